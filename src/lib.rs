@@ -1,0 +1,4 @@
+//! darkqa-eval
+
+pub mod error;
+pub mod types;

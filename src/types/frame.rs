@@ -1,0 +1,107 @@
+//! What is seen: [`Frame`], [`FrameId`], [`Rgb`].
+
+use std::fmt;
+
+use ndarray::{Array2, Array3, ArrayView3};
+use serde::{Deserialize, Serialize};
+
+use crate::error::Error;
+
+/// The name of a frame, unique in its data set: `scene/frame`, or the path of an image in a ready-made set.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct FrameId(pub String);
+
+impl fmt::Display for FrameId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(&self.0)
+    }
+}
+
+/// An 8-bit sRGB image, height × width × 3, contiguous, at least one pixel.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Rgb(Array3<u8>);
+
+impl Rgb {
+    /// Takes height × width × 3 samples, row by row, red first.
+    ///
+    /// # Errors
+    /// Where the number of samples is not `height * width * 3`, or is zero.
+    pub fn new(height: usize, width: usize, samples: Vec<u8>) -> Result<Self, Error> {
+        let found = samples.len();
+        let expected = height
+            .checked_mul(width)
+            .and_then(|n| n.checked_mul(3))
+            .filter(|n| *n > 0 && *n == found);
+        let array = expected.and_then(|_| Array3::from_shape_vec((height, width, 3), samples).ok());
+        array.map(Self).ok_or_else(|| {
+            Error::data(
+                "image",
+                format_args!("{found} samples are no {height} × {width} RGB image"),
+            )
+        })
+    }
+
+    /// The height in pixels.
+    #[must_use]
+    pub fn height(&self) -> usize {
+        self.0.dim().0
+    }
+
+    /// The width in pixels.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        self.0.dim().1
+    }
+
+    /// The samples, row by row, red first.
+    #[must_use]
+    pub fn samples(&self) -> &[u8] {
+        self.0.as_slice().unwrap_or_default()
+    }
+
+    /// The samples, to be changed in place.
+    #[must_use]
+    pub fn samples_mut(&mut self) -> &mut [u8] {
+        self.0.as_slice_mut().unwrap_or_default()
+    }
+
+    /// The image as an array, height × width × 3.
+    #[must_use]
+    pub fn view(&self) -> ArrayView3<'_, u8> {
+        self.0.view()
+    }
+}
+
+impl fmt::Debug for Rgb {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Rgb({} × {})", self.height(), self.width())
+    }
+}
+
+/// One view of a scene: an image and, where the data set has them, its maps of the same height and width.
+#[derive(Debug, Clone)]
+pub struct Frame {
+    /// Its name.
+    pub id: FrameId,
+    /// The image.
+    pub rgb: Rgb,
+    /// Depth in millimetres, 0 where there is none.
+    pub depth: Option<Array2<u32>>,
+    /// The class of each pixel, an id of the data set's own classes.
+    pub semantic: Option<Array2<u16>>,
+    /// The segment of each pixel, 0 where there is none.
+    pub segments: Option<Array2<u32>>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn images_are_checked() {
+        assert!(Rgb::new(2, 2, vec![0; 12]).is_ok());
+        for (height, width, samples) in [(2, 2, 11), (0, 2, 0), (usize::MAX, 2, 12), (2, 2, 13)] {
+            assert!(Rgb::new(height, width, vec![0; samples]).is_err());
+        }
+    }
+}

@@ -1,0 +1,250 @@
+//! What is asked: [`Question`], its [`Choices`], and what was understood of a reply, [`Answer`].
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use super::frame::FrameId;
+use crate::error::Error;
+
+/// The name of a question, unique in its data set.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct QuestionId(pub String);
+
+impl fmt::Display for QuestionId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(&self.0)
+    }
+}
+
+/// What kind of question it is: the paper's five families, or a category of a ready-made set.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Family {
+    /// "What type of room is this?"
+    RoomType,
+    /// "I want to sleep, is this room suitable for this?"
+    Affordance,
+    /// "Is there a cushion in the image?"
+    Presence,
+    /// "What color is the sofa in the image?"
+    Color,
+    /// "Which object is closest to the camera?"
+    Closest,
+    /// A category of somebody else's set, in its own words.
+    Other(String),
+}
+
+impl Family {
+    /// The paper's five families.
+    pub const PAPER: [Self; 5] = [
+        Self::RoomType,
+        Self::Affordance,
+        Self::Presence,
+        Self::Color,
+        Self::Closest,
+    ];
+
+    /// The name in files and tables: `room_type`, `affordance`, `presence`, `color`, `closest`, or the set's own.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        match self {
+            Self::RoomType => "room_type",
+            Self::Affordance => "affordance",
+            Self::Presence => "presence",
+            Self::Color => "color",
+            Self::Closest => "closest",
+            Self::Other(name) => name,
+        }
+    }
+}
+
+impl From<&str> for Family {
+    fn from(name: &str) -> Self {
+        Self::PAPER
+            .into_iter()
+            .find(|family| family.name() == name)
+            .unwrap_or_else(|| Self::Other(name.to_owned()))
+    }
+}
+
+impl fmt::Display for Family {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl Serialize for Family {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
+impl<'de> Deserialize<'de> for Family {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Ok(Self::from(String::deserialize(deserializer)?.as_str()))
+    }
+}
+
+/// The answers a question offers, in the order shown, and which of them is true.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Choices {
+    texts: Vec<String>,
+    truth: usize,
+}
+
+impl Choices {
+    /// How many choices there can be: one letter each.
+    pub const MOST: usize = 26;
+
+    /// Checks a list of choices: 2 to 26, none empty, no two alike (letter case and outer space aside), the true one
+    /// among them.
+    ///
+    /// # Errors
+    /// [`Error::Data`] with what is wrong; its place is `choices`.
+    pub fn new(texts: Vec<String>, truth: usize) -> Result<Self, Error> {
+        let wrong = |problem: String| Err(Error::data("choices", problem));
+        if !(2..=Self::MOST).contains(&texts.len()) {
+            return wrong(format!(
+                "{} choices: a question needs 2 to {}",
+                texts.len(),
+                Self::MOST
+            ));
+        }
+        if truth >= texts.len() {
+            return wrong(format!(
+                "the answer is choice {} of {}",
+                truth + 1,
+                texts.len()
+            ));
+        }
+        let folded: Vec<String> = texts
+            .iter()
+            .map(|text| text.trim().to_lowercase())
+            .collect();
+        for (i, text) in folded.iter().enumerate() {
+            if text.is_empty() {
+                return wrong(format!("choice {} is empty", letter(i)));
+            }
+            if let Some(j) = folded[..i].iter().position(|earlier| earlier == text) {
+                return wrong(format!(
+                    "choices {} and {} are both {:?}",
+                    letter(j),
+                    letter(i),
+                    texts[i]
+                ));
+            }
+        }
+        Ok(Self { texts, truth })
+    }
+
+    /// The choices in the order shown.
+    #[must_use]
+    pub fn texts(&self) -> &[String] {
+        &self.texts
+    }
+
+    /// The index of the true choice.
+    #[must_use]
+    pub fn truth(&self) -> usize {
+        self.truth
+    }
+
+    /// How many there are, at least 2.
+    #[must_use]
+    #[expect(clippy::len_without_is_empty, reason = "there are always two")]
+    pub fn len(&self) -> usize {
+        self.texts.len()
+    }
+}
+
+/// The letter of the choice at an index: 0 is `A`.
+#[must_use]
+pub fn letter(index: usize) -> char {
+    char::from(b'A' + (index % Choices::MOST) as u8)
+}
+
+/// One multiple-choice question about one frame.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Question {
+    /// Its name.
+    pub id: QuestionId,
+    /// The frame it is about.
+    pub frame: FrameId,
+    /// Its kind.
+    pub family: Family,
+    /// The question in words, without the choices.
+    pub text: String,
+    /// The answers offered.
+    pub choices: Choices,
+    /// What the generator saw that makes the answer true; `Null` for questions that came without.
+    pub evidence: serde_json::Value,
+}
+
+/// What was understood of a reply.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Answer {
+    /// One choice, by its index.
+    Chosen(usize),
+    /// No choice; never guessed.
+    Unparsed(Why),
+}
+
+/// Why no choice could be read from a reply.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Why {
+    /// Nothing was said.
+    Empty,
+    /// The model declined.
+    Refused,
+    /// The reply was cut at the token limit before an answer.
+    Truncated,
+    /// A content filter withheld it.
+    Filtered,
+    /// More than one choice was named.
+    Ambiguous,
+    /// A letter beyond the choices.
+    OutOfRange,
+    /// The letter of one choice with the text of another.
+    Contradiction,
+    /// The only choice named was denied.
+    Negated,
+    /// No choice was named in the form that this reading accepts.
+    NoChoice,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn texts(texts: &[&str]) -> Vec<String> {
+        texts.iter().map(|&text| text.to_owned()).collect()
+    }
+
+    #[test]
+    fn choices_are_checked() {
+        assert!(Choices::new(texts(&["yes", "no"]), 1).is_ok());
+        for (list, truth) in [
+            (vec!["yes"], 0),
+            (vec!["yes", "no"], 2),
+            (vec!["yes", " Yes "], 0),
+            (vec!["yes", ""], 0),
+            (vec!["x"; 27], 0),
+        ] {
+            assert!(
+                Choices::new(texts(&list), truth).is_err(),
+                "{list:?} {truth}"
+            );
+        }
+    }
+
+    #[test]
+    fn families_read_back() {
+        for family in Family::PAPER
+            .into_iter()
+            .chain([Family::Other("OCR".into())])
+        {
+            assert_eq!(Family::from(family.name()), family);
+        }
+    }
+}
