@@ -1,4 +1,5 @@
 //! darkqa-eval
 
+pub mod enhance;
 pub mod error;
 pub mod types;

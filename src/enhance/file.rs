@@ -1,0 +1,167 @@
+//! An enhancement model as it lies on disk: [`ModelFile`].
+
+use std::path::{Component, Path, PathBuf};
+
+use crate::error::{Error, Result};
+use crate::types::{Digest, EnhancerName};
+
+use super::sidecar::{self, Sidecar};
+use super::weights::Weights;
+
+/// An ONNX file with its sidecar, read and checked as far as that goes without ONNX Runtime.
+#[derive(Debug)]
+pub struct ModelFile {
+    pub(super) path: PathBuf,
+    pub(super) name: EnhancerName,
+    pub(super) digest: Digest,
+    pub(super) bytes: Vec<u8>,
+    pub(super) weights: Weights,
+    pub(super) sidecar: Sidecar,
+}
+
+impl ModelFile {
+    /// Reads a model, its sidecar `MODEL.onnx.toml` where there is one, and the files that hold its external data.
+    ///
+    /// # Errors
+    /// Where a file cannot be read, the model is no ONNX model, its name is no [`EnhancerName`], or the sidecar has an
+    /// unknown key.
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).map_err(|e| Error::file(path, "read", e))?;
+        let weights = Weights::find(&bytes).map_err(|_| not_onnx(path, &bytes))?;
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let name = EnhancerName::new(&stem)?;
+        let text = sidecar::text_for(path)?;
+        Ok(Self {
+            path: path.to_owned(),
+            name,
+            digest: digest(path, &bytes, &text, &weights)?,
+            sidecar: Sidecar::parse(path, &text)?,
+            bytes,
+            weights,
+        })
+    }
+
+    /// The name in tables and records: the file's name without its extension.
+    #[must_use]
+    pub fn name(&self) -> &EnhancerName {
+        &self.name
+    }
+
+    /// The digest of everything the user gave: the model, its sidecar and its external data.
+    #[must_use]
+    pub fn digest(&self) -> Digest {
+        self.digest
+    }
+}
+
+/// The digest of a model's content, its sidecar's text and its external data; each file is hashed alone, so that only one
+/// is in memory at a time.
+fn digest(path: &Path, bytes: &[u8], sidecar: &str, weights: &Weights) -> Result<Digest> {
+    let mut digests = vec![Digest::of(bytes), Digest::of(sidecar.as_bytes())];
+    for location in &weights.external {
+        let file = external_path(path, location)?;
+        let content = std::fs::read(&file).map_err(|e| Error::file(file, "read", e))?;
+        digests.extend([Digest::of(location.as_bytes()), Digest::of(&content)]);
+    }
+    Ok(Digest::of_parts(
+        digests.iter().map(|d| d.as_bytes().as_slice()),
+    ))
+}
+
+/// The path of a file with external data, which must lie in the model's folder or below (ONNX Runtime refuses others too).
+fn external_path(model: &Path, location: &str) -> Result<PathBuf> {
+    let relative = Path::new(location);
+    let inside = relative
+        .components()
+        .all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+    if !inside || location.is_empty() {
+        return Err(Error::Enhancer {
+            path: model.to_owned(),
+            problem: format!(
+                "its weights are said to lie in {location:?}, outside of its folder; put them beside it and export it again"
+            ),
+        });
+    }
+    Ok(model.with_file_name("").join(relative))
+}
+
+fn not_onnx(path: &Path, bytes: &[u8]) -> Error {
+    let problem = if bytes.starts_with(b"version https://git-lfs") {
+        "is a Git LFS pointer and no model; fetch the model itself with `git lfs pull`"
+    } else {
+        "is no ONNX model; a PyTorch or TensorFlow model is to be exported to ONNX first"
+    };
+    Error::Enhancer {
+        path: path.to_owned(),
+        problem: problem.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `ir_version = 8` and a graph that is empty but for one initialiser, with external data in `location`.
+    fn model(location: &str) -> Vec<u8> {
+        let field = |number: u8, content: &[u8]| {
+            [&[number << 3 | 2, content.len() as u8], content].concat()
+        };
+        let entry = [field(1, b"location"), field(2, location.as_bytes())].concat();
+        let tensor = [&[16, 1, 14 << 3, 1], field(13, &entry).as_slice()].concat();
+        [&[8, 8], field(7, &field(5, &tensor)).as_slice()].concat()
+    }
+
+    #[test]
+    fn the_digest_changes_with_every_part() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, content: &[u8]| {
+            std::fs::write(folder.path().join(name), content).unwrap();
+        };
+        let digest = || {
+            ModelFile::read(&folder.path().join("a.onnx"))
+                .unwrap()
+                .digest()
+        };
+        write("a.onnx", &model("a.bin"));
+        write("a.bin", &[1]);
+        let first = digest();
+        assert_eq!(first, digest());
+        write("a.bin", &[2]);
+        let second = digest();
+        write("a.onnx.toml", b"output = 0");
+        let third = digest();
+        write("a.onnx", &model("./a.bin"));
+        let all = [first, second, third, digest()];
+        for (i, one) in all.iter().enumerate() {
+            assert!(!all[..i].contains(one), "{i}");
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_used_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let cases: [(&str, &[u8], &str); 5] = [
+            ("text.onnx", b"not a model", "is no ONNX model"),
+            (
+                "lfs.onnx",
+                b"version https://git-lfs.github.com/spec/v1\n",
+                "git lfs pull",
+            ),
+            ("out.onnx", &model("../secret"), "outside of its folder"),
+            ("gone.onnx", &model("gone.bin"), "gone.bin: cannot read"),
+            ("a b.onnx", &model("x"), "rename the file"),
+        ];
+        for (name, content, part) in cases {
+            let path = folder.path().join(name);
+            std::fs::write(&path, content).unwrap();
+            let message = ModelFile::read(&path).unwrap_err().to_string();
+            assert!(message.contains(part), "{message}");
+        }
+        let missing = ModelFile::read(Path::new("missing.onnx")).unwrap_err();
+        assert!(
+            missing
+                .to_string()
+                .starts_with("missing.onnx: cannot read: ")
+        );
+    }
+}

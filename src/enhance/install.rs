@@ -1,0 +1,302 @@
+//! The installation of ONNX Runtime's library out of its PyPI wheel into the user's cache: [`install`].
+
+use std::env::consts;
+use std::fs::{self, File};
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use sha2::{Digest as _, Sha256};
+use zip::ZipArchive;
+
+use super::library::PINNED;
+
+/// The library of one platform in the wheel of version [`PINNED`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Pin {
+    os: &'static str,
+    arch: &'static str,
+    /// The wheel's platform tag.
+    tag: &'static str,
+    /// The library's file name, in `onnxruntime/capi/` of the wheel.
+    file: &'static str,
+    /// The SHA-256 of the library, which is the same file in the wheels for every version of Python.
+    sha256: &'static str,
+}
+
+/// The wheels of `onnxruntime==1.31.1` on PyPI.
+const PINS: [Pin; 4] = [
+    Pin {
+        os: "linux",
+        arch: "x86_64",
+        tag: "manylinux_2_28_x86_64",
+        file: "libonnxruntime.so.1.31.1",
+        sha256: "fc44112fbe06d7d689c57e11d3862031f64711007e4ee020f8eed5185fd2c1d3",
+    },
+    Pin {
+        os: "linux",
+        arch: "aarch64",
+        tag: "manylinux_2_28_aarch64",
+        file: "libonnxruntime.so.1.31.1",
+        sha256: "8aa3b76b28c778a2b1dd660d34161adb1d508c9ccd04ff9dc80e26eca5df8467",
+    },
+    Pin {
+        os: "macos",
+        arch: "aarch64",
+        tag: "macosx_14_0_arm64",
+        file: "libonnxruntime.1.31.1.dylib",
+        sha256: "d586cbe89effc085a09d3341b3cfbd5c322517f9d397aeb20814af21433f2b36",
+    },
+    Pin {
+        os: "windows",
+        arch: "x86_64",
+        tag: "win_amd64",
+        file: "onnxruntime.dll",
+        sha256: "e45f61e50d8650885452be538a00bb14a715e46a1bc3691000ce947e89ed0306",
+    },
+];
+
+impl Pin {
+    /// The pin of the platform that this program was built for; `None` where no wheel is known to fit.
+    pub(super) fn of_this_platform() -> Option<Self> {
+        // The wheels need the GNU C library.
+        if cfg!(target_env = "musl") {
+            return None;
+        }
+        Self::of(consts::OS, consts::ARCH)
+    }
+
+    fn of(os: &str, arch: &str) -> Option<Self> {
+        PINS.into_iter()
+            .find(|pin| pin.os == os && pin.arch == arch)
+    }
+}
+
+/// The ways to call pip, in the order in which they are tried.
+const PIPS: [&[&str]; 4] = [
+    &["python3", "-m", "pip"],
+    &["pip3"],
+    &["pip"],
+    &["python", "-m", "pip"],
+];
+
+/// Downloads the pinned wheel with pip, takes the library out of it, checks it and puts it into `folder`.
+///
+/// Everything happens in a folder of its own beside `folder`, and the library is moved into place whole: two processes that
+/// install at once do not disturb each other, and one that is interrupted leaves nothing that could be loaded.
+///
+/// # Errors
+/// A sentence that says what failed.
+pub(super) fn install(pin: Pin, folder: &Path) -> Result<PathBuf, String> {
+    let workshop = Workshop::beside(folder)?;
+    download(pin, &workshop.0)?;
+    let wheel = wheel_in(&workshop.0)?;
+    let unpacked = workshop.0.join(pin.file);
+    unpack(&wheel, pin, &unpacked)?;
+    let place = folder.join(pin.file);
+    fs::create_dir_all(folder).map_err(|e| at(folder, "cannot be created", &e))?;
+    match fs::rename(&unpacked, &place) {
+        // Windows does not replace a library that another process has loaded: that one is as good.
+        Err(_) if place.is_file() => Ok(place),
+        Err(error) => Err(at(&place, "cannot be written", &error)),
+        Ok(()) => Ok(place),
+    }
+}
+
+/// A folder for the time of an installation.
+struct Workshop(PathBuf);
+
+impl Workshop {
+    fn beside(folder: &Path) -> Result<Self, String> {
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let count = COUNT.fetch_add(1, Ordering::Relaxed);
+        let name = format!("installing-{}-{count}", std::process::id());
+        let path = folder.with_file_name(name);
+        // What a process of the same number left behind when it was interrupted.
+        drop(fs::remove_dir_all(&path));
+        fs::create_dir_all(&path).map_err(|e| at(&path, "cannot be created", &e))?;
+        Ok(Self(path))
+    }
+}
+
+impl Drop for Workshop {
+    fn drop(&mut self) {
+        if let Err(error) = fs::remove_dir_all(&self.0) {
+            tracing::debug!("{}: cannot be removed: {error}", self.0.display());
+        }
+    }
+}
+
+/// Lets the first pip that there is download the wheel into `folder`.
+fn download(pin: Pin, folder: &Path) -> Result<(), String> {
+    for pip in PIPS {
+        let output = command(pip, pin, folder).output();
+        match output {
+            Ok(output) if output.status.success() => return Ok(()),
+            Ok(output) if !is_missing(&output) => {
+                return Err(format!(
+                    "`{}` failed: {}",
+                    pip.join(" "),
+                    last_line(&output)
+                ));
+            }
+            // No such program, or a Python without pip: the next one.
+            Ok(_) | Err(_) => {}
+        }
+    }
+    Err("there is no pip on PATH".to_owned())
+}
+
+/// The command that downloads the wheel, whatever version of Python runs pip.
+fn command(pip: &[&str], pin: Pin, folder: &Path) -> Command {
+    let mut command = Command::new(pip[0]);
+    command
+        .args(&pip[1..])
+        .args(["download", "--no-deps", "--only-binary=:all:"])
+        .args(["--implementation", "cp", "--python-version", "3.12"])
+        .args(["--abi", "cp312", "--platform", pin.tag])
+        .args(["--disable-pip-version-check", "--no-input", "--dest"])
+        .arg(folder)
+        .arg(format!("onnxruntime=={PINNED}"))
+        .stdin(Stdio::null());
+    command
+}
+
+/// Whether a Python said that it has no pip.
+fn is_missing(output: &Output) -> bool {
+    // 127 is a shim (pyenv, asdf) that stands for a program that is not there.
+    output.status.code() == Some(127)
+        || String::from_utf8_lossy(&output.stderr).contains("No module named pip")
+}
+
+/// The last line that says something.
+fn last_line(output: &Output) -> String {
+    let text = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes));
+    let mut lines = text.iter().flat_map(|text| text.lines());
+    let last = lines.rfind(|line| !line.trim().is_empty());
+    last.map_or_else(|| output.status.to_string(), |line| line.trim().to_owned())
+}
+
+fn wheel_in(folder: &Path) -> Result<PathBuf, String> {
+    let entries = fs::read_dir(folder).map_err(|e| at(folder, "cannot be read", &e))?;
+    let mut paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
+    paths
+        .find(|path| path.extension().is_some_and(|extension| extension == "whl"))
+        .ok_or_else(|| "pip downloaded no wheel".to_owned())
+}
+
+/// Takes the library out of a wheel into `target`, if it is the pinned one.
+fn unpack(wheel: &Path, pin: Pin, target: &Path) -> Result<(), String> {
+    let broken = |e: &dyn std::error::Error| format!("{}: {e}", wheel.display());
+    let file = File::open(wheel).map_err(|e| broken(&e))?;
+    let mut archive = ZipArchive::new(file).map_err(|e| broken(&e))?;
+    let mut library = archive
+        .by_name(&format!("onnxruntime/capi/{}", pin.file))
+        .map_err(|e| broken(&e))?;
+    let mut hasher = Sha256::new();
+    copy(&mut library, target, &mut hasher).map_err(|e| at(target, "cannot be written", &e))?;
+    let found = hex(&hasher.finalize());
+    if found == pin.sha256 {
+        return Ok(());
+    }
+    Err(format!(
+        "{} in the wheel that pip downloaded has the SHA-256 {found} in place of {}; it was not installed. Look at pip's index and find-links settings (`pip config list`)",
+        pin.file, pin.sha256
+    ))
+}
+
+/// Writes what `source` gives into a file and into the hasher.
+fn copy(source: &mut impl Read, target: &Path, hasher: &mut Sha256) -> io::Result<()> {
+    let mut file = File::create(target)?;
+    let mut buffer = vec![0; 1 << 16];
+    loop {
+        let length = source.read(&mut buffer)?;
+        if length == 0 {
+            return file.sync_all();
+        }
+        hasher.update(&buffer[..length]);
+        file.write_all(&buffer[..length])?;
+    }
+}
+
+fn hex(bytes: &[u8]) -> String {
+    let digits = bytes.iter().flat_map(|byte| [byte >> 4, byte & 15]);
+    digits
+        .filter_map(|digit| char::from_digit(digit.into(), 16))
+        .collect()
+}
+
+fn at(path: &Path, what: &str, error: &io::Error) -> String {
+    format!("{} {what}: {error}", path.display())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use zip::write::SimpleFileOptions;
+
+    /// Writes a wheel with `content` for a library; returns the pin that it would satisfy.
+    fn wheel(path: &Path, name: &str, content: &[u8]) -> Pin {
+        let mut writer = zip::ZipWriter::new(File::create(path).unwrap());
+        let options = SimpleFileOptions::default();
+        writer
+            .start_file(format!("onnxruntime/capi/{name}"), options)
+            .unwrap();
+        writer.write_all(content).unwrap();
+        writer.finish().unwrap();
+        let sha256 = hex(&Sha256::digest(content)).leak();
+        Pin { sha256, ..PINS[0] }
+    }
+
+    #[test]
+    fn the_pins_are_well_formed() {
+        for pin in PINS {
+            assert_eq!(pin.sha256.len(), 64);
+            assert!(super::super::library::is_library_name(pin.os, pin.file));
+            assert!(pin.os == "windows" || pin.file.contains(PINNED));
+            assert_eq!(Pin::of(pin.os, pin.arch), Some(pin));
+        }
+        assert_eq!(Pin::of("linux", "riscv64"), None);
+    }
+
+    #[test]
+    fn only_the_pinned_library_is_unpacked() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.whl");
+        let target = folder.path().join("library");
+        let pin = wheel(&path, PINS[0].file, &[7; 100_000]);
+        assert_eq!(unpack(&path, pin, &target), Ok(()));
+        assert_eq!(fs::read(&target).unwrap(), [7; 100_000]);
+        let problem = unpack(&path, PINS[0], &target).unwrap_err();
+        assert!(problem.contains("it was not installed"), "{problem}");
+        wheel(&path, "other.so", &[7]);
+        assert!(unpack(&path, pin, &target).is_err());
+        fs::write(&path, "not a zip").unwrap();
+        assert!(unpack(&path, pin, &target).is_err());
+    }
+
+    #[test]
+    fn a_workshop_is_swept_when_it_is_left() {
+        let folder = tempfile::tempdir().unwrap();
+        let workshop = Workshop::beside(&folder.path().join("1.31.1")).unwrap();
+        let path = workshop.0.clone();
+        fs::write(path.join("wheel"), "").unwrap();
+        assert_eq!(path.parent(), Some(folder.path()));
+        drop(workshop);
+        assert!(!path.exists());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn the_last_line_of_pip_is_told() {
+        let output = |script| Command::new("sh").args(["-c", script]).output().unwrap();
+        let failed = output("echo Looking; echo 'ERROR: none found' >&2; echo >&2; exit 1");
+        assert_eq!(last_line(&failed), "ERROR: none found");
+        assert!(!is_missing(&failed));
+        assert_eq!(last_line(&output("exit 3")), "exit status: 3");
+        assert!(is_missing(&output(
+            "echo \"$0: No module named pip\" >&2; exit 1"
+        )));
+    }
+}

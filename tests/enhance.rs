@@ -1,0 +1,258 @@
+//! Stage 3 through its own door: models made by hand, on the ONNX Runtime that is found or installed.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod support;
+
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+
+use darkqa_eval::enhance::{Enhancer, Install, ModelFile, Runtime, RuntimeSearch};
+use darkqa_eval::types::Rgb;
+use support::onnx::{self, Graph};
+use tempfile::TempDir;
+
+fn runtime() -> Runtime {
+    let search = RuntimeSearch {
+        library: std::env::var_os("ORT_DYLIB_PATH").map(PathBuf::from),
+        install: Install::Allowed,
+    };
+    search.open().unwrap()
+}
+
+fn open(path: &Path) -> darkqa_eval::error::Result<Enhancer> {
+    Enhancer::open(path, &runtime(), NonZeroUsize::new(1))
+}
+
+/// A model in a folder of its own, loaded.
+fn loaded(graph: &Graph) -> (TempDir, Enhancer) {
+    let folder = tempfile::tempdir().unwrap();
+    let enhancer = open(&graph.write(folder.path(), "model.onnx")).unwrap();
+    (folder, enhancer)
+}
+
+/// What is wrong with a model.
+fn fault(graph: &Graph) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let path = graph.write(folder.path(), "model.onnx");
+    let message = open(&path).err().unwrap().to_string();
+    assert!(
+        message.starts_with(&path.display().to_string()),
+        "{message}"
+    );
+    message
+}
+
+/// An image with all 256 bytes in it, where it is large enough.
+fn image(height: usize, width: usize) -> Rgb {
+    let samples = (0..height * width * 3).map(|i| (i * 37 % 256) as u8);
+    Rgb::new(height, width, samples.collect()).unwrap()
+}
+
+/// An image with a function on each byte.
+fn map(image: &Rgb, with: impl Fn(f64) -> f64) -> Rgb {
+    let samples = image
+        .samples()
+        .iter()
+        .map(|byte| (with(f64::from(*byte) / 255.0).clamp(0.0, 1.0) * 255.0).round() as u8);
+    Rgb::new(image.height(), image.width(), samples.collect()).unwrap()
+}
+
+#[test]
+fn an_identity_gives_every_byte_back_at_any_size() {
+    let (_folder, mut enhancer) = loaded(&onnx::identity());
+    for (height, width) in [(16, 16), (7, 31), (1, 1), (16, 16)] {
+        let image = image(height, width);
+        assert_eq!(enhancer.enhance(&image).unwrap(), image);
+    }
+}
+
+#[test]
+fn gain_and_gamma_are_computed_and_held_in_range() {
+    let image = image(12, 20);
+    let (_folder, mut gain) = loaded(&onnx::gain(2.2));
+    assert_eq!(gain.enhance(&image).unwrap(), map(&image, |x| 2.2 * x));
+    let (_folder, mut gamma) = loaded(&onnx::gamma(0.45));
+    assert_eq!(
+        gamma.enhance(&image).unwrap(),
+        map(&image, |x| x.powf(0.45))
+    );
+}
+
+#[test]
+fn of_zero_dces_three_outputs_the_second_is_the_image() {
+    let image = image(8, 8);
+    for names in [
+        ["enhance_image_1", "enhance_image", "r"],
+        ["101", "102", "103"],
+    ] {
+        let (_folder, mut enhancer) = loaded(&onnx::three_outputs(names));
+        assert_eq!(enhancer.enhance(&image).unwrap(), map(&image, |x| 2.0 * x));
+    }
+}
+
+#[test]
+fn a_sidecar_says_which_output_it_is() {
+    let graph = onnx::two_outputs();
+    assert!(fault(&graph).contains("several outputs"));
+    let folder = tempfile::tempdir().unwrap();
+    let path = graph.write(folder.path(), "model.onnx");
+    let sidecar = folder.path().join("model.onnx.toml");
+    let image = image(8, 8);
+    for text in ["output = 1", "output = \"18\""] {
+        std::fs::write(&sidecar, text).unwrap();
+        let mended = open(&path).unwrap().enhance(&image).unwrap();
+        assert_eq!(mended, map(&image, |x| 2.0 * x));
+    }
+    std::fs::write(&sidecar, "layout_in = \"nhwc\"").unwrap();
+    let message = open(&path).err().unwrap().to_string();
+    assert!(message.contains("layout_in"), "{message}");
+}
+
+#[test]
+fn a_model_of_a_fixed_size_is_fed_and_read_by_resizing() {
+    let (_folder, mut enhancer) = loaded(&onnx::fixed(16, 24));
+    let same = image(16, 24);
+    assert_eq!(enhancer.enhance(&same).unwrap(), same);
+    let flat = Rgb::new(30, 17, [9, 120, 250].repeat(30 * 17)).unwrap();
+    assert_eq!(enhancer.enhance(&flat).unwrap(), flat);
+}
+
+#[test]
+fn subnormal_weights_count_as_zero() {
+    let image = image(4, 4);
+    // 1e-39 · 1e38 = 0.1, if the weight is not flushed.
+    let (_folder, mut subnormal) = loaded(&onnx::weight(1e-39));
+    assert_eq!(subnormal.enhance(&image).unwrap(), image);
+    let (_folder, mut normal) = loaded(&onnx::weight(2e-38));
+    assert_eq!(normal.enhance(&image).unwrap(), map(&image, |x| x + 2.0));
+}
+
+#[test]
+fn external_data_is_loaded_from_beside_the_model() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("gain.bin"), 2.0_f32.to_le_bytes()).unwrap();
+    let path = onnx::external_gain("gain.bin").write(folder.path(), "model.onnx");
+    let image = image(8, 8);
+    let mended = open(&path).unwrap().enhance(&image).unwrap();
+    assert_eq!(mended, map(&image, |x| 2.0 * x));
+}
+
+#[test]
+fn other_conventions_are_refused_by_name() {
+    for (graph, part) in [
+        (onnx::wrong_rank(), "no NCHW image"),
+        (onnx::bytes_channels_last(), "u8"),
+        (onnx::no_image(), "no output that is an image"),
+        (onnx::two_inputs(), "2 inputs"),
+    ] {
+        let message = fault(&graph).to_lowercase();
+        assert!(message.contains(&part.to_lowercase()), "{message}");
+    }
+}
+
+#[test]
+fn what_goes_wrong_while_running_is_an_error() {
+    let (_folder, mut halved) = loaded(&onnx::halved());
+    let message = halved.enhance(&image(8, 8)).unwrap_err().to_string();
+    assert!(message.contains("[1, 3, 4, 4]"), "{message}");
+    let (_folder, mut broken) = loaded(&onnx::not_a_number());
+    let message = broken.enhance(&image(8, 8)).unwrap_err().to_string();
+    assert!(message.contains("not numbers"), "{message}");
+    // An image without a black pixel divides well, on the same session.
+    let gray = Rgb::new(2, 2, vec![100; 12]).unwrap();
+    assert_eq!(broken.enhance(&gray).unwrap().samples(), [255; 12]);
+}
+
+#[test]
+fn a_graph_that_the_runtime_refuses_is_an_error() {
+    let graph = Graph::new().node("NoSuchOperator", &["input"], "output");
+    assert!(fault(&graph).contains("NoSuchOperator"));
+    let mut bytes = onnx::gain(2.0).model();
+    bytes.truncate(bytes.len() / 2);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cut.onnx");
+    std::fs::write(&path, bytes).unwrap();
+    assert!(open(&path).is_err());
+}
+
+#[test]
+fn name_and_digest_are_those_of_the_file() {
+    let (folder, enhancer) = loaded(&onnx::identity());
+    let file = ModelFile::read(&folder.path().join("model.onnx")).unwrap();
+    assert_eq!(enhancer.name().as_str(), "model");
+    assert_eq!(enhancer.name(), file.name());
+    assert_eq!(enhancer.digest(), file.digest());
+}
+
+#[test]
+fn threads_and_enhancers_do_not_disturb_each_other() {
+    let image = image(9, 14);
+    std::thread::scope(|scope| {
+        for factor in [1.0_f32, 2.0, 3.0, 4.0] {
+            let image = &image;
+            scope.spawn(move || {
+                let (_folder, mut enhancer) = loaded(&onnx::gain(factor));
+                for _ in 0..5 {
+                    let mended = enhancer.enhance(image).unwrap();
+                    assert_eq!(mended, map(image, |x| f64::from(factor) * x));
+                }
+            });
+        }
+    });
+}
+
+#[test]
+fn the_runtime_is_opened_once() {
+    let first = runtime();
+    assert_eq!(first.path(), runtime().path());
+    assert!(first.version().starts_with("1."));
+    let folder = tempfile::tempdir().unwrap();
+    let other = RuntimeSearch {
+        library: Some(folder.path().join("other.so")),
+        install: Install::Offline,
+    };
+    let message = other.open().err().unwrap().to_string();
+    assert!(message.contains("this process has loaded"), "{message}");
+}
+
+fn shipped() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("models/gray-gain.onnx")
+}
+
+/// `DARKQA_BLESS=1 cargo test --test enhance` writes the file anew.
+#[test]
+fn the_shipped_enhancer_is_what_the_writer_makes() {
+    let made = onnx::gray_gain().model();
+    if std::env::var_os("DARKQA_BLESS").is_some_and(|value| value == "1") {
+        std::fs::write(shipped(), &made).unwrap();
+    }
+    assert!(
+        std::fs::read(shipped()).unwrap() == made,
+        "models/gray-gain.onnx differs; write it anew with DARKQA_BLESS=1"
+    );
+}
+
+#[test]
+fn the_shipped_enhancer_exposes_for_gray() {
+    let mut enhancer = open(&shipped()).unwrap();
+    let light = |byte: f64| {
+        let x = byte / 255.0;
+        if x < 0.04045 {
+            x / 12.92
+        } else {
+            ((x + 0.055) / 1.055_f64).powf(2.4)
+        }
+    };
+    let mean = |image: &Rgb| {
+        let sum: f64 = image.samples().iter().map(|b| light(f64::from(*b))).sum();
+        sum / image.samples().len() as f64
+    };
+    // Six stops below middle gray.
+    let dark = Rgb::new(6, 8, (0..144).map(|i| 5 + (i % 9) as u8).collect()).unwrap();
+    assert!((mean(&enhancer.enhance(&dark).unwrap()) - 0.18).abs() < 0.004);
+    // A bright image is not darkened, and a black one is not lifted.
+    for byte in [0, 200] {
+        let flat = Rgb::new(6, 8, vec![byte; 144]).unwrap();
+        assert_eq!(enhancer.enhance(&flat).unwrap(), flat);
+    }
+}

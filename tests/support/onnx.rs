@@ -1,0 +1,393 @@
+//! ONNX files made by hand: a writer of as much protobuf as a `ModelProto` needs, and the models of the tests.
+//!
+//! Field numbers are those of `onnx/onnx.proto`.
+
+use std::path::{Path, PathBuf};
+
+/// One protobuf message that is being written.
+#[derive(Default, Clone)]
+struct Message(Vec<u8>);
+
+impl Message {
+    fn varint(&mut self, mut value: u64) {
+        while value > 127 {
+            self.0.push(value as u8 | 0x80);
+            value >>= 7;
+        }
+        self.0.push(value as u8);
+    }
+
+    fn int(mut self, field: u64, value: u64) -> Self {
+        self.varint(field << 3);
+        self.varint(value);
+        self
+    }
+
+    fn bytes(mut self, field: u64, value: &[u8]) -> Self {
+        self.varint(field << 3 | 2);
+        self.varint(value.len() as u64);
+        self.0.extend_from_slice(value);
+        self
+    }
+
+    fn message(self, field: u64, value: &Self) -> Self {
+        self.bytes(field, &value.0)
+    }
+}
+
+/// A size in a shape.
+#[derive(Clone, Copy)]
+pub enum Size {
+    Known(u64),
+    Named(&'static str),
+}
+
+use Size::{Known, Named};
+
+/// `TensorProto.DataType`
+#[derive(Clone, Copy)]
+pub enum Type {
+    Float = 1,
+    Byte = 2,
+}
+
+/// The value of an attribute of an operator.
+pub enum Attribute {
+    Int(u64),
+    Ints(&'static [u64]),
+}
+
+/// 1 × channels × height × width of any size.
+fn image(channels: u64) -> [Size; 4] {
+    [Known(1), Known(channels), Named("height"), Named("width")]
+}
+
+/// A model that is being made.
+pub struct Graph {
+    nodes: Vec<Message>,
+    constants: Vec<Message>,
+    inputs: Vec<Message>,
+    outputs: Vec<Message>,
+}
+
+impl Graph {
+    fn empty() -> Self {
+        Self {
+            nodes: Vec::new(),
+            constants: Vec::new(),
+            inputs: Vec::new(),
+            outputs: Vec::new(),
+        }
+    }
+
+    /// A graph with the input `input`, an image of any size.
+    pub fn new() -> Self {
+        Self::empty().input("input", Type::Float, &image(3))
+    }
+
+    fn port(name: &str, element: Type, shape: &[Size]) -> Message {
+        let dims = shape
+            .iter()
+            .fold(Message::default(), |dims, size| match size {
+                Known(size) => dims.message(1, &Message::default().int(1, *size)),
+                Named(name) => dims.message(1, &Message::default().bytes(2, name.as_bytes())),
+            });
+        let tensor = Message::default().int(1, element as u64).message(2, &dims);
+        Message::default()
+            .bytes(1, name.as_bytes())
+            .message(2, &Message::default().message(1, &tensor))
+    }
+
+    pub fn input(mut self, name: &str, element: Type, shape: &[Size]) -> Self {
+        self.inputs.push(Self::port(name, element, shape));
+        self
+    }
+
+    pub fn output(mut self, name: &str, element: Type, shape: &[Size]) -> Self {
+        self.outputs.push(Self::port(name, element, shape));
+        self
+    }
+
+    /// A float initialiser.
+    pub fn constant(mut self, name: &str, shape: &[u64], values: &[f32]) -> Self {
+        let dims = shape
+            .iter()
+            .fold(Message::default(), |tensor, size| tensor.int(1, *size));
+        let raw: Vec<u8> = values.iter().flat_map(|x| x.to_le_bytes()).collect();
+        let tensor = dims.int(2, 1).bytes(8, name.as_bytes()).bytes(9, &raw);
+        self.constants.push(tensor);
+        self
+    }
+
+    /// A float initialiser whose values lie in another file.
+    pub fn external(mut self, name: &str, shape: &[u64], file: &str) -> Self {
+        let dims = shape
+            .iter()
+            .fold(Message::default(), |tensor, size| tensor.int(1, *size));
+        let entry = Message::default()
+            .bytes(1, b"location")
+            .bytes(2, file.as_bytes());
+        let tensor = dims
+            .int(2, 1)
+            .bytes(8, name.as_bytes())
+            .message(13, &entry)
+            .int(14, 1);
+        self.constants.push(tensor);
+        self
+    }
+
+    /// An operator without attributes.
+    pub fn node(self, operator: &str, inputs: &[&str], output: &str) -> Self {
+        self.node_with(operator, inputs, output, &[])
+    }
+
+    /// An operator with attributes.
+    pub fn node_with(
+        mut self,
+        operator: &str,
+        inputs: &[&str],
+        output: &str,
+        attributes: &[(&str, Attribute)],
+    ) -> Self {
+        let node = inputs.iter().fold(Message::default(), |node, name| {
+            node.bytes(1, name.as_bytes())
+        });
+        let node = node
+            .bytes(2, output.as_bytes())
+            .bytes(4, operator.as_bytes());
+        let node = attributes.iter().fold(node, |node, (name, value)| {
+            let attribute = Message::default().bytes(1, name.as_bytes());
+            let attribute = match value {
+                Attribute::Int(value) => attribute.int(3, *value).int(20, 2),
+                Attribute::Ints(values) => {
+                    let listed = values.iter().fold(attribute, |a, value| a.int(8, *value));
+                    listed.int(20, 7)
+                }
+            };
+            node.message(5, &attribute)
+        });
+        self.nodes.push(node);
+        self
+    }
+
+    /// The bytes of an ONNX file: IR version 8, operator set 13.
+    pub fn model(&self) -> Vec<u8> {
+        let graph = Message::default();
+        let graph = self.nodes.iter().fold(graph, |g, node| g.message(1, node));
+        let graph = graph.bytes(2, b"graph");
+        let graph = self.constants.iter().fold(graph, |g, c| g.message(5, c));
+        let graph = self
+            .inputs
+            .iter()
+            .fold(graph, |g, port| g.message(11, port));
+        let graph = self
+            .outputs
+            .iter()
+            .fold(graph, |g, port| g.message(12, port));
+        let opset = Message::default().bytes(1, b"").int(2, 13);
+        let model = Message::default().int(1, 8).bytes(2, b"darkqa-eval");
+        model.message(7, &graph).message(8, &opset).0
+    }
+
+    /// Writes the model into a folder.
+    pub fn write(&self, folder: &Path, name: &str) -> PathBuf {
+        let path = folder.join(name);
+        std::fs::write(&path, self.model()).unwrap();
+        path
+    }
+
+    /// The model with the output `output`, an image of any size.
+    fn giving_image(self) -> Self {
+        self.output("output", Type::Float, &image(3))
+    }
+}
+
+/// The image as it is.
+pub fn identity() -> Graph {
+    Graph::new()
+        .node("Identity", &["input"], "output")
+        .giving_image()
+}
+
+/// Every sample times a number.
+pub fn gain(factor: f32) -> Graph {
+    Graph::new()
+        .constant("factor", &[], &[factor])
+        .node("Mul", &["input", "factor"], "output")
+        .giving_image()
+}
+
+/// Every sample to a power.
+pub fn gamma(exponent: f32) -> Graph {
+    Graph::new()
+        .constant("exponent", &[], &[exponent])
+        .node("Pow", &["input", "exponent"], "output")
+        .giving_image()
+}
+
+/// A model with the outputs of Zero-DCE: a wrong image (black), the image doubled, and 24 channels.
+pub fn three_outputs(names: [&str; 3]) -> Graph {
+    Graph::new()
+        .constant("zero", &[], &[0.0])
+        .node("Mul", &["input", "zero"], names[0])
+        .node("Add", &["input", "input"], names[1])
+        .node_with(
+            "Concat",
+            &["input"; 8],
+            names[2],
+            &[("axis", Attribute::Int(1))],
+        )
+        .output(names[0], Type::Float, &image(3))
+        .output(names[1], Type::Float, &image(3))
+        .output(names[2], Type::Float, &image(24))
+}
+
+/// Two images under names that say nothing: black, and the image doubled.
+pub fn two_outputs() -> Graph {
+    Graph::new()
+        .constant("zero", &[], &[0.0])
+        .node("Mul", &["input", "zero"], "17")
+        .node("Add", &["input", "input"], "18")
+        .output("17", Type::Float, &image(3))
+        .output("18", Type::Float, &image(3))
+}
+
+/// The image as it is, of one size only.
+pub fn fixed(height: u64, width: u64) -> Graph {
+    let shape = [Known(1), Known(3), Known(height), Known(width)];
+    Graph::empty()
+        .input("input", Type::Float, &shape)
+        .node("Identity", &["input"], "output")
+        .output("output", Type::Float, &shape)
+}
+
+/// Channels first without a batch: rank 3.
+pub fn wrong_rank() -> Graph {
+    let shape = [Known(3), Named("height"), Named("width")];
+    Graph::empty()
+        .input("input", Type::Float, &shape)
+        .node("Identity", &["input"], "output")
+        .output("output", Type::Float, &shape)
+}
+
+/// Bytes with the channels last.
+pub fn bytes_channels_last() -> Graph {
+    let shape = [Known(1), Named("height"), Named("width"), Known(3)];
+    Graph::empty()
+        .input("input", Type::Byte, &shape)
+        .node("Identity", &["input"], "output")
+        .output("output", Type::Byte, &shape)
+}
+
+/// A model with a single output, of the eight-fold channels.
+pub fn no_image() -> Graph {
+    Graph::new()
+        .node_with(
+            "Concat",
+            &["input"; 8],
+            "curves",
+            &[("axis", Attribute::Int(1))],
+        )
+        .output("curves", Type::Float, &image(24))
+}
+
+/// A second input beside the image.
+pub fn two_inputs() -> Graph {
+    Graph::new()
+        .input("exposure", Type::Float, &[Known(1)])
+        .node("Mul", &["input", "exposure"], "output")
+        .giving_image()
+}
+
+/// Half of the image, under a shape that does not say so.
+pub fn halved() -> Graph {
+    let shape = [
+        Known(1),
+        Known(3),
+        Named("half_height"),
+        Named("half_width"),
+    ];
+    Graph::new()
+        .node_with(
+            "MaxPool",
+            &["input"],
+            "output",
+            &[
+                ("kernel_shape", Attribute::Ints(&[2, 2])),
+                ("strides", Attribute::Ints(&[2, 2])),
+            ],
+        )
+        .output("output", Type::Float, &shape)
+}
+
+/// 0/0 wherever the image is black.
+pub fn not_a_number() -> Graph {
+    Graph::new()
+        .node("Div", &["input", "input"], "output")
+        .giving_image()
+}
+
+/// The image and a weight of the given value, added `1e38` times over: nothing, where the weight counts as zero.
+pub fn weight(value: f32) -> Graph {
+    Graph::new()
+        .constant("weight", &[1, 3, 1, 1], &[value; 3])
+        .constant("huge", &[], &[1e38])
+        .node("Mul", &["weight", "huge"], "large")
+        .node("Add", &["input", "large"], "output")
+        .giving_image()
+}
+
+/// The gain lies in another file: four bytes, a little-endian float.
+pub fn external_gain(file: &str) -> Graph {
+    Graph::new()
+        .external("factor", &[1, 1, 1, 1], file)
+        .node("Mul", &["input", "factor"], "output")
+        .giving_image()
+}
+
+/// Automatic exposure in linear light, the enhancer in `models/gray-gain.onnx`; `models/README.md` says what it computes.
+pub fn gray_gain() -> Graph {
+    // IEC 61966-2-1, both ways
+    let decode = Graph::new()
+        .constant("slope", &[], &[12.92])
+        .constant("offset", &[], &[0.055])
+        .constant("scale", &[], &[1.055])
+        .constant("power", &[], &[2.4])
+        .constant("knee", &[], &[0.04045])
+        .node("Div", &["input", "slope"], "toe")
+        .node("Add", &["input", "offset"], "raised")
+        .node("Div", &["raised", "scale"], "scaled")
+        .node("Pow", &["scaled", "power"], "shoulder")
+        .node("Less", &["input", "knee"], "in_toe")
+        .node("Where", &["in_toe", "toe", "shoulder"], "light");
+    let expose = decode
+        .constant("gray", &[], &[0.18])
+        .constant("black", &[], &[1e-6])
+        .constant("one", &[], &[1.0])
+        .constant("cap", &[], &[512.0])
+        .node_with(
+            "ReduceMean",
+            &["light"],
+            "mean",
+            &[("axes", Attribute::Ints(&[1, 2, 3]))],
+        )
+        .node("Max", &["mean", "black"], "mean_above_black")
+        .node("Div", &["gray", "mean_above_black"], "wanted")
+        .node("Clip", &["wanted", "one", "cap"], "gain")
+        .node("Mul", &["light", "gain"], "bright")
+        .node("Min", &["bright", "one"], "exposed");
+    expose
+        .constant("root", &[], &[1.0 / 2.4])
+        .constant("linear_knee", &[], &[0.0031308])
+        .node("Mul", &["exposed", "slope"], "encoded_toe")
+        .node("Pow", &["exposed", "root"], "rooted")
+        .node("Mul", &["rooted", "scale"], "stretched")
+        .node("Sub", &["stretched", "offset"], "encoded_shoulder")
+        .node("Less", &["exposed", "linear_knee"], "in_encoded_toe")
+        .node(
+            "Where",
+            &["in_encoded_toe", "encoded_toe", "encoded_shoulder"],
+            "enhanced",
+        )
+        .output("enhanced", Type::Float, &image(3))
+}
