@@ -12,6 +12,7 @@ use support::onnx::{self, Graph};
 use tempfile::TempDir;
 
 fn runtime() -> Runtime {
+    support::forbid_telemetry();
     let search = RuntimeSearch {
         library: std::env::var_os("ORT_DYLIB_PATH").map(PathBuf::from),
         install: Install::Allowed,
@@ -199,6 +200,14 @@ fn threads_and_enhancers_do_not_disturb_each_other() {
             });
         }
     });
+}
+
+#[test]
+fn the_callers_arithmetic_keeps_its_subnormal_numbers() {
+    let (_folder, mut enhancer) = loaded(&onnx::identity());
+    enhancer.enhance(&image(4, 4)).unwrap();
+    let half = std::hint::black_box(f32::MIN_POSITIVE) / std::hint::black_box(2.0);
+    assert!(half.is_subnormal());
 }
 
 #[test]

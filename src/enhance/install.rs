@@ -232,6 +232,7 @@ fn at(path: &Path, what: &str, error: &io::Error) -> String {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
     use zip::write::SimpleFileOptions;
@@ -265,9 +266,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.whl");
         let target = folder.path().join("library");
-        let pin = wheel(&path, PINS[0].file, &[7; 100_000]);
+        let content = vec![7; 100_000];
+        let pin = wheel(&path, PINS[0].file, &content);
         assert_eq!(unpack(&path, pin, &target), Ok(()));
-        assert_eq!(fs::read(&target).unwrap(), [7; 100_000]);
+        assert_eq!(fs::read(&target).unwrap(), content);
         let problem = unpack(&path, PINS[0], &target).unwrap_err();
         assert!(problem.contains("it was not installed"), "{problem}");
         wheel(&path, "other.so", &[7]);

@@ -1,5 +1,6 @@
 //! A file that may be ONNX Runtime's library, and whether it is: [`probe`].
 
+use std::error::Error as _;
 use std::ffi::CStr;
 use std::path::Path;
 
@@ -62,7 +63,13 @@ fn minor(version: &str) -> Option<u32> {
 fn version_of(path: &Path) -> Result<String, String> {
     // SAFETY: loading runs the library's initialisers. The file bears ONNX Runtime's name or was named by the user, who
     // asks for it to be loaded; ONNX Runtime's initialisers have no preconditions.
-    let library = unsafe { Library::new(path) }.map_err(|e| format!("cannot be loaded: {e}"))?;
+    let library = unsafe { Library::new(path) }.map_err(|e| {
+        // The loader's own words are in the source; the error itself says only that it failed.
+        let reason = e
+            .source()
+            .map_or_else(|| e.to_string(), ToString::to_string);
+        format!("cannot be loaded: {reason}")
+    })?;
     // SAFETY: a symbol of this name has had this type, `const OrtApiBase* OrtGetApiBase(void)`, in every release of
     // ONNX Runtime's C API since 1.0; it takes nothing and may be called at any time.
     let base = unsafe {
@@ -94,6 +101,7 @@ fn version_of(path: &Path) -> Result<String, String> {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
 

@@ -24,4 +24,4 @@ mod weights;
 
 pub use file::ModelFile;
 pub use onnx::Enhancer;
-pub use runtime::{Install, Runtime, RuntimeSearch};
+pub use runtime::{Install, Runtime, RuntimeSearch, forbid_telemetry};

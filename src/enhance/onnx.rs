@@ -133,8 +133,12 @@ impl Enhancer {
             let mut loaded = loaded.lock().unwrap_or_else(PoisonError::into_inner);
             loaded.run(input, &output)
         })?;
-        let Output { dims, samples } = result
-            .map_err(|e| self.fault(format!("failed on an image of {width} × {height}: {e}")))?;
+        let Output { dims, samples } = result.map_err(|e| {
+            self.fault(format!(
+                "failed on an image of {width} × {height} (a model for multiples of a certain size has to pad inside its graph): {}",
+                e.message().trim()
+            ))
+        })?;
         let sizes: Vec<Option<usize>> = dims.iter().map(|&dim| usize::try_from(dim).ok()).collect();
         if sizes != [Some(1), Some(3), Some(height), Some(width)] {
             return Err(self.fault(format!(

@@ -1,6 +1,10 @@
 //! ONNX Runtime's library, found or installed, and open: [`RuntimeSearch::open`], [`Runtime`].
 //!
 //! A process has one ONNX Runtime, so the first one that is opened is every later one's too.
+//!
+//! Released builds send telemetry to Microsoft unless they are told not to. The C API can say so only after the library
+//! has reported the start of the process and left an identifier in the user's cache folder (seen with 1.31.1 on Linux);
+//! the environment variable [`TELEMETRY_SWITCH`] comes before that. A program calls [`forbid_telemetry`] first of all.
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Sender, channel};
@@ -45,6 +49,22 @@ struct Open {
 }
 
 type Job = Box<dyn FnOnce() + Send>;
+
+/// The environment variable that keeps ONNX Runtime's telemetry off from the start, where it is `1`.
+pub const TELEMETRY_SWITCH: &str = "ORT_DISABLE_TELEMETRY";
+
+/// Sets [`TELEMETRY_SWITCH`] for this process, so that ONNX Runtime sends nothing and leaves no identifier behind.
+///
+/// # Safety
+/// No other thread of the process may be running: the environment is not to be changed while C code may read it.
+#[expect(
+    unsafe_code,
+    reason = "ONNX Runtime can be told in no other way before it starts"
+)]
+pub unsafe fn forbid_telemetry() {
+    // SAFETY: the caller vouches that there is no other thread that could read the environment meanwhile.
+    unsafe { std::env::set_var(TELEMETRY_SWITCH, "1") };
+}
 
 /// The runtime of this process, once it is open.
 static OPEN: Mutex<Option<Runtime>> = Mutex::new(None);
@@ -156,6 +176,11 @@ impl Runtime {
     /// Loads a library that was probed, and starts its thread.
     fn start(path: PathBuf, version: String) -> Result<Self> {
         let fault = |e: &dyn std::error::Error| Error::Runtime(format!("{}: {e}", path.display()));
+        if std::env::var_os(TELEMETRY_SWITCH).is_none_or(|value| value != "1") {
+            tracing::warn!(
+                "ONNX Runtime may report its use to Microsoft; {TELEMETRY_SWITCH}=1 in the environment forbids that"
+            );
+        }
         // What it has to say of errors comes back as errors too; the rest is for those who look for it.
         let logger = Arc::new(|level, _: &str, _: &str, place: &str, message: &str| {
             if matches!(level, LogLevel::Warning | LogLevel::Error | LogLevel::Fatal) {
@@ -224,6 +249,7 @@ fn start_thread() -> std::io::Result<Sender<Job>> {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
 

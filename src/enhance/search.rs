@@ -176,6 +176,7 @@ fn system_folders() -> Vec<PathBuf> {
 }
 
 #[cfg(all(test, unix, not(target_os = "macos")))]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
 
@@ -201,7 +202,9 @@ mod tests {
         ]
         .map(at)
         .to_vec();
-        expected.iter().for_each(|path| touch(path));
+        for path in &expected {
+            touch(path);
+        }
         touch(&at("system/libonnxruntime_providers_shared.so"));
         touch(&at("usr/bin/python3"));
         let surroundings = Surroundings {
@@ -221,7 +224,9 @@ mod tests {
         let root = root.path().canonicalize().unwrap();
         let capi = "lib/python3.12/site-packages/onnxruntime/capi/libonnxruntime.so.1.31.1";
         let expected = [root.join("venv").join(capi), root.join("base").join(capi)];
-        expected.iter().for_each(|path| touch(path));
+        for path in &expected {
+            touch(path);
+        }
         touch(&root.join("base/bin/python3.12"));
         std::fs::create_dir_all(root.join("venv/bin")).unwrap();
         std::os::unix::fs::symlink(

@@ -116,16 +116,7 @@ impl Signature {
         let (height, width) = image_input(inputs)?;
         let fits = |port: &Port| can_be_image(port, height, width);
         let output = match stated {
-            Some(choice) => {
-                let port = find_stated(outputs, choice)?;
-                let port = port.filter(|port| fits(port)).ok_or_else(|| {
-                    format!(
-                        "its sidecar says {choice}, which is none of its image outputs; it has {}",
-                        list(outputs)
-                    )
-                })?;
-                &port.name
-            }
+            Some(choice) => stated_output(outputs, choice, fits)?,
             None => choose_output(outputs, fits)?,
         };
         Ok(Self {
@@ -187,17 +178,25 @@ fn can_be_image(port: &Port, input_height: &Dim, input_width: &Dim) -> bool {
     shape && port.element == Element::Float32
 }
 
-fn find_stated<'a>(outputs: &'a [Port], choice: &OutputChoice) -> Result<Option<&'a Port>, String> {
+/// The output that the sidecar names, where it can be the image.
+fn stated_output<'a>(
+    outputs: &'a [Port],
+    choice: &OutputChoice,
+    fits: impl Fn(&Port) -> bool,
+) -> Result<&'a String, String> {
     let found = match choice {
         OutputChoice::Index(index) => outputs.get(*index),
         OutputChoice::Name(name) => outputs.iter().find(|port| port.name == *name),
     };
-    found.map(Some).ok_or_else(|| {
-        format!(
-            "its sidecar says {choice}, which it does not have; it has {}",
-            list(outputs)
-        )
-    })
+    let problem = match found {
+        Some(port) if fits(port) => return Ok(&port.name),
+        Some(_) => "which is none of its image outputs",
+        None => "which it does not have",
+    };
+    Err(format!(
+        "its sidecar says {choice}, {problem}; it has {}",
+        list(outputs)
+    ))
 }
 
 /// The image among the outputs: the only one, else the one that names and structure agree on.
@@ -218,7 +217,7 @@ fn choose_output(outputs: &[Port], fits: impl Fn(&Port) -> bool) -> Result<&Stri
     };
     index.map(|i| &outputs[i].name).ok_or_else(|| {
         format!(
-            "has several outputs that could be the image: {}; say which in a file of the model's name with .toml after it: `output = \"NAME\"` or `output = INDEX`, counted from 0",
+            "has several outputs that could be the image: {}; say which in MODEL.onnx.toml beside it: `output = \"NAME\"` or `output = INDEX`, counted from 0",
             list(outputs)
         )
     })
@@ -270,6 +269,7 @@ fn list(ports: &[Port]) -> String {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
 
@@ -378,11 +378,17 @@ mod tests {
     #[test]
     fn fixed_sizes_are_read_and_have_to_agree() {
         let fixed = port("in", &[1, 3, 96, 128]);
-        let signature =
-            Signature::of(&[fixed.clone()], &[port("out", &[0, 0, 96, 0])], None).unwrap();
+        let signature = Signature::of(
+            std::slice::from_ref(&fixed),
+            &[port("out", &[0, 0, 96, 0])],
+            None,
+        )
+        .unwrap();
         assert_eq!((signature.height, signature.width), (Some(96), Some(128)));
         for dims in [[1, 3, 48, 64], [1, 3, 0, 64]] {
-            assert!(Signature::of(&[fixed.clone()], &[port("out", &dims)], None).is_err());
+            assert!(
+                Signature::of(std::slice::from_ref(&fixed), &[port("out", &dims)], None).is_err()
+            );
         }
     }
 

@@ -1,6 +1,7 @@
 //! What the integration tests share. Every test program compiles all of it and uses a part.
 #![allow(
     dead_code,
+    unreachable_pub,
     reason = "each integration test is a program of its own and uses a part of what is shared"
 )]
 #![allow(
@@ -9,3 +10,12 @@
 )]
 
 pub mod onnx;
+
+/// Keeps the ONNX Runtime of this test program from reporting anything; to be called before it is opened.
+#[expect(unsafe_code, reason = "the environment is how ONNX Runtime is told")]
+pub fn forbid_telemetry() {
+    static ONCE: std::sync::Once = std::sync::Once::new();
+    // SAFETY: the tests read the environment through the standard library, which locks it; ONNX Runtime, which does not,
+    // is opened after this call alone, by every thread that opens it.
+    ONCE.call_once(|| unsafe { darkqa_eval::enhance::forbid_telemetry() });
+}
