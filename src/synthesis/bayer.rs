@@ -85,7 +85,11 @@ impl Bayer {
         } else {
             row + 1
         });
-        let fill = if row % 2 == 0 { red_pair } else { blue_pair };
+        let fill = if row.is_multiple_of(2) {
+            red_pair
+        } else {
+            blue_pair
+        };
         for (i, pair) in pixels.chunks_mut(2).enumerate() {
             let even = 2 * i;
             let odd = even + 1;
@@ -181,7 +185,7 @@ mod tests {
         let found = demosaic(&filled(height, width, value));
         let clamp = |at: isize, size: usize| {
             let parity = at.rem_euclid(2);
-            (at.clamp(parity, size as isize - 2 + parity)) as usize
+            (at.clamp(parity, size.cast_signed() - 2 + parity)) as usize
         };
         let channel = |row: isize, column: isize| match Plane::at(row as usize, column as usize) {
             Plane::R => 0,
@@ -195,7 +199,7 @@ mod tests {
                 for (colour, sum) in sums.iter_mut().enumerate() {
                     for distance in 0..=2isize {
                         for (down, right) in (-1..=1).flat_map(|d| (-1..=1).map(move |r| (d, r))) {
-                            let [y, x] = [row as isize + down, column as isize + right];
+                            let [y, x] = [row.cast_signed() + down, column.cast_signed() + right];
                             let parity = [y.rem_euclid(2), x.rem_euclid(2)];
                             if down * down + right * right == distance
                                 && channel(parity[0], parity[1]) == colour

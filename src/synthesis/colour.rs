@@ -118,14 +118,24 @@ mod tests {
         }
     }
 
+    /// The figures of an independent implementation.
     #[test]
-    fn only_the_proportion_of_the_weights_counts() {
-        let (one, seven) = (
-            rgb_to_camera([1.0, 2.0, 3.0, 4.0]),
-            rgb_to_camera([7.0, 14.0, 21.0, 28.0]),
-        );
-        for (a, b) in one.iter().flatten().zip(seven.iter().flatten()) {
-            assert!((a - b).abs() < 1e-15);
+    fn mixes_are_those_of_the_cameras() {
+        let mean = [
+            [0.6460054538, 0.2714313899, 0.0825631563],
+            [0.0825578502, 0.7557543488, 0.161687801],
+            [0.0145444844, 0.2250190894, 0.7604364262],
+        ];
+        let uneven = [
+            [0.6218507358, 0.2552155048, 0.1229337595],
+            [0.0815851812, 0.7259717238, 0.192443095],
+            [0.0112382471, 0.2211703924, 0.7675913605],
+        ];
+        for (weights, due) in [([3.0; 4], mean), ([1.0, 2.0, 3.0, 4.0], uneven)] {
+            let found = rgb_to_camera(weights);
+            for (found, due) in found.iter().flatten().zip(due.iter().flatten()) {
+                assert!((found - due).abs() < 1e-9, "{found} against {due}");
+            }
         }
     }
 }
