@@ -2,4 +2,5 @@
 
 pub mod enhance;
 pub mod error;
+pub mod synthesis;
 pub mod types;

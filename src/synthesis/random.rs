@@ -1,0 +1,260 @@
+//! Where every random number of the synthesis comes from: [`NoiseKey`], [`Stream`], [`Site`].
+//!
+//! A draw is a pure function of (seed, frame, component, sensor row, sensor column, number of the draw): there is no
+//! state that threads or order could change. The generator is Philox2x64-10 (Salmon et al., "Parallel random numbers:
+//! as easy as 1, 2, 3", SC 2011), which passes BigCrush on plain counters; its key is taken from a BLAKE3 digest.
+
+use std::f64::consts::PI;
+
+use crate::types::{Digest, FrameId};
+
+/// What a frame's noise is drawn from: the run's seed and the frame's name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NoiseKey(Digest);
+
+impl NoiseKey {
+    /// The key of a frame under a seed.
+    #[must_use]
+    pub fn new(seed: u64, frame: &FrameId) -> Self {
+        let parts: [&[u8]; 3] = [
+            b"darkqa-eval noise",
+            &seed.to_le_bytes(),
+            frame.0.as_bytes(),
+        ];
+        Self(Digest::of_parts(parts))
+    }
+
+    /// The numbers of one component, unrelated to those of every other.
+    #[must_use]
+    pub fn stream(&self, component: Component) -> Stream {
+        let digest = Digest::of_parts([self.0.as_bytes(), component.name().as_bytes()]);
+        let mut word = [0; 8];
+        word.copy_from_slice(&digest.as_bytes()[..8]);
+        Stream(u64::from_le_bytes(word))
+    }
+}
+
+/// What a number is drawn for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Component {
+    /// The state of the camera.
+    Camera,
+    /// Photon shot noise.
+    Shot,
+    /// Read noise.
+    Read,
+    /// Row noise.
+    Row,
+    /// Quantisation noise.
+    Quantisation,
+}
+
+impl Component {
+    /// The name that enters the key: a component may be added or moved without changing the draws of the others.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Camera => "camera",
+            Self::Shot => "shot",
+            Self::Read => "read",
+            Self::Row => "row",
+            Self::Quantisation => "quantisation",
+        }
+    }
+}
+
+/// A place on the sensor. Row and column name the Bayer plane and the place in it, and are named by them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Site(u64);
+
+impl Site {
+    /// The site at a sensor row and column, each below 2^32.
+    #[must_use]
+    pub fn new(row: usize, column: usize) -> Self {
+        debug_assert!(row >> 32 == 0 && column >> 32 == 0);
+        Self(((row as u64) << 32) | column as u64)
+    }
+}
+
+/// The random numbers of one component of one frame, addressed by site and by the number of the draw there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Stream(u64);
+
+impl Stream {
+    /// Two words of 64 random bits.
+    #[must_use]
+    pub fn words(self, site: Site, draw: u64) -> [u64; 2] {
+        philox([site.0, draw], self.0)
+    }
+
+    /// Two independent numbers, uniform in the open interval (0, 1).
+    #[must_use]
+    pub fn uniforms(self, site: Site, draw: u64) -> [f64; 2] {
+        self.words(site, draw).map(open_unit)
+    }
+
+    /// A number uniform in the open interval (0, 1): the first draw at a site.
+    #[must_use]
+    pub fn uniform(self, site: Site) -> f64 {
+        self.uniforms(site, 0)[0]
+    }
+
+    /// A standard normal number (Box and Muller 1958).
+    #[must_use]
+    pub fn normal(self, site: Site, draw: u64) -> f64 {
+        let [radius, angle] = self.uniforms(site, draw);
+        (-2.0 * libm::log(radius)).sqrt() * libm::cos(2.0 * PI * angle)
+    }
+}
+
+/// Maps a word to the middle of one of 2^52 equal cells of (0, 1).
+///
+/// With 52 bits both u and 1 − u are exact; with 53, half a cell less than 1 would round to 1, where the quantile
+/// functions are infinite.
+fn open_unit(word: u64) -> f64 {
+    const CELL: f64 = 1.0 / (1u64 << 52) as f64;
+    ((word >> 12) as f64 + 0.5) * CELL
+}
+
+/// The block function Philox2x64 with ten rounds.
+fn philox([mut left, mut right]: [u64; 2], mut key: u64) -> [u64; 2] {
+    const MULTIPLIER: u64 = 0xD2B7_4407_B1CE_6E93;
+    const WEYL: u64 = 0x9E37_79B9_7F4A_7C15;
+    for _ in 0..10 {
+        let product = u128::from(left) * u128::from(MULTIPLIER);
+        left = (product >> 64) as u64 ^ key ^ right;
+        right = product as u64;
+        key = key.wrapping_add(WEYL);
+    }
+    [left, right]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn key(seed: u64, frame: &str) -> NoiseKey {
+        NoiseKey::new(seed, &FrameId(frame.to_owned()))
+    }
+
+    /// The known answers that come with Random123, the authors' own library.
+    #[test]
+    fn philox_gives_the_known_answers() {
+        let cases = [
+            ([0, 0], 0, [0xca00a0459843d731, 0x66c24222c9a845b5]),
+            (
+                [u64::MAX; 2],
+                u64::MAX,
+                [0x65b021d60cd8310f, 0x4d02f3222f86df20],
+            ),
+            (
+                [0x243f6a8885a308d3, 0x13198a2e03707344],
+                0xa4093822299f31d0,
+                [0x0a5e742c2997341c, 0xb0f883d38000de5d],
+            ),
+        ];
+        for (counter, key, answer) in cases {
+            assert_eq!(philox(counter, key), answer);
+        }
+    }
+
+    #[test]
+    fn the_unit_interval_is_open_and_symmetric() {
+        let (low, high) = (open_unit(0), open_unit(u64::MAX));
+        assert!(low > 0.0 && high < 1.0);
+        assert_eq!(low.to_bits(), (1.0 - high).to_bits());
+    }
+
+    #[test]
+    fn seed_frame_and_component_each_name_another_stream() {
+        let first = key(7, "a").stream(Component::Shot);
+        assert_eq!(first, key(7, "a").stream(Component::Shot));
+        assert_ne!(first, key(8, "a").stream(Component::Shot));
+        assert_ne!(first, key(7, "b").stream(Component::Shot));
+        assert_ne!(first, key(7, "a").stream(Component::Read));
+    }
+
+    /// Every bit of both words is even-handed over neighbouring sites, and flips half the bits of the next site,
+    /// row or draw (5 sigma).
+    #[test]
+    fn bits_are_even_and_neighbours_unrelated() {
+        let stream = key(1, "frame").stream(Component::Read);
+        let (rows, columns) = (256, 512);
+        let mut ones = [[0u32; 64]; 2];
+        let mut flips = [0u64; 4];
+        for row in 0..rows {
+            for column in 0..columns {
+                let words = stream.words(Site::new(row, column), 0);
+                for (counts, word) in ones.iter_mut().zip(words) {
+                    for (bit, count) in counts.iter_mut().enumerate() {
+                        *count += (word >> bit & 1) as u32;
+                    }
+                }
+                let others = [
+                    stream.words(Site::new(row, column + 1), 0)[0],
+                    stream.words(Site::new(row + 1, column), 0)[0],
+                    stream.words(Site::new(row, column), 1)[0],
+                    words[1],
+                ];
+                for (count, other) in flips.iter_mut().zip(others) {
+                    *count += u64::from((words[0] ^ other).count_ones());
+                }
+            }
+        }
+        let n = (rows * columns) as f64;
+        for count in ones.iter().flatten() {
+            assert!((f64::from(*count) - n / 2.0).abs() < 5.0 * (n / 4.0).sqrt());
+        }
+        for count in flips {
+            let bits = 64.0 * n;
+            assert!((count as f64 - bits / 2.0).abs() < 5.0 * (bits / 4.0).sqrt());
+        }
+    }
+
+    /// χ² over 64 × 64 cells of a number and its right neighbour's: uniform, and independent.
+    #[test]
+    fn pairs_of_neighbours_fill_the_square_evenly() {
+        const CELLS: usize = 64;
+        let stream = key(2, "frame").stream(Component::Quantisation);
+        let mut cells = vec![0u32; CELLS * CELLS];
+        let n = 400_000;
+        for i in 0..n {
+            let (row, column) = (i / 1000, i % 1000);
+            let at = |column| (stream.uniform(Site::new(row, column)) * CELLS as f64) as usize;
+            cells[at(2 * column) * CELLS + at(2 * column + 1)] += 1;
+        }
+        let expected = f64::from(n as u32) / cells.len() as f64;
+        let chi: f64 = cells
+            .iter()
+            .map(|c| (f64::from(*c) - expected).powi(2) / expected)
+            .sum();
+        let freedom = (cells.len() - 1) as f64;
+        assert!(
+            (chi - freedom).abs() < 5.0 * (2.0 * freedom).sqrt(),
+            "{chi}"
+        );
+    }
+
+    #[test]
+    fn normal_numbers_have_the_normal_moments() {
+        let stream = key(3, "frame").stream(Component::Row);
+        let n = 400_000;
+        let mut moments = [0.0; 4];
+        for i in 0..n {
+            let z = stream.normal(Site::new(i, 0), 0);
+            let mut power = 1.0;
+            for moment in &mut moments {
+                power *= z;
+                *moment += power / n as f64;
+            }
+        }
+        // The variances of the four sample moments are 1, 2, 15 and 96 over n.
+        for (moment, (mean, variance)) in
+            moments
+                .iter()
+                .zip([(0.0, 1.0), (1.0, 2.0), (0.0, 15.0), (3.0, 96.0)])
+        {
+            let bound = 5.0 * f64::sqrt(variance / n as f64);
+            assert!((moment - mean).abs() < bound, "{moment} against {mean}");
+        }
+    }
+}

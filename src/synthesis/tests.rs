@@ -1,0 +1,227 @@
+//! The whole pipeline: its figures, and that nothing but its arguments decides a pixel.
+
+use super::camera::tests::median;
+use super::noise::Term;
+use super::*;
+use crate::types::{DarkLevel, Digest, FrameId};
+
+fn key(seed: u64, frame: &str) -> NoiseKey {
+    NoiseKey::new(seed, &FrameId(frame.to_owned()))
+}
+
+fn flat(code: u8, size: usize) -> Rgb {
+    Rgb::new(size, size, vec![code; size * size * 3]).unwrap()
+}
+
+/// Red rises along a row, green along a column, blue falls along the diagonal.
+fn ramps(height: usize, width: usize) -> Rgb {
+    let code = |at: usize, size: usize| (at * 255 / size.max(2)) as u8;
+    let samples = (0..height * width).flat_map(|i| {
+        let (row, column) = (i / width, i % width);
+        let diagonal = 255 - code(row + column, height + width);
+        [code(column, width), code(row, height), diagonal]
+    });
+    Rgb::new(height, width, samples.collect()).unwrap()
+}
+
+/// Mean and standard deviation of each channel.
+fn statistics(image: &Rgb) -> [[f64; 2]; 3] {
+    let n = (image.height() * image.width()) as f64;
+    std::array::from_fn(|channel| {
+        let codes = || {
+            let samples = image.samples().iter().skip(channel).step_by(3);
+            samples.map(|code| f64::from(*code))
+        };
+        let mean = codes().sum::<f64>() / n;
+        let variance = codes().map(|code| (code - mean).powi(2)).sum::<f64>() / n;
+        [mean, variance.sqrt()]
+    })
+}
+
+#[test]
+fn the_untouched_level_is_untouched() {
+    let clean = ramps(5, 7);
+    let same = degrade(
+        &clean,
+        Degradation::None,
+        &key(1, "a"),
+        &CameraModel::default(),
+    );
+    assert_eq!(same, clean);
+}
+
+#[test]
+fn one_negative_gives_what_the_door_gives() {
+    let (clean, key, camera) = (ramps(10, 14), key(1, "a"), CameraModel::default());
+    let negative = Negative::new(&clean, &key, &camera);
+    for level in DarkLevel::ALL {
+        let alone = degrade(&clean, Degradation::Sensor(level), &key, &camera);
+        assert_eq!(alone, negative.develop(level));
+        let exposed = degrade(&clean, Degradation::Exposure(level), &key, &camera);
+        assert_eq!(exposed, expose(&clean, level));
+    }
+}
+
+/// A change of these bytes is a change of every result: it must raise [`VERSION`].
+#[test]
+fn bytes_are_those_of_this_version() {
+    let clean = ramps(48, 63);
+    let mut bytes = Vec::new();
+    for level in DarkLevel::ALL {
+        bytes.extend_from_slice(expose(&clean, level).samples());
+    }
+    let exposure = Digest::of(&bytes).to_string();
+    bytes.clear();
+    for frame in ["first", "second", "third", "fourth"] {
+        let negative = Negative::new(&clean, &key(20, frame), &CameraModel::default());
+        for level in DarkLevel::ALL {
+            bytes.extend_from_slice(negative.develop(level).samples());
+        }
+    }
+    let sensor = Digest::of(&bytes).to_string();
+    assert_eq!(VERSION, 1);
+    assert_eq!(
+        exposure,
+        "ef493dc91ffe0b7f1558f10c2c581c4419340505a34a969706ef98b04cf79a9e"
+    );
+    assert_eq!(
+        sensor,
+        "cfa20a8d1527aa01a838dd333009b1f334996faf9da2a6a15e677f03805bdc52"
+    );
+}
+
+#[test]
+fn threads_do_not_enter() {
+    let develop = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        pool.build().unwrap().install(|| {
+            let negative = Negative::new(&ramps(61, 40), &key(3, "a"), &CameraModel::default());
+            DarkLevel::ALL.map(|level| negative.develop(level))
+        })
+    };
+    let one = develop(1);
+    for threads in [2, 5] {
+        assert_eq!(one, develop(threads));
+    }
+}
+
+#[test]
+fn seed_and_frame_enter() {
+    let clean = flat(128, 64);
+    let take = |seed, frame| {
+        let negative = Negative::taken(&clean, &key(seed, frame), median(), &Term::ALL);
+        negative.develop(DarkLevel::L1)
+    };
+    let first = take(1, "a");
+    for other in [take(2, "a"), take(1, "b")] {
+        let pairs = || first.samples().chunks(3).zip(other.samples().chunks(3));
+        let changed = pairs().filter(|(a, b)| a != b).count();
+        assert!(changed * 10 > pairs().count() * 9, "{changed} changed");
+    }
+}
+
+#[test]
+fn every_size_is_kept() {
+    for (height, width) in [
+        (1, 1),
+        (1, 2),
+        (1, 9),
+        (2, 1),
+        (9, 1),
+        (3, 5),
+        (4, 5),
+        (5, 4),
+    ] {
+        let clean = ramps(height, width);
+        let how = Degradation::Sensor(DarkLevel::L2);
+        let dark = degrade(&clean, how, &key(1, "a"), &CameraModel::default());
+        assert_eq!((dark.height(), dark.width()), (height, width));
+    }
+}
+
+/// Published figures of flat greys under the median camera: mean and deviation of red, green and blue.
+#[test]
+fn flat_greys_have_their_figures() {
+    let cases = [
+        (
+            128,
+            DarkLevel::L1,
+            [[66.1, 15.2], [67.3, 9.4], [67.0, 11.0]],
+        ),
+        (128, DarkLevel::L3, [[18.7, 4.3], [19.1, 2.7], [19.0, 3.1]]),
+        (128, DarkLevel::L5, [[7.3, 1.7], [7.4, 1.1], [7.4, 1.3]]),
+        (32, DarkLevel::L3, [[7.5, 4.4], [7.9, 3.2], [7.7, 3.6]]),
+    ];
+    for (code, level, due) in cases {
+        let clean = flat(code, 512);
+        let negative = Negative::taken(&clean, &key(4, "flat"), median(), &Term::ALL);
+        let found = statistics(&negative.develop(level));
+        for (found, due) in found.iter().flatten().zip(due.iter().flatten()) {
+            let close = (found - due).abs() < 0.01 * due + 0.07;
+            assert!(close, "grey {code}, {level:?}: {found} against {due}");
+        }
+    }
+}
+
+#[test]
+fn noise_shrinks_with_the_light() {
+    let negative = Negative::taken(&flat(128, 256), &key(5, "a"), median(), &Term::ALL);
+    let [light, dark] = [DarkLevel::L1, DarkLevel::L2]
+        .map(|level| statistics(&negative.develop(level)).map(|[_, deviation]| deviation));
+    for (light, dark) in light.iter().zip(dark) {
+        assert!((dark / light * f64::exp2(2.0 / 2.2) - 1.0).abs() < 0.02);
+    }
+}
+
+/// Without noise, grey and white fall as they do in the exposure branch.
+#[test]
+fn without_noise_a_mid_grey_and_white_are_the_exposure_branchs() {
+    for code in [128, 255] {
+        let clean = flat(code, 4);
+        for seed in 0..20 {
+            let key = key(seed, "a");
+            let state = CameraState::draw(&key, &CameraModel::default());
+            // A brightness gain below 1 leaves no headroom for white.
+            if code == 255 && state.rgb_gain < 1.0 {
+                continue;
+            }
+            let negative = Negative::taken(&clean, &key, state, &[]);
+            for level in DarkLevel::ALL {
+                assert_eq!(
+                    negative.develop(level),
+                    expose(&clean, level),
+                    "{code}, {level:?}"
+                );
+            }
+        }
+    }
+}
+
+/// Undoing what the paper leaves undone (the tone curve) brings a grey ramp back.
+#[test]
+fn a_grey_ramp_returns_from_the_sensor() {
+    let samples = (0..4 * 256).flat_map(|i| [(i % 256) as u8; 3]).collect();
+    let clean = Rgb::new(4, 256, samples).unwrap();
+    for seed in 0..20 {
+        let state = CameraState::draw(&key(seed, "a"), &CameraModel::default());
+        let mut raw = unprocess::unprocess(&clean, &state);
+        isp::balance(&mut raw, &state);
+        let mut pixels = vec![[0.0; 3]; 256];
+        raw.demosaic_row(1, &mut pixels);
+        for (code, pixel) in pixels.iter().enumerate() {
+            for light in colour::apply(&state.camera_to_rgb, pixel.map(f64::from)) {
+                let x = curve::gamma_compress(light.clamp(0.0, 1.0));
+                let back = 255.0 * x * x * (3.0 - 2.0 * x);
+                assert!((back - code as f64).abs() <= 2.0, "{code} became {back}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_state_can_be_written_down() {
+    let state = serde_json::to_value(median()).unwrap();
+    assert_eq!(state["ratio"], 200.0);
+    assert_eq!(state["bias"].as_array().map(Vec::len), Some(4));
+    assert_eq!(state["rgb_to_camera"][2].as_array().map(Vec::len), Some(3));
+}
