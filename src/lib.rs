@@ -1,4 +1,5 @@
 //! darkqa-eval
 
+pub mod ask;
 pub mod error;
 pub mod types;
