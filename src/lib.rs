@@ -1,6 +1,7 @@
 //! darkqa-eval
 
 pub mod enhance;
+pub mod ask;
 pub mod error;
 pub mod synthesis;
 pub mod types;

@@ -19,3 +19,12 @@ pub fn forbid_telemetry() {
     // is opened after this call alone, by every thread that opens it.
     ONCE.call_once(|| unsafe { darkqa_eval::enhance::forbid_telemetry() });
 }
+//! What integration tests share.
+#![allow(
+    dead_code,
+    unreachable_pub,
+    clippy::unwrap_used,
+    reason = "each test binary uses its part, and a test may panic"
+)]
+
+pub mod endpoint;

@@ -1,0 +1,363 @@
+//! One server and how it is talked to: [`Endpoint`].
+
+use std::error::Error as _;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant, SystemTime};
+
+use backon::{ExponentialBuilder, Retryable as _};
+use reqwest::header::{AUTHORIZATION, CONTENT_TYPE, HeaderMap, HeaderValue, LOCATION};
+use reqwest::{Client, Response, StatusCode, Url, redirect};
+use tracing::debug;
+
+use super::body::Parts;
+use super::complaint::Complaint;
+use super::pace::{Gate, asked_wait};
+use super::response::{self, Flaw};
+use super::secret::{Scrub, Secret};
+use super::url::BaseUrl;
+use super::verdict::{Sent, Verdict, judge};
+use super::{AskError, Reach, failure};
+use crate::error::{Error, Result};
+use crate::types::{Failure, FailureKind, Reply};
+
+/// The most of a reply that is read: no completion of a few tokens comes near, and memory is not the server's to fill.
+const LONGEST_REPLY: usize = 16 << 20;
+
+/// How long a connection may take to come about.
+const CONNECT: Duration = Duration::from_secs(10);
+
+/// The longest wait of our own making; a server may ask for longer ones.
+const LONGEST_DELAY: Duration = Duration::from_secs(30);
+
+/// How requests are sent and sent again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sending {
+    /// The time one try may take, from connecting to the last byte of the reply.
+    pub timeout: Duration,
+    /// How many times a request is sent again after it failed.
+    pub retries: u32,
+    /// The wait before the first retry where the server asks for none; each further one doubles, and each is drawn out at
+    /// random by up to its length.
+    pub first_delay: Duration,
+    /// The longest wait that a server may ask for; beyond it the request is given up at once.
+    pub max_wait: Duration,
+    /// Whether a key may travel unencrypted to another machine.
+    pub allow_http: bool,
+}
+
+impl Default for Sending {
+    fn default() -> Self {
+        Self {
+            timeout: Duration::from_secs(120),
+            retries: 5,
+            first_delay: Duration::from_millis(500),
+            max_wait: Duration::from_secs(120),
+            allow_http: false,
+        }
+    }
+}
+
+/// An OpenAI-compatible endpoint: its address, key, pooled connections, and the pauses it asked for.
+#[derive(Debug)]
+pub struct Endpoint {
+    base: BaseUrl,
+    url: Url,
+    authorization: Option<HeaderValue>,
+    client: Client,
+    sending: Sending,
+    scrub: Scrub,
+    gate: Gate,
+}
+
+/// One try that brought no reply.
+struct Miss {
+    failure: Failure,
+    reach: Reach,
+    again: bool,
+    /// The wait that the server asked for.
+    wait: Option<Duration>,
+}
+
+impl Endpoint {
+    /// Makes ready to talk to an endpoint; nothing is sent yet.
+    ///
+    /// Redirects are not followed, bodies not decompressed. Proxies are those of the environment, and none for this machine.
+    ///
+    /// # Errors
+    /// Where a key would be sent unencrypted to another machine, or is given twice.
+    pub fn open(base: BaseUrl, key: Option<&Secret>, sending: Sending) -> Result<Self> {
+        let secrets = base.secrets().into_iter();
+        let scrub = Scrub::new(secrets.chain(key.map(|key| key.expose().to_owned())));
+        if base.is_plain() && !base.is_loopback() && !sending.allow_http {
+            let secret = key.is_some() || !scrub.is_empty();
+            if secret {
+                return Err(Error::usage(
+                    "--base-url",
+                    format_args!(
+                        "the key would travel to {base} for all to read; use https://, or --allow-http if the network is yours"
+                    ),
+                ));
+            }
+        }
+        if key.is_some() && base.has_credentials() {
+            return Err(Error::usage(
+                "--base-url",
+                format_args!("{base} comes with a user name and with a key; leave one of them out"),
+            ));
+        }
+        let authorization = key.map(authorization).transpose()?;
+        let mut client = Client::builder()
+            .user_agent(concat!("darkqa-eval/", env!("CARGO_PKG_VERSION")))
+            .redirect(redirect::Policy::none())
+            .connect_timeout(CONNECT.min(sending.timeout))
+            .timeout(sending.timeout);
+        if base.is_loopback() {
+            client = client.no_proxy();
+        }
+        let client = client.build().map_err(|error| Error::Endpoint {
+            endpoint: base.to_string(),
+            problem: scrub.line(&chain(error)),
+        })?;
+        Ok(Self {
+            url: base.completions(),
+            base,
+            authorization,
+            client,
+            sending,
+            scrub,
+            gate: Gate::new(),
+        })
+    }
+
+    /// The base URL; shown without user, password and query string.
+    #[must_use]
+    pub fn base(&self) -> &BaseUrl {
+        &self.base
+    }
+
+    pub(super) fn host(&self) -> &str {
+        self.base.host()
+    }
+
+    pub(super) fn has_key(&self) -> bool {
+        self.authorization.is_some() || self.base.has_credentials()
+    }
+
+    /// Sends a request, again where that may help. Nothing is left behind where the future is dropped.
+    pub(super) async fn ask(&self, body: &Parts, sent: Sent<'_>) -> Result<Reply, AskError> {
+        let attempts = AtomicU32::new(0);
+        let backoff = ExponentialBuilder::new()
+            .with_jitter()
+            .with_min_delay(self.sending.first_delay)
+            .with_max_delay(LONGEST_DELAY)
+            .with_max_times(self.sending.retries as usize);
+        let outcome = (|| async {
+            self.gate.pass().await;
+            attempts.fetch_add(1, Ordering::Relaxed);
+            self.send(body.clone(), sent).await
+        })
+        .retry(backoff)
+        .when(|miss: &Miss| miss.again)
+        // `None` where the retries are used up.
+        .adjust(|miss, own| own.map(|own| miss.wait.unwrap_or(own)))
+        .notify(|miss, wait| {
+            debug!(endpoint = %self.base, ?wait, problem = miss.failure.message, "trying again");
+        })
+        .await;
+        let attempts = attempts.into_inner();
+        match outcome {
+            Ok(reply) => Ok(Reply { attempts, ..reply }),
+            Err(miss) => Err(AskError {
+                failure: miss.failure,
+                attempts,
+                reach: miss.reach,
+            }),
+        }
+    }
+
+    /// One try.
+    async fn send(&self, body: Parts, sent: Sent<'_>) -> Result<Reply, Miss> {
+        let started = Instant::now();
+        let mut request = self
+            .client
+            .post(self.url.clone())
+            .header(CONTENT_TYPE, "application/json");
+        if let Some(authorization) = &self.authorization {
+            request = request.header(AUTHORIZATION, authorization);
+        }
+        let request = request.body(reqwest::Body::wrap(body));
+        let response = request.send().await.map_err(|error| self.broken(error))?;
+        let status = response.status();
+        let headers = response.headers().clone();
+        let body = self.receive(response).await;
+        let request_id = header(&headers, "x-request-id");
+        let latency_ms = started.elapsed().as_millis() as u64;
+        debug!(endpoint = %self.base, %status, latency_ms, request_id = self.scrub.line(request_id), "answered");
+        if !status.is_success() {
+            // A refusal whose words were lost on the way is a refusal all the same.
+            let words = body.unwrap_or_default();
+            return Err(self.refused(status, &headers, &words, sent));
+        }
+        match response::read(&body?, header(&headers, CONTENT_TYPE.as_str())) {
+            Ok(reply) => {
+                self.gate.ease();
+                Ok(Reply {
+                    latency_ms,
+                    ..reply
+                })
+            }
+            Err(Flaw::Said(complaint)) => {
+                // Without a code of its own it is the server's failure, and may pass.
+                let code = complaint.status().unwrap_or(500);
+                let mut miss = self.complained(code, &complaint, &headers, sent);
+                miss.failure.status = Some(status.as_u16());
+                Err(miss)
+            }
+            Err(Flaw::Unreadable(what)) => Err(Miss {
+                failure: Failure {
+                    kind: FailureKind::Response,
+                    status: Some(status.as_u16()),
+                    message: format!("{} answered with {}", self.base, self.scrub.line(&what)),
+                },
+                reach: Reach::Trial,
+                again: true,
+                wait: None,
+            }),
+        }
+    }
+
+    /// The body of a reply, up to a length.
+    async fn receive(&self, mut response: Response) -> Result<Vec<u8>, Miss> {
+        let mut body = Vec::new();
+        while let Some(chunk) = response.chunk().await.map_err(|error| self.broken(error))? {
+            if body.len() + chunk.len() > LONGEST_REPLY {
+                let message = format!("{} answered with more than 16 MiB", self.base);
+                return Err(Miss {
+                    failure: failure(FailureKind::Response, message),
+                    reach: Reach::Trial,
+                    again: false,
+                    wait: None,
+                });
+            }
+            body.extend_from_slice(&chunk);
+        }
+        Ok(body)
+    }
+
+    /// A try without a whole reply.
+    fn broken(&self, error: reqwest::Error) -> Miss {
+        let (kind, message) = if error.is_timeout() {
+            let timeout = self.sending.timeout.as_secs_f64();
+            (
+                FailureKind::Timeout,
+                format!(
+                    "{} did not answer within {timeout} s; allow more by --timeout",
+                    self.base
+                ),
+            )
+        } else {
+            let said = self.scrub.line(&chain(error.without_url()));
+            (FailureKind::Connection, format!("{}: {said}", self.base))
+        };
+        Miss {
+            failure: failure(kind, message),
+            reach: Reach::Trial,
+            again: true,
+            wait: None,
+        }
+    }
+
+    /// A try that the status says failed.
+    fn refused(
+        &self,
+        status: StatusCode,
+        headers: &HeaderMap,
+        body: &[u8],
+        sent: Sent<'_>,
+    ) -> Miss {
+        let mut complaint = Complaint::of_body(&String::from_utf8_lossy(body));
+        if status.is_redirection() {
+            complaint.message = format!("moved to {}", header(headers, LOCATION.as_str()));
+        }
+        self.complained(status.as_u16(), &complaint, headers, sent)
+    }
+
+    fn complained(
+        &self,
+        status: u16,
+        complaint: &Complaint,
+        headers: &HeaderMap,
+        sent: Sent<'_>,
+    ) -> Miss {
+        let Verdict {
+            kind,
+            mut reach,
+            mut again,
+            hint,
+        } = judge(status, complaint, sent);
+        match header(headers, "x-should-retry") {
+            "true" => again = true,
+            "false" => again = false,
+            _ => {}
+        }
+        let wait = asked_wait(headers, SystemTime::now()).filter(|_| again);
+        let mut message = format!("{} answered {status}", self.base);
+        let said = self.scrub.line(&complaint.message);
+        if !said.is_empty() {
+            message = format!("{message}: {said}");
+        }
+        if let Some(hint) = hint {
+            message = format!("{message} ({hint})");
+        }
+        let is_pause = matches!(status, 429 | 503 | 529);
+        match wait {
+            Some(wait) if wait > self.sending.max_wait => {
+                again = false;
+                if is_pause {
+                    reach = Reach::Endpoint;
+                }
+                message = format!(
+                    "{message} (it asks to wait {:.0} s, beyond --max-wait of {:.0} s)",
+                    wait.as_secs_f64(),
+                    self.sending.max_wait.as_secs_f64()
+                );
+            }
+            Some(wait) if is_pause => self.gate.shut(wait),
+            _ => {}
+        }
+        Miss {
+            failure: Failure {
+                kind,
+                status: Some(status),
+                message,
+            },
+            reach,
+            again,
+            wait,
+        }
+    }
+}
+
+/// A header as text, empty where there is none.
+fn header<'a>(headers: &'a HeaderMap, name: &str) -> &'a str {
+    let value = headers.get(name).and_then(|value| value.to_str().ok());
+    value.unwrap_or_default()
+}
+
+fn authorization(key: &Secret) -> Result<HeaderValue> {
+    let value = HeaderValue::try_from(format!("Bearer {}", key.expose()));
+    let mut value = value.map_err(|_| Error::usage("key", "no HTTP header can carry it"))?;
+    value.set_sensitive(true);
+    Ok(value)
+}
+
+/// An error with all that caused it: reqwest's own words alone say only that something failed.
+fn chain(error: reqwest::Error) -> String {
+    let mut words = error.to_string();
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        words = format!("{words}: {error}");
+        cause = error.source();
+    }
+    words
+}

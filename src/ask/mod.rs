@@ -1,0 +1,118 @@
+//! Stage 4, ask: a prompt and an image go out, a [`Reply`] comes back. The only asynchronous stage.
+//!
+//! [`Prompts`] turn a question into words, [`Payload`] an image into the text of a data URL; both are CPU work and done before.
+//! A [`Model`] takes the two as a [`Call`]. [`OpenAi`] is a model behind an [`Endpoint`]; what belongs to one server (address,
+//! key, connections, pauses) lives in the endpoint and is shared by all models asked there.
+
+mod body;
+mod complaint;
+mod endpoint;
+mod openai;
+mod pace;
+mod payload;
+mod plain_png;
+mod prompt;
+mod random;
+mod request;
+mod response;
+mod script;
+mod secret;
+mod url;
+mod verdict;
+
+pub use endpoint::{Endpoint, Sending};
+pub use openai::OpenAi;
+pub use payload::{Format, Payload, Quality};
+pub use prompt::Prompts;
+pub use random::Random;
+pub use request::{Detail, Parameters, TokenField};
+pub use script::Script;
+pub use secret::Secret;
+pub use url::BaseUrl;
+
+use crate::types::{Condition, Digest, Failure, FailureKind, Question, Reply};
+
+/// Everything a model needs to answer one question.
+#[derive(Debug, Clone, Copy)]
+pub struct Call<'a> {
+    /// The question; models made in process look at it, the others at `prompt`.
+    pub question: &'a Question,
+    /// What the image shows; `None` where no image is shown.
+    pub condition: Option<&'a Condition>,
+    /// The question as [`Prompts`] rendered it.
+    pub prompt: &'a str,
+    /// The image; `None` for a question put in words alone.
+    pub image: Option<&'a Payload>,
+}
+
+/// Something that can be asked.
+#[derive(Debug)]
+pub enum Model {
+    /// A model behind an OpenAI-compatible endpoint.
+    OpenAi(OpenAi),
+    /// Any choice, as likely as another.
+    Random(Random),
+    /// Replies out of a file.
+    Script(Script),
+}
+
+impl Model {
+    /// The name in records and tables.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        match self {
+            Self::OpenAi(model) => model.name(),
+            Self::Random(_) => Random::NAME,
+            Self::Script(script) => script.name(),
+        }
+    }
+
+    /// The digest of what decides a reply besides prompt and image: the model and its parameters, not where it is asked.
+    #[must_use]
+    pub fn digest(&self) -> Digest {
+        match self {
+            Self::OpenAi(model) => model.digest(),
+            Self::Random(random) => random.digest(),
+            Self::Script(script) => script.digest(),
+        }
+    }
+
+    /// Puts one question. Dropping the future gives up the request and leaves nothing behind.
+    pub async fn ask(&self, call: Call<'_>) -> Result<Reply, AskError> {
+        match self {
+            Self::OpenAi(model) => model.ask(call.prompt, call.image).await,
+            Self::Random(random) => Ok(Reply::local(random.answer(call.question, call.condition))),
+            Self::Script(script) => script.answer(call.question, call.condition),
+        }
+    }
+}
+
+/// How far a failure reaches.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reach {
+    /// This one request failed; another may succeed.
+    Trial,
+    /// Every further request would fail alike: key, credit, address, model, parameters.
+    Endpoint,
+}
+
+/// Why no reply came.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{}", failure.message)]
+pub struct AskError {
+    /// What went wrong in the last try.
+    pub failure: Failure,
+    /// How many requests were sent.
+    pub attempts: u32,
+    /// Whether it is worth asking anything else.
+    pub reach: Reach,
+}
+
+/// A failure without an HTTP status.
+fn failure(kind: FailureKind, message: String) -> Failure {
+    Failure {
+        kind,
+        status: None,
+        message,
+    }
+}

@@ -1,0 +1,88 @@
+//! The model that guesses: [`Random`].
+
+use crate::types::question::letter;
+use crate::types::{Condition, Digest, Question};
+
+/// Answers with the letter of any choice, each as likely; the same one for the same seed, question and condition, in
+/// whatever order they are asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Random {
+    /// What decides the guesses.
+    pub seed: u64,
+}
+
+impl Random {
+    /// The name in records and tables.
+    pub const NAME: &'static str = "random";
+
+    pub(super) fn digest(self) -> Digest {
+        Digest::of_parts([Self::NAME.as_bytes(), &self.seed.to_le_bytes()])
+    }
+
+    pub(super) fn answer(self, question: &Question, condition: Option<&Condition>) -> String {
+        let shown = condition.map(ToString::to_string).unwrap_or_default();
+        let mut digest = Digest::of_parts([
+            Self::NAME.as_bytes(),
+            &self.seed.to_le_bytes(),
+            question.id.0.as_bytes(),
+            shown.as_bytes(),
+        ]);
+        let count = question.choices.len() as u64;
+        // Numbers beyond the last full round of the choices are drawn again: taking the remainder would favour the first ones.
+        let fair = u64::MAX - u64::MAX % count;
+        loop {
+            let (words, _) = digest.as_bytes().as_chunks::<8>();
+            let mut words = words.iter().map(|word| u64::from_le_bytes(*word));
+            if let Some(word) = words.find(|word| *word < fair) {
+                return letter((word % count) as usize).to_string();
+            }
+            digest = Digest::of(digest.as_bytes());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::types::{Choices, Family, FrameId, QuestionId};
+
+    fn question(id: usize, choices: usize) -> Question {
+        let texts = (0..choices).map(|i| format!("choice {i}")).collect();
+        Question {
+            id: QuestionId(id.to_string()),
+            frame: FrameId("f".into()),
+            family: Family::Presence,
+            text: "?".into(),
+            choices: Choices::new(texts, 0).unwrap(),
+            evidence: serde_json::Value::Null,
+        }
+    }
+
+    #[test]
+    fn guesses_are_even() {
+        let random = Random { seed: 7 };
+        let mut counts = [0_u32; 3];
+        for id in 0..3000 {
+            let reply = random.answer(&question(id, 3), None);
+            counts[usize::from(reply.as_bytes()[0] - b'A')] += 1;
+        }
+        // Five standard deviations of a fair draw are 129.
+        assert!(
+            counts.iter().all(|count| count.abs_diff(1000) < 130),
+            "{counts:?}"
+        );
+    }
+
+    #[test]
+    fn guesses_depend_on_seed_question_and_condition() {
+        let guesses = |seed: u64, condition: &str| -> String {
+            let condition = condition.parse().unwrap();
+            (0..40)
+                .map(|id| Random { seed }.answer(&question(id, 4), Some(&condition)))
+                .collect()
+        };
+        assert_eq!(guesses(1, "L3-noise"), guesses(1, "L3-noise"));
+        assert_ne!(guesses(1, "L3-noise"), guesses(2, "L3-noise"));
+        assert_ne!(guesses(1, "L3-noise"), guesses(1, "L3-ev"));
+    }
+}

@@ -1,0 +1,270 @@
+//! What an endpoint says: a chat completion read as leniently as servers are written, [`read`].
+
+use serde_json::Value;
+
+use super::complaint::{Complaint, page_title};
+use crate::types::{Finish, Reply, Usage};
+
+/// Why a reply with a status of success holds no answer.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Flaw {
+    /// The server says that something went wrong.
+    Said(Complaint),
+    /// It is no chat completion; what it is instead.
+    Unreadable(String),
+}
+
+/// Reads a body; `latency_ms` and `attempts` are left at zero.
+///
+/// An error is looked for first at the top level and then in the choice, since gateways send both with status 200. Fields that
+/// do not matter may be missing, null or of another type; hidden reasoning is never looked at. Bytes that are no UTF-8 become
+/// replacement characters: a small model at temperature 0 would say them again however often it is asked.
+pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, Flaw> {
+    let text = String::from_utf8_lossy(body);
+    let text = text.trim_start_matches('\u{FEFF}');
+    let completion: Value =
+        serde_json::from_str(text).map_err(|error| unreadable(text, content_type, &error))?;
+    if let Some(complaint) = Complaint::of(&completion) {
+        return Err(Flaw::Said(complaint));
+    }
+    let choice = choice(&completion)?;
+    if let Some(error) = choice.get("error").filter(|error| !error.is_null()) {
+        return Err(Flaw::Said(Complaint::of_error(error)));
+    }
+    let reason = choice.get("finish_reason").and_then(Value::as_str);
+    if reason == Some("error") {
+        return Err(flaw(
+            "a reply that broke off: its finish_reason is \"error\"",
+        ));
+    }
+    let message = choice
+        .get("message")
+        .filter(|message| message.is_object())
+        .ok_or_else(|| flaw("a choice without a message"))?;
+    let (text, refused) = content(message.get("content"))?;
+    let refusal = message.get("refusal").and_then(Value::as_str);
+    Ok(Reply {
+        text,
+        refusal: refusal
+            .filter(|words| !words.is_empty())
+            .map(str::to_owned)
+            .or(refused),
+        finish: finish(reason),
+        usage: usage(completion.get("usage")),
+        served_model: completion
+            .get("model")
+            .and_then(Value::as_str)
+            .map(str::to_owned),
+        latency_ms: 0,
+        attempts: 0,
+    })
+}
+
+fn flaw(what: &str) -> Flaw {
+    Flaw::Unreadable(what.to_owned())
+}
+
+/// What a body is that is no JSON.
+fn unreadable(text: &str, content_type: &str, error: &serde_json::Error) -> Flaw {
+    if content_type.starts_with("text/event-stream") || text.trim_start().starts_with("data:") {
+        return flaw("an event stream, which was not asked for");
+    }
+    if text.trim().is_empty() {
+        return flaw("an empty body");
+    }
+    Flaw::Unreadable(
+        page_title(text)
+            .unwrap_or_else(|| format!("{content_type:?} that is no whole JSON ({error}): {text}")),
+    )
+}
+
+/// The choice with index 0, else the first.
+fn choice(completion: &Value) -> Result<&Value, Flaw> {
+    let choices = completion
+        .get("choices")
+        .and_then(Value::as_array)
+        .ok_or_else(|| flaw("JSON without choices"))?;
+    choices
+        .iter()
+        .find(|choice| choice.get("index").and_then(Value::as_u64) == Some(0))
+        .or(choices.first())
+        .ok_or_else(|| flaw("a completion with no choices in it"))
+}
+
+/// The words of a message and those of a refusal among its parts.
+fn content(content: Option<&Value>) -> Result<(String, Option<String>), Flaw> {
+    let parts = match content {
+        None | Some(Value::Null) => return Ok((String::new(), None)),
+        Some(Value::String(text)) => return Ok((text.clone(), None)),
+        Some(Value::Array(parts)) => parts,
+        Some(_) => return Err(flaw("a message whose content is neither text nor parts")),
+    };
+    let of = |kinds: &[&str], field: &str| -> String {
+        let named = |part: &&Value| {
+            let kind = part.get("type").and_then(Value::as_str);
+            kind.is_some_and(|kind| kinds.contains(&kind))
+        };
+        let fields = parts.iter().filter(named).map(|part| part.get(field));
+        fields.filter_map(|text| text?.as_str()).collect()
+    };
+    let refusal = of(&["refusal"], "refusal");
+    Ok((
+        of(&["text", "output_text"], "text"),
+        (!refusal.is_empty()).then_some(refusal),
+    ))
+}
+
+fn finish(reason: Option<&str>) -> Finish {
+    let reason = reason.unwrap_or_default();
+    match reason.to_ascii_lowercase().as_str() {
+        "" => Finish::Unknown,
+        "stop" | "eos" | "eos_token" | "end_turn" | "stop_sequence" => Finish::Stop,
+        "length" | "max_tokens" => Finish::Length,
+        "content_filter" | "safety" => Finish::Filter,
+        _ => Finish::Other(
+            reason
+                .chars()
+                .filter(|c| !c.is_control())
+                .take(40)
+                .collect(),
+        ),
+    }
+}
+
+fn usage(usage: Option<&Value>) -> Option<Usage> {
+    let tokens = |field| usage?.get(field)?.as_u64();
+    let usage = Usage {
+        prompt_tokens: tokens("prompt_tokens"),
+        completion_tokens: tokens("completion_tokens"),
+    };
+    (usage != Usage::default()).then_some(usage)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn json(body: &str) -> Result<Reply, Flaw> {
+        read(body.as_bytes(), "application/json")
+    }
+
+    fn message(message: &str) -> Reply {
+        json(&format!(r#"{{"choices":[{{"message":{message}}}]}}"#)).unwrap()
+    }
+
+    #[test]
+    fn contents_of_every_shape_are_read() {
+        for (content, text) in [
+            (r#"{"content":"B"}"#, "B"),
+            (r#"{"content":null}"#, ""),
+            (r#"{"role":"assistant"}"#, ""),
+            (
+                r#"{"content":"","reasoning_content":"A","reasoning":"A"}"#,
+                "",
+            ),
+            (
+                r#"{"content":[{"type":"thinking","thinking":[{"type":"text","text":"A"}]},{"type":"text","text":"B"},{"type":"text","text":"."},7,null,{"type":"text","text":null}]}"#,
+                "B.",
+            ),
+            (r#"{"content":[]}"#, ""),
+        ] {
+            assert_eq!(message(content).text, text, "{content}");
+        }
+        let refusal = message(r#"{"content":null,"refusal":"I cannot see"}"#);
+        assert_eq!(refusal.refusal.as_deref(), Some("I cannot see"));
+        let part = message(r#"{"content":[{"type":"refusal","refusal":"no"}],"refusal":""}"#);
+        assert_eq!(
+            (part.text.as_str(), part.refusal.as_deref()),
+            ("", Some("no"))
+        );
+        assert!(json(r#"{"choices":[{"message":{"content":{"a":1}}}]}"#).is_err());
+    }
+
+    #[test]
+    fn the_choice_of_index_zero_is_taken() {
+        let two = r#"{"choices":[{"index":1,"message":{"content":"A"}},{"index":0,"message":{"content":"B"}}]}"#;
+        assert_eq!(json(two).unwrap().text, "B");
+        let odd = r#"{"choices":[{"index":1,"message":{"content":"A"}},{"index":2,"message":{"content":"B"}}]}"#;
+        assert_eq!(json(odd).unwrap().text, "A");
+    }
+
+    #[test]
+    fn the_rest_is_read_where_it_is_there() {
+        let whole = "\n\n \r\n{\"model\":\"m-1\",\"choices\":[{\"finish_reason\":\"length\",\"message\":{\"content\":\"\"}}],\"usage\":{\"prompt_tokens\":9,\"completion_tokens\":\"many\"},\"timings\":{}}";
+        let reply = json(whole).unwrap();
+        assert_eq!(reply.finish, Finish::Length);
+        assert_eq!(reply.served_model.as_deref(), Some("m-1"));
+        assert_eq!(reply.usage.unwrap().prompt_tokens, Some(9));
+        assert_eq!(reply.usage.unwrap().completion_tokens, None);
+        let bare = r#"{"model":7,"choices":[{"finish_reason":null,"message":{"content":"B"}}],"usage":null}"#;
+        let reply = json(bare).unwrap();
+        assert_eq!(
+            (reply.finish, reply.usage, reply.served_model),
+            (Finish::Unknown, None, None)
+        );
+        for (reason, finish_) in [
+            ("STOP", Finish::Stop),
+            ("MAX_TOKENS", Finish::Length),
+            ("content_filter", Finish::Filter),
+            ("abort\u{7}", Finish::Other("abort".into())),
+        ] {
+            assert_eq!(finish(Some(reason)), finish_);
+        }
+    }
+
+    #[test]
+    fn errors_inside_a_success_are_found() {
+        for body in [
+            r#"{"error":{"message":"m","code":502},"choices":[{"message":{"content":"B"}}]}"#,
+            r#"{"error":"m"}"#,
+            r#"{"choices":[{"error":{"message":"m"},"message":{"content":"B"}}]}"#,
+        ] {
+            let Err(Flaw::Said(complaint)) = json(body) else {
+                panic!("{body}");
+            };
+            assert_eq!(complaint.message, "m");
+        }
+    }
+
+    #[test]
+    fn what_is_no_completion_is_named() {
+        let deep = "[".repeat(1000);
+        for (body, content_type, said) in [
+            ("", "application/json", "empty"),
+            ("{\"choices\":[", "application/json", "no whole JSON"),
+            ("{\"choices\":null}", "application/json", "without choices"),
+            ("{\"choices\":[]}", "application/json", "no choices"),
+            (
+                "{\"choices\":[null]}",
+                "application/json",
+                "without a message",
+            ),
+            (
+                "{\"choices\":[{\"finish_reason\":\"error\",\"message\":{\"content\":\"B\"}}]}",
+                "application/json",
+                "broke off",
+            ),
+            ("[]", "application/json", "without choices"),
+            ("data: {}\n\n", "text/plain", "event stream"),
+            (": ping", "text/event-stream; charset=utf-8", "event stream"),
+            ("<html><title>Welcome</title>", "text/html", "Welcome"),
+            (
+                r#"{"choices":[{"message":{"content":"\ud83d"}}]}"#,
+                "application/json",
+                "no whole JSON",
+            ),
+            (&deep, "application/json", "no whole JSON"),
+        ] {
+            let Err(Flaw::Unreadable(what)) = read(body.as_bytes(), content_type) else {
+                panic!("{body}");
+            };
+            assert!(what.contains(said), "{what}");
+        }
+    }
+
+    #[test]
+    fn bytes_that_are_no_text_do_not_lose_the_reply() {
+        let body = b"\xef\xbb\xbf{\"choices\":[{\"message\":{\"content\":\"B \xff\xfe\"}}]}";
+        assert_eq!(read(body, "").unwrap().text, "B \u{FFFD}\u{FFFD}");
+    }
+}

@@ -1,0 +1,122 @@
+//! The model that reads its lines: [`Script`].
+
+use std::collections::HashMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::{AskError, Reach, failure};
+use crate::error::{Error, Result};
+use crate::types::{Condition, Digest, FailureKind, Question, QuestionId, Reply};
+
+/// Replies out of a JSONL file, one a line:
+/// `{"question": "<id>", "reply": ".."}`, the same with `"condition": "L3-noise"` for one condition, `{"default": ".."}` for the rest.
+/// The most specific line wins.
+#[derive(Debug)]
+pub struct Script {
+    name: String,
+    path: PathBuf,
+    digest: Digest,
+    replies: HashMap<Cue, String>,
+}
+
+/// What a line answers to.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+enum Cue {
+    Shown(QuestionId, Condition),
+    Asked(QuestionId),
+    Anything,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Line {
+    question: Option<QuestionId>,
+    condition: Option<Condition>,
+    reply: Option<String>,
+    default: Option<String>,
+}
+
+impl Line {
+    fn read(self) -> Option<(Cue, String)> {
+        match (self.question, self.condition, self.reply, self.default) {
+            (Some(id), Some(condition), Some(reply), None) => {
+                Some((Cue::Shown(id, condition), reply))
+            }
+            (Some(id), None, Some(reply), None) => Some((Cue::Asked(id), reply)),
+            (None, None, None, Some(reply)) => Some((Cue::Anything, reply)),
+            _ => None,
+        }
+    }
+}
+
+impl Script {
+    /// Reads a file of replies.
+    ///
+    /// # Errors
+    /// With file and line where a line is broken or answers to what an earlier one answered to.
+    pub fn load(path: &Path) -> Result<Self> {
+        let text = fs::read_to_string(path).map_err(|error| Error::file(path, "read", error))?;
+        let mut replies = HashMap::new();
+        let mut lines: HashMap<Cue, usize> = HashMap::new();
+        for (number, line) in (1..).zip(text.lines()) {
+            if line.trim().is_empty() {
+                continue;
+            }
+            let line: Line =
+                serde_json::from_str(line).map_err(|error| Error::line(path, number, error))?;
+            let (cue, reply) = line.read().ok_or_else(|| {
+                Error::line(
+                    path,
+                    number,
+                    r#"expected {"question": "<id>", "reply": ".."}, with "condition": "L3-noise" where it is for one condition, or {"default": ".."}"#,
+                )
+            })?;
+            if let Some(first) = lines.insert(cue.clone(), number) {
+                let problem = format_args!("answers to the same as line {first}; keep one of them");
+                return Err(Error::line(path, number, problem));
+            }
+            replies.insert(cue, reply);
+        }
+        Ok(Self {
+            name: format!("script:{}", path.display()),
+            path: path.to_owned(),
+            digest: Digest::of_parts([b"script".as_slice(), text.as_bytes()]),
+            replies,
+        })
+    }
+
+    /// `script:` and the file.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    pub(super) fn digest(&self) -> Digest {
+        self.digest
+    }
+
+    pub(super) fn answer(
+        &self,
+        question: &Question,
+        condition: Option<&Condition>,
+    ) -> Result<Reply, AskError> {
+        let id = &question.id;
+        let reply = condition
+            .and_then(|condition| self.replies.get(&Cue::Shown(id.clone(), condition.clone())))
+            .or_else(|| self.replies.get(&Cue::Asked(id.clone())))
+            .or_else(|| self.replies.get(&Cue::Anything));
+        reply.cloned().map(Reply::local).ok_or_else(|| {
+            let message = format!(
+                r#"{} has no reply to question {id} and no {{"default": ".."}} line"#,
+                self.path.display()
+            );
+            AskError {
+                failure: failure(FailureKind::Request, message),
+                attempts: 1,
+                reach: Reach::Trial,
+            }
+        })
+    }
+}

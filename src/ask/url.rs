@@ -1,0 +1,224 @@
+//! Where requests go: [`BaseUrl`].
+
+use std::fmt;
+use std::net::IpAddr;
+use std::str::FromStr;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use reqwest::Url;
+
+use crate::error::{Error, Result};
+
+/// The base URL of an OpenAI-compatible endpoint, taken word for word: no `/v1` is added or assumed.
+#[derive(Clone, PartialEq, Eq)]
+pub struct BaseUrl(Url);
+
+impl BaseUrl {
+    /// The address of chat completions: `/chat/completions` behind the path, the query string kept.
+    pub(super) fn completions(&self) -> Url {
+        let mut url = self.0.clone();
+        url.set_path(&format!(
+            "{}{COMPLETIONS}",
+            self.0.path().trim_end_matches('/')
+        ));
+        url
+    }
+
+    /// The host, in lower case.
+    #[must_use]
+    pub fn host(&self) -> &str {
+        self.0.host_str().unwrap_or_default()
+    }
+
+    /// Whether it names this machine.
+    #[must_use]
+    pub fn is_loopback(&self) -> bool {
+        let host = self.host();
+        let bare = host.trim_start_matches('[').trim_end_matches(']');
+        host == "localhost"
+            || host.ends_with(".localhost")
+            || bare.parse::<IpAddr>().is_ok_and(|ip| ip.is_loopback())
+    }
+
+    /// Whether what is sent there can be read on the way.
+    #[must_use]
+    pub fn is_plain(&self) -> bool {
+        self.0.scheme() == "http"
+    }
+
+    /// Whether it carries a user name or password of its own.
+    #[must_use]
+    pub fn has_credentials(&self) -> bool {
+        !self.0.username().is_empty() || self.0.password().is_some()
+    }
+
+    /// Everything in it that must not be shown: user and password in every form that a server could echo, and the values of its
+    /// query string.
+    pub(super) fn secrets(&self) -> Vec<String> {
+        let mut secrets = Vec::new();
+        if self.has_credentials() {
+            let (user, password) = (self.0.username(), self.0.password().unwrap_or_default());
+            let (user_read, password_read) = (decoded(user), decoded(password));
+            secrets.push(STANDARD.encode(format!("{user_read}:{password_read}")));
+            secrets.extend([user, password].map(str::to_owned));
+            secrets.extend([user_read, password_read]);
+        }
+        for pair in self.0.query().unwrap_or_default().split('&') {
+            // Azure's version is no secret, and its errors speak about it.
+            if let Some((name, value)) = pair.split_once('=')
+                && name != "api-version"
+            {
+                secrets.extend([value.to_owned(), decoded(value)]);
+            }
+        }
+        secrets
+    }
+}
+
+const COMPLETIONS: &str = "/chat/completions";
+
+/// Undoes percent encoding.
+fn decoded(text: &str) -> String {
+    let bytes = text.as_bytes();
+    let mut out = Vec::with_capacity(bytes.len());
+    let mut at = 0;
+    while let Some(&byte) = bytes.get(at) {
+        let code = (byte == b'%')
+            .then(|| bytes.get(at + 1..at + 3))
+            .flatten()
+            .and_then(|digits| std::str::from_utf8(digits).ok())
+            .and_then(|digits| u8::from_str_radix(digits, 16).ok());
+        out.push(code.unwrap_or(byte));
+        at += if code.is_some() { 3 } else { 1 };
+    }
+    String::from_utf8_lossy(&out).into_owned()
+}
+
+impl FromStr for BaseUrl {
+    type Err = Error;
+
+    /// Reads an address; the error does not show it, for it may hold a password.
+    fn from_str(text: &str) -> Result<Self> {
+        let wrong = |problem: &str| Error::usage("--base-url", problem);
+        let url = Url::parse(text.trim()).map_err(|error| {
+            wrong(&format!(
+                "not an address ({error}); expected for example https://api.openai.com/v1 or http://127.0.0.1:8000/v1"
+            ))
+        })?;
+        if !matches!(url.scheme(), "http" | "https") || url.host_str().is_none() {
+            return Err(wrong(
+                "expected an address that begins with https:// or http://",
+            ));
+        }
+        if url.fragment().is_some() {
+            return Err(wrong(
+                "an address with '#' cannot be used; leave that part off",
+            ));
+        }
+        if url.path().trim_end_matches('/').ends_with(COMPLETIONS) {
+            return Err(wrong(
+                "leave /chat/completions off the end; it is added to the address",
+            ));
+        }
+        Ok(Self(url))
+    }
+}
+
+impl fmt::Display for BaseUrl {
+    /// The address without user, password and query string.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}://{}", self.0.scheme(), self.host())?;
+        if let Some(port) = self.0.port() {
+            write!(f, ":{port}")?;
+        }
+        f.write_str(self.0.path().trim_end_matches('/'))
+    }
+}
+
+impl fmt::Debug for BaseUrl {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "BaseUrl({self})")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn url(text: &str) -> BaseUrl {
+        text.parse().unwrap()
+    }
+
+    #[test]
+    fn the_path_is_taken_word_for_word() {
+        for (base, completions) in [
+            (
+                "https://api.openai.com/v1",
+                "https://api.openai.com/v1/chat/completions",
+            ),
+            (
+                "https://api.openai.com/v1/",
+                "https://api.openai.com/v1/chat/completions",
+            ),
+            (
+                "http://127.0.0.1:4010",
+                "http://127.0.0.1:4010/chat/completions",
+            ),
+            (
+                "https://r.example/openai/deployments/a%2Fb?api-version=2024-10-21",
+                "https://r.example/openai/deployments/a%2Fb/chat/completions?api-version=2024-10-21",
+            ),
+            (
+                "https://g.example/v1beta/openai//",
+                "https://g.example/v1beta/openai/chat/completions",
+            ),
+        ] {
+            assert_eq!(url(base).completions().as_str(), completions);
+        }
+        for wrong in [
+            "",
+            "api.openai.com/v1",
+            "ftp://a/",
+            "http://",
+            "https://a/v1#x",
+            "https://a/v1/chat/completions/",
+        ] {
+            assert!(wrong.parse::<BaseUrl>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn secrets_of_the_address_are_not_shown() {
+        let base = url("https://me:p%40ss@h.example:444/v1?key=s3cr%20t&api-version=2024-10-21");
+        assert_eq!(base.to_string(), "https://h.example:444/v1");
+        assert_eq!(format!("{base:?}"), "BaseUrl(https://h.example:444/v1)");
+        let secrets = base.secrets();
+        for secret in ["me", "p@ss", "p%40ss", "s3cr%20t", "s3cr t", "bWU6cEBzcw=="] {
+            assert!(secrets.iter().any(|s| s == secret), "{secret}");
+        }
+        assert!(!secrets.iter().any(|s| s == "2024-10-21"));
+        let error = "https://me:secret@[::1".parse::<BaseUrl>().unwrap_err();
+        assert!(!error.to_string().contains("secret"));
+    }
+
+    #[test]
+    fn this_machine_is_known() {
+        for here in [
+            "http://localhost:1/",
+            "http://127.0.0.1/",
+            "http://127.9.9.9/v1",
+            "http://[::1]:8/v1",
+            "http://LOCALHOST/",
+        ] {
+            assert!(url(here).is_loopback(), "{here}");
+        }
+        for there in [
+            "http://192.168.0.1/",
+            "http://localhost.example.com/",
+            "http://[::2]/",
+        ] {
+            assert!(!url(there).is_loopback(), "{there}");
+        }
+    }
+}

@@ -1,0 +1,307 @@
+//! What follows from a failure: whether to try again, what it reaches, and the flag that mends it.
+
+use super::Reach;
+use super::complaint::Complaint;
+use super::request::{Parameters, TokenField};
+use crate::types::FailureKind;
+
+/// What the request had in it that a server may complain about.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sent<'a> {
+    pub(super) parameters: &'a Parameters,
+    pub(super) token_field: TokenField,
+    pub(super) has_image: bool,
+    pub(super) has_key: bool,
+}
+
+/// What to make of a refused request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Verdict {
+    pub(super) kind: FailureKind,
+    pub(super) reach: Reach,
+    /// Whether the same request may succeed later.
+    pub(super) again: bool,
+    /// How to mend it.
+    pub(super) hint: Option<&'static str>,
+}
+
+/// Codes and types that mean: no money. They come with 429 as well, where waiting does not help.
+const NO_CREDIT: [&str; 4] = [
+    "insufficient_quota",
+    "billing_hard_limit_reached",
+    "billing_not_active",
+    "exceeded_current_quota_error",
+];
+const NO_CREDIT_WORDS: [&str; 4] = [
+    "credit balance",
+    "insufficient credit",
+    "insufficient balance",
+    "out of credits",
+];
+
+/// Codes and types that mean the same for every request, with whatever status they come.
+const HOPELESS: [&str; 5] = [
+    "invalid_api_key",
+    "authentication_error",
+    "model_not_found",
+    "account_deactivated",
+    "unsupported_country_region_territory",
+];
+
+/// What OpenAI, vLLM, Ollama, llama.cpp (with status 500) and OpenRouter say of an image sent to a model without eyes.
+const NO_EYES: [&str; 5] = [
+    "image_url is only supported by certain models",
+    "is not a multimodal model",
+    "does not support image input",
+    "image input is not supported",
+    "no endpoints found that support image input",
+];
+
+/// Judges a refused request by its status and by what the server said of it.
+pub(super) fn judge(status: u16, complaint: &Complaint, sent: Sent<'_>) -> Verdict {
+    let hopeless = |hint| Verdict {
+        kind: FailureKind::Request,
+        reach: Reach::Endpoint,
+        again: false,
+        hint: Some(hint),
+    };
+    let again = |kind| Verdict {
+        kind,
+        reach: Reach::Trial,
+        again: true,
+        hint: None,
+    };
+    let no_credit = complaint.is_any(&NO_CREDIT)
+        || (matches!(status, 400 | 402 | 403 | 429) && complaint.says_any(&NO_CREDIT_WORDS));
+    match status {
+        _ if no_credit => Verdict {
+            kind: if status == 429 {
+                FailureKind::RateLimit
+            } else {
+                FailureKind::Request
+            },
+            ..hopeless("the account has no credit left: add some, then go on with --resume")
+        },
+        _ if sent.has_image && complaint.says_any(&NO_EYES) => hopeless(
+            "the model takes no images: choose another --model, or ask it without them by --blind",
+        ),
+        400.. if complaint.is_any(&HOPELESS) => hopeless("check the key, --model and --base-url"),
+        300..400 => hopeless("redirects are not followed: give the final address as --base-url"),
+        401 if !sent.has_key => {
+            hopeless("no key was sent: name one by --api-key-env or --api-key-file")
+        }
+        401 => hopeless("check the key that --api-key-env or --api-key-file names"),
+        402 => hopeless("the account has no credit left: add some, then go on with --resume"),
+        403 if complaint.moderated || complaint.says_any(&["moderation", "flagged"]) => {
+            refused(None)
+        }
+        403 | 407 => {
+            hopeless("the key may not use this model from here: check the key and --model")
+        }
+        404 | 410 => hopeless("check --base-url (many end with /v1) and --model"),
+        405 => {
+            hopeless("check --base-url: requests go to its path with /chat/completions behind it")
+        }
+        408 => again(FailureKind::Timeout),
+        409 => again(FailureKind::Server),
+        413 => refused(Some("send smaller images: --max-side, or --image jpeg:95")),
+        429 => again(FailureKind::RateLimit),
+        500.. => again(FailureKind::Server),
+        _ => parameter(complaint, sent),
+    }
+}
+
+fn refused(hint: Option<&'static str>) -> Verdict {
+    Verdict {
+        kind: FailureKind::Request,
+        reach: Reach::Trial,
+        again: false,
+        hint,
+    }
+}
+
+/// A refused request that may be about one of its parameters. Where the server names the parameter, every other request with it
+/// fails alike; where only its words do, it could be about this one request.
+fn parameter(complaint: &Complaint, sent: Sent<'_>) -> Verdict {
+    let parameters = sent.parameters;
+    let with_limit = parameters.max_tokens.is_some();
+    let hints = [
+        (
+            "temperature",
+            parameters.temperature.is_some(),
+            "leave the temperature to the server: --temperature default",
+        ),
+        (
+            "max_tokens",
+            with_limit && sent.token_field == TokenField::MaxTokens,
+            "send the limit otherwise: --token-field max_completion_tokens (or none), or another --max-tokens",
+        ),
+        (
+            "max_completion_tokens",
+            with_limit && sent.token_field == TokenField::MaxCompletionTokens,
+            "send the limit otherwise: --token-field max_tokens (or none), or another --max-tokens",
+        ),
+        (
+            "reasoning_effort",
+            parameters.reasoning_effort.is_some(),
+            "leave --reasoning-effort out, or give a value the model takes",
+        ),
+        (
+            "detail",
+            sent.has_image && parameters.detail.is_some(),
+            "leave --detail out, or give a value the server takes",
+        ),
+    ];
+    let named = |name: &str| {
+        let param = complaint.param.as_deref();
+        param.is_some_and(|param| param.rsplit(['.', '/']).next() == Some(name))
+    };
+    let mut sent_ones = hints.iter().filter(|(_, sent, _)| *sent);
+    if let Some((_, _, hint)) = sent_ones.clone().find(|(name, ..)| named(name)) {
+        return Verdict {
+            reach: Reach::Endpoint,
+            ..refused(Some(hint))
+        };
+    }
+    let mentioned = sent_ones.find(|(name, ..)| mentions(&complaint.message, name));
+    refused(mentioned.map(|(_, _, hint)| *hint))
+}
+
+/// Whether a text holds a name as a whole word: `max_tokens` is not in `max_tokens_total`.
+fn mentions(text: &str, name: &str) -> bool {
+    let inside = |c: char| c.is_alphanumeric() || c == '_';
+    text.split(|c: char| !inside(c)).any(|word| word == name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parameters() -> Parameters {
+        Parameters {
+            reasoning_effort: Some("minimal".into()),
+            ..Parameters::new("m".into())
+        }
+    }
+
+    fn judged(status: u16, body: &str) -> Verdict {
+        let sent = Sent {
+            parameters: &parameters(),
+            token_field: TokenField::MaxTokens,
+            has_image: true,
+            has_key: true,
+        };
+        judge(status, &Complaint::of_body(body), sent)
+    }
+
+    #[test]
+    fn statuses_are_told_apart() {
+        for status in [301, 302, 307, 401, 402, 403, 404, 405, 407, 410] {
+            let verdict = judged(status, "");
+            assert_eq!(
+                (verdict.reach, verdict.again),
+                (Reach::Endpoint, false),
+                "{status}"
+            );
+            assert!(verdict.hint.is_some(), "{status}");
+        }
+        for (status, kind) in [
+            (408, FailureKind::Timeout),
+            (409, FailureKind::Server),
+            (429, FailureKind::RateLimit),
+            (500, FailureKind::Server),
+            (503, FailureKind::Server),
+            (529, FailureKind::Server),
+            (599, FailureKind::Server),
+        ] {
+            let verdict = judged(status, "");
+            assert_eq!(
+                (verdict.reach, verdict.again),
+                (Reach::Trial, true),
+                "{status}"
+            );
+            assert_eq!(verdict.kind, kind);
+        }
+        for status in [400, 413, 415, 422] {
+            let verdict = judged(status, "");
+            assert_eq!(
+                (verdict.reach, verdict.again),
+                (Reach::Trial, false),
+                "{status}"
+            );
+        }
+    }
+
+    #[test]
+    fn words_overrule_the_status() {
+        for (status, body) in [
+            (
+                429,
+                r#"{"error":{"type":"insufficient_quota","code":"insufficient_quota","message":"You exceeded your current quota"}}"#,
+            ),
+            (
+                400,
+                r#"{"error":{"type":"invalid_request_error","message":"Your credit balance is too low"}}"#,
+            ),
+            (400, r#"{"error":{"code":"model_not_found","message":"x"}}"#),
+            (
+                500,
+                r#"{"error":{"code":500,"message":"image input is not supported - hint: mmproj"}}"#,
+            ),
+            (
+                400,
+                r#"{"object":"error","message":"X is not a multimodal model None","code":400}"#,
+            ),
+        ] {
+            let verdict = judged(status, body);
+            assert_eq!(
+                (verdict.reach, verdict.again),
+                (Reach::Endpoint, false),
+                "{body}"
+            );
+        }
+        // A minute's limit of Gemini speaks of quota too; waiting helps.
+        let minute = r#"{"error":{"code":429,"status":"RESOURCE_EXHAUSTED","message":"You exceeded your current quota, please check your plan"}}"#;
+        assert!(judged(429, minute).again);
+        let moderated =
+            r#"{"error":{"code":403,"message":"x","metadata":{"reasons":["violence"]}}}"#;
+        assert_eq!(judged(403, moderated).reach, Reach::Trial);
+    }
+
+    #[test]
+    fn the_flag_that_mends_it_is_named() {
+        for (body, reach, flag) in [
+            (
+                r#"{"error":{"param":"temperature","message":"x"}}"#,
+                Reach::Endpoint,
+                "--temperature default",
+            ),
+            (
+                r#"{"error":{"param":"max_tokens","message":"Use 'max_completion_tokens' instead."}}"#,
+                Reach::Endpoint,
+                "--token-field max_completion_tokens",
+            ),
+            (
+                r#"{"error":{"message":"Unsupported: 'max_tokens'. Use 'max_completion_tokens' instead."}}"#,
+                Reach::Trial,
+                "--token-field max_completion_tokens",
+            ),
+            (
+                r#"{"error":{"param":"reasoning_effort","message":"x"}}"#,
+                Reach::Endpoint,
+                "--reasoning-effort",
+            ),
+        ] {
+            let verdict = judged(400, body);
+            assert_eq!(verdict.reach, reach, "{body}");
+            assert!(verdict.hint.unwrap().contains(flag), "{body}");
+        }
+        // What was not sent is not to blame.
+        for body in [
+            r#"{"error":{"param":"max_completion_tokens","message":"x"}}"#,
+            r#"{"error":{"param":"messages.[0].content.[1].image_url.detail","message":"x"}}"#,
+        ] {
+            assert_eq!(judged(400, body).hint, None, "{body}");
+        }
+    }
+}
