@@ -1,4 +1,5 @@
 //! darkqa-eval
 
 pub mod error;
+pub mod score;
 pub mod types;
