@@ -1,0 +1,167 @@
+//! The words that announce an answer, in the languages that models reply in.
+//!
+//! The nouns include those of the multilingual patterns of OpenAI's simple-evals (`MULTILINGUAL_ANSWER_REGEXES`).
+
+use std::sync::LazyLock;
+
+use regex::Regex;
+
+use super::clean::compiled;
+
+/// How firmly a marker announces.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// "answer", "correct option": what it is said to be is the answer.
+    Answer,
+    /// "choose", "go with": a decision.
+    Decision,
+    /// "option", "letter": a choice is named, perhaps in passing.
+    Mention,
+}
+
+/// One marker in a text.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Marker {
+    /// Its first byte.
+    pub(super) start: usize,
+    /// The byte after its last.
+    pub(super) end: usize,
+    /// How firmly it announces.
+    pub(super) kind: Kind,
+}
+
+static MARKER: LazyLock<Regex> = LazyLock::new(|| {
+    compiled(concat!(
+        r"(?P<answer>\b(?:answer|ans|antwort|lösung|réponse|reponse|respuesta|risposta|resposta|antwoord|ответ|ответом|відповідь",
+        r"|odpowiedź|odpowiedzią|odpověď|cevap|cevabı|cevabım|yanıt|yanıtı|yanıtım|jawaban|jawapan|jibu|svar|svaret|vastaus|răspuns|răspunsul",
+        r"|válasz|απάντηση|ìdáhùn|idáhùn|đáp án|trả lời|solution|solución|soluzione|solução)\b",
+        r"|\b(?:correct|right|best|final|my|likely|suitable|appropriate|accurate)\s+(?:option|choice|selection|letter|pick|response|one)\b",
+        r"|\b(?:richtige|korrekte) (?:option|wahl)\b|\b(?:opción|opção|opzione|option) (?:correcta|correta|corretta|correcte)\b|\bbonne option\b",
+        r"|правильный вариант|doğru (?:seçenek|şık)",
+        r"|الإجابة|الاجابة|الجواب|إجابة|جواب|پاسخ|תשובה|उत्तर|जवाब|উত্তর|பதில்|సమాధానం|જવાબ|คำตอบ",
+        r"|答案|答え|答复|答復|答曰|解答|回答|正解|正确选项|正確選項|正しい選択肢|答|정답|답변|답안|답)",
+        r"|(?P<decision>\b(?:choose|chose|select|selected|pick|picked|go(?:ing)? with|went with|opt(?:ing)? for|i'd say|i would say|wähle|choisis|elijo",
+        r"|scelgo|escolho|kies|выбираю|wybieram|seçiyorum|i think it is|i think it's|i believe it is|i believe it's)\b|选择|選擇|应选|應選)",
+        r"|(?P<mention>\b(?:option|choice|letter|selection|response|result|conclusion|verdict|prediction|output|label|wahl|choix|opción|opzione",
+        r"|opção|optie|вариант|opcja|seçenek|şık)\b|الخيار|विकल्प|选项|選項|選択肢|보기|선택|选|選)"
+    ))
+});
+
+/// Every marker of a text in lower case, from left to right.
+pub(super) fn markers(folded: &str) -> impl Iterator<Item = Marker> {
+    MARKER.captures_iter(folded).filter_map(|found| {
+        let groups = [
+            ("answer", Kind::Answer),
+            ("decision", Kind::Decision),
+            ("mention", Kind::Mention),
+        ];
+        let (mark, kind) = groups
+            .into_iter()
+            .find_map(|(name, kind)| Some((found.name(name)?, kind)))?;
+        Some(Marker {
+            start: mark.start(),
+            end: mark.end(),
+            kind,
+        })
+    })
+}
+
+/// What leads from a marker to the name: its words, one at a time.
+static LEAD: LazyLock<Regex> = LazyLock::new(|| {
+    compiled(concat!(
+        r"\A[\s]*(?:(?P<colon>[:=]|=>|->|[→⇒⟶])",
+        r"|(?P<deny>(?:(?:is|was|are|would|should|could|must|can)\s*(?:not|n't)(?: be)?|cannot be|can't be|not|never|ist nicht|nicht|n'est pas",
+        r"|no es|non è|não é|is niet|не|nie jest|değil)\b|不是|并非|並非|不为|不選|不选)",
+        r"|(?P<link>(?:is|was|are|be|(?:would|should|must|will|could|may|might) be|(?:has|have|seems|appears) to be|seems|appears|becomes|being|ist|wäre|lautet|est|serait",
+        r"|es|sería|è|sarebbe|é|seria|zou|to|jest|brzmi|это|este|je|är|er|on|là|adalah|ialah|είναι)\b|'s\b|[–—-]",
+        r"|هي|هو|है|是|应该是|應該是|应为|應為|应选|應選|为|為|选|選|は|が|은|는|이|가|คือ|הוא|היא|است)",
+        r"|(?P<fill>(?:option|choice|letter|answer|clearly|likely|probably|most|definitely|therefore|indeed|still|thus|simply|just|actually",
+        r"|obviously|certainly|best|correct|that|it|it's|this|i think|i believe|i'd say|i would say|as follows|below|number|here|la|le|el|il|lo|o|die|der|das|de|het|lettre",
+        r"|letra|lettera|buchstabe|opción|opção|opzione|optie|correcta|correcte|correta|corretta|finale|final|буква|вариант|opcja|şık|c'est|é a)\b",
+        r"|الصحيحة|الصحيح|النهائية|النهائي|الحرف|الخيار|选项|選項|選択肢|보기|最终|最終))"
+    ))
+});
+
+/// Articles and opening words between a label and a text.
+static ARTICLE: LazyLock<Regex> = LazyLock::new(|| {
+    compiled(concat!(
+        r"\A[(\[]?(?:(?:it is|it's|this is|that is|that's|there is|there are)\s+)?",
+        r"(?:(?:an?|the|in|on|un|une|le|la|les|el|los|las|il|lo|una?|uno|o|um|uma|der|die|das|ein|eine|de|het|een)\s+|l'|une )?"
+    ))
+});
+
+/// How many bytes of articles and opening words stand at a text's beginning.
+pub(super) fn article(folded: &str) -> usize {
+    ARTICLE.find(folded).map_or(0, |found| found.end())
+}
+
+/// The way from a marker to what it announces.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Lead {
+    /// The bytes where the announced name may begin, the farthest last.
+    pub(super) steps: Vec<usize>,
+    /// Whether it comes after a verb or colon, so that it is said to be the answer.
+    pub(super) linked: bool,
+    /// Whether a colon follows the marker, so that all the rest is the answer.
+    pub(super) colon: bool,
+    /// Whether it is said not to be the answer.
+    pub(super) denied: bool,
+}
+
+/// More words than this announce nothing.
+const LEAD_WORDS: usize = 12;
+
+/// Follows the words after a marker that ends at byte `end`.
+pub(super) fn lead(folded: &str, end: usize) -> Lead {
+    let mut lead = Lead {
+        steps: vec![past_space(folded, end)],
+        linked: false,
+        colon: false,
+        denied: false,
+    };
+    let mut at = end;
+    for _ in 0..LEAD_WORDS {
+        let Some(found) = LEAD.captures(&folded[at..]) else {
+            break;
+        };
+        let has = |name: &str| found.name(name).is_some();
+        lead.colon |= has("colon");
+        lead.denied |= has("deny");
+        lead.linked |= has("link") || has("colon") || has("deny");
+        at += found.get(0).map_or(0, |whole| whole.end());
+        lead.steps.push(past_space(folded, at));
+    }
+    lead
+}
+
+/// The first byte from `at` on that is no white space.
+fn past_space(text: &str, at: usize) -> usize {
+    text.len() - text[at..].trim_start().len()
+}
+
+static PRAISE: LazyLock<Regex> = LazyLock::new(|| {
+    compiled(concat!(
+        r"\A[)\].]*\s*(?:is|seems|would be|must be|should be|appears to be|looks like)\s+",
+        r"(?:(?:clearly|definitely|probably|likely|most|therefore|thus|also|indeed)\s+)*(?:the\s+|my\s+)?(?:most\s+|only\s+)?",
+        r"(?:(?:correct|right|best|accurate|appropriate|suitable|likely|plausible|final)\s+(?:answer|option|choice|one|match|fit)",
+        r"|answer)\b",
+        r"|\A[)\].]*\s*(?:是|为|為)?(?:最)?(?:正确|正確)?(?:的)?(?:答案|选项|選項)|\A[)\].]*\s*が(?:正解|答え|正しい)",
+        r"|\A[)\].]*\s*(?:가|이)\s*(?:정답|답)"
+    ))
+});
+static PRAISE_OF_LETTER: LazyLock<Regex> = LazyLock::new(|| {
+    compiled(concat!(
+        r"\A[)\].]*\s*(?:is|seems|would be|must be)\s+(?:clearly |definitely |probably |most likely |likely )?(?:correct|right|best|true)\b",
+        r"|\A[)\].]*\s*(?:是)?(?:正确|正確|对的|對的)"
+    ))
+});
+
+/// Whether a letter is followed by words that call it the answer: "B is correct".
+pub(super) fn praises_letter(after: &str) -> bool {
+    PRAISE.is_match(after) || PRAISE_OF_LETTER.is_match(after)
+}
+
+/// Whether a choice's text is followed by words that call it the answer: "kitchen is the best answer".
+pub(super) fn praises_text(after: &str) -> bool {
+    PRAISE.is_match(after)
+}

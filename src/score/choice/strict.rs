@@ -1,0 +1,86 @@
+//! The exact forms: a choice's text, its letter, or its letter with its text.
+
+use super::names::index_of;
+use crate::types::question::{Answer, Why};
+
+/// Reads a reply that is one of the exact forms, whole; `None` where it is none.
+///
+/// The forms are, in either case of letters: a choice's text with or without a final period; `B`, `(B)`, `[B]`, `B.`,
+/// `B)`, `B:`; and such a letter, or `B -`, before the text of the same choice.
+pub(super) fn read(text: &str, choices: &[String]) -> Option<Answer> {
+    let by_text = position(text, choices);
+    let by_letter = label(text).and_then(|(letter, rest)| {
+        let index = index_of(letter).filter(|index| *index < choices.len());
+        let named = position(rest, choices);
+        match (index, named) {
+            _ if !rest.is_empty() && named.is_none() => None,
+            (None, _) => Some(Answer::Unparsed(Why::OutOfRange)),
+            (Some(index), Some(named)) if index != named => {
+                Some(Answer::Unparsed(Why::Contradiction))
+            }
+            (Some(index), _) => Some(Answer::Chosen(index)),
+        }
+    });
+    match (by_text, by_letter) {
+        // Only where choices are themselves letters can a reply be one choice's text and another's letter.
+        (Some(text), Some(Answer::Chosen(letter))) if text != letter => {
+            Some(Answer::Unparsed(Why::Ambiguous))
+        }
+        (Some(text), _) => Some(Answer::Chosen(text)),
+        (None, by_letter) => by_letter,
+    }
+}
+
+/// The choice whose text this is, letter case and a final period aside.
+fn position(text: &str, choices: &[String]) -> Option<usize> {
+    fn bare(text: &str) -> &str {
+        text.strip_suffix('.').unwrap_or(text)
+    }
+    let text = text.trim();
+    if text.is_empty() {
+        return None;
+    }
+    let folded = text.to_lowercase();
+    let same = |choice: &String| choice.trim().to_lowercase() == folded;
+    let nearly = |choice: &String| bare(&choice.trim().to_lowercase()) == bare(&folded);
+    let exact = choices.iter().position(same);
+    exact.or_else(|| choices.iter().position(nearly))
+}
+
+/// The letter that a reply begins with as a label, and what follows it, which may be nothing.
+fn label(text: &str) -> Option<(char, &str)> {
+    let text = text.trim();
+    let mut chars = text.chars();
+    let first = chars.next()?;
+    let close = match first {
+        '(' => Some(')'),
+        '[' => Some(']'),
+        _ => None,
+    };
+    let letter = if close.is_some() {
+        chars.next()?
+    } else {
+        first
+    };
+    if !letter.is_ascii_alphabetic() {
+        return None;
+    }
+    let rest = chars.as_str();
+    if let Some(close) = close {
+        return Some((letter, rest.strip_prefix(close)?.trim_start()));
+    }
+    if rest.is_empty() {
+        return Some((letter, rest));
+    }
+    if let Some(rest) = rest.strip_prefix(['.', ')', ':']) {
+        return Some((letter, rest.trim_start()));
+    }
+    let after = rest.trim_start();
+    if let Some(named) = after.strip_prefix(['-', '–', '—']) {
+        return Some((letter, named.trim_start())).filter(|(_, named)| !named.is_empty());
+    }
+    // "A kitchen" is a kitchen, "A" on a line of its own is a letter.
+    let gap = &rest[..rest.len() - after.len()];
+    let word = matches!(letter.to_ascii_uppercase(), 'A' | 'I');
+    (gap.contains('\n') || (!gap.is_empty() && !word)).then_some((letter, after))
+}

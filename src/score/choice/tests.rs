@@ -1,0 +1,166 @@
+//! Every rule of reading, on a table of replies, and what holds for any reply.
+
+use proptest::prelude::*;
+use serde::Deserialize;
+
+use super::{Mode, read, readings};
+use crate::types::question::{Answer, Choices, Why};
+use crate::types::reply::{Finish, Reply};
+
+/// One line of the table: the set of choices, the reply, and what each mode reads.
+#[derive(Deserialize)]
+struct Case {
+    of: String,
+    reply: String,
+    strict: Reading,
+    lenient: Reading,
+}
+
+#[derive(Deserialize, Clone, Copy)]
+#[serde(untagged)]
+enum Reading {
+    Chosen(usize),
+    Unparsed(Why),
+}
+
+impl From<Reading> for Answer {
+    fn from(reading: Reading) -> Self {
+        match reading {
+            Reading::Chosen(index) => Self::Chosen(index),
+            Reading::Unparsed(why) => Self::Unparsed(why),
+        }
+    }
+}
+
+const SETS: [(&str, &[&str]); 9] = [
+    ("rooms", &["bedroom", "kitchen", "bathroom", "garage"]),
+    ("yes_no", &["yes", "no"]),
+    ("numbers", &["1", "2", "3", "4"]),
+    ("tables", &["table", "dining table", "coffee table", "chair"]),
+    ("six", &["bed", "sofa", "lamp", "desk", "rug", "none of the above"]),
+    ("chinese", &["卧室", "厨房", "浴室", "车库"]),
+    ("letters", &["D", "C", "B", "A"]),
+    ("signs", &["C++", "C#", ".*", "[a-z]+", "(x)"]),
+    ("left_right", &["left", "right", "in front", "behind"]),
+];
+
+fn choices(set: &str) -> Choices {
+    let texts = match SETS.iter().find(|(name, _)| *name == set) {
+        Some((_, texts)) => texts.iter().map(|&text| text.to_owned()).collect(),
+        None => (1..=26).map(|i| format!("item{i}")).collect(),
+    };
+    Choices::new(texts, 0).unwrap()
+}
+
+#[test]
+fn the_table_of_replies_is_read() {
+    let mut wrong = Vec::new();
+    for line in include_str!("../../../tests/data/replies.jsonl").lines() {
+        let case: Case = serde_json::from_str(line).unwrap();
+        for (mode, want) in [(Mode::Strict, case.strict), (Mode::Lenient, case.lenient)] {
+            let found = read(&case.reply, &choices(&case.of), mode);
+            if found != want.into() {
+                wrong.push(format!("{mode:?} {line}: {found:?}"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{} wrong:\n{}", wrong.len(), wrong.join("\n"));
+}
+
+#[test]
+fn how_a_reply_ended_is_regarded() {
+    let rooms = choices("rooms");
+    let reply = |text: &str, finish: Finish, refusal: Option<&str>| Reply {
+        finish,
+        refusal: refusal.map(str::to_owned),
+        ..Reply::local(text.to_owned())
+    };
+    let both = |answer: Answer| (answer, answer);
+    let unparsed = |why: Why| both(Answer::Unparsed(why));
+    for (reply, want) in [
+        (reply("B", Finish::Stop, None), both(Answer::Chosen(1))),
+        (
+            reply("It is B.", Finish::Stop, None),
+            (Answer::Unparsed(Why::NoChoice), Answer::Chosen(1)),
+        ),
+        (reply("", Finish::Stop, None), unparsed(Why::Empty)),
+        (reply("", Finish::Stop, Some("I cannot.")), unparsed(Why::Refused)),
+        (reply("Option B", Finish::Stop, Some("I cannot.")), unparsed(Why::Refused)),
+        (reply("", Finish::Filter, None), unparsed(Why::Filtered)),
+        (reply("", Finish::Length, None), unparsed(Why::Truncated)),
+        (reply("B", Finish::Length, None), both(Answer::Chosen(1))),
+        (reply("The answer is B", Finish::Length, None), unparsed(Why::Truncated)),
+        (reply("", Finish::Other("x".into()), None), unparsed(Why::Empty)),
+    ] {
+        assert_eq!(readings(&reply, &rooms), want, "{reply:?}");
+    }
+}
+
+#[test]
+fn long_replies_are_read() {
+    let rooms = choices("rooms");
+    // Each of these would take minutes if any level were quadratic.
+    for piece in [
+        "answer: ", "answer is ", "option ", "option:", "is ", "\\boxed{", "{\"answer\":", "{", "[", "<answer>",
+        "<|im_end|>", "B", "B ", "B, ", "(", "kitchen ", "kitchen", "not ", "\n", " ", "**", "_", "'", "```", "|",
+        "<think>", "\\text{", "Question: x\n", "答案", "A bedroom. ", "no B ", "<b>", "answer: x\n", "\u{301}",
+    ] {
+        let long = piece.repeat(200_000 / piece.len());
+        let _ = read(&long, &rooms, Mode::Lenient);
+        let answered = format!("There is a stove. {}\nAnswer: B", "It is dim here. ".repeat(1_000));
+        assert_eq!(read(&answered, &rooms, Mode::Lenient), Answer::Chosen(1));
+    }
+}
+
+/// Fragments that the levels look for, so that random strings of them reach every level.
+const FRAGMENTS: [&str; 64] = [
+    "A", "B", "C", "D", "E", "I", "a", "b", "(B)", "[C]", "B.", "c)", "A:", "kitchen", "Kitchen.", "bathroom", "bedroom",
+    "garage", "kitchens", "yes", "no", "1", "2", "2.5", "answer", "Answer:", "The answer is", "option", "correct", "I choose",
+    "is", "not", "isn't", "or", "and", ",", ".", ":", "-", "?", "!", "\n", "\n\n", " ", " ", "**", "`", "\"", "'", "$",
+    "\\boxed{", "}", "{\"answer\": \"", "\"}", "<answer>", "</answer>", "<think>", "</think>", "<|im_end|>", "答案",
+    "是", "Question:", "\u{200b}", "❌",
+];
+
+fn reply() -> impl Strategy<Value = String> {
+    let fragments = prop::collection::vec(prop::sample::select(&FRAGMENTS[..]), 0..14);
+    let spaced = (fragments.clone(), Just(" ")).prop_map(|(parts, gap)| parts.join(gap));
+    prop_oneof![fragments.prop_map(|parts| parts.concat()), spaced, any::<String>(), "\\PC{0,40}"]
+}
+
+proptest! {
+    #[test]
+    fn the_modes_never_disagree(reply in reply(), set in 0..SETS.len()) {
+        let choices = choices(SETS[set].0);
+        let strict = read(&reply, &choices, Mode::Strict);
+        let lenient = read(&reply, &choices, Mode::Lenient);
+        match (strict, lenient) {
+            (Answer::Chosen(strict), lenient) => {
+                prop_assert_eq!(lenient, Answer::Chosen(strict));
+                prop_assert!(strict < choices.len());
+            }
+            (Answer::Unparsed(_), Answer::Chosen(index)) => prop_assert!(index < choices.len()),
+            (strict, lenient) => prop_assert_eq!(strict, lenient),
+        }
+    }
+
+    #[test]
+    fn every_form_of_every_choice_is_read(set in 0..SETS.len() - 2, pick in 0..100usize, form in 0..8usize) {
+        let choices = choices(SETS[set].0);
+        prop_assume!(SETS[set].0 != "letters");
+        let index = pick % choices.len();
+        let letter = crate::types::question::letter(index);
+        let text = &choices.texts()[index];
+        let (reply, strict) = match form {
+            0 => (letter.to_string(), true),
+            1 => (format!("({letter}) {text}"), true),
+            2 => (text.to_uppercase(), true),
+            3 => (format!("{letter}.\n{text}."), true),
+            4 => (format!("The answer is {letter}."), false),
+            5 => (format!("Answer: {text}"), false),
+            6 => (format!("{{\"answer\": \"{text}\"}}"), false),
+            _ => (format!("**{letter}. {text}**"), false),
+        };
+        prop_assert_eq!(read(&reply, &choices, Mode::Lenient), Answer::Chosen(index), "{}", reply);
+        prop_assert_eq!(read(&reply, &choices, Mode::Strict) == Answer::Chosen(index), strict, "{}", reply);
+    }
+}

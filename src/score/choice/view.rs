@@ -1,0 +1,147 @@
+//! A plain text with every place where it names one of the offered choices.
+
+use super::letters::letters;
+use super::names::{Grip, Name, cut_number, denied, one_word};
+use super::plain::{fold, plain};
+use super::{clean, markers};
+use crate::types::question::Choices;
+
+/// The choices as they can stand in a plain text.
+pub(super) struct Offered {
+    /// Their texts without markup.
+    pub(super) texts: Vec<String>,
+    /// The same in lower case without a final period, longest first, with the choices they belong to.
+    folded: Vec<(String, usize)>,
+    /// Which choices are "yes" and "no", where both are offered.
+    pub(super) yes_no: Option<(usize, usize)>,
+}
+
+impl Offered {
+    pub(super) fn new(choices: &Choices) -> Self {
+        let texts: Vec<String> = choices
+            .texts()
+            .iter()
+            .map(|text| plain(&clean::tidy(text)))
+            .collect();
+        let mut folded: Vec<(String, usize)> = texts
+            .iter()
+            .map(|text| fold(text.strip_suffix('.').unwrap_or(text)))
+            .enumerate()
+            .map(|(index, text)| (text, index))
+            .filter(|(text, _)| !text.is_empty())
+            .collect();
+        let position = |word: &str| {
+            folded
+                .iter()
+                .find(|(text, _)| text == word)
+                .map(|(_, index)| *index)
+        };
+        let yes_no = position("yes").zip(position("no"));
+        folded.sort_by_key(|(text, index)| (std::cmp::Reverse(text.len()), *index));
+        Self {
+            texts,
+            folded,
+            yes_no,
+        }
+    }
+}
+
+/// A plain text and what it names.
+pub(super) struct View<'a> {
+    /// The text.
+    pub(super) text: &'a str,
+    /// The text in lower case, byte for byte.
+    pub(super) folded: &'a str,
+    /// What it is read against.
+    pub(super) offered: &'a Offered,
+    /// Letters, from left to right.
+    pub(super) letters: Vec<Name>,
+    /// Texts of choices, from left to right, none inside a longer one.
+    pub(super) texts: Vec<Name>,
+}
+
+impl<'a> View<'a> {
+    /// Looks through a text; `folded` is [`fold`] of it.
+    pub(super) fn new(text: &'a str, folded: &'a str, offered: &'a Offered) -> Self {
+        Self {
+            text,
+            folded,
+            offered,
+            letters: letters(text, offered.texts.len()),
+            texts: texts(folded, offered),
+        }
+    }
+
+    /// The choice's text that begins at a byte, articles and words such as "it is" passed over.
+    pub(super) fn text_at(&self, at: usize) -> Option<Name> {
+        let found = |at: usize| {
+            let first = self.texts.partition_point(|name| name.start < at);
+            self.texts
+                .get(first)
+                .copied()
+                .filter(|name| name.start == at)
+        };
+        found(at).or_else(|| found(at + markers::article(&self.folded[at..])))
+    }
+
+    /// Whether the words around a name deny it.
+    pub(super) fn denies(&self, name: &Name) -> bool {
+        denied(self.folded, name.start, name.end)
+    }
+
+    /// The text that follows a letter as its label does: "B. kitchen", "(B) a kitchen", "B: kitchen".
+    pub(super) fn labelled_text(&self, letter: &Name) -> Option<Name> {
+        let rest = &self.text[letter.end..];
+        let after = rest.trim_start_matches([')', ']', '.', ':', ',', ' ', '\n', '-', '–', '—']);
+        let gap = &rest[..rest.len() - after.len()];
+        let name = self.text_at(letter.end + gap.len())?;
+        // On another line it is the letter's text only where it fills the line.
+        let line = self.text[name.end..].trim_start_matches(['.', ' ']);
+        let alone = !gap.contains('\n') || line.is_empty() || line.starts_with('\n');
+        (!gap.is_empty() && alone && !self.denies(&name)).then_some(name)
+    }
+}
+
+/// Every whole-word place of a choice's text, longest texts first, from left to right.
+fn texts(folded: &str, offered: &Offered) -> Vec<Name> {
+    let mut taken = vec![false; folded.len()];
+    let mut names = Vec::new();
+    for (i, (text, choice)) in offered.folded.iter().enumerate() {
+        // Two choices may differ in markup alone; then every place names both.
+        let twins = offered.folded[i + 1..]
+            .iter()
+            .take_while(|(twin, _)| twin.len() == text.len());
+        let twins: Vec<usize> = twins
+            .filter(|(twin, _)| twin == text)
+            .map(|(_, index)| *index)
+            .collect();
+        for (start, _) in folded.match_indices(text.as_str()) {
+            let end = start + text.len();
+            if taken[start..end].contains(&true) || !whole(folded, start, end) {
+                continue;
+            }
+            taken[start..end].fill(true);
+            names.extend([*choice].iter().chain(&twins).map(|&choice| Name {
+                start,
+                end,
+                choice: Some(choice),
+                grip: Grip::Plain,
+            }));
+        }
+    }
+    names.sort_by_key(|name| name.start);
+    names
+}
+
+/// Whether a span stands for itself: no part of a word or number, and no "no" that belongs to a noun.
+fn whole(folded: &str, start: usize, end: usize) -> bool {
+    let span = &folded[start..end];
+    let (before, after) = (
+        folded[..start].chars().next_back(),
+        folded[end..].chars().next(),
+    );
+    let inside = one_word(before, span.chars().next()) || one_word(span.chars().next_back(), after);
+    let article = span.len() == 1 && matches!(span, "a" | "i") && after == Some(' ');
+    let noun = span == "no" && !after.is_none_or(|c| ".,;:!?)\n".contains(c));
+    !inside && !article && !noun && !cut_number(folded, start, end)
+}
