@@ -102,6 +102,22 @@ impl Error {
         }
     }
 
+    /// The same error, said of another flag or place: what a type's own parser reports gets the flag it came by.
+    #[must_use]
+    pub fn at(self, origin: impl Into<String>) -> Self {
+        match self {
+            Self::Usage { problem, .. } => Self::Usage {
+                origin: origin.into(),
+                problem,
+            },
+            Self::Data { problem, .. } => Self::Data {
+                place: origin.into(),
+                problem,
+            },
+            other => other,
+        }
+    }
+
     /// An error at one line (counted from 1) of a data file.
     pub fn line(path: &Path, line: usize, problem: impl Display) -> Self {
         Self::data(format_args!("{}, line {line}", path.display()), problem)

@@ -1,3 +1,90 @@
-//! The command line of darkqa-eval.
+//! The program: parse, resolve, log, run, exit code.
 
-fn main() {}
+use std::io::Write;
+use std::process::ExitCode;
+
+use clap::Parser;
+use clap::error::ErrorKind;
+use darkqa_eval::cli::Cli;
+use darkqa_eval::config::{self, Config};
+use darkqa_eval::enhance;
+use darkqa_eval::run::progress::{Loudness, Progress};
+use darkqa_eval::run::{Verdict, evaluate};
+use darkqa_eval::types::manifest::Status;
+use tracing_subscriber::EnvFilter;
+
+/// Finished, but some trials failed.
+const WITH_FAILURES: u8 = 1;
+/// Usage, configuration, or an error that stops everything.
+const FATAL: u8 = 2;
+/// Interrupted; the same command goes on.
+const INTERRUPTED: u8 = 130;
+
+#[expect(
+    unsafe_code,
+    reason = "a switch that ONNX Runtime reads from the environment alone"
+)]
+fn main() -> ExitCode {
+    // SAFETY: nothing has started a thread yet.
+    unsafe { enhance::forbid_telemetry() };
+    run()
+}
+
+fn run() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(e) if matches!(e.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
+            return if e.print().is_ok() {
+                ExitCode::SUCCESS
+            } else {
+                ExitCode::from(FATAL)
+            };
+        }
+        Err(e) => return fail(&config::one_line(&e)),
+    };
+    let loudness = if cli.evaluate.output.quiet {
+        Loudness::Quiet
+    } else {
+        Loudness::Normal
+    };
+    let progress = Progress::new(loudness);
+    let filter =
+        EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("darkqa_eval=warn"));
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_target(false)
+        .without_time()
+        .with_writer(progress.clone())
+        .init();
+    match show(cli, &progress) {
+        Ok(code) => code,
+        Err(e) => fail(&format!("{e:#}")),
+    }
+}
+
+fn show(cli: Cli, progress: &Progress) -> anyhow::Result<ExitCode> {
+    let config = Config::resolve(cli.evaluate)?;
+    let Verdict {
+        status,
+        output,
+        folder,
+    } = evaluate(&config, progress)?;
+    let written = std::io::stdout().lock().write_all(output.as_bytes());
+    progress.say(&format!("{}: {status}", folder.display()));
+    match (status, written) {
+        (Status::Cancelled, _) => Ok(ExitCode::from(INTERRUPTED)),
+        // Whoever reads the output may have enough of it.
+        (_, Err(e)) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(e.into()),
+        (Status::Complete, _) => Ok(ExitCode::SUCCESS),
+        _ => Ok(ExitCode::from(WITH_FAILURES)),
+    }
+}
+
+#[expect(
+    clippy::print_stderr,
+    reason = "the one place where an error reaches the user"
+)]
+fn fail(problem: &str) -> ExitCode {
+    eprintln!("error: {problem}");
+    ExitCode::from(FATAL)
+}

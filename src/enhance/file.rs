@@ -98,7 +98,6 @@ fn not_onnx(path: &Path, bytes: &[u8]) -> Error {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
 

@@ -232,7 +232,6 @@ fn at(path: &Path, what: &str, error: &io::Error) -> String {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
     use zip::write::SimpleFileOptions;

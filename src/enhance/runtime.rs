@@ -249,7 +249,6 @@ fn start_thread() -> std::io::Result<Sender<Job>> {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
 

@@ -176,7 +176,6 @@ fn system_folders() -> Vec<PathBuf> {
 }
 
 #[cfg(all(test, unix, not(target_os = "macos")))]
-#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
 

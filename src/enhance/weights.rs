@@ -143,7 +143,6 @@ fn location_in(model: &[u8], entry: Range<usize>) -> Result<Option<String>, Malf
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
     use proptest::prelude::*;

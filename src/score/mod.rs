@@ -1,3 +1,6 @@
-//! Judging replies: from what a model said to which choice it made.
+//! Stage 5, JUDGE: a reply → a choice; records → numbers.
 
+pub mod accuracy;
+pub mod chance;
 pub mod choice;
+pub mod estimate;

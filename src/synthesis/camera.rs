@@ -176,7 +176,6 @@ impl Draws {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 pub(super) mod tests {
     use super::*;
     use crate::types::FrameId;

@@ -25,7 +25,6 @@ pub fn table(level: DarkLevel) -> [u8; 256] {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 

@@ -52,5 +52,4 @@ pub fn degrade(clean: &Rgb, how: Degradation, key: &NoiseKey, camera: &CameraMod
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests;

@@ -69,7 +69,6 @@ fn log_probability(mean: f64, count: f64) -> f64 {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use std::collections::BTreeMap;
 

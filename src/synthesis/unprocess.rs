@@ -52,7 +52,6 @@ fn behind_filter(camera: [f64; 3], plane: Plane, state: &CameraState) -> f64 {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::super::camera::tests::median;
     use super::*;

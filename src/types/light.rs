@@ -121,6 +121,55 @@ impl fmt::Display for Variant {
     }
 }
 
+/// A choice among the two dark variants.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Variants {
+    /// Exposure drop alone.
+    Ev,
+    /// With sensor noise.
+    Noise,
+    /// Each by itself.
+    Both,
+}
+
+impl Variants {
+    /// Whether a variant is among them; the untouched frame never is.
+    #[must_use]
+    pub fn include(self, variant: Variant) -> bool {
+        match variant {
+            Variant::None => false,
+            Variant::Ev => self != Self::Noise,
+            Variant::Noise => self != Self::Ev,
+        }
+    }
+}
+
+impl fmt::Display for Variants {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Ev => "ev",
+            Self::Noise => "noise",
+            Self::Both => "both",
+        })
+    }
+}
+
+impl FromStr for Variants {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        [Self::Ev, Self::Noise, Self::Both]
+            .into_iter()
+            .find(|variants| variants.to_string() == text)
+            .ok_or_else(|| {
+                Error::usage(
+                    "variant",
+                    format_args!("{text:?} is none of ev, noise, both"),
+                )
+            })
+    }
+}
+
 /// What happened to the light of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Degradation {

@@ -9,6 +9,7 @@
     reason = "a test that cannot set up its scene fails where it cannot"
 )]
 
+pub mod endpoint;
 pub mod onnx;
 
 /// Keeps the ONNX Runtime of this test program from reporting anything; to be called before it is opened.
@@ -19,12 +20,3 @@ pub fn forbid_telemetry() {
     // is opened after this call alone, by every thread that opens it.
     ONCE.call_once(|| unsafe { darkqa_eval::enhance::forbid_telemetry() });
 }
-//! What integration tests share.
-#![allow(
-    dead_code,
-    unreachable_pub,
-    clippy::unwrap_used,
-    reason = "each test binary uses its part, and a test may panic"
-)]
-
-pub mod endpoint;

@@ -21,16 +21,24 @@ mod tests;
 mod view;
 mod written;
 
+use serde::Serialize;
+
 use crate::types::question::{Answer, Choices, Why};
 use crate::types::reply::{Finish, Reply};
 
 /// How much of a reply may stand around the answer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Mode {
     /// Nothing: the whole reply is a choice's text, its letter, or its letter with its text. The headline number.
     Strict,
     /// Sentences, markup, JSON, LaTeX; as long as one choice alone is meant.
     Lenient,
+}
+
+impl Mode {
+    /// Both, the headline first.
+    pub const ALL: [Self; 2] = [Self::Strict, Self::Lenient];
 }
 
 /// The choice that a reply makes; its index is that of the order shown.

@@ -1,0 +1,528 @@
+//! Everything a run is told, checked once; nothing later reads the world again.
+
+mod layers;
+
+use std::num::{NonZeroU32, NonZeroUsize};
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::time::Duration;
+use std::{env, fs};
+
+pub use layers::one_line;
+
+use crate::ask::{BaseUrl, Format, Parameters, Secret, Sending};
+use crate::cli::{
+    DataArgs, EnhancementArgs, EvaluateArgs, LightArgs, ModelArgs, OutputArgs, SendingArgs,
+};
+use crate::dataset::Place;
+use crate::enhance::{Install, RuntimeSearch};
+use crate::error::{Error, Result};
+use crate::synthesis::CameraModel;
+use crate::types::{Family, Level, Variants, View};
+
+/// How many requests are in flight where nobody says otherwise.
+const CONCURRENCY: NonZeroUsize = NonZeroUsize::new(8).unwrap();
+
+/// The endpoint where nobody says otherwise.
+const BASE_URL: &str = "https://api.openai.com/v1";
+
+/// A whole evaluation.
+#[derive(Debug)]
+pub struct Config {
+    /// Which images and questions.
+    pub data: Data,
+    /// How dark.
+    pub light: Light,
+    /// What mends the images.
+    pub enhancement: Enhancement,
+    /// Who is asked.
+    pub ask: Ask,
+    /// How images are sent.
+    pub images: Images,
+    /// How much at once, and when to give up.
+    pub pace: Pace,
+    /// What is left behind.
+    pub output: Output,
+}
+
+/// Which images and questions.
+#[derive(Debug)]
+pub struct Data {
+    /// Where they are.
+    pub place: Place,
+    /// The questions, where they are not beside the images.
+    pub questions: Option<PathBuf>,
+    /// Only the first so many questions.
+    pub limit: Option<NonZeroUsize>,
+    /// Only these families.
+    pub families: Option<Vec<Family>>,
+}
+
+/// How dark.
+#[derive(Debug)]
+pub struct Light {
+    /// The levels, lightest first, none twice.
+    pub levels: Vec<Level>,
+    /// The variants of the dark ones.
+    pub variants: Variants,
+    /// The seed of all random draws.
+    pub seed: u64,
+    /// The sensor.
+    pub camera: CameraModel,
+}
+
+/// What mends the images.
+#[derive(Debug)]
+pub struct Enhancement {
+    /// The ONNX files.
+    pub models: Vec<PathBuf>,
+    /// The variants that are mended.
+    pub on: Variants,
+    /// Threads of synthesis and enhancement; `None` for all cores.
+    pub threads: Option<NonZeroUsize>,
+    /// Where ONNX Runtime is looked for.
+    pub runtime: RuntimeSearch,
+}
+
+/// The name of a model.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ModelName {
+    /// The built-in one that guesses.
+    Random,
+    /// The built-in one that answers out of a file.
+    Script(PathBuf),
+    /// One at the endpoint.
+    Remote(String),
+}
+
+/// Who is asked.
+#[derive(Debug)]
+pub struct Ask {
+    /// The models.
+    pub models: Vec<ModelName>,
+    /// Whether they see the images.
+    pub view: View,
+    /// The models of the text-only baseline.
+    pub blind_models: Vec<ModelName>,
+    /// The endpoint; `None` where all models are built in.
+    pub server: Option<Server>,
+    /// How a model is to speak; its name is set for each.
+    pub parameters: Parameters,
+    /// A folder with prompts of the user's.
+    pub prompts: Option<PathBuf>,
+}
+
+/// Where requests go, and how.
+#[derive(Debug)]
+pub struct Server {
+    /// The address.
+    pub base_url: BaseUrl,
+    /// The key.
+    pub key: Option<Secret>,
+    /// Timeouts and retries.
+    pub sending: Sending,
+}
+
+/// How images are sent.
+#[derive(Debug)]
+pub struct Images {
+    /// The file format.
+    pub format: Format,
+    /// The longest side; `None` for as they are.
+    pub max_side: Option<NonZeroU32>,
+}
+
+/// How much at once, and when to give up.
+#[derive(Debug)]
+pub struct Pace {
+    /// Requests in flight at once.
+    pub concurrency: NonZeroUsize,
+    /// The most failed trials that are borne.
+    pub max_failures: Option<usize>,
+}
+
+/// Where the run is kept.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum RunPlace {
+    /// The folder of the same command, else a new one.
+    Automatic,
+    /// This folder.
+    Named(PathBuf),
+    /// This folder, which must hold a run.
+    Resume(PathBuf),
+}
+
+/// What standard output gets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Show {
+    /// A table.
+    Table,
+    /// The summary as JSON.
+    Json,
+}
+
+/// What is left behind.
+#[derive(Debug)]
+pub struct Output {
+    /// Where.
+    pub place: RunPlace,
+    /// In what form on standard output.
+    pub show: Show,
+}
+
+impl Config {
+    /// Resolves what was typed against environment, configuration file and defaults.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with the flag, variable or line that cannot be used.
+    pub fn resolve(flags: EvaluateArgs) -> Result<Self> {
+        let said = layers::merge(flags)?;
+        Ok(Self {
+            data: data(said.data),
+            light: light(&said.light)?,
+            enhancement: enhancement(said.enhancement)?,
+            ask: ask(said.model, &said.sending)?,
+            images: Images {
+                format: parsed("--image", said.sending.image.as_deref())?.unwrap_or(Format::Png),
+                max_side: said.sending.max_side,
+            },
+            pace: pace(&said.sending),
+            output: output(said.output),
+        })
+    }
+}
+
+fn data(said: DataArgs) -> Data {
+    let families = said.families.map(|list| {
+        list.split(',')
+            .map(|name| Family::from(name.trim()))
+            .collect()
+    });
+    Data {
+        place: said.data.map_or(Place::Rooms, Place::Path),
+        questions: said.questions,
+        limit: said.limit,
+        families,
+    }
+}
+
+fn light(said: &LightArgs) -> Result<Light> {
+    let mut camera = CameraModel::default();
+    if let Some(gain) = said.gain {
+        camera.pin_gain(gain)?;
+    }
+    if let Some(ratio) = said.ratio {
+        camera.pin_ratio(ratio)?;
+    }
+    Ok(Light {
+        levels: said
+            .levels
+            .as_deref()
+            .map_or(Ok(Level::ALL.to_vec()), levels)?,
+        variants: parsed("--variant", said.variant.as_deref())?.unwrap_or(Variants::Both),
+        seed: said.seed.unwrap_or(0),
+        camera,
+    })
+}
+
+/// Reads `L0-L5` or `L0,L3`, in any order, none twice.
+fn levels(text: &str) -> Result<Vec<Level>> {
+    let mut levels = Vec::new();
+    for part in text.split(',').map(str::trim) {
+        let read = |level: &str| level.trim().parse::<Level>().map_err(|e| e.at("--levels"));
+        match part.split_once('-') {
+            None => levels.push(read(part)?),
+            Some((first, last)) => {
+                let (first, last) = (read(first)?, read(last)?);
+                if first > last {
+                    return Err(Error::usage(
+                        "--levels",
+                        format_args!("{part:?} runs backwards; {last}-{first} is meant?"),
+                    ));
+                }
+                levels.extend(
+                    Level::ALL
+                        .into_iter()
+                        .filter(|level| (first..=last).contains(level)),
+                );
+            }
+        }
+    }
+    levels.sort_unstable();
+    levels.dedup();
+    Ok(levels)
+}
+
+fn enhancement(said: EnhancementArgs) -> Result<Enhancement> {
+    // ORT_DYLIB_PATH is the variable of the `ort` crate.
+    let library = said.ort_lib.or_else(|| {
+        env::var_os("ORT_DYLIB_PATH")
+            .filter(|path| !path.is_empty())
+            .map(PathBuf::from)
+    });
+    Ok(Enhancement {
+        models: said.llie,
+        on: parsed("--llie-on", said.llie_on.as_deref())?.unwrap_or(Variants::Noise),
+        threads: said.threads,
+        runtime: RuntimeSearch {
+            library,
+            install: if said.offline {
+                Install::Offline
+            } else {
+                Install::Allowed
+            },
+        },
+    })
+}
+
+fn ask(said: ModelArgs, sending: &SendingArgs) -> Result<Ask> {
+    let names = |flag: &'static str, names: &[String]| -> Result<Vec<ModelName>> {
+        names
+            .iter()
+            .map(|name| name.parse::<ModelName>().map_err(|e| e.at(flag)))
+            .collect()
+    };
+    let (models, blind_models) = (
+        names("--model", &said.model)?,
+        names("--blind-model", &said.blind_model)?,
+    );
+    if models.is_empty() && blind_models.is_empty() {
+        return Err(Error::usage(
+            "--model",
+            "no model is named: a model's name at the endpoint, or random to try without one",
+        ));
+    }
+    let remote = models
+        .iter()
+        .chain(&blind_models)
+        .any(|name| matches!(name, ModelName::Remote(_)));
+    let parameters = Parameters {
+        temperature: temperature(said.temperature.as_deref())?,
+        max_tokens: Some(
+            said.max_tokens
+                .map_or(Parameters::MAX_TOKENS, NonZeroU32::get),
+        ),
+        token_field: parsed("--token-field", said.token_field.as_deref())?
+            .unwrap_or(crate::ask::TokenField::Auto),
+        reasoning_effort: said.reasoning_effort.clone(),
+        detail: parsed("--detail", said.detail.as_deref())?,
+        ..Parameters::new(String::new())
+    };
+    Ok(Ask {
+        models,
+        view: if said.blind { View::Blind } else { View::Image },
+        blind_models,
+        server: if remote {
+            Some(server(&said, sending)?)
+        } else {
+            None
+        },
+        parameters,
+        prompts: said.prompts,
+    })
+}
+
+impl FromStr for ModelName {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        match text.trim() {
+            "" => Err(Error::usage("--model", "the name of a model is empty")),
+            "random" => Ok(Self::Random),
+            name => Ok(name.strip_prefix("script:").map_or_else(
+                || Self::Remote(name.to_owned()),
+                |path| Self::Script(path.into()),
+            )),
+        }
+    }
+}
+
+fn temperature(said: Option<&str>) -> Result<Option<f64>> {
+    match said {
+        None => Ok(Some(Parameters::TEMPERATURE)),
+        Some("default") => Ok(None),
+        Some(text) => match text.parse::<f64>() {
+            Ok(value) if value.is_finite() && value >= 0.0 => Ok(Some(value)),
+            _ => Err(Error::usage(
+                "--temperature",
+                format_args!("{text:?} is neither a number from 0 on nor default"),
+            )),
+        },
+    }
+}
+
+fn server(said: &ModelArgs, sending: &SendingArgs) -> Result<Server> {
+    let base_url = said
+        .base_url
+        .clone()
+        .or_else(|| set("OPENAI_BASE_URL"))
+        .unwrap_or_else(|| BASE_URL.to_owned());
+    let base_url: BaseUrl = base_url.parse()?;
+    let key = key(said, &base_url)?;
+    let defaults = Sending::default();
+    Ok(Server {
+        base_url,
+        key,
+        sending: Sending {
+            timeout: seconds("--timeout", sending.timeout)?.unwrap_or(defaults.timeout),
+            retries: sending.retries.unwrap_or(defaults.retries),
+            max_wait: seconds("--max-wait", sending.max_wait)?.unwrap_or(defaults.max_wait),
+            allow_http: said.allow_http,
+            ..defaults
+        },
+    })
+}
+
+/// The key for an endpoint: from a file, else from a variable; another machine must have one unless `none` is said.
+fn key(said: &ModelArgs, base_url: &BaseUrl) -> Result<Option<Secret>> {
+    if let Some(path) = &said.api_key_file {
+        let text = fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))?;
+        return Secret::new(&text, "--api-key-file").map(Some);
+    }
+    let name = said.api_key_env.as_deref().unwrap_or("OPENAI_API_KEY");
+    if name == "none" {
+        return Ok(None);
+    }
+    match set(name) {
+        Some(text) => Secret::new(&text, name).map(Some),
+        None if said.api_key_env.is_some() => Err(Error::usage(
+            "--api-key-env",
+            format_args!("the variable {name} is not set"),
+        )),
+        None if base_url.is_loopback() || base_url.has_credentials() => Ok(None),
+        None => Err(Error::usage(
+            name,
+            format_args!(
+                "no key for {base_url}: set this variable, or name another with --api-key-env NAME or a file with --api-key-file FILE; \
+                 an endpoint without keys takes --api-key-env none"
+            ),
+        )),
+    }
+}
+
+fn set(variable: &str) -> Option<String> {
+    env::var(variable)
+        .ok()
+        .filter(|text| !text.trim().is_empty())
+}
+
+fn pace(said: &SendingArgs) -> Pace {
+    Pace {
+        concurrency: said.concurrency.unwrap_or(CONCURRENCY),
+        max_failures: said.max_failures,
+    }
+}
+
+fn output(said: OutputArgs) -> Output {
+    let place = match (said.out, said.resume) {
+        (Some(path), _) => RunPlace::Named(path),
+        (None, Some(path)) => RunPlace::Resume(path),
+        (None, None) => RunPlace::Automatic,
+    };
+    Output {
+        place,
+        show: if said.json { Show::Json } else { Show::Table },
+    }
+}
+
+fn parsed<T: FromStr<Err = Error>>(flag: &str, text: Option<&str>) -> Result<Option<T>> {
+    text.map(|text| text.parse().map_err(|e: Error| e.at(flag)))
+        .transpose()
+}
+
+fn seconds(flag: &str, said: Option<f64>) -> Result<Option<Duration>> {
+    said.map(|seconds| {
+        let duration = Duration::try_from_secs_f64(seconds)
+            .ok()
+            .filter(|duration| !duration.is_zero());
+        duration.ok_or_else(|| {
+            Error::usage(
+                flag,
+                format_args!("{seconds} is no number of seconds above 0"),
+            )
+        })
+    })
+    .transpose()
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+    use crate::cli::Cli;
+
+    fn resolve(words: &[&str]) -> Result<Config> {
+        Config::resolve(
+            Cli::try_parse_from(std::iter::once(&"darkqa-eval").chain(words))
+                .unwrap()
+                .evaluate,
+        )
+    }
+
+    #[test]
+    fn levels_are_read_in_any_form() {
+        assert_eq!(levels("L0-L5").unwrap(), Level::ALL);
+        assert_eq!(levels("l3, L0,L3").unwrap(), [Level::L0, Level::L3]);
+        for (wrong, says) in [
+            ("L6", "\"L6\" is none of"),
+            ("", "\"\" is none of"),
+            ("L3-L1", "runs backwards"),
+        ] {
+            let error = levels(wrong).unwrap_err().to_string();
+            assert!(
+                error.starts_with("--levels: ") && error.contains(says),
+                "{error}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_makes_no_sense_names_its_flag() {
+        for (words, says) in [
+            (vec![], "--model: no model is named"),
+            (vec!["--model", ""], "--model: the name"),
+            (
+                vec!["--model", "random", "--variant", "dark"],
+                "--variant: \"dark\" is none of",
+            ),
+            (vec!["--model", "random", "--gain", "-1"], "--gain: "),
+            (
+                vec!["--model", "random", "--temperature", "warm"],
+                "--temperature: \"warm\"",
+            ),
+            (
+                vec![
+                    "--model",
+                    "m",
+                    "--base-url",
+                    "http://127.0.0.1:1/v1",
+                    "--timeout",
+                    "-2",
+                ],
+                "--timeout: -2",
+            ),
+            (
+                vec!["--model", "m", "--base-url", "ftp://x"],
+                "--base-url: ",
+            ),
+            (
+                vec!["--model", "m", "--api-key-env", "DARKQA_NO_SUCH_VARIABLE"],
+                "--api-key-env: the variable",
+            ),
+        ] {
+            let error = resolve(&words).unwrap_err().to_string();
+            assert!(error.starts_with(says), "{words:?}: {error}");
+        }
+    }
+
+    #[test]
+    fn built_in_models_need_no_endpoint() {
+        let config = resolve(&["--model", "random", "--blind-model", "script:a.jsonl"]).unwrap();
+        assert!(config.ask.server.is_none());
+        assert_eq!(
+            config.ask.blind_models,
+            [ModelName::Script("a.jsonl".into())]
+        );
+    }
+}

@@ -1,0 +1,150 @@
+//! Stage 1, READ: anything → images and the questions that came with them.
+//!
+//! The door is [`Dataset::open`]. What the user points at decides the reader: a folder of frames ([`frames`]), a
+//! ready-made multiple-choice set ([`multiple_choice`]), or nothing, which is the built-in rooms ([`rooms`]).
+
+pub mod frames;
+pub mod multiple_choice;
+pub mod picture;
+pub mod questions;
+pub mod rooms;
+
+use std::collections::{BTreeMap, HashSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+use crate::types::{Digest, FrameId, Question};
+
+pub use picture::Picture;
+
+/// Where the data are.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Place {
+    /// The built-in rooms.
+    Rooms,
+    /// A folder or file of the user's.
+    Path(PathBuf),
+}
+
+/// Where one image is.
+#[derive(Debug, Clone)]
+enum Source {
+    /// An image file.
+    File(PathBuf),
+    /// A base64 cell of a table: the row's place in the file.
+    Cell(multiple_choice::Cell),
+    /// A built-in room.
+    Room(rooms::Room),
+}
+
+/// Images and the questions about them.
+#[derive(Debug)]
+pub struct Dataset {
+    name: String,
+    sources: BTreeMap<FrameId, Source>,
+    questions: Vec<Question>,
+}
+
+impl Dataset {
+    /// Opens the data at a place; `questions` overrides the questions beside a folder of frames.
+    ///
+    /// No image is read. Every question is checked: its choices, its answer among them, its frame among the images.
+    pub fn open(place: &Place, questions: Option<&Path>) -> Result<Self> {
+        let dataset = match place {
+            Place::Rooms => {
+                refuse(
+                    questions,
+                    "the built-in rooms bring their own; name the frames with --data",
+                )?;
+                rooms::open()?
+            }
+            Place::Path(path) if path.is_dir() => frames::open(path, questions)?,
+            Place::Path(path) => {
+                refuse(questions, "a ready-made set brings its own questions")?;
+                multiple_choice::open(path)?
+            }
+        };
+        if dataset.questions.is_empty() {
+            return Err(Error::data(&dataset.name, "no questions in it"));
+        }
+        let mut seen = HashSet::new();
+        if let Some(twice) = dataset
+            .questions
+            .iter()
+            .find(|question| !seen.insert(&question.id))
+        {
+            return Err(Error::data(
+                &dataset.name,
+                format_args!("two questions have the id {:?}", twice.id.0),
+            ));
+        }
+        Ok(dataset)
+    }
+
+    /// A short name for tables and folders: the folder's or file's own, without its ending.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The questions, in the order of their file.
+    #[must_use]
+    pub fn questions(&self) -> &[Question] {
+        &self.questions
+    }
+
+    /// The image of a frame as it lies in the data set, not decoded.
+    pub fn picture(&self, frame: &FrameId) -> Result<Picture> {
+        match self.sources.get(frame) {
+            Some(Source::File(path)) => fs::read(path)
+                .map(|bytes| Picture::Encoded {
+                    bytes,
+                    place: path.display().to_string(),
+                })
+                .map_err(|e| Error::file(path, "read", e)),
+            Some(Source::Cell(cell)) => cell.picture(),
+            Some(Source::Room(room)) => room.paint().map(Picture::Pixels),
+            None => Err(Error::data(
+                &self.name,
+                format_args!("no frame {:?} in it", frame.0),
+            )),
+        }
+    }
+
+    /// The content of all questions, evidence left out: what is asked decides a reply, why it is right does not.
+    #[must_use]
+    pub fn questions_digest(&self) -> Digest {
+        let words = self.questions.iter().flat_map(|question| {
+            let choices = question.choices.texts().iter().map(String::as_str);
+            let head = [
+                &question.id.0,
+                &question.frame.0,
+                question.family.name(),
+                &question.text,
+            ];
+            head.into_iter()
+                .chain(choices)
+                .chain([&question.choices.texts()[question.choices.truth()], "\n"])
+        });
+        Digest::of_parts(words.map(str::as_bytes))
+    }
+}
+
+fn refuse(questions: Option<&Path>, why: &str) -> Result<()> {
+    questions.map_or(Ok(()), |path| {
+        Err(Error::usage(
+            "--questions",
+            format_args!("{} cannot be used: {why}", path.display()),
+        ))
+    })
+}
+
+/// The name of a file or folder without its ending.
+fn stem(path: &Path) -> String {
+    let named = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    named.file_stem().map_or_else(
+        || "data".to_owned(),
+        |stem| stem.to_string_lossy().into_owned(),
+    )
+}

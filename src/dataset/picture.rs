@@ -1,0 +1,184 @@
+//! An image as it lies in a data set: [`Picture`].
+
+use std::io::Cursor;
+
+use image::{
+    ColorType, DynamicImage, ExtendedColorType, ImageDecoder, ImageFormat, ImageReader, Limits,
+};
+
+use crate::error::{Error, Result};
+use crate::types::{Digest, Rgb};
+
+/// The most pixels an image may have: a larger one is refused before it is inflated.
+pub const MOST_PIXELS: u64 = 100_000_000;
+
+/// An image, not yet decoded where it came as a file.
+#[derive(Debug)]
+pub enum Picture {
+    /// A PNG or JPEG file.
+    Encoded {
+        /// The file's bytes.
+        bytes: Vec<u8>,
+        /// Where it came from, for messages.
+        place: String,
+    },
+    /// Pixels that were never a file.
+    Pixels(Rgb),
+}
+
+impl Picture {
+    /// The content: of the file, or of the pixels with their size.
+    #[must_use]
+    pub fn digest(&self) -> Digest {
+        match self {
+            Self::Encoded { bytes, .. } => Digest::of(bytes),
+            Self::Pixels(rgb) => Digest::of_parts([&rgb.width().to_le_bytes()[..], rgb.samples()]),
+        }
+    }
+
+    /// Checks what can be seen without inflating it: that it is PNG or JPEG, of a kind that is read, and not too large.
+    pub fn check(&self) -> Result<()> {
+        match self {
+            Self::Encoded { bytes, place } => decoder(bytes, place).map(drop),
+            Self::Pixels(_) => Ok(()),
+        }
+    }
+
+    /// The pixels as 8-bit sRGB.
+    ///
+    /// Grey becomes three equal channels, a palette its colours, 16 bits the nearest 8, and an alpha channel is dropped
+    /// where it is opaque everywhere. CMYK and transparency are refused: there is no one right way to show them. EXIF
+    /// orientation is not applied, as by every tool that reads label maps beside the image.
+    pub fn decode(&self) -> Result<Rgb> {
+        let (bytes, place) = match self {
+            Self::Pixels(rgb) => return Ok(rgb.clone()),
+            Self::Encoded { bytes, place } => (bytes, place),
+        };
+        let image = DynamicImage::from_decoder(decoder(bytes, place)?)
+            .map_err(|e| Error::data(place, format_args!("not a whole image: {e}")))?;
+        if image.color().has_alpha()
+            && !image.to_rgba8().pixels().all(|pixel| pixel.0[3] == u8::MAX)
+        {
+            return Err(Error::data(
+                place,
+                "the image is transparent in places; flatten it first",
+            ));
+        }
+        let rgb = image.into_rgb8();
+        Rgb::new(rgb.height() as usize, rgb.width() as usize, rgb.into_raw())
+            .map_err(|e| e.at(place.clone()))
+    }
+}
+
+fn decoder<'a>(bytes: &'a [u8], place: &str) -> Result<impl ImageDecoder + 'a> {
+    let wrong = |problem: String| Error::data(place, problem);
+    let mut reader = ImageReader::new(Cursor::new(bytes))
+        .with_guessed_format()
+        .map_err(|e| wrong(format!("cannot be read: {e}")))?;
+    if !matches!(reader.format(), Some(ImageFormat::Png | ImageFormat::Jpeg)) {
+        return Err(wrong("not an image: PNG or JPEG expected".to_owned()));
+    }
+    let mut limits = Limits::default();
+    limits.max_alloc = Some(MOST_PIXELS * 8);
+    reader.limits(limits);
+    let decoder = reader
+        .into_decoder()
+        .map_err(|e| wrong(format!("not a readable image: {e}")))?;
+    let (width, height) = decoder.dimensions();
+    if u64::from(width) * u64::from(height) > MOST_PIXELS {
+        return Err(wrong(format!(
+            "{width} × {height} pixels are more than the {MOST_PIXELS} that are read; shrink it first"
+        )));
+    }
+    match (decoder.color_type(), decoder.original_color_type()) {
+        (_, ExtendedColorType::Cmyk8 | ExtendedColorType::Cmyk16) => {
+            Err(wrong("a CMYK image; convert it to RGB first".to_owned()))
+        }
+        (ColorType::Rgb32F | ColorType::Rgba32F, _) => Err(wrong(
+            "a floating-point image; 8 or 16 bits expected".to_owned(),
+        )),
+        _ => Ok(decoder),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::{GrayImage, RgbaImage};
+
+    fn png(image: &DynamicImage) -> Picture {
+        let mut bytes = Vec::new();
+        image
+            .write_to(&mut Cursor::new(&mut bytes), ImageFormat::Png)
+            .unwrap();
+        Picture::Encoded {
+            bytes,
+            place: "test.png".into(),
+        }
+    }
+
+    #[test]
+    fn grey_and_opaque_alpha_become_rgb() {
+        let grey = png(&GrayImage::from_raw(2, 1, vec![7, 9]).unwrap().into());
+        assert_eq!(grey.decode().unwrap().samples(), [7, 7, 7, 9, 9, 9]);
+        let opaque = png(&RgbaImage::from_raw(1, 1, vec![1, 2, 3, 255])
+            .unwrap()
+            .into());
+        assert_eq!(opaque.decode().unwrap().samples(), [1, 2, 3]);
+    }
+
+    #[test]
+    fn sixteen_bits_become_the_nearest_eight() {
+        let deep =
+            image::ImageBuffer::<image::Luma<u16>, _>::from_raw(3, 1, vec![0, 32_896, 65_535])
+                .unwrap();
+        assert_eq!(
+            png(&deep.into()).decode().unwrap().samples(),
+            [0, 0, 0, 128, 128, 128, 255, 255, 255]
+        );
+    }
+
+    #[test]
+    fn what_cannot_be_shown_is_refused_by_name() {
+        let clear = png(&RgbaImage::from_raw(1, 1, vec![1, 2, 3, 9]).unwrap().into());
+        assert!(
+            clear
+                .decode()
+                .unwrap_err()
+                .to_string()
+                .contains("transparent")
+        );
+        let text = Picture::Encoded {
+            bytes: b"no image".to_vec(),
+            place: "a.png".into(),
+        };
+        assert!(
+            text.check()
+                .unwrap_err()
+                .to_string()
+                .starts_with("a.png: not an image")
+        );
+    }
+
+    #[test]
+    fn a_cut_file_is_named() {
+        let Picture::Encoded { mut bytes, place } = png(&GrayImage::new(64, 64).into()) else {
+            unreachable!()
+        };
+        bytes.truncate(bytes.len() / 2);
+        let error = Picture::Encoded { bytes, place }
+            .decode()
+            .unwrap_err()
+            .to_string();
+        assert!(error.starts_with("test.png: not a whole image"), "{error}");
+    }
+
+    #[test]
+    fn a_bomb_is_refused_before_it_is_inflated() {
+        let Picture::Encoded { mut bytes, place } = png(&GrayImage::new(1, 1).into()) else {
+            unreachable!()
+        };
+        bytes[16..24].copy_from_slice(&[0, 1, 0, 0, 0, 1, 0, 0]);
+        assert!(Picture::Encoded { bytes, place }.check().is_err());
+    }
+}

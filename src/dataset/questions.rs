@@ -1,0 +1,155 @@
+//! Files of questions: one JSON object a line.
+//!
+//! `{"id", "frame", "family", "question", "choices", "answer", "evidence"}`; a ready-made set has `"image"`, a path
+//! beside the file, in place of `"frame"`. `answer` is the text of the true choice.
+
+use std::fs;
+use std::path::Path;
+
+use serde::Deserialize;
+use serde_json::Value;
+
+use crate::error::{Error, Result};
+use crate::types::{Choices, Family, FrameId, Question, QuestionId};
+
+#[derive(Debug, Deserialize)]
+struct Line {
+    id: Value,
+    #[serde(alias = "image")]
+    frame: String,
+    #[serde(default = "other")]
+    family: Family,
+    question: String,
+    choices: Vec<String>,
+    answer: String,
+    #[serde(default)]
+    evidence: Value,
+}
+
+/// The family of a question that names none.
+pub(super) fn other() -> Family {
+    Family::Other("other".to_owned())
+}
+
+/// Reads a file of questions.
+///
+/// # Errors
+/// With the file and the line: broken JSON, a missing key, choices that are no choices, an answer not among them.
+pub fn read(path: &Path) -> Result<Vec<Question>> {
+    let text = fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))?;
+    let lines = text.trim_start_matches('\u{feff}').lines().enumerate();
+    lines
+        .filter(|(_, line)| !line.trim().is_empty())
+        .map(|(i, line)| {
+            let line = serde_json::from_str::<Line>(line)
+                .map_err(|e| Error::line(path, i + 1, without_place(&e)))?;
+            line.into_question()
+                .map_err(|e| e.at(format!("{}, line {}", path.display(), i + 1)))
+        })
+        .collect()
+}
+
+/// What serde says, without its place: it counts lines within the one line it was given.
+fn without_place(error: &serde_json::Error) -> String {
+    let text = error.to_string();
+    text.rsplit_once(" at line ")
+        .map_or(text.clone(), |(problem, _)| problem.to_owned())
+}
+
+impl Line {
+    fn into_question(self) -> Result<Question> {
+        let id = match self.id {
+            Value::String(id) if !id.is_empty() => id,
+            Value::Number(id) => id.to_string(),
+            other => {
+                return Err(Error::data(
+                    "id",
+                    format_args!("the id {other} is neither text nor a number"),
+                ));
+            }
+        };
+        if self.question.trim().is_empty() {
+            return Err(Error::data(
+                "question",
+                format_args!("question {id:?} is empty"),
+            ));
+        }
+        let truth = self
+            .choices
+            .iter()
+            .position(|choice| *choice == self.answer)
+            .ok_or_else(|| {
+                Error::data(
+                    "answer",
+                    format_args!(
+                        "question {id:?}: the answer {:?} is not among the choices {:?}",
+                        self.answer, self.choices
+                    ),
+                )
+            })?;
+        let choices = Choices::new(self.choices, truth)?;
+        Ok(Question {
+            id: QuestionId(id),
+            frame: FrameId(self.frame),
+            family: self.family,
+            text: self.question,
+            choices,
+            evidence: self.evidence,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<Vec<Question>> {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        fs::write(file.path(), text).unwrap();
+        read(file.path())
+    }
+
+    #[test]
+    fn a_line_is_a_question() {
+        let read = parse(
+            "{\"id\":7,\"frame\":\"a/0\",\"family\":\"color\",\"question\":\"What?\",\"choices\":[\"red\",\"blue\"],\"answer\":\"blue\"}\n\n",
+        );
+        let question = &read.unwrap()[0];
+        assert_eq!(
+            (
+                question.id.0.as_str(),
+                question.choices.truth(),
+                &question.family
+            ),
+            ("7", 1, &Family::Color)
+        );
+    }
+
+    #[test]
+    fn broken_lines_are_named() {
+        let good = r#"{"id":"a","frame":"f","question":"q","choices":["x","y"],"answer":"x"}"#;
+        for (line, says) in [
+            ("{", "line 2: EOF"),
+            (r#"{"id":"a"}"#, "line 2: missing field `frame`"),
+            (
+                r#"{"id":"a","frame":"f","question":"q","choices":["x","y"],"answer":"z"}"#,
+                "line 2: question \"a\": the answer \"z\" is not among",
+            ),
+            (
+                r#"{"id":"a","frame":"f","question":"q","choices":["x"],"answer":"x"}"#,
+                "line 2: 1 choices",
+            ),
+            (
+                r#"{"id":"a","frame":"f","question":" ","choices":["x","y"],"answer":"x"}"#,
+                "line 2: question \"a\" is empty",
+            ),
+            (
+                r#"{"id":null,"frame":"f","question":"q","choices":["x","y"],"answer":"x"}"#,
+                "line 2: the id null",
+            ),
+        ] {
+            let error = parse(&format!("{good}\n{line}\n")).unwrap_err().to_string();
+            assert!(error.contains(says), "{error}");
+        }
+    }
+}

@@ -1,0 +1,83 @@
+//! `summary.csv` and `summary.json`: every number of a run with its interval.
+
+use serde::Serialize;
+
+use crate::error::{Error, Result};
+use crate::score::accuracy::{Cell, Summary};
+use crate::score::choice::Mode;
+use crate::types::manifest::RunManifest;
+use crate::types::{EnhancerName, Level, Variant, View};
+
+/// The schema of `summary.json`.
+const SCHEMA: &str = "darkqa.summary/1";
+
+/// One row, in the order of the columns.
+#[derive(Serialize)]
+struct Row<'a> {
+    model: &'a str,
+    view: Option<View>,
+    level: Option<Level>,
+    variant: Variant,
+    enhancer: Option<&'a EnhancerName>,
+    family: &'a str,
+    mode: Mode,
+    n: usize,
+    right: Option<usize>,
+    unparsed: usize,
+    failed: usize,
+    value: Option<f64>,
+    low: Option<f64>,
+    high: Option<f64>,
+}
+
+impl<'a> Row<'a> {
+    fn of(cell: &'a Cell) -> Self {
+        let subject = &cell.subject;
+        Self {
+            model: &subject.model,
+            view: subject.view,
+            level: subject.level,
+            variant: subject.variant,
+            enhancer: subject.enhancer.as_ref(),
+            family: cell.family.as_ref().map_or("all", |family| family.name()),
+            mode: cell.mode,
+            n: cell.accuracy.map_or(0, |accuracy| accuracy.n),
+            right: subject.view.map(|_| cell.right),
+            unparsed: cell.unparsed,
+            failed: cell.failed,
+            value: cell.accuracy.map(|accuracy| accuracy.value),
+            low: cell.accuracy.map(|accuracy| accuracy.low),
+            high: cell.accuracy.map(|accuracy| accuracy.high),
+        }
+    }
+}
+
+/// The summary as CSV: `model, view, level, variant, enhancer, family, mode, n, right, unparsed, failed, value, low,
+/// high`; a cell is empty where there is nothing to say.
+pub fn csv(summary: &Summary) -> Result<Vec<u8>> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let unwritten = |e: &dyn std::fmt::Display| Error::data("summary.csv", e);
+    for cell in &summary.cells {
+        writer.serialize(Row::of(cell)).map_err(|e| unwritten(&e))?;
+    }
+    writer.into_inner().map_err(|e| unwritten(&e))
+}
+
+#[derive(Serialize)]
+struct Document<'a> {
+    schema: &'static str,
+    run: &'a RunManifest,
+    rows: Vec<Row<'a>>,
+}
+
+/// The summary as JSON: the run's manifest and the rows of the CSV.
+pub fn json(summary: &Summary, run: &RunManifest) -> Result<String> {
+    let rows = summary.cells.iter().map(Row::of).collect();
+    let text = serde_json::to_string_pretty(&Document {
+        schema: SCHEMA,
+        run,
+        rows,
+    });
+    text.map(|text| text + "\n")
+        .map_err(|e| Error::data("summary.json", e))
+}

@@ -1,0 +1,4 @@
+//! Stage 7, SHOW: from the records alone.
+
+pub mod files;
+pub mod table;

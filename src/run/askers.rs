@@ -1,0 +1,65 @@
+//! The models of a run, opened: [`Asker`].
+
+use std::sync::Arc;
+
+use crate::ask::{Endpoint, Model, OpenAi, Parameters, Random, Script};
+use crate::config::{Config, ModelName};
+use crate::error::{Error, Result};
+use crate::types::View;
+
+/// One model and whether it sees the images.
+#[derive(Debug, Clone)]
+pub(super) struct Asker {
+    pub(super) model: Arc<Model>,
+    pub(super) view: View,
+}
+
+/// Opens all models; nothing is sent.
+pub(super) fn open(config: &Config) -> Result<Vec<Asker>> {
+    let ask = &config.ask;
+    let endpoint = match &ask.server {
+        Some(server) => {
+            let key = server.key.as_ref();
+            Some(Arc::new(Endpoint::open(
+                server.base_url.clone(),
+                key,
+                server.sending,
+            )?))
+        }
+        None => None,
+    };
+    let seen = ask.models.iter().map(|name| (name, ask.view));
+    let blind = ask.blind_models.iter().map(|name| (name, View::Blind));
+    let mut askers: Vec<Asker> = Vec::new();
+    for (name, view) in seen.chain(blind) {
+        let model = Arc::new(match name {
+            ModelName::Random => Model::Random(Random {
+                seed: config.light.seed,
+            }),
+            ModelName::Script(path) => Model::Script(Script::load(path)?),
+            ModelName::Remote(name) => {
+                let endpoint = endpoint
+                    .as_ref()
+                    .ok_or_else(|| Error::usage("--base-url", "no endpoint is known"))?;
+                Model::OpenAi(OpenAi::new(
+                    Arc::clone(endpoint),
+                    Parameters {
+                        model: name.clone(),
+                        ..ask.parameters.clone()
+                    },
+                ))
+            }
+        });
+        if askers
+            .iter()
+            .any(|asker| asker.view == view && asker.model.name() == model.name())
+        {
+            return Err(Error::usage(
+                "--model",
+                format_args!("{} is named twice", model.name()),
+            ));
+        }
+        askers.push(Asker { model, view });
+    }
+    Ok(askers)
+}

@@ -1,0 +1,238 @@
+//! The asynchronous side: asks about what the darkroom has made, and keeps every reply the moment it arrives.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use rayon::ThreadPoolBuilder;
+use tokio::runtime;
+use tokio::sync::mpsc::{self, Receiver};
+use tokio::task::{JoinError, JoinSet};
+
+use super::askers::Asker;
+use super::darkroom::{Darkroom, Exposed};
+use super::interrupt::Interrupt;
+use super::plan::{Plan, Trial};
+use super::progress::{Bar, Progress};
+use super::recipe::Recipe;
+use super::record::record;
+use super::stop::{End, Watch};
+use crate::ask::{AskError, Call, Payload, Reach};
+use crate::config::Config;
+use crate::dataset::Dataset;
+use crate::enhance::Enhancer;
+use crate::error::{Error, Result};
+use crate::store::Store;
+use crate::types::{Condition, Failure, FailureKind, Reply, View};
+
+/// How many finished images may wait to be asked about.
+const IMAGES_AHEAD: usize = 2;
+
+/// What a run is driven with.
+pub(super) struct Drive<'a> {
+    pub(super) config: &'a Config,
+    pub(super) dataset: &'a Dataset,
+    pub(super) recipe: &'a Recipe,
+    pub(super) askers: &'a [Asker],
+    pub(super) progress: &'a Progress,
+}
+
+/// One trial with the image that it shares.
+pub(super) struct Ready {
+    pub(super) trial: Trial,
+    pub(super) view: View,
+    pub(super) condition: Option<Condition>,
+    pub(super) image: Option<Arc<Payload>>,
+}
+
+/// One trial with what came of it.
+type Done = (Ready, Result<Reply, AskError>);
+
+impl Drive<'_> {
+    /// Asks everything that is left.
+    pub(super) fn run(
+        &self,
+        plan: Plan,
+        enhancers: Vec<Enhancer>,
+        store: &mut Store,
+    ) -> Result<End> {
+        if plan.left() == 0 {
+            return Ok(End::Through);
+        }
+        let unstarted = |e: &dyn std::fmt::Display| {
+            Error::usage("--threads", format_args!("cannot be started: {e}"))
+        };
+        let threads = self.config.enhancement.threads.map_or(0, usize::from);
+        let cores = ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .map_err(|e| unstarted(&e))?;
+        let runtime = runtime::Builder::new_multi_thread()
+            .enable_all()
+            .build()
+            .map_err(|e| unstarted(&e))?;
+        let (out, images) = mpsc::channel(IMAGES_AHEAD);
+        let bar = self
+            .progress
+            .trials(plan.trials(), plan.trials() - plan.left());
+        let darkroom = Darkroom {
+            dataset: self.dataset,
+            recipe: self.recipe,
+            enhancers,
+        };
+        std::thread::scope(|scope| {
+            scope.spawn(move || cores.install(|| darkroom.develop(plan.frames, &out)));
+            runtime.block_on(
+                Desk {
+                    drive: self,
+                    store,
+                    bar,
+                    watch: self.watch(),
+                }
+                .ask(images),
+            )
+        })
+    }
+
+    fn watch(&self) -> Watch {
+        let server = self.config.ask.server.as_ref();
+        let endpoint = server.map_or("built-in models".to_owned(), |server| {
+            server.base_url.to_string()
+        });
+        Watch::new(endpoint, self.config.pace.max_failures)
+    }
+}
+
+/// Where replies come in and are kept.
+struct Desk<'a> {
+    drive: &'a Drive<'a>,
+    store: &'a mut Store,
+    bar: Bar,
+    watch: Watch,
+}
+
+impl Desk<'_> {
+    async fn ask(mut self, mut images: Receiver<Exposed>) -> Result<End> {
+        let limit = self.drive.config.pace.concurrency.get();
+        let mut waiting = VecDeque::<Ready>::new();
+        let mut asking = JoinSet::<Done>::new();
+        let mut interrupt = Interrupt::listen()?;
+        let mut more = true;
+        while !self.watch.stopped() && (more || !waiting.is_empty() || !asking.is_empty()) {
+            while asking.len() < limit
+                && let Some(ready) = waiting.pop_front()
+            {
+                asking.spawn(put(self.drive.askers[ready.trial.asker].clone(), ready));
+            }
+            tokio::select! {
+                () = interrupt.next() => self.watch.interrupted(),
+                Some(done) = asking.join_next() => self.keep(done)?,
+                exposed = images.recv(), if more && waiting.is_empty() => match exposed {
+                    Some(exposed) => waiting.extend(self.accept(exposed)?),
+                    None => more = false,
+                },
+            }
+        }
+        // The darkroom stops as soon as nobody waits for its images.
+        drop(images);
+        self.drain(asking, interrupt).await?;
+        self.store.sync()?;
+        Ok(self.watch.into_end())
+    }
+
+    /// Waits for what is in flight, for it may be paid for already; a second interrupt gives it up.
+    async fn drain(&mut self, mut asking: JoinSet<Done>, mut interrupt: Interrupt) -> Result<()> {
+        if !asking.is_empty() {
+            let count = asking.len();
+            self.drive.progress.say(&format!(
+                "stopping: {count} requests are in flight; interrupt again to give them up"
+            ));
+        }
+        while !asking.is_empty() {
+            tokio::select! {
+                () = interrupt.next() => asking.abort_all(),
+                Some(done) = asking.join_next() => self.keep(done)?,
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes trials out of an image, or failures out of a failed one.
+    fn accept(&mut self, exposed: Exposed) -> Result<Vec<Ready>> {
+        let Exposed {
+            condition,
+            trials,
+            image,
+        } = exposed;
+        let (image, broken) = match image {
+            Ok(image) => (image, None),
+            Err(e) => (None, Some(e.to_string())),
+        };
+        let view = if condition.is_some() {
+            View::Image
+        } else {
+            View::Blind
+        };
+        let ready = trials.into_iter().map(|trial| Ready {
+            trial,
+            view,
+            condition: condition.clone(),
+            image: image.clone(),
+        });
+        let Some(message) = broken else {
+            return Ok(ready.collect());
+        };
+        for ready in ready {
+            let failure = Failure {
+                kind: FailureKind::Image,
+                status: None,
+                message: message.clone(),
+            };
+            self.keep(Ok((
+                ready,
+                Err(AskError {
+                    failure,
+                    attempts: 0,
+                    reach: Reach::Trial,
+                }),
+            )))?;
+        }
+        Ok(Vec::new())
+    }
+
+    /// Keeps what came of one trial.
+    fn keep(&mut self, done: Result<Done, JoinError>) -> Result<()> {
+        let (ready, result) = match done {
+            Ok(done) => done,
+            Err(aborted) if aborted.is_cancelled() => return Ok(()),
+            Err(panic) => std::panic::resume_unwind(panic.into_panic()),
+        };
+        match &result {
+            Ok(_) => self.watch.succeeded(),
+            Err(error) => self.watch.failed(error, &ready.trial.question.frame),
+        }
+        self.bar.failed(self.watch.failures());
+        // Where the endpoint itself is at fault, the trial was never really made.
+        if result
+            .as_ref()
+            .is_err_and(|error| error.reach == Reach::Endpoint)
+        {
+            return Ok(());
+        }
+        self.bar.inc();
+        let asker = &self.drive.askers[ready.trial.asker];
+        self.store
+            .append(&record(ready, asker.model.name(), result))
+    }
+}
+
+/// Puts one question to its model.
+async fn put(asker: Asker, ready: Ready) -> Done {
+    let call = Call {
+        question: &ready.trial.question,
+        condition: ready.condition.as_ref(),
+        prompt: &ready.trial.prompt,
+        image: ready.image.as_deref(),
+    };
+    let result = asker.model.ask(call).await;
+    (ready, result)
+}

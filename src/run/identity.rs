@@ -1,0 +1,151 @@
+//! What decides the replies of a run, and what does not, by flag.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Value, json};
+
+use super::plan::Inputs;
+use crate::config::Config;
+use crate::dataset::Dataset;
+use crate::enhance::{ModelFile, Runtime};
+use crate::error::{Error, Result};
+use crate::synthesis;
+use crate::types::{Digest, EnhancerName, View};
+
+/// Flags and contents that decide the replies.
+pub(super) type Identity = BTreeMap<String, Value>;
+
+/// The names and contents of the enhancement models.
+pub(super) fn enhancers(config: &Config) -> Result<Vec<(EnhancerName, Digest)>> {
+    let mut enhancers: Vec<(EnhancerName, Digest)> = Vec::new();
+    for path in &config.enhancement.models {
+        let file = ModelFile::read(path)?;
+        if enhancers.iter().any(|(name, _)| name == file.name()) {
+            let problem = format_args!(
+                "two models are named {}; rename one of the files",
+                file.name()
+            );
+            return Err(Error::usage("--llie", problem));
+        }
+        enhancers.push((file.name().clone(), file.digest()));
+    }
+    Ok(enhancers)
+}
+
+/// What decides the replies. A run is only resumed by a command with the same.
+pub(super) fn identity(config: &Config, dataset: &Dataset, inputs: &Inputs<'_>) -> Identity {
+    let images = inputs
+        .pictures
+        .iter()
+        .flat_map(|(frame, digest)| [frame.0.as_bytes(), digest.as_bytes()]);
+    let ask = &config.ask;
+    let names = |view| -> Vec<&str> {
+        inputs
+            .askers
+            .iter()
+            .filter(|asker| asker.view == view)
+            .map(|asker| asker.model.name())
+            .collect()
+    };
+    let models: BTreeMap<&str, Digest> = inputs
+        .askers
+        .iter()
+        .map(|asker| (asker.model.name(), asker.model.digest()))
+        .collect();
+    let enhancers: BTreeMap<&str, Digest> = inputs
+        .recipe
+        .enhancers
+        .iter()
+        .map(|(name, digest)| (name.as_str(), *digest))
+        .collect();
+    let levels: Vec<String> = config
+        .light
+        .levels
+        .iter()
+        .map(ToString::to_string)
+        .collect();
+    let conditions: Vec<String> = inputs.conditions.iter().map(ToString::to_string).collect();
+    let fields = [
+        (
+            "--data",
+            json!({"name": dataset.name(), "images": Digest::of_parts(images)}),
+        ),
+        ("--questions", json!(dataset.questions_digest())),
+        ("--families", json!(config.data.families)),
+        ("--limit", json!(config.data.limit)),
+        ("--levels", json!(levels)),
+        ("--variant", json!(config.light.variants.to_string())),
+        ("--seed", json!(config.light.seed)),
+        ("--gain, --ratio", json!(config.light.camera)),
+        ("--llie", json!(enhancers)),
+        ("--llie-on", json!(config.enhancement.on.to_string())),
+        ("--model", json!(names(View::Image))),
+        ("--blind-model", json!(names(View::Blind))),
+        (
+            "--base-url",
+            json!(
+                ask.server
+                    .as_ref()
+                    .map(|server| server.base_url.to_string())
+            ),
+        ),
+        ("--prompts", json!(inputs.prompts.digest())),
+        ("--image", json!(config.images.format.to_string())),
+        ("--max-side", json!(config.images.max_side)),
+        ("--temperature", json!(ask.parameters.temperature)),
+        ("--max-tokens", json!(ask.parameters.max_tokens)),
+        (
+            "--token-field",
+            json!(ask.parameters.token_field.to_string()),
+        ),
+        ("--reasoning-effort", json!(ask.parameters.reasoning_effort)),
+        ("--detail", json!(ask.parameters.detail)),
+        ("models", json!(models)),
+        ("conditions", json!(conditions)),
+        ("synthesis", json!(synthesis::VERSION)),
+    ];
+    fields
+        .into_iter()
+        .map(|(field, value)| (field.to_owned(), value))
+        .collect()
+}
+
+/// The content of an identity.
+pub(super) fn digest(identity: &Identity) -> Digest {
+    let fields = identity
+        .iter()
+        .flat_map(|(field, value)| [field.clone(), value.to_string()]);
+    let fields: Vec<String> = fields.collect();
+    Digest::of_parts(fields.iter().map(String::as_bytes))
+}
+
+/// What does not decide a reply, but may explain how a run went.
+pub(super) fn settings(config: &Config) -> BTreeMap<String, Value> {
+    let mut settings = BTreeMap::from([
+        ("--concurrency".to_owned(), json!(config.pace.concurrency)),
+        ("--max-failures".to_owned(), json!(config.pace.max_failures)),
+        ("--threads".to_owned(), json!(config.enhancement.threads)),
+    ]);
+    if let Some(server) = &config.ask.server {
+        let sending = server.sending;
+        settings.insert("--timeout".to_owned(), json!(sending.timeout.as_secs_f64()));
+        settings.insert("--retries".to_owned(), json!(sending.retries));
+        settings.insert(
+            "--max-wait".to_owned(),
+            json!(sending.max_wait.as_secs_f64()),
+        );
+    }
+    settings
+}
+
+/// Where the run was made.
+pub(super) fn platform(runtime: Option<&Runtime>) -> BTreeMap<String, String> {
+    let mut platform = BTreeMap::from([
+        ("system".to_owned(), std::env::consts::OS.to_owned()),
+        ("processor".to_owned(), std::env::consts::ARCH.to_owned()),
+    ]);
+    if let Some(runtime) = runtime {
+        platform.insert("onnxruntime".to_owned(), runtime.version().to_owned());
+    }
+    platform
+}

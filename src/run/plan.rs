@@ -1,0 +1,248 @@
+//! What is left to ask: [`Plan`].
+
+use std::collections::{BTreeMap, HashSet};
+use std::sync::Arc;
+
+use super::askers::Asker;
+use super::recipe::Recipe;
+use crate::ask::Prompts;
+use crate::config::Config;
+use crate::error::Result;
+use crate::types::{
+    Condition, Degradation, Digest, EnhancerName, FrameId, Outcome, Question, Record, TrialKey,
+    View,
+};
+
+/// What a plan is made of.
+#[derive(Debug)]
+pub(super) struct Inputs<'a> {
+    pub(super) questions: &'a [Question],
+    pub(super) pictures: &'a BTreeMap<FrameId, Digest>,
+    pub(super) askers: &'a [Asker],
+    pub(super) prompts: Prompts,
+    pub(super) conditions: Vec<Condition>,
+    pub(super) recipe: Recipe,
+}
+
+impl<'a> Inputs<'a> {
+    pub(super) fn new(
+        config: &Config,
+        questions: &'a [Question],
+        pictures: &'a BTreeMap<FrameId, Digest>,
+        askers: &'a [Asker],
+        enhancers: &[(EnhancerName, Digest)],
+    ) -> Result<Self> {
+        let recipe = Recipe {
+            seed: config.light.seed,
+            camera: config.light.camera,
+            format: config.images.format,
+            max_side: config.images.max_side,
+            enhancers: enhancers.to_vec(),
+        };
+        let prompts = config
+            .ask
+            .prompts
+            .as_deref()
+            .map_or_else(Prompts::built_in, Prompts::load)?;
+        Ok(Self {
+            questions,
+            pictures,
+            askers,
+            prompts,
+            conditions: conditions(config, enhancers),
+            recipe,
+        })
+    }
+}
+
+/// Every condition in which a frame is shown: raw first, each enhancer after, level by level, so that a frame is
+/// developed once for all that use it.
+fn conditions(config: &Config, enhancers: &[(EnhancerName, Digest)]) -> Vec<Condition> {
+    let mut all = Vec::new();
+    for level in &config.light.levels {
+        let Some(dark) = level.dark() else {
+            all.push(Condition::raw(Degradation::None));
+            continue;
+        };
+        for degradation in [Degradation::Exposure(dark), Degradation::Sensor(dark)] {
+            if !config.light.variants.include(degradation.variant()) {
+                continue;
+            }
+            all.push(Condition::raw(degradation));
+            if config.enhancement.on.include(degradation.variant()) {
+                let mended = |(name, _): &(EnhancerName, Digest)| Condition {
+                    degradation,
+                    enhancer: Some(name.clone()),
+                };
+                all.extend(enhancers.iter().map(mended));
+            }
+        }
+    }
+    all
+}
+
+/// One question for one model.
+#[derive(Debug, Clone)]
+pub(super) struct Trial {
+    pub(super) key: TrialKey,
+    pub(super) question: Arc<Question>,
+    pub(super) prompt: Arc<str>,
+    pub(super) asker: usize,
+}
+
+/// All trials that share one image, or that have none.
+#[derive(Debug)]
+pub(super) struct Shot {
+    pub(super) condition: Option<Condition>,
+    pub(super) trials: Vec<Trial>,
+}
+
+/// All shots of one frame.
+#[derive(Debug)]
+pub(super) struct FramePlan {
+    pub(super) frame: FrameId,
+    pub(super) shots: Vec<Shot>,
+}
+
+/// The trials of a run, and those of them that have no reply yet.
+#[derive(Debug)]
+pub(super) struct Plan {
+    /// Every trial, answered or not, in the order of the frames.
+    pub(super) keys: Vec<TrialKey>,
+    /// What is left to ask, in the same order.
+    pub(super) frames: Vec<FramePlan>,
+}
+
+impl Plan {
+    /// Lays out all trials of the inputs and leaves out those with a kept reply; failed ones are asked again.
+    pub(super) fn new(inputs: &Inputs<'_>, kept: &[Record]) -> Result<Self> {
+        let answered: HashSet<TrialKey> = kept
+            .iter()
+            .filter(|record| record.outcome != Outcome::Failed)
+            .map(|record| record.key)
+            .collect();
+        let mut by_frame: Vec<(&FrameId, Vec<&Question>)> = Vec::new();
+        let mut places = BTreeMap::<&FrameId, usize>::new();
+        for question in inputs.questions {
+            let place = *places.entry(&question.frame).or_insert_with(|| {
+                by_frame.push((&question.frame, Vec::new()));
+                by_frame.len() - 1
+            });
+            by_frame[place].1.push(question);
+        }
+        let mut plan = Self {
+            keys: Vec::new(),
+            frames: Vec::new(),
+        };
+        for (frame, questions) in by_frame {
+            let shots = plan.shots(inputs, &questions, &answered)?;
+            if !shots.is_empty() {
+                plan.frames.push(FramePlan {
+                    frame: frame.clone(),
+                    shots,
+                });
+            }
+        }
+        Ok(plan)
+    }
+
+    fn shots(
+        &mut self,
+        inputs: &Inputs<'_>,
+        questions: &[&Question],
+        answered: &HashSet<TrialKey>,
+    ) -> Result<Vec<Shot>> {
+        let mut asked = Vec::new();
+        for question in questions {
+            let prompts = [View::Image, View::Blind]
+                .map(|view| inputs.prompts.render(view, question).map(Arc::from));
+            let [image, blind] = prompts;
+            asked.push((Arc::new((*question).clone()), image?, blind?));
+        }
+        let mut shots = Vec::new();
+        for condition in std::iter::once(None).chain(inputs.conditions.iter().map(Some)) {
+            let view = if condition.is_some() {
+                View::Image
+            } else {
+                View::Blind
+            };
+            let mut trials = Vec::new();
+            for (question, image, blind) in &asked {
+                let prompt: &Arc<str> = if view == View::Image { image } else { blind };
+                for (index, asker) in inputs
+                    .askers
+                    .iter()
+                    .enumerate()
+                    .filter(|(_, asker)| asker.view == view)
+                {
+                    let key = key(inputs, question, prompt, asker, condition);
+                    self.keys.push(key);
+                    if !answered.contains(&key) {
+                        trials.push(Trial {
+                            key,
+                            question: Arc::clone(question),
+                            prompt: Arc::clone(prompt),
+                            asker: index,
+                        });
+                    }
+                }
+            }
+            if !trials.is_empty() {
+                shots.push(Shot {
+                    condition: condition.cloned(),
+                    trials,
+                });
+            }
+        }
+        Ok(shots)
+    }
+
+    /// How many trials there are, answered or not.
+    pub(super) fn trials(&self) -> usize {
+        self.keys.len()
+    }
+
+    /// How many of them have no reply yet.
+    pub(super) fn left(&self) -> usize {
+        self.frames
+            .iter()
+            .flat_map(|frame| &frame.shots)
+            .map(|shot| shot.trials.len())
+            .sum()
+    }
+}
+
+/// The key of one trial: see [`TrialKey`].
+fn key(
+    inputs: &Inputs<'_>,
+    question: &Question,
+    prompt: &str,
+    asker: &Asker,
+    condition: Option<&Condition>,
+) -> TrialKey {
+    let image = condition.and_then(|condition| {
+        let picture = inputs.pictures.get(&question.frame)?;
+        Some(
+            inputs
+                .recipe
+                .digest(&question.frame, picture, condition)
+                .to_string(),
+        )
+    });
+    let shown = question.choices.texts().iter().map(String::as_str);
+    // Built-in models answer by the names of question and condition, so these decide the reply too.
+    let condition = condition.map_or("blind".to_owned(), ToString::to_string);
+    let model = asker.model.digest().to_string();
+    let head = [
+        "darkqa.trial/1",
+        question.id.0.as_str(),
+        prompt,
+        &model,
+        &condition,
+    ];
+    let parts = head
+        .into_iter()
+        .chain([image.as_deref().unwrap_or("no image")])
+        .chain(shown);
+    Digest::of_parts(parts.map(str::as_bytes)).into()
+}

@@ -1,0 +1,114 @@
+//! Progress on standard error: [`Progress`].
+
+use std::io::{self, IsTerminal, Write};
+use std::time::Duration;
+
+use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use tracing_subscriber::fmt::MakeWriter;
+
+/// Where progress is shown: on a terminal, or nowhere.
+#[derive(Debug, Clone)]
+pub struct Progress {
+    bars: MultiProgress,
+    loudness: Loudness,
+}
+
+/// Whether progress is wanted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Loudness {
+    /// Where standard error is a terminal.
+    Normal,
+    /// Never.
+    Quiet,
+}
+
+impl Progress {
+    /// Progress on standard error.
+    #[must_use]
+    pub fn new(loudness: Loudness) -> Self {
+        let shown = loudness == Loudness::Normal && io::stderr().is_terminal();
+        let target = if shown {
+            ProgressDrawTarget::stderr()
+        } else {
+            ProgressDrawTarget::hidden()
+        };
+        Self {
+            bars: MultiProgress::with_draw_target(target),
+            loudness,
+        }
+    }
+
+    /// Says one line above the bars; a pipe and `--quiet` hear nothing.
+    pub fn say(&self, line: &str) {
+        // A line that cannot be shown is no reason to stop.
+        let _ = self.bars.println(line);
+    }
+
+    /// Whether anything is shown.
+    #[must_use]
+    pub fn loudness(&self) -> Loudness {
+        self.loudness
+    }
+
+    /// A plain bar for a step of known length, gone when it is dropped.
+    pub(super) fn bar(&self, what: &'static str, length: usize) -> Bar {
+        let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len}");
+        let bar = self
+            .bars
+            .add(ProgressBar::new(length as u64).with_message(what));
+        Bar(style.map_or(bar.clone(), |style| bar.with_style(style)))
+    }
+
+    /// The bar of the trials: answered, failed, rate, time left.
+    pub(super) fn trials(&self, trials: usize, answered: usize) -> Bar {
+        let template = "{wide_bar} {pos}/{len} answered{msg} · {per_sec} · {eta} left";
+        let bar = self
+            .bars
+            .add(ProgressBar::new(trials as u64).with_position(answered as u64));
+        bar.reset_eta();
+        bar.enable_steady_tick(Duration::from_millis(500));
+        Bar(ProgressStyle::with_template(template)
+            .map_or(bar.clone(), |style| bar.with_style(style)))
+    }
+}
+
+/// A bar that goes away with its step.
+pub(super) struct Bar(ProgressBar);
+
+impl Bar {
+    pub(super) fn inc(&self) {
+        self.0.inc(1);
+    }
+
+    pub(super) fn failed(&self, failed: usize) {
+        self.0.set_message(format!(", {failed} failed"));
+    }
+}
+
+impl Drop for Bar {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}
+
+/// Log lines go above the bars, to standard error.
+#[derive(Debug)]
+pub struct Above(MultiProgress);
+
+impl Write for Above {
+    fn write(&mut self, line: &[u8]) -> io::Result<usize> {
+        self.0.suspend(|| io::stderr().write(line))
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        io::stderr().flush()
+    }
+}
+
+impl<'a> MakeWriter<'a> for Progress {
+    type Writer = Above;
+
+    fn make_writer(&'a self) -> Above {
+        Above(self.bars.clone())
+    }
+}

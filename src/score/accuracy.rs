@@ -1,0 +1,146 @@
+//! The accuracy of each model in each condition: [`Summary`].
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde::Serialize;
+
+use super::chance::chance;
+use super::choice::Mode;
+use super::estimate::Estimate;
+use crate::types::{
+    EnhancerName, Family, Level, Outcome, Question, Reading, Record, Variant, View,
+};
+
+/// The name under which guessing stands among the models.
+pub const CHANCE: &str = "chance";
+
+/// What a cell of a table is about.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+pub struct Subject {
+    /// The model, or [`CHANCE`].
+    pub model: String,
+    /// Whether it saw the images; `None` for chance.
+    pub view: Option<View>,
+    /// How dark they were; `None` where none was seen.
+    pub level: Option<Level>,
+    /// The variant.
+    pub variant: Variant,
+    /// What mended them; `None` for raw.
+    pub enhancer: Option<EnhancerName>,
+}
+
+/// The accuracy of one subject on one family, in one reading.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Cell {
+    /// What it is about.
+    #[serde(flatten)]
+    pub subject: Subject,
+    /// The family; `None` for all together.
+    pub family: Option<Family>,
+    /// How the replies were read.
+    pub mode: Mode,
+    /// Replies that named the true choice.
+    pub right: usize,
+    /// Replies in which no choice could be read: they count as wrong.
+    pub unparsed: usize,
+    /// Trials without a reply: they do not count.
+    pub failed: usize,
+    /// The share of right ones among the replies; `None` where none came.
+    pub accuracy: Option<Estimate>,
+}
+
+/// All cells of a run, ordered by subject, family and reading.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// The cells.
+    pub cells: Vec<Cell>,
+}
+
+#[derive(Default)]
+struct Tally {
+    right: usize,
+    unparsed: usize,
+    failed: usize,
+    replies: usize,
+}
+
+/// Scores the records of a run; `questions` are those it asks, for the chance line.
+#[must_use]
+pub fn summarize(records: &[Record], questions: &[Question]) -> Summary {
+    let mut tallies = BTreeMap::<(Subject, Option<Family>, Mode), Tally>::new();
+    for record in records {
+        let subject = Subject {
+            model: record.model.clone(),
+            view: Some(record.view),
+            level: record.level,
+            variant: record.variant,
+            enhancer: record.enhancer.clone(),
+        };
+        for family in [None, Some(record.family.clone())] {
+            for mode in Mode::ALL {
+                let reading = match mode {
+                    Mode::Strict => record.strict,
+                    Mode::Lenient => record.lenient,
+                };
+                tallies
+                    .entry((subject.clone(), family.clone(), mode))
+                    .or_default()
+                    .count(record, reading);
+            }
+        }
+    }
+    let scored = tallies
+        .into_iter()
+        .map(|((subject, family, mode), tally)| Cell {
+            subject,
+            family,
+            mode,
+            right: tally.right,
+            unparsed: tally.unparsed,
+            failed: tally.failed,
+            accuracy: Estimate::share(tally.right, tally.replies),
+        });
+    Summary {
+        cells: scored.chain(guesses(questions)).collect(),
+    }
+}
+
+impl Tally {
+    fn count(&mut self, record: &Record, reading: Option<Reading>) {
+        match reading {
+            Some(reading) if record.outcome != Outcome::Failed => {
+                self.replies += 1;
+                self.right += usize::from(reading.chosen == Some(record.truth));
+                self.unparsed += usize::from(reading.chosen.is_none());
+            }
+            _ => self.failed += 1,
+        }
+    }
+}
+
+fn guesses(questions: &[Question]) -> Vec<Cell> {
+    let families: BTreeSet<&Family> = questions.iter().map(|question| &question.family).collect();
+    let groups = std::iter::once(None).chain(families.into_iter().map(Some));
+    let cells = groups.flat_map(|family| {
+        let asked = questions
+            .iter()
+            .filter(|question| family.is_none_or(|family| question.family == *family));
+        let accuracy = chance(asked);
+        Mode::ALL.map(|mode| Cell {
+            subject: Subject {
+                model: CHANCE.to_owned(),
+                view: None,
+                level: None,
+                variant: Variant::None,
+                enhancer: None,
+            },
+            family: family.cloned(),
+            mode,
+            right: 0,
+            unparsed: 0,
+            failed: 0,
+            accuracy,
+        })
+    });
+    cells.collect()
+}

@@ -1,0 +1,44 @@
+//! What guessing would score.
+
+use super::estimate::Estimate;
+use crate::types::Question;
+
+/// The exact accuracy of a uniform guess: the mean of 1 / number of choices (DarkQA, section IV); `None` of no questions.
+///
+/// Summed over counts of choices, so that the order of the questions cannot change a digit.
+pub fn chance<'a>(questions: impl IntoIterator<Item = &'a Question>) -> Option<Estimate> {
+    let mut counts = std::collections::BTreeMap::<usize, usize>::new();
+    for question in questions {
+        *counts.entry(question.choices.len()).or_default() += 1;
+    }
+    let n: usize = counts.values().sum();
+    let sum: f64 = counts
+        .iter()
+        .map(|(&choices, &questions)| questions as f64 / choices as f64)
+        .sum();
+    (n > 0).then(|| Estimate::exact(sum / n as f64, n))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::types::{Choices, Family, FrameId, QuestionId};
+
+    fn question(choices: usize) -> Question {
+        Question {
+            id: QuestionId(choices.to_string()),
+            frame: FrameId("f".into()),
+            family: Family::Closest,
+            text: "?".into(),
+            choices: Choices::new((0..choices).map(|i| i.to_string()).collect(), 0).unwrap(),
+            evidence: serde_json::Value::Null,
+        }
+    }
+
+    #[test]
+    fn it_is_the_mean_of_one_over_the_choices() {
+        let questions = [question(2), question(4), question(2)];
+        assert_eq!(chance(&questions).unwrap(), Estimate::exact(1.25 / 3.0, 3));
+        assert_eq!(chance([]), None);
+    }
+}

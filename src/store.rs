@@ -1,0 +1,409 @@
+//! Stage 6, KEEP: `results/<run>/`.
+//!
+//! `records.jsonl` is the truth: one line a trial, appended and handed to the operating system the moment a reply has
+//! arrived, so that a killed run loses nothing. `manifest.json` says what the run is; everything else is made again from
+//! these two.
+
+use std::collections::HashMap;
+use std::ffi::OsStr;
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{BufRead, BufReader, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use crate::error::{Error, Result};
+use crate::types::manifest::{RunManifest, SCHEMA};
+use crate::types::{Record, TrialKey};
+
+const MANIFEST: &str = "manifest.json";
+const RECORDS: &str = "records.jsonl";
+
+/// How often records are forced to the disk itself: what a power cut, not a killed process, may cost.
+const SYNC_EVERY: Duration = Duration::from_secs(2);
+
+/// An open run folder, held by this process alone.
+#[derive(Debug)]
+pub struct Store {
+    folder: PathBuf,
+    records: File,
+    synced: Instant,
+}
+
+impl Store {
+    /// Opens a run folder, which is made where it does not exist.
+    ///
+    /// A last line that was cut off while it was written is taken away, so that the next one begins a line.
+    ///
+    /// # Errors
+    /// Where the folder holds something else, another run (the message names the flag that differs), a broken record, or
+    /// is held by another process.
+    pub fn open(folder: &Path, manifest: &RunManifest) -> Result<Self> {
+        match read_manifest(folder)? {
+            Some(kept) => agree(folder, &kept, manifest)?,
+            None => claim(folder, manifest)?,
+        }
+        let path = folder.join(RECORDS);
+        let records = OpenOptions::new()
+            .read(true)
+            .append(true)
+            .create(true)
+            .open(&path)
+            .map_err(|e| Error::file(&path, "open", e))?;
+        records.try_lock().map_err(|e| match e {
+            TryLockError::WouldBlock => Error::Run {
+                path: folder.to_owned(),
+                problem:
+                    "another process is writing to this run; wait for it, or use another --out"
+                        .to_owned(),
+            },
+            TryLockError::Error(e) => Error::file(&path, "lock", e),
+        })?;
+        mend(&path, &records)?;
+        let store = Self {
+            folder: folder.to_owned(),
+            records,
+            synced: Instant::now(),
+        };
+        store.write_manifest(manifest)?;
+        Ok(store)
+    }
+
+    /// What the run holds: the last record of each trial, in the order of their first.
+    pub fn records(&self) -> Result<Vec<Record>> {
+        let mut latest = HashMap::<TrialKey, usize>::new();
+        let mut records: Vec<Record> = Vec::new();
+        let path = self.folder.join(RECORDS);
+        let file = File::open(&path).map_err(|e| Error::file(&path, "read", e))?;
+        for (i, line) in BufReader::new(file).split(b'\n').enumerate() {
+            let line = line.map_err(|e| Error::file(&path, "read", e))?;
+            let record: Record = serde_json::from_slice(&line).map_err(|e| {
+                Error::line(
+                    &path,
+                    i + 1,
+                    format_args!("not a record: {e}; restore the file, or use another --out"),
+                )
+            })?;
+            if let Some(&index) = latest.get(&record.key) {
+                records[index] = record;
+            } else {
+                latest.insert(record.key, records.len());
+                records.push(record);
+            }
+        }
+        Ok(records)
+    }
+
+    /// The run folder.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Appends one record: once this returns, killing the process cannot lose it.
+    pub fn append(&mut self, record: &Record) -> Result<()> {
+        let path = || self.folder.join(RECORDS);
+        let mut line =
+            serde_json::to_vec(record).map_err(|e| Error::file(path(), "write", e.into()))?;
+        line.push(b'\n');
+        self.records
+            .write_all(&line)
+            .map_err(|e| Error::file(path(), "write", e))?;
+        if self.synced.elapsed() >= SYNC_EVERY {
+            self.sync()
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Forces all records to the disk.
+    pub fn sync(&mut self) -> Result<()> {
+        self.synced = Instant::now();
+        self.records
+            .sync_data()
+            .map_err(|e| Error::file(self.folder.join(RECORDS), "write", e))
+    }
+
+    /// Writes the manifest.
+    pub fn write_manifest(&self, manifest: &RunManifest) -> Result<()> {
+        write_manifest(&self.folder, manifest)
+    }
+
+    /// Writes a file into the run folder, whole or not at all.
+    pub fn write(&self, name: &str, content: &[u8]) -> Result<()> {
+        write(&self.folder, name, content)
+    }
+}
+
+fn write(folder: &Path, name: &str, content: &[u8]) -> Result<()> {
+    let (path, unfinished) = (folder.join(name), folder.join(format!(".{name}.part")));
+    fs::write(&unfinished, content).map_err(|e| Error::file(&unfinished, "write", e))?;
+    fs::rename(&unfinished, &path).map_err(|e| Error::file(&path, "write", e))
+}
+
+fn write_manifest(folder: &Path, manifest: &RunManifest) -> Result<()> {
+    let unwritten = |e: serde_json::Error| Error::file(folder.join(MANIFEST), "write", e.into());
+    let mut text = serde_json::to_vec_pretty(manifest).map_err(unwritten)?;
+    text.push(b'\n');
+    write(folder, MANIFEST, &text)
+}
+
+/// The newest run folder in `base` whose name ends in `-<hash>`.
+#[must_use]
+pub fn find(base: &Path, hash: &str) -> Option<PathBuf> {
+    let ending = format!("-{hash}");
+    let folders = fs::read_dir(base).ok()?.flatten().map(|entry| entry.path());
+    folders
+        .filter(|path| {
+            path.file_name()
+                .and_then(OsStr::to_str)
+                .is_some_and(|name| name.ends_with(&ending))
+        })
+        .filter(|path| path.join(MANIFEST).is_file())
+        .max()
+}
+
+/// The manifest of a run folder; `None` where there is none.
+pub fn read_manifest(folder: &Path) -> Result<Option<RunManifest>> {
+    let path = folder.join(MANIFEST);
+    let text = match fs::read(&path) {
+        Ok(text) => text,
+        Err(e)
+            if matches!(
+                e.kind(),
+                std::io::ErrorKind::NotFound | std::io::ErrorKind::NotADirectory
+            ) =>
+        {
+            return Ok(None);
+        }
+        Err(e) => return Err(Error::file(path, "read", e)),
+    };
+    let manifest: RunManifest = serde_json::from_slice(&text).map_err(|e| Error::Run {
+        path: path.clone(),
+        problem: format!("not the manifest of a run: {e}"),
+    })?;
+    if manifest.schema == SCHEMA {
+        Ok(Some(manifest))
+    } else {
+        let problem = format!(
+            "the run has the schema {:?}, this program writes {SCHEMA:?}; use another --out",
+            manifest.schema
+        );
+        Err(Error::Run { path, problem })
+    }
+}
+
+/// Makes sure that a kept run is the one now asked for.
+fn agree(folder: &Path, kept: &RunManifest, now: &RunManifest) -> Result<()> {
+    let fields = kept.identity.keys().chain(now.identity.keys());
+    let said = |manifest: &RunManifest, field: &str| {
+        manifest
+            .identity
+            .get(field)
+            .map_or("unset".to_owned(), ToString::to_string)
+    };
+    match fields
+        .map(String::as_str)
+        .find(|field| kept.identity.get(*field) != now.identity.get(*field))
+    {
+        None => Ok(()),
+        Some(field) => Err(Error::Run {
+            path: folder.to_owned(),
+            problem: format!(
+                "this run has another {field}: it was {}, now it is {}; use another --out, or the same {field}",
+                said(kept, field),
+                said(now, field)
+            ),
+        }),
+    }
+}
+
+/// Makes a new folder, or takes an empty one, and marks it as a run before anything else lies in it.
+fn claim(folder: &Path, manifest: &RunManifest) -> Result<()> {
+    fs::create_dir_all(folder).map_err(|e| Error::file(folder, "create", e))?;
+    let mut inside = fs::read_dir(folder).map_err(|e| Error::file(folder, "read", e))?;
+    if inside.next().is_some() {
+        let problem = "the folder is not empty and holds no run; use another --out".to_owned();
+        return Err(Error::Run {
+            path: folder.to_owned(),
+            problem,
+        });
+    }
+    write_manifest(folder, manifest)
+}
+
+/// Cuts a torn last line off: what stands after the last line end.
+fn mend(path: &Path, mut file: &File) -> Result<()> {
+    const STEP: u64 = 64 * 1024;
+    let unread = |e| Error::file(path, "read", e);
+    let length = file.metadata().map_err(unread)?.len();
+    let (mut end, mut whole) = (length, 0);
+    while end > 0 && whole == 0 {
+        let start = end.saturating_sub(STEP);
+        let mut chunk = vec![0; (end - start) as usize];
+        file.seek(SeekFrom::Start(start)).map_err(unread)?;
+        file.read_exact(&mut chunk).map_err(unread)?;
+        whole = chunk
+            .iter()
+            .rposition(|&byte| byte == b'\n')
+            .map_or(0, |at| start + at as u64 + 1);
+        end = start;
+    }
+    if whole == length {
+        return Ok(());
+    }
+    tracing::warn!(
+        "{}: the last line was cut off while it was written; that trial is asked again",
+        path.display()
+    );
+    file.set_len(whole)
+        .map_err(|e| Error::file(path, "write", e))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeMap;
+
+    use crate::types::manifest::{Counts, Status};
+    use crate::types::{Digest, Family, FrameId, Outcome, QuestionId, Variant, View};
+
+    fn manifest(seed: u64) -> RunManifest {
+        RunManifest {
+            schema: SCHEMA.into(),
+            status: Status::Started,
+            version: "0".into(),
+            created: String::new(),
+            updated: String::new(),
+            platform: BTreeMap::new(),
+            identity: BTreeMap::from([("--seed".to_owned(), seed.into())]),
+            settings: BTreeMap::new(),
+            counts: Counts::default(),
+        }
+    }
+
+    fn record(name: &str, outcome: Outcome) -> Record {
+        Record {
+            key: Digest::of(name.as_bytes()).into(),
+            question: QuestionId(name.into()),
+            frame: FrameId("f".into()),
+            family: Family::Color,
+            model: "m".into(),
+            view: View::Blind,
+            condition: None,
+            level: None,
+            variant: Variant::None,
+            enhancer: None,
+            choices: vec!["a".into(), "b".into()],
+            truth: 0,
+            reply: Some("A\u{2028}\n".into()),
+            refusal: None,
+            finish: None,
+            strict: None,
+            lenient: None,
+            outcome,
+            failure: None,
+            usage: None,
+            served_model: None,
+            latency_ms: None,
+            attempts: 1,
+            image: None,
+        }
+    }
+
+    #[test]
+    fn records_come_back_the_last_of_each_trial() {
+        let base = tempfile::tempdir().unwrap();
+        let folder = base.path().join("run");
+        let mut store = Store::open(&folder, &manifest(0)).unwrap();
+        assert!(store.records().unwrap().is_empty());
+        for (name, outcome) in [
+            ("a", Outcome::Failed),
+            ("b", Outcome::Right),
+            ("a", Outcome::Wrong),
+        ] {
+            store.append(&record(name, outcome)).unwrap();
+        }
+        drop(store);
+        let kept = Store::open(&folder, &manifest(0))
+            .unwrap()
+            .records()
+            .unwrap();
+        assert_eq!(
+            kept,
+            [record("a", Outcome::Wrong), record("b", Outcome::Right)]
+        );
+    }
+
+    #[test]
+    fn a_torn_line_is_cut_and_a_broken_one_is_named() {
+        let base = tempfile::tempdir().unwrap();
+        let mut store = Store::open(base.path(), &manifest(0)).unwrap();
+        store.append(&record("a", Outcome::Right)).unwrap();
+        store.records.write_all(b"{\"key\":\"12").unwrap();
+        drop(store);
+        let mut store = Store::open(base.path(), &manifest(0)).unwrap();
+        assert_eq!(store.records().unwrap().len(), 1);
+        store.append(&record("b", Outcome::Right)).unwrap();
+        drop(store);
+        assert_eq!(Store::open(base.path(), &manifest(0)).unwrap().1.len(), 2);
+        let path = base.path().join(RECORDS);
+        let text = fs::read_to_string(&path).unwrap();
+        fs::write(&path, text.replacen("{\"key\"", "{\"kex\"", 1)).unwrap();
+        let error = Store::open(base.path(), &manifest(0))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("records.jsonl, line 1: not a record"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn another_run_is_refused_by_the_flag_that_differs() {
+        let base = tempfile::tempdir().unwrap();
+        drop(Store::open(base.path(), &manifest(0)).unwrap());
+        let error = Store::open(base.path(), &manifest(7))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("another --seed: it was 0, now it is 7"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn a_run_is_held_by_one_process_and_a_strange_folder_is_left_alone() {
+        let base = tempfile::tempdir().unwrap();
+        let _held = Store::open(base.path(), &manifest(0)).unwrap();
+        assert!(
+            Store::open(base.path(), &manifest(0))
+                .unwrap_err()
+                .to_string()
+                .contains("another process")
+        );
+        let strange = tempfile::tempdir().unwrap();
+        fs::write(strange.path().join("thesis.tex"), "").unwrap();
+        assert!(
+            Store::open(strange.path(), &manifest(0))
+                .unwrap_err()
+                .to_string()
+                .contains("not empty")
+        );
+    }
+
+    #[test]
+    fn runs_are_found_by_their_hash() {
+        let base = tempfile::tempdir().unwrap();
+        for name in [
+            "20260101-m-d-0123abcd",
+            "20260102-m-d-0123abcd",
+            "20260103-m-d-99999999",
+        ] {
+            drop(Store::open(&base.path().join(name), &manifest(0)).unwrap());
+        }
+        fs::create_dir(base.path().join("20260104-m-d-0123abcd")).unwrap();
+        let found = find(base.path(), "0123abcd").unwrap();
+        assert!(found.ends_with("20260102-m-d-0123abcd"));
+        assert_eq!(find(base.path(), "abcdabcd"), None);
+    }
+}
