@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
-use comfy_table::{CellAlignment, Table};
+use comfy_table::{CellAlignment, LineStyle, Table};
 
 use crate::score::accuracy::{Cell, Subject, Summary};
 use crate::score::choice::Mode;
@@ -122,7 +122,7 @@ fn levels(seen: &[Pair<'_>]) -> Table {
         .map(|pair| Series::of(&pair.strict.subject))
         .collect();
     let mut table = Table::new();
-    table.load_style(UTF8_HORIZONTAL_ONLY);
+    table.load_style(UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none()));
     let head = ["model", "light"].map(str::to_owned).into_iter();
     let tail = ["n", "unparsed", "failed"].map(str::to_owned);
     table.set_header(

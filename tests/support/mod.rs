@@ -11,6 +11,7 @@
 
 pub mod endpoint;
 pub mod onnx;
+pub mod run;
 
 /// Keeps the ONNX Runtime of this test program from reporting anything; to be called before it is opened.
 #[expect(unsafe_code, reason = "the environment is how ONNX Runtime is told")]

@@ -1,0 +1,83 @@
+//! A call of the program in an empty folder, and what it left there.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// An empty folder in which the program is called.
+pub struct Bench {
+    folder: TempDir,
+}
+
+/// What a call gave.
+#[derive(Debug)]
+pub struct Called {
+    pub code: Option<i32>,
+    pub stdout: String,
+    pub stderr: String,
+}
+
+impl Bench {
+    pub fn new() -> Self {
+        Self { folder: tempfile::tempdir().unwrap() }
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// Writes a file.
+    pub fn file(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
+        let path = self.path(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(&path, content).unwrap();
+        path
+    }
+
+    /// The program without any setting of the surroundings, the network's proxies aside.
+    pub fn command(&self, words: &[&str]) -> Command {
+        let mut command = Command::cargo_bin("darkqa-eval").unwrap();
+        for (name, _) in std::env::vars() {
+            if ["OPENAI_", "DARKQA_", "RUST_LOG"].iter().any(|begin| name.starts_with(begin)) {
+                command.env_remove(name);
+            }
+        }
+        command.current_dir(self.folder.path()).args(words);
+        command
+    }
+
+    pub fn call(&self, words: &[&str]) -> Called {
+        called(&mut self.command(words))
+    }
+
+    /// A call that must end with everything scored.
+    pub fn complete(&self, words: &[&str]) -> String {
+        let called = self.call(words);
+        assert_eq!(called.code, Some(0), "{words:?}: {called:?}");
+        called.stdout
+    }
+}
+
+pub fn called(command: &mut Command) -> Called {
+    let output = command.output().unwrap();
+    Called {
+        code: output.status.code(),
+        stdout: String::from_utf8(output.stdout).unwrap(),
+        stderr: String::from_utf8(output.stderr).unwrap(),
+    }
+}
+
+/// The records of a run, in the order of the file.
+pub fn records(run: &Path) -> Vec<Value> {
+    let text = fs::read_to_string(run.join("records.jsonl")).unwrap();
+    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+/// Every file below a folder.
+pub fn files(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    entries.flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] }).collect()
+}
