@@ -69,6 +69,7 @@ fn without_signs(text: &str) -> String {
             '【' | '〔' | '〖' => out.push('['),
             '】' | '〕' | '〗' => out.push(']'),
             '|' => out.push('\n'),
+            '~' => out.push(' '),
             '❌' | '✗' | '✘' | '❎' | '✖' => out.push_str(" not "),
             '\u{20e3}'
             | '\u{2600}'..='\u{27bf}'
