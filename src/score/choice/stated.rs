@@ -83,7 +83,7 @@ fn only(sayings: &[Saying], beside: &[Name]) -> Option<Answer> {
     for saying in sayings {
         match saying.what {
             What::Is(Answer::Chosen(index)) if chosen.is_none_or(|other| other == index) => {
-                chosen = Some(index)
+                chosen = Some(index);
             }
             What::Is(Answer::Chosen(_)) => return Some(Answer::Unparsed(Why::Ambiguous)),
             What::Is(unparsed) => return Some(unparsed),

@@ -1,5 +1,7 @@
 //! Every rule of reading, on a table of replies, and what holds for any reply.
 
+#![allow(clippy::unwrap_used)]
+
 use proptest::prelude::*;
 use serde::Deserialize;
 
