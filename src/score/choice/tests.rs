@@ -52,6 +52,9 @@ const SETS: [(&str, &[&str]); 9] = [
     ("left_right", &["left", "right", "in front", "behind"]),
 ];
 
+/// The first sets: those whose texts are words, so that no letter or sign in them can be read as something else.
+const PLAIN_SETS: usize = 6;
+
 fn choices(set: &str) -> Choices {
     let texts = match SETS.iter().find(|(name, _)| *name == set) {
         Some((_, texts)) => texts.iter().map(|&text| text.to_owned()).collect(),
@@ -256,9 +259,8 @@ proptest! {
     }
 
     #[test]
-    fn every_form_of_every_choice_is_read(set in 0..SETS.len() - 2, pick in 0..100usize, form in 0..8usize) {
+    fn every_form_of_every_choice_is_read(set in 0..PLAIN_SETS, pick in 0..100usize, form in 0..8usize) {
         let choices = choices(SETS[set].0);
-        prop_assume!(SETS[set].0 != "letters");
         let index = pick % choices.len();
         let letter = crate::types::question::letter(index);
         let text = &choices.texts()[index];
