@@ -133,7 +133,10 @@ fn letters(view: &View<'_>) -> Option<Answer> {
             .iter()
             .all(|text| text.choice == view.texts[0].choice);
     let why = if view.letters.iter().any(another)
-        || held.clone().any(|letter| alternative(view, letter))
+        || held
+            .clone()
+            .chain(&view.texts)
+            .any(|name| alternative(view, name))
     {
         Why::Ambiguous
     } else if held.clone().any(|letter| view.denies(letter)) {

@@ -10,7 +10,7 @@ use super::names::{Grip, Name, index_of, joins};
 /// Words that follow the letter A, never the article.
 pub(super) static AFTER_A: LazyLock<Regex> = LazyLock::new(|| {
     compiled(
-        r"(?i)\A(?:and|or|but|because|since|as|is|isn't|was|are|would|could|can|cannot|must|should|may|might|seems|for|due|not|nor|if|then|&|/|=)(?:\W|\z)",
+        r"(?i)\A(?:and|or|but|because|since|as|is|isn't|was|are|would|could|can|cannot|must|should|may|might|seems|appears|has|shows|does|doesn't|fits|for|due|not|nor|if|then|&|/|=|[a-z])(?:[^\w-]|\z)",
     )
 });
 
@@ -62,6 +62,7 @@ fn grip(text: &str, at: usize, letter: char) -> Option<Grip> {
         && !(letter == 'I' && after == Some(','));
     let bracket = matches!(before, Some('(' | '['));
     let name = match letter {
+        _ if called_letter(left) => true,
         'A' => AFTER_A.is_match(words),
         'I' => AFTER_I.is_match(words),
         // One-letter words of other languages: "E", "O", "Y", "U", "W", "Z".
@@ -83,11 +84,31 @@ pub(super) fn hyphenated(left: &str, right: &str) -> bool {
     (dash(before.next()) && joins(before.next())) || (dash(after.next()) && joins(after.next()))
 }
 
-/// "U.S.", "e.g.": single letters, each with its period.
+/// Whether the words before a letter say that it is one: "option A".
+pub(super) fn called_letter(left: &str) -> bool {
+    const WORDS: [&str; 8] = [
+        "option",
+        "choice",
+        "letter",
+        "opción",
+        "opção",
+        "opzione",
+        "optie",
+        "вариант",
+    ];
+    let words = left.trim_end();
+    let word = words
+        .rsplit(|c: char| !c.is_alphabetic())
+        .next()
+        .unwrap_or_default();
+    word.len() <= WORDS[7].len() && WORDS.contains(&word.to_lowercase().as_str())
+}
+
+/// "U.S.", "e.g.": single letters, each with its period; "N/A".
 fn abbreviated(left: &str, right: &str) -> bool {
     let mut before = left.chars().rev();
     let mut after = right.chars();
     let preceded = before.next() == Some('.') && joins(before.next()) && !joins(before.next());
     let followed = after.next() == Some('.') && joins(after.next()) && after.next() == Some('.');
-    preceded || followed
+    preceded || followed || left.ends_with("N/") || right.starts_with("/A")
 }

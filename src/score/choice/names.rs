@@ -99,7 +99,7 @@ static NO_DENIAL: LazyLock<Regex> = LazyLock::new(|| {
 /// Words after a name that deny it.
 static DENIAL_AFTER: LazyLock<Regex> = LazyLock::new(|| {
     compiled(concat!(
-        r"\A[)\].,:\s]*(?:not\b|(?:is|was|are|does|do|did|would|could|can|should|will|must|seems?|looks?)\s*(?:not\b|n't\b)",
+        r"\A[)\].\s]*(?:not\s*(?:\z|[.,;!\n])|(?:is|was|are|does|do|did|would|could|can|should|will|must|seems?|looks?)\s*(?:not\b|n't\b)",
         r"|(?:isn't|wasn't|doesn't|can't|cannot|won't|wouldn't|couldn't)\b",
         r"|(?:is|are|was|seems|looks|would be|can be|must be)\s+(?:clearly |obviously |definitely |probably |likely )?",
         r"(?:incorrect|wrong|false|unlikely|impossible|ruled out|excluded|eliminated|out\b|not\b|absent|missing)",

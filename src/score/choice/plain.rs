@@ -70,7 +70,8 @@ fn without_signs(text: &str) -> String {
             '】' | '〕' | '〗' => out.push(']'),
             '|' => out.push('\n'),
             '❌' | '✗' | '✘' | '❎' | '✖' => out.push_str(" not "),
-            '\u{20e3}'
+            '~'
+            | '\u{20e3}'
             | '\u{2600}'..='\u{27bf}'
             | '\u{2b00}'..='\u{2bff}'
             | '\u{1f000}'..='\u{1faff}' => out.push(' '),

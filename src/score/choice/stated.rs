@@ -6,7 +6,7 @@ use regex::Regex;
 
 use super::clean::compiled;
 use super::lenient;
-use super::letters::{AFTER_A, AFTER_I, hyphenated};
+use super::letters::{AFTER_A, AFTER_I, called_letter, hyphenated};
 use super::markers::{self, Kind, Lead, Marker};
 use super::names::{Grip, Name, index_of, joins};
 use super::plain::fold;
@@ -34,11 +34,14 @@ enum What {
 /// spoken of, where there is only one.
 pub(super) fn stated(view: &View<'_>) -> Option<Answer> {
     let marks: Vec<Marker> = markers::markers(view.folded).collect();
-    let announced = marks.iter().enumerate().filter_map(|(i, mark)| {
-        let next = marks[i + 1..].iter().find(|next| next.kind == Kind::Answer);
-        saying(view, *mark, next.map_or(view.text.len(), |next| next.start))
-    });
-    let mut sayings: Vec<Saying> = announced.chain(praised(view)).collect();
+    let mut sayings: Vec<Saying> = praised(view).collect();
+    let mut end = view.text.len();
+    for mark in marks.into_iter().rev() {
+        sayings.extend(saying(view, mark, end));
+        if mark.kind == Kind::Answer {
+            end = mark.start;
+        }
+    }
     sayings.sort_by_key(|saying| saying.at);
     let of = |kind: Kind| -> Vec<Saying> {
         let same = sayings.iter().filter(|saying| saying.kind == kind);
@@ -80,7 +83,7 @@ fn only(sayings: &[Saying], beside: &[Name]) -> Option<Answer> {
     for saying in sayings {
         match saying.what {
             What::Is(Answer::Chosen(index)) if chosen.is_none_or(|other| other == index) => {
-                chosen = Some(index)
+                chosen = Some(index);
             }
             What::Is(Answer::Chosen(_)) => return Some(Answer::Unparsed(Why::Ambiguous)),
             What::Is(unparsed) => return Some(unparsed),
@@ -143,7 +146,11 @@ fn rest_of(view: &View<'_>, rest: &str) -> Option<Answer> {
 /// The name that a marker leads to, with what it says once its surroundings are regarded.
 fn announced(view: &View<'_>, lead: &Lead) -> Option<(Name, Answer)> {
     let far = *lead.steps.last()?;
-    let name = letter_at(view, far)
+    let longer = |name: &Name| name.end - name.start > 1;
+    let name = view
+        .text_from(far)
+        .filter(longer)
+        .or_else(|| letter_at(view, far))
         .or_else(|| lead.steps.iter().rev().find_map(|&at| view.text_at(at)))?;
     let after = &view.text[name.end..];
     if after.trim_start_matches([')', ']']).starts_with('?') {
@@ -204,7 +211,7 @@ fn letter_at(view: &View<'_>, at: usize) -> Option<Name> {
         || words.is_empty()
         || words.starts_with(['(', '-', '–', '—', '\n']);
     let fits = match letter {
-        _ if open || ends => true,
+        _ if open || ends || (letter.is_ascii_uppercase() && called_letter(left)) => true,
         'A' | 'a' => AFTER_A.is_match(words),
         'I' | 'i' => AFTER_I.is_match(words),
         'a'..='z' => AFTER_A.is_match(words) || view.labelled_text(&name).is_some(),

@@ -63,25 +63,35 @@ pub(super) struct View<'a> {
 impl<'a> View<'a> {
     /// Looks through a text; `folded` is [`fold`] of it.
     pub(super) fn new(text: &'a str, folded: &'a str, offered: &'a Offered) -> Self {
+        let texts = texts(folded, offered);
+        let within = |letter: &Name| {
+            let after = texts.partition_point(|name| name.start <= letter.start);
+            texts[..after]
+                .last()
+                .is_some_and(|name| name.end > letter.end)
+        };
+        let mut letters = letters(text, offered.texts.len());
+        letters.retain(|letter| !within(letter));
         Self {
             text,
             folded,
             offered,
-            letters: letters(text, offered.texts.len()),
-            texts: texts(folded, offered),
+            letters,
+            texts,
         }
     }
 
     /// The choice's text that begins at a byte, articles and words such as "it is" passed over.
     pub(super) fn text_at(&self, at: usize) -> Option<Name> {
-        let found = |at: usize| {
-            let first = self.texts.partition_point(|name| name.start < at);
-            self.texts
-                .get(first)
-                .copied()
-                .filter(|name| name.start == at)
-        };
-        found(at).or_else(|| found(at + markers::article(&self.folded[at..])))
+        self.text_from(at)
+            .or_else(|| self.text_from(at + markers::article(&self.folded[at..])))
+    }
+
+    /// The choice's text that begins at just this byte.
+    pub(super) fn text_from(&self, at: usize) -> Option<Name> {
+        let first = self.texts.partition_point(|name| name.start < at);
+        let name = self.texts.get(first).copied();
+        name.filter(|name| name.start == at)
     }
 
     /// Whether the words around a name deny it.
@@ -92,7 +102,8 @@ impl<'a> View<'a> {
     /// The text that follows a letter as its label does: "B. kitchen", "(B) a kitchen", "B: kitchen".
     pub(super) fn labelled_text(&self, letter: &Name) -> Option<Name> {
         let rest = &self.text[letter.end..];
-        let after = rest.trim_start_matches([')', ']', '.', ':', ',', ' ', '\n', '-', '–', '—']);
+        let after =
+            rest.trim_start_matches([')', ']', '.', ':', ',', '、', ' ', '\n', '-', '–', '—']);
         let gap = &rest[..rest.len() - after.len()];
         let name = self.text_at(letter.end + gap.len())?;
         // On another line it is the letter's text only where it fills the line.
