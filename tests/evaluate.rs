@@ -8,8 +8,8 @@ use std::io::Cursor;
 
 use serde_json::{Value, json};
 use support::endpoint::{Answer, MockEndpoint};
-use support::run::{Bench, called, files, records};
 use support::onnx;
+use support::run::{Bench, called, files, records};
 
 /// A small PNG with something to see in it.
 fn png(shade: u8) -> Vec<u8> {
@@ -42,13 +42,25 @@ fn text<'a>(record: &'a Value, key: &str) -> &'a str {
 fn the_built_in_rooms_run_without_anything() {
     let bench = Bench::new();
     let table = bench.complete(&["--model", "random", "--out", "run"]);
-    assert!(table.contains("untouched") && table.contains("with noise") && table.contains("chance: 31.82 over 20"), "{table}");
+    assert!(
+        table.contains("untouched")
+            && table.contains("with noise")
+            && table.contains("chance: 31.82 over 20"),
+        "{table}"
+    );
     let records = records(&bench.path("run"));
     assert_eq!(records.len(), 20 * 11);
-    let conditions: BTreeSet<&str> = records.iter().map(|record| text(record, "condition")).collect();
+    let conditions: BTreeSet<&str> = records
+        .iter()
+        .map(|record| text(record, "condition"))
+        .collect();
     assert_eq!(conditions.len(), 11);
-    let manifest: Value = serde_json::from_slice(&fs::read(bench.path("run/manifest.json")).unwrap()).unwrap();
-    assert_eq!((&manifest["status"], &manifest["counts"]["answered"]), (&json!("complete"), &json!(220)));
+    let manifest: Value =
+        serde_json::from_slice(&fs::read(bench.path("run/manifest.json")).unwrap()).unwrap();
+    assert_eq!(
+        (&manifest["status"], &manifest["counts"]["answered"]),
+        (&json!("complete"), &json!(220))
+    );
 }
 
 #[test]
@@ -57,19 +69,52 @@ fn every_condition_runs_raw_and_enhanced() {
     frames(&bench);
     onnx::gain(3.0).write(&bench.path(""), "bright.onnx");
     onnx::gamma(0.5).write(&bench.path(""), "curve.onnx");
-    let words = ["--data", "frames", "--model", "random", "--llie", "bright.onnx", "--llie", "curve.onnx", "--out", "run"];
+    let words = [
+        "--data",
+        "frames",
+        "--model",
+        "random",
+        "--llie",
+        "bright.onnx",
+        "--llie",
+        "curve.onnx",
+        "--out",
+        "run",
+    ];
     let table = bench.complete(&words);
-    assert!(table.contains("with noise + bright") && table.contains("with noise + curve"), "{table}");
+    assert!(
+        table.contains("with noise + bright") && table.contains("with noise + curve"),
+        "{table}"
+    );
     let records = records(&bench.path("run"));
     // L0, five of each variant, five for each enhancer on noise.
     assert_eq!(records.len(), 3 * (1 + 5 + 5 + 5 + 5));
     let digest = |condition: &str, frame: &str| {
-        let of = |record: &&Value| text(record, "condition") == condition && text(record, "frame") == frame;
-        let digests: BTreeSet<String> = records.iter().filter(of).map(|record| record["image"]["digest"].to_string()).collect();
-        assert_eq!(digests.len(), 1, "one image for all questions of {condition}");
+        let of = |record: &&Value| {
+            text(record, "condition") == condition && text(record, "frame") == frame
+        };
+        let digests: BTreeSet<String> = records
+            .iter()
+            .filter(of)
+            .map(|record| record["image"]["digest"].to_string())
+            .collect();
+        assert_eq!(
+            digests.len(),
+            1,
+            "one image for all questions of {condition}"
+        );
         digests.into_iter().next().unwrap()
     };
-    let shown: BTreeSet<String> = ["L0", "L1-ev", "L1-noise", "L1-noise+bright", "L1-noise+curve"].iter().map(|c| digest(c, "b.png")).collect();
+    let shown: BTreeSet<String> = [
+        "L0",
+        "L1-ev",
+        "L1-noise",
+        "L1-noise+bright",
+        "L1-noise+curve",
+    ]
+    .iter()
+    .map(|c| digest(c, "b.png"))
+    .collect();
     assert_eq!(shown.len(), 5, "five different images");
 }
 
@@ -78,29 +123,93 @@ fn a_record_and_a_row_keep_the_contract() {
     let bench = Bench::new();
     frames(&bench);
     bench.file("script.jsonl", "{\"question\":\"a1\",\"reply\":\"No.\"}\n{\"question\":\"b1\",\"condition\":\"L1-ev\",\"reply\":\"too dark to see\"}\n{\"default\":\"**A**\"}\n");
-    bench.complete(&["--data", "frames", "--model", "script:script.jsonl", "--levels", "L0,L1", "--variant", "ev", "--out", "run"]);
+    bench.complete(&[
+        "--data",
+        "frames",
+        "--model",
+        "script:script.jsonl",
+        "--levels",
+        "L0,L1",
+        "--variant",
+        "ev",
+        "--out",
+        "run",
+    ]);
     let records = records(&bench.path("run"));
-    let record = records.iter().find(|r| text(r, "question") == "b1" && text(r, "condition") == "L1-ev").unwrap();
-    let keys: Vec<&str> = record.as_object().unwrap().keys().map(String::as_str).collect();
+    let record = records
+        .iter()
+        .find(|r| text(r, "question") == "b1" && text(r, "condition") == "L1-ev")
+        .unwrap();
+    let keys: Vec<&str> = record
+        .as_object()
+        .unwrap()
+        .keys()
+        .map(String::as_str)
+        .collect();
     for key in [
-        "key", "question", "frame", "family", "model", "view", "condition", "level", "variant", "enhancer", "choices", "truth", "reply", "strict",
-        "lenient", "outcome", "failure", "usage", "latency_ms", "attempts", "image",
+        "key",
+        "question",
+        "frame",
+        "family",
+        "model",
+        "view",
+        "condition",
+        "level",
+        "variant",
+        "enhancer",
+        "choices",
+        "truth",
+        "reply",
+        "strict",
+        "lenient",
+        "outcome",
+        "failure",
+        "usage",
+        "latency_ms",
+        "attempts",
+        "image",
     ] {
         assert!(keys.contains(&key), "{key} of {keys:?}");
     }
-    assert_eq!((text(record, "level"), text(record, "variant"), text(record, "outcome")), ("L1", "ev", "unparsed"));
+    assert_eq!(
+        (
+            text(record, "level"),
+            text(record, "variant"),
+            text(record, "outcome")
+        ),
+        ("L1", "ev", "unparsed")
+    );
     assert_eq!(record["strict"], json!({"chosen": null, "why": "refused"}));
     assert_eq!(record["image"]["format"], "png");
 
     let csv = fs::read_to_string(bench.path("run/summary.csv")).unwrap();
     let mut lines = csv.lines();
-    assert_eq!(lines.next().unwrap(), "model,view,level,variant,enhancer,family,mode,n,right,unparsed,failed,value,low,high");
+    assert_eq!(
+        lines.next().unwrap(),
+        "model,view,level,variant,enhancer,family,mode,n,right,unparsed,failed,value,low,high"
+    );
     let all: Vec<&str> = lines.filter(|line| line.contains(",all,")).collect();
     // a1 is right both times; a2 and b1 say **A**, which is not strict: b1's A is right in the lenient reading.
-    assert!(all.iter().any(|line| line.contains(",L0,none,,all,strict,3,1,2,0,0.333")), "{csv}");
-    assert!(all.iter().any(|line| line.contains(",L0,none,,all,lenient,3,2,0,0,0.666")), "{csv}");
-    assert!(all.iter().any(|line| line.contains(",L1,ev,,all,lenient,3,1,1,0,0.333")), "{csv}");
-    assert!(all.iter().any(|line| line.starts_with("chance,,,none,,all,strict,3,,0,0,0.4444")), "{csv}");
+    assert!(
+        all.iter()
+            .any(|line| line.contains(",L0,none,,all,strict,3,1,2,0,0.333")),
+        "{csv}"
+    );
+    assert!(
+        all.iter()
+            .any(|line| line.contains(",L0,none,,all,lenient,3,2,0,0,0.666")),
+        "{csv}"
+    );
+    assert!(
+        all.iter()
+            .any(|line| line.contains(",L1,ev,,all,lenient,3,1,1,0,0.333")),
+        "{csv}"
+    );
+    assert!(
+        all.iter()
+            .any(|line| line.starts_with("chance,,,none,,all,strict,3,,0,0,0.4444")),
+        "{csv}"
+    );
 }
 
 #[test]
@@ -109,19 +218,46 @@ fn words_are_the_same_bytes_in_every_condition() {
     frames(&bench);
     let endpoint = MockEndpoint::start([Answer::text("A")]);
     let url = endpoint.base_url();
-    bench.complete(&["--data", "frames", "--model", "m", "--base-url", &url, "--levels", "L0,L5", "--out", "run"]);
+    bench.complete(&[
+        "--data",
+        "frames",
+        "--model",
+        "m",
+        "--base-url",
+        &url,
+        "--levels",
+        "L0,L5",
+        "--out",
+        "run",
+    ]);
     let mut by_words = BTreeMap::<String, Vec<String>>::new();
     for request in endpoint.requests() {
         let content = request.json()["messages"][0]["content"].clone();
-        assert_eq!((&content[0]["type"], &content[1]["type"]), (&json!("text"), &json!("image_url")));
+        assert_eq!(
+            (&content[0]["type"], &content[1]["type"]),
+            (&json!("text"), &json!("image_url"))
+        );
         let image = text(&content[1]["image_url"], "url").to_owned();
-        by_words.entry(text(&content[0], "text").to_owned()).or_default().push(image);
+        by_words
+            .entry(text(&content[0], "text").to_owned())
+            .or_default()
+            .push(image);
     }
     assert_eq!(by_words.len(), 3);
-    assert!(by_words.keys().any(|words| words.contains("Is there a \"lamp\" {{here}}?\nA. yes\nB. no\n")), "{:?}", by_words.keys());
+    assert!(
+        by_words
+            .keys()
+            .any(|words| words.contains("Is there a \"lamp\" {{here}}?\nA. yes\nB. no\n")),
+        "{:?}",
+        by_words.keys()
+    );
     for images in by_words.values() {
         let different: BTreeSet<&String> = images.iter().collect();
-        assert_eq!((images.len(), different.len()), (3, 3), "L0, L5-ev, L5-noise");
+        assert_eq!(
+            (images.len(), different.len()),
+            (3, 3),
+            "L0, L5-ev, L5-noise"
+        );
     }
 }
 
@@ -132,10 +268,25 @@ fn the_untouched_file_itself_is_sent() {
     frames(&bench);
     let endpoint = MockEndpoint::start([Answer::text("A")]);
     let url = endpoint.base_url();
-    bench.complete(&["--data", "frames", "--model", "m", "--base-url", &url, "--levels", "L0", "--limit", "1", "--out", "run"]);
+    bench.complete(&[
+        "--data",
+        "frames",
+        "--model",
+        "m",
+        "--base-url",
+        &url,
+        "--levels",
+        "L0",
+        "--limit",
+        "1",
+        "--out",
+        "run",
+    ]);
     let request = endpoint.requests()[0].json();
     let url = text(&request["messages"][0]["content"][1]["image_url"], "url").to_owned();
-    let sent = base64::engine::general_purpose::STANDARD.decode(url.strip_prefix("data:image/png;base64,").unwrap()).unwrap();
+    let sent = base64::engine::general_purpose::STANDARD
+        .decode(url.strip_prefix("data:image/png;base64,").unwrap())
+        .unwrap();
     assert_eq!(sent, fs::read(bench.path("frames/a.png")).unwrap());
 }
 
@@ -144,10 +295,23 @@ fn a_stopped_run_goes_on_where_it_stopped() {
     let bench = Bench::new();
     frames(&bench);
     let words = |url: &str| -> Vec<String> {
-        let words = ["--data", "frames", "--model", "m", "--base-url", url, "--levels", "L0-L2", "--concurrency", "1"];
+        let words = [
+            "--data",
+            "frames",
+            "--model",
+            "m",
+            "--base-url",
+            url,
+            "--levels",
+            "L0-L2",
+            "--concurrency",
+            "1",
+        ];
         words.iter().map(|&word| word.to_owned()).collect()
     };
-    let answers = std::iter::repeat_n(Answer::text("A"), 4).chain([Answer::error(401, "invalid_api_key", "no such key")]).chain([Answer::text("B")]);
+    let answers = std::iter::repeat_n(Answer::text("A"), 4)
+        .chain([Answer::error(401, "invalid_api_key", "no such key")])
+        .chain([Answer::text("B")]);
     let endpoint = MockEndpoint::start(answers);
     let url = endpoint.base_url();
     let words: Vec<String> = words(&url);
@@ -155,16 +319,27 @@ fn a_stopped_run_goes_on_where_it_stopped() {
     let stopped = bench.call(&words);
     assert_eq!(stopped.code, Some(2), "{stopped:?}");
     assert!(stopped.stderr.contains("no such key"), "{stopped:?}");
-    let runs: Vec<_> = fs::read_dir(bench.path("results")).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let runs: Vec<_> = fs::read_dir(bench.path("results"))
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .collect();
     assert_eq!((runs.len(), records(&runs[0]).len()), (1, 4));
 
     bench.complete(&words);
-    assert_eq!(endpoint.requests().len(), 15 + 1, "3 questions in 5 conditions, and the one that was refused");
+    assert_eq!(
+        endpoint.requests().len(),
+        15 + 1,
+        "3 questions in 5 conditions, and the one that was refused"
+    );
     assert_eq!(records(&runs[0]).len(), 15);
 
     let table = bench.complete(&words);
     assert!(table.contains("exposure drop"), "{table}");
-    assert_eq!(endpoint.requests().len(), 15 + 1, "a complete run asks nothing");
+    assert_eq!(
+        endpoint.requests().len(),
+        15 + 1,
+        "a complete run asks nothing"
+    );
 }
 
 #[test]
@@ -173,15 +348,32 @@ fn a_torn_record_is_asked_again_and_nothing_else() {
     frames(&bench);
     let endpoint = MockEndpoint::start([Answer::text("A")]);
     let url = endpoint.base_url();
-    let words = ["--data", "frames", "--model", "m", "--base-url", &url, "--levels", "L0", "--out", "run"];
+    let words = [
+        "--data",
+        "frames",
+        "--model",
+        "m",
+        "--base-url",
+        &url,
+        "--levels",
+        "L0",
+        "--out",
+        "run",
+    ];
     bench.complete(&words);
     let path = bench.path("run/records.jsonl");
     let kept = fs::read(&path).unwrap();
     fs::write(&path, &kept[..kept.len() - 20]).unwrap();
     let manifest = fs::read_to_string(bench.path("run/manifest.json")).unwrap();
-    bench.file("run/manifest.json", manifest.replace("\"complete\"", "\"started\""));
+    bench.file(
+        "run/manifest.json",
+        manifest.replace("\"complete\"", "\"started\""),
+    );
     bench.complete(&words);
-    assert_eq!((records(&bench.path("run")).len(), endpoint.requests().len()), (3, 4));
+    assert_eq!(
+        (records(&bench.path("run")).len(), endpoint.requests().len()),
+        (3, 4)
+    );
 }
 
 #[test]
@@ -191,22 +383,52 @@ fn failed_trials_are_counted_apart_and_asked_again() {
     let broken = Answer::error(400, "bad_image", "cannot look at this");
     let endpoint = MockEndpoint::start([Answer::text("B"), broken, Answer::text("A")]);
     let url = endpoint.base_url();
-    let words = ["--data", "frames", "--model", "m", "--base-url", &url, "--levels", "L0", "--concurrency", "1", "--out", "run"];
+    let words = [
+        "--data",
+        "frames",
+        "--model",
+        "m",
+        "--base-url",
+        &url,
+        "--levels",
+        "L0",
+        "--concurrency",
+        "1",
+        "--out",
+        "run",
+    ];
     let first = bench.call(&words);
     assert_eq!(first.code, Some(1), "{first:?}");
     let csv = fs::read_to_string(bench.path("run/summary.csv")).unwrap();
-    assert!(csv.contains("m,image,L0,none,,all,strict,2,2,0,1,1"), "{csv}");
-    let failed = records(&bench.path("run")).into_iter().find(|record| record["outcome"] == "failed").unwrap();
-    assert_eq!((&failed["failure"]["status"], &failed["strict"]), (&json!(400), &Value::Null));
+    assert!(
+        csv.contains("m,image,L0,none,,all,strict,2,2,0,1,1"),
+        "{csv}"
+    );
+    let failed = records(&bench.path("run"))
+        .into_iter()
+        .find(|record| record["outcome"] == "failed")
+        .unwrap();
+    assert_eq!(
+        (&failed["failure"]["status"], &failed["strict"]),
+        (&json!(400), &Value::Null)
+    );
     bench.complete(&words);
-    assert_eq!(endpoint.requests().len(), 4, "only the failed one is asked again");
+    assert_eq!(
+        endpoint.requests().len(),
+        4,
+        "only the failed one is asked again"
+    );
 }
 
 #[test]
 fn another_configuration_on_the_same_folder_is_refused() {
     let bench = Bench::new();
     bench.complete(&["--model", "random", "--levels", "L0", "--out", "run"]);
-    for (more, field) in [(["--seed", "7"], "--seed"), (["--levels", "L1"], "--levels"), (["--image", "jpeg:90"], "--image")] {
+    for (more, field) in [
+        (["--seed", "7"], "--seed"),
+        (["--levels", "L1"], "--levels"),
+        (["--image", "jpeg:90"], "--image"),
+    ] {
         let mut words = vec!["--model", "random", "--out", "run"];
         if more[0] != "--levels" {
             words.extend(["--levels", "L0"]);
@@ -214,7 +436,10 @@ fn another_configuration_on_the_same_folder_is_refused() {
         words.extend(more);
         let refused = bench.call(&words);
         assert_eq!(refused.code, Some(2), "{refused:?}");
-        assert!(refused.stderr.contains(&format!("another {field}")), "{refused:?}");
+        assert!(
+            refused.stderr.contains(&format!("another {field}")),
+            "{refused:?}"
+        );
     }
 }
 
@@ -223,10 +448,26 @@ fn threads_and_order_change_no_byte() {
     let bench = Bench::new();
     frames(&bench);
     let images = |run: &str, threads: &str, concurrency: &str| {
-        bench.complete(&["--data", "frames", "--model", "random", "--threads", threads, "--concurrency", concurrency, "--out", run]);
-        let digests: BTreeMap<String, String> =
-            records(&bench.path(run)).iter().map(|r| (r["key"].to_string(), r["image"]["digest"].to_string())).collect();
-        (digests, fs::read(bench.path(run).join("summary.csv")).unwrap())
+        bench.complete(&[
+            "--data",
+            "frames",
+            "--model",
+            "random",
+            "--threads",
+            threads,
+            "--concurrency",
+            concurrency,
+            "--out",
+            run,
+        ]);
+        let digests: BTreeMap<String, String> = records(&bench.path(run))
+            .iter()
+            .map(|r| (r["key"].to_string(), r["image"]["digest"].to_string()))
+            .collect();
+        (
+            digests,
+            fs::read(bench.path(run).join("summary.csv")).unwrap(),
+        )
     };
     assert_eq!(images("one", "1", "1"), images("many", "5", "16"));
 }
@@ -237,14 +478,40 @@ fn a_blind_model_sees_words_alone() {
     frames(&bench);
     let endpoint = MockEndpoint::start([Answer::text("A")]);
     let url = endpoint.base_url();
-    let words = ["--data", "frames", "--model", "random", "--blind-model", "gpt", "--base-url", &url, "--levels", "L0", "--out", "run"];
+    let words = [
+        "--data",
+        "frames",
+        "--model",
+        "random",
+        "--blind-model",
+        "gpt",
+        "--base-url",
+        &url,
+        "--levels",
+        "L0",
+        "--out",
+        "run",
+    ];
     let table = bench.complete(&words);
-    assert!(table.contains("gpt without images: 33.3 (33.3), n 3"), "{table}");
+    assert!(
+        table.contains("gpt without images: 33.3 (33.3), n 3"),
+        "{table}"
+    );
     let requests = endpoint.requests();
     assert_eq!(requests.len(), 3, "once a question, not once a condition");
-    assert!(requests.iter().all(|request| !String::from_utf8_lossy(&request.body).contains("image_url")));
-    let blind = records(&bench.path("run")).into_iter().find(|record| record["view"] == "blind").unwrap();
-    assert_eq!((&blind["condition"], &blind["image"], &blind["level"]), (&Value::Null, &Value::Null, &Value::Null));
+    assert!(
+        requests
+            .iter()
+            .all(|request| !String::from_utf8_lossy(&request.body).contains("image_url"))
+    );
+    let blind = records(&bench.path("run"))
+        .into_iter()
+        .find(|record| record["view"] == "blind")
+        .unwrap();
+    assert_eq!(
+        (&blind["condition"], &blind["image"], &blind["level"]),
+        (&Value::Null, &Value::Null, &Value::Null)
+    );
 }
 
 #[test]
@@ -257,17 +524,40 @@ fn ready_made_sets_are_read() {
     bench.file("set/base64.tsv", format!("index\timage\tquestion\tA\tB\tanswer\n7\t{file}\tWhat?\tred\tblue\tB\n8\t7\tAnd?\tyes\tno\tA\n"));
     bench.file("set/lines.jsonl", "{\"id\":1,\"image\":\"one.png\",\"question\":\"What?\",\"choices\":[\"red\",\"blue\"],\"answer\":\"blue\",\"family\":\"color\"}\n");
     bench.file("script.jsonl", "{\"default\":\"B\"}\n");
-    for (set, n, right) in [("paths.tsv", 2, 1), ("base64.tsv", 2, 1), ("lines.jsonl", 1, 1)] {
+    for (set, n, right) in [
+        ("paths.tsv", 2, 1),
+        ("base64.tsv", 2, 1),
+        ("lines.jsonl", 1, 1),
+    ] {
         let data = format!("set/{set}");
-        bench.complete(&["--data", &data, "--model", "script:script.jsonl", "--levels", "L0,L3", "--out", set]);
+        bench.complete(&[
+            "--data",
+            &data,
+            "--model",
+            "script:script.jsonl",
+            "--levels",
+            "L0,L3",
+            "--out",
+            set,
+        ]);
         let records = records(&bench.path(set));
         assert_eq!(records.len(), n * 3, "{set}");
-        let seen = records.iter().filter(|r| r["condition"] == "L3-noise" && r["outcome"] == "right").count();
+        let seen = records
+            .iter()
+            .filter(|r| r["condition"] == "L3-noise" && r["outcome"] == "right")
+            .count();
         assert_eq!(seen, right, "{set}");
-        assert!(records.iter().all(|record| record["image"]["width"] == 24), "{set}");
+        assert!(
+            records.iter().all(|record| record["image"]["width"] == 24),
+            "{set}"
+        );
     }
     let choices = &records(&bench.path("paths.tsv"))[0]["choices"];
-    assert_eq!(*choices, json!(["red", "blue"]), "an empty cell is no choice");
+    assert_eq!(
+        *choices,
+        json!(["red", "blue"]),
+        "an empty cell is no choice"
+    );
 }
 
 #[test]
@@ -276,12 +566,26 @@ fn a_broken_image_fails_its_own_trials_alone() {
     frames(&bench);
     let whole = png(20);
     bench.file("frames/a.png", &whole[..whole.len() - 40]);
-    let run = bench.call(&["--data", "frames", "--model", "random", "--levels", "L0,L1", "--out", "run"]);
+    let run = bench.call(&[
+        "--data", "frames", "--model", "random", "--levels", "L0,L1", "--out", "run",
+    ]);
     assert_eq!(run.code, Some(1), "{run:?}");
     let records = records(&bench.path("run"));
-    assert!(records.iter().all(|record| (text(record, "outcome") == "failed") == (text(record, "frame") == "a.png")), "{records:?}");
-    let failed = records.iter().find(|record| record["outcome"] == "failed").unwrap();
-    assert!(text(&failed["failure"], "message").contains("a.png: not a whole image"), "{failed}");
+    assert!(
+        records
+            .iter()
+            .all(|record| (text(record, "outcome") == "failed")
+                == (text(record, "frame") == "a.png")),
+        "{records:?}"
+    );
+    let failed = records
+        .iter()
+        .find(|record| record["outcome"] == "failed")
+        .unwrap();
+    assert!(
+        text(&failed["failure"], "message").contains("a.png: not a whole image"),
+        "{failed}"
+    );
 }
 
 #[test]
@@ -290,25 +594,54 @@ fn the_key_is_nowhere() {
     let bench = Bench::new();
     frames(&bench);
     let echo = Answer::error(400, "bad", &format!("your key {KEY} may not do that"));
-    let endpoint = MockEndpoint::start([Answer::text(&format!("A {KEY}")), echo, Answer::text("B")]);
+    let endpoint =
+        MockEndpoint::start([Answer::text(&format!("A {KEY}")), echo, Answer::text("B")]);
     let url = endpoint.base_url();
-    let mut command = bench.command(&["--data", "frames", "--model", "m", "--base-url", &url, "--levels", "L0", "--concurrency", "1", "--out", "run"]);
+    let mut command = bench.command(&[
+        "--data",
+        "frames",
+        "--model",
+        "m",
+        "--base-url",
+        &url,
+        "--levels",
+        "L0",
+        "--concurrency",
+        "1",
+        "--out",
+        "run",
+    ]);
     let run = called(command.env("OPENAI_API_KEY", KEY).env("RUST_LOG", "trace"));
-    assert_eq!(endpoint.requests()[0].header("authorization"), Some(format!("Bearer {KEY}").as_str()));
-    assert!(!run.stderr.contains(KEY) && !run.stdout.contains(KEY), "{run:?}");
+    assert_eq!(
+        endpoint.requests()[0].header("authorization"),
+        Some(format!("Bearer {KEY}").as_str())
+    );
+    assert!(
+        !run.stderr.contains(KEY) && !run.stdout.contains(KEY),
+        "{run:?}"
+    );
     for file in files(&bench.path("run")) {
         let content = fs::read(&file).unwrap();
-        assert!(!String::from_utf8_lossy(&content).contains(KEY), "{}", file.display());
+        assert!(
+            !String::from_utf8_lossy(&content).contains(KEY),
+            "{}",
+            file.display()
+        );
     }
 }
 
 #[test]
 fn json_is_the_summary() {
     let bench = Bench::new();
-    let output = bench.complete(&["--model", "random", "--levels", "L0", "--json", "--out", "run"]);
+    let output = bench.complete(&[
+        "--model", "random", "--levels", "L0", "--json", "--out", "run",
+    ]);
     let summary: Value = serde_json::from_str(&output).unwrap();
     assert_eq!(summary["run"]["status"], "complete");
-    assert_eq!(output, fs::read_to_string(bench.path("run/summary.json")).unwrap());
+    assert_eq!(
+        output,
+        fs::read_to_string(bench.path("run/summary.json")).unwrap()
+    );
 }
 
 #[cfg(unix)]
@@ -322,7 +655,20 @@ fn an_interrupt_keeps_what_was_answered() {
     let endpoint = MockEndpoint::start([Answer::text("A"), Answer::silent()]);
     let url = endpoint.base_url();
     let mut program = Command::new(assert_cmd::cargo::cargo_bin("darkqa-eval"))
-        .args(["--data", "frames", "--model", "m", "--base-url", &url, "--levels", "L0", "--concurrency", "1", "--out", "run"])
+        .args([
+            "--data",
+            "frames",
+            "--model",
+            "m",
+            "--base-url",
+            &url,
+            "--levels",
+            "L0",
+            "--concurrency",
+            "1",
+            "--out",
+            "run",
+        ])
         .current_dir(bench.path(""))
         .stdout(Stdio::null())
         .stderr(Stdio::null())
@@ -333,7 +679,10 @@ fn an_interrupt_keeps_what_was_answered() {
     }
     // The first asks to stop, the second gives up the request that is never answered.
     loop {
-        Command::new("kill").args(["-INT", &program.id().to_string()]).status().unwrap();
+        Command::new("kill")
+            .args(["-INT", &program.id().to_string()])
+            .status()
+            .unwrap();
         std::thread::sleep(Duration::from_millis(50));
         if let Some(status) = program.try_wait().unwrap() {
             assert_eq!(status.code(), Some(130));

@@ -1,8 +1,7 @@
 //! Between an image of bytes and the tensor a model takes and gives: [`Planes`].
 
-use fast_image_resize::images::{TypedImage, TypedImageRef};
-use fast_image_resize::pixels::F32;
-use fast_image_resize::{FilterType, ResizeAlg, ResizeOptions, Resizer};
+use image::imageops::{FilterType, resize};
+use image::{ImageBuffer, Luma};
 
 use crate::types::Rgb;
 
@@ -60,18 +59,16 @@ impl Planes {
     /// Samples stay floats throughout; in bytes the few levels that a dark image has would be rounded twice.
     pub(super) fn resized(&self, height: usize, width: usize) -> Result<Self, String> {
         let side = |size: usize| u32::try_from(size).map_err(|e| e.to_string());
-        let options = ResizeOptions::new().resize_alg(ResizeAlg::Convolution(FilterType::Bilinear));
-        let mut resizer = Resizer::new();
+        let (from, to) = (
+            (side(self.width)?, side(self.height)?),
+            (side(width)?, side(height)?),
+        );
         let mut samples = Vec::with_capacity(3 * height * width);
         for plane in self.samples.chunks_exact(self.height * self.width) {
-            let pixels: Vec<F32> = plane.iter().map(|x| F32::new(x.clamp(0.0, 1.0))).collect();
-            let source = TypedImageRef::new(side(self.width)?, side(self.height)?, &pixels)
-                .map_err(|e| e.to_string())?;
-            let mut target = TypedImage::new(side(width)?, side(height)?);
-            resizer
-                .resize_typed(&source, &mut target, &options)
-                .map_err(|e| e.to_string())?;
-            samples.extend(target.pixels().iter().map(|pixel| pixel.0));
+            let plane = plane.iter().map(|sample| sample.clamp(0.0, 1.0)).collect();
+            let plane = ImageBuffer::<Luma<f32>, Vec<f32>>::from_raw(from.0, from.1, plane)
+                .ok_or("a plane of another size than its image")?;
+            samples.extend(resize(&plane, to.0, to.1, FilterType::Triangle).into_raw());
         }
         Ok(Self {
             height,

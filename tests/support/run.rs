@@ -22,7 +22,9 @@ pub struct Called {
 
 impl Bench {
     pub fn new() -> Self {
-        Self { folder: tempfile::tempdir().unwrap() }
+        Self {
+            folder: tempfile::tempdir().unwrap(),
+        }
     }
 
     pub fn path(&self, name: &str) -> PathBuf {
@@ -41,7 +43,10 @@ impl Bench {
     pub fn command(&self, words: &[&str]) -> Command {
         let mut command = Command::cargo_bin("darkqa-eval").unwrap();
         for (name, _) in std::env::vars() {
-            if ["OPENAI_", "DARKQA_", "RUST_LOG"].iter().any(|begin| name.starts_with(begin)) {
+            if ["OPENAI_", "DARKQA_", "RUST_LOG"]
+                .iter()
+                .any(|begin| name.starts_with(begin))
+            {
                 command.env_remove(name);
             }
         }
@@ -73,11 +78,23 @@ pub fn called(command: &mut Command) -> Called {
 /// The records of a run, in the order of the file.
 pub fn records(run: &Path) -> Vec<Value> {
     let text = fs::read_to_string(run.join("records.jsonl")).unwrap();
-    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    text.lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect()
 }
 
 /// Every file below a folder.
 pub fn files(folder: &Path) -> Vec<PathBuf> {
-    let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-    entries.flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] }).collect()
+    let entries = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path());
+    entries
+        .flat_map(|path| {
+            if path.is_dir() {
+                files(&path)
+            } else {
+                vec![path]
+            }
+        })
+        .collect()
 }
