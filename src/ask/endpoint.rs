@@ -48,10 +48,10 @@ pub struct Sending {
 impl Default for Sending {
     fn default() -> Self {
         Self {
-            timeout: Duration::from_secs(120),
+            timeout: Duration::from_mins(2),
             retries: 5,
             first_delay: Duration::from_millis(500),
-            max_wait: Duration::from_secs(120),
+            max_wait: Duration::from_mins(2),
             allow_http: false,
         }
     }
@@ -116,7 +116,7 @@ impl Endpoint {
         }
         let client = client.build().map_err(|error| Error::Endpoint {
             endpoint: base.to_string(),
-            problem: scrub.line(&chain(error)),
+            problem: scrub.line(&chain(&error)),
         })?;
         Ok(Self {
             url: base.completions(),
@@ -256,7 +256,7 @@ impl Endpoint {
                 ),
             )
         } else {
-            let said = self.scrub.line(&chain(error.without_url()));
+            let said = self.scrub.line(&chain(&error.without_url()));
             (FailureKind::Connection, format!("{}: {said}", self.base))
         };
         Miss {
@@ -352,7 +352,7 @@ fn authorization(key: &Secret) -> Result<HeaderValue> {
 }
 
 /// An error with all that caused it: reqwest's own words alone say only that something failed.
-fn chain(error: reqwest::Error) -> String {
+fn chain(error: &reqwest::Error) -> String {
     let mut words = error.to_string();
     let mut cause = error.source();
     while let Some(error) = cause {

@@ -49,8 +49,8 @@ struct State {
     turned_away: u32,
 }
 
-/// What a success leaves of the distance: it is halved by 35 of them.
-const EASING: f64 = 0.98;
+/// What a success leaves of the distance: 14 of them halve it.
+const EASING: f64 = 0.95;
 
 /// Below this distance there is none.
 const NEGLIGIBLE: Duration = Duration::from_millis(1);
@@ -140,6 +140,7 @@ impl State {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
 

@@ -42,6 +42,7 @@ impl Random {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
     use crate::types::{Choices, Family, FrameId, QuestionId};

@@ -143,6 +143,7 @@ impl fmt::Debug for BaseUrl {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
 

@@ -85,12 +85,12 @@ pub(super) fn judge(status: u16, complaint: &Complaint, sent: Sent<'_>) -> Verdi
         _ if sent.has_image && complaint.says_any(&NO_EYES) => hopeless(
             "the model takes no images: choose another --model, or ask it without them by --blind",
         ),
-        400.. if complaint.is_any(&HOPELESS) => hopeless("check the key, --model and --base-url"),
         300..400 => hopeless("redirects are not followed: give the final address as --base-url"),
         401 if !sent.has_key => {
             hopeless("no key was sent: name one by --api-key-env or --api-key-file")
         }
         401 => hopeless("check the key that --api-key-env or --api-key-file names"),
+        400.. if complaint.is_any(&HOPELESS) => hopeless("check the key, --model and --base-url"),
         402 => hopeless("the account has no credit left: add some, then go on with --resume"),
         403 if complaint.moderated || complaint.says_any(&["moderation", "flagged"]) => {
             refused(None)
@@ -103,10 +103,9 @@ pub(super) fn judge(status: u16, complaint: &Complaint, sent: Sent<'_>) -> Verdi
             hopeless("check --base-url: requests go to its path with /chat/completions behind it")
         }
         408 => again(FailureKind::Timeout),
-        409 => again(FailureKind::Server),
         413 => refused(Some("send smaller images: --max-side, or --image jpeg:95")),
         429 => again(FailureKind::RateLimit),
-        500.. => again(FailureKind::Server),
+        409 | 500.. => again(FailureKind::Server),
         _ => parameter(complaint, sent),
     }
 }
@@ -174,6 +173,7 @@ fn mentions(text: &str, name: &str) -> bool {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
 
