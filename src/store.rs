@@ -345,13 +345,13 @@ mod tests {
         assert_eq!(store.records().unwrap().len(), 1);
         store.append(&record("b", Outcome::Right)).unwrap();
         drop(store);
-        assert_eq!(Store::open(base.path(), &manifest(0)).unwrap().1.len(), 2);
+        let kept = Store::open(base.path(), &manifest(0)).unwrap().records();
+        assert_eq!(kept.unwrap().len(), 2);
         let path = base.path().join(RECORDS);
         let text = fs::read_to_string(&path).unwrap();
         fs::write(&path, text.replacen("{\"key\"", "{\"kex\"", 1)).unwrap();
-        let error = Store::open(base.path(), &manifest(0))
-            .unwrap_err()
-            .to_string();
+        let store = Store::open(base.path(), &manifest(0)).unwrap();
+        let error = store.records().unwrap_err().to_string();
         assert!(
             error.contains("records.jsonl, line 1: not a record"),
             "{error}"

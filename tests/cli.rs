@@ -1,5 +1,7 @@
 //! The command line as a contract: its help, and one clear line for each wrong word.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 mod support;
 
 use serde_json::json;

@@ -1,5 +1,7 @@
 //! The main job from the outside: the program is called as a user calls it.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 mod support;
 
 use std::collections::{BTreeMap, BTreeSet};

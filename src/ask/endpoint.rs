@@ -201,7 +201,11 @@ impl Endpoint {
         match response::read(&body?, header(&headers, CONTENT_TYPE.as_str())) {
             Ok(reply) => {
                 self.gate.ease();
+                let clean = |text: Option<String>| text.map(|text| self.scrub.reply(text));
                 Ok(Reply {
+                    text: self.scrub.reply(reply.text),
+                    refusal: clean(reply.refusal),
+                    served_model: clean(reply.served_model),
                     latency_ms,
                     ..reply
                 })

@@ -166,7 +166,6 @@ fn sample() -> Result<Question> {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
 

@@ -42,7 +42,6 @@ impl Random {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
     use crate::types::{Choices, Family, FrameId, QuestionId};

@@ -141,7 +141,6 @@ fn usage(usage: Option<&Value>) -> Option<Usage> {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
 

@@ -48,6 +48,9 @@ const KEPT: usize = 300;
 /// Shorter secrets are stand-ins like `x` for servers that want any key; taking them out would spoil every word.
 const SHORTEST: usize = 4;
 
+/// Shorter secrets are left standing in a model's reply: no real key is, and a word that an answer may need must not be lost.
+const SHORTEST_IN_REPLY: usize = 16;
+
 /// Makes the words of a server fit for a terminal, a log and a table: one line, no control characters, no secrets, not long.
 #[derive(Clone, Default)]
 pub(super) struct Scrub(Vec<String>);
@@ -68,6 +71,18 @@ impl Scrub {
     /// Whether there is anything to hide.
     pub(super) fn is_empty(&self) -> bool {
         self.0.is_empty()
+    }
+
+    /// A model's reply as it came, except that a key which it echoes is taken out.
+    pub(super) fn reply(&self, text: String) -> String {
+        let keys = self.0.iter().filter(|key| key.len() >= SHORTEST_IN_REPLY);
+        keys.fold(text, |text, key| {
+            if text.contains(key) {
+                text.replace(key, "[secret]")
+            } else {
+                text
+            }
+        })
     }
 
     /// The text on one line of at most 300 characters.
@@ -99,7 +114,6 @@ impl fmt::Debug for Scrub {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
 
@@ -113,6 +127,13 @@ mod tests {
             assert!(error.starts_with("KEY: "), "{error}");
             assert!(!error.contains("sk-"), "{error}");
         }
+    }
+
+    #[test]
+    fn replies_lose_keys_and_nothing_else() {
+        let scrub = Scrub::new(["kitchen".to_owned(), "sk-0123456789abcdef".to_owned()]);
+        let reply = "A  kitchen\nsk-0123456789abcdef".to_owned();
+        assert_eq!(scrub.reply(reply), "A  kitchen\n[secret]");
     }
 
     #[test]

@@ -143,7 +143,6 @@ impl fmt::Debug for BaseUrl {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
 

@@ -486,7 +486,7 @@ mod tests {
                 vec!["--model", "random", "--variant", "dark"],
                 "--variant: \"dark\" is none of",
             ),
-            (vec!["--model", "random", "--gain", "-1"], "--gain: "),
+            (vec!["--model", "random", "--gain=-1"], "--gain: "),
             (
                 vec!["--model", "random", "--temperature", "warm"],
                 "--temperature: \"warm\"",
@@ -497,8 +497,7 @@ mod tests {
                     "m",
                     "--base-url",
                     "http://127.0.0.1:1/v1",
-                    "--timeout",
-                    "-2",
+                    "--timeout=-2",
                 ],
                 "--timeout: -2",
             ),

@@ -222,7 +222,7 @@ mod tests {
         .concat();
         let weights = Weights::find(&model(&field(5, &content))).unwrap();
         assert_eq!(weights.external, BTreeSet::from(["weights.bin".to_owned()]));
-        assert_eq!(weights.floats, []);
+        assert!(weights.floats.is_empty());
     }
 
     #[test]
