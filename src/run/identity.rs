@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::plan::Inputs;
 use crate::config::Config;
 use crate::dataset::Dataset;
-use crate::enhance::{ModelFile, Runtime};
+use crate::enhance::ModelFile;
 use crate::error::{Error, Result};
 use crate::synthesis;
 use crate::types::{Digest, EnhancerName, View};
@@ -139,13 +139,12 @@ pub(super) fn settings(config: &Config) -> BTreeMap<String, Value> {
 }
 
 /// Where the run was made.
-pub(super) fn platform(runtime: Option<&Runtime>) -> BTreeMap<String, String> {
-    let mut platform = BTreeMap::from([
-        ("system".to_owned(), std::env::consts::OS.to_owned()),
-        ("processor".to_owned(), std::env::consts::ARCH.to_owned()),
-    ]);
-    if let Some(runtime) = runtime {
-        platform.insert("onnxruntime".to_owned(), runtime.version().to_owned());
-    }
-    platform
+pub(super) fn platform() -> BTreeMap<String, String> {
+    let facts = [
+        ("system", std::env::consts::OS),
+        ("processor", std::env::consts::ARCH),
+    ];
+    facts
+        .map(|(fact, value)| (fact.to_owned(), value.to_owned()))
+        .into()
 }

@@ -68,14 +68,24 @@ pub fn evaluate(config: &Config, progress: &Progress) -> Result<Verdict> {
     let complete = kept
         .as_ref()
         .is_some_and(|manifest| manifest.status == Status::Complete);
-    let (runtime, enhancers) = if complete {
-        (None, Vec::new())
+    // Opened before the folder is made, so that an enhancer that does not work leaves nothing behind.
+    let opened = if complete {
+        None
     } else {
-        open_enhancers(config)?
+        Some(open_enhancers(config)?)
     };
-    let mut manifest = manifest(config, identity, runtime.as_ref(), kept);
+    let mut manifest = manifest(config, identity, kept);
     let mut store = Store::open(&folder, &manifest)?;
     let plan = Plan::new(&inputs, &store.records()?)?;
+    let (runtime, enhancers) = match opened {
+        None if plan.left() == 0 => (None, Vec::new()),
+        None => open_enhancers(config)?,
+        Some(opened) => opened,
+    };
+    if let Some(runtime) = runtime {
+        let version = runtime.version().to_owned();
+        manifest.platform.insert("onnxruntime".to_owned(), version);
+    }
     if plan.left() < plan.trials() {
         let answered = plan.trials() - plan.left();
         progress.say(&format!(
@@ -239,19 +249,19 @@ fn folder(config: &Config, dataset: &Dataset, identity: &Identity) -> Result<Pat
     }
 }
 
-fn manifest(
-    config: &Config,
-    identity: Identity,
-    runtime: Option<&Runtime>,
-    kept: Option<RunManifest>,
-) -> RunManifest {
+fn manifest(config: &Config, identity: Identity, kept: Option<RunManifest>) -> RunManifest {
+    let (created, mut platform) = kept.map_or_else(
+        || (now(), BTreeMap::new()),
+        |manifest| (manifest.created, manifest.platform),
+    );
+    platform.extend(identity::platform());
     RunManifest {
         schema: SCHEMA.to_owned(),
         status: Status::Started,
         version: env!("CARGO_PKG_VERSION").to_owned(),
-        created: kept.map_or_else(now, |manifest| manifest.created),
+        created,
         updated: now(),
-        platform: identity::platform(runtime),
+        platform,
         identity,
         settings: identity::settings(config),
         counts: Counts::default(),
