@@ -64,7 +64,6 @@ pub(super) fn identity(config: &Config, dataset: &Dataset, inputs: &Inputs<'_>) 
         .iter()
         .map(ToString::to_string)
         .collect();
-    let conditions: Vec<String> = inputs.conditions.iter().map(ToString::to_string).collect();
     let fields = [
         (
             "--data",
@@ -101,7 +100,6 @@ pub(super) fn identity(config: &Config, dataset: &Dataset, inputs: &Inputs<'_>) 
         ("--reasoning-effort", json!(ask.parameters.reasoning_effort)),
         ("--detail", json!(ask.parameters.detail)),
         ("models", json!(models)),
-        ("conditions", json!(conditions)),
         ("synthesis", json!(synthesis::VERSION)),
     ];
     fields
