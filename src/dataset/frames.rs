@@ -1,7 +1,8 @@
 //! A folder of frames.
 //!
 //! With a `frames.jsonl` it is the common interface: one frame a line, `{"scene", "frame", "rgb", …}`, paths relative
-//! to the folder, and a frame's name is `scene/frame`. Without one, every PNG and JPEG file in the folder is a frame,
+//! to the folder, and a frame's name is `scene/frame`. A line may name maps of the image's size: `depth`, in metres as
+//! `.npy` or in units of `depth_scale` metres as PNG, `sem`, the classes, and `over`, the segments. Without the file, every PNG and JPEG file in the folder is a frame,
 //! named by its file name. The questions lie beside them in `questions.jsonl`.
 
 use std::collections::BTreeMap;
@@ -10,6 +11,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
+use super::maps::{DepthFile, Maps};
 use super::{Dataset, Source, questions, stem};
 use crate::error::{Error, Result};
 use crate::types::FrameId;
@@ -19,12 +21,40 @@ const FRAMES: &str = "frames.jsonl";
 /// The questions about a folder of frames.
 const QUESTIONS: &str = "questions.jsonl";
 
-/// The keys of a line of `frames.jsonl` that an evaluation needs.
+/// The keys of a line of `frames.jsonl` that are used.
 #[derive(Debug, Deserialize)]
 struct Line {
     scene: String,
     frame: String,
     rgb: PathBuf,
+    depth: Option<PathBuf>,
+    depth_scale: Option<f64>,
+    sem: Option<PathBuf>,
+    over: Option<PathBuf>,
+}
+
+impl Line {
+    /// The files of the frame, all of which exist.
+    fn source(self, folder: &Path) -> Result<Source, String> {
+        let existing = |file: PathBuf| {
+            let path = folder.join(file);
+            if path.is_file() {
+                Ok(path)
+            } else {
+                Err(format!("no such file: {}", path.display()))
+            }
+        };
+        let rgb = existing(self.rgb)?;
+        let depth = self.depth.map(existing).transpose()?;
+        let maps = Maps {
+            depth: depth
+                .map(|path| DepthFile::new(path, self.depth_scale))
+                .transpose()?,
+            semantic: self.sem.map(existing).transpose()?,
+            segments: self.over.map(existing).transpose()?,
+        };
+        Ok(Source::File { rgb, maps })
+    }
 }
 
 pub(super) fn open(folder: &Path, questions: Option<&Path>) -> Result<Dataset> {
@@ -72,15 +102,10 @@ fn listed(folder: &Path, list: &Path) -> Result<BTreeMap<FrameId, Source>> {
     {
         let line: Line = serde_json::from_str(line).map_err(|e| Error::line(list, i + 1, e))?;
         let id = FrameId(format!("{}/{}", line.scene, line.frame));
-        let path = folder.join(&line.rgb);
-        if !path.is_file() {
-            return Err(Error::line(
-                list,
-                i + 1,
-                format_args!("no such file: {}", path.display()),
-            ));
-        }
-        if sources.insert(id.clone(), Source::File(path)).is_some() {
+        let source = line
+            .source(folder)
+            .map_err(|problem| Error::line(list, i + 1, problem))?;
+        if sources.insert(id.clone(), source).is_some() {
             return Err(Error::line(
                 list,
                 i + 1,
@@ -105,7 +130,7 @@ fn images(folder: &Path) -> Result<BTreeMap<FrameId, Source>> {
                 .unwrap_or_default()
                 .to_string_lossy()
                 .into_owned();
-            sources.insert(FrameId(name), Source::File(path));
+            sources.insert(FrameId(name), Source::image(path));
         }
     }
     if sources.is_empty() {
@@ -115,4 +140,66 @@ fn images(folder: &Path) -> Result<BTreeMap<FrameId, Source>> {
         ));
     }
     Ok(sources)
+}
+
+#[cfg(test)]
+mod tests {
+    use image::{GrayImage, ImageBuffer, Luma, RgbImage};
+    use ndarray::array;
+
+    use super::*;
+
+    /// A folder of one image, its maps and a list of the given line.
+    fn folder(keys: &str) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        RgbImage::new(2, 1).save(at("rgb.png")).unwrap();
+        let ids = GrayImage::from_raw(2, 1, vec![3, 4]).unwrap();
+        ids.save(at("sem.png")).unwrap();
+        let units = ImageBuffer::<Luma<u16>, _>::from_raw(2, 1, vec![0, 1500]).unwrap();
+        units.save(at("deep.png")).unwrap();
+        let line = format!(r#"{{"scene":"a","frame":"0","rgb":"rgb.png"{keys}}}"#);
+        fs::write(at(FRAMES), format!("\n{line}\n")).unwrap();
+        let question = r#"{"id":1,"frame":"a/0","question":"?","choices":["x","y"],"answer":"x"}"#;
+        fs::write(at(QUESTIONS), question).unwrap();
+        folder
+    }
+
+    #[test]
+    fn a_frame_has_the_maps_its_line_names() {
+        let id = FrameId("a/0".into());
+        let bare = folder(r#","depth":null,"depth_scale":0.001"#);
+        let frame = open(bare.path(), None).unwrap().frame(&id).unwrap();
+        assert_eq!((&frame.id, frame.rgb.width()), (&id, 2));
+        assert!(frame.depth.is_none() && frame.semantic.is_none() && frame.segments.is_none());
+        let full = folder(
+            r#","depth":"deep.png","depth_scale":0.002,"sem":"sem.png","over":"deep.png","t":1.5"#,
+        );
+        let frame = open(full.path(), None).unwrap().frame(&id).unwrap();
+        assert_eq!(frame.depth.unwrap(), array![[0, 3000]]);
+        assert_eq!(frame.semantic.unwrap(), array![[3, 4]]);
+        assert_eq!(frame.segments.unwrap(), array![[0, 1500]]);
+    }
+
+    #[test]
+    fn what_a_line_names_must_be_there() {
+        for (keys, says) in [
+            (r#","depth":"no.png","depth_scale":1"#, "no.png"),
+            (r#","sem":"no.png""#, "no such file: "),
+            (r#","over":"""#, "no such file: "),
+            (r#","depth":"deep.png""#, "depth_scale is missing"),
+            (
+                r#","depth":"deep.png","depth_scale":0"#,
+                "depth_scale is 0;",
+            ),
+            (r#","depth":"deep.png","depth_scale":"mm""#, "invalid type"),
+        ] {
+            let folder = folder(keys);
+            let error = open(folder.path(), None).unwrap_err().to_string();
+            assert!(
+                error.contains("frames.jsonl, line 2: ") && error.contains(says),
+                "{error}"
+            );
+        }
+    }
 }

@@ -4,9 +4,12 @@
 //! ready-made multiple-choice set ([`multiple_choice`]), or nothing, which is the built-in rooms ([`rooms`]).
 
 pub mod frames;
+mod maps;
 pub mod multiple_choice;
+mod npy;
 pub mod picture;
 pub mod questions;
+mod raw_png;
 pub mod rooms;
 
 use std::collections::{BTreeMap, HashSet};
@@ -14,8 +17,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
-use crate::types::{Digest, FrameId, Question};
+use crate::types::{Digest, Frame, FrameId, Question};
 
+use maps::Maps;
 pub use picture::Picture;
 
 /// Where the data are.
@@ -27,15 +31,25 @@ pub enum Place {
     Path(PathBuf),
 }
 
-/// Where one image is.
+/// Where one image is, with its maps.
 #[derive(Debug, Clone)]
 enum Source {
-    /// An image file.
-    File(PathBuf),
+    /// An image file, and the map files beside it.
+    File { rgb: PathBuf, maps: Maps },
     /// A base64 cell of a table: the row's place in the file.
     Cell(multiple_choice::Cell),
     /// A built-in room.
     Room(rooms::Room),
+}
+
+impl Source {
+    /// An image file that has no maps.
+    fn image(rgb: PathBuf) -> Self {
+        Self::File {
+            rgb,
+            maps: Maps::default(),
+        }
+    }
 }
 
 /// Images and the questions about them.
@@ -97,7 +111,7 @@ impl Dataset {
     /// The image of a frame as it lies in the data set, not decoded.
     pub fn picture(&self, frame: &FrameId) -> Result<Picture> {
         match self.sources.get(frame) {
-            Some(Source::File(path)) => fs::read(path)
+            Some(Source::File { rgb: path, .. }) => fs::read(path)
                 .map(|bytes| Picture::Encoded {
                     bytes,
                     place: path.display().to_string(),
@@ -110,6 +124,20 @@ impl Dataset {
                 format_args!("no frame {:?} in it", frame.0),
             )),
         }
+    }
+
+    /// A frame: its image decoded, with the maps that the data set has of it.
+    ///
+    /// # Errors
+    /// With the file: an image or a map that cannot be read, a map of another size than the image.
+    pub fn frame(&self, frame: &FrameId) -> Result<Frame> {
+        let rgb = self.picture(frame)?.decode()?;
+        let none = Maps::default();
+        let maps = match self.sources.get(frame) {
+            Some(Source::File { maps, .. }) => maps,
+            _ => &none,
+        };
+        maps.frame(frame.clone(), rgb)
     }
 
     /// The content of all questions, evidence left out: what is asked decides a reply, why it is right does not.

@@ -59,7 +59,7 @@ fn jsonl(path: &Path) -> Result<Parts> {
                 format_args!("question {:?}: {problem}", question.id.0),
             )
         })?;
-        sources.insert(question.frame.clone(), Source::File(file));
+        sources.insert(question.frame.clone(), Source::image(file));
     }
     Ok((sources, questions))
 }
@@ -192,7 +192,7 @@ fn tsv(path: &Path) -> Result<Parts> {
                 if !sources.contains_key(&frame) {
                     sources.insert(
                         frame.clone(),
-                        Source::File(existing(beside, image).map_err(line)?),
+                        Source::image(existing(beside, image).map_err(line)?),
                     );
                 }
                 frame

@@ -1,0 +1,349 @@
+//! The maps that lie beside an image: [`Maps`].
+//!
+//! A map has one number for each pixel of its image and its very size: it is never scaled to fit, for between two ids
+//! there is no third.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use ndarray::Array2;
+
+use super::npy::Npy;
+use super::raw_png::{Form, RawPng};
+use crate::error::{Error, Result};
+use crate::types::{Frame, FrameId, Rgb};
+
+/// The deepest a pixel may be, in millimetres: a kilometre. No room is; a map that says more has its unit wrong, as
+/// where millimetres are taken for metres.
+const MOST_DEPTH: f64 = 1e6;
+
+/// The map files of a frame, each of which may be missing.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Maps {
+    /// Depth.
+    pub(super) depth: Option<DepthFile>,
+    /// The class of each pixel: a PNG file, 8-bit grey, 16-bit grey or with a palette whose places are the ids.
+    pub(super) semantic: Option<PathBuf>,
+    /// The segment of each pixel, 0 for none: a 16-bit grey PNG file, or a `.npy` file of integers.
+    pub(super) segments: Option<PathBuf>,
+}
+
+/// A file of depth.
+#[derive(Debug, Clone)]
+pub(super) enum DepthFile {
+    /// A 16-bit grey PNG file, 0 where there is no depth.
+    Png {
+        /// Where it is.
+        path: PathBuf,
+        /// Metres in one unit.
+        scale: f64,
+    },
+    /// A `.npy` file of metres as 4- or 8-byte floats; NaN, an infinity, 0 or less where there is no depth.
+    Npy(PathBuf),
+}
+
+impl DepthFile {
+    /// The file at `path` with the `depth_scale` of its frame.
+    pub(super) fn new(path: PathBuf, scale: Option<f64>) -> Result<Self, String> {
+        match (is_npy(&path), scale) {
+            (true, None | Some(1.0)) => Ok(Self::Npy(path)),
+            (true, Some(scale)) => Err(format!(
+                "depth_scale is {scale}, but a .npy file of depth is in metres; leave it out"
+            )),
+            (false, Some(scale)) if scale.is_finite() && scale > 0.0 => {
+                Ok(Self::Png { path, scale })
+            }
+            (false, Some(scale)) => Err(format!(
+                "depth_scale is {scale}; the metres in one unit of the depth PNG expected, as 0.001"
+            )),
+            (false, None) => Err(
+                "depth_scale is missing: the metres in one unit of the depth PNG, as 0.001"
+                    .to_owned(),
+            ),
+        }
+    }
+
+    fn read(&self, size: Size) -> Result<Array2<u32>> {
+        match self {
+            Self::Png { path, scale } => load(path, |bytes| {
+                // Scaled once: most scales are a round number of millimetres, and then this is exact.
+                let unit = scale * 1_000.0;
+                let units = png(bytes, &[Form::Grey16], size)?.into_iter();
+                grid(size, units.map(|units| millimetres(units.into(), unit)))
+            }),
+            Self::Npy(path) => load(path, |bytes| {
+                let metres = npy(bytes, size)?.floats()?;
+                grid(size, metres.map(|metres| millimetres(metres, 1_000.0)))
+            }),
+        }
+    }
+}
+
+impl Maps {
+    /// A frame of these maps and their image.
+    ///
+    /// # Errors
+    /// With the file: one that cannot be read, is of another form or another size than the image, or holds a value that
+    /// cannot be.
+    pub(super) fn frame(&self, id: FrameId, rgb: Rgb) -> Result<Frame> {
+        let size = (rgb.height(), rgb.width());
+        let depth = self.depth.as_ref().map(|file| file.read(size));
+        let semantic = self.semantic.as_deref().map(|path| semantic(path, size));
+        let segments = self.segments.as_deref().map(|path| segments(path, size));
+        Ok(Frame {
+            id,
+            depth: depth.transpose()?,
+            semantic: semantic.transpose()?,
+            segments: segments.transpose()?,
+            rgb,
+        })
+    }
+}
+
+/// Height and width in pixels.
+type Size = (usize, usize);
+
+fn semantic(path: &Path, size: Size) -> Result<Array2<u16>> {
+    load(path, |bytes| {
+        let ids = png(bytes, &[Form::Grey8, Form::Grey16, Form::Palette], size)?;
+        grid(size, ids.into_iter().map(Ok))
+    })
+}
+
+fn segments(path: &Path, size: Size) -> Result<Array2<u32>> {
+    load(path, |bytes| {
+        if is_npy(path) {
+            grid(size, npy(bytes, size)?.integers()?.map(segment))
+        } else {
+            let ids = png(bytes, &[Form::Grey16], size)?;
+            grid(size, ids.into_iter().map(|id| Ok(id.into())))
+        }
+    })
+}
+
+/// The id of a segment.
+fn segment(id: i128) -> Result<u32, String> {
+    u32::try_from(id).map_err(|_| {
+        format!(
+            "{id} is no id of a segment; 0 (none) to {} expected",
+            u32::MAX
+        )
+    })
+}
+
+/// A depth in units of so many millimetres as whole ones, to the nearest, half to even; 0 where there is none.
+fn millimetres(units: f64, unit: f64) -> Result<u32, String> {
+    if !units.is_finite() || units <= 0.0 {
+        return Ok(0);
+    }
+    let depth = units * unit;
+    if depth > MOST_DEPTH {
+        return Err(format!(
+            "a depth of {} m, deeper than any room ({} m at most); a .npy file is in metres and a PNG in units of its depth_scale, with 0 where there is no depth",
+            depth / 1_000.0,
+            MOST_DEPTH / 1_000.0
+        ));
+    }
+    Ok(depth.round_ties_even() as u32)
+}
+
+fn is_npy(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("npy"))
+}
+
+/// Reads a file, and says of which file a problem is.
+fn load<T>(path: &Path, read: impl FnOnce(&[u8]) -> Result<T, String>) -> Result<T> {
+    let bytes = fs::read(path).map_err(|e| Error::file(path, "read", e))?;
+    read(&bytes).map_err(|problem| Error::data(path.display(), problem))
+}
+
+fn png(bytes: &[u8], forms: &[Form], size: Size) -> Result<Vec<u16>, String> {
+    let png = RawPng::open(bytes, forms)?;
+    same(png.size, size)?;
+    png.samples()
+}
+
+fn npy(bytes: &[u8], size: Size) -> Result<Npy<'_>, String> {
+    let npy = Npy::parse(bytes)?;
+    same(npy.size, size)?;
+    Ok(npy)
+}
+
+fn same(map: Size, image: Size) -> Result<(), String> {
+    if map == image {
+        return Ok(());
+    }
+    Err(format!(
+        "{} × {} pixels (height × width), but its image has {} × {}; a map must have the size of its image",
+        map.0, map.1, image.0, image.1
+    ))
+}
+
+fn grid<T>(
+    size: Size,
+    values: impl Iterator<Item = Result<T, String>>,
+) -> Result<Array2<T>, String> {
+    let values = values.collect::<Result<Vec<T>, String>>()?;
+    Array2::from_shape_vec(size, values).map_err(|e| e.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use ndarray::array;
+    use png::{BitDepth, ColorType};
+    use proptest::prelude::*;
+
+    use super::super::npy::tests::array as npy_file;
+    use super::super::raw_png::tests::png as png_file;
+    use super::*;
+
+    fn deep(size: (u32, u32), values: &[u16]) -> Vec<u8> {
+        let data: Vec<u8> = values.iter().flat_map(|v| v.to_be_bytes()).collect();
+        png_file(size, ColorType::Grayscale, BitDepth::Sixteen, &data)
+    }
+
+    fn written(name: &str, bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        fs::write(&path, bytes).unwrap();
+        (folder, path)
+    }
+
+    fn depth(name: &str, bytes: &[u8], scale: Option<f64>, size: Size) -> Result<Array2<u32>> {
+        let (_folder, path) = written(name, bytes);
+        DepthFile::new(path, scale).unwrap().read(size)
+    }
+
+    #[test]
+    fn depth_is_rounded_half_to_even_and_0_where_there_is_none() {
+        let png = deep((2, 3), &[0, 1, 3, 5, 7, 65_535]);
+        let read = depth("d.png", &png, Some(0.0005), (2, 3)).unwrap();
+        assert_eq!(read, array![[0, 0, 2], [2, 4, 32_768]]);
+        let metres = [
+            0.0005,
+            0.0015,
+            0.0025,
+            1.2344,
+            1000.0,
+            0.0,
+            -0.0,
+            -3.0,
+            f64::NAN,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+            5e-324,
+        ];
+        let npy = npy_file("<f8", "(3, 4)", &metres.map(f64::to_le_bytes).concat());
+        let read = depth("d.NPY", &npy, None, (3, 4)).unwrap();
+        assert_eq!(
+            read,
+            array![[0, 2, 2, 1234], [1_000_000, 0, 0, 0], [0, 0, 0, 0]]
+        );
+        let npy = npy_file(
+            "<f4",
+            "(1, 2)",
+            &[2.5_f32, f32::NAN].map(f32::to_le_bytes).concat(),
+        );
+        let read = depth("d.npy", &npy, Some(1.0), (1, 2)).unwrap();
+        assert_eq!(read, array![[2500, 0]]);
+    }
+
+    #[test]
+    fn depth_no_room_has_is_refused() {
+        let error = depth("d.png", &deep((1, 1), &[2500]), Some(1.0), (1, 1)).unwrap_err();
+        let error = error.to_string();
+        assert!(error.contains("d.png: a depth of 2500 m"), "{error}");
+        for metres in [1000.001, 5e6, f64::MAX] {
+            let npy = npy_file("<f8", "(1, 1)", &f64::to_le_bytes(metres));
+            assert!(depth("d.npy", &npy, None, (1, 1)).is_err(), "{metres}");
+        }
+    }
+
+    #[test]
+    fn a_scale_must_be_one() {
+        for (name, scale) in [
+            ("d.png", None),
+            ("d.png", Some(0.0)),
+            ("d.png", Some(-0.001)),
+            ("d.png", Some(f64::NAN)),
+            ("d.png", Some(f64::INFINITY)),
+            ("d.npy", Some(0.001)),
+        ] {
+            let problem = DepthFile::new(name.into(), scale).unwrap_err();
+            assert!(problem.starts_with("depth_scale is "), "{problem}");
+        }
+    }
+
+    #[test]
+    fn classes_are_read_in_every_form() {
+        let size = (1, 2);
+        let shallow = |color| png_file(size, color, BitDepth::Eight, &[7, 255]);
+        for (bytes, expected) in [
+            (shallow(ColorType::Grayscale), array![[7, 255]]),
+            (shallow(ColorType::Indexed), array![[7, 255]]),
+            (deep(size, &[7, 40_000]), array![[7, 40_000]]),
+        ] {
+            let (_folder, path) = written("s.png", &bytes);
+            assert_eq!(semantic(&path, (1, 2)).unwrap(), expected);
+        }
+        let colour = png_file((1, 1), ColorType::Rgb, BitDepth::Eight, &[1, 2, 3]);
+        let (_folder, path) = written("s.png", &colour);
+        let error = semantic(&path, (1, 1)).unwrap_err().to_string();
+        assert!(error.contains("s.png: an RGB PNG of 8 bits"), "{error}");
+    }
+
+    #[test]
+    fn segments_are_read_in_every_form() {
+        let (_folder, path) = written("o.png", &deep((1, 2), &[0, 65_535]));
+        assert_eq!(segments(&path, (1, 2)).unwrap(), array![[0, 65_535]]);
+        let ids = [0_i64, 4_294_967_295].map(i64::to_le_bytes).concat();
+        let (_folder, path) = written("o.npy", &npy_file("<i8", "(2, 1)", &ids));
+        assert_eq!(segments(&path, (2, 1)).unwrap(), array![[0], [u32::MAX]]);
+        for id in [-1_i64, 4_294_967_296] {
+            let (_folder, path) = written("o.npy", &npy_file("<i8", "(1, 1)", &id.to_le_bytes()));
+            let error = segments(&path, (1, 1)).unwrap_err().to_string();
+            assert!(error.contains(&format!("o.npy: {id} is no id")), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_map_of_another_size_is_named_with_both_sizes() {
+        let says = "1 × 2 pixels (height × width), but its image has 2 × 1";
+        let (_folder, png) = written("m.png", &deep((1, 2), &[1, 2]));
+        let (_folder, npy) = written("m.npy", &npy_file("|u1", "(1, 2)", &[1, 2]));
+        let depth = DepthFile::new(png.clone(), Some(0.001)).unwrap();
+        for error in [
+            depth.read((2, 1)).unwrap_err(),
+            semantic(&png, (2, 1)).unwrap_err(),
+            segments(&png, (2, 1)).unwrap_err(),
+            segments(&npy, (2, 1)).unwrap_err(),
+        ] {
+            let error = error.to_string();
+            assert!(error.contains(says) && error.contains("m."), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_cut_map_is_named() {
+        let mut noise = 1_u32;
+        let values: Vec<u16> = std::iter::repeat_with(|| {
+            noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (noise >> 16) as u16
+        })
+        .take(32 * 32)
+        .collect();
+        let bytes = deep((32, 32), &values);
+        let (_folder, path) = written("o.png", &bytes[..bytes.len() / 2]);
+        let error = segments(&path, (32, 32)).unwrap_err().to_string();
+        assert!(error.contains("o.png: not a whole PNG"), "{error}");
+    }
+
+    proptest! {
+        #[test]
+        fn millimetres_are_the_nearest(depth in -10.0..MOST_DEPTH) {
+            let rounded = f64::from(millimetres(depth, 1.0).unwrap());
+            prop_assert!((rounded - depth.max(0.0)).abs() <= 0.5);
+        }
+    }
+}
