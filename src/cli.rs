@@ -127,7 +127,7 @@ pub struct ModelArgs {
     /// Add a text-only baseline by this model; repeatable
     #[arg(long, value_name = "NAME")]
     pub blind_model: Vec<String>,
-    /// The endpoint; /chat/completions is appended; default: OPENAI_BASE_URL, else https://api.openai.com/v1
+    /// The endpoint; /chat/completions is appended; default: OPENAI_BASE_URL, else OpenAI's own
     #[arg(long, value_name = "URL")]
     pub base_url: Option<String>,
     /// The variable that holds the API key, or none for an endpoint without keys; default: OPENAI_API_KEY
@@ -190,7 +190,7 @@ pub struct SendingArgs {
 #[derive(Debug, Default, Args)]
 #[command(next_help_heading = "Output")]
 pub struct OutputArgs {
-    /// The run folder; default: results/<time>-<model>-<data>-<hash>, found again by the same command
+    /// The run folder; default: results/TIME-MODEL-DATA-HASH, found again by the same command
     #[arg(long, value_name = "DIR", conflicts_with = "resume")]
     pub out: Option<PathBuf>,
     /// Go on with the run in this folder

@@ -1,7 +1,7 @@
 //! THE CONDUCTOR: the only place that sees every stage, and the only bridge between CPU work and waiting.
 //!
 //! [`evaluate`] reads as the sentence it carries out: open the data, open the models, open the run folder, plan what is
-//! left to ask, send the [`darkroom`] to make the images and ask about them, score, show.
+//! left to ask, send the darkroom to make the images and ask about them, score, show.
 
 mod askers;
 mod darkroom;
