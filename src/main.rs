@@ -64,13 +64,8 @@ fn run() -> ExitCode {
 
 fn show(cli: Cli, progress: &Progress) -> anyhow::Result<ExitCode> {
     let config = Config::resolve(cli.evaluate)?;
-    let Verdict {
-        status,
-        output,
-        folder,
-    } = evaluate(&config, progress)?;
+    let Verdict { status, output } = evaluate(&config, progress)?;
     let written = std::io::stdout().lock().write_all(output.as_bytes());
-    progress.say(&format!("{}: {status}", folder.display()));
     match (status, written) {
         (Status::Cancelled, _) => Ok(ExitCode::from(INTERRUPTED)),
         // Whoever reads the output may have enough of it.

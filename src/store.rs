@@ -17,9 +17,23 @@ use crate::types::{Record, TrialKey};
 
 const MANIFEST: &str = "manifest.json";
 const RECORDS: &str = "records.jsonl";
+/// What the name of a file ends in until it is whole.
+const UNFINISHED: &str = ".part";
 
 /// How often records are forced to the disk itself: what a power cut, not a killed process, may cost.
 const SYNC_EVERY: Duration = Duration::from_secs(2);
+
+/// Whether a kept run may go on at another address of its endpoint.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Moved {
+    /// It may: the user has named this run as the one to go on with, and says so that it is the same model.
+    Allowed,
+    /// It may not: another server may serve another model by the same name.
+    Refused,
+}
+
+/// The field of a run's identity that holds the address.
+const ADDRESS: &str = "--base-url";
 
 /// An open run folder, held by this process alone.
 #[derive(Debug)]
@@ -37,9 +51,9 @@ impl Store {
     /// # Errors
     /// Where the folder holds something else, another run (the message names the flag that differs), a broken record, or
     /// is held by another process.
-    pub fn open(folder: &Path, manifest: &RunManifest) -> Result<Self> {
+    pub fn open(folder: &Path, manifest: &RunManifest, moved: Moved) -> Result<Self> {
         match read_manifest(folder)? {
-            Some(kept) => agree(folder, &kept, manifest)?,
+            Some(kept) => agree(folder, &kept, manifest, moved)?,
             None => claim(folder, manifest)?,
         }
         let path = folder.join(RECORDS);
@@ -59,13 +73,11 @@ impl Store {
             TryLockError::Error(e) => Error::file(&path, "lock", e),
         })?;
         mend(&path, &records)?;
-        let store = Self {
+        Ok(Self {
             folder: folder.to_owned(),
             records,
             synced: Instant::now(),
-        };
-        store.write_manifest(manifest)?;
-        Ok(store)
+        })
     }
 
     /// What the run holds: the last record of each trial, in the order of their first.
@@ -135,8 +147,15 @@ impl Store {
 }
 
 fn write(folder: &Path, name: &str, content: &[u8]) -> Result<()> {
-    let (path, unfinished) = (folder.join(name), folder.join(format!(".{name}.part")));
-    fs::write(&unfinished, content).map_err(|e| Error::file(&unfinished, "write", e))?;
+    let (path, unfinished) = (
+        folder.join(name),
+        folder.join(format!(".{name}{UNFINISHED}")),
+    );
+    let written = File::create(&unfinished).and_then(|mut file| {
+        file.write_all(content)?;
+        file.sync_all()
+    });
+    written.map_err(|e| Error::file(&unfinished, "write", e))?;
     fs::rename(&unfinished, &path).map_err(|e| Error::file(&path, "write", e))
 }
 
@@ -193,35 +212,42 @@ pub fn read_manifest(folder: &Path) -> Result<Option<RunManifest>> {
 }
 
 /// Makes sure that a kept run is the one now asked for.
-fn agree(folder: &Path, kept: &RunManifest, now: &RunManifest) -> Result<()> {
-    let fields = kept.identity.keys().chain(now.identity.keys());
+fn agree(folder: &Path, kept: &RunManifest, now: &RunManifest, moved: Moved) -> Result<()> {
     let said = |manifest: &RunManifest, field: &str| {
-        manifest
-            .identity
-            .get(field)
-            .map_or("unset".to_owned(), ToString::to_string)
+        let value = manifest.identity.get(field);
+        value.map_or("unset".to_owned(), ToString::to_string)
     };
-    match fields
-        .map(String::as_str)
-        .find(|field| kept.identity.get(*field) != now.identity.get(*field))
-    {
-        None => Ok(()),
-        Some(field) => Err(Error::Run {
-            path: folder.to_owned(),
-            problem: format!(
-                "this run has another {field}: it was {}, now it is {}; use another --out, or the same {field}",
-                said(kept, field),
-                said(now, field)
-            ),
-        }),
+    let fields = kept.identity.keys().chain(now.identity.keys());
+    for field in fields.map(String::as_str) {
+        let (before, after) = (said(kept, field), said(now, field));
+        if before == after {
+            continue;
+        }
+        if field == ADDRESS && moved == Moved::Allowed {
+            tracing::warn!("this run was begun at {before}; it goes on at {after}");
+            continue;
+        }
+        let hint = if field == ADDRESS {
+            " (the same model at another address: --resume)"
+        } else {
+            ""
+        };
+        let problem = format!(
+            "this run has another {field}: it was {before}, now it is {after}; use another --out, or the same {field}{hint}"
+        );
+        let path = folder.to_owned();
+        return Err(Error::Run { path, problem });
     }
+    Ok(())
 }
 
 /// Makes a new folder, or takes an empty one, and marks it as a run before anything else lies in it.
 fn claim(folder: &Path, manifest: &RunManifest) -> Result<()> {
     fs::create_dir_all(folder).map_err(|e| Error::file(folder, "create", e))?;
     let mut inside = fs::read_dir(folder).map_err(|e| Error::file(folder, "read", e))?;
-    if inside.next().is_some() {
+    // What a process killed in the midst of writing has left is nobody's.
+    let unfinished = |name: &OsStr| name.to_string_lossy().ends_with(UNFINISHED);
+    if inside.any(|entry| entry.is_ok_and(|entry| !unfinished(&entry.file_name()))) {
         let problem = "the folder is not empty and holds no run; use another --out".to_owned();
         return Err(Error::Run {
             path: folder.to_owned(),
@@ -314,7 +340,7 @@ mod tests {
     fn records_come_back_the_last_of_each_trial() {
         let base = tempfile::tempdir().unwrap();
         let folder = base.path().join("run");
-        let mut store = Store::open(&folder, &manifest(0)).unwrap();
+        let mut store = Store::open(&folder, &manifest(0), Moved::Refused).unwrap();
         assert!(store.records().unwrap().is_empty());
         for (name, outcome) in [
             ("a", Outcome::Failed),
@@ -324,7 +350,7 @@ mod tests {
             store.append(&record(name, outcome)).unwrap();
         }
         drop(store);
-        let kept = Store::open(&folder, &manifest(0))
+        let kept = Store::open(&folder, &manifest(0), Moved::Refused)
             .unwrap()
             .records()
             .unwrap();
@@ -337,20 +363,22 @@ mod tests {
     #[test]
     fn a_torn_line_is_cut_and_a_broken_one_is_named() {
         let base = tempfile::tempdir().unwrap();
-        let mut store = Store::open(base.path(), &manifest(0)).unwrap();
+        let mut store = Store::open(base.path(), &manifest(0), Moved::Refused).unwrap();
         store.append(&record("a", Outcome::Right)).unwrap();
         store.records.write_all(b"{\"key\":\"12").unwrap();
         drop(store);
-        let mut store = Store::open(base.path(), &manifest(0)).unwrap();
+        let mut store = Store::open(base.path(), &manifest(0), Moved::Refused).unwrap();
         assert_eq!(store.records().unwrap().len(), 1);
         store.append(&record("b", Outcome::Right)).unwrap();
         drop(store);
-        let kept = Store::open(base.path(), &manifest(0)).unwrap().records();
+        let kept = Store::open(base.path(), &manifest(0), Moved::Refused)
+            .unwrap()
+            .records();
         assert_eq!(kept.unwrap().len(), 2);
         let path = base.path().join(RECORDS);
         let text = fs::read_to_string(&path).unwrap();
         fs::write(&path, text.replacen("{\"key\"", "{\"kex\"", 1)).unwrap();
-        let store = Store::open(base.path(), &manifest(0)).unwrap();
+        let store = Store::open(base.path(), &manifest(0), Moved::Refused).unwrap();
         let error = store.records().unwrap_err().to_string();
         assert!(
             error.contains("records.jsonl, line 1: not a record"),
@@ -361,8 +389,8 @@ mod tests {
     #[test]
     fn another_run_is_refused_by_the_flag_that_differs() {
         let base = tempfile::tempdir().unwrap();
-        drop(Store::open(base.path(), &manifest(0)).unwrap());
-        let error = Store::open(base.path(), &manifest(7))
+        drop(Store::open(base.path(), &manifest(0), Moved::Refused).unwrap());
+        let error = Store::open(base.path(), &manifest(7), Moved::Refused)
             .unwrap_err()
             .to_string();
         assert!(
@@ -374,9 +402,9 @@ mod tests {
     #[test]
     fn a_run_is_held_by_one_process_and_a_strange_folder_is_left_alone() {
         let base = tempfile::tempdir().unwrap();
-        let _held = Store::open(base.path(), &manifest(0)).unwrap();
+        let _held = Store::open(base.path(), &manifest(0), Moved::Refused).unwrap();
         assert!(
-            Store::open(base.path(), &manifest(0))
+            Store::open(base.path(), &manifest(0), Moved::Refused)
                 .unwrap_err()
                 .to_string()
                 .contains("another process")
@@ -384,11 +412,33 @@ mod tests {
         let strange = tempfile::tempdir().unwrap();
         fs::write(strange.path().join("thesis.tex"), "").unwrap();
         assert!(
-            Store::open(strange.path(), &manifest(0))
+            Store::open(strange.path(), &manifest(0), Moved::Refused)
                 .unwrap_err()
                 .to_string()
                 .contains("not empty")
         );
+    }
+
+    #[test]
+    fn a_run_goes_on_at_another_address_where_it_is_named() {
+        let at = |address: &str| {
+            let mut manifest = manifest(0);
+            let address = address.to_owned();
+            manifest.identity.insert(ADDRESS.to_owned(), address.into());
+            manifest
+        };
+        let base = tempfile::tempdir().unwrap();
+        drop(Store::open(base.path(), &at("here"), Moved::Refused).unwrap());
+        assert!(Store::open(base.path(), &at("there"), Moved::Allowed).is_ok());
+        let error = Store::open(base.path(), &at("there"), Moved::Refused).unwrap_err();
+        assert!(error.to_string().contains("--resume"), "{error}");
+    }
+
+    #[test]
+    fn what_a_killed_process_left_unfinished_is_in_nobodys_way() {
+        let base = tempfile::tempdir().unwrap();
+        fs::write(base.path().join(".manifest.json.part"), "{").unwrap();
+        assert!(Store::open(base.path(), &manifest(0), Moved::Refused).is_ok());
     }
 
     #[test]
@@ -399,7 +449,7 @@ mod tests {
             "20260102-m-d-0123abcd",
             "20260103-m-d-99999999",
         ] {
-            drop(Store::open(&base.path().join(name), &manifest(0)).unwrap());
+            drop(Store::open(&base.path().join(name), &manifest(0), Moved::Refused).unwrap());
         }
         fs::create_dir(base.path().join("20260104-m-d-0123abcd")).unwrap();
         let found = find(base.path(), "0123abcd").unwrap();

@@ -496,7 +496,8 @@ fn a_blind_model_sees_words_alone() {
     ];
     let table = bench.complete(&words);
     assert!(
-        table.contains("gpt without images: 33.3 (33.3), n 3"),
+        table.contains("gpt without images: 33.3 ±")
+            && table.contains("(33.3), n 3, unparsed 0 (0), failed 0"),
         "{table}"
     );
     let requests = endpoint.requests();
@@ -644,10 +645,10 @@ fn json_is_the_summary() {
     ]);
     let summary: Value = serde_json::from_str(&output).unwrap();
     assert_eq!(summary["run"]["status"], "complete");
-    assert_eq!(
-        output,
-        fs::read_to_string(bench.path("run/summary.json")).unwrap()
-    );
+    assert_eq!(summary["folder"], "run");
+    let kept = fs::read(bench.path("run/summary.json")).unwrap();
+    let kept: Value = serde_json::from_slice(&kept).unwrap();
+    assert_eq!(summary["rows"], kept["rows"]);
 }
 
 #[cfg(unix)]
@@ -683,19 +684,267 @@ fn an_interrupt_keeps_what_was_answered() {
     while endpoint.requests().len() < 2 {
         std::thread::sleep(Duration::from_millis(5));
     }
-    // The first asks to stop, the second gives up the request that is never answered.
-    loop {
-        Command::new("kill")
-            .args(["-INT", &program.id().to_string()])
-            .status()
-            .unwrap();
-        std::thread::sleep(Duration::from_millis(50));
-        if let Some(status) = program.try_wait().unwrap() {
-            assert_eq!(status.code(), Some(130));
-            break;
-        }
-    }
+    // The first asks to stop; the request that is never answered is given up by the second alone.
+    interrupt(&program);
+    std::thread::sleep(Duration::from_millis(300));
+    assert!(
+        program.try_wait().unwrap().is_none(),
+        "what is on the wire is waited for"
+    );
+    interrupt(&program);
+    assert_eq!(program.wait().unwrap().code(), Some(130));
     assert_eq!(records(&bench.path("run")).len(), 1);
     let manifest = fs::read_to_string(bench.path("run/manifest.json")).unwrap();
     assert!(manifest.contains("\"cancelled\""), "{manifest}");
+}
+
+#[cfg(unix)]
+fn interrupt(program: &std::process::Child) {
+    let signal = ["-INT", &program.id().to_string()];
+    std::process::Command::new("kill")
+        .args(signal)
+        .status()
+        .unwrap();
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_does_not_wait_for_retries() {
+    use std::process::{Command, Stdio};
+    use std::time::Duration;
+
+    let bench = Bench::new();
+    frames(&bench);
+    let later = Answer::error(429, "slow_down", "later").header("retry-after", "100");
+    let endpoint = MockEndpoint::start([Answer::text("A"), later]);
+    let url = endpoint.base_url();
+    let program = Command::new(assert_cmd::cargo::cargo_bin("darkqa-eval"))
+        .args([
+            "--data",
+            "frames",
+            "--model",
+            "m",
+            "--base-url",
+            &url,
+            "--levels",
+            "L0",
+            "--concurrency",
+            "1",
+            "--out",
+            "run",
+        ])
+        .current_dir(bench.path(""))
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    while endpoint.requests().len() < 2 {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    std::thread::sleep(Duration::from_millis(100));
+    interrupt(&program);
+    // Would take 100 s otherwise, and the run of the tests with it.
+    let output = program.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130));
+    let table = String::from_utf8(output.stdout).unwrap();
+    assert!(
+        table.starts_with("cancelled: 1 of 3 trials answered, 0 failed"),
+        "{table}"
+    );
+    assert_eq!(
+        records(&bench.path("run")).len(),
+        1,
+        "what was given up has not failed"
+    );
+}
+
+#[test]
+fn a_model_that_does_not_exist_stops_itself_alone() {
+    let bench = Bench::new();
+    frames(&bench);
+    let endpoint = MockEndpoint::start([Answer::error(404, "model_not_found", "no such model")]);
+    let url = endpoint.base_url();
+    let run = bench.call(&[
+        "--data",
+        "frames",
+        "--model",
+        "random",
+        "--model",
+        "gone",
+        "--base-url",
+        &url,
+        "--levels",
+        "L0-L2",
+        "--out",
+        "run",
+    ]);
+    assert_eq!(run.code, Some(2), "{run:?}");
+    assert!(
+        run.stderr.contains("gone") && run.stderr.contains("no such model"),
+        "{run:?}"
+    );
+    let csv = fs::read_to_string(bench.path("run/summary.csv")).unwrap();
+    assert!(
+        csv.contains("random,image,L2,noise,,all,strict,3,") && !csv.contains("gone"),
+        "{csv}"
+    );
+}
+
+#[test]
+fn an_endpoint_that_is_not_there_is_noticed_by_its_first_failures() {
+    let bench = Bench::new();
+    frames(&bench);
+    let free = std::net::TcpListener::bind("127.0.0.1:0")
+        .unwrap()
+        .local_addr()
+        .unwrap();
+    let url = format!("http://{free}/v1");
+    let run = bench.call(&[
+        "--data",
+        "frames",
+        "--model",
+        "m",
+        "--base-url",
+        &url,
+        "--retries",
+        "0",
+        "--concurrency",
+        "1",
+        "--out",
+        "run",
+    ]);
+    assert_eq!(run.code, Some(2), "{run:?}");
+    assert!(
+        run.stderr.contains("m: 5 trials in a row failed"),
+        "{run:?}"
+    );
+    assert_eq!(records(&bench.path("run")).len(), 5);
+}
+
+#[test]
+fn an_image_that_changes_under_way_is_not_taken_for_the_old_one() {
+    let bench = Bench::new();
+    frames(&bench);
+    let later = Answer::error(429, "slow_down", "later").header("retry-after", "1");
+    let endpoint = MockEndpoint::start([later, Answer::text("A")]);
+    let url = endpoint.base_url();
+    let changed = bench.path("frames/b.png");
+    let run = std::thread::scope(|scope| {
+        scope.spawn(|| {
+            while endpoint.requests().is_empty() {
+                std::thread::sleep(std::time::Duration::from_millis(5));
+            }
+            fs::write(&changed, png(200)).unwrap();
+        });
+        bench.call(&[
+            "--data",
+            "frames",
+            "--model",
+            "m",
+            "--base-url",
+            &url,
+            "--concurrency",
+            "1",
+            "--out",
+            "run",
+        ])
+    });
+    assert_eq!(run.code, Some(1), "{run:?}");
+    let of_b: Vec<Value> = records(&bench.path("run"))
+        .into_iter()
+        .filter(|record| record["frame"] == "b.png")
+        .collect();
+    assert_eq!(of_b.len(), 11);
+    assert!(
+        of_b.iter()
+            .all(|record| text(&record["failure"], "message").contains("changed while the run")),
+        "{of_b:?}"
+    );
+}
+
+#[test]
+fn an_enhancer_that_fails_is_found_before_anything_is_asked() {
+    let bench = Bench::new();
+    frames(&bench);
+    onnx::not_a_number().write(&bench.path(""), "nan.onnx");
+    let endpoint = MockEndpoint::start([Answer::text("A")]);
+    let url = endpoint.base_url();
+    let run = bench.call(&[
+        "--data",
+        "frames",
+        "--model",
+        "m",
+        "--base-url",
+        &url,
+        "--llie",
+        "nan.onnx",
+        "--out",
+        "run",
+    ]);
+    assert_eq!(run.code, Some(2), "{run:?}");
+    assert!(
+        run.stderr.contains("nan.onnx") && run.stderr.contains("NaN"),
+        "{run:?}"
+    );
+    assert_eq!(endpoint.requests().len(), 0);
+}
+
+#[test]
+fn kept_replies_are_read_as_new_ones() {
+    let bench = Bench::new();
+    frames(&bench);
+    bench.file("script.jsonl", "{\"default\":\"A\"}\n");
+    let words = [
+        "--data",
+        "frames",
+        "--model",
+        "script:script.jsonl",
+        "--levels",
+        "L0",
+        "--out",
+        "run",
+    ];
+    let table = bench.complete(&words);
+    let path = bench.path("run/records.jsonl");
+    let records = fs::read_to_string(&path).unwrap();
+    fs::write(&path, records.replace("\"chosen\":0", "\"chosen\":1")).unwrap();
+    assert_eq!(bench.complete(&words), table);
+}
+
+#[test]
+fn two_scripts_that_say_the_same_are_two_models() {
+    let bench = Bench::new();
+    frames(&bench);
+    for script in ["one.jsonl", "two.jsonl"] {
+        bench.file(script, "{\"default\":\"A\"}\n");
+    }
+    bench.complete(&[
+        "--data",
+        "frames",
+        "--model",
+        "script:one.jsonl",
+        "--model",
+        "script:two.jsonl",
+        "--levels",
+        "L0",
+        "--out",
+        "run",
+    ]);
+    assert_eq!(records(&bench.path("run")).len(), 6);
+}
+
+#[test]
+fn showing_a_complete_run_changes_nothing() {
+    let bench = Bench::new();
+    let words = ["--model", "random", "--levels", "L0", "--out", "run"];
+    let table = bench.complete(&words);
+    let kept = |name: &str| fs::read(bench.path("run").join(name)).unwrap();
+    let before = ["manifest.json", "summary.json", "records.jsonl"].map(kept);
+    let mut again = words.to_vec();
+    again.extend(["--concurrency", "3"]);
+    assert_eq!(bench.complete(&again), table);
+    assert_eq!(
+        ["manifest.json", "summary.json", "records.jsonl"].map(kept),
+        before
+    );
 }

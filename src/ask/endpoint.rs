@@ -7,6 +7,8 @@ use std::time::{Duration, Instant, SystemTime};
 use backon::{ExponentialBuilder, Retryable as _};
 use reqwest::header::{AUTHORIZATION, CONTENT_TYPE, HeaderMap, HeaderValue, LOCATION};
 use reqwest::{Client, Response, StatusCode, Url, redirect};
+use tokio::sync::watch;
+use tokio::time::sleep;
 use tracing::debug;
 
 use super::body::Parts;
@@ -67,6 +69,7 @@ pub struct Endpoint {
     sending: Sending,
     scrub: Scrub,
     gate: Gate,
+    closing: watch::Sender<bool>,
 }
 
 /// One try that brought no reply.
@@ -126,6 +129,7 @@ impl Endpoint {
             sending,
             scrub,
             gate: Gate::new(),
+            closing: watch::Sender::new(false),
         })
     }
 
@@ -143,6 +147,31 @@ impl Endpoint {
         self.authorization.is_some() || self.base.has_credentials()
     }
 
+    /// Lets no further request go out: those on the wire are finished, those that wait give up at once.
+    pub fn close(&self) {
+        self.closing.send_replace(true);
+    }
+
+    /// Ends once the endpoint is closed.
+    async fn closed(&self) {
+        // The sender lives as long as the endpoint, so this only ends by a change.
+        let _ = self.closing.subscribe().wait_for(|closing| *closing).await;
+    }
+
+    /// Waits for one's turn; an error where the endpoint is closed first.
+    async fn turn(&self) -> Result<(), Miss> {
+        tokio::select! {
+            biased;
+            () = self.closed() => Err(Miss {
+                failure: failure(FailureKind::Connection, "the run ended before it was asked".to_owned()),
+                reach: Reach::Interrupted,
+                again: false,
+                wait: None,
+            }),
+            () = self.gate.pass() => Ok(()),
+        }
+    }
+
     /// Sends a request, again where that may help. Nothing is left behind where the future is dropped.
     pub(super) async fn ask(&self, body: &Parts, sent: Sent<'_>) -> Result<Reply, AskError> {
         let attempts = AtomicU32::new(0);
@@ -151,12 +180,22 @@ impl Endpoint {
             .with_min_delay(self.sending.first_delay)
             .with_max_delay(LONGEST_DELAY)
             .with_max_times(self.sending.retries as usize);
+        let closing = self.closing.subscribe();
         let outcome = (|| async {
-            self.gate.pass().await;
+            self.turn().await?;
             attempts.fetch_add(1, Ordering::Relaxed);
             self.send(body.clone(), sent).await
         })
         .retry(backoff)
+        .sleep(move |wait| {
+            let mut closing = closing.clone();
+            async move {
+                tokio::select! {
+                    _ = closing.wait_for(|closing| *closing) => (),
+                    () = sleep(wait) => (),
+                }
+            }
+        })
         .when(|miss: &Miss| miss.again)
         // `None` where the retries are used up.
         .adjust(|miss, own| own.map(|own| miss.wait.unwrap_or(own)))

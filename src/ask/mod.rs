@@ -77,6 +77,19 @@ impl Model {
         }
     }
 
+    /// Lets nothing further go out to the model's endpoint; what is on the wire is finished.
+    pub fn close(&self) {
+        if let Self::OpenAi(model) = self {
+            model.endpoint().close();
+        }
+    }
+
+    /// Whether it is asked over a network, and so can fail for reasons of its own.
+    #[must_use]
+    pub fn is_remote(&self) -> bool {
+        matches!(self, Self::OpenAi(_))
+    }
+
     /// Puts one question. Dropping the future gives up the request and leaves nothing behind.
     pub async fn ask(&self, call: Call<'_>) -> Result<Reply, AskError> {
         match self {
@@ -92,8 +105,10 @@ impl Model {
 pub enum Reach {
     /// This one request failed; another may succeed.
     Trial,
-    /// Every further request would fail alike: key, credit, address, model, parameters.
+    /// Every further request to this model would fail alike: key, credit, address, name, parameters.
     Endpoint,
+    /// None: it was given up because the run ends, and may not even have been sent.
+    Interrupted,
 }
 
 /// Why no reply came.

@@ -23,5 +23,9 @@ mod tensor;
 mod weights;
 
 pub use file::ModelFile;
-pub use onnx::Enhancer;
+pub use onnx::{Enhancer, Stopper};
 pub use runtime::{Install, Runtime, RuntimeSearch, forbid_telemetry};
+
+/// The version of the way to and from a model: raised whenever a pixel changes, so that no result of an older one is taken
+/// for its own.
+pub const VERSION: u32 = 1;

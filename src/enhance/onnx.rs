@@ -23,13 +23,31 @@ pub struct Enhancer {
     digest: Digest,
     signature: Signature,
     runtime: Runtime,
-    loaded: Arc<Mutex<Loaded>>,
+    session: Arc<Mutex<Session>>,
+    options: Arc<Options>,
 }
 
-/// What lives on the runtime's own thread.
-struct Loaded {
-    session: Session,
-    options: RunOptions<HasSelectedOutputs>,
+/// How a session is run: which output is wanted, and whether it is to end early.
+struct Options(RunOptions<HasSelectedOutputs>);
+
+// SAFETY: `ort` withholds `Sync` because a selected output may hold a preallocated tensor, which two runs would write at
+// once. None is ever preallocated here (`Enhancer::open` selects by name alone), runs are held apart by the session's
+// mutex, and the one call made beside a run is `terminate`, which ONNX Runtime documents for use from another thread.
+#[expect(unsafe_code, reason = "a run can be ended in no other way")]
+unsafe impl Sync for Options {}
+
+/// Ends the run of an enhancer from another thread.
+#[derive(Clone)]
+pub struct Stopper(Arc<Options>);
+
+impl Stopper {
+    /// Ends the image that is being made, with an error, and every later one.
+    pub fn stop(&self) {
+        // A run that cannot be ended is one that is waited for.
+        if let Err(e) = self.0.0.terminate() {
+            tracing::debug!("the enhancer cannot be stopped: {e}");
+        }
+    }
 }
 
 /// What a run gave: the tensor's dimensions and samples.
@@ -80,10 +98,8 @@ impl Enhancer {
             digest: file.digest,
             signature,
             runtime: runtime.clone(),
-            loaded: Arc::new(Mutex::new(Loaded {
-                session,
-                options: options.with_outputs(selected),
-            })),
+            session: Arc::new(Mutex::new(session)),
+            options: Arc::new(Options(options.with_outputs(selected))),
         })
     }
 
@@ -97,6 +113,12 @@ impl Enhancer {
     #[must_use]
     pub fn digest(&self) -> Digest {
         self.digest
+    }
+
+    /// A handle that ends a run from another thread.
+    #[must_use]
+    pub fn stopper(&self) -> Stopper {
+        Stopper(Arc::clone(&self.options))
     }
 
     /// Enhances an image; the result has the same size.
@@ -127,11 +149,11 @@ impl Enhancer {
     /// Runs the model on an image of a size that it takes.
     fn infer(&self, input: Planes) -> Result<Planes> {
         let (height, width) = (input.height, input.width);
-        let loaded = Arc::clone(&self.loaded);
+        let (session, options) = (Arc::clone(&self.session), Arc::clone(&self.options));
         let output = self.signature.output.clone();
         let result = self.runtime.run(move || {
-            let mut loaded = loaded.lock().unwrap_or_else(PoisonError::into_inner);
-            loaded.run(input, &output)
+            let mut session = session.lock().unwrap_or_else(PoisonError::into_inner);
+            run(&mut session, &options.0, input, &output)
         })?;
         let Output { dims, samples } = result.map_err(|e| {
             self.fault(format!(
@@ -168,18 +190,20 @@ impl Enhancer {
     }
 }
 
-impl Loaded {
-    fn run(&mut self, input: Planes, output: &str) -> ort::Result<Output> {
-        let shape = [1, 3, input.height, input.width];
-        let tensor = Tensor::from_array((shape, input.samples))?;
-        let Self { session, options } = self;
-        let outputs = session.run_with_options(ort::inputs![tensor], options)?;
-        let (shape, samples) = outputs[output].try_extract_tensor::<f32>()?;
-        Ok(Output {
-            dims: shape.to_vec(),
-            samples: samples.to_vec(),
-        })
-    }
+fn run(
+    session: &mut Session,
+    options: &RunOptions<HasSelectedOutputs>,
+    input: Planes,
+    output: &str,
+) -> ort::Result<Output> {
+    let shape = [1, 3, input.height, input.width];
+    let tensor = Tensor::from_array((shape, input.samples))?;
+    let outputs = session.run_with_options(ort::inputs![tensor], options)?;
+    let (shape, samples) = outputs[output].try_extract_tensor::<f32>()?;
+    Ok(Output {
+        dims: shape.to_vec(),
+        samples: samples.to_vec(),
+    })
 }
 
 /// Where a session gets its graph from.

@@ -1,5 +1,7 @@
 //! `summary.csv` and `summary.json`: every number of a run with its interval.
 
+use std::path::Path;
+
 use serde::Serialize;
 
 use crate::error::{Error, Result};
@@ -66,15 +68,18 @@ pub fn csv(summary: &Summary) -> Result<Vec<u8>> {
 #[derive(Serialize)]
 struct Document<'a> {
     schema: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    folder: Option<&'a Path>,
     run: &'a RunManifest,
     rows: Vec<Row<'a>>,
 }
 
-/// The summary as JSON: the run's manifest and the rows of the CSV.
-pub fn json(summary: &Summary, run: &RunManifest) -> Result<String> {
+/// The summary as JSON: the run's manifest and the rows of the CSV; with the folder where it is not itself in there.
+pub fn json(summary: &Summary, run: &RunManifest, folder: Option<&Path>) -> Result<String> {
     let rows = summary.cells.iter().map(Row::of).collect();
     let text = serde_json::to_string_pretty(&Document {
         schema: SCHEMA,
+        folder,
         run,
         rows,
     });

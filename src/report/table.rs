@@ -2,12 +2,14 @@
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
+use std::path::Path;
 
 use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
 use comfy_table::{CellAlignment, LineStyle, Table};
 
 use crate::score::accuracy::{Cell, Subject, Summary};
 use crate::score::choice::Mode;
+use crate::types::manifest::{Counts, RunManifest, Status};
 use crate::types::{EnhancerName, Level, Variant, View};
 
 /// One line of the table: a model in one variant, raw or enhanced, over the levels.
@@ -47,12 +49,15 @@ struct Pair<'a> {
 
 impl Pair<'_> {
     fn accuracy(self) -> String {
-        let percent = |cell: &Cell| {
-            cell.accuracy.map_or("–".to_owned(), |share| {
-                format!("{:.1}", 100.0 * share.value)
-            })
-        };
-        format!("{} ({})", percent(self.strict), percent(self.lenient))
+        let percent = |share: f64| format!("{:.1}", 100.0 * share);
+        match (self.strict.accuracy, self.lenient.accuracy) {
+            (Some(strict), Some(lenient)) => {
+                let half = (strict.high - strict.low) / 2.0;
+                let (value, lenient) = (percent(strict.value), percent(lenient.value));
+                format!("{value} ±{} ({lenient})", percent(half))
+            }
+            _ => "–".to_owned(),
+        }
     }
 
     fn replies(self) -> usize {
@@ -60,55 +65,61 @@ impl Pair<'_> {
     }
 }
 
-/// Renders a summary: accuracy by level, variant and enhancer, the blind and chance lines below.
+/// Renders a summary: how far the run has come where it is not complete, accuracy by level, variant and enhancer, the
+/// blind and chance lines, and the run's folder.
 #[must_use]
-pub fn render(summary: &Summary) -> String {
+pub fn render(summary: &Summary, run: &RunManifest, folder: &Path) -> String {
     let pairs = pairs(summary);
-    let seen: Vec<Pair<'_>> = pairs
-        .iter()
-        .copied()
-        .filter(|pair| pair.strict.subject.view == Some(View::Image))
-        .collect();
-    let mut text = String::from("Accuracy in %, strict (lenient) reading\n");
+    let of_view = |view: Option<View>| {
+        pairs
+            .iter()
+            .copied()
+            .filter(move |pair| pair.strict.subject.view == view)
+    };
+    let mut text = String::new();
+    if run.status != Status::Complete {
+        let Counts {
+            trials,
+            answered,
+            failed,
+        } = run.counts;
+        let _ = writeln!(
+            text,
+            "{}: {answered} of {trials} trials answered, {failed} failed",
+            run.status
+        );
+    }
+    text.push_str(
+        "Accuracy in %: strict ± half of the 95 % interval (lenient); n replies at each level\n",
+    );
+    let seen: Vec<Pair<'_>> = of_view(Some(View::Image)).collect();
     if !seen.is_empty() {
         let _ = writeln!(text, "{}", levels(&seen));
     }
-    for pair in pairs
-        .iter()
-        .filter(|pair| pair.strict.subject.view == Some(View::Blind))
-    {
+    for pair in of_view(Some(View::Blind)) {
         let Cell {
             unparsed,
             failed,
             subject,
             ..
         } = pair.strict;
+        let (accuracy, replies, lenient) = (pair.accuracy(), pair.replies(), pair.lenient.unparsed);
         let _ = write!(
             text,
-            "{} without images: {}, n {}",
-            subject.model,
-            pair.accuracy(),
-            pair.replies()
+            "{} without images: {accuracy}, n {replies}",
+            subject.model
         );
+        let _ = writeln!(text, ", unparsed {unparsed} ({lenient}), failed {failed}");
+    }
+    for chance in of_view(None).filter_map(|pair| pair.strict.accuracy) {
         let _ = writeln!(
             text,
-            ", unparsed {unparsed} ({}), failed {failed}",
-            pair.lenient.unparsed
+            "chance: {:.2} over {} questions",
+            100.0 * chance.value,
+            chance.n
         );
     }
-    for pair in pairs
-        .iter()
-        .filter(|pair| pair.strict.subject.view.is_none())
-    {
-        if let Some(chance) = pair.strict.accuracy {
-            let _ = writeln!(
-                text,
-                "chance: {:.2} over {} questions",
-                100.0 * chance.value,
-                chance.n
-            );
-        }
-    }
+    let _ = writeln!(text, "run: {}", folder.display());
     text
 }
 
@@ -123,49 +134,54 @@ fn levels(seen: &[Pair<'_>]) -> Table {
         .collect();
     let mut table = Table::new();
     table.load_style(UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none()));
-    let head = ["model", "light"].map(str::to_owned).into_iter();
-    let tail = ["n", "unparsed", "failed"].map(str::to_owned);
-    table.set_header(
-        head.chain(levels.iter().map(ToString::to_string))
-            .chain(tail),
-    );
+    let names = levels.iter().map(ToString::to_string);
+    let head = ["model", "light"]
+        .map(str::to_owned)
+        .into_iter()
+        .chain(names);
+    table.set_header(head.chain(["n", "unparsed", "failed"].map(str::to_owned)));
     for line in &series {
-        let of_line: Vec<Pair<'_>> = seen
+        let pairs = seen
             .iter()
             .copied()
-            .filter(|pair| Series::of(&pair.strict.subject) == *line)
-            .collect();
-        let at = |level: &Level| {
-            of_line
-                .iter()
-                .find(|pair| pair.strict.subject.level.as_ref() == Some(level))
-        };
-        let accuracies = levels
-            .iter()
-            .map(|level| at(level).map_or(String::new(), |pair| pair.accuracy()));
-        let sum =
-            |count: fn(&Pair<'_>) -> usize| of_line.iter().map(count).sum::<usize>().to_string();
-        let unparsed = format!(
-            "{} ({})",
-            sum(|pair| pair.strict.unparsed),
-            sum(|pair| pair.lenient.unparsed)
-        );
-        let counts = [
-            sum(|pair| pair.replies()),
-            unparsed,
-            sum(|pair| pair.strict.failed),
-        ];
-        table.add_row(
-            [line.model.to_owned(), line.label()]
-                .into_iter()
-                .chain(accuracies)
-                .chain(counts),
-        );
+            .filter(|pair| Series::of(&pair.strict.subject) == *line);
+        table.add_row(row(line, &pairs.collect::<Vec<_>>(), &levels));
     }
     for column in table.column_iter_mut().skip(2) {
         column.set_cell_alignment(CellAlignment::Right);
     }
     table
+}
+
+fn row(line: &Series<'_>, pairs: &[Pair<'_>], levels: &BTreeSet<Level>) -> Vec<String> {
+    let at = |level: &Level| {
+        pairs
+            .iter()
+            .find(|pair| pair.strict.subject.level.as_ref() == Some(level))
+    };
+    let accuracies = levels
+        .iter()
+        .map(|level| at(level).map_or(String::new(), |pair| pair.accuracy()));
+    let sum = |count: fn(&Pair<'_>) -> usize| pairs.iter().map(count).sum::<usize>();
+    let replies = pairs.iter().map(|pair| pair.replies());
+    let n = match (replies.clone().min(), replies.max()) {
+        (Some(least), Some(most)) if least != most => format!("{least}–{most}"),
+        (least, _) => least.unwrap_or(0).to_string(),
+    };
+    let (strict, lenient) = (
+        sum(|pair| pair.strict.unparsed),
+        sum(|pair| pair.lenient.unparsed),
+    );
+    let counts = [
+        n,
+        format!("{strict} ({lenient})"),
+        sum(|pair| pair.strict.failed).to_string(),
+    ];
+    [line.model.to_owned(), line.label()]
+        .into_iter()
+        .chain(accuracies)
+        .chain(counts)
+        .collect()
 }
 
 fn pairs(summary: &Summary) -> Vec<Pair<'_>> {

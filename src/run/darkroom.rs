@@ -1,8 +1,9 @@
 //! The darkroom: one thread that makes the images, in the order of the plan.
 //!
-//! Each is loaded, darkened, mended and encoded once for all the questions about it. The channel is bounded: that is the
-//! memory limit.
+//! Each is loaded, darkened, mended and encoded once for all the questions about it. The channel is bounded, so that
+//! memory holds the images in flight and a few more.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use tokio::sync::mpsc::Sender;
@@ -14,7 +15,7 @@ use crate::dataset::{Dataset, Picture};
 use crate::enhance::Enhancer;
 use crate::error::{Error, Result};
 use crate::synthesis::{Negative, NoiseKey, expose};
-use crate::types::{Condition, Degradation, FrameId, Rgb};
+use crate::types::{Condition, Degradation, Digest, FrameId, Rgb};
 
 /// A shot with its image, or with what went wrong while it was made.
 #[derive(Debug)]
@@ -27,11 +28,30 @@ pub(super) struct Exposed {
 /// What the thread works with.
 pub(super) struct Darkroom<'a> {
     pub(super) dataset: &'a Dataset,
+    /// The content of each image as the plan knows it.
+    pub(super) pictures: &'a BTreeMap<FrameId, Digest>,
     pub(super) recipe: &'a Recipe,
     pub(super) enhancers: Vec<Enhancer>,
 }
 
 impl Darkroom<'_> {
+    /// Makes the first image of each enhancer, so that one that does not work is found before anything is asked.
+    pub(super) fn rehearse(&mut self, frames: &[FramePlan]) -> Result<()> {
+        let shots = frames.iter().flat_map(|plan| {
+            let conditions = plan.shots.iter().filter_map(|shot| shot.condition.as_ref());
+            conditions.map(|condition| (&plan.frame, condition))
+        });
+        let mut tried = BTreeSet::new();
+        for (frame, condition) in shots {
+            if let Some(name) = &condition.enhancer
+                && tried.insert(name)
+            {
+                self.image(&mut Desk::new(frame.clone()), condition)?;
+            }
+        }
+        Ok(())
+    }
+
     /// Makes the images of all frames until they are done or nobody waits for them any more.
     pub(super) fn develop(mut self, frames: Vec<FramePlan>, out: &Sender<Exposed>) {
         for FramePlan { frame, shots } in frames {
@@ -61,13 +81,14 @@ impl Darkroom<'_> {
         } = *self.recipe;
         if *condition == Condition::raw(Degradation::None) && format == Format::Png {
             // The file itself, where it is the very image that would be encoded.
-            if let Picture::Encoded { bytes, .. } = desk.picture(self.dataset)?
+            if let Picture::Encoded { bytes, .. } = desk.picture(self.dataset, self.pictures)?
                 && let Some(payload) = Payload::of_plain_png(bytes, max_side)
             {
                 return Ok(Arc::new(payload));
             }
         }
-        let dark = desk.dark(self.dataset, self.recipe, condition.degradation)?;
+        desk.picture(self.dataset, self.pictures)?;
+        let dark = desk.dark(self.recipe, condition.degradation)?;
         let payload = match &condition.enhancer {
             None => Payload::encode(dark, format, max_side),
             Some(name) => {
@@ -104,30 +125,35 @@ impl Desk {
         }
     }
 
-    fn picture(&mut self, dataset: &Dataset) -> Result<&Picture> {
-        once(&mut self.picture, || dataset.picture(&self.frame))
+    /// The frame's file; an error where it is not the one that the plan was made with.
+    fn picture(
+        &mut self,
+        dataset: &Dataset,
+        planned: &BTreeMap<FrameId, Digest>,
+    ) -> Result<&Picture> {
+        once(&mut self.picture, || {
+            let picture = dataset.picture(&self.frame)?;
+            if planned.get(&self.frame) == Some(&picture.digest()) {
+                return Ok(picture);
+            }
+            let problem = "the image was changed while the run was under way; put it back, or begin a new run";
+            Err(Error::data(&self.frame, problem))
+        })
     }
 
     /// The frame in one degradation; the last one is kept for the enhancers that follow.
-    fn dark(
-        &mut self,
-        dataset: &Dataset,
-        recipe: &Recipe,
-        degradation: Degradation,
-    ) -> Result<&Rgb> {
-        if self.clean.is_none() {
-            self.clean = Some(self.picture(dataset)?.decode()?);
-        }
+    fn dark(&mut self, recipe: &Recipe, degradation: Degradation) -> Result<&Rgb> {
         let Self {
             frame,
-            clean: Some(clean),
+            picture,
+            clean,
             negative,
             dark,
-            ..
-        } = self
-        else {
-            return Err(Error::data(&self.frame, "the frame was not decoded"));
-        };
+        } = self;
+        let clean = once(clean, || match picture {
+            Some(picture) => picture.decode(),
+            None => Err(Error::data(&*frame, "the frame was not read")),
+        })?;
         if dark.as_ref().is_some_and(|(made, _)| *made != degradation) {
             *dark = None;
         }

@@ -1,6 +1,6 @@
 //! The asynchronous side: asks about what the darkroom has made, and keeps every reply the moment it arrives.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
 use rayon::ThreadPoolBuilder;
@@ -19,10 +19,10 @@ use super::stop::{End, Watch};
 use crate::ask::{AskError, Call, Payload, Reach};
 use crate::config::Config;
 use crate::dataset::Dataset;
-use crate::enhance::Enhancer;
+use crate::enhance::{Enhancer, Stopper};
 use crate::error::{Error, Result};
 use crate::store::Store;
-use crate::types::{Condition, Failure, FailureKind, Reply, View};
+use crate::types::{Condition, Digest, Failure, FailureKind, FrameId, Reply, View};
 
 /// How many finished images may wait to be asked about.
 const IMAGES_AHEAD: usize = 2;
@@ -31,6 +31,7 @@ const IMAGES_AHEAD: usize = 2;
 pub(super) struct Drive<'a> {
     pub(super) config: &'a Config,
     pub(super) dataset: &'a Dataset,
+    pub(super) pictures: &'a BTreeMap<FrameId, Digest>,
     pub(super) recipe: &'a Recipe,
     pub(super) askers: &'a [Asker],
     pub(super) progress: &'a Progress,
@@ -74,22 +75,24 @@ impl Drive<'_> {
         let bar = self
             .progress
             .trials(plan.trials(), plan.trials() - plan.left());
-        let darkroom = Darkroom {
+        let stoppers: Vec<Stopper> = enhancers.iter().map(Enhancer::stopper).collect();
+        let mut darkroom = Darkroom {
             dataset: self.dataset,
+            pictures: self.pictures,
             recipe: self.recipe,
             enhancers,
         };
+        cores.install(|| darkroom.rehearse(&plan.frames))?;
+        let intake = Intake {
+            drive: self,
+            store,
+            bar,
+            watch: self.watch(),
+            stoppers,
+        };
         std::thread::scope(|scope| {
             scope.spawn(move || cores.install(|| darkroom.develop(plan.frames, &out)));
-            runtime.block_on(
-                Desk {
-                    drive: self,
-                    store,
-                    bar,
-                    watch: self.watch(),
-                }
-                .ask(images),
-            )
+            runtime.block_on(intake.ask(images))
         })
     }
 
@@ -98,19 +101,26 @@ impl Drive<'_> {
         let endpoint = server.map_or("built-in models".to_owned(), |server| {
             server.base_url.to_string()
         });
-        Watch::new(endpoint, self.config.pace.max_failures)
+        let pace = &self.config.pace;
+        Watch::new(
+            endpoint,
+            self.askers,
+            pace.concurrency.get(),
+            pace.max_failures,
+        )
     }
 }
 
 /// Where replies come in and are kept.
-struct Desk<'a> {
+struct Intake<'a> {
     drive: &'a Drive<'a>,
     store: &'a mut Store,
     bar: Bar,
     watch: Watch,
+    stoppers: Vec<Stopper>,
 }
 
-impl Desk<'_> {
+impl Intake<'_> {
     async fn ask(mut self, mut images: Receiver<Exposed>) -> Result<End> {
         let limit = self.drive.config.pace.concurrency.get();
         let mut waiting = VecDeque::<Ready>::new();
@@ -121,7 +131,9 @@ impl Desk<'_> {
             while asking.len() < limit
                 && let Some(ready) = waiting.pop_front()
             {
-                asking.spawn(put(self.drive.askers[ready.trial.asker].clone(), ready));
+                if !self.watch.retired(ready.trial.asker) {
+                    asking.spawn(put(self.drive.askers[ready.trial.asker].clone(), ready));
+                }
             }
             tokio::select! {
                 () = interrupt.next() => self.watch.interrupted(),
@@ -132,20 +144,27 @@ impl Desk<'_> {
                 },
             }
         }
-        // The darkroom stops as soon as nobody waits for its images.
+        // The darkroom ends as soon as nobody waits for its images.
         drop(images);
-        self.drain(asking, interrupt).await?;
+        if self.watch.stopped() {
+            self.stoppers.iter().for_each(Stopper::stop);
+            self.drain(asking, interrupt).await?;
+        }
         self.store.sync()?;
         Ok(self.watch.into_end())
     }
 
-    /// Waits for what is in flight, for it may be paid for already; a second interrupt gives it up.
+    /// Waits for the requests on the wire, for they may be paid for already; a second interrupt gives them up. What
+    /// waits for its turn or for a retry is given up at once.
     async fn drain(&mut self, mut asking: JoinSet<Done>, mut interrupt: Interrupt) -> Result<()> {
         if !asking.is_empty() {
             let count = asking.len();
             self.drive.progress.say(&format!(
                 "stopping: {count} requests are in flight; interrupt again to give them up"
             ));
+        }
+        for asker in self.drive.askers {
+            asker.model.close();
         }
         while !asking.is_empty() {
             tokio::select! {
@@ -206,18 +225,18 @@ impl Desk<'_> {
             Err(aborted) if aborted.is_cancelled() => return Ok(()),
             Err(panic) => std::panic::resume_unwind(panic.into_panic()),
         };
+        let trial = &ready.trial;
         match &result {
-            Ok(_) => self.watch.succeeded(),
-            Err(error) => self.watch.failed(error, &ready.trial.question.frame),
+            Ok(_) => self.watch.succeeded(trial.asker),
+            Err(error) => {
+                self.watch.failed(trial.asker, error, &trial.question.frame);
+                // Where the model itself is at fault or the run ends, the trial was never really made.
+                if error.reach != Reach::Trial {
+                    return Ok(());
+                }
+            }
         }
         self.bar.failed(self.watch.failures());
-        // Where the endpoint itself is at fault, the trial was never really made.
-        if result
-            .as_ref()
-            .is_err_and(|error| error.reach == Reach::Endpoint)
-        {
-            return Ok(());
-        }
         self.bar.inc();
         let asker = &self.drive.askers[ready.trial.asker];
         self.store

@@ -1,6 +1,6 @@
 //! What decides the replies of a run, and what does not, by flag.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Value, json};
 
@@ -39,7 +39,7 @@ pub(super) fn identity(config: &Config, dataset: &Dataset, inputs: &Inputs<'_>) 
         .iter()
         .flat_map(|(frame, digest)| [frame.0.as_bytes(), digest.as_bytes()]);
     let ask = &config.ask;
-    let names = |view| -> Vec<&str> {
+    let names = |view| -> BTreeSet<&str> {
         inputs
             .askers
             .iter()
@@ -93,13 +93,9 @@ pub(super) fn identity(config: &Config, dataset: &Dataset, inputs: &Inputs<'_>) 
         ("--max-side", json!(config.images.max_side)),
         ("--temperature", json!(ask.parameters.temperature)),
         ("--max-tokens", json!(ask.parameters.max_tokens)),
-        (
-            "--token-field",
-            json!(ask.parameters.token_field.to_string()),
-        ),
         ("--reasoning-effort", json!(ask.parameters.reasoning_effort)),
         ("--detail", json!(ask.parameters.detail)),
-        ("models", json!(models)),
+        ("what the models answer by", json!(models)),
         ("synthesis", json!(synthesis::VERSION)),
     ];
     fields
@@ -123,6 +119,10 @@ pub(super) fn settings(config: &Config) -> BTreeMap<String, Value> {
         ("--concurrency".to_owned(), json!(config.pace.concurrency)),
         ("--max-failures".to_owned(), json!(config.pace.max_failures)),
         ("--threads".to_owned(), json!(config.enhancement.threads)),
+        (
+            "--token-field".to_owned(),
+            json!(config.ask.parameters.token_field.to_string()),
+        ),
     ]);
     if let Some(server) = &config.ask.server {
         let sending = server.sending;

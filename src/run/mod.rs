@@ -26,7 +26,7 @@ use crate::enhance::{Enhancer, Runtime};
 use crate::error::{Error, Result};
 use crate::report;
 use crate::score::accuracy::summarize;
-use crate::store::{self, Store};
+use crate::store::{self, Moved, Store};
 use crate::types::manifest::{Counts, RunManifest, SCHEMA, Status};
 use crate::types::{Digest, Family, FrameId, Outcome, Question, Record, TrialKey};
 
@@ -46,8 +46,6 @@ pub struct Verdict {
     pub status: Status,
     /// What belongs on standard output.
     pub output: String,
-    /// The run folder.
-    pub folder: PathBuf,
 }
 
 /// Runs an evaluation, or goes on with it.
@@ -65,66 +63,82 @@ pub fn evaluate(config: &Config, progress: &Progress) -> Result<Verdict> {
     let identity = identity::identity(config, &dataset, &inputs);
     let folder = folder(config, &dataset, &identity)?;
     let kept = store::read_manifest(&folder)?;
-    let complete = kept
-        .as_ref()
-        .is_some_and(|manifest| manifest.status == Status::Complete);
     // Opened before the folder is made, so that an enhancer that does not work leaves nothing behind.
-    let opened = if complete {
-        None
-    } else {
-        Some(open_enhancers(config)?)
+    let opened = match &kept {
+        Some(manifest) if manifest.status == Status::Complete => None,
+        _ => Some(open_enhancers(config)?),
     };
     let mut manifest = manifest(config, identity, kept);
-    let mut store = Store::open(&folder, &manifest)?;
+    let mut store = Store::open(&folder, &manifest, moved(config))?;
     let plan = Plan::new(&inputs, &store.records()?)?;
-    let (runtime, enhancers) = match opened {
-        None if plan.left() == 0 => (None, Vec::new()),
-        None => open_enhancers(config)?,
-        Some(opened) => opened,
+    let trials = plan.keys.clone();
+    let end = if plan.left() == 0 {
+        End::Through
+    } else {
+        let (runtime, enhancers) = opened.map_or_else(|| open_enhancers(config), Ok)?;
+        let version =
+            runtime.map(|runtime| ("onnxruntime".to_owned(), runtime.version().to_owned()));
+        manifest.platform.extend(version);
+        store.write_manifest(&manifest)?;
+        if plan.left() < trials.len() {
+            let answered = trials.len() - plan.left();
+            progress.say(&format!(
+                "{}: {answered} of {} trials are answered already",
+                folder.display(),
+                trials.len()
+            ));
+        }
+        let drive = Drive {
+            config,
+            dataset: &dataset,
+            pictures: &pictures,
+            recipe: &inputs.recipe,
+            askers: &askers,
+            progress,
+        };
+        drive.run(plan, enhancers, &mut store)?
     };
-    if let Some(runtime) = runtime {
-        let version = runtime.version().to_owned();
-        manifest.platform.insert("onnxruntime".to_owned(), version);
-    }
-    if plan.left() < plan.trials() {
-        let answered = plan.trials() - plan.left();
-        progress.say(&format!(
-            "{}: {answered} of {} trials are answered already",
-            folder.display(),
-            plan.trials()
-        ));
-    }
-    let (trials, keys) = (plan.trials(), plan.keys.clone());
-    let drive = Drive {
-        config,
-        dataset: &dataset,
-        recipe: &inputs.recipe,
-        askers: &askers,
-        progress,
-    };
-    let end = drive.run(plan, enhancers, &mut store)?;
+    show(config, &store, manifest, end, &trials, &questions)
+}
 
-    let records = in_order(store.records()?, &keys);
-    manifest.counts = count(trials, &records);
-    manifest.status = end.status(manifest.counts);
-    manifest.updated = now();
-    let summary = summarize(&records, &questions);
-    let json = report::files::json(&summary, &manifest)?;
-    store.write("summary.csv", &report::files::csv(&summary)?)?;
-    store.write("summary.json", json.as_bytes())?;
-    store.write_manifest(&manifest)?;
+/// Scores what a run holds, and leaves it in its folder where that says anything new.
+fn show(
+    config: &Config,
+    store: &Store,
+    mut manifest: RunManifest,
+    end: End,
+    trials: &[TrialKey],
+    questions: &[Question],
+) -> Result<Verdict> {
+    let records = in_order(store.records()?, trials)?;
+    let summary = summarize(&records, questions);
+    let counts = count(trials.len(), &records);
+    let status = end.status(counts);
+    if (status, counts) != (manifest.status, manifest.counts) {
+        (manifest.status, manifest.counts, manifest.updated) = (status, counts, now());
+        store.write("summary.csv", &report::files::csv(&summary)?)?;
+        store.write(
+            "summary.json",
+            report::files::json(&summary, &manifest, None)?.as_bytes(),
+        )?;
+        store.write_manifest(&manifest)?;
+    }
     if let End::Stopped(error) = end {
         return Err(error);
     }
     let output = match config.output.show {
-        Show::Json => json,
-        Show::Table => report::table::render(&summary),
+        Show::Json => report::files::json(&summary, &manifest, Some(store.folder()))?,
+        Show::Table => report::table::render(&summary, &manifest, store.folder()),
     };
-    Ok(Verdict {
-        status: manifest.status,
-        output,
-        folder,
-    })
+    Ok(Verdict { status, output })
+}
+
+/// Whether the run may lie at another address than before: only where it is named as the one to go on with.
+fn moved(config: &Config) -> Moved {
+    match config.output.place {
+        RunPlace::Resume(_) => Moved::Allowed,
+        RunPlace::Named(_) | RunPlace::Automatic => Moved::Refused,
+    }
 }
 
 /// The questions that are asked: of the chosen families, the first so many.
@@ -220,7 +234,13 @@ fn label(config: &Config) -> String {
             ),
             ModelName::Remote(name) => name.clone(),
         });
-    names.take(2).collect::<Vec<_>>().join("-")
+    names
+        .take(2)
+        .collect::<Vec<_>>()
+        .join("-")
+        .chars()
+        .take(60)
+        .collect()
 }
 
 /// The folder of this run: the one named, else the newest with the same identity, else a new one.
@@ -249,22 +269,22 @@ fn folder(config: &Config, dataset: &Dataset, identity: &Identity) -> Result<Pat
     }
 }
 
+/// The manifest of a run under way; one that was kept goes on as it is.
 fn manifest(config: &Config, identity: Identity, kept: Option<RunManifest>) -> RunManifest {
-    let (created, mut platform) = kept.map_or_else(
-        || (now(), BTreeMap::new()),
-        |manifest| (manifest.created, manifest.platform),
-    );
-    platform.extend(identity::platform());
-    RunManifest {
-        schema: SCHEMA.to_owned(),
-        status: Status::Started,
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        created,
-        updated: now(),
-        platform,
-        identity,
-        settings: identity::settings(config),
-        counts: Counts::default(),
+    let version = env!("CARGO_PKG_VERSION").to_owned();
+    match kept {
+        Some(kept) if kept.status == Status::Complete => RunManifest { identity, ..kept },
+        kept => RunManifest {
+            schema: SCHEMA.to_owned(),
+            status: Status::Started,
+            version,
+            created: kept.map_or_else(now, |manifest| manifest.created),
+            updated: now(),
+            platform: identity::platform(),
+            identity,
+            settings: identity::settings(config),
+            counts: Counts::default(),
+        },
     }
 }
 
@@ -273,13 +293,15 @@ fn now() -> String {
     Timestamp::now().strftime("%Y-%m-%dT%H:%M:%SZ").to_string()
 }
 
-/// The records in the plan's order, whatever order the replies came in.
-fn in_order(records: Vec<Record>, keys: &[TrialKey]) -> Vec<Record> {
+/// The records in the plan's order, whatever order the replies came in, and read anew: a reply is read alike wherever it
+/// stands in a table, also where an earlier version of this program has kept it.
+fn in_order(records: Vec<Record>, keys: &[TrialKey]) -> Result<Vec<Record>> {
     let mut by_key: BTreeMap<TrialKey, Record> = records
         .into_iter()
         .map(|record| (record.key, record))
         .collect();
-    keys.iter().filter_map(|key| by_key.remove(key)).collect()
+    let records = keys.iter().filter_map(|key| by_key.remove(key));
+    records.map(record::reread).collect()
 }
 
 fn count(trials: usize, records: &[Record]) -> Counts {

@@ -235,6 +235,7 @@ fn key(
     let model = asker.model.digest().to_string();
     let head = [
         "darkqa.trial/1",
+        asker.model.name(),
         question.id.0.as_str(),
         prompt,
         &model,

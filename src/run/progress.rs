@@ -59,9 +59,9 @@ impl Progress {
         Bar(style.map_or(bar.clone(), |style| bar.with_style(style)))
     }
 
-    /// The bar of the trials: answered, failed, rate, time left.
+    /// The bar of the trials: done, failed of them, rate, time left.
     pub(super) fn trials(&self, trials: usize, answered: usize) -> Bar {
-        let template = "{wide_bar} {pos}/{len} answered{msg} · {per_sec} · {eta} left";
+        let template = "{wide_bar} {pos}/{len} done{msg} · {per_sec} · {eta} left";
         let bar = self
             .bars
             .add(ProgressBar::new(trials as u64).with_position(answered as u64));
@@ -81,7 +81,7 @@ impl Bar {
     }
 
     pub(super) fn failed(&self, failed: usize) {
-        self.0.set_message(format!(", {failed} failed"));
+        self.0.set_message(format!(", {failed} of them failed"));
     }
 }
 

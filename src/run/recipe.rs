@@ -1,6 +1,7 @@
 //! What decides the pixels that are sent, as a digest.
 
 use crate::ask::Format;
+use crate::enhance;
 use crate::synthesis::{self, CameraModel};
 use crate::types::{Condition, Degradation, Digest, EnhancerName, FrameId};
 
@@ -40,7 +41,9 @@ impl Recipe {
             .enhancer
             .as_ref()
             .and_then(|name| self.enhancers.iter().find(|(known, _)| known == name));
-        let mended = mended.map_or("raw".to_owned(), |(_, digest)| digest.to_string());
+        let mended = mended.map_or("raw".to_owned(), |(_, digest)| {
+            format!("enhance {} {digest}", enhance::VERSION)
+        });
         let sent = format!("{} {:?}", self.format, self.max_side);
         let parts = [
             picture.to_string(),

@@ -2,11 +2,16 @@
 
 use super::drive::Ready;
 use crate::ask::AskError;
+use crate::error::Result;
 use crate::score::choice::readings;
-use crate::types::{Answer, Degradation, Outcome, Record, Reply, Variant};
+use crate::types::{Answer, Choices, Degradation, Finish, Outcome, Record, Reply, Variant};
 
 /// The record of a trial: the reply with both readings, or the failure.
-pub(super) fn record(ready: Ready, model: &str, result: Result<Reply, AskError>) -> Record {
+pub(super) fn record(
+    ready: Ready,
+    model: &str,
+    result: std::result::Result<Reply, AskError>,
+) -> Record {
     let Ready {
         trial,
         condition,
@@ -45,14 +50,7 @@ pub(super) fn record(ready: Ready, model: &str, result: Result<Reply, AskError>)
     };
     match result {
         Ok(reply) => {
-            let (strict, lenient) = readings(&reply, &question.choices);
-            record.outcome = match strict {
-                Answer::Chosen(index) if index == record.truth => Outcome::Right,
-                Answer::Chosen(_) => Outcome::Wrong,
-                Answer::Unparsed(_) => Outcome::Unparsed,
-            };
-            record.strict = Some(strict.into());
-            record.lenient = Some(lenient.into());
+            read(&mut record, &reply, &question.choices);
             record.reply = Some(reply.text);
             record.refusal = reply.refusal;
             record.finish = Some(reply.finish);
@@ -67,4 +65,31 @@ pub(super) fn record(ready: Ready, model: &str, result: Result<Reply, AskError>)
         }
     }
     record
+}
+
+/// The record with its kept reply read as this version of the program reads.
+pub(super) fn reread(mut record: Record) -> Result<Record> {
+    if let Some(text) = record.reply.clone() {
+        let choices = Choices::new(record.choices.clone(), record.truth)
+            .map_err(|e| e.at(format!("the record of question {:?}", record.question.0)))?;
+        let reply = Reply {
+            refusal: record.refusal.clone(),
+            finish: record.finish.clone().unwrap_or(Finish::Unknown),
+            ..Reply::local(text)
+        };
+        read(&mut record, &reply, &choices);
+    }
+    Ok(record)
+}
+
+/// Enters both readings of a reply and the outcome, which is the strict one's.
+fn read(record: &mut Record, reply: &Reply, choices: &Choices) {
+    let (strict, lenient) = readings(reply, choices);
+    record.outcome = match strict {
+        Answer::Chosen(index) if index == choices.truth() => Outcome::Right,
+        Answer::Chosen(_) => Outcome::Wrong,
+        Answer::Unparsed(_) => Outcome::Unparsed,
+    };
+    record.strict = Some(strict.into());
+    record.lenient = Some(lenient.into());
 }
