@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 use assert_cmd::Command;
 use serde_json::Value;
@@ -75,12 +76,25 @@ pub fn called(command: &mut Command) -> Called {
     }
 }
 
-/// The records of a run, in the order of the file.
+/// What every line of `records.jsonl` must be.
+static SCHEMA: LazyLock<jsonschema::Validator> = LazyLock::new(|| {
+    let schema = serde_json::from_str(include_str!("../data/record.schema.json")).unwrap();
+    jsonschema::validator_for(&schema).unwrap()
+});
+
+/// The records of a run, in the order of the file; each is held to the schema.
 pub fn records(run: &Path) -> Vec<Value> {
     let text = fs::read_to_string(run.join("records.jsonl")).unwrap();
-    text.lines()
+    let records: Vec<Value> = text
+        .lines()
         .map(|line| serde_json::from_str(line).unwrap())
-        .collect()
+        .collect();
+    for record in &records {
+        if let Err(breach) = SCHEMA.validate(record) {
+            panic!("{breach} at {}: {record}", breach.instance_path());
+        }
+    }
+    records
 }
 
 /// Every file below a folder.
