@@ -2,12 +2,14 @@
 
 use std::io::Cursor;
 
-use image::{
-    ColorType, DynamicImage, ExtendedColorType, ImageDecoder, ImageFormat, ImageReader, Limits,
-};
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 
+use super::jpeg::Outline;
 use crate::error::{Error, Result};
 use crate::types::{Digest, Rgb};
+
+/// What every PNG file begins with.
+const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
 
 /// The most pixels an image may have: a larger one is refused before it is inflated.
 pub const MOST_PIXELS: u64 = 100_000_000;
@@ -44,7 +46,7 @@ impl Picture {
         }
     }
 
-    /// The pixels as 8-bit sRGB.
+    /// The pixels as 8-bit sRGB; a file that is cut or, as a PNG, not as its checksums say is refused.
     ///
     /// Grey becomes three equal channels, a palette its colours, 16 bits the nearest 8, and an alpha channel is dropped
     /// where it is opaque everywhere. CMYK and transparency are refused: there is no one right way to show them. EXIF
@@ -54,7 +56,15 @@ impl Picture {
             Self::Pixels(rgb) => return Ok(rgb.clone()),
             Self::Encoded { bytes, place } => (bytes, place),
         };
-        let image = DynamicImage::from_decoder(decoder(bytes, place)?)
+        let decoder = decoder(bytes, place)?;
+        // The decoders are content with all the samples, the JPEG decoder with less than that.
+        if !ends(bytes) {
+            return Err(Error::data(
+                place,
+                "not a whole image: the file ends before its end mark; copy or export it again",
+            ));
+        }
+        let image = DynamicImage::from_decoder(decoder)
             .map_err(|e| Error::data(place, format_args!("not a whole image: {e}")))?;
         if image.color().has_alpha()
             && !image.to_rgba8().pixels().all(|pixel| pixel.0[3] == u8::MAX)
@@ -90,21 +100,41 @@ fn decoder<'a>(bytes: &'a [u8], place: &str) -> Result<impl ImageDecoder + 'a> {
             "{width} × {height} pixels are more than the {MOST_PIXELS} that are read; shrink it first"
         )));
     }
-    match (decoder.color_type(), decoder.original_color_type()) {
-        (_, ExtendedColorType::Cmyk8 | ExtendedColorType::Cmyk16) => {
-            Err(wrong("a CMYK image; convert it to RGB first".to_owned()))
-        }
-        (ColorType::Rgb32F | ColorType::Rgba32F, _) => Err(wrong(
-            "a floating-point image; 8 or 16 bits expected".to_owned(),
-        )),
-        _ => Ok(decoder),
+    if !bytes.starts_with(PNG) && Outline::of(bytes).components == Some(4) {
+        return Err(wrong(
+            "a CMYK image (four components: CMYK or YCCK); convert it to RGB first".to_owned(),
+        ));
     }
+    Ok(decoder)
+}
+
+/// Whether a PNG or JPEG file goes on until its own end mark.
+fn ends(file: &[u8]) -> bool {
+    match file.strip_prefix(PNG) {
+        Some(chunks) => reaches_iend(chunks),
+        None => Outline::of(file).ends,
+    }
+}
+
+/// Whether the chunks of a PNG file lead to the last one, `IEND`, its checksum included.
+fn reaches_iend(mut chunks: &[u8]) -> bool {
+    while let Some((length, rest)) = chunks.split_first_chunk::<4>()
+        && let Some((kind, rest)) = rest.split_first_chunk::<4>()
+        && let Some((_, rest)) = rest.split_at_checked(u32::from_be_bytes(*length) as usize)
+        && let Some((_checksum, rest)) = rest.split_first_chunk::<4>()
+    {
+        if kind == b"IEND" {
+            return true;
+        }
+        chunks = rest;
+    }
+    false
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use image::{GrayImage, RgbaImage};
+    use image::{GrayImage, RgbImage, RgbaImage};
 
     fn png(image: &DynamicImage) -> Picture {
         let mut bytes = Vec::new();
@@ -171,6 +201,87 @@ mod tests {
             .unwrap_err()
             .to_string();
         assert!(error.starts_with("test.png: not a whole image"), "{error}");
+    }
+
+    /// What is said of bytes that are no whole picture; it is one line that begins with the file.
+    fn fault(bytes: Vec<u8>) -> String {
+        let place = "a.png".into();
+        let error = Picture::Encoded { bytes, place }.decode().unwrap_err();
+        let error = error.to_string();
+        assert!(error.starts_with("a.png: "), "{error}");
+        assert_eq!(error.lines().count(), 1, "{error}");
+        error
+    }
+
+    #[test]
+    fn a_corrupt_png_is_named() {
+        let image = RgbImage::from_fn(64, 64, |x, y| image::Rgb([x as u8, y as u8, (x * y) as u8]));
+        let Picture::Encoded { bytes, .. } = png(&image.into()) else {
+            unreachable!()
+        };
+        let data = bytes.windows(4).position(|four| four == b"IDAT").unwrap() + 4;
+        let end = bytes.len() - 12;
+        for at in [data, data + 40, end - 5] {
+            let mut flipped = bytes.clone();
+            flipped[at] ^= 0x10;
+            assert!(fault(flipped).contains("not a "), "data at {at}");
+        }
+        for at in end - 4..end {
+            let mut flipped = bytes.clone();
+            flipped[at] ^= 1;
+            assert!(fault(flipped).contains("CRC"), "checksum at {at}");
+        }
+        for length in [data + 9, end - 4, end, end + 4, end + 8, end + 11] {
+            let cut = fault(bytes[..length].to_vec());
+            assert!(cut.contains("not a whole image"), "{length}: {cut}");
+        }
+        assert!(
+            Picture::Encoded {
+                bytes,
+                place: String::new()
+            }
+            .decode()
+            .is_ok()
+        );
+    }
+
+    fn jpeg(color: jpeg_encoder::ColorType, channels: usize) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let samples: Vec<u8> = (0..32 * 32 * channels).map(|i| (i * 7) as u8).collect();
+        jpeg_encoder::Encoder::new(&mut bytes, 90)
+            .encode(&samples, 32, 32, color)
+            .unwrap();
+        bytes
+    }
+
+    #[test]
+    fn cmyk_is_refused_by_name() {
+        for color in [
+            jpeg_encoder::ColorType::Cmyk,
+            jpeg_encoder::ColorType::CmykAsYcck,
+        ] {
+            let error = fault(jpeg(color, 4));
+            assert!(
+                error.contains("CMYK") && error.contains("convert it"),
+                "{error}"
+            );
+        }
+        for (color, channels) in [
+            (jpeg_encoder::ColorType::Rgb, 3),
+            (jpeg_encoder::ColorType::Luma, 1),
+        ] {
+            let (bytes, place) = (jpeg(color, channels), String::new());
+            assert!(Picture::Encoded { bytes, place }.decode().is_ok());
+        }
+    }
+
+    #[test]
+    fn a_cut_jpeg_is_named() {
+        let bytes = jpeg(jpeg_encoder::ColorType::Rgb, 3);
+        for length in [bytes.len() / 2, bytes.len() - 40, bytes.len() - 2] {
+            let cut = fault(bytes[..length].to_vec());
+            assert!(cut.contains("not a "), "{length}: {cut}");
+        }
     }
 
     #[test]
