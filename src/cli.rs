@@ -25,6 +25,7 @@ pub struct Cli {
 
 const AFTER_HELP: &str = "\
 Precedence: flag, then environment (DARKQA_CONCURRENCY=16 for --concurrency 16), then --config FILE, then default.
+OPENAI_BASE_URL, OPENAI_API_KEY and ORT_DYLIB_PATH are defaults: whatever names another goes before them.
 Exit codes: 0 everything scored; 1 finished with failures; 2 usage, configuration or a fatal error; 130 interrupted.
 Results go to standard output, progress and logs to standard error (RUST_LOG=darkqa_eval=debug shows more).";
 
@@ -103,10 +104,10 @@ pub struct EnhancementArgs {
     /// Which dark variants are enhanced: noise, ev, both; default: noise
     #[arg(long, value_name = "noise|ev|both")]
     pub llie_on: Option<String>,
-    /// Threads of synthesis and enhancement; default: all cores
+    /// Threads of synthesis and enhancement, 1024 at most; default: all cores
     #[arg(long, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
-    /// The ONNX Runtime library to load; default: found, else installed once by pip (or ORT_DYLIB_PATH)
+    /// The ONNX Runtime library to load; default: ORT_DYLIB_PATH, else found, else installed once by pip
     #[arg(long, value_name = "FILE")]
     pub ort_lib: Option<PathBuf>,
     /// Never install ONNX Runtime
@@ -181,9 +182,9 @@ pub struct SendingArgs {
     /// Shrink images whose longer side is longer than this, in pixels; default: never
     #[arg(long, value_name = "PIXELS")]
     pub max_side: Option<NonZeroU32>,
-    /// Stop after this many failed trials; default: never
+    /// Stop when this many trials have failed; default: never
     #[arg(long, value_name = "N")]
-    pub max_failures: Option<usize>,
+    pub max_failures: Option<NonZeroUsize>,
 }
 
 /// What is left behind.
@@ -193,7 +194,7 @@ pub struct OutputArgs {
     /// The run folder; default: results/TIME-MODEL-DATA-HASH, found again by the same command
     #[arg(long, value_name = "DIR", conflicts_with = "resume")]
     pub out: Option<PathBuf>,
-    /// Go on with the run in this folder
+    /// Go on with the run in this folder; takes the same flags as the run had
     #[arg(long, value_name = "DIR")]
     pub resume: Option<PathBuf>,
     /// Print the summary as JSON instead of a table

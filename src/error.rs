@@ -118,6 +118,16 @@ impl Error {
         }
     }
 
+    /// An error of JSON in one line (counted from 1) of a data file, without the place that serde counts within the line.
+    #[must_use]
+    pub fn json_line(path: &Path, line: usize, error: &serde_json::Error) -> Self {
+        let text = error.to_string();
+        let problem = text
+            .rsplit_once(" at line ")
+            .map_or(&*text, |(problem, _)| problem);
+        Self::line(path, line, problem)
+    }
+
     /// An error at one line (counted from 1) of a data file.
     pub fn line(path: &Path, line: usize, problem: impl Display) -> Self {
         Self::data(format_args!("{}, line {line}", path.display()), problem)

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use clap::error::ErrorKind;
-use darkqa_eval::cli::Cli;
+use darkqa_eval::cli::{Cli, EvaluateArgs};
 use darkqa_eval::config::{self, Config};
 use darkqa_eval::enhance;
 use darkqa_eval::run::progress::{Loudness, Progress};
@@ -42,7 +42,11 @@ fn run() -> ExitCode {
         }
         Err(e) => return fail(&config::one_line(&e)),
     };
-    let loudness = if cli.evaluate.output.quiet {
+    let said = match config::merge(cli.evaluate) {
+        Ok(said) => said,
+        Err(e) => return fail(&e.to_string()),
+    };
+    let loudness = if said.output.quiet {
         Loudness::Quiet
     } else {
         Loudness::Normal
@@ -56,14 +60,15 @@ fn run() -> ExitCode {
         .without_time()
         .with_writer(progress.clone())
         .init();
-    match show(cli, &progress) {
+    match show(said, &progress) {
         Ok(code) => code,
-        Err(e) => fail(&format!("{e:#}")),
+        // An error of this crate says its cause itself.
+        Err(e) => fail(&e.to_string()),
     }
 }
 
-fn show(cli: Cli, progress: &Progress) -> anyhow::Result<ExitCode> {
-    let config = Config::resolve(cli.evaluate)?;
+fn show(said: EvaluateArgs, progress: &Progress) -> anyhow::Result<ExitCode> {
+    let config = Config::resolve(said)?;
     let Verdict { status, output } = evaluate(&config, progress)?;
     let written = std::io::stdout().lock().write_all(output.as_bytes());
     match (status, written) {

@@ -4,6 +4,8 @@
 
 mod support;
 
+use std::collections::BTreeSet;
+
 use serde_json::json;
 use support::onnx;
 use support::run::{Bench, called};
@@ -90,6 +92,18 @@ fn wrong_words_name_their_flag() {
         (
             &["--model", "random", "--out", "a", "--resume", "b"],
             &["--out", "--resume"],
+        ),
+        (
+            &["--resume", "nowhere"],
+            &["--model", "--resume takes the same flags"],
+        ),
+        (
+            &["--model", "random", "--threads", "1025"],
+            &["--threads", "1025", "1024"],
+        ),
+        (
+            &["--model", "random", "--max-failures", "0"],
+            &["--max-failures"],
         ),
         (
             &["--model", "random", "--model", "random"],
@@ -208,4 +222,107 @@ fn wrong_enhancers_name_their_file() {
         "fine.onnx",
     ];
     refused(&bench, &twice, &["--llie", "fine"]);
+}
+
+/// A short run that needs no network.
+const SHORT: [&str; 7] = [
+    "--model", "random", "--limit", "2", "--out", "run", "--json",
+];
+
+/// The different values that the rows of a summary have under a name, as JSON.
+fn said(summary: &str, name: &str) -> BTreeSet<String> {
+    let summary: serde_json::Value = serde_json::from_str(summary).unwrap();
+    let rows = summary["rows"].as_array().unwrap().iter();
+    rows.filter(|row| row["model"] == "random")
+        .map(|row| row[name].to_string())
+        .collect()
+}
+
+#[test]
+fn a_switch_turned_off_above_beats_one_turned_on_below() {
+    for (words, variable, view) in [
+        (&["--config", "c.toml"][..], "false", "\"image\""),
+        (&["--config", "c.toml"], "", "\"blind\""),
+        (&["--blind"], "false", "\"blind\""),
+        (&[], "yes", "\"blind\""),
+        (&[], "0", "\"image\""),
+    ] {
+        let bench = Bench::new();
+        bench.file("c.toml", "blind = true\nlevels = \"L0\"\n");
+        let mut command = bench.command(&SHORT);
+        command.args(words).args(["--levels", "L0"]);
+        let run = called(command.env("DARKQA_BLIND", variable));
+        assert_eq!(run.code, Some(0), "{run:?}");
+        let views = said(&run.stdout, "view");
+        assert_eq!(views, [view.into()].into(), "{words:?} {variable:?}");
+    }
+}
+
+#[test]
+fn the_variables_of_others_are_defaults_below_the_file() {
+    let bench = Bench::new();
+    bench.file("c.toml", "base-url = \"http://of-the-file.test/v1\"\n");
+    let asked = |words: &[&str], ours: &str| {
+        let mut command = bench.command(&["--model", "m"]);
+        command.env("OPENAI_BASE_URL", "http://of-openai.test/v1");
+        called(command.env("DARKQA_BASE_URL", ours).args(words)).stderr
+    };
+    for (words, ours, host) in [
+        (&[][..], "", "of-openai.test"),
+        (&["--config", "c.toml"], "", "of-the-file.test"),
+        (&["--config", "c.toml"], "http://ours.test", "ours.test"),
+    ] {
+        let error = asked(words, ours);
+        assert!(error.contains(host), "{words:?} {ours:?}: {error}");
+    }
+}
+
+#[test]
+fn a_file_of_flags_has_lists_and_names_its_mistakes() {
+    let bench = Bench::new();
+    bench.file(
+        "lists.toml",
+        "levels = [\"L0\", \"L3\"]\nvariant = \"ev\"\nfamilies = [\"color\", \"presence\"]\n",
+    );
+    let listed = bench.complete(&[&SHORT[..], &["--config", "lists.toml"]].concat());
+    assert_eq!(
+        said(&listed, "level"),
+        ["\"L0\"".into(), "\"L3\"".into()].into()
+    );
+    let bench = Bench::new();
+    for (text, words) in [
+        ("seed = 1\nblind = = 2\n", &["c.toml, line 2: "][..]),
+        ("seed = 1\n\nmodel = [\"a\",\n", &["c.toml, line "]),
+        (
+            "config = \"other.toml\"",
+            &["c.toml, config: ", "--config", "one file"],
+        ),
+        ("seed = [1, 2]", &["c.toml, seed: "]),
+        ("blind = 3", &["c.toml, blind: ", "true or false"]),
+    ] {
+        bench.file("c.toml", text);
+        refused(&bench, &["--model", "random", "--config", "c.toml"], words);
+    }
+}
+
+#[test]
+fn a_variable_that_sets_nothing_is_named() {
+    let bench = Bench::new();
+    let run = called(bench.command(&SHORT).env("DARKQA_LEVEL", "L0"));
+    assert_eq!(run.code, Some(0), "{run:?}");
+    let lines: Vec<&str> = run.stderr.lines().collect();
+    assert_eq!(lines.len(), 1, "{lines:?}");
+    assert!(
+        lines[0].contains("DARKQA_LEVEL: ") && lines[0].contains("--level"),
+        "{lines:?}"
+    );
+}
+
+#[test]
+fn a_cause_is_said_once() {
+    let bench = Bench::new();
+    let error = bench
+        .call(&["--model", "random", "--config", "nowhere.toml"])
+        .stderr;
+    assert_eq!(error.matches("os error").count(), 1, "{error}");
 }

@@ -568,31 +568,39 @@ fn ready_made_sets_are_read() {
 }
 
 #[test]
-fn a_broken_image_fails_its_own_trials_alone() {
+fn a_broken_image_is_found_before_anything_is_asked() {
     let bench = Bench::new();
     frames(&bench);
     let whole = png(20);
-    bench.file("frames/a.png", &whole[..whole.len() - 40]);
-    let run = bench.call(&[
-        "--data", "frames", "--model", "random", "--levels", "L0,L1", "--out", "run",
-    ]);
-    assert_eq!(run.code, Some(1), "{run:?}");
-    let records = records(&bench.path("run"));
-    assert!(
-        records
-            .iter()
-            .all(|record| (text(record, "outcome") == "failed")
-                == (text(record, "frame") == "a.png")),
-        "{records:?}"
-    );
-    let failed = records
-        .iter()
-        .find(|record| record["outcome"] == "failed")
-        .unwrap();
-    assert!(
-        text(&failed["failure"], "message").contains("a.png: not a whole image"),
-        "{failed}"
-    );
+    let endpoint = MockEndpoint::start([Answer::text("A")]);
+    let url = endpoint.base_url();
+    let mut corrupt = whole.clone();
+    let middle = corrupt.len() / 2;
+    corrupt[middle] ^= 0x40;
+    for (broken, says) in [
+        (&whole[..whole.len() - 40], "ends before"),
+        (&corrupt, "checksum"),
+    ] {
+        bench.file("frames/a.png", broken);
+        let run = bench.call(&[
+            "--data",
+            "frames",
+            "--model",
+            "m",
+            "--base-url",
+            &url,
+            "--levels",
+            "L0",
+            "--out",
+            "run",
+        ]);
+        assert_eq!(run.code, Some(2), "{run:?}");
+        assert!(
+            run.stderr.contains("a.png: not a whole image") && run.stderr.contains(says),
+            "{run:?}"
+        );
+    }
+    assert_eq!(endpoint.requests().len(), 0);
 }
 
 #[test]

@@ -101,6 +101,8 @@ impl Payload {
     /// The bytes of a PNG file as they are, without decoding or encoding: only where that is the same as encoding its
     /// pixels, which is 8-bit RGB with nothing in the file that changes how it is shown, nothing that says more than its
     /// pixels do, and no side beyond `max_side`. `None` for every other file.
+    ///
+    /// Whether the file is whole is not looked at: it must have been decoded before.
     #[must_use]
     pub fn of_plain_png(file: &[u8], max_side: Option<NonZeroU32>) -> Option<Self> {
         let (width, height) = plain_png::size(file)?;

@@ -38,8 +38,8 @@ fn plain_header(header: &[u8]) -> Option<(u32, u32)> {
     plain.then_some(size)
 }
 
-/// The kind and content of the first chunk, and what is behind it; `None` where the file ends too early. Checksums are for the
-/// decoder, which every frame goes through when it is loaded.
+/// The kind and content of the first chunk, and what is behind it; `None` where the file ends too early. Checksums are not
+/// looked at: whoever sends a file as it is has held it to them before.
 fn chunk(bytes: &[u8]) -> Option<([u8; 4], &[u8], &[u8])> {
     let (length, rest) = bytes.split_first_chunk::<4>()?;
     let (kind, rest) = rest.split_first_chunk::<4>()?;

@@ -58,14 +58,15 @@ impl Script {
     /// With file and line where a line is broken or answers to what an earlier one answered to.
     pub fn load(path: &Path) -> Result<Self> {
         let text = fs::read_to_string(path).map_err(|error| Error::file(path, "read", error))?;
+        let text = text.trim_start_matches('\u{feff}');
         let mut replies = HashMap::new();
         let mut lines: HashMap<Cue, usize> = HashMap::new();
         for (number, line) in (1..).zip(text.lines()) {
             if line.trim().is_empty() {
                 continue;
             }
-            let line: Line =
-                serde_json::from_str(line).map_err(|error| Error::line(path, number, error))?;
+            let line: Line = serde_json::from_str(line)
+                .map_err(|error| Error::json_line(path, number, &error))?;
             let (cue, reply) = line.read().ok_or_else(|| {
                 Error::line(
                     path,
@@ -118,5 +119,35 @@ impl Script {
                 reach: Reach::Trial,
             }
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn load(text: &str) -> Result<Script> {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        fs::write(file.path(), text).unwrap();
+        Script::load(file.path())
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_no_part_of_the_first_line() {
+        let line = r#"{"default": "A"}"#;
+        let marked = load(&format!("\u{feff}{line}\n")).unwrap();
+        assert_eq!(
+            marked.digest(),
+            load(&format!("{line}\n")).unwrap().digest()
+        );
+    }
+
+    #[test]
+    fn a_broken_line_is_named_once() {
+        let error = load("\n{\n").unwrap_err().to_string();
+        assert!(
+            error.ends_with(", line 2: EOF while parsing an object"),
+            "{error}"
+        );
     }
 }

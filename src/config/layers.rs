@@ -3,6 +3,7 @@
 //! All three are read by the one parser of [`crate::cli`], so that a value is understood alike wherever it stands, and
 //! its error names where that is.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::{env, fs};
 
@@ -17,49 +18,111 @@ use crate::error::{Error, Result};
 /// What every variable of the environment begins with.
 const PREFIX: &str = "DARKQA_";
 
+/// The flags whose one text is a list with commas: a file may write it as a list.
+const WITH_COMMAS: [&str; 2] = ["levels", "families"];
+
+/// What one place says.
+#[derive(Debug, Default)]
+struct Layer {
+    said: EvaluateArgs,
+    /// The switches that it turns off, by their fields; those that it turns on stand in `said`.
+    off: BTreeSet<String>,
+}
+
 /// Fills what the flags leave open from the environment, and what that leaves open from the `--config` file.
-pub(super) fn merge(flags: EvaluateArgs) -> Result<EvaluateArgs> {
-    let said = or(flags, environment(|name| env::var(name).ok())?);
-    match said.output.config.clone() {
-        Some(path) => Ok(or(said, file(&path)?)),
-        None => Ok(said),
+///
+/// # Errors
+/// [`Error::Usage`] with the variable or the entry of the file that cannot be used.
+pub fn merge(flags: EvaluateArgs) -> Result<EvaluateArgs> {
+    let flags = Layer {
+        said: flags,
+        off: BTreeSet::new(),
+    };
+    let layer = or(flags, environment(|name| env::var(name).ok())?);
+    let layer = match layer.said.output.config.clone() {
+        Some(path) => or(layer, file(&path)?),
+        None => layer,
+    };
+    Ok(layer.said)
+}
+
+/// Warns of variables that look like settings and are none.
+pub(super) fn warn_of_strangers() {
+    let names = env::vars_os().map(|(name, _)| name.to_string_lossy().into_owned());
+    for name in strangers(names) {
+        let flag = name[PREFIX.len()..].replace('_', "-").to_lowercase();
+        tracing::warn!("{name}: there is no flag --{flag}, so this variable sets nothing");
     }
+}
+
+/// The variables that begin as settings do and name no flag.
+fn strangers(names: impl Iterator<Item = String>) -> Vec<String> {
+    let known: Vec<String> = flags().iter().map(|flag| variable(flag)).collect();
+    let ours = names.filter(|name| name.starts_with(PREFIX));
+    ours.filter(|name| !known.contains(name)).collect()
+}
+
+fn flags() -> Vec<String> {
+    let command = Cli::command();
+    let flags = command.get_arguments().filter_map(Arg::get_long);
+    flags.map(str::to_owned).collect()
+}
+
+/// The variable of a flag.
+fn variable(flag: &str) -> String {
+    format!("{PREFIX}{}", flag.replace('-', "_").to_uppercase())
 }
 
 /// The flags that the environment sets: `DARKQA_MAX_TOKENS` is `--max-tokens`; a list is separated by commas.
-fn environment(variable: impl Fn(&str) -> Option<String>) -> Result<EvaluateArgs> {
-    let mut said = EvaluateArgs::default();
-    for flag in Cli::command().get_arguments().filter_map(Arg::get_long) {
-        let name = format!("{PREFIX}{}", flag.replace('-', "_").to_uppercase());
-        if let Some(text) = variable(&name).filter(|text| !text.is_empty()) {
-            said = or(said, parse(&name, flag, &split(flag, &text))?);
+fn environment(value: impl Fn(&str) -> Option<String>) -> Result<Layer> {
+    let mut layer = Layer::default();
+    for flag in flags() {
+        let name = variable(&flag);
+        if let Some(text) = value(&name).filter(|text| !text.is_empty()) {
+            layer = or(layer, parse(&name, &flag, &split(&flag, &text))?);
         }
     }
-    Ok(said)
+    Ok(layer)
 }
 
 /// The flags that a TOML file sets: `max-tokens = 16`, `model = ["a", "b"]`, `blind = true`.
-fn file(path: &Path) -> Result<EvaluateArgs> {
+fn file(path: &Path) -> Result<Layer> {
     let text = fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))?;
-    let table: Table = text
-        .parse()
-        .map_err(|e: toml::de::Error| Error::data(path.display(), e.to_string().trim_end()))?;
-    let mut said = EvaluateArgs::default();
+    let table: Table = text.parse().map_err(|e| broken(path, &text, &e))?;
+    let mut layer = Layer::default();
     for (key, value) in &table {
         let origin = format!("{}, {key}", path.display());
+        let flag = key.replace('_', "-");
+        if flag == "config" {
+            return Err(Error::usage(
+                origin,
+                "a file of flags cannot name another; --config takes one file",
+            ));
+        }
         let texts = match value {
             Value::Array(values) => values.iter().map(text_of).collect(),
             single => text_of(single).map(|text| vec![text]),
         };
-        let texts = texts.ok_or_else(|| {
+        let mut texts: Vec<String> = texts.ok_or_else(|| {
             Error::usage(
                 &origin,
                 "a text, a number, a switch or a list of them expected",
             )
         })?;
-        said = or(said, parse(&origin, &key.replace('_', "-"), &texts)?);
+        if WITH_COMMAS.contains(&flag.as_str()) {
+            texts = vec![texts.join(",")];
+        }
+        layer = or(layer, parse(&origin, &flag, &texts)?);
     }
-    Ok(said)
+    Ok(layer)
+}
+
+/// What is wrong with a TOML file, in one line that names its own.
+fn broken(path: &Path, text: &str, error: &toml::de::Error) -> Error {
+    let before = error.span().and_then(|span| text.get(..span.start));
+    let line = before.unwrap_or_default().matches('\n').count() + 1;
+    let problem: Vec<&str> = error.message().lines().map(str::trim).collect();
+    Error::line(path, line, format_args!("no TOML: {}", problem.join(", ")))
 }
 
 fn text_of(value: &Value) -> Option<String> {
@@ -87,14 +150,18 @@ fn argument(flag: &str) -> Option<Arg> {
         .cloned()
 }
 
-/// Reads one flag as if it had been typed.
-fn parse(origin: &str, flag: &str, values: &[String]) -> Result<EvaluateArgs> {
+/// Reads one flag as if it had been typed; a switch can be turned off, too.
+fn parse(origin: &str, flag: &str, values: &[String]) -> Result<Layer> {
     let argument = argument(flag)
         .ok_or_else(|| Error::usage(origin, format_args!("there is no flag --{flag}")))?;
+    let mut off = BTreeSet::new();
     let words: Vec<String> = if matches!(argument.get_action(), ArgAction::SetTrue) {
         match values {
             [yes] if matches!(yes.as_str(), "1" | "true" | "yes") => vec![format!("--{flag}")],
-            [no] if matches!(no.as_str(), "0" | "false" | "no") => Vec::new(),
+            [no] if matches!(no.as_str(), "0" | "false" | "no") => {
+                off.insert(flag.replace('-', "_"));
+                Vec::new()
+            }
             _ => return Err(Error::usage(origin, "true or false expected")),
         }
     } else {
@@ -103,9 +170,10 @@ fn parse(origin: &str, flag: &str, values: &[String]) -> Result<EvaluateArgs> {
             .map(|value| format!("--{flag}={value}"))
             .collect()
     };
-    let said = Cli::try_parse_from(std::iter::once("darkqa-eval".to_owned()).chain(words));
-    said.map(|cli| cli.evaluate)
-        .map_err(|e| Error::usage(origin, one_line(&e)))
+    let said = Cli::try_parse_from(std::iter::once("darkqa-eval".to_owned()).chain(words))
+        .map_err(|e| Error::usage(origin, one_line(&e)))?
+        .evaluate;
+    Ok(Layer { said, off })
 }
 
 /// What clap says, in one line without its advice.
@@ -120,33 +188,35 @@ pub fn one_line(error: &clap::Error) -> String {
     line.trim_start_matches("error: ").to_owned()
 }
 
-/// The fields of one structure, each from the first of two where it is set there.
+/// The fields of one structure, each from the first of two where it is set there; a switch that is `$off` there is set.
 macro_rules! first_set {
-    ($kind:ident { $($single:ident),* ; $($list:ident),* ; $($switch:ident),* }, $first:expr, $second:expr) => {{
+    ($kind:ident { $($single:ident),* ; $($list:ident),* ; $($switch:ident),* }, $first:expr, $second:expr, $off:expr) => {{
         let (first, second) = ($first, $second);
         $kind {
             $($single: first.$single.or(second.$single),)*
             $($list: if first.$list.is_empty() { second.$list } else { first.$list },)*
-            $($switch: first.$switch || second.$switch,)*
+            $($switch: first.$switch || second.$switch && !$off.contains(stringify!($switch)),)*
         }
     }};
 }
 
-fn or(first: EvaluateArgs, second: EvaluateArgs) -> EvaluateArgs {
+fn or(first: Layer, second: Layer) -> Layer {
+    let (off, mut below) = (first.off, second.off);
+    let (first, second) = (first.said, second.said);
     // A key named in one layer hides every other way to name one in the layers below.
-    let mut below = second.model;
+    let mut model = second.model;
     if first.model.api_key_env.is_some() || first.model.api_key_file.is_some() {
-        (below.api_key_env, below.api_key_file) = (None, None);
+        (model.api_key_env, model.api_key_file) = (None, None);
     }
-    let mut place = second.output;
+    let mut output = second.output;
     if first.output.out.is_some() || first.output.resume.is_some() {
-        (place.out, place.resume) = (None, None);
+        (output.out, output.resume) = (None, None);
     }
-    EvaluateArgs {
-        data: first_set!(DataArgs { data, questions, limit, families; ; }, first.data, second.data),
-        light: first_set!(LightArgs { levels, variant, seed, gain, ratio; ; }, first.light, second.light),
+    let said = EvaluateArgs {
+        data: first_set!(DataArgs { data, questions, limit, families; ; }, first.data, second.data, off),
+        light: first_set!(LightArgs { levels, variant, seed, gain, ratio; ; }, first.light, second.light, off),
         enhancement: first_set!(
-            EnhancementArgs { llie_on, threads, ort_lib; llie; offline }, first.enhancement, second.enhancement
+            EnhancementArgs { llie_on, threads, ort_lib; llie; offline }, first.enhancement, second.enhancement, off
         ),
         model: first_set!(
             ModelArgs {
@@ -154,27 +224,31 @@ fn or(first: EvaluateArgs, second: EvaluateArgs) -> EvaluateArgs {
                 model, blind_model;
                 blind, allow_http
             },
-            first.model, below
+            first.model, model, off
         ),
         sending: first_set!(
             SendingArgs { concurrency, timeout, retries, max_wait, image, max_side, max_failures; ; },
-            first.sending, second.sending
+            first.sending, second.sending, off
         ),
-        output: first_set!(OutputArgs { out, resume, config; ; json, quiet }, first.output, place),
-    }
+        output: first_set!(OutputArgs { out, resume, config; ; json, quiet }, first.output, output, off),
+    };
+    below.extend(off);
+    Layer { said, off: below }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn typed(words: &[&str]) -> EvaluateArgs {
-        Cli::try_parse_from(std::iter::once(&"darkqa-eval").chain(words))
-            .unwrap()
-            .evaluate
+    fn typed(words: &[&str]) -> Layer {
+        let cli = Cli::try_parse_from(std::iter::once(&"darkqa-eval").chain(words)).unwrap();
+        Layer {
+            said: cli.evaluate,
+            off: BTreeSet::new(),
+        }
     }
 
-    fn from_file(text: &str) -> Result<EvaluateArgs> {
+    fn from_file(text: &str) -> Result<Layer> {
         let path = tempfile::NamedTempFile::new().unwrap();
         fs::write(path.path(), text).unwrap();
         file(path.path())
@@ -191,7 +265,7 @@ mod tests {
         });
         let file =
             from_file("seed = 3\ngain = 1\nratio = 150\nmodel = [\"c\"]\nquiet = false\n").unwrap();
-        let said = or(or(typed(&["--seed", "1"]), environment.unwrap()), file);
+        let said = or(or(typed(&["--seed", "1"]), environment.unwrap()), file).said;
         assert_eq!(
             (said.light.seed, said.light.gain, said.light.ratio),
             (Some(1), Some(0.5), Some(150.0))
@@ -199,6 +273,40 @@ mod tests {
         assert_eq!(
             (said.model.model, said.model.blind, said.output.quiet),
             (vec!["a".into(), "b".into()], true, false)
+        );
+    }
+
+    #[test]
+    fn the_first_to_speak_of_a_switch_decides() {
+        let layer = |text: &str| match text {
+            "" => Layer::default(),
+            value => from_file(&format!("allow-http = {value}")).unwrap(),
+        };
+        for (layers, expected) in [
+            (["false", "true", ""], false),
+            (["", "false", "true"], false),
+            (["true", "false", "false"], true),
+            (["", "true", "false"], true),
+            (["", "", ""], false),
+        ] {
+            let [first, second, third] = layers.map(layer);
+            let said = or(or(first, second), third).said;
+            assert_eq!(said.model.allow_http, expected, "{layers:?}");
+        }
+    }
+
+    #[test]
+    fn only_flags_are_variables() {
+        let names = [
+            "DARKQA_MAX_TOKENS",
+            "DARKQA_MAX_TOKEN",
+            "OPENAI_X",
+            "DARKQA_",
+            "DARKQA_seed",
+        ];
+        assert_eq!(
+            strangers(names.into_iter().map(str::to_owned)),
+            ["DARKQA_MAX_TOKEN", "DARKQA_", "DARKQA_seed"]
         );
     }
 

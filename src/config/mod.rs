@@ -8,7 +8,7 @@ use std::str::FromStr;
 use std::time::Duration;
 use std::{env, fs};
 
-pub use layers::one_line;
+pub use layers::{merge, one_line};
 
 use crate::ask::{BaseUrl, Format, Parameters, Secret, Sending};
 use crate::cli::{
@@ -22,6 +22,9 @@ use crate::types::{Family, Level, Variants, View};
 
 /// How many requests are in flight where nobody says otherwise.
 const CONCURRENCY: NonZeroUsize = NonZeroUsize::new(8).unwrap();
+
+/// The most threads that can be asked for: more than any machine has use for, fewer than stop one.
+const MOST_THREADS: usize = 1024;
 
 /// The endpoint where nobody says otherwise.
 const BASE_URL: &str = "https://api.openai.com/v1";
@@ -137,7 +140,7 @@ pub struct Images {
 pub struct Pace {
     /// Requests in flight at once.
     pub concurrency: NonZeroUsize,
-    /// The most failed trials that are borne.
+    /// So many failed trials end the run.
     pub max_failures: Option<usize>,
 }
 
@@ -171,12 +174,18 @@ pub struct Output {
 }
 
 impl Config {
-    /// Resolves what was typed against environment, configuration file and defaults.
+    /// Checks what was said by flags, environment and file (see [`merge`]), and fills in the defaults.
+    ///
+    /// The variables that other programs use, too (`OPENAI_BASE_URL`, `OPENAI_API_KEY`, `ORT_DYLIB_PATH`), are among
+    /// the defaults. A variable that begins as ours do and sets nothing is warned of.
     ///
     /// # Errors
-    /// [`Error::Usage`] with the flag, variable or line that cannot be used.
-    pub fn resolve(flags: EvaluateArgs) -> Result<Self> {
-        let said = layers::merge(flags)?;
+    /// [`Error::Usage`] with the flag that cannot be used.
+    pub fn resolve(said: EvaluateArgs) -> Result<Self> {
+        layers::warn_of_strangers();
+        if said.model.model.is_empty() && said.model.blind_model.is_empty() {
+            return Err(nameless(&said.output));
+        }
         Ok(Self {
             data: data(said.data),
             light: light(&said.light)?,
@@ -190,6 +199,15 @@ impl Config {
             output: output(said.output),
         })
     }
+}
+
+fn nameless(output: &OutputArgs) -> Error {
+    let mend = if output.resume.is_some() {
+        "--resume takes the same flags as the run had, the model's name among them"
+    } else {
+        "a model's name at the endpoint, or random to try without one"
+    };
+    Error::usage("--model", format_args!("no model is named: {mend}"))
 }
 
 fn data(said: DataArgs) -> Data {
@@ -260,6 +278,12 @@ fn enhancement(said: EnhancementArgs) -> Result<Enhancement> {
             .filter(|path| !path.is_empty())
             .map(PathBuf::from)
     });
+    if let Some(threads) = said.threads.filter(|n| n.get() > MOST_THREADS) {
+        return Err(Error::usage(
+            "--threads",
+            format_args!("{threads} are too many; {MOST_THREADS} at most"),
+        ));
+    }
     Ok(Enhancement {
         models: said.llie,
         on: parsed("--llie-on", said.llie_on.as_deref())?.unwrap_or(Variants::Noise),
@@ -286,12 +310,6 @@ fn ask(said: ModelArgs, sending: &SendingArgs) -> Result<Ask> {
         names("--model", &said.model)?,
         names("--blind-model", &said.blind_model)?,
     );
-    if models.is_empty() && blind_models.is_empty() {
-        return Err(Error::usage(
-            "--model",
-            "no model is named: a model's name at the endpoint, or random to try without one",
-        ));
-    }
     let remote = models
         .iter()
         .chain(&blind_models)
@@ -409,7 +427,7 @@ fn set(variable: &str) -> Option<String> {
 fn pace(said: &SendingArgs) -> Pace {
     Pace {
         concurrency: said.concurrency.unwrap_or(CONCURRENCY),
-        max_failures: said.max_failures,
+        max_failures: said.max_failures.map(NonZeroUsize::get),
     }
 }
 
@@ -453,11 +471,8 @@ mod tests {
     use crate::cli::Cli;
 
     fn resolve(words: &[&str]) -> Result<Config> {
-        Config::resolve(
-            Cli::try_parse_from(std::iter::once(&"darkqa-eval").chain(words))
-                .unwrap()
-                .evaluate,
-        )
+        let cli = Cli::try_parse_from(std::iter::once(&"darkqa-eval").chain(words)).unwrap();
+        Config::resolve(merge(cli.evaluate)?)
     }
 
     #[test]

@@ -96,11 +96,13 @@ fn listed(folder: &Path, list: &Path) -> Result<BTreeMap<FrameId, Source>> {
     let text = fs::read_to_string(list).map_err(|e| Error::file(list, "read", e))?;
     let mut sources = BTreeMap::new();
     for (i, line) in text
+        .trim_start_matches('\u{feff}')
         .lines()
         .enumerate()
         .filter(|(_, line)| !line.trim().is_empty())
     {
-        let line: Line = serde_json::from_str(line).map_err(|e| Error::line(list, i + 1, e))?;
+        let line: Line =
+            serde_json::from_str(line).map_err(|e| Error::json_line(list, i + 1, &e))?;
         let id = FrameId(format!("{}/{}", line.scene, line.frame));
         let source = line
             .source(folder)
@@ -201,5 +203,25 @@ mod tests {
                 "{error}"
             );
         }
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_no_part_of_the_first_line() {
+        let folder = folder("");
+        let list = folder.path().join(FRAMES);
+        let text = fs::read_to_string(&list).unwrap();
+        fs::write(&list, format!("\u{feff}{}", text.trim_start())).unwrap();
+        assert!(open(folder.path(), None).is_ok());
+    }
+
+    #[test]
+    fn a_broken_line_is_named_once() {
+        let folder = folder("");
+        fs::write(folder.path().join(FRAMES), "\n{\n").unwrap();
+        let error = open(folder.path(), None).unwrap_err().to_string();
+        assert!(
+            error.ends_with("frames.jsonl, line 2: EOF while parsing an object"),
+            "{error}"
+        );
     }
 }

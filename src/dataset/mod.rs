@@ -4,6 +4,7 @@
 //! ready-made multiple-choice set ([`multiple_choice`]), or nothing, which is the built-in rooms ([`rooms`]).
 
 pub mod frames;
+mod jpeg;
 mod maps;
 pub mod multiple_choice;
 mod npy;
@@ -96,7 +97,7 @@ impl Dataset {
         Ok(dataset)
     }
 
-    /// A short name for tables and folders: the folder's or file's own, without its ending.
+    /// A short name for tables and folders: the folder's own, or the file's without its ending.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
@@ -168,11 +169,37 @@ fn refuse(questions: Option<&Path>, why: &str) -> Result<()> {
     })
 }
 
-/// The name of a file or folder without its ending.
+/// The name of a folder, or of a file without its ending.
 fn stem(path: &Path) -> String {
     let named = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-    named.file_stem().map_or_else(
+    let name = if named.is_dir() {
+        named.file_name()
+    } else {
+        named.file_stem()
+    };
+    name.map_or_else(
         || "data".to_owned(),
-        |stem| stem.to_string_lossy().into_owned(),
+        |name| name.to_string_lossy().into_owned(),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_file_loses_its_ending() {
+        let folder = tempfile::tempdir().unwrap();
+        let (inner, set) = (
+            folder.path().join("data.v1"),
+            folder.path().join("set.v2.tsv"),
+        );
+        fs::create_dir(&inner).unwrap();
+        fs::write(&set, "").unwrap();
+        assert_eq!(
+            (stem(&inner), stem(&set)),
+            ("data.v1".into(), "set.v2".into())
+        );
+        assert_eq!(stem(&inner.join(".")), "data.v1");
+    }
 }

@@ -4,10 +4,14 @@
 //! an optional `hint`, the choices in the columns `A`, `B`, … (an empty cell is no choice), `answer` (a letter),
 //! `category`, and either `image_path` or `image`, which holds the file in base64 or the index of the row that does.
 //! `.jsonl` as [`questions`] describes, with `image`. Paths are relative to the file.
+//!
+//! A frame is named by the path of its image, spelled in one way whatever way the set spells it: relative to the set's
+//! folder, with `/`, without `.` and without `..` that leads back. An absolute path into that folder becomes relative;
+//! one to elsewhere stays absolute. So one file is one frame, with one noise.
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::path::{Path, PathBuf};
+use std::path::{self, Component, Path, PathBuf};
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -49,28 +53,82 @@ pub(super) fn open(path: &Path) -> Result<Dataset> {
 type Parts = (BTreeMap<FrameId, Source>, Vec<Question>);
 
 fn jsonl(path: &Path) -> Result<Parts> {
-    let questions = questions::read(path)?;
-    let beside = path.parent().unwrap_or(Path::new("."));
+    let mut questions = questions::read(path)?;
+    let beside = Beside::of(path);
     let mut sources = BTreeMap::new();
-    for question in &questions {
-        let file = existing(beside, &question.frame.0).map_err(|problem| {
+    for question in &mut questions {
+        let (frame, file) = beside.image(&question.frame.0).map_err(|problem| {
             Error::data(
                 path.display(),
                 format_args!("question {:?}: {problem}", question.id.0),
             )
         })?;
-        sources.insert(question.frame.clone(), Source::image(file));
+        question.frame = frame.clone();
+        sources.insert(frame, Source::image(file));
     }
     Ok((sources, questions))
 }
 
-fn existing(beside: &Path, image: &str) -> Result<PathBuf, String> {
-    let file = beside.join(image);
-    if file.is_file() {
-        Ok(file)
-    } else {
-        Err(format!("no such image: {}", file.display()))
+/// The folder of a set, in which its paths begin.
+struct Beside<'a> {
+    folder: &'a Path,
+    /// The same, absolute, without `.` and `..`.
+    absolute: PathBuf,
+}
+
+impl<'a> Beside<'a> {
+    fn of(set: &'a Path) -> Self {
+        let folder = set.parent().unwrap_or(Path::new(""));
+        let absolute = path::absolute(set).unwrap_or_else(|_| set.to_owned());
+        let absolute = plain(absolute.parent().unwrap_or(Path::new("")));
+        Self { folder, absolute }
     }
+
+    /// The name and the file of the image that a set spells so.
+    fn image(&self, spelled: &str) -> Result<(FrameId, PathBuf), String> {
+        if spelled.trim().is_empty() {
+            return Err("no image is named".to_owned());
+        }
+        let file = self.folder.join(spelled);
+        if !file.is_file() {
+            return Err(format!("no such image: {}", file.display()));
+        }
+        let named = self.named(Path::new(spelled));
+        // Behind a link to a folder, `..` leads elsewhere than the words say: such a path keeps its spelling.
+        let same = named == spelled
+            || file.canonicalize().ok() == self.folder.join(&named).canonicalize().ok();
+        let name = if same { named } else { spelled.to_owned() };
+        Ok((FrameId(name), file))
+    }
+
+    /// The one spelling of a path, by its words alone.
+    fn named(&self, spelled: &Path) -> String {
+        let absolute = plain(&self.absolute.join(spelled));
+        match absolute.strip_prefix(&self.absolute) {
+            Ok(within) => slashed(within),
+            Err(_) => slashed(&plain(spelled)),
+        }
+    }
+}
+
+/// A path without `.`, and without `..` behind a folder that it leaves.
+fn plain(path: &Path) -> PathBuf {
+    let mut plain = PathBuf::new();
+    for part in path.components() {
+        match (part, plain.components().next_back()) {
+            (Component::CurDir, _) | (Component::ParentDir, Some(Component::RootDir)) => {}
+            (Component::ParentDir, Some(Component::Normal(_))) => {
+                plain.pop();
+            }
+            _ => plain.push(part),
+        }
+    }
+    plain
+}
+
+/// A path with `/` between its parts, on every system.
+fn slashed(path: &Path) -> String {
+    path.to_string_lossy().replace(path::MAIN_SEPARATOR, "/")
 }
 
 /// The columns of a table by what they hold.
@@ -113,7 +171,8 @@ impl Columns {
 
     fn question(&self, row: &StringRecord, frame: FrameId) -> Result<Question> {
         let cell = |column: usize| row.get(column).unwrap_or_default();
-        let id = cell(self.index).trim().to_owned();
+        let id = filled(row, self.index, "index")?.to_owned();
+        filled(row, self.question, "question")?;
         let answer = cell(self.answer).trim();
         let shown: Vec<(char, &str)> = self
             .choices
@@ -146,6 +205,7 @@ impl Columns {
             .map(cell)
             .filter(|name| !name.trim().is_empty())
             .map_or_else(questions::other, Family::from);
+        let family = questions::checked(family)?;
         Ok(Question {
             id: QuestionId(id),
             frame,
@@ -154,6 +214,17 @@ impl Columns {
             choices,
             evidence: serde_json::Value::Null,
         })
+    }
+}
+
+/// A cell without the space around it, which must not be empty.
+fn filled<'a>(row: &'a StringRecord, column: usize, name: &str) -> Result<&'a str> {
+    match row.get(column).unwrap_or_default().trim() {
+        "" => Err(Error::data(
+            name,
+            format_args!("the column {name:?} is empty"),
+        )),
+        text => Ok(text),
     }
 }
 
@@ -176,7 +247,7 @@ fn tsv(path: &Path) -> Result<Parts> {
             format_args!("not a VLMEvalKit table: {problem}"),
         )
     })?;
-    let beside = path.parent().unwrap_or(Path::new("."));
+    let beside = Beside::of(path);
     let (mut sources, mut questions) = (BTreeMap::new(), Vec::new());
     let mut row = StringRecord::new();
     while reader
@@ -184,25 +255,22 @@ fn tsv(path: &Path) -> Result<Parts> {
         .map_err(|e| Error::data(path.display(), e))?
     {
         let position = row.position().cloned().unwrap_or_else(Position::new);
-        let line = |problem: String| Error::line(path, position.line() as usize, problem);
+        let place = format!("{}, line {}", path.display(), position.line());
+        let at = |e: Error| e.at(&place);
         let frame = match columns.image {
             ImageColumn::Path(column) => {
-                let image = row.get(column).unwrap_or_default();
-                let frame = FrameId(image.to_owned());
-                if !sources.contains_key(&frame) {
-                    sources.insert(
-                        frame.clone(),
-                        Source::image(existing(beside, image).map_err(line)?),
-                    );
-                }
+                let image = filled(&row, column, "image_path").map_err(at)?;
+                let (frame, file) = beside
+                    .image(image)
+                    .map_err(|problem| Error::data(&place, problem))?;
+                sources.insert(frame.clone(), Source::image(file));
                 frame
             }
-            ImageColumn::Base64(column) => match row.get(column).unwrap_or_default().trim() {
-                "" => return Err(line("the column \"image\" is empty".to_owned())),
+            ImageColumn::Base64(column) => match filled(&row, column, "image").map_err(at)? {
                 index if index.len() <= LONGEST_INDEX => FrameId(index.to_owned()),
                 _ => {
-                    let frame =
-                        FrameId(row.get(columns.index).unwrap_or_default().trim().to_owned());
+                    let index = filled(&row, columns.index, "index").map_err(at)?;
+                    let frame = FrameId(index.to_owned());
                     let cell = Cell {
                         file: path.to_owned(),
                         position: position.clone(),
@@ -213,8 +281,7 @@ fn tsv(path: &Path) -> Result<Parts> {
                 }
             },
         };
-        let place = format!("{}, line {}", path.display(), position.line());
-        questions.push(columns.question(&row, frame).map_err(|e| e.at(place))?);
+        questions.push(columns.question(&row, frame).map_err(at)?);
     }
     if let Some(stray) = questions
         .iter()
@@ -264,5 +331,186 @@ impl Cell {
             .decode(&text)
             .map_err(|e| Error::data(&place, format_args!("the image is not base64: {e}")))?;
         Ok(Picture::Encoded { bytes, place })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use image::RgbImage;
+
+    use super::*;
+
+    /// A set of this name and text, with two images in a folder beside it and one outside.
+    struct Scene(tempfile::TempDir);
+
+    impl Scene {
+        fn new(name: &str, text: &str) -> Self {
+            let folder = tempfile::tempdir().unwrap();
+            let scene = Self(folder);
+            fs::create_dir_all(scene.path("set/fr")).unwrap();
+            for (file, sample) in [("set/fr/a.png", 1), ("set/fr/b.png", 2), ("out.png", 3)] {
+                let image = RgbImage::from_pixel(2, 1, image::Rgb([sample; 3]));
+                image.save(scene.path(file)).unwrap();
+            }
+            fs::write(scene.path("set").join(name), text).unwrap();
+            scene
+        }
+
+        fn path(&self, name: &str) -> PathBuf {
+            self.0.path().join(name)
+        }
+
+        fn open(&self, name: &str) -> Result<Dataset> {
+            open(&self.path("set").join(name))
+        }
+    }
+
+    fn frames(set: &Dataset) -> Vec<&str> {
+        let questions = set.questions().iter();
+        questions
+            .map(|question| question.frame.0.as_str())
+            .collect()
+    }
+
+    #[test]
+    fn one_file_is_one_frame_however_it_is_spelled() {
+        let outside = Scene::new("x", "");
+        let absolute = outside.path("out.png").display().to_string();
+        let spellings = [
+            "fr/a.png",
+            "./fr/a.png",
+            "fr//./a.png",
+            "fr/../fr/a.png",
+            "../set/fr/a.png",
+            "HERE/fr/a.png",
+            "HERE/../set/fr/a.png",
+            "fr/b.png",
+            "../out.png",
+            "fr/../../out.png",
+            &absolute,
+        ];
+        let expected = [
+            &["fr/a.png"; 7][..],
+            &["fr/b.png", "../out.png", "../out.png", &absolute],
+        ]
+        .concat();
+        let scene = Scene::new("x", "");
+        let here = scene.path("set").display().to_string();
+        let spellings = spellings.map(|image| image.replace("HERE", &here));
+        let lines: Vec<String> = (0..)
+            .zip(&spellings)
+            .map(|(i, image)| {
+                serde_json::json!({"id": i, "image": image, "question": "?", "choices": ["x", "y"], "answer": "x"}).to_string()
+            })
+            .collect();
+        let rows: Vec<String> = (0..)
+            .zip(&spellings)
+            .map(|(i, image)| format!("{i}\t{image}\t?\tx\ty\tA"))
+            .collect();
+        let header = "index\timage_path\tquestion\tA\tB\tanswer\n";
+        for (name, text) in [
+            ("a.jsonl", lines.join("\n")),
+            ("a.tsv", format!("{header}{}", rows.join("\n"))),
+        ] {
+            fs::write(scene.path("set").join(name), text).unwrap();
+            let set = scene.open(name).unwrap();
+            assert_eq!(frames(&set), expected, "{name}");
+            for (frame, sample) in [("fr/a.png", 1), ("../out.png", 3)] {
+                let image = set.picture(&FrameId(frame.into())).unwrap();
+                assert_eq!(image.decode().unwrap().samples()[0], sample);
+            }
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_is_followed_before_its_parent_is_taken() {
+        let scene = Scene::new("a.tsv", "");
+        fs::create_dir_all(scene.path("far/deep")).unwrap();
+        let image = RgbImage::from_pixel(2, 1, image::Rgb([9; 3]));
+        fs::create_dir_all(scene.path("far/fr")).unwrap();
+        image.save(scene.path("far/fr/a.png")).unwrap();
+        std::os::unix::fs::symlink(scene.path("far/deep"), scene.path("set/link")).unwrap();
+        let table = "index\timage_path\tquestion\tA\tB\tanswer\n1\tlink/../fr/a.png\t?\tx\ty\tA\n2\tfr/a.png\t?\tx\ty\tA\n";
+        fs::write(scene.path("set/a.tsv"), table).unwrap();
+        let set = scene.open("a.tsv").unwrap();
+        assert_eq!(frames(&set), ["link/../fr/a.png", "fr/a.png"]);
+        let sample = |i: usize| {
+            let picture = set.picture(&set.questions()[i].frame).unwrap();
+            picture.decode().unwrap().samples()[0]
+        };
+        assert_eq!((sample(0), sample(1)), (9, 1));
+    }
+
+    #[test]
+    fn rows_that_cannot_be_asked_are_named() {
+        let header =
+            "index\timage_path\tquestion\tA\tB\tanswer\tcategory\n1\tfr/a.png\t?\tx\ty\tA\tc\n";
+        for (row, says) in [
+            (
+                " \tfr/a.png\t?\tx\ty\tA\tc",
+                "the column \"index\" is empty",
+            ),
+            ("2\t \t?\tx\ty\tA\tc", "the column \"image_path\" is empty"),
+            ("2", "the column \"image_path\" is empty"),
+            (
+                "2\tfr/a.png\t \tx\ty\tA\tc",
+                "the column \"question\" is empty",
+            ),
+            ("2\tfr/c.png\t?\tx\ty\tA\tc", "no such image: "),
+            ("2\tfr/a.png\t?\tx\ty\tC\tc", "the answer \"C\""),
+            (
+                "2\tfr/a.png\t?\tx\ty\tA\tall",
+                "\"all\" is the name of the total",
+            ),
+        ] {
+            let scene = Scene::new("a.tsv", &format!("{header}{row}\n"));
+            let error = scene.open("a.tsv").unwrap_err().to_string();
+            assert!(
+                error.contains("a.tsv, line 3: ") && error.contains(says),
+                "{error}"
+            );
+        }
+        let empty = r#"{"id":1,"image":"","question":"?","choices":["x","y"],"answer":"x"}"#;
+        let scene = Scene::new("a.jsonl", empty);
+        let error = scene.open("a.jsonl").unwrap_err().to_string();
+        assert!(
+            error.ends_with("question \"1\": no image is named"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn a_broken_image_in_a_table_is_named() {
+        let mut file = std::io::Cursor::new(Vec::new());
+        RgbImage::new(40, 40)
+            .write_to(&mut file, image::ImageFormat::Png)
+            .unwrap();
+        let whole = file.into_inner();
+        let (mut flipped, cut) = (whole.clone(), &whole[..whole.len() - 12]);
+        let data = whole.windows(4).position(|four| four == b"IDAT").unwrap() + 6;
+        flipped[data] ^= 0x10;
+        for (cell, says) in [
+            (STANDARD.encode(&flipped), "not a "),
+            (STANDARD.encode(cut), "not a whole image"),
+            ("no base64!".repeat(9), "not base64"),
+            (STANDARD.encode([7; 99]), "not an image"),
+        ] {
+            let header = "index\timage\tquestion\tA\tB\tanswer";
+            let scene = Scene::new("a.tsv", &format!("{header}\n1\t{cell}\t?\tx\ty\tA\n"));
+            let set = scene.open("a.tsv").unwrap();
+            let picture = set.picture(&FrameId("1".into()));
+            let error = picture
+                .and_then(|picture| picture.decode())
+                .unwrap_err()
+                .to_string();
+            assert!(
+                error.contains("a.tsv, line 2: ") && error.contains(says),
+                "{error}"
+            );
+            assert_eq!(error.lines().count(), 1, "{error}");
+        }
     }
 }

@@ -2,12 +2,14 @@
 
 use std::io::Cursor;
 
-use image::{
-    ColorType, DynamicImage, ExtendedColorType, ImageDecoder, ImageFormat, ImageReader, Limits,
-};
+use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 
+use super::jpeg::Outline;
 use crate::error::{Error, Result};
 use crate::types::{Digest, Rgb};
+
+/// What every PNG file begins with.
+const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
 
 /// The most pixels an image may have: a larger one is refused before it is inflated.
 pub const MOST_PIXELS: u64 = 100_000_000;
@@ -36,15 +38,23 @@ impl Picture {
         }
     }
 
-    /// Checks what can be seen without inflating it: that it is PNG or JPEG, of a kind that is read, and not too large.
+    /// Checks that the picture can be shown, before anything is asked about it.
+    ///
+    /// A PNG file is held to its checksums, which find any damage for a hundredth of what inflating costs; where that
+    /// does not settle it (JPEG files have none, an alpha channel may hide something) the picture is decoded.
     pub fn check(&self) -> Result<()> {
-        match self {
-            Self::Encoded { bytes, place } => decoder(bytes, place).map(drop),
-            Self::Pixels(_) => Ok(()),
+        let Self::Encoded { bytes, place } = self else {
+            return Ok(());
+        };
+        let settled = decoder(bytes, place)?.color_type() == ColorType::Rgb8;
+        if bytes.starts_with(PNG) && settled {
+            whole(bytes, place)
+        } else {
+            self.decode().map(drop)
         }
     }
 
-    /// The pixels as 8-bit sRGB.
+    /// The pixels as 8-bit sRGB; a file that is cut or, as a PNG, not as its checksums say is refused.
     ///
     /// Grey becomes three equal channels, a palette its colours, 16 bits the nearest 8, and an alpha channel is dropped
     /// where it is opaque everywhere. CMYK and transparency are refused: there is no one right way to show them. EXIF
@@ -54,7 +64,10 @@ impl Picture {
             Self::Pixels(rgb) => return Ok(rgb.clone()),
             Self::Encoded { bytes, place } => (bytes, place),
         };
-        let image = DynamicImage::from_decoder(decoder(bytes, place)?)
+        let decoder = decoder(bytes, place)?;
+        // The decoders are content with all the samples, the JPEG decoder with less than that.
+        whole(bytes, place)?;
+        let image = DynamicImage::from_decoder(decoder)
             .map_err(|e| Error::data(place, format_args!("not a whole image: {e}")))?;
         if image.color().has_alpha()
             && !image.to_rgba8().pixels().all(|pixel| pixel.0[3] == u8::MAX)
@@ -90,21 +103,51 @@ fn decoder<'a>(bytes: &'a [u8], place: &str) -> Result<impl ImageDecoder + 'a> {
             "{width} × {height} pixels are more than the {MOST_PIXELS} that are read; shrink it first"
         )));
     }
-    match (decoder.color_type(), decoder.original_color_type()) {
-        (_, ExtendedColorType::Cmyk8 | ExtendedColorType::Cmyk16) => {
-            Err(wrong("a CMYK image; convert it to RGB first".to_owned()))
-        }
-        (ColorType::Rgb32F | ColorType::Rgba32F, _) => Err(wrong(
-            "a floating-point image; 8 or 16 bits expected".to_owned(),
-        )),
-        _ => Ok(decoder),
+    if !bytes.starts_with(PNG) && Outline::of(bytes).components == Some(4) {
+        return Err(wrong(
+            "a CMYK image (four components: CMYK or YCCK); convert it to RGB first".to_owned(),
+        ));
     }
+    Ok(decoder)
+}
+
+/// Makes sure that a PNG or JPEG file goes on until its own end mark, and that a PNG's checksums hold.
+fn whole(file: &[u8], place: &str) -> Result<()> {
+    let fault = match file.strip_prefix(PNG) {
+        Some(chunks) => png_fault(chunks),
+        None if Outline::of(file).ends => None,
+        None => Some(CUT),
+    };
+    fault.map_or(Ok(()), |fault| {
+        let problem = format_args!("not a whole image: {fault}; copy or export it again");
+        Err(Error::data(place, problem))
+    })
+}
+
+const CUT: &str = "the file ends before its end mark";
+
+/// What is wrong with the chunks of a PNG file, followed until the last one, `IEND`.
+fn png_fault(mut chunks: &[u8]) -> Option<&'static str> {
+    while let Some((length, rest)) = chunks.split_first_chunk::<4>()
+        && let Some((body, rest)) =
+            rest.split_at_checked((u32::from_be_bytes(*length) as usize).saturating_add(4))
+        && let Some((checksum, rest)) = rest.split_first_chunk::<4>()
+    {
+        if crc32fast::hash(body) != u32::from_be_bytes(*checksum) {
+            return Some("a checksum in it does not hold");
+        }
+        if body.starts_with(b"IEND") {
+            return None;
+        }
+        chunks = rest;
+    }
+    Some(CUT)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use image::{GrayImage, RgbaImage};
+    use image::{GrayImage, RgbImage, RgbaImage};
 
     fn png(image: &DynamicImage) -> Picture {
         let mut bytes = Vec::new();
@@ -171,6 +214,87 @@ mod tests {
             .unwrap_err()
             .to_string();
         assert!(error.starts_with("test.png: not a whole image"), "{error}");
+    }
+
+    /// What is said of bytes that are no whole picture; it is one line that begins with the file.
+    fn fault(bytes: Vec<u8>) -> String {
+        let place = "a.png".into();
+        let error = Picture::Encoded { bytes, place }.decode().unwrap_err();
+        let error = error.to_string();
+        assert!(error.starts_with("a.png: "), "{error}");
+        assert_eq!(error.lines().count(), 1, "{error}");
+        error
+    }
+
+    #[test]
+    fn a_corrupt_png_is_named() {
+        let image = RgbImage::from_fn(64, 64, |x, y| image::Rgb([x as u8, y as u8, (x * y) as u8]));
+        let Picture::Encoded { bytes, .. } = png(&image.into()) else {
+            unreachable!()
+        };
+        let data = bytes.windows(4).position(|four| four == b"IDAT").unwrap() + 4;
+        let end = bytes.len() - 12;
+        for at in [data, data + 40, end - 5] {
+            let mut flipped = bytes.clone();
+            flipped[at] ^= 0x10;
+            assert!(fault(flipped).contains("not a "), "data at {at}");
+        }
+        for at in end - 4..end {
+            let mut flipped = bytes.clone();
+            flipped[at] ^= 1;
+            assert!(fault(flipped).contains("checksum"), "checksum at {at}");
+        }
+        for length in [data + 9, end - 4, end, end + 4, end + 8, end + 11] {
+            let cut = fault(bytes[..length].to_vec());
+            assert!(cut.contains("not a whole image"), "{length}: {cut}");
+        }
+        assert!(
+            Picture::Encoded {
+                bytes,
+                place: String::new()
+            }
+            .decode()
+            .is_ok()
+        );
+    }
+
+    fn jpeg(color: jpeg_encoder::ColorType, channels: usize) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let samples: Vec<u8> = (0..32 * 32 * channels).map(|i| (i * 7) as u8).collect();
+        jpeg_encoder::Encoder::new(&mut bytes, 90)
+            .encode(&samples, 32, 32, color)
+            .unwrap();
+        bytes
+    }
+
+    #[test]
+    fn cmyk_is_refused_by_name() {
+        for color in [
+            jpeg_encoder::ColorType::Cmyk,
+            jpeg_encoder::ColorType::CmykAsYcck,
+        ] {
+            let error = fault(jpeg(color, 4));
+            assert!(
+                error.contains("CMYK") && error.contains("convert it"),
+                "{error}"
+            );
+        }
+        for (color, channels) in [
+            (jpeg_encoder::ColorType::Rgb, 3),
+            (jpeg_encoder::ColorType::Luma, 1),
+        ] {
+            let (bytes, place) = (jpeg(color, channels), String::new());
+            assert!(Picture::Encoded { bytes, place }.decode().is_ok());
+        }
+    }
+
+    #[test]
+    fn a_cut_jpeg_is_named() {
+        let bytes = jpeg(jpeg_encoder::ColorType::Rgb, 3);
+        for length in [bytes.len() / 2, bytes.len() - 40, bytes.len() - 2] {
+            let cut = fault(bytes[..length].to_vec());
+            assert!(cut.contains("not a "), "{length}: {cut}");
+        }
     }
 
     #[test]

@@ -31,10 +31,25 @@ pub(super) fn other() -> Family {
     Family::Other("other".to_owned())
 }
 
+/// Refuses a family that would bear the name of the total in the tables.
+pub(super) fn checked(family: Family) -> Result<Family> {
+    if family.name().trim() == Family::TOTAL {
+        return Err(Error::data(
+            "family",
+            format_args!(
+                "the family {:?} is the name of the total over all families; rename it",
+                Family::TOTAL
+            ),
+        ));
+    }
+    Ok(family)
+}
+
 /// Reads a file of questions.
 ///
 /// # Errors
-/// With the file and the line: broken JSON, a missing key, choices that are no choices, an answer not among them.
+/// With the file and the line: broken JSON, a missing key, choices that are no choices, an answer not among them,
+/// a family named as the total.
 pub fn read(path: &Path) -> Result<Vec<Question>> {
     let text = fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))?;
     let lines = text.trim_start_matches('\u{feff}').lines().enumerate();
@@ -42,18 +57,11 @@ pub fn read(path: &Path) -> Result<Vec<Question>> {
         .filter(|(_, line)| !line.trim().is_empty())
         .map(|(i, line)| {
             let line = serde_json::from_str::<Line>(line)
-                .map_err(|e| Error::line(path, i + 1, without_place(&e)))?;
+                .map_err(|e| Error::json_line(path, i + 1, &e))?;
             line.into_question()
                 .map_err(|e| e.at(format!("{}, line {}", path.display(), i + 1)))
         })
         .collect()
-}
-
-/// What serde says, without its place: it counts lines within the one line it was given.
-fn without_place(error: &serde_json::Error) -> String {
-    let text = error.to_string();
-    text.rsplit_once(" at line ")
-        .map_or(text.clone(), |(problem, _)| problem.to_owned())
 }
 
 impl Line {
@@ -88,10 +96,11 @@ impl Line {
                 )
             })?;
         let choices = Choices::new(self.choices, truth)?;
+        let family = checked(self.family)?;
         Ok(Question {
             id: QuestionId(id),
             frame: FrameId(self.frame),
-            family: self.family,
+            family,
             text: self.question,
             choices,
             evidence: self.evidence,
@@ -142,6 +151,10 @@ mod tests {
             (
                 r#"{"id":"a","frame":"f","question":" ","choices":["x","y"],"answer":"x"}"#,
                 "line 2: question \"a\" is empty",
+            ),
+            (
+                r#"{"id":"a","frame":"f","family":" all","question":"q","choices":["x","y"],"answer":"x"}"#,
+                "line 2: the family \"all\" is the name of the total",
             ),
             (
                 r#"{"id":null,"frame":"f","question":"q","choices":["x","y"],"answer":"x"}"#,

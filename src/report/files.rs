@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::score::accuracy::{Cell, Summary};
 use crate::score::choice::Mode;
 use crate::types::manifest::RunManifest;
-use crate::types::{EnhancerName, Level, Variant, View};
+use crate::types::{EnhancerName, Family, Level, Variant, View};
 
 /// The schema of `summary.json`.
 const SCHEMA: &str = "darkqa.summary/1";
@@ -41,7 +41,7 @@ impl<'a> Row<'a> {
             level: subject.level,
             variant: subject.variant,
             enhancer: subject.enhancer.as_ref(),
-            family: cell.family.as_ref().map_or("all", |family| family.name()),
+            family: cell.family.as_ref().map_or(Family::TOTAL, Family::name),
             mode: cell.mode,
             n: cell.accuracy.map_or(0, |accuracy| accuracy.n),
             right: subject.view.map(|_| cell.right),

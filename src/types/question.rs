@@ -35,6 +35,9 @@ pub enum Family {
 }
 
 impl Family {
+    /// The name under which all families together stand in tables and files; no family may have it.
+    pub const TOTAL: &str = "all";
+
     /// The paper's five families.
     pub const PAPER: [Self; 5] = [
         Self::RoomType,
