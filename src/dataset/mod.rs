@@ -3,6 +3,7 @@
 //! The door is [`Dataset::open`]. What the user points at decides the reader: a folder of frames ([`frames`]), a
 //! ready-made multiple-choice set ([`multiple_choice`]), or nothing, which is the built-in rooms ([`rooms`]).
 
+mod beside;
 pub mod frames;
 mod jpeg;
 mod maps;
