@@ -140,13 +140,16 @@ impl Store {
         write_manifest(&self.folder, manifest)
     }
 
-    /// Writes a file into the run folder, whole or not at all.
+    /// Writes a file into the run folder, whole or not at all; one that already says this is left as it is.
     pub fn write(&self, name: &str, content: &[u8]) -> Result<()> {
         write(&self.folder, name, content)
     }
 }
 
 fn write(folder: &Path, name: &str, content: &[u8]) -> Result<()> {
+    if fs::read(folder.join(name)).is_ok_and(|there| there == content) {
+        return Ok(());
+    }
     let (path, unfinished) = (
         folder.join(name),
         folder.join(format!(".{name}{UNFINISHED}")),

@@ -13,6 +13,7 @@ pub mod picture;
 pub mod questions;
 mod raw_png;
 pub mod rooms;
+mod table;
 
 use std::collections::{BTreeMap, HashSet};
 use std::fs;
@@ -39,7 +40,7 @@ enum Source {
     /// An image file, and the map files beside it.
     File { rgb: PathBuf, maps: Maps },
     /// A base64 cell of a table: the row's place in the file.
-    Cell(multiple_choice::Cell),
+    Cell(table::Cell),
     /// A built-in room.
     Room(rooms::Room),
 }

@@ -116,13 +116,11 @@ fn show(
     let status = end.status(counts);
     if (status, counts) != (manifest.status, manifest.counts) {
         (manifest.status, manifest.counts, manifest.updated) = (status, counts, now());
-        store.write("summary.csv", &report::files::csv(&summary)?)?;
-        store.write(
-            "summary.json",
-            report::files::json(&summary, &manifest, None)?.as_bytes(),
-        )?;
-        store.write_manifest(&manifest)?;
     }
+    store.write("summary.csv", &report::files::csv(&summary)?)?;
+    let json = report::files::json(&summary, &manifest, None)?;
+    store.write("summary.json", json.as_bytes())?;
+    store.write_manifest(&manifest)?;
     if let End::Stopped(error) = end {
         return Err(error);
     }

@@ -1,0 +1,226 @@
+//! A table of questions about images, `.tsv` as VLMEvalKit writes it (`vlmeval/dataset/image_mcq.py`).
+//!
+//! Tab-separated with a header: `index`, `question`, an optional `hint`, the choices in the columns `A`, `B`, … (an empty
+//! cell is no choice), `answer` (a letter), `category`, and either `image_path` or `image`, which holds the file in base64
+//! or the index of the row that does.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use csv::{ByteRecord, Position, Reader, ReaderBuilder, StringRecord};
+
+use super::beside::Beside;
+use super::{Picture, Source, questions};
+use crate::error::{Error, Result};
+use crate::types::question::letter;
+use crate::types::{Choices, Family, FrameId, Question, QuestionId};
+
+/// A longer cell of the column `image` is a file, a shorter one the index of another row (as in VLMEvalKit).
+const LONGEST_INDEX: usize = 64;
+
+/// The columns of a table by what they hold.
+struct Columns {
+    index: usize,
+    question: usize,
+    answer: usize,
+    image: ImageColumn,
+    hint: Option<usize>,
+    category: Option<usize>,
+    choices: Vec<(char, usize)>,
+}
+
+enum ImageColumn {
+    Path(usize),
+    Base64(usize),
+}
+
+impl Columns {
+    fn of(header: &StringRecord) -> Result<Self, String> {
+        let find = |name: &str| header.iter().position(|column| column.trim() == name);
+        let need = |name: &str| find(name).ok_or_else(|| format!("the column {name:?} is missing"));
+        let image = match (find("image_path"), find("image")) {
+            (Some(column), _) => ImageColumn::Path(column),
+            (None, Some(column)) => ImageColumn::Base64(column),
+            (None, None) => return Err("neither a column \"image_path\" nor \"image\"".to_owned()),
+        };
+        let choices =
+            (0..Choices::MOST).filter_map(|i| Some((letter(i), find(&letter(i).to_string())?)));
+        Ok(Self {
+            index: need("index")?,
+            question: need("question")?,
+            answer: need("answer")?,
+            image,
+            hint: find("hint"),
+            category: find("category"),
+            choices: choices.collect(),
+        })
+    }
+
+    fn question(&self, row: &StringRecord, frame: FrameId) -> Result<Question> {
+        let cell = |column: usize| row.get(column).unwrap_or_default();
+        let id = filled(row, self.index, "index")?.to_owned();
+        filled(row, self.question, "question")?;
+        let answer = cell(self.answer).trim();
+        let shown: Vec<(char, &str)> = self
+            .choices
+            .iter()
+            .map(|&(letter, column)| (letter, cell(column)))
+            .filter(|(_, text)| !text.trim().is_empty())
+            .collect();
+        let truth = shown
+            .iter()
+            .position(|(letter, _)| answer == letter.to_string())
+            .ok_or_else(|| {
+                Error::data(
+                    "answer",
+                    format_args!(
+                        "question {id:?}: the answer {answer:?} is none of its choices' letters"
+                    ),
+                )
+            })?;
+        let choices = Choices::new(
+            shown.iter().map(|(_, text)| (*text).to_owned()).collect(),
+            truth,
+        )?;
+        let hint = self.hint.map(cell).filter(|hint| !hint.trim().is_empty());
+        let text = hint.map_or_else(
+            || cell(self.question).to_owned(),
+            |hint| format!("{hint}\n{}", cell(self.question)),
+        );
+        let family = self
+            .category
+            .map(cell)
+            .filter(|name| !name.trim().is_empty())
+            .map_or_else(questions::other, Family::from);
+        let family = questions::checked(family)?;
+        Ok(Question {
+            id: QuestionId(id),
+            frame,
+            family,
+            text,
+            choices,
+            evidence: serde_json::Value::Null,
+        })
+    }
+}
+
+/// A cell without the space around it, which must not be empty.
+fn filled<'a>(row: &'a StringRecord, column: usize, name: &str) -> Result<&'a str> {
+    match row.get(column).unwrap_or_default().trim() {
+        "" => Err(Error::data(
+            name,
+            format_args!("the column {name:?} is empty"),
+        )),
+        text => Ok(text),
+    }
+}
+
+fn reader(path: &Path) -> Result<Reader<File>> {
+    let file = File::open(path).map_err(|e| Error::file(path, "read", e))?;
+    Ok(ReaderBuilder::new()
+        .delimiter(b'\t')
+        .flexible(true)
+        .from_reader(file))
+}
+
+/// Reads the table: its images and its questions.
+pub(super) fn read(path: &Path) -> Result<(BTreeMap<FrameId, Source>, Vec<Question>)> {
+    let mut reader = reader(path)?;
+    let header = reader
+        .headers()
+        .map_err(|e| Error::data(path.display(), e))?;
+    let columns = Columns::of(header).map_err(|problem| {
+        Error::data(
+            path.display(),
+            format_args!("not a VLMEvalKit table: {problem}"),
+        )
+    })?;
+    let beside = Beside::of(path);
+    let (mut sources, mut questions) = (BTreeMap::new(), Vec::new());
+    let mut row = StringRecord::new();
+    while reader
+        .read_record(&mut row)
+        .map_err(|e| Error::data(path.display(), e))?
+    {
+        let position = row.position().cloned().unwrap_or_else(Position::new);
+        let place = format!("{}, line {}", path.display(), position.line());
+        let at = |e: Error| e.at(&place);
+        let frame = match columns.image {
+            ImageColumn::Path(column) => {
+                let image = filled(&row, column, "image_path").map_err(at)?;
+                let (frame, file) = beside
+                    .image(image)
+                    .map_err(|problem| Error::data(&place, problem))?;
+                sources.insert(frame.clone(), Source::image(file));
+                frame
+            }
+            ImageColumn::Base64(column) => match filled(&row, column, "image").map_err(at)? {
+                index if index.len() <= LONGEST_INDEX => FrameId(index.to_owned()),
+                _ => {
+                    let index = filled(&row, columns.index, "index").map_err(at)?;
+                    let frame = FrameId(index.to_owned());
+                    let cell = Cell {
+                        file: path.to_owned(),
+                        position: position.clone(),
+                        column,
+                    };
+                    sources.insert(frame.clone(), Source::Cell(cell));
+                    frame
+                }
+            },
+        };
+        questions.push(columns.question(&row, frame).map_err(at)?);
+    }
+    if let Some(stray) = questions
+        .iter()
+        .find(|question| !sources.contains_key(&question.frame))
+    {
+        let problem = format_args!(
+            "question {:?} shares the image of row {:?}, which holds none",
+            stray.id.0, stray.frame.0
+        );
+        return Err(Error::data(path.display(), problem));
+    }
+    Ok((sources, questions))
+}
+
+/// The place of an image in a table: read when it is needed, so that a table of gigabytes is never held.
+#[derive(Debug, Clone)]
+pub(super) struct Cell {
+    file: PathBuf,
+    position: Position,
+    column: usize,
+}
+
+impl Cell {
+    pub(super) fn picture(&self) -> Result<Picture> {
+        let place = format!("{}, line {}", self.file.display(), self.position.line());
+        let mut reader = reader(&self.file)?;
+        let mut row = ByteRecord::new();
+        reader
+            .seek(self.position.clone())
+            .map_err(|e| Error::data(&place, e))?;
+        reader
+            .read_byte_record(&mut row)
+            .map_err(|e| Error::data(&place, e))?;
+        let mut text = row
+            .get(self.column)
+            .unwrap_or_default()
+            .trim_ascii()
+            .to_vec();
+        if let Some(comma) = text
+            .starts_with(b"data:")
+            .then(|| text.iter().position(|&b| b == b','))
+            .flatten()
+        {
+            text.drain(..=comma);
+        }
+        let bytes = STANDARD
+            .decode(&text)
+            .map_err(|e| Error::data(&place, format_args!("the image is not base64: {e}")))?;
+        Ok(Picture::Encoded { bytes, place })
+    }
+}
