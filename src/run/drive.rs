@@ -89,6 +89,7 @@ impl Drive<'_> {
             bar,
             watch: self.watch(),
             stoppers,
+            answered: plan.trials() - plan.left(),
         };
         std::thread::scope(|scope| {
             scope.spawn(move || cores.install(|| darkroom.develop(plan.frames, &out)));
@@ -118,6 +119,8 @@ struct Intake<'a> {
     bar: Bar,
     watch: Watch,
     stoppers: Vec<Stopper>,
+    /// Trials with a reply, those of earlier calls included.
+    answered: usize,
 }
 
 impl Intake<'_> {
@@ -127,13 +130,17 @@ impl Intake<'_> {
         let mut asking = JoinSet::<Done>::new();
         let mut interrupt = Interrupt::listen()?;
         let mut more = true;
-        while !self.watch.stopped() && (more || !waiting.is_empty() || !asking.is_empty()) {
+        loop {
             while asking.len() < limit
                 && let Some(ready) = waiting.pop_front()
             {
                 if !self.watch.retired(ready.trial.asker) {
                     asking.spawn(put(self.drive.askers[ready.trial.asker].clone(), ready));
                 }
+            }
+            let through = !more && waiting.is_empty() && asking.is_empty();
+            if through || self.watch.stopped() {
+                break;
             }
             tokio::select! {
                 () = interrupt.next() => self.watch.interrupted(),
@@ -236,8 +243,8 @@ impl Intake<'_> {
                 }
             }
         }
-        self.bar.failed(self.watch.failures());
-        self.bar.inc();
+        self.answered += usize::from(result.is_ok());
+        self.bar.count(self.answered, self.watch.failures());
         let asker = &self.drive.askers[ready.trial.asker];
         self.store
             .append(&record(ready, asker.model.name(), result))

@@ -1,6 +1,7 @@
 //! What decides the replies of a run, and what does not, by flag.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
@@ -16,9 +17,9 @@ use crate::types::{Digest, EnhancerName, View};
 pub(super) type Identity = BTreeMap<String, Value>;
 
 /// The names and contents of the enhancement models.
-pub(super) fn enhancers(config: &Config) -> Result<Vec<(EnhancerName, Digest)>> {
+pub(super) fn enhancers(models: &[PathBuf]) -> Result<Vec<(EnhancerName, Digest)>> {
     let mut enhancers: Vec<(EnhancerName, Digest)> = Vec::new();
-    for path in &config.enhancement.models {
+    for path in models {
         let file = ModelFile::read(path)?;
         if enhancers.iter().any(|(name, _)| name == file.name()) {
             let problem = format_args!(

@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 use jiff::Timestamp;
 use rayon::prelude::*;
 
-use crate::config::{Config, Enhancement, ModelName, RunPlace, Show};
+use crate::config::{Config, ModelName, RunPlace, Show};
 use crate::dataset::Dataset;
 use crate::enhance::{Enhancer, Runtime};
 use crate::error::{Error, Result};
@@ -28,7 +28,7 @@ use crate::report;
 use crate::score::accuracy::summarize;
 use crate::store::{self, Moved, Store};
 use crate::types::manifest::{Counts, RunManifest, SCHEMA, Status};
-use crate::types::{Digest, Family, FrameId, Outcome, Question, Record, TrialKey};
+use crate::types::{Digest, Family, FrameId, Outcome, Question, Record, TrialKey, View};
 
 use drive::Drive;
 use identity::Identity;
@@ -56,8 +56,19 @@ pub fn evaluate(config: &Config, progress: &Progress) -> Result<Verdict> {
     let dataset = Dataset::open(&config.data.place, config.data.questions.as_deref())?;
     let questions = select(&dataset, config)?;
     let askers = askers::open(config)?;
-    let enhancers = identity::enhancers(config)?;
-    let pictures = look_through(&dataset, &questions, progress)?;
+    // Where every model is blind, no image is read and no enhancer is opened.
+    let seeing = askers.iter().any(|asker| asker.view == View::Image);
+    let models = if seeing {
+        &*config.enhancement.models
+    } else {
+        &[]
+    };
+    let enhancers = identity::enhancers(models)?;
+    let pictures = if seeing {
+        look_through(&dataset, &questions, progress)?
+    } else {
+        BTreeMap::new()
+    };
     let inputs = Inputs::new(config, &questions, &pictures, &askers, &enhancers)?;
 
     let identity = identity::identity(config, &dataset, &inputs);
@@ -66,7 +77,7 @@ pub fn evaluate(config: &Config, progress: &Progress) -> Result<Verdict> {
     // Opened before the folder is made, so that an enhancer that does not work leaves nothing behind.
     let opened = match &kept {
         Some(manifest) if manifest.status == Status::Complete => None,
-        _ => Some(open_enhancers(config)?),
+        _ => Some(open_enhancers(models, config)?),
     };
     let mut manifest = manifest(config, identity, kept);
     let mut store = Store::open(&folder, &manifest, moved(config))?;
@@ -75,7 +86,7 @@ pub fn evaluate(config: &Config, progress: &Progress) -> Result<Verdict> {
     let end = if plan.left() == 0 {
         End::Through
     } else {
-        let (runtime, enhancers) = opened.map_or_else(|| open_enhancers(config), Ok)?;
+        let (runtime, enhancers) = opened.map_or_else(|| open_enhancers(models, config), Ok)?;
         let version =
             runtime.map(|runtime| ("onnxruntime".to_owned(), runtime.version().to_owned()));
         manifest.platform.extend(version);
@@ -200,23 +211,19 @@ fn look_through(
     digests.collect()
 }
 
-fn open_enhancers(config: &Config) -> Result<(Option<Runtime>, Vec<Enhancer>)> {
-    let Enhancement {
-        models,
-        threads,
-        runtime,
-        ..
-    } = &config.enhancement;
+fn open_enhancers(models: &[PathBuf], config: &Config) -> Result<(Option<Runtime>, Vec<Enhancer>)> {
     if models.is_empty() {
         return Ok((None, Vec::new()));
     }
-    let runtime = runtime.open()?;
+    let runtime = config.enhancement.runtime.open()?;
+    let threads = config.enhancement.threads;
     let enhancers = models
         .iter()
-        .map(|path| Enhancer::open(path, &runtime, *threads))
+        .map(|path| Enhancer::open(path, &runtime, threads))
         .collect::<Result<_>>()?;
     Ok((Some(runtime), enhancers))
 }
+
 /// The models in the name of a folder.
 fn label(config: &Config) -> String {
     let names = config

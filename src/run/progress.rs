@@ -1,16 +1,16 @@
 //! Progress on standard error: [`Progress`].
 
+use std::fmt;
 use std::io::{self, IsTerminal, Write};
 use std::time::Duration;
 
-use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use tracing_subscriber::fmt::MakeWriter;
 
 /// Where progress is shown: on a terminal, or nowhere.
 #[derive(Debug, Clone)]
 pub struct Progress {
     bars: MultiProgress,
-    loudness: Loudness,
 }
 
 /// Whether progress is wanted.
@@ -34,7 +34,6 @@ impl Progress {
         };
         Self {
             bars: MultiProgress::with_draw_target(target),
-            loudness,
         }
     }
 
@@ -42,12 +41,6 @@ impl Progress {
     pub fn say(&self, line: &str) {
         // A line that cannot be shown is no reason to stop.
         let _ = self.bars.println(line);
-    }
-
-    /// Whether anything is shown.
-    #[must_use]
-    pub fn loudness(&self) -> Loudness {
-        self.loudness
     }
 
     /// A plain bar for a step of known length, gone when it is dropped.
@@ -59,17 +52,25 @@ impl Progress {
         Bar(style.map_or(bar.clone(), |style| bar.with_style(style)))
     }
 
-    /// The bar of the trials: done, failed of them, rate, time left.
+    /// The bar of the trials: answered, failed, rate, time left.
     pub(super) fn trials(&self, trials: usize, answered: usize) -> Bar {
-        let template = "{wide_bar} {pos}/{len} done{msg} · {per_sec} · {eta} left";
-        let bar = self
-            .bars
-            .add(ProgressBar::new(trials as u64).with_position(answered as u64));
+        let bar = ProgressBar::new(trials as u64).with_position(answered as u64);
+        let bar = self.bars.add(bar);
         bar.reset_eta();
         bar.enable_steady_tick(Duration::from_millis(500));
-        Bar(ProgressStyle::with_template(template)
-            .map_or(bar.clone(), |style| bar.with_style(style)))
+        let style = ProgressStyle::with_template("{wide_bar} {msg} of {len} · {rate} · {eta} left");
+        let bar = Bar(style.map_or(bar.clone(), |style| {
+            bar.with_style(style.with_key("rate", rate))
+        }));
+        bar.count(answered, 0);
+        bar
     }
+}
+
+/// Trials a second, with one digit behind the point.
+fn rate(state: &ProgressState, out: &mut dyn fmt::Write) {
+    // A rate that cannot be shown is no reason to stop.
+    let _ = write!(out, "{:.1}/s", state.per_sec());
 }
 
 /// A bar that goes away with its step.
@@ -80,8 +81,11 @@ impl Bar {
         self.0.inc(1);
     }
 
-    pub(super) fn failed(&self, failed: usize) {
-        self.0.set_message(format!(", {failed} of them failed"));
+    /// Shows how many trials are answered and how many have failed.
+    pub(super) fn count(&self, answered: usize, failed: usize) {
+        self.0.set_position((answered + failed) as u64);
+        self.0
+            .set_message(format!("{answered} answered, {failed} failed"));
     }
 }
 
