@@ -125,7 +125,7 @@ fn a_record_and_a_row_keep_the_contract() {
     let bench = Bench::new();
     frames(&bench);
     bench.file("script.jsonl", "{\"question\":\"a1\",\"reply\":\"No.\"}\n{\"question\":\"b1\",\"condition\":\"L1-ev\",\"reply\":\"too dark to see\"}\n{\"default\":\"**A**\"}\n");
-    bench.complete(&[
+    let table = bench.complete(&[
         "--data",
         "frames",
         "--model",
@@ -137,6 +137,10 @@ fn a_record_and_a_row_keep_the_contract() {
         "--out",
         "run",
     ]);
+    assert!(
+        table.contains("(66.7)"),
+        "the lenient reading differs: {table}"
+    );
     let records = records(&bench.path("run"));
     let record = records
         .iter()
@@ -497,7 +501,7 @@ fn a_blind_model_sees_words_alone() {
     let table = bench.complete(&words);
     assert!(
         table.contains("gpt without images: 33.3 ±")
-            && table.contains("(33.3), n 3, unparsed 0 (0), failed 0"),
+            && table.contains(", n 3, unparsed 0, failed 0"),
         "{table}"
     );
     let requests = endpoint.requests();

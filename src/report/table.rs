@@ -40,6 +40,15 @@ impl<'a> Series<'a> {
     }
 }
 
+/// The lenient figure in brackets where it is not the strict one.
+fn differing(strict: &str, lenient: &str) -> String {
+    if strict == lenient {
+        String::new()
+    } else {
+        format!(" ({lenient})")
+    }
+}
+
 /// The strict and the lenient cell of one subject, all families together.
 #[derive(Debug, Clone, Copy)]
 struct Pair<'a> {
@@ -52,9 +61,9 @@ impl Pair<'_> {
         let percent = |share: f64| format!("{:.1}", 100.0 * share);
         match (self.strict.accuracy, self.lenient.accuracy) {
             (Some(strict), Some(lenient)) => {
-                let half = (strict.high - strict.low) / 2.0;
-                let (value, lenient) = (percent(strict.value), percent(lenient.value));
-                format!("{value} ±{} ({lenient})", percent(half))
+                let half = percent((strict.high - strict.low) / 2.0);
+                let (strict, lenient) = (percent(strict.value), percent(lenient.value));
+                format!("{strict} ±{half}{}", differing(&strict, &lenient))
             }
             _ => "–".to_owned(),
         }
@@ -90,7 +99,7 @@ pub fn render(summary: &Summary, run: &RunManifest, folder: &Path) -> String {
         );
     }
     text.push_str(
-        "Accuracy in %: strict ± half of the 95 % interval (lenient); n replies at each level\n",
+        "Accuracy in %: strict ± half of the 95 % interval (lenient where it differs); n replies at each level\n",
     );
     let seen: Vec<Pair<'_>> = of_view(Some(View::Image)).collect();
     if !seen.is_empty() {
@@ -103,13 +112,14 @@ pub fn render(summary: &Summary, run: &RunManifest, folder: &Path) -> String {
             subject,
             ..
         } = pair.strict;
-        let (accuracy, replies, lenient) = (pair.accuracy(), pair.replies(), pair.lenient.unparsed);
+        let (accuracy, replies) = (pair.accuracy(), pair.replies());
+        let lenient = differing(&unparsed.to_string(), &pair.lenient.unparsed.to_string());
         let _ = write!(
             text,
             "{} without images: {accuracy}, n {replies}",
             subject.model
         );
-        let _ = writeln!(text, ", unparsed {unparsed} ({lenient}), failed {failed}");
+        let _ = writeln!(text, ", unparsed {unparsed}{lenient}, failed {failed}");
     }
     for chance in of_view(None).filter_map(|pair| pair.strict.accuracy) {
         let _ = writeln!(
@@ -169,14 +179,11 @@ fn row(line: &Series<'_>, pairs: &[Pair<'_>], levels: &BTreeSet<Level>) -> Vec<S
         (least, _) => least.unwrap_or(0).to_string(),
     };
     let (strict, lenient) = (
-        sum(|pair| pair.strict.unparsed),
-        sum(|pair| pair.lenient.unparsed),
+        sum(|pair| pair.strict.unparsed).to_string(),
+        sum(|pair| pair.lenient.unparsed).to_string(),
     );
-    let counts = [
-        n,
-        format!("{strict} ({lenient})"),
-        sum(|pair| pair.strict.failed).to_string(),
-    ];
+    let unparsed = format!("{strict}{}", differing(&strict, &lenient));
+    let counts = [n, unparsed, sum(|pair| pair.strict.failed).to_string()];
     [line.model.to_owned(), line.label()]
         .into_iter()
         .chain(accuracies)
