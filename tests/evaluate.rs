@@ -7,6 +7,7 @@ mod support;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io::Cursor;
+use std::path::Path;
 
 use serde_json::{Value, json};
 use support::endpoint::{Answer, MockEndpoint};
@@ -476,6 +477,22 @@ fn threads_and_order_change_no_byte() {
         )
     };
     assert_eq!(images("one", "1", "1"), images("many", "5", "16"));
+}
+
+#[test]
+fn the_reference_run_is_made_again() {
+    let bench = Bench::new();
+    bench.complete(&["--model", "random", "--levels", "L0,L3", "--out", "run"]);
+    let reference = Path::new(env!("CARGO_MANIFEST_DIR")).join("results/reference");
+    let made = |run: &Path| -> BTreeMap<String, Value> {
+        let kept = records(run).into_iter();
+        kept.map(|record| (record["key"].to_string(), record))
+            .collect()
+    };
+    // Trials, choices, replies and the very files that were sent, whatever machine made them.
+    assert_eq!(made(&bench.path("run")), made(&reference));
+    let rows = |run: &Path| fs::read_to_string(run.join("summary.csv")).unwrap();
+    assert_eq!(rows(&bench.path("run")), rows(&reference));
 }
 
 #[test]
