@@ -45,6 +45,17 @@ impl Mode {
 ///
 /// Whatever stands in a closed reasoning block is left out; a block that is opened and never closed leaves nothing to
 /// read and is [`Why::Truncated`].
+///
+/// ```
+/// use darkqa_eval::score::choice::{Mode, read};
+/// use darkqa_eval::types::{Answer, Choices, Why};
+///
+/// let choices = Choices::new(vec!["kitchen".into(), "bedroom".into()], 0)?;
+/// assert_eq!(read("(B) bedroom", &choices, Mode::Strict), Answer::Chosen(1));
+/// assert_eq!(read("Answer: **B**", &choices, Mode::Strict), Answer::Unparsed(Why::NoChoice));
+/// assert_eq!(read("Answer: **B**", &choices, Mode::Lenient), Answer::Chosen(1));
+/// # Ok::<(), darkqa_eval::error::Error>(())
+/// ```
 #[must_use]
 pub fn read(reply: &str, choices: &Choices, mode: Mode) -> Answer {
     let text = match clean::spoken(reply) {
