@@ -16,7 +16,7 @@
 //!                        run = the conductor; types = the shared vocabulary
 //! ```
 //!
-//! - [`types`]: the vocabulary. [`Frame`](types::FrameId)s are seen, [`Question`](types::Question)s are asked, a
+//! - [`types`]: the vocabulary. [`Frame`](types::Frame)s are seen, [`Question`](types::Question)s are asked, a
 //!   [`Condition`](types::Condition) is a degradation with or without an enhancer, a [`Reply`](types::Reply) is what a
 //!   model said, and a [`Record`](types::Record) is what came of one question for one model in one condition.
 //! - [`dataset`]: a folder or a ready-made set → images, their maps and questions.

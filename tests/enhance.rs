@@ -21,7 +21,7 @@ fn runtime() -> Runtime {
 }
 
 fn open(path: &Path) -> darkqa_eval::error::Result<Enhancer> {
-    Enhancer::open(path, &runtime(), NonZeroUsize::new(1))
+    Enhancer::open(ModelFile::read(path)?, &runtime(), NonZeroUsize::new(1))
 }
 
 /// A model in a folder of its own, loaded.

@@ -1,7 +1,7 @@
 //! A user's ONNX model on ONNX Runtime's CPU provider: [`Enhancer`].
 
 use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use ort::session::builder::{GraphOptimizationLevel, SessionBuilder};
@@ -57,14 +57,18 @@ struct Output {
 }
 
 impl Enhancer {
-    /// Loads a model; `threads` is how many threads one image is computed with, `None` for as many as there are cores.
+    /// Loads a model from the file as it was read, so that its digest is that of what runs; `threads` is how many threads one image is computed with, `None` for as many as there are cores.
     ///
     /// # Errors
     /// Where the file is no ONNX model, ONNX Runtime refuses it, or its inputs and outputs are not one RGB image each.
-    pub fn open(path: &Path, runtime: &Runtime, threads: Option<NonZeroUsize>) -> Result<Self> {
-        let mut file = ModelFile::read(path)?;
+    pub fn open(
+        mut file: ModelFile,
+        runtime: &Runtime,
+        threads: Option<NonZeroUsize>,
+    ) -> Result<Self> {
+        let path = file.path.clone();
         let fault = |problem: String| Error::Enhancer {
-            path: path.to_owned(),
+            path: path.clone(),
             problem,
         };
         let flushed = file.weights.flush_subnormals(&mut file.bytes);

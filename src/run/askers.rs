@@ -11,6 +11,8 @@ use crate::types::View;
 #[derive(Debug, Clone)]
 pub(super) struct Asker {
     pub(super) model: Arc<Model>,
+    /// What the model answers by, as [`Model::digest`] writes it: made once, for it enters every key.
+    pub(super) digest: Arc<str>,
     pub(super) view: View,
 }
 
@@ -59,7 +61,12 @@ pub(super) fn open(config: &Config) -> Result<Vec<Asker>> {
                 format_args!("{} is named twice", model.name()),
             ));
         }
-        askers.push(Asker { model, view });
+        let digest = model.digest().to_string().into();
+        askers.push(Asker {
+            model,
+            digest,
+            view,
+        });
     }
     Ok(askers)
 }

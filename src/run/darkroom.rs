@@ -79,15 +79,15 @@ impl Darkroom<'_> {
         let Recipe {
             format, max_side, ..
         } = *self.recipe;
-        if *condition == Condition::raw(Degradation::None) && format == Format::Png {
-            // The file itself, where it is the very image that would be encoded.
-            if let Picture::Encoded { bytes, .. } = desk.picture(self.dataset, self.pictures)?
-                && let Some(payload) = Payload::of_plain_png(bytes, max_side)
-            {
-                return Ok(Arc::new(payload));
-            }
+        let picture = desk.picture(self.dataset, self.pictures)?;
+        // The file itself, where it is the very image that would be encoded.
+        if *condition == Condition::raw(Degradation::None)
+            && format == Format::Png
+            && let Picture::Encoded { bytes, .. } = picture
+            && let Some(payload) = Payload::of_plain_png(bytes, max_side)
+        {
+            return Ok(Arc::new(payload));
         }
-        desk.picture(self.dataset, self.pictures)?;
         let dark = desk.dark(self.recipe, condition.degradation)?;
         let payload = match &condition.enhancer {
             None => Payload::encode(dark, format, max_side),

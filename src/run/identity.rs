@@ -11,24 +11,24 @@ use crate::dataset::Dataset;
 use crate::enhance::ModelFile;
 use crate::error::{Error, Result};
 use crate::synthesis;
-use crate::types::{Digest, EnhancerName, View};
+use crate::types::{Digest, View};
 
 /// Flags and contents that decide the replies.
 pub(super) type Identity = BTreeMap<String, Value>;
 
-/// The names and contents of the enhancement models.
-pub(super) fn enhancers(models: &[PathBuf]) -> Result<Vec<(EnhancerName, Digest)>> {
-    let mut enhancers: Vec<(EnhancerName, Digest)> = Vec::new();
+/// The enhancement models' files, each under a name of its own.
+pub(super) fn enhancers(models: &[PathBuf]) -> Result<Vec<ModelFile>> {
+    let mut enhancers: Vec<ModelFile> = Vec::new();
     for path in models {
         let file = ModelFile::read(path)?;
-        if enhancers.iter().any(|(name, _)| name == file.name()) {
+        if enhancers.iter().any(|other| other.name() == file.name()) {
             let problem = format_args!(
                 "two models are named {}; rename one of the files",
                 file.name()
             );
             return Err(Error::usage("--llie", problem));
         }
-        enhancers.push((file.name().clone(), file.digest()));
+        enhancers.push(file);
     }
     Ok(enhancers)
 }

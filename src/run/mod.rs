@@ -22,7 +22,7 @@ use rayon::prelude::*;
 
 use crate::config::{Config, ModelName, RunPlace, Show};
 use crate::dataset::Dataset;
-use crate::enhance::{Enhancer, Runtime};
+use crate::enhance::{Enhancer, ModelFile, Runtime};
 use crate::error::{Error, Result};
 use crate::report;
 use crate::score::accuracy::summarize;
@@ -63,21 +63,21 @@ pub fn evaluate(config: &Config, progress: &Progress) -> Result<Verdict> {
     } else {
         &[]
     };
-    let enhancers = identity::enhancers(models)?;
+    let files = identity::enhancers(models)?;
     let pictures = if seeing {
         look_through(&dataset, &questions, progress)?
     } else {
         BTreeMap::new()
     };
-    let inputs = Inputs::new(config, &questions, &pictures, &askers, &enhancers)?;
+    let inputs = Inputs::new(config, &questions, &pictures, &askers, &files)?;
 
     let identity = identity::identity(config, &dataset, &inputs);
     let folder = folder(config, &dataset, &identity)?;
     let kept = store::read_manifest(&folder)?;
     // Opened before the folder is made, so that an enhancer that does not work leaves nothing behind.
     let opened = match &kept {
-        Some(manifest) if manifest.status == Status::Complete => None,
-        _ => Some(open_enhancers(models, config)?),
+        Some(manifest) if manifest.status == Status::Complete => Err(files),
+        _ => Ok(open_enhancers(files, config)?),
     };
     let mut manifest = manifest(config, identity, kept);
     let mut store = Store::open(&folder, &manifest, moved(config))?;
@@ -86,7 +86,7 @@ pub fn evaluate(config: &Config, progress: &Progress) -> Result<Verdict> {
     let end = if plan.left() == 0 {
         End::Through
     } else {
-        let (runtime, enhancers) = opened.map_or_else(|| open_enhancers(models, config), Ok)?;
+        let (runtime, enhancers) = opened.or_else(|files| open_enhancers(files, config))?;
         let version =
             runtime.map(|runtime| ("onnxruntime".to_owned(), runtime.version().to_owned()));
         manifest.platform.extend(version);
@@ -211,15 +211,18 @@ fn look_through(
     digests.collect()
 }
 
-fn open_enhancers(models: &[PathBuf], config: &Config) -> Result<(Option<Runtime>, Vec<Enhancer>)> {
-    if models.is_empty() {
+fn open_enhancers(
+    files: Vec<ModelFile>,
+    config: &Config,
+) -> Result<(Option<Runtime>, Vec<Enhancer>)> {
+    if files.is_empty() {
         return Ok((None, Vec::new()));
     }
     let runtime = config.enhancement.runtime.open()?;
     let threads = config.enhancement.threads;
-    let enhancers = models
-        .iter()
-        .map(|path| Enhancer::open(path, &runtime, threads))
+    let enhancers = files
+        .into_iter()
+        .map(|file| Enhancer::open(file, &runtime, threads))
         .collect::<Result<_>>()?;
     Ok((Some(runtime), enhancers))
 }

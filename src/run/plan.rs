@@ -7,7 +7,8 @@ use super::askers::Asker;
 use super::recipe::Recipe;
 use crate::ask::Prompts;
 use crate::config::Config;
-use crate::error::Result;
+use crate::enhance::ModelFile;
+use crate::error::{Error, Result};
 use crate::types::{
     Condition, Degradation, Digest, EnhancerName, FrameId, Outcome, Question, Record, TrialKey,
     View,
@@ -30,14 +31,17 @@ impl<'a> Inputs<'a> {
         questions: &'a [Question],
         pictures: &'a BTreeMap<FrameId, Digest>,
         askers: &'a [Asker],
-        enhancers: &[(EnhancerName, Digest)],
+        files: &[ModelFile],
     ) -> Result<Self> {
         let recipe = Recipe {
             seed: config.light.seed,
             camera: config.light.camera,
             format: config.images.format,
             max_side: config.images.max_side,
-            enhancers: enhancers.to_vec(),
+            enhancers: files
+                .iter()
+                .map(|file| (file.name().clone(), file.digest()))
+                .collect(),
         };
         let prompts = config
             .ask
@@ -49,7 +53,7 @@ impl<'a> Inputs<'a> {
             pictures,
             askers,
             prompts,
-            conditions: conditions(config, enhancers),
+            conditions: conditions(config, &recipe.enhancers),
             recipe,
         })
     }
@@ -135,7 +139,7 @@ impl Plan {
             frames: Vec::new(),
         };
         for (frame, questions) in by_frame {
-            let shots = plan.shots(inputs, &questions, &answered)?;
+            let shots = plan.shots(inputs, frame, &questions, &answered)?;
             if !shots.is_empty() {
                 plan.frames.push(FramePlan {
                     frame: frame.clone(),
@@ -149,6 +153,7 @@ impl Plan {
     fn shots(
         &mut self,
         inputs: &Inputs<'_>,
+        frame: &FrameId,
         questions: &[&Question],
         answered: &HashSet<TrialKey>,
     ) -> Result<Vec<Shot>> {
@@ -166,16 +171,17 @@ impl Plan {
             } else {
                 View::Blind
             };
+            let askers = inputs.askers.iter().enumerate();
+            let askers: Vec<(usize, &Asker)> = askers.filter(|(_, a)| a.view == view).collect();
+            if askers.is_empty() {
+                continue;
+            }
+            let shown = Shown::new(inputs, frame, condition)?;
             let mut trials = Vec::new();
             for (question, image, blind) in &asked {
                 let prompt: &Arc<str> = if view == View::Image { image } else { blind };
-                for (index, asker) in inputs
-                    .askers
-                    .iter()
-                    .enumerate()
-                    .filter(|(_, asker)| asker.view == view)
-                {
-                    let key = key(inputs, question, prompt, asker, condition);
+                for &(index, asker) in &askers {
+                    let key = shown.key(question, prompt, asker);
                     self.keys.push(key);
                     if !answered.contains(&key) {
                         trials.push(Trial {
@@ -212,38 +218,41 @@ impl Plan {
     }
 }
 
-/// The key of one trial: see [`TrialKey`].
-fn key(
-    inputs: &Inputs<'_>,
-    question: &Question,
-    prompt: &str,
-    asker: &Asker,
-    condition: Option<&Condition>,
-) -> TrialKey {
-    let image = condition.and_then(|condition| {
-        let picture = inputs.pictures.get(&question.frame)?;
-        Some(
-            inputs
-                .recipe
-                .digest(&question.frame, picture, condition)
-                .to_string(),
-        )
-    });
-    let shown = question.choices.texts().iter().map(String::as_str);
-    // Built-in models answer by the names of question and condition, so these decide the reply too.
-    let condition = condition.map_or("blind".to_owned(), ToString::to_string);
-    let model = asker.model.digest().to_string();
-    let head = [
-        "darkqa.trial/1",
-        asker.model.name(),
-        question.id.0.as_str(),
-        prompt,
-        &model,
-        &condition,
-    ];
-    let parts = head
-        .into_iter()
-        .chain([image.as_deref().unwrap_or("no image")])
-        .chain(shown);
-    Digest::of_parts(parts.map(str::as_bytes)).into()
+/// What is shown in one shot, as it enters the keys of its trials.
+struct Shown {
+    condition: String,
+    image: String,
+}
+
+impl Shown {
+    fn new(inputs: &Inputs<'_>, frame: &FrameId, condition: Option<&Condition>) -> Result<Self> {
+        let Some(condition) = condition else {
+            return Ok(Self {
+                condition: "blind".to_owned(),
+                image: "no image".to_owned(),
+            });
+        };
+        let picture = inputs.pictures.get(frame);
+        let picture = picture.ok_or_else(|| Error::data(frame, "the frame was not read"))?;
+        Ok(Self {
+            condition: condition.to_string(),
+            image: inputs.recipe.digest(frame, picture, condition).to_string(),
+        })
+    }
+
+    /// The key of one trial: see [`TrialKey`].
+    fn key(&self, question: &Question, prompt: &str, asker: &Asker) -> TrialKey {
+        // Built-in models answer by the names of question and condition, so these decide the reply too.
+        let head = [
+            "darkqa.trial/1",
+            asker.model.name(),
+            question.id.0.as_str(),
+            prompt,
+            &asker.digest,
+            &self.condition,
+            &self.image,
+        ];
+        let choices = question.choices.texts().iter().map(String::as_str);
+        Digest::of_parts(head.into_iter().chain(choices).map(str::as_bytes)).into()
+    }
 }

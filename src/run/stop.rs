@@ -177,6 +177,7 @@ mod tests {
     fn watch(models: usize, max_failures: Option<usize>) -> Watch {
         let asker = |_| Asker {
             model: Arc::new(Model::Random(Random { seed: 0 })),
+            digest: "".into(),
             view: View::Image,
         };
         let askers: Vec<Asker> = (0..models).map(asker).collect();

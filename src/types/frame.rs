@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use ndarray::{Array2, Array3, ArrayView3};
+use ndarray::{Array2, Array3};
 use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
@@ -63,12 +63,6 @@ impl Rgb {
     #[must_use]
     pub fn samples_mut(&mut self) -> &mut [u8] {
         self.0.as_slice_mut().unwrap_or_default()
-    }
-
-    /// The image as an array, height × width × 3.
-    #[must_use]
-    pub fn view(&self) -> ArrayView3<'_, u8> {
-        self.0.view()
     }
 }
 
