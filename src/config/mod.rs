@@ -17,7 +17,7 @@ use crate::cli::{DataArgs, EnhancementArgs, EvaluateArgs, LightArgs, OutputArgs,
 use crate::dataset::Place;
 use crate::enhance::{Install, RuntimeSearch};
 use crate::error::{Error, Result};
-use crate::synthesis::CameraModel;
+use crate::synthesis::{CameraModel, Profile, Synthesis};
 use crate::types::{Family, Level, Variants};
 
 /// How many requests are in flight where nobody says otherwise.
@@ -67,8 +67,8 @@ pub struct Light {
     pub variants: Variants,
     /// The seed of all random draws.
     pub seed: u64,
-    /// The sensor.
-    pub camera: CameraModel,
+    /// The sensor branch.
+    pub synthesis: Synthesis,
 }
 
 /// What mends the images.
@@ -197,7 +197,7 @@ fn light(said: &LightArgs) -> Result<Light> {
             .map_or(Ok(Level::ALL.to_vec()), levels)?,
         variants: parsed("--variant", said.variant.as_deref())?.unwrap_or(Variants::Both),
         seed: said.seed.unwrap_or(0),
-        camera,
+        synthesis: Synthesis::of(Profile::Paper, camera),
     })
 }
 

@@ -163,8 +163,11 @@ impl Desk {
                 Degradation::Exposure(level) => expose(clean, level),
                 Degradation::Sensor(level) => {
                     let key = NoiseKey::new(recipe.seed, frame);
-                    once(negative, || Ok(Negative::new(clean, &key, &recipe.camera)))?
-                        .develop(level)
+                    if negative.as_ref().is_some_and(|kept| !kept.serves(level)) {
+                        *negative = None;
+                    }
+                    let take = || Ok(Negative::new(clean, &key, &recipe.synthesis, level));
+                    once(negative, take)?.develop(level)
                 }
             };
             Ok((degradation, image))

@@ -76,7 +76,10 @@ pub(super) fn identity(config: &Config, dataset: &Dataset, inputs: &Inputs<'_>) 
         ("--levels", json!(levels)),
         ("--variant", json!(config.light.variants.to_string())),
         ("--seed", json!(config.light.seed)),
-        ("--gain, --ratio", json!(config.light.camera)),
+        (
+            "the sensor (--profile, --camera and the flags beside them)",
+            json!(config.light.synthesis),
+        ),
         ("--llie", json!(enhancers)),
         ("--llie-on", json!(config.enhancement.on.to_string())),
         ("--model", json!(names(View::Image))),

@@ -35,7 +35,7 @@ impl<'a> Inputs<'a> {
     ) -> Result<Self> {
         let recipe = Recipe {
             seed: config.light.seed,
-            camera: config.light.camera,
+            synthesis: config.light.synthesis.clone(),
             format: config.images.format,
             max_side: config.images.max_side,
             enhancers: files

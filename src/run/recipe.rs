@@ -2,14 +2,14 @@
 
 use crate::ask::Format;
 use crate::enhance;
-use crate::synthesis::{self, CameraModel};
+use crate::synthesis::{self, Synthesis};
 use crate::types::{Condition, Degradation, Digest, EnhancerName, FrameId};
 
 /// Everything but the frame and the condition that decides an image.
 #[derive(Debug)]
 pub(super) struct Recipe {
     pub(super) seed: u64,
-    pub(super) camera: CameraModel,
+    pub(super) synthesis: Synthesis,
     pub(super) format: Format,
     pub(super) max_side: Option<std::num::NonZeroU32>,
     pub(super) enhancers: Vec<(EnhancerName, Digest)>,
@@ -29,11 +29,11 @@ impl Recipe {
             Degradation::Exposure(_) => format!("synthesis {}", synthesis::VERSION),
             Degradation::Sensor(_) => {
                 format!(
-                    "synthesis {} seed {} frame {} camera {:?}",
+                    "synthesis {} seed {} frame {} {:?}",
                     synthesis::VERSION,
                     self.seed,
                     frame,
-                    self.camera
+                    self.synthesis
                 )
             }
         };

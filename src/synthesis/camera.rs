@@ -17,7 +17,7 @@ const RATIOS: [f64; 2] = [1.0, 10000.0];
 /// The default is the paper's: a Sony A7S2 with its gain K log-uniform in [0.1, 6.0] and its amplification ratio r
 /// uniform in [100, 300]. Either may be pinned; pinning one leaves every other number of the state as it was drawn,
 /// save what is a function of K.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct CameraModel {
     gain: Option<f64>,
     ratio: Option<f64>,

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::bayer::{Bayer, Plane};
 use super::camera::CameraState;
 use super::curve;
+use super::profile::Tone;
 use crate::types::{DarkLevel, Rgb};
 
 /// White balance and brightness gains, clipped to [0, 1].
@@ -22,9 +23,9 @@ pub fn balance(raw: &mut Bayer, state: &CameraState) {
 }
 
 /// Develops a balanced RAW image into `dark`, which it covers: bilinear demosaic, camera → sRGB, clip, exposure drop,
-/// gamma compression, 8 bit.
-pub fn render(balanced: &Bayer, state: &CameraState, level: DarkLevel, dark: &mut Rgb) {
-    let encoder = Encoder::new(level);
+/// gamma compression, tone curve, 8 bit.
+pub fn render(balanced: &Bayer, state: &CameraState, tone: Tone, level: DarkLevel, dark: &mut Rgb) {
+    let encoder = Encoder::new(level, tone);
     let matrix = state.camera_to_rgb.map(|row| row.map(|value| value as f32));
     let width = dark.width();
     dark.samples_mut()
@@ -58,13 +59,26 @@ pub struct Encoder {
 const CELLS: usize = 4096;
 
 impl Encoder {
-    /// The encoder of a level: ((c − ½) / 255)^2.2 · 2^ΔEV is where code c begins (DarkQA, eqs. 2 and 3 inverted).
+    /// The encoder of a level: ((c − ½) / 255)^2.2 · 2^ΔEV is where code c begins (DarkQA, eqs. 2 and 3 inverted), or
+    /// where it begins behind a tone curve.
     #[must_use]
-    pub fn new(level: DarkLevel) -> Self {
+    pub fn new(level: DarkLevel, tone: Tone) -> Self {
         let left = curve::light_left(level.exposure_drop());
         let mut thresholds = [0.0; 257];
         for (code, threshold) in thresholds.iter_mut().enumerate().skip(1) {
-            let light = libm::pow((code as f64 - 0.5) / 255.0, curve::GAMMA) / left;
+            let display = (code as f64 - 0.5) / 255.0;
+            let light = match tone {
+                Tone::None => curve::gamma_expand(display) / left,
+                Tone::AfterEv => curve::gamma_expand(curve::inverse_smoothstep(display)) / left,
+                Tone::BeforeEv => {
+                    let before = curve::gamma_compress(curve::gamma_expand(display) / left);
+                    if before > 1.0 {
+                        f64::INFINITY
+                    } else {
+                        curve::gamma_expand(curve::inverse_smoothstep(before))
+                    }
+                }
+            };
             *threshold = light as f32;
         }
         thresholds[256] = f32::INFINITY;
@@ -96,7 +110,7 @@ mod tests {
     #[test]
     fn the_encoder_is_the_papers_formula() {
         for level in DarkLevel::ALL {
-            let encoder = Encoder::new(level);
+            let encoder = Encoder::new(level, Tone::None);
             let left = curve::light_left(level.exposure_drop());
             let display = |light: f32| curve::gamma_compress(left * f64::from(light)) * 255.0;
             for step in 0..=300_000 {
@@ -113,7 +127,7 @@ mod tests {
     #[test]
     fn the_encoder_takes_its_ends() {
         let ends = DarkLevel::ALL.map(|level| {
-            let encoder = Encoder::new(level);
+            let encoder = Encoder::new(level, Tone::None);
             (encoder.code(0.0), encoder.code(1.0))
         });
         assert_eq!(ends, [(0, 136), (0, 72), (0, 39), (0, 24), (0, 15)]);

@@ -25,6 +25,7 @@ pub mod isp;
 pub mod negative;
 pub mod noise;
 pub mod poisson;
+pub mod profile;
 pub mod random;
 pub mod sensor;
 pub mod unprocess;
@@ -32,6 +33,7 @@ pub mod unprocess;
 pub use camera::{CameraModel, CameraState};
 pub use exposure::expose;
 pub use negative::Negative;
+pub use profile::{Amplify, Coupling, Draws, Profile, Synthesis, Tone};
 pub use random::NoiseKey;
 
 use crate::types::{Degradation, Rgb};
@@ -43,11 +45,11 @@ pub const VERSION: u32 = 1;
 ///
 /// For several levels of one frame with noise, a [`Negative`] gives the same images for less work.
 #[must_use]
-pub fn degrade(clean: &Rgb, how: Degradation, key: &NoiseKey, camera: &CameraModel) -> Rgb {
+pub fn degrade(clean: &Rgb, how: Degradation, key: &NoiseKey, synthesis: &Synthesis) -> Rgb {
     match how {
         Degradation::None => clean.clone(),
         Degradation::Exposure(level) => expose(clean, level),
-        Degradation::Sensor(level) => Negative::new(clean, key, camera).develop(level),
+        Degradation::Sensor(level) => Negative::new(clean, key, synthesis, level).develop(level),
     }
 }
 

@@ -2,15 +2,16 @@
 //!
 //! Each term works on one sensor row in ADU and takes each of its numbers from the site it is for, in double precision.
 //!
-//! The paper's wording is kept: the ratio r belongs to the shot noise alone ("reduce the signal by r, add Poisson noise,
+//! By the paper's wording the ratio r belongs to the shot noise alone ("reduce the signal by r, add Poisson noise,
 //! amplify back by r"), and read, row and quantisation noise act on the amplified signal. ELD lets all four act on the
-//! attenuated one.
+//! attenuated one. [`Amplify`] chooses.
 
 use rayon::prelude::*;
 
 use super::bayer::{Bayer, Plane};
 use super::camera::CameraState;
 use super::poisson;
+use super::profile::Amplify;
 use super::random::{Component, NoiseKey, Site, Stream};
 use super::sensor::ADU_RANGE;
 
@@ -33,7 +34,7 @@ impl Term {
 }
 
 /// Adds the given terms to a RAW image (DarkQA, N₄ ∘ N₃ ∘ N₂ ∘ N₁). Leaving one out changes no draw of the others.
-pub fn add(raw: &mut Bayer, state: &CameraState, key: &NoiseKey, terms: &[Term]) {
+pub fn add(raw: &mut Bayer, state: &CameraState, key: &NoiseKey, amplify: Amplify, terms: &[Term]) {
     let stream = |term, component| terms.contains(&term).then(|| key.stream(component));
     let shots = stream(Term::Shot, Component::Shot);
     let reads = stream(Term::Read, Component::Read);
@@ -44,9 +45,11 @@ pub fn add(raw: &mut Bayer, state: &CameraState, key: &NoiseKey, terms: &[Term])
         .for_each_init(Vec::new, |adu, (at, samples)| {
             adu.clear();
             adu.extend(samples.iter().map(|sample| f64::from(*sample) * ADU_RANGE));
+            scale(adu, 1.0 / state.ratio);
             if let Some(stream) = shots {
-                scale(adu, 1.0 / state.ratio);
                 shot(adu, at, state, stream);
+            }
+            if amplify == Amplify::ShotOnly {
                 scale(adu, state.ratio);
             }
             if let Some(stream) = reads {
@@ -57,6 +60,9 @@ pub fn add(raw: &mut Bayer, state: &CameraState, key: &NoiseKey, terms: &[Term])
             }
             if let Some(stream) = roundings {
                 quantisation(adu, at, stream);
+            }
+            if amplify == Amplify::All {
+                scale(adu, state.ratio);
             }
             for (sample, adu) in samples.iter_mut().zip(adu) {
                 *sample = (*adu / ADU_RANGE) as f32;
@@ -311,7 +317,7 @@ mod tests {
         let noisy = |terms: &[Term]| {
             let mut raw = Bayer::covering(8, 12);
             raw.rows_mut().for_each(|line| line.fill(0.3));
-            add(&mut raw, &median(), &key(), terms);
+            add(&mut raw, &median(), &key(), Amplify::ShotOnly, terms);
             (0..8)
                 .flat_map(|row| raw.row(row).to_vec())
                 .collect::<Vec<_>>()
@@ -344,6 +350,7 @@ mod tests {
             &mut raw,
             &state,
             &key(),
+            Amplify::ShotOnly,
             &[Term::Read, Term::Row, Term::Quantisation],
         );
         let all: Vec<f64> = (0..600)
@@ -356,7 +363,7 @@ mod tests {
         assert!(((mean - b) * ADU_RANGE - bias).abs() < 0.13);
 
         raw.rows_mut().for_each(|line| line.fill(b as f32));
-        add(&mut raw, &state, &key(), &[Term::Shot]);
+        add(&mut raw, &state, &key(), Amplify::ShotOnly, &[Term::Shot]);
         let all: Vec<f64> = (0..600)
             .flat_map(|row| raw.row(row).iter().map(|y| f64::from(*y)))
             .collect();

@@ -6,7 +6,7 @@
 
 use std::f64::consts::PI;
 
-use crate::types::{Digest, FrameId};
+use crate::types::{DarkLevel, Digest, FrameId};
 
 /// What a frame's noise is drawn from: the run's seed and the frame's name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,6 +22,13 @@ impl NoiseKey {
             frame.0.as_bytes(),
         ];
         Self(Digest::of_parts(parts))
+    }
+
+    /// The key of the same frame at one level, for noise of its own.
+    #[must_use]
+    pub fn at(&self, level: DarkLevel) -> Self {
+        let level = level.level().to_string();
+        Self(Digest::of_parts([self.0.as_bytes(), level.as_bytes()]))
     }
 
     /// The numbers of one component, unrelated to those of every other.

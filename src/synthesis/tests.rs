@@ -45,19 +45,19 @@ fn the_untouched_level_is_untouched() {
         &clean,
         Degradation::None,
         &key(1, "a"),
-        &CameraModel::default(),
+        &Synthesis::default(),
     );
     assert_eq!(same, clean);
 }
 
 #[test]
 fn one_negative_gives_what_the_door_gives() {
-    let (clean, key, camera) = (ramps(10, 14), key(1, "a"), CameraModel::default());
-    let negative = Negative::new(&clean, &key, &camera);
+    let (clean, key, paper) = (ramps(10, 14), key(1, "a"), Synthesis::default());
+    let negative = Negative::new(&clean, &key, &paper, DarkLevel::L1);
     for level in DarkLevel::ALL {
-        let alone = degrade(&clean, Degradation::Sensor(level), &key, &camera);
+        let alone = degrade(&clean, Degradation::Sensor(level), &key, &paper);
         assert_eq!(alone, negative.develop(level));
-        let exposed = degrade(&clean, Degradation::Exposure(level), &key, &camera);
+        let exposed = degrade(&clean, Degradation::Exposure(level), &key, &paper);
         assert_eq!(exposed, expose(&clean, level));
     }
 }
@@ -73,7 +73,12 @@ fn bytes_are_those_of_this_version() {
     let exposure = Digest::of(&bytes).to_string();
     bytes.clear();
     for frame in ["first", "second", "third", "fourth"] {
-        let negative = Negative::new(&clean, &key(20, frame), &CameraModel::default());
+        let negative = Negative::new(
+            &clean,
+            &key(20, frame),
+            &Synthesis::default(),
+            DarkLevel::L1,
+        );
         for level in DarkLevel::ALL {
             bytes.extend_from_slice(negative.develop(level).samples());
         }
@@ -95,7 +100,12 @@ fn threads_do_not_enter() {
     let develop = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
         pool.build().unwrap().install(|| {
-            let negative = Negative::new(&ramps(61, 40), &key(3, "a"), &CameraModel::default());
+            let negative = Negative::new(
+                &ramps(61, 40),
+                &key(3, "a"),
+                &Synthesis::default(),
+                DarkLevel::L1,
+            );
             DarkLevel::ALL.map(|level| negative.develop(level))
         })
     };
@@ -109,7 +119,13 @@ fn threads_do_not_enter() {
 fn seed_and_frame_enter() {
     let clean = flat(128, 64);
     let take = |seed, frame| {
-        let negative = Negative::taken(&clean, &key(seed, frame), median(), &Term::ALL);
+        let negative = Negative::taken(
+            &clean,
+            &key(seed, frame),
+            median(),
+            Amplify::ShotOnly,
+            &Term::ALL,
+        );
         negative.develop(DarkLevel::L1)
     };
     let first = take(1, "a");
@@ -134,7 +150,7 @@ fn every_size_is_kept() {
     ] {
         let clean = ramps(height, width);
         let how = Degradation::Sensor(DarkLevel::L2);
-        let dark = degrade(&clean, how, &key(1, "a"), &CameraModel::default());
+        let dark = degrade(&clean, how, &key(1, "a"), &Synthesis::default());
         assert_eq!((dark.height(), dark.width()), (height, width));
     }
 }
@@ -154,7 +170,13 @@ fn flat_greys_have_their_figures() {
     ];
     for (code, level, due) in cases {
         let clean = flat(code, 512);
-        let negative = Negative::taken(&clean, &key(4, "flat"), median(), &Term::ALL);
+        let negative = Negative::taken(
+            &clean,
+            &key(4, "flat"),
+            median(),
+            Amplify::ShotOnly,
+            &Term::ALL,
+        );
         let found = statistics(&negative.develop(level));
         for (found, due) in found.iter().flatten().zip(due.iter().flatten()) {
             let close = (found - due).abs() < 0.01 * due + 0.07;
@@ -165,7 +187,13 @@ fn flat_greys_have_their_figures() {
 
 #[test]
 fn noise_shrinks_with_the_light() {
-    let negative = Negative::taken(&flat(128, 256), &key(5, "a"), median(), &Term::ALL);
+    let negative = Negative::taken(
+        &flat(128, 256),
+        &key(5, "a"),
+        median(),
+        Amplify::ShotOnly,
+        &Term::ALL,
+    );
     let [light, dark] = [DarkLevel::L1, DarkLevel::L2]
         .map(|level| statistics(&negative.develop(level)).map(|[_, deviation]| deviation));
     for (light, dark) in light.iter().zip(dark) {
@@ -185,7 +213,7 @@ fn without_noise_a_mid_grey_and_white_are_the_exposure_branchs() {
             if code == 255 && state.rgb_gain < 1.0 {
                 continue;
             }
-            let negative = Negative::taken(&clean, &key, state, &[]);
+            let negative = Negative::taken(&clean, &key, state, Amplify::ShotOnly, &[]);
             for level in DarkLevel::ALL {
                 assert_eq!(
                     negative.develop(level),

@@ -6,7 +6,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use darkqa_eval::ask::{Format, Payload};
-use darkqa_eval::synthesis::{CameraModel, Negative, NoiseKey, expose};
+use darkqa_eval::synthesis::{Negative, NoiseKey, Synthesis, expose};
 use darkqa_eval::types::{DarkLevel, FrameId, Rgb};
 
 /// A frame with edges, ramps and some texture, made by integer arithmetic.
@@ -22,9 +22,9 @@ fn frame(height: usize, width: usize) -> Rgb {
 
 fn ladder(c: &mut Criterion) {
     let clean = frame(1440, 2560);
-    let (key, camera) = (
+    let (key, paper) = (
         NoiseKey::new(0, &FrameId("bench".into())),
-        CameraModel::default(),
+        Synthesis::default(),
     );
     let mut group = c.benchmark_group("2560x1440");
     group.sample_size(10);
@@ -33,15 +33,15 @@ fn ladder(c: &mut Criterion) {
         b.iter(|| DarkLevel::ALL.map(|level| expose(black_box(&clean), level)));
     });
     group.bench_function("noise, negative", |b| {
-        b.iter(|| Negative::new(black_box(&clean), &key, &camera));
+        b.iter(|| Negative::new(black_box(&clean), &key, &paper, DarkLevel::L3));
     });
-    let negative = Negative::new(&clean, &key, &camera);
+    let negative = Negative::new(&clean, &key, &paper, DarkLevel::L3);
     group.bench_function("noise, one level from the negative", |b| {
         b.iter(|| negative.develop(black_box(DarkLevel::L3)));
     });
     group.bench_function("noise, five levels", |b| {
         b.iter(|| {
-            let negative = Negative::new(black_box(&clean), &key, &camera);
+            let negative = Negative::new(black_box(&clean), &key, &paper, DarkLevel::L3);
             DarkLevel::ALL.map(|level| negative.develop(level))
         });
     });
@@ -50,9 +50,9 @@ fn ladder(c: &mut Criterion) {
 
 fn request(c: &mut Criterion) {
     let clean = frame(720, 1280);
-    let (key, camera) = (
+    let (key, paper) = (
         NoiseKey::new(0, &FrameId("bench".into())),
-        CameraModel::default(),
+        Synthesis::default(),
     );
     let mut group = c.benchmark_group("1280x720");
     group.sample_size(10);
@@ -61,7 +61,8 @@ fn request(c: &mut Criterion) {
     });
     group.bench_function("frame to request, noise L3", |b| {
         b.iter(|| {
-            let dark = Negative::new(black_box(&clean), &key, &camera).develop(DarkLevel::L3);
+            let dark = Negative::new(black_box(&clean), &key, &paper, DarkLevel::L3)
+                .develop(DarkLevel::L3);
             Payload::encode(&dark, Format::Png, None)
         });
     });
