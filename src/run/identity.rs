@@ -100,7 +100,10 @@ pub(super) fn identity(config: &Config, dataset: &Dataset, inputs: &Inputs<'_>) 
         ("--reasoning-effort", json!(ask.parameters.reasoning_effort)),
         ("--detail", json!(ask.parameters.detail)),
         ("what the models answer by", json!(models)),
-        ("synthesis", json!(synthesis::VERSION)),
+        (
+            "synthesis",
+            json!([synthesis::exposure::VERSION, synthesis::VERSION]),
+        ),
     ];
     fields
         .into_iter()

@@ -26,7 +26,7 @@ impl Recipe {
     ) -> Digest {
         let light = match condition.degradation {
             Degradation::None => "untouched".to_owned(),
-            Degradation::Exposure(_) => format!("synthesis {}", synthesis::VERSION),
+            Degradation::Exposure(_) => format!("synthesis {}", synthesis::exposure::VERSION),
             Degradation::Sensor(_) => {
                 format!(
                     "synthesis {} seed {} frame {} {:?}",

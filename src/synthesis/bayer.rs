@@ -2,6 +2,8 @@
 
 use rayon::prelude::*;
 
+use super::lanes::{LANES, Lanes};
+
 /// The four colour planes of an RGGB mosaic, each of half the height and half the width.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Plane {
@@ -26,7 +28,10 @@ impl Plane {
     }
 }
 
-/// A RAW image: even height × even width, row by row in the sensor's own order, black 0 and white 1.
+/// A RAW image: even height × even width, black 0 and white 1.
+///
+/// The sites of a row lie plane by plane, even columns before odd ones, each plane filled up to a whole number of lanes
+/// and one: so that what works on a plane works on whole lanes, and finds the neighbour beyond the edge.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bayer {
     height: usize,
@@ -42,7 +47,7 @@ impl Bayer {
         Self {
             height,
             width,
-            samples: vec![0.0; height * width],
+            samples: vec![0.0; height * 2 * stride(width)],
         }
     }
 
@@ -58,75 +63,145 @@ impl Bayer {
         self.width
     }
 
-    /// The samples of a sensor row.
+    /// The sample at a site.
+    ///
+    /// # Panics
+    /// Where there is no such site.
+    #[must_use]
+    pub fn sample(&self, row: usize, column: usize) -> f32 {
+        assert!(column < self.width, "column {column} of {}", self.width);
+        self.sites(row).planes[column % 2][column / 2 + column % 2]
+    }
+
+    /// The sites of a row, to be read.
     ///
     /// # Panics
     /// Where there is no such row.
     #[must_use]
-    pub fn row(&self, row: usize) -> &[f32] {
-        &self.samples[row * self.width..][..self.width]
+    pub(super) fn sites(&self, row: usize) -> Sites<'_> {
+        let stride = stride(self.width);
+        let (even, odd) = self.samples[row * 2 * stride..][..2 * stride].split_at(stride);
+        Sites {
+            planes: [even, odd],
+        }
     }
 
     /// All rows, to be changed in parallel.
-    pub fn rows_mut(&mut self) -> impl IndexedParallelIterator<Item = &mut [f32]> {
-        self.samples.par_chunks_mut(self.width)
+    pub fn lines_mut(&mut self) -> impl IndexedParallelIterator<Item = Line<'_>> {
+        let width = self.width;
+        let lines = self.samples.par_chunks_mut(2 * stride(width));
+        lines.map(move |samples| Line { width, samples })
     }
 
-    /// Interpolates one row of pixels bilinearly, each plane replicated beyond its edges. `pixels` may be shorter than
-    /// the row.
-    ///
-    /// A plane's replicated neighbour lies two sites back, so that beyond an edge the mosaic is mirrored at its last
-    /// site: −1 reads 1.
-    pub fn demosaic_row(&self, row: usize, pixels: &mut [[f32; 3]]) {
-        let above = self.row(if row == 0 { 1 } else { row - 1 });
-        let here = self.row(row);
-        let below = self.row(if row + 1 == self.height {
-            row - 1
-        } else {
-            row + 1
-        });
-        let fill = if row.is_multiple_of(2) {
-            red_pair
-        } else {
-            blue_pair
-        };
-        for (i, pair) in pixels.chunks_mut(2).enumerate() {
-            let even = 2 * i;
-            let odd = even + 1;
-            let left = if even == 0 { odd } else { even - 1 };
-            let right = if odd + 1 == self.width { even } else { odd + 1 };
-            let columns = [left, even, odd, right];
-            let both = fill([above, here, below].map(|line| columns.map(|column| line[column])));
-            pair.copy_from_slice(&both[..pair.len()]);
+    /// A row, to be changed.
+    pub(super) fn line_mut(&mut self, row: usize) -> Line<'_> {
+        let (width, size) = (self.width, 2 * stride(self.width));
+        Line {
+            width,
+            samples: &mut self.samples[row * size..][..size],
         }
     }
 }
 
-/// Three rows of four neighbouring sites, of which the middle two are interpolated.
-type Window = [[f32; 4]; 3];
-
-/// The two pixels of a red and a green site.
-fn red_pair([u, m, d]: Window) -> [[f32; 3]; 2] {
-    [
-        [
-            m[1],
-            (m[0] + m[2] + u[1] + d[1]) * 0.25,
-            (u[0] + u[2] + d[0] + d[2]) * 0.25,
-        ],
-        [(m[1] + m[3]) * 0.5, m[2], (u[2] + d[2]) * 0.5],
-    ]
+/// The samples that a plane takes in a row: whole lanes, and one for the neighbour beyond the edge.
+fn stride(width: usize) -> usize {
+    (width / 2).next_multiple_of(LANES) + 1
 }
 
-/// The two pixels of a green and a blue site.
-fn blue_pair([u, m, d]: Window) -> [[f32; 3]; 2] {
-    [
-        [(u[1] + d[1]) * 0.5, m[1], (m[0] + m[2]) * 0.5],
+/// The sites of one row. A plane's neighbour beyond the edge is its own last site: that of the even columns follows it,
+/// that of the odd ones goes before it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sites<'a> {
+    /// Column 2i at i.
+    pub(super) planes: [&'a [f32]; 2],
+}
+
+/// One row of a RAW image, to be changed.
+#[derive(Debug)]
+pub struct Line<'a> {
+    width: usize,
+    samples: &'a mut [f32],
+}
+
+impl Line<'_> {
+    /// The plane of the even columns and that of the odd ones, in whole lanes: what lies beyond the width is never seen.
+    pub fn planes(&mut self) -> [&mut [Lanes<f32>]; 2] {
+        let (even, odd) = self.samples.split_at_mut(stride(self.width));
         [
-            (u[1] + u[3] + d[1] + d[3]) * 0.25,
-            (m[1] + m[3] + u[2] + d[2]) * 0.25,
-            m[2],
-        ],
-    ]
+            even.as_chunks_mut().0,
+            odd.split_at_mut(1).1.as_chunks_mut().0,
+        ]
+    }
+
+    /// Repeats each plane's last site beyond the edge: to be called when the row is done.
+    pub fn seal(&mut self) {
+        let (n, stride) = (self.width / 2, stride(self.width));
+        self.samples[n] = self.samples[n - 1];
+        self.samples[stride] = self.samples[stride + 1];
+    }
+}
+
+/// The colours of the even and of the odd columns of a row, channel by channel.
+pub(super) type Colours = [[Lanes<f32>; 3]; 2];
+
+/// Interpolates the `index`-th lanes of a row bilinearly, each plane replicated beyond its edges, from the rows above,
+/// here and below.
+#[inline(always)]
+pub(super) fn demosaic([above, here, below]: [Sites<'_>; 3], row: usize, index: usize) -> Colours {
+    let even = |sites: Sites<'_>| sites.planes[0].as_chunks().0[index];
+    let even_right = |sites: Sites<'_>| sites.planes[0][1..].as_chunks().0[index];
+    let odd_left = |sites: Sites<'_>| sites.planes[1].as_chunks().0[index];
+    let odd = |sites: Sites<'_>| sites.planes[1][1..].as_chunks().0[index];
+    if row.is_multiple_of(2) {
+        let (red, green) = (even(here), odd(here));
+        let cross = four(&odd_left(here), &green, &even(above), &even(below));
+        let corners = four(&odd_left(above), &odd(above), &odd_left(below), &odd(below));
+        [
+            [red, cross, corners],
+            [
+                two(&red, &even_right(here)),
+                green,
+                two(&odd(above), &odd(below)),
+            ],
+        ]
+    } else {
+        let (green, blue) = (even(here), odd(here));
+        let cross = four(&green, &even_right(here), &odd(above), &odd(below));
+        let corners = four(
+            &even(above),
+            &even_right(above),
+            &even(below),
+            &even_right(below),
+        );
+        [
+            [
+                two(&even(above), &even(below)),
+                green,
+                two(&odd_left(here), &blue),
+            ],
+            [corners, cross, blue],
+        ]
+    }
+}
+
+/// The mean of two.
+#[inline(always)]
+fn two(a: &Lanes<f32>, b: &Lanes<f32>) -> Lanes<f32> {
+    let mut mean = [0.0; LANES];
+    for i in 0..LANES {
+        mean[i] = (a[i] + b[i]) * 0.5;
+    }
+    mean
+}
+
+/// The mean of four.
+#[inline(always)]
+fn four(a: &Lanes<f32>, b: &Lanes<f32>, c: &Lanes<f32>, d: &Lanes<f32>) -> Lanes<f32> {
+    let mut mean = [0.0; LANES];
+    for i in 0..LANES {
+        mean[i] = (a[i] + b[i] + c[i] + d[i]) * 0.25;
+    }
+    mean
 }
 
 #[cfg(test)]
@@ -135,20 +210,33 @@ mod tests {
 
     fn filled(height: usize, width: usize, value: impl Fn(usize, usize) -> f32 + Sync) -> Bayer {
         let mut bayer = Bayer::covering(height, width);
-        bayer.rows_mut().enumerate().for_each(|(row, line)| {
-            for (column, sample) in line.iter_mut().enumerate() {
-                *sample = value(row, column);
+        bayer.lines_mut().enumerate().for_each(|(row, mut line)| {
+            for (parity, plane) in line.planes().into_iter().enumerate() {
+                for (i, sample) in plane.as_flattened_mut().iter_mut().enumerate() {
+                    *sample = value(row, 2 * i + parity);
+                }
             }
+            line.seal();
         });
         bayer
     }
 
-    fn demosaic(bayer: &Bayer) -> Vec<Vec<[f32; 3]>> {
-        let mut rows = vec![vec![[0.0; 3]; bayer.width()]; bayer.height()];
-        for (row, pixels) in rows.iter_mut().enumerate() {
-            bayer.demosaic_row(row, pixels);
-        }
-        rows
+    fn interpolated(bayer: &Bayer) -> Vec<Vec<[f32; 3]>> {
+        let last = bayer.height() - 1;
+        let pixels = |row: usize| {
+            let around = [
+                if row == 0 { 1 } else { row - 1 },
+                row,
+                if row == last { row - 1 } else { row + 1 },
+            ];
+            let pixel = |column: usize| {
+                let site = column / 2;
+                let colours = demosaic(around.map(|row| bayer.sites(row)), row, site / LANES);
+                colours[column % 2].map(|channel| channel[site % LANES])
+            };
+            (0..bayer.width()).map(pixel).collect()
+        };
+        (0..bayer.height()).map(pixels).collect()
     }
 
     #[test]
@@ -161,13 +249,13 @@ mod tests {
 
     #[test]
     fn constant_planes_stay_constant_to_the_border() {
-        for (height, width) in [(2, 2), (2, 8), (6, 2), (6, 8)] {
+        for (height, width) in [(2, 2), (2, 8), (6, 2), (6, 8), (2, 126), (4, 130)] {
             let colours = filled(height, width, |row, column| match Plane::at(row, column) {
                 Plane::R => 0.25,
                 Plane::Gr | Plane::Gb => 0.5,
                 Plane::B => 0.75,
             });
-            for pixel in demosaic(&colours).iter().flatten() {
+            for pixel in interpolated(&colours).iter().flatten() {
                 assert_eq!(
                     pixel.map(f32::to_bits),
                     [0.25f32, 0.5, 0.75].map(f32::to_bits)
@@ -180,9 +268,9 @@ mod tests {
     /// an edge being the plane's last one.
     #[test]
     fn pixels_are_means_of_their_neighbours() {
-        let (height, width) = (6, 8);
+        let (height, width) = (6, 132);
         let value = |row: usize, column: usize| ((row * 31 + column * 17) % 64) as f32;
-        let found = demosaic(&filled(height, width, value));
+        let found = interpolated(&filled(height, width, value));
         let clamp = |at: isize, size: usize| {
             let parity = at.rem_euclid(2);
             (at.clamp(parity, size.cast_signed() - 2 + parity)) as usize

@@ -79,6 +79,8 @@ pub struct CameraState {
     pub row_deviation: f64,
     /// Offset of each Bayer plane, in ADU, in the order R, Gr, Gb, B.
     pub bias: [f64; 4],
+    /// The range of a sample above its black level, in ADU.
+    pub adu_range: f64,
 }
 
 impl CameraState {
@@ -114,6 +116,7 @@ impl CameraState {
             read_shape: noise.read_shape,
             row_deviation: noise.row_deviation,
             bias: noise.bias,
+            adu_range: sensor::ADU_RANGE,
         }
     }
 }
@@ -154,7 +157,7 @@ impl Draws {
         self.0.uniform(Site::new(number as usize, 0))
     }
 
-    fn normal(self, number: Number, draw: u64) -> f64 {
+    fn normal(self, number: Number, draw: u32) -> f64 {
         self.0.normal(Site::new(number as usize, 0), draw)
     }
 
@@ -197,6 +200,7 @@ pub(super) mod tests {
             read_shape: noise.read_shape,
             row_deviation: noise.row_deviation,
             bias: noise.bias,
+            adu_range: sensor::ADU_RANGE,
         }
     }
 

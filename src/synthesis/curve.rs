@@ -33,6 +33,19 @@ pub fn light_left(drop: crate::types::Stops) -> f64 {
     libm::exp2(-f64::from(drop.0))
 }
 
+/// The factor 2^(−ΔEV/2.2) by which display values fall: the exposure drop behind the gamma (DarkQA, eqs. 2 and 3).
+#[must_use]
+pub fn display_left(drop: crate::types::Stops) -> f64 {
+    libm::exp2(-f64::from(drop.0) / GAMMA)
+}
+
+/// The tone curve 3x² − 2x³, for values in [0, 1].
+#[inline(always)]
+#[must_use]
+pub fn smoothstep(display: f32) -> f32 {
+    display * display * (3.0 - 2.0 * display)
+}
+
 /// The nearest 8-bit code of a display value; values outside [0, 1] take the nearest end.
 ///
 /// Rounding, not truncation: that would add half a code of bias, 7 % of a grey at L5.

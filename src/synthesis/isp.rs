@@ -1,103 +1,181 @@
-//! RAW → sRGB: the simple image processing of the paper ([`balance`], then [`render`] at a level).
+//! RAW → sRGB: the simple image processing of the paper, as a [`Developer`].
 //!
-//! Per pixel it needs sums and products alone; the curves are in the thresholds of an [`Encoder`].
+//! White balance and brightness gains, clip; bilinear demosaic; camera → sRGB, clip; exposure drop; gamma compression; 8
+//! bit. As (2^−ΔEV · x)^(1/2.2) is 2^(−ΔEV/2.2) · x^(1/2.2), all up to the gamma is done once for all levels, and the drop
+//! is a factor behind it.
 
-use rayon::prelude::*;
+use std::sync::LazyLock;
 
-use super::bayer::{Bayer, Plane};
+use super::bayer::{self, Bayer, Line, Plane, Sites};
 use super::camera::CameraState;
 use super::curve;
+use super::lanes::{Isa, Kernel, LANES, Lanes};
+use super::piecewise::Piecewise;
 use super::profile::Tone;
-use crate::types::{DarkLevel, Rgb};
+use crate::types::Stops;
 
-/// White balance and brightness gains, clipped to [0, 1].
-pub fn balance(raw: &mut Bayer, state: &CameraState) {
-    let gains = [state.red_gain, 1.0, 1.0, state.blue_gain]
-        .map(|balance| (balance * state.rgb_gain) as f32);
-    raw.rows_mut().enumerate().for_each(|(row, line)| {
-        for (column, sample) in line.iter_mut().enumerate() {
-            let gain = gains[Plane::at(row, column) as usize];
-            *sample = (*sample * gain).clamp(0.0, 1.0);
+/// Gamma compression of light from 2⁻³¹ up; below 10⁻⁸ it is that of 10⁻⁸.
+static GAMMA: LazyLock<Piecewise> = LazyLock::new(|| Piecewise::new(-31, curve::gamma_compress));
+
+/// The least light in the table: black, and 0 at every level.
+const DARKEST: f32 = 1.0 / 2_147_483_648.0;
+
+/// Adding it to a number from 0 to 255 leaves the nearest whole number in the lowest byte.
+const ROUND: f32 = 8_388_608.0;
+
+/// Image processing of one camera, ready for any row.
+#[derive(Debug)]
+pub(super) struct Developer {
+    /// The gains of each plane.
+    gains: [f32; 4],
+    /// Camera → linear sRGB.
+    matrix: [[f32; 3]; 3],
+    tone: Tone,
+    isa: Isa,
+}
+
+impl Developer {
+    pub(super) fn new(state: &CameraState, tone: Tone, isa: Isa) -> Self {
+        Self {
+            gains: [state.red_gain, 1.0, 1.0, state.blue_gain]
+                .map(|balance| (balance * state.rgb_gain) as f32),
+            matrix: state.camera_to_rgb.map(|row| row.map(|value| value as f32)),
+            tone,
+            isa,
         }
-    });
-}
-
-/// Develops a balanced RAW image into `dark`, which it covers: bilinear demosaic, camera → sRGB, clip, exposure drop,
-/// gamma compression, tone curve, 8 bit.
-pub fn render(balanced: &Bayer, state: &CameraState, tone: Tone, level: DarkLevel, dark: &mut Rgb) {
-    let encoder = Encoder::new(level, tone);
-    let matrix = state.camera_to_rgb.map(|row| row.map(|value| value as f32));
-    let width = dark.width();
-    dark.samples_mut()
-        .par_chunks_mut(3 * width)
-        .enumerate()
-        .for_each_init(
-            || vec![[0.0; 3]; width],
-            |pixels, (row, samples)| {
-                balanced.demosaic_row(row, pixels);
-                for (codes, camera) in samples.as_chunks_mut::<3>().0.iter_mut().zip(pixels) {
-                    for (code, row) in codes.iter_mut().zip(&matrix) {
-                        let light = row[0] * camera[0] + row[1] * camera[1] + row[2] * camera[2];
-                        *code = encoder.code(light.clamp(0.0, 1.0));
-                    }
-                }
-            },
-        );
-}
-
-/// Linear light → 8-bit code at a level, as a search for the last threshold that the light reaches.
-///
-/// Thresholds say exactly where each code begins, so that no resolution of a table enters the result.
-#[derive(Debug, Clone)]
-pub struct Encoder {
-    /// The least light of each code; above the last code, infinity.
-    thresholds: [f32; 257],
-    /// The code at the lower end of each of `CELLS` equal cells of [0, 1], and at 1.
-    first: Vec<u8>,
-}
-
-const CELLS: usize = 4096;
-
-impl Encoder {
-    /// The encoder of a level: ((c − ½) / 255)^2.2 · 2^ΔEV is where code c begins (DarkQA, eqs. 2 and 3 inverted), or
-    /// where it begins behind a tone curve.
-    #[must_use]
-    pub fn new(level: DarkLevel, tone: Tone) -> Self {
-        let left = curve::light_left(level.exposure_drop());
-        let mut thresholds = [0.0; 257];
-        for (code, threshold) in thresholds.iter_mut().enumerate().skip(1) {
-            let display = (code as f64 - 0.5) / 255.0;
-            let light = match tone {
-                Tone::None => curve::gamma_expand(display) / left,
-                Tone::AfterEv => curve::gamma_expand(curve::inverse_smoothstep(display)) / left,
-                Tone::BeforeEv => {
-                    let before = curve::gamma_compress(curve::gamma_expand(display) / left);
-                    if before > 1.0 {
-                        f64::INFINITY
-                    } else {
-                        curve::gamma_expand(curve::inverse_smoothstep(before))
-                    }
-                }
-            };
-            *threshold = light as f32;
-        }
-        thresholds[256] = f32::INFINITY;
-        let begins_by = |light: f32| thresholds.partition_point(|threshold| *threshold <= light);
-        let first = (0..=CELLS)
-            .map(|cell| (begins_by(cell as f32 / CELLS as f32) - 1) as u8)
-            .collect();
-        Self { thresholds, first }
     }
 
-    /// The code of some light in [0, 1].
-    #[must_use]
-    pub fn code(&self, light: f32) -> u8 {
-        let cell = (light * CELLS as f32) as usize;
-        let mut code = self.first[cell.min(CELLS)];
-        while light >= self.thresholds[usize::from(code) + 1] {
-            code += 1;
+    /// White balance and brightness gains on a sensor row, clipped to [0, 1].
+    pub(super) fn balance(&self, row: usize, line: &mut Line<'_>) {
+        for (parity, samples) in line.planes().into_iter().enumerate() {
+            let gain = self.gains[Plane::at(row, parity) as usize];
+            self.isa.run(Balance { gain, samples });
         }
-        code
+    }
+
+    /// The display values in [0, 1] of a row of pixels as they would be without an exposure drop, red, green, blue by
+    /// turns. `values` may be shorter than the row.
+    ///
+    /// `at` is the row's place in `balanced`, whose first row is the sensor's `first`: rows beyond the image mirror at its
+    /// last ones, those beyond a part of it must be there.
+    pub(super) fn display(&self, balanced: &Bayer, at: usize, values: &mut [f32]) {
+        let last = balanced.height() - 1;
+        let rows = [
+            if at == 0 { 1 } else { at - 1 },
+            at,
+            if at == last { at - 1 } else { at + 1 },
+        ];
+        self.isa.run(Display {
+            developer: self,
+            rows: rows.map(|row| balanced.sites(row)),
+            row: at,
+            values,
+        });
+    }
+
+    /// The 8-bit codes of display values after an exposure drop.
+    pub(super) fn encode(&self, display: &[f32], drop: Stops, codes: &mut [u8]) {
+        self.isa.run(Encode {
+            display,
+            left: curve::display_left(drop) as f32,
+            tone: self.tone,
+            codes,
+        });
+    }
+}
+
+struct Balance<'a> {
+    gain: f32,
+    samples: &'a mut [Lanes<f32>],
+}
+
+impl Kernel for Balance<'_> {
+    #[inline(always)]
+    fn run(self) {
+        for sample in self.samples.as_flattened_mut() {
+            *sample = unit(*sample * self.gain);
+        }
+    }
+}
+
+/// Clips to [0, 1].
+#[inline(always)]
+fn unit(x: f32) -> f32 {
+    let x = if x > 0.0 { x } else { 0.0 };
+    if x < 1.0 { x } else { 1.0 }
+}
+
+struct Display<'a> {
+    developer: &'a Developer,
+    /// Above, here and below.
+    rows: [Sites<'a>; 3],
+    row: usize,
+    values: &'a mut [f32],
+}
+
+impl Kernel for Display<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let gamma = &*GAMMA;
+        for (index, values) in self.values.chunks_mut(6 * LANES).enumerate() {
+            let colours = bayer::demosaic(self.rows, self.row, index);
+            let light = colours.map(|camera| self.developer.light(&camera));
+            for (pixel, values) in values.chunks_mut(3).enumerate() {
+                let channels = &light[pixel % 2];
+                for (value, channel) in values.iter_mut().zip(channels) {
+                    *value = gamma.at(channel[pixel / 2]);
+                }
+            }
+            if self.developer.tone == Tone::BeforeEv {
+                for value in values {
+                    *value = curve::smoothstep(*value);
+                }
+            }
+        }
+    }
+}
+
+impl Developer {
+    /// Linear sRGB in [`DARKEST`] to 1 of colours in camera space.
+    #[inline(always)]
+    fn light(&self, camera: &[Lanes<f32>; 3]) -> [Lanes<f32>; 3] {
+        let mut light = [[0.0; LANES]; 3];
+        for (light, row) in light.iter_mut().zip(&self.matrix) {
+            for i in 0..LANES {
+                let x = row[0] * camera[0][i] + row[1] * camera[1][i] + row[2] * camera[2][i];
+                let x = if x > DARKEST { x } else { DARKEST };
+                light[i] = if x < 1.0 { x } else { 1.0 };
+            }
+        }
+        light
+    }
+}
+
+struct Encode<'a> {
+    display: &'a [f32],
+    /// What the drop leaves of a display value.
+    left: f32,
+    tone: Tone,
+    codes: &'a mut [u8],
+}
+
+impl Kernel for Encode<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let codes = self.codes.iter_mut().zip(self.display);
+        if self.tone == Tone::AfterEv {
+            for (code, value) in codes {
+                let dark = curve::smoothstep(unit(value * self.left));
+                *code = (dark * 255.0 + ROUND).to_bits() as u8;
+            }
+        } else {
+            let scale = 255.0 * self.left;
+            for (code, value) in codes {
+                let dark = value * scale;
+                let dark = if dark < 255.0 { dark } else { 255.0 };
+                *code = (dark + ROUND).to_bits() as u8;
+            }
+        }
     }
 }
 
@@ -105,53 +183,65 @@ impl Encoder {
 mod tests {
     use super::super::camera::tests::median;
     use super::*;
+    use crate::types::DarkLevel;
+
+    fn developer(tone: Tone) -> Developer {
+        Developer::new(&median(), tone, Isa::best())
+    }
 
     /// Against the paper's own order of operations, but where light lies on the very edge between two codes.
     #[test]
-    fn the_encoder_is_the_papers_formula() {
+    fn codes_are_the_papers_formula() {
         for level in DarkLevel::ALL {
-            let encoder = Encoder::new(level, Tone::None);
             let left = curve::light_left(level.exposure_drop());
-            let display = |light: f32| curve::gamma_compress(left * f64::from(light)) * 255.0;
-            for step in 0..=300_000 {
-                let light = step as f32 / 300_000.0;
-                let edge = (display(light) + 0.5).fract();
-                if edge > 1e-4 && edge < 1.0 - 1e-4 {
-                    let due = curve::to_code(display(light) / 255.0);
-                    assert_eq!(encoder.code(light), due, "{level:?} at {light}");
+            let light: Vec<f32> = (0..=300_000).map(|step| step as f32 / 300_000.0).collect();
+            let display: Vec<f32> = light.iter().map(|x| GAMMA.at(x.max(DARKEST))).collect();
+            let mut codes = vec![0; light.len()];
+            developer(Tone::None).encode(&display, level.exposure_drop(), &mut codes);
+            for (light, code) in light.iter().zip(codes) {
+                let due = curve::gamma_compress(left * f64::from(*light));
+                let edge = (due * 255.0 + 0.5).fract();
+                if edge > 1e-3 && edge < 1.0 - 1e-3 {
+                    assert_eq!(code, curve::to_code(due), "{level:?} at {light}");
                 }
             }
         }
     }
 
     #[test]
-    fn the_encoder_takes_its_ends() {
+    fn codes_have_their_ends() {
         let ends = DarkLevel::ALL.map(|level| {
-            let encoder = Encoder::new(level, Tone::None);
-            (encoder.code(0.0), encoder.code(1.0))
+            let mut codes = [7; 2];
+            let display = [GAMMA.at(DARKEST), GAMMA.at(1.0)];
+            developer(Tone::None).encode(&display, level.exposure_drop(), &mut codes);
+            codes
         });
-        assert_eq!(ends, [(0, 136), (0, 72), (0, 39), (0, 24), (0, 15)]);
+        assert_eq!(ends, [[0, 136], [0, 72], [0, 39], [0, 24], [0, 15]]);
+        let mut codes = [0; 2];
+        developer(Tone::None).encode(&[0.9, 1.0], Stops(-3.0), &mut codes);
+        assert_eq!(codes, [255, 255]);
     }
 
     #[test]
     fn gains_are_applied_to_their_planes_and_clipped() {
         let mut raw = Bayer::covering(2, 4);
-        raw.rows_mut()
-            .for_each(|line| line.copy_from_slice(&[0.1, 0.1, -0.1, 0.9]));
-        balance(&mut raw, &median());
+        for row in 0..2 {
+            let mut line = raw.line_mut(row);
+            for plane in line.planes() {
+                plane[0][..2].copy_from_slice(&[0.1, if row == 0 { -0.1 } else { 0.9 }]);
+            }
+            developer(Tone::None).balance(row, &mut line);
+            line.seal();
+        }
         let due = [
-            [0.1 * 2.15 * 1.25, 0.1 * 1.25],
-            [0.1 * 1.25, 0.1 * 1.7 * 1.25],
+            [0.1 * 2.15 * 1.25, 0.1 * 1.25, 0.0, 0.0],
+            [0.1 * 1.25, 0.1 * 1.7 * 1.25, 1.0, 1.0],
         ];
         for (row, due) in due.iter().enumerate() {
-            let line = raw.row(row);
-            assert!(
-                due.iter()
-                    .zip(line)
-                    .all(|(due, found)| (due - found).abs() < 1e-6)
-            );
-            assert!(line[2].abs() < f32::EPSILON);
-            assert!((line[3] - 1.0).abs() < f32::EPSILON);
+            for (column, due) in due.iter().enumerate() {
+                let found = raw.sample(row, column);
+                assert!((found - due).abs() < 1e-6, "{row}, {column}: {found}");
+            }
         }
     }
 }

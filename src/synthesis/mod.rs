@@ -12,9 +12,14 @@
 //! in contrast as well as in noise.
 //!
 //! The result is a function of the arguments and of [`VERSION`] alone. Threads, order and machine do not enter: random
-//! numbers are addressed by where they are used (see [`random`]), powers and logarithms are `libm`'s, and everything
-//! else is IEEE sums, products, quotients and square roots in a fixed order. Noise is computed in double precision; RAW
-//! images are kept and developed in single precision.
+//! numbers are addressed by where they are used (see [`random`]), powers and logarithms are `libm`'s and stand in tables
+//! (see [`piecewise`]), and everything else is IEEE sums, products, quotients and square roots in a fixed order. The
+//! camera's state is computed in double precision, samples in single, many at once (see [`lanes`]).
+
+#![expect(
+    clippy::inline_always,
+    reason = "only inlined code is compiled for a kernel's instruction set, see lanes"
+)]
 
 pub mod bayer;
 pub mod camera;
@@ -22,24 +27,28 @@ pub mod colour;
 pub mod curve;
 pub mod exposure;
 pub mod isp;
+pub mod lanes;
 pub mod negative;
 pub mod noise;
+pub mod piecewise;
 pub mod poisson;
 pub mod profile;
+pub mod quantile;
 pub mod random;
 pub mod sensor;
 pub mod unprocess;
 
 pub use camera::{CameraModel, CameraState};
-pub use exposure::expose;
-pub use negative::Negative;
+pub use exposure::{expose, expose_by};
+pub use negative::{Negative, ladder};
 pub use profile::{Amplify, Coupling, Draws, Profile, Synthesis, Tone};
 pub use random::NoiseKey;
 
 use crate::types::{Degradation, Rgb};
 
-/// The version of the synthesis: raised whenever a pixel changes, so that no result of an older one is taken for its own.
-pub const VERSION: u32 = 1;
+/// The version of the sensor branch: raised whenever a pixel changes, so that no result of an older one is taken for its
+/// own. The exposure branch has [its own](exposure::VERSION).
+pub const VERSION: u32 = 2;
 
 /// The frame under a degradation.
 ///
@@ -53,5 +62,7 @@ pub fn degrade(clean: &Rgb, how: Degradation, key: &NoiseKey, synthesis: &Synthe
     }
 }
 
+#[cfg(test)]
+mod statistics;
 #[cfg(test)]
 mod tests;

@@ -1,11 +1,12 @@
 //! Where every random number of the synthesis comes from: [`NoiseKey`], [`Stream`], [`Site`].
 //!
 //! A draw is a pure function of (seed, frame, component, sensor row, sensor column, number of the draw): there is no
-//! state that threads or order could change. The generator is Philox2x64-10 (Salmon et al., "Parallel random numbers:
+//! state that threads or order could change. The generator is Philox4x32-10 (Salmon et al., "Parallel random numbers:
 //! as easy as 1, 2, 3", SC 2011), which passes BigCrush on plain counters; its key is taken from a BLAKE3 digest.
 
 use std::f64::consts::PI;
 
+use super::lanes::{LANES, Lanes};
 use crate::types::{DarkLevel, Digest, FrameId};
 
 /// What a frame's noise is drawn from: the run's seed and the frame's name.
@@ -35,9 +36,12 @@ impl NoiseKey {
     #[must_use]
     pub fn stream(&self, component: Component) -> Stream {
         let digest = Digest::of_parts([self.0.as_bytes(), component.name().as_bytes()]);
-        let mut word = [0; 8];
-        word.copy_from_slice(&digest.as_bytes()[..8]);
-        Stream(u64::from_le_bytes(word))
+        let [low, high] = [0, 4].map(|at| {
+            let mut word = [0; 4];
+            word.copy_from_slice(&digest.as_bytes()[at..at + 4]);
+            u32::from_le_bytes(word)
+        });
+        Stream([low, high])
     }
 }
 
@@ -46,14 +50,10 @@ impl NoiseKey {
 pub enum Component {
     /// The state of the camera.
     Camera,
-    /// Photon shot noise.
-    Shot,
-    /// Read noise.
-    Read,
     /// Row noise.
     Row,
-    /// Quantisation noise.
-    Quantisation,
+    /// What each site draws for itself: see [`Field`].
+    Field,
 }
 
 impl Component {
@@ -61,42 +61,80 @@ impl Component {
     fn name(self) -> &'static str {
         match self {
             Self::Camera => "camera",
-            Self::Shot => "shot",
-            Self::Read => "read",
             Self::Row => "row",
-            Self::Quantisation => "quantisation",
+            Self::Field => "field",
         }
     }
 }
 
+/// The 32 random bits that sites of one sensor row have for each use, by lane.
+#[derive(Debug, Clone)]
+pub struct Field {
+    /// Shot noise: two words.
+    pub shot: [Lanes<u32>; 2],
+    /// Read noise.
+    pub read: Lanes<u32>,
+    /// Quantisation noise.
+    pub quantisation: Lanes<u32>,
+}
+
 /// A place on the sensor. Row and column name the Bayer plane and the place in it, and are named by them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Site(u64);
+pub struct Site {
+    row: u32,
+    column: u32,
+}
 
 impl Site {
     /// The site at a sensor row and column, each below 2^32.
     #[must_use]
     pub fn new(row: usize, column: usize) -> Self {
         debug_assert!(row >> 32 == 0 && column >> 32 == 0);
-        Self(((row as u64) << 32) | column as u64)
+        Self {
+            row: row as u32,
+            column: column as u32,
+        }
     }
 }
 
 /// The random numbers of one component of one frame, addressed by site and by the number of the draw there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Stream(u64);
+pub struct Stream([u32; 2]);
 
 impl Stream {
-    /// Two words of 64 random bits.
+    /// Four words of 32 random bits.
+    #[inline(always)]
     #[must_use]
-    pub fn words(self, site: Site, draw: u64) -> [u64; 2] {
-        philox([site.0, draw], self.0)
+    pub fn words(self, site: Site, draw: u32) -> [u32; 4] {
+        philox([site.column, site.row, draw, 0], self.0)
+    }
+
+    /// The words of [`LANES`] sites of a row: `first` and every other column from there, the sites of one Bayer plane.
+    #[inline(always)]
+    #[must_use]
+    pub fn field(self, first: Site) -> Field {
+        let mut field = Field {
+            shot: [[0; LANES]; 2],
+            read: [0; LANES],
+            quantisation: [0; LANES],
+        };
+        for lane in 0..LANES {
+            let column = first.column.wrapping_add(2 * lane as u32);
+            let site = Site { column, ..first };
+            let words = self.words(site, 0);
+            field.shot[0][lane] = words[0];
+            field.shot[1][lane] = words[1];
+            field.read[lane] = words[2];
+            field.quantisation[lane] = words[3];
+        }
+        field
     }
 
     /// Two independent numbers, uniform in the open interval (0, 1).
     #[must_use]
-    pub fn uniforms(self, site: Site, draw: u64) -> [f64; 2] {
-        self.words(site, draw).map(open_unit)
+    pub fn uniforms(self, site: Site, draw: u32) -> [f64; 2] {
+        let [a, b, c, d] = self.words(site, draw);
+        [[a, b], [c, d]].map(|[low, high]| open_unit(u64::from(high) << 32 | u64::from(low)))
     }
 
     /// A number uniform in the open interval (0, 1): the first draw at a site.
@@ -107,7 +145,7 @@ impl Stream {
 
     /// A standard normal number (Box and Muller 1958).
     #[must_use]
-    pub fn normal(self, site: Site, draw: u64) -> f64 {
+    pub fn normal(self, site: Site, draw: u32) -> f64 {
         let [radius, angle] = self.uniforms(site, draw);
         (-2.0 * libm::log(radius)).sqrt() * libm::cos(2.0 * PI * angle)
     }
@@ -122,17 +160,22 @@ fn open_unit(word: u64) -> f64 {
     ((word >> 12) as f64 + 0.5) * CELL
 }
 
-/// The block function Philox2x64 with ten rounds.
-fn philox([mut left, mut right]: [u64; 2], mut key: u64) -> [u64; 2] {
-    const MULTIPLIER: u64 = 0xD2B7_4407_B1CE_6E93;
-    const WEYL: u64 = 0x9E37_79B9_7F4A_7C15;
+/// The block function Philox4x32 with ten rounds.
+#[inline(always)]
+fn philox(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
     for _ in 0..10 {
-        let product = u128::from(left) * u128::from(MULTIPLIER);
-        left = (product >> 64) as u64 ^ key ^ right;
-        right = product as u64;
-        key = key.wrapping_add(WEYL);
+        let first = u64::from(counter[0]) * 0xD251_1F53;
+        let second = u64::from(counter[2]) * 0xCD9E_8D57;
+        counter = [
+            (second >> 32) as u32 ^ counter[1] ^ key[0],
+            second as u32,
+            (first >> 32) as u32 ^ counter[3] ^ key[1],
+            first as u32,
+        ];
+        key[0] = key[0].wrapping_add(0x9E37_79B9);
+        key[1] = key[1].wrapping_add(0xBB67_AE85);
     }
-    [left, right]
+    counter
 }
 
 #[cfg(test)]
@@ -147,16 +190,20 @@ mod tests {
     #[test]
     fn philox_gives_the_known_answers() {
         let cases = [
-            ([0, 0], 0, [0xca00a0459843d731, 0x66c24222c9a845b5]),
             (
-                [u64::MAX; 2],
-                u64::MAX,
-                [0x65b021d60cd8310f, 0x4d02f3222f86df20],
+                [0; 4],
+                [0; 2],
+                [0x6627_e8d5, 0xe169_c58d, 0xbc57_ac4c, 0x9b00_dbd8],
             ),
             (
-                [0x243f6a8885a308d3, 0x13198a2e03707344],
-                0xa4093822299f31d0,
-                [0x0a5e742c2997341c, 0xb0f883d38000de5d],
+                [u32::MAX; 4],
+                [u32::MAX; 2],
+                [0x408f_276d, 0x41c8_3b0e, 0xa20b_c7c6, 0x6d54_51fd],
+            ),
+            (
+                [0x243f_6a88, 0x85a3_08d3, 0x1319_8a2e, 0x0370_7344],
+                [0xa409_3822, 0x299f_31d0],
+                [0xd16c_fe09, 0x94fd_cceb, 0x5001_e420, 0x2412_6ea1],
             ),
         ];
         for (counter, key, answer) in cases {
@@ -173,27 +220,27 @@ mod tests {
 
     #[test]
     fn seed_frame_and_component_each_name_another_stream() {
-        let first = key(7, "a").stream(Component::Shot);
-        assert_eq!(first, key(7, "a").stream(Component::Shot));
-        assert_ne!(first, key(8, "a").stream(Component::Shot));
-        assert_ne!(first, key(7, "b").stream(Component::Shot));
-        assert_ne!(first, key(7, "a").stream(Component::Read));
+        let first = key(7, "a").stream(Component::Field);
+        assert_eq!(first, key(7, "a").stream(Component::Field));
+        assert_ne!(first, key(8, "a").stream(Component::Field));
+        assert_ne!(first, key(7, "b").stream(Component::Field));
+        assert_ne!(first, key(7, "a").stream(Component::Row));
     }
 
     /// Every bit of both words is even-handed over neighbouring sites, and flips half the bits of the next site,
     /// row or draw (5 sigma).
     #[test]
     fn bits_are_even_and_neighbours_unrelated() {
-        let stream = key(1, "frame").stream(Component::Read);
+        let stream = key(1, "frame").stream(Component::Field);
         let (rows, columns) = (256, 512);
-        let mut ones = [[0u32; 64]; 2];
-        let mut flips = [0u64; 4];
+        let mut ones = [[0u32; 32]; 4];
+        let mut flips = [0u64; 6];
         for row in 0..rows {
             for column in 0..columns {
                 let words = stream.words(Site::new(row, column), 0);
                 for (counts, word) in ones.iter_mut().zip(words) {
                     for (bit, count) in counts.iter_mut().enumerate() {
-                        *count += (word >> bit & 1) as u32;
+                        *count += word >> bit & 1;
                     }
                 }
                 let others = [
@@ -201,6 +248,8 @@ mod tests {
                     stream.words(Site::new(row + 1, column), 0)[0],
                     stream.words(Site::new(row, column), 1)[0],
                     words[1],
+                    words[2],
+                    words[3],
                 ];
                 for (count, other) in flips.iter_mut().zip(others) {
                     *count += u64::from((words[0] ^ other).count_ones());
@@ -212,8 +261,19 @@ mod tests {
             assert!((f64::from(*count) - n / 2.0).abs() < 5.0 * (n / 4.0).sqrt());
         }
         for count in flips {
-            let bits = 64.0 * n;
+            let bits = 32.0 * n;
             assert!((count as f64 - bits / 2.0).abs() < 5.0 * (bits / 4.0).sqrt());
+        }
+    }
+
+    #[test]
+    fn lanes_are_the_sites_of_a_plane() {
+        let stream = key(4, "frame").stream(Component::Field);
+        let field = stream.field(Site::new(7, 129));
+        for lane in [0, 1, LANES - 1] {
+            let words = stream.words(Site::new(7, 129 + 2 * lane), 0);
+            let found = [field.shot[0], field.shot[1], field.read, field.quantisation];
+            assert_eq!(found.map(|lanes| lanes[lane]), words);
         }
     }
 
@@ -221,7 +281,7 @@ mod tests {
     #[test]
     fn pairs_of_neighbours_fill_the_square_evenly() {
         const CELLS: usize = 64;
-        let stream = key(2, "frame").stream(Component::Quantisation);
+        let stream = key(2, "frame").stream(Component::Field);
         let mut cells = vec![0u32; CELLS * CELLS];
         let n = 400_000;
         for i in 0..n {

@@ -3,7 +3,7 @@
 use super::camera::tests::median;
 use super::noise::Term;
 use super::*;
-use crate::types::{DarkLevel, Digest, FrameId};
+use crate::types::{DarkLevel, Digest, FrameId, Stops};
 
 fn key(seed: u64, frame: &str) -> NoiseKey {
     NoiseKey::new(seed, &FrameId(frame.to_owned()))
@@ -84,14 +84,14 @@ fn bytes_are_those_of_this_version() {
         }
     }
     let sensor = Digest::of(&bytes).to_string();
-    assert_eq!(VERSION, 1);
+    assert_eq!(VERSION, 2);
     assert_eq!(
         exposure,
         "ef493dc91ffe0b7f1558f10c2c581c4419340505a34a969706ef98b04cf79a9e"
     );
     assert_eq!(
         sensor,
-        "cfa20a8d1527aa01a838dd333009b1f334996faf9da2a6a15e677f03805bdc52"
+        "17eaa7dfafd65e100705809ef73a8dc5d8b77f97f6429524752b72b3fc52c72c"
     );
 }
 
@@ -124,6 +124,7 @@ fn seed_and_frame_enter() {
             &key(seed, frame),
             median(),
             Amplify::ShotOnly,
+            Tone::None,
             &Term::ALL,
         );
         negative.develop(DarkLevel::L1)
@@ -175,6 +176,7 @@ fn flat_greys_have_their_figures() {
             &key(4, "flat"),
             median(),
             Amplify::ShotOnly,
+            Tone::None,
             &Term::ALL,
         );
         let found = statistics(&negative.develop(level));
@@ -192,6 +194,7 @@ fn noise_shrinks_with_the_light() {
         &key(5, "a"),
         median(),
         Amplify::ShotOnly,
+        Tone::None,
         &Term::ALL,
     );
     let [light, dark] = [DarkLevel::L1, DarkLevel::L2]
@@ -213,7 +216,7 @@ fn without_noise_a_mid_grey_and_white_are_the_exposure_branchs() {
             if code == 255 && state.rgb_gain < 1.0 {
                 continue;
             }
-            let negative = Negative::taken(&clean, &key, state, Amplify::ShotOnly, &[]);
+            let negative = Negative::taken(&clean, &key, state, Amplify::ShotOnly, Tone::None, &[]);
             for level in DarkLevel::ALL {
                 assert_eq!(
                     negative.develop(level),
@@ -232,18 +235,92 @@ fn a_grey_ramp_returns_from_the_sensor() {
     let clean = Rgb::new(4, 256, samples).unwrap();
     for seed in 0..20 {
         let state = CameraState::draw(&key(seed, "a"), &CameraModel::default());
-        let mut raw = unprocess::unprocess(&clean, &state);
-        isp::balance(&mut raw, &state);
-        let mut pixels = vec![[0.0; 3]; 256];
-        raw.demosaic_row(1, &mut pixels);
-        for (code, pixel) in pixels.iter().enumerate() {
-            for light in colour::apply(&state.camera_to_rgb, pixel.map(f64::from)) {
-                let x = curve::gamma_compress(light.clamp(0.0, 1.0));
-                let back = 255.0 * x * x * (3.0 - 2.0 * x);
-                assert!((back - code as f64).abs() <= 2.0, "{code} became {back}");
+        let tone = Tone::BeforeEv;
+        let key = key(seed, "a");
+        let negative = Negative::taken(&clean, &key, state, Amplify::ShotOnly, tone, &[]);
+        let back = negative.develop_by(Stops(0.0));
+        for (column, codes) in back.samples().chunks(3).enumerate() {
+            for code in codes {
+                assert!(
+                    code.abs_diff((column % 256) as u8) <= 2,
+                    "{column} became {code}"
+                );
             }
         }
     }
+}
+
+/// The tone curve before the drop gives the exposure branch on greys; behind it, that of the dark image.
+#[test]
+fn the_tone_curve_stands_where_it_is_told_to() {
+    let clean = flat(100, 4);
+    let develop = |tone| {
+        let negative = Negative::taken(&clean, &key(1, "a"), median(), Amplify::All, tone, &[]);
+        negative.develop(DarkLevel::L1)
+    };
+    assert_eq!(develop(Tone::BeforeEv), expose(&clean, DarkLevel::L1));
+    let dark = f64::from(develop(Tone::None).samples()[0]) / 255.0;
+    let after = develop(Tone::AfterEv).samples()[0];
+    let due = dark * dark * (3.0 - 2.0 * dark) * 255.0;
+    assert!((f64::from(after) - due).abs() < 1.0, "{after} for {due}");
+}
+
+/// Light lost is photons lost: the signal over the noise falls with the level as it does not where r is drawn.
+#[test]
+fn coupling_makes_the_ratio_the_drop() {
+    let physical = Synthesis::of(Profile::Physical, CameraModel::default());
+    let ratios = DarkLevel::ALL.map(|level| physical.state(&key(1, "a"), level).ratio);
+    for (found, due) in ratios.iter().zip([4.0, 16.0, 64.0, 181.02, 512.0]) {
+        assert!((found - due).abs() < 0.01, "{found}");
+    }
+    let paper = Synthesis::default();
+    let state = |level| paper.state(&key(1, "a"), level);
+    assert_eq!(state(DarkLevel::L1), state(DarkLevel::L5));
+}
+
+/// Every way to make a frame's ladder gives the images of its negatives, for every size and set of instructions.
+#[test]
+fn ladders_are_their_negatives() {
+    let settings = [
+        Synthesis::default(),
+        Synthesis::of(Profile::Physical, CameraModel::default()),
+        Synthesis {
+            draws: Draws::Fresh,
+            tone: Tone::AfterEv,
+            ..Synthesis::default()
+        },
+    ];
+    for (height, width) in [(1, 1), (2, 3), (33, 130), (64, 129), (67, 300)] {
+        let (clean, key) = (ramps(height, width), key(6, "a"));
+        for synthesis in &settings {
+            let mut dark = DarkLevel::ALL.map(|_| Rgb::black(height, width));
+            ladder(&clean, &key, synthesis, &DarkLevel::ALL, &mut dark);
+            for (level, dark) in DarkLevel::ALL.into_iter().zip(&dark) {
+                let negative = Negative::new(&clean, &key, synthesis, level);
+                assert!(negative.serves(level));
+                assert_eq!(
+                    negative.develop(level),
+                    *dark,
+                    "{height} × {width}, {level:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn fresh_draws_are_each_levels_own() {
+    let fresh = Synthesis {
+        draws: Draws::Fresh,
+        ..Synthesis::default()
+    };
+    let clean = flat(128, 32);
+    let at = |level| Negative::new(&clean, &key(1, "a"), &fresh, level);
+    assert!(!at(DarkLevel::L1).serves(DarkLevel::L2));
+    let [first, second] =
+        [DarkLevel::L1, DarkLevel::L2].map(|level| at(level).develop(DarkLevel::L3));
+    assert_ne!(first, second);
+    assert_eq!(at(DarkLevel::L1).state(), at(DarkLevel::L2).state());
 }
 
 #[test]

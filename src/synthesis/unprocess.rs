@@ -1,10 +1,13 @@
 //! sRGB → RAW: the inverse of a camera's image processing ([`unprocess`], Brooks et al. 2019).
 
+use std::sync::LazyLock;
+
 use rayon::prelude::*;
 
-use super::bayer::{Bayer, Plane};
+use super::bayer::{Bayer, Line, Plane};
 use super::camera::CameraState;
-use super::{colour, curve};
+use super::curve;
+use super::lanes::{Isa, Kernel, LANES, Lanes};
 use crate::types::Rgb;
 
 /// The RAW image, without noise, of which a camera in this state would have made `clean`.
@@ -12,43 +15,137 @@ use crate::types::Rgb;
 /// An odd height or width is made even by repeating the last row or column.
 #[must_use]
 pub fn unprocess(clean: &Rgb, state: &CameraState) -> Bayer {
-    let (height, width) = (clean.height(), clean.width());
-    let linear = linear_light();
-    let mut raw = Bayer::covering(height, width);
-    raw.rows_mut().enumerate().for_each(|(row, line)| {
-        let pixels = clean.samples()[row.min(height - 1) * width * 3..]
-            .as_chunks::<3>()
-            .0;
-        for (column, sample) in line.iter_mut().enumerate() {
-            let pixel = pixels[column.min(width - 1)].map(|code| linear[usize::from(code)]);
-            let camera = colour::apply(&state.rgb_to_camera, pixel);
-            *sample = behind_filter(camera, Plane::at(row, column), state) as f32;
-        }
+    let unprocess = Unprocess::new(state, Isa::best());
+    let mut raw = Bayer::covering(clean.height(), clean.width());
+    raw.lines_mut().enumerate().for_each(|(row, mut line)| {
+        unprocess.act(clean, row, &mut line);
+        line.seal();
     });
     raw
 }
 
 /// The scene light of each 8-bit code: inverse tone curve, then gamma expansion.
-fn linear_light() -> [f64; 256] {
-    std::array::from_fn(|code| curve::gamma_expand(curve::inverse_smoothstep(code as f64 / 255.0)))
+static LINEAR_LIGHT: LazyLock<[f32; 256]> = LazyLock::new(|| {
+    std::array::from_fn(|code| {
+        curve::gamma_expand(curve::inverse_smoothstep(code as f64 / 255.0)) as f32
+    })
+});
+
+/// The way back to RAW of one camera, ready for any row.
+#[derive(Debug)]
+pub(super) struct Unprocess {
+    filters: [Filter; 4],
+    isa: Isa,
 }
 
-/// What a site sees of a colour in camera space: white balance and brightness undone, clipped to [0, 1].
-///
-/// Highlights are preserved: from a grey of 0.9 to 1 the gains fade to 1, so that white stays white (Brooks et al. 2019,
-/// `safe_invert_gains`).
-fn behind_filter(camera: [f64; 3], plane: Plane, state: &CameraState) -> f64 {
-    let (channel, balance) = match plane {
-        Plane::R => (camera[0], state.red_gain),
-        Plane::Gr | Plane::Gb => (camera[1], 1.0),
-        Plane::B => (camera[2], state.blue_gain),
-    };
-    let inverse_gain = 1.0 / (balance * state.rgb_gain);
-    let grey = (camera[0] + camera[1] + camera[2]) / 3.0;
-    let highlight = (grey - 0.9).max(0.0) / 0.1;
-    let mask = highlight * highlight;
-    let gain = (mask + (1.0 - mask) * inverse_gain).max(inverse_gain);
-    (channel * gain).clamp(0.0, 1.0)
+/// What the sites of one plane see.
+#[derive(Debug, Clone, Copy)]
+struct Filter {
+    /// Linear sRGB → the plane's channel of camera space.
+    channel: [f32; 3],
+    /// Linear sRGB → the mean of the camera's channels.
+    grey: [f32; 3],
+    /// 1 / (white balance · brightness).
+    inverse_gain: f32,
+}
+
+impl Unprocess {
+    pub(super) fn new(state: &CameraState, isa: Isa) -> Self {
+        let matrix = &state.rgb_to_camera;
+        let grey = [0, 1, 2].map(|i| ((matrix[0][i] + matrix[1][i] + matrix[2][i]) / 3.0) as f32);
+        let filters = Plane::ALL.map(|plane| {
+            let (row, balance) = match plane {
+                Plane::R => (0, state.red_gain),
+                Plane::Gr | Plane::Gb => (1, 1.0),
+                Plane::B => (2, state.blue_gain),
+            };
+            Filter {
+                channel: matrix[row].map(|value| value as f32),
+                grey,
+                inverse_gain: (1.0 / (balance * state.rgb_gain)) as f32,
+            }
+        });
+        Self { filters, isa }
+    }
+
+    /// Fills a sensor row from the pixels of `clean`.
+    pub(super) fn act(&self, clean: &Rgb, row: usize, line: &mut Line<'_>) {
+        let width = clean.width();
+        let pixels = clean.samples()[row.min(clean.height() - 1) * width * 3..]
+            .as_chunks::<3>()
+            .0;
+        for (parity, samples) in line.planes().into_iter().enumerate() {
+            self.isa.run(PlaneRow {
+                filter: self.filters[Plane::at(row, parity) as usize],
+                pixels: &pixels[..width],
+                parity,
+                samples,
+            });
+        }
+    }
+}
+
+/// The sites of one plane in one row, and the pixels that they lie under.
+struct PlaneRow<'a> {
+    filter: Filter,
+    pixels: &'a [[u8; 3]],
+    parity: usize,
+    samples: &'a mut [Lanes<f32>],
+}
+
+impl Kernel for PlaneRow<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let linear = &*LINEAR_LIGHT;
+        for (index, samples) in self.samples.iter_mut().enumerate() {
+            let mut light = [[0.0; LANES]; 3];
+            let first = (2 * LANES * index).min(self.pixels.len() - 1);
+            let pixels = &self.pixels[first..];
+            if pixels.len() >= 2 * LANES {
+                // The usual case, without a look at the edge for each pixel.
+                for (lane, pair) in pixels.as_chunks::<2>().0[..LANES].iter().enumerate() {
+                    for channel in 0..3 {
+                        light[channel][lane] = linear[usize::from(pair[self.parity][channel])];
+                    }
+                }
+            } else {
+                for lane in 0..LANES {
+                    let pixel = pixels[(2 * lane + self.parity).min(pixels.len() - 1)];
+                    for channel in 0..3 {
+                        light[channel][lane] = linear[usize::from(pixel[channel])];
+                    }
+                }
+            }
+            *samples = self.filter.behind(&light);
+        }
+    }
+}
+
+impl Filter {
+    /// What sites see of colours in linear sRGB: white balance and brightness undone, clipped to [0, 1].
+    ///
+    /// Highlights are preserved: from a grey of 0.9 to 1 the gains fade to 1, so that white stays white (Brooks et al.
+    /// 2019, `safe_invert_gains`).
+    #[inline(always)]
+    fn behind(&self, [red, green, blue]: &[Lanes<f32>; 3]) -> Lanes<f32> {
+        let mut samples = [0.0; LANES];
+        for i in 0..LANES {
+            let through = |row: [f32; 3]| row[0] * red[i] + row[1] * green[i] + row[2] * blue[i];
+            let above = (through(self.grey) - 0.9) * 10.0;
+            let highlight = if above > 0.0 { above } else { 0.0 };
+            let mask = highlight * highlight;
+            let faded = mask + (1.0 - mask) * self.inverse_gain;
+            let gain = if faded > self.inverse_gain {
+                faded
+            } else {
+                self.inverse_gain
+            };
+            let sample = through(self.channel) * gain;
+            let sample = if sample > 0.0 { sample } else { 0.0 };
+            samples[i] = if sample < 1.0 { sample } else { 1.0 };
+        }
+        samples
+    }
 }
 
 #[cfg(test)]
@@ -64,7 +161,7 @@ mod tests {
     #[test]
     fn grey_is_divided_by_the_gains_of_its_plane() {
         let raw = flat(128, 4, 4);
-        let light = linear_light()[128];
+        let light = f64::from(LINEAR_LIGHT[128]);
         for row in 0..4 {
             for column in 0..4 {
                 let gain = match Plane::at(row, column) {
@@ -72,7 +169,7 @@ mod tests {
                     Plane::Gr | Plane::Gb => 1.25,
                     Plane::B => 1.7 * 1.25,
                 };
-                let sample = f64::from(raw.row(row)[column]);
+                let sample = f64::from(raw.sample(row, column));
                 assert!((sample - light / gain).abs() < 1e-7);
             }
         }
@@ -81,7 +178,8 @@ mod tests {
     #[test]
     fn white_is_preserved() {
         for row in 0..2 {
-            for sample in flat(255, 2, 2).row(row) {
+            for column in 0..2 {
+                let sample = flat(255, 2, 2).sample(row, column);
                 assert!((sample - 1.0).abs() < 1e-6);
             }
         }

@@ -41,6 +41,12 @@ impl Rgb {
         })
     }
 
+    /// A black image of at least one pixel.
+    #[must_use]
+    pub fn black(height: usize, width: usize) -> Self {
+        Self(Array3::zeros((height.max(1), width.max(1), 3)))
+    }
+
     /// The height in pixels.
     #[must_use]
     pub fn height(&self) -> usize {

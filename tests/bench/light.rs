@@ -1,12 +1,18 @@
-//! What an image costs: one 2560×1440 frame through the ladder of both branches, and from decoded frame to request.
+//! What an image costs: one 2560×1440 frame through the ladder of both branches and through each part of it, and a
+//! 1280×720 frame from pixels to request.
 //!
-//! `cargo bench` runs it; `RAYON_NUM_THREADS=1 cargo bench` on one core.
+//! `cargo bench --bench light` runs it; `RAYON_NUM_THREADS=1 cargo bench --bench light` on one core.
 
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use darkqa_eval::ask::{Format, Payload};
-use darkqa_eval::synthesis::{Negative, NoiseKey, Synthesis, expose};
+use darkqa_eval::synthesis::exposure::expose_into;
+use darkqa_eval::synthesis::noise::{self, Term};
+use darkqa_eval::synthesis::unprocess::unprocess;
+use darkqa_eval::synthesis::{
+    Amplify, Draws, Negative, NoiseKey, Synthesis, expose, ladder as develop_ladder,
+};
 use darkqa_eval::types::{DarkLevel, FrameId, Rgb};
 
 /// A frame with edges, ramps and some texture, made by integer arithmetic.
@@ -20,17 +26,36 @@ fn frame(height: usize, width: usize) -> Rgb {
     Rgb::new(height, width, (0..height * width * 3).map(sample).collect()).unwrap()
 }
 
+fn key() -> NoiseKey {
+    NoiseKey::new(0, &FrameId("bench".into()))
+}
+
 fn ladder(c: &mut Criterion) {
     let clean = frame(1440, 2560);
-    let (key, paper) = (
-        NoiseKey::new(0, &FrameId("bench".into())),
-        Synthesis::default(),
-    );
+    let (key, paper) = (key(), Synthesis::default());
+    let mut dark = DarkLevel::ALL.map(|_| Rgb::black(1440, 2560));
     let mut group = c.benchmark_group("2560x1440");
     group.sample_size(10);
     group.throughput(Throughput::Elements((1440 * 2560) as u64));
     group.bench_function("exposure, five levels", |b| {
+        b.iter(|| {
+            for (level, dark) in DarkLevel::ALL.into_iter().zip(&mut dark) {
+                expose_into(black_box(&clean), level.exposure_drop(), dark);
+            }
+        });
+    });
+    group.bench_function("exposure, five levels, new images", |b| {
         b.iter(|| DarkLevel::ALL.map(|level| expose(black_box(&clean), level)));
+    });
+    group.bench_function("noise, five levels", |b| {
+        b.iter(|| develop_ladder(black_box(&clean), &key, &paper, &DarkLevel::ALL, &mut dark));
+    });
+    let fresh = Synthesis {
+        draws: Draws::Fresh,
+        ..Synthesis::default()
+    };
+    group.bench_function("noise, five levels, fresh draws", |b| {
+        b.iter(|| develop_ladder(black_box(&clean), &key, &fresh, &DarkLevel::ALL, &mut dark));
     });
     group.bench_function("noise, negative", |b| {
         b.iter(|| Negative::new(black_box(&clean), &key, &paper, DarkLevel::L3));
@@ -39,35 +64,57 @@ fn ladder(c: &mut Criterion) {
     group.bench_function("noise, one level from the negative", |b| {
         b.iter(|| negative.develop(black_box(DarkLevel::L3)));
     });
-    group.bench_function("noise, five levels", |b| {
-        b.iter(|| {
-            let negative = Negative::new(black_box(&clean), &key, &paper, DarkLevel::L3);
-            DarkLevel::ALL.map(|level| negative.develop(level))
-        });
+    group.finish();
+}
+
+/// Each part alone, by sample of the sensor: what is left of the noise when a term is taken is the draw of its bits.
+fn parts(c: &mut Criterion) {
+    let clean = frame(1440, 2560);
+    let (key, paper) = (key(), Synthesis::default());
+    let state = paper.state(&key, DarkLevel::L3);
+    let mut group = c.benchmark_group("parts, 2560x1440");
+    group.sample_size(10);
+    group.throughput(Throughput::Elements((1440 * 2560) as u64));
+    group.bench_function("unprocess", |b| {
+        b.iter(|| unprocess(black_box(&clean), &state));
     });
+    let mut raw = unprocess(&clean, &state);
+    let sets: [(&str, &[Term]); 6] = [
+        ("no term", &[]),
+        ("shot", &[Term::Shot]),
+        ("read", &[Term::Read]),
+        ("row", &[Term::Row]),
+        ("quantisation", &[Term::Quantisation]),
+        ("all terms", &Term::ALL),
+    ];
+    for (name, terms) in sets {
+        group.bench_function(name, |b| {
+            b.iter(|| noise::add(black_box(&mut raw), &state, &key, Amplify::ShotOnly, terms));
+        });
+        raw = unprocess(&clean, &state);
+    }
     group.finish();
 }
 
 fn request(c: &mut Criterion) {
     let clean = frame(720, 1280);
-    let (key, paper) = (
-        NoiseKey::new(0, &FrameId("bench".into())),
-        Synthesis::default(),
-    );
+    let (key, paper) = (key(), Synthesis::default());
     let mut group = c.benchmark_group("1280x720");
     group.sample_size(10);
+    let noisy = || Negative::new(&clean, &key, &paper, DarkLevel::L3).develop(DarkLevel::L3);
+    group.bench_function("noise L3", |b| b.iter(noisy));
+    let dark = noisy();
+    group.bench_function("noise L3 to PNG body", |b| {
+        b.iter(|| Payload::encode(black_box(&dark), Format::Png, None));
+    });
     group.bench_function("frame to request, exposure L3", |b| {
         b.iter(|| Payload::encode(&expose(black_box(&clean), DarkLevel::L3), Format::Png, None));
     });
     group.bench_function("frame to request, noise L3", |b| {
-        b.iter(|| {
-            let dark = Negative::new(black_box(&clean), &key, &paper, DarkLevel::L3)
-                .develop(DarkLevel::L3);
-            Payload::encode(&dark, Format::Png, None)
-        });
+        b.iter(|| Payload::encode(&noisy(), Format::Png, None));
     });
     group.finish();
 }
 
-criterion_group!(benches, ladder, request);
+criterion_group!(benches, ladder, parts, request);
 criterion_main!(benches);
