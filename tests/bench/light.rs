@@ -21,7 +21,9 @@ fn frame(height: usize, width: usize) -> Rgb {
     let sample = |i: usize| {
         let (y, x, channel) = (i / 3 / width, i / 3 % width, i % 3);
         let shade = (x * 200 / width + y * 55 / height + 40 * ((x / 97 + y / 61) % 2)) as u8;
-        shade.wrapping_add((i.wrapping_mul(2_654_435_761) >> 28) as u8 + 9 * channel as u8)
+        shade
+            .wrapping_add((i.wrapping_mul(2_654_435_761) >> 28) as u8)
+            .wrapping_add(9 * channel as u8)
     };
     Rgb::new(height, width, (0..height * width * 3).map(sample).collect()).unwrap()
 }
