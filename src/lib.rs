@@ -25,7 +25,7 @@
 //! - [`ask`]: a prompt and an image → a reply; the only asynchronous stage.
 //! - [`score`]: a reply → a choice; records → numbers with their intervals.
 //! - [`store`]: `results/<run>/`, append-only and resumable.
-//! - [`report`]: tables and files, from the records alone.
+//! - [`report`]: tables and files, from the records alone; figures of pictures that are handed in.
 //! - [`run`]: the only place that sees every stage, and the only bridge between CPU work and waiting.
 //! - [`cli`] is what the user typed; [`config`] is what it means, checked once.
 //!

@@ -5,10 +5,11 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use clap::error::ErrorKind;
-use darkqa_eval::cli::{Cli, EvaluateArgs};
-use darkqa_eval::config::{self, Config};
+use darkqa_eval::cli::{Cli, Command, EvaluateArgs};
+use darkqa_eval::config::{self, Config, Synthesize};
 use darkqa_eval::enhance;
 use darkqa_eval::run::progress::{Loudness, Progress};
+use darkqa_eval::run::synthesize::synthesize;
 use darkqa_eval::run::{Verdict, evaluate};
 use darkqa_eval::types::manifest::Status;
 use tracing_subscriber::EnvFilter;
@@ -42,16 +43,11 @@ fn run() -> ExitCode {
         }
         Err(e) => return fail(&config::one_line(&e)),
     };
-    let said = match config::merge(cli.evaluate) {
-        Ok(said) => said,
+    let job = match Job::resolve(cli) {
+        Ok(job) => job,
         Err(e) => return fail(&e.to_string()),
     };
-    let loudness = if said.output.quiet {
-        Loudness::Quiet
-    } else {
-        Loudness::Normal
-    };
-    let progress = Progress::new(loudness);
+    let progress = Progress::new(job.loudness);
     let filter =
         EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("darkqa_eval=warn"));
     tracing_subscriber::fmt()
@@ -60,16 +56,53 @@ fn run() -> ExitCode {
         .without_time()
         .with_writer(progress.clone())
         .init();
-    match show(said, &progress) {
+    match show(job.task, &progress) {
         Ok(code) => code,
         // An error of this crate says its cause itself.
         Err(e) => fail(&e.to_string()),
     }
 }
 
-fn show(said: EvaluateArgs, progress: &Progress) -> anyhow::Result<ExitCode> {
-    let config = Config::resolve(said)?;
-    let Verdict { status, output } = evaluate(&config, progress)?;
+/// What is to be done, before the world is looked at.
+struct Job {
+    loudness: Loudness,
+    task: Task,
+}
+
+enum Task {
+    Evaluate(Box<EvaluateArgs>),
+    Synthesize(Box<Synthesize>),
+}
+
+impl Job {
+    fn resolve(cli: Cli) -> anyhow::Result<Self> {
+        let (quiet, task) = match cli.command {
+            None => {
+                let said = config::merge(cli.evaluate)?;
+                (said.output.quiet, Task::Evaluate(Box::new(said)))
+            }
+            Some(Command::Synthesize(said)) => {
+                let quiet = said.quiet;
+                (
+                    quiet,
+                    Task::Synthesize(Box::new(Synthesize::resolve(said)?)),
+                )
+            }
+        };
+        let loudness = if quiet {
+            Loudness::Quiet
+        } else {
+            Loudness::Normal
+        };
+        Ok(Self { loudness, task })
+    }
+}
+
+fn show(task: Task, progress: &Progress) -> anyhow::Result<ExitCode> {
+    let Verdict { status, output } = match task {
+        Task::Evaluate(said) => evaluate(&Config::resolve(*said)?, progress)?,
+        Task::Synthesize(config) => synthesize(&config, progress)?,
+    };
     let written = std::io::stdout().lock().write_all(output.as_bytes());
     match (status, written) {
         (Status::Cancelled, _) => Ok(ExitCode::from(INTERRUPTED)),

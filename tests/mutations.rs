@@ -151,7 +151,11 @@ fn read_mutated(rounds: usize) -> [usize; 2] {
     for round in 0..rounds {
         let bytes = mutate(&corpus[round % corpus.len()], &mut random);
         let place = format!("mutation {round}");
-        let picture = Picture::Encoded { bytes, place };
+        let picture = Picture::Encoded {
+            bytes,
+            place,
+            most_pixels: MOST_PIXELS,
+        };
         // What passes the check may still not decode: an error, no more.
         let _ = picture.check();
         match picture.decode() {

@@ -213,8 +213,10 @@ fn or(first: Layer, second: Layer) -> Layer {
         (output.out, output.resume) = (None, None);
     }
     let said = EvaluateArgs {
-        data: first_set!(DataArgs { data, questions, limit, families; ; }, first.data, second.data, off),
-        light: first_set!(LightArgs { levels, variant, seed, gain, ratio; ; }, first.light, second.light, off),
+        data: first_set!(DataArgs { data, questions, limit, families, max_pixels; ; }, first.data, second.data, off),
+        light: first_set!(LightArgs {
+                levels, variant, seed, profile, amplify, tone, draws, coupling, camera, gain, ratio; ; fixed
+            }, first.light, second.light, off),
         enhancement: first_set!(
             EnhancementArgs { llie_on, threads, ort_lib; llie; offline }, first.enhancement, second.enhancement, off
         ),

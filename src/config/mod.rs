@@ -2,23 +2,27 @@
 
 mod asking;
 mod layers;
+mod light;
+mod synthesize;
 
 use std::env;
-use std::num::{NonZeroU32, NonZeroUsize};
+use std::num::{NonZeroU32, NonZeroU64, NonZeroUsize};
 use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Duration;
 
 pub use asking::{Ask, ModelName, Server};
 pub use layers::{merge, one_line};
+pub use light::Light;
+pub use synthesize::{Existing, Product, Synthesize};
 
 use crate::ask::Format;
-use crate::cli::{DataArgs, EnhancementArgs, EvaluateArgs, LightArgs, OutputArgs, SendingArgs};
+use crate::cli::{DataArgs, EnhancementArgs, EvaluateArgs, OutputArgs, SendingArgs};
 use crate::dataset::Place;
+use crate::dataset::picture::MOST_PIXELS;
 use crate::enhance::{Install, RuntimeSearch};
 use crate::error::{Error, Result};
-use crate::synthesis::{CameraModel, Profile, Synthesis};
-use crate::types::{Family, Level, Variants};
+use crate::types::{Family, Variants};
 
 /// How many requests are in flight where nobody says otherwise.
 const CONCURRENCY: NonZeroUsize = NonZeroUsize::new(8).unwrap();
@@ -56,19 +60,8 @@ pub struct Data {
     pub limit: Option<NonZeroUsize>,
     /// Only these families.
     pub families: Option<Vec<Family>>,
-}
-
-/// How dark.
-#[derive(Debug)]
-pub struct Light {
-    /// The levels, lightest first, none twice.
-    pub levels: Vec<Level>,
-    /// The variants of the dark ones.
-    pub variants: Variants,
-    /// The seed of all random draws.
-    pub seed: u64,
-    /// The sensor branch.
-    pub synthesis: Synthesis,
+    /// The most pixels an image may have.
+    pub most_pixels: u64,
 }
 
 /// What mends the images.
@@ -146,7 +139,7 @@ impl Config {
         }
         Ok(Self {
             data: data(said.data),
-            light: light(&said.light)?,
+            light: Light::resolve(&said.light)?,
             enhancement: enhancement(said.enhancement)?,
             ask: asking::ask(said.model, &said.sending)?,
             images: Images {
@@ -179,54 +172,8 @@ fn data(said: DataArgs) -> Data {
         questions: said.questions,
         limit: said.limit,
         families,
+        most_pixels: most_pixels(said.max_pixels),
     }
-}
-
-fn light(said: &LightArgs) -> Result<Light> {
-    let mut camera = CameraModel::default();
-    if let Some(gain) = said.gain {
-        camera.pin_gain(gain)?;
-    }
-    if let Some(ratio) = said.ratio {
-        camera.pin_ratio(ratio)?;
-    }
-    Ok(Light {
-        levels: said
-            .levels
-            .as_deref()
-            .map_or(Ok(Level::ALL.to_vec()), levels)?,
-        variants: parsed("--variant", said.variant.as_deref())?.unwrap_or(Variants::Both),
-        seed: said.seed.unwrap_or(0),
-        synthesis: Synthesis::of(Profile::Paper, camera),
-    })
-}
-
-/// Reads `L0-L5` or `L0,L3`, in any order, none twice.
-fn levels(text: &str) -> Result<Vec<Level>> {
-    let mut levels = Vec::new();
-    for part in text.split(',').map(str::trim) {
-        let read = |level: &str| level.trim().parse::<Level>().map_err(|e| e.at("--levels"));
-        match part.split_once('-') {
-            None => levels.push(read(part)?),
-            Some((first, last)) => {
-                let (first, last) = (read(first)?, read(last)?);
-                if first > last {
-                    return Err(Error::usage(
-                        "--levels",
-                        format_args!("{part:?} runs backwards; {last}-{first} is meant?"),
-                    ));
-                }
-                levels.extend(
-                    Level::ALL
-                        .into_iter()
-                        .filter(|level| (first..=last).contains(level)),
-                );
-            }
-        }
-    }
-    levels.sort_unstable();
-    levels.dedup();
-    Ok(levels)
 }
 
 fn enhancement(said: EnhancementArgs) -> Result<Enhancement> {
@@ -236,16 +183,10 @@ fn enhancement(said: EnhancementArgs) -> Result<Enhancement> {
             .filter(|path| !path.is_empty())
             .map(PathBuf::from)
     });
-    if let Some(threads) = said.threads.filter(|n| n.get() > MOST_THREADS) {
-        return Err(Error::usage(
-            "--threads",
-            format_args!("{threads} are too many; {MOST_THREADS} at most"),
-        ));
-    }
     Ok(Enhancement {
         models: said.llie,
         on: parsed("--llie-on", said.llie_on.as_deref())?.unwrap_or(Variants::Noise),
-        threads: said.threads,
+        threads: threads(said.threads)?,
         runtime: RuntimeSearch {
             library,
             install: if said.offline {
@@ -255,6 +196,20 @@ fn enhancement(said: EnhancementArgs) -> Result<Enhancement> {
             },
         },
     })
+}
+
+fn most_pixels(said: Option<NonZeroU64>) -> u64 {
+    said.map_or(MOST_PIXELS, NonZeroU64::get)
+}
+
+fn threads(said: Option<NonZeroUsize>) -> Result<Option<NonZeroUsize>> {
+    match said {
+        Some(n) if n.get() > MOST_THREADS => Err(Error::usage(
+            "--threads",
+            format_args!("{n} are too many; {MOST_THREADS} at most"),
+        )),
+        _ => Ok(said),
+    }
 }
 
 fn pace(said: &SendingArgs) -> Pace {
@@ -309,23 +264,6 @@ mod tests {
     }
 
     #[test]
-    fn levels_are_read_in_any_form() {
-        assert_eq!(levels("L0-L5").unwrap(), Level::ALL);
-        assert_eq!(levels("l3, L0,L3").unwrap(), [Level::L0, Level::L3]);
-        for (wrong, says) in [
-            ("L6", "\"L6\" is none of"),
-            ("", "\"\" is none of"),
-            ("L3-L1", "runs backwards"),
-        ] {
-            let error = levels(wrong).unwrap_err().to_string();
-            assert!(
-                error.starts_with("--levels: ") && error.contains(says),
-                "{error}"
-            );
-        }
-    }
-
-    #[test]
     fn what_makes_no_sense_names_its_flag() {
         for (words, says) in [
             (vec![], "--model: no model is named"),
@@ -335,6 +273,18 @@ mod tests {
                 "--variant: \"dark\" is none of",
             ),
             (vec!["--model", "random", "--gain=-1"], "--gain: "),
+            (
+                vec!["--model", "random", "--tone", "late"],
+                "--tone: \"late\" is none of",
+            ),
+            (
+                vec!["--model", "random", "--camera", "leica"],
+                "--camera: \"leica\" is none of sony-a7s2",
+            ),
+            (
+                vec!["--model", "random", "--profile", "physical", "--ratio", "9"],
+                "--ratio: with --coupling photon",
+            ),
             (
                 vec!["--model", "random", "--temperature", "warm"],
                 "--temperature: \"warm\"",

@@ -58,12 +58,7 @@ impl Line {
 }
 
 pub(super) fn open(folder: &Path, questions: Option<&Path>) -> Result<Dataset> {
-    let list = folder.join(FRAMES);
-    let sources = if list.exists() {
-        listed(folder, &list)?
-    } else {
-        images(folder)?
-    };
+    let sources = sources(folder)?;
     let file = questions.map_or_else(|| folder.join(QUESTIONS), Path::to_owned);
     if questions.is_none() && !file.exists() {
         let problem = format_args!(
@@ -85,11 +80,25 @@ pub(super) fn open(folder: &Path, questions: Option<&Path>) -> Result<Dataset> {
         );
         return Err(Error::data(file.display(), problem));
     }
-    Ok(Dataset {
-        name: stem(folder),
-        sources,
-        questions,
-    })
+    Ok(Dataset::new(stem(folder), sources, questions))
+}
+
+/// The frames of a folder: those that its list names, else its images.
+pub(super) fn sources(folder: &Path) -> Result<BTreeMap<FrameId, Source>> {
+    let list = folder.join(FRAMES);
+    if list.exists() {
+        listed(folder, &list)
+    } else {
+        images(folder)
+    }
+}
+
+/// One image file, named as it would be in its folder.
+pub(super) fn image(path: &Path) -> Result<BTreeMap<FrameId, Source>> {
+    fs::metadata(path).map_err(|e| Error::file(path, "read", e))?;
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let id = FrameId(name.into_owned());
+    Ok([(id, Source::image(path.to_owned()))].into())
 }
 
 fn listed(folder: &Path, list: &Path) -> Result<BTreeMap<FrameId, Source>> {

@@ -23,6 +23,7 @@ use crate::error::{Error, Result};
 use crate::types::{Digest, Frame, FrameId, Question};
 
 use maps::Maps;
+use picture::MOST_PIXELS;
 pub use picture::Picture;
 
 /// Where the data are.
@@ -61,9 +62,43 @@ pub struct Dataset {
     name: String,
     sources: BTreeMap<FrameId, Source>,
     questions: Vec<Question>,
+    most_pixels: u64,
 }
 
 impl Dataset {
+    fn new(name: String, sources: BTreeMap<FrameId, Source>, questions: Vec<Question>) -> Self {
+        Self {
+            name,
+            sources,
+            questions,
+            most_pixels: MOST_PIXELS,
+        }
+    }
+
+    /// The images at a place, an image file or a folder of frames, without questions. No image is read.
+    pub fn of_images(path: &Path) -> Result<Self> {
+        let sources = if path.is_dir() {
+            frames::sources(path)?
+        } else {
+            frames::image(path)?
+        };
+        Ok(Self::new(stem(path), sources, Vec::new()))
+    }
+
+    /// Reads images of up to so many pixels, instead of [`MOST_PIXELS`].
+    #[must_use]
+    pub fn with_most_pixels(self, most_pixels: u64) -> Self {
+        Self {
+            most_pixels,
+            ..self
+        }
+    }
+
+    /// The frames, by name.
+    pub fn frames(&self) -> impl Iterator<Item = &FrameId> {
+        self.sources.keys()
+    }
+
     /// Opens the data at a place; `questions` overrides the questions beside a folder of frames.
     ///
     /// No image is read. Every question is checked: its choices, its answer among them, its frame among the images.
@@ -118,9 +153,10 @@ impl Dataset {
                 .map(|bytes| Picture::Encoded {
                     bytes,
                     place: path.display().to_string(),
+                    most_pixels: self.most_pixels,
                 })
                 .map_err(|e| Error::file(path, "read", e)),
-            Some(Source::Cell(cell)) => cell.picture(),
+            Some(Source::Cell(cell)) => cell.picture(self.most_pixels),
             Some(Source::Room(room)) => room.paint().map(Picture::Pixels),
             None => Err(Error::data(
                 &self.name,

@@ -29,11 +29,7 @@ pub(super) fn open(path: &Path) -> Result<Dataset> {
             return Err(Error::usage("--data", problem));
         }
     };
-    Ok(Dataset {
-        name: stem(path),
-        sources,
-        questions,
-    })
+    Ok(Dataset::new(stem(path), sources, questions))
 }
 
 fn jsonl(path: &Path) -> Result<(BTreeMap<FrameId, Source>, Vec<Question>)> {

@@ -11,7 +11,7 @@ use crate::types::{Digest, Rgb};
 /// What every PNG file begins with.
 const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
 
-/// The most pixels an image may have: a larger one is refused before it is inflated.
+/// The most pixels an image may have where nobody says otherwise.
 pub const MOST_PIXELS: u64 = 100_000_000;
 
 /// An image, not yet decoded where it came as a file.
@@ -23,6 +23,8 @@ pub enum Picture {
         bytes: Vec<u8>,
         /// Where it came from, for messages.
         place: String,
+        /// The most pixels it may have: one with more is refused before it is inflated.
+        most_pixels: u64,
     },
     /// Pixels that were never a file.
     Pixels(Rgb),
@@ -43,10 +45,15 @@ impl Picture {
     /// A PNG file is held to its checksums, which find any damage for a hundredth of what inflating costs; where that
     /// does not settle it (JPEG files have none, an alpha channel may hide something) the picture is decoded.
     pub fn check(&self) -> Result<()> {
-        let Self::Encoded { bytes, place } = self else {
+        let Self::Encoded {
+            bytes,
+            place,
+            most_pixels,
+        } = self
+        else {
             return Ok(());
         };
-        let settled = decoder(bytes, place)?.color_type() == ColorType::Rgb8;
+        let settled = decoder(bytes, place, *most_pixels)?.color_type() == ColorType::Rgb8;
         if bytes.starts_with(PNG) && settled {
             whole(bytes, place)
         } else {
@@ -60,11 +67,15 @@ impl Picture {
     /// where it is opaque everywhere. CMYK and transparency are refused: there is no one right way to show them. EXIF
     /// orientation is not applied, as by every tool that reads label maps beside the image.
     pub fn decode(&self) -> Result<Rgb> {
-        let (bytes, place) = match self {
+        let (bytes, place, most_pixels) = match self {
             Self::Pixels(rgb) => return Ok(rgb.clone()),
-            Self::Encoded { bytes, place } => (bytes, place),
+            Self::Encoded {
+                bytes,
+                place,
+                most_pixels,
+            } => (bytes, place, *most_pixels),
         };
-        let decoder = decoder(bytes, place)?;
+        let decoder = decoder(bytes, place, most_pixels)?;
         // The decoders are content with all the samples, the JPEG decoder with less than that.
         whole(bytes, place)?;
         let image = DynamicImage::from_decoder(decoder)
@@ -83,7 +94,7 @@ impl Picture {
     }
 }
 
-fn decoder<'a>(bytes: &'a [u8], place: &str) -> Result<impl ImageDecoder + 'a> {
+fn decoder<'a>(bytes: &'a [u8], place: &str, most_pixels: u64) -> Result<impl ImageDecoder + 'a> {
     let wrong = |problem: String| Error::data(place, problem);
     let mut reader = ImageReader::new(Cursor::new(bytes))
         .with_guessed_format()
@@ -92,15 +103,15 @@ fn decoder<'a>(bytes: &'a [u8], place: &str) -> Result<impl ImageDecoder + 'a> {
         return Err(wrong("not an image: PNG or JPEG expected".to_owned()));
     }
     let mut limits = Limits::default();
-    limits.max_alloc = Some(MOST_PIXELS * 8);
+    limits.max_alloc = Some(most_pixels.saturating_mul(8));
     reader.limits(limits);
     let decoder = reader
         .into_decoder()
         .map_err(|e| wrong(format!("not a readable image: {e}")))?;
     let (width, height) = decoder.dimensions();
-    if u64::from(width) * u64::from(height) > MOST_PIXELS {
+    if u64::from(width) * u64::from(height) > most_pixels {
         return Err(wrong(format!(
-            "{width} × {height} pixels are more than the {MOST_PIXELS} that are read; shrink it first"
+            "{width} × {height} pixels are more than the {most_pixels} that are read; shrink it first, or raise --max-pixels"
         )));
     }
     if !bytes.starts_with(PNG) && Outline::of(bytes).components == Some(4) {
@@ -149,6 +160,14 @@ mod tests {
     use super::*;
     use image::{GrayImage, RgbImage, RgbaImage};
 
+    fn encoded(bytes: Vec<u8>, place: impl Into<String>) -> Picture {
+        Picture::Encoded {
+            bytes,
+            place: place.into(),
+            most_pixels: MOST_PIXELS,
+        }
+    }
+
     fn png(image: &DynamicImage) -> Picture {
         let mut bytes = Vec::new();
         image
@@ -157,6 +176,7 @@ mod tests {
         Picture::Encoded {
             bytes,
             place: "test.png".into(),
+            most_pixels: MOST_PIXELS,
         }
     }
 
@@ -194,6 +214,7 @@ mod tests {
         let text = Picture::Encoded {
             bytes: b"no image".to_vec(),
             place: "a.png".into(),
+            most_pixels: MOST_PIXELS,
         };
         assert!(
             text.check()
@@ -205,21 +226,32 @@ mod tests {
 
     #[test]
     fn a_cut_file_is_named() {
-        let Picture::Encoded { mut bytes, place } = png(&GrayImage::new(64, 64).into()) else {
-            unreachable!()
-        };
-        bytes.truncate(bytes.len() / 2);
-        let error = Picture::Encoded { bytes, place }
-            .decode()
-            .unwrap_err()
-            .to_string();
+        let mut picture = png(&GrayImage::new(64, 64).into());
+        if let Picture::Encoded { bytes, .. } = &mut picture {
+            bytes.truncate(bytes.len() / 2);
+        }
+        let error = picture.decode().unwrap_err().to_string();
         assert!(error.starts_with("test.png: not a whole image"), "{error}");
+    }
+
+    #[test]
+    fn the_limit_on_pixels_can_be_moved() {
+        let mut picture = png(&GrayImage::new(64, 64).into());
+        picture.decode().unwrap();
+        if let Picture::Encoded { most_pixels, .. } = &mut picture {
+            *most_pixels = 4095;
+        }
+        let error = picture.decode().unwrap_err().to_string();
+        assert!(
+            error.contains("64 × 64 pixels") && error.contains("--max-pixels"),
+            "{error}"
+        );
     }
 
     /// What is said of bytes that are no whole picture; it is one line that begins with the file.
     fn fault(bytes: Vec<u8>) -> String {
-        let place = "a.png".into();
-        let error = Picture::Encoded { bytes, place }.decode().unwrap_err();
+        let place = "a.png";
+        let error = encoded(bytes, place).decode().unwrap_err();
         let error = error.to_string();
         assert!(error.starts_with("a.png: "), "{error}");
         assert_eq!(error.lines().count(), 1, "{error}");
@@ -248,14 +280,7 @@ mod tests {
             let cut = fault(bytes[..length].to_vec());
             assert!(cut.contains("not a whole image"), "{length}: {cut}");
         }
-        assert!(
-            Picture::Encoded {
-                bytes,
-                place: String::new()
-            }
-            .decode()
-            .is_ok()
-        );
+        assert!(encoded(bytes, "").decode().is_ok());
     }
 
     fn jpeg(color: jpeg_encoder::ColorType, channels: usize) -> Vec<u8> {
@@ -284,7 +309,7 @@ mod tests {
             (jpeg_encoder::ColorType::Luma, 1),
         ] {
             let (bytes, place) = (jpeg(color, channels), String::new());
-            assert!(Picture::Encoded { bytes, place }.decode().is_ok());
+            assert!(encoded(bytes, place).decode().is_ok());
         }
     }
 
@@ -299,10 +324,13 @@ mod tests {
 
     #[test]
     fn a_bomb_is_refused_before_it_is_inflated() {
-        let Picture::Encoded { mut bytes, place } = png(&GrayImage::new(1, 1).into()) else {
+        let Picture::Encoded {
+            mut bytes, place, ..
+        } = png(&GrayImage::new(1, 1).into())
+        else {
             unreachable!()
         };
         bytes[16..24].copy_from_slice(&[0, 1, 0, 0, 0, 1, 0, 0]);
-        assert!(Picture::Encoded { bytes, place }.check().is_err());
+        assert!(encoded(bytes, place).check().is_err());
     }
 }

@@ -249,11 +249,7 @@ pub(super) fn open() -> Result<Dataset> {
     for (i, plan) in PLANS.iter().enumerate() {
         questions.extend(plan.questions(i)?);
     }
-    Ok(Dataset {
-        name: "rooms".to_owned(),
-        sources,
-        questions,
-    })
+    Ok(Dataset::new("rooms".to_owned(), sources, questions))
 }
 
 #[cfg(test)]

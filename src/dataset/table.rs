@@ -196,7 +196,7 @@ pub(super) struct Cell {
 }
 
 impl Cell {
-    pub(super) fn picture(&self) -> Result<Picture> {
+    pub(super) fn picture(&self, most_pixels: u64) -> Result<Picture> {
         let place = format!("{}, line {}", self.file.display(), self.position.line());
         let mut reader = reader(&self.file)?;
         let mut row = ByteRecord::new();
@@ -221,6 +221,10 @@ impl Cell {
         let bytes = STANDARD
             .decode(&text)
             .map_err(|e| Error::data(&place, format_args!("the image is not base64: {e}")))?;
-        Ok(Picture::Encoded { bytes, place })
+        Ok(Picture::Encoded {
+            bytes,
+            place,
+            most_pixels,
+        })
     }
 }

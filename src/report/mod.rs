@@ -1,4 +1,5 @@
-//! Stage 7, SHOW: from the records alone.
+//! Stage 7, SHOW: from the records alone; and [`sheet`], figures of pictures that are handed in.
 
 pub mod files;
+pub mod sheet;
 pub mod table;

@@ -10,7 +10,7 @@ use crate::config::Config;
 use crate::dataset::Dataset;
 use crate::enhance::ModelFile;
 use crate::error::{Error, Result};
-use crate::synthesis;
+use crate::synthesis::{VERSION, exposure};
 use crate::types::{Digest, View};
 
 /// Flags and contents that decide the replies.
@@ -39,7 +39,7 @@ pub(super) fn identity(config: &Config, dataset: &Dataset, inputs: &Inputs<'_>) 
         .pictures
         .iter()
         .flat_map(|(frame, digest)| [frame.0.as_bytes(), digest.as_bytes()]);
-    let ask = &config.ask;
+    let (ask, synthesis) = (&config.ask, &config.light.synthesis);
     let names = |view| -> BTreeSet<&str> {
         inputs
             .askers
@@ -76,9 +76,13 @@ pub(super) fn identity(config: &Config, dataset: &Dataset, inputs: &Inputs<'_>) 
         ("--levels", json!(levels)),
         ("--variant", json!(config.light.variants.to_string())),
         ("--seed", json!(config.light.seed)),
+        ("--profile or --amplify", json!(synthesis.amplify)),
+        ("--profile or --tone", json!(synthesis.tone)),
+        ("--draws", json!(synthesis.draws)),
+        ("--profile or --coupling", json!(synthesis.coupling)),
         (
-            "the sensor (--profile, --camera and the flags beside them)",
-            json!(config.light.synthesis),
+            "--camera, --gain, --ratio or --fixed",
+            json!(synthesis.camera),
         ),
         ("--llie", json!(enhancers)),
         ("--llie-on", json!(config.enhancement.on.to_string())),
@@ -100,10 +104,7 @@ pub(super) fn identity(config: &Config, dataset: &Dataset, inputs: &Inputs<'_>) 
         ("--reasoning-effort", json!(ask.parameters.reasoning_effort)),
         ("--detail", json!(ask.parameters.detail)),
         ("what the models answer by", json!(models)),
-        (
-            "synthesis",
-            json!([synthesis::exposure::VERSION, synthesis::VERSION]),
-        ),
+        ("synthesis", json!([exposure::VERSION, VERSION])),
     ];
     fields
         .into_iter()

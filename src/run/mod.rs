@@ -13,6 +13,7 @@ pub mod progress;
 mod recipe;
 mod record;
 mod stop;
+pub mod synthesize;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -53,7 +54,8 @@ pub struct Verdict {
 /// # Errors
 /// Where nothing can be asked, or no further trial could succeed; what had arrived by then is kept.
 pub fn evaluate(config: &Config, progress: &Progress) -> Result<Verdict> {
-    let dataset = Dataset::open(&config.data.place, config.data.questions.as_deref())?;
+    let dataset = Dataset::open(&config.data.place, config.data.questions.as_deref())?
+        .with_most_pixels(config.data.most_pixels);
     let questions = select(&dataset, config)?;
     let askers = askers::open(config)?;
     // Where every model is blind, no image is read and no enhancer is opened.

@@ -1,5 +1,7 @@
 //! What decides the pixels that are sent, as a digest.
 
+use serde_json::json;
+
 use crate::ask::Format;
 use crate::enhance;
 use crate::synthesis::{self, Synthesis};
@@ -29,11 +31,11 @@ impl Recipe {
             Degradation::Exposure(_) => format!("synthesis {}", synthesis::exposure::VERSION),
             Degradation::Sensor(_) => {
                 format!(
-                    "synthesis {} seed {} frame {} {:?}",
+                    "synthesis {} seed {} frame {} {}",
                     synthesis::VERSION,
                     self.seed,
                     frame,
-                    self.synthesis
+                    json!(self.synthesis)
                 )
             }
         };

@@ -35,10 +35,9 @@ pub mod poisson;
 pub mod profile;
 pub mod quantile;
 pub mod random;
-pub mod sensor;
 pub mod unprocess;
 
-pub use camera::{CameraModel, CameraState};
+pub use camera::{Calibration, CameraModel, CameraState, Sampling};
 pub use exposure::{expose, expose_by};
 pub use negative::{Negative, ladder};
 pub use profile::{Amplify, Coupling, Draws, Profile, Synthesis, Tone};

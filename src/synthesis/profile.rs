@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::camera::CameraModel;
 use crate::error::{Error, Result};
@@ -55,7 +55,7 @@ impl Synthesis {
 }
 
 /// What the ratio r amplifies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Amplify {
     /// The shot noise alone, and read, row and quantisation noise act after it (DarkQA, noise item 1).
@@ -66,7 +66,7 @@ pub enum Amplify {
 }
 
 /// Where a forward tone curve, 3x² − 2x³, stands in the way back to sRGB.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Tone {
     /// Nowhere, as the paper lists none.
@@ -79,7 +79,7 @@ pub enum Tone {
 }
 
 /// What the five levels of a frame share.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Draws {
     /// The camera and the noise field: levels differ in light alone.
@@ -90,7 +90,7 @@ pub enum Draws {
 }
 
 /// What the ratio r depends on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Coupling {
     /// Nothing: it is drawn once a frame (DarkQA).

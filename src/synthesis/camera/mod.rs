@@ -1,29 +1,97 @@
 //! The camera that a frame is taken with: [`CameraModel`] and one [`CameraState`] of it.
 
-use serde::Serialize;
+mod calibration;
+
+use std::sync::Arc;
+
+pub use calibration::{Calibration, Fit, SensorNoise, Step};
+use calibration::{GAINS, RATIOS};
+use serde::ser::SerializeStruct;
+use serde::{Deserialize, Serialize, Serializer};
 
 use super::colour::{self, Matrix};
 use super::random::{Component, NoiseKey, Site, Stream};
-use super::sensor;
 use crate::error::{Error, Result};
-
-/// The system gains K that may be pinned; the calibration's own range is 0.094 to 6.01.
-const GAINS: [f64; 2] = [0.01, 100.0];
-/// The amplification ratios r that may be pinned.
-const RATIOS: [f64; 2] = [1.0, 10000.0];
+use crate::types::Digest;
 
 /// The distribution that each frame's camera is drawn from.
 ///
 /// The default is the paper's: a Sony A7S2 with its gain K log-uniform in [0.1, 6.0] and its amplification ratio r
 /// uniform in [100, 300]. Either may be pinned; pinning one leaves every other number of the state as it was drawn,
 /// save what is a function of K.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct CameraModel {
+    calibration: Arc<Calibration>,
+    sampling: Sampling,
     gain: Option<f64>,
     ratio: Option<f64>,
 }
 
+/// Where a state comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sampling {
+    /// Drawn for each frame.
+    #[default]
+    Drawn,
+    /// The middle of every distribution, the same for all frames.
+    Fixed,
+}
+
+impl Default for CameraModel {
+    fn default() -> Self {
+        // The paper's own camera, which is among the presets.
+        Self::preset("sony-a7s2").unwrap_or_else(|_| unreachable!("a test reads it"))
+    }
+}
+
+/// Written by the calibration's name and digest: its numbers would fill a page.
+impl Serialize for CameraModel {
+    fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+        let calibration =
+            serde_json::to_vec(&*self.calibration).map_err(serde::ser::Error::custom)?;
+        let mut fields = serializer.serialize_struct("CameraModel", 5)?;
+        fields.serialize_field("name", &self.calibration.name)?;
+        fields.serialize_field("calibration", &Digest::of(&calibration).to_string())?;
+        fields.serialize_field("sampling", &self.sampling)?;
+        fields.serialize_field("gain", &self.gain)?;
+        fields.serialize_field("ratio", &self.ratio)?;
+        fields.end()
+    }
+}
+
 impl CameraModel {
+    /// The cameras of a calibration.
+    #[must_use]
+    pub fn new(calibration: Calibration) -> Self {
+        Self {
+            calibration: Arc::new(calibration),
+            sampling: Sampling::Drawn,
+            gain: None,
+            ratio: None,
+        }
+    }
+
+    /// A calibrated camera by its name.
+    ///
+    /// # Errors
+    /// Where none is called so.
+    pub fn preset(name: &str) -> Result<Self> {
+        Calibration::preset(name).map(Self::new).ok_or_else(|| {
+            let names: Vec<_> = Calibration::names().collect();
+            let problem = format!(
+                "{name:?} is none of {}, and no TOML file of a calibration",
+                names.join(", ")
+            );
+            Error::usage("--camera", problem)
+        })
+    }
+
+    /// Whether a state is drawn or fixed (`--fixed`).
+    pub fn set_sampling(&mut self, sampling: Sampling) {
+        self.sampling = sampling;
+    }
+
     /// Pins the system gain K, in ADU an electron (`--gain`).
     ///
     /// # Errors
@@ -55,7 +123,8 @@ fn within(flag: &str, value: f64, [low, high]: [f64; 2]) -> Result<f64> {
 }
 
 /// Everything about the camera that takes one frame.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct CameraState {
     /// Linear sRGB → camera, rows summing to 1.
     pub rgb_to_camera: Matrix,
@@ -89,12 +158,16 @@ impl CameraState {
     /// Matrix and gains follow Brooks et al. 2019, the sensor's noise Wei et al. 2021, K and r DarkQA.
     #[must_use]
     pub fn draw(key: &NoiseKey, model: &CameraModel) -> Self {
+        if model.sampling == Sampling::Fixed {
+            return Self::median(model);
+        }
         let draws = Draws(key.stream(Component::Camera));
         let weights = Number::WEIGHTS.map(|number| draws.uniform(number));
-        let rgb_to_camera = colour::rgb_to_camera(weights);
-        let drawn_gain = 0.1 * libm::exp(draws.uniform(Number::Gain) * libm::log(60.0));
-        let system_gain = model.gain.unwrap_or(drawn_gain);
-        let noise = sensor::noise_at(
+        let calibration = &model.calibration;
+        let [least, most] = calibration.gain;
+        let octaves = draws.uniform(Number::Gain) * libm::log(most / least);
+        let system_gain = model.gain.unwrap_or(least * libm::exp(octaves));
+        let noise = calibration.noise_at(
             system_gain,
             [
                 draws.normal(Number::ReadScale, 0),
@@ -102,21 +175,52 @@ impl CameraState {
             ],
             [Number::ReadShape, Number::Bias].map(|number| draws.uniform(number)),
         );
+        let [low, high] = calibration.ratio;
         Self {
-            rgb_to_camera,
-            camera_to_rgb: colour::inverse(&rgb_to_camera),
             rgb_gain: 1.0 / draws.cut_normal(Number::RgbGain),
             red_gain: draws.between(Number::RedGain, 1.9, 2.4),
             blue_gain: draws.between(Number::BlueGain, 1.5, 1.9),
             system_gain,
             ratio: model
                 .ratio
-                .unwrap_or_else(|| draws.between(Number::Ratio, 100.0, 300.0)),
+                .unwrap_or_else(|| draws.between(Number::Ratio, low, high)),
+            ..Self::of(weights, &noise, calibration)
+        }
+    }
+
+    /// The camera at the middle of each distribution, and the first of a step's measurements.
+    fn median(model: &CameraModel) -> Self {
+        let calibration = &model.calibration;
+        let [least, most] = calibration.gain;
+        let system_gain = model.gain.unwrap_or((least * most).sqrt());
+        let noise = calibration.noise_at(system_gain, [0.0; 2], [0.0; 2]);
+        let [low, high] = calibration.ratio;
+        Self {
+            rgb_gain: 1.25,
+            red_gain: 2.15,
+            blue_gain: 1.7,
+            system_gain,
+            ratio: model.ratio.unwrap_or(f64::midpoint(low, high)),
+            ..Self::of([1.0; 4], &noise, calibration)
+        }
+    }
+
+    /// A state of colour and noise, its gains and ratio 1.
+    fn of(weights: [f64; 4], noise: &SensorNoise, calibration: &Calibration) -> Self {
+        let rgb_to_camera = colour::rgb_to_camera(weights);
+        Self {
+            rgb_to_camera,
+            camera_to_rgb: colour::inverse(&rgb_to_camera),
+            rgb_gain: 1.0,
+            red_gain: 1.0,
+            blue_gain: 1.0,
+            system_gain: 1.0,
+            ratio: 1.0,
             read_scale: noise.read_scale,
             read_shape: noise.read_shape,
             row_deviation: noise.row_deviation,
             bias: noise.bias,
-            adu_range: sensor::ADU_RANGE,
+            adu_range: calibration.adu_range,
         }
     }
 }
@@ -183,25 +287,51 @@ pub(super) mod tests {
     use super::*;
     use crate::types::FrameId;
 
-    /// The camera at the middle of each distribution: the one that published figures of flat greys are for.
+    /// The fixed camera: the one that published figures of flat greys are for.
     pub(in crate::synthesis) fn median() -> CameraState {
-        let rgb_to_camera = colour::rgb_to_camera([1.0; 4]);
-        let system_gain = 0.6f64.sqrt();
-        let noise = sensor::noise_at(system_gain, [0.0; 2], [0.0; 2]);
-        CameraState {
-            rgb_to_camera,
-            camera_to_rgb: colour::inverse(&rgb_to_camera),
-            rgb_gain: 1.25,
-            red_gain: 2.15,
-            blue_gain: 1.7,
-            system_gain,
-            ratio: 200.0,
-            read_scale: noise.read_scale,
-            read_shape: noise.read_shape,
-            row_deviation: noise.row_deviation,
-            bias: noise.bias,
-            adu_range: sensor::ADU_RANGE,
+        let mut model = CameraModel::default();
+        model.set_sampling(Sampling::Fixed);
+        let key = NoiseKey::new(0, &FrameId(String::new()));
+        CameraState::draw(&key, &model)
+    }
+
+    #[test]
+    fn the_fixed_camera_is_the_same_for_all_frames() {
+        let state = median();
+        assert!((state.system_gain - 0.6f64.sqrt()).abs() < 1e-15);
+        assert!((state.ratio - 200.0).abs() < 1e-12);
+        let mut model = CameraModel::default();
+        model.set_sampling(Sampling::Fixed);
+        model.pin_gain(2.0).unwrap();
+        let pinned = states(&model, 2);
+        assert_eq!(pinned[0], pinned[1]);
+        assert!((pinned[0].system_gain - 2.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_state_is_read_as_it_was_written() {
+        for state in states(&CameraModel::default(), 50) {
+            let text = serde_json::to_string(&state).unwrap();
+            assert_eq!(serde_json::from_str::<CameraState>(&text).unwrap(), state);
         }
+    }
+
+    #[test]
+    fn every_calibrated_camera_keeps_its_ranges() {
+        for name in Calibration::names() {
+            let model = CameraModel::preset(name).unwrap();
+            let [low, high] = model.calibration.gain;
+            for state in states(&model, 200) {
+                assert!(
+                    state.system_gain >= low && state.system_gain <= high,
+                    "{name}"
+                );
+                assert!((100.0..=300.0).contains(&state.ratio), "{name}");
+                assert!(state.read_scale > 0.0 && state.read_scale < 500.0, "{name}");
+            }
+        }
+        let error = CameraModel::preset("leica").unwrap_err().to_string();
+        assert!(error.contains("canon-eos-70d"), "{error}");
     }
 
     fn states(model: &CameraModel, n: usize) -> Vec<CameraState> {

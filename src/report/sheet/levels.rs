@@ -1,0 +1,151 @@
+//! The paper's example figure: both variants by level.
+
+use super::{CELL, Canvas, GAP, LINE, fitted, letter_width, mean};
+use crate::types::{DarkLevel, Rgb};
+
+/// One level of a frame.
+#[derive(Debug, Clone)]
+pub struct LevelColumn {
+    /// Which.
+    pub level: DarkLevel,
+    /// By exposure drop alone.
+    pub exposure: Rgb,
+    /// With the sensor's noise.
+    pub noise: Rgb,
+}
+
+/// The frame and its levels, exposure drop above noise, as the paper's figure of examples (DarkQA, Fig. 3).
+///
+/// Cells are means of the pixels they stand for. In the lower right corner of L3, L4 and L5 the middle of the image (half
+/// its sides, so a quarter of it) is shown in 10, 20 and 50 times its light, as the paper's insets; its pixels are
+/// picked, not averaged, so that the noise keeps its strength. The paper says "pixel intensities amplified": codes taken
+/// so many times would leave nothing of a bright room but white, so its light is meant.
+#[must_use]
+pub fn levels(clean: &Rgb, columns: &[LevelColumn]) -> Rgb {
+    let size = fitted(clean.height(), clean.width());
+    let [height, width] = size;
+    let margin = 6 * letter_width() + GAP;
+    // A label needs its room, however small the image is.
+    let cell = width.max(CELL / 2);
+    let mut sheet = Canvas::new(
+        GAP + LINE + 2 * (GAP + height.max(LINE)) + GAP,
+        margin + (columns.len() + 1) * (cell + GAP),
+    );
+    let tops = [0, 1].map(|row| GAP + LINE + GAP + row * (GAP + height.max(LINE)));
+    for (top, name) in tops.into_iter().zip(["EV", "noise"]) {
+        sheet.write(
+            [top + height.saturating_sub(LINE) / 2, GAP],
+            margin,
+            name,
+            [0; 3],
+        );
+    }
+    let left = |column: usize| margin + column * (cell + GAP);
+    sheet.write([GAP, left(0)], cell, "L0", [0; 3]);
+    for top in tops {
+        sheet.put([top, left(0)], size, |row, column| {
+            mean(clean, size, row, column)
+        });
+    }
+    for (index, column) in columns.iter().enumerate() {
+        let left = left(index + 1);
+        let level = column.level.level();
+        let label = format!("{level} -{} EV", column.level.exposure_drop().0);
+        sheet.write([GAP, left], cell, &label, [0; 3]);
+        for (top, image) in tops.into_iter().zip([&column.exposure, &column.noise]) {
+            sheet.put([top, left], size, |row, column| {
+                mean(image, size, row, column)
+            });
+            if let Some(factor) = amplification(column.level) {
+                inset(&mut sheet, [top, left], size, image, factor);
+            }
+        }
+    }
+    sheet.finish()
+}
+
+/// By how much an inset is amplified; L1 and L2 can be seen as they are.
+fn amplification(level: DarkLevel) -> Option<u16> {
+    match level {
+        DarkLevel::L1 | DarkLevel::L2 => None,
+        DarkLevel::L3 => Some(10),
+        DarkLevel::L4 => Some(20),
+        DarkLevel::L5 => Some(50),
+    }
+}
+
+/// The amplified middle of the image in a cell's lower right corner, with a white edge and its factor.
+fn inset(sheet: &mut Canvas, [top, left]: [usize; 2], size: [usize; 2], image: &Rgb, factor: u16) {
+    let [height, width] = size.map(|side| side / 2);
+    if height < 4 || width < 4 {
+        return;
+    }
+    let (top, left) = (top + size[0] - height, left + size[1] - width);
+    sheet.put([top - 1, left - 1], [height + 1, width + 1], |_, _| {
+        [255; 3]
+    });
+    let lighter = lighter(factor);
+    let from = |at: usize, of: usize, side: usize| side / 4 + at * (side / 2) / of;
+    sheet.put([top, left], [height, width], |row, column| {
+        let (y, x) = (
+            from(row, height, image.height()),
+            from(column, width, image.width()),
+        );
+        let at = (y * image.width() + x) * 3;
+        [0, 1, 2].map(|channel| lighter[usize::from(image.samples()[at + channel])])
+    });
+    let label = format!("×{factor}");
+    let room = label.chars().count() * letter_width();
+    if height > LINE && width > room {
+        sheet.put([top, left], [LINE, room + 2], |_, _| [0; 3]);
+        sheet.write([top, left + 1], room, &label, [255; 3]);
+    }
+}
+
+/// The code of so many times a code's light: times factor^(1/2.2).
+fn lighter(factor: u16) -> [u8; 256] {
+    let scale = libm::pow(f64::from(factor), 1.0 / 2.2);
+    std::array::from_fn(|code| (code as f64 * scale).round().min(255.0) as u8)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grey(height: usize, width: usize, code: u8) -> Rgb {
+        Rgb::new(height, width, vec![code; height * width * 3]).unwrap()
+    }
+
+    fn sheet(height: usize, width: usize, levels_of: &[DarkLevel]) -> Rgb {
+        let column = |level: &DarkLevel| LevelColumn {
+            level: *level,
+            exposure: grey(height, width, 3),
+            noise: grey(height, width, 4),
+        };
+        let columns: Vec<_> = levels_of.iter().map(column).collect();
+        levels(&grey(height, width, 100), &columns)
+    }
+
+    #[test]
+    fn insets_are_amplified_by_their_level() {
+        let sheet = sheet(100, 300, &[DarkLevel::L1, DarkLevel::L5]);
+        let has = |code: u8| {
+            let pixels = sheet.samples().chunks(3);
+            pixels.filter(|pixel| **pixel == [code; 3]).count()
+        };
+        // The clean frame twice; the cells, less the quarter of the amplified inset and its edge.
+        assert!(has(100) >= 2 * 100 * 300);
+        assert!(has(3) > 100 * 300 && has(3) < 2 * 100 * 300);
+        assert!(has(18) > 4000 && has(24) > 4000);
+    }
+
+    #[test]
+    fn every_size_has_a_sheet() {
+        for (height, width) in [(1, 1), (3, 500), (500, 3), (7, 7), (720, 1280)] {
+            for levels in [&[][..], &[DarkLevel::L4], &DarkLevel::ALL] {
+                let sheet = sheet(height, width, levels);
+                assert!(sheet.width() <= 2400, "{}", sheet.width());
+            }
+        }
+    }
+}

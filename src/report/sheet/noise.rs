@@ -1,0 +1,102 @@
+//! The terms of the noise alone, as signals.
+
+use ndarray::Array2;
+
+use super::{CELL, Canvas, GAP, LINE};
+use crate::types::Rgb;
+
+/// One signal on the sensor.
+#[derive(Debug, Clone)]
+pub struct Signal {
+    /// What it is called.
+    pub name: String,
+    /// Height × width, in ADU.
+    pub adu: Array2<f32>,
+}
+
+/// Each signal's middle, pixel for pixel, about mid grey, with its mean and standard deviation (over the whole of it).
+///
+/// Grey goes from three standard deviations below the mean, black, to three above it, white.
+#[must_use]
+pub fn noise(signals: &[Signal]) -> Rgb {
+    const COLUMNS: usize = 3;
+    let side = |length: fn(&Array2<f32>) -> usize, most: usize| {
+        signals
+            .iter()
+            .map(|signal| length(&signal.adu))
+            .min()
+            .unwrap_or(1)
+            .min(most)
+    };
+    let (height, width) = (side(Array2::nrows, CELL * 3 / 4), side(Array2::ncols, CELL));
+    let step = [GAP + 2 * LINE + height, GAP + CELL];
+    let mut sheet = Canvas::new(
+        signals.len().div_ceil(COLUMNS) * step[0] + GAP,
+        COLUMNS * step[1] + GAP,
+    );
+    for (index, signal) in signals.iter().enumerate() {
+        let top = GAP + index / COLUMNS * step[0];
+        let left = GAP + index % COLUMNS * step[1];
+        let [mean, deviation] = moments(&signal.adu);
+        sheet.write([top, left], CELL, &signal.name, [0; 3]);
+        let numbers = format!("mean {mean:.3}, std {deviation:.3} ADU");
+        sheet.write([top + LINE, left], CELL, &numbers, [0; 3]);
+        let first = [
+            (signal.adu.nrows() - height) / 2,
+            (signal.adu.ncols() - width) / 2,
+        ];
+        let scale = if deviation > 0.0 {
+            127.5 / (3.0 * deviation)
+        } else {
+            0.0
+        };
+        sheet.put([top + 2 * LINE, left], [height, width], |row, column| {
+            let value = f64::from(signal.adu[[first[0] + row, first[1] + column]]);
+            [(127.5 + (value - mean) * scale).round().clamp(0.0, 255.0) as u8; 3]
+        });
+    }
+    sheet.finish()
+}
+
+fn moments(adu: &Array2<f32>) -> [f64; 2] {
+    let n = adu.len().max(1) as f64;
+    let mean = adu.iter().map(|x| f64::from(*x)).sum::<f64>() / n;
+    let variance = adu
+        .iter()
+        .map(|x| (f64::from(*x) - mean).powi(2))
+        .sum::<f64>()
+        / n;
+    [mean, variance.sqrt()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn three_deviations_are_black_and_white() {
+        let adu = Array2::from_shape_fn((8, 8), |(row, _)| if row % 2 == 0 { 1.0 } else { 3.0 });
+        let [mean, deviation] = moments(&adu);
+        assert!((mean - 2.0).abs() < 1e-9 && (deviation - 1.0).abs() < 1e-9);
+        let name = "row".to_owned();
+        let sheet = noise(&[Signal { name, adu }]);
+        let has = |code: u8| sheet.samples().contains(&code);
+        assert!(has(85) && has(170));
+    }
+
+    #[test]
+    fn flat_and_tiny_signals_are_grey() {
+        let signal = |size| Signal {
+            name: "a name that is longer than its place on the sheet is".to_owned(),
+            adu: Array2::zeros(size),
+        };
+        let sheet = noise(&[
+            signal((1, 1)),
+            signal((500, 2)),
+            signal((2, 500)),
+            signal((9, 9)),
+        ]);
+        assert!(sheet.samples().contains(&128));
+        assert_eq!(noise(&[]).width(), 3 * (GAP + CELL) + GAP);
+    }
+}

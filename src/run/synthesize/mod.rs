@@ -1,0 +1,338 @@
+//! `synthesize`: low-light versions of images as files, as an evaluation of the same folder would send them.
+
+mod sheet;
+mod sidecar;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::Write;
+use std::path::{Component, Path, PathBuf};
+
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder as _};
+use rayon::ThreadPoolBuilder;
+use rayon::prelude::*;
+
+use super::Verdict;
+use super::progress::{Bar, Progress};
+use crate::config::{Existing, Light, Product, Synthesize};
+use crate::dataset::{Dataset, Picture};
+use crate::error::{Error, Result};
+use crate::synthesis::{Negative, NoiseKey, expose};
+use crate::types::manifest::Status;
+use crate::types::{Degradation, FrameId, Rgb, Variants};
+use sidecar::Sidecar;
+
+/// Makes the images that the command asks for.
+///
+/// What cannot be made of one frame is said, counted, and does not stop the others.
+///
+/// # Errors
+/// Where nothing can be made: no such input, two frames of one name, no folder to write to.
+pub fn synthesize(config: &Synthesize, progress: &Progress) -> Result<Verdict> {
+    let frames = Frames::open(config)?;
+    let threads = config.threads.map_or(0, std::num::NonZero::get);
+    let cores = ThreadPoolBuilder::new().num_threads(threads).build();
+    let cores = cores.map_err(|e| Error::usage("--threads", e))?;
+    fs::create_dir_all(&config.out).map_err(|e| Error::file(&config.out, "make", e))?;
+    if let Product::Replay(file) = &config.product {
+        return cores.install(|| replay(config, &frames, file));
+    }
+    let files = files(config);
+    let bar = progress.bar("images", frames.entries.len() * files.len());
+    let made: Vec<Tally> = cores.install(|| {
+        let entries = frames.entries.par_iter();
+        entries
+            .map(|entry| one(config, &frames, entry, &files, &bar))
+            .collect()
+    });
+    drop(bar);
+    let total = made.iter().fold(Tally::default(), |sum, tally| Tally {
+        made: sum.made + tally.made,
+        kept: sum.kept + tally.kept,
+        failed: sum.failed + tally.failed,
+    });
+    Ok(total.verdict(config, frames.entries.len()))
+}
+
+/// What became of the images.
+#[derive(Debug, Clone, Copy, Default)]
+struct Tally {
+    made: usize,
+    kept: usize,
+    failed: usize,
+}
+
+impl Tally {
+    fn verdict(self, config: &Synthesize, frames: usize) -> Verdict {
+        let Self { made, kept, failed } = self;
+        let kept = match kept {
+            0 => String::new(),
+            n => format!(", {n} kept as they were (--force makes them again)"),
+        };
+        let lost = match failed {
+            0 => String::new(),
+            n => format!(", {n} failed"),
+        };
+        Verdict {
+            status: if failed == 0 {
+                Status::Complete
+            } else {
+                Status::Incomplete
+            },
+            output: format!(
+                "{}: {made} made of {frames} frames{kept}{lost}\n",
+                config.out.display()
+            ),
+        }
+    }
+}
+
+/// The frames of all inputs.
+struct Frames {
+    sets: Vec<Dataset>,
+    entries: Vec<Entry>,
+}
+
+/// One frame, and what its files are called.
+struct Entry {
+    set: usize,
+    id: FrameId,
+    /// The path below the output folder, without what tells the conditions apart.
+    stem: String,
+}
+
+impl Frames {
+    fn open(config: &Synthesize) -> Result<Self> {
+        let sets: Vec<Dataset> = config
+            .inputs
+            .iter()
+            .map(|path| Ok(Dataset::of_images(path)?.with_most_pixels(config.most_pixels)))
+            .collect::<Result<_>>()?;
+        let mut entries = Vec::new();
+        let mut taken: BTreeMap<String, String> = BTreeMap::new();
+        for (set, (dataset, input)) in sets.iter().zip(&config.inputs).enumerate() {
+            for id in dataset.frames() {
+                let stem = stem(id)?;
+                let whole = format!("{:?} of {}", id.0, input.display());
+                if let Some(other) = taken.insert(stem.clone(), whole.clone()) {
+                    let problem = format!(
+                        "{whole} and {other} would both be written as {stem}_…; give each its own --out"
+                    );
+                    return Err(Error::usage("INPUT", problem));
+                }
+                let id = id.clone();
+                entries.push(Entry { set, id, stem });
+            }
+        }
+        Ok(Self { sets, entries })
+    }
+
+    fn picture(&self, entry: &Entry) -> Result<Picture> {
+        self.sets[entry.set].picture(&entry.id)
+    }
+}
+
+/// The name of a frame's files: its own, without the ending of an image.
+fn stem(id: &FrameId) -> Result<String> {
+    let path = Path::new(&id.0);
+    if !path
+        .components()
+        .all(|part| matches!(part, Component::Normal(_)))
+    {
+        let problem = "this name of a frame leads out of the output folder";
+        return Err(Error::data(format_args!("{:?}", id.0), problem));
+    }
+    let ending = path
+        .extension()
+        .map(|ending| ending.to_string_lossy().to_lowercase());
+    let bare = match ending.as_deref() {
+        Some("png" | "jpg" | "jpeg") => path.with_extension(""),
+        _ => path.to_owned(),
+    };
+    Ok(bare.to_string_lossy().into_owned())
+}
+
+/// One file of a frame.
+#[derive(Debug, Clone, Copy)]
+enum File {
+    Image(Degradation),
+    LevelSheet,
+    NoiseSheet,
+}
+
+/// The files of each frame.
+fn files(config: &Synthesize) -> Vec<File> {
+    match config.product {
+        Product::LevelSheet => vec![File::LevelSheet],
+        Product::NoiseSheet => vec![File::NoiseSheet],
+        Product::Images | Product::Replay(_) => {
+            let degradations = config
+                .light
+                .levels
+                .iter()
+                .flat_map(|level| match level.dark() {
+                    None => vec![Degradation::None],
+                    Some(dark) => {
+                        let (ev, noise) = (Degradation::Exposure(dark), Degradation::Sensor(dark));
+                        match config.light.variants {
+                            Variants::Ev => vec![ev],
+                            Variants::Noise => vec![noise],
+                            Variants::Both => vec![ev, noise],
+                        }
+                    }
+                });
+            degradations.map(File::Image).collect()
+        }
+    }
+}
+
+/// Makes all images of one frame.
+fn one(config: &Synthesize, frames: &Frames, entry: &Entry, files: &[File], bar: &Bar) -> Tally {
+    let mut tally = Tally::default();
+    let mut work = match frames.picture(entry) {
+        Ok(picture) => Work {
+            config,
+            entry,
+            picture,
+            clean: None,
+            negative: None,
+        },
+        Err(e) => {
+            tracing::error!("{e}");
+            tally.failed = files.len();
+            return tally;
+        }
+    };
+    for file in files {
+        let made = match file {
+            File::Image(degradation) => work.image(*degradation),
+            File::LevelSheet => work.sheet("levels", sheet::levels),
+            File::NoiseSheet => work.sheet("noise", sheet::terms),
+        };
+        match made {
+            Ok(Made::New) => tally.made += 1,
+            Ok(Made::Kept) => tally.kept += 1,
+            Err(e) => {
+                tracing::error!("{e}");
+                tally.failed += 1;
+            }
+        }
+        bar.inc();
+    }
+    tally
+}
+
+/// One frame being worked on: each step is done when it is first needed, and once.
+struct Work<'a> {
+    config: &'a Synthesize,
+    entry: &'a Entry,
+    picture: Picture,
+    clean: Option<Rgb>,
+    negative: Option<Negative>,
+}
+
+/// Whether an image was made.
+enum Made {
+    New,
+    Kept,
+}
+
+impl Work<'_> {
+    fn image(&mut self, degradation: Degradation) -> Result<Made> {
+        let light = &self.config.light;
+        let key = NoiseKey::new(light.seed, &self.entry.id);
+        let name = format!("{}_{degradation}", self.entry.stem);
+        let sidecar = Sidecar::new(&self.entry.id, &self.picture, degradation, light, &key);
+        let [image, json] = [".png", ".json"].map(|end| self.config.out.join(name.clone() + end));
+        if self.config.existing == Existing::Kept && image.exists() && json.exists() {
+            if sidecar.is_at(&json)? {
+                return Ok(Made::Kept);
+            }
+            let problem = "made from another image or with other settings; --force makes it again, another --out keeps both";
+            return Err(Error::data(json.display(), problem));
+        }
+        let dark = self.dark(degradation, &key)?;
+        write(&image, &png(&dark)?)?;
+        write(&json, sidecar.text().as_bytes())?;
+        Ok(Made::New)
+    }
+
+    /// A figure; it has no file beside it, so one that is there is kept whatever it shows.
+    fn sheet(&mut self, kind: &str, draw: fn(&Rgb, &FrameId, &Light) -> Rgb) -> Result<Made> {
+        let path = self
+            .config
+            .out
+            .join(format!("{}_{kind}.png", self.entry.stem));
+        if self.config.existing == Existing::Kept && path.exists() {
+            return Ok(Made::Kept);
+        }
+        let figure = draw(&self.picture.decode()?, &self.entry.id, &self.config.light);
+        write(&path, &png(&figure)?)?;
+        Ok(Made::New)
+    }
+
+    fn dark(&mut self, degradation: Degradation, key: &NoiseKey) -> Result<Rgb> {
+        let clean = match &mut self.clean {
+            Some(clean) => clean,
+            none => none.insert(self.picture.decode()?),
+        };
+        Ok(match degradation {
+            Degradation::None => clean.clone(),
+            Degradation::Exposure(level) => expose(clean, level),
+            Degradation::Sensor(level) => {
+                let kept = self.negative.take().filter(|kept| kept.serves(level));
+                let synthesis = &self.config.light.synthesis;
+                let negative = kept.unwrap_or_else(|| Negative::new(clean, key, synthesis, level));
+                self.negative.insert(negative).develop(level)
+            }
+        })
+    }
+}
+
+/// Makes the one image again that a file tells of.
+fn replay(config: &Synthesize, frames: &Frames, file: &Path) -> Result<Verdict> {
+    let sidecar = Sidecar::read(file)?;
+    let [entry] = &frames.entries[..] else {
+        let problem = format_args!(
+            "one image is made again from one INPUT, not from {}",
+            frames.entries.len()
+        );
+        return Err(Error::usage("--from", problem));
+    };
+    let picture = frames.picture(entry)?;
+    let dark = sidecar.replay(&picture, file)?;
+    let path = config.out.join(sidecar.name(&stem(&sidecar.frame())?));
+    if config.existing == Existing::Kept && path.exists() {
+        let problem = "there already; --force makes it again";
+        return Err(Error::data(path.display(), problem));
+    }
+    write(&path, &png(&dark)?)?;
+    let made = Tally {
+        made: 1,
+        ..Tally::default()
+    };
+    Ok(made.verdict(config, 1))
+}
+
+/// An image as a PNG file, lossless at the lowest effort: 26 times faster than the usual one for 2 % more bytes.
+fn png(image: &Rgb) -> Result<Vec<u8>> {
+    let mut file = Vec::new();
+    let [width, height] = [image.width(), image.height()].map(|side| side as u32);
+    PngEncoder::new_with_quality(&mut file, CompressionType::Fast, FilterType::Adaptive)
+        .write_image(image.samples(), width, height, ExtendedColorType::Rgb8)
+        .map_err(|e| Error::data("image", e))?;
+    Ok(file)
+}
+
+/// Writes a file whole or not at all.
+fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    let folder = path.parent().unwrap_or(Path::new("."));
+    fs::create_dir_all(folder).map_err(|e| Error::file(folder, "make", e))?;
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(".part");
+    let part = PathBuf::from(beside);
+    let written = fs::File::create(&part).and_then(|mut file| file.write_all(bytes));
+    written.map_err(|e| Error::file(&part, "write", e))?;
+    fs::rename(&part, path).map_err(|e| Error::file(path, "write", e))
+}

@@ -1,0 +1,82 @@
+//! The figures of `synthesize --sheet`: what is on them is made here, [`crate::report::sheet`] draws it.
+
+use ndarray::Array2;
+
+use crate::config::Light;
+use crate::report::sheet::{self, LevelColumn, Signal};
+use crate::synthesis::bayer::Bayer;
+use crate::synthesis::noise::{self, Term};
+use crate::synthesis::unprocess::unprocess;
+use crate::synthesis::{Draws, NoiseKey, expose, ladder};
+use crate::types::{DarkLevel, FrameId, Level, Rgb};
+
+fn dark_levels(light: &Light) -> Vec<DarkLevel> {
+    light
+        .levels
+        .iter()
+        .copied()
+        .filter_map(Level::dark)
+        .collect()
+}
+
+/// Both variants of a frame by level.
+pub(super) fn levels(clean: &Rgb, frame: &FrameId, light: &Light) -> Rgb {
+    let levels = dark_levels(light);
+    let key = NoiseKey::new(light.seed, frame);
+    let mut noisy: Vec<Rgb> = levels
+        .iter()
+        .map(|_| Rgb::black(clean.height(), clean.width()))
+        .collect();
+    ladder(clean, &key, &light.synthesis, &levels, &mut noisy);
+    let columns: Vec<LevelColumn> = levels
+        .into_iter()
+        .zip(noisy)
+        .map(|(level, noise)| LevelColumn {
+            level,
+            exposure: expose(clean, level),
+            noise,
+        })
+        .collect();
+    sheet::levels(clean, &columns)
+}
+
+/// The terms of a frame's noise, at the darkest level that is asked for (which matters where levels share no negative).
+pub(super) fn terms(clean: &Rgb, frame: &FrameId, light: &Light) -> Rgb {
+    let level = dark_levels(light).pop().unwrap_or(DarkLevel::L5);
+    let (synthesis, frame) = (&light.synthesis, NoiseKey::new(light.seed, frame));
+    let key = match synthesis.draws {
+        Draws::Shared => frame,
+        Draws::Fresh => frame.at(level),
+    };
+    let state = synthesis.state(&frame, level);
+    let raw = unprocess(clean, &state);
+    let range = state.adu_range as f32;
+    let under = |terms: &[Term]| {
+        let mut noisy = raw.clone();
+        noise::add(&mut noisy, &state, &key, synthesis.amplify, terms);
+        adu(&noisy, range)
+    };
+    let clean = under(&[]);
+    let signal = |name: String, adu| Signal { name, adu };
+    let mut signals = vec![signal("RAW".to_owned(), clean.clone())];
+    for (name, term) in [
+        ("shot noise", Term::Shot),
+        ("read noise", Term::Read),
+        ("row noise", Term::Row),
+        ("quantisation noise", Term::Quantisation),
+    ] {
+        signals.push(signal(name.to_owned(), under(&[term]) - &clean));
+    }
+    let name = format!(
+        "noisy RAW (K {:.2}, r {:.0})",
+        state.system_gain, state.ratio
+    );
+    signals.push(signal(name, under(&Term::ALL)));
+    sheet::noise(&signals)
+}
+
+fn adu(raw: &Bayer, range: f32) -> Array2<f32> {
+    Array2::from_shape_fn((raw.height(), raw.width()), |(row, column)| {
+        raw.sample(row, column) * range
+    })
+}
