@@ -34,6 +34,8 @@ pub struct Cli {
 pub enum Command {
     /// Write the low-light versions of images, as an evaluation would send them
     Synthesize(SynthesizeArgs),
+    /// Hold the synthesis against real pairs of images in normal and low light
+    Realism(RealismArgs),
 }
 
 /// The flags of `synthesize`.
@@ -48,6 +50,9 @@ pub struct SynthesizeArgs {
     /// Light.
     #[command(flatten)]
     pub light: LightArgs,
+    /// Light, as a sensor sees it.
+    #[command(flatten)]
+    pub sensor: SensorArgs,
     /// Make again the image that this JSON file stands beside, from the one INPUT that it was made from
     #[arg(long, value_name = "FILE", help_heading = "Synthesis")]
     pub from: Option<PathBuf>,
@@ -76,6 +81,56 @@ pub struct SynthesizeArgs {
     pub config: Option<PathBuf>,
 }
 
+/// The flags of `realism`.
+#[derive(Debug, Args)]
+pub struct RealismArgs {
+    /// A folder of pairs: normal/ and low/, high/ and low/, val_rgb_h/ and val_rgb_l/, or files like normal1.png and
+    /// low1.png
+    #[arg(
+        value_name = "PAIRS",
+        required_unless_present = "normal",
+        conflicts_with = "normal"
+    )]
+    pub pairs: Option<PathBuf>,
+    /// The images in normal light, where they lie elsewhere
+    #[arg(long, value_name = "DIR", requires = "low")]
+    pub normal: Option<PathBuf>,
+    /// The images in low light, of the same names
+    #[arg(long, value_name = "DIR", requires = "normal")]
+    pub low: Option<PathBuf>,
+    /// The exposure drop of every pair in EV; default: estimated for each from its mean light
+    #[arg(long, value_name = "EV", allow_negative_numbers = true)]
+    pub ev: Option<f32>,
+    /// The bins of the residuals' divergence: fu (64 bins within ±0.1) or kousha (4 codes wide); default: fu
+    #[arg(long, value_name = "fu|kousha")]
+    pub kl_bins: Option<String>,
+    /// What is done about empty bins of fu: eps (1e-8 added to each) or drop (they are left out); both are shown; default:
+    /// eps
+    #[arg(long, value_name = "eps|drop")]
+    pub kl_empty: Option<String>,
+    /// Light, as a sensor sees it.
+    #[command(flatten)]
+    pub sensor: SensorArgs,
+    /// Where the numbers by pair, the summary and the figures go; default: nowhere
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    pub out: Option<PathBuf>,
+    /// Print the summary as JSON instead of a table
+    #[arg(long, help_heading = "Output")]
+    pub json: bool,
+    /// Threads, 1024 at most; default: all cores
+    #[arg(long, value_name = "N", help_heading = "Output")]
+    pub threads: Option<NonZeroUsize>,
+    /// The most pixels an image may have before it is refused undecoded; default: 100 million
+    #[arg(long, value_name = "N", help_heading = "Output")]
+    pub max_pixels: Option<NonZeroU64>,
+    /// No progress
+    #[arg(long, help_heading = "Output")]
+    pub quiet: bool,
+    /// A TOML file of flags by their long names
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    pub config: Option<PathBuf>,
+}
+
 const AFTER_HELP: &str = "\
 Precedence: flag, then environment (DARKQA_CONCURRENCY=16 for --concurrency 16), then --config FILE, then default.
 OPENAI_BASE_URL, OPENAI_API_KEY and ORT_DYLIB_PATH are defaults: whatever names another goes before them.
@@ -91,6 +146,9 @@ pub struct EvaluateArgs {
     /// Light.
     #[command(flatten)]
     pub light: LightArgs,
+    /// Light, as a sensor sees it.
+    #[command(flatten)]
+    pub sensor: SensorArgs,
     /// Enhancement.
     #[command(flatten)]
     pub enhancement: EnhancementArgs,
@@ -137,6 +195,12 @@ pub struct LightArgs {
     ///
     #[arg(long, value_name = "ev|noise|both")]
     pub variant: Option<String>,
+}
+
+/// What takes the noisy images.
+#[derive(Debug, Default, Args)]
+#[command(next_help_heading = "Light")]
+pub struct SensorArgs {
     /// The seed of all random draws; default: 0
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,

@@ -53,7 +53,7 @@
 //! | `store` | `types`, `error` |
 //! | `report` | `types`, `error`, `score` |
 //! | `cli` | nothing |
-//! | `config` | `types`, `error`, `cli`, `dataset`, `synthesis`, `enhance`, `ask` |
+//! | `config` | `types`, `error`, `cli`, `dataset`, `synthesis`, `enhance`, `ask`, `score` |
 //! | `run` | `types`, `error`, `config`, `dataset`, `synthesis`, `enhance`, `ask`, `score`, `store`, `report` |
 //! | `main` | `cli`, `config`, `run`, `enhance`, `types` |
 //!

@@ -6,9 +6,10 @@ use std::process::ExitCode;
 use clap::Parser;
 use clap::error::ErrorKind;
 use darkqa_eval::cli::{Cli, Command, EvaluateArgs};
-use darkqa_eval::config::{self, Config, Synthesize};
+use darkqa_eval::config::{self, Config, Realism, Synthesize};
 use darkqa_eval::enhance;
 use darkqa_eval::run::progress::{Loudness, Progress};
+use darkqa_eval::run::realism::realism;
 use darkqa_eval::run::synthesize::synthesize;
 use darkqa_eval::run::{Verdict, evaluate};
 use darkqa_eval::types::manifest::Status;
@@ -72,6 +73,7 @@ struct Job {
 enum Task {
     Evaluate(Box<EvaluateArgs>),
     Synthesize(Box<Synthesize>),
+    Realism(Box<Realism>),
 }
 
 impl Job {
@@ -83,10 +85,12 @@ impl Job {
             }
             Some(Command::Synthesize(said)) => {
                 let quiet = said.quiet;
-                (
-                    quiet,
-                    Task::Synthesize(Box::new(Synthesize::resolve(said)?)),
-                )
+                let config = Synthesize::resolve(said)?;
+                (quiet, Task::Synthesize(Box::new(config)))
+            }
+            Some(Command::Realism(said)) => {
+                let quiet = said.quiet;
+                (quiet, Task::Realism(Box::new(Realism::resolve(said)?)))
             }
         };
         let loudness = if quiet {
@@ -102,6 +106,7 @@ fn show(task: Task, progress: &Progress) -> anyhow::Result<ExitCode> {
     let Verdict { status, output } = match task {
         Task::Evaluate(said) => evaluate(&Config::resolve(*said)?, progress)?,
         Task::Synthesize(config) => synthesize(&config, progress)?,
+        Task::Realism(config) => realism(&config, progress)?,
     };
     let written = std::io::stdout().lock().write_all(output.as_bytes());
     match (status, written) {

@@ -12,6 +12,7 @@ use toml::{Table, Value};
 
 use crate::cli::{
     Cli, DataArgs, EnhancementArgs, EvaluateArgs, LightArgs, ModelArgs, OutputArgs, SendingArgs,
+    SensorArgs,
 };
 use crate::error::{Error, Result};
 
@@ -214,9 +215,11 @@ fn or(first: Layer, second: Layer) -> Layer {
     }
     let said = EvaluateArgs {
         data: first_set!(DataArgs { data, questions, limit, families, max_pixels; ; }, first.data, second.data, off),
-        light: first_set!(LightArgs {
-                levels, variant, seed, profile, amplify, tone, draws, coupling, camera, gain, ratio; ; fixed
-            }, first.light, second.light, off),
+        light: first_set!(LightArgs { levels, variant; ; }, first.light, second.light, off),
+        sensor: first_set!(
+            SensorArgs { seed, profile, amplify, tone, draws, coupling, camera, gain, ratio; ; fixed },
+            first.sensor, second.sensor, off
+        ),
         enhancement: first_set!(
             EnhancementArgs { llie_on, threads, ort_lib; llie; offline }, first.enhancement, second.enhancement, off
         ),
@@ -269,7 +272,7 @@ mod tests {
             from_file("seed = 3\ngain = 1\nratio = 150\nmodel = [\"c\"]\nquiet = false\n").unwrap();
         let said = or(or(typed(&["--seed", "1"]), environment.unwrap()), file).said;
         assert_eq!(
-            (said.light.seed, said.light.gain, said.light.ratio),
+            (said.sensor.seed, said.sensor.gain, said.sensor.ratio),
             (Some(1), Some(0.5), Some(150.0))
         );
         assert_eq!(

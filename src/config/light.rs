@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use super::parsed;
-use crate::cli::LightArgs;
+use crate::cli::{LightArgs, SensorArgs};
 use crate::error::{Error, Result};
 use crate::synthesis::{Calibration, CameraModel, Coupling, Sampling, Synthesis};
 use crate::types::{Level, Variants};
@@ -16,28 +16,43 @@ pub struct Light {
     pub levels: Vec<Level>,
     /// The variants of the dark ones.
     pub variants: Variants,
+    /// What takes the noisy images.
+    pub sensor: Sensor,
+}
+
+/// What takes the noisy images.
+#[derive(Debug)]
+pub struct Sensor {
     /// The seed of all random draws.
     pub seed: u64,
     /// The sensor branch.
     pub synthesis: Synthesis,
 }
 
-impl Light {
-    pub(super) fn resolve(said: &LightArgs) -> Result<Self> {
+impl Sensor {
+    pub(super) fn resolve(said: &SensorArgs) -> Result<Self> {
         Ok(Self {
-            levels: said
-                .levels
-                .as_deref()
-                .map_or(Ok(Level::ALL.to_vec()), levels)?,
-            variants: parsed("--variant", said.variant.as_deref())?.unwrap_or(Variants::Both),
             seed: said.seed.unwrap_or(0),
             synthesis: synthesis(said)?,
         })
     }
 }
 
+impl Light {
+    pub(super) fn resolve(said: &LightArgs, sensor: &SensorArgs) -> Result<Self> {
+        Ok(Self {
+            levels: said
+                .levels
+                .as_deref()
+                .map_or(Ok(Level::ALL.to_vec()), levels)?,
+            variants: parsed("--variant", said.variant.as_deref())?.unwrap_or(Variants::Both),
+            sensor: Sensor::resolve(sensor)?,
+        })
+    }
+}
+
 /// A profile, and what is said beside it.
-fn synthesis(said: &LightArgs) -> Result<Synthesis> {
+fn synthesis(said: &SensorArgs) -> Result<Synthesis> {
     let profile = parsed("--profile", said.profile.as_deref())?.unwrap_or_default();
     let of = Synthesis::of(profile, camera(said)?);
     let synthesis = Synthesis {
@@ -54,7 +69,7 @@ fn synthesis(said: &LightArgs) -> Result<Synthesis> {
     Ok(synthesis)
 }
 
-fn camera(said: &LightArgs) -> Result<CameraModel> {
+fn camera(said: &SensorArgs) -> Result<CameraModel> {
     let mut camera = match said.camera.as_deref() {
         None => CameraModel::default(),
         Some(name) => match Path::new(name) {
@@ -134,27 +149,27 @@ mod tests {
 
     #[test]
     fn a_flag_goes_before_its_part_of_the_profile() {
-        let said = LightArgs {
+        let said = SensorArgs {
             profile: Some("physical".into()),
             tone: Some("none".into()),
-            ..LightArgs::default()
+            ..SensorArgs::default()
         };
-        let synthesis = Light::resolve(&said).unwrap().synthesis;
+        let synthesis = Sensor::resolve(&said).unwrap().synthesis;
         assert_eq!(synthesis.amplify, Amplify::All);
         assert_eq!(synthesis.tone, Tone::None);
         assert_eq!(synthesis.coupling, Coupling::Photon);
-        let default = Light::resolve(&LightArgs::default()).unwrap();
+        let default = Sensor::resolve(&SensorArgs::default()).unwrap();
         assert_eq!(default.synthesis, Synthesis::default());
     }
 
     #[test]
     fn a_camera_is_a_name_or_a_file() {
         let camera = |name: &str| {
-            let said = LightArgs {
+            let said = SensorArgs {
                 camera: Some(name.into()),
-                ..LightArgs::default()
+                ..SensorArgs::default()
             };
-            Light::resolve(&said).map(|light| light.synthesis.camera)
+            Sensor::resolve(&said).map(|sensor| sensor.synthesis.camera)
         };
         assert_eq!(camera("sony-a7s2").unwrap(), CameraModel::default());
         assert_ne!(camera("nikon-d850").unwrap(), CameraModel::default());

@@ -3,6 +3,7 @@
 mod asking;
 mod layers;
 mod light;
+mod realism;
 mod synthesize;
 
 use std::env;
@@ -13,7 +14,8 @@ use std::time::Duration;
 
 pub use asking::{Ask, ModelName, Server};
 pub use layers::{merge, one_line};
-pub use light::Light;
+pub use light::{Light, Sensor};
+pub use realism::{PairPlace, Realism};
 pub use synthesize::{Existing, Product, Synthesize};
 
 use crate::ask::Format;
@@ -139,7 +141,7 @@ impl Config {
         }
         Ok(Self {
             data: data(said.data),
-            light: Light::resolve(&said.light)?,
+            light: Light::resolve(&said.light, &said.sensor)?,
             enhancement: enhancement(said.enhancement)?,
             ask: asking::ask(said.model, &said.sending)?,
             images: Images {

@@ -63,6 +63,7 @@ impl Synthesize {
                 ..DataArgs::default()
             },
             light: said.light,
+            sensor: said.sensor,
             enhancement: EnhancementArgs {
                 threads: said.threads,
                 ..EnhancementArgs::default()
@@ -76,7 +77,7 @@ impl Synthesize {
         Ok(Self {
             inputs: said.inputs,
             out: said.out,
-            light: Light::resolve(&shared.light)?,
+            light: Light::resolve(&shared.light, &shared.sensor)?,
             product: match (said.from, parsed("--sheet", said.sheet.as_deref())?) {
                 (Some(sidecar), _) => Product::Replay(sidecar),
                 (None, Some(Sheet(product))) => product,

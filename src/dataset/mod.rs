@@ -9,6 +9,7 @@ mod jpeg;
 mod maps;
 pub mod multiple_choice;
 mod npy;
+pub mod pairs;
 pub mod picture;
 pub mod questions;
 mod raw_png;

@@ -1,5 +1,6 @@
 //! Stage 7, SHOW: from the records alone; and [`sheet`], figures of pictures that are handed in.
 
 pub mod files;
+pub mod histogram;
 pub mod sheet;
 pub mod table;

@@ -36,7 +36,7 @@ pub(super) fn open(config: &Config) -> Result<Vec<Asker>> {
     for (name, view) in seen.chain(blind) {
         let model = Arc::new(match name {
             ModelName::Random => Model::Random(Random {
-                seed: config.light.seed,
+                seed: config.light.sensor.seed,
             }),
             ModelName::Script(path) => Model::Script(Script::load(path)?),
             ModelName::Remote(name) => {

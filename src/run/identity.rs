@@ -39,7 +39,7 @@ pub(super) fn identity(config: &Config, dataset: &Dataset, inputs: &Inputs<'_>) 
         .pictures
         .iter()
         .flat_map(|(frame, digest)| [frame.0.as_bytes(), digest.as_bytes()]);
-    let (ask, synthesis) = (&config.ask, &config.light.synthesis);
+    let (ask, synthesis) = (&config.ask, &config.light.sensor.synthesis);
     let names = |view| -> BTreeSet<&str> {
         inputs
             .askers
@@ -75,7 +75,7 @@ pub(super) fn identity(config: &Config, dataset: &Dataset, inputs: &Inputs<'_>) 
         ("--limit", json!(config.data.limit)),
         ("--levels", json!(levels)),
         ("--variant", json!(config.light.variants.to_string())),
-        ("--seed", json!(config.light.seed)),
+        ("--seed", json!(config.light.sensor.seed)),
         ("--profile or --amplify", json!(synthesis.amplify)),
         ("--profile or --tone", json!(synthesis.tone)),
         ("--draws", json!(synthesis.draws)),

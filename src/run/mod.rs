@@ -10,10 +10,12 @@ mod identity;
 mod interrupt;
 mod plan;
 pub mod progress;
+pub mod realism;
 mod recipe;
 mod record;
 mod stop;
 pub mod synthesize;
+mod written;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};

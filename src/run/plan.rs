@@ -34,8 +34,8 @@ impl<'a> Inputs<'a> {
         files: &[ModelFile],
     ) -> Result<Self> {
         let recipe = Recipe {
-            seed: config.light.seed,
-            synthesis: config.light.synthesis.clone(),
+            seed: config.light.sensor.seed,
+            synthesis: config.light.sensor.synthesis.clone(),
             format: config.images.format,
             max_side: config.images.max_side,
             enhancers: files

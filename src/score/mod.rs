@@ -4,3 +4,4 @@ pub mod accuracy;
 pub mod chance;
 pub mod choice;
 pub mod estimate;
+pub mod realism;

@@ -215,11 +215,17 @@ impl Synthesis {
     /// The camera of the frame that `key` belongs to, as it is at a level.
     #[must_use]
     pub fn state(&self, key: &NoiseKey, level: DarkLevel) -> CameraState {
+        self.state_by(key, level.exposure_drop())
+    }
+
+    /// The same as it is after any exposure drop; light that is not lost is no reason to amplify.
+    #[must_use]
+    pub fn state_by(&self, key: &NoiseKey, drop: Stops) -> CameraState {
         let drawn = CameraState::draw(key, &self.camera);
         match self.coupling {
             Coupling::Independent => drawn,
             Coupling::Photon => CameraState {
-                ratio: libm::exp2(f64::from(level.exposure_drop().0)),
+                ratio: libm::exp2(f64::from(drop.0).max(0.0)),
                 ..drawn
             },
         }

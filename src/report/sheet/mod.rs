@@ -1,10 +1,12 @@
-//! Figures made of pictures: [`levels`] and [`noise`], drawn on a [`Canvas`].
+//! Figures made of pictures: [`levels`], [`noise`] and [`crops`], drawn on a [`Canvas`].
 
+mod crops;
 mod levels;
 mod noise;
 
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 
+pub use crops::{CropRow, crops};
 pub use levels::{LevelColumn, levels};
 pub use noise::{Signal, noise};
 

@@ -22,12 +22,12 @@ fn dark_levels(light: &Light) -> Vec<DarkLevel> {
 /// Both variants of a frame by level.
 pub(super) fn levels(clean: &Rgb, frame: &FrameId, light: &Light) -> Rgb {
     let levels = dark_levels(light);
-    let key = NoiseKey::new(light.seed, frame);
+    let key = NoiseKey::new(light.sensor.seed, frame);
     let mut noisy: Vec<Rgb> = levels
         .iter()
         .map(|_| Rgb::black(clean.height(), clean.width()))
         .collect();
-    ladder(clean, &key, &light.synthesis, &levels, &mut noisy);
+    ladder(clean, &key, &light.sensor.synthesis, &levels, &mut noisy);
     let columns: Vec<LevelColumn> = levels
         .into_iter()
         .zip(noisy)
@@ -43,7 +43,10 @@ pub(super) fn levels(clean: &Rgb, frame: &FrameId, light: &Light) -> Rgb {
 /// The terms of a frame's noise, at the darkest level that is asked for (which matters where levels share no negative).
 pub(super) fn terms(clean: &Rgb, frame: &FrameId, light: &Light) -> Rgb {
     let level = dark_levels(light).pop().unwrap_or(DarkLevel::L5);
-    let (synthesis, frame) = (&light.synthesis, NoiseKey::new(light.seed, frame));
+    let (synthesis, frame) = (
+        &light.sensor.synthesis,
+        NoiseKey::new(light.sensor.seed, frame),
+    );
     let key = match synthesis.draws {
         Draws::Shared => frame,
         Draws::Fresh => frame.at(level),

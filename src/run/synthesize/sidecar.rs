@@ -56,10 +56,10 @@ impl Sidecar {
         light: &Light,
         key: &NoiseKey,
     ) -> Self {
-        let synthesis = &light.synthesis;
+        let synthesis = &light.sensor.synthesis;
         let sensor = match degradation {
             Degradation::Sensor(level) => Some(Sensor {
-                seed: light.seed,
+                seed: light.sensor.seed,
                 amplify: synthesis.amplify,
                 tone: synthesis.tone,
                 draws: synthesis.draws,

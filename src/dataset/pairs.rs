@@ -1,0 +1,239 @@
+//! Pairs of the same scene in normal and in low light: [`Pairs`].
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+
+/// The folders that pairs lie in, normal light first: LISU's, LOL's, and plain ones.
+const FOLDERS: [[&str; 2]; 3] = [
+    ["normal", "low"],
+    ["high", "low"],
+    ["val_rgb_h", "val_rgb_l"],
+];
+
+/// One scene in normal and in low light.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Pair {
+    /// What both files' names have in common.
+    pub name: String,
+    /// The image in normal light.
+    pub normal: PathBuf,
+    /// The image in low light.
+    pub low: PathBuf,
+}
+
+/// The pairs of a data set, by name.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Pairs {
+    /// The pairs.
+    pub pairs: Vec<Pair>,
+    /// Images without a partner.
+    pub unmatched: Vec<PathBuf>,
+}
+
+/// Which of a pair's images a name is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Light {
+    Normal,
+    Low,
+}
+
+impl Pairs {
+    /// The pairs below a folder: in `normal` and `low`, `high` and `low` or `val_rgb_h` and `val_rgb_l` (in any case), or
+    /// beside each other, named by `normal` or `high` and `low` at either end (`normal00733.png`, `low00733.png`).
+    ///
+    /// # Errors
+    /// Where there is no pair, or two images of one name.
+    pub fn open(folder: &Path) -> Result<Self> {
+        let entries = entries(folder)?;
+        let subfolder = |name: &str| {
+            entries
+                .iter()
+                .find(|path| path.is_dir() && file_name(path).eq_ignore_ascii_case(name))
+        };
+        for [normal, low] in FOLDERS {
+            if let (Some(normal), Some(low)) = (subfolder(normal), subfolder(low)) {
+                return Self::of_folders(normal, low);
+            }
+        }
+        let mut sides = [BTreeMap::new(), BTreeMap::new()];
+        let mut unmatched = Vec::new();
+        for path in images(entries) {
+            match role(&stem(&path)) {
+                (name, Some(light)) => add(&mut sides[light as usize], name, &path)?,
+                (_, None) => unmatched.push(path),
+            }
+        }
+        Self::matched(sides, unmatched).ok_or_else(|| {
+            let problem = "no pairs in it; expected are folders normal and low (or high and low, val_rgb_h and val_rgb_l), or files like normal1.png and low1.png; --normal DIR and --low DIR name any two folders";
+            Error::data(folder.display(), problem)
+        })
+    }
+
+    /// The pairs of two folders, by the files' names without their endings and without `normal`, `high` or `low`.
+    ///
+    /// # Errors
+    /// Where there is no pair, or two images of one name.
+    pub fn of_folders(normal: &Path, low: &Path) -> Result<Self> {
+        let mut sides = [BTreeMap::new(), BTreeMap::new()];
+        for (side, folder) in sides.iter_mut().zip([normal, low]) {
+            for path in images(entries(folder)?) {
+                add(side, role(&stem(&path)).0, &path)?;
+            }
+        }
+        Self::matched(sides, Vec::new()).ok_or_else(|| {
+            let problem =
+                format_args!("no image in it has the name of one in {}", normal.display());
+            Error::data(low.display(), problem)
+        })
+    }
+
+    fn matched(
+        [mut normal, low]: [BTreeMap<String, PathBuf>; 2],
+        mut unmatched: Vec<PathBuf>,
+    ) -> Option<Self> {
+        let mut pairs = Vec::new();
+        for (name, low) in low {
+            match normal.remove(&name) {
+                Some(normal) => pairs.push(Pair { name, normal, low }),
+                None => unmatched.push(low),
+            }
+        }
+        unmatched.extend(normal.into_values());
+        unmatched.sort();
+        (!pairs.is_empty()).then_some(Self { pairs, unmatched })
+    }
+}
+
+fn add(side: &mut BTreeMap<String, PathBuf>, name: String, path: &Path) -> Result<()> {
+    match side.insert(name, path.to_owned()) {
+        None => Ok(()),
+        Some(other) => {
+            let problem = format_args!("of the same name as {}", other.display());
+            Err(Error::data(path.display(), problem))
+        }
+    }
+}
+
+/// A name without the words at its ends that say which light it is of, and that light; what begins as one and ends as the
+/// other is of the light that it begins with.
+fn role(stem: &str) -> (String, Option<Light>) {
+    const WORDS: [(&str, Light); 3] = [
+        ("normal", Light::Normal),
+        ("high", Light::Normal),
+        ("low", Light::Low),
+    ];
+    let bare = |rest: &str| rest.trim_matches(['_', '-', '.', ' ']).to_owned();
+    let lower = stem.to_ascii_lowercase();
+    let begun = WORDS.iter().find(|(word, _)| lower.starts_with(word));
+    let ended = WORDS.iter().find(|(word, light)| {
+        lower.ends_with(word) && begun.is_none_or(|(_, begun)| begun == light)
+    });
+    let first = begun.map_or(0, |(word, _)| word.len());
+    let last = stem.len() - ended.map_or(0, |(word, _)| word.len());
+    match begun.or(ended) {
+        Some((_, light)) if first <= last => (bare(&stem[first..last]), Some(*light)),
+        // The word alone.
+        Some((_, light)) => (String::new(), Some(*light)),
+        None => (stem.to_owned(), None),
+    }
+}
+
+fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
+    let unread = |e| Error::file(folder, "read", e);
+    let entries = fs::read_dir(folder).map_err(unread)?;
+    let mut paths = entries
+        .map(|entry| entry.map(|entry| entry.path()))
+        .collect::<std::io::Result<Vec<_>>>()
+        .map_err(unread)?;
+    paths.sort();
+    Ok(paths)
+}
+
+fn images(paths: Vec<PathBuf>) -> impl Iterator<Item = PathBuf> {
+    paths.into_iter().filter(|path| {
+        let ending = path
+            .extension()
+            .map(|end| end.to_string_lossy().to_lowercase());
+        path.is_file() && matches!(ending.as_deref(), Some("png" | "jpg" | "jpeg"))
+    })
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned()
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn folder(files: &[&str]) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        for file in files {
+            let path = folder.path().join(file);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, "").unwrap();
+        }
+        folder
+    }
+
+    fn names(pairs: &Pairs) -> Vec<&str> {
+        pairs.pairs.iter().map(|pair| pair.name.as_str()).collect()
+    }
+
+    #[test]
+    fn the_usual_forms_are_known() {
+        for files in [
+            &["normal/1.png", "low/1.png"][..],
+            &["high/1.png", "low/1.jpg"],
+            &["Normal/normal1.png", "Low/low1.png"],
+            &["val_rgb_h/1.png", "val_rgb_l/1.png", "val_lbl/1.png"],
+            &["normal1.png", "low1.png", "notes.txt"],
+            &["1_normal.png", "1_low.png"],
+            &["normal1.png", "low1_low.png"],
+        ] {
+            let folder = folder(files);
+            let pairs = Pairs::open(folder.path()).unwrap();
+            assert_eq!(names(&pairs), ["1"], "{files:?}");
+            assert!(pairs.unmatched.is_empty(), "{files:?}");
+        }
+    }
+
+    #[test]
+    fn what_has_no_partner_is_named() {
+        let folder = folder(&[
+            "normal1.png",
+            "low1.png",
+            "low1_mended.png",
+            "high3.png",
+            "x.png",
+        ]);
+        let pairs = Pairs::open(folder.path()).unwrap();
+        let unmatched: Vec<String> = pairs.unmatched.iter().map(|path| file_name(path)).collect();
+        assert_eq!(unmatched, ["high3.png", "low1_mended.png", "x.png"]);
+    }
+
+    #[test]
+    fn no_pair_and_two_of_a_name_are_errors() {
+        let none = folder(&["a.png", "low/1.png"]);
+        let error = Pairs::open(none.path()).unwrap_err().to_string();
+        assert!(error.contains("--normal DIR"), "{error}");
+        let two = folder(&["normal1.png", "low1.png", "low1.jpg"]);
+        let error = Pairs::open(two.path()).unwrap_err().to_string();
+        assert!(error.contains("same name"), "{error}");
+        let apart = folder(&["normal/1.png", "low/2.png"]);
+        assert!(Pairs::open(apart.path()).is_err());
+    }
+}

@@ -1,0 +1,74 @@
+//! Crops of images side by side.
+
+use super::{CELL, Canvas, GAP, LINE};
+use crate::types::Rgb;
+
+/// One row: what it shows, and its images, which are of one size.
+#[derive(Debug, Clone)]
+pub struct CropRow<'a> {
+    /// What the images have in common.
+    pub name: String,
+    /// The images.
+    pub images: Vec<&'a Rgb>,
+    /// By how much their light is amplified.
+    pub amplified: f64,
+}
+
+/// The middle of each image, pixel for pixel, lightened as its row says, below the columns' names.
+#[must_use]
+pub fn crops(columns: &[&str], rows: &[CropRow<'_>]) -> Rgb {
+    let height = CELL * 2 / 3;
+    let step = [LINE + height + GAP, CELL + GAP];
+    let mut sheet = Canvas::new(
+        GAP + LINE + rows.len() * step[0],
+        GAP + columns.len().max(1) * step[1],
+    );
+    for (index, name) in columns.iter().enumerate() {
+        sheet.write([GAP, GAP + index * step[1]], CELL, name, [0; 3]);
+    }
+    for (index, row) in rows.iter().enumerate() {
+        let top = GAP + LINE + index * step[0];
+        let label = format!("{}, light × {:.1}", row.name, row.amplified);
+        sheet.write([top, GAP], sheet.width - GAP, &label, [90; 3]);
+        let scale = libm::pow(row.amplified.max(0.0), 1.0 / 2.2);
+        for (column, image) in row.images.iter().enumerate() {
+            let size = [image.height().min(height), image.width().min(CELL)];
+            let first = [
+                (image.height() - size[0]) / 2,
+                (image.width() - size[1]) / 2,
+            ];
+            let place = [top + LINE, GAP + column * step[1]];
+            sheet.put(place, size, |y, x| {
+                let at = ((first[0] + y) * image.width() + first[1] + x) * 3;
+                [0, 1, 2].map(|channel| {
+                    let code = f64::from(image.samples()[at + channel]);
+                    (code * scale).round().min(255.0) as u8
+                })
+            });
+        }
+    }
+    sheet.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_middle_is_shown_in_its_light() {
+        let image = Rgb::new(3, 500, vec![10; 4500]).unwrap();
+        let rows = [CropRow {
+            name: "a".to_owned(),
+            images: vec![&image, &image],
+            amplified: 4.0,
+        }];
+        let sheet = crops(&["real", "made"], &rows);
+        let lit = sheet
+            .samples()
+            .chunks(3)
+            .filter(|pixel| **pixel == [19; 3])
+            .count();
+        assert!(lit >= 2 * 3 * CELL);
+        assert!(crops(&[], &[]).width() > 0);
+    }
+}

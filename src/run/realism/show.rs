@@ -1,0 +1,270 @@
+//! What a comparison with real pairs shows: [`Summary`], and the files beside it.
+
+use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
+use comfy_table::{LineStyle, Table};
+use serde::Serialize;
+
+use super::{Compared, Measured, rule};
+use crate::config::Realism;
+use crate::error::{Error, Result};
+use crate::report::histogram::{Line, histogram};
+use crate::report::sheet::{self, CropRow};
+use crate::score::realism::mean::Mean;
+use crate::score::realism::residual::{Bins, Empty, Residuals};
+use crate::types::Rgb;
+
+/// All pairs together.
+#[derive(Debug, Serialize)]
+pub(super) struct Summary {
+    pairs: usize,
+    unmatched: usize,
+    failed: usize,
+    /// The rule of the divergence.
+    kl_rule: String,
+    /// The other rule about empty bins, where it matters.
+    kl_other_rule: Option<String>,
+    /// The mean exposure drop in EV.
+    drop: Mean,
+    exposure: Row,
+    noise: Row,
+    clean_psnr: Mean,
+    seed: u64,
+    synthesis: serde_json::Value,
+}
+
+/// One way to make the dark images.
+#[derive(Debug, Serialize)]
+struct Row {
+    psnr: Mean,
+    ssim: Mean,
+    kl: Mean,
+    kl_other: Mean,
+    /// Bins that are empty on the synthetic side alone, mean over pairs.
+    empty_bins: Mean,
+}
+
+impl Row {
+    fn of(compared: &[&Compared], of: fn(&Compared) -> &Measured) -> Option<Self> {
+        let mean = |number: fn(&Measured) -> f64| {
+            let numbers: Vec<f64> = compared.iter().map(|pair| number(of(pair))).collect();
+            Mean::of(&numbers)
+        };
+        Some(Self {
+            psnr: mean(|m| m.psnr)?,
+            ssim: mean(|m| m.ssim)?,
+            kl: mean(|m| m.kl.nats)?,
+            kl_other: mean(|m| m.kl_other.nats)?,
+            empty_bins: mean(|m| m.kl.empty as f64)?,
+        })
+    }
+
+    fn cells(&self, name: &str) -> [String; 6] {
+        [
+            name.to_owned(),
+            shown(&self.psnr, 2),
+            shown(&self.ssim, 4),
+            shown(&self.kl, 3),
+            shown(&self.kl_other, 3),
+            shown(&self.empty_bins, 1),
+        ]
+    }
+}
+
+impl Summary {
+    pub(super) fn new(
+        config: &Realism,
+        compared: &[&Compared],
+        unmatched: usize,
+        failed: usize,
+    ) -> Result<Self> {
+        let mean = |number: fn(&Compared) -> f64| {
+            let numbers: Vec<f64> = compared.iter().map(|pair| number(pair)).collect();
+            Mean::of(&numbers)
+        };
+        let summary = || {
+            let (bins, empty) = (config.bins, config.empty);
+            let other = match empty {
+                Empty::Eps => Empty::Drop,
+                Empty::Drop => Empty::Eps,
+            };
+            Some(Self {
+                pairs: compared.len(),
+                unmatched,
+                failed,
+                kl_rule: rule(bins, empty),
+                kl_other_rule: (bins == Bins::Fu).then(|| rule(bins, other)),
+                drop: mean(|pair| f64::from(pair.drop))?,
+                exposure: Row::of(compared, |pair| &pair.exposure)?,
+                noise: Row::of(compared, |pair| &pair.noise)?,
+                clean_psnr: mean(|pair| pair.clean_psnr)?,
+                seed: config.sensor.seed,
+                synthesis: serde_json::json!(config.sensor.synthesis),
+            })
+        };
+        summary().ok_or_else(|| Error::data("pairs", "none of them could be compared"))
+    }
+
+    pub(super) fn json(&self) -> String {
+        format!("{:#}\n", serde_json::json!(self))
+    }
+
+    /// The paper's table, with intervals, and with the rules of its numbers below it.
+    pub(super) fn table(&self) -> String {
+        let mut table = Table::new();
+        table.load_style(UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none()));
+        let other = self.kl_other_rule.as_ref().map(|_| "D_KL (other rule)");
+        let columns = ["", "PSNR dB", "SSIM", "D_KL"].into_iter();
+        let kept = |index: usize| index != 4 || other.is_some();
+        table.set_header(
+            columns
+                .chain([other.unwrap_or_default(), "bins empty"])
+                .enumerate()
+                .filter(|(i, _)| kept(*i))
+                .map(|(_, name)| name),
+        );
+        for cells in [
+            self.exposure.cells("exposure drop alone"),
+            self.noise.cells("with sensor noise"),
+        ] {
+            table.add_row(
+                cells
+                    .into_iter()
+                    .enumerate()
+                    .filter(|(i, _)| kept(*i))
+                    .map(|(_, cell)| cell),
+            );
+        }
+        let mut lines = vec![
+            format!(
+                "Synthetic against real low light, {} pairs: mean ± half of the 95 % interval (Student's t)",
+                self.pairs
+            ),
+            table.to_string(),
+            format!(
+                "D_KL(real ‖ synthetic) of residuals over the dropped clean image, in nats: {}",
+                self.kl_rule
+            ),
+        ];
+        lines.extend(
+            self.kl_other_rule
+                .iter()
+                .map(|rule| format!("other rule: {rule}")),
+        );
+        lines.push(
+            "exposure drop alone has no residual: its D_KL tells of the rule, not of noise"
+                .to_owned(),
+        );
+        lines.push(format!(
+            "drop {} EV; PSNR of the sensor branch without noise {} dB",
+            shown(&self.drop, 3),
+            shown(&self.clean_psnr, 2)
+        ));
+        if self.failed > 0 || self.unmatched > 0 {
+            lines.push(format!(
+                "{} pairs failed, {} images without a partner",
+                self.failed, self.unmatched
+            ));
+        }
+        lines.join("\n") + "\n"
+    }
+}
+
+fn shown(mean: &Mean, digits: usize) -> String {
+    if mean.value.is_infinite() {
+        return "∞".to_owned();
+    }
+    match mean.interval {
+        Some([low, high]) => format!("{:.digits$} ±{:.digits$}", mean.value, (high - low) / 2.0),
+        None => format!("{:.digits$}", mean.value),
+    }
+}
+
+fn table_of(header: &[&str], rows: impl Iterator<Item = Vec<String>>) -> Result<Vec<u8>> {
+    let failed = |e: csv::Error| Error::data("CSV", e);
+    let mut table = csv::Writer::from_writer(Vec::new());
+    table.write_record(header).map_err(failed)?;
+    for row in rows {
+        table.write_record(row).map_err(failed)?;
+    }
+    table.into_inner().map_err(|e| Error::data("CSV", e))
+}
+
+/// A row a pair and way of making it.
+pub(super) fn pairs(compared: &[&Compared]) -> Result<Vec<u8>> {
+    let header = [
+        "pair",
+        "drop",
+        "variant",
+        "psnr",
+        "ssim",
+        "kl",
+        "kl_other",
+        "empty_bins",
+        "clean_psnr",
+    ];
+    let rows = compared.iter().flat_map(|pair| {
+        [("ev", &pair.exposure), ("noise", &pair.noise)].map(|(variant, measured)| {
+            vec![
+                pair.pair.clone(),
+                pair.drop.to_string(),
+                variant.to_owned(),
+                measured.psnr.to_string(),
+                measured.ssim.to_string(),
+                measured.kl.nats.to_string(),
+                measured.kl_other.nats.to_string(),
+                measured.kl.empty.to_string(),
+                pair.clean_psnr.to_string(),
+            ]
+        })
+    });
+    table_of(&header, rows)
+}
+
+/// The spread of real and synthetic residuals by clean code.
+pub(super) fn by_code(residuals: &[Residuals; 2]) -> Result<Vec<u8>> {
+    let header = [
+        "code",
+        "n",
+        "real_mean",
+        "real_std",
+        "noise_mean",
+        "noise_std",
+    ];
+    let [real, noise] = residuals;
+    let rows = real
+        .by_code()
+        .zip(noise.by_code())
+        .map(|((code, n, real), (_, _, noise))| {
+            let numbers = real.into_iter().chain(noise).map(|x| x.to_string());
+            [code.to_string(), n.to_string()]
+                .into_iter()
+                .chain(numbers)
+                .collect()
+        });
+    table_of(&header, rows)
+}
+
+/// Both residual histograms.
+pub(super) fn figure([real, noise]: &[Residuals; 2]) -> Result<String> {
+    let line = |name: &str, residuals: &Residuals| Line {
+        name: name.to_owned(),
+        shares: residuals.shares().collect(),
+    };
+    let lines = [
+        line("real", real),
+        line("synthetic, with sensor noise", noise),
+    ];
+    histogram("Residuals over the dropped clean image, all pairs", &lines)
+}
+
+/// Crops of the first pairs, in the light of the image that they were made from.
+pub(super) fn crops<'a>(pairs: impl Iterator<Item = (&'a Compared, &'a [Rgb; 3])>) -> Rgb {
+    let rows: Vec<CropRow<'_>> = pairs
+        .map(|(compared, images)| CropRow {
+            name: format!("{} (drop {:.2} EV)", compared.pair, compared.drop),
+            images: images.iter().collect(),
+            amplified: f64::from(compared.drop).exp2(),
+        })
+        .collect();
+    sheet::crops(&["real", "exposure drop alone", "with sensor noise"], &rows)
+}

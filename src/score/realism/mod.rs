@@ -1,0 +1,95 @@
+//! How near a made image is to a real one: [`psnr`], [`ssim`](ssim::ssim), and the divergence of their noise
+//! ([`residual`]).
+
+pub mod mean;
+pub mod residual;
+pub mod ssim;
+
+use crate::error::{Error, Result};
+use crate::types::{Rgb, Stops};
+
+/// Refuses images of different sizes.
+///
+/// # Errors
+/// With both sizes.
+pub fn same_size(a: &Rgb, b: &Rgb) -> Result<()> {
+    let [a, b] = [a, b].map(|image| (image.width(), image.height()));
+    if a == b {
+        return Ok(());
+    }
+    let problem = format_args!(
+        "{} × {} pixels against {} × {}; a pair is of one size",
+        a.0, a.1, b.0, b.1
+    );
+    Err(Error::data("pair", problem))
+}
+
+/// Peak signal-to-noise ratio in dB, peak 255, over all samples; infinite where the images are the same.
+///
+/// # Errors
+/// Where the sizes differ.
+pub fn psnr(a: &Rgb, b: &Rgb) -> Result<f64> {
+    same_size(a, b)?;
+    let squares = a.samples().iter().zip(b.samples()).map(|(a, b)| {
+        let difference = u64::from(a.abs_diff(*b));
+        difference * difference
+    });
+    let mean = squares.sum::<u64>() as f64 / a.samples().len() as f64;
+    Ok(10.0 * libm::log10(255.0 * 255.0 / mean))
+}
+
+/// The exposure drop between two images: log2 of their ratio of mean linear light (gamma 2.2), in EV.
+///
+/// # Errors
+/// Where either is black.
+pub fn exposure_drop(normal: &Rgb, low: &Rgb) -> Result<Stops> {
+    let linear: [f64; 256] =
+        std::array::from_fn(|code| libm::pow((code as f64 / 255.0).max(1e-8), 2.2));
+    let mean = |image: &Rgb| {
+        let mut counts = [0_u64; 256];
+        image
+            .samples()
+            .iter()
+            .for_each(|code| counts[usize::from(*code)] += 1);
+        let light = counts
+            .iter()
+            .zip(linear)
+            .map(|(n, light)| *n as f64 * light);
+        light.sum::<f64>() / image.samples().len() as f64
+    };
+    let black = |image: &Rgb| image.samples().iter().all(|code| *code == 0);
+    if black(normal) || black(low) {
+        let problem = "an image is black, so there is no drop to estimate; give one with --ev";
+        return Err(Error::data("pair", problem));
+    }
+    Ok(Stops(libm::log2(mean(normal) / mean(low)) as f32))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_images_are_infinitely_near() {
+        let image = Rgb::new(12, 12, vec![9; 432]).unwrap();
+        assert!(psnr(&image, &image).unwrap().is_infinite());
+        assert!((ssim::ssim(&image, &image).unwrap() - 1.0).abs() < 1e-12);
+        assert!(exposure_drop(&image, &image).unwrap().0.abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_difference_of_one_is_48_db() {
+        let [a, b] = [9, 10].map(|code| Rgb::new(2, 2, vec![code; 12]).unwrap());
+        assert!((psnr(&a, &b).unwrap() - 48.130_803_608_679_1).abs() < 1e-9);
+        let other = Rgb::black(3, 2);
+        let error = psnr(&a, &other).unwrap_err().to_string();
+        assert!(error.contains("2 × 2 pixels against 2 × 3"), "{error}");
+    }
+
+    #[test]
+    fn a_fall_of_light_is_found() {
+        let [light, dark] = [200, 100].map(|code| Rgb::new(2, 2, vec![code; 12]).unwrap());
+        assert!((exposure_drop(&light, &dark).unwrap().0 - 2.2).abs() < 1e-6);
+        assert!(exposure_drop(&light, &Rgb::black(2, 2)).is_err());
+    }
+}
