@@ -44,6 +44,8 @@ pub fn histogram(title: &str, lines: &[Line]) -> Result<String> {
             .configure_mesh()
             .x_desc("residual in 8-bit codes")
             .y_desc("share of samples")
+            .label_style(("sans-serif", 14))
+            .axis_desc_style(("sans-serif", 15))
             .y_label_formatter(&|share| format!("{share:.0e}"))
             .draw()
             .map_err(|e| failed(e.to_string()))?;
@@ -71,6 +73,7 @@ pub fn histogram(title: &str, lines: &[Line]) -> Result<String> {
         }
         chart
             .configure_series_labels()
+            .position(SeriesLabelPosition::UpperRight)
             .background_style(WHITE.mix(0.8))
             .border_style(BLACK)
             .label_font(("sans-serif", 15))

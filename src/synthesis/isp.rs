@@ -1,4 +1,4 @@
-//! RAW → sRGB: the simple image processing of the paper, as a [`Developer`].
+//! RAW → sRGB: the simple image processing of the paper, as a `Developer`.
 //!
 //! White balance and brightness gains, clip; bilinear demosaic; camera → sRGB, clip; exposure drop; gamma compression; 8
 //! bit. As (2^−ΔEV · x)^(1/2.2) is 2^(−ΔEV/2.2) · x^(1/2.2), all up to the gamma is done once for all levels, and the drop

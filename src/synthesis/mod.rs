@@ -26,7 +26,7 @@ pub mod camera;
 pub mod colour;
 pub mod curve;
 pub mod exposure;
-pub mod isp;
+mod isp;
 pub mod lanes;
 pub mod negative;
 pub mod noise;

@@ -1,4 +1,4 @@
-//! Figures made of pictures: [`levels`], [`noise`] and [`crops`], drawn on a [`Canvas`].
+//! Figures made of pictures: [`levels`], [`noise`] and [`crops`], with words on them.
 
 mod crops;
 mod levels;
