@@ -147,61 +147,71 @@ pub(super) type Colours = [[Lanes<f32>; 3]; 2];
 /// Interpolates the `index`-th lanes of a row bilinearly, each plane replicated beyond its edges, from the rows above,
 /// here and below.
 #[inline(always)]
-pub(super) fn demosaic([above, here, below]: [Sites<'_>; 3], row: usize, index: usize) -> Colours {
-    let even = |sites: Sites<'_>| sites.planes[0].as_chunks().0[index];
-    let even_right = |sites: Sites<'_>| sites.planes[0][1..].as_chunks().0[index];
-    let odd_left = |sites: Sites<'_>| sites.planes[1].as_chunks().0[index];
-    let odd = |sites: Sites<'_>| sites.planes[1][1..].as_chunks().0[index];
+pub(super) fn demosaic(
+    [above, here, below]: [Sites<'_>; 3],
+    row: usize,
+    index: usize,
+    colours: &mut Colours,
+) {
+    let [even, odd] = colours;
+    let [o_left, o] = here.odd(index);
+    let [e, e_right] = here.even(index);
+    let ([above_e, above_e_right], [below_e, below_e_right]) =
+        (above.even(index), below.even(index));
+    let ([above_o_left, above_o], [below_o_left, below_o]) = (above.odd(index), below.odd(index));
     if row.is_multiple_of(2) {
-        let (red, green) = (even(here), odd(here));
-        let cross = four(&odd_left(here), &green, &even(above), &even(below));
-        let corners = four(&odd_left(above), &odd(above), &odd_left(below), &odd(below));
-        [
-            [red, cross, corners],
-            [
-                two(&red, &even_right(here)),
-                green,
-                two(&odd(above), &odd(below)),
-            ],
-        ]
+        even[0].copy_from_slice(e);
+        four(o_left, o, above_e, below_e, &mut even[1]);
+        four(above_o_left, above_o, below_o_left, below_o, &mut even[2]);
+        two(e, e_right, &mut odd[0]);
+        odd[1].copy_from_slice(o);
+        two(above_o, below_o, &mut odd[2]);
     } else {
-        let (green, blue) = (even(here), odd(here));
-        let cross = four(&green, &even_right(here), &odd(above), &odd(below));
-        let corners = four(
-            &even(above),
-            &even_right(above),
-            &even(below),
-            &even_right(below),
-        );
+        two(above_e, below_e, &mut even[0]);
+        even[1].copy_from_slice(e);
+        two(o_left, o, &mut even[2]);
+        four(above_e, above_e_right, below_e, below_e_right, &mut odd[0]);
+        four(e, e_right, above_o, below_o, &mut odd[1]);
+        odd[2].copy_from_slice(o);
+    }
+}
+
+impl<'a> Sites<'a> {
+    /// Lanes of the even columns, and of their right neighbours in the plane.
+    #[inline(always)]
+    fn even(self, index: usize) -> [&'a Lanes<f32>; 2] {
+        let plane = self.planes[0];
         [
-            [
-                two(&even(above), &even(below)),
-                green,
-                two(&odd_left(here), &blue),
-            ],
-            [corners, cross, blue],
+            &plane.as_chunks().0[index],
+            &plane[1..].as_chunks().0[index],
+        ]
+    }
+
+    /// Lanes of the left neighbours of the odd columns in the plane, and of those themselves.
+    #[inline(always)]
+    fn odd(self, index: usize) -> [&'a Lanes<f32>; 2] {
+        let plane = self.planes[1];
+        [
+            &plane.as_chunks().0[index],
+            &plane[1..].as_chunks().0[index],
         ]
     }
 }
 
 /// The mean of two.
 #[inline(always)]
-fn two(a: &Lanes<f32>, b: &Lanes<f32>) -> Lanes<f32> {
-    let mut mean = [0.0; LANES];
+fn two(a: &Lanes<f32>, b: &Lanes<f32>, mean: &mut Lanes<f32>) {
     for i in 0..LANES {
         mean[i] = (a[i] + b[i]) * 0.5;
     }
-    mean
 }
 
 /// The mean of four.
 #[inline(always)]
-fn four(a: &Lanes<f32>, b: &Lanes<f32>, c: &Lanes<f32>, d: &Lanes<f32>) -> Lanes<f32> {
-    let mut mean = [0.0; LANES];
+fn four(a: &Lanes<f32>, b: &Lanes<f32>, c: &Lanes<f32>, d: &Lanes<f32>, mean: &mut Lanes<f32>) {
     for i in 0..LANES {
         mean[i] = (a[i] + b[i] + c[i] + d[i]) * 0.25;
     }
-    mean
 }
 
 #[cfg(test)]
@@ -231,7 +241,9 @@ mod tests {
             ];
             let pixel = |column: usize| {
                 let site = column / 2;
-                let colours = demosaic(around.map(|row| bayer.sites(row)), row, site / LANES);
+                let mut colours = [[[0.0; LANES]; 3]; 2];
+                let rows = around.map(|row| bayer.sites(row));
+                demosaic(rows, row, site / LANES, &mut colours);
                 colours[column % 2].map(|channel| channel[site % LANES])
             };
             (0..bayer.width()).map(pixel).collect()

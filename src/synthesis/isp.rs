@@ -117,13 +117,30 @@ impl Kernel for Display<'_> {
     #[inline(always)]
     fn run(self) {
         let gamma = &*GAMMA;
+        let mut colours = [[[0.0; LANES]; 3]; 2];
         for (index, values) in self.values.chunks_mut(6 * LANES).enumerate() {
-            let colours = bayer::demosaic(self.rows, self.row, index);
-            let light = colours.map(|camera| self.developer.light(&camera));
-            for (pixel, values) in values.chunks_mut(3).enumerate() {
-                let channels = &light[pixel % 2];
-                for (value, channel) in values.iter_mut().zip(channels) {
-                    *value = gamma.at(channel[pixel / 2]);
+            bayer::demosaic(self.rows, self.row, index, &mut colours);
+            self.developer.light(&mut colours);
+            let [even, odd] = &colours;
+            for (lane, values) in values.chunks_mut(6).enumerate().take(LANES) {
+                let (even, odd) = (even.each_ref(), odd.each_ref());
+                let pair = [
+                    even[0][lane],
+                    even[1][lane],
+                    even[2][lane],
+                    odd[0][lane],
+                    odd[1][lane],
+                    odd[2][lane],
+                ];
+                if let Ok(values) = <&mut [f32; 6]>::try_from(&mut *values) {
+                    for (value, light) in values.iter_mut().zip(pair) {
+                        *value = gamma.at(light);
+                    }
+                } else {
+                    // The last pixel of an odd width.
+                    for (value, light) in values.iter_mut().zip(pair) {
+                        *value = gamma.at(light);
+                    }
                 }
             }
             if self.developer.tone == Tone::BeforeEv {
@@ -136,18 +153,23 @@ impl Kernel for Display<'_> {
 }
 
 impl Developer {
-    /// Linear sRGB in [`DARKEST`] to 1 of colours in camera space.
+    /// Turns colours in camera space into linear sRGB, in [`DARKEST`] to 1.
     #[inline(always)]
-    fn light(&self, camera: &[Lanes<f32>; 3]) -> [Lanes<f32>; 3] {
-        let mut light = [[0.0; LANES]; 3];
-        for (light, row) in light.iter_mut().zip(&self.matrix) {
+    fn light(&self, colours: &mut bayer::Colours) {
+        let [red, green, blue] = self.matrix;
+        for [r, g, b] in colours {
             for i in 0..LANES {
-                let x = row[0] * camera[0][i] + row[1] * camera[1][i] + row[2] * camera[2][i];
-                let x = if x > DARKEST { x } else { DARKEST };
-                light[i] = if x < 1.0 { x } else { 1.0 };
+                let camera = [r[i], g[i], b[i]];
+                let through = |row: [f32; 3]| {
+                    let x = row[0] * camera[0] + row[1] * camera[1] + row[2] * camera[2];
+                    let x = if x > DARKEST { x } else { DARKEST };
+                    if x < 1.0 { x } else { 1.0 }
+                };
+                r[i] = through(red);
+                g[i] = through(green);
+                b[i] = through(blue);
             }
         }
-        light
     }
 }
 
