@@ -4,7 +4,8 @@
 //! its error names where that is.
 
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::num::{NonZeroU64, NonZeroUsize};
+use std::path::{Path, PathBuf};
 use std::{env, fs};
 
 use clap::{Arg, ArgAction, CommandFactory, Parser};
@@ -45,6 +46,45 @@ pub fn merge(flags: EvaluateArgs) -> Result<EvaluateArgs> {
         None => layer,
     };
     Ok(layer.said)
+}
+
+/// The flags that other commands share with an evaluation, filled in like its own; the rest of them stays empty.
+#[derive(Debug, Default)]
+pub(super) struct Shared {
+    pub(super) light: LightArgs,
+    pub(super) sensor: SensorArgs,
+    pub(super) threads: Option<NonZeroUsize>,
+    pub(super) max_pixels: Option<NonZeroU64>,
+    pub(super) config: Option<PathBuf>,
+}
+
+impl Shared {
+    pub(super) fn merge(self) -> Result<Self> {
+        let said = merge(EvaluateArgs {
+            data: DataArgs {
+                max_pixels: self.max_pixels,
+                ..DataArgs::default()
+            },
+            light: self.light,
+            sensor: self.sensor,
+            enhancement: EnhancementArgs {
+                threads: self.threads,
+                ..EnhancementArgs::default()
+            },
+            output: OutputArgs {
+                config: self.config,
+                ..OutputArgs::default()
+            },
+            ..EvaluateArgs::default()
+        })?;
+        Ok(Self {
+            light: said.light,
+            sensor: said.sensor,
+            threads: said.enhancement.threads,
+            max_pixels: said.data.max_pixels,
+            config: said.output.config,
+        })
+    }
 }
 
 /// Warns of variables that look like settings and are none.

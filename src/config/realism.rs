@@ -3,10 +3,10 @@
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use super::layers::merge;
+use super::layers::Shared;
 use super::light::Sensor;
 use super::{Show, most_pixels, parsed, threads};
-use crate::cli::{DataArgs, EnhancementArgs, EvaluateArgs, OutputArgs, RealismArgs};
+use crate::cli::RealismArgs;
 use crate::error::{Error, Result};
 use crate::score::realism::residual::{Bins, Empty};
 use crate::types::Stops;
@@ -58,22 +58,14 @@ impl Realism {
     /// # Errors
     /// [`Error::Usage`] with the flag that cannot be used.
     pub fn resolve(said: RealismArgs) -> Result<Self> {
-        let shared = merge(EvaluateArgs {
-            data: DataArgs {
-                max_pixels: said.max_pixels,
-                ..DataArgs::default()
-            },
+        let shared = Shared {
             sensor: said.sensor,
-            enhancement: EnhancementArgs {
-                threads: said.threads,
-                ..EnhancementArgs::default()
-            },
-            output: OutputArgs {
-                config: said.config,
-                ..OutputArgs::default()
-            },
-            ..EvaluateArgs::default()
-        })?;
+            threads: said.threads,
+            max_pixels: said.max_pixels,
+            config: said.config,
+            ..Shared::default()
+        }
+        .merge()?;
         if let Some(ev) = said.ev.filter(|ev| !(DROPS[0]..=DROPS[1]).contains(ev)) {
             let problem = format!("{ev} is not a number from {} to {}", DROPS[0], DROPS[1]);
             return Err(Error::usage("--ev", problem));
@@ -90,8 +82,8 @@ impl Realism {
             sensor: Sensor::resolve(&shared.sensor)?,
             out: said.out,
             show: if said.json { Show::Json } else { Show::Table },
-            threads: threads(shared.enhancement.threads)?,
-            most_pixels: most_pixels(shared.data.max_pixels),
+            threads: threads(shared.threads)?,
+            most_pixels: most_pixels(shared.max_pixels),
         })
     }
 }

@@ -3,10 +3,10 @@
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use super::layers::merge;
+use super::layers::Shared;
 use super::light::Light;
 use super::{most_pixels, parsed, threads};
-use crate::cli::{DataArgs, EnhancementArgs, EvaluateArgs, OutputArgs, SynthesizeArgs};
+use crate::cli::SynthesizeArgs;
 use crate::error::{Error, Result};
 
 /// A whole synthesis.
@@ -57,23 +57,14 @@ impl Synthesize {
     /// # Errors
     /// [`Error::Usage`] with the flag that cannot be used.
     pub fn resolve(said: SynthesizeArgs) -> Result<Self> {
-        let shared = merge(EvaluateArgs {
-            data: DataArgs {
-                max_pixels: said.max_pixels,
-                ..DataArgs::default()
-            },
+        let shared = Shared {
             light: said.light,
             sensor: said.sensor,
-            enhancement: EnhancementArgs {
-                threads: said.threads,
-                ..EnhancementArgs::default()
-            },
-            output: OutputArgs {
-                config: said.config,
-                ..OutputArgs::default()
-            },
-            ..EvaluateArgs::default()
-        })?;
+            threads: said.threads,
+            max_pixels: said.max_pixels,
+            config: said.config,
+        }
+        .merge()?;
         Ok(Self {
             inputs: said.inputs,
             out: said.out,
@@ -88,8 +79,8 @@ impl Synthesize {
             } else {
                 Existing::Kept
             },
-            threads: threads(shared.enhancement.threads)?,
-            most_pixels: most_pixels(shared.data.max_pixels),
+            threads: threads(shared.threads)?,
+            most_pixels: most_pixels(shared.max_pixels),
         })
     }
 }
