@@ -129,10 +129,12 @@ fn whole(file: &[u8], place: &str) -> Result<()> {
         None if Outline::of(file).ends => None,
         None => Some(CUT),
     };
-    fault.map_or(Ok(()), |fault| {
-        let problem = format_args!("not a whole image: {fault}; copy or export it again");
-        Err(Error::data(place, problem))
-    })
+    let problem = match fault {
+        None => return Ok(()),
+        Some(CUT) => format!("not a whole image: {CUT}, at byte {}", file.len()),
+        Some(fault) => format!("not a whole image: {fault}"),
+    };
+    Err(Error::data(place, problem + "; copy or export it again"))
 }
 
 const CUT: &str = "the file ends before its end mark";
@@ -232,6 +234,7 @@ mod tests {
         }
         let error = picture.decode().unwrap_err().to_string();
         assert!(error.starts_with("test.png: not a whole image"), "{error}");
+        assert!(error.contains("at byte"), "{error}");
     }
 
     #[test]

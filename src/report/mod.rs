@@ -2,5 +2,6 @@
 
 pub mod files;
 pub mod histogram;
+pub mod realism;
 pub mod sheet;
 pub mod table;

@@ -95,6 +95,39 @@ fn bytes_are_those_of_this_version() {
     );
 }
 
+/// The same for the choices beside the default, another camera among them.
+#[test]
+fn bytes_of_every_choice_are_those_of_this_version() {
+    let clean = ramps(37, 130);
+    let camera = || CameraModel::preset("nikon-d850").unwrap();
+    let choices = [
+        Synthesis::of(Profile::Physical, CameraModel::default()),
+        Synthesis::of(Profile::Physical, camera()),
+        Synthesis {
+            draws: Draws::Fresh,
+            tone: Tone::AfterEv,
+            ..Synthesis::of(Profile::Paper, camera())
+        },
+    ];
+    let mut bytes = Vec::new();
+    for synthesis in &choices {
+        let mut dark = DarkLevel::ALL.map(|_| Rgb::black(37, 130));
+        ladder(
+            &clean,
+            &key(20, "frame"),
+            synthesis,
+            &DarkLevel::ALL,
+            &mut dark,
+        );
+        for image in &dark {
+            bytes.extend_from_slice(image.samples());
+        }
+    }
+    assert_eq!(VERSION, 2);
+    let digest = "135736c6e5e5372959f81423e99612b894d09f2ba87bad7c88d6cd5ed9fcf884";
+    assert_eq!(Digest::of(&bytes).to_string(), digest);
+}
+
 #[test]
 fn threads_do_not_enter() {
     let develop = |threads| {

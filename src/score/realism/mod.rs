@@ -5,8 +5,39 @@ pub mod mean;
 pub mod residual;
 pub mod ssim;
 
+use residual::Divergence;
+use serde::Serialize;
+
 use crate::error::{Error, Result};
 use crate::types::{Rgb, Stops};
+
+/// How one made image compares with the real one.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Measured {
+    /// In dB; null in JSON where it is infinite.
+    pub psnr: f64,
+    /// Structural similarity.
+    pub ssim: f64,
+    /// By the rule that is asked for.
+    pub kl: Divergence,
+    /// By the other rule about empty bins.
+    pub kl_other: Divergence,
+}
+
+/// What one pair shows.
+#[derive(Debug, Clone, Serialize)]
+pub struct Compared {
+    /// The pair's name.
+    pub pair: String,
+    /// The exposure drop in EV.
+    pub drop: f32,
+    /// By exposure drop alone.
+    pub exposure: Measured,
+    /// With the sensor's noise.
+    pub noise: Measured,
+    /// PSNR of the sensor branch without noise: its tone, apart from its noise.
+    pub clean_psnr: f64,
+}
 
 /// Refuses images of different sizes.
 ///

@@ -116,6 +116,17 @@ pub enum Empty {
     Drop,
 }
 
+impl Empty {
+    /// The other rule.
+    #[must_use]
+    pub fn other(self) -> Self {
+        match self {
+            Self::Eps => Self::Drop,
+            Self::Drop => Self::Eps,
+        }
+    }
+}
+
 impl Bins {
     fn count(self) -> usize {
         match self {

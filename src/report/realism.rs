@@ -1,24 +1,23 @@
-//! What a comparison with real pairs shows: [`Summary`], and the files beside it.
+//! What a comparison with real pairs shows: [`Summary`], and the files and figures beside it.
 
 use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
 use comfy_table::{LineStyle, Table};
 use serde::Serialize;
 
-use super::{Compared, Measured, rule};
-use crate::config::Realism;
+use super::histogram::{Line, histogram};
+use super::sheet::{self, CropRow};
 use crate::error::{Error, Result};
-use crate::report::histogram::{Line, histogram};
-use crate::report::sheet::{self, CropRow};
 use crate::score::realism::mean::Mean;
 use crate::score::realism::residual::{Bins, Empty, Residuals};
+use crate::score::realism::{Compared, Measured};
 use crate::types::Rgb;
 
 /// All pairs together.
 #[derive(Debug, Serialize)]
-pub(super) struct Summary {
+pub struct Summary {
     pairs: usize,
-    unmatched: usize,
-    failed: usize,
+    #[serde(flatten)]
+    source: Source,
     /// The rule of the divergence.
     kl_rule: String,
     /// The other rule about empty bins, where it matters.
@@ -28,8 +27,52 @@ pub(super) struct Summary {
     exposure: Row,
     noise: Row,
     clean_psnr: Mean,
-    seed: u64,
-    synthesis: serde_json::Value,
+    /// A line for each pair.
+    #[serde(skip)]
+    by_pair: Vec<String>,
+}
+
+/// By which rules residuals are compared.
+#[derive(Debug, Clone, Copy)]
+pub struct Rules {
+    /// The bins.
+    pub bins: Bins,
+    /// What is done about empty ones.
+    pub empty: Empty,
+}
+
+impl Rules {
+    fn named(self, empty: Empty) -> String {
+        match self.bins {
+            Bins::Fu => format!("{}; {empty}", self.bins),
+            Bins::Kousha => self.bins.to_string(),
+        }
+    }
+}
+
+/// What was compared.
+#[derive(Debug, Clone, Serialize)]
+pub struct Source {
+    /// The seed of the noise.
+    pub seed: u64,
+    /// The choices of the synthesis.
+    pub synthesis: serde_json::Value,
+    /// Images without a partner.
+    pub unmatched: usize,
+    /// Pairs that could not be compared.
+    pub failed: usize,
+}
+
+/// One pair in a line, exposure drop alone before noise.
+fn line(pair: &Compared) -> String {
+    let [ev, noise] = [&pair.exposure, &pair.noise].map(|measured| {
+        let (psnr, ssim, kl) = (measured.psnr, measured.ssim, measured.kl.nats);
+        format!("PSNR {psnr:.2} SSIM {ssim:.4} D_KL {kl:.3}")
+    });
+    format!(
+        "{}: drop {:.3} EV; alone {ev}; with noise {noise}",
+        pair.pair, pair.drop
+    )
 }
 
 /// One way to make the dark images.
@@ -71,45 +114,40 @@ impl Row {
 }
 
 impl Summary {
-    pub(super) fn new(
-        config: &Realism,
-        compared: &[&Compared],
-        unmatched: usize,
-        failed: usize,
-    ) -> Result<Self> {
+    /// Takes the means over all pairs.
+    ///
+    /// # Errors
+    /// Where there is none.
+    pub fn new(rules: Rules, source: Source, compared: &[&Compared]) -> Result<Self> {
         let mean = |number: fn(&Compared) -> f64| {
             let numbers: Vec<f64> = compared.iter().map(|pair| number(pair)).collect();
             Mean::of(&numbers)
         };
         let summary = || {
-            let (bins, empty) = (config.bins, config.empty);
-            let other = match empty {
-                Empty::Eps => Empty::Drop,
-                Empty::Drop => Empty::Eps,
-            };
             Some(Self {
                 pairs: compared.len(),
-                unmatched,
-                failed,
-                kl_rule: rule(bins, empty),
-                kl_other_rule: (bins == Bins::Fu).then(|| rule(bins, other)),
+                kl_rule: rules.named(rules.empty),
+                kl_other_rule: (rules.bins == Bins::Fu).then(|| rules.named(rules.empty.other())),
                 drop: mean(|pair| f64::from(pair.drop))?,
                 exposure: Row::of(compared, |pair| &pair.exposure)?,
                 noise: Row::of(compared, |pair| &pair.noise)?,
                 clean_psnr: mean(|pair| pair.clean_psnr)?,
-                seed: config.sensor.seed,
-                synthesis: serde_json::json!(config.sensor.synthesis),
+                source,
+                by_pair: compared.iter().map(|pair| line(pair)).collect(),
             })
         };
         summary().ok_or_else(|| Error::data("pairs", "none of them could be compared"))
     }
 
-    pub(super) fn json(&self) -> String {
+    /// As JSON.
+    #[must_use]
+    pub fn json(&self) -> String {
         format!("{:#}\n", serde_json::json!(self))
     }
 
     /// The paper's table, with intervals, and with the rules of its numbers below it.
-    pub(super) fn table(&self) -> String {
+    #[must_use]
+    pub fn table(&self) -> String {
         let mut table = Table::new();
         table.load_style(UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none()));
         let other = self.kl_other_rule.as_ref().map(|_| "D_KL (other rule)");
@@ -159,10 +197,11 @@ impl Summary {
             shown(&self.drop, 3),
             shown(&self.clean_psnr, 2)
         ));
-        if self.failed > 0 || self.unmatched > 0 {
+        lines.extend(self.by_pair.iter().cloned());
+        if self.source.failed > 0 || self.source.unmatched > 0 {
             lines.push(format!(
                 "{} pairs failed, {} images without a partner",
-                self.failed, self.unmatched
+                self.source.failed, self.source.unmatched
             ));
         }
         lines.join("\n") + "\n"
@@ -190,7 +229,7 @@ fn table_of(header: &[&str], rows: impl Iterator<Item = Vec<String>>) -> Result<
 }
 
 /// A row a pair and way of making it.
-pub(super) fn pairs(compared: &[&Compared]) -> Result<Vec<u8>> {
+pub fn pairs(compared: &[&Compared]) -> Result<Vec<u8>> {
     let header = [
         "pair",
         "drop",
@@ -221,7 +260,7 @@ pub(super) fn pairs(compared: &[&Compared]) -> Result<Vec<u8>> {
 }
 
 /// The spread of real and synthetic residuals by clean code.
-pub(super) fn by_code(residuals: &[Residuals; 2]) -> Result<Vec<u8>> {
+pub fn by_code(residuals: &[Residuals; 2]) -> Result<Vec<u8>> {
     let header = [
         "code",
         "n",
@@ -245,7 +284,7 @@ pub(super) fn by_code(residuals: &[Residuals; 2]) -> Result<Vec<u8>> {
 }
 
 /// Both residual histograms.
-pub(super) fn figure([real, noise]: &[Residuals; 2]) -> Result<String> {
+pub fn figure([real, noise]: &[Residuals; 2]) -> Result<String> {
     let line = |name: &str, residuals: &Residuals| Line {
         name: name.to_owned(),
         shares: residuals.shares().collect(),
@@ -258,7 +297,8 @@ pub(super) fn figure([real, noise]: &[Residuals; 2]) -> Result<String> {
 }
 
 /// Crops of the first pairs, in the light of the image that they were made from.
-pub(super) fn crops<'a>(pairs: impl Iterator<Item = (&'a Compared, &'a [Rgb; 3])>) -> Rgb {
+#[must_use]
+pub fn crops<'a>(pairs: impl Iterator<Item = (&'a Compared, &'a [Rgb; 3])>) -> Rgb {
     let rows: Vec<CropRow<'_>> = pairs
         .map(|(compared, images)| CropRow {
             name: format!("{} (drop {:.2} EV)", compared.pair, compared.drop),

@@ -5,14 +5,11 @@
 //! and both are compared with the real one. Residuals stand over the dropped clean image on either side; those of the
 //! exposure drop itself are 0 everywhere, so that its divergence says how empty bins are counted, and no more.
 
-mod show;
-
 use std::fs;
 use std::path::Path;
 
 use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
-use serde::Serialize;
 
 use super::Verdict;
 use super::progress::Progress;
@@ -21,9 +18,11 @@ use crate::config::{PairPlace, Realism, Show};
 use crate::dataset::Picture;
 use crate::dataset::pairs::{Pair, Pairs};
 use crate::error::{Error, Result};
-use crate::score::realism::residual::{Bins, Divergence, Empty, Residuals, divergence};
+use crate::report;
+use crate::report::realism::{Rules, Source, Summary};
+use crate::score::realism::residual::{Residuals, divergence};
 use crate::score::realism::ssim::ssim;
-use crate::score::realism::{exposure_drop, psnr, same_size};
+use crate::score::realism::{Compared, Measured, exposure_drop, psnr, same_size};
 use crate::synthesis::noise::Term;
 use crate::synthesis::{Negative, NoiseKey, expose_by};
 use crate::types::manifest::Status;
@@ -31,30 +30,6 @@ use crate::types::{FrameId, Rgb};
 
 /// The most pairs whose crops are shown.
 const MOST_CROPS: usize = 8;
-
-/// How one made image compares with the real one.
-#[derive(Debug, Clone, Copy, Serialize)]
-pub(super) struct Measured {
-    /// In dB; null in JSON where it is infinite.
-    psnr: f64,
-    ssim: f64,
-    /// By the rule that is asked for.
-    kl: Divergence,
-    /// By the other rule about empty bins.
-    kl_other: Divergence,
-}
-
-/// What one pair shows.
-#[derive(Debug, Serialize)]
-pub(super) struct Compared {
-    pair: String,
-    /// The exposure drop in EV.
-    drop: f32,
-    exposure: Measured,
-    noise: Measured,
-    /// PSNR of the sensor branch without noise: its tone, apart from its noise.
-    clean_psnr: f64,
-}
 
 /// A pair that was compared, with what the figures need.
 struct Work {
@@ -99,7 +74,17 @@ pub fn realism(config: &Realism, progress: &Progress) -> Result<Verdict> {
     }
     let failed = pairs.len() - works.len();
     let compared: Vec<&Compared> = works.iter().map(|work| &work.compared).collect();
-    let summary = show::Summary::new(config, &compared, unmatched.len(), failed)?;
+    let rules = Rules {
+        bins: config.bins,
+        empty: config.empty,
+    };
+    let source = Source {
+        seed: config.sensor.seed,
+        synthesis: serde_json::json!(config.sensor.synthesis),
+        unmatched: unmatched.len(),
+        failed,
+    };
+    let summary = Summary::new(rules, source, &compared)?;
     if let Some(out) = &config.out {
         files(out, &works, &summary)?;
     }
@@ -146,10 +131,7 @@ fn compare(config: &Realism, pair: &Pair, shown: bool) -> Result<Work> {
     let residuals = [&real, &noise, &exposure].map(|image| Residuals::of(image, &exposure));
     let [of_real, of_noise, of_exposure] = residuals;
     let (of_real, of_noise, of_exposure) = (of_real?, of_noise?, of_exposure?);
-    let other = match config.empty {
-        Empty::Eps => Empty::Drop,
-        Empty::Drop => Empty::Eps,
-    };
+    let other = config.empty.other();
     let measured = |image: &Rgb, residuals: &Residuals| -> Result<Measured> {
         Ok(Measured {
             psnr: psnr(&real, image)?,
@@ -172,10 +154,10 @@ fn compare(config: &Realism, pair: &Pair, shown: bool) -> Result<Work> {
 }
 
 /// Leaves the numbers by pair, the summary and the figures in a folder.
-fn files(out: &Path, works: &[Work], summary: &show::Summary) -> Result<()> {
+fn files(out: &Path, works: &[Work], summary: &Summary) -> Result<()> {
     fs::create_dir_all(out).map_err(|e| Error::file(out, "make", e))?;
     let compared: Vec<&Compared> = works.iter().map(|work| &work.compared).collect();
-    write(&out.join("pairs.csv"), &show::pairs(&compared)?)?;
+    write(&out.join("pairs.csv"), &report::realism::pairs(&compared)?)?;
     write(&out.join("summary.json"), summary.json().as_bytes())?;
     let mut pooled = [Residuals::default(), Residuals::default()];
     for work in works {
@@ -183,22 +165,20 @@ fn files(out: &Path, works: &[Work], summary: &show::Summary) -> Result<()> {
             sum.add(residuals);
         }
     }
-    write(&out.join("residuals_by_code.csv"), &show::by_code(&pooled)?)?;
+    write(
+        &out.join("residuals_by_code.csv"),
+        &report::realism::by_code(&pooled)?,
+    )?;
     write(
         &out.join("residuals.svg"),
-        show::figure(&pooled)?.as_bytes(),
+        report::realism::figure(&pooled)?.as_bytes(),
     )?;
     let crops = works.iter().filter_map(|work| {
         let images = work.images.as_ref()?;
         Some((&work.compared, images))
     });
-    write(&out.join("crops.png"), &png(&show::crops(crops))?)
-}
-
-/// The name of a rule about bins, with the one about empty ones where it has a say.
-fn rule(bins: Bins, empty: Empty) -> String {
-    match bins {
-        Bins::Fu => format!("{bins}; {empty}"),
-        Bins::Kousha => bins.to_string(),
-    }
+    write(
+        &out.join("crops.png"),
+        &png(&report::realism::crops(crops))?,
+    )
 }
