@@ -107,8 +107,8 @@ impl Row {
             shown(&self.psnr, 2),
             shown(&self.ssim, 4),
             shown(&self.kl, 3),
-            shown(&self.kl_other, 3),
             shown(&self.empty_bins, 1),
+            shown(&self.kl_other, 3),
         ]
     }
 }
@@ -148,63 +148,55 @@ impl Summary {
     /// The paper's table, with intervals, and with the rules of its numbers below it.
     #[must_use]
     pub fn table(&self) -> String {
+        // The last column is the other rule's, where there is one.
+        let columns = if self.kl_other_rule.is_some() { 6 } else { 5 };
+        let header = [
+            "",
+            "PSNR dB",
+            "SSIM",
+            "D_KL",
+            "bins empty",
+            "D_KL (other rule)",
+        ];
         let mut table = Table::new();
         table.load_style(UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none()));
-        let other = self.kl_other_rule.as_ref().map(|_| "D_KL (other rule)");
-        let columns = ["", "PSNR dB", "SSIM", "D_KL"].into_iter();
-        let kept = |index: usize| index != 4 || other.is_some();
-        table.set_header(
-            columns
-                .chain([other.unwrap_or_default(), "bins empty"])
-                .enumerate()
-                .filter(|(i, _)| kept(*i))
-                .map(|(_, name)| name),
+        table.set_header(&header[..columns]);
+        table.add_row(&self.exposure.cells("exposure drop alone")[..columns]);
+        table.add_row(&self.noise.cells("with sensor noise")[..columns]);
+        let title = format!(
+            "Synthetic against real low light, {} pairs: mean ± half of the 95 % interval (Student's t)",
+            self.pairs
         );
-        for cells in [
-            self.exposure.cells("exposure drop alone"),
-            self.noise.cells("with sensor noise"),
-        ] {
-            table.add_row(
-                cells
-                    .into_iter()
-                    .enumerate()
-                    .filter(|(i, _)| kept(*i))
-                    .map(|(_, cell)| cell),
-            );
-        }
-        let mut lines = vec![
-            format!(
-                "Synthetic against real low light, {} pairs: mean ± half of the 95 % interval (Student's t)",
-                self.pairs
-            ),
-            table.to_string(),
-            format!(
-                "D_KL(real ‖ synthetic) of residuals over the dropped clean image, in nats: {}",
-                self.kl_rule
-            ),
-        ];
-        lines.extend(
-            self.kl_other_rule
-                .iter()
-                .map(|rule| format!("other rule: {rule}")),
-        );
-        lines.push(
+        [title, table.to_string(), self.notes().join("\n")].join("\n") + "\n"
+    }
+
+    /// What stands below the table: the rules of its numbers, and each pair.
+    fn notes(&self) -> Vec<String> {
+        let Source {
+            unmatched, failed, ..
+        } = self.source;
+        let mut notes = vec![format!(
+            "D_KL(real ‖ synthetic) of residuals over the dropped clean image, in nats: {}",
+            self.kl_rule
+        )];
+        let other = self.kl_other_rule.iter();
+        notes.extend(other.map(|rule| format!("other rule: {rule}")));
+        notes.push(
             "exposure drop alone has no residual: its D_KL tells of the rule, not of noise"
                 .to_owned(),
         );
-        lines.push(format!(
+        notes.push(format!(
             "drop {} EV; PSNR of the sensor branch without noise {} dB",
             shown(&self.drop, 3),
             shown(&self.clean_psnr, 2)
         ));
-        lines.extend(self.by_pair.iter().cloned());
-        if self.source.failed > 0 || self.source.unmatched > 0 {
-            lines.push(format!(
-                "{} pairs failed, {} images without a partner",
-                self.source.failed, self.source.unmatched
+        notes.extend(self.by_pair.iter().cloned());
+        if failed > 0 || unmatched > 0 {
+            notes.push(format!(
+                "{failed} pairs failed, {unmatched} images without a partner"
             ));
         }
-        lines.join("\n") + "\n"
+        notes
     }
 }
 
