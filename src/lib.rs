@@ -10,7 +10,7 @@
 //! (light) are two corridors that meet only where a question is put to a model.
 //!
 //! ```text
-//!                  ┌── questions of the data ───────┐            (words: what is asked)
+//!                  ┌──────► questions ─────────────┐            (words: what is asked)
 //!  cli → config → dataset                           ├─► ask → score → store → report
 //!                  └──────► synthesis ──► enhance ──┘            (light: what is seen)
 //!                        run = the conductor; types = the shared vocabulary
@@ -20,6 +20,7 @@
 //!   [`Condition`](types::Condition) is a degradation with or without an enhancer, a [`Reply`](types::Reply) is what a
 //!   model said, and a [`Record`](types::Record) is what came of one question for one model in one condition.
 //! - [`dataset`]: a folder or a ready-made set → images, their maps and questions.
+//! - [`questions`]: a frame with its maps → questions with one true answer, by rule; pure integers.
 //! - [`synthesis`]: a clean image → the same with less light; pure, given a noise key.
 //! - [`enhance`]: a dark image → a mended one, by the user's ONNX model.
 //! - [`ask`]: a prompt and an image → a reply; the only asynchronous stage.
@@ -46,15 +47,16 @@
 //! | `error` | nothing |
 //! | `types` | `error` |
 //! | `dataset` | `types`, `error` |
+//! | `questions` | `types`, `error` |
 //! | `synthesis` | `types`, `error` |
 //! | `enhance` | `types`, `error` |
 //! | `ask` | `types`, `error` |
 //! | `score` | `types`, `error` |
 //! | `store` | `types`, `error` |
-//! | `report` | `types`, `error`, `score` |
+//! | `report` | `types`, `error`, `score`, `questions` |
 //! | `cli` | nothing |
-//! | `config` | `types`, `error`, `cli`, `dataset`, `synthesis`, `enhance`, `ask`, `score` |
-//! | `run` | `types`, `error`, `config`, `dataset`, `synthesis`, `enhance`, `ask`, `score`, `store`, `report` |
+//! | `config` | `types`, `error`, `cli`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score` |
+//! | `run` | `types`, `error`, `config`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `report` |
 //! | `main` | `cli`, `config`, `run`, `enhance`, `types` |
 //!
 //! `config` uses the stages for the settings that each of them defines, and for nothing else.
@@ -67,6 +69,7 @@ pub mod config;
 pub mod dataset;
 pub mod enhance;
 pub mod error;
+pub mod questions;
 pub mod report;
 pub mod run;
 pub mod score;

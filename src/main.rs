@@ -6,9 +6,10 @@ use std::process::ExitCode;
 use clap::Parser;
 use clap::error::ErrorKind;
 use darkqa_eval::cli::{Cli, Command, EvaluateArgs};
-use darkqa_eval::config::{self, Config, Realism, Synthesize};
+use darkqa_eval::config::{self, Config, Questions, Realism, Synthesize};
 use darkqa_eval::enhance;
 use darkqa_eval::run::progress::{Loudness, Progress};
+use darkqa_eval::run::questions::questions;
 use darkqa_eval::run::realism::realism;
 use darkqa_eval::run::synthesize::synthesize;
 use darkqa_eval::run::{Verdict, evaluate};
@@ -74,6 +75,7 @@ enum Task {
     Evaluate(Box<EvaluateArgs>),
     Synthesize(Box<Synthesize>),
     Realism(Box<Realism>),
+    Questions(Box<Questions>),
 }
 
 impl Job {
@@ -92,6 +94,10 @@ impl Job {
                 let quiet = said.quiet;
                 (quiet, Task::Realism(Box::new(Realism::resolve(said)?)))
             }
+            Some(Command::Questions(said)) => {
+                let quiet = said.quiet;
+                (quiet, Task::Questions(Box::new(Questions::resolve(said)?)))
+            }
         };
         let loudness = if quiet {
             Loudness::Quiet
@@ -107,6 +113,7 @@ fn show(task: Task, progress: &Progress) -> anyhow::Result<ExitCode> {
         Task::Evaluate(said) => evaluate(&Config::resolve(*said)?, progress)?,
         Task::Synthesize(config) => synthesize(&config, progress)?,
         Task::Realism(config) => realism(&config, progress)?,
+        Task::Questions(config) => questions(&config, progress)?,
     };
     let written = std::io::stdout().lock().write_all(output.as_bytes());
     match (status, written) {

@@ -20,7 +20,7 @@ const ROOMS: [(&str, &[&str]); 12] = [
     ("ort", &["enhance"]),
     ("rand", &["synthesis", "ask/random.rs"]),
     ("rand_distr", &["synthesis", "ask/random.rs"]),
-    ("clap", &["cli.rs", "config", "main.rs"]),
+    ("clap", &["cli", "config", "main.rs"]),
     (
         "image",
         &["dataset", "enhance/tensor.rs", "ask/payload.rs", "run"],

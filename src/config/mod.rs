@@ -3,6 +3,7 @@
 mod asking;
 mod layers;
 mod light;
+mod questions;
 mod realism;
 mod synthesize;
 
@@ -15,6 +16,7 @@ use std::time::Duration;
 pub use asking::{Ask, ModelName, Server};
 pub use layers::{merge, one_line};
 pub use light::{Light, Sensor};
+pub use questions::{Questions, Strangers};
 pub use realism::{PairPlace, Realism};
 pub use synthesize::{Existing, Product, Synthesize};
 

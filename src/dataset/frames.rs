@@ -1,25 +1,56 @@
 //! A folder of frames.
 //!
-//! With a `frames.jsonl` it is the common interface: one frame a line, `{"scene", "frame", "rgb", …}`, paths relative
-//! to the folder, and a frame's name is `scene/frame`. A line may name maps of the image's size: `depth`, in metres as
-//! `.npy` or in units of `depth_scale` metres as PNG, `sem`, the classes, and `over`, the segments. Without the file, every PNG and JPEG file in the folder is a frame,
-//! named by its file name. The questions lie beside them in `questions.jsonl`.
+//! With a `frames.jsonl` it is the common interface, paths relative to the folder:
+//!
+//! - `frames.jsonl`: one frame a line, `{"scene", "frame", "rgb", …}`; a frame's name is `scene/frame`. A line may name maps
+//!   of the image's size: `depth`, in metres as `.npy` or in units of `depth_scale` metres as PNG; `sem`, the classes; and
+//!   `over`, the segments, which `over_source` calls `renderer` or `connected_components` (objects) or `superpixel`
+//!   (parts). It may also say `depth_kind` (`planar` or `euclid`), `intrinsics` (`{"fx", "fy", "cx", "cy"}`), `room_gt`,
+//!   `t` (seconds) and `pose`.
+//! - `classes.json`: what the numbers of `sem` stand for ([`spaces`]).
+//! - `dataset.json`: `{"schema": "darkqa.dataset/1", "name", "depth_kind"}`, both of which may be missing.
+//! - `scenes/<scene>/segments.json`: what is known of segments by name, `{"7": {"name", "canonical", "region"}}`.
+//!
+//! Without the list, every PNG and JPEG file in the folder is a frame, named by its file name. The questions lie beside
+//! them in `questions.jsonl`.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use serde::Deserialize;
 
 use super::maps::{DepthFile, Maps};
-use super::{Dataset, Source, questions, stem};
+use super::view::View;
+use super::{Dataset, Source, questions, spaces, stem};
 use crate::error::{Error, Result};
-use crate::types::FrameId;
+use crate::types::{DepthKind, FrameId, Intrinsics, SegmentName, Segmentation};
 
 /// The file that lists the frames of the common interface.
 const FRAMES: &str = "frames.jsonl";
 /// The questions about a folder of frames.
 const QUESTIONS: &str = "questions.jsonl";
+
+/// What the numbers of the semantic maps stand for.
+const CLASSES: &str = "classes.json";
+/// What the data set is.
+const DATASET: &str = "dataset.json";
+/// The schema of `dataset.json`.
+const SCHEMA: &str = "darkqa.dataset/1";
+/// The segments of a scene by name.
+const SEGMENTS: &str = "segments.json";
+
+/// `dataset.json`, as far as it is used.
+#[derive(Debug, Default, Deserialize)]
+struct About {
+    schema: String,
+    name: Option<String>,
+    depth_kind: Option<DepthKind>,
+}
+
+/// The segments of the scenes by name, each scene's read once.
+type Names = BTreeMap<String, Arc<BTreeMap<u32, SegmentName>>>;
 
 /// The keys of a line of `frames.jsonl` that are used.
 #[derive(Debug, Deserialize)]
@@ -31,11 +62,24 @@ struct Line {
     depth_scale: Option<f64>,
     sem: Option<PathBuf>,
     over: Option<PathBuf>,
+    over_source: Option<OverSource>,
+    depth_kind: Option<DepthKind>,
+    intrinsics: Option<Intrinsics>,
+    room_gt: Option<String>,
+}
+
+/// Where a map of segments comes from.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum OverSource {
+    Renderer,
+    ConnectedComponents,
+    Superpixel,
 }
 
 impl Line {
-    /// The files of the frame, all of which exist.
-    fn source(self, folder: &Path) -> Result<Source, String> {
+    /// The files of the frame, all of which exist, and what its line says of them.
+    fn source(self, folder: &Path, about: &About, names: &Names) -> Result<Source, String> {
         let existing = |file: PathBuf| {
             let path = folder.join(file);
             if path.is_file() {
@@ -53,8 +97,88 @@ impl Line {
             semantic: self.sem.map(existing).transpose()?,
             segments: self.over.map(existing).transpose()?,
         };
-        Ok(Source::File { rgb, maps })
+        let focal = self
+            .intrinsics
+            .map_or(1.0, |camera| camera.fx.min(camera.fy));
+        if !(focal.is_finite() && focal > 0.0) {
+            return Err(format!(
+                "a focal length of {focal} pixels; fx and fy above 0 expected"
+            ));
+        }
+        let view = View {
+            depth_kind: self.depth_kind.or(about.depth_kind).unwrap_or_default(),
+            intrinsics: self.intrinsics,
+            segmentation: match self.over_source {
+                Some(OverSource::Superpixel) => Segmentation::Parts,
+                Some(OverSource::Renderer | OverSource::ConnectedComponents) | None => {
+                    Segmentation::Instances
+                }
+            },
+            names: names.get(&self.scene).cloned().unwrap_or_default(),
+            room: self.room_gt,
+            scene: self.scene,
+        };
+        Ok(Source::File { rgb, maps, view })
     }
+}
+
+/// The frames of a folder, without questions, and what their numbers stand for.
+pub(super) fn frames(folder: &Path) -> Result<Dataset> {
+    let about = about(folder)?;
+    let classes = folder.join(CLASSES);
+    let labels = classes
+        .exists()
+        .then(|| spaces::read(&classes))
+        .transpose()?;
+    let title = about.name.unwrap_or_default();
+    let name = if title.is_empty() {
+        stem(folder)
+    } else {
+        title.clone()
+    };
+    let dataset = Dataset::new(name, sources(folder)?, Vec::new());
+    Ok(Dataset {
+        title,
+        labels,
+        ..dataset
+    })
+}
+
+fn about(folder: &Path) -> Result<About> {
+    let path = folder.join(DATASET);
+    if !path.exists() {
+        return Ok(About::default());
+    }
+    let text = fs::read_to_string(&path).map_err(|e| Error::file(&path, "read", e))?;
+    let about: About = serde_json::from_str(&text).map_err(|e| Error::data(path.display(), e))?;
+    if about.schema != SCHEMA {
+        let problem = format_args!("schema {:?}; {SCHEMA:?} expected", about.schema);
+        return Err(Error::data(path.display(), problem));
+    }
+    Ok(about)
+}
+
+/// The segments of a scene by name, where there are any.
+fn segment_names(folder: &Path, scene: &str) -> Result<Arc<BTreeMap<u32, SegmentName>>> {
+    let path = folder.join("scenes").join(scene).join(SEGMENTS);
+    if !path.exists() {
+        return Ok(Arc::default());
+    }
+    let text = fs::read_to_string(&path).map_err(|e| Error::file(&path, "read", e))?;
+    let names: BTreeMap<u32, SegmentName> =
+        serde_json::from_str(&text).map_err(|e| Error::data(path.display(), e))?;
+    let canonical = spaces::canonical();
+    if let Some((id, name)) = names
+        .iter()
+        .find(|(_, name)| !canonical.contains(&name.canonical))
+    {
+        let problem = format_args!(
+            "segment {id} ({:?}) is said to be {:?}, which is no class of mpcat40",
+            name.name, name.canonical
+        );
+        return Err(Error::data(path.display(), problem));
+    }
+    Ok(Arc::new(names))
 }
 
 pub(super) fn open(folder: &Path, questions: Option<&Path>) -> Result<Dataset> {
@@ -103,6 +227,7 @@ pub(super) fn image(path: &Path) -> Result<BTreeMap<FrameId, Source>> {
 
 fn listed(folder: &Path, list: &Path) -> Result<BTreeMap<FrameId, Source>> {
     let text = fs::read_to_string(list).map_err(|e| Error::file(list, "read", e))?;
+    let (about, mut names) = (about(folder)?, Names::new());
     let mut sources = BTreeMap::new();
     for (i, line) in text
         .trim_start_matches('\u{feff}')
@@ -113,8 +238,11 @@ fn listed(folder: &Path, list: &Path) -> Result<BTreeMap<FrameId, Source>> {
         let line: Line =
             serde_json::from_str(line).map_err(|e| Error::json_line(list, i + 1, &e))?;
         let id = FrameId(format!("{}/{}", line.scene, line.frame));
+        if !names.contains_key(&line.scene) {
+            names.insert(line.scene.clone(), segment_names(folder, &line.scene)?);
+        }
         let source = line
-            .source(folder)
+            .source(folder, &about, &names)
             .map_err(|problem| Error::line(list, i + 1, problem))?;
         if sources.insert(id.clone(), source).is_some() {
             return Err(Error::line(

@@ -11,7 +11,7 @@ use ndarray::Array2;
 use super::npy::Npy;
 use super::raw_png::{Form, RawPng};
 use crate::error::{Error, Result};
-use crate::types::{Frame, FrameId, Rgb};
+use crate::types::Digest;
 
 /// The deepest a pixel may be, in millimetres: a kilometre. No room is; a map that says more has its unit wrong, as
 /// where millimetres are taken for metres.
@@ -63,62 +63,125 @@ impl DepthFile {
         }
     }
 
-    fn read(&self, size: Size) -> Result<Array2<u32>> {
+    fn path(&self) -> &Path {
         match self {
-            Self::Png { path, scale } => load(path, |bytes| {
+            Self::Png { path, .. } | Self::Npy(path) => path,
+        }
+    }
+
+    fn decode(&self, bytes: &[u8], size: Size) -> Result<Array2<u32>, String> {
+        match self {
+            Self::Png { scale, .. } => {
                 // Scaled once: most scales are a round number of millimetres, and then this is exact.
                 let unit = scale * 1_000.0;
                 let units = png(bytes, &[Form::Grey16], size)?.into_iter();
                 grid(size, units.map(|units| millimetres(units.into(), unit)))
-            }),
-            Self::Npy(path) => load(path, |bytes| {
+            }
+            Self::Npy(_) => {
                 let metres = npy(bytes, size)?.floats()?;
                 grid(size, metres.map(|metres| millimetres(metres, 1_000.0)))
-            }),
+            }
         }
     }
 }
 
 impl Maps {
-    /// A frame of these maps and their image.
+    /// No maps at all.
+    pub(super) const NONE: Self = Self {
+        depth: None,
+        semantic: None,
+        segments: None,
+    };
+
+    /// Reads the files, undecoded.
     ///
     /// # Errors
-    /// With the file: one that cannot be read, is of another form or another size than the image, or holds a value that
-    /// cannot be.
-    pub(super) fn frame(&self, id: FrameId, rgb: Rgb) -> Result<Frame> {
-        let size = (rgb.height(), rgb.width());
-        let depth = self.depth.as_ref().map(|file| file.read(size));
-        let semantic = self.semantic.as_deref().map(|path| semantic(path, size));
-        let segments = self.segments.as_deref().map(|path| segments(path, size));
-        Ok(Frame {
-            id,
-            depth: depth.transpose()?,
-            semantic: semantic.transpose()?,
-            segments: segments.transpose()?,
-            rgb,
+    /// With the file that cannot be read.
+    pub(super) fn read(&self) -> Result<MapFiles<'_>> {
+        let read = |path| fs::read(path).map_err(|e| Error::file(path, "read", e));
+        let depth = self.depth.as_ref().map(DepthFile::path);
+        Ok(MapFiles {
+            maps: self,
+            depth: depth.map(read).transpose()?,
+            semantic: self.semantic.as_deref().map(read).transpose()?,
+            segments: self.segments.as_deref().map(read).transpose()?,
         })
+    }
+}
+
+/// The bytes of a frame's map files.
+#[derive(Debug)]
+pub(super) struct MapFiles<'a> {
+    maps: &'a Maps,
+    depth: Option<Vec<u8>>,
+    semantic: Option<Vec<u8>>,
+    segments: Option<Vec<u8>>,
+}
+
+impl MapFiles<'_> {
+    /// The content of the maps: of the files, and the unit of depth.
+    pub(super) fn digest(&self) -> Digest {
+        let unit = match &self.maps.depth {
+            Some(DepthFile::Png { scale, .. }) => scale.to_string(),
+            Some(DepthFile::Npy(_)) => "m".to_owned(),
+            None => String::new(),
+        };
+        let files = [&self.depth, &self.semantic, &self.segments].map(|file| {
+            let digest = file.as_deref().map(Digest::of);
+            digest.map_or_else(Vec::new, |digest| digest.as_bytes().to_vec())
+        });
+        Digest::of_parts(
+            [unit.as_bytes()]
+                .into_iter()
+                .chain(files.iter().map(Vec::as_slice)),
+        )
+    }
+
+    /// Depth in millimetres.
+    ///
+    /// # Errors
+    /// As for the other maps, with the file: one of another form or another size than the image, or with a value that
+    /// cannot be.
+    pub(super) fn depth(&self, size: Size) -> Result<Option<Array2<u32>>> {
+        let Some((file, bytes)) = self.maps.depth.as_ref().zip(self.depth.as_ref()) else {
+            return Ok(None);
+        };
+        of(file.path(), file.decode(bytes, size)).map(Some)
+    }
+
+    /// The class of each pixel.
+    pub(super) fn semantic(&self, size: Size) -> Result<Option<Array2<u16>>> {
+        let Some((path, bytes)) = self.maps.semantic.as_ref().zip(self.semantic.as_ref()) else {
+            return Ok(None);
+        };
+        of(path, semantic(bytes, size)).map(Some)
+    }
+
+    /// The segment of each pixel.
+    pub(super) fn segments(&self, size: Size) -> Result<Option<Array2<u32>>> {
+        let Some((path, bytes)) = self.maps.segments.as_ref().zip(self.segments.as_ref()) else {
+            return Ok(None);
+        };
+        of(path, segments(bytes, size, is_npy(path))).map(Some)
     }
 }
 
 /// Height and width in pixels.
 type Size = (usize, usize);
 
-fn semantic(path: &Path, size: Size) -> Result<Array2<u16>> {
-    load(path, |bytes| {
-        let ids = png(bytes, &[Form::Grey8, Form::Grey16, Form::Palette], size)?;
-        grid(size, ids.into_iter().map(Ok))
-    })
+fn semantic(bytes: &[u8], size: Size) -> Result<Array2<u16>, String> {
+    let ids = png(bytes, &[Form::Grey8, Form::Grey16, Form::Palette], size)?;
+    Array2::from_shape_vec(size, ids).map_err(|e| e.to_string())
 }
 
-fn segments(path: &Path, size: Size) -> Result<Array2<u32>> {
-    load(path, |bytes| {
-        if is_npy(path) {
-            grid(size, npy(bytes, size)?.integers()?.map(segment))
-        } else {
-            let ids = png(bytes, &[Form::Grey16], size)?;
-            grid(size, ids.into_iter().map(|id| Ok(id.into())))
-        }
-    })
+fn segments(bytes: &[u8], size: Size, as_npy: bool) -> Result<Array2<u32>, String> {
+    if as_npy {
+        return grid(size, npy(bytes, size)?.integers()?.map(segment));
+    }
+    // 8 bits hold 255 segments, and a wider id is cut to them without a trace.
+    let ids = png(bytes, &[Form::Grey16], size)?;
+    let ids = ids.into_iter().map(u32::from).collect();
+    Array2::from_shape_vec(size, ids).map_err(|e| e.to_string())
 }
 
 /// The id of a segment.
@@ -152,10 +215,9 @@ fn is_npy(path: &Path) -> bool {
         .is_some_and(|ending| ending.eq_ignore_ascii_case("npy"))
 }
 
-/// Reads a file, and says of which file a problem is.
-fn load<T>(path: &Path, read: impl FnOnce(&[u8]) -> Result<T, String>) -> Result<T> {
-    let bytes = fs::read(path).map_err(|e| Error::file(path, "read", e))?;
-    read(&bytes).map_err(|problem| Error::data(path.display(), problem))
+/// Says of which file a problem is.
+fn of<T>(path: &Path, read: Result<T, String>) -> Result<T> {
+    read.map_err(|problem| Error::data(path.display(), problem))
 }
 
 fn png(bytes: &[u8], forms: &[Form], size: Size) -> Result<Vec<u16>, String> {
@@ -212,7 +274,27 @@ mod tests {
 
     fn depth(name: &str, bytes: &[u8], scale: Option<f64>, size: Size) -> Result<Array2<u32>> {
         let (_folder, path) = written(name, bytes);
-        DepthFile::new(path, scale).unwrap().read(size)
+        let maps = Maps {
+            depth: Some(DepthFile::new(path, scale).unwrap()),
+            ..Maps::default()
+        };
+        maps.read()?.depth(size).map(Option::unwrap)
+    }
+
+    fn semantic(path: &Path, size: Size) -> Result<Array2<u16>> {
+        let maps = Maps {
+            semantic: Some(path.to_owned()),
+            ..Maps::default()
+        };
+        maps.read()?.semantic(size).map(Option::unwrap)
+    }
+
+    fn segments(path: &Path, size: Size) -> Result<Array2<u32>> {
+        let maps = Maps {
+            segments: Some(path.to_owned()),
+            ..Maps::default()
+        };
+        maps.read()?.segments(size).map(Option::unwrap)
     }
 
     #[test]
@@ -312,9 +394,9 @@ mod tests {
         let says = "1 × 2 pixels (height × width), but its image has 2 × 1";
         let (_folder, png) = written("m.png", &deep((1, 2), &[1, 2]));
         let (_folder, npy) = written("m.npy", &npy_file("|u1", "(1, 2)", &[1, 2]));
-        let depth = DepthFile::new(png.clone(), Some(0.001)).unwrap();
+        let units = deep((1, 2), &[1, 2]);
         for error in [
-            depth.read((2, 1)).unwrap_err(),
+            depth("m.png", &units, Some(0.001), (2, 1)).unwrap_err(),
             semantic(&png, (2, 1)).unwrap_err(),
             segments(&png, (2, 1)).unwrap_err(),
             segments(&npy, (2, 1)).unwrap_err(),

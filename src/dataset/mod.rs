@@ -14,18 +14,23 @@ pub mod picture;
 pub mod questions;
 mod raw_png;
 pub mod rooms;
+pub mod spaces;
 mod table;
+mod view;
 
 use std::collections::{BTreeMap, HashSet};
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 use crate::error::{Error, Result};
-use crate::types::{Digest, Frame, FrameId, Question};
+use crate::types::{Digest, Frame, FrameId, Labels, Question};
 
 use maps::Maps;
 use picture::MOST_PIXELS;
 pub use picture::Picture;
+pub use view::FrameFiles;
+use view::View;
 
 /// Where the data are.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -40,7 +45,11 @@ pub enum Place {
 #[derive(Debug, Clone)]
 enum Source {
     /// An image file, and the map files beside it.
-    File { rgb: PathBuf, maps: Maps },
+    File {
+        rgb: PathBuf,
+        maps: Maps,
+        view: View,
+    },
     /// A base64 cell of a table: the row's place in the file.
     Cell(table::Cell),
     /// A built-in room.
@@ -53,6 +62,7 @@ impl Source {
         Self::File {
             rgb,
             maps: Maps::default(),
+            view: View::default(),
         }
     }
 }
@@ -61,8 +71,11 @@ impl Source {
 #[derive(Debug)]
 pub struct Dataset {
     name: String,
+    /// The name that the data set gives itself; empty where it gives none.
+    title: String,
     sources: BTreeMap<FrameId, Source>,
     questions: Vec<Question>,
+    labels: Option<Labels>,
     most_pixels: u64,
 }
 
@@ -70,8 +83,10 @@ impl Dataset {
     fn new(name: String, sources: BTreeMap<FrameId, Source>, questions: Vec<Question>) -> Self {
         Self {
             name,
+            title: String::new(),
             sources,
             questions,
+            labels: None,
             most_pixels: MOST_PIXELS,
         }
     }
@@ -84,6 +99,23 @@ impl Dataset {
             frames::image(path)?
         };
         Ok(Self::new(stem(path), sources, Vec::new()))
+    }
+
+    /// The frames of a folder with what its labels stand for, without questions. No image is read.
+    pub fn of_frames(folder: &Path) -> Result<Self> {
+        if !folder.is_dir() {
+            return Err(Error::usage(
+                "DATA",
+                format_args!("{}: no such folder of frames", folder.display()),
+            ));
+        }
+        frames::frames(folder)
+    }
+
+    /// What the numbers of the semantic maps stand for; `None` where the data set does not say.
+    #[must_use]
+    pub fn labels(&self) -> Option<&Labels> {
+        self.labels.as_ref()
     }
 
     /// Reads images of up to so many pixels, instead of [`MOST_PIXELS`].
@@ -141,6 +173,12 @@ impl Dataset {
         &self.name
     }
 
+    /// The name that the data set gives itself in its `dataset.json`, the same wherever it lies; empty where it gives none.
+    #[must_use]
+    pub fn title(&self) -> &str {
+        &self.title
+    }
+
     /// The questions, in the order of their file.
     #[must_use]
     pub fn questions(&self) -> &[Question] {
@@ -166,18 +204,40 @@ impl Dataset {
         }
     }
 
+    /// The image file of a frame; `None` where it has none of its own.
+    #[must_use]
+    pub fn image_file(&self, frame: &FrameId) -> Option<&Path> {
+        match self.sources.get(frame)? {
+            Source::File { rgb, .. } => Some(rgb),
+            Source::Cell(_) | Source::Room(_) => None,
+        }
+    }
+
+    /// The files of a frame, undecoded.
+    ///
+    /// # Errors
+    /// With the file that cannot be read.
+    pub fn files<'a>(&'a self, frame: &'a FrameId) -> Result<FrameFiles<'a>> {
+        const NONE: &Maps = &Maps::NONE;
+        static UNKNOWN: LazyLock<View> = LazyLock::new(View::default);
+        let (maps, view) = match self.sources.get(frame) {
+            Some(Source::File { maps, view, .. }) => (maps, view),
+            _ => (NONE, &*UNKNOWN),
+        };
+        Ok(FrameFiles {
+            id: frame,
+            picture: self.picture(frame)?,
+            maps: maps.read()?,
+            view,
+        })
+    }
+
     /// A frame: its image decoded, with the maps that the data set has of it.
     ///
     /// # Errors
     /// With the file: an image or a map that cannot be read, a map of another size than the image.
     pub fn frame(&self, frame: &FrameId) -> Result<Frame> {
-        let rgb = self.picture(frame)?.decode()?;
-        let none = Maps::default();
-        let maps = match self.sources.get(frame) {
-            Some(Source::File { maps, .. }) => maps,
-            _ => &none,
-        };
-        maps.frame(frame.clone(), rgb)
+        self.files(frame)?.decode()
     }
 
     /// The content of all questions, evidence left out: what is asked decides a reply, why it is right does not.

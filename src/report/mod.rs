@@ -2,6 +2,7 @@
 
 pub mod files;
 pub mod histogram;
+pub mod questions;
 pub mod realism;
 pub mod sheet;
 pub mod table;

@@ -9,7 +9,9 @@ mod drive;
 mod identity;
 mod interrupt;
 mod plan;
+
 pub mod progress;
+pub mod questions;
 pub mod realism;
 mod recipe;
 mod record;

@@ -1,10 +1,13 @@
 //! What is seen: [`Frame`], [`FrameId`], [`Rgb`].
 
+use std::collections::BTreeMap;
 use std::fmt;
+use std::sync::Arc;
 
 use ndarray::{Array2, Array3};
 use serde::{Deserialize, Serialize};
 
+use super::labels::SegmentName;
 use crate::error::Error;
 
 /// The name of a frame, unique in its data set: `scene/frame`, or the path of an image in a ready-made set.
@@ -83,14 +86,61 @@ impl fmt::Debug for Rgb {
 pub struct Frame {
     /// Its name.
     pub id: FrameId,
+    /// The scene it is a view of; empty where the data set says nothing of scenes.
+    pub scene: String,
     /// The image.
     pub rgb: Rgb,
     /// Depth in millimetres, 0 where there is none.
     pub depth: Option<Array2<u32>>,
+    /// What depth is measured along.
+    pub depth_kind: DepthKind,
+    /// How the camera projects; `None` where the data set does not say.
+    pub intrinsics: Option<Intrinsics>,
     /// The class of each pixel, an id of the data set's own classes.
     pub semantic: Option<Array2<u16>>,
     /// The segment of each pixel, 0 where there is none.
     pub segments: Option<Array2<u32>>,
+    /// What the segments are.
+    pub segmentation: Segmentation,
+    /// What is known of the segments of the scene by name.
+    pub names: Arc<BTreeMap<u32, SegmentName>>,
+    /// The type of the room, where a person has said it.
+    pub room: Option<String>,
+}
+
+/// What a depth is measured along.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DepthKind {
+    /// The optical axis: z.
+    #[default]
+    Planar,
+    /// The ray through the pixel: the distance itself.
+    Euclid,
+}
+
+/// What the segments of a map are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Segmentation {
+    /// Objects: one segment each.
+    #[default]
+    Instances,
+    /// Parts of objects, as superpixels are: neighbours of one class belong together.
+    Parts,
+}
+
+/// A pinhole camera, in pixels; the centre of the first pixel is (0, 0).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Intrinsics {
+    /// The focal length along a row.
+    pub fx: f64,
+    /// The focal length along a column.
+    pub fy: f64,
+    /// The optical axis along a row.
+    pub cx: f64,
+    /// The optical axis along a column.
+    pub cy: f64,
 }
 
 #[cfg(test)]

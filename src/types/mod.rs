@@ -3,6 +3,7 @@
 pub mod condition;
 pub mod digest;
 pub mod frame;
+pub mod labels;
 pub mod light;
 pub mod manifest;
 pub mod question;
@@ -11,7 +12,8 @@ pub mod trial;
 
 pub use condition::{Condition, EnhancerName};
 pub use digest::Digest;
-pub use frame::{Frame, FrameId, Rgb};
+pub use frame::{DepthKind, Frame, FrameId, Intrinsics, Rgb, Segmentation};
+pub use labels::{Label, Labels, SegmentName};
 pub use light::{DarkLevel, Degradation, Level, Stops, Variant, Variants};
 pub use question::{Answer, Choices, Family, Question, QuestionId, Why};
 pub use reply::{Finish, Reply, Usage};

@@ -3,10 +3,14 @@
 //! The same structure is read three times: from the arguments, from `DARKQA_*` variables and from a `--config` file
 //! (see [`crate::config`]); so every field is an `Option`, a list or a switch, and no default stands here.
 
+mod questions;
+
 use std::num::{NonZeroU32, NonZeroU64, NonZeroUsize};
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
+
+pub use questions::QuestionsArgs;
 
 /// Measures how well a vision-language model sees in the dark.
 ///
@@ -36,6 +40,8 @@ pub enum Command {
     Synthesize(SynthesizeArgs),
     /// Hold the synthesis against real pairs of images in normal and low light
     Realism(RealismArgs),
+    /// Make multiple-choice questions about frames, by rule, from their depth, class and segment maps
+    Questions(QuestionsArgs),
 }
 
 /// The flags of `synthesize`.

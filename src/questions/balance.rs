@@ -1,0 +1,307 @@
+//! Evening out the answers, so that a model that sees nothing gains nothing by habit: [`balance`].
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+use std::str::FromStr;
+
+use super::generate::Asked;
+use super::rules::Balance;
+use crate::error::Error;
+use crate::types::{Digest, Family};
+
+/// How far the answers are evened out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Balanced {
+    /// Not at all: Algorithm 1 to the letter.
+    None,
+    /// As many yes as no of each class and activity, but for one.
+    #[default]
+    Binary,
+    /// And no room and no colour is too large a share of the answers.
+    Full,
+}
+
+impl FromStr for Balanced {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        match text {
+            "none" => Ok(Self::None),
+            "binary" => Ok(Self::Binary),
+            "full" => Ok(Self::Full),
+            _ => Err(Error::usage(
+                "balance",
+                format_args!("{text:?} is none of none, binary, full"),
+            )),
+        }
+    }
+}
+
+impl fmt::Display for Balanced {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::None => "none",
+            Self::Binary => "binary",
+            Self::Full => "full",
+        })
+    }
+}
+
+/// What stays, and what does not.
+pub(super) struct Evened {
+    pub(super) asked: Vec<Asked>,
+    /// The family of each question that was dropped.
+    pub(super) dropped: Vec<Family>,
+    /// Answers that stayed too frequent.
+    pub(super) uneven: Vec<String>,
+}
+
+/// Drops questions until the answers are even. Which of several go is decided by the digest of their names.
+pub(super) fn balance(asked: Vec<Asked>, how: Balanced, rule: &Balance) -> Evened {
+    let mut dropped: BTreeSet<usize> = BTreeSet::new();
+    let mut uneven = Vec::new();
+    if rule.max_repeat > 0 {
+        let key = |asked: &Asked| {
+            let question = &asked.question;
+            (
+                asked.scene.clone(),
+                question.text.clone(),
+                asked.answer().to_owned(),
+            )
+        };
+        for (_, list) in groups(&asked, &dropped, |asked| Some(key(asked))) {
+            dropped.extend(list.into_iter().skip(rule.max_repeat));
+        }
+    }
+    if rule.least_entropy_ppm > 0 {
+        let lists = groups(&asked, &dropped, |asked| Some(asked.question.text.clone()));
+        for (_, list) in lists {
+            if !varied(&asked, &list, rule) {
+                dropped.extend(list);
+            }
+        }
+    }
+    if how != Balanced::None {
+        let binary = |asked: &Asked| {
+            let family = &asked.question.family;
+            matches!(family, Family::Affordance | Family::Presence)
+                .then(|| (family.clone(), asked.about.clone()))
+        };
+        for (_, list) in groups(&asked, &dropped, binary) {
+            let truth = |i: &usize| asked[*i].question.choices.truth();
+            let (yes, no): (Vec<usize>, Vec<usize>) = list.into_iter().partition(|i| truth(i) == 0);
+            let most = yes.len().min(no.len()) + 1;
+            dropped.extend(yes.into_iter().skip(most));
+            dropped.extend(no.into_iter().skip(most));
+        }
+    }
+    if how == Balanced::Full {
+        for (family, share) in [
+            (Family::RoomType, rule.room_type_share_ppm),
+            (Family::Color, rule.color_share_ppm),
+        ] {
+            let answer = |asked: &Asked| {
+                (asked.question.family == family).then(|| asked.answer().to_owned())
+            };
+            let lists = groups(&asked, &dropped, answer);
+            match caps(&lists, share) {
+                Some(most) => {
+                    dropped.extend(
+                        lists
+                            .into_values()
+                            .flat_map(|list| list.into_iter().skip(most)),
+                    );
+                }
+                None if lists.is_empty() => {}
+                None => uneven.push(format!(
+                    "{family}: {} answers cannot be made even to {} % each",
+                    lists.len(),
+                    share / 10_000
+                )),
+            }
+        }
+    }
+    let families = dropped
+        .iter()
+        .map(|i| asked[*i].question.family.clone())
+        .collect();
+    let kept = asked
+        .into_iter()
+        .enumerate()
+        .filter(|(i, _)| !dropped.contains(i));
+    Evened {
+        asked: kept.map(|(_, asked)| asked).collect(),
+        dropped: families,
+        uneven,
+    }
+}
+
+/// The questions that are left by key, each list in the order of its names' digests.
+fn groups<K: Ord>(
+    asked: &[Asked],
+    dropped: &BTreeSet<usize>,
+    key: impl Fn(&Asked) -> Option<K>,
+) -> BTreeMap<K, Vec<usize>> {
+    let mut groups: BTreeMap<K, Vec<usize>> = BTreeMap::new();
+    for (i, asked) in asked.iter().enumerate() {
+        if let Some(key) = key(asked).filter(|_| !dropped.contains(&i)) {
+            groups.entry(key).or_default().push(i);
+        }
+    }
+    for list in groups.values_mut() {
+        list.sort_by_key(|i| Digest::of(asked[*i].question.id.0.as_bytes()));
+    }
+    groups
+}
+
+/// How many of each answer stay, so that none is more than a share of all; as many as can be. `None` where there are too few
+/// answers for that.
+fn caps(lists: &BTreeMap<String, Vec<usize>>, share_ppm: u64) -> Option<usize> {
+    let total: usize = lists.values().map(Vec::len).sum();
+    let kept = |most: usize| -> usize { lists.values().map(|list| list.len().min(most)).sum() };
+    (1..=total)
+        .rev()
+        .map(|all| (all, (all as u64 * share_ppm / 1_000_000) as usize))
+        .find(|(all, most)| *most > 0 && kept(*most) >= *all)
+        .map(|(_, most)| most)
+}
+
+/// Whether a question occurs in enough scenes, with answers that differ enough: their entropy over that of the answers that are
+/// possible (EmbodiedQA, `entropy_based_filtering.py`).
+fn varied(asked: &[Asked], list: &[usize], rule: &Balance) -> bool {
+    let scenes: BTreeSet<&str> = list.iter().map(|i| asked[*i].scene.as_str()).collect();
+    if scenes.len() < rule.least_scenes {
+        return false;
+    }
+    let mut counts: BTreeMap<&str, u64> = BTreeMap::new();
+    for i in list {
+        *counts.entry(asked[*i].answer()).or_insert(0) += 1;
+    }
+    let total = list.len() as f64;
+    let entropy: f64 = counts
+        .values()
+        .map(|count| *count as f64 / total)
+        .map(|share| -share * libm::log2(share))
+        .sum();
+    let possible = list
+        .iter()
+        .map(|i| asked[*i].question.choices.len())
+        .max()
+        .unwrap_or(2);
+    entropy >= libm::log2(possible as f64) * rule.least_entropy_ppm as f64 / 1e6
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::Value;
+
+    use super::*;
+    use crate::types::{Choices, FrameId, Question, QuestionId};
+
+    fn asked(number: usize, family: Family, about: &str, answer: usize) -> Asked {
+        let texts = ["yes", "no", "perhaps"].map(str::to_owned).to_vec();
+        let question = Question {
+            id: QuestionId(format!("q{number}")),
+            frame: FrameId(format!("f{number}")),
+            family,
+            text: format!("{about}?"),
+            choices: Choices::new(texts, answer).unwrap(),
+            evidence: Value::Null,
+        };
+        Asked {
+            question,
+            about: about.to_owned(),
+            scene: format!("s{}", number % 5),
+        }
+    }
+
+    fn rule() -> Balance {
+        super::super::rules::Rules::built_in()
+            .unwrap()
+            .book()
+            .balance
+            .clone()
+    }
+
+    fn count(kept: &[Asked], about: &str, answer: &str) -> usize {
+        kept.iter()
+            .filter(|asked| asked.about == about && asked.answer() == answer)
+            .count()
+    }
+
+    #[test]
+    fn yes_and_no_are_even_but_for_one() {
+        let list = |family: &Family| {
+            let chairs = (0..9).map(|i| asked(i, family.clone(), "chair", usize::from(i >= 7)));
+            let beds = (9..12).map(|i| asked(i, family.clone(), "bed", 1));
+            chairs.chain(beds).collect::<Vec<_>>()
+        };
+        let kept = balance(list(&Family::Presence), Balanced::Binary, &rule());
+        assert_eq!(
+            (
+                count(&kept.asked, "chair", "yes"),
+                count(&kept.asked, "chair", "no")
+            ),
+            (3, 2)
+        );
+        assert_eq!((kept.asked.len(), kept.dropped.len()), (6, 6));
+        let mut reversed = list(&Family::Presence);
+        reversed.reverse();
+        let mut other = balance(reversed, Balanced::Binary, &rule()).asked;
+        other.reverse();
+        assert_eq!(other, kept.asked);
+        for (family, how) in [
+            (Family::Presence, Balanced::None),
+            (Family::Color, Balanced::Binary),
+        ] {
+            assert_eq!(balance(list(&family), how, &rule()).asked.len(), 12);
+        }
+    }
+
+    #[test]
+    fn no_colour_is_more_than_its_share() {
+        let counts = [40, 10, 10];
+        let list: Vec<Asked> = counts
+            .iter()
+            .enumerate()
+            .flat_map(|(answer, count)| {
+                (0..*count).map(move |i| asked(answer * 100 + i, Family::Color, "sofa", answer))
+            })
+            .collect();
+        let half = Balance {
+            color_share_ppm: 500_000,
+            ..rule()
+        };
+        let kept = balance(list.clone(), Balanced::Full, &half);
+        assert_eq!(
+            (count(&kept.asked, "sofa", "yes"), kept.asked.len()),
+            (20, 40)
+        );
+        let fifth = balance(list, Balanced::Full, &rule());
+        assert_eq!((fifth.asked.len(), fifth.uneven.len()), (60, 1));
+    }
+
+    #[test]
+    fn repeats_and_habits_go() {
+        let list: Vec<Asked> = (0..30)
+            .map(|i| asked(i, Family::Color, "sofa", usize::from(i < 3)))
+            .collect();
+        let most = Balance {
+            max_repeat: 2,
+            ..rule()
+        };
+        // Five scenes; three of the thirty answers are "no", each in its own scene.
+        assert_eq!(balance(list.clone(), Balanced::None, &most).asked.len(), 13);
+        for (ppm, kept) in [(200_000, 30), (500_000, 0)] {
+            let varied = Balance {
+                least_entropy_ppm: ppm,
+                ..rule()
+            };
+            assert_eq!(
+                balance(list.clone(), Balanced::None, &varied).asked.len(),
+                kept,
+                "{ppm}"
+            );
+        }
+    }
+}

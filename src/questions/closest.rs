@@ -1,0 +1,164 @@
+//! "Which object is closest to the camera?"
+
+use serde_json::json;
+
+use super::rules::{Flag, GapScope};
+use super::statistics::{Segment, SegmentDepth};
+use super::survey::{Claim, Reason, Survey, Verdict, falls};
+use crate::types::Family;
+
+/// The one candidate of a frame.
+pub(super) fn candidates(survey: &Survey<'_>) -> Vec<Verdict> {
+    let verdict = claim(survey);
+    vec![verdict.unwrap_or_else(|reason| falls(Family::Closest, "", None, reason))]
+}
+
+type Object<'a> = (&'a Segment, SegmentDepth);
+
+fn claim(survey: &Survey<'_>) -> Result<Verdict, Reason> {
+    let (book, statistics) = (survey.book, survey.statistics);
+    let depth = statistics.depth.as_ref().ok_or(Reason::NoDepth)?;
+    let measure = &book.measure;
+    if !(measure.least_median_depth_mm..=measure.most_median_depth_mm).contains(&depth.median) {
+        return Err(Reason::Scale);
+    }
+    let lower = statistics.pixels() / 2;
+    if statistics.lower_void * 1_000_000 > book.closest.lower_void_ppm * lower {
+        return Err(Reason::Void);
+    }
+    let mut objects: Vec<Object<'_>> = statistics
+        .evidence(book)
+        .filter(|segment| eligible(survey, segment))
+        .filter_map(|segment| Some((segment, segment.measured(book)?)))
+        .collect();
+    objects.sort_by_key(|(segment, depth)| (depth.median, segment.id));
+    let [first, rest @ ..] = &objects[..] else {
+        return Err(Reason::Few);
+    };
+    let second = match book.closest.gap_scope {
+        GapScope::Instances => rest.first(),
+        GapScope::Classes => rest.iter().find(|(other, _)| other.class != first.0.class),
+    };
+    let second = second.ok_or(Reason::Few)?;
+    let mut classes: Vec<&str> = Vec::new();
+    for (segment, _) in &objects {
+        if !classes.contains(&segment.class.as_str()) {
+            classes.push(&segment.class);
+        }
+    }
+    if classes.len() < 2 {
+        return Err(Reason::Few);
+    }
+    apart(survey, &objects, *first, *second)?;
+    rivals(survey, &objects, first.1.p10, second.1.median)?;
+
+    let winner = classes[0];
+    classes.truncate(book.closest.choices);
+    survey.picker.shuffle("closest", &mut classes);
+    let truth = classes
+        .iter()
+        .position(|class| *class == winner)
+        .unwrap_or(0);
+    let choices = classes
+        .iter()
+        .map(|class| book.name(class).to_owned())
+        .collect();
+    let more = json!({
+        "gap_mm": second.1.median - first.1.median,
+        "near_gap_mm": near_gap(&objects, *first),
+        "along": depth.along,
+    });
+    let segments: Vec<&Segment> = objects.iter().map(|(segment, _)| *segment).collect();
+    let text = book.closest.text.clone();
+    Ok(survey.rests(
+        Claim {
+            family: Family::Closest,
+            about: winner.to_owned(),
+            text,
+            choices,
+            truth,
+            evidence: more,
+        },
+        &segments,
+    ))
+}
+
+/// Whether a segment may be offered.
+fn eligible(survey: &Survey<'_>, segment: &Segment) -> bool {
+    let book = survey.book;
+    book.is(&segment.class, Flag::Asked)
+        && !book.is(&segment.class, Flag::Structural)
+        && !segment.flat(book)
+        && survey.statistics.area(segment) >= book.closest.area_ppm
+}
+
+/// How much nearer the near end of the first is than that of any other that competes with it.
+fn near_gap(objects: &[Object<'_>], first: Object<'_>) -> Option<u32> {
+    let others = objects
+        .iter()
+        .filter(|(segment, _)| segment.id != first.0.id);
+    let nearest = others.map(|(_, depth)| depth.p10).min()?;
+    nearest.checked_sub(first.1.p10)
+}
+
+/// The first must be clearly nearer than the second, and nobody's near end nearer than its own.
+fn apart(
+    survey: &Survey<'_>,
+    objects: &[Object<'_>],
+    first: Object<'_>,
+    second: Object<'_>,
+) -> Result<(), Reason> {
+    let rule = &survey.book.closest;
+    let (near, far) = (u64::from(first.1.median), u64::from(second.1.median));
+    let gap = far - near;
+    if gap < rule.gap_mm.into() || gap * 1_000_000 < near * rule.gap_ppm {
+        return Err(Reason::Gap);
+    }
+    let competes = |other: &&Object<'_>| {
+        rule.gap_scope == GapScope::Instances || other.0.class != first.0.class
+    };
+    let others: Vec<Object<'_>> = objects.iter().filter(competes).copied().collect();
+    match near_gap(&others, first) {
+        None => Err(Reason::Disputed),
+        Some(gap) if gap < rule.near_gap_mm => Err(Reason::Gap),
+        Some(_) => Ok(()),
+    }
+}
+
+/// Nothing that is not offered may be nearer than the second, nor reach nearer than the first.
+fn rivals(
+    survey: &Survey<'_>,
+    objects: &[Object<'_>],
+    nearest: u32,
+    second: u32,
+) -> Result<(), Reason> {
+    let (book, statistics) = (survey.book, survey.statistics);
+    let harmless = |class: &str| book.is(class, Flag::Structural) || book.is(class, Flag::Flat);
+    for segment in &statistics.segments {
+        // What has several classes may be anything.
+        let background = (harmless(&segment.class) || segment.flat(book)) && !segment.mixed(book);
+        if background || objects.iter().any(|(object, _)| object.id == segment.id) {
+            continue;
+        }
+        let area = statistics.area(segment);
+        match segment.measured(book) {
+            None if area >= book.closest.unmeasured_ppm => return Err(Reason::Unmeasured),
+            Some(depth)
+                if area >= book.closest.rival_ppm
+                    && (depth.median < second || depth.p10 < nearest) =>
+            {
+                return Err(Reason::Rival);
+            }
+            _ => {}
+        }
+    }
+    let loose = statistics
+        .loose
+        .iter()
+        .filter(|(class, _)| !harmless(class));
+    let loose: u64 = loose.map(|(_, pixels)| pixels).sum();
+    if statistics.ppm(loose) >= book.closest.rival_ppm {
+        return Err(Reason::Rival);
+    }
+    Ok(())
+}

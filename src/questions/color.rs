@@ -1,0 +1,126 @@
+//! "What color is the sofa in the image?"
+
+use serde_json::json;
+
+use super::colors::{Color, Palette};
+use super::rules::{ColorChoices, ColorRule, Flag};
+use super::statistics::{Segment, ppm};
+use super::survey::{Claim, Reason, Survey, Verdict, falls};
+use crate::types::Family;
+
+/// Every segment of a class whose colour may be asked.
+pub(super) fn candidates(survey: &Survey<'_>, palette: &Palette) -> Vec<Verdict> {
+    let segments = survey.statistics.segments.iter();
+    let colored = segments.filter(|segment| survey.book.is(&segment.class, Flag::Color));
+    colored
+        .map(|segment| {
+            let verdict = claim(survey, segment, palette);
+            verdict.unwrap_or_else(|reason| falls(Family::Color, &segment.class, None, reason))
+        })
+        .collect()
+}
+
+fn claim(survey: &Survey<'_>, segment: &Segment, palette: &Palette) -> Result<Verdict, Reason> {
+    let rule = &survey.book.color;
+    if let Some(flaw) = survey.statistics.disqualified(segment, survey.book) {
+        return Err(flaw.into());
+    }
+    if survey.statistics.area(segment) < rule.area_ppm || segment.core < rule.eroded_px {
+        return Err(Reason::Small);
+    }
+    if !alone(survey, segment) {
+        return Err(Reason::NotUnique);
+    }
+    let color = named(segment, rule, palette)?;
+    let (choices, truth) = offered(survey, color).ok_or(Reason::NotOffered)?;
+    let (_, most, next, none) = segment.leading_color();
+    let share = |part| ppm(part, segment.core);
+    let more = json!({
+        "core_px": segment.core,
+        "dominant_ppm": share(most),
+        "second_ppm": share(next),
+        "nameless_ppm": share(none),
+        "median_rgb": segment.median,
+    });
+    let text = rule
+        .text
+        .replace("{object}", survey.book.name(&segment.class));
+    Ok(survey.rests(
+        Claim {
+            family: Family::Color,
+            about: segment.class.clone(),
+            text,
+            choices,
+            truth,
+            evidence: more,
+        },
+        &[segment],
+    ))
+}
+
+/// Whether a segment is the only one of its class that a person would see; pixels of the class outside of all segments are
+/// another one.
+fn alone(survey: &Survey<'_>, segment: &Segment) -> bool {
+    let (statistics, least) = (survey.statistics, survey.book.color.lone_ppm);
+    let others = statistics.segments.iter().filter(|other| {
+        other.class == segment.class && other.id != segment.id && statistics.area(other) >= least
+    });
+    let loose = statistics.loose.get(&segment.class).copied().unwrap_or(0);
+    others.count() == 0 && statistics.ppm(loose) < least
+}
+
+/// The one colour that a person would name.
+fn named(segment: &Segment, rule: &ColorRule, palette: &Palette) -> Result<Color, Reason> {
+    let (color, most, next, none) = segment.leading_color();
+    let share = |part| ppm(part, segment.core);
+    let color = color.ok_or(Reason::Nameless)?;
+    if color != Color::White && share(segment.bright) > rule.bright_ppm {
+        return Err(Reason::Bright);
+    }
+    if color != Color::Black && share(segment.crushed) > rule.crushed_ppm {
+        return Err(Reason::Crushed);
+    }
+    if share(none) >= rule.none_ppm {
+        return Err(Reason::Nameless);
+    }
+    let dominant = share(most) >= rule.dominant_ppm && most >= rule.lead * next;
+    if !dominant || palette.color(segment.median) != Some(color) {
+        return Err(Reason::Motley);
+    }
+    Ok(color)
+}
+
+/// The colours that are offered, and which of them is true.
+fn offered(survey: &Survey<'_>, truth: Color) -> Option<(Vec<String>, usize)> {
+    let rule = &survey.book.color;
+    let mut colors = match rule.candidates {
+        ColorChoices::All11 => Color::ALL.to_vec(),
+        ColorChoices::Fixed8 => rule.fixed8.clone(),
+        ColorChoices::K5 => {
+            let near = |color: Color| {
+                rule.neighbours
+                    .iter()
+                    .any(|pair| *pair == [color, truth] || *pair == [truth, color])
+            };
+            let others = Color::ALL
+                .into_iter()
+                .filter(|color| *color != truth && !near(*color));
+            let mut others: Vec<Color> = others.collect();
+            survey.picker.shuffle("color", &mut others);
+            others.truncate(4);
+            others.push(truth);
+            others
+        }
+    };
+    if rule.candidates == ColorChoices::K5 {
+        colors.sort_unstable();
+    }
+    let index = colors.iter().position(|color| *color == truth)?;
+    Some((
+        colors
+            .into_iter()
+            .map(|color| color.name().to_owned())
+            .collect(),
+        index,
+    ))
+}

@@ -1,0 +1,28 @@
+//! Stage 2a, WORDS: frames → questions, by rule (DarkQA, arXiv 2512.24985, Algorithm 1).
+//!
+//! First each frame is measured ([`statistics`]), by integers alone; then the rules ([`rules`], `rules.toml`) see what was
+//! measured and nothing else: what room it is ([`room`]), then one file a family. [`generate`] is the door. There is no
+//! random state: what has to be picked is a function of the frame's name ([`pick`]), and nothing depends on the order in which
+//! frames come.
+
+mod affordance;
+pub mod balance;
+mod closest;
+mod color;
+#[cfg(test)]
+mod color_tree;
+pub mod colors;
+pub mod frequency;
+pub mod generate;
+pub mod pick;
+mod presence;
+pub mod room;
+mod room_type;
+pub mod rules;
+pub mod statistics;
+pub mod summary;
+pub mod survey;
+#[cfg(test)]
+mod tests;
+
+pub use generate::{Asked, Generated, Order, generate};

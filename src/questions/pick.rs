@@ -1,0 +1,122 @@
+//! Choices that look random and are a function of where they are made: [`Picker`].
+
+use crate::types::{Digest, FrameId};
+
+/// The first word of all that is picked; another one would be another benchmark.
+const DOMAIN: &[u8] = b"darkqa-eval questions 1";
+
+/// Picks for one frame.
+///
+/// There is no state: a pick is the BLAKE3 digest of seed, data set, scene, frame and purpose, scaled to the range. So the
+/// order in which frames come changes nothing.
+#[derive(Debug, Clone, Copy)]
+pub struct Picker<'a> {
+    /// The rulebook's.
+    pub seed: u64,
+    /// The data set's name.
+    pub dataset: &'a str,
+    /// The frame.
+    pub frame: &'a FrameId,
+}
+
+impl Picker<'_> {
+    /// The 64 bits of a purpose.
+    #[must_use]
+    pub fn bits(&self, family: &str, purpose: &str) -> u64 {
+        let seed = self.seed.to_le_bytes();
+        let parts = [
+            DOMAIN,
+            &seed,
+            self.dataset.as_bytes(),
+            self.frame.0.as_bytes(),
+            family.as_bytes(),
+            purpose.as_bytes(),
+        ];
+        let digest = Digest::of_parts(parts);
+        digest
+            .as_bytes()
+            .iter()
+            .take(8)
+            .fold(0, |bits, byte| (bits << 8) | u64::from(*byte))
+    }
+
+    /// A number below `count`, which is above 0.
+    #[must_use]
+    pub fn pick(&self, family: &str, purpose: &str, count: usize) -> usize {
+        ((u128::from(self.bits(family, purpose)) * count as u128) >> 64) as usize
+    }
+
+    /// Shuffles, each order as likely as any other (Fisher and Yates).
+    pub fn shuffle<T>(&self, family: &str, list: &mut [T]) {
+        for last in (1..list.len()).rev() {
+            let other = self.pick(family, &format!("shuffle {last}"), last + 1);
+            list.swap(last, other);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn picks_are_even_and_pinned() {
+        let mut counts = [0; 6];
+        let mut orders = std::collections::BTreeMap::new();
+        for i in 0..6_000 {
+            let frame = FrameId(format!("scene/{i}"));
+            let picker = Picker {
+                seed: 0,
+                dataset: "d",
+                frame: &frame,
+            };
+            counts[picker.pick("color", "segment", 6)] += 1;
+            let mut list = [0, 1, 2];
+            picker.shuffle("closest", &mut list);
+            *orders.entry(list).or_insert(0) += 1;
+        }
+        // 1,000 each, deviation 29.
+        assert!(
+            counts.iter().all(|count| (880..1120).contains(count)),
+            "{counts:?}"
+        );
+        assert_eq!(orders.len(), 6);
+        assert!(
+            orders.values().all(|count| (880..1120).contains(count)),
+            "{orders:?}"
+        );
+        let frame = FrameId("scene/0".into());
+        let picker = Picker {
+            seed: 0,
+            dataset: "d",
+            frame: &frame,
+        };
+        assert_eq!(picker.bits("color", "segment"), 13977079698431977642);
+    }
+
+    #[test]
+    fn every_part_counts() {
+        let (here, there) = (FrameId("a".into()), FrameId("b".into()));
+        let one = Picker {
+            seed: 0,
+            dataset: "d",
+            frame: &here,
+        };
+        let bits = one.bits("color", "x");
+        for other in [
+            Picker { seed: 1, ..one },
+            Picker {
+                dataset: "e",
+                ..one
+            },
+            Picker {
+                frame: &there,
+                ..one
+            },
+        ] {
+            assert_ne!(bits, other.bits("color", "x"));
+        }
+        assert_ne!(bits, one.bits("closest", "x"));
+        assert_ne!(bits, one.bits("color", "y"));
+    }
+}

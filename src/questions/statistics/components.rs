@@ -1,0 +1,129 @@
+//! Connected pieces of one label: [`components`].
+
+use super::rim::runs;
+
+/// A run of one label in a row.
+struct Run {
+    left: usize,
+    right: usize,
+    label: u32,
+}
+
+/// Numbers the pieces of equal label that hang together by edges or corners, row by row from 1; label 0 is none and keeps 0.
+pub(super) fn components(labels: &[u32], [width, height]: [usize; 2]) -> Vec<u32> {
+    let mut parents: Vec<u32> = Vec::new();
+    let mut rows: Vec<Vec<(Run, u32)>> = Vec::with_capacity(height);
+    for y in 0..height {
+        let row = &labels[y * width..][..width];
+        let mut found: Vec<(Run, u32)> = Vec::new();
+        let above: &[(Run, u32)] = rows.last().map_or(&[], |above| above);
+        // Runs of both rows come from left to right: whatever ends before this one begins is passed for good.
+        let mut first = 0;
+        for (left, right) in runs(row) {
+            let label = row[left];
+            if label == 0 {
+                continue;
+            }
+            while above.get(first).is_some_and(|(run, _)| run.right < left) {
+                first += 1;
+            }
+            let mut own = None;
+            for (run, node) in above[first..]
+                .iter()
+                .take_while(|(run, _)| run.left <= right)
+            {
+                if run.label != label {
+                    continue;
+                }
+                own = Some(match own {
+                    None => *node,
+                    Some(other) => join(&mut parents, other, *node),
+                });
+            }
+            let node = own.unwrap_or_else(|| {
+                parents.push(parents.len() as u32);
+                parents.len() as u32 - 1
+            });
+            found.push((Run { left, right, label }, node));
+        }
+        rows.push(found);
+    }
+    number(&rows, &mut parents, [width, height])
+}
+
+/// Joins two trees; the older root stays.
+fn join(parents: &mut [u32], one: u32, other: u32) -> u32 {
+    let (one, other) = (root(parents, one), root(parents, other));
+    let (old, new) = (one.min(other), one.max(other));
+    parents[new as usize] = old;
+    old
+}
+
+fn root(parents: &mut [u32], mut node: u32) -> u32 {
+    while parents[node as usize] != node {
+        parents[node as usize] = parents[parents[node as usize] as usize];
+        node = parents[node as usize];
+    }
+    node
+}
+
+fn number(rows: &[Vec<(Run, u32)>], parents: &mut [u32], [width, height]: [usize; 2]) -> Vec<u32> {
+    let mut numbers = vec![0; parents.len()];
+    let mut next = 1;
+    let mut pieces = vec![0; width * height];
+    for (y, row) in rows.iter().enumerate() {
+        for (run, node) in row {
+            let root = root(parents, *node) as usize;
+            if numbers[root] == 0 {
+                numbers[root] = next;
+                next += 1;
+            }
+            pieces[y * width + run.left..y * width + run.right].fill(numbers[root]);
+        }
+    }
+    pieces
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn plainly(labels: &[u32], [width, height]: [usize; 2]) -> Vec<u32> {
+        let mut pieces = vec![0; labels.len()];
+        let mut next = 0;
+        for start in 0..labels.len() {
+            if labels[start] == 0 || pieces[start] != 0 {
+                continue;
+            }
+            next += 1;
+            let mut open = vec![start];
+            pieces[start] = next;
+            while let Some(i) = open.pop() {
+                let (x, y) = (i % width, i / width);
+                for j in y.saturating_sub(1)..=(y + 1).min(height - 1) {
+                    for k in x.saturating_sub(1)..=(x + 1).min(width - 1) {
+                        let there = j * width + k;
+                        if labels[there] == labels[start] && pieces[there] == 0 {
+                            pieces[there] = next;
+                            open.push(there);
+                        }
+                    }
+                }
+            }
+        }
+        pieces
+    }
+
+    proptest! {
+        #[test]
+        fn pieces_hang_together(
+            (width, height, labels) in (1..12_usize, 1..12_usize).prop_flat_map(|(width, height)| {
+                (Just(width), Just(height), prop::collection::vec(0..3_u32, width * height))
+            }),
+        ) {
+            prop_assert_eq!(components(&labels, [width, height]), plainly(&labels, [width, height]));
+        }
+    }
+}

@@ -1,0 +1,153 @@
+//! "Is this room suitable for this?"
+
+use super::*;
+
+fn ask(frame: &FrameStatistics, activity: &str, answer: &str) -> Option<Reason> {
+    candidate(frame, &Family::Affordance, activity, answer).err()
+}
+
+#[test]
+fn yes_needs_the_room_and_what_it_takes() {
+    let bedroom = frame(&BEDROOM);
+    assert_eq!(ask(&bedroom, "sleep", "yes"), None);
+    assert_eq!(ask(&bedroom, "cook a meal", "yes"), Some(Reason::OtherRoom));
+    let bathroom = frame(&[("toilet", "toilet", 60_000), ("towel", "towel", 9_000)]);
+    assert_eq!(ask(&bathroom, "use the toilet", "yes"), None);
+    assert_eq!(ask(&bathroom, "take a shower", "yes"), Some(Reason::Unseen));
+    assert_eq!(
+        ask(&frame(&[("wall", "", 9_000)]), "sleep", "yes"),
+        Some(Reason::NoRoom)
+    );
+    for (segments, activity) in [
+        (vec![("bathtub", "bathtub", 60_000)], "take a shower"),
+        (
+            vec![("toilet", "", 60_000), ("sink", "sink", 9_000)],
+            "wash my hands",
+        ),
+        (
+            vec![
+                ("cabinet", "kitchen cabinet", 60_000),
+                ("sink", "sink", 9_000),
+            ],
+            "wash my hands",
+        ),
+        (vec![("appliances", "stove", 60_000)], "cook a meal"),
+        (
+            vec![("appliances", "", 60_000), ("counter", "", 60_000)],
+            "cook a meal",
+        ),
+        (
+            vec![("sofa", "sofa", 60_000), ("tv_monitor", "tv", 9_000)],
+            "watch TV on the sofa",
+        ),
+        (vec![("sofa", "sofa", 60_000)], "relax on a sofa"),
+        (
+            vec![("table", "dining table", 60_000), ("chair", "chair", 9_000)],
+            "have dinner with my family",
+        ),
+        (
+            vec![("table", "desk", 60_000), ("chair", "office chair", 9_000)],
+            "work at a desk",
+        ),
+    ] {
+        assert_eq!(ask(&frame(&segments), activity, "yes"), None, "{activity}");
+    }
+}
+
+#[test]
+fn no_needs_that_nothing_of_it_is_seen() {
+    let bathroom = [("toilet", "toilet", 60_000), ("towel", "towel", 9_000)];
+    let with = |class, word| frame(&[&bathroom[..], &[(class, word, 1)]].concat());
+    assert_eq!(ask(&frame(&bathroom), "sleep", "no"), None);
+    assert_eq!(
+        ask(&frame(&bathroom), "use the toilet", "no"),
+        Some(Reason::OtherRoom)
+    );
+    for (activity, class, word) in [
+        ("sleep", "bed", "bed"),
+        ("sleep", "sofa", "sofa"),
+        ("sleep", "seating", "bench"),
+        ("cook a meal", "appliances", "stove"),
+        ("cook a meal", "misc", "oven and stove"),
+        ("cook a meal", "appliances", "microwave"),
+        ("watch TV on the sofa", "tv_monitor", "tv"),
+        ("relax on a sofa", "sofa", "sofa"),
+        ("have dinner with my family", "table", "table"),
+        ("work at a desk", "table", "side table"),
+    ] {
+        assert_eq!(
+            ask(&with(class, word), activity, "no"),
+            Some(Reason::Seen),
+            "{activity} {word}"
+        );
+        assert_eq!(ask(&frame(&bathroom), activity, "no"), None, "{activity}");
+    }
+}
+
+#[test]
+fn no_needs_a_frame_that_says_what_is_not_there() {
+    let bedroom = frame(&BEDROOM);
+    let no = |frame: &FrameStatistics| ask(frame, "cook a meal", "no");
+    assert_eq!(no(&bedroom), None);
+    let void = |effective_void| FrameStatistics {
+        effective_void,
+        ..bedroom.clone()
+    };
+    assert_eq!(
+        (no(&void(50_000)), no(&void(50_001))),
+        (None, Some(Reason::Void))
+    );
+    let mirror = |area| frame(&[&BEDROOM[..], &[("mirror", "mirror", area)]].concat());
+    assert_eq!(
+        (no(&mirror(30_000)), no(&mirror(30_001))),
+        (None, Some(Reason::Mirror))
+    );
+}
+
+#[test]
+fn what_would_do_at_a_pinch_counts_where_that_is_strict() {
+    let frame = frame(&[("toilet", "toilet", 60_000), ("sofa", "sofa", 9_000)]);
+    let rules = rules("strict = true", "strict = false");
+    let lenient = candidate_by(&frame, &Family::Affordance, "sleep", "no", &rules);
+    assert_eq!(ask(&frame, "sleep", "no"), Some(Reason::Seen));
+    assert_eq!(
+        lenient.unwrap().text,
+        "I want to sleep, is this room suitable for this?"
+    );
+}
+
+#[test]
+fn what_cannot_be_labelled_is_not_denied() {
+    let mut labels = labels();
+    labels.expressible.remove("sofa");
+    let rules = Rules::built_in().unwrap();
+    let said = say(
+        &[frame(&BEDROOM)],
+        |order| order.families = [Family::Affordance].into(),
+        &rules,
+    );
+    assert!(said.candidates.len() > 10);
+    let bathroom = frame(&[("toilet", "toilet", 60_000)]);
+    let palette = Palette::built_in().unwrap();
+    let order = Order {
+        dataset: "",
+        labels: &labels,
+        rules: &rules,
+        palette: &palette,
+        families: Family::PAPER.into_iter().collect(),
+        room_source: RoomSource::Signature,
+        balance: Balanced::None,
+        rejected: BTreeSet::new(),
+    };
+    let mut reasons = BTreeSet::new();
+    generate(&[bathroom], &order, |_, verdict| {
+        if let Verdict::Falls(fallen) = verdict
+            && fallen.answer.as_deref() == Some("no")
+            && ["sleep", "relax on a sofa", "sofa"].contains(&fallen.about.as_str())
+        {
+            reasons.insert(fallen.reason);
+        }
+    })
+    .unwrap();
+    assert_eq!(reasons, [Reason::Inexpressible].into());
+}

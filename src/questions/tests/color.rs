@@ -1,0 +1,142 @@
+//! "What color is the sofa in the image?"
+
+use super::*;
+
+fn sofa(change: impl FnOnce(&mut FrameStatistics)) -> Option<Reason> {
+    let mut frame = frame(&[("wall", "wall", 500_000), ("sofa", "sofa", 100_000)]);
+    change(&mut frame);
+    candidate(&frame, &Family::Color, "sofa", "").err()
+}
+
+/// A sofa with so many thousandths of brown, of red, and without a name.
+fn shares(brown: u64, red: u64, none: u64) -> Option<Reason> {
+    sofa(|frame| {
+        let sofa = &mut frame.segments[1];
+        sofa.colors = [0; NONE + 1];
+        sofa.colors[Color::Brown as usize] = brown * 100;
+        sofa.colors[Color::Red as usize] = red * 100;
+        sofa.colors[NONE] = none * 100;
+        sofa.colors[Color::Blue as usize] = 100_000 - (brown + red + none) * 100;
+    })
+}
+
+#[test]
+fn one_colour_must_dominate() {
+    let frame = frame(&[("sofa", "sofa", 100_000)]);
+    let claim = candidate(&frame, &Family::Color, "sofa", "").unwrap();
+    assert_eq!((claim.answer(), claim.choices.len()), ("brown", 11));
+    assert_eq!(claim.text, "What color is the sofa in the image?");
+    assert_eq!(shares(600, 300, 0), None);
+    assert_eq!(shares(599, 201, 0), Some(Reason::Motley));
+    assert_eq!(shares(660, 330, 0), None);
+    assert_eq!(shares(660, 331, 0), Some(Reason::Motley));
+    assert_eq!(shares(650, 0, 299), None);
+    assert_eq!(shares(650, 0, 300), Some(Reason::Nameless));
+    assert_eq!(shares(300, 0, 600), Some(Reason::Nameless));
+    let median = sofa(|frame| frame.segments[1].median = [200, 30, 30]);
+    assert_eq!(median, Some(Reason::Motley));
+}
+
+#[test]
+fn it_must_be_the_only_one_and_large_enough() {
+    let beside = |area| {
+        let frame = frame(&[("sofa", "sofa", 100_000), ("sofa", "sofa", area)]);
+        candidate(&frame, &Family::Color, "sofa", "").err()
+    };
+    assert_eq!(
+        (beside(999), beside(1_000)),
+        (None, Some(Reason::NotUnique))
+    );
+    let loose = |pixels| {
+        sofa(|frame| {
+            frame.loose.insert("sofa".into(), pixels);
+        })
+    };
+    assert_eq!((loose(999), loose(1_000)), (None, Some(Reason::NotUnique)));
+    let area = |area| {
+        let frame = frame(&[("sofa", "sofa", area)]);
+        candidate(&frame, &Family::Color, "sofa", "").err()
+    };
+    assert_eq!((area(10_000), area(9_999)), (None, Some(Reason::Small)));
+    let core = |core| {
+        sofa(|frame| {
+            frame.segments[1].core = core;
+            frame.segments[1].colors = [0; NONE + 1];
+            frame.segments[1].colors[Color::Brown as usize] = core;
+        })
+    };
+    assert_eq!((core(2_000), core(1_999)), (None, Some(Reason::Small)));
+    for class in [
+        "mirror",
+        "window",
+        "tv_monitor",
+        "picture",
+        "plant",
+        "lighting",
+        "shower",
+        "fireplace",
+    ] {
+        let said = say(
+            &[frame(&[(class, "", 100_000)])],
+            |_| {},
+            &Rules::built_in().unwrap(),
+        );
+        let colors = said
+            .made
+            .asked
+            .iter()
+            .filter(|asked| asked.question.family == Family::Color);
+        assert_eq!(colors.count(), 0, "{class}");
+    }
+}
+
+#[test]
+fn light_and_shadow_decide_no_colour() {
+    let bright = |bright| sofa(|frame| frame.segments[1].bright = bright);
+    assert_eq!(
+        (bright(40_000), bright(40_001)),
+        (None, Some(Reason::Bright))
+    );
+    let crushed = |crushed| sofa(|frame| frame.segments[1].crushed = crushed);
+    assert_eq!(
+        (crushed(40_000), crushed(40_001)),
+        (None, Some(Reason::Crushed))
+    );
+    for (color, median) in [(Color::White, [250; 3]), (Color::Black, [2; 3])] {
+        let reason = sofa(|frame| {
+            let sofa = &mut frame.segments[1];
+            sofa.colors = [0; NONE + 1];
+            sofa.colors[color as usize] = 100_000;
+            sofa.median = median;
+            match color {
+                Color::White => sofa.bright = 100_000,
+                _ => sofa.crushed = 100_000,
+            }
+        });
+        assert_eq!(reason, None, "{color:?}");
+    }
+}
+
+#[test]
+fn other_choices_can_be_offered() {
+    let frame = frame(&[("sofa", "sofa", 100_000)]);
+    let eight = rules("candidates = \"all11\"", "candidates = \"fixed8\"");
+    let claim = candidate_by(&frame, &Family::Color, "sofa", "", &eight).unwrap();
+    assert_eq!((claim.choices.len(), claim.answer()), (8, "brown"));
+    let without = rules("\"blue\", \"brown\"]\nneighbours", "\"blue\"]\nneighbours");
+    let text = include_str!("../rules.toml").replacen(
+        "\"blue\", \"brown\"]\nneighbours",
+        "\"blue\"]\nneighbours",
+        1,
+    );
+    let seven = Rules::parse(&text.replacen("\"all11\"", "\"fixed8\"", 1)).unwrap();
+    assert_ne!(without.digest(), seven.digest());
+    let fallen = candidate_by(&frame, &Family::Color, "sofa", "", &seven);
+    assert_eq!(fallen.err(), Some(Reason::NotOffered));
+    let five = rules("candidates = \"all11\"", "candidates = \"k5\"");
+    let claim = candidate_by(&frame, &Family::Color, "sofa", "", &five).unwrap();
+    assert_eq!((claim.choices.len(), claim.answer()), (5, "brown"));
+    for near in ["black", "red", "orange"] {
+        assert!(!claim.choices.iter().any(|choice| choice == near), "{near}");
+    }
+}

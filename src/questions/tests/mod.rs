@@ -1,0 +1,190 @@
+//! Every rule on frames made for it: it fires, it abstains on either side of each threshold, and each blocker blocks.
+//!
+//! The frames have a million pixels, so that an area in pixels is one in millionths.
+
+#![allow(clippy::unwrap_used)]
+
+mod affordance;
+mod closest;
+mod color;
+mod presence;
+mod room_type;
+mod rooms;
+mod whole;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::questions::balance::Balanced;
+use crate::questions::colors::{Color, NONE, Palette};
+use crate::questions::generate::{Asked, Generated, Order, generate};
+use crate::questions::room::{NoRoom, RoomSigns, RoomSource, classify};
+use crate::questions::rules::Rules;
+use crate::questions::statistics::{
+    Along, FrameDepth, FrameStatistics, Segment, SegmentDepth, Where, plain_word,
+};
+use crate::questions::survey::{Claim, Reason, Verdict};
+use crate::types::{Digest, Family, FrameId, Labels, QuestionId};
+
+/// A frame of the given segments: class, the data set's word, area.
+pub(crate) fn frame(segments: &[(&str, &str, u64)]) -> FrameStatistics {
+    let mut frame = FrameStatistics {
+        frame: FrameId("scene/0".into()),
+        key: Digest::of(b""),
+        scene: "scene".into(),
+        size: [1000, 1000],
+        luma: [60, 120, 200],
+        void: 0,
+        effective_void: 0,
+        lower_void: 0,
+        classes: BTreeMap::new(),
+        loose: BTreeMap::new(),
+        words: BTreeMap::new(),
+        unknown: BTreeMap::new(),
+        depth: Some(FrameDepth {
+            holes: 0,
+            median: 3000,
+            along: Along::Ray,
+        }),
+        segments: Vec::new(),
+        room: None,
+    };
+    for (id, &(class, word, area)) in (1..).zip(segments) {
+        let (word, stands) = plain_word(word);
+        *frame.classes.entry(class.to_owned()).or_insert(0) += area;
+        *frame.words.entry(word.clone()).or_insert(0) += area;
+        let mut colors = [0; NONE + 1];
+        colors[Color::Brown as usize] = area;
+        frame.segments.push(Segment {
+            id,
+            class: class.to_owned(),
+            word,
+            stands,
+            region: None,
+            parts: 0,
+            area,
+            pure: area,
+            bbox: [100, 100, 300, 300],
+            rim: 1000,
+            rim_on_border: 0,
+            core: area,
+            depth: Some(deep(area, 2000 + 1000 * id)),
+            colors,
+            median: [110, 70, 40],
+            bright: 0,
+            crushed: 0,
+        });
+    }
+    frame
+}
+
+fn deep(valid: u64, median: u32) -> SegmentDepth {
+    SegmentDepth {
+        valid,
+        p10: median - 100,
+        median,
+        p90: median + 100,
+    }
+}
+
+/// A label space that can say everything.
+pub(crate) fn labels() -> Labels {
+    let rules = Rules::built_in().unwrap();
+    Labels {
+        expressible: rules.book().class.keys().cloned().collect(),
+        ..Labels::default()
+    }
+}
+
+/// What the rules say of frames, and every candidate of the first.
+struct Said {
+    made: Generated,
+    candidates: Vec<Verdict>,
+}
+
+fn say(frames: &[FrameStatistics], change: impl FnOnce(&mut Order<'_>), rules: &Rules) -> Said {
+    let (labels, palette) = (labels(), Palette::built_in().unwrap());
+    let mut order = Order {
+        dataset: "test",
+        labels: &labels,
+        rules,
+        palette: &palette,
+        families: Family::PAPER.into_iter().collect(),
+        room_source: RoomSource::Signature,
+        balance: Balanced::None,
+        rejected: BTreeSet::new(),
+    };
+    change(&mut order);
+    let mut candidates = Vec::new();
+    let made = generate(frames, &order, |name, verdict| {
+        if *name == frames[0].frame {
+            candidates.push(verdict.clone());
+        }
+    });
+    Said {
+        made: made.unwrap(),
+        candidates,
+    }
+}
+
+/// What becomes of a candidate of a family about something, with the answer of yes or no where it has one.
+fn candidate(
+    frame: &FrameStatistics,
+    family: &Family,
+    about: &str,
+    answer: &str,
+) -> Result<Claim, Reason> {
+    candidate_by(frame, family, about, answer, &Rules::built_in().unwrap())
+}
+
+fn candidate_by(
+    frame: &FrameStatistics,
+    family: &Family,
+    about: &str,
+    answer: &str,
+    rules: &Rules,
+) -> Result<Claim, Reason> {
+    let said = say(std::slice::from_ref(frame), |_| {}, rules);
+    let mut found: Vec<Result<Claim, Reason>> = Vec::new();
+    for verdict in said.candidates {
+        match verdict {
+            Verdict::Holds(claim)
+                if claim.family == *family && (claim.about == about || about.is_empty()) =>
+            {
+                if answer.is_empty() || claim.answer() == answer {
+                    found.push(Ok(claim));
+                }
+            }
+            Verdict::Falls(fallen) if fallen.family == *family && fallen.about == about => {
+                if answer.is_empty() || fallen.answer.as_deref().is_none_or(|other| other == answer)
+                {
+                    found.push(Err(fallen.reason));
+                }
+            }
+            _ => {}
+        }
+    }
+    found
+        .into_iter()
+        .next()
+        .unwrap_or_else(|| panic!("no candidate {family} {about} {answer}"))
+}
+
+fn rules(from: &str, to: &str) -> Rules {
+    let text = include_str!("../rules.toml");
+    assert!(text.contains(from), "{from}");
+    Rules::parse(&text.replacen(from, to, 1)).unwrap()
+}
+
+fn signs(segments: &[(&str, &str, u64)]) -> RoomSigns {
+    classify(&frame(segments), Rules::built_in().unwrap().book())
+}
+
+fn room(segments: &[(&str, &str, u64)]) -> Result<String, NoRoom> {
+    signs(segments).room
+}
+
+const BEDROOM: [(&str, &str, u64); 3] = [
+    ("wall", "wall", 500_000),
+    ("bed", "bed", 200_000),
+    ("chest_of_drawers", "nightstand", 30_000),
+];

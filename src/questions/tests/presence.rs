@@ -1,0 +1,167 @@
+//! "Is there a chair in the image?"
+
+use super::*;
+
+fn ask(frame: &FrameStatistics, class: &str, answer: &str) -> Option<Reason> {
+    candidate(frame, &Family::Presence, class, answer).err()
+}
+
+fn chair(change: impl FnOnce(&mut Segment)) -> FrameStatistics {
+    let mut frame = frame(&[("wall", "wall", 500_000), ("chair", "chair", 20_000)]);
+    change(&mut frame.segments[1]);
+    frame
+}
+
+#[test]
+fn yes_needs_one_good_segment() {
+    let claim = candidate(&chair(|_| {}), &Family::Presence, "chair", "yes").unwrap();
+    assert_eq!(claim.text, "Is there a chair in the image?");
+    assert_eq!(claim.evidence["segments"][0]["id"], 2);
+    let check = |change: fn(&mut Segment)| ask(&chair(change), "chair", "yes");
+    for (change, expected) in [
+        (
+            (|c: &mut Segment| (c.area, c.pure) = (5_000, 5_000)) as fn(&mut Segment),
+            None,
+        ),
+        (|c| (c.area, c.pure) = (4_999, 4_999), Some(Reason::Small)),
+        (|c| c.pure = 18_000, None),
+        (|c| c.pure = 17_999, Some(Reason::Mixed)),
+        (|c| c.rim_on_border = 500, None),
+        (|c| c.rim_on_border = 501, Some(Reason::Cut)),
+        (
+            |c| (c.rim_on_border, c.area, c.pure) = (1000, 99_999, 99_999),
+            Some(Reason::Cut),
+        ),
+        (
+            |c| (c.rim_on_border, c.area, c.pure) = (1000, 100_000, 100_000),
+            None,
+        ),
+        (|c| c.bbox = [0, 0, 20, 900], None),
+        (|c| c.bbox = [0, 0, 19, 900], Some(Reason::Thin)),
+        (|c| c.stands = Where::Elsewhere, Some(Reason::Elsewhere)),
+    ] {
+        assert_eq!(check(change), expected);
+    }
+    let pet = frame(&[("bed", "dog bed", 90_000)]);
+    assert_eq!(ask(&pet, "bed", "yes"), Some(Reason::Unlike));
+    // A tiny one beside a good one does no harm.
+    let two = frame(&[("chair", "chair", 600), ("chair", "chair", 20_000)]);
+    assert_eq!(ask(&two, "chair", "yes"), None);
+}
+
+#[test]
+fn words_fit_their_classes() {
+    for (class, text) in [
+        ("appliances", "Is there an appliance in the image?"),
+        ("tv_monitor", "Is there a TV in the image?"),
+        (
+            "chest_of_drawers",
+            "Is there a chest of drawers in the image?",
+        ),
+        ("lighting", "Is there a lamp in the image?"),
+    ] {
+        let frame = frame(&[(class, "", 20_000)]);
+        assert_eq!(
+            candidate(&frame, &Family::Presence, class, "yes")
+                .unwrap()
+                .text,
+            text
+        );
+    }
+}
+
+#[test]
+fn no_needs_that_nothing_like_it_is_seen() {
+    let wall = frame(&[("wall", "wall", 500_000)]);
+    assert_eq!(ask(&wall, "bathtub", "no"), None);
+    let with = |class: &'static str, word: &'static str| {
+        frame(&[("wall", "wall", 500_000), (class, word, 1)])
+    };
+    assert_eq!(
+        ask(&with("bathtub", "bathtub"), "bathtub", "yes"),
+        Some(Reason::Small)
+    );
+    let rules = Rules::built_in().unwrap();
+    for group in &rules.book().confusable {
+        for class in group
+            .classes
+            .iter()
+            .filter(|class| rules.book().is(class, crate::questions::rules::Flag::Asked))
+        {
+            for other in group.classes.iter().filter(|other| *other != class) {
+                let seen = frame(&[("wall", "wall", 500_000), (other, "", 1)]);
+                assert_eq!(
+                    ask(&seen, class, "no"),
+                    Some(Reason::Confusable),
+                    "{class} {other}"
+                );
+            }
+            for word in &group.names {
+                let seen = frame(&[("wall", "wall", 500_000), ("misc", word, 1)]);
+                assert_eq!(
+                    ask(&seen, class, "no"),
+                    Some(Reason::Confusable),
+                    "{class} {word}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn no_needs_a_frame_that_says_what_is_not_there() {
+    let wall = frame(&[("wall", "wall", 500_000)]);
+    let no = |frame: &FrameStatistics| ask(frame, "bathtub", "no");
+    let void = |effective_void| FrameStatistics {
+        effective_void,
+        ..wall.clone()
+    };
+    assert_eq!(
+        (no(&void(50_000)), no(&void(50_001))),
+        (None, Some(Reason::Void))
+    );
+    let mirror = |area| frame(&[("mirror", "mirror", area)]);
+    assert_eq!(
+        (no(&mirror(30_000)), no(&mirror(30_001))),
+        (None, Some(Reason::Mirror))
+    );
+}
+
+#[test]
+fn no_is_asked_of_what_is_common_in_such_rooms_elsewhere() {
+    // Twelve classes stand in the bedrooms of another scene; bathtubs do not.
+    let common = [
+        "bed",
+        "cabinet",
+        "chair",
+        "chest_of_drawers",
+        "curtain",
+        "cushion",
+        "lighting",
+        "picture",
+        "plant",
+        "shelving",
+        "table",
+        "towel",
+    ];
+    let mut other = frame(&common.map(|class| (class, "", 20_000)));
+    (other.frame, other.scene) = (FrameId("other/0".into()), "other".into());
+    let rules = Rules::built_in().unwrap();
+    let said = say(&[frame(&BEDROOM), other], |_| {}, &rules);
+    let reason = |class: &str| {
+        said.candidates.iter().find_map(|verdict| match verdict {
+            Verdict::Falls(fallen)
+                if fallen.family == Family::Presence && fallen.about == class =>
+            {
+                Some(Some(fallen.reason))
+            }
+            Verdict::Holds(claim) if claim.family == Family::Presence && claim.about == class => {
+                Some(None)
+            }
+            _ => None,
+        })
+    };
+    assert_eq!(reason("plant"), Some(None));
+    assert_eq!(reason("towel"), Some(None));
+    assert_eq!(reason("bathtub"), Some(Some(Reason::Implausible)));
+}

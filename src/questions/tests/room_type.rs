@@ -1,0 +1,55 @@
+//! "What type of room is this?"
+
+use super::*;
+
+#[test]
+fn it_is_asked_where_enough_is_seen() {
+    let ask = |frame: &FrameStatistics| {
+        candidate(frame, &Family::RoomType, "", "").map(|claim| claim.answer().to_owned())
+    };
+    let bedroom = frame(&BEDROOM);
+    assert_eq!(ask(&bedroom), Ok("bedroom".into()));
+    let unlabelled = |void| FrameStatistics {
+        void,
+        ..bedroom.clone()
+    };
+    assert_eq!(ask(&unlabelled(400_000)), Ok("bedroom".into()));
+    assert_eq!(ask(&unlabelled(400_001)), Err(Reason::Unlabelled));
+    assert_eq!(
+        ask(&frame(&[("wall", "wall", 900_000)])),
+        Err(Reason::NoRoom)
+    );
+    // One asked segment must be large.
+    assert_eq!(
+        ask(&frame(&[("toilet", "toilet", 50_000)])),
+        Ok("bathroom".into())
+    );
+    assert_eq!(
+        ask(&frame(&[("toilet", "toilet", 49_999)])),
+        Err(Reason::Bare)
+    );
+    let two = frame(&[("toilet", "toilet", 9_000), ("towel", "towel", 9_000)]);
+    assert_eq!(ask(&two), Ok("bathroom".into()));
+}
+
+#[test]
+fn a_stated_room_is_used_where_that_is_asked_for() {
+    let mut frame = frame(&[("toilet", "toilet", 50_000)]);
+    frame.room = Some("living_room".into());
+    let rules = Rules::built_in().unwrap();
+    let answer = |source| {
+        let said = say(
+            std::slice::from_ref(&frame),
+            |order| order.room_source = source,
+            &rules,
+        );
+        let asked = said
+            .made
+            .asked
+            .iter()
+            .find(|asked| asked.question.family == Family::RoomType);
+        asked.map(|asked| asked.answer().to_owned())
+    };
+    assert_eq!(answer(RoomSource::Signature), Some("bathroom".into()));
+    assert_eq!(answer(RoomSource::Stated), Some("living room".into()));
+}

@@ -1,0 +1,177 @@
+//! The figure of a set of questions, as SVG: [`figure`].
+
+use std::collections::BTreeMap;
+
+use plotters::coord::Shift;
+use plotters::prelude::*;
+
+use crate::error::{Error, Result};
+use crate::questions::summary::Summary;
+use crate::types::Family;
+
+/// The most bars of a panel.
+const MOST: usize = 24;
+/// The height of a bar with the space around it, in pixels.
+const BAR: i32 = 20;
+/// The width of the figure, in pixels.
+const WIDTH: i32 = 1100;
+
+/// One panel: bars by name.
+struct Panel {
+    title: String,
+    bars: Vec<(String, u64)>,
+}
+
+impl Panel {
+    /// The largest first, those beyond [`MOST`] together.
+    fn ranked(title: &str, counts: impl Iterator<Item = (String, u64)>) -> Self {
+        let mut bars: Vec<(String, u64)> = counts.filter(|(_, count)| *count > 0).collect();
+        bars.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
+        if bars.len() > MOST {
+            let rest = bars.split_off(MOST - 1);
+            bars.push((
+                format!("{} others", rest.len()),
+                rest.iter().map(|(_, count)| count).sum(),
+            ));
+        }
+        Self {
+            title: title.to_owned(),
+            bars,
+        }
+    }
+
+    /// At least one, which says that there are none; at most [`MOST`].
+    fn rows(&self) -> i32 {
+        i32::try_from(self.bars.len()).unwrap_or(i32::MAX).max(1)
+    }
+
+    fn height(&self) -> i32 {
+        60 + BAR * self.rows()
+    }
+}
+
+/// Questions by family, answers, rooms and classes (by pixels, segments and questions), as bars with their counts and shares.
+///
+/// # Errors
+/// Where the figure cannot be drawn.
+pub fn figure(summary: &Summary) -> Result<String> {
+    let panels = panels(summary);
+    // Two columns, each panel in the shorter one.
+    let mut columns: [(i32, Vec<(i32, &Panel)>); 2] = [(0, Vec::new()), (0, Vec::new())];
+    for panel in &panels {
+        let column = usize::from(columns[1].0 < columns[0].0);
+        let (height, list) = &mut columns[column];
+        list.push((*height, panel));
+        *height += panel.height();
+    }
+    let height = columns
+        .iter()
+        .map(|(height, _)| *height)
+        .max()
+        .unwrap_or(0)
+        .max(BAR);
+    let mut svg = String::new();
+    {
+        let root =
+            SVGBackend::with_string(&mut svg, (WIDTH as u32, height as u32)).into_drawing_area();
+        draw(&root, &columns).map_err(|e| Error::data("figure", e))?;
+    }
+    Ok(svg)
+}
+
+fn panels(summary: &Summary) -> Vec<Panel> {
+    let classes = |title: &str, count: fn(&crate::questions::summary::Coverage) -> u64| {
+        let counts = summary
+            .classes
+            .iter()
+            .map(|(class, coverage)| (class.clone(), count(coverage)));
+        Panel::ranked(title, counts)
+    };
+    let words = |counts: &BTreeMap<String, usize>| {
+        let counts: Vec<(String, u64)> = counts
+            .iter()
+            .map(|(word, count)| (word.clone(), *count as u64))
+            .collect();
+        counts.into_iter()
+    };
+    let families = summary.candidates.iter();
+    let mut panels = vec![
+        Panel::ranked(
+            "Questions by family",
+            families.map(|(family, candidates)| (family.to_string(), candidates.asked)),
+        ),
+        Panel::ranked(
+            "Frames by room",
+            summary
+                .rooms
+                .iter()
+                .map(|(room, counts)| (room.clone(), counts.frames as u64)),
+        ),
+    ];
+    for family in Family::PAPER {
+        if let Some(answers) = summary.answers.get(&family) {
+            panels.push(Panel::ranked(&format!("Answers: {family}"), words(answers)));
+        }
+    }
+    panels.push(classes("Classes by questions about them", |coverage| {
+        coverage.questions
+    }));
+    panels.push(classes("Classes by segments", |coverage| coverage.segments));
+    panels.push(classes("Classes by pixels", |coverage| coverage.pixels));
+    panels
+}
+
+type Area<'a, 'b> = DrawingArea<SVGBackend<'a>, Shift>;
+
+fn draw(root: &Area<'_, '_>, columns: &[(i32, Vec<(i32, &Panel)>); 2]) -> Result<(), String> {
+    root.fill(&WHITE).map_err(|e| e.to_string())?;
+    let half = WIDTH / 2;
+    for (column, (_, panels)) in (0..).zip(columns) {
+        for (top, panel) in panels {
+            bars(root, (column * half, *top), panel).map_err(|e| e.to_string())?;
+        }
+    }
+    root.present().map_err(|e| e.to_string())
+}
+
+fn bars<'a>(
+    root: &Area<'a, '_>,
+    (left, top): (i32, i32),
+    panel: &Panel,
+) -> Result<(), DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>> {
+    const NAMES: i32 = 190;
+    const LONGEST: f64 = 220.0;
+    let total: u64 = panel.bars.iter().map(|(_, count)| count).sum();
+    let most = panel
+        .bars
+        .iter()
+        .map(|(_, count)| *count)
+        .max()
+        .unwrap_or(1)
+        .max(1);
+    let title = ("sans-serif", 17).into_font();
+    root.draw(&Text::new(
+        panel.title.clone(),
+        (left + 12, top + 14),
+        title,
+    ))?;
+    let small = ("sans-serif", 13).into_font();
+    for (i, (name, count)) in (0..).zip(&panel.bars) {
+        let y = top + 40 + i * BAR;
+        let length = (*count as f64 / most as f64 * LONGEST).round() as i32;
+        let bar = [(left + NAMES, y), (left + NAMES + length.max(1), y + 14)];
+        root.draw(&Rectangle::new(bar, RGBColor(70, 110, 160).filled()))?;
+        root.draw(&Text::new(name.clone(), (left + 12, y + 1), small.clone()))?;
+        let share = 100.0 * *count as f64 / total.max(1) as f64;
+        let label = format!("{count} ({share:.1} %)");
+        root.draw(&Text::new(
+            label,
+            (left + NAMES + length + 6, y + 1),
+            small.clone(),
+        ))?;
+    }
+    if panel.bars.is_empty() {
+        root.draw(&Text::new("none", (left + 12, top + 41), small))?;
+    }
+    Ok(())
+}

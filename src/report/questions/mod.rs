@@ -1,0 +1,244 @@
+//! What a set of questions is like: a table, a file of all counts, and a figure.
+
+pub mod figure;
+pub mod review;
+
+use std::fmt::Write as _;
+
+use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
+use comfy_table::{CellAlignment, LineStyle, Table};
+
+use crate::error::{Error, Result};
+use crate::questions::summary::{Baselines, Summary};
+use crate::types::Family;
+
+/// How many reasons a line of the table names.
+const REASONS: usize = 3;
+
+/// The table at the end: questions by family with what came of their candidates and what not looking would score.
+#[must_use]
+pub fn table(summary: &Summary) -> String {
+    let mut table = Table::new();
+    table.load_style(UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none()));
+    table.set_header([
+        "family",
+        "questions",
+        "chance %",
+        "majority %",
+        "prior %",
+        "candidates that hold",
+        "why others do not",
+    ]);
+    let share = |right: f64, of: &Baselines| {
+        if of.questions == 0 {
+            "–".to_owned()
+        } else {
+            format!("{:.1}", 100.0 * right / of.questions as f64)
+        }
+    };
+    let none = Baselines::default();
+    for family in Family::PAPER {
+        let Some(candidates) = summary.candidates.get(&family) else {
+            continue;
+        };
+        let base = summary.baselines.get(family.name()).unwrap_or(&none);
+        let mut fallen: Vec<(String, u64)> = candidates
+            .fallen
+            .iter()
+            .map(|(reason, count)| (word(reason), *count))
+            .collect();
+        fallen.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
+        let reasons: Vec<String> = fallen
+            .iter()
+            .take(REASONS)
+            .map(|(reason, count)| format!("{reason} {count}"))
+            .collect();
+        table.add_row([
+            family.to_string(),
+            candidates.asked.to_string(),
+            share(base.chance, base),
+            share(base.majority as f64, base),
+            share(base.prior, base),
+            candidates.viable.to_string(),
+            reasons.join(", "),
+        ]);
+    }
+    if let Some(base) = summary.baselines.get(Family::TOTAL) {
+        table.add_row([
+            Family::TOTAL.to_owned(),
+            summary.questions.to_string(),
+            share(base.chance, base),
+            share(base.majority as f64, base),
+            share(base.prior, base),
+            String::new(),
+            String::new(),
+        ]);
+    }
+    for column in 1..6 {
+        if let Some(column) = table.column_mut(column) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    let mut text = format!("{table}\n");
+    notes(summary, &mut text);
+    text
+}
+
+/// The lines below the table.
+fn notes(summary: &Summary, text: &mut String) {
+    let mut note = |line: String| {
+        // Writing to a text cannot fail.
+        let _ = writeln!(text, "{line}");
+    };
+    note(format!(
+        "{} questions about {} frames of {} scenes; prior: the commonest answer to the same words in other scenes",
+        summary.questions, summary.frames, summary.scenes
+    ));
+    let sum = |count: fn(&crate::questions::summary::Candidates) -> u64| -> u64 {
+        summary.candidates.values().map(count).sum()
+    };
+    let (unbalanced, rejected) = (sum(|c| c.unbalanced), sum(|c| c.rejected));
+    if unbalanced > 0 {
+        note(format!(
+            "{unbalanced} more were left out to even out the answers (--balance {})",
+            summary.balance
+        ));
+    }
+    if rejected > 0 {
+        note(format!("{rejected} more were rejected by a person"));
+    }
+    let [both, same] = summary.room_agreement;
+    if both > 0 {
+        note(format!(
+            "rooms: {same} of {both} that are seen and stated agree"
+        ));
+    }
+    if summary.dark > 0 {
+        note(format!("{} frames are too dark to ask about", summary.dark));
+    }
+    if summary.failed > 0 {
+        note(format!(
+            "{} frames could not be measured, and have no questions",
+            summary.failed
+        ));
+    }
+    if !summary.unknown.is_empty() {
+        let ids: Vec<String> = summary.unknown.keys().take(8).map(u16::to_string).collect();
+        note(format!(
+            "numbers that classes.json does not have were taken as unlabelled: {} of them, as {} (--strict refuses them)",
+            summary.unknown.len(),
+            ids.join(", ")
+        ));
+    }
+}
+
+/// A unit variant in the words of its file.
+fn word<T: serde::Serialize>(value: &T) -> String {
+    let json = serde_json::to_value(value).unwrap_or_default();
+    json.as_str().unwrap_or_default().replace('_', " ")
+}
+
+/// The summary as JSON.
+///
+/// # Errors
+/// Where it cannot be written as such.
+pub fn json(summary: &Summary) -> Result<String> {
+    let text = serde_json::to_string_pretty(summary).map_err(|e| Error::data("statistics", e))?;
+    Ok(text + "\n")
+}
+
+/// All counts as CSV: `table, row, column, count`.
+///
+/// # Errors
+/// Where it cannot be written as such.
+pub fn csv(summary: &Summary) -> Result<Vec<u8>> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let mut rows: Vec<[String; 4]> = vec![["table", "row", "column", "count"].map(str::to_owned)];
+    let mut row = |table: &str, row: &str, column: &str, count: String| {
+        rows.push([table.to_owned(), row.to_owned(), column.to_owned(), count]);
+    };
+    for (what, count) in [
+        ("scenes", summary.scenes),
+        ("frames", summary.frames),
+        ("failed", summary.failed),
+        ("dark", summary.dark),
+        ("questions", summary.questions),
+        ("repeats", summary.repeats),
+    ] {
+        row("all", what, "", count.to_string());
+    }
+    for (family, candidates) in &summary.candidates {
+        for (column, count) in [
+            ("viable", candidates.viable),
+            ("asked", candidates.asked),
+            ("not_chosen", candidates.not_chosen),
+            ("rejected", candidates.rejected),
+            ("unbalanced", candidates.unbalanced),
+        ] {
+            row("candidates", family.name(), column, count.to_string());
+        }
+        for (reason, count) in &candidates.fallen {
+            row("fallen", family.name(), &word(reason), count.to_string());
+        }
+    }
+    for (questions, frames) in &summary.per_frame {
+        row(
+            "per_frame",
+            &questions.to_string(),
+            "frames",
+            frames.to_string(),
+        );
+    }
+    for (family, answers) in &summary.answers {
+        for (answer, count) in answers {
+            row("answers", family.name(), answer, count.to_string());
+        }
+    }
+    for (words, count) in &summary.texts {
+        row("texts", words, "", count.to_string());
+    }
+    for (choices, count) in &summary.choices {
+        row(
+            "choices",
+            &choices.to_string(),
+            "questions",
+            count.to_string(),
+        );
+    }
+    for (family, subjects) in &summary.polarity {
+        for (about, [yes, no]) in subjects {
+            row(family.name(), about, "yes", yes.to_string());
+            row(family.name(), about, "no", no.to_string());
+        }
+    }
+    for (class, coverage) in &summary.classes {
+        for (column, count) in [
+            ("pixels", coverage.pixels),
+            ("segments", coverage.segments),
+            ("frames", coverage.frames),
+            ("questions", coverage.questions),
+        ] {
+            row("classes", class, column, count.to_string());
+        }
+    }
+    for (room, counts) in &summary.rooms {
+        row("rooms", room, "frames", counts.frames.to_string());
+        row("rooms", room, "questions", counts.questions.to_string());
+    }
+    for (gap, count) in &summary.gaps {
+        row("gaps_mm", &gap.to_string(), "questions", count.to_string());
+    }
+    for (family, base) in &summary.baselines {
+        row("baselines", family, "questions", base.questions.to_string());
+        row("baselines", family, "chance", base.chance.to_string());
+        row("baselines", family, "majority", base.majority.to_string());
+        row("baselines", family, "prior", base.prior.to_string());
+    }
+    let failed = |e: csv::Error| Error::data("statistics", e);
+    for row in rows {
+        writer.write_record(row).map_err(failed)?;
+    }
+    writer
+        .into_inner()
+        .map_err(|e| Error::data("statistics", e))
+}
