@@ -6,8 +6,9 @@ use std::process::ExitCode;
 use clap::Parser;
 use clap::error::ErrorKind;
 use darkqa_eval::cli::{Cli, Command, EvaluateArgs};
-use darkqa_eval::config::{self, Config, Questions, Realism, Synthesize};
+use darkqa_eval::config::{self, Config, Import, Questions, Realism, Synthesize};
 use darkqa_eval::enhance;
+use darkqa_eval::run::import::import;
 use darkqa_eval::run::progress::{Loudness, Progress};
 use darkqa_eval::run::questions::questions;
 use darkqa_eval::run::realism::realism;
@@ -76,6 +77,7 @@ enum Task {
     Synthesize(Box<Synthesize>),
     Realism(Box<Realism>),
     Questions(Box<Questions>),
+    Import(Box<Import>),
 }
 
 impl Job {
@@ -93,6 +95,10 @@ impl Job {
             Some(Command::Realism(said)) => {
                 let quiet = said.quiet;
                 (quiet, Task::Realism(Box::new(Realism::resolve(said)?)))
+            }
+            Some(Command::Import(said)) => {
+                let quiet = said.quiet;
+                (quiet, Task::Import(Box::new(Import::resolve(said)?)))
             }
             Some(Command::Questions(said)) => {
                 let quiet = said.quiet;
@@ -114,6 +120,7 @@ fn show(task: Task, progress: &Progress) -> anyhow::Result<ExitCode> {
         Task::Synthesize(config) => synthesize(&config, progress)?,
         Task::Realism(config) => realism(&config, progress)?,
         Task::Questions(config) => questions(&config, progress)?,
+        Task::Import(config) => import(&config, progress)?,
     };
     let written = std::io::stdout().lock().write_all(output.as_bytes());
     match (status, written) {

@@ -3,6 +3,7 @@
 //! The same structure is read three times: from the arguments, from `DARKQA_*` variables and from a `--config` file
 //! (see [`crate::config`]); so every field is an `Option`, a list or a switch, and no default stands here.
 
+mod import;
 mod questions;
 
 use std::num::{NonZeroU32, NonZeroU64, NonZeroUsize};
@@ -10,6 +11,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
+pub use import::ImportArgs;
 pub use questions::QuestionsArgs;
 
 /// Measures how well a vision-language model sees in the dark.
@@ -42,6 +44,8 @@ pub enum Command {
     Realism(RealismArgs),
     /// Make multiple-choice questions about frames, by rule, from their depth, class and segment maps
     Questions(QuestionsArgs),
+    /// Take over frames of another data set into the common interface
+    Import(ImportArgs),
 }
 
 /// The flags of `synthesize`.

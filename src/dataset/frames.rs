@@ -186,7 +186,7 @@ pub(super) fn open(folder: &Path, questions: Option<&Path>) -> Result<Dataset> {
     let file = questions.map_or_else(|| folder.join(QUESTIONS), Path::to_owned);
     if questions.is_none() && !file.exists() {
         let problem = format_args!(
-            "no {QUESTIONS} in this folder; write one, or name one with --questions FILE"
+            "no {QUESTIONS} in this folder; `darkqa-eval questions` makes them from frames with maps, --questions FILE names others"
         );
         return Err(Error::data(folder.display(), problem));
     }

@@ -69,6 +69,15 @@ impl DepthFile {
         }
     }
 
+    /// Depth of the file's own size.
+    pub(super) fn decode_alone(&self, bytes: &[u8]) -> Result<Array2<u32>, String> {
+        let size = match self {
+            Self::Png { .. } => RawPng::open(bytes, &[Form::Grey16])?.size,
+            Self::Npy(_) => Npy::parse(bytes)?.size,
+        };
+        self.decode(bytes, size)
+    }
+
     fn decode(&self, bytes: &[u8], size: Size) -> Result<Array2<u32>, String> {
         match self {
             Self::Png { scale, .. } => {

@@ -5,6 +5,7 @@
 
 mod beside;
 pub mod frames;
+pub mod import;
 mod jpeg;
 mod maps;
 pub mod multiple_choice;

@@ -7,6 +7,7 @@ mod askers;
 mod darkroom;
 mod drive;
 mod identity;
+pub mod import;
 mod interrupt;
 mod plan;
 

@@ -3,9 +3,12 @@
 //! The rules see nothing else of a frame, so that they can be changed without opening an image again.
 
 mod components;
+mod light;
 mod measure;
 mod opening;
 mod rim;
+mod scene;
+mod shape;
 #[cfg(test)]
 mod tests;
 

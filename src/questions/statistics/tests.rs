@@ -53,8 +53,8 @@ fn frame(width: usize, height: usize, semantic: Vec<u16>) -> Frame {
     }
 }
 
-fn map<T: Clone>(width: usize, height: usize, values: &[T]) -> Option<Array2<T>> {
-    Some(Array2::from_shape_vec((height, width), values.to_vec()).unwrap())
+fn map<T: Clone>(width: usize, height: usize, values: &[T]) -> Array2<T> {
+    Array2::from_shape_vec((height, width), values.to_vec()).unwrap()
 }
 
 fn measured(frame: &Frame) -> FrameStatistics {
@@ -91,7 +91,7 @@ fn pixels_are_counted_by_class_and_segment() {
         7, 7, 3, 3, 0, 0,
     ];
     let mut frame = frame(6, 4, semantic);
-    frame.segments = map(6, 4, &segments);
+    frame.segments = Some(map(6, 4, &segments));
     let found = measured(&frame);
     assert_eq!(
         found.classes,
@@ -156,7 +156,7 @@ fn unknown_numbers_are_void_and_counted() {
 #[test]
 fn names_of_segments_go_before_the_words_of_labels() {
     let mut frame = frame(4, 1, vec![4, 4, 1, 1]);
-    frame.segments = map(4, 1, &[5_u32, 5, 70_000, 70_000]);
+    frame.segments = Some(map(4, 1, &[5_u32, 5, 70_000, 70_000]));
     let name = |name: &str, canonical: &str| SegmentName {
         name: name.into(),
         canonical: canonical.into(),
@@ -194,7 +194,7 @@ fn names_of_segments_go_before_the_words_of_labels() {
 #[test]
 fn parts_of_one_class_are_merged() {
     let mut frame = frame(7, 1, vec![4, 4, 1, 1, 4, 4, 1]);
-    frame.segments = map(7, 1, &[1_u32, 2, 2, 2, 3, 4, 5]);
+    frame.segments = Some(map(7, 1, &[1_u32, 2, 2, 2, 3, 4, 5]));
     frame.segmentation = Segmentation::Parts;
     let found = measured(&frame);
     // Part 2 is wall for the most part, and so no neighbour of the same class.
@@ -218,7 +218,7 @@ fn parts_of_one_class_are_merged() {
 #[test]
 fn depth_is_along_the_ray_where_the_camera_is_known() {
     let mut frame = frame(3, 1, vec![4, 4, 4]);
-    frame.depth = map(3, 1, &[1000_u32, 1000, 0]);
+    frame.depth = Some(map(3, 1, &[1000_u32, 1000, 0]));
     assert_eq!(measured(&frame).depth.unwrap().along, Along::Axis);
     frame.intrinsics = Some(Intrinsics {
         fx: 1.0,
@@ -247,7 +247,7 @@ fn depth_is_along_the_ray_where_the_camera_is_known() {
         ),
         (1000, Along::Ray)
     );
-    frame.depth = map(3, 1, &[15_000_u32, 15_001, 0]);
+    frame.depth = Some(map(3, 1, &[15_000_u32, 15_001, 0]));
     assert_eq!(measured(&frame).segments[0].depth.unwrap().valid, 1);
 }
 
@@ -265,7 +265,7 @@ fn the_rim_of_a_mask_tells_neither_depth_nor_colour() {
     let depth: Vec<u32> = (0..width * height)
         .map(|i| if core(i) { 2000 } else { 5 })
         .collect();
-    frame.depth = map(width, height, &depth);
+    frame.depth = Some(map(width, height, &depth));
     let found = measured(&frame);
     let chair = found
         .segments
@@ -396,9 +396,9 @@ proptest! {
         let id = |i: usize| (bits >> (cell(i) % 125) & 7) as u32;
         let mut frame = frame(width, height, pixels.clone().map(|i| (id(i) % 6) as u16).collect());
         let ids: Vec<u32> = pixels.clone().map(|i| id(i) * 1_000_003).collect();
-        frame.segments = map(width, height, &ids);
+        frame.segments = Some(map(width, height, &ids));
         let depths: Vec<u32> = pixels.map(|i| (i as u32).wrapping_mul(seed | 1) >> 18).collect();
-        frame.depth = map(width, height, &depths);
+        frame.depth = Some(map(width, height, &depths));
         let found = measured(&frame);
         let expected = plainly(&frame);
         for segment in &found.segments {

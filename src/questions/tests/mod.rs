@@ -147,20 +147,20 @@ fn candidate_by(
     let mut found: Vec<Result<Claim, Reason>> = Vec::new();
     for verdict in said.candidates {
         match verdict {
-            Verdict::Holds(claim)
-                if claim.family == *family && (claim.about == about || about.is_empty()) =>
-            {
-                if answer.is_empty() || claim.answer() == answer {
+            Verdict::Holds(claim) => {
+                let same = claim.about == about || about.is_empty();
+                let answered = answer.is_empty() || claim.answer() == answer;
+                if claim.family == *family && same && answered {
                     found.push(Ok(claim));
                 }
             }
-            Verdict::Falls(fallen) if fallen.family == *family && fallen.about == about => {
-                if answer.is_empty() || fallen.answer.as_deref().is_none_or(|other| other == answer)
-                {
+            Verdict::Falls(fallen) => {
+                let other = fallen.answer.as_deref().unwrap_or(answer);
+                let answered = answer.is_empty() || other == answer;
+                if fallen.family == *family && fallen.about == about && answered {
                     found.push(Err(fallen.reason));
                 }
             }
-            _ => {}
         }
     }
     found

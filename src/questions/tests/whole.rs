@@ -105,7 +105,9 @@ fn black_frames_are_asked_nothing() {
 #[test]
 fn frames_without_depth_yield_nothing_about_the_closest() {
     let mut frames = many();
-    frames.iter_mut().for_each(|frame| frame.depth = None);
+    for frame in &mut frames {
+        frame.depth = None;
+    }
     let made = say(&frames, |_| {}, &Rules::built_in().unwrap()).made;
     assert_eq!(made.tallies[&Family::Closest].viable, 0);
     assert_eq!(

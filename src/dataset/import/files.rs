@@ -1,0 +1,119 @@
+//! Files of a folder by name, and what is read of them.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use ndarray::Array2;
+
+use crate::dataset::maps::DepthFile;
+use crate::dataset::picture::{MOST_PIXELS, Picture};
+use crate::dataset::raw_png::{Form, RawPng};
+use crate::error::{Error, Result};
+use crate::types::Rgb;
+
+/// The folders in a folder, by name.
+pub(super) fn folders(folder: &Path) -> Result<Vec<PathBuf>> {
+    let mut folders = entries(folder)?;
+    folders.retain(|path| path.is_dir());
+    Ok(folders)
+}
+
+/// The files in a folder with one of these endings, by their names without it; none where the folder is not there.
+pub(super) fn files(folder: &Path, endings: &[&str]) -> Result<BTreeMap<String, PathBuf>> {
+    if !folder.is_dir() {
+        return Ok(BTreeMap::new());
+    }
+    let mut files = BTreeMap::new();
+    for path in entries(folder)?.into_iter().filter(|path| path.is_file()) {
+        let name = path
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
+        let lower = name.to_lowercase();
+        if let Some(ending) = endings.iter().find(|ending| lower.ends_with(**ending)) {
+            files.insert(name[..name.len() - ending.len()].to_owned(), path);
+        }
+    }
+    Ok(files)
+}
+
+/// The first of these folders that is there.
+pub(super) fn first(folder: &Path, names: &[&str]) -> Option<PathBuf> {
+    names
+        .iter()
+        .map(|name| folder.join(name))
+        .find(|path| path.is_dir())
+}
+
+fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
+    let unread = |e| Error::file(folder, "read", e);
+    let entries = fs::read_dir(folder).map_err(unread)?;
+    let mut paths = entries
+        .map(|entry| entry.map(|entry| entry.path()).map_err(unread))
+        .collect::<Result<Vec<PathBuf>>>()?;
+    paths.sort();
+    Ok(paths)
+}
+
+/// The text of a file.
+pub(super) fn text(path: &Path) -> Result<String> {
+    fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))
+}
+
+/// An image, decoded.
+pub(super) fn picture(path: &Path) -> Result<Rgb> {
+    let bytes = fs::read(path).map_err(|e| Error::file(path, "read", e))?;
+    let place = path.display().to_string();
+    Picture::Encoded {
+        bytes,
+        place,
+        most_pixels: MOST_PIXELS,
+    }
+    .decode()
+}
+
+/// The numbers of a PNG file of one of these forms.
+pub(super) fn png(path: &Path, forms: &[Form]) -> Result<Array2<u16>> {
+    let bytes = fs::read(path).map_err(|e| Error::file(path, "read", e))?;
+    let read = || {
+        let png = RawPng::open(&bytes, forms)?;
+        let size = png.size;
+        Array2::from_shape_vec(size, png.samples()?).map_err(|e| e.to_string())
+    };
+    read().map_err(|problem| Error::data(path.display(), problem))
+}
+
+/// Depth in millimetres, of the file's own size.
+pub(super) fn depth(path: &Path, scale: Option<f64>) -> Result<Array2<u32>> {
+    let wrong = |problem: String| Error::data(path.display(), problem);
+    let file = DepthFile::new(path.to_owned(), scale)
+        .map_err(|problem| wrong(problem + " (--depth-scale METRES says it)"))?;
+    let bytes = fs::read(path).map_err(|e| Error::file(path, "read", e))?;
+    file.decode_alone(&bytes).map_err(wrong)
+}
+
+/// Refuses a map of another size than its image.
+pub(super) fn same_size<T>(path: &Path, map: &Array2<T>, rgb: &Rgb) -> Result<()> {
+    let (height, width) = map.dim();
+    if (height, width) == (rgb.height(), rgb.width()) {
+        return Ok(());
+    }
+    let problem = format_args!(
+        "{height} × {width} pixels (height × width), but its image has {} × {}; a map of labels is never scaled",
+        rgb.height(),
+        rgb.width()
+    );
+    Err(Error::data(path.display(), problem))
+}
+
+/// So many numbers of a text file.
+pub(super) fn numbers(path: &Path) -> Result<Vec<f64>> {
+    let words = text(path)?;
+    let numbers = words
+        .split_whitespace()
+        .map(str::parse::<f64>)
+        .collect::<Result<Vec<f64>, _>>();
+    numbers.map_err(|e| Error::data(path.display(), format_args!("numbers expected: {e}")))
+}

@@ -1,0 +1,229 @@
+//! Folders of images and maps that share their names; or a folder of the common interface, taken over as it is.
+//!
+//! `rgb`, `depth`, `sem` and `over` (or names that other tools use), in the folder itself or in a folder for each scene.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use ndarray::Array2;
+
+use super::files::{depth, files, first, folders, png, same_size};
+use super::{Adapter, Incoming, Read, Stated, labels, pinhole};
+use crate::dataset::npy::Npy;
+use crate::dataset::raw_png::Form;
+use crate::error::{Error, Result};
+use crate::types::{DepthKind, Intrinsics, Labels, Rgb, SegmentName};
+
+/// What the folders are called: images, depth, classes, segments.
+const RGB: [&str; 6] = ["rgb", "image", "images", "color", "img", "RGB"];
+const DEPTH: [&str; 3] = ["depth", "depths", "Depth"];
+const CLASSES: [&str; 8] = [
+    "sem",
+    "semantic",
+    "semantics",
+    "label",
+    "labels",
+    "semantic_class",
+    "mask",
+    "masks",
+];
+const SEGMENTS: [&str; 6] = [
+    "over",
+    "instance",
+    "instances",
+    "semantic_instance",
+    "segment",
+    "segments",
+];
+
+/// The frames of a folder.
+#[derive(Debug)]
+pub(super) struct Folder {
+    frames: Vec<Incoming>,
+    maps: Vec<Maps>,
+    labels: Labels,
+    depth_scale: Option<f64>,
+    depth_kind: DepthKind,
+    hfov: Option<f64>,
+    /// How the numbers of the class maps are told from those of the label space.
+    offset: Offset,
+    unlisted: BTreeMap<String, usize>,
+}
+
+/// How the numbers of class maps lie.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Offset {
+    /// As in the label space.
+    None,
+    /// One less, with 255 for void.
+    One,
+}
+
+#[derive(Debug)]
+struct Maps {
+    depth: Option<PathBuf>,
+    classes: Option<PathBuf>,
+    segments: Option<PathBuf>,
+}
+
+impl Folder {
+    pub(super) fn open(folder: &Path, stated: &Stated) -> Result<Self> {
+        let known = folder.join("classes.json");
+        let labels = match labels(stated)? {
+            Some(labels) => labels,
+            None if known.is_file() => crate::dataset::spaces::read(&known)?,
+            None => {
+                let problem = "which label space the numbers of its class maps belong to must be said: nyu40, nyu13, mpcat40, ade150, or a classes.json";
+                return Err(Error::usage("--labels", problem));
+            }
+        };
+        Self::of(folder, stated, labels, Offset::None)
+    }
+
+    pub(super) fn of(
+        folder: &Path,
+        stated: &Stated,
+        labels: Labels,
+        offset: Offset,
+    ) -> Result<Self> {
+        let mut set = Self {
+            frames: Vec::new(),
+            maps: Vec::new(),
+            labels,
+            depth_scale: stated.depth_scale,
+            depth_kind: stated.depth_kind.unwrap_or_default(),
+            hfov: stated.hfov,
+            offset,
+            unlisted: BTreeMap::new(),
+        };
+        if first(folder, &RGB).is_some() {
+            set.add(folder)?;
+        } else {
+            let nested = folder.join("scenes");
+            for scene in folders(if nested.is_dir() { &nested } else { folder })? {
+                if first(&scene, &RGB).is_some() {
+                    set.add(&scene)?;
+                }
+            }
+        }
+        Ok(set)
+    }
+
+    fn add(&mut self, folder: &Path) -> Result<()> {
+        let scene = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+        let scene = scene.file_name().map_or_else(
+            || "scene".into(),
+            |name| name.to_string_lossy().into_owned(),
+        );
+        let in_any = |names: &[&str], endings: &[&str]| match first(folder, names) {
+            Some(folder) => files(&folder, endings),
+            None => Ok(BTreeMap::new()),
+        };
+        let images = in_any(&RGB, &[".png", ".jpg", ".jpeg"])?;
+        let mut depths = in_any(&DEPTH, &[".npy", ".png"])?;
+        let mut classes = in_any(&CLASSES, &[".png"])?;
+        let mut segments = in_any(&SEGMENTS, &[".npy", ".png"])?;
+        for (frame, rgb) in images {
+            self.maps.push(Maps {
+                depth: depths.remove(&frame),
+                classes: classes.remove(&frame),
+                segments: segments.remove(&frame),
+            });
+            self.frames.push(Incoming {
+                scene: scene.clone(),
+                frame,
+                time: None,
+                pose: None,
+                intrinsics: None,
+                room: None,
+                rgb,
+                index: self.maps.len() - 1,
+            });
+        }
+        let strays = depths
+            .into_values()
+            .chain(classes.into_values())
+            .chain(segments.into_values());
+        if let Some(stray) = strays.min() {
+            return Err(Error::data(
+                stray.display(),
+                "no image has the name of this map",
+            ));
+        }
+        Ok(())
+    }
+}
+
+fn segments(path: &Path) -> Result<Array2<u32>> {
+    if path
+        .extension()
+        .is_some_and(|end| end.eq_ignore_ascii_case("png"))
+    {
+        return Ok(png(path, &[Form::Grey16])?.mapv(u32::from));
+    }
+    let bytes = std::fs::read(path).map_err(|e| Error::file(path, "read", e))?;
+    let read = || {
+        let npy = Npy::parse(&bytes)?;
+        let ids = npy.integers()?.map(|id| u32::try_from(id).unwrap_or(0));
+        Array2::from_shape_vec(npy.size, ids.collect()).map_err(|e| e.to_string())
+    };
+    read().map_err(|problem| Error::data(path.display(), problem))
+}
+
+impl Adapter for Folder {
+    fn frames(&self) -> &[Incoming] {
+        &self.frames
+    }
+
+    fn labels(&self) -> &Labels {
+        &self.labels
+    }
+
+    fn names(&self, _scene: &str) -> BTreeMap<u32, SegmentName> {
+        BTreeMap::new()
+    }
+
+    fn depth_kind(&self) -> DepthKind {
+        self.depth_kind
+    }
+
+    fn camera(&self, _frame: &Incoming, rgb: &Rgb) -> Option<Intrinsics> {
+        self.hfov
+            .map(|hfov| pinhole(rgb.width(), rgb.height(), hfov))
+    }
+
+    fn has_segments(&self) -> bool {
+        self.maps.iter().any(|maps| maps.segments.is_some())
+    }
+
+    fn unlisted(&self) -> &BTreeMap<String, usize> {
+        &self.unlisted
+    }
+
+    fn read(&self, frame: &Incoming, rgb: &Rgb) -> Result<Read> {
+        let maps = &self.maps[frame.index];
+        let mut read = Read::default();
+        if let Some(path) = &maps.depth {
+            let scale = self
+                .depth_scale
+                .filter(|_| path.extension().is_some_and(|end| end != "npy"));
+            let depth = depth(path, scale)?;
+            same_size(path, &depth, rgb)?;
+            read.depth = Some(depth);
+        }
+        if let Some(path) = &maps.classes {
+            let mut classes = png(path, &[Form::Grey8, Form::Grey16, Form::Palette])?;
+            same_size(path, &classes, rgb)?;
+            if self.offset == Offset::One {
+                classes.mapv_inplace(|id| if id == 255 { 0 } else { id + 1 });
+            }
+            read.semantic = Some(classes);
+        }
+        if let Some(path) = &maps.segments {
+            let segments = segments(path)?;
+            same_size(path, &segments, rgb)?;
+            read.segments = Some(segments);
+        }
+        Ok(read)
+    }
+}

@@ -1,0 +1,282 @@
+//! Renders of habitat-sim: one folder a scene, with its instances named as the scene's data set names them.
+//!
+//! `<scene>/rgb/<frame>.png`, `depth/<frame>.npy` (metres) or `.png`, `semantic/<frame>.npy` or `.png` (16 bits: the numbers of
+//! instances), beside them `*.semantic.txt` (HM3D-Sem), `*.house` (Matterport3D) or `info_semantic.json` (Replica), and where
+//! frames have a time `trajectory.jsonl`, a line each: `{"frame", "t", "pose", "intrinsics"}`.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use ndarray::Array2;
+use serde::Deserialize;
+
+use super::files::{depth, files, folders, png, same_size, text};
+use super::{Adapter, Incoming, Read, Stated, hm3d, mp3d, mpcat40, numbers, pinhole, replica};
+use crate::dataset::npy::Npy;
+use crate::dataset::raw_png::Form;
+use crate::error::{Error, Result};
+use crate::types::{DepthKind, Intrinsics, Labels, Rgb, SegmentName};
+
+/// The part of the named pixels that a region must have for its room to be the frame's, in hundredths.
+const MOST_OF_FRAME: u64 = 60;
+
+/// The renders of a folder.
+#[derive(Debug)]
+pub(super) struct Habitat {
+    frames: Vec<Incoming>,
+    /// Depth and semantic map of each.
+    maps: Vec<(Option<PathBuf>, PathBuf)>,
+    scenes: BTreeMap<String, Scene>,
+    labels: Labels,
+    numbers: BTreeMap<String, u16>,
+    unlisted: BTreeMap<String, usize>,
+    depth_scale: Option<f64>,
+    depth_kind: DepthKind,
+    hfov: Option<f64>,
+}
+
+/// What a scene's own files say.
+#[derive(Debug, Default)]
+struct Scene {
+    names: BTreeMap<u32, SegmentName>,
+    rooms: BTreeMap<i64, &'static str>,
+    /// What is added to the numbers of instances: 1 where one of them is 0, which stands for none elsewhere.
+    shift: u32,
+}
+
+/// A line of `trajectory.jsonl`.
+#[derive(Deserialize)]
+struct Step {
+    frame: String,
+    t: Option<f64>,
+    pose: Option<Vec<f64>>,
+    intrinsics: Option<Intrinsics>,
+}
+
+impl Habitat {
+    pub(super) fn open(folder: &Path, stated: &Stated) -> Result<Self> {
+        let labels = mpcat40();
+        let mut set = Self {
+            frames: Vec::new(),
+            maps: Vec::new(),
+            scenes: BTreeMap::new(),
+            numbers: numbers(&labels),
+            labels,
+            unlisted: BTreeMap::new(),
+            depth_scale: stated.depth_scale,
+            depth_kind: stated.depth_kind.unwrap_or_default(),
+            hfov: stated.hfov,
+        };
+        for scene in folders(folder)? {
+            if scene.join("rgb").is_dir() {
+                set.add(&scene)?;
+            }
+        }
+        Ok(set)
+    }
+
+    fn add(&mut self, folder: &Path) -> Result<()> {
+        let name = folder
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
+        let scene = self.scene(folder)?;
+        let images = files(&folder.join("rgb"), &[".png", ".jpg", ".jpeg"])?;
+        let depths = files(&folder.join("depth"), &[".npy", ".png"])?;
+        let semantics = files(&folder.join("semantic"), &[".npy", ".png"])?;
+        let mut steps = steps(&folder.join("trajectory.jsonl"))?;
+        for (frame, rgb) in images {
+            let Some(semantic) = semantics.get(&frame) else {
+                let problem = format_args!("no semantic map of the frame {frame:?}");
+                return Err(Error::data(folder.join("semantic").display(), problem));
+            };
+            let step = steps.remove(&frame);
+            self.frames.push(Incoming {
+                scene: name.clone(),
+                time: step.as_ref().and_then(|step| step.t),
+                intrinsics: step.as_ref().and_then(|step| step.intrinsics),
+                pose: step.and_then(|step| step.pose),
+                room: None,
+                rgb,
+                index: self.maps.len(),
+                frame: frame.clone(),
+            });
+            self.maps
+                .push((depths.get(&frame).cloned(), semantic.clone()));
+        }
+        self.scenes.insert(name, scene);
+        Ok(())
+    }
+
+    /// Reads the one file that names a scene's instances.
+    fn scene(&mut self, folder: &Path) -> Result<Scene> {
+        let annotations = files(folder, &[".semantic.txt", ".house", "info_semantic.json"])?;
+        let Some(path) = annotations.into_values().next() else {
+            let problem = "none of *.semantic.txt (HM3D-Sem), *.house (Matterport3D), info_semantic.json (Replica) in this folder: nothing names the instances of its maps";
+            return Err(Error::data(folder.display(), problem));
+        };
+        let content = text(&path)?;
+        let at_line = |(line, problem): (usize, String)| Error::line(&path, line, problem);
+        let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
+        let (names, rooms) = if ending == "house" {
+            let house = mp3d::parse(&content, &self.labels.expressible).map_err(at_line)?;
+            (house.names, house.rooms)
+        } else if ending == "json" {
+            let names = replica::parse(&content, &mut self.unlisted);
+            (
+                names.map_err(|problem| Error::data(path.display(), problem))?,
+                BTreeMap::new(),
+            )
+        } else {
+            (
+                hm3d::parse(&content, &mut self.unlisted).map_err(at_line)?,
+                BTreeMap::new(),
+            )
+        };
+        if names.is_empty() {
+            return Err(Error::data(path.display(), "it names no instance"));
+        }
+        let shift = u32::from(names.contains_key(&0));
+        let names = names
+            .into_iter()
+            .map(|(id, name)| (id + shift, name))
+            .collect();
+        Ok(Scene {
+            names,
+            rooms,
+            shift,
+        })
+    }
+}
+
+/// The steps of a trajectory by frame; none where there is no such file.
+fn steps(path: &Path) -> Result<BTreeMap<String, Step>> {
+    if !path.exists() {
+        return Ok(BTreeMap::new());
+    }
+    let content = text(path)?;
+    let lines = content
+        .lines()
+        .enumerate()
+        .filter(|(_, line)| !line.trim().is_empty());
+    let steps = lines.map(|(i, line)| {
+        let step: Step =
+            serde_json::from_str(line).map_err(|e| Error::json_line(path, i + 1, &e))?;
+        Ok((step.frame.clone(), step))
+    });
+    steps.collect()
+}
+
+/// The numbers of instances in a map.
+fn instances(path: &Path) -> Result<Array2<u32>> {
+    if path
+        .extension()
+        .is_some_and(|end| end.eq_ignore_ascii_case("png"))
+    {
+        return Ok(png(path, &[Form::Grey16])?.mapv(u32::from));
+    }
+    let bytes = std::fs::read(path).map_err(|e| Error::file(path, "read", e))?;
+    let read = || {
+        let npy = Npy::parse(&bytes)?;
+        let ids = npy
+            .integers()?
+            .map(|id| u32::try_from(id).map_err(|_| format!("{id} is no number of an instance")));
+        let ids = ids.collect::<Result<Vec<u32>, String>>()?;
+        Array2::from_shape_vec(npy.size, ids).map_err(|e| e.to_string())
+    };
+    read().map_err(|problem| Error::data(path.display(), problem))
+}
+
+impl Adapter for Habitat {
+    fn frames(&self) -> &[Incoming] {
+        &self.frames
+    }
+
+    fn labels(&self) -> &Labels {
+        &self.labels
+    }
+
+    fn names(&self, scene: &str) -> BTreeMap<u32, SegmentName> {
+        self.scenes
+            .get(scene)
+            .map_or_else(BTreeMap::new, |scene| scene.names.clone())
+    }
+
+    fn depth_kind(&self) -> DepthKind {
+        self.depth_kind
+    }
+
+    fn camera(&self, frame: &Incoming, rgb: &Rgb) -> Option<Intrinsics> {
+        let stated = self
+            .hfov
+            .map(|hfov| pinhole(rgb.width(), rgb.height(), hfov));
+        frame.intrinsics.or(stated)
+    }
+
+    fn has_segments(&self) -> bool {
+        true
+    }
+
+    fn unlisted(&self) -> &BTreeMap<String, usize> {
+        &self.unlisted
+    }
+
+    fn read(&self, frame: &Incoming, rgb: &Rgb) -> Result<Read> {
+        let (deep, semantic) = &self.maps[frame.index];
+        let scene = &self.scenes[&frame.scene];
+        let depth = match deep {
+            Some(path) => {
+                let scale = self
+                    .depth_scale
+                    .filter(|_| path.extension().is_some_and(|end| end != "npy"));
+                let depth = depth(path, scale)?;
+                same_size(path, &depth, rgb)?;
+                Some(depth)
+            }
+            None => None,
+        };
+        let ids = instances(semantic)?;
+        same_size(semantic, &ids, rgb)?;
+        let (mut regions, mut named) = (BTreeMap::new(), 0_u64);
+        let (mut last, mut found) = (None, (0, None));
+        let mut segments = ids;
+        let classes = segments.mapv(|id| {
+            if last != Some(id) {
+                let name = id
+                    .checked_add(scene.shift)
+                    .and_then(|id| scene.names.get(&id));
+                let class = name.and_then(|name| self.numbers.get(&name.canonical));
+                (last, found) = (
+                    Some(id),
+                    (class.copied().unwrap_or(0), name.and_then(|n| n.region)),
+                );
+            }
+            if found.0 != 0 {
+                named += 1;
+                *regions.entry(found.1).or_insert(0_u64) += 1;
+            }
+            found.0
+        });
+        if named == 0 {
+            let problem = "no pixel has the number of an instance that the scene names; habitat-sim renders 0 everywhere where the scene was opened without its *.scene_dataset_config.json";
+            return Err(Error::data(semantic.display(), problem));
+        }
+        segments.mapv_inplace(|id| match id.checked_add(scene.shift) {
+            Some(id) if scene.names.contains_key(&id) => id,
+            _ => 0,
+        });
+        let (region, most) = regions
+            .into_iter()
+            .max_by_key(|(_, count)| *count)
+            .unwrap_or((None, 0));
+        let room = region.and_then(|region| scene.rooms.get(&region));
+        let room = room.filter(|_| most * 100 >= named * MOST_OF_FRAME);
+        Ok(Read {
+            depth,
+            semantic: Some(classes),
+            segments: Some(segments),
+            room: room.map(|room| (*room).to_owned()),
+        })
+    }
+}

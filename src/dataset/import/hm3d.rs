@@ -1,0 +1,108 @@
+//! The segments of an HM3D-Sem scene, `<scene>.semantic.txt`.
+//!
+//! As habitat-sim reads it (`src/esp/scene/HM3DSemanticScene.cpp`): the first line is `HM3D Semantic Annotations`, then one line
+//! a segment, `id,colour,"name",region`. A name may have commas, so that it is what stands between the quotes.
+
+use std::collections::BTreeMap;
+
+use super::names::{Meaning, UNKNOWN, meaning};
+use crate::types::SegmentName;
+
+/// The first line.
+const HEAD: &str = "HM3D Semantic Annotations";
+
+/// Segments by number; one whose name says nothing is left out.
+pub(super) fn parse(
+    text: &str,
+    unlisted: &mut BTreeMap<String, usize>,
+) -> Result<BTreeMap<u32, SegmentName>, (usize, String)> {
+    let mut lines = (1..).zip(text.trim_start_matches('\u{feff}').lines());
+    match lines.next() {
+        Some((_, head)) if head.trim() == HEAD => {}
+        _ => return Err((1, format!("{HEAD:?} expected"))),
+    }
+    let mut names = BTreeMap::new();
+    for (number, line) in lines.filter(|(_, line)| !line.trim().is_empty()) {
+        let wrong = |problem: &str| (number, format!("{problem} in id,colour,\"name\",region"));
+        let mut parts = line.splitn(2, '"');
+        let head = parts.next().unwrap_or_default();
+        let (name, region) = parts
+            .next()
+            .and_then(|rest| rest.rsplit_once('"'))
+            .ok_or_else(|| wrong("a name between quotes expected"))?;
+        let id = head.split(',').next().unwrap_or_default().trim();
+        let id: u32 = id
+            .parse()
+            .map_err(|_| wrong("a whole number expected as id"))?;
+        let region = region.trim_start_matches(',').trim();
+        let region: i64 = region
+            .parse()
+            .map_err(|_| wrong("a whole number expected as region"))?;
+        let canonical = match meaning(name) {
+            Meaning::Nothing => continue,
+            Meaning::Class(class) => class,
+            Meaning::Unlisted => {
+                *unlisted.entry(name.to_owned()).or_insert(0) += 1;
+                UNKNOWN
+            }
+        };
+        let segment = SegmentName {
+            name: name.to_owned(),
+            canonical: canonical.to_owned(),
+            region: Some(region),
+        };
+        if names.insert(id, segment).is_some() {
+            return Err((number, format!("a second segment {id}")));
+        }
+    }
+    Ok(names)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_may_have_commas_and_be_empty() {
+        let text = "HM3D Semantic Annotations\n1,00FF7F,\"Night stand\",0\n\n2,AA0000,\"books, magazines\",-1\n3,BB,\"\",4\n4,CC,\"unknown\",4\n5,DD,\"flux capacitor\",2\n";
+        let mut unlisted = BTreeMap::new();
+        let names = parse(text, &mut unlisted).unwrap();
+        assert_eq!(names.keys().copied().collect::<Vec<_>>(), [1, 2, 5]);
+        assert_eq!(
+            (names[&1].canonical.as_str(), names[&1].region),
+            ("chest_of_drawers", Some(0))
+        );
+        assert_eq!(names[&2].name, "books, magazines");
+        assert_eq!(names[&5].canonical, "misc");
+        assert_eq!(
+            unlisted.into_keys().collect::<Vec<_>>(),
+            ["books, magazines", "flux capacitor"]
+        );
+    }
+
+    #[test]
+    fn broken_lines_are_named() {
+        for (text, line, says) in [
+            ("", 1, "HM3D Semantic"),
+            ("id,colour\n", 1, "HM3D Semantic"),
+            (
+                "HM3D Semantic Annotations\n1,FF,name,0\n",
+                2,
+                "between quotes",
+            ),
+            ("HM3D Semantic Annotations\nx,FF,\"bed\",0\n", 2, "as id"),
+            ("HM3D Semantic Annotations\n1,FF,\"bed\"\n", 2, "as region"),
+            (
+                "HM3D Semantic Annotations\n1,FF,\"bed\",0\n1,FE,\"bed\",0\n",
+                3,
+                "a second segment 1",
+            ),
+        ] {
+            let (found, problem) = parse(text, &mut BTreeMap::new()).unwrap_err();
+            assert!(
+                found == line && problem.contains(says),
+                "{found}: {problem}"
+            );
+        }
+    }
+}

@@ -1,0 +1,154 @@
+//! Key frames, uniform in time along a trajectory: [`Every`].
+
+use super::Incoming;
+use crate::error::{Error, Result};
+
+/// Which frames of each scene are kept.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Every {
+    /// All.
+    Frame,
+    /// One for each so many seconds, counted from the scene's first (DarkQA: 2).
+    Seconds(f64),
+    /// So many, evenly spread.
+    Count(usize),
+}
+
+/// Keeps the key frames of each scene, in time where frames have one, else in the order of their names.
+///
+/// For each k = 0, 1, … it is the first frame at k · seconds or later, and never the same frame twice; for a count N of n
+/// frames those at k · (n − 1) / (N − 1), rounded half to even.
+///
+/// # Errors
+/// Where frames have no time and one is needed.
+pub fn choose(frames: &[Incoming], every: Every, fps: Option<f64>) -> Result<Vec<Incoming>> {
+    let mut chosen = Vec::new();
+    for scene in frames.chunk_by(|a, b| a.scene == b.scene) {
+        let mut timed: Vec<Incoming> = scene.to_vec();
+        if let Some(fps) = fps.filter(|_| scene.iter().all(|frame| frame.time.is_none())) {
+            for (i, frame) in timed.iter_mut().enumerate() {
+                frame.time = Some(i as f64 / fps);
+            }
+        }
+        timed.sort_by(|a, b| {
+            a.time
+                .partial_cmp(&b.time)
+                .unwrap_or(std::cmp::Ordering::Equal)
+        });
+        match every {
+            Every::Frame => {}
+            Every::Count(count) => timed = spread(timed, count),
+            Every::Seconds(seconds) => timed = seldom(timed, seconds)?,
+        }
+        chosen.extend(timed);
+    }
+    chosen.sort_by(|a, b| (&a.scene, &a.frame).cmp(&(&b.scene, &b.frame)));
+    Ok(chosen)
+}
+
+fn spread(frames: Vec<Incoming>, count: usize) -> Vec<Incoming> {
+    let (last, gaps) = (frames.len() - 1, count.saturating_sub(1));
+    let mut places: Vec<usize> = (0..count)
+        .map(|k| match gaps {
+            0 => 0,
+            gaps => (k as f64 * last as f64 / gaps as f64).round_ties_even() as usize,
+        })
+        .collect();
+    places.dedup();
+    let mut frames: Vec<Option<Incoming>> = frames.into_iter().map(Some).collect();
+    places
+        .into_iter()
+        .filter_map(|place| frames.get_mut(place)?.take())
+        .collect()
+}
+
+fn seldom(frames: Vec<Incoming>, seconds: f64) -> Result<Vec<Incoming>> {
+    let untimed = |frame: &Incoming| {
+        let problem = format_args!(
+            "the frame {}/{} has no time; --fps says how many there are in a second, --count N needs no time",
+            frame.scene, frame.frame
+        );
+        Error::usage("--every", problem)
+    };
+    let (mut chosen, mut next, mut start) = (Vec::new(), 0.0, None);
+    for frame in frames {
+        let time = frame.time.ok_or_else(|| untimed(&frame))?;
+        let since = time - *start.get_or_insert(time);
+        if since >= next * seconds {
+            next = libm::floor(since / seconds) + 1.0;
+            // A quotient that was rounded up must not take the same moment again.
+            if next * seconds <= since {
+                next += 1.0;
+            }
+            chosen.push(frame);
+        }
+    }
+    Ok(chosen)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame(scene: &str, number: usize, time: Option<f64>) -> Incoming {
+        Incoming {
+            scene: scene.into(),
+            frame: format!("{number:03}"),
+            time,
+            pose: None,
+            intrinsics: None,
+            room: None,
+            rgb: "x.png".into(),
+            index: number,
+        }
+    }
+
+    fn names(frames: &[Incoming]) -> Vec<&str> {
+        frames.iter().map(|frame| frame.frame.as_str()).collect()
+    }
+
+    #[test]
+    fn one_frame_for_each_step_of_time() {
+        let times = [100.0, 100.5, 101.9, 102.0, 102.1, 107.0, 107.5, 108.0];
+        let frames: Vec<Incoming> = (0..)
+            .zip(times)
+            .map(|(i, time)| frame("a", i, Some(time)))
+            .collect();
+        let chosen = choose(&frames, Every::Seconds(2.0), None).unwrap();
+        // 0, 2, then 7 for both 4 and 6, then 8.
+        assert_eq!(names(&chosen), ["000", "003", "005", "007"]);
+        let mut reversed = frames.clone();
+        reversed.reverse();
+        assert_eq!(
+            choose(&reversed, Every::Seconds(2.0), None).unwrap(),
+            chosen
+        );
+        assert_eq!(choose(&frames, Every::Frame, None).unwrap().len(), 8);
+    }
+
+    #[test]
+    fn frames_a_second_give_a_time() {
+        let frames: Vec<Incoming> = (0..61).map(|i| frame("a", i, None)).collect();
+        let chosen = choose(&frames, Every::Seconds(2.0), Some(10.0)).unwrap();
+        assert_eq!(names(&chosen), ["000", "020", "040", "060"]);
+        let error = choose(&frames, Every::Seconds(2.0), None)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.starts_with("--every: the frame a/000 has no time"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn a_count_is_spread_evenly_in_each_scene() {
+        let mut frames: Vec<Incoming> = (0..10).map(|i| frame("a", i, None)).collect();
+        frames.extend((0..2).map(|i| frame("b", i, None)));
+        let chosen = choose(&frames, Every::Count(4), None).unwrap();
+        assert_eq!(names(&chosen), ["000", "003", "006", "009", "000", "001"]);
+        assert_eq!(
+            names(&choose(&frames, Every::Count(1), None).unwrap()),
+            ["000", "000"]
+        );
+    }
+}

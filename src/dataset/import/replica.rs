@@ -1,0 +1,72 @@
+//! The segments of a Replica scene, `info_semantic.json`.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+
+use super::names::{Meaning, UNKNOWN, meaning};
+use crate::types::SegmentName;
+
+/// The keys that are used.
+#[derive(Deserialize)]
+struct File {
+    objects: Vec<Object>,
+}
+
+#[derive(Deserialize)]
+struct Object {
+    id: i64,
+    class_name: String,
+}
+
+/// Segments by number; those without a class are left out.
+pub(super) fn parse(
+    text: &str,
+    unlisted: &mut BTreeMap<String, usize>,
+) -> Result<BTreeMap<u32, SegmentName>, String> {
+    let file: File = serde_json::from_str(text).map_err(|e| e.to_string())?;
+    let mut names = BTreeMap::new();
+    for Object { id, class_name } in file.objects {
+        let Ok(id) = u32::try_from(id) else {
+            continue;
+        };
+        let canonical = match meaning(&class_name.replace('-', " ")) {
+            Meaning::Nothing => continue,
+            Meaning::Class(class) => class,
+            Meaning::Unlisted => {
+                *unlisted.entry(class_name.clone()).or_insert(0) += 1;
+                UNKNOWN
+            }
+        };
+        let name = SegmentName {
+            name: class_name.replace('-', " "),
+            canonical: canonical.to_owned(),
+            region: None,
+        };
+        names.insert(id, name);
+    }
+    Ok(names)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn objects_have_classes() {
+        let text = r#"{"classes":[{"id":1,"name":"bed"}],"objects":[{"id":0,"class_id":1,"class_name":"bed"},{"id":2,"class_name":"coffee-table"},{"id":-1,"class_name":"bed"},{"id":3,"class_name":"gizmo"},{"id":4,"class_name":""}]}"#;
+        let mut unlisted = BTreeMap::new();
+        let names = parse(text, &mut unlisted).unwrap();
+        let classes: Vec<(u32, &str)> = names
+            .iter()
+            .map(|(id, name)| (*id, name.canonical.as_str()))
+            .collect();
+        assert_eq!(classes, [(0, "bed"), (2, "table"), (3, "misc")]);
+        assert_eq!(unlisted, [("gizmo".to_owned(), 1)].into());
+        assert!(
+            parse("{}", &mut unlisted)
+                .unwrap_err()
+                .contains("missing field `objects`")
+        );
+    }
+}

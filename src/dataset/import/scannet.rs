@@ -1,0 +1,400 @@
+//! Frames of ScanNet, extracted: one folder a scene.
+//!
+//! `<scene>/color/<n>.jpg`, `depth/<n>.png` (millimetres), `pose/<n>.txt`, and either `label-filt` and `instance-filt` (ScanNet's
+//! own numbers, with `scannetv2-labels.combined.tsv` beside the scenes) or, as in frames_25k, `label` (NYU40) and `instance`
+//! (label · 1000 + number). Depth, which is smaller than colour, is taken to its pixels through both cameras; labels are never
+//! scaled. A frame whose pose is lost has `-inf` in it and is left out.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use ndarray::Array2;
+use serde::Deserialize;
+
+use super::files::{depth, files, first, folders, numbers, png, same_size, text};
+use super::names::{UNKNOWN, overridden};
+use super::{Adapter, Incoming, Read, Stated};
+use crate::dataset::raw_png::Form;
+use crate::dataset::spaces::{canonical, space};
+use crate::error::{Error, Result};
+use crate::types::{DepthKind, Intrinsics, Label, Labels, Rgb, SegmentName};
+
+/// The table of ScanNet's own numbers.
+const TABLE: &str = "scannetv2-labels.combined.tsv";
+/// Frames a second of the sensor; frames are named by their number.
+const RATE: f64 = 30.0;
+/// Metres in a unit of depth.
+const SCALE: f64 = 0.001;
+
+/// The frames of a folder.
+#[derive(Debug)]
+pub(super) struct Scannet {
+    frames: Vec<Incoming>,
+    maps: Vec<Maps>,
+    labels: Labels,
+    depth_scale: f64,
+    unlisted: BTreeMap<String, usize>,
+}
+
+#[derive(Debug)]
+struct Maps {
+    depth: Option<PathBuf>,
+    labels: PathBuf,
+    instances: Option<PathBuf>,
+    /// The camera of depth, where it is another one.
+    depth_camera: Option<Intrinsics>,
+}
+
+/// How labels and instances are numbered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Numbering {
+    /// ScanNet's own.
+    Own,
+    /// NYU40.
+    Nyu40,
+}
+
+impl Scannet {
+    pub(super) fn open(folder: &Path, stated: &Stated) -> Result<Self> {
+        let mut set = Self {
+            frames: Vec::new(),
+            maps: Vec::new(),
+            labels: Labels::default(),
+            depth_scale: stated.depth_scale.unwrap_or(SCALE),
+            unlisted: BTreeMap::new(),
+        };
+        let scenes: Vec<PathBuf> = folders(folder)?
+            .into_iter()
+            .filter(|scene| scene.join("color").is_dir())
+            .collect();
+        let own = scenes.iter().any(|scene| scene.join("label-filt").is_dir());
+        let numbering = if own {
+            Numbering::Own
+        } else {
+            Numbering::Nyu40
+        };
+        set.labels = match numbering {
+            Numbering::Own => table(&folder.join(TABLE))?,
+            Numbering::Nyu40 => space("nyu40").unwrap_or_default(),
+        };
+        for scene in scenes {
+            set.add(&scene, numbering)?;
+        }
+        Ok(set)
+    }
+
+    fn add(&mut self, folder: &Path, numbering: Numbering) -> Result<()> {
+        let name = folder
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
+        check_overflow(folder, &name)?;
+        let camera = |names: [String; 2]| {
+            let path = names
+                .into_iter()
+                .map(|name| folder.join(name))
+                .find(|path| path.exists());
+            path.map(|path| intrinsics(&path)).transpose()
+        };
+        let of = |which: &str| {
+            camera([
+                format!("intrinsic/intrinsic_{which}.txt"),
+                format!("intrinsics_{which}.txt"),
+            ])
+        };
+        let (color, deep) = (of("color")?, of("depth")?);
+        let room = room(&folder.join(format!("{name}.txt")))?;
+        let within = |folders: &[&str]| match first(folder, folders) {
+            Some(folder) => files(&folder, &[".png"]),
+            None => Ok(BTreeMap::new()),
+        };
+        let (labels, instances) = match numbering {
+            Numbering::Own => (within(&["label-filt"])?, within(&["instance-filt"])?),
+            Numbering::Nyu40 => (within(&["label"])?, within(&["instance"])?),
+        };
+        let depths = within(&["depth"])?;
+        let poses = files(&folder.join("pose"), &[".txt"])?;
+        for (frame, rgb) in files(&folder.join("color"), &[".jpg", ".jpeg", ".png"])? {
+            let pose = poses.get(&frame).map(|path| numbers(path)).transpose()?;
+            if pose
+                .as_ref()
+                .is_some_and(|pose| pose.iter().any(|number| !number.is_finite()))
+            {
+                continue;
+            }
+            let Some(label) = labels.get(&frame) else {
+                let problem = format_args!(
+                    "no labels of the frame {frame:?}: label-filt/{frame}.png or label/{frame}.png expected"
+                );
+                return Err(Error::data(folder.display(), problem));
+            };
+            let number: Option<u32> = frame.parse().ok();
+            self.maps.push(Maps {
+                depth: depths.get(&frame).cloned(),
+                labels: label.clone(),
+                instances: instances.get(&frame).cloned(),
+                depth_camera: deep,
+            });
+            self.frames.push(Incoming {
+                scene: name.clone(),
+                time: number.map(|number| f64::from(number) / RATE),
+                pose,
+                intrinsics: color,
+                room: room.clone(),
+                rgb,
+                index: self.maps.len() - 1,
+                frame,
+            });
+        }
+        Ok(())
+    }
+}
+
+/// The keys of `<scene>.aggregation.json` that are used.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Aggregation {
+    seg_groups: Vec<serde_json::Value>,
+}
+
+/// Refuses a scene of more objects than the 8 bits of its instance maps hold: the numbers beyond begin again at 0.
+fn check_overflow(folder: &Path, scene: &str) -> Result<()> {
+    let path = folder.join(format!("{scene}.aggregation.json"));
+    if !path.exists() || !folder.join("instance-filt").is_dir() {
+        return Ok(());
+    }
+    let file: Aggregation =
+        serde_json::from_str(&text(&path)?).map_err(|e| Error::data(path.display(), e))?;
+    let objects = file.seg_groups.len();
+    if objects > 255 {
+        let problem = format_args!(
+            "{objects} objects, but the 8 bits of instance-filt hold 255: their numbers overflow; export them with 16 bits, as frames_25k has them"
+        );
+        return Err(Error::data(path.display(), problem));
+    }
+    Ok(())
+}
+
+/// The label space of ScanNet's own numbers.
+fn table(path: &Path) -> Result<Labels> {
+    let mut reader = csv::ReaderBuilder::new()
+        .delimiter(b'\t')
+        .flexible(true)
+        .from_path(path)
+        .map_err(|e| Error::data(path.display(), e))?;
+    let header = reader
+        .headers()
+        .map_err(|e| Error::data(path.display(), e))?
+        .clone();
+    let column = |name: &str| {
+        header
+            .iter()
+            .position(|column| column == name)
+            .ok_or_else(|| Error::data(path.display(), format_args!("no column {name:?}")))
+    };
+    let [id, raw, class] = [column("id")?, column("raw_category")?, column("mpcat40")?];
+    let known = canonical();
+    let mut labels = Labels {
+        space: "scannet".into(),
+        void: [0].into(),
+        ..Labels::default()
+    };
+    for row in reader.records() {
+        let row = row.map_err(|e| Error::data(path.display(), e))?;
+        let cell = |column: usize| row.get(column).unwrap_or_default().trim();
+        let Ok(id) = cell(id).parse::<u16>() else {
+            continue;
+        };
+        let class = overridden(cell(raw)).unwrap_or(cell(class));
+        if matches!(class, "void" | "unlabeled") {
+            labels.void.insert(id);
+            continue;
+        }
+        let class = if known.contains(class) {
+            class
+        } else {
+            UNKNOWN
+        };
+        let label = Label {
+            name: cell(raw).to_owned(),
+            canonical: class.to_owned(),
+        };
+        labels.labels.insert(id, label);
+    }
+    // Annotators wrote whatever they saw, so that whatever the table can say they could have said.
+    let classes = labels.labels.values().map(|label| label.canonical.clone());
+    labels.expressible = classes.collect::<BTreeSet<String>>();
+    Ok(labels)
+}
+
+/// The camera of a matrix of 4 × 4.
+fn intrinsics(path: &Path) -> Result<Intrinsics> {
+    match numbers(path)?[..] {
+        [fx, _, cx, _, _, fy, cy, ..] => Ok(Intrinsics { fx, fy, cx, cy }),
+        _ => Err(Error::data(path.display(), "a matrix of 4 × 4 expected")),
+    }
+}
+
+/// The type of a scene, `sceneType = Bedroom / Hotel`.
+fn room(path: &Path) -> Result<Option<String>> {
+    if !path.exists() {
+        return Ok(None);
+    }
+    let content = text(path)?;
+    let stated = content
+        .lines()
+        .filter_map(|line| line.split_once('='))
+        .find(|(key, _)| key.trim() == "sceneType");
+    Ok(stated.map(|(_, room)| {
+        room.split('/')
+            .next()
+            .unwrap_or_default()
+            .trim()
+            .to_lowercase()
+    }))
+}
+
+/// Depth at the pixels of an image, from those of its own: the nearest through both cameras, or by place where they are unknown.
+fn at_pixels(depth: &Array2<u32>, rgb: &Rgb, cameras: Option<[Intrinsics; 2]>) -> Array2<u32> {
+    let (height, width) = depth.dim();
+    let scale = [
+        width as f64 / rgb.width() as f64,
+        height as f64 / rgb.height() as f64,
+    ];
+    let along = |i: usize, axis: usize| -> f64 {
+        match &cameras {
+            Some([color, deep]) if axis == 0 => {
+                (i as f64 - color.cx) / color.fx * deep.fx + deep.cx
+            }
+            Some([color, deep]) => (i as f64 - color.cy) / color.fy * deep.fy + deep.cy,
+            None => (i as f64 + 0.5) * scale[axis] - 0.5,
+        }
+    };
+    let columns: Vec<f64> = (0..rgb.width()).map(|x| along(x, 0).round()).collect();
+    let rows: Vec<f64> = (0..rgb.height()).map(|y| along(y, 1).round()).collect();
+    Array2::from_shape_fn((rgb.height(), rgb.width()), |(y, x)| {
+        let (row, column) = (rows[y], columns[x]);
+        let within = row >= 0.0 && column >= 0.0;
+        depth
+            .get((row as usize, column as usize))
+            .copied()
+            .filter(|_| within)
+            .unwrap_or(0)
+    })
+}
+
+impl Adapter for Scannet {
+    fn frames(&self) -> &[Incoming] {
+        &self.frames
+    }
+
+    fn labels(&self) -> &Labels {
+        &self.labels
+    }
+
+    fn names(&self, _scene: &str) -> BTreeMap<u32, SegmentName> {
+        BTreeMap::new()
+    }
+
+    fn depth_kind(&self) -> DepthKind {
+        DepthKind::Planar
+    }
+
+    fn has_segments(&self) -> bool {
+        self.maps.iter().any(|maps| maps.instances.is_some())
+    }
+
+    fn unlisted(&self) -> &BTreeMap<String, usize> {
+        &self.unlisted
+    }
+
+    fn read(&self, frame: &Incoming, rgb: &Rgb) -> Result<Read> {
+        let maps = &self.maps[frame.index];
+        let labels = png(&maps.labels, &[Form::Grey8, Form::Grey16])?;
+        same_size(&maps.labels, &labels, rgb)?;
+        let segments = match &maps.instances {
+            Some(path) => {
+                let instances = png(path, &[Form::Grey8, Form::Grey16])?;
+                same_size(path, &instances, rgb)?;
+                // One number for each label and instance: where 8 bits overflowed unseen, two things of different labels
+                // stay two.
+                let mut pairs = BTreeMap::new();
+                let both = || {
+                    labels
+                        .iter()
+                        .zip(&instances)
+                        .filter(|(_, instance)| **instance != 0)
+                };
+                for (label, instance) in both() {
+                    pairs.entry((*label, *instance)).or_insert(0);
+                }
+                for (number, id) in (1..).zip(pairs.values_mut()) {
+                    *id = number;
+                }
+                let ids = labels
+                    .iter()
+                    .zip(&instances)
+                    .map(|pair| pairs.get(&(*pair.0, *pair.1)).copied().unwrap_or(0));
+                let ids = Array2::from_shape_vec(labels.dim(), ids.collect());
+                Some(ids.map_err(|e| Error::data(path.display(), e))?)
+            }
+            None => None,
+        };
+        let depth = match &maps.depth {
+            Some(path) => {
+                let depth = depth(path, Some(self.depth_scale))?;
+                let same = depth.dim() == (rgb.height(), rgb.width());
+                let cameras = frame
+                    .intrinsics
+                    .zip(maps.depth_camera)
+                    .map(|(color, deep)| [color, deep]);
+                Some(if same {
+                    depth
+                } else {
+                    at_pixels(&depth, rgb, cameras)
+                })
+            }
+            None => None,
+        };
+        Ok(Read {
+            depth,
+            semantic: Some(labels),
+            segments,
+            room: None,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn depth_goes_to_the_pixels_of_colour() {
+        let depth = Array2::from_shape_vec((1, 2), vec![7, 9]).unwrap();
+        let rgb = Rgb::black(2, 4);
+        let found = at_pixels(&depth, &rgb, None);
+        assert_eq!(found.into_raw_vec_and_offset().0, [7, 7, 9, 9, 7, 7, 9, 9]);
+        // A camera of colour that sees half as wide looks at the middle of depth.
+        let deep = Array2::from_shape_vec((1, 5), vec![1, 2, 3, 4, 5]).unwrap();
+        let camera = |fx, cx| Intrinsics {
+            fx,
+            fy: 1.0,
+            cx,
+            cy: 0.0,
+        };
+        let found = at_pixels(
+            &deep,
+            &Rgb::black(1, 3),
+            Some([camera(2.0, 1.0), camera(2.0, 2.0)]),
+        );
+        assert_eq!(found.into_raw_vec_and_offset().0, [2, 3, 4]);
+        let found = at_pixels(
+            &deep,
+            &Rgb::black(1, 3),
+            Some([camera(1.0, 1.0), camera(3.0, 2.0)]),
+        );
+        assert_eq!(found.into_raw_vec_and_offset().0, [0, 3, 0]);
+    }
+}

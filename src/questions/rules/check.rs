@@ -1,0 +1,127 @@
+//! Whether a rulebook holds together: every class, room and token that it names is there.
+
+use std::collections::BTreeSet;
+
+use super::{Book, SCHEMA};
+use crate::types::Choices;
+
+impl Book {
+    /// Says what does not.
+    pub(super) fn check(&self) -> Result<(), String> {
+        if self.schema != SCHEMA {
+            return Err(format!("schema {:?}; {SCHEMA:?} expected", self.schema));
+        }
+        if self.measure.erosion_per_height == 0 || self.measure.void_per_height == 0 {
+            return Err("erosion_per_height and void_per_height must be above 0".to_owned());
+        }
+        self.check_classes()?;
+        self.check_rooms()?;
+        if !(2..=Choices::MOST).contains(&self.closest.choices) {
+            return Err(format!(
+                "closest.choices is {}; 2 to 26 expected",
+                self.closest.choices
+            ));
+        }
+        for (family, text, blank) in [
+            ("affordance", &self.affordance.text, "{activity}"),
+            ("presence", &self.presence.text, "{object}"),
+            ("color", &self.color.text, "{object}"),
+        ] {
+            if !text.contains(blank) {
+                return Err(format!("{family}.text has no {blank} in it"));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_classes(&self) -> Result<(), String> {
+        let unknown = |place: &str, class: &str| {
+            Err(format!(
+                "{place} names the class {class:?}, which [class] has not"
+            ))
+        };
+        for group in &self.confusable {
+            for class in &group.classes {
+                if !self.class.contains_key(class) {
+                    return unknown("confusable", class);
+                }
+            }
+        }
+        for class in self.names.unlike.keys() {
+            if !self.class.contains_key(class) {
+                return unknown("names.unlike", class);
+            }
+        }
+        for token in &self.token {
+            if let Some(class) = &token.class
+                && !self.class.contains_key(class)
+            {
+                return unknown("token", class);
+            }
+            if token.class.is_none() && token.names.is_empty() && token.starts.is_empty() {
+                return Err(format!("the token {:?} stands for everything", token.token));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_rooms(&self) -> Result<(), String> {
+        let order = &self.room.order;
+        let rooms: BTreeSet<&str> = self.clue.iter().map(|clue| clue.room.as_str()).collect();
+        if !(2..=Choices::MOST).contains(&order.len()) {
+            return Err("room.order: 2 to 26 rooms expected".to_owned());
+        }
+        for (i, room) in order.iter().enumerate() {
+            if order[..i].contains(room) {
+                return Err(format!("room.order has {room:?} twice"));
+            }
+        }
+        let named = order
+            .iter()
+            .chain(self.contest.iter().flat_map(|c| [&c.winner, &c.loser]));
+        let named = named.chain(self.activity.iter().flat_map(|activity| &activity.rooms));
+        for room in named {
+            if !rooms.contains(room.as_str()) {
+                return Err(format!("the room {room:?} has no clue"));
+            }
+        }
+        let signs = self.clue.iter().flat_map(|clue| {
+            let seen = clue.seen.iter().map(|sign| &sign.token);
+            seen.chain(&clue.unseen)
+        });
+        let enablers = self
+            .activity
+            .iter()
+            .flat_map(|activity| activity.enablers.iter().flatten().chain(&activity.pinch));
+        let contests = self
+            .contest
+            .iter()
+            .flat_map(|contest| contest.tokens.iter().flatten().chain(&contest.unseen));
+        for token in signs.chain(enablers).chain(contests) {
+            let known = self.class.contains_key(token)
+                || self.token.iter().any(|known| known.token == *token);
+            if !known {
+                return Err(format!("{token:?} is neither a token nor a class"));
+            }
+        }
+        let twice = self.activity.iter().enumerate().find(|(i, activity)| {
+            self.activity[..*i]
+                .iter()
+                .any(|other| other.activity == activity.activity)
+        });
+        if let Some((_, twice)) = twice {
+            return Err(format!(
+                "the activity {:?} stands there twice",
+                twice.activity
+            ));
+        }
+        match self
+            .activity
+            .iter()
+            .find(|activity| activity.enablers.is_empty())
+        {
+            Some(idle) => Err(format!("the activity {:?} has no enablers", idle.activity)),
+            None => Ok(()),
+        }
+    }
+}

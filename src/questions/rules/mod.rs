@@ -1,0 +1,255 @@
+//! The rulebook: every threshold, table and template by which questions are made, [`Rules`].
+//!
+//! It is one TOML file, built in as `rules.toml`, whose comments say what each entry means and what it rests on. The names of
+//! the fields here are its own.
+
+mod check;
+mod entries;
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, Result};
+use crate::types::Digest;
+
+pub use entries::*;
+
+/// The rulebook that is built in.
+const BUILT_IN: &str = include_str!("../rules.toml");
+/// The schema of the file.
+const SCHEMA: &str = "darkqa.rules/1";
+
+/// A whole rulebook.
+#[derive(Debug, Clone)]
+pub struct Rules {
+    book: Book,
+    digest: Digest,
+    measure_digest: Digest,
+}
+
+/// The file.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Book {
+    schema: String,
+    /// The version of the rules, in words.
+    pub version: String,
+    /// Of every choice between candidates that are equally good.
+    pub seed: u64,
+    /// What is measured of a frame.
+    pub measure: Measure,
+    /// What makes a segment evidence.
+    pub qualified: Qualified,
+    /// The canonical classes.
+    pub class: BTreeMap<String, Class>,
+    /// What words add to classes.
+    pub names: Names,
+    /// Groups of which one hides the absence of another.
+    pub confusable: Vec<Confusable>,
+    /// When a room has a type.
+    pub room: Room,
+    /// What a segment says of its room, by its word; the first that fits.
+    pub token: Vec<Token>,
+    /// What speaks for a room.
+    pub clue: Vec<Clue>,
+    /// Which of two rooms wins.
+    pub contest: Vec<Contest>,
+    /// A room seen through a door.
+    pub doorway: Doorway,
+    /// What must hold before anything is said to be absent.
+    pub closed_world: ClosedWorld,
+    /// "What type of room is this?"
+    pub room_type: RoomType,
+    /// "Is this room suitable for this?"
+    pub affordance: Affordance,
+    /// What a room may be suitable for.
+    pub activity: Vec<Activity>,
+    /// "Is there a chair in the image?"
+    pub presence: Presence,
+    /// "What color is the chair in the image?"
+    pub color: ColorRule,
+    /// "Which object is closest to the camera?"
+    pub closest: Closest,
+    /// How the answers are evened out.
+    pub balance: Balance,
+}
+
+impl Rules {
+    /// The rulebook that is built in.
+    ///
+    /// # Errors
+    /// None: a test reads the very same text.
+    pub fn built_in() -> Result<Self> {
+        Self::parse(BUILT_IN)
+    }
+
+    /// Reads a rulebook.
+    ///
+    /// # Errors
+    /// [`Error::Data`] where it is no TOML of this schema, or names a class, room or token that it has not.
+    pub fn parse(text: &str) -> Result<Self> {
+        let wrong = |problem: String| Error::data("rules", problem);
+        let book: Book = toml::from_str(text).map_err(|e| {
+            let before = e.span().and_then(|span| text.get(..span.start));
+            let line = before.unwrap_or_default().matches('\n').count() + 1;
+            wrong(format!("line {line}: {}", e.message().replace('\n', ", ")))
+        })?;
+        book.check().map_err(wrong)?;
+        // The content, not its spelling: a comment changes no question.
+        let content = |part: String| Digest::of_parts([part.as_bytes()]);
+        let whole = serde_json::to_string(&book).map_err(|e| wrong(e.to_string()))?;
+        let measure = serde_json::to_string(&book.measure).map_err(|e| wrong(e.to_string()))?;
+        Ok(Self {
+            book,
+            digest: content(whole),
+            measure_digest: content(measure),
+        })
+    }
+
+    /// What the rulebook says.
+    #[must_use]
+    pub fn book(&self) -> &Book {
+        &self.book
+    }
+
+    /// The content of the whole rulebook.
+    #[must_use]
+    pub fn digest(&self) -> Digest {
+        self.digest
+    }
+
+    /// The content of what decides the statistics of a frame.
+    #[must_use]
+    pub fn measure_digest(&self) -> Digest {
+        self.measure_digest
+    }
+}
+
+impl Book {
+    /// Whether a class is of this kind.
+    #[must_use]
+    pub fn is(&self, class: &str, flag: Flag) -> bool {
+        let class = self.class.get(class);
+        class.is_some_and(|class| class.flags.contains(&flag))
+    }
+
+    /// What a class is called in a question.
+    #[must_use]
+    pub fn name<'a>(&'a self, class: &'a str) -> &'a str {
+        let name = self
+            .class
+            .get(class)
+            .and_then(|class| class.name.as_deref());
+        name.unwrap_or(class)
+    }
+
+    /// The article of a class.
+    #[must_use]
+    pub fn article(&self, class: &str) -> &str {
+        let class = self.class.get(class);
+        class
+            .and_then(|class| class.article.as_deref())
+            .unwrap_or("a")
+    }
+
+    /// The token of a segment by its word and class.
+    #[must_use]
+    pub fn token<'a>(&'a self, name: &str, class: &'a str) -> &'a str {
+        let fits = |token: &&Token| {
+            let named = token.names.contains(name)
+                || token
+                    .starts
+                    .iter()
+                    .any(|start| name.starts_with(start.as_str()))
+                || token.names.is_empty() && token.starts.is_empty();
+            named && token.class.as_deref().is_none_or(|only| only == class)
+        };
+        let token = self.token.iter().find(fits);
+        token.map_or(class, |token| &token.token)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_built_in_rules_are_whole() {
+        let rules = Rules::built_in().unwrap();
+        let book = rules.book();
+        let asked = book
+            .class
+            .values()
+            .filter(|class| class.flags.contains(&Flag::Asked));
+        assert_eq!((asked.count(), book.class.len()), (23, 40));
+        assert_eq!(
+            (book.room.order.len(), book.color.neighbours.len()),
+            (6, 11)
+        );
+        assert_eq!(book.token("desk", "table"), "desk");
+        assert_eq!(book.token("side table", "table"), "table");
+        assert_eq!(book.token("shower curtain", "curtain"), "bath fitting");
+        assert_eq!(book.token("bathtub", "bathtub"), "bathtub");
+        assert_eq!(book.token("dog bed", "bed"), "pet bed");
+    }
+
+    #[test]
+    fn comments_change_no_digest() {
+        let commented = format!("# nothing\n{BUILT_IN}");
+        let (rules, same) = (
+            Rules::built_in().unwrap(),
+            Rules::parse(&commented).unwrap(),
+        );
+        assert_eq!(rules.digest(), same.digest());
+        let other = Rules::parse(&BUILT_IN.replace("gap_mm = 300", "gap_mm = 301")).unwrap();
+        assert_ne!(rules.digest(), other.digest());
+        assert_eq!(rules.measure_digest(), other.measure_digest());
+        let other = Rules::parse(&BUILT_IN.replace("bright = 252", "bright = 251")).unwrap();
+        assert_ne!(rules.measure_digest(), other.measure_digest());
+    }
+
+    #[test]
+    fn broken_rules_say_what_is_wrong() {
+        for (from, to, says) in [
+            ("gap_mm = 300", "gap_mm = \"wide\"", "line "),
+            ("gap_mm = 300", "gap_mn = 300", "unknown field `gap_mn`"),
+            (
+                "darkqa.rules/1",
+                "darkqa.rules/9",
+                "schema \"darkqa.rules/9\"",
+            ),
+            (
+                "classes = [\"plant\"]",
+                "classes = [\"palm\"]",
+                "the class \"palm\"",
+            ),
+            (
+                "token = \"nightstand\" }",
+                "token = \"nightstnd\" }",
+                "\"nightstnd\" is neither",
+            ),
+            (
+                "rooms = [\"office\"]",
+                "rooms = [\"study\"]",
+                "\"study\" has no clue",
+            ),
+            (
+                "{activity}, is",
+                "that, is",
+                "affordance.text has no {activity}",
+            ),
+            ("choices = 4", "choices = 1", "closest.choices is 1"),
+            ("\"office\"]   #", "\"bedroom\"]   #", "\"bedroom\" twice"),
+        ] {
+            assert!(BUILT_IN.contains(from), "{from}");
+            let error = Rules::parse(&BUILT_IN.replacen(from, to, 1))
+                .unwrap_err()
+                .to_string();
+            assert!(
+                error.starts_with("rules: ") && error.contains(says),
+                "{error}"
+            );
+        }
+    }
+}

@@ -1,0 +1,185 @@
+//! What a mask's pixels show: their colour and their depth, [`Core`]; and what is measured of all pixels.
+
+use super::{Along, FrameDepth, Segment, SegmentDepth};
+use crate::questions::colors::{BINS, Palette};
+use crate::questions::rules::Measure;
+use crate::types::{DepthKind, Frame, Intrinsics};
+
+/// Depth and colour of the pixels of a mask.
+pub(super) struct Core {
+    pub(super) count: u64,
+    colors: [u64; BINS],
+    channels: [[u32; 256]; 3],
+    bright: u64,
+    crushed: u64,
+    depths: Option<Vec<u32>>,
+}
+
+impl Default for Core {
+    fn default() -> Self {
+        Self {
+            count: 0,
+            colors: [0; BINS],
+            channels: [[0; 256]; 3],
+            bright: 0,
+            crushed: 0,
+            depths: None,
+        }
+    }
+}
+
+impl Core {
+    pub(super) fn tell(self, segment: &mut Segment) {
+        segment.core = self.count;
+        segment.colors = self.colors;
+        segment.median = self
+            .channels
+            .map(|counts| quantile(&counts, self.count, 50));
+        (segment.bright, segment.crushed) = (self.bright, self.crushed);
+        segment.depth = self.depths.and_then(depths);
+    }
+}
+
+/// The nearest-rank quantiles of depths.
+fn depths(mut depths: Vec<u32>) -> Option<SegmentDepth> {
+    if depths.is_empty() {
+        return None;
+    }
+    let count = depths.len();
+    let mut ranked = |percent| {
+        let (_, depth, _) = depths.select_nth_unstable(rank(count as u64, percent) as usize);
+        *depth
+    };
+    Some(SegmentDepth {
+        valid: count as u64,
+        p10: ranked(10),
+        median: ranked(50),
+        p90: ranked(90),
+    })
+}
+
+/// The index of a quantile among so many in order: ⌈percent · count / 100⌉ − 1.
+fn rank(count: u64, percent: u64) -> u64 {
+    (percent * count).div_ceil(100).saturating_sub(1)
+}
+
+/// A quantile of 8-bit values by their counts.
+fn quantile(counts: &[u32; 256], count: u64, percent: u64) -> u8 {
+    let rank = rank(count, percent);
+    let mut seen = 0;
+    let value = counts.iter().position(|count| {
+        seen += u64::from(*count);
+        seen > rank
+    });
+    value.unwrap_or(0) as u8
+}
+
+/// The image and its depth, as a mask's pixels see them.
+pub(super) struct Light<'a> {
+    frame: &'a Frame,
+    rule: &'a Measure,
+    palette: &'a Palette,
+    depth: Option<&'a [u32]>,
+    /// The squares of the slopes of rays by column and by row.
+    slopes: Option<[Vec<f64>; 2]>,
+}
+
+impl<'a> Light<'a> {
+    pub(super) fn of(frame: &'a Frame, rule: &'a Measure, palette: &'a Palette) -> Self {
+        let slopes = rays(frame).map(|camera| {
+            let square = |length: usize, focal: f64, center: f64| -> Vec<f64> {
+                (0..length)
+                    .map(|i| (i as f64 - center) / focal)
+                    .map(|slope| slope * slope)
+                    .collect()
+            };
+            [
+                square(frame.rgb.width(), camera.fx, camera.cx),
+                square(frame.rgb.height(), camera.fy, camera.cy),
+            ]
+        });
+        Self {
+            frame,
+            rule,
+            palette,
+            depth: frame.depth.as_ref().and_then(|depth| depth.as_slice()),
+            slopes,
+        }
+    }
+
+    /// Adds a run of a row to a mask.
+    pub(super) fn fall(&self, core: &mut Core, y: usize, left: usize, right: usize) {
+        let start = y * self.frame.rgb.width();
+        let samples = &self.frame.rgb.samples()[(start + left) * 3..(start + right) * 3];
+        core.count += (right - left) as u64;
+        for &rgb in samples.as_chunks::<3>().0 {
+            core.colors[self.palette.bin(rgb)] += 1;
+            for (counts, value) in core.channels.iter_mut().zip(rgb) {
+                counts[usize::from(value)] += 1;
+            }
+            let most = rgb[0].max(rgb[1]).max(rgb[2]);
+            core.bright += u64::from(most >= self.rule.bright);
+            core.crushed += u64::from(most <= self.rule.crushed);
+        }
+        let Some(depth) = self.depth else {
+            return;
+        };
+        let depths = core.depths.get_or_insert_default();
+        let row = &depth[start + left..start + right];
+        let valid = |depth: &u32| (1..=self.rule.most_depth_mm).contains(depth);
+        match &self.slopes {
+            None => depths.extend(row.iter().copied().filter(valid)),
+            Some([columns, rows]) => {
+                let steep = 1.0 + rows[y];
+                let along = row
+                    .iter()
+                    .zip(&columns[left..right])
+                    .map(|(z, slope)| (f64::from(*z) * (steep + slope).sqrt() + 0.5) as u32);
+                depths.extend(along.filter(valid));
+            }
+        }
+    }
+}
+
+/// The camera, where depth is to be turned from the axis to the rays.
+fn rays(frame: &Frame) -> Option<Intrinsics> {
+    frame
+        .intrinsics
+        .filter(|_| frame.depth_kind == DepthKind::Planar)
+}
+
+/// What is known of a frame's depth.
+pub(super) fn frame_depth(frame: &Frame) -> Option<FrameDepth> {
+    const MOST: usize = 1 << 16;
+    let depth = frame.depth.as_ref()?;
+    let mut counts = vec![0_u64; MOST];
+    for depth in depth {
+        counts[(*depth as usize).min(MOST - 1)] += 1;
+    }
+    let holes = counts[0];
+    let rank = rank(depth.len() as u64 - holes, 50);
+    let mut seen = 0;
+    let median = counts.iter().skip(1).position(|count| {
+        seen += count;
+        seen > rank
+    });
+    Some(FrameDepth {
+        holes,
+        median: median.map_or(0, |median| median as u32 + 1),
+        along: match (frame.depth_kind, rays(frame)) {
+            (DepthKind::Euclid, _) | (_, Some(_)) => Along::Ray,
+            (DepthKind::Planar, None) => Along::Axis,
+        },
+    })
+}
+
+/// The 10 %, 50 % and 90 % quantiles of luma, which has the weights of ITU-R BT.709 in 256ths.
+pub(super) fn luma(frame: &Frame) -> [u8; 3] {
+    let mut counts = [0; 256];
+    let (pixels, _) = frame.rgb.samples().as_chunks::<3>();
+    for &[red, green, blue] in pixels {
+        let luma = 54 * u32::from(red) + 183 * u32::from(green) + 19 * u32::from(blue);
+        counts[(luma >> 8) as usize] += 1;
+    }
+    [10, 50, 90].map(|percent| quantile(&counts, pixels.len() as u64, percent))
+}

@@ -1,0 +1,176 @@
+//! What is measured of masks: [`Shapes`].
+
+use std::collections::BTreeMap;
+
+use super::light::{Core, Light};
+use super::rim::{cores, runs};
+use super::scene::{Scene, rounded};
+use super::{Segment, plain_word, ppm};
+use crate::questions::colors::{BINS, Palette};
+use crate::questions::rules::Measure;
+use crate::types::{Frame, Segmentation};
+
+/// What is measured of the mask alone.
+#[derive(Clone)]
+pub(super) struct Shape {
+    area: u64,
+    bbox: [usize; 4],
+    rim: u64,
+    rim_on_border: u64,
+}
+
+impl Shape {
+    const NONE: Self = Self {
+        area: 0,
+        bbox: [usize::MAX, usize::MAX, 0, 0],
+        rim: 0,
+        rim_on_border: 0,
+    };
+
+    /// Takes a run of a row.
+    fn take(&mut self, row: usize, left: usize, right: usize) {
+        self.area += (right - left) as u64;
+        let [least, top, most, bottom] = self.bbox;
+        self.bbox = [
+            least.min(left),
+            top.min(row),
+            most.max(right),
+            bottom.max(row + 1),
+        ];
+    }
+}
+
+/// All masks.
+pub(super) struct Shapes {
+    pub(super) list: Vec<Shape>,
+    /// Pixels by mask and label.
+    pub(super) joint: BTreeMap<(u32, u32), u64>,
+}
+
+impl Shapes {
+    /// Measures all masks.
+    pub(super) fn of(scene: &Scene<'_>, rule: &Measure) -> Self {
+        let [width, height] = scene.size;
+        let mut shapes = Self {
+            list: vec![Shape::NONE; scene.numbers.len()],
+            joint: BTreeMap::new(),
+        };
+        scene.each_run(|left, right, mask, id| {
+            *shapes.joint.entry((mask, id)).or_insert(0) += (right - left) as u64;
+        });
+        for y in 0..height {
+            let row = &scene.masks[y * width..][..width];
+            let rows = [y.checked_sub(1), (y + 1 < height).then_some(y + 1)];
+            let [above, below] = rows.map(|y| y.map(|y| &scene.masks[y * width..][..width]));
+            let outer_row = y < rule.border_px || y + rule.border_px >= height;
+            for (left, right) in runs(row) {
+                let mask = row[left];
+                let Some(index) = mask.checked_sub(1) else {
+                    continue;
+                };
+                let shape = &mut shapes.list[index as usize];
+                shape.take(y, left, right);
+                for x in left..right {
+                    let end = x == left || x + 1 == right;
+                    let differs = |row: Option<&[u32]>| row.is_none_or(|row| row[x] != mask);
+                    if end || differs(above) || differs(below) {
+                        shape.rim += 1;
+                        let outer = outer_row || x < rule.border_px || x + rule.border_px >= width;
+                        shape.rim_on_border += u64::from(outer);
+                    }
+                }
+            }
+        }
+        shapes
+    }
+
+    /// What a mask is, before its depth and its colour; `None` where it has no class.
+    pub(super) fn segment(
+        &self,
+        frame: &Frame,
+        scene: &Scene<'_>,
+        mask: u32,
+        shape: &Shape,
+    ) -> Option<Segment> {
+        let labels = self.joint.range((mask, 0)..=(mask, u32::MAX));
+        let mut classes: BTreeMap<&str, u64> = BTreeMap::new();
+        for (&(_, id), &count) in labels.clone() {
+            if let Some(class) = scene.class(id) {
+                *classes.entry(class).or_insert(0) += count;
+            }
+        }
+        // Of classes as common as each other, the first.
+        let (&class, &pure) = classes.iter().rev().max_by_key(|(_, count)| **count)?;
+        let number = scene.numbers[mask as usize - 1];
+        let own = match (&frame.segments, frame.segmentation) {
+            (Some(_), Segmentation::Instances) => frame.names.get(&number),
+            _ => None,
+        };
+        let word = own.map_or_else(
+            || {
+                let of_class = labels.filter(|((_, id), _)| scene.class(*id) == Some(class));
+                let commonest = of_class.rev().max_by_key(|(_, count)| **count);
+                commonest.map_or("", |((_, id), _)| scene.word(*id))
+            },
+            |name| &name.name,
+        );
+        let (word, stands) = plain_word(word);
+        Some(Segment {
+            id: number,
+            class: class.to_owned(),
+            word,
+            stands,
+            region: own.and_then(|name| name.region),
+            parts: scene.parts.get(mask as usize - 1).copied().unwrap_or(0),
+            area: shape.area,
+            pure,
+            bbox: shape.bbox,
+            rim: shape.rim,
+            rim_on_border: shape.rim_on_border,
+            core: 0,
+            depth: None,
+            colors: [0; BINS],
+            median: [0; 3],
+            bright: 0,
+            crushed: 0,
+        })
+    }
+
+    /// Depth and colour of the masks that are not tiny.
+    pub(super) fn cores(
+        &self,
+        frame: &Frame,
+        scene: &Scene<'_>,
+        rule: &Measure,
+        palette: &Palette,
+    ) -> Vec<Option<Core>> {
+        let pixels = scene.ids.len() as u64;
+        let large = |shape: &Shape| ppm(shape.area, pixels) >= rule.detail_ppm;
+        let mut found: Vec<Option<Core>> = self
+            .list
+            .iter()
+            .map(|shape| large(shape).then(Core::default))
+            .collect();
+        let light = Light::of(frame, rule, palette);
+        let radius = rounded(scene.size[1], rule.erosion_per_height);
+        cores(&scene.masks, scene.size, radius, |y, left, right, mask| {
+            if let Some(core) = &mut found[mask as usize - 1] {
+                light.fall(core, y, left, right);
+            }
+        });
+        let width = scene.size[0];
+        for ((mask, shape), core) in (1..).zip(&self.list).zip(&mut found) {
+            let Some(core) = core.as_mut().filter(|core| core.count == 0) else {
+                continue;
+            };
+            let [left, top, right, bottom] = shape.bbox;
+            for y in top..bottom {
+                let row = &scene.masks[y * width + left..y * width + right];
+                for (from, to) in runs(row).filter(|(from, _)| row[*from] == mask) {
+                    light.fall(core, y, left + from, left + to);
+                }
+            }
+        }
+        found
+    }
+}

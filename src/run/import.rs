@@ -1,0 +1,308 @@
+//! `import`: another data set → frames of the common interface.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Component, Path};
+
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder as _};
+use ndarray::Array2;
+use rayon::ThreadPoolBuilder;
+use rayon::prelude::*;
+use serde_json::{Value, json};
+
+use super::Verdict;
+use super::progress::Progress;
+use super::written::{png, write};
+use crate::config::{Existing, Import};
+use crate::dataset::Picture;
+use crate::dataset::import::keyframes::choose;
+use crate::dataset::import::{Adapter, Incoming, Read, classes, open};
+use crate::error::{Error, Result};
+use crate::types::Segmentation;
+use crate::types::manifest::Status;
+
+/// The median depths of a frame of a room, in millimetres: outside of them its scale is wrong, or it looks at a wall.
+const ROOM: std::ops::RangeInclusive<u32> = 300..=15_000;
+
+/// How many words without a class are named.
+const NAMED: usize = 12;
+
+/// Imports the frames.
+///
+/// What cannot be read of one frame is said, counted, and does not stop the others.
+///
+/// # Errors
+/// Where there are no frames, the folder holds others already, most depths are none of a room, or nothing could be read.
+pub fn import(config: &Import, progress: &Progress) -> Result<Verdict> {
+    let list = config.out.join("frames.jsonl");
+    if config.existing == Existing::Kept && list.exists() {
+        let problem =
+            "frames are there already; --force writes over them, another --out keeps both";
+        return Err(Error::data(list.display(), problem));
+    }
+    let adapter = open(config.kind, &config.source, &config.stated)?;
+    let frames = choose(adapter.frames(), config.every, config.stated.fps)?;
+    let threads = config.threads.map_or(0, std::num::NonZero::get);
+    let cores = ThreadPoolBuilder::new().num_threads(threads).build();
+    let cores = cores.map_err(|e| Error::usage("--threads", e))?;
+    let bar = progress.bar("frames", frames.len());
+    let made: Vec<Option<Made>> = cores.install(|| {
+        let frames = frames.par_iter().map(|frame| {
+            let made = one(config, &*adapter, frame);
+            bar.inc();
+            made.map_err(|e| tracing::error!("{}/{}: {e}", frame.scene, frame.frame))
+                .ok()
+        });
+        frames.collect()
+    });
+    drop(bar);
+    let failed = made.iter().filter(|made| made.is_none()).count();
+    let made: Vec<Made> = made.into_iter().flatten().collect();
+    if made.is_empty() {
+        return Err(Error::data(
+            config.source.display(),
+            "none of its frames could be read",
+        ));
+    }
+    let note = depths(&made)?;
+    let mut scenes: Vec<&str> = frames.iter().map(|frame| frame.scene.as_str()).collect();
+    scenes.dedup();
+    for scene in &scenes {
+        let names = adapter.names(scene);
+        if !names.is_empty() {
+            let text =
+                serde_json::to_string_pretty(&names).map_err(|e| Error::data("segments", e))?;
+            write(
+                &config.out.join("scenes").join(scene).join("segments.json"),
+                text.as_bytes(),
+            )?;
+        }
+    }
+    write(
+        &config.out.join("classes.json"),
+        classes(adapter.labels()).as_bytes(),
+    )?;
+    let about = json!({
+        "schema": "darkqa.dataset/1",
+        "name": config.name,
+        "label_space": adapter.labels().space,
+        "depth_kind": adapter.depth_kind(),
+        "source": config.kind.name(),
+    });
+    write(
+        &config.out.join("dataset.json"),
+        format!("{about:#}\n").as_bytes(),
+    )?;
+    let lines: Vec<String> = made.iter().map(|made| made.line.to_string()).collect();
+    write(&list, (lines.join("\n") + "\n").as_bytes())?;
+    let mut output = format!(
+        "{}: {} frames of {} scenes{}\n{note}",
+        config.out.display(),
+        made.len(),
+        scenes.len(),
+        if failed == 0 {
+            String::new()
+        } else {
+            format!(", {failed} failed")
+        }
+    );
+    output.push_str(&words(adapter.unlisted()));
+    Ok(Verdict {
+        status: if failed == 0 {
+            Status::Complete
+        } else {
+            Status::Incomplete
+        },
+        output,
+    })
+}
+
+/// A frame that was written.
+struct Made {
+    /// Its line of `frames.jsonl`.
+    line: Value,
+    /// The median of its depth in millimetres.
+    depth: Option<u32>,
+}
+
+fn one(config: &Import, adapter: &dyn Adapter, frame: &Incoming) -> Result<Made> {
+    for name in [&frame.scene, &frame.frame] {
+        let mut parts = Path::new(name).components();
+        if name.is_empty() || !parts.all(|part| matches!(part, Component::Normal(_))) {
+            let problem = "this name of a scene or frame leads out of the output folder";
+            return Err(Error::data(format_args!("{name:?}"), problem));
+        }
+    }
+    let bytes = fs::read(&frame.rgb).map_err(|e| Error::file(&frame.rgb, "read", e))?;
+    let picture = Picture::Encoded {
+        bytes,
+        place: frame.rgb.display().to_string(),
+        most_pixels: config.most_pixels,
+    };
+    let rgb = picture.decode()?;
+    let Read {
+        depth,
+        semantic,
+        segments,
+        room,
+    } = adapter.read(frame, &rgb)?;
+    let place = |kind: &str, ending: &str| {
+        format!("scenes/{}/{kind}/{}.{ending}", frame.scene, frame.frame)
+    };
+    let mut line = json!({
+        "scene": frame.scene,
+        "frame": frame.frame,
+        "width": rgb.width(),
+        "height": rgb.height(),
+        "source": frame.rgb.file_name().map(|name| name.to_string_lossy()),
+    });
+    let mut say = |key: &str, value: Value| {
+        if let Some(line) = line.as_object_mut() {
+            line.insert(key.to_owned(), value);
+        }
+    };
+    // A JPEG file stays one: what it has lost stays lost, and its pixels stay the same.
+    let jpeg = frame
+        .rgb
+        .extension()
+        .is_some_and(|end| !end.eq_ignore_ascii_case("png"));
+    let image = place("rgb", if jpeg { "jpg" } else { "png" });
+    let content = match picture {
+        Picture::Encoded { bytes, .. } if jpeg => bytes,
+        _ => png(&rgb)?,
+    };
+    write(&config.out.join(&image), &content)?;
+    say("rgb", json!(image));
+    let median = depth.as_ref().and_then(median);
+    if let Some(depth) = depth {
+        let path = place("depth", "png");
+        let units = depth.mapv(|depth| u16::try_from(depth).unwrap_or(u16::MAX));
+        write(&config.out.join(&path), &grey(&units)?)?;
+        say("depth", json!(path));
+        say("depth_scale", json!(0.001));
+        say("depth_kind", json!(adapter.depth_kind()));
+    }
+    if let Some(semantic) = semantic {
+        let path = place("sem", "png");
+        write(&config.out.join(&path), &grey(&semantic)?)?;
+        say("sem", json!(path));
+    }
+    if let Some(segments) = segments {
+        let path = write_segments(&config.out, &place, &segments)?;
+        say("over", json!(path));
+        let source = match adapter.segmentation() {
+            Segmentation::Instances => "renderer",
+            Segmentation::Parts => "superpixel",
+        };
+        say("over_source", json!(source));
+    }
+    for (key, value) in [
+        ("t", json!(frame.time)),
+        ("pose", json!(frame.pose)),
+        ("intrinsics", json!(adapter.camera(frame, &rgb))),
+        ("room_gt", json!(frame.room.clone().or(room))),
+    ] {
+        if !value.is_null() {
+            say(key, value);
+        }
+    }
+    Ok(Made {
+        line,
+        depth: median,
+    })
+}
+
+/// Segments as 16-bit PNG, or as `.npy` where there are too many; the path they lie at.
+fn write_segments(
+    out: &Path,
+    place: &impl Fn(&str, &str) -> String,
+    segments: &Array2<u32>,
+) -> Result<String> {
+    let most = segments.iter().copied().max().unwrap_or(0);
+    if u16::try_from(most).is_ok() {
+        let path = place("over", "png");
+        write(&out.join(&path), &grey(&segments.mapv(|id| id as u16))?)?;
+        return Ok(path);
+    }
+    let path = place("over", "npy");
+    let (height, width) = segments.dim();
+    let header =
+        format!("{{'descr': '<u4', 'fortran_order': False, 'shape': ({height}, {width}), }}");
+    // The numbers begin at a multiple of 64 bytes, after a newline (numpy.lib.format, version 1.0).
+    let length = (header.len() + 11).next_multiple_of(64) - 10;
+    let mut file = b"\x93NUMPY\x01\x00".to_vec();
+    file.extend((length as u16).to_le_bytes());
+    file.extend(format!("{header:<width$}\n", width = length - 1).bytes());
+    file.extend(segments.iter().flat_map(|id| id.to_le_bytes()));
+    write(&out.join(&path), &file)?;
+    Ok(path)
+}
+
+/// A map as 16-bit grey PNG.
+fn grey(map: &Array2<u16>) -> Result<Vec<u8>> {
+    let (height, width) = map.dim();
+    let samples: Vec<u8> = map.iter().flat_map(|value| value.to_ne_bytes()).collect();
+    let mut file = Vec::new();
+    PngEncoder::new_with_quality(&mut file, CompressionType::Fast, FilterType::Adaptive)
+        .write_image(
+            &samples,
+            width as u32,
+            height as u32,
+            ExtendedColorType::L16,
+        )
+        .map_err(|e| Error::data("map", e))?;
+    Ok(file)
+}
+
+/// The median of what has depth.
+fn median(depth: &Array2<u32>) -> Option<u32> {
+    let mut depths: Vec<u32> = depth.iter().copied().filter(|depth| *depth > 0).collect();
+    let middle = depths.len().checked_sub(1)? / 2;
+    Some(*depths.select_nth_unstable(middle).1)
+}
+
+/// What the depths are like; refused where most of them are none of a room.
+fn depths(made: &[Made]) -> Result<String> {
+    let mut medians: Vec<u32> = made.iter().filter_map(|made| made.depth).collect();
+    let Some(middle) = medians.len().checked_sub(1) else {
+        return Ok("no depth: there will be no questions about the closest object\n".to_owned());
+    };
+    medians.sort_unstable();
+    let typical = medians[middle / 2];
+    let metres = |depth: u32| f64::from(depth) / 1000.0;
+    if !ROOM.contains(&typical) {
+        let problem = format_args!(
+            "the frames' typical depth is {} m, but that of rooms lies between {} and {} m; --depth-scale says how many metres a unit of depth is",
+            metres(typical),
+            metres(*ROOM.start()),
+            metres(*ROOM.end())
+        );
+        return Err(Error::data("depth", problem));
+    }
+    Ok(format!("typical depth: {:.2} m\n", metres(typical)))
+}
+
+/// The words that no table has a class for.
+fn words(unlisted: &BTreeMap<String, usize>) -> String {
+    if unlisted.is_empty() {
+        return String::new();
+    }
+    let mut list: Vec<(&String, &usize)> = unlisted.iter().collect();
+    list.sort_by_key(|(word, count)| (std::cmp::Reverse(**count), *word));
+    let named: Vec<String> = list
+        .iter()
+        .take(NAMED)
+        .map(|(word, count)| format!("{word:?} {count}"))
+        .collect();
+    let more = list.len().saturating_sub(NAMED);
+    let more = if more == 0 {
+        String::new()
+    } else {
+        format!(" and {more} more")
+    };
+    format!(
+        "without a class of mpcat40, taken as misc: {}{more}\n",
+        named.join(", ")
+    )
+}
