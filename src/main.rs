@@ -6,8 +6,9 @@ use std::process::ExitCode;
 use clap::Parser;
 use clap::error::ErrorKind;
 use darkqa_eval::cli::{Cli, Command, EvaluateArgs};
-use darkqa_eval::config::{self, Config, Import, Questions, Realism, Synthesize};
+use darkqa_eval::config::{self, Config, Export, Import, Questions, Realism, Synthesize};
 use darkqa_eval::enhance;
+use darkqa_eval::run::export::export;
 use darkqa_eval::run::import::import;
 use darkqa_eval::run::progress::{Loudness, Progress};
 use darkqa_eval::run::questions::questions;
@@ -78,6 +79,7 @@ enum Task {
     Realism(Box<Realism>),
     Questions(Box<Questions>),
     Import(Box<Import>),
+    Export(Box<Export>),
 }
 
 impl Job {
@@ -95,6 +97,10 @@ impl Job {
             Some(Command::Realism(said)) => {
                 let quiet = said.quiet;
                 (quiet, Task::Realism(Box::new(Realism::resolve(said)?)))
+            }
+            Some(Command::Export(said)) => {
+                let quiet = said.quiet;
+                (quiet, Task::Export(Box::new(Export::resolve(*said)?)))
             }
             Some(Command::Import(said)) => {
                 let quiet = said.quiet;
@@ -121,6 +127,7 @@ fn show(task: Task, progress: &Progress) -> anyhow::Result<ExitCode> {
         Task::Realism(config) => realism(&config, progress)?,
         Task::Questions(config) => questions(&config, progress)?,
         Task::Import(config) => import(&config, progress)?,
+        Task::Export(config) => export(&config, progress)?,
     };
     let written = std::io::stdout().lock().write_all(output.as_bytes());
     match (status, written) {

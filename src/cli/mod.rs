@@ -3,6 +3,7 @@
 //! The same structure is read three times: from the arguments, from `DARKQA_*` variables and from a `--config` file
 //! (see [`crate::config`]); so every field is an `Option`, a list or a switch, and no default stands here.
 
+mod export;
 mod import;
 mod questions;
 
@@ -11,6 +12,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
+pub use export::ExportArgs;
 pub use import::ImportArgs;
 pub use questions::QuestionsArgs;
 
@@ -46,6 +48,8 @@ pub enum Command {
     Questions(QuestionsArgs),
     /// Take over frames of another data set into the common interface
     Import(ImportArgs),
+    /// Write ready-made sets for other tools, one for each condition, with its images
+    Export(Box<ExportArgs>),
 }
 
 /// The flags of `synthesize`.

@@ -1,6 +1,7 @@
 //! Everything a run is told, checked once; nothing later reads the world again.
 
 mod asking;
+mod export;
 mod import;
 mod layers;
 mod light;
@@ -15,6 +16,7 @@ use std::str::FromStr;
 use std::time::Duration;
 
 pub use asking::{Ask, ModelName, Server};
+pub use export::{Export, Form};
 pub use import::Import;
 pub use layers::{merge, one_line};
 pub use light::{Light, Sensor};

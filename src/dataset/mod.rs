@@ -4,6 +4,7 @@
 //! ready-made multiple-choice set ([`multiple_choice`]), or nothing, which is the built-in rooms ([`rooms`]).
 
 mod beside;
+mod dialect;
 pub mod frames;
 pub mod import;
 mod jpeg;
@@ -144,6 +145,13 @@ impl Dataset {
                     "the built-in rooms bring their own; name the frames with --data",
                 )?;
                 rooms::open()?
+            }
+            Place::Path(path) if multiple_choice::is_image_folder(path) => {
+                refuse(
+                    questions,
+                    "a folder with metadata.jsonl brings its own questions",
+                )?;
+                multiple_choice::open_image_folder(path)?
             }
             Place::Path(path) if path.is_dir() => frames::open(path, questions)?,
             Place::Path(path) => {

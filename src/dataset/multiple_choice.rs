@@ -1,6 +1,7 @@
 //! Ready-made image multiple-choice sets.
 //!
-//! `.tsv` as `table.rs` describes, `.jsonl` as [`questions`] describes, with `image`. Paths are relative to the file, and a
+//! `.tsv` as `table.rs` describes, `.jsonl` as [`questions`] describes, with `image`, and a folder of images with
+//! `metadata.jsonl`, as Hugging Face's `imagefolder` has it. Paths are relative to the file, and a
 //! frame is named by the path of its image, spelled in one way (`beside.rs`).
 
 use std::collections::BTreeMap;
@@ -10,6 +11,20 @@ use super::beside::Beside;
 use super::{Dataset, Source, questions, stem, table};
 use crate::error::{Error, Result};
 use crate::types::{FrameId, Question};
+
+/// The questions of a folder of images.
+const METADATA: &str = "metadata.jsonl";
+
+/// Whether a folder is one of images with their questions, and not of frames.
+pub(super) fn is_image_folder(path: &Path) -> bool {
+    path.join(METADATA).is_file() && !path.join("frames.jsonl").exists()
+}
+
+/// Opens a folder of images with their questions.
+pub(super) fn open_image_folder(folder: &Path) -> Result<Dataset> {
+    let (sources, questions) = jsonl(&folder.join(METADATA))?;
+    Ok(Dataset::new(stem(folder), sources, questions))
+}
 
 pub(super) fn open(path: &Path) -> Result<Dataset> {
     if !path.is_file() {

@@ -1,7 +1,8 @@
 //! Files of questions: one JSON object a line.
 //!
 //! `{"id", "frame", "family", "question", "choices", "answer", "evidence"}`; a ready-made set has `"image"`, a path
-//! beside the file, in place of `"frame"`. `answer` is the text of the true choice.
+//! beside the file, in place of `"frame"`. `answer` is the text of the true choice. Lines as other tools write them are
+//! read, too (`dialect.rs`).
 
 use std::fs;
 use std::path::Path;
@@ -9,6 +10,7 @@ use std::path::Path;
 use serde::Deserialize;
 use serde_json::Value;
 
+use super::dialect::translated;
 use crate::error::{Error, Result};
 use crate::types::{Choices, Family, FrameId, Question, QuestionId};
 
@@ -56,7 +58,10 @@ pub fn read(path: &Path) -> Result<Vec<Question>> {
     lines
         .filter(|(_, line)| !line.trim().is_empty())
         .map(|(i, line)| {
-            let line = serde_json::from_str::<Line>(line)
+            let value = serde_json::from_str::<Value>(line)
+                .map_err(|e| Error::json_line(path, i + 1, &e))?;
+            let value = translated(value).map_err(|problem| Error::line(path, i + 1, problem))?;
+            let line = serde_json::from_value::<Line>(value)
                 .map_err(|e| Error::json_line(path, i + 1, &e))?;
             line.into_question()
                 .map_err(|e| e.at(format!("{}, line {}", path.display(), i + 1)))

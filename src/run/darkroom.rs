@@ -3,6 +3,7 @@
 //! Each is loaded, darkened, mended and encoded once for all the questions about it. The channel is bounded, so that
 //! memory holds the images in flight and a few more.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -88,25 +89,31 @@ impl Darkroom<'_> {
         {
             return Ok(Arc::new(payload));
         }
+        let pixels = self.pixels(desk, condition)?;
+        Payload::encode(&pixels, format, max_side).map(Arc::new)
+    }
+
+    /// The pixels of a frame in a condition.
+    pub(super) fn pixels<'d>(
+        &mut self,
+        desk: &'d mut Desk,
+        condition: &Condition,
+    ) -> Result<Cow<'d, Rgb>> {
+        desk.picture(self.dataset, self.pictures)?;
         let dark = desk.dark(self.recipe, condition.degradation)?;
-        let payload = match &condition.enhancer {
-            None => Payload::encode(dark, format, max_side),
-            Some(name) => {
-                let enhancer = self
-                    .enhancers
-                    .iter_mut()
-                    .find(|enhancer| enhancer.name() == name);
-                let enhancer =
-                    enhancer.ok_or_else(|| Error::data(condition, "this enhancer is not open"))?;
-                Payload::encode(&enhancer.enhance(dark)?, format, max_side)
-            }
+        let Some(name) = &condition.enhancer else {
+            return Ok(Cow::Borrowed(dark));
         };
-        payload.map(Arc::new)
+        let mut enhancers = self.enhancers.iter_mut();
+        let enhancer = enhancers.find(|enhancer| enhancer.name() == name);
+        let enhancer =
+            enhancer.ok_or_else(|| Error::data(condition, "this enhancer is not open"))?;
+        enhancer.enhance(dark).map(Cow::Owned)
     }
 }
 
 /// What lies on the desk while one frame is worked on: each step is done when it is first needed, and once.
-struct Desk {
+pub(super) struct Desk {
     frame: FrameId,
     picture: Option<Picture>,
     clean: Option<Rgb>,
@@ -115,7 +122,7 @@ struct Desk {
 }
 
 impl Desk {
-    fn new(frame: FrameId) -> Self {
+    pub(super) fn new(frame: FrameId) -> Self {
         Self {
             frame,
             picture: None,

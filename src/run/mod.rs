@@ -6,6 +6,7 @@
 mod askers;
 mod darkroom;
 mod drive;
+pub mod export;
 mod identity;
 pub mod import;
 mod interrupt;
@@ -26,7 +27,7 @@ use std::path::{Path, PathBuf};
 use jiff::Timestamp;
 use rayon::prelude::*;
 
-use crate::config::{Config, ModelName, RunPlace, Show};
+use crate::config::{Config, Data, Enhancement, ModelName, RunPlace, Show};
 use crate::dataset::Dataset;
 use crate::enhance::{Enhancer, ModelFile, Runtime};
 use crate::error::{Error, Result};
@@ -61,7 +62,7 @@ pub struct Verdict {
 pub fn evaluate(config: &Config, progress: &Progress) -> Result<Verdict> {
     let dataset = Dataset::open(&config.data.place, config.data.questions.as_deref())?
         .with_most_pixels(config.data.most_pixels);
-    let questions = select(&dataset, config)?;
+    let questions = select(&dataset, &config.data)?;
     let askers = askers::open(config)?;
     // Where every model is blind, no image is read and no enhancer is opened.
     let seeing = askers.iter().any(|asker| asker.view == View::Image);
@@ -84,7 +85,7 @@ pub fn evaluate(config: &Config, progress: &Progress) -> Result<Verdict> {
     // Opened before the folder is made, so that an enhancer that does not work leaves nothing behind.
     let opened = match &kept {
         Some(manifest) if manifest.status == Status::Complete => Err(files),
-        _ => Ok(open_enhancers(files, config)?),
+        _ => Ok(open_enhancers(files, &config.enhancement)?),
     };
     let mut manifest = manifest(config, identity, kept);
     let mut store = Store::open(&folder, &manifest, moved(config))?;
@@ -93,7 +94,8 @@ pub fn evaluate(config: &Config, progress: &Progress) -> Result<Verdict> {
     let end = if plan.left() == 0 {
         End::Through
     } else {
-        let (runtime, enhancers) = opened.or_else(|files| open_enhancers(files, config))?;
+        let (runtime, enhancers) =
+            opened.or_else(|files| open_enhancers(files, &config.enhancement))?;
         let version =
             runtime.map(|runtime| ("onnxruntime".to_owned(), runtime.version().to_owned()));
         manifest.platform.extend(version);
@@ -158,10 +160,9 @@ fn moved(config: &Config) -> Moved {
 }
 
 /// The questions that are asked: of the chosen families, the first so many.
-fn select(dataset: &Dataset, config: &Config) -> Result<Vec<Question>> {
+fn select(dataset: &Dataset, config: &Data) -> Result<Vec<Question>> {
     let wanted = |question: &&Question| {
         config
-            .data
             .families
             .as_ref()
             .is_none_or(|list| list.contains(&question.family))
@@ -172,7 +173,6 @@ fn select(dataset: &Dataset, config: &Config) -> Result<Vec<Question>> {
         .map(|question| &question.family)
         .collect();
     if let Some(missing) = config
-        .data
         .families
         .iter()
         .flatten()
@@ -185,7 +185,7 @@ fn select(dataset: &Dataset, config: &Config) -> Result<Vec<Question>> {
         );
         return Err(Error::usage("--families", problem));
     }
-    let limit = config.data.limit.map_or(usize::MAX, usize::from);
+    let limit = config.limit.map_or(usize::MAX, usize::from);
     Ok(dataset
         .questions()
         .iter()
@@ -220,13 +220,13 @@ fn look_through(
 
 fn open_enhancers(
     files: Vec<ModelFile>,
-    config: &Config,
+    config: &Enhancement,
 ) -> Result<(Option<Runtime>, Vec<Enhancer>)> {
     if files.is_empty() {
         return Ok((None, Vec::new()));
     }
-    let runtime = config.enhancement.runtime.open()?;
-    let threads = config.enhancement.threads;
+    let runtime = config.runtime.open()?;
+    let threads = config.threads;
     let enhancers = files
         .into_iter()
         .map(|file| Enhancer::open(file, &runtime, threads))

@@ -6,12 +6,12 @@ use std::sync::Arc;
 use super::askers::Asker;
 use super::recipe::Recipe;
 use crate::ask::Prompts;
-use crate::config::Config;
+use crate::config::{Config, Light};
 use crate::enhance::ModelFile;
 use crate::error::{Error, Result};
 use crate::types::{
     Condition, Degradation, Digest, EnhancerName, FrameId, Outcome, Question, Record, TrialKey,
-    View,
+    Variants, View,
 };
 
 /// What a plan is made of.
@@ -53,7 +53,7 @@ impl<'a> Inputs<'a> {
             pictures,
             askers,
             prompts,
-            conditions: conditions(config, &recipe.enhancers),
+            conditions: conditions(&config.light, config.enhancement.on, &recipe.enhancers),
             recipe,
         })
     }
@@ -61,19 +61,23 @@ impl<'a> Inputs<'a> {
 
 /// Every condition in which a frame is shown: raw first, each enhancer after, level by level, so that a frame is
 /// developed once for all that use it.
-fn conditions(config: &Config, enhancers: &[(EnhancerName, Digest)]) -> Vec<Condition> {
+pub(super) fn conditions(
+    light: &Light,
+    on: Variants,
+    enhancers: &[(EnhancerName, Digest)],
+) -> Vec<Condition> {
     let mut all = Vec::new();
-    for level in &config.light.levels {
+    for level in &light.levels {
         let Some(dark) = level.dark() else {
             all.push(Condition::raw(Degradation::None));
             continue;
         };
         for degradation in [Degradation::Exposure(dark), Degradation::Sensor(dark)] {
-            if !config.light.variants.include(degradation.variant()) {
+            if !light.variants.include(degradation.variant()) {
                 continue;
             }
             all.push(Condition::raw(degradation));
-            if config.enhancement.on.include(degradation.variant()) {
+            if on.include(degradation.variant()) {
                 let mended = |(name, _): &(EnhancerName, Digest)| Condition {
                     degradation,
                     enhancer: Some(name.clone()),

@@ -1,0 +1,158 @@
+//! `export`: ready-made sets for other tools, one for each condition, with its images.
+
+mod set;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use rayon::ThreadPoolBuilder;
+
+use super::darkroom::{Darkroom, Desk};
+use super::plan::conditions;
+use super::progress::Progress;
+use super::recipe::Recipe;
+use super::written::png;
+use super::{Verdict, identity, look_through, open_enhancers, select};
+use crate::ask::Format;
+use crate::config::{Existing, Export};
+use crate::dataset::Dataset;
+use crate::error::{Error, Result};
+use crate::types::manifest::Status;
+use crate::types::{Condition, FrameId, Question};
+
+use set::Set;
+
+/// Writes the sets.
+///
+/// # Errors
+/// Where the data cannot be read, a set is there already, or a file cannot be written.
+pub fn export(config: &Export, progress: &Progress) -> Result<Verdict> {
+    let dataset = Dataset::open(&config.data.place, config.data.questions.as_deref())?
+        .with_most_pixels(config.data.most_pixels);
+    let questions = select(&dataset, &config.data)?;
+    let files = identity::enhancers(&config.enhancement.models)?;
+    let recipe = Recipe {
+        seed: config.light.sensor.seed,
+        synthesis: config.light.sensor.synthesis.clone(),
+        format: Format::Png,
+        max_side: None,
+        enhancers: files
+            .iter()
+            .map(|file| (file.name().clone(), file.digest()))
+            .collect(),
+    };
+    let conditions = conditions(&config.light, config.enhancement.on, &recipe.enhancers);
+    let threads = config.enhancement.threads.map_or(0, std::num::NonZero::get);
+    let cores = ThreadPoolBuilder::new().num_threads(threads).build();
+    let cores = cores.map_err(|e| Error::usage("--threads", e))?;
+    let pictures = cores.install(|| look_through(&dataset, &questions, progress))?;
+    let mut sets = open_sets(config, &dataset, &conditions, &questions)?;
+    let (_, enhancers) = open_enhancers(files, &config.enhancement)?;
+    let mut darkroom = Darkroom {
+        dataset: &dataset,
+        pictures: &pictures,
+        recipe: &recipe,
+        enhancers,
+    };
+    let names = names(pictures.keys());
+    let bar = progress.bar("images", pictures.len() * conditions.len());
+    cores.install(|| {
+        for frame in pictures.keys() {
+            let of_frame: Vec<(usize, &Question)> = questions
+                .iter()
+                .enumerate()
+                .filter(|(_, question)| question.frame == *frame)
+                .collect();
+            let mut desk = Desk::new(frame.clone());
+            for (condition, set) in conditions.iter().zip(&mut sets) {
+                let pixels = darkroom.pixels(&mut desk, condition)?;
+                let image = png(&pixels)?;
+                set.take(&names[frame], &image, &of_frame)?;
+                bar.inc();
+            }
+        }
+        Ok::<(), Error>(())
+    })?;
+    drop(bar);
+    let mut paths = Vec::new();
+    for set in sets {
+        paths.push(set.finish()?.display().to_string());
+    }
+    Ok(Verdict {
+        status: Status::Complete,
+        output: format!(
+            "{} questions about {} images in {} conditions:\n{}\n",
+            questions.len(),
+            pictures.len(),
+            conditions.len(),
+            paths.join("\n")
+        ),
+    })
+}
+
+fn open_sets(
+    config: &Export,
+    dataset: &Dataset,
+    conditions: &[Condition],
+    questions: &[Question],
+) -> Result<Vec<Set>> {
+    let sets: Vec<Set> = conditions
+        .iter()
+        .map(|condition| {
+            Set::new(
+                config.form,
+                &config.out,
+                dataset.name(),
+                condition,
+                questions,
+            )
+        })
+        .collect();
+    let taken = sets.iter().find(|set| set.path().exists());
+    match taken.filter(|_| config.existing == Existing::Kept) {
+        Some(set) => Err(Error::data(
+            set.path().display(),
+            "there already; --force writes over it, another --out keeps both",
+        )),
+        None => Ok(sets),
+    }
+}
+
+/// A file name for each frame: its own without folders and ending, with a number where two would be the same.
+fn names<'a>(frames: impl Iterator<Item = &'a FrameId>) -> BTreeMap<&'a FrameId, String> {
+    let mut taken = BTreeSet::new();
+    let name = |frame: &'a FrameId| {
+        let path = Path::new(&frame.0);
+        let ending = path
+            .extension()
+            .map(|ending| ending.to_string_lossy().to_lowercase());
+        let bare = match ending.as_deref() {
+            Some("png" | "jpg" | "jpeg") => path.with_extension(""),
+            _ => path.to_owned(),
+        };
+        let plain = |letter: char| letter.is_alphanumeric() || "-_.".contains(letter);
+        let name = bare.to_string_lossy().replace(|letter| !plain(letter), "_");
+        let name = name.trim_start_matches('.').to_owned();
+        let mut unique = name.clone();
+        let mut number = 2;
+        while !taken.insert(unique.to_lowercase()) {
+            unique = format!("{name}-{number}");
+            number += 1;
+        }
+        (frame, unique)
+    };
+    frames.map(name).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_two_frames_share_a_file() {
+        let frames =
+            ["a/b.png", "a_b", "A_B.jpg", "../c d.png", "2"].map(|name| FrameId(name.into()));
+        let names: Vec<String> = names(frames.iter()).into_values().collect();
+        assert_eq!(names, ["_c_d", "2", "A_B-3", "a_b", "a_b-2"]);
+    }
+}

@@ -1,0 +1,197 @@
+//! One ready-made set: [`Set`].
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use serde_json::{Value, json};
+
+use crate::config::Form;
+use crate::error::{Error, Result};
+use crate::run::written::write;
+use crate::types::question::letter;
+use crate::types::{Choices, Condition, Question};
+
+/// What LLaVA's questions end with.
+const LLAVA: &str = "Answer with the option's letter from the given choices directly.";
+
+/// The questions in one condition, written frame by frame, so that no more than one image is held.
+pub(super) struct Set {
+    form: Form,
+    path: PathBuf,
+    /// The most choices of any question: so many columns has a table.
+    most: usize,
+    part: Option<csv::Writer<File>>,
+}
+
+impl Set {
+    pub(super) fn new(
+        form: Form,
+        out: &Path,
+        data: &str,
+        condition: &Condition,
+        questions: &[Question],
+    ) -> Self {
+        let folder = out.join(condition.to_string());
+        let path = match form {
+            Form::VlmEvalKit => out.join(format!("{data}_{condition}.tsv")),
+            Form::ImageFolder => folder.join("metadata.jsonl"),
+            Form::Llava => folder.join("questions.jsonl"),
+        };
+        let most = questions
+            .iter()
+            .map(|question| question.choices.len())
+            .max();
+        Self {
+            form,
+            path,
+            most: most.unwrap_or(0),
+            part: None,
+        }
+    }
+
+    /// The file that a reader is pointed at.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Takes an image under a name with the questions about it.
+    pub(super) fn take(
+        &mut self,
+        name: &str,
+        image: &[u8],
+        questions: &[(usize, &Question)],
+    ) -> Result<()> {
+        let file = format!("images/{name}.png");
+        if self.form != Form::VlmEvalKit {
+            let folder = self.path.parent().unwrap_or(Path::new(""));
+            write(&folder.join(&file), image)?;
+        }
+        let mut first = None;
+        for &(index, question) in questions {
+            match self.form {
+                Form::ImageFolder => self.line(&image_folder(&file, question))?,
+                Form::Llava => self.line(&llava(&file, question))?,
+                Form::VlmEvalKit => {
+                    // One row has the image, the others its index.
+                    let cell = match first {
+                        None => STANDARD.encode(image),
+                        Some(first) => usize::to_string(&first),
+                    };
+                    first = first.or(Some(index));
+                    let mut cells = table(index, cell, question);
+                    cells.resize(COLUMNS.len() + self.most, String::new());
+                    self.cells(cells)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn line(&mut self, value: &Value) -> Result<()> {
+        self.cells(vec![value.to_string()])
+    }
+
+    /// Writes a row; a line of JSON is one of a single cell that is never quoted.
+    fn cells(&mut self, cells: Vec<String>) -> Result<()> {
+        let path = beside(&self.path);
+        let part = match &mut self.part {
+            Some(part) => part,
+            none => {
+                let folder = path.parent().unwrap_or(Path::new("."));
+                fs::create_dir_all(folder).map_err(|e| Error::file(folder, "make", e))?;
+                let file = File::create(&path).map_err(|e| Error::file(&path, "write", e))?;
+                let quotes = match self.form {
+                    Form::VlmEvalKit => csv::QuoteStyle::Necessary,
+                    Form::ImageFolder | Form::Llava => csv::QuoteStyle::Never,
+                };
+                let mut builder = csv::WriterBuilder::new();
+                let part = none.insert(
+                    builder
+                        .delimiter(b'\t')
+                        .quote_style(quotes)
+                        .from_writer(file),
+                );
+                if self.form == Form::VlmEvalKit {
+                    let letters = (0..self.most).map(|i| letter(i).to_string());
+                    let header = COLUMNS.iter().map(|&name| name.to_owned()).chain(letters);
+                    part.write_record(header)
+                        .map_err(|e| Error::data(path.display(), e))?;
+                }
+                part
+            }
+        };
+        part.write_record(cells)
+            .map_err(|e| Error::data(path.display(), e))
+    }
+
+    /// Gives the set its name: it is whole.
+    pub(super) fn finish(self) -> Result<PathBuf> {
+        let part = beside(&self.path);
+        if let Some(mut writer) = self.part {
+            writer.flush().map_err(|e| Error::file(&part, "write", e))?;
+        }
+        fs::rename(&part, &self.path).map_err(|e| Error::file(&self.path, "write", e))?;
+        Ok(self.path)
+    }
+}
+
+/// Where a set is written until it is whole.
+fn beside(path: &Path) -> PathBuf {
+    let mut part = path.as_os_str().to_owned();
+    part.push(".part");
+    part.into()
+}
+
+/// The columns of a table before the choices.
+const COLUMNS: [&str; 6] = ["index", "image", "question", "answer", "category", "id"];
+
+/// A row of VLMEvalKit's table (`vlmeval/dataset/image_mcq.py`): its index is a number, and a short cell of `image` is the index
+/// of the row that has the image.
+fn table(index: usize, image: String, question: &Question) -> Vec<String> {
+    let truth = letter(question.choices.truth()).to_string();
+    let head = [
+        index.to_string(),
+        image,
+        question.text.clone(),
+        truth,
+        question.family.name().to_owned(),
+        question.id.0.clone(),
+    ];
+    head.into_iter()
+        .chain(question.choices.texts().iter().cloned())
+        .collect()
+}
+
+/// A line of `metadata.jsonl`.
+fn image_folder(file: &str, question: &Question) -> Value {
+    json!({
+        "file_name": file,
+        "id": question.id,
+        "question": question.text,
+        "options": question.choices.texts(),
+        "answer": letter(question.choices.truth()).to_string(),
+        "category": question.family,
+    })
+}
+
+/// A line of LLaVA's questions (`llava/eval/model_vqa_loader.py`), with the letter of the true choice.
+fn llava(file: &str, question: &Question) -> Value {
+    json!({
+        "question_id": question.id,
+        "image": file,
+        "text": format!("{}\n{}\n{LLAVA}", question.text, lettered(&question.choices)),
+        "answer": letter(question.choices.truth()).to_string(),
+        "category": question.family,
+    })
+}
+
+/// The choices, a line each with its letter.
+fn lettered(choices: &Choices) -> String {
+    let lines = choices.texts().iter().enumerate();
+    lines
+        .map(|(i, text)| format!("{}. {text}", letter(i)))
+        .collect::<Vec<_>>()
+        .join("\n")
+}
