@@ -1,4 +1,4 @@
-//! Evening out the answers, so that a model that sees nothing gains nothing by habit: [`balance`].
+//! Evening out the answers, so that a model that sees nothing gains nothing by habit: `balance`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;

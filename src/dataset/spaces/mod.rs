@@ -1,4 +1,4 @@
-//! Label spaces that data sets share, by name: [`space`]; and a data set's own, `classes.json`: [`read`].
+//! Label spaces that data sets share, by name: [`space`]; and a data set's own, `classes.json`: `read`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

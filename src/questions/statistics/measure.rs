@@ -18,7 +18,7 @@ use crate::types::{Digest, Frame, Labels};
 /// rounds alike on every machine.
 ///
 /// # Errors
-/// [`Error::Data`] with the frame where it has no classes at all.
+/// [`crate::error::Error::Data`] with the frame where it has no classes at all.
 pub fn measure(
     frame: &Frame,
     labels: &Labels,
