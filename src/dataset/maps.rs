@@ -83,8 +83,16 @@ impl DepthFile {
             Self::Png { scale, .. } => {
                 // Scaled once: most scales are a round number of millimetres, and then this is exact.
                 let unit = scale * 1_000.0;
-                let units = png(bytes, &[Form::Grey16], size)?.into_iter();
-                grid(size, units.map(|units| millimetres(units.into(), unit)))
+                let table = (0..=u16::MAX).map(|units| millimetres(units.into(), unit));
+                let table: Vec<u32> = table.map(|depth| depth.unwrap_or(u32::MAX)).collect();
+                let depths = png(bytes, &[Form::Grey16], size, |units| {
+                    table[usize::from(units)]
+                })?;
+                if let Some(at) = depths.iter().position(|depth| *depth == u32::MAX) {
+                    let units = png(bytes, &[Form::Grey16], size, |units| units)?[at];
+                    millimetres(units.into(), unit)?;
+                }
+                Array2::from_shape_vec(size, depths).map_err(|e| e.to_string())
             }
             Self::Npy(_) => {
                 let metres = npy(bytes, size)?.floats()?;
@@ -179,7 +187,8 @@ impl MapFiles<'_> {
 type Size = (usize, usize);
 
 fn semantic(bytes: &[u8], size: Size) -> Result<Array2<u16>, String> {
-    let ids = png(bytes, &[Form::Grey8, Form::Grey16, Form::Palette], size)?;
+    let forms = [Form::Grey8, Form::Grey16, Form::Palette];
+    let ids = png(bytes, &forms, size, |id| id)?;
     Array2::from_shape_vec(size, ids).map_err(|e| e.to_string())
 }
 
@@ -188,8 +197,7 @@ fn segments(bytes: &[u8], size: Size, as_npy: bool) -> Result<Array2<u32>, Strin
         return grid(size, npy(bytes, size)?.integers()?.map(segment));
     }
     // 8 bits hold 255 segments, and a wider id is cut to them without a trace.
-    let ids = png(bytes, &[Form::Grey16], size)?;
-    let ids = ids.into_iter().map(u32::from).collect();
+    let ids = png(bytes, &[Form::Grey16], size, u32::from)?;
     Array2::from_shape_vec(size, ids).map_err(|e| e.to_string())
 }
 
@@ -229,10 +237,15 @@ fn of<T>(path: &Path, read: Result<T, String>) -> Result<T> {
     read.map_err(|problem| Error::data(path.display(), problem))
 }
 
-fn png(bytes: &[u8], forms: &[Form], size: Size) -> Result<Vec<u16>, String> {
+fn png<T: Clone>(
+    bytes: &[u8],
+    forms: &[Form],
+    size: Size,
+    of: impl Fn(u16) -> T,
+) -> Result<Vec<T>, String> {
     let png = RawPng::open(bytes, forms)?;
     same(png.size, size)?;
-    png.samples()
+    png.samples(of)
 }
 
 fn npy(bytes: &[u8], size: Size) -> Result<Npy<'_>, String> {

@@ -6,7 +6,7 @@
 use std::fmt;
 use std::io::Cursor;
 
-use png::{BitDepth, ColorType, Decoder, Reader, Transformations};
+use png::{BitDepth, ColorType, Decoder, DecodingError, Reader, Transformations};
 
 use super::picture::MOST_PIXELS;
 
@@ -71,41 +71,47 @@ impl<'a> RawPng<'a> {
         })
     }
 
-    /// The samples, row by row.
-    pub(super) fn samples(mut self) -> Result<Vec<u16>, String> {
+    /// The samples, row by row, each as `of` makes it.
+    pub(super) fn samples<T: Clone>(mut self, of: impl Fn(u16) -> T) -> Result<Vec<T>, String> {
+        let not_whole = |e: DecodingError| format!("not a whole PNG: {e}");
         let bits = self.reader.info().bit_depth;
-        let wide = self
-            .reader
-            .output_buffer_size()
-            .ok_or("too large for this machine")?;
-        let mut bytes = vec![0; wide];
-        let frame = self
-            .reader
-            .next_frame(&mut bytes)
-            .map_err(|e| format!("not a whole PNG: {e}"))?;
-        if self.size != (frame.height as usize, frame.width as usize) {
-            return Err("an animated PNG; a single image expected".to_owned());
-        }
         let (height, width) = self.size;
         let mut samples = Vec::with_capacity(height * width);
-        for row in bytes.chunks_exact(frame.line_size) {
-            samples.extend((0..width).map(|x| sample(row, x, bits)));
+        let mut take = |row: &[u8]| match bits {
+            BitDepth::Sixteen => {
+                let (pairs, _) = row.as_chunks::<2>();
+                samples.extend(pairs.iter().map(|pair| of(u16::from_be_bytes(*pair))));
+            }
+            BitDepth::Eight => samples.extend(row.iter().map(|byte| of((*byte).into()))),
+            BitDepth::One | BitDepth::Two | BitDepth::Four => {
+                samples.extend((0..width).map(|x| of(sample(row, x, bits))));
+            }
+        };
+        let line = self.reader.output_line_size(self.reader.info().width);
+        let line = line.ok_or("too large for this machine")?;
+        if self.reader.info().interlaced {
+            let wide = self.reader.output_buffer_size();
+            let mut bytes = vec![0; wide.ok_or("too large for this machine")?];
+            self.reader.next_frame(&mut bytes).map_err(not_whole)?;
+            bytes.chunks_exact(line).for_each(take);
+        } else {
+            let mut row = vec![0; line];
+            while self.reader.read_row(&mut row).map_err(not_whole)?.is_some() {
+                take(&row);
+            }
+        }
+        if samples.len() != height * width {
+            return Err("an animated PNG; a single image expected".to_owned());
         }
         Ok(samples)
     }
 }
 
-/// The sample at `x` of a row, as the PNG specification packs it (section 7.2): high bits first, big-endian.
+/// The sample at `x` of a row of so many bits a sample, as the PNG specification packs it (section 7.2): high bits first.
 fn sample(row: &[u8], x: usize, bits: BitDepth) -> u16 {
-    match bits {
-        BitDepth::Sixteen => u16::from_be_bytes([row[2 * x], row[2 * x + 1]]),
-        BitDepth::Eight => row[x].into(),
-        BitDepth::One | BitDepth::Two | BitDepth::Four => {
-            let bits = bits as usize;
-            let (byte, place) = (x * bits / 8, x * bits % 8);
-            u16::from((row[byte] << place) >> (8 - bits))
-        }
-    }
+    let bits = bits as usize;
+    let (byte, place) = (x * bits / 8, x * bits % 8);
+    u16::from((row[byte] << place) >> (8 - bits))
 }
 
 /// The form of a PNG file that has one.
@@ -159,7 +165,7 @@ pub(super) mod tests {
     }
 
     fn read(bytes: &[u8], forms: &[Form]) -> Result<Vec<u16>, String> {
-        RawPng::open(bytes, forms)?.samples()
+        RawPng::open(bytes, forms)?.samples(|sample| sample)
     }
 
     #[test]
@@ -207,7 +213,7 @@ pub(super) mod tests {
         );
         let opened = RawPng::open(&deep, &[Form::Grey16]).unwrap();
         assert_eq!(opened.size, (2, 1));
-        assert_eq!(opened.samples().unwrap(), [258, 65_535]);
+        assert_eq!(opened.samples(|sample| sample).unwrap(), [258, 65_535]);
     }
 
     #[test]

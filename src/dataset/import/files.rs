@@ -80,7 +80,7 @@ pub(super) fn png(path: &Path, forms: &[Form]) -> Result<Array2<u16>> {
     let read = || {
         let png = RawPng::open(&bytes, forms)?;
         let size = png.size;
-        Array2::from_shape_vec(size, png.samples()?).map_err(|e| e.to_string())
+        Array2::from_shape_vec(size, png.samples(|sample| sample)?).map_err(|e| e.to_string())
     };
     read().map_err(|problem| Error::data(path.display(), problem))
 }

@@ -1,5 +1,7 @@
 //! What a mask's pixels show: their colour and their depth, [`Core`]; and what is measured of all pixels.
 
+use ndarray::{CowArray, Ix2};
+
 use super::{Along, FrameDepth, Segment, SegmentDepth};
 use crate::questions::colors::{BINS, Palette};
 use crate::questions::rules::Measure;
@@ -15,20 +17,22 @@ pub(super) struct Core {
     depths: Option<Vec<u32>>,
 }
 
-impl Default for Core {
-    fn default() -> Self {
+impl Core {
+    /// Nothing yet, of a mask of so many pixels.
+    pub(super) fn of(area: u64, frame: &Frame) -> Self {
         Self {
             count: 0,
             colors: [0; BINS],
             channels: [[0; 256]; 3],
             bright: 0,
             crushed: 0,
-            depths: None,
+            depths: frame
+                .depth
+                .as_ref()
+                .map(|_| Vec::with_capacity(area as usize)),
         }
     }
-}
 
-impl Core {
     pub(super) fn tell(self, segment: &mut Segment) {
         segment.core = self.count;
         segment.colors = self.colors;
@@ -45,16 +49,23 @@ fn depths(mut depths: Vec<u32>) -> Option<SegmentDepth> {
     if depths.is_empty() {
         return None;
     }
-    let count = depths.len();
-    let mut ranked = |percent| {
-        let (_, depth, _) = depths.select_nth_unstable(rank(count as u64, percent) as usize);
-        *depth
-    };
+    let count = depths.len() as u64;
+    let [near, middle, far] = [10, 50, 90].map(|percent| rank(count, percent) as usize);
+    // What lies before the median is nearer, and what lies behind it farther.
+    let (nearer, &mut median, farther) = depths.select_nth_unstable(middle);
+    let ranked = |depths: &mut [u32], rank| *depths.select_nth_unstable(rank).1;
     Some(SegmentDepth {
-        valid: count as u64,
-        p10: ranked(10),
-        median: ranked(50),
-        p90: ranked(90),
+        valid: count,
+        p10: if near < middle {
+            ranked(nearer, near)
+        } else {
+            median
+        },
+        median,
+        p90: match far.checked_sub(middle + 1) {
+            Some(far) => ranked(farther, far),
+            None => median,
+        },
     })
 }
 
@@ -79,7 +90,7 @@ pub(super) struct Light<'a> {
     frame: &'a Frame,
     rule: &'a Measure,
     palette: &'a Palette,
-    depth: Option<&'a [u32]>,
+    depth: Option<CowArray<'a, u32, Ix2>>,
     /// The squares of the slopes of rays by column and by row.
     slopes: Option<[Vec<f64>; 2]>,
 }
@@ -102,7 +113,7 @@ impl<'a> Light<'a> {
             frame,
             rule,
             palette,
-            depth: frame.depth.as_ref().and_then(|depth| depth.as_slice()),
+            depth: frame.depth.as_ref().map(|depth| depth.as_standard_layout()),
             slopes,
         }
     }
@@ -121,10 +132,10 @@ impl<'a> Light<'a> {
             core.bright += u64::from(most >= self.rule.bright);
             core.crushed += u64::from(most <= self.rule.crushed);
         }
-        let Some(depth) = self.depth else {
+        let depth = self.depth.as_ref().and_then(|depth| depth.as_slice());
+        let (Some(depth), Some(depths)) = (depth, &mut core.depths) else {
             return;
         };
-        let depths = core.depths.get_or_insert_default();
         let row = &depth[start + left..start + right];
         let valid = |depth: &u32| (1..=self.rule.most_depth_mm).contains(depth);
         match &self.slopes {
@@ -152,15 +163,15 @@ fn rays(frame: &Frame) -> Option<Intrinsics> {
 pub(super) fn frame_depth(frame: &Frame) -> Option<FrameDepth> {
     const MOST: usize = 1 << 16;
     let depth = frame.depth.as_ref()?;
-    let mut counts = vec![0_u64; MOST];
+    let mut counts = vec![0_u32; MOST];
     for depth in depth {
         counts[(*depth as usize).min(MOST - 1)] += 1;
     }
-    let holes = counts[0];
+    let holes = u64::from(counts[0]);
     let rank = rank(depth.len() as u64 - holes, 50);
     let mut seen = 0;
     let median = counts.iter().skip(1).position(|count| {
-        seen += count;
+        seen += u64::from(*count);
         seen > rank
     });
     Some(FrameDepth {

@@ -30,7 +30,7 @@ pub fn measure(
     let scene = Scene::of(frame, labels)?;
     let size = scene.size;
     let shapes = Shapes::of(&scene, rule);
-    let (void, effective_void, lower_void) = scene.void(rule);
+    let (void, effective_void, lower_void) = scene.void(&shapes.joint, rule);
     let mut cores = shapes.cores(frame, &scene, rule, palette);
     let (mut classes, mut loose, mut words) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
     for (&(mask, id), &count) in &shapes.joint {
@@ -67,7 +67,7 @@ pub fn measure(
         classes,
         loose,
         words,
-        unknown: scene.unknown(),
+        unknown: scene.unknown(&shapes.joint),
         depth: frame_depth(frame),
         segments,
         room: frame.room.clone(),

@@ -10,8 +10,8 @@ pub(super) fn cores(
     radius: usize,
     mut visit: impl FnMut(usize, usize, usize, u32),
 ) {
-    let whole = 2 * radius + 1;
-    let mut streaks = vec![0_usize; width];
+    let whole = 2 * radius as u32 + 1;
+    let mut streaks = vec![0_u32; width];
     // Above the first row and below the last the mask goes on as it is there.
     for y in 0..height + radius {
         if y < height {
@@ -29,12 +29,14 @@ pub(super) fn cores(
                 let (from, to) = (from.min(right), to.max(from.min(right)));
                 streaks[left..from].fill(0);
                 streaks[to..right].fill(0);
-                for x in from..to {
-                    streaks[x] = match above {
-                        None => radius + 1,
-                        Some(above) if above[x] == row[x] => streaks[x] + 1,
-                        Some(_) => 1,
-                    };
+                let streaks = &mut streaks[from..to];
+                match above {
+                    None => streaks.fill(radius as u32 + 1),
+                    Some(above) => {
+                        for (streak, above) in streaks.iter_mut().zip(&above[from..to]) {
+                            *streak = if *above == row[left] { *streak + 1 } else { 1 };
+                        }
+                    }
                 }
             }
         } else {
@@ -65,15 +67,29 @@ pub(super) fn cores(
 pub(super) fn runs<T: PartialEq>(row: &[T]) -> impl Iterator<Item = (usize, usize)> {
     let mut left = 0;
     std::iter::from_fn(move || {
-        let first = row.get(left)?;
-        let length = row[left..]
-            .iter()
-            .take_while(|value| *value == first)
-            .count();
-        let run = (left, left + length);
-        left += length;
+        let run = (left, left + streak(row.get(left..)?)?);
+        left = run.1;
         Some(run)
     })
+}
+
+/// How many values at the front are the same; `None` where there are none.
+fn streak<T: PartialEq>(values: &[T]) -> Option<usize> {
+    /// Compared at once, without a way out between.
+    const LANES: usize = 32;
+    let first = values.first()?;
+    let strangers = |lanes: &[T; LANES]| -> u32 {
+        let strange = lanes.iter().map(|value| u32::from(value != first));
+        strange.sum()
+    };
+    let (chunks, _) = values.as_chunks::<LANES>();
+    let whole = LANES
+        * chunks
+            .iter()
+            .take_while(|lanes| strangers(lanes) == 0)
+            .count();
+    let rest = values[whole..].iter();
+    Some(whole + rest.take_while(|value| *value == first).count())
 }
 
 #[cfg(test)]

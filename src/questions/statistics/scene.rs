@@ -2,6 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use ndarray::{CowArray, Ix2};
+
 use super::components::components;
 use super::opening::opened;
 use super::rim::runs;
@@ -12,12 +14,19 @@ use crate::types::{Frame, Labels, Segmentation};
 /// A number of the semantic map that stands for nothing.
 const VOID: u32 = u32::MAX;
 
+/// What says the label of a pixel.
+enum Kinds<'a> {
+    /// A semantic map.
+    OfPixels(CowArray<'a, u16, Ix2>),
+    /// The names of segments: the label of each mask, [`VOID`] for none, that of no mask first.
+    OfMasks(Vec<u32>),
+}
+
 /// The maps of a frame, as numbers.
 pub(super) struct Scene<'a> {
     pub(super) size: [usize; 2],
     labels: &'a Labels,
-    /// The label of each pixel; [`VOID`] for none.
-    pub(super) ids: Vec<u32>,
+    kinds: Kinds<'a>,
     /// The mask of each pixel, from 1; 0 for none.
     pub(super) masks: Vec<u32>,
     /// The number of each mask in the map.
@@ -32,33 +41,23 @@ pub(super) struct Scene<'a> {
 const NAMED: u32 = 1 << 16;
 
 impl<'a> Scene<'a> {
-    pub(super) fn of(frame: &Frame, labels: &'a Labels) -> Result<Self> {
+    pub(super) fn of(frame: &'a Frame, labels: &'a Labels) -> Result<Self> {
         let size = [frame.rgb.width(), frame.rgb.height()];
         let mut scene = Self {
             size,
             labels,
-            ids: Vec::new(),
+            kinds: Kinds::OfMasks(Vec::new()),
             masks: Vec::new(),
             numbers: Vec::new(),
             parts: Vec::new(),
             named: BTreeMap::new(),
         };
         if let Some(segments) = &frame.segments {
-            scene.number(&segments.iter().copied().collect::<Vec<_>>());
+            scene.number(plain(&segments.as_standard_layout()));
         }
         match &frame.semantic {
             Some(semantic) => {
-                let void: Vec<bool> = (0..=u16::MAX).map(|id| labels.void.contains(&id)).collect();
-                scene.ids = semantic
-                    .iter()
-                    .map(|&id| {
-                        if void[usize::from(id)] {
-                            VOID
-                        } else {
-                            id.into()
-                        }
-                    })
-                    .collect();
+                scene.kinds = Kinds::OfPixels(semantic.as_standard_layout());
             }
             None if frame.segments.is_some() && !frame.names.is_empty() => scene.by_name(frame),
             None => {
@@ -93,25 +92,17 @@ impl<'a> Scene<'a> {
         self.numbers = ids.into_keys().collect();
     }
 
-    /// Gives each pixel the class of its segment's name.
+    /// Gives each mask the class of its segment's name.
     fn by_name(&mut self, frame: &Frame) {
         let mut classes: BTreeMap<&str, u32> = BTreeMap::new();
-        let of_mask: Vec<u32> = self
-            .numbers
-            .iter()
-            .map(|number| match frame.names.get(number) {
-                None => VOID,
-                Some(name) => {
-                    let next = NAMED + classes.len() as u32;
-                    *classes.entry(&name.canonical).or_insert(next)
-                }
+        let named = self.numbers.iter().map(|number| {
+            let name = frame.names.get(number);
+            name.map_or(VOID, |name| {
+                let next = NAMED + classes.len() as u32;
+                *classes.entry(&name.canonical).or_insert(next)
             })
-            .collect();
-        let mask = |mask: &u32| match mask.checked_sub(1) {
-            None => VOID,
-            Some(mask) => of_mask[mask as usize],
-        };
-        self.ids = self.masks.iter().map(mask).collect();
+        });
+        self.kinds = Kinds::OfMasks(std::iter::once(VOID).chain(named).collect());
         self.named = classes
             .into_iter()
             .map(|(name, id)| (id, name.to_owned()))
@@ -120,14 +111,17 @@ impl<'a> Scene<'a> {
 
     /// Cuts the classes into connected pieces.
     fn cut(&mut self) {
-        let labels: Vec<u32> = self.ids.iter().map(|id| id.wrapping_add(1)).collect();
-        self.masks = components(&labels, self.size);
+        let Kinds::OfPixels(ids) = &self.kinds else {
+            return;
+        };
+        let label = |id| self.label(id).wrapping_add(1);
+        self.masks = components(plain(ids), self.size, label);
         self.numbers = (1..=self.masks.iter().copied().max().unwrap_or(0)).collect();
     }
 
     /// Merges the parts of objects: neighbours whose commonest label is the same.
     fn merge(&mut self) {
-        let mut joint: BTreeMap<(u32, u32), u64> = BTreeMap::new();
+        let mut joint = Joint::new();
         self.each_run(|left, right, mask, id| {
             *joint.entry((mask, id)).or_insert(0) += (right - left) as u64;
         });
@@ -144,7 +138,7 @@ impl<'a> Scene<'a> {
             .iter()
             .map(|mask| modes[*mask as usize].1.wrapping_add(1))
             .collect();
-        let pieces = components(&labels, self.size);
+        let pieces = components(&labels, self.size, |label| label);
         let count = pieces.iter().copied().max().unwrap_or(0);
         let mut parts = vec![BTreeSet::new(); count as usize];
         for (left, right) in runs(&self.masks) {
@@ -164,23 +158,36 @@ impl<'a> Scene<'a> {
         self.numbers = (1..=count).collect();
     }
 
+    /// The label of a number of the semantic map.
+    fn label(&self, id: u16) -> u32 {
+        if self.labels.void.contains(&id) {
+            VOID
+        } else {
+            id.into()
+        }
+    }
+
     /// Visits every run of pixels of one mask and one label, row by row.
     pub(super) fn each_run(&self, mut visit: impl FnMut(usize, usize, u32, u32)) {
-        let width = self.size[0];
-        for row in 0..self.size[1] {
-            let start = row * width;
-            let (masks, ids) = (
-                &self.masks[start..start + width],
-                &self.ids[start..start + width],
-            );
-            for (left, right) in runs(masks) {
-                for (from, to) in runs(&ids[left..right]) {
-                    visit(
-                        start + left + from,
-                        start + left + to,
-                        masks[left],
-                        ids[left + from],
-                    );
+        for y in 0..self.size[1] {
+            self.each_run_of(y, &mut visit);
+        }
+    }
+
+    /// Visits every run of a row.
+    pub(super) fn each_run_of(&self, y: usize, visit: &mut impl FnMut(usize, usize, u32, u32)) {
+        let [width, _] = self.size;
+        let start = y * width;
+        let masks = &self.masks[start..start + width];
+        for (left, right) in runs(masks) {
+            let (from, to, mask) = (start + left, start + right, masks[left]);
+            match &self.kinds {
+                Kinds::OfMasks(labels) => visit(from, to, mask, labels[mask as usize]),
+                Kinds::OfPixels(ids) => {
+                    let ids = &plain(ids)[from..to];
+                    for (left, right) in runs(ids) {
+                        visit(from + left, from + right, mask, self.label(ids[left]));
+                    }
                 }
             }
         }
@@ -207,34 +214,42 @@ impl<'a> Scene<'a> {
     }
 
     /// Pixels of numbers that the label space has not.
-    pub(super) fn unknown(&self) -> BTreeMap<u16, u64> {
+    pub(super) fn unknown(&self, joint: &Joint) -> BTreeMap<u16, u64> {
         let mut unknown = BTreeMap::new();
-        for (left, right) in runs(&self.ids) {
-            if let Ok(id) = u16::try_from(self.ids[left])
+        for (&(_, id), count) in joint {
+            if let Ok(id) = u16::try_from(id)
                 && !self.labels.labels.contains_key(&id)
             {
-                *unknown.entry(id).or_insert(0) += (right - left) as u64;
+                *unknown.entry(id).or_insert(0) += count;
             }
         }
         unknown
     }
 
     /// Pixels without a class, those that survive an opening, and those of them in the lower half.
-    pub(super) fn void(&self, rule: &Measure) -> (u64, u64, u64) {
-        let [_, height] = self.size;
-        let mut void = vec![false; self.ids.len()];
-        for (left, right) in runs(&self.ids) {
-            void[left..right].fill(self.class(self.ids[left]).is_none());
-        }
-        let count = |pixels: &[bool]| pixels.iter().filter(|void| **void).count() as u64;
-        let all = count(&void);
+    pub(super) fn void(&self, joint: &Joint, rule: &Measure) -> (u64, u64, u64) {
+        let [width, height] = self.size;
+        let all = joint
+            .iter()
+            .filter(|((_, id), _)| self.class(*id).is_none());
+        let all = all.map(|(_, count)| count).sum();
         if all == 0 {
             return (0, 0, 0);
         }
+        let mut void = vec![false; width * height];
+        self.each_run(|left, right, _, id| void[left..right].fill(self.class(id).is_none()));
         opened(&mut void, self.size, rounded(height, rule.void_per_height));
-        let lower = &void[height / 2 * self.size[0]..];
-        (all, count(&void), count(lower))
+        let count = |pixels: &[bool]| pixels.iter().filter(|void| **void).count() as u64;
+        (all, count(&void), count(&void[height / 2 * width..]))
     }
+}
+
+/// Pixels by mask and label.
+pub(super) type Joint = BTreeMap<(u32, u32), u64>;
+
+/// The numbers of a map, row by row.
+fn plain<'a, T>(map: &'a CowArray<'_, T, Ix2>) -> &'a [T] {
+    map.as_slice().unwrap_or_default()
 }
 
 /// A length in pixels that goes with the height: at least 1, to the nearest.

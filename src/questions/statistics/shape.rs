@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::light::{Core, Light};
 use super::rim::{cores, runs};
-use super::scene::{Scene, rounded};
+use super::scene::{Joint, Scene, rounded};
 use super::{Segment, plain_word, ppm};
 use crate::questions::colors::{BINS, Palette};
 use crate::questions::rules::Measure;
@@ -40,11 +40,35 @@ impl Shape {
     }
 }
 
+/// How many pixels between two columns of a run are of its rim: they end it, or have something else above or below.
+fn rim(
+    mask: u32,
+    [from, to]: [usize; 2],
+    [left, right]: [usize; 2],
+    rows: [Option<&[u32]>; 2],
+) -> u64 {
+    if from >= to {
+        return 0;
+    }
+    let [Some(above), Some(below)] = rows else {
+        return (to - from) as u64;
+    };
+    let differs = |x: usize| above[x] != mask || below[x] != mask;
+    let both = above[from..to].iter().zip(&below[from..to]);
+    let count: u32 = both
+        .map(|(above, below)| u32::from(*above != mask) | u32::from(*below != mask))
+        .sum();
+    let last = (right - left > 1).then(|| right - 1);
+    let ends = std::iter::once(left).chain(last);
+    let whole = ends.filter(|x| (from..to).contains(x) && !differs(*x));
+    u64::from(count) + whole.count() as u64
+}
+
 /// All masks.
 pub(super) struct Shapes {
     pub(super) list: Vec<Shape>,
     /// Pixels by mask and label.
-    pub(super) joint: BTreeMap<(u32, u32), u64>,
+    pub(super) joint: Joint,
 }
 
 impl Shapes {
@@ -53,12 +77,12 @@ impl Shapes {
         let [width, height] = scene.size;
         let mut shapes = Self {
             list: vec![Shape::NONE; scene.numbers.len()],
-            joint: BTreeMap::new(),
+            joint: Joint::new(),
         };
-        scene.each_run(|left, right, mask, id| {
-            *shapes.joint.entry((mask, id)).or_insert(0) += (right - left) as u64;
-        });
         for y in 0..height {
+            scene.each_run_of(y, &mut |left, right, mask, id| {
+                *shapes.joint.entry((mask, id)).or_insert(0) += (right - left) as u64;
+            });
             let row = &scene.masks[y * width..][..width];
             let rows = [y.checked_sub(1), (y + 1 < height).then_some(y + 1)];
             let [above, below] = rows.map(|y| y.map(|y| &scene.masks[y * width..][..width]));
@@ -70,15 +94,17 @@ impl Shapes {
                 };
                 let shape = &mut shapes.list[index as usize];
                 shape.take(y, left, right);
-                for x in left..right {
-                    let end = x == left || x + 1 == right;
-                    let differs = |row: Option<&[u32]>| row.is_none_or(|row| row[x] != mask);
-                    if end || differs(above) || differs(below) {
-                        shape.rim += 1;
-                        let outer = outer_row || x < rule.border_px || x + rule.border_px >= width;
-                        shape.rim_on_border += u64::from(outer);
-                    }
-                }
+                let rim = |from: usize, to: usize| {
+                    let (from, to) = (from.max(left), to.min(right));
+                    rim(mask, [from, to], [left, right], [above, below])
+                };
+                shape.rim += rim(left, right);
+                shape.rim_on_border += if outer_row {
+                    rim(left, right)
+                } else {
+                    let inner = width.saturating_sub(rule.border_px).max(rule.border_px);
+                    rim(0, rule.border_px) + rim(inner, width)
+                };
             }
         }
         shapes
@@ -144,12 +170,12 @@ impl Shapes {
         rule: &Measure,
         palette: &Palette,
     ) -> Vec<Option<Core>> {
-        let pixels = scene.ids.len() as u64;
+        let pixels = scene.masks.len() as u64;
         let large = |shape: &Shape| ppm(shape.area, pixels) >= rule.detail_ppm;
         let mut found: Vec<Option<Core>> = self
             .list
             .iter()
-            .map(|shape| large(shape).then(Core::default))
+            .map(|shape| large(shape).then(|| Core::of(shape.area, frame)))
             .collect();
         let light = Light::of(frame, rule, palette);
         let radius = rounded(scene.size[1], rule.erosion_per_height);
