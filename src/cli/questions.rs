@@ -11,7 +11,7 @@ pub struct QuestionsArgs {
     /// A folder of frames with their maps (frames.jsonl, classes.json), as import makes it
     #[arg(value_name = "DATA")]
     pub data: PathBuf,
-    /// Where the questions go (.jsonl); what was measured and what became of every candidate is kept beside them
+    /// Where the questions go (.jsonl); what was measured of the frames is kept beside it
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
     /// The rulebook; default: the one built in (src/questions/rules.toml)

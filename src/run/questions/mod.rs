@@ -18,8 +18,8 @@ use crate::dataset::Dataset;
 use crate::error::{Error, Result};
 use crate::questions::statistics::{self, FrameStatistics, measure, strangers};
 use crate::questions::summary::Summary;
-use crate::questions::survey::Verdict as Candidate;
-use crate::questions::{Asked, Order, generate};
+use crate::questions::survey::{Reason, Verdict as Candidate};
+use crate::questions::{Asked, Generated, Order, generate};
 use crate::report;
 use crate::types::manifest::Status;
 use crate::types::{Digest, Family, FrameId, Labels, QuestionId};
@@ -73,9 +73,7 @@ pub fn questions(config: &Questions, progress: &Progress) -> Result<Verdict> {
     if let Some(page) = &config.review {
         checked::review(page, &dataset, &frames, &made.asked)?;
     }
-    for uneven in &made.uneven {
-        tracing::warn!("{uneven}");
-    }
+    warn(&made, config);
     Ok(Verdict {
         status: if failed == 0 {
             Status::Complete
@@ -91,6 +89,23 @@ pub fn questions(config: &Questions, progress: &Progress) -> Result<Verdict> {
             ),
         },
     })
+}
+
+/// Says what is not wrong, but likely not meant.
+fn warn(made: &Generated, config: &Questions) {
+    for uneven in &made.uneven {
+        tracing::warn!("{uneven}");
+    }
+    let closest = made.tallies.get(&Family::Closest);
+    let scale = closest.and_then(|tally| tally.fallen.get(&Reason::Scale));
+    if let Some(frames) = scale {
+        let measure = &config.rules.book().measure;
+        tracing::warn!(
+            "{frames} frames have a median depth outside {}–{} mm, which no room has, and are asked nothing of depth; is their depth_scale right?",
+            measure.least_median_depth_mm,
+            measure.most_median_depth_mm
+        );
+    }
 }
 
 /// The file of what was measured, beside the questions.
