@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use ndarray::Array2;
 
 use crate::dataset::maps::DepthFile;
+use crate::dataset::npy::Npy;
 use crate::dataset::picture::{MOST_PIXELS, Picture};
 use crate::dataset::raw_png::{Form, RawPng};
 use crate::error::{Error, Result};
@@ -81,6 +82,28 @@ pub(super) fn png(path: &Path, forms: &[Form]) -> Result<Array2<u16>> {
         let png = RawPng::open(&bytes, forms)?;
         let size = png.size;
         Array2::from_shape_vec(size, png.samples(|sample| sample)?).map_err(|e| e.to_string())
+    };
+    read().map_err(|problem| Error::data(path.display(), problem))
+}
+
+/// The numbers of segments: a 16-bit grey PNG file, or a `.npy` file of integers, where one below 0 is none.
+pub(super) fn segments(path: &Path) -> Result<Array2<u32>> {
+    let ending = path.extension();
+    if ending.is_some_and(|ending| ending.eq_ignore_ascii_case("png")) {
+        return Ok(png(path, &[Form::Grey16])?.mapv(u32::from));
+    }
+    let bytes = fs::read(path).map_err(|e| Error::file(path, "read", e))?;
+    let read = || {
+        let npy = Npy::parse(&bytes)?;
+        let id = |id: i128| {
+            u32::try_from(id.max(0)).map_err(|_| format!("{id} is no number of a segment"))
+        };
+        let size = npy.size;
+        let ids = npy
+            .integers()?
+            .map(id)
+            .collect::<Result<Vec<u32>, String>>()?;
+        Array2::from_shape_vec(size, ids).map_err(|e| e.to_string())
     };
     read().map_err(|problem| Error::data(path.display(), problem))
 }

@@ -5,11 +5,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use ndarray::Array2;
-
-use super::files::{depth, files, first, folders, png, same_size};
+use super::files::{depth, files, first, folders, png, same_size, segments};
 use super::{Adapter, Incoming, Read, Stated, labels, pinhole};
-use crate::dataset::npy::Npy;
 use crate::dataset::raw_png::Form;
 use crate::error::{Error, Result};
 use crate::types::{DepthKind, Intrinsics, Labels, Rgb, SegmentName};
@@ -152,22 +149,6 @@ impl Folder {
         }
         Ok(())
     }
-}
-
-fn segments(path: &Path) -> Result<Array2<u32>> {
-    if path
-        .extension()
-        .is_some_and(|end| end.eq_ignore_ascii_case("png"))
-    {
-        return Ok(png(path, &[Form::Grey16])?.mapv(u32::from));
-    }
-    let bytes = std::fs::read(path).map_err(|e| Error::file(path, "read", e))?;
-    let read = || {
-        let npy = Npy::parse(&bytes)?;
-        let ids = npy.integers()?.map(|id| u32::try_from(id).unwrap_or(0));
-        Array2::from_shape_vec(npy.size, ids.collect()).map_err(|e| e.to_string())
-    };
-    read().map_err(|problem| Error::data(path.display(), problem))
 }
 
 impl Adapter for Folder {

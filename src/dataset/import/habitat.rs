@@ -7,13 +7,10 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use ndarray::Array2;
 use serde::Deserialize;
 
-use super::files::{depth, files, folders, png, same_size, text};
+use super::files::{depth, files, folders, same_size, segments, text};
 use super::{Adapter, Incoming, Read, Stated, hm3d, mp3d, mpcat40, numbers, pinhole, replica};
-use crate::dataset::npy::Npy;
-use crate::dataset::raw_png::Form;
 use crate::error::{Error, Result};
 use crate::types::{DepthKind, Intrinsics, Labels, Rgb, SegmentName};
 
@@ -168,26 +165,6 @@ fn steps(path: &Path) -> Result<BTreeMap<String, Step>> {
     steps.collect()
 }
 
-/// The numbers of instances in a map.
-fn instances(path: &Path) -> Result<Array2<u32>> {
-    if path
-        .extension()
-        .is_some_and(|end| end.eq_ignore_ascii_case("png"))
-    {
-        return Ok(png(path, &[Form::Grey16])?.mapv(u32::from));
-    }
-    let bytes = std::fs::read(path).map_err(|e| Error::file(path, "read", e))?;
-    let read = || {
-        let npy = Npy::parse(&bytes)?;
-        let ids = npy
-            .integers()?
-            .map(|id| u32::try_from(id).map_err(|_| format!("{id} is no number of an instance")));
-        let ids = ids.collect::<Result<Vec<u32>, String>>()?;
-        Array2::from_shape_vec(npy.size, ids).map_err(|e| e.to_string())
-    };
-    read().map_err(|problem| Error::data(path.display(), problem))
-}
-
 impl Adapter for Habitat {
     fn frames(&self) -> &[Incoming] {
         &self.frames
@@ -236,7 +213,7 @@ impl Adapter for Habitat {
             }
             None => None,
         };
-        let ids = instances(semantic)?;
+        let ids = segments(semantic)?;
         same_size(semantic, &ids, rgb)?;
         let (mut regions, mut named) = (BTreeMap::new(), 0_u64);
         let (mut last, mut found) = (None, (0, None));
