@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Parser;
 use clap::error::ErrorKind;
 use darkqa_eval::cli::{Cli, Command, EvaluateArgs};
-use darkqa_eval::config::{self, Config, Export, Import, Questions, Realism, Synthesize};
+use darkqa_eval::config::{self, Config, Enhance, Export, Import, Questions, Realism, Synthesize};
 use darkqa_eval::enhance;
 use darkqa_eval::run::export::export;
 use darkqa_eval::run::import::import;
@@ -14,7 +14,7 @@ use darkqa_eval::run::progress::{Loudness, Progress};
 use darkqa_eval::run::questions::questions;
 use darkqa_eval::run::realism::realism;
 use darkqa_eval::run::synthesize::synthesize;
-use darkqa_eval::run::{Verdict, evaluate};
+use darkqa_eval::run::{self, Verdict, evaluate};
 use darkqa_eval::types::manifest::Status;
 use tracing_subscriber::EnvFilter;
 
@@ -80,6 +80,7 @@ enum Task {
     Questions(Box<Questions>),
     Import(Box<Import>),
     Export(Box<Export>),
+    Enhance(Box<Enhance>),
 }
 
 impl Job {
@@ -101,6 +102,10 @@ impl Job {
             Some(Command::Export(said)) => {
                 let quiet = said.quiet;
                 (quiet, Task::Export(Box::new(Export::resolve(*said)?)))
+            }
+            Some(Command::Enhance(said)) => {
+                let quiet = said.quiet;
+                (quiet, Task::Enhance(Box::new(Enhance::resolve(said)?)))
             }
             Some(Command::Import(said)) => {
                 let quiet = said.quiet;
@@ -128,6 +133,7 @@ fn show(task: Task, progress: &Progress) -> anyhow::Result<ExitCode> {
         Task::Questions(config) => questions(&config, progress)?,
         Task::Import(config) => import(&config, progress)?,
         Task::Export(config) => export(&config, progress)?,
+        Task::Enhance(config) => run::enhance::enhance(&config, progress)?,
     };
     let written = std::io::stdout().lock().write_all(output.as_bytes());
     match (status, written) {

@@ -23,7 +23,7 @@ const ROOMS: [(&str, &[&str]); 12] = [
     ("clap", &["cli", "config", "main.rs"]),
     (
         "image",
-        &["dataset", "enhance/tensor.rs", "ask/payload.rs", "run"],
+        &["dataset", "enhance/planes.rs", "ask/payload.rs", "run"],
     ),
     ("png", &["dataset/raw_png.rs"]),
     ("anyhow", &["main.rs"]),
@@ -614,7 +614,7 @@ fn breaches_are_found() {
             "ask/wire.rs",
             "use image::Rgb;",
             1,
-            "`image` outside dataset, enhance/tensor.rs, ask/payload.rs, run",
+            "`image` outside dataset, enhance/planes.rs, ask/payload.rs, run",
         ),
     ] {
         let found = inspect(path, source, &sample());

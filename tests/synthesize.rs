@@ -165,7 +165,7 @@ fn what_makes_no_sense_is_one_line() {
     fs::copy(bench.path("frames/a.png"), bench.path("frames/a.PNG")).unwrap();
     bench.file("my.toml", "name = \"mine\"\nadu-range = nan\n");
     let cases: [(&[&str], &str); 6] = [
-        (&["frames"], "would both be written as a_"),
+        (&["frames"], "would both be written as a;"),
         (&["none"], "none"),
         (&["frames/a.png", "--camera", "my.toml"], "my.toml"),
         (

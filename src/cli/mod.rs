@@ -3,6 +3,7 @@
 //! The same structure is read three times: from the arguments, from `DARKQA_*` variables and from a `--config` file
 //! (see [`crate::config`]); so every field is an `Option`, a list or a switch, and no default stands here.
 
+mod enhance;
 mod export;
 mod import;
 mod questions;
@@ -12,6 +13,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
+pub use enhance::EnhanceArgs;
 pub use export::ExportArgs;
 pub use import::ImportArgs;
 pub use questions::QuestionsArgs;
@@ -50,6 +52,8 @@ pub enum Command {
     Import(ImportArgs),
     /// Write ready-made sets for other tools, one for each condition, with its images
     Export(Box<ExportArgs>),
+    /// Enhance images by an ONNX model, as an evaluation would; or tell how it is fed and read
+    Enhance(EnhanceArgs),
 }
 
 /// The flags of `synthesize`.
@@ -261,12 +265,17 @@ pub struct SensorArgs {
 #[derive(Debug, Default, Args)]
 #[command(next_help_heading = "Enhancement")]
 pub struct EnhancementArgs {
-    /// An enhancement model as ONNX (RGB, 0–1, NCHW); repeatable: each is shown beside raw
+    /// An enhancement model as ONNX, or PRESET:FILE (zero-dce, zero-dce++, ruas-lol, ruas-upe, retinexformer, darkir, sci,
+    /// iat, pairlie, enlightengan); repeatable: each is shown beside raw
     #[arg(long, value_name = "FILE")]
     pub llie: Vec<PathBuf>,
     /// Which dark variants are enhanced: noise, ev, both; default: noise
     #[arg(long, value_name = "noise|ev|both")]
     pub llie_on: Option<String>,
+    /// Enhance in tiles of N × N pixels, their seams checked, or whole; default: 256 for images above 1280 × 720 where
+    /// sidecar or preset say that tiles are exact, else whole
+    #[arg(long, value_name = "N|whole")]
+    pub tile: Option<String>,
     /// Threads of synthesis and enhancement, 1024 at most; default: all cores
     #[arg(long, value_name = "N")]
     pub threads: Option<NonZeroUsize>,

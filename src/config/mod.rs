@@ -1,6 +1,7 @@
 //! Everything a run is told, checked once; nothing later reads the world again.
 
 mod asking;
+mod enhance;
 mod export;
 mod import;
 mod layers;
@@ -16,6 +17,7 @@ use std::str::FromStr;
 use std::time::Duration;
 
 pub use asking::{Ask, ModelName, Server};
+pub use enhance::Enhance;
 pub use export::{Export, Form};
 pub use import::Import;
 pub use layers::{merge, one_line};
@@ -28,7 +30,7 @@ use crate::ask::Format;
 use crate::cli::{DataArgs, EnhancementArgs, EvaluateArgs, OutputArgs, SendingArgs};
 use crate::dataset::Place;
 use crate::dataset::picture::MOST_PIXELS;
-use crate::enhance::{Install, RuntimeSearch};
+use crate::enhance::{Install, RuntimeSearch, Tiling};
 use crate::error::{Error, Result};
 use crate::types::{Family, Variants};
 
@@ -79,6 +81,8 @@ pub struct Enhancement {
     pub models: Vec<PathBuf>,
     /// The variants that are mended.
     pub on: Variants,
+    /// How images are cut.
+    pub tiling: Tiling,
     /// Threads of synthesis and enhancement; `None` for all cores.
     pub threads: Option<NonZeroUsize>,
     /// Where ONNX Runtime is looked for.
@@ -194,6 +198,7 @@ fn enhancement(said: EnhancementArgs) -> Result<Enhancement> {
     Ok(Enhancement {
         models: said.llie,
         on: parsed("--llie-on", said.llie_on.as_deref())?.unwrap_or(Variants::Noise),
+        tiling: tiling(said.tile.as_deref())?,
         threads: threads(said.threads)?,
         runtime: RuntimeSearch {
             library,
@@ -204,6 +209,18 @@ fn enhancement(said: EnhancementArgs) -> Result<Enhancement> {
             },
         },
     })
+}
+
+/// How images are cut for an enhancer: `256`, `whole`.
+fn tiling(said: Option<&str>) -> Result<Tiling> {
+    match said {
+        None => Ok(Tiling::Auto),
+        Some("whole") => Ok(Tiling::Whole),
+        Some(side) => side.parse().map(Tiling::Of).map_err(|_| {
+            let problem = format_args!("{side:?}; a side in pixels or whole expected");
+            Error::usage("--tile", problem)
+        }),
+    }
 }
 
 fn most_pixels(said: Option<NonZeroU64>) -> u64 {

@@ -5,6 +5,7 @@ use std::path::{Component, Path, PathBuf};
 use crate::error::{Error, Result};
 use crate::types::{Digest, EnhancerName};
 
+use super::preset::Preset;
 use super::sidecar::{self, Sidecar};
 use super::weights::Weights;
 
@@ -16,16 +17,22 @@ pub struct ModelFile {
     pub(super) digest: Digest,
     pub(super) bytes: Vec<u8>,
     pub(super) weights: Weights,
+    /// What the sidecar states.
     pub(super) sidecar: Sidecar,
+    /// What a preset states beside it.
+    pub(super) preset: Option<Preset>,
 }
 
 impl ModelFile {
-    /// Reads a model, its sidecar `MODEL.onnx.toml` where there is one, and the files that hold its external data.
+    /// Reads a model, `FILE.onnx` or `PRESET:FILE.onnx`, its sidecar `FILE.onnx.toml` where there is one, and the files that
+    /// hold its external data.
     ///
     /// # Errors
-    /// Where a file cannot be read, the model is no ONNX model, its name is no [`EnhancerName`], or the sidecar has an
-    /// unknown key.
-    pub fn read(path: &Path) -> Result<Self> {
+    /// Where a file cannot be read, the model is no ONNX model, its name is no [`EnhancerName`], the sidecar has an unknown
+    /// key, or there is no such preset.
+    pub fn read(said: &Path) -> Result<Self> {
+        let (preset, path) = Preset::split(said)?;
+        let path = path.as_path();
         let bytes = std::fs::read(path).map_err(|e| Error::file(path, "read", e))?;
         let weights = Weights::find(&bytes).map_err(|_| not_onnx(path, &bytes))?;
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
@@ -34,8 +41,9 @@ impl ModelFile {
         Ok(Self {
             path: path.to_owned(),
             name,
-            digest: digest(path, &bytes, &text, &weights)?,
+            digest: digest(path, &bytes, &text, &weights, preset.as_ref())?,
             sidecar: Sidecar::parse(path, &text)?,
+            preset,
             bytes,
             weights,
         })
@@ -47,7 +55,7 @@ impl ModelFile {
         &self.name
     }
 
-    /// The digest of everything the user gave: the model, its sidecar and its external data.
+    /// The digest of everything the user gave: the model, its sidecar, its external data and its preset.
     #[must_use]
     pub fn digest(&self) -> Digest {
         self.digest
@@ -56,13 +64,20 @@ impl ModelFile {
 
 /// The digest of a model's content, its sidecar's text and its external data; each file is hashed alone, so that only one
 /// is in memory at a time.
-fn digest(path: &Path, bytes: &[u8], sidecar: &str, weights: &Weights) -> Result<Digest> {
+fn digest(
+    path: &Path,
+    bytes: &[u8],
+    sidecar: &str,
+    weights: &Weights,
+    preset: Option<&Preset>,
+) -> Result<Digest> {
     let mut digests = vec![Digest::of(bytes), Digest::of(sidecar.as_bytes())];
     for location in &weights.external {
         let file = external_path(path, location)?;
         let content = std::fs::read(&file).map_err(|e| Error::file(file, "read", e))?;
         digests.extend([Digest::of(location.as_bytes()), Digest::of(&content)]);
     }
+    digests.extend(preset.map(|preset| Digest::of(format!("{:?}", preset.states).as_bytes())));
     Ok(Digest::of_parts(
         digests.iter().map(|d| d.as_bytes().as_slice()),
     ))

@@ -6,25 +6,33 @@
 //! ModelFile::read ─► name, digest ┘
 //! ```
 //!
-//! A model takes one float32 tensor 1 × 3 × height × width (NCHW), RGB, 0..1, of fixed or dynamic size, and gives back one
-//! of the same shape. Every other convention is refused by name, never guessed. [`ModelFile::read`] needs no runtime: a
-//! file that is no ONNX model is found out before anything is searched or installed, and a resumed run knows its digest.
+//! How a model is fed and read comes from its graph (layout, type, sizes), else from a sidecar `MODEL.onnx.toml`, else from a
+//! preset (`zero-dce:FILE`), else from what published models do (RGB, 0..1); what none of them says and matters is refused by
+//! name. [`ModelFile::read`] needs no runtime: a file that is no ONNX model is found out before anything is searched or
+//! installed, and a resumed run knows its digest.
 
+mod convention;
+mod describe;
 pub mod file;
 mod install;
 mod library;
 pub mod onnx;
+mod planes;
+mod preset;
 mod protobuf;
 pub mod runtime;
 mod search;
+mod session;
 mod sidecar;
 mod signature;
 mod tensor;
+mod tiles;
 mod weights;
 
 pub use file::ModelFile;
-pub use onnx::{Enhancer, Stopper};
+pub use onnx::{Enhancer, Tiling};
 pub use runtime::{Install, Runtime, RuntimeSearch, forbid_telemetry};
+pub use session::Stopper;
 
 /// The version of the way to and from a model: raised whenever a pixel changes, so that no result of an older one is taken
 /// for its own.

@@ -1,59 +1,83 @@
 //! A user's ONNX model on ONNX Runtime's CPU provider: [`Enhancer`].
 
+use std::fmt;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use ort::session::builder::{GraphOptimizationLevel, SessionBuilder};
-use ort::session::{HasSelectedOutputs, OutputSelector, RunOptions, Session};
-use ort::value::{Outlet, Tensor, TensorElementType, ValueType};
+use ort::session::Session;
 
 use crate::error::{Error, Result};
 use crate::types::{Digest, EnhancerName, Rgb};
 
+use super::convention::{Element, Layout, Pad, Range, Tile};
+use super::describe::Description;
 use super::file::ModelFile;
+use super::planes::Planes;
 use super::runtime::Runtime;
-use super::signature::{Dim, Element, Port, Signature};
-use super::tensor::Planes;
+use super::session::{Options, Source, Stopper, builder, ports, run, said};
+use super::sidecar::Sidecar;
+use super::signature::Signature;
+use super::tensor::{Certainty, Feeding, Input, Reading, Samples, Wild, Window};
+use super::tiles::{Canvas, Cut, Plan};
+
+/// The sides of tiles where nobody says them, in pixels: measured as fast as the whole image with a twelfth of its memory.
+const TILE: usize = 256;
+/// The most pixels of an image that is not cut into tiles by itself.
+const WHOLE: usize = 1280 * 720;
+/// The context of tiles that are asked for without anybody saying how much is exact.
+const CONTEXT: usize = 32;
+/// What sides are tried as multiples of, where a model fails on an image's own and nobody says better.
+const MULTIPLES: [usize; 6] = [1, 4, 8, 12, 16, 32];
+
+/// How an image is cut.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Tiling {
+    /// Into tiles where they are known to be exact and the image is large; else not at all.
+    #[default]
+    Auto,
+    /// Into tiles of such a side in pixels, context included.
+    Of(NonZeroUsize),
+    /// Not at all.
+    Whole,
+}
+
+impl fmt::Display for Tiling {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Auto => f.write_str("auto"),
+            Self::Of(side) => side.fmt(f),
+            Self::Whole => f.write_str("whole"),
+        }
+    }
+}
 
 /// An enhancement model, loaded and ready.
 pub struct Enhancer {
     path: PathBuf,
     name: EnhancerName,
     digest: Digest,
-    signature: Signature,
+    signature: Arc<Signature>,
+    stated: Sidecar,
+    feeding: Feeding,
+    reading: Arc<Reading>,
+    tiling: Tiling,
+    description: Description,
     runtime: Runtime,
     session: Arc<Mutex<Session>>,
     options: Arc<Options>,
 }
 
-/// How a session is run: which output is wanted, and whether it is to end early.
-struct Options(RunOptions<HasSelectedOutputs>);
-
-// SAFETY: `ort` withholds `Sync` because a selected output may hold a preallocated tensor, which two runs would write at
-// once. None is ever preallocated here (`Enhancer::open` selects by name alone), runs are held apart by the session's
-// mutex, and the one call made beside a run is `terminate`, which ONNX Runtime documents for use from another thread.
-#[expect(unsafe_code, reason = "a run can be ended in no other way")]
-unsafe impl Sync for Options {}
-
-/// Ends the run of an enhancer from another thread.
-#[derive(Clone)]
-pub struct Stopper(Arc<Options>);
-
-impl Stopper {
-    /// Ends the image that is being made, with an error, and every later one.
-    pub fn stop(&self) {
-        // A run that cannot be ended is one that is waited for.
-        if let Err(e) = self.0.0.terminate() {
-            tracing::debug!("the enhancer cannot be stopped: {e}");
-        }
-    }
-}
-
-/// What a run gave: the tensor's dimensions and samples.
-struct Output {
-    dims: Vec<i64>,
-    samples: Vec<f32>,
+/// What became of a run.
+enum Ran<T> {
+    /// It gave this.
+    Gave(T),
+    /// It failed, with ONNX Runtime's words.
+    Failed(String),
+    /// It gave a tensor of such dimensions, which is no image of the size it should have.
+    Misshapen(Vec<i64>),
+    /// Its values are none.
+    Wild(Wild),
 }
 
 impl Enhancer {
@@ -72,12 +96,6 @@ impl Enhancer {
             problem,
         };
         let flushed = file.weights.flush_subnormals(&mut file.bytes);
-        if flushed > 0 {
-            tracing::debug!(
-                "{}: {flushed} subnormal weights set to zero",
-                path.display()
-            );
-        }
         // ONNX Runtime finds external data only from the model's path.
         let source = if file.weights.external.is_empty() {
             Source::Memory(file.bytes)
@@ -87,24 +105,44 @@ impl Enhancer {
         let environment = runtime.environment().clone();
         let session = runtime
             .run(move || builder(&environment, threads).and_then(|builder| source.commit(builder)))?
-            .map_err(|e| fault(format!("ONNX Runtime cannot load it: {e}")))?;
-        let signature = Signature::of(
-            &ports(session.inputs()),
-            &ports(session.outputs()),
-            file.sidecar.output.as_ref(),
-        )
-        .map_err(fault)?;
-        let selected = OutputSelector::no_default().with(&signature.output);
-        let options = RunOptions::new().map_err(|e| fault(e.to_string()))?;
+            .map_err(|e| fault(format!("ONNX Runtime cannot load it: {}", said(&e))))?;
+        let none = Sidecar::default();
+        let preset = file.preset.as_ref();
+        let stated = file
+            .sidecar
+            .clone()
+            .over(preset.map_or(&none, |preset| &preset.states));
+        let inputs = ports(session.inputs());
+        let signature =
+            Signature::of(&inputs, &ports(session.outputs()), &stated).map_err(fault)?;
+        let (feeding, reading) = (feeding(&signature, &stated), reading(&signature, &stated));
+        let description = Description {
+            sidecar: file.sidecar,
+            preset: file.preset,
+            flushed,
+        };
+        let options = Options::of(&signature.output.port.name);
+        let options = options.map_err(|e| fault(said(&e)))?;
         Ok(Self {
             path: file.path,
             name: file.name,
             digest: file.digest,
-            signature,
+            signature: Arc::new(signature),
+            stated,
+            feeding,
+            reading: Arc::new(reading),
+            tiling: Tiling::Auto,
+            description,
             runtime: runtime.clone(),
             session: Arc::new(Mutex::new(session)),
-            options: Arc::new(Options(options.with_outputs(selected))),
+            options: Arc::new(options),
         })
+    }
+
+    /// Cuts images otherwise.
+    #[must_use]
+    pub fn with_tiling(self, tiling: Tiling) -> Self {
+        Self { tiling, ..self }
     }
 
     /// The name in tables and records: the file's name without its extension.
@@ -113,10 +151,22 @@ impl Enhancer {
         &self.name
     }
 
-    /// The digest of the model, its sidecar and its external data; see [`ModelFile::digest`].
+    /// The digest of the model, its sidecar, its external data and its preset; see [`ModelFile::digest`].
     #[must_use]
     pub fn digest(&self) -> Digest {
         self.digest
+    }
+
+    /// What was found in the graph and beside it, and why it is taken to be so: lines of text.
+    #[must_use]
+    pub fn describe(&self) -> String {
+        self.description.text(
+            &self.path,
+            &self.signature,
+            &self.feeding,
+            &self.reading,
+            &self.stated,
+        )
     }
 
     /// A handle that ends a run from another thread.
@@ -127,54 +177,203 @@ impl Enhancer {
 
     /// Enhances an image; the result has the same size.
     ///
-    /// Where the model is of a fixed size the image is resized to it and its result back, with a bilinear filter.
+    /// Where the model is of a fixed size the image is cut into tiles of it, if they are exact, or else resized to it and its
+    /// result back, with a bilinear filter.
     ///
     /// # Errors
-    /// Where the model fails on this image, gives another size than it was given, or values that are not numbers.
+    /// Where the model fails on this image, gives another size than it was given, or values that are not numbers or of
+    /// another range than was said; where tiles do not fit together.
     pub fn enhance(&mut self, dark: &Rgb) -> Result<Rgb> {
-        let planes = Planes::of(dark);
-        let height = self.signature.height.unwrap_or(planes.height);
-        let width = self.signature.width.unwrap_or(planes.width);
-        let mended = if (height, width) == (planes.height, planes.width) {
-            self.infer(planes)?
-        } else {
-            let input = planes.resized(height, width).map_err(|e| self.fault(e))?;
-            let mended = self.infer(input)?;
-            if mended.samples.iter().any(|sample| sample.is_nan()) {
-                return Err(self.not_numbers(dark));
-            }
-            mended
-                .resized(dark.height(), dark.width())
-                .map_err(|e| self.fault(e))?
+        let size = [dark.height(), dark.width()];
+        let fixed = [
+            self.signature.height.unwrap_or(size[0]),
+            self.signature.width.unwrap_or(size[1]),
+        ];
+        let cut_exactly = matches!(self.stated.tile, Some(Tile::Exact(_)))
+            && fixed.iter().zip(size).all(|(fixed, size)| *fixed <= size);
+        if fixed != size && !cut_exactly {
+            return self.resized(dark, fixed);
+        }
+        let multiples: &[usize] = match self.stated.multiple {
+            Some(multiple) => &[multiple.get()],
+            None if fixed == size && self.is_dynamic() => &MULTIPLES,
+            None => &[1],
         };
-        mended.to_rgb().ok_or_else(|| self.not_numbers(dark))
+        let mut first = None;
+        for multiple in multiples {
+            match self.mended(dark, fixed, *multiple)? {
+                Ok(mended) => return Ok(mended),
+                Err(problem) => drop(first.get_or_insert(problem)),
+            }
+        }
+        Err(self.fault(first.unwrap_or_default()))
     }
 
-    /// Runs the model on an image of a size that it takes.
-    fn infer(&self, input: Planes) -> Result<Planes> {
-        let (height, width) = (input.height, input.width);
-        let (session, options) = (Arc::clone(&self.session), Arc::clone(&self.options));
-        let output = self.signature.output.clone();
-        let result = self.runtime.run(move || {
-            let mut session = session.lock().unwrap_or_else(PoisonError::into_inner);
-            run(&mut session, &options.0, input, &output)
-        })?;
-        let Output { dims, samples } = result.map_err(|e| {
-            self.fault(format!(
-                "failed on an image of {width} × {height} (a model for multiples of a certain size has to pad inside its graph): {}",
-                e.message().trim()
-            ))
-        })?;
-        let sizes: Vec<Option<usize>> = dims.iter().map(|&dim| usize::try_from(dim).ok()).collect();
-        if sizes != [Some(1), Some(3), Some(height), Some(width)] {
+    fn is_dynamic(&self) -> bool {
+        self.signature.height.is_none() && self.signature.width.is_none()
+    }
+
+    /// Enhances an image whose sides are filled up to multiples; a problem that another multiple may mend is given back.
+    fn mended(
+        &self,
+        dark: &Rgb,
+        fixed: [usize; 2],
+        multiple: usize,
+    ) -> Result<std::result::Result<Rgb, String>> {
+        let size = [dark.height(), dark.width()];
+        let (area, cut, checked) = self.cut(size, fixed, multiple)?;
+        let plan = Plan::of(area, cut).ok_or_else(|| self.too_small(cut))?;
+        let mut canvas = Canvas::new(area);
+        for row in &plan.rows {
+            for column in &plan.columns {
+                let window = Window {
+                    left: column.start,
+                    top: row.start,
+                    right: column.end,
+                    bottom: row.end,
+                };
+                let part = Window {
+                    left: column.from - column.start,
+                    top: row.from - row.start,
+                    right: column.to - column.start,
+                    bottom: row.to - row.start,
+                };
+                let input = self.feeding.window(dark, window);
+                let reading = Arc::clone(&self.reading);
+                let ran = self.run(input, window.size(), move |samples, layout| {
+                    reading.bytes(samples, layout, window.size(), part)
+                })?;
+                match ran {
+                    Ran::Gave(bytes) => canvas.put(*row, *column, &bytes),
+                    Ran::Wild(wild) => return Err(self.wild(wild, dark)),
+                    problem => return Ok(Err(problem.to_string(window.size()))),
+                }
+            }
+        }
+        let (mended, seam) = canvas.finish();
+        if checked && !seam.holds() {
             return Err(self.fault(format!(
-                "gave {dims:?} for [1, 3, {height}, {width}]: it does not keep the size of an image; pad to the multiple it needs inside the graph, or export it with that fixed size"
+                "is not to be cut: its {} tiles differ by up to {} codes at their seams in {} of {} samples, so that a pixel depends on more than {} pixels around it. Leave --tile out for the whole image, or state more context (tile = \"exact:N\" in MODEL.onnx.toml)",
+                plan.count(),
+                seam.most,
+                seam.differing,
+                seam.compared,
+                cut.context
             )));
         }
-        Ok(Planes {
-            height,
-            width,
-            samples,
+        Ok(Ok(if area == size {
+            mended
+        } else {
+            cropped(&mended, size)
+        }))
+    }
+
+    /// The area that tiles cover, how they are cut, and whether their seams have to hold.
+    fn cut(
+        &self,
+        size: [usize; 2],
+        fixed: [usize; 2],
+        multiple: usize,
+    ) -> Result<([usize; 2], Cut, bool)> {
+        if self.feeding.pad == Pad::Crop && size.iter().any(|side| side % multiple != 0) {
+            let tile = size.map(|side| side / multiple * multiple);
+            if tile.contains(&0) {
+                return Err(self.fault(format!(
+                    "takes images of multiples of {multiple} pixels, and {} × {} is smaller than that",
+                    size[1], size[0]
+                )));
+            }
+            let cut = Cut {
+                tile,
+                context: 0,
+                multiple: 1,
+            };
+            return Ok((size, cut, false));
+        }
+        let area = size.map(|side| side.next_multiple_of(multiple));
+        let stated = match self.stated.tile {
+            Some(Tile::Exact(context)) => Some(context),
+            _ => None,
+        };
+        let context = stated.unwrap_or(CONTEXT);
+        let down = |side: usize| (side / multiple * multiple).max(multiple);
+        let tile = match (self.tiling, stated) {
+            _ if fixed != size => fixed,
+            (Tiling::Of(asked), _) if self.stated.tile == Some(Tile::None) => {
+                return Err(Error::usage(
+                    "--tile",
+                    format_args!(
+                        "{asked}, but {} is said to need the whole image (tile = \"none\" in its sidecar or preset)",
+                        self.name
+                    ),
+                ));
+            }
+            (Tiling::Of(asked), _) => [down(asked.get()); 2],
+            (Tiling::Auto, Some(_)) if size[0] * size[1] > WHOLE => {
+                [down(TILE.max(4 * context)); 2]
+            }
+            (Tiling::Auto | Tiling::Whole, _) => area,
+        };
+        Ok((
+            area,
+            Cut {
+                tile,
+                context,
+                multiple,
+            },
+            true,
+        ))
+    }
+
+    fn too_small(&self, cut: Cut) -> Error {
+        self.fault(format!(
+            "cannot be cut into tiles of {} × {} pixels: with {} pixels of context on each side nothing is left of them; --tile N says larger ones",
+            cut.tile[1], cut.tile[0], cut.context
+        ))
+    }
+
+    /// Enhances an image in the size that the model takes.
+    fn resized(&self, dark: &Rgb, fixed: [usize; 2]) -> Result<Rgb> {
+        let planes = Planes::of(dark).resized(fixed[0], fixed[1]);
+        let input = self.feeding.planes(&planes.map_err(|e| self.fault(e))?);
+        let reading = Arc::clone(&self.reading);
+        let ran = self.run(input, fixed, move |samples, layout| {
+            reading.planes(samples, layout, fixed)
+        })?;
+        let mended = match ran {
+            Ran::Gave(planes) => planes,
+            Ran::Wild(wild) => return Err(self.wild(wild, dark)),
+            problem => return Err(self.fault(problem.to_string(fixed))),
+        };
+        let mended = mended.resized(dark.height(), dark.width());
+        let mended = mended.map_err(|e| self.fault(e))?;
+        mended
+            .to_rgb(self.reading.rounding)
+            .ok_or_else(|| self.fault("gave no pixels".to_owned()))
+    }
+
+    /// Runs the model, and reads what it gives before another run writes over it.
+    fn run<T: Send + 'static>(
+        &self,
+        input: Input,
+        size: [usize; 2],
+        read: impl FnOnce(Samples<'_>, Layout) -> std::result::Result<T, Wild> + Send + 'static,
+    ) -> Result<Ran<T>> {
+        let (session, options) = (Arc::clone(&self.session), Arc::clone(&self.options));
+        let (signature, reading) = (Arc::clone(&self.signature), Arc::clone(&self.reading));
+        self.runtime.run(move || {
+            let mut session = session.lock().unwrap_or_else(PoisonError::into_inner);
+            let ran = run(
+                &mut session,
+                &options,
+                &signature,
+                input,
+                |dims, samples| match reading.layout(dims, size) {
+                    Some(layout) => read(samples, layout).map_or_else(Ran::Wild, Ran::Gave),
+                    None => Ran::Misshapen(dims.to_vec()),
+                },
+            );
+            ran.unwrap_or_else(|e| Ran::Failed(said(&e)))
         })
     }
 
@@ -185,93 +384,92 @@ impl Enhancer {
         }
     }
 
-    fn not_numbers(&self, image: &Rgb) -> Error {
-        self.fault(format!(
-            "gave values that are not numbers (NaN) for an image of {} × {}; its weights or a division by zero in it are at fault",
-            image.width(),
-            image.height()
-        ))
+    fn wild(&self, wild: Wild, image: &Rgb) -> Error {
+        self.fault(match wild {
+            Wild::NotNumbers => format!(
+                "gave values that are not numbers (NaN) for an image of {} × {}; its weights or a division by zero in it are at fault",
+                image.width(),
+                image.height()
+            ),
+            Wild::Beyond {
+                least,
+                most,
+                likely,
+            } => format!(
+                "gave values from {least} to {most}, which are not of {} as is usual; where they are of {likely}, say so in MODEL.onnx.toml beside it: `range_out = \"{likely}\"` (or `range_out = \"{}\"` where they are as they should be)",
+                self.reading.range, self.reading.range
+            ),
+        })
     }
 }
 
-fn run(
-    session: &mut Session,
-    options: &RunOptions<HasSelectedOutputs>,
-    input: Planes,
-    output: &str,
-) -> ort::Result<Output> {
-    let shape = [1, 3, input.height, input.width];
-    let tensor = Tensor::from_array((shape, input.samples))?;
-    let outputs = session.run_with_options(ort::inputs![tensor], options)?;
-    let (shape, samples) = outputs[output].try_extract_tensor::<f32>()?;
-    Ok(Output {
-        dims: shape.to_vec(),
-        samples: samples.to_vec(),
-    })
-}
-
-/// Where a session gets its graph from.
-enum Source {
-    Memory(Vec<u8>),
-    Path(PathBuf),
-}
-
-impl Source {
-    fn commit(self, mut builder: SessionBuilder) -> ort::Result<Session> {
+impl<T> Ran<T> {
+    /// What went wrong with an image of such a size.
+    fn to_string(&self, [height, width]: [usize; 2]) -> String {
         match self {
-            Self::Memory(bytes) => builder.commit_from_memory(&bytes),
-            Self::Path(path) => builder.commit_from_file(path),
+            Self::Failed(words) => format!(
+                "failed on an image of {width} × {height} ({words}); where it takes multiples of some size alone, say it in MODEL.onnx.toml beside it: `multiple = 8`"
+            ),
+            Self::Misshapen(dims) => format!(
+                "gave {dims:?} for an image of {width} × {height}: it does not keep the size of an image; where it takes multiples of some size alone, say it in MODEL.onnx.toml beside it: `multiple = 8`"
+            ),
+            Self::Gave(_) | Self::Wild(_) => String::new(),
         }
     }
 }
 
-/// The options of a session.
-fn builder(
-    environment: &ort::environment::Environment,
-    threads: Option<NonZeroUsize>,
-) -> ort::Result<SessionBuilder> {
-    // Left alone, ONNX Runtime pins one thread to each core, against whatever else runs there.
-    let threads = threads
-        .or_else(|| std::thread::available_parallelism().ok())
-        .map_or(1, NonZeroUsize::get);
-    let builder = Session::builder(environment)?
-        .with_optimization_level(GraphOptimizationLevel::All)?
-        .with_intra_threads(threads)?
-        // Plans of one image's memory do not fit the next one's size, and are kept: twice the memory for nothing.
-        .with_memory_pattern(false)?
-        .with_flush_to_zero()?;
-    Ok(builder)
+/// The top left part of an image.
+fn cropped(image: &Rgb, [height, width]: [usize; 2]) -> Rgb {
+    let mut part = Rgb::black(height, width);
+    let lines = part.samples_mut().chunks_exact_mut(3 * width);
+    for (to, from) in lines.zip(image.samples().chunks_exact(3 * image.width())) {
+        to.copy_from_slice(&from[..3 * width]);
+    }
+    part
 }
 
-fn ports(outlets: &[Outlet]) -> Vec<Port> {
-    outlets.iter().map(port).collect()
-}
-
-/// An input or output of a session in this module's own words.
-fn port(outlet: &Outlet) -> Port {
-    let (element, dims) = match outlet.dtype() {
-        ValueType::Tensor {
-            ty,
-            shape,
-            dimension_symbols,
-        } => {
-            let element = match ty {
-                TensorElementType::Float32 => Element::Float32,
-                other => Element::Other(other.to_string()),
-            };
-            let dims = shape
-                .iter()
-                .zip(dimension_symbols.iter())
-                .map(|(size, symbol)| {
-                    usize::try_from(*size).map_or_else(|_| Dim::Free(symbol.clone()), Dim::Known)
-                });
-            (element, dims.collect())
-        }
-        other => (Element::Other(other.to_string()), Vec::new()),
-    };
-    Port {
-        name: outlet.name().to_owned(),
+/// How an image becomes what the model takes.
+fn feeding(signature: &Signature, stated: &Sidecar) -> Feeding {
+    let element = signature.input.port.element.clone();
+    Feeding {
+        layout: signature.input.layout,
+        range: stated.range_in.unwrap_or(usual(&element)),
         element,
-        dims,
+        color: stated.color.unwrap_or_default(),
+        mean: stated.mean.unwrap_or([0.0; 3]),
+        std: stated.std.unwrap_or([1.0; 3]),
+        pad: stated.pad.unwrap_or_default(),
+    }
+}
+
+/// How what it gives becomes an image.
+fn reading(signature: &Signature, stated: &Sidecar) -> Reading {
+    let output = &signature.output;
+    let (range, certainty) = match (stated.range_out, &output.port.element) {
+        (Some(range), _) => (range, Certainty::Known),
+        (None, Element::Uint8) => (Range::Bytes, Certainty::Known),
+        // What is not said of the output is as in the input.
+        (None, _) => (
+            stated
+                .range_in
+                .unwrap_or(usual(&signature.input.port.element)),
+            Certainty::Assumed,
+        ),
+    };
+    Reading {
+        layout: stated.layout_out.or(output.layout),
+        likely: signature.input.layout,
+        color: stated.color.unwrap_or_default(),
+        range,
+        certainty,
+        rounding: stated.rounding.unwrap_or_default(),
+    }
+}
+
+/// The range that goes with a type.
+fn usual(element: &Element) -> Range {
+    match element {
+        Element::Uint8 => Range::Bytes,
+        _ => Range::Unit,
     }
 }

@@ -1,11 +1,12 @@
-//! Which tensors of a graph are the dark image and the enhanced one: [`Signature::of`].
+//! Which tensors of a graph are the dark image, the enhanced one and further numbers: [`Signature::of`].
 //!
-//! A graph says element types, ranks and the sizes it knows. What it cannot say (value range, colour order) is taken to be
-//! the convention of the published models: RGB, 0..1. What it says otherwise is refused.
+//! A graph says element types, ranks and the sizes it knows. What it cannot say (value range, colour order) a sidecar or a
+//! preset states; else it is taken to be the convention of the published models: RGB, 0..1.
 
 use std::fmt;
 
-use super::sidecar::OutputChoice;
+use super::convention::{Element, Layout};
+use super::sidecar::{OutputChoice, Sidecar};
 
 /// The names that exporters give the enhanced image where a model has other outputs beside it.
 const IMAGE_NAMES: [&str; 8] = [
@@ -26,17 +27,8 @@ pub(super) struct Port {
     pub(super) name: String,
     /// What its elements are.
     pub(super) element: Element,
-    /// Its dimensions; empty where the graph does not say even their number.
+    /// Its dimensions; empty for a number, and where the graph does not say even how many there are.
     pub(super) dims: Vec<Dim>,
-}
-
-/// What the elements of a tensor are.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Element {
-    /// 32-bit floats.
-    Float32,
-    /// Anything else, by its name.
-    Other(String),
 }
 
 /// One dimension of a tensor.
@@ -79,11 +71,7 @@ impl fmt::Display for Dim {
 
 impl fmt::Display for Port {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let element = match &self.element {
-            Element::Float32 => "float32",
-            Element::Other(name) => name,
-        };
-        write!(f, "{:?} ({element} [", self.name)?;
+        write!(f, "{:?} ({} [", self.name, self.element)?;
         for (i, dim) in self.dims.iter().enumerate() {
             let comma = if i == 0 { "" } else { ", " };
             write!(f, "{comma}{dim}")?;
@@ -93,103 +81,262 @@ impl fmt::Display for Port {
 }
 
 /// How a graph is to be fed and read.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Signature {
-    /// The name of the output that is the enhanced image.
-    pub(super) output: String,
+    /// The input that is the dark image.
+    pub(super) input: Image,
     /// The height in pixels that the input has to have; `None` for any.
     pub(super) height: Option<usize>,
     /// The width in pixels that the input has to have; `None` for any.
     pub(super) width: Option<usize>,
+    /// Further inputs of one number each.
+    pub(super) extras: Vec<Extra>,
+    /// The output that is the enhanced image; its layout where the graph or the sidecar says it.
+    pub(super) output: Output,
+}
+
+/// An input that is an image.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Image {
+    /// The graph's words for it.
+    pub(super) port: Port,
+    /// The order of its dimensions.
+    pub(super) layout: Layout,
+}
+
+/// The output that is an image.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Output {
+    /// The graph's words for it.
+    pub(super) port: Port,
+    /// The order of its dimensions; `None` where only a run shows it.
+    pub(super) layout: Option<Layout>,
+    /// Why it is this one.
+    pub(super) why: &'static str,
+}
+
+/// An input of one number.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Extra {
+    /// The graph's words for it.
+    pub(super) port: Port,
+    /// Its value.
+    pub(super) value: f32,
 }
 
 impl Signature {
-    /// Decides which output is the image, and checks that input and output are NCHW, RGB, float32.
+    /// Decides which tensors are what.
     ///
     /// # Errors
     /// A sentence that says what was found and what mends it; it is to follow the file's name.
-    pub(super) fn of(
-        inputs: &[Port],
-        outputs: &[Port],
-        stated: Option<&OutputChoice>,
-    ) -> Result<Self, String> {
-        let (height, width) = image_input(inputs)?;
-        let fits = |port: &Port| can_be_image(port, height, width);
-        let output = match stated {
-            Some(choice) => stated_output(outputs, choice, fits)?,
-            None => choose_output(outputs, fits)?,
-        };
+    pub(super) fn of(inputs: &[Port], outputs: &[Port], stated: &Sidecar) -> Result<Self, String> {
+        let (image, layout) = image_input(inputs, stated)?;
+        let [_, height, width] = layout.places().map(|place| &image.dims[place]);
+        let extras = inputs.iter().filter(|port| port.name != image.name);
+        let extras = extras.map(|port| extra(port, stated));
+        let extras = extras.collect::<Result<Vec<_>, String>>()?;
+        if let Some(name) = stated
+            .extra
+            .keys()
+            .find(|name| !extras.iter().any(|extra| extra.port.name == **name))
+            && !extras.is_empty()
+        {
+            return Err(format!(
+                "its sidecar gives a value for {name:?}, which is no further input; it has {}",
+                list(inputs)
+            ));
+        }
+        let fits = |port: &Port| can_be_image(port, [height, width], stated.layout_out, layout);
+        let output = choose_output(outputs, stated.output.as_ref(), fits)?;
         Ok(Self {
-            output: output.clone(),
             height: height.known(),
             width: width.known(),
+            extras,
+            output,
+            input: Image {
+                port: image.clone(),
+                layout,
+            },
         })
     }
 }
 
-/// Checks the input and returns its height and width.
-fn image_input(inputs: &[Port]) -> Result<(&Dim, &Dim), String> {
-    const WANTED: &str = "one input, float32 [1, 3, height, width], RGB in 0..1";
-    let [input] = inputs else {
-        return Err(format!(
-            "has {} inputs where {WANTED} is supported; it has {}",
-            inputs.len(),
-            list(inputs)
-        ));
+/// The layout of an image of three channels, where its dimensions say it.
+fn layout(port: &Port) -> Option<Layout> {
+    let mut fitting = Layout::ALL.into_iter().filter(|layout| {
+        port.dims.len() == layout.rank()
+            && port.dims[layout.places()[0]].known() == Some(3)
+            && (layout.rank() == 3 || port.dims[0].can_be(1))
+    });
+    // A size of 3 in two places says nothing.
+    fitting.next().filter(|_| fitting.next().is_none())
+}
+
+/// The input that is the image, and its layout.
+fn image_input<'a>(inputs: &'a [Port], stated: &Sidecar) -> Result<(&'a Port, Layout), String> {
+    let numbers = |port: &Port| matches!(port.element, Element::Other(_));
+    let images: Vec<&Port> = inputs.iter().filter(|port| !is_scalar(port)).collect();
+    let image = match images.as_slice() {
+        [image] => *image,
+        [] => {
+            return Err(format!(
+                "has no image among its inputs; it has {}",
+                list(inputs)
+            ));
+        }
+        several => {
+            return Err(format!(
+                "takes {} images where one is what there is: {}; export it with the others made inside the graph",
+                several.len(),
+                list(inputs)
+            ));
+        }
     };
-    if input.element != Element::Float32 {
+    if numbers(image) {
         return Err(format!(
-            "takes {input}; only float32 is supported: export it with {WANTED}"
+            "takes {image}; float32, float16 or uint8 is supported: export it so"
         ));
     }
-    match input.dims.as_slice() {
-        [batch, channels, height, width]
-            if channels.known() == Some(3) && width.known() != Some(3) =>
-        {
-            if batch.can_be(1) {
-                Ok((height, width))
-            } else {
-                Err(format!(
-                    "takes {input}, several images at a time: export it with {WANTED}"
-                ))
-            }
+    if let [first, _, _, _] = image.dims.as_slice()
+        && !first.can_be(1)
+    {
+        return Err(format!(
+            "takes {image}, several images at a time; export it for a batch of 1 or of any size"
+        ));
+    }
+    let layout = match (stated.layout_in, layout(image)) {
+        (Some(stated), Some(found)) if stated != found => None,
+        (Some(stated), _) => Some(stated).filter(|stated| stated.rank() == image.dims.len()),
+        (None, Some(found)) => Some(found),
+        (None, None) if may_be_image(image) => {
+            return Err(format!(
+                "takes {image}, which does not say where its three channels are; say it in MODEL.onnx.toml beside it: `layout_in = \"nchw\"` (or nhwc, chw, hwc)"
+            ));
         }
-        [_, _, _, channels] if channels.known() == Some(3) => Err(format!(
-            "takes {input}, channels last (NHWC): export it with {WANTED}"
-        )),
+        (None, None) => {
+            return Err(format!(
+                "takes {image}, which is no image of three channels"
+            ));
+        }
+    };
+    match layout {
+        Some(layout) if image.dims[layout.places()[0]].can_be(3) => Ok((image, layout)),
         _ => Err(format!(
-            "takes {input}, which is no NCHW image of three channels: export it with {WANTED}"
+            "takes {image}, which is not as its sidecar says (layout_in)"
         )),
     }
 }
 
-/// Whether an output can be an image of the input's size: NCHW, float32, three channels. What the graph leaves open can.
-fn can_be_image(port: &Port, input_height: &Dim, input_width: &Dim) -> bool {
-    let shape = match port.dims.as_slice() {
-        [] => true,
-        [batch, channels, height, width] => {
-            batch.can_be(1)
-                && channels.can_be(3)
-                && height.can_equal(input_height)
-                && width.can_equal(input_width)
-        }
-        _ => false,
-    };
-    shape && port.element == Element::Float32
+/// Whether the dimensions leave room for three channels somewhere; a plane of grey, which has a 1 in their place, does not.
+fn may_be_image(port: &Port) -> bool {
+    let last = &port.dims[port.dims.len().saturating_sub(3)..];
+    let grey = last.iter().any(|dim| dim.known() == Some(1));
+    (3..=4).contains(&port.dims.len()) && !grey && last.iter().any(|dim| dim.can_be(3))
 }
 
-/// The output that the sidecar names, where it can be the image.
-fn stated_output<'a>(
-    outputs: &'a [Port],
+/// Whether a port holds one number.
+fn is_scalar(port: &Port) -> bool {
+    port.dims.iter().all(|dim| dim.known() == Some(1))
+}
+
+/// The value of an input of one number.
+fn extra(port: &Port, stated: &Sidecar) -> Result<Extra, String> {
+    if !matches!(port.element, Element::Float32 | Element::Float16) {
+        return Err(format!(
+            "takes {port} beside the image; one float is supported: export it with a value inside the graph"
+        ));
+    }
+    let value = stated.extra.get(&port.name).ok_or_else(|| {
+        format!(
+            "takes {port} beside the image, and its value is not known; say it in MODEL.onnx.toml beside it: `[extra]` and below it `{} = 0.5`, or whatever its authors take",
+            quoted(&port.name)
+        )
+    })?;
+    Ok(Extra {
+        port: port.clone(),
+        value: *value,
+    })
+}
+
+/// A key of a TOML file.
+fn quoted(name: &str) -> String {
+    let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    if !name.is_empty() && name.chars().all(bare) {
+        name.to_owned()
+    } else {
+        format!("{name:?}")
+    }
+}
+
+/// Whether an output can be an image of the input's size: in the stated layout, else in the one that its 3 tells, else in that
+/// of the input. What the graph leaves open can.
+fn can_be_image(
+    port: &Port,
+    [height, width]: [&Dim; 2],
+    stated: Option<Layout>,
+    of_input: Layout,
+) -> bool {
+    let layout = stated.or(layout(port)).unwrap_or(of_input);
+    let [channels, rows, columns] = layout.places();
+    let shape = port.dims.is_empty()
+        || port.dims.len() == layout.rank()
+            && port.dims[channels].can_be(3)
+            && port.dims[rows].can_equal(height)
+            && port.dims[columns].can_equal(width)
+            && (layout.rank() == 3 || port.dims[0].can_be(1));
+    shape && !matches!(port.element, Element::Other(_))
+}
+
+/// The image among the outputs: the stated one, the only one, else the one that names and structure agree on.
+fn choose_output(
+    outputs: &[Port],
+    stated: Option<&OutputChoice>,
+    fits: impl Fn(&Port) -> bool,
+) -> Result<Output, String> {
+    let images: Vec<usize> = (0..outputs.len()).filter(|&i| fits(&outputs[i])).collect();
+    let (index, why) = match (images.as_slice(), stated) {
+        ([only], None) => (*only, "the only output that can be the image"),
+        // A preset's index is that of its authors' model, whose other outputs an export may have left out.
+        ([only], Some(OutputChoice::Index(_))) if outputs.len() == 1 => (*only, "the only output"),
+        (_, Some(choice)) => (stated_output(outputs, choice, &fits)?, "stated"),
+        ([], None) => {
+            return Err(format!(
+                "has no output that is an image of the input's size; it has {}",
+                list(outputs)
+            ));
+        }
+        (several, None) => match (by_name(outputs, several), by_structure(outputs)) {
+            (Some(name), None) => (name, "its name"),
+            (None, Some(structure)) => (structure, "the second of Zero-DCE's three outputs"),
+            (Some(name), Some(structure)) if name == structure => (name, "its name"),
+            _ => {
+                return Err(format!(
+                    "has several outputs that could be the image: {}; say which in MODEL.onnx.toml beside it: `output = \"NAME\"` or `output = INDEX`, counted from 0; or name a preset, as --llie ruas-lol:FILE",
+                    list(outputs)
+                ));
+            }
+        },
+    };
+    let port = outputs[index].clone();
+    Ok(Output {
+        layout: layout(&port),
+        port,
+        why,
+    })
+}
+
+/// The output that is stated, where it can be the image.
+fn stated_output(
+    outputs: &[Port],
     choice: &OutputChoice,
     fits: impl Fn(&Port) -> bool,
-) -> Result<&'a String, String> {
+) -> Result<usize, String> {
     let found = match choice {
-        OutputChoice::Index(index) => outputs.get(*index),
-        OutputChoice::Name(name) => outputs.iter().find(|port| port.name == *name),
+        OutputChoice::Index(index) => (*index < outputs.len()).then_some(*index),
+        OutputChoice::Name(name) => outputs.iter().position(|port| port.name == *name),
     };
     let problem = match found {
-        Some(port) if fits(port) => return Ok(&port.name),
+        Some(index) if fits(&outputs[index]) => return Ok(index),
         Some(_) => "which is none of its image outputs",
         None => "which it does not have",
     };
@@ -197,30 +344,6 @@ fn stated_output<'a>(
         "its sidecar says {choice}, {problem}; it has {}",
         list(outputs)
     ))
-}
-
-/// The image among the outputs: the only one, else the one that names and structure agree on.
-fn choose_output(outputs: &[Port], fits: impl Fn(&Port) -> bool) -> Result<&String, String> {
-    let images: Vec<usize> = (0..outputs.len()).filter(|&i| fits(&outputs[i])).collect();
-    let index = match images.as_slice() {
-        [] => {
-            return Err(format!(
-                "has no output that is an image of the input's size, float32 [1, 3, height, width]; it has {}",
-                list(outputs)
-            ));
-        }
-        [only] => Some(*only),
-        _ => match (by_name(outputs, &images), by_structure(outputs)) {
-            (Some(name), Some(structure)) if name != structure => None,
-            (name, structure) => name.or(structure),
-        },
-    };
-    index.map(|i| &outputs[i].name).ok_or_else(|| {
-        format!(
-            "has several outputs that could be the image: {}; say which in MODEL.onnx.toml beside it: `output = \"NAME\"` or `output = INDEX`, counted from 0",
-            list(outputs)
-        )
-    })
 }
 
 /// The one image output with a telling name.
@@ -269,159 +392,4 @@ fn list(ports: &[Port]) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A float32 port; a dimension of 0 is a free one.
-    fn port(name: &str, dims: &[usize]) -> Port {
-        let dim = |size: &usize| match size {
-            0 => Dim::Free("n".into()),
-            known => Dim::Known(*known),
-        };
-        Port {
-            name: name.into(),
-            element: Element::Float32,
-            dims: dims.iter().map(dim).collect(),
-        }
-    }
-
-    fn image(name: &str) -> Port {
-        port(name, &[1, 3, 0, 0])
-    }
-
-    fn curves(name: &str) -> Port {
-        port(name, &[1, 24, 0, 0])
-    }
-
-    fn choose(outputs: &[Port]) -> Result<String, String> {
-        Signature::of(&[image("input")], outputs, None).map(|signature| signature.output)
-    }
-
-    #[test]
-    fn the_only_image_is_taken_whatever_its_name() {
-        let cases = [
-            vec![image("758")],
-            vec![curves("a"), image("758")],
-            vec![port("scalar", &[1]), image("758")],
-            vec![port("758", &[0, 0, 0, 0])],
-            vec![port("758", &[])],
-        ];
-        for outputs in cases {
-            assert_eq!(choose(&outputs), Ok("758".into()), "{}", list(&outputs));
-        }
-    }
-
-    #[test]
-    fn among_several_a_telling_name_decides() {
-        for (names, expected) in [
-            (&["illumination", "output"][..], "output"),
-            (&["enhanced", "params"], "enhanced"),
-            (&["mul", "add", "result"], "result"),
-            (&["illumination", "r", "enhance_image"], "enhance_image"),
-        ] {
-            let outputs: Vec<Port> = names.iter().map(|name| image(name)).collect();
-            assert_eq!(choose(&outputs), Ok(expected.into()), "{names:?}");
-        }
-    }
-
-    #[test]
-    fn zero_dce_gives_its_second_output_under_any_name() {
-        for names in [
-            ["enhance_image_1", "enhance_image", "r"],
-            ["301", "322", "300"],
-            ["output", "322", "300"],
-            ["output_0", "output_1", "output_2"],
-        ] {
-            let outputs = [image(names[0]), image(names[1]), curves(names[2])];
-            assert_eq!(choose(&outputs), Ok(names[1].into()), "{names:?}");
-        }
-    }
-
-    #[test]
-    fn what_could_ruin_pixels_is_left_to_the_user() {
-        for names in [
-            &["1", "2"][..],
-            &["output", "322"],
-            &["output", "add_5"],
-            &["enhanced", "/net/Mul_output_0"],
-            &["u0", "u1", "u2", "u_denoised"],
-            &["enhanced", "output"],
-        ] {
-            let outputs: Vec<Port> = names.iter().map(|name| image(name)).collect();
-            let message = choose(&outputs).unwrap_err();
-            assert!(message.contains("output = INDEX"), "{message}");
-            assert!(names.iter().all(|name| message.contains(name)), "{message}");
-        }
-        // Names and structure that contradict each other.
-        let outputs = [image("enhanced"), image("half"), curves("r")];
-        assert!(choose(&outputs).is_err());
-    }
-
-    #[test]
-    fn a_stated_output_is_taken_where_it_can_be_an_image() {
-        let outputs = [image("1"), image("2"), curves("3")];
-        let stated =
-            |choice: OutputChoice| Signature::of(&[image("input")], &outputs, Some(&choice));
-        assert_eq!(stated(OutputChoice::Index(0)).unwrap().output, "1");
-        assert_eq!(stated(OutputChoice::Name("2".into())).unwrap().output, "2");
-        for (choice, part) in [
-            (OutputChoice::Index(3), "does not have"),
-            (OutputChoice::Name("x".into()), "does not have"),
-            (OutputChoice::Index(2), "none of its image outputs"),
-        ] {
-            let message = stated(choice).unwrap_err();
-            assert!(message.contains(part), "{message}");
-        }
-    }
-
-    #[test]
-    fn fixed_sizes_are_read_and_have_to_agree() {
-        let fixed = port("in", &[1, 3, 96, 128]);
-        let signature = Signature::of(
-            std::slice::from_ref(&fixed),
-            &[port("out", &[0, 0, 96, 0])],
-            None,
-        )
-        .unwrap();
-        assert_eq!((signature.height, signature.width), (Some(96), Some(128)));
-        for dims in [[1, 3, 48, 64], [1, 3, 0, 64]] {
-            assert!(
-                Signature::of(std::slice::from_ref(&fixed), &[port("out", &dims)], None).is_err()
-            );
-        }
-    }
-
-    #[test]
-    fn other_conventions_are_refused_by_name() {
-        let half = Port {
-            element: Element::Other("float16".into()),
-            ..image("half")
-        };
-        let cases = [
-            (vec![], "0 inputs"),
-            (vec![image("a"), port("exposure", &[1])], "2 inputs"),
-            (vec![half], "float16"),
-            (vec![port("a", &[1, 0, 0, 3])], "NHWC"),
-            (vec![port("a", &[3, 0, 0])], "no NCHW image"),
-            (vec![port("a", &[1, 1, 0, 0])], "no NCHW image"),
-            (vec![port("a", &[0, 0, 0, 0])], "no NCHW image"),
-            (vec![port("a", &[2, 3, 0, 0])], "several images"),
-            (vec![port("a", &[])], "no NCHW image"),
-        ];
-        for (inputs, part) in cases {
-            let message = Signature::of(&inputs, &[image("out")], None).unwrap_err();
-            assert!(message.contains(part), "{message}");
-        }
-    }
-
-    #[test]
-    fn a_model_without_an_image_is_refused() {
-        let outputs = [port("758", &[1, 85, 22, 22]), port("flat", &[1, 3])];
-        let message = choose(&outputs).unwrap_err();
-        assert!(
-            message.contains("\"758\" (float32 [1, 85, 22, 22])"),
-            "{message}"
-        );
-        assert!(choose(&[]).unwrap_err().ends_with("it has none"));
-    }
-}
+mod tests;

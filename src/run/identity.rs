@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::plan::Inputs;
 use crate::config::Config;
 use crate::dataset::Dataset;
-use crate::enhance::ModelFile;
+use crate::enhance::{ModelFile, Tiling};
 use crate::error::{Error, Result};
 use crate::synthesis::{VERSION, exposure};
 use crate::types::{Digest, View};
@@ -106,8 +106,12 @@ pub(super) fn identity(config: &Config, dataset: &Dataset, inputs: &Inputs<'_>) 
         ("what the models answer by", json!(models)),
         ("synthesis", json!([exposure::VERSION, VERSION])),
     ];
+    // Tiles give what the whole image does, or all but one sample in a thousand of it.
+    let tiling = config.enhancement.tiling;
+    let tiling = (tiling != Tiling::Auto).then(|| ("--tile", json!(tiling.to_string())));
     fields
         .into_iter()
+        .chain(tiling)
         .map(|(field, value)| (field.to_owned(), value))
         .collect()
 }

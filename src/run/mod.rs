@@ -6,9 +6,11 @@
 mod askers;
 mod darkroom;
 mod drive;
+pub mod enhance;
 pub mod export;
 mod identity;
 pub mod import;
+mod inputs;
 mod interrupt;
 mod plan;
 
@@ -229,7 +231,10 @@ fn open_enhancers(
     let threads = config.threads;
     let enhancers = files
         .into_iter()
-        .map(|file| Enhancer::open(file, &runtime, threads))
+        .map(|file| {
+            let enhancer = Enhancer::open(file, &runtime, threads)?;
+            Ok(enhancer.with_tiling(config.tiling))
+        })
         .collect::<Result<_>>()?;
     Ok((Some(runtime), enhancers))
 }

@@ -49,6 +49,8 @@ use Size::{Known, Named};
 pub enum Type {
     Float = 1,
     Byte = 2,
+    Long = 7,
+    Half = 10,
 }
 
 /// The value of an attribute of an operator.
@@ -261,22 +263,59 @@ pub fn fixed(height: u64, width: u64) -> Graph {
         .output("output", Type::Float, &shape)
 }
 
-/// Channels first without a batch: rank 3.
-pub fn wrong_rank() -> Graph {
-    let shape = [Known(3), Named("height"), Named("width")];
+/// The image as it is, of such a type and shape.
+pub fn shaped(element: Type, shape: &[Size]) -> Graph {
     Graph::empty()
-        .input("input", Type::Float, &shape)
+        .input("input", element, shape)
         .node("Identity", &["input"], "output")
-        .output("output", Type::Float, &shape)
+        .output("output", element, shape)
 }
 
-/// Bytes with the channels last.
-pub fn bytes_channels_last() -> Graph {
-    let shape = [Known(1), Named("height"), Named("width"), Known(3)];
-    Graph::empty()
-        .input("input", Type::Byte, &shape)
-        .node("Identity", &["input"], "output")
-        .output("output", Type::Byte, &shape)
+/// Every pixel the mean of the 5 × 5 around it.
+pub fn blurred() -> Graph {
+    Graph::new()
+        .node_with(
+            "AveragePool",
+            &["input"],
+            "output",
+            &[
+                ("kernel_shape", Attribute::Ints(&[5, 5])),
+                ("pads", Attribute::Ints(&[2, 2, 2, 2])),
+            ],
+        )
+        .giving_image()
+}
+
+/// The image and its mean, added.
+pub fn mean_added() -> Graph {
+    Graph::new()
+        .node_with(
+            "ReduceMean",
+            &["input"],
+            "mean",
+            &[("axes", Attribute::Ints(&[2, 3]))],
+        )
+        .node("Add", &["input", "mean"], "output")
+        .giving_image()
+}
+
+/// The image as it is, where its sides are multiples of eight.
+pub fn of_eights() -> Graph {
+    let blocks = [("blocksize", Attribute::Int(8))];
+    Graph::new()
+        .node_with("SpaceToDepth", &["input"], "deep", &blocks)
+        .node_with("DepthToSpace", &["deep"], "output", &blocks)
+        .giving_image()
+}
+
+/// The image, its codes from `low` to `high` where they go in from 0 to 1.
+pub fn ranged(low: f32, high: f32) -> Graph {
+    Graph::new()
+        .constant("span", &[], &[high - low])
+        .constant("low", &[], &[low])
+        .node("Mul", &["input", "span"], "spread")
+        .node("Add", &["spread", "low"], "output")
+        .giving_image()
 }
 
 /// A model with a single output, of the eight-fold channels.

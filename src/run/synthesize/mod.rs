@@ -3,18 +3,18 @@
 mod sheet;
 mod sidecar;
 
-use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Component, Path};
+use std::path::Path;
 
 use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
 
 use super::Verdict;
+use super::inputs::{Entry, Inputs, stem};
 use super::progress::{Bar, Progress};
 use super::written::{png, write};
 use crate::config::{Existing, Light, Product, Synthesize};
-use crate::dataset::{Dataset, Picture};
+use crate::dataset::Picture;
 use crate::error::{Error, Result};
 use crate::synthesis::{Negative, NoiseKey, expose};
 use crate::types::manifest::Status;
@@ -28,7 +28,7 @@ use sidecar::Sidecar;
 /// # Errors
 /// Where nothing can be made: no such input, two frames of one name, no folder to write to.
 pub fn synthesize(config: &Synthesize, progress: &Progress) -> Result<Verdict> {
-    let frames = Frames::open(config)?;
+    let frames = Inputs::open(&config.inputs, config.most_pixels)?;
     let threads = config.threads.map_or(0, std::num::NonZero::get);
     let cores = ThreadPoolBuilder::new().num_threads(threads).build();
     let cores = cores.map_err(|e| Error::usage("--threads", e))?;
@@ -86,71 +86,6 @@ impl Tally {
     }
 }
 
-/// The frames of all inputs.
-struct Frames {
-    sets: Vec<Dataset>,
-    entries: Vec<Entry>,
-}
-
-/// One frame, and what its files are called.
-struct Entry {
-    set: usize,
-    id: FrameId,
-    /// The path below the output folder, without what tells the conditions apart.
-    stem: String,
-}
-
-impl Frames {
-    fn open(config: &Synthesize) -> Result<Self> {
-        let sets: Vec<Dataset> = config
-            .inputs
-            .iter()
-            .map(|path| Ok(Dataset::of_images(path)?.with_most_pixels(config.most_pixels)))
-            .collect::<Result<_>>()?;
-        let mut entries = Vec::new();
-        let mut taken: BTreeMap<String, String> = BTreeMap::new();
-        for (set, (dataset, input)) in sets.iter().zip(&config.inputs).enumerate() {
-            for id in dataset.frames() {
-                let stem = stem(id)?;
-                let whole = format!("{:?} of {}", id.0, input.display());
-                if let Some(other) = taken.insert(stem.clone(), whole.clone()) {
-                    let problem = format!(
-                        "{whole} and {other} would both be written as {stem}_…; give each its own --out"
-                    );
-                    return Err(Error::usage("INPUT", problem));
-                }
-                let id = id.clone();
-                entries.push(Entry { set, id, stem });
-            }
-        }
-        Ok(Self { sets, entries })
-    }
-
-    fn picture(&self, entry: &Entry) -> Result<Picture> {
-        self.sets[entry.set].picture(&entry.id)
-    }
-}
-
-/// The name of a frame's files: its own, without the ending of an image.
-fn stem(id: &FrameId) -> Result<String> {
-    let path = Path::new(&id.0);
-    if !path
-        .components()
-        .all(|part| matches!(part, Component::Normal(_)))
-    {
-        let problem = "this name of a frame leads out of the output folder";
-        return Err(Error::data(format_args!("{:?}", id.0), problem));
-    }
-    let ending = path
-        .extension()
-        .map(|ending| ending.to_string_lossy().to_lowercase());
-    let bare = match ending.as_deref() {
-        Some("png" | "jpg" | "jpeg") => path.with_extension(""),
-        _ => path.to_owned(),
-    };
-    Ok(bare.to_string_lossy().into_owned())
-}
-
 /// One file of a frame.
 #[derive(Debug, Clone, Copy)]
 enum File {
@@ -186,7 +121,7 @@ fn files(config: &Synthesize) -> Vec<File> {
 }
 
 /// Makes all images of one frame.
-fn one(config: &Synthesize, frames: &Frames, entry: &Entry, files: &[File], bar: &Bar) -> Tally {
+fn one(config: &Synthesize, frames: &Inputs, entry: &Entry, files: &[File], bar: &Bar) -> Tally {
     let mut tally = Tally::default();
     let mut work = match frames.picture(entry) {
         Ok(picture) => Work {
@@ -289,7 +224,7 @@ impl Work<'_> {
 }
 
 /// Makes the one image again that a file tells of.
-fn replay(config: &Synthesize, frames: &Frames, file: &Path) -> Result<Verdict> {
+fn replay(config: &Synthesize, frames: &Inputs, file: &Path) -> Result<Verdict> {
     let sidecar = Sidecar::read(file)?;
     let [entry] = &frames.entries[..] else {
         let problem = format_args!(

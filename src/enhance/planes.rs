@@ -1,0 +1,155 @@
+//! An image of floats, for models of a fixed size: [`Planes`].
+
+use image::imageops::{FilterType, resize};
+use image::{ImageBuffer, Luma};
+
+use super::convention::Rounding;
+use crate::types::Rgb;
+
+/// An image of three planes, red, green, blue, one after the other, 0..1.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Planes {
+    /// The height in pixels.
+    pub(super) height: usize,
+    /// The width in pixels.
+    pub(super) width: usize,
+    /// 3 × height × width samples.
+    pub(super) samples: Vec<f32>,
+}
+
+impl Planes {
+    /// The image with its bytes divided by 255.
+    pub(super) fn of(image: &Rgb) -> Self {
+        let pixels = image.samples().chunks_exact(3);
+        let samples = (0..3)
+            .flat_map(|channel| {
+                pixels
+                    .clone()
+                    .map(move |pixel| f32::from(pixel[channel]) / 255.0)
+            })
+            .collect();
+        Self {
+            height: image.height(),
+            width: image.width(),
+            samples,
+        }
+    }
+
+    /// The image in bytes: each sample held within 0..1 and times 255. `None` where there is no pixel.
+    pub(super) fn to_rgb(&self, rounding: Rounding) -> Option<Rgb> {
+        let plane = self.height * self.width;
+        let byte = |sample: f32| {
+            let code = sample.clamp(0.0, 1.0) * 255.0;
+            match rounding {
+                Rounding::Round => code.round() as u8,
+                Rounding::Truncate => code as u8,
+            }
+        };
+        let mut samples = vec![0; 3 * plane];
+        for (channel, plane) in self.samples.chunks_exact(plane).take(3).enumerate() {
+            for (pixel, sample) in samples.chunks_exact_mut(3).zip(plane) {
+                pixel[channel] = byte(*sample);
+            }
+        }
+        Rgb::new(self.height, self.width, samples).ok()
+    }
+
+    /// The image in another size, for models of a fixed one, with its samples held within 0..1 first.
+    ///
+    /// The filter is bilinear, widened by the ratio where the image shrinks: unlike sharper filters it makes no value that
+    /// was not between those of the image, so neither haloes nor samples out of range go into a model or come back.
+    /// Samples stay floats throughout; in bytes the few levels that a dark image has would be rounded twice.
+    pub(super) fn resized(&self, height: usize, width: usize) -> Result<Self, String> {
+        let side = |size: usize| u32::try_from(size).map_err(|e| e.to_string());
+        let (from, to) = (
+            (side(self.width)?, side(self.height)?),
+            (side(width)?, side(height)?),
+        );
+        let mut samples = Vec::with_capacity(3 * height * width);
+        for plane in self.samples.chunks_exact(self.height * self.width) {
+            let plane = plane.iter().map(|sample| sample.clamp(0.0, 1.0)).collect();
+            let plane = ImageBuffer::<Luma<f32>, Vec<f32>>::from_raw(from.0, from.1, plane)
+                .ok_or("a plane of another size than its image")?;
+            samples.extend(resize(&plane, to.0, to.1, FilterType::Triangle).into_raw());
+        }
+        Ok(Self {
+            height,
+            width,
+            samples,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An image in which no two samples near each other are alike.
+    fn image(height: usize, width: usize) -> Rgb {
+        let samples = (0..height * width * 3).map(|i| (i * 37 % 256) as u8);
+        Rgb::new(height, width, samples.collect()).unwrap()
+    }
+
+    #[test]
+    fn planes_are_red_green_blue() {
+        let image = Rgb::new(1, 2, vec![0, 51, 102, 153, 204, 255]).unwrap();
+        let planes = Planes::of(&image);
+        assert_eq!(planes.samples, [0.0, 0.6, 0.2, 0.8, 0.4, 1.0]);
+        assert_eq!((planes.height, planes.width), (1, 2));
+    }
+
+    #[test]
+    fn every_byte_comes_back() {
+        let image = image(11, 24);
+        assert_eq!(Planes::of(&image).to_rgb(Rounding::Round).unwrap(), image);
+    }
+
+    #[test]
+    fn samples_are_held_in_range_and_rounded() {
+        let planes = Planes {
+            height: 1,
+            width: 2,
+            samples: vec![-0.1, 1.1, 0.5, f32::INFINITY, 1.4 / 255.0, 1.6 / 255.0],
+        };
+        // 0.5 · 255 = 127.5 is rounded up
+        assert_eq!(
+            planes.to_rgb(Rounding::Round).unwrap().samples(),
+            [0, 128, 1, 255, 255, 2]
+        );
+    }
+
+    #[test]
+    fn resizing_keeps_flat_colours_and_the_range() {
+        let flat = Rgb::new(9, 7, [3, 120, 255].repeat(63)).unwrap();
+        let there = Planes::of(&flat).resized(4, 16).unwrap();
+        assert_eq!(
+            (there.height, there.width, there.samples.len()),
+            (4, 16, 192)
+        );
+        assert_eq!(
+            there
+                .resized(9, 7)
+                .unwrap()
+                .to_rgb(Rounding::Round)
+                .unwrap(),
+            flat
+        );
+        let mut wild = Planes::of(&image(8, 8));
+        wild.samples[0] = 5.0;
+        let resized = wild.resized(16, 5).unwrap();
+        assert!(resized.samples.iter().all(|x| (0.0..=1.0).contains(x)));
+    }
+
+    #[test]
+    fn resizing_puts_pixels_where_they_belong() {
+        let halves: Vec<u8> = (0..16)
+            .flat_map(|i| [if i % 4 < 2 { 0 } else { 255 }; 3])
+            .collect();
+        let small = Planes::of(&Rgb::new(4, 4, halves).unwrap())
+            .resized(2, 2)
+            .unwrap();
+        for row in small.samples.chunks_exact(2) {
+            assert!(row[0] < 0.2 && row[1] > 0.8, "{row:?}");
+        }
+    }
+}

@@ -1,0 +1,170 @@
+//! A session of ONNX Runtime: made, run, ended.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use ort::environment::Environment;
+use ort::session::builder::{GraphOptimizationLevel, SessionBuilder};
+use ort::session::{HasSelectedOutputs, OutputSelector, RunOptions, Session, SessionInputValue};
+use ort::value::{DynValue, Outlet, Tensor, TensorElementType, ValueType};
+
+use super::convention::Element;
+use super::signature::{Dim, Extra, Port, Signature};
+use super::tensor::{Data, Input, Samples};
+
+/// How a session is run: which output is wanted, and whether it is to end early.
+pub(super) struct Options(RunOptions<HasSelectedOutputs>);
+
+impl Options {
+    /// Those of a run that gives one output.
+    pub(super) fn of(output: &str) -> ort::Result<Self> {
+        let selected = OutputSelector::no_default().with(output);
+        Ok(Self(RunOptions::new()?.with_outputs(selected)))
+    }
+}
+
+// SAFETY: `ort` withholds `Sync` because a selected output may hold a preallocated tensor, which two runs would write at
+// once. None is ever preallocated here (`Options::of` selects by name alone), runs are held apart by the session's
+// mutex, and the one call made beside a run is `terminate`, which ONNX Runtime documents for use from another thread.
+#[expect(unsafe_code, reason = "a run can be ended in no other way")]
+unsafe impl Sync for Options {}
+
+/// Ends the run of an enhancer from another thread.
+#[derive(Clone)]
+pub struct Stopper(pub(super) Arc<Options>);
+
+impl Stopper {
+    /// Ends the image that is being made, with an error, and every later one.
+    pub fn stop(&self) {
+        // A run that cannot be ended is one that is waited for.
+        if let Err(e) = self.0.0.terminate() {
+            tracing::debug!("the enhancer cannot be stopped: {e}");
+        }
+    }
+}
+
+/// An error of ONNX Runtime in one line.
+pub(super) fn said(error: &ort::Error) -> String {
+    let words: Vec<&str> = error.message().split_whitespace().collect();
+    words.join(" ")
+}
+
+/// Runs a session on an image, and reads the output before another run writes over it.
+pub(super) fn run<T>(
+    session: &mut Session,
+    options: &Options,
+    signature: &Signature,
+    input: Input,
+    read: impl FnOnce(&[i64], Samples<'_>) -> T,
+) -> ort::Result<T> {
+    let mut inputs: Vec<(&str, SessionInputValue<'_>)> = Vec::new();
+    inputs.push((&signature.input.port.name, tensor(input)?.into()));
+    for extra in &signature.extras {
+        inputs.push((&extra.port.name, number(extra)?.into()));
+    }
+    let outputs = session.run_with_options(inputs, &options.0)?;
+    let output = &outputs[signature.output.port.name.as_str()];
+    match signature.output.port.element {
+        Element::Uint8 => {
+            let (dims, samples) = output.try_extract_tensor::<u8>()?;
+            Ok(read(dims, Samples::Uint8(samples)))
+        }
+        Element::Float16 => {
+            let (dims, samples) = output.try_extract_tensor::<half::f16>()?;
+            Ok(read(dims, Samples::Float16(samples)))
+        }
+        _ => {
+            let (dims, samples) = output.try_extract_tensor::<f32>()?;
+            Ok(read(dims, Samples::Float32(samples)))
+        }
+    }
+}
+
+fn tensor(input: Input) -> ort::Result<DynValue> {
+    let Input { dims, data } = input;
+    Ok(match data {
+        Data::Float32(values) => Tensor::from_array((dims, values))?.into_dyn(),
+        Data::Float16(values) => Tensor::from_array((dims, values))?.into_dyn(),
+        Data::Uint8(values) => Tensor::from_array((dims, values))?.into_dyn(),
+    })
+}
+
+fn number(extra: &Extra) -> ort::Result<DynValue> {
+    let dims = vec![1_usize; extra.port.dims.len()];
+    Ok(match extra.port.element {
+        Element::Float16 => {
+            Tensor::from_array((dims, vec![half::f16::from_f32(extra.value)]))?.into_dyn()
+        }
+        _ => Tensor::from_array((dims, vec![extra.value]))?.into_dyn(),
+    })
+}
+
+/// Where a session gets its graph from.
+pub(super) enum Source {
+    Memory(Vec<u8>),
+    Path(PathBuf),
+}
+
+impl Source {
+    pub(super) fn commit(self, mut builder: SessionBuilder) -> ort::Result<Session> {
+        match self {
+            Self::Memory(bytes) => builder.commit_from_memory(&bytes),
+            Self::Path(path) => builder.commit_from_file(path),
+        }
+    }
+}
+
+/// The options of a session.
+pub(super) fn builder(
+    environment: &Environment,
+    threads: Option<NonZeroUsize>,
+) -> ort::Result<SessionBuilder> {
+    // Left alone, ONNX Runtime pins one thread to each core, against whatever else runs there.
+    let threads = threads
+        .or_else(|| std::thread::available_parallelism().ok())
+        .map_or(1, NonZeroUsize::get);
+    let builder = Session::builder(environment)?
+        .with_optimization_level(GraphOptimizationLevel::All)?
+        .with_intra_threads(threads)?
+        // Plans of one image's memory do not fit the next one's size, and are kept: twice the memory for nothing.
+        .with_memory_pattern(false)?
+        .with_flush_to_zero()?;
+    Ok(builder)
+}
+
+/// The inputs or outputs of a session.
+pub(super) fn ports(outlets: &[Outlet]) -> Vec<Port> {
+    outlets.iter().map(port).collect()
+}
+
+/// An input or output of a session in this module's own words.
+fn port(outlet: &Outlet) -> Port {
+    let (element, dims) = match outlet.dtype() {
+        ValueType::Tensor {
+            ty,
+            shape,
+            dimension_symbols,
+        } => {
+            let element = match ty {
+                TensorElementType::Float32 => Element::Float32,
+                TensorElementType::Float16 => Element::Float16,
+                TensorElementType::Uint8 => Element::Uint8,
+                other => Element::Other(other.to_string()),
+            };
+            let dims = shape
+                .iter()
+                .zip(dimension_symbols.iter())
+                .map(|(size, symbol)| {
+                    usize::try_from(*size).map_or_else(|_| Dim::Free(symbol.clone()), Dim::Known)
+                });
+            (element, dims.collect())
+        }
+        other => (Element::Other(other.to_string()), Vec::new()),
+    };
+    Port {
+        name: outlet.name().to_owned(),
+        element,
+        dims,
+    }
+}

@@ -1,0 +1,228 @@
+use super::*;
+
+/// A float32 port; a dimension of 0 is a free one.
+fn port(name: &str, dims: &[usize]) -> Port {
+    let dim = |size: &usize| match size {
+        0 => Dim::Free("n".into()),
+        known => Dim::Known(*known),
+    };
+    Port {
+        name: name.into(),
+        element: Element::Float32,
+        dims: dims.iter().map(dim).collect(),
+    }
+}
+
+fn image(name: &str) -> Port {
+    port(name, &[1, 3, 0, 0])
+}
+
+fn curves(name: &str) -> Port {
+    port(name, &[1, 24, 0, 0])
+}
+
+fn of(inputs: &[Port], outputs: &[Port]) -> Result<Signature, String> {
+    Signature::of(inputs, outputs, &Sidecar::default())
+}
+
+fn choose(outputs: &[Port]) -> Result<String, String> {
+    of(&[image("input")], outputs).map(|signature| signature.output.port.name)
+}
+
+#[test]
+fn the_only_image_is_taken_whatever_its_name() {
+    let cases = [
+        vec![image("758")],
+        vec![curves("a"), image("758")],
+        vec![port("scalar", &[1]), image("758")],
+        vec![port("758", &[0, 0, 0, 0])],
+        vec![port("758", &[])],
+    ];
+    for outputs in cases {
+        assert_eq!(choose(&outputs), Ok("758".into()), "{}", list(&outputs));
+    }
+}
+
+#[test]
+fn among_several_a_telling_name_decides() {
+    for (names, expected) in [
+        (&["illumination", "output"][..], "output"),
+        (&["enhanced", "params"], "enhanced"),
+        (&["mul", "add", "result"], "result"),
+        (&["illumination", "r", "enhance_image"], "enhance_image"),
+    ] {
+        let outputs: Vec<Port> = names.iter().map(|name| image(name)).collect();
+        assert_eq!(choose(&outputs), Ok(expected.into()), "{names:?}");
+    }
+}
+
+#[test]
+fn zero_dce_gives_its_second_output_under_any_name() {
+    for names in [
+        ["enhance_image_1", "enhance_image", "r"],
+        ["301", "322", "300"],
+        ["output", "322", "300"],
+        ["output_0", "output_1", "output_2"],
+    ] {
+        let outputs = [image(names[0]), image(names[1]), curves(names[2])];
+        assert_eq!(choose(&outputs), Ok(names[1].into()), "{names:?}");
+    }
+}
+
+#[test]
+fn what_could_ruin_pixels_is_left_to_the_user() {
+    for names in [
+        &["1", "2"][..],
+        &["output", "322"],
+        &["output", "add_5"],
+        &["enhanced", "/net/Mul_output_0"],
+        &["u0", "u1", "u2", "u_denoised"],
+        &["enhanced", "output"],
+    ] {
+        let outputs: Vec<Port> = names.iter().map(|name| image(name)).collect();
+        let message = choose(&outputs).unwrap_err();
+        assert!(message.contains("output = INDEX"), "{message}");
+        assert!(names.iter().all(|name| message.contains(name)), "{message}");
+    }
+    // Names and structure that contradict each other.
+    let outputs = [image("enhanced"), image("half"), curves("r")];
+    assert!(choose(&outputs).is_err());
+}
+
+#[test]
+fn a_stated_output_is_taken_where_it_can_be_an_image() {
+    let outputs = [image("1"), image("2"), curves("3")];
+    let stated = |outputs: &[Port], choice: OutputChoice| {
+        let sidecar = Sidecar {
+            output: Some(choice),
+            ..Sidecar::default()
+        };
+        let found = Signature::of(&[image("input")], outputs, &sidecar);
+        found.map(|signature| signature.output.port.name)
+    };
+    let index = OutputChoice::Index;
+    assert_eq!(stated(&outputs, index(0)), Ok("1".into()));
+    assert_eq!(
+        stated(&outputs, OutputChoice::Name("2".into())),
+        Ok("2".into())
+    );
+    // Of one output it is that one.
+    assert_eq!(stated(&outputs[1..2], index(3)), Ok("2".into()));
+    for (choice, part) in [
+        (index(3), "does not have"),
+        (OutputChoice::Name("x".into()), "does not have"),
+        (index(2), "none of its image outputs"),
+    ] {
+        let message = stated(&outputs, choice).unwrap_err();
+        assert!(message.contains(part), "{message}");
+    }
+}
+
+#[test]
+fn fixed_sizes_are_read_and_have_to_agree() {
+    let fixed = port("in", &[1, 3, 96, 128]);
+    let found = of(
+        std::slice::from_ref(&fixed),
+        &[port("out", &[1, 3, 0, 128])],
+    )
+    .unwrap();
+    assert_eq!((found.height, found.width), (Some(96), Some(128)));
+    let half = of(&[port("in", &[1, 3, 0, 128])], &[image("out")]).unwrap();
+    assert_eq!((half.height, half.width), (None, Some(128)));
+    for dims in [[1, 3, 96, 127], [1, 3, 128, 96], [2, 3, 96, 128]] {
+        assert!(of(std::slice::from_ref(&fixed), &[port("out", &dims)]).is_err());
+    }
+}
+
+#[test]
+fn layouts_and_elements_are_read() {
+    for (dims, layout) in [
+        (&[1, 3, 0, 0][..], Layout::Nchw),
+        (&[0, 0, 0, 3], Layout::Nhwc),
+        (&[3, 0, 0], Layout::Chw),
+        (&[48, 64, 3], Layout::Hwc),
+    ] {
+        for element in [Element::Float32, Element::Float16, Element::Uint8] {
+            let input = Port {
+                element,
+                ..port("x", dims)
+            };
+            let found = of(&[input], &[port("y", &[])]).unwrap();
+            assert_eq!((found.input.layout, found.output.layout), (layout, None));
+        }
+    }
+    let out = of(&[image("x")], &[port("y", &[0, 0, 3])]).unwrap();
+    assert_eq!(out.output.layout, Some(Layout::Hwc));
+}
+
+#[test]
+fn what_the_graph_leaves_open_is_stated() {
+    let open = [port("x", &[0, 0, 0, 0])];
+    let message = of(&open, &[image("y")]).unwrap_err();
+    assert!(message.contains("layout_in = \"nchw\""), "{message}");
+    let stated = |layout| Sidecar {
+        layout_in: Some(layout),
+        ..Sidecar::default()
+    };
+    let found = Signature::of(&open, &[image("y")], &stated(Layout::Nhwc)).unwrap();
+    assert_eq!(found.input.layout, Layout::Nhwc);
+    for layout in [Layout::Chw, Layout::Nhwc] {
+        assert!(Signature::of(&[image("x")], &[image("y")], &stated(layout)).is_err());
+    }
+}
+
+#[test]
+fn further_numbers_need_values() {
+    let inputs = [image("x"), port("exposure", &[1])];
+    let message = of(&inputs, &[image("y")]).unwrap_err();
+    assert!(message.contains("exposure = 0.5"), "{message}");
+    let sidecar = |name: &str| Sidecar {
+        extra: [(name.to_owned(), 0.25)].into(),
+        ..Sidecar::default()
+    };
+    let found = Signature::of(&inputs, &[image("y")], &sidecar("exposure")).unwrap();
+    assert_eq!(found.extras[0].value.to_bits(), 0.25_f32.to_bits());
+    assert!(Signature::of(&inputs, &[image("y")], &sidecar("gamma")).is_err());
+    let whole = Port {
+        element: Element::Other("int64".into()),
+        ..port("n", &[])
+    };
+    let message = of(&[image("x"), whole], &[image("y")]).unwrap_err();
+    assert!(message.contains("one float is supported"), "{message}");
+}
+
+#[test]
+fn other_conventions_are_refused_by_name() {
+    let double = Port {
+        element: Element::Other("float64".into()),
+        ..image("double")
+    };
+    let cases = [
+        (vec![], "no image among its inputs; it has none"),
+        (vec![image("a"), image("b")], "takes 2 images"),
+        (
+            vec![image("a"), port("gray", &[1, 1, 0, 0])],
+            "takes 2 images",
+        ),
+        (vec![double], "float64"),
+        (vec![port("a", &[1, 1, 0, 0])], "no image of three"),
+        (vec![port("a", &[2, 3, 0, 0])], "several images"),
+        (vec![port("a", &[])], "no image among"),
+        (vec![port("a", &[1, 85])], "no image of three"),
+    ];
+    for (inputs, part) in cases {
+        let message = of(&inputs, &[image("out")]).unwrap_err();
+        assert!(message.contains(part), "{message}");
+    }
+}
+
+#[test]
+fn a_model_without_an_image_is_refused() {
+    let outputs = [port("758", &[1, 85, 22, 22]), port("flat", &[1, 3])];
+    let message = choose(&outputs).unwrap_err();
+    assert!(
+        message.contains("\"758\" (float32 [1, 85, 22, 22])"),
+        "{message}"
+    );
+    assert!(choose(&[]).unwrap_err().ends_with("it has none"));
+}

@@ -1,0 +1,210 @@
+use super::*;
+
+const FEEDING: Feeding = Feeding {
+    layout: Layout::Nchw,
+    element: Element::Float32,
+    color: Color::Rgb,
+    range: Range::Unit,
+    mean: [0.0; 3],
+    std: [1.0; 3],
+    pad: Pad::Reflect,
+};
+const READING: Reading = Reading {
+    layout: None,
+    likely: Layout::Nchw,
+    color: Color::Rgb,
+    range: Range::Unit,
+    certainty: Certainty::Known,
+    rounding: Rounding::Round,
+};
+
+fn image(height: usize, width: usize) -> Rgb {
+    let samples = (0..height * width * 3).map(|i| (i * 37 % 256) as u8);
+    Rgb::new(height, width, samples.collect()).unwrap()
+}
+
+fn whole(image: &Rgb) -> Window {
+    Window {
+        left: 0,
+        top: 0,
+        right: image.width(),
+        bottom: image.height(),
+    }
+}
+
+fn floats(input: &Input) -> &[f32] {
+    match &input.data {
+        Data::Float32(values) => values,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn every_convention_gives_every_byte_back() {
+    let image = image(11, 24);
+    for layout in Layout::ALL {
+        for (element, range) in [
+            (Element::Float32, Range::Unit),
+            (Element::Float32, Range::Bytes),
+            (Element::Float32, Range::Signed),
+            (Element::Float16, Range::Unit),
+            (Element::Uint8, Range::Bytes),
+        ] {
+            for color in [Color::Rgb, Color::Bgr] {
+                let feeding = Feeding {
+                    layout,
+                    element: element.clone(),
+                    color,
+                    range,
+                    ..FEEDING
+                };
+                let input = feeding.window(&image, whole(&image));
+                let reading = Reading {
+                    likely: layout,
+                    color,
+                    range,
+                    ..READING
+                };
+                let samples = match &input.data {
+                    Data::Float32(values) => Samples::Float32(values),
+                    Data::Float16(values) => Samples::Float16(values),
+                    Data::Uint8(values) => Samples::Uint8(values),
+                };
+                let dims: Vec<i64> = input
+                    .dims
+                    .iter()
+                    .map(|dim| i64::try_from(*dim).unwrap())
+                    .collect();
+                assert_eq!(reading.layout(&dims, [11, 24]), Some(layout));
+                let bytes = reading
+                    .bytes(samples, layout, [11, 24], whole(&image))
+                    .unwrap();
+                assert_eq!(bytes, image.samples(), "{layout} {element} {range} {color}");
+                let part = Window {
+                    left: 3,
+                    top: 2,
+                    right: 7,
+                    bottom: 3,
+                };
+                let bytes = reading.bytes(samples, layout, [11, 24], part).unwrap();
+                assert_eq!(bytes, image.samples()[(2 * 24 + 3) * 3..][..12]);
+                // The way by floats, for models of a fixed size, feeds and reads the same.
+                let planes = reading.planes(samples, layout, [11, 24]).unwrap();
+                assert_eq!(planes.to_rgb(Rounding::Round).unwrap(), image);
+                if element != Element::Float16 {
+                    let fed = feeding.planes(&Planes::of(&image));
+                    let near = match (&fed.data, &input.data) {
+                        (Data::Float32(a), Data::Float32(b)) => {
+                            a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-4)
+                        }
+                        (a, b) => a == b,
+                    };
+                    assert!(near && fed.dims == input.dims);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn mean_and_deviation_are_the_models_channels() {
+    let image = Rgb::new(1, 1, vec![255, 0, 51]).unwrap();
+    let feeding = Feeding {
+        mean: [0.5, 0.25, 0.0],
+        std: [0.5, 0.25, 0.1],
+        ..FEEDING
+    };
+    let input = feeding.window(&image, whole(&image));
+    assert_eq!(floats(&input), [1.0, -1.0, 2.0]);
+    let blue_first = Feeding {
+        color: Color::Bgr,
+        ..feeding
+    };
+    let input = blue_first.window(&image, whole(&image));
+    assert_eq!(floats(&input), [(0.2 - 0.5) / 0.5, -1.0, 10.0]);
+}
+
+#[test]
+fn what_is_missing_is_padded() {
+    let image = Rgb::new(1, 3, vec![1, 1, 1, 2, 2, 2, 3, 3, 3]).unwrap();
+    let wide = Window {
+        right: 8,
+        bottom: 2,
+        ..whole(&image)
+    };
+    for (pad, row, below) in [
+        (Pad::Reflect, [1, 2, 3, 2, 1, 2, 3, 2], 1),
+        (Pad::Replicate, [1, 2, 3, 3, 3, 3, 3, 3], 1),
+        (Pad::Zero, [1, 2, 3, 0, 0, 0, 0, 0], 0),
+    ] {
+        let feeding = Feeding {
+            pad,
+            element: Element::Uint8,
+            range: Range::Bytes,
+            ..FEEDING
+        };
+        let Data::Uint8(bytes) = feeding.window(&image, wide).data else {
+            panic!("no bytes");
+        };
+        assert_eq!(bytes[..8], row, "{pad}");
+        assert_eq!(bytes[8], below, "{pad}");
+    }
+}
+
+#[test]
+fn samples_are_held_in_range_and_rounded() {
+    let values = [-0.1, 1.1, 0.5, f32::INFINITY, 1.4 / 255.0, 1.6 / 255.0];
+    let part = Window {
+        left: 0,
+        top: 0,
+        right: 2,
+        bottom: 1,
+    };
+    let bytes = |rounding| {
+        let reading = Reading {
+            rounding,
+            ..READING
+        };
+        let samples = Samples::Float32(&values);
+        reading.bytes(samples, Layout::Nchw, [1, 2], part).unwrap()
+    };
+    // 0.5 · 255 = 127.5
+    assert_eq!(bytes(Rounding::Round), [0, 128, 1, 255, 255, 2]);
+    assert_eq!(bytes(Rounding::Truncate), [0, 127, 1, 255, 255, 1]);
+    for i in 0..=u16::MAX {
+        let code = f32::from(i) / 257.0;
+        assert_eq!(nearest(code), code.round() as u8);
+    }
+    assert_eq!((nearest(0.499_999_97), nearest(254.5)), (0, 255));
+}
+
+#[test]
+fn values_of_another_range_are_told() {
+    let wild = |values: &[f32], range, certainty| {
+        let reading = Reading {
+            range,
+            certainty,
+            ..READING
+        };
+        reading.check(values).err()
+    };
+    let likely = |values: &[f32], range| match wild(values, range, Certainty::Assumed) {
+        Some(Wild::Beyond { likely, .. }) => Some(likely),
+        other => {
+            assert_eq!(other, None);
+            None
+        }
+    };
+    assert_eq!(likely(&[0.0, 200.0], Range::Unit), Some(Range::Bytes));
+    assert_eq!(likely(&[-0.9, 0.3], Range::Unit), Some(Range::Signed));
+    assert_eq!(likely(&[0.0, 0.9], Range::Bytes), Some(Range::Unit));
+    // A model that does not clamp overshoots by little, or seldom by much.
+    assert_eq!(likely(&[-0.1, 1.4], Range::Unit), None);
+    let mut seldom = vec![0.5; 1000];
+    seldom[0] = -3.0;
+    seldom[1] = 40.0;
+    assert_eq!(likely(&seldom, Range::Unit), None);
+    assert_eq!(wild(&[0.0, 200.0], Range::Unit, Certainty::Known), None);
+    let broken = wild(&[0.0, f32::NAN], Range::Unit, Certainty::Known);
+    assert_eq!(broken, Some(Wild::NotNumbers));
+}
