@@ -16,6 +16,7 @@ mod describe;
 pub mod file;
 mod install;
 mod library;
+mod memory;
 pub mod onnx;
 mod planes;
 mod preset;

@@ -13,6 +13,7 @@ use crate::types::{Digest, EnhancerName, Rgb};
 use super::convention::{Element, Layout, Pad, Range, Tile};
 use super::describe::Description;
 use super::file::ModelFile;
+use super::memory::{self, Cost, PROBES};
 use super::planes::Planes;
 use super::runtime::Runtime;
 use super::session::{Options, Source, Stopper, builder, ports, run, said};
@@ -52,6 +53,17 @@ impl fmt::Display for Tiling {
     }
 }
 
+/// What is known of the memory that a model needs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Estimate {
+    /// Nothing yet.
+    Unknown,
+    /// It cannot be told.
+    Untold,
+    /// So much a pixel.
+    Of(Cost),
+}
+
 /// An enhancement model, loaded and ready.
 pub struct Enhancer {
     path: PathBuf,
@@ -62,6 +74,7 @@ pub struct Enhancer {
     feeding: Feeding,
     reading: Arc<Reading>,
     tiling: Tiling,
+    cost: Estimate,
     description: Description,
     runtime: Runtime,
     session: Arc<Mutex<Session>>,
@@ -132,6 +145,7 @@ impl Enhancer {
             feeding,
             reading: Arc::new(reading),
             tiling: Tiling::Auto,
+            cost: Estimate::Unknown,
             description,
             runtime: runtime.clone(),
             session: Arc::new(Mutex::new(session)),
@@ -199,6 +213,7 @@ impl Enhancer {
             None if fixed == size && self.is_dynamic() => &MULTIPLES,
             None => &[1],
         };
+        self.estimate(dark, fixed)?;
         let mut first = None;
         for multiple in multiples {
             match self.mended(dark, fixed, *multiple)? {
@@ -207,6 +222,56 @@ impl Enhancer {
             }
         }
         Err(self.fault(first.unwrap_or_default()))
+    }
+
+    /// Refuses a large image that would need more memory than there is, before it is spent.
+    fn estimate(&mut self, dark: &Rgb, fixed: [usize; 2]) -> Result<()> {
+        let size = [dark.height(), dark.width()];
+        let pixels = size[0] * size[1];
+        let (area, cut, _) = self.cut(
+            size,
+            fixed,
+            self.stated.multiple.map_or(1, NonZeroUsize::get),
+        )?;
+        let probed = size.iter().all(|side| *side >= PROBES[1]) && self.is_dynamic();
+        if pixels <= WHOLE || cut.tile != area || !probed {
+            return Ok(());
+        }
+        if self.cost == Estimate::Unknown {
+            self.cost = self.probed(dark)?.map_or(Estimate::Untold, Estimate::Of);
+        }
+        let Estimate::Of(cost) = self.cost else {
+            return Ok(());
+        };
+        let Some(available) = memory::available() else {
+            return Ok(());
+        };
+        cost.fits(pixels, available).map_err(|[needed, available]| {
+            self.fault(format!(
+                "would need about {needed:.1} GB of memory for an image of {} × {}, and {available:.1} GB are free; --tile 256 does with a fraction of it where the model is local",
+                size[1], size[0]
+            ))
+        })
+    }
+
+    /// What small parts of an image need; `None` where that tells nothing.
+    fn probed(&self, dark: &Rgb) -> Result<Option<Cost>> {
+        let mut resident = [0; 2];
+        for (side, resident) in PROBES.into_iter().zip(&mut resident) {
+            let window = Window {
+                left: 0,
+                top: 0,
+                right: side,
+                bottom: side,
+            };
+            let input = self.feeding.window(dark, window);
+            let ran = self.run(input, window.size(), |_, _| Ok(()))?;
+            let (Ran::Gave(()), Some(bytes)) = (ran, memory::resident()) else {
+                return Ok(None);
+            };
+            *resident = bytes;
+        }
+        Ok(Cost::of(resident))
     }
 
     fn is_dynamic(&self) -> bool {

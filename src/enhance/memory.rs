@@ -1,0 +1,98 @@
+//! What a whole image will cost in memory, before it is spent: [`Cost`].
+//!
+//! ONNX Runtime does not say what a graph needs. So two small parts of the image go through first, and what the process grew by
+//! between them tells the bytes of a pixel. Where the system does not tell (anything but Linux), nothing is estimated.
+
+use std::fs;
+
+/// The sides of the two parts.
+pub(super) const PROBES: [usize; 2] = [128, 256];
+
+/// What a model needs for a pixel, in bytes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Cost(f64);
+
+impl Cost {
+    /// From what was resident after each of the parts; `None` where that tells nothing.
+    pub(super) fn of(resident: [u64; 2]) -> Option<Self> {
+        let grown = resident[1]
+            .checked_sub(resident[0])
+            .filter(|grown| *grown > 0)?;
+        let pixels = PROBES[1] * PROBES[1] - PROBES[0] * PROBES[0];
+        Some(Self(grown as f64 / pixels as f64))
+    }
+
+    /// Whether an image of so many pixels fits into what is available; else both in gigabytes.
+    pub(super) fn fits(self, pixels: usize, available: u64) -> Result<(), [f64; 2]> {
+        const GIGABYTE: f64 = 1e9;
+        let needed = self.0 * pixels as f64;
+        if needed <= available as f64 {
+            Ok(())
+        } else {
+            Err([needed / GIGABYTE, available as f64 / GIGABYTE])
+        }
+    }
+}
+
+/// The bytes of this process that lie in memory.
+pub(super) fn resident() -> Option<u64> {
+    let status = fs::read_to_string("/proc/self/status").ok()?;
+    kilobytes(&status, "VmRSS:")
+}
+
+/// The bytes that a process may still take: what the machine has free, and what its control group leaves.
+pub(super) fn available() -> Option<u64> {
+    let free = kilobytes(&fs::read_to_string("/proc/meminfo").ok()?, "MemAvailable:")?;
+    let number = |path: &str| -> Option<u64> {
+        let text = fs::read_to_string(path).ok()?;
+        text.trim().parse().ok()
+    };
+    let groups = [
+        ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
+        (
+            "/sys/fs/cgroup/memory/memory.limit_in_bytes",
+            "/sys/fs/cgroup/memory/memory.usage_in_bytes",
+        ),
+    ];
+    let left = groups.iter().filter_map(|(most, used)| {
+        let (most, used) = (number(most)?, number(used)?);
+        Some(most.saturating_sub(used))
+    });
+    Some(left.fold(free, u64::min))
+}
+
+/// The value of a line like `VmRSS:  1234 kB`, in bytes.
+fn kilobytes(text: &str, name: &str) -> Option<u64> {
+    let line = text.lines().find_map(|line| line.strip_prefix(name))?;
+    let value: u64 = line.split_whitespace().next()?.parse().ok()?;
+    Some(1024 * value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_grew_tells_the_cost() {
+        assert_eq!(Cost::of([5, 5]), None);
+        assert_eq!(Cost::of([7, 5]), None);
+        // 800 bytes a pixel.
+        let cost = Cost::of([1_000, 1_000 + 800 * 3 * 128 * 128]).unwrap();
+        assert_eq!(cost.fits(1_000_000, 800_000_001), Ok(()));
+        let [needed, available] = cost.fits(1_000_000, 500_000_000).unwrap_err();
+        assert!((needed - 0.8).abs() < 1e-9 && (available - 0.5).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_system_is_read() {
+        assert_eq!(
+            kilobytes("A: 1 kB\nVmRSS:\t  12 kB\n", "VmRSS:"),
+            Some(12_288)
+        );
+        assert_eq!(kilobytes("VmRSS: much", "VmRSS:"), None);
+        if cfg!(target_os = "linux") {
+            let resident = resident().unwrap();
+            assert!(resident > 100_000 && available().unwrap() > 0);
+        }
+    }
+}
