@@ -233,6 +233,16 @@ pub(super) enum Element {
     Other(String),
 }
 
+impl Element {
+    /// The range that goes with a type.
+    pub(super) fn usual_range(&self) -> Range {
+        match self {
+            Self::Uint8 => Range::Bytes,
+            _ => Range::Unit,
+        }
+    }
+}
+
 impl fmt::Display for Element {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {

@@ -4,10 +4,11 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use super::convention::Tile;
+use super::feeding::Feeding;
 use super::preset::Preset;
+use super::reading::Reading;
 use super::sidecar::Sidecar;
 use super::signature::Signature;
-use super::tensor::{Feeding, Reading};
 
 /// What is needed beside the convention itself to tell where it comes from.
 #[derive(Debug)]

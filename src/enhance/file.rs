@@ -104,7 +104,7 @@ fn not_onnx(path: &Path, bytes: &[u8]) -> Error {
     let problem = if bytes.starts_with(b"version https://git-lfs") {
         "is a Git LFS pointer and no model; fetch the model itself with `git lfs pull`"
     } else {
-        "is no ONNX model; a PyTorch or TensorFlow model is to be exported to ONNX first"
+        "is no ONNX model, or a part of one; fetch it again, and export a PyTorch or TensorFlow model to ONNX first"
     };
     Error::Enhancer {
         path: path.to_owned(),

@@ -13,6 +13,7 @@
 
 mod convention;
 mod describe;
+mod feeding;
 pub mod file;
 mod install;
 mod library;
@@ -21,19 +22,20 @@ pub mod onnx;
 mod planes;
 mod preset;
 mod protobuf;
+mod reading;
 pub mod runtime;
 mod search;
 mod session;
 mod sidecar;
 mod signature;
-mod tensor;
 mod tiles;
 mod weights;
 
 pub use file::ModelFile;
-pub use onnx::{Enhancer, Tiling};
+pub use onnx::Enhancer;
 pub use runtime::{Install, Runtime, RuntimeSearch, forbid_telemetry};
 pub use session::Stopper;
+pub use tiles::Tiling;
 
 /// The version of the way to and from a model: raised whenever a pixel changes, so that no result of an older one is taken
 /// for its own.

@@ -1,6 +1,5 @@
 //! A user's ONNX model on ONNX Runtime's CPU provider: [`Enhancer`].
 
-use std::fmt;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -10,17 +9,18 @@ use ort::session::Session;
 use crate::error::{Error, Result};
 use crate::types::{Digest, EnhancerName, Rgb};
 
-use super::convention::{Element, Layout, Pad, Range, Tile};
+use super::convention::{Layout, Pad, Tile};
 use super::describe::Description;
+use super::feeding::{Feeding, Input, Window};
 use super::file::ModelFile;
 use super::memory::{self, Cost, PROBES};
 use super::planes::Planes;
+use super::reading::{Reading, Samples, Wild};
 use super::runtime::Runtime;
 use super::session::{Options, Source, Stopper, builder, ports, run, said};
 use super::sidecar::Sidecar;
 use super::signature::Signature;
-use super::tensor::{Certainty, Feeding, Input, Reading, Samples, Wild, Window};
-use super::tiles::{Canvas, Cut, Plan};
+use super::tiles::{Canvas, Cut, Plan, Tiling};
 
 /// The sides of tiles where nobody says them, in pixels: measured as fast as the whole image with a twelfth of its memory.
 const TILE: usize = 256;
@@ -30,28 +30,6 @@ const WHOLE: usize = 1280 * 720;
 const CONTEXT: usize = 32;
 /// What sides are tried as multiples of, where a model fails on an image's own and nobody says better.
 const MULTIPLES: [usize; 6] = [1, 4, 8, 12, 16, 32];
-
-/// How an image is cut.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Tiling {
-    /// Into tiles where they are known to be exact and the image is large; else not at all.
-    #[default]
-    Auto,
-    /// Into tiles of such a side in pixels, context included.
-    Of(NonZeroUsize),
-    /// Not at all.
-    Whole,
-}
-
-impl fmt::Display for Tiling {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Auto => f.write_str("auto"),
-            Self::Of(side) => side.fmt(f),
-            Self::Whole => f.write_str("whole"),
-        }
-    }
-}
 
 /// What is known of the memory that a model needs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -128,7 +106,10 @@ impl Enhancer {
         let inputs = ports(session.inputs());
         let signature =
             Signature::of(&inputs, &ports(session.outputs()), &stated).map_err(fault)?;
-        let (feeding, reading) = (feeding(&signature, &stated), reading(&signature, &stated));
+        let (feeding, reading) = (
+            Feeding::of(&signature, &stated),
+            Reading::of(&signature, &stated),
+        );
         let description = Description {
             sidecar: file.sidecar,
             preset: file.preset,
@@ -491,50 +472,4 @@ fn cropped(image: &Rgb, [height, width]: [usize; 2]) -> Rgb {
         to.copy_from_slice(&from[..3 * width]);
     }
     part
-}
-
-/// How an image becomes what the model takes.
-fn feeding(signature: &Signature, stated: &Sidecar) -> Feeding {
-    let element = signature.input.port.element.clone();
-    Feeding {
-        layout: signature.input.layout,
-        range: stated.range_in.unwrap_or(usual(&element)),
-        element,
-        color: stated.color.unwrap_or_default(),
-        mean: stated.mean.unwrap_or([0.0; 3]),
-        std: stated.std.unwrap_or([1.0; 3]),
-        pad: stated.pad.unwrap_or_default(),
-    }
-}
-
-/// How what it gives becomes an image.
-fn reading(signature: &Signature, stated: &Sidecar) -> Reading {
-    let output = &signature.output;
-    let (range, certainty) = match (stated.range_out, &output.port.element) {
-        (Some(range), _) => (range, Certainty::Known),
-        (None, Element::Uint8) => (Range::Bytes, Certainty::Known),
-        // What is not said of the output is as in the input.
-        (None, _) => (
-            stated
-                .range_in
-                .unwrap_or(usual(&signature.input.port.element)),
-            Certainty::Assumed,
-        ),
-    };
-    Reading {
-        layout: stated.layout_out.or(output.layout),
-        likely: signature.input.layout,
-        color: stated.color.unwrap_or_default(),
-        range,
-        certainty,
-        rounding: stated.rounding.unwrap_or_default(),
-    }
-}
-
-/// The range that goes with a type.
-fn usual(element: &Element) -> Range {
-    match element {
-        Element::Uint8 => Range::Bytes,
-        _ => Range::Unit,
-    }
 }

@@ -10,8 +10,9 @@ use ort::session::{HasSelectedOutputs, OutputSelector, RunOptions, Session, Sess
 use ort::value::{DynValue, Outlet, Tensor, TensorElementType, ValueType};
 
 use super::convention::Element;
+use super::feeding::{Data, Input};
+use super::reading::Samples;
 use super::signature::{Dim, Extra, Port, Signature};
-use super::tensor::{Data, Input, Samples};
 
 /// How a session is run: which output is wanted, and whether it is to end early.
 pub(super) struct Options(RunOptions<HasSelectedOutputs>);

@@ -4,10 +4,35 @@
 //! pixels depend on nothing beyond the context that is exact, and no blending hides a seam. Neighbours give a few pixels
 //! twice ([`GUARD`] on either side), which must agree: where they do not, the model sees farther than was said.
 
+use std::fmt;
+use std::num::NonZeroUsize;
+
 use crate::types::Rgb;
 
 /// Pixels beyond a seam that a tile gives too, for the comparison.
 pub(super) const GUARD: usize = 2;
+
+/// How an image is cut.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Tiling {
+    /// Into tiles where they are known to be exact and the image is large; else not at all.
+    #[default]
+    Auto,
+    /// Into tiles of such a side in pixels, context included.
+    Of(NonZeroUsize),
+    /// Not at all.
+    Whole,
+}
+
+impl fmt::Display for Tiling {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Auto => f.write_str("auto"),
+            Self::Of(side) => side.fmt(f),
+            Self::Whole => f.write_str("whole"),
+        }
+    }
+}
 
 /// A tile along one side: what is seen, and what of it is taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

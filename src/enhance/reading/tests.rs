@@ -1,4 +1,7 @@
 use super::*;
+use crate::enhance::convention::Pad;
+use crate::enhance::feeding::{Data, Feeding, Input};
+use crate::types::Rgb;
 
 const FEEDING: Feeding = Feeding {
     layout: Layout::Nchw,
