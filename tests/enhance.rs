@@ -320,6 +320,19 @@ fn a_fixed_size_is_a_tile_where_tiles_are_exact() {
 }
 
 #[test]
+fn large_images_may_be_enhanced_in_a_smaller_size() {
+    let (_folder, enhancer) = stated(&onnx::of_eights(), "multiple = 8");
+    let mut enhancer = enhancer.with_most_side(NonZeroUsize::new(40));
+    // 100 × 64 as 40 × 24: multiples of eight.
+    let flat = Rgb::new(64, 100, [9, 120, 250].repeat(6400)).unwrap();
+    assert_eq!(enhancer.enhance(&flat).unwrap(), flat);
+    let textured = image(64, 100);
+    assert_ne!(enhancer.enhance(&textured).unwrap(), textured);
+    let small = image(24, 40);
+    assert_eq!(enhancer.enhance(&small).unwrap(), small);
+}
+
+#[test]
 fn the_command_enhances_files_and_folders() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);

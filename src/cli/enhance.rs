@@ -29,6 +29,10 @@ pub struct EnhanceArgs {
     /// preset say that tiles are exact, else whole
     #[arg(long, value_name = "N|whole", help_heading = "Enhancement")]
     pub tile: Option<String>,
+    /// Enhance images whose longer side is longer than this, in pixels, in that size, and scale the result back (bilinear):
+    /// for models that need the whole image and too much memory for it; default: never
+    #[arg(long, value_name = "PIXELS", help_heading = "Enhancement")]
+    pub llie_max_side: Option<NonZeroUsize>,
     /// Threads, 1024 at most; default: all cores
     #[arg(long, value_name = "N", help_heading = "Enhancement")]
     pub threads: Option<NonZeroUsize>,

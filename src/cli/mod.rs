@@ -276,6 +276,10 @@ pub struct EnhancementArgs {
     /// sidecar or preset say that tiles are exact, else whole
     #[arg(long, value_name = "N|whole")]
     pub tile: Option<String>,
+    /// Enhance images whose longer side is longer than this, in pixels, in that size, and scale the result back (bilinear):
+    /// for models that need the whole image and too much memory for it; default: never
+    #[arg(long, value_name = "PIXELS")]
+    pub llie_max_side: Option<NonZeroUsize>,
     /// Threads of synthesis and enhancement, 1024 at most; default: all cores
     #[arg(long, value_name = "N")]
     pub threads: Option<NonZeroUsize>,

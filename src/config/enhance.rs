@@ -36,6 +36,7 @@ impl Enhance {
             enhancement: EnhancementArgs {
                 llie: vec![said.model],
                 tile: said.tile,
+                llie_max_side: said.llie_max_side,
                 threads: said.threads,
                 ort_lib: said.ort_lib,
                 offline: said.offline,

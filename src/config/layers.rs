@@ -261,7 +261,7 @@ fn or(first: Layer, second: Layer) -> Layer {
             first.sensor, second.sensor, off
         ),
         enhancement: first_set!(
-            EnhancementArgs { llie_on, tile, threads, ort_lib; llie; offline }, first.enhancement, second.enhancement, off
+            EnhancementArgs { llie_on, tile, llie_max_side, threads, ort_lib; llie; offline }, first.enhancement, second.enhancement, off
         ),
         model: first_set!(
             ModelArgs {

@@ -83,6 +83,8 @@ pub struct Enhancement {
     pub on: Variants,
     /// How images are cut.
     pub tiling: Tiling,
+    /// The longest side of an image that is enhanced in its own size; `None` for any.
+    pub most_side: Option<NonZeroUsize>,
     /// Threads of synthesis and enhancement; `None` for all cores.
     pub threads: Option<NonZeroUsize>,
     /// Where ONNX Runtime is looked for.
@@ -199,6 +201,7 @@ fn enhancement(said: EnhancementArgs) -> Result<Enhancement> {
         models: said.llie,
         on: parsed("--llie-on", said.llie_on.as_deref())?.unwrap_or(Variants::Noise),
         tiling: tiling(said.tile.as_deref())?,
+        most_side: said.llie_max_side,
         threads: threads(said.threads)?,
         runtime: RuntimeSearch {
             library,

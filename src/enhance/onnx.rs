@@ -52,6 +52,7 @@ pub struct Enhancer {
     feeding: Feeding,
     reading: Arc<Reading>,
     tiling: Tiling,
+    most_side: Option<NonZeroUsize>,
     cost: Estimate,
     description: Description,
     runtime: Runtime,
@@ -126,6 +127,7 @@ impl Enhancer {
             feeding,
             reading: Arc::new(reading),
             tiling: Tiling::Auto,
+            most_side: None,
             cost: Estimate::Unknown,
             description,
             runtime: runtime.clone(),
@@ -138,6 +140,12 @@ impl Enhancer {
     #[must_use]
     pub fn with_tiling(self, tiling: Tiling) -> Self {
         Self { tiling, ..self }
+    }
+
+    /// Enhances images whose longer side is longer in that size, and scales the result back.
+    #[must_use]
+    pub fn with_most_side(self, most_side: Option<NonZeroUsize>) -> Self {
+        Self { most_side, ..self }
     }
 
     /// The name in tables and records: the file's name without its extension.
@@ -180,6 +188,9 @@ impl Enhancer {
     /// another range than was said; where tiles do not fit together.
     pub fn enhance(&mut self, dark: &Rgb) -> Result<Rgb> {
         let size = [dark.height(), dark.width()];
+        if let Some(smaller) = self.reduced(size) {
+            return self.resized(dark, smaller);
+        }
         let fixed = [
             self.signature.height.unwrap_or(size[0]),
             self.signature.width.unwrap_or(size[1]),
@@ -229,7 +240,7 @@ impl Enhancer {
         };
         cost.fits(pixels, available).map_err(|[needed, available]| {
             self.fault(format!(
-                "would need about {needed:.1} GB of memory for an image of {} × {}, and {available:.1} GB are free; --tile 256 does with a fraction of it where the model is local",
+                "would need about {needed:.1} GB of memory for an image of {} × {}, and {available:.1} GB are free; --tile 256 does with a fraction of it where the model is local, --llie-max-side 1280 with a smaller image where it is not",
                 size[1], size[0]
             ))
         })
@@ -253,6 +264,20 @@ impl Enhancer {
             *resident = bytes;
         }
         Ok(Cost::of(resident))
+    }
+
+    /// The size in which an image is enhanced that is too large for its own: of the same shape, and of the model's multiple.
+    fn reduced(&self, size: [usize; 2]) -> Option<[usize; 2]> {
+        let most = self.most_side.map(NonZeroUsize::get)?;
+        let longest = size[0].max(size[1]);
+        if longest <= most || !self.is_dynamic() {
+            return None;
+        }
+        let multiple = self.stated.multiple.map_or(1, NonZeroUsize::get);
+        Some(size.map(|side| {
+            let scaled = (side * most + longest / 2) / longest;
+            (scaled / multiple * multiple).max(multiple)
+        }))
     }
 
     fn is_dynamic(&self) -> bool {

@@ -109,9 +109,12 @@ pub(super) fn identity(config: &Config, dataset: &Dataset, inputs: &Inputs<'_>) 
     // Tiles give what the whole image does, or all but one sample in a thousand of it.
     let tiling = config.enhancement.tiling;
     let tiling = (tiling != Tiling::Auto).then(|| ("--tile", json!(tiling.to_string())));
+    let side = config.enhancement.most_side;
+    let side = side.map(|side| ("--llie-max-side", json!(side)));
     fields
         .into_iter()
         .chain(tiling)
+        .chain(side)
         .map(|(field, value)| (field.to_owned(), value))
         .collect()
 }

@@ -233,7 +233,9 @@ fn open_enhancers(
         .into_iter()
         .map(|file| {
             let enhancer = Enhancer::open(file, &runtime, threads)?;
-            Ok(enhancer.with_tiling(config.tiling))
+            Ok(enhancer
+                .with_tiling(config.tiling)
+                .with_most_side(config.most_side))
         })
         .collect::<Result<_>>()?;
     Ok((Some(runtime), enhancers))
