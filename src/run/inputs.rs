@@ -65,12 +65,5 @@ pub(super) fn stem(id: &FrameId) -> Result<String> {
         let problem = "this name of a frame leads out of the output folder";
         return Err(Error::data(format_args!("{:?}", id.0), problem));
     }
-    let ending = path
-        .extension()
-        .map(|ending| ending.to_string_lossy().to_lowercase());
-    let bare = match ending.as_deref() {
-        Some("png" | "jpg" | "jpeg") => path.with_extension(""),
-        _ => path.to_owned(),
-    };
-    Ok(bare.to_string_lossy().into_owned())
+    Ok(id.bare().to_owned())
 }

@@ -14,6 +14,25 @@ use crate::error::Error;
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct FrameId(pub String);
 
+impl FrameId {
+    /// The name without the ending of an image file, where it has one.
+    #[must_use]
+    pub fn bare(&self) -> &str {
+        let image = |ending: &str| {
+            let endings = ["png", "jpg", "jpeg"];
+            endings
+                .iter()
+                .any(|known| ending.eq_ignore_ascii_case(known))
+        };
+        match self.0.rsplit_once('.') {
+            Some((bare, ending)) if image(ending) && !bare.is_empty() && !bare.ends_with('/') => {
+                bare
+            }
+            _ => &self.0,
+        }
+    }
+}
+
 impl fmt::Display for FrameId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(&self.0)
@@ -146,6 +165,19 @@ pub struct Intrinsics {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn endings_of_images_are_no_part_of_a_name() {
+        for (name, bare) in [
+            ("a/b.PNG", "a/b"),
+            ("a.b.jpeg", "a.b"),
+            ("a.b", "a.b"),
+            ("a/.png", "a/.png"),
+            ("scene/1", "scene/1"),
+        ] {
+            assert_eq!(FrameId(name.into()).bare(), bare);
+        }
+    }
 
     #[test]
     fn images_are_checked() {

@@ -3,7 +3,6 @@
 mod set;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 
 use rayon::ThreadPoolBuilder;
 
@@ -122,16 +121,8 @@ fn open_sets(
 fn names<'a>(frames: impl Iterator<Item = &'a FrameId>) -> BTreeMap<&'a FrameId, String> {
     let mut taken = BTreeSet::new();
     let name = |frame: &'a FrameId| {
-        let path = Path::new(&frame.0);
-        let ending = path
-            .extension()
-            .map(|ending| ending.to_string_lossy().to_lowercase());
-        let bare = match ending.as_deref() {
-            Some("png" | "jpg" | "jpeg") => path.with_extension(""),
-            _ => path.to_owned(),
-        };
         let plain = |letter: char| letter.is_alphanumeric() || "-_.".contains(letter);
-        let name = bare.to_string_lossy().replace(|letter| !plain(letter), "_");
+        let name = frame.bare().replace(|letter| !plain(letter), "_");
         let name = name.trim_start_matches('.').to_owned();
         let mut unique = name.clone();
         let mut number = 2;
