@@ -52,11 +52,7 @@ impl Enhance {
             enhancement: enhancement(shared.enhancement)?,
             inputs: said.inputs,
             out: said.out,
-            existing: if said.force {
-                Existing::Replaced
-            } else {
-                Existing::Kept
-            },
+            existing: Existing::said(said.force),
             most_pixels: most_pixels(shared.data.max_pixels),
         })
     }

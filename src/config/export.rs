@@ -97,11 +97,7 @@ impl Export {
             light: Light::resolve(&merged.light, &merged.sensor)?,
             enhancement: enhancement(merged.enhancement)?,
             out: said.out,
-            existing: if said.force {
-                Existing::Replaced
-            } else {
-                Existing::Kept
-            },
+            existing: Existing::said(said.force),
         })
     }
 }

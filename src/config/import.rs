@@ -74,11 +74,7 @@ impl Import {
                 (None, Some(count)) => Every::Count(count.get()),
                 (None, None) => Every::Frame,
             },
-            existing: if said.force {
-                Existing::Replaced
-            } else {
-                Existing::Kept
-            },
+            existing: Existing::said(said.force),
             threads: threads(shared.threads)?,
             most_pixels: most_pixels(shared.max_pixels),
         })

@@ -50,6 +50,13 @@ pub enum Existing {
     Replaced,
 }
 
+impl Existing {
+    /// What `--force` says of it.
+    pub(super) fn said(force: bool) -> Self {
+        if force { Self::Replaced } else { Self::Kept }
+    }
+}
+
 impl Synthesize {
     /// Checks what was said by flags, environment and `--config` file; of the last two, what concerns light, threads and
     /// pixels.
@@ -74,11 +81,7 @@ impl Synthesize {
                 (None, Some(Sheet(product))) => product,
                 (None, None) => Product::Images,
             },
-            existing: if said.force {
-                Existing::Replaced
-            } else {
-                Existing::Kept
-            },
+            existing: Existing::said(said.force),
             threads: threads(shared.threads)?,
             most_pixels: most_pixels(shared.max_pixels),
         })

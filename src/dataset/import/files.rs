@@ -27,11 +27,7 @@ pub(super) fn files(folder: &Path, endings: &[&str]) -> Result<BTreeMap<String, 
     }
     let mut files = BTreeMap::new();
     for path in entries(folder)?.into_iter().filter(|path| path.is_file()) {
-        let name = path
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned();
+        let name = last(&path);
         let lower = name.to_lowercase();
         if let Some(ending) = endings.iter().find(|ending| lower.ends_with(**ending)) {
             files.insert(name[..name.len() - ending.len()].to_owned(), path);
@@ -73,6 +69,12 @@ pub(super) fn picture(path: &Path) -> Result<Rgb> {
         most_pixels: MOST_PIXELS,
     }
     .decode()
+}
+
+/// The last part of a path, as text.
+pub(super) fn last(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
 }
 
 /// The numbers of a PNG file of one of these forms.

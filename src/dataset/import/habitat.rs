@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::files::{depth, files, folders, same_size, segments, text};
+use super::files::{depth, files, folders, last, same_size, segments, text};
 use super::{Adapter, Incoming, Read, Stated, hm3d, mp3d, mpcat40, numbers, pinhole, replica};
 use crate::error::{Error, Result};
 use crate::types::{DepthKind, Intrinsics, Labels, Rgb, SegmentName};
@@ -73,11 +73,7 @@ impl Habitat {
     }
 
     fn add(&mut self, folder: &Path) -> Result<()> {
-        let name = folder
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned();
+        let name = last(folder);
         let scene = self.scene(folder)?;
         let images = files(&folder.join("rgb"), &[".png", ".jpg", ".jpeg"])?;
         let depths = files(&folder.join("depth"), &[".npy", ".png"])?;

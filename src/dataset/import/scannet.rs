@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use ndarray::Array2;
 use serde::Deserialize;
 
-use super::files::{depth, files, first, folders, numbers, png, same_size, text};
+use super::files::{depth, files, first, folders, last, numbers, png, same_size, text};
 use super::names::{UNKNOWN, overridden};
 use super::{Adapter, Incoming, Read, Stated};
 use crate::dataset::raw_png::Form;
@@ -84,11 +84,7 @@ impl Scannet {
     }
 
     fn add(&mut self, folder: &Path, numbering: Numbering) -> Result<()> {
-        let name = folder
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned();
+        let name = last(folder);
         check_overflow(folder, &name)?;
         let camera = |names: [String; 2]| {
             let path = names

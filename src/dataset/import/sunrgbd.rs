@@ -12,7 +12,7 @@ use ndarray::Array2;
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::files::{files, folders, numbers, png, same_size, text};
+use super::files::{files, folders, last, numbers, png, same_size, text};
 use super::names::{Meaning, UNKNOWN, meaning};
 use super::polygons::{Polygon, draw};
 use super::{Adapter, Incoming, Read};
@@ -88,11 +88,7 @@ impl SunRgbd {
             return self.add(folder, way, annotation);
         }
         for inner in folders(folder)? {
-            let name = inner
-                .file_name()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned();
+            let name = last(&inner);
             self.walk(&inner, &[way, &[name]].concat())?;
         }
         Ok(())

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use ndarray::Array2;
 
-use super::files::{depth, files, folders, picture, same_size, text};
+use super::files::{depth, files, folders, last, picture, same_size, text};
 use super::{Adapter, Incoming, Read, Stated, mpcat40, names, numbers, pinhole};
 use crate::error::{Error, Result};
 use crate::types::{DepthKind, Intrinsics, Labels, Rgb, SegmentName};
@@ -57,11 +57,7 @@ impl Thor {
     }
 
     fn add(&mut self, folder: &Path) -> Result<()> {
-        let name = folder
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned();
+        let name = last(folder);
         let scene = scene(&folder.join("colors.json"))?;
         let depths = files(&folder.join("depth"), &[".npy", ".png"])?;
         let instances = files(&folder.join("instance"), &[".png"])?;
