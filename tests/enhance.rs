@@ -113,6 +113,10 @@ fn a_sidecar_says_which_output_it_is() {
 #[test]
 fn a_model_of_a_fixed_size_is_fed_and_read_by_resizing() {
     let (_folder, mut enhancer) = loaded(&onnx::fixed(16, 24));
+    // Multiples are tried for a model of any size alone, and nothing else is said.
+    let tried = |enhancer: &Enhancer| enhancer.describe().contains("tried; then 4");
+    assert!(!tried(&enhancer), "{}", enhancer.describe());
+    assert!(tried(&loaded(&onnx::identity()).1));
     let same = image(16, 24);
     assert_eq!(enhancer.enhance(&same).unwrap(), same);
     let flat = Rgb::new(30, 17, [9, 120, 250].repeat(30 * 17)).unwrap();

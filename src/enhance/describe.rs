@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::convention::Tile;
 use super::feeding::Feeding;
+use super::onnx::MULTIPLES;
 use super::preset::Preset;
 use super::reading::Reading;
 use super::sidecar::Sidecar;
@@ -68,11 +69,13 @@ impl Description {
             Some(multiple) => {
                 lines.add("multiple", multiple, self.why(|s| s.multiple.is_some(), ""));
             }
-            None => lines.add(
-                "multiple",
-                "1",
-                "tried; then 4, 8, 12, 16, 32 where it fails",
-            ),
+            None if signature.takes_any_size() => {
+                let others = MULTIPLES[1..].iter().map(ToString::to_string);
+                let others = others.collect::<Vec<_>>().join(", ");
+                let why = format!("tried; then {others} where it fails");
+                lines.add("multiple", MULTIPLES[0], why);
+            }
+            None => lines.add("multiple", 1, "its size is fixed"),
         }
         lines.add("pad", feeding.pad, self.why(|s| s.pad.is_some(), "usual"));
         for extra in &signature.extras {

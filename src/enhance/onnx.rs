@@ -29,7 +29,7 @@ const WHOLE: usize = 1280 * 720;
 /// The context of tiles that are asked for without anybody saying how much is exact.
 const CONTEXT: usize = 32;
 /// What sides are tried as multiples of, where a model fails on an image's own and nobody says better.
-const MULTIPLES: [usize; 6] = [1, 4, 8, 12, 16, 32];
+pub(super) const MULTIPLES: [usize; 6] = [1, 4, 8, 12, 16, 32];
 
 /// What is known of the memory that a model needs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -202,7 +202,7 @@ impl Enhancer {
         }
         let multiples: &[usize] = match self.stated.multiple {
             Some(multiple) => &[multiple.get()],
-            None if fixed == size && self.is_dynamic() => &MULTIPLES,
+            None if fixed == size && self.signature.takes_any_size() => &MULTIPLES,
             None => &[1],
         };
         self.estimate(dark, fixed)?;
@@ -225,7 +225,7 @@ impl Enhancer {
             fixed,
             self.stated.multiple.map_or(1, NonZeroUsize::get),
         )?;
-        let probed = size.iter().all(|side| *side >= PROBES[1]) && self.is_dynamic();
+        let probed = size.iter().all(|side| *side >= PROBES[1]) && self.signature.takes_any_size();
         if pixels <= WHOLE || cut.tile != area || !probed {
             return Ok(());
         }
@@ -270,7 +270,7 @@ impl Enhancer {
     fn reduced(&self, size: [usize; 2]) -> Option<[usize; 2]> {
         let most = self.most_side.map(NonZeroUsize::get)?;
         let longest = size[0].max(size[1]);
-        if longest <= most || !self.is_dynamic() {
+        if longest <= most || !self.signature.takes_any_size() {
             return None;
         }
         let multiple = self.stated.multiple.map_or(1, NonZeroUsize::get);
@@ -278,10 +278,6 @@ impl Enhancer {
             let scaled = (side * most + longest / 2) / longest;
             (scaled / multiple * multiple).max(multiple)
         }))
-    }
-
-    fn is_dynamic(&self) -> bool {
-        self.signature.height.is_none() && self.signature.width.is_none()
     }
 
     /// Enhances an image whose sides are filled up to multiples; a problem that another multiple may mend is given back.

@@ -161,6 +161,13 @@ impl Signature {
     }
 }
 
+impl Signature {
+    /// Whether the graph fixes neither height nor width.
+    pub(super) fn takes_any_size(&self) -> bool {
+        self.height.is_none() && self.width.is_none()
+    }
+}
+
 /// The layout of an image of three channels, where its dimensions say it.
 fn layout(port: &Port) -> Option<Layout> {
     let mut fitting = Layout::ALL.into_iter().filter(|layout| {
