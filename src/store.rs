@@ -82,27 +82,7 @@ impl Store {
 
     /// What the run holds: the last record of each trial, in the order of their first.
     pub fn records(&self) -> Result<Vec<Record>> {
-        let mut latest = HashMap::<TrialKey, usize>::new();
-        let mut records: Vec<Record> = Vec::new();
-        let path = self.folder.join(RECORDS);
-        let file = File::open(&path).map_err(|e| Error::file(&path, "read", e))?;
-        for (i, line) in BufReader::new(file).split(b'\n').enumerate() {
-            let line = line.map_err(|e| Error::file(&path, "read", e))?;
-            let record: Record = serde_json::from_slice(&line).map_err(|e| {
-                Error::line(
-                    &path,
-                    i + 1,
-                    format_args!("not a record: {e}; restore the file, or use another --out"),
-                )
-            })?;
-            if let Some(&index) = latest.get(&record.key) {
-                records[index] = record;
-            } else {
-                latest.insert(record.key, records.len());
-                records.push(record);
-            }
-        }
-        Ok(records)
+        read_records(&self.folder)
     }
 
     /// The run folder.
@@ -167,6 +147,40 @@ fn write_manifest(folder: &Path, manifest: &RunManifest) -> Result<()> {
     let mut text = serde_json::to_vec_pretty(manifest).map_err(unwritten)?;
     text.push(b'\n');
     write(folder, MANIFEST, &text)
+}
+
+/// What a run folder holds: the last record of each trial, in the order of their first; a last line that was cut off while it
+/// was written is passed over.
+pub fn read_records(folder: &Path) -> Result<Vec<Record>> {
+    let mut latest = HashMap::<TrialKey, usize>::new();
+    let mut records: Vec<Record> = Vec::new();
+    let path = folder.join(RECORDS);
+    let file = match File::open(&path) {
+        Ok(file) => file,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(records),
+        Err(e) => return Err(Error::file(&path, "read", e)),
+    };
+    let mut lines = BufReader::new(file);
+    let mut line = Vec::new();
+    for number in 1.. {
+        line.clear();
+        let read = lines.read_until(b'\n', &mut line);
+        read.map_err(|e| Error::file(&path, "read", e))?;
+        if line.pop() != Some(b'\n') {
+            break;
+        }
+        let record: Record = serde_json::from_slice(&line).map_err(|e| {
+            let problem = format!("not a record: {e}; restore the file, or use another --out");
+            Error::line(&path, number, problem)
+        })?;
+        if let Some(&index) = latest.get(&record.key) {
+            records[index] = record;
+        } else {
+            latest.insert(record.key, records.len());
+            records.push(record);
+        }
+    }
+    Ok(records)
 }
 
 /// The newest run folder in `base` whose name ends in `-<hash>`.
@@ -329,6 +343,7 @@ mod tests {
             finish: None,
             strict: None,
             lenient: None,
+            repeat: 0,
             outcome,
             failure: None,
             usage: None,

@@ -9,8 +9,8 @@ use std::time::{Duration, Instant, SystemTime};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use darkqa_eval::ask::{
-    AskError, BaseUrl, Call, Detail, Endpoint, Format, Model, OpenAi, Parameters, Payload, Prompts,
-    Random, Reach, Script, Secret, Sending, TokenField,
+    Access, AskError, BaseUrl, Call, Constrain, Detail, Endpoint, Format, Model, OpenAi,
+    Parameters, Payload, Prompts, Random, Reach, Script, Secret, Sending, Temperature, TokenField,
 };
 use darkqa_eval::types::{
     Choices, Digest, FailureKind, Family, Finish, FrameId, Question, QuestionId, Reply, Rgb, View,
@@ -28,8 +28,11 @@ fn quick() -> Sending {
 }
 
 fn endpoint_at(base: &str, key: Option<&str>, sending: Sending) -> Arc<Endpoint> {
-    let key = key.map(|key| Secret::new(key, "KEY").unwrap());
-    Arc::new(Endpoint::open(base.parse().unwrap(), key.as_ref(), sending).unwrap())
+    let access = Access {
+        key: key.map(|key| Secret::new(key, "KEY").unwrap()),
+        ..Access::new(base.parse().unwrap())
+    };
+    Arc::new(Endpoint::open(access, sending).unwrap())
 }
 
 fn model_at(mock: &MockEndpoint, sending: Sending) -> OpenAi {
@@ -56,7 +59,9 @@ fn question(id: &str, text: &str) -> Question {
 /// Asks once, of an endpoint that plays these answers.
 async fn asked(answers: Vec<Answer>) -> (Result<Reply, AskError>, MockEndpoint) {
     let mock = MockEndpoint::start(answers);
-    let reply = model_at(&mock, quick()).ask("Red?", Some(&image())).await;
+    let reply = model_at(&mock, quick())
+        .ask("Red?", 2, Some(&image()))
+        .await;
     (reply, mock)
 }
 
@@ -66,7 +71,7 @@ async fn a_request_is_the_smallest_every_server_takes() {
     let hostile = "say \"url\":\"\" \u{1F512} \\\"}}]}]} \n{{ x }}\u{0}";
     let image = image();
     let reply = model_at(&mock, quick())
-        .ask(hostile, Some(&image))
+        .ask(hostile, 2, Some(&image))
         .await
         .unwrap();
     assert_eq!((reply.text.as_str(), reply.attempts), ("B", 1));
@@ -84,7 +89,7 @@ async fn a_request_is_the_smallest_every_server_takes() {
     let length = request.body.len().to_string();
     assert_eq!(request.header("content-length"), Some(length.as_str()));
     assert_eq!(request.header("transfer-encoding"), None);
-    assert_eq!(request.header("accept-encoding"), None);
+    assert_eq!(request.header("accept-encoding"), Some("gzip"));
 
     let mut body = request.json();
     let url = body["messages"][0]["content"][1]["image_url"]["url"].take();
@@ -111,21 +116,22 @@ async fn what_is_set_is_sent_and_what_is_not_is_left_out() {
     let endpoint = endpoint_at(&mock.base_url(), None, quick());
     let parameters = Parameters {
         model: "m".into(),
-        temperature: None,
+        temperature: Temperature::Server,
         max_tokens: Some(16),
         token_field: TokenField::MaxCompletionTokens,
         reasoning_effort: Some("low".into()),
         detail: Some(Detail::High),
+        constrain: Constrain::None,
     };
     let model = OpenAi::new(endpoint.clone(), parameters);
-    model.ask("Red?", Some(&image())).await.unwrap();
+    model.ask("Red?", 2, Some(&image())).await.unwrap();
     let bare = Parameters {
-        temperature: None,
+        temperature: Temperature::Server,
         max_tokens: None,
         ..Parameters::new("m".into())
     };
     let model = OpenAi::new(endpoint, bare);
-    model.ask("Red?", None).await.unwrap();
+    model.ask("Red?", 2, None).await.unwrap();
 
     let requests = mock.requests();
     assert_eq!(requests[0].header("authorization"), None);
@@ -154,7 +160,7 @@ async fn base_urls_keep_their_path_and_query() {
     ] {
         let endpoint = endpoint_at(&format!("{root}{base}"), None, quick());
         let model = OpenAi::new(endpoint, Parameters::new("m".into()));
-        model.ask("Red?", None).await.unwrap();
+        model.ask("Red?", 2, None).await.unwrap();
         assert_eq!(mock.requests().pop().unwrap().line, line);
     }
 }
@@ -177,6 +183,7 @@ async fn what_may_pass_is_tried_again() {
         Answer::json(200, &json!({"choices": null})),
         html,
         Answer::new(200, "data: {}\n\n").header("content-type", "text/event-stream"),
+        Answer::new(499, ""),
         Answer::json(200, &json!({"error": {"message": "no", "code": 502}})),
         Answer::json(200, &json!({"error": "overloaded"})),
         Answer::error(400, "x", "odd").header("x-should-retry", "true"),
@@ -226,7 +233,7 @@ async fn retries_come_to_an_end() {
             ..quick()
         };
         let error = model_at(&mock, sending)
-            .ask("Red?", None)
+            .ask("Red?", 2, None)
             .await
             .unwrap_err();
         assert_eq!(
@@ -349,7 +356,7 @@ async fn servers_that_say_nothing_time_out() {
             ..quick()
         };
         let error = model_at(&mock, sending)
-            .ask("Red?", None)
+            .ask("Red?", 2, None)
             .await
             .unwrap_err();
         assert_eq!(error.failure.kind, FailureKind::Timeout);
@@ -370,7 +377,7 @@ async fn a_closed_port_is_a_connection_failure() {
     };
     let endpoint = endpoint_at(&format!("http://127.0.0.1:{port}/v1"), None, sending);
     let model = OpenAi::new(endpoint, Parameters::new("m".into()));
-    let error = model.ask("Red?", None).await.unwrap_err();
+    let error = model.ask("Red?", 2, None).await.unwrap_err();
     assert_eq!(error.failure.kind, FailureKind::Connection);
     assert!(
         error.failure.message.to_lowercase().contains("refused"),
@@ -390,7 +397,7 @@ async fn a_wait_asked_for_is_kept_by_all() {
         let mock = MockEndpoint::start([answer, Answer::text("B")]);
         let model = model_at(&mock, quick());
         let start = Instant::now();
-        assert_eq!(model.ask("Red?", None).await.unwrap().attempts, 2);
+        assert_eq!(model.ask("Red?", 2, None).await.unwrap().attempts, 2);
         assert!(start.elapsed() >= Duration::from_millis(50));
     }
     // One request is turned away; another one, asked in the meanwhile, waits as well.
@@ -406,8 +413,8 @@ async fn a_wait_asked_for_is_kept_by_all() {
     let first = OpenAi::new(endpoint.clone(), Parameters::new("m".into()));
     let second = OpenAi::new(endpoint, Parameters::new("n".into()));
     let start = Instant::now();
-    first.ask("Red?", None).await.unwrap_err();
-    let reply = second.ask("Red?", None).await.unwrap();
+    first.ask("Red?", 2, None).await.unwrap_err();
+    let reply = second.ask("Red?", 2, None).await.unwrap();
     assert_eq!(reply.attempts, 1);
     assert!(start.elapsed() >= Duration::from_millis(80));
 }
@@ -429,9 +436,9 @@ async fn a_wait_too_long_is_given_up_at_once() {
 async fn a_request_dropped_leaves_the_model_usable() {
     let mock = MockEndpoint::start([Answer::silent(), Answer::text("B")]);
     let model = model_at(&mock, quick());
-    let asked = tokio::time::timeout(Duration::from_millis(50), model.ask("Red?", None));
+    let asked = tokio::time::timeout(Duration::from_millis(50), model.ask("Red?", 2, None));
     assert!(asked.await.is_err());
-    assert_eq!(model.ask("Red?", None).await.unwrap().text, "B");
+    assert_eq!(model.ask("Red?", 2, None).await.unwrap().text, "B");
 }
 
 #[tokio::test]
@@ -455,7 +462,7 @@ async fn keys_are_in_no_error_and_no_debug_output() {
                 ..quick()
             },
         );
-        let error = model.ask("Red?", None).await.unwrap_err();
+        let error = model.ask("Red?", 2, None).await.unwrap_err();
         let shown = format!("{error:?} {error} {model:?}");
         assert!(!shown.contains("sk-very"), "{shown}");
         assert!(error.failure.message.contains("[secret]"), "{error}");
@@ -472,7 +479,7 @@ async fn keys_are_in_no_error_and_no_debug_output() {
         endpoint_at(&base, None, quick()),
         Parameters::new("m".into()),
     );
-    let error = model.ask("Red?", None).await.unwrap_err();
+    let error = model.ask("Red?", 2, None).await.unwrap_err();
     let shown = format!("{error:?} {model:?}");
     for secret in ["us3r", "passw0rd", "t0ken"] {
         assert!(!error.failure.message.contains(secret), "{shown}");
@@ -489,11 +496,12 @@ async fn keys_are_in_no_error_and_no_debug_output() {
 fn keys_do_not_travel_in_the_open() {
     let key = Secret::new(KEY, "KEY").unwrap();
     let open = |base: &str, key: Option<&Secret>, allow_http| {
-        let sending = Sending {
+        let access = Access {
+            key: key.cloned(),
             allow_http,
-            ..quick()
+            ..Access::new(base.parse::<BaseUrl>().unwrap())
         };
-        Endpoint::open(base.parse::<BaseUrl>().unwrap(), key, sending)
+        Endpoint::open(access, quick())
     };
     let refused = open("http://10.0.0.7:8000/v1", Some(&key), false).unwrap_err();
     assert!(refused.to_string().contains("--allow-http"), "{refused}");
@@ -521,6 +529,7 @@ async fn scripts_and_guesses_answer_without_an_endpoint() {
         condition,
         prompt: &prompt,
         image: None,
+        turn: 0,
     };
     std::fs::write(
         &path,

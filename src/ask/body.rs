@@ -20,6 +20,11 @@ impl Parts {
         Self { pieces, next: 0 }
     }
 
+    /// All of it in one piece.
+    pub(super) fn joined(&self) -> Vec<u8> {
+        self.pieces.concat()
+    }
+
     fn rest(&self) -> &[Bytes] {
         self.pieces.get(self.next..).unwrap_or_default()
     }

@@ -2,31 +2,31 @@
 
 use std::error::Error as _;
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, SystemTime};
 
 use backon::{ExponentialBuilder, Retryable as _};
-use reqwest::header::{AUTHORIZATION, CONTENT_TYPE, HeaderMap, HeaderValue, LOCATION};
-use reqwest::{Client, Response, StatusCode, Url, redirect};
+use reqwest::header::{CONTENT_TYPE, HeaderMap, LOCATION};
+use reqwest::{Client, Response, StatusCode, Url};
 use tokio::sync::watch;
-use tokio::time::sleep;
+use tokio::time::{Instant, sleep};
 use tracing::debug;
 
+use super::access::Access;
 use super::body::Parts;
 use super::complaint::Complaint;
-use super::pace::{Gate, asked_wait};
+use super::field::Refused;
+use super::pace::{Allowance, Bounds, Gate, Quota, Window, asked_wait};
 use super::response::{self, Flaw};
-use super::secret::{Scrub, Secret};
+use super::secret::Scrub;
 use super::url::BaseUrl;
 use super::verdict::{Sent, Verdict, judge};
 use super::{AskError, Reach, failure};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::types::{Failure, FailureKind, Reply};
 
-/// The most of a reply that is read: no completion of a few tokens comes near, and memory is not the server's to fill.
+/// The most of a reply that is read, unpacked: no completion of a few tokens comes near, and memory is not the server's to
+/// fill.
 const LONGEST_REPLY: usize = 16 << 20;
-
-/// How long a connection may take to come about.
-const CONNECT: Duration = Duration::from_secs(10);
 
 /// The longest wait of our own making; a server may ask for longer ones.
 const LONGEST_DELAY: Duration = Duration::from_secs(30);
@@ -43,8 +43,10 @@ pub struct Sending {
     pub first_delay: Duration,
     /// The longest wait that a server may ask for; beyond it the request is given up at once.
     pub max_wait: Duration,
-    /// Whether a key may travel unencrypted to another machine.
-    pub allow_http: bool,
+    /// How many requests are on the wire at once.
+    pub concurrency: Bounds,
+    /// What may be sent in a minute.
+    pub quota: Quota,
 }
 
 impl Default for Sending {
@@ -54,7 +56,8 @@ impl Default for Sending {
             retries: 5,
             first_delay: Duration::from_millis(500),
             max_wait: Duration::from_mins(2),
-            allow_http: false,
+            concurrency: Bounds::DEFAULT,
+            quota: Quota::default(),
         }
     }
 }
@@ -64,11 +67,13 @@ impl Default for Sending {
 pub struct Endpoint {
     base: BaseUrl,
     url: Url,
-    authorization: Option<HeaderValue>,
+    headers: HeaderMap,
+    has_key: bool,
     client: Client,
     sending: Sending,
     scrub: Scrub,
     gate: Gate,
+    window: Window,
     closing: watch::Sender<bool>,
 }
 
@@ -79,58 +84,49 @@ struct Miss {
     again: bool,
     /// The wait that the server asked for.
     wait: Option<Duration>,
+    /// The field that it refused.
+    refused: Option<Refused>,
+}
+
+impl Miss {
+    /// One that may pass.
+    fn passing(failure: Failure) -> Self {
+        Self {
+            failure,
+            reach: Reach::Trial,
+            again: true,
+            wait: None,
+            refused: None,
+        }
+    }
 }
 
 impl Endpoint {
     /// Makes ready to talk to an endpoint; nothing is sent yet.
     ///
-    /// Redirects are not followed, bodies not decompressed. Proxies are those of the environment, and none for this machine.
-    ///
     /// # Errors
     /// Where a key would be sent unencrypted to another machine, or is given twice.
-    pub fn open(base: BaseUrl, key: Option<&Secret>, sending: Sending) -> Result<Self> {
-        let secrets = base.secrets().into_iter();
-        let scrub = Scrub::new(secrets.chain(key.map(|key| key.expose().to_owned())));
-        if base.is_plain() && !base.is_loopback() && !sending.allow_http {
-            let secret = key.is_some() || !scrub.is_empty();
-            if secret {
-                return Err(Error::usage(
-                    "--base-url",
-                    format_args!(
-                        "the key would travel to {base} for all to read; use https://, or --allow-http if the network is yours"
-                    ),
-                ));
-            }
-        }
-        if key.is_some() && base.has_credentials() {
-            return Err(Error::usage(
-                "--base-url",
-                format_args!("{base} comes with a user name and with a key; leave one of them out"),
-            ));
-        }
-        let authorization = key.map(authorization).transpose()?;
-        let mut client = Client::builder()
-            .user_agent(concat!("darkqa-eval/", env!("CARGO_PKG_VERSION")))
-            .redirect(redirect::Policy::none())
-            .connect_timeout(CONNECT.min(sending.timeout))
-            .timeout(sending.timeout);
-        if base.is_loopback() {
-            client = client.no_proxy();
-        }
-        let client = client.build().map_err(|error| Error::Endpoint {
-            endpoint: base.to_string(),
-            problem: scrub.line(&chain(&error)),
-        })?;
+    pub fn open(access: Access, sending: Sending) -> Result<Self> {
+        let scrub = access.scrub();
+        access.check(&scrub)?;
         Ok(Self {
-            url: base.completions(),
-            base,
-            authorization,
-            client,
+            url: access.base.completions(),
+            headers: access.headers()?,
+            has_key: access.key.is_some() || access.base.has_credentials(),
+            client: access.client(sending.timeout, &scrub)?,
+            base: access.base,
             sending,
             scrub,
-            gate: Gate::new(),
+            gate: Gate::new(sending.quota),
+            window: Window::new(sending.concurrency),
             closing: watch::Sender::new(false),
         })
+    }
+
+    /// How many requests may be on the wire now, within [`Sending::concurrency`].
+    #[must_use]
+    pub fn width(&self) -> usize {
+        self.window.width()
     }
 
     /// The base URL; shown without user, password and query string.
@@ -144,7 +140,7 @@ impl Endpoint {
     }
 
     pub(super) fn has_key(&self) -> bool {
-        self.authorization.is_some() || self.base.has_credentials()
+        self.has_key
     }
 
     /// Lets no further request go out: those on the wire are finished, those that wait give up at once.
@@ -167,6 +163,7 @@ impl Endpoint {
                 reach: Reach::Interrupted,
                 again: false,
                 wait: None,
+                refused: None,
             }),
             () = self.gate.pass() => Ok(()),
         }
@@ -210,6 +207,7 @@ impl Endpoint {
                 failure: miss.failure,
                 attempts,
                 reach: miss.reach,
+                refused: miss.refused,
             }),
         }
     }
@@ -217,29 +215,37 @@ impl Endpoint {
     /// One try.
     async fn send(&self, body: Parts, sent: Sent<'_>) -> Result<Reply, Miss> {
         let started = Instant::now();
-        let mut request = self
+        let request = self
             .client
             .post(self.url.clone())
-            .header(CONTENT_TYPE, "application/json");
-        if let Some(authorization) = &self.authorization {
-            request = request.header(AUTHORIZATION, authorization);
-        }
-        let request = request.body(reqwest::Body::wrap(body));
-        let response = request.send().await.map_err(|error| self.broken(error))?;
+            .headers(self.headers.clone())
+            .header(CONTENT_TYPE, "application/json")
+            .body(reqwest::Body::wrap(body));
+        let response = request
+            .send()
+            .await
+            .map_err(|error| self.broken(error, started))?;
         let status = response.status();
         let headers = response.headers().clone();
-        let body = self.receive(response).await;
+        let body = self.receive(response, started).await;
         let request_id = header(&headers, "x-request-id");
-        let latency_ms = started.elapsed().as_millis() as u64;
+        let took = started.elapsed();
+        let latency_ms = took.as_millis() as u64;
         debug!(endpoint = %self.base, %status, latency_ms, request_id = self.scrub.line(request_id), "answered");
         if !status.is_success() {
             // A refusal whose words were lost on the way is a refusal all the same.
             let words = body.unwrap_or_default();
+            if matches!(status.as_u16(), 429 | 503 | 529) {
+                self.window.overloaded(started);
+            }
             return Err(self.refused(status, &headers, &words, sent));
         }
         match response::read(&body?, header(&headers, CONTENT_TYPE.as_str())) {
             Ok(reply) => {
-                self.gate.ease();
+                self.window.succeeded(took);
+                let left = Allowance::read(&headers, SystemTime::now());
+                let tokens = reply.usage.and_then(|usage| usage.total());
+                self.gate.ease(tokens, left, self.sending.max_wait);
                 let clean = |text: Option<String>| text.map(|text| self.scrub.reply(text));
                 Ok(Reply {
                     text: self.scrub.reply(reply.text),
@@ -256,30 +262,27 @@ impl Endpoint {
                 miss.failure.status = Some(status.as_u16());
                 Err(miss)
             }
-            Err(Flaw::Unreadable(what)) => Err(Miss {
-                failure: Failure {
-                    kind: FailureKind::Response,
-                    status: Some(status.as_u16()),
-                    message: format!("{} answered with {}", self.base, self.scrub.line(&what)),
-                },
-                reach: Reach::Trial,
-                again: true,
-                wait: None,
-            }),
+            Err(Flaw::Unreadable(what)) => Err(Miss::passing(Failure {
+                kind: FailureKind::Response,
+                status: Some(status.as_u16()),
+                message: format!("{} answered with {}", self.base, self.scrub.line(&what)),
+            })),
         }
     }
 
-    /// The body of a reply, up to a length.
-    async fn receive(&self, mut response: Response) -> Result<Vec<u8>, Miss> {
+    /// The body of a reply, unpacked where it is compressed, up to a length.
+    async fn receive(&self, mut response: Response, started: Instant) -> Result<Vec<u8>, Miss> {
         let mut body = Vec::new();
-        while let Some(chunk) = response.chunk().await.map_err(|error| self.broken(error))? {
+        while let Some(chunk) = response
+            .chunk()
+            .await
+            .map_err(|error| self.broken(error, started))?
+        {
             if body.len() + chunk.len() > LONGEST_REPLY {
                 let message = format!("{} answered with more than 16 MiB", self.base);
                 return Err(Miss {
-                    failure: failure(FailureKind::Response, message),
-                    reach: Reach::Trial,
                     again: false,
-                    wait: None,
+                    ..Miss::passing(failure(FailureKind::Response, message))
                 });
             }
             body.extend_from_slice(&chunk);
@@ -288,8 +291,9 @@ impl Endpoint {
     }
 
     /// A try without a whole reply.
-    fn broken(&self, error: reqwest::Error) -> Miss {
+    fn broken(&self, error: reqwest::Error, started: Instant) -> Miss {
         let (kind, message) = if error.is_timeout() {
+            self.window.overloaded(started);
             let timeout = self.sending.timeout.as_secs_f64();
             (
                 FailureKind::Timeout,
@@ -302,12 +306,7 @@ impl Endpoint {
             let said = self.scrub.line(&chain(&error.without_url()));
             (FailureKind::Connection, format!("{}: {said}", self.base))
         };
-        Miss {
-            failure: failure(kind, message),
-            reach: Reach::Trial,
-            again: true,
-            wait: None,
-        }
+        Miss::passing(failure(kind, message))
     }
 
     /// A try that the status says failed.
@@ -337,6 +336,7 @@ impl Endpoint {
             mut reach,
             mut again,
             hint,
+            refused,
         } = judge(status, complaint, sent);
         match header(headers, "x-should-retry") {
             "true" => again = true,
@@ -352,6 +352,10 @@ impl Endpoint {
         if let Some(hint) = hint {
             message = format!("{message} ({hint})");
         }
+        let request_id = self.scrub.line(header(headers, "x-request-id"));
+        if !request_id.is_empty() {
+            message = format!("{message} [request {request_id}]");
+        }
         let is_pause = matches!(status, 429 | 503 | 529);
         match wait {
             Some(wait) if wait > self.sending.max_wait => {
@@ -366,6 +370,8 @@ impl Endpoint {
                 );
             }
             Some(wait) if is_pause => self.gate.shut(wait),
+            // It does not say how long: all wait as long as the one that was turned away does first.
+            None if is_pause && again => self.gate.shut(self.sending.first_delay),
             _ => {}
         }
         Miss {
@@ -377,6 +383,7 @@ impl Endpoint {
             reach,
             again,
             wait,
+            refused,
         }
     }
 }
@@ -387,15 +394,8 @@ fn header<'a>(headers: &'a HeaderMap, name: &str) -> &'a str {
     value.unwrap_or_default()
 }
 
-fn authorization(key: &Secret) -> Result<HeaderValue> {
-    let value = HeaderValue::try_from(format!("Bearer {}", key.expose()));
-    let mut value = value.map_err(|_| Error::usage("key", "no HTTP header can carry it"))?;
-    value.set_sensitive(true);
-    Ok(value)
-}
-
 /// An error with all that caused it: reqwest's own words alone say only that something failed.
-fn chain(error: &reqwest::Error) -> String {
+pub(super) fn chain(error: &reqwest::Error) -> String {
     let mut words = error.to_string();
     let mut cause = error.source();
     while let Some(error) = cause {

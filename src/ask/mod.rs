@@ -4,28 +4,42 @@
 //! A [`Model`] takes the two as a [`Call`]. [`OpenAi`] is a model behind an [`Endpoint`]; what belongs to one server (address,
 //! key, connections, pauses) lives in the endpoint and is shared by all models asked there.
 
+mod access;
 mod body;
 mod complaint;
 mod endpoint;
+mod escapes;
+mod field;
+mod image_limit;
+mod image_tokens;
 mod openai;
 mod pace;
+mod parameters;
 mod payload;
 mod plain_png;
+mod prices;
 mod prompt;
 mod random;
 mod request;
 mod response;
 mod script;
 mod secret;
+mod stream;
 mod url;
 mod verdict;
 
+pub use access::{Access, Authorities, KeyHeader};
 pub use endpoint::{Endpoint, Sending};
+pub use field::Refused;
+pub use image_limit::ImageLimit;
+pub use image_tokens::image_tokens;
 pub use openai::OpenAi;
+pub use pace::{Bounds, Quota};
+pub use parameters::{Constrain, Detail, Parameters, Temperature, TokenField};
 pub use payload::{Format, Payload, Quality};
+pub use prices::{Price, Prices};
 pub use prompt::Prompts;
 pub use random::Random;
-pub use request::{Detail, Parameters, TokenField};
 pub use script::Script;
 pub use secret::Secret;
 pub use url::BaseUrl;
@@ -43,6 +57,8 @@ pub struct Call<'a> {
     pub prompt: &'a str,
     /// The image; `None` for a question put in words alone.
     pub image: Option<&'a Payload>,
+    /// How many times the question was put before, in whatever order of its choices.
+    pub turn: u32,
 }
 
 /// Something that can be asked.
@@ -77,6 +93,15 @@ impl Model {
         }
     }
 
+    /// How many questions may be under way at once; `None` where it does not matter.
+    #[must_use]
+    pub fn width(&self) -> Option<usize> {
+        match self {
+            Self::OpenAi(model) => Some(model.endpoint().width()),
+            Self::Random(_) | Self::Script(_) => None,
+        }
+    }
+
     /// Lets nothing further go out to the model's endpoint; what is on the wire is finished.
     pub fn close(&self) {
         if let Self::OpenAi(model) = self {
@@ -93,8 +118,11 @@ impl Model {
     /// Puts one question. Dropping the future gives up the request and leaves nothing behind.
     pub async fn ask(&self, call: Call<'_>) -> Result<Reply, AskError> {
         match self {
-            Self::OpenAi(model) => model.ask(call.prompt, call.image).await,
-            Self::Random(random) => Ok(Reply::local(random.answer(call.question, call.condition))),
+            Self::OpenAi(model) => {
+                let choices = call.question.choices.len();
+                model.ask(call.prompt, choices, call.image).await
+            }
+            Self::Random(random) => Ok(Reply::local(random.answer(call))),
             Self::Script(script) => script.answer(call.question, call.condition),
         }
     }
@@ -121,6 +149,8 @@ pub struct AskError {
     pub attempts: u32,
     /// Whether it is worth asking anything else.
     pub reach: Reach,
+    /// The field that the server does not take, where it is one that can be sent otherwise.
+    pub refused: Option<Refused>,
 }
 
 /// A failure without an HTTP status.

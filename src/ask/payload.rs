@@ -14,9 +14,6 @@ use super::plain_png;
 use crate::error::{Error, Result};
 use crate::types::{Digest, ImageFacts, Rgb};
 
-/// The largest file that is sent, 20 MB: the most that providers of hosted models take in one image.
-const LARGEST: usize = 20_000_000;
-
 /// The file format in which images are sent. PNG and JPEG alone: servers refuse others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
@@ -86,7 +83,7 @@ impl Payload {
     /// Encodes an image, made smaller (Lanczos3) where its longer side is beyond `max_side` pixels; never larger.
     ///
     /// # Errors
-    /// Where the outcome is larger than any endpoint takes, or larger than the format allows.
+    /// Where the image is larger than the format allows.
     pub fn encode(image: &Rgb, format: Format, max_side: Option<NonZeroU32>) -> Result<Self> {
         let (width, height) = (side(image.width())?, side(image.height())?);
         match fitted(width, height, max_side) {
@@ -106,10 +103,16 @@ impl Payload {
     #[must_use]
     pub fn of_plain_png(file: &[u8], max_side: Option<NonZeroU32>) -> Option<Self> {
         let (width, height) = plain_png::size(file)?;
-        if file.len() > LARGEST || fitted(width, height, max_side).is_some() {
+        if fitted(width, height, max_side).is_some() {
             return None;
         }
         Some(Self::of_file(file, width, height, Format::Png))
+    }
+
+    /// The width and height in which an image of this size is sent: as it is, or made to fit `max_side`.
+    #[must_use]
+    pub fn fitted(width: u32, height: u32, max_side: Option<NonZeroU32>) -> (u32, u32) {
+        fitted(width, height, max_side).unwrap_or((width, height))
     }
 
     /// What a record keeps of the image: the digest and size of the encoded file, its sides and format.
@@ -128,13 +131,6 @@ impl Payload {
         match format {
             Format::Png => write_png(samples, width, height, &mut file)?,
             Format::Jpeg(quality) => write_jpeg(samples, width, height, quality, &mut file)?,
-        }
-        if file.len() > LARGEST {
-            return Err(unfit(format_args!(
-                "{width} × {height} pixels are {:.1} MB as {}, more than the 20 MB that endpoints take; set --max-side, or --image jpeg:95",
-                file.len() as f64 / 1e6,
-                format.name()
-            )));
         }
         Ok(Self::of_file(&file, width, height, format))
     }
@@ -281,13 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_endpoint_takes_is_an_error() {
-        // A hash makes samples that no encoder can pack: 2600 × 2600 × 3 are 20.3 MB.
-        let mut samples = vec![0; 2600 * 2600 * 3];
-        blake3::Hasher::new().finalize_xof().fill(&mut samples);
-        let image = Rgb::new(2600, 2600, samples).unwrap();
-        let error = Payload::encode(&image, Format::Png, None).unwrap_err();
-        assert!(error.to_string().contains("--max-side"), "{error}");
+    fn what_the_format_does_not_allow_is_an_error() {
         let wide = Rgb::new(1, 65_536, vec![0; 65_536 * 3]).unwrap();
         let jpeg = "jpeg:95".parse().unwrap();
         let error = Payload::encode(&wide, jpeg, None).unwrap_err();

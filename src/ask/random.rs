@@ -1,9 +1,10 @@
 //! The model that guesses: [`Random`].
 
+use super::Call;
+use crate::types::Digest;
 use crate::types::question::letter;
-use crate::types::{Condition, Digest, Question};
 
-/// Answers with the letter of any choice, each as likely; the same one for the same seed, question and condition, in
+/// Answers with the letter of any choice, each as likely; the same one for the same seed, question, condition and turn, in
 /// whatever order they are asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Random {
@@ -19,8 +20,12 @@ impl Random {
         Digest::of_parts([Self::NAME.as_bytes(), &self.seed.to_le_bytes()])
     }
 
-    pub(super) fn answer(self, question: &Question, condition: Option<&Condition>) -> String {
-        let shown = condition.map(ToString::to_string).unwrap_or_default();
+    pub(super) fn answer(self, call: Call<'_>) -> String {
+        let question = call.question;
+        let mut shown = call.condition.map(ToString::to_string).unwrap_or_default();
+        if call.turn > 0 {
+            shown = format!("{shown} turn {}", call.turn);
+        }
         let mut digest = Digest::of_parts([
             Self::NAME.as_bytes(),
             &self.seed.to_le_bytes(),
@@ -44,7 +49,7 @@ impl Random {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::{Choices, Family, FrameId, QuestionId};
+    use crate::types::{Choices, Condition, Family, FrameId, Question, QuestionId};
 
     fn question(id: usize, choices: usize) -> Question {
         let texts = (0..choices).map(|i| format!("choice {i}")).collect();
@@ -58,12 +63,22 @@ mod tests {
         }
     }
 
+    fn guess(seed: u64, question: &Question, condition: Option<&Condition>, turn: u32) -> String {
+        let call = Call {
+            question,
+            condition,
+            prompt: "",
+            image: None,
+            turn,
+        };
+        Random { seed }.answer(call)
+    }
+
     #[test]
     fn guesses_are_even() {
-        let random = Random { seed: 7 };
         let mut counts = [0_u32; 3];
         for id in 0..3000 {
-            let reply = random.answer(&question(id, 3), None);
+            let reply = guess(7, &question(id, 3), None, 0);
             counts[usize::from(reply.as_bytes()[0] - b'A')] += 1;
         }
         // Five standard deviations of a fair draw are 129.
@@ -78,7 +93,7 @@ mod tests {
         let guesses = |seed: u64, condition: &str| -> String {
             let condition = condition.parse().unwrap();
             (0..40)
-                .map(|id| Random { seed }.answer(&question(id, 4), Some(&condition)))
+                .map(|id| guess(seed, &question(id, 4), Some(&condition), 0))
                 .collect()
         };
         assert_eq!(guesses(1, "L3-noise"), guesses(1, "L3-noise"));

@@ -3,6 +3,7 @@
 use serde_json::Value;
 
 use super::complaint::{Complaint, page_title};
+use super::{escapes, stream};
 use crate::types::{Finish, Reply, Usage};
 
 /// Why a reply with a status of success holds no answer.
@@ -17,13 +18,13 @@ pub(super) enum Flaw {
 /// Reads a body; `latency_ms` and `attempts` are left at zero.
 ///
 /// An error is looked for first at the top level and then in the choice, since gateways send both with status 200. Fields that
-/// do not matter may be missing, null or of another type; hidden reasoning is never looked at. Bytes that are no UTF-8 become
-/// replacement characters: a small model at temperature 0 would say them again however often it is asked.
+/// do not matter may be missing, null or of another type; hidden reasoning is never looked at. Bytes that are no UTF-8, and
+/// escapes that are no character, become replacement characters: a small model at temperature 0 would say them again however
+/// often it is asked. An event stream that nobody asked for is put together.
 pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, Flaw> {
     let text = String::from_utf8_lossy(body);
     let text = text.trim_start_matches('\u{FEFF}');
-    let completion: Value =
-        serde_json::from_str(text).map_err(|error| unreadable(text, content_type, &error))?;
+    let completion = parsed(text, content_type)?;
     if let Some(complaint) = Complaint::of(&completion) {
         return Err(Flaw::Said(complaint));
     }
@@ -64,11 +65,19 @@ fn flaw(what: &str) -> Flaw {
     Flaw::Unreadable(what.to_owned())
 }
 
+fn parsed(text: &str, content_type: &str) -> Result<Value, Flaw> {
+    if stream::is_stream(text, content_type) {
+        return stream::assemble(text)
+            .ok_or_else(|| flaw("an event stream that holds no whole chat completion"));
+    }
+    serde_json::from_str(text).or_else(|error| {
+        let mended = escapes::mended(text).and_then(|text| serde_json::from_str(&text).ok());
+        mended.ok_or_else(|| unreadable(text, content_type, &error))
+    })
+}
+
 /// What a body is that is no JSON.
 fn unreadable(text: &str, content_type: &str, error: &serde_json::Error) -> Flaw {
-    if content_type.starts_with("text/event-stream") || text.trim_start().starts_with("data:") {
-        return flaw("an event stream, which was not asked for");
-    }
     if text.trim().is_empty() {
         return flaw("an empty body");
     }
@@ -99,19 +108,18 @@ fn content(content: Option<&Value>) -> Result<(String, Option<String>), Flaw> {
         Some(Value::Array(parts)) => parts,
         Some(_) => return Err(flaw("a message whose content is neither text nor parts")),
     };
-    let of = |kinds: &[&str], field: &str| -> String {
-        let named = |part: &&Value| {
-            let kind = part.get("type").and_then(Value::as_str);
-            kind.is_some_and(|kind| kinds.contains(&kind))
-        };
-        let fields = parts.iter().filter(named).map(|part| part.get(field));
-        fields.filter_map(|text| text?.as_str()).collect()
-    };
-    let refusal = of(&["refusal"], "refusal");
-    Ok((
-        of(&["text", "output_text"], "text"),
-        (!refusal.is_empty()).then_some(refusal),
-    ))
+    let (mut text, mut refusal) = (String::new(), String::new());
+    for part in parts {
+        let words = |field| part.get(field).and_then(Value::as_str).unwrap_or_default();
+        match part.get("type").and_then(Value::as_str) {
+            Some("text" | "output_text") => text += words("text"),
+            Some("refusal") => refusal += words("refusal"),
+            // A part without a type is a plain text, or holds one.
+            None => text += part.as_str().unwrap_or_else(|| words("text")),
+            Some(_) => {}
+        }
+    }
+    Ok((text, (!refusal.is_empty()).then_some(refusal)))
 }
 
 fn finish(reason: Option<&str>) -> Finish {
@@ -166,6 +174,7 @@ mod tests {
                 r#"{"content":[{"type":"thinking","thinking":[{"type":"text","text":"A"}]},{"type":"text","text":"B"},{"type":"text","text":"."},7,null,{"type":"text","text":null}]}"#,
                 "B.",
             ),
+            (r#"{"content":["B",{"text":"."}]}"#, "B."),
             (r#"{"content":[]}"#, ""),
         ] {
             assert_eq!(message(content).text, text, "{content}");
@@ -248,11 +257,6 @@ mod tests {
             ("data: {}\n\n", "text/plain", "event stream"),
             (": ping", "text/event-stream; charset=utf-8", "event stream"),
             ("<html><title>Welcome</title>", "text/html", "Welcome"),
-            (
-                r#"{"choices":[{"message":{"content":"\ud83d"}}]}"#,
-                "application/json",
-                "no whole JSON",
-            ),
             (&deep, "application/json", "no whole JSON"),
         ] {
             let Err(Flaw::Unreadable(what)) = read(body.as_bytes(), content_type) else {
@@ -266,5 +270,10 @@ mod tests {
     fn bytes_that_are_no_text_do_not_lose_the_reply() {
         let body = b"\xef\xbb\xbf{\"choices\":[{\"message\":{\"content\":\"B \xff\xfe\"}}]}";
         assert_eq!(read(body, "").unwrap().text, "B \u{FFFD}\u{FFFD}");
+        assert_eq!(message(r#"{"content":"B \ud83d"}"#).text, "B \u{FFFD}");
+        let stream =
+            "data: {\"choices\":[{\"delta\":{\"content\":\"B\"},\"finish_reason\":\"stop\"}]}\n\n";
+        let reply = read(stream.as_bytes(), "text/event-stream").unwrap();
+        assert_eq!((reply.text.as_str(), reply.finish), ("B", Finish::Stop));
     }
 }

@@ -117,6 +117,7 @@ impl Script {
                 failure: failure(FailureKind::Request, message),
                 attempts: 1,
                 reach: Reach::Trial,
+                refused: None,
             }
         })
     }

@@ -41,6 +41,12 @@ impl BaseUrl {
             || bare.parse::<IpAddr>().is_ok_and(|ip| ip.is_loopback())
     }
 
+    /// Whether it is an endpoint of Azure, which wants a key in a header of its own.
+    #[must_use]
+    pub fn is_azure(&self) -> bool {
+        AZURE.iter().any(|domain| self.host().ends_with(domain))
+    }
+
     /// Whether what is sent there can be read on the way.
     #[must_use]
     pub fn is_plain(&self) -> bool {
@@ -77,6 +83,13 @@ impl BaseUrl {
 }
 
 const COMPLETIONS: &str = "/chat/completions";
+
+/// Where Azure serves models: by resource (`R.openai.azure.com`) and by project.
+const AZURE: [&str; 3] = [
+    ".openai.azure.com",
+    ".cognitiveservices.azure.com",
+    ".services.ai.azure.com",
+];
 
 /// Undoes percent encoding.
 fn decoded(text: &str) -> String {
@@ -121,7 +134,14 @@ impl FromStr for BaseUrl {
                 "leave /chat/completions off the end; it is added to the address",
             ));
         }
-        Ok(Self(url))
+        let base = Self(url);
+        if base.is_azure() && base.0.path().trim_matches('/').is_empty() {
+            return Err(wrong(
+                "an address of Azure needs its path: https://RESOURCE.openai.azure.com/openai/v1, or \
+                 https://RESOURCE.openai.azure.com/openai/deployments/DEPLOYMENT?api-version=VERSION",
+            ));
+        }
+        Ok(base)
     }
 }
 
@@ -183,6 +203,7 @@ mod tests {
             "http://",
             "https://a/v1#x",
             "https://a/v1/chat/completions/",
+            "https://r.openai.azure.com/?api-version=2024-10-21",
         ] {
             assert!(wrong.parse::<BaseUrl>().is_err(), "{wrong}");
         }

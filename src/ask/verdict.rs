@@ -2,14 +2,16 @@
 
 use super::Reach;
 use super::complaint::Complaint;
-use super::request::{Parameters, TokenField};
+use super::field::{Refused, fields, is_unsupported};
+use super::parameters::Parameters;
+use super::request::Fields;
 use crate::types::FailureKind;
 
 /// What the request had in it that a server may complain about.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sent<'a> {
     pub(super) parameters: &'a Parameters,
-    pub(super) token_field: TokenField,
+    pub(super) fields: Fields,
     pub(super) has_image: bool,
     pub(super) has_key: bool,
 }
@@ -23,6 +25,8 @@ pub(super) struct Verdict {
     pub(super) again: bool,
     /// How to mend it.
     pub(super) hint: Option<&'static str>,
+    /// The field that it was refused for.
+    pub(super) refused: Option<Refused>,
 }
 
 /// Codes and types that mean: no money. They come with 429 as well, where waiting does not help.
@@ -40,19 +44,34 @@ const NO_CREDIT_WORDS: [&str; 4] = [
 ];
 
 /// Codes and types that mean the same for every request, with whatever status they come.
-const HOPELESS: [&str; 5] = [
+const HOPELESS: [&str; 6] = [
     "invalid_api_key",
     "authentication_error",
     "model_not_found",
+    "DeploymentNotFound",
     "account_deactivated",
     "unsupported_country_region_territory",
 ];
 
+/// What LiteLLM says, with status 400, of a wrong key where it has no database of keys, and of a model it does not know.
+const HOPELESS_WORDS: [&str; 2] = ["no connected db", "invalid model name passed in"];
+
+/// Codes and types that mean: a moderator refused what was asked. Another question may pass.
+const MODERATED: [&str; 5] = [
+    "content_filter",
+    "ResponsibleAIPolicyViolation",
+    "content_policy_violation",
+    "moderation_blocked",
+    "data_inspection_failed",
+];
+
 /// What OpenAI, vLLM, Ollama, llama.cpp (with status 500) and OpenRouter say of an image sent to a model without eyes.
-const NO_EYES: [&str; 5] = [
+const NO_EYES: [&str; 7] = [
     "image_url is only supported by certain models",
     "is not a multimodal model",
-    "does not support image input",
+    "does not support image",
+    "does not support vision",
+    "image input is not enabled",
     "image input is not supported",
     "no endpoints found that support image input",
 ];
@@ -64,12 +83,14 @@ pub(super) fn judge(status: u16, complaint: &Complaint, sent: Sent<'_>) -> Verdi
         reach: Reach::Endpoint,
         again: false,
         hint: Some(hint),
+        refused: None,
     };
     let again = |kind| Verdict {
         kind,
         reach: Reach::Trial,
         again: true,
         hint: None,
+        refused: None,
     };
     let no_credit = complaint.is_any(&NO_CREDIT)
         || (matches!(status, 400 | 402 | 403 | 429) && complaint.says_any(&NO_CREDIT_WORDS));
@@ -90,11 +111,16 @@ pub(super) fn judge(status: u16, complaint: &Complaint, sent: Sent<'_>) -> Verdi
             hopeless("no key was sent: name one by --api-key-env or --api-key-file")
         }
         401 => hopeless("check the key that --api-key-env or --api-key-file names"),
-        400.. if complaint.is_any(&HOPELESS) => hopeless("check the key, --model and --base-url"),
-        402 => hopeless("the account has no credit left: add some, then go on with --resume"),
-        403 if complaint.moderated || complaint.says_any(&["moderation", "flagged"]) => {
-            refused(None)
+        400.. if complaint.is_any(&HOPELESS) || complaint.says_any(&HOPELESS_WORDS) => {
+            hopeless("check the key, --model and --base-url")
         }
+        400..500 if complaint.is_any(&MODERATED) || (status == 403 && moderated(complaint)) => {
+            Verdict {
+                kind: FailureKind::Filtered,
+                ..refused(None)
+            }
+        }
+        402 => hopeless("the account has no credit left: add some, then go on with --resume"),
         403 | 407 => {
             hopeless("the key may not use this model from here: check the key and --model")
         }
@@ -102,12 +128,17 @@ pub(super) fn judge(status: u16, complaint: &Complaint, sent: Sent<'_>) -> Verdi
         405 => {
             hopeless("check --base-url: requests go to its path with /chat/completions behind it")
         }
-        408 => again(FailureKind::Timeout),
+        408 | 425 => again(FailureKind::Timeout),
         413 => refused(Some("send smaller images: --max-side, or --image jpeg:95")),
         429 => again(FailureKind::RateLimit),
-        409 | 500.. => again(FailureKind::Server),
+        // 498 and 499 are Groq's and nginx' words for: no room, and: gone away.
+        409 | 498 | 499 | 500.. => again(FailureKind::Server),
         _ => parameter(complaint, sent),
     }
+}
+
+fn moderated(complaint: &Complaint) -> bool {
+    complaint.moderated || complaint.says_any(&["moderation", "flagged"])
 }
 
 fn refused(hint: Option<&'static str>) -> Verdict {
@@ -116,65 +147,33 @@ fn refused(hint: Option<&'static str>) -> Verdict {
         reach: Reach::Trial,
         again: false,
         hint,
+        refused: None,
     }
 }
 
-/// A refused request that may be about one of its parameters. Where the server names the parameter, every other request with it
+/// A refused request that may be about one of its fields. Where the server names the field, every other request with it
 /// fails alike; where only its words do, it could be about this one request.
 fn parameter(complaint: &Complaint, sent: Sent<'_>) -> Verdict {
-    let parameters = sent.parameters;
-    let with_limit = parameters.max_tokens.is_some();
-    let hints = [
-        (
-            "temperature",
-            parameters.temperature.is_some(),
-            "leave the temperature to the server: --temperature default",
-        ),
-        (
-            "max_tokens",
-            with_limit && sent.token_field == TokenField::MaxTokens,
-            "send the limit otherwise: --token-field max_completion_tokens (or none), or another --max-tokens",
-        ),
-        (
-            "max_completion_tokens",
-            with_limit && sent.token_field == TokenField::MaxCompletionTokens,
-            "send the limit otherwise: --token-field max_tokens (or none), or another --max-tokens",
-        ),
-        (
-            "reasoning_effort",
-            parameters.reasoning_effort.is_some(),
-            "leave --reasoning-effort out, or give a value the model takes",
-        ),
-        (
-            "detail",
-            sent.has_image && parameters.detail.is_some(),
-            "leave --detail out, or give a value the server takes",
-        ),
-    ];
-    let named = |name: &str| {
-        let param = complaint.param.as_deref();
-        param.is_some_and(|param| param.rsplit(['.', '/']).next() == Some(name))
+    let fields = fields(sent);
+    let mut sent_ones = fields.iter().filter(|field| field.sent);
+    let (reach, field) = match sent_ones.clone().find(|field| field.is_named(complaint)) {
+        Some(field) => (Reach::Endpoint, field),
+        None => match sent_ones.find(|field| field.is_mentioned(complaint)) {
+            Some(field) => (Reach::Trial, field),
+            None => return refused(None),
+        },
     };
-    let mut sent_ones = hints.iter().filter(|(_, sent, _)| *sent);
-    if let Some((_, _, hint)) = sent_ones.clone().find(|(name, ..)| named(name)) {
-        return Verdict {
-            reach: Reach::Endpoint,
-            ..refused(Some(hint))
-        };
+    Verdict {
+        reach,
+        refused: field.refused.filter(|_| is_unsupported(complaint)),
+        ..refused(Some(field.hint))
     }
-    let mentioned = sent_ones.find(|(name, ..)| mentions(&complaint.message, name));
-    refused(mentioned.map(|(_, _, hint)| *hint))
-}
-
-/// Whether a text holds a name as a whole word: `max_tokens` is not in `max_tokens_total`.
-fn mentions(text: &str, name: &str) -> bool {
-    let inside = |c: char| c.is_alphanumeric() || c == '_';
-    text.split(|c: char| !inside(c)).any(|word| word == name)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ask::parameters::TokenField;
 
     fn parameters() -> Parameters {
         Parameters {
@@ -186,7 +185,10 @@ mod tests {
     fn judged(status: u16, body: &str) -> Verdict {
         let sent = Sent {
             parameters: &parameters(),
-            token_field: TokenField::MaxTokens,
+            fields: Fields {
+                token_field: TokenField::MaxTokens,
+                temperature: Some(0.0),
+            },
             has_image: true,
             has_key: true,
         };
@@ -206,6 +208,8 @@ mod tests {
         }
         for (status, kind) in [
             (408, FailureKind::Timeout),
+            (425, FailureKind::Timeout),
+            (499, FailureKind::Server),
             (409, FailureKind::Server),
             (429, FailureKind::RateLimit),
             (500, FailureKind::Server),
@@ -244,6 +248,10 @@ mod tests {
             ),
             (400, r#"{"error":{"code":"model_not_found","message":"x"}}"#),
             (
+                400,
+                r#"{"error":{"message":"No connected db.","code":"400"}}"#,
+            ),
+            (
                 500,
                 r#"{"error":{"code":500,"message":"image input is not supported - hint: mmproj"}}"#,
             ),
@@ -264,7 +272,14 @@ mod tests {
         assert!(judged(429, minute).again);
         let moderated =
             r#"{"error":{"code":403,"message":"x","metadata":{"reasons":["violence"]}}}"#;
-        assert_eq!(judged(403, moderated).reach, Reach::Trial);
+        let filtered = r#"{"error":{"code":"content_filter","message":"x","innererror":{"code":"ResponsibleAIPolicyViolation"}}}"#;
+        for (status, body) in [(403, moderated), (400, filtered)] {
+            let verdict = judged(status, body);
+            assert_eq!(
+                (verdict.reach, verdict.again, verdict.kind),
+                (Reach::Trial, false, FailureKind::Filtered)
+            );
+        }
     }
 
     #[test]
@@ -301,6 +316,34 @@ mod tests {
             r#"{"error":{"param":"messages.[0].content.[1].image_url.detail","message":"x"}}"#,
         ] {
             assert_eq!(judged(400, body).hint, None, "{body}");
+        }
+    }
+
+    #[test]
+    fn a_field_that_is_not_taken_is_told_from_one_that_does_not_fit() {
+        for (body, refused) in [
+            (
+                r#"{"error":{"param":"max_tokens","code":"unsupported_parameter","message":"x"}}"#,
+                Some(Refused::TokenField),
+            ),
+            (
+                r#"{"error":{"message":"Unsupported: 'max_tokens'. Use 'max_completion_tokens' instead."}}"#,
+                Some(Refused::TokenField),
+            ),
+            (
+                r#"{"error":{"param":"temperature","code":"unsupported_value","message":"only 1"}}"#,
+                Some(Refused::Temperature),
+            ),
+            (
+                r#"{"error":{"param":"max_tokens","message":"max_tokens is too large: 1024"}}"#,
+                None,
+            ),
+            (
+                r#"{"error":{"param":"reasoning_effort","code":"unsupported_value","message":"x"}}"#,
+                None,
+            ),
+        ] {
+            assert_eq!(judged(400, body).refused, refused, "{body}");
         }
     }
 }

@@ -3,6 +3,7 @@
 //! The same structure is read three times: from the arguments, from `DARKQA_*` variables and from a `--config` file
 //! (see [`crate::config`]); so every field is an `Option`, a list or a switch, and no default stands here.
 
+mod asking;
 mod enhance;
 mod export;
 mod import;
@@ -13,6 +14,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
+pub use asking::{ModelArgs, SendingArgs};
 pub use enhance::EnhanceArgs;
 pub use export::ExportArgs;
 pub use import::ImportArgs;
@@ -197,6 +199,15 @@ pub struct DataArgs {
     /// Only these question families (or categories of a ready-made set), separated by commas
     #[arg(long, value_name = "LIST")]
     pub families: Option<String>,
+    /// Show the choices of each question in an order drawn from --seed, the same in every condition
+    #[arg(long)]
+    pub shuffle_options: bool,
+    /// Ask each question once for every rotation of its choices: what a model answers by position averages out
+    #[arg(long)]
+    pub circular: bool,
+    /// Ask everything N times; default: 1
+    #[arg(long, value_name = "N")]
+    pub repeats: Option<NonZeroU32>,
     /// The most pixels an image may have before it is refused undecoded; default: 100 million
     #[arg(long, value_name = "N")]
     pub max_pixels: Option<NonZeroU64>,
@@ -289,78 +300,6 @@ pub struct EnhancementArgs {
     /// Never install ONNX Runtime
     #[arg(long)]
     pub offline: bool,
-}
-
-/// Who is asked.
-#[derive(Debug, Default, Args)]
-#[command(next_help_heading = "Model")]
-pub struct ModelArgs {
-    /// The model to ask, by its name at the endpoint; repeatable; built in: random, script:FILE
-    #[arg(long, value_name = "NAME")]
-    pub model: Vec<String>,
-    /// Show the models no image: words alone
-    #[arg(long)]
-    pub blind: bool,
-    /// Add a text-only baseline by this model; repeatable
-    #[arg(long, value_name = "NAME")]
-    pub blind_model: Vec<String>,
-    /// The endpoint; /chat/completions is appended; default: OPENAI_BASE_URL, else OpenAI's own
-    #[arg(long, value_name = "URL")]
-    pub base_url: Option<String>,
-    /// The variable that holds the API key, or none for an endpoint without keys; default: OPENAI_API_KEY
-    #[arg(long, value_name = "NAME|none", conflicts_with = "api_key_file")]
-    pub api_key_env: Option<String>,
-    /// A file that holds the API key
-    #[arg(long, value_name = "FILE")]
-    pub api_key_file: Option<PathBuf>,
-    /// Send a key over unencrypted http to another machine
-    #[arg(long)]
-    pub allow_http: bool,
-    /// Sampling temperature, or default for the server's own; default: 0
-    #[arg(long, value_name = "T|default")]
-    pub temperature: Option<String>,
-    /// The most tokens of a reply, hidden reasoning included; default: 1024
-    #[arg(long, value_name = "N")]
-    pub max_tokens: Option<NonZeroU32>,
-    /// The field that carries it: max_tokens, max_completion_tokens, none, or auto by endpoint; default: auto
-    #[arg(long, value_name = "FIELD")]
-    pub token_field: Option<String>,
-    /// How long a reasoning model thinks, in the server's words (none, minimal, low, medium, high …)
-    #[arg(long, value_name = "EFFORT")]
-    pub reasoning_effort: Option<String>,
-    /// How closely the server looks at images: auto, low, high; default: not sent
-    #[arg(long, value_name = "DETAIL")]
-    pub detail: Option<String>,
-    /// A folder with prompts of your own (choice.txt, blind.txt); default: built in
-    #[arg(long, value_name = "DIR")]
-    pub prompts: Option<PathBuf>,
-}
-
-/// How it is sent.
-#[derive(Debug, Default, Args)]
-#[command(next_help_heading = "Sending")]
-pub struct SendingArgs {
-    /// Requests in flight at once; default: 8
-    #[arg(long, value_name = "N")]
-    pub concurrency: Option<NonZeroUsize>,
-    /// Seconds until a try is given up, reply included; default: 120
-    #[arg(long, value_name = "SECONDS")]
-    pub timeout: Option<f64>,
-    /// Further tries after a failure that may pass; default: 5
-    #[arg(long, value_name = "N")]
-    pub retries: Option<u32>,
-    /// The longest wait, in seconds, that a server may ask for; default: 120
-    #[arg(long, value_name = "SECONDS")]
-    pub max_wait: Option<f64>,
-    /// How images are sent: png (lossless) or jpeg:QUALITY; default: png
-    #[arg(long, value_name = "FORMAT")]
-    pub image: Option<String>,
-    /// Shrink images whose longer side is longer than this, in pixels; default: never
-    #[arg(long, value_name = "PIXELS")]
-    pub max_side: Option<NonZeroU32>,
-    /// Stop when this many trials have failed; default: never
-    #[arg(long, value_name = "N")]
-    pub max_failures: Option<NonZeroUsize>,
 }
 
 /// What is left behind.

@@ -6,13 +6,19 @@ use std::str::FromStr;
 use std::{env, fs};
 
 use super::{parsed, seconds};
-use crate::ask::{BaseUrl, Parameters, Secret, Sending, TokenField};
+use crate::ask::{
+    Access, Authorities, BaseUrl, Bounds, Constrain, KeyHeader, Parameters, Quota, Secret, Sending,
+    Temperature, TokenField,
+};
 use crate::cli::{ModelArgs, SendingArgs};
 use crate::error::{Error, Result};
 use crate::types::View;
 
 /// The endpoint where nobody says otherwise.
 const BASE_URL: &str = "https://api.openai.com/v1";
+
+/// Where Azure's own clients look for a key.
+const AZURE_KEY: &str = "AZURE_OPENAI_API_KEY";
 
 /// The name of a model.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -45,11 +51,9 @@ pub struct Ask {
 /// Where requests go, and how.
 #[derive(Debug)]
 pub struct Server {
-    /// The address.
-    pub base_url: BaseUrl,
-    /// The key.
-    pub key: Option<Secret>,
-    /// Timeouts and retries.
+    /// The address, the key and the certificates.
+    pub access: Access,
+    /// Timeouts, retries, pace.
     pub sending: Sending,
 }
 
@@ -69,7 +73,8 @@ pub(super) fn ask(said: ModelArgs, sending: &SendingArgs) -> Result<Ask> {
         .chain(&blind_models)
         .any(|name| matches!(name, ModelName::Remote(_)));
     let parameters = Parameters {
-        temperature: temperature(said.temperature.as_deref())?,
+        temperature: parsed("--temperature", said.temperature.as_deref())?
+            .unwrap_or(Temperature::Auto),
         max_tokens: Some(
             said.max_tokens
                 .map_or(Parameters::MAX_TOKENS, NonZeroU32::get),
@@ -78,6 +83,7 @@ pub(super) fn ask(said: ModelArgs, sending: &SendingArgs) -> Result<Ask> {
             .unwrap_or(TokenField::Auto),
         reasoning_effort: said.reasoning_effort.clone(),
         detail: parsed("--detail", said.detail.as_deref())?,
+        constrain: parsed("--constrain", said.constrain.as_deref())?.unwrap_or(Constrain::None),
         ..Parameters::new(String::new())
     };
     Ok(Ask {
@@ -109,40 +115,58 @@ impl FromStr for ModelName {
     }
 }
 
-fn temperature(said: Option<&str>) -> Result<Option<f64>> {
-    match said {
-        None => Ok(Some(Parameters::TEMPERATURE)),
-        Some("default") => Ok(None),
-        Some(text) => match text.parse::<f64>() {
-            Ok(value) if value.is_finite() && value >= 0.0 => Ok(Some(value)),
-            _ => Err(Error::usage(
-                "--temperature",
-                format_args!("{text:?} is neither a number from 0 on nor default"),
-            )),
-        },
-    }
-}
-
 fn server(said: &ModelArgs, sending: &SendingArgs) -> Result<Server> {
-    let base_url = said
+    let base = said
         .base_url
         .clone()
         .or_else(|| set("OPENAI_BASE_URL"))
         .unwrap_or_else(|| BASE_URL.to_owned());
-    let base_url: BaseUrl = base_url.parse()?;
-    let key = key(said, &base_url)?;
+    let base: BaseUrl = base.parse()?;
+    let authorities = said.ca_file.as_deref().map(Authorities::load).transpose()?;
     let defaults = Sending::default();
     Ok(Server {
-        base_url,
-        key,
+        access: Access {
+            key: key(said, &base)?,
+            key_header: parsed("--key-header", said.key_header.as_deref())?
+                .unwrap_or(KeyHeader::Auto),
+            headers: who_asks(&base),
+            authorities: authorities.unwrap_or_default(),
+            allow_http: said.allow_http,
+            ..Access::new(base)
+        },
         sending: Sending {
             timeout: seconds("--timeout", sending.timeout)?.unwrap_or(defaults.timeout),
             retries: sending.retries.unwrap_or(defaults.retries),
             max_wait: seconds("--max-wait", sending.max_wait)?.unwrap_or(defaults.max_wait),
-            allow_http: said.allow_http,
+            concurrency: concurrency(sending)?,
+            quota: Quota {
+                requests: sending.rpm,
+                tokens: sending.tpm,
+            },
             ..defaults
         },
     })
+}
+
+/// How many requests are in flight at once.
+pub(super) fn concurrency(said: &SendingArgs) -> Result<Bounds> {
+    let said = parsed("--concurrency", said.concurrency.as_deref())?;
+    Ok(said.unwrap_or(Bounds::DEFAULT))
+}
+
+/// The headers of OpenAI for accounts with several organizations or projects, from the variables of its own clients.
+fn who_asks(base: &BaseUrl) -> Vec<(&'static str, String)> {
+    if base.host() != "api.openai.com" {
+        return Vec::new();
+    }
+    let headers = [
+        ("openai-organization", "OPENAI_ORG_ID"),
+        ("openai-project", "OPENAI_PROJECT_ID"),
+    ];
+    let headers = headers.into_iter();
+    headers
+        .filter_map(|(header, variable)| Some((header, set(variable)?)))
+        .collect()
 }
 
 /// The key for an endpoint: from a file, else from a variable; another machine must have one unless `none` is said.
@@ -151,7 +175,12 @@ fn key(said: &ModelArgs, base_url: &BaseUrl) -> Result<Option<Secret>> {
         let text = fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))?;
         return Secret::new(&text, "--api-key-file").map(Some);
     }
-    let name = said.api_key_env.as_deref().unwrap_or("OPENAI_API_KEY");
+    let azure = || base_url.is_azure() && set(AZURE_KEY).is_some();
+    let name = match &said.api_key_env {
+        Some(name) => name,
+        None if azure() => AZURE_KEY,
+        None => "OPENAI_API_KEY",
+    };
     if name == "none" {
         return Ok(None);
     }

@@ -81,6 +81,7 @@ impl Export {
                 limit: said.limit,
                 families: said.families,
                 max_pixels: said.max_pixels,
+                ..DataArgs::default()
             },
             light: said.light,
             sensor: said.sensor,

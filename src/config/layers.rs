@@ -254,7 +254,10 @@ fn or(first: Layer, second: Layer) -> Layer {
         (output.out, output.resume) = (None, None);
     }
     let said = EvaluateArgs {
-        data: first_set!(DataArgs { data, questions, limit, families, max_pixels; ; }, first.data, second.data, off),
+        data: first_set!(
+            DataArgs { data, questions, limit, families, repeats, max_pixels; ; shuffle_options, circular },
+            first.data, second.data, off
+        ),
         light: first_set!(LightArgs { levels, variant; ; }, first.light, second.light, off),
         sensor: first_set!(
             SensorArgs { seed, profile, amplify, tone, draws, coupling, camera, gain, ratio; ; fixed },
@@ -265,14 +268,19 @@ fn or(first: Layer, second: Layer) -> Layer {
         ),
         model: first_set!(
             ModelArgs {
-                base_url, api_key_env, api_key_file, temperature, max_tokens, token_field, reasoning_effort, detail, prompts;
+                base_url, api_key_env, api_key_file, key_header, ca_file, temperature, max_tokens, token_field, reasoning_effort, detail,
+                constrain, prompts;
                 model, blind_model;
                 blind, allow_http
             },
             first.model, model, off
         ),
         sending: first_set!(
-            SendingArgs { concurrency, timeout, retries, max_wait, image, max_side, max_failures; ; },
+            SendingArgs {
+                concurrency, rpm, tpm, timeout, retries, max_wait, image, max_side, max_image, max_failures, max_cost, prices;
+                ;
+                dry_run
+            },
             first.sending, second.sending, off
         ),
         output: first_set!(OutputArgs { out, resume, config; ; json, quiet }, first.output, output, off),
@@ -357,11 +365,11 @@ mod tests {
 
     #[test]
     fn a_wrong_value_names_where_it_stands() {
-        let wrong = environment(|name| (name == "DARKQA_CONCURRENCY").then(|| "many".into()))
+        let wrong = environment(|name| (name == "DARKQA_RETRIES").then(|| "many".into()))
             .unwrap_err()
             .to_string();
         assert!(
-            wrong.starts_with("DARKQA_CONCURRENCY: invalid value 'many'"),
+            wrong.starts_with("DARKQA_RETRIES: invalid value 'many'"),
             "{wrong}"
         );
         for (text, says) in [

@@ -6,8 +6,10 @@ mod export;
 mod import;
 mod layers;
 mod light;
+mod money;
 mod questions;
 mod realism;
+mod showing;
 mod synthesize;
 
 use std::env;
@@ -22,20 +24,19 @@ pub use export::{Export, Form};
 pub use import::Import;
 pub use layers::{merge, one_line};
 pub use light::{Light, Sensor};
+pub use money::Money;
 pub use questions::{Questions, Strangers};
 pub use realism::{PairPlace, Realism};
+pub use showing::{Order, Rotations, Showing};
 pub use synthesize::{Existing, Product, Synthesize};
 
-use crate::ask::Format;
+use crate::ask::{Bounds, Format};
 use crate::cli::{DataArgs, EnhancementArgs, EvaluateArgs, OutputArgs, SendingArgs};
 use crate::dataset::Place;
 use crate::dataset::picture::MOST_PIXELS;
 use crate::enhance::{Install, RuntimeSearch, Tiling};
 use crate::error::{Error, Result};
 use crate::types::{Family, Variants};
-
-/// How many requests are in flight where nobody says otherwise.
-const CONCURRENCY: NonZeroUsize = NonZeroUsize::new(8).unwrap();
 
 /// The most threads that can be asked for: more than any machine has use for, fewer than stop one.
 const MOST_THREADS: usize = 1024;
@@ -45,6 +46,8 @@ const MOST_THREADS: usize = 1024;
 pub struct Config {
     /// Which images and questions.
     pub data: Data,
+    /// In which order choices are shown, and how often.
+    pub showing: Showing,
     /// How dark.
     pub light: Light,
     /// What mends the images.
@@ -55,6 +58,10 @@ pub struct Config {
     pub images: Images,
     /// How much at once, and when to give up.
     pub pace: Pace,
+    /// What it may cost.
+    pub money: Money,
+    /// Whether anything is sent.
+    pub earnest: Earnest,
     /// What is left behind.
     pub output: Output,
 }
@@ -98,15 +105,26 @@ pub struct Images {
     pub format: Format,
     /// The longest side; `None` for as they are.
     pub max_side: Option<NonZeroU32>,
+    /// The largest file in bytes; `None` for what is known of the endpoint.
+    pub largest: Option<usize>,
 }
 
 /// How much at once, and when to give up.
 #[derive(Debug)]
 pub struct Pace {
     /// Requests in flight at once.
-    pub concurrency: NonZeroUsize,
+    pub concurrency: Bounds,
     /// So many failed trials end the run.
     pub max_failures: Option<usize>,
+}
+
+/// Whether anything is sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Earnest {
+    /// It is.
+    Run,
+    /// Only what it would take is said.
+    Estimate,
 }
 
 /// Where the run is kept.
@@ -151,16 +169,26 @@ impl Config {
         if said.model.model.is_empty() && said.model.blind_model.is_empty() {
             return Err(nameless(&said.output));
         }
+        let light = Light::resolve(&said.light, &said.sensor)?;
         Ok(Self {
+            showing: Showing::said(&said.data, light.sensor.seed),
             data: data(said.data),
-            light: Light::resolve(&said.light, &said.sensor)?,
+            light,
             enhancement: enhancement(said.enhancement)?,
             ask: asking::ask(said.model, &said.sending)?,
             images: Images {
                 format: parsed("--image", said.sending.image.as_deref())?.unwrap_or(Format::Png),
                 max_side: said.sending.max_side,
+                largest: positive("--max-image", said.sending.max_image)?
+                    .map(|megabytes| (megabytes * 1e6) as usize),
             },
-            pace: pace(&said.sending),
+            pace: pace(&said.sending)?,
+            money: Money::said(&said.sending)?,
+            earnest: if said.sending.dry_run {
+                Earnest::Estimate
+            } else {
+                Earnest::Run
+            },
             output: output(said.output),
         })
     }
@@ -240,10 +268,20 @@ fn threads(said: Option<NonZeroUsize>) -> Result<Option<NonZeroUsize>> {
     }
 }
 
-fn pace(said: &SendingArgs) -> Pace {
-    Pace {
-        concurrency: said.concurrency.unwrap_or(CONCURRENCY),
+fn pace(said: &SendingArgs) -> Result<Pace> {
+    Ok(Pace {
+        concurrency: asking::concurrency(said)?,
         max_failures: said.max_failures.map(NonZeroUsize::get),
+    })
+}
+
+fn positive(flag: &str, said: Option<f64>) -> Result<Option<f64>> {
+    match said {
+        Some(value) if !(value.is_finite() && value > 0.0) => Err(Error::usage(
+            flag,
+            format_args!("{value} is no number above 0"),
+        )),
+        _ => Ok(said),
     }
 }
 

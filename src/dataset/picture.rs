@@ -40,25 +40,26 @@ impl Picture {
         }
     }
 
-    /// Checks that the picture can be shown, before anything is asked about it.
+    /// Checks that the picture can be shown, before anything is asked about it, and returns its width and height in pixels.
     ///
     /// A PNG file is held to its checksums, which find any damage for a hundredth of what inflating costs; where that
     /// does not settle it (JPEG files have none, an alpha channel may hide something) the picture is decoded.
-    pub fn check(&self) -> Result<()> {
-        let Self::Encoded {
-            bytes,
-            place,
-            most_pixels,
-        } = self
-        else {
-            return Ok(());
+    pub fn check(&self) -> Result<(u32, u32)> {
+        let (bytes, place, most_pixels) = match self {
+            Self::Pixels(rgb) => return Ok((rgb.width() as u32, rgb.height() as u32)),
+            Self::Encoded {
+                bytes,
+                place,
+                most_pixels,
+            } => (bytes, place, *most_pixels),
         };
-        let settled = decoder(bytes, place, *most_pixels)?.color_type() == ColorType::Rgb8;
-        if bytes.starts_with(PNG) && settled {
-            whole(bytes, place)
+        let decoder = decoder(bytes, place, most_pixels)?;
+        if bytes.starts_with(PNG) && decoder.color_type() == ColorType::Rgb8 {
+            whole(bytes, place)?;
         } else {
-            self.decode().map(drop)
+            self.decode()?;
         }
+        Ok(decoder.dimensions())
     }
 
     /// The pixels as 8-bit sRGB; a file that is cut or, as a PNG, not as its checksums say is refused.

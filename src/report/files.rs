@@ -30,6 +30,21 @@ struct Row<'a> {
     value: Option<f64>,
     low: Option<f64>,
     high: Option<f64>,
+    /// The share of questions answered rightly every time; a column only where questions were asked more than once.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[expect(
+        clippy::option_option,
+        reason = "the column may be absent, and a cell in it empty"
+    )]
+    always: Option<Option<f64>>,
+}
+
+fn rows(summary: &Summary) -> impl Iterator<Item = Row<'_>> {
+    let repeated = summary.cells.iter().any(|cell| cell.always.is_some());
+    summary.cells.iter().map(move |cell| Row {
+        always: repeated.then(|| cell.always.map(|always| always.value)),
+        ..Row::of(cell)
+    })
 }
 
 impl<'a> Row<'a> {
@@ -50,17 +65,18 @@ impl<'a> Row<'a> {
             value: cell.accuracy.map(|accuracy| accuracy.value),
             low: cell.accuracy.map(|accuracy| accuracy.low),
             high: cell.accuracy.map(|accuracy| accuracy.high),
+            always: None,
         }
     }
 }
 
 /// The summary as CSV: `model, view, level, variant, enhancer, family, mode, n, right, unparsed, failed, value, low,
-/// high`; a cell is empty where there is nothing to say.
+/// high`, and `always` where questions were asked more than once; a cell is empty where there is nothing to say.
 pub fn csv(summary: &Summary) -> Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let unwritten = |e: &dyn std::fmt::Display| Error::data("summary.csv", e);
-    for cell in &summary.cells {
-        writer.serialize(Row::of(cell)).map_err(|e| unwritten(&e))?;
+    for row in rows(summary) {
+        writer.serialize(row).map_err(|e| unwritten(&e))?;
     }
     writer.into_inner().map_err(|e| unwritten(&e))
 }
@@ -76,7 +92,7 @@ struct Document<'a> {
 
 /// The summary as JSON: the run's manifest and the rows of the CSV; with the folder where it is not itself in there.
 pub fn json(summary: &Summary, run: &RunManifest, folder: Option<&Path>) -> Result<String> {
-    let rows = summary.cells.iter().map(Row::of).collect();
+    let rows = rows(summary).collect();
     let text = serde_json::to_string_pretty(&Document {
         schema: SCHEMA,
         folder,

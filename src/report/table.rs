@@ -69,6 +69,12 @@ impl Pair<'_> {
         }
     }
 
+    /// The share of questions that were answered rightly every time.
+    fn always(self) -> Option<String> {
+        let always = self.strict.always?;
+        Some(format!("{:.1}", 100.0 * always.value))
+    }
+
     fn replies(self) -> usize {
         self.strict.accuracy.map_or(0, |share| share.n)
     }
@@ -119,6 +125,9 @@ pub fn render(summary: &Summary, run: &RunManifest, folder: &Path) -> String {
             "{} without images: {accuracy}, n {replies}",
             subject.model
         );
+        if let Some(always) = pair.always() {
+            let _ = write!(text, ", right every time {always}");
+        }
         let _ = writeln!(text, ", unparsed {unparsed}{lenient}, failed {failed}");
     }
     for chance in of_view(None).filter_map(|pair| pair.strict.accuracy) {
@@ -155,7 +164,18 @@ fn levels(seen: &[Pair<'_>]) -> Table {
             .iter()
             .copied()
             .filter(|pair| Series::of(&pair.strict.subject) == *line);
-        table.add_row(row(line, &pairs.collect::<Vec<_>>(), &levels));
+        let pairs: Vec<Pair<'_>> = pairs.collect();
+        table.add_row(row(line, &pairs, &levels));
+        if pairs.iter().any(|pair| pair.strict.always.is_some()) {
+            let always = levels.iter().map(|level| {
+                let at = pairs
+                    .iter()
+                    .find(|pair| pair.strict.subject.level == Some(*level));
+                at.and_then(|pair| pair.always()).unwrap_or_default()
+            });
+            let label = [String::new(), "  right every time".to_owned()];
+            table.add_row(label.into_iter().chain(always).collect::<Vec<_>>());
+        }
     }
     for column in table.column_iter_mut().skip(2) {
         column.set_cell_alignment(CellAlignment::Right);

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use serde_json::{Value, json};
+
 use crate::ask::{Endpoint, Model, OpenAi, Parameters, Random, Script};
 use crate::config::{Config, ModelName};
 use crate::error::{Error, Result};
@@ -20,14 +22,10 @@ pub(super) struct Asker {
 pub(super) fn open(config: &Config) -> Result<Vec<Asker>> {
     let ask = &config.ask;
     let endpoint = match &ask.server {
-        Some(server) => {
-            let key = server.key.as_ref();
-            Some(Arc::new(Endpoint::open(
-                server.base_url.clone(),
-                key,
-                server.sending,
-            )?))
-        }
+        Some(server) => Some(Arc::new(Endpoint::open(
+            server.access.clone(),
+            server.sending,
+        )?)),
         None => None,
     };
     let seen = ask.models.iter().map(|name| (name, ask.view));
@@ -69,4 +67,16 @@ pub(super) fn open(config: &Config) -> Result<Vec<Asker>> {
         });
     }
     Ok(askers)
+}
+
+/// How requests had to differ from what was tried first, by model; for the manifest.
+pub(super) fn adapted(askers: &[Asker]) -> impl Iterator<Item = (String, Value)> {
+    askers.iter().filter_map(|asker| {
+        let Model::OpenAi(model) = &*asker.model else {
+            return None;
+        };
+        let adapted = model.adapted();
+        let name = format!("adapted for {}", model.name());
+        (!adapted.is_empty()).then(|| (name, json!(adapted)))
+    })
 }

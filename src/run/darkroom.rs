@@ -4,19 +4,20 @@
 //! memory holds the images in flight and a few more.
 
 use std::borrow::Cow;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use tokio::sync::mpsc::Sender;
 
+use super::gallery::Gallery;
 use super::plan::{FramePlan, Shot, Trial};
 use super::recipe::Recipe;
-use crate::ask::{Format, Payload};
+use crate::ask::{Format, ImageLimit, Payload};
 use crate::dataset::{Dataset, Picture};
 use crate::enhance::Enhancer;
 use crate::error::{Error, Result};
 use crate::synthesis::{Negative, NoiseKey, expose};
-use crate::types::{Condition, Degradation, Digest, FrameId, Rgb};
+use crate::types::{Condition, Degradation, FrameId, ImageFacts, Rgb};
 
 /// A shot with its image, or with what went wrong while it was made.
 #[derive(Debug)]
@@ -30,9 +31,11 @@ pub(super) struct Exposed {
 pub(super) struct Darkroom<'a> {
     pub(super) dataset: &'a Dataset,
     /// The content of each image as the plan knows it.
-    pub(super) pictures: &'a BTreeMap<FrameId, Digest>,
+    pub(super) pictures: &'a Gallery,
     pub(super) recipe: &'a Recipe,
     pub(super) enhancers: Vec<Enhancer>,
+    /// What an image may be; `None` where nobody far away looks at it.
+    pub(super) limit: Option<ImageLimit>,
 }
 
 impl Darkroom<'_> {
@@ -51,6 +54,36 @@ impl Darkroom<'_> {
             }
         }
         Ok(())
+    }
+
+    /// Makes the images of the frame with the most pixels in every condition without an enhancer, so that one which is too
+    /// large for the endpoint is found before anything is paid for; the largest of them.
+    pub(super) fn largest(&mut self, frames: &[FramePlan]) -> Result<Option<ImageFacts>> {
+        let pixels = |plan: &&FramePlan| {
+            let pictured = self.pictures.get(&plan.frame);
+            pictured.map_or(0, |pictured| {
+                u64::from(pictured.size.0) * u64::from(pictured.size.1)
+            })
+        };
+        let Some(plan) = frames.iter().max_by_key(pixels) else {
+            return Ok(None);
+        };
+        let mut desk = Desk::new(plan.frame.clone());
+        let conditions = plan.shots.iter().filter_map(|shot| shot.condition.as_ref());
+        let mut largest: Option<ImageFacts> = None;
+        for condition in conditions.filter(|condition| condition.enhancer.is_none()) {
+            let image = self
+                .image(&mut desk, condition)
+                .map_err(|e| e.at(format!("frame {} at {condition}", plan.frame)))?;
+            let facts = image.facts();
+            if largest
+                .as_ref()
+                .is_none_or(|largest| facts.bytes > largest.bytes)
+            {
+                largest = Some(facts.clone());
+            }
+        }
+        Ok(largest)
     }
 
     /// Makes the images of all frames until they are done or nobody waits for them any more.
@@ -76,7 +109,7 @@ impl Darkroom<'_> {
         }
     }
 
-    fn image(&mut self, desk: &mut Desk, condition: &Condition) -> Result<Arc<Payload>> {
+    pub(super) fn image(&mut self, desk: &mut Desk, condition: &Condition) -> Result<Arc<Payload>> {
         let Recipe {
             format, max_side, ..
         } = *self.recipe;
@@ -87,10 +120,17 @@ impl Darkroom<'_> {
             && let Picture::Encoded { bytes, .. } = picture
             && let Some(payload) = Payload::of_plain_png(bytes, max_side)
         {
-            return Ok(Arc::new(payload));
+            return self.within(payload);
         }
         let pixels = self.pixels(desk, condition)?;
-        Payload::encode(&pixels, format, max_side).map(Arc::new)
+        self.within(Payload::encode(&pixels, format, max_side)?)
+    }
+
+    fn within(&self, payload: Payload) -> Result<Arc<Payload>> {
+        if let Some(limit) = &self.limit {
+            limit.check(payload.facts())?;
+        }
+        Ok(Arc::new(payload))
     }
 
     /// The pixels of a frame in a condition.
@@ -133,14 +173,11 @@ impl Desk {
     }
 
     /// The frame's file; an error where it is not the one that the plan was made with.
-    fn picture(
-        &mut self,
-        dataset: &Dataset,
-        planned: &BTreeMap<FrameId, Digest>,
-    ) -> Result<&Picture> {
+    fn picture(&mut self, dataset: &Dataset, planned: &Gallery) -> Result<&Picture> {
         once(&mut self.picture, || {
             let picture = dataset.picture(&self.frame)?;
-            if planned.get(&self.frame) == Some(&picture.digest()) {
+            let planned = planned.get(&self.frame);
+            if planned.map(|planned| planned.digest) == Some(picture.digest()) {
                 return Ok(picture);
             }
             let problem = "the image was changed while the run was under way; put it back, or begin a new run";

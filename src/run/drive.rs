@@ -1,6 +1,6 @@
 //! The asynchronous side: asks about what the darkroom has made, and keeps every reply the moment it arrives.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 use rayon::ThreadPoolBuilder;
@@ -10,19 +10,21 @@ use tokio::task::{JoinError, JoinSet};
 
 use super::askers::Asker;
 use super::darkroom::{Darkroom, Exposed};
+use super::gallery::Gallery;
 use super::interrupt::Interrupt;
+use super::ledger::Ledger;
 use super::plan::{Plan, Trial};
 use super::progress::{Bar, Progress};
 use super::recipe::Recipe;
 use super::record::record;
 use super::stop::{End, Watch};
-use crate::ask::{AskError, Call, Payload, Reach};
+use crate::ask::{AskError, Call, ImageLimit, Payload, Reach};
 use crate::config::Config;
 use crate::dataset::Dataset;
 use crate::enhance::{Enhancer, Stopper};
 use crate::error::{Error, Result};
 use crate::store::Store;
-use crate::types::{Condition, Digest, Failure, FailureKind, FrameId, Reply, View};
+use crate::types::{Condition, Failure, FailureKind, ImageFacts, Reply, View};
 
 /// How many finished images may wait to be asked about.
 const IMAGES_AHEAD: usize = 2;
@@ -31,10 +33,12 @@ const IMAGES_AHEAD: usize = 2;
 pub(super) struct Drive<'a> {
     pub(super) config: &'a Config,
     pub(super) dataset: &'a Dataset,
-    pub(super) pictures: &'a BTreeMap<FrameId, Digest>,
+    pub(super) pictures: &'a Gallery,
     pub(super) recipe: &'a Recipe,
     pub(super) askers: &'a [Asker],
     pub(super) progress: &'a Progress,
+    /// What an image may be that leaves the machine.
+    pub(super) limit: Option<ImageLimit>,
 }
 
 /// One trial with the image that it shares.
@@ -54,6 +58,7 @@ impl Drive<'_> {
         &self,
         plan: Plan,
         enhancers: Vec<Enhancer>,
+        ledger: Ledger,
         store: &mut Store,
     ) -> Result<End> {
         if plan.left() == 0 {
@@ -81,13 +86,19 @@ impl Drive<'_> {
             pictures: self.pictures,
             recipe: self.recipe,
             enhancers,
+            limit: self.limit,
         };
         cores.install(|| darkroom.rehearse(&plan.frames))?;
+        if self.limit.is_some() {
+            let largest = cores.install(|| darkroom.largest(&plan.frames))?;
+            warn_of_large(largest.as_ref(), self.limit);
+        }
         let intake = Intake {
             drive: self,
             store,
             bar,
             watch: self.watch(),
+            ledger,
             stoppers,
             answered: plan.trials() - plan.left(),
         };
@@ -97,16 +108,23 @@ impl Drive<'_> {
         })
     }
 
+    /// How many questions may be under way now.
+    fn width(&self) -> usize {
+        let widths = self.askers.iter().filter_map(|asker| asker.model.width());
+        // Models of one endpoint share its window.
+        widths.max().unwrap_or(self.config.pace.concurrency.most())
+    }
+
     fn watch(&self) -> Watch {
         let server = self.config.ask.server.as_ref();
         let endpoint = server.map_or("built-in models".to_owned(), |server| {
-            server.base_url.to_string()
+            server.access.base.to_string()
         });
         let pace = &self.config.pace;
         Watch::new(
             endpoint,
             self.askers,
-            pace.concurrency.get(),
+            pace.concurrency.most(),
             pace.max_failures,
         )
     }
@@ -118,6 +136,7 @@ struct Intake<'a> {
     store: &'a mut Store,
     bar: Bar,
     watch: Watch,
+    ledger: Ledger,
     stoppers: Vec<Stopper>,
     /// Trials with a reply, those of earlier calls included.
     answered: usize,
@@ -125,18 +144,27 @@ struct Intake<'a> {
 
 impl Intake<'_> {
     async fn ask(mut self, mut images: Receiver<Exposed>) -> Result<End> {
-        let limit = self.drive.config.pace.concurrency.get();
         let mut waiting = VecDeque::<Ready>::new();
         let mut asking = JoinSet::<Done>::new();
         let mut interrupt = Interrupt::listen()?;
         let mut more = true;
         loop {
-            while asking.len() < limit
+            while asking.len() < self.drive.width()
                 && let Some(ready) = waiting.pop_front()
             {
-                if !self.watch.retired(ready.trial.asker) {
-                    asking.spawn(put(self.drive.askers[ready.trial.asker].clone(), ready));
+                let asker = &self.drive.askers[ready.trial.asker];
+                if self.watch.retired(ready.trial.asker) {
+                    continue;
                 }
+                let likely = self.likely(&ready);
+                if !self.ledger.affords(asking.len(), ready.trial.asker, likely) {
+                    waiting.push_front(ready);
+                    break;
+                }
+                asking.spawn(put(asker.clone(), ready));
+            }
+            if asking.is_empty() && !waiting.is_empty() {
+                self.watch.spent();
             }
             let through = !more && waiting.is_empty() && asking.is_empty();
             if through || self.watch.stopped() {
@@ -182,6 +210,13 @@ impl Intake<'_> {
         Ok(())
     }
 
+    /// How many tokens the prompt of a trial is likely to have.
+    fn likely(&self, ready: &Ready) -> f64 {
+        let asker = &self.drive.askers[ready.trial.asker];
+        let image = ready.image.as_ref().map(|image| image.facts());
+        self.ledger.likely(asker, &ready.trial, image)
+    }
+
     /// Makes trials out of an image, or failures out of a failed one.
     fn accept(&mut self, exposed: Exposed) -> Result<Vec<Ready>> {
         let Exposed {
@@ -219,6 +254,7 @@ impl Intake<'_> {
                     failure,
                     attempts: 0,
                     reach: Reach::Trial,
+                    refused: None,
                 }),
             )))?;
         }
@@ -243,11 +279,33 @@ impl Intake<'_> {
                 }
             }
         }
-        self.answered += usize::from(result.is_ok());
-        self.bar.count(self.answered, self.watch.failures());
+        if let Ok(reply) = &result {
+            self.answered += 1;
+            self.ledger
+                .book(ready.trial.asker, reply.usage, self.likely(&ready));
+        }
+        self.bar
+            .count(self.answered, self.watch.failures(), self.ledger.spent());
         let asker = &self.drive.askers[ready.trial.asker];
         self.store
             .append(&record(ready, asker.model.name(), result))
+    }
+}
+
+/// Images from this size on, in bytes, are more than some servers and proxies take.
+const LARGE: usize = 5_000_000;
+
+/// Says so where images are large and nobody knows whether the endpoint takes them.
+fn warn_of_large(largest: Option<&ImageFacts>, limit: Option<ImageLimit>) {
+    if let Some(image) = largest
+        && image.bytes > LARGE
+        && limit == Some(ImageLimit::UNKNOWN)
+    {
+        tracing::warn!(
+            "images are up to {:.1} MB, {:.1} MB as sent; where the server answers 413, --max-side or --image jpeg:95 makes them smaller",
+            image.bytes as f64 / 1e6,
+            image.bytes as f64 / 0.75e6
+        );
     }
 }
 
@@ -258,6 +316,7 @@ async fn put(asker: Asker, ready: Ready) -> Done {
         condition: ready.condition.as_ref(),
         prompt: &ready.trial.prompt,
         image: ready.image.as_deref(),
+        turn: ready.trial.turn,
     };
     let result = asker.model.ask(call).await;
     (ready, result)

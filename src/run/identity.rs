@@ -6,7 +6,8 @@ use std::path::PathBuf;
 use serde_json::{Value, json};
 
 use super::plan::Inputs;
-use crate::config::Config;
+use crate::ask::Constrain;
+use crate::config::{Config, Order, Rotations, Showing};
 use crate::dataset::Dataset;
 use crate::enhance::{ModelFile, Tiling};
 use crate::error::{Error, Result};
@@ -38,7 +39,7 @@ pub(super) fn identity(config: &Config, dataset: &Dataset, inputs: &Inputs<'_>) 
     let images = inputs
         .pictures
         .iter()
-        .flat_map(|(frame, digest)| [frame.0.as_bytes(), digest.as_bytes()]);
+        .flat_map(|(frame, pictured)| [frame.0.as_bytes(), pictured.digest.as_bytes()]);
     let (ask, synthesis) = (&config.ask, &config.light.sensor.synthesis);
     let names = |view| -> BTreeSet<&str> {
         inputs
@@ -93,13 +94,16 @@ pub(super) fn identity(config: &Config, dataset: &Dataset, inputs: &Inputs<'_>) 
             json!(
                 ask.server
                     .as_ref()
-                    .map(|server| server.base_url.to_string())
+                    .map(|server| server.access.base.to_string())
             ),
         ),
         ("--prompts", json!(inputs.prompts.digest())),
         ("--image", json!(config.images.format.to_string())),
         ("--max-side", json!(config.images.max_side)),
-        ("--temperature", json!(ask.parameters.temperature)),
+        (
+            "--temperature",
+            json!(ask.parameters.temperature.to_string()),
+        ),
         ("--max-tokens", json!(ask.parameters.max_tokens)),
         ("--reasoning-effort", json!(ask.parameters.reasoning_effort)),
         ("--detail", json!(ask.parameters.detail)),
@@ -111,12 +115,31 @@ pub(super) fn identity(config: &Config, dataset: &Dataset, inputs: &Inputs<'_>) 
     let tiling = (tiling != Tiling::Auto).then(|| ("--tile", json!(tiling.to_string())));
     let side = config.enhancement.most_side;
     let side = side.map(|side| ("--llie-max-side", json!(side)));
+    let constrain = ask.parameters.constrain;
+    let constrain =
+        (constrain != Constrain::None).then(|| ("--constrain", json!(constrain.to_string())));
     fields
         .into_iter()
         .chain(tiling)
         .chain(side)
+        .chain(constrain)
+        .chain(showing(config.showing))
         .map(|(field, value)| (field.to_owned(), value))
         .collect()
+}
+
+/// How choices are shown and how often, where that is not the usual way.
+fn showing(said: Showing) -> impl Iterator<Item = (&'static str, Value)> {
+    let shuffled = said.order != Order::Given;
+    let every = said.rotations == Rotations::Every;
+    let repeated = said.repeats.get() > 1;
+    [
+        shuffled.then_some(("--shuffle-options", true.into())),
+        every.then_some(("--circular", true.into())),
+        repeated.then(|| ("--repeats", json!(said.repeats))),
+    ]
+    .into_iter()
+    .flatten()
 }
 
 /// The content of an identity.
@@ -131,7 +154,10 @@ pub(super) fn digest(identity: &Identity) -> Digest {
 /// What does not decide a reply, but may explain how a run went.
 pub(super) fn settings(config: &Config) -> BTreeMap<String, Value> {
     let mut settings = BTreeMap::from([
-        ("--concurrency".to_owned(), json!(config.pace.concurrency)),
+        (
+            "--concurrency".to_owned(),
+            json!(config.pace.concurrency.to_string()),
+        ),
         ("--max-failures".to_owned(), json!(config.pace.max_failures)),
         ("--threads".to_owned(), json!(config.enhancement.threads)),
         (
@@ -147,6 +173,8 @@ pub(super) fn settings(config: &Config) -> BTreeMap<String, Value> {
             "--max-wait".to_owned(),
             json!(sending.max_wait.as_secs_f64()),
         );
+        settings.insert("--rpm".to_owned(), json!(sending.quota.requests));
+        settings.insert("--tpm".to_owned(), json!(sending.quota.tokens));
     }
     settings
 }

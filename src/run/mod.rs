@@ -3,15 +3,19 @@
 //! [`evaluate`] reads as the sentence it carries out: open the data, open the models, open the run folder, plan what is
 //! left to ask, send the darkroom to make the images and ask about them, score, show.
 
+mod arrangement;
 mod askers;
 mod darkroom;
 mod drive;
 pub mod enhance;
 pub mod export;
+mod forecast;
+mod gallery;
 mod identity;
 pub mod import;
 mod inputs;
 mod interrupt;
+mod ledger;
 mod plan;
 
 pub mod progress;
@@ -27,9 +31,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use jiff::Timestamp;
-use rayon::prelude::*;
 
-use crate::config::{Config, Data, Enhancement, ModelName, RunPlace, Show};
+use crate::ask::ImageLimit;
+use crate::config::{Config, Data, Earnest, Enhancement, ModelName, RunPlace, Show};
 use crate::dataset::Dataset;
 use crate::enhance::{Enhancer, ModelFile, Runtime};
 use crate::error::{Error, Result};
@@ -37,10 +41,13 @@ use crate::report;
 use crate::score::accuracy::summarize;
 use crate::store::{self, Moved, Store};
 use crate::types::manifest::{Counts, RunManifest, SCHEMA, Status};
-use crate::types::{Digest, Family, FrameId, Outcome, Question, Record, TrialKey, View};
+use crate::types::{Family, Outcome, Question, Record, TrialKey, View};
 
+use darkroom::Darkroom;
 use drive::Drive;
+use forecast::Means;
 use identity::Identity;
+use ledger::Ledger;
 use plan::{Inputs, Plan};
 use progress::Progress;
 use stop::End;
@@ -75,14 +82,17 @@ pub fn evaluate(config: &Config, progress: &Progress) -> Result<Verdict> {
     };
     let files = identity::enhancers(models)?;
     let pictures = if seeing {
-        look_through(&dataset, &questions, progress)?
+        gallery::look_through(&dataset, &questions, progress)?
     } else {
-        BTreeMap::new()
+        gallery::Gallery::new()
     };
     let inputs = Inputs::new(config, &questions, &pictures, &askers, &files)?;
 
     let identity = identity::identity(config, &dataset, &inputs);
     let folder = folder(config, &dataset, &identity)?;
+    if config.earnest == Earnest::Estimate {
+        return estimate(config, &dataset, &inputs, files, &folder);
+    }
     let kept = store::read_manifest(&folder)?;
     // Opened before the folder is made, so that an enhancer that does not work leaves nothing behind.
     let opened = match &kept {
@@ -91,7 +101,10 @@ pub fn evaluate(config: &Config, progress: &Progress) -> Result<Verdict> {
     };
     let mut manifest = manifest(config, identity, kept);
     let mut store = Store::open(&folder, &manifest, moved(config))?;
-    let plan = Plan::new(&inputs, &store.records()?)?;
+    let kept = store.records()?;
+    let ledger = Ledger::new(&config.money, &askers, &kept)?;
+    let plan = Plan::new(&inputs, &kept)?;
+    drop(kept);
     let trials = plan.keys.clone();
     let end = if plan.left() == 0 {
         End::Through
@@ -117,10 +130,63 @@ pub fn evaluate(config: &Config, progress: &Progress) -> Result<Verdict> {
             recipe: &inputs.recipe,
             askers: &askers,
             progress,
+            limit: limit(config),
         };
-        drive.run(plan, enhancers, &mut store)?
+        drive.run(plan, enhancers, ledger, &mut store)?
     };
+    if let (End::Spent, Some(most)) = (&end, config.money.most) {
+        tracing::warn!(
+            "stopped: one more question could cost more than the {} of --max-cost; the same command with more goes on",
+            report::forecast::money(most)
+        );
+    }
+    manifest.settings.extend(askers::adapted(&askers));
     show(config, &store, manifest, end, &trials, &questions)
+}
+
+/// Says what is left to ask and what it would take; sends nothing and leaves no file.
+fn estimate(
+    config: &Config,
+    dataset: &Dataset,
+    inputs: &Inputs<'_>,
+    files: Vec<ModelFile>,
+    folder: &Path,
+) -> Result<Verdict> {
+    let kept = store::read_records(folder)?;
+    let ledger = Ledger::new(&config.money, inputs.askers, &kept)?;
+    let plan = Plan::new(inputs, &kept)?;
+    let (_, enhancers) = open_enhancers(files, &config.enhancement)?;
+    let mut darkroom = Darkroom {
+        dataset,
+        pictures: inputs.pictures,
+        recipe: &inputs.recipe,
+        enhancers,
+        limit: None,
+    };
+    let means = Means {
+        config,
+        askers: inputs.askers,
+        plan: &plan,
+        ledger: &ledger,
+        kept: &kept,
+        limit: limit(config),
+    };
+    let forecast = forecast::forecast(&means, &mut darkroom)?;
+    let output = match config.output.show {
+        Show::Json => report::forecast::json(&forecast)?,
+        Show::Table => report::forecast::render(&forecast),
+    };
+    Ok(Verdict {
+        status: Status::Complete,
+        output,
+    })
+}
+
+/// The largest image that the endpoint takes; `None` where all models are built in.
+fn limit(config: &Config) -> Option<ImageLimit> {
+    let server = config.ask.server.as_ref()?;
+    let known = || ImageLimit::of(&server.access.base);
+    Some(config.images.largest.map_or_else(known, ImageLimit::stated))
 }
 
 /// Scores what a run holds, and leaves it in its folder where that says anything new.
@@ -195,29 +261,6 @@ fn select(dataset: &Dataset, config: &Data) -> Result<Vec<Question>> {
         .take(limit)
         .cloned()
         .collect())
-}
-
-/// Reads every image that is asked about once: a missing or broken one is found before anything is paid for, and its
-/// content enters the keys of its trials.
-fn look_through(
-    dataset: &Dataset,
-    questions: &[Question],
-    progress: &Progress,
-) -> Result<BTreeMap<FrameId, Digest>> {
-    let frames: BTreeMap<&FrameId, &Question> = questions
-        .iter()
-        .map(|question| (&question.frame, question))
-        .collect();
-    let bar = progress.bar("reading images", frames.len());
-    let digests = frames.into_par_iter().map(|(frame, question)| {
-        let picture = dataset.picture(frame)?;
-        picture
-            .check()
-            .map_err(|e| Error::data(format_args!("question {:?}", question.id.0), e))?;
-        bar.inc();
-        Ok((frame.clone(), picture.digest()))
-    });
-    digests.collect()
 }
 
 fn open_enhancers(

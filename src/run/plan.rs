@@ -3,10 +3,12 @@
 use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
 
+use super::arrangement::arrange;
 use super::askers::Asker;
+use super::gallery::Gallery;
 use super::recipe::Recipe;
 use crate::ask::Prompts;
-use crate::config::{Config, Light};
+use crate::config::{Config, Light, Showing};
 use crate::enhance::ModelFile;
 use crate::error::{Error, Result};
 use crate::types::{
@@ -18,10 +20,11 @@ use crate::types::{
 #[derive(Debug)]
 pub(super) struct Inputs<'a> {
     pub(super) questions: &'a [Question],
-    pub(super) pictures: &'a BTreeMap<FrameId, Digest>,
+    pub(super) pictures: &'a Gallery,
     pub(super) askers: &'a [Asker],
     pub(super) prompts: Prompts,
     pub(super) conditions: Vec<Condition>,
+    pub(super) showing: Showing,
     pub(super) recipe: Recipe,
 }
 
@@ -29,7 +32,7 @@ impl<'a> Inputs<'a> {
     pub(super) fn new(
         config: &Config,
         questions: &'a [Question],
-        pictures: &'a BTreeMap<FrameId, Digest>,
+        pictures: &'a Gallery,
         askers: &'a [Asker],
         files: &[ModelFile],
     ) -> Result<Self> {
@@ -54,6 +57,7 @@ impl<'a> Inputs<'a> {
             askers,
             prompts,
             conditions: conditions(&config.light, config.enhancement.on, &recipe.enhancers),
+            showing: config.showing,
             recipe,
         })
     }
@@ -96,6 +100,10 @@ pub(super) struct Trial {
     pub(super) question: Arc<Question>,
     pub(super) prompt: Arc<str>,
     pub(super) asker: usize,
+    /// How many times the same was asked before.
+    pub(super) repeat: u32,
+    /// How many times the question was put before, in whatever order of its choices.
+    pub(super) turn: u32,
 }
 
 /// All trials that share one image, or that have none.
@@ -163,10 +171,16 @@ impl Plan {
     ) -> Result<Vec<Shot>> {
         let mut asked = Vec::new();
         for question in questions {
-            let prompts = [View::Image, View::Blind]
-                .map(|view| inputs.prompts.render(view, question).map(Arc::from));
-            let [image, blind] = prompts;
-            asked.push((Arc::new((*question).clone()), image?, blind?));
+            for arranged in arrange(question, inputs.showing)? {
+                let prompt = |view| inputs.prompts.render(view, &arranged.question);
+                asked.push(Asked {
+                    image: prompt(View::Image)?.into(),
+                    blind: prompt(View::Blind)?.into(),
+                    question: Arc::new(arranged.question),
+                    repeat: arranged.repeat,
+                    turn: arranged.turn,
+                });
+            }
         }
         let mut shots = Vec::new();
         for condition in std::iter::once(None).chain(inputs.conditions.iter().map(Some)) {
@@ -182,17 +196,23 @@ impl Plan {
             }
             let shown = Shown::new(inputs, frame, condition)?;
             let mut trials = Vec::new();
-            for (question, image, blind) in &asked {
-                let prompt: &Arc<str> = if view == View::Image { image } else { blind };
+            for asked in &asked {
+                let prompt = if view == View::Image {
+                    &asked.image
+                } else {
+                    &asked.blind
+                };
                 for &(index, asker) in &askers {
-                    let key = shown.key(question, prompt, asker);
+                    let key = shown.key(asked, prompt, asker);
                     self.keys.push(key);
                     if !answered.contains(&key) {
                         trials.push(Trial {
                             key,
-                            question: Arc::clone(question),
+                            question: Arc::clone(&asked.question),
                             prompt: Arc::clone(prompt),
                             asker: index,
+                            repeat: asked.repeat,
+                            turn: asked.turn,
                         });
                     }
                 }
@@ -222,6 +242,15 @@ impl Plan {
     }
 }
 
+/// A question as it is shown once, with its words for models that see the image and for those that do not.
+struct Asked {
+    question: Arc<Question>,
+    image: Arc<str>,
+    blind: Arc<str>,
+    repeat: u32,
+    turn: u32,
+}
+
 /// What is shown in one shot, as it enters the keys of its trials.
 struct Shown {
     condition: String,
@@ -240,12 +269,17 @@ impl Shown {
         let picture = picture.ok_or_else(|| Error::data(frame, "the frame was not read"))?;
         Ok(Self {
             condition: condition.to_string(),
-            image: inputs.recipe.digest(frame, picture, condition).to_string(),
+            image: inputs
+                .recipe
+                .digest(frame, &picture.digest, condition)
+                .to_string(),
         })
     }
 
     /// The key of one trial: see [`TrialKey`].
-    fn key(&self, question: &Question, prompt: &str, asker: &Asker) -> TrialKey {
+    fn key(&self, put: &Asked, prompt: &str, asker: &Asker) -> TrialKey {
+        let question = &*put.question;
+        let repeat = (put.repeat > 0).then(|| format!("repeat {}", put.repeat));
         // Built-in models answer by the names of question and condition, so these decide the reply too.
         let head = [
             "darkqa.trial/1",
@@ -257,6 +291,7 @@ impl Shown {
             &self.image,
         ];
         let choices = question.choices.texts().iter().map(String::as_str);
-        Digest::of_parts(head.into_iter().chain(choices).map(str::as_bytes)).into()
+        let parts = head.into_iter().chain(choices).chain(repeat.as_deref());
+        Digest::of_parts(parts.map(str::as_bytes)).into()
     }
 }

@@ -7,6 +7,8 @@ use std::time::Duration;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use tracing_subscriber::fmt::MakeWriter;
 
+use crate::report::forecast::money;
+
 /// Where progress is shown: on a terminal, or nowhere.
 #[derive(Debug, Clone)]
 pub struct Progress {
@@ -62,7 +64,7 @@ impl Progress {
         let bar = Bar(style.map_or(bar.clone(), |style| {
             bar.with_style(style.with_key("rate", rate))
         }));
-        bar.count(answered, 0);
+        bar.count(answered, 0, None);
         bar
     }
 }
@@ -81,11 +83,12 @@ impl Bar {
         self.0.inc(1);
     }
 
-    /// Shows how many trials are answered and how many have failed.
-    pub(super) fn count(&self, answered: usize, failed: usize) {
+    /// Shows how many trials are answered and how many have failed, and the dollars that went into them.
+    pub(super) fn count(&self, answered: usize, failed: usize, spent: Option<f64>) {
         self.0.set_position((answered + failed) as u64);
+        let spent = spent.map_or(String::new(), |dollars| format!(", {}", money(dollars)));
         self.0
-            .set_message(format!("{answered} answered, {failed} failed"));
+            .set_message(format!("{answered} answered, {failed} failed{spent}"));
     }
 }
 

@@ -40,6 +40,7 @@ pub(super) fn record(
         finish: None,
         strict: None,
         lenient: None,
+        repeat: trial.repeat,
         outcome: Outcome::Failed,
         failure: None,
         usage: None,

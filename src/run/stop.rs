@@ -21,6 +21,8 @@ pub(super) enum End {
     Through,
     /// The user interrupted it.
     Interrupted,
+    /// The next question would have gone beyond `--max-cost`.
+    Spent,
     /// A model could not be asked any further, or too much had failed.
     Stopped(Error),
 }
@@ -30,7 +32,7 @@ impl End {
         match self {
             _ if counts.answered == counts.trials => Status::Complete,
             Self::Through => Status::Incomplete,
-            Self::Interrupted => Status::Cancelled,
+            Self::Interrupted | Self::Spent => Status::Cancelled,
             Self::Stopped(_) => Status::Stopped,
         }
     }
@@ -105,6 +107,12 @@ impl Watch {
         self.end.get_or_insert(End::Interrupted);
     }
 
+    /// Takes note that nothing more is within the means.
+    pub(super) fn spent(&mut self) {
+        self.stopped = true;
+        self.end.get_or_insert(End::Spent);
+    }
+
     pub(super) fn succeeded(&mut self, asker: usize) {
         let health = &mut self.models[asker].1;
         (health.succeeded, health.outage) = (true, 0);
@@ -119,7 +127,8 @@ impl Watch {
         let (name, health) = &mut self.models[asker];
         let Failure { kind, message, .. } = &error.failure;
         match kind {
-            FailureKind::Image => {}
+            // The images are at fault, or what they show; the next may pass.
+            FailureKind::Image | FailureKind::Filtered => {}
             FailureKind::Request => {
                 health.refusals += 1;
                 health.refused_frames.insert(frame.clone());
@@ -194,6 +203,7 @@ mod tests {
             failure,
             attempts: 1,
             reach,
+            refused: None,
         }
     }
 

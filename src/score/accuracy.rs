@@ -1,6 +1,6 @@
 //! The accuracy of each model in each condition: [`Summary`].
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use serde::Serialize;
 
@@ -8,7 +8,7 @@ use super::chance::chance;
 use super::choice::Mode;
 use super::estimate::Estimate;
 use crate::types::{
-    EnhancerName, Family, Level, Outcome, Question, Reading, Record, Variant, View,
+    EnhancerName, Family, Level, Outcome, Question, QuestionId, Reading, Record, Variant, View,
 };
 
 /// The name under which guessing stands among the models.
@@ -47,6 +47,9 @@ pub struct Cell {
     pub failed: usize,
     /// The share of right ones among the replies; `None` where none came.
     pub accuracy: Option<Estimate>,
+    /// The share of questions answered rightly every time, where some were asked more than once: in every order of their
+    /// choices (MMBench's circular evaluation, Liu et al. 2023, arXiv:2307.06281, section 4.2) and every repeat.
+    pub always: Option<Estimate>,
 }
 
 /// All cells of a run, ordered by subject, family and reading.
@@ -57,17 +60,19 @@ pub struct Summary {
 }
 
 #[derive(Default)]
-struct Tally {
+struct Tally<'a> {
     right: usize,
     unparsed: usize,
     failed: usize,
     replies: usize,
+    /// How often each question was answered, and how often rightly.
+    questions: HashMap<&'a QuestionId, (usize, usize)>,
 }
 
 /// Scores the records of a run; `questions` are those it asks, for the chance line.
 #[must_use]
 pub fn summarize(records: &[Record], questions: &[Question]) -> Summary {
-    let mut tallies = BTreeMap::<(Subject, Option<Family>, Mode), Tally>::new();
+    let mut tallies = BTreeMap::<(Subject, Option<Family>, Mode), Tally<'_>>::new();
     for record in records {
         let subject = Subject {
             model: record.model.clone(),
@@ -98,23 +103,40 @@ pub fn summarize(records: &[Record], questions: &[Question]) -> Summary {
             right: tally.right,
             unparsed: tally.unparsed,
             failed: tally.failed,
-            accuracy: Estimate::share(tally.right, tally.replies),
+            accuracy: tally.accuracy(),
+            always: tally.always(),
         });
     Summary {
         cells: scored.chain(guesses(questions)).collect(),
     }
 }
 
-impl Tally {
-    fn count(&mut self, record: &Record, reading: Option<Reading>) {
+impl<'a> Tally<'a> {
+    fn count(&mut self, record: &'a Record, reading: Option<Reading>) {
         match reading {
             Some(reading) if record.outcome != Outcome::Failed => {
+                let right = usize::from(reading.chosen == Some(record.truth));
                 self.replies += 1;
-                self.right += usize::from(reading.chosen == Some(record.truth));
+                self.right += right;
                 self.unparsed += usize::from(reading.chosen.is_none());
+                let (replies, rights) = self.questions.entry(&record.question).or_default();
+                (*replies, *rights) = (*replies + 1, *rights + right);
             }
             _ => self.failed += 1,
         }
+    }
+
+    fn accuracy(&self) -> Option<Estimate> {
+        Estimate::over(self.right, self.replies, self.questions.len())
+    }
+
+    fn always(&self) -> Option<Estimate> {
+        let mut counts = self.questions.values();
+        if counts.clone().all(|(replies, _)| *replies == 1) {
+            return None;
+        }
+        let always = counts.by_ref().filter(|(replies, right)| replies == right);
+        Estimate::share(always.count(), self.questions.len())
     }
 }
 
@@ -140,6 +162,7 @@ fn guesses(questions: &[Question]) -> Vec<Cell> {
             unparsed: 0,
             failed: 0,
             accuracy,
+            always: None,
         })
     });
     cells.collect()

@@ -25,10 +25,17 @@ impl Estimate {
     /// frame share its light, so the true uncertainty is somewhat larger.
     #[must_use]
     pub fn share(right: usize, n: usize) -> Option<Self> {
-        if n == 0 || right > n {
+        Self::over(right, n, n)
+    }
+
+    /// The share of `right` among `n` replies to fewer questions, each asked several times: the interval is that of the
+    /// number of questions, since replies to one question say little more than one of them.
+    #[must_use]
+    pub fn over(right: usize, n: usize, questions: usize) -> Option<Self> {
+        if n == 0 || right > n || questions == 0 {
             return None;
         }
-        let (count, value) = (n as f64, right as f64 / n as f64);
+        let (count, value) = (questions as f64, right as f64 / n as f64);
         let scale = 1.0 + Z * Z / count;
         let center = (value + Z * Z / (2.0 * count)) / scale;
         let half =
@@ -73,6 +80,12 @@ mod tests {
             );
         }
         assert_eq!(Estimate::share(0, 0), None);
+        let (once, thrice) = (Estimate::share(15, 148), Estimate::over(45, 444, 148));
+        assert_eq!(
+            thrice,
+            once.map(|once| Estimate { n: 444, ..once }),
+            "the interval of the questions"
+        );
         let all = Estimate::share(7, 7).unwrap();
         assert!(all.high <= 1.0 && all.low < 1.0);
     }

@@ -27,6 +27,16 @@ pub struct Usage {
     pub completion_tokens: Option<u64>,
 }
 
+impl Usage {
+    /// All tokens, where any were told.
+    #[must_use]
+    pub fn total(&self) -> Option<u64> {
+        let (prompt, completion) = (self.prompt_tokens, self.completion_tokens);
+        (prompt.is_some() || completion.is_some())
+            .then(|| prompt.unwrap_or(0).saturating_add(completion.unwrap_or(0)))
+    }
+}
+
 /// One reply of a model, as it arrived.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reply {

@@ -106,6 +106,8 @@ pub enum FailureKind {
     Server,
     /// The request was refused.
     Request,
+    /// A moderator refused what the request showed or asked.
+    Filtered,
     /// The answer was not a chat completion.
     Response,
     /// The image could not be made.
@@ -199,6 +201,9 @@ pub struct Record {
     pub strict: Option<Reading>,
     /// The lenient reading of the reply; `None` where it failed.
     pub lenient: Option<Reading>,
+    /// How many times the same was asked before; left out of the file where it is the first.
+    #[serde(default, skip_serializing_if = "is_first")]
+    pub repeat: u32,
     /// How it ended.
     pub outcome: Outcome,
     /// What went wrong, where it failed.
@@ -213,6 +218,11 @@ pub struct Record {
     pub attempts: u32,
     /// The image as it was sent.
     pub image: Option<ImageFacts>,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands a reference")]
+fn is_first(repeat: &u32) -> bool {
+    *repeat == 0
 }
 
 #[cfg(test)]

@@ -7,11 +7,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use rayon::ThreadPoolBuilder;
 
 use super::darkroom::{Darkroom, Desk};
+use super::gallery::look_through;
 use super::plan::conditions;
 use super::progress::Progress;
 use super::recipe::Recipe;
 use super::written::png;
-use super::{Verdict, identity, look_through, open_enhancers, select};
+use super::{Verdict, identity, open_enhancers, select};
 use crate::ask::Format;
 use crate::config::{Existing, Export};
 use crate::dataset::Dataset;
@@ -52,6 +53,7 @@ pub fn export(config: &Export, progress: &Progress) -> Result<Verdict> {
         pictures: &pictures,
         recipe: &recipe,
         enhancers,
+        limit: None,
     };
     let names = names(pictures.keys());
     let bar = progress.bar("images", pictures.len() * conditions.len());

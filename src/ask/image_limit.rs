@@ -1,0 +1,119 @@
+//! The largest image that an endpoint takes: [`ImageLimit`].
+
+use super::url::BaseUrl;
+use crate::error::{Error, Result};
+use crate::types::ImageFacts;
+
+/// What is known of the images that an endpoint takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ImageLimit {
+    /// The most bytes of the encoded file.
+    pub bytes: usize,
+    /// The longest side, in pixels; `None` for any.
+    pub side: Option<u32>,
+    /// Whose limit it is.
+    pub whose: &'static str,
+}
+
+/// Limits by how the host ends. A limit on the base64 text is three quarters of it in bytes of the file.
+const KNOWN: [(&str, ImageLimit); 7] = [
+    // Of a request of 50 MB with everything in it, so somewhat less (platform.openai.com/docs/guides/images-vision).
+    ("api.openai.com", limit(20_000_000, None, "OpenAI")),
+    (".azure.com", limit(20_000_000, None, "Azure")),
+    // 5 MB of base64 and 8000 pixels (docs.anthropic.com/en/docs/build-with-claude/vision).
+    (
+        "api.anthropic.com",
+        limit(3_750_000, Some(8000), "Anthropic"),
+    ),
+    // 4 MB of base64 (console.groq.com/docs/vision).
+    ("api.groq.com", limit(3_000_000, None, "Groq")),
+    // 20 MB for a whole request, base64 (ai.google.dev/gemini-api/docs/image-understanding).
+    ("googleapis.com", limit(14_900_000, None, "Gemini")),
+    ("api.x.ai", limit(20_000_000, None, "xAI")),
+    ("api.mistral.ai", limit(10_000_000, None, "Mistral")),
+];
+
+const fn limit(bytes: usize, side: Option<u32>, whose: &'static str) -> ImageLimit {
+    ImageLimit { bytes, side, whose }
+}
+
+impl ImageLimit {
+    /// Where nothing is known: 20 MB, which no hosted model takes more of.
+    pub const UNKNOWN: Self = limit(20_000_000, None, "the default");
+
+    /// The limit of an endpoint.
+    #[must_use]
+    pub fn of(base: &BaseUrl) -> Self {
+        let known = KNOWN.iter().find(|(host, _)| base.host().ends_with(host));
+        known.map_or(Self::UNKNOWN, |(_, limit)| *limit)
+    }
+
+    /// Makes sure that an image is within the limit.
+    ///
+    /// # Errors
+    /// [`Error::Data`] about the image, with the flags that make it smaller.
+    pub fn check(&self, image: &ImageFacts) -> Result<()> {
+        let long = image.width.max(image.height);
+        let mend = "make it smaller by --max-side, or by --image jpeg:95";
+        let wrong = |problem: String| Err(Error::data("image", problem));
+        let megabytes = |bytes: usize| bytes as f64 / 1e6;
+        if image.bytes > self.bytes {
+            return wrong(format!(
+                "{} × {} pixels are {:.1} MB as {}, more than the {} MB of {}; {mend}, or take another limit by --max-image",
+                image.width,
+                image.height,
+                megabytes(image.bytes),
+                image.format,
+                megabytes(self.bytes),
+                self.whose,
+            ));
+        }
+        match self.side {
+            Some(side) if long > side as usize => wrong(format!(
+                "a side of {long} pixels is more than the {side} of {}; {mend}",
+                self.whose
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    /// The limit that the user states.
+    #[must_use]
+    pub fn stated(bytes: usize) -> Self {
+        limit(bytes, None, "--max-image")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limits_are_known_by_host() {
+        let of = |base: &str| ImageLimit::of(&base.parse().unwrap());
+        assert_eq!(of("https://api.anthropic.com/v1").side, Some(8000));
+        assert_eq!(of("https://r.openai.azure.com/openai/v1").whose, "Azure");
+        assert_eq!(of("http://127.0.0.1:8000/v1"), ImageLimit::UNKNOWN);
+    }
+
+    #[test]
+    fn what_is_beyond_the_limit_names_what_mends_it() {
+        let image = |bytes, width| ImageFacts {
+            digest: crate::types::Digest::of(b""),
+            bytes,
+            width,
+            height: 10,
+            format: "png".into(),
+        };
+        let limit = ImageLimit::of(&"https://api.anthropic.com/v1".parse().unwrap());
+        assert!(limit.check(&image(3_750_000, 8000)).is_ok());
+        for beyond in [image(3_750_001, 10), image(10, 8001)] {
+            let error = limit.check(&beyond).unwrap_err().to_string();
+            assert!(
+                error.contains("Anthropic") && error.contains("--max-side"),
+                "{error}"
+            );
+        }
+        assert!(ImageLimit::stated(5).check(&image(6, 10)).is_err());
+    }
+}

@@ -1,0 +1,287 @@
+//! How many tokens a model takes an image for: [`image_tokens`].
+//!
+//! Only for estimates before anything is sent; what a reply was charged for is told by the server.
+
+use super::parameters::Detail;
+
+/// How a family of models counts.
+#[derive(Debug, Clone, Copy)]
+enum Rule {
+    /// OpenAI's tiles: the image is made to fit 2048 × 2048, then its shorter side 768; a base and a price for each tile of
+    /// 512 × 512, in low detail the base alone (platform.openai.com/docs/guides/images-vision, "Calculating costs").
+    Tiles { base: u64, tile: u64 },
+    /// OpenAI's patches of 32 × 32, the image made smaller until it has no more than so many in this and in high detail, times
+    /// a factor (same page; the factors of the gpt-5 line as users measured them,
+    /// community.openai.com/t/1377015).
+    Patches { most: f64, high: f64, factor: f64 },
+    /// Anthropic's: width × height / 750, the longer side made to fit first
+    /// (docs.anthropic.com/en/docs/build-with-claude/vision), no more than so many.
+    Area { side: f64, most: f64 },
+    /// Gemini 2's: 258 where both sides are 384 at most, else 258 for each tile of two thirds of the shorter side
+    /// (ai.google.dev/gemini-api/docs/tokens).
+    Crops,
+    /// The same for all images.
+    Fixed(u64),
+    /// Merged patches of so many pixels a side, the image made to fit this side first where there is one.
+    Merged { patch: f64, side: f64 },
+}
+
+use Rule::{Area, Crops, Fixed, Merged, Patches, Tiles};
+
+const fn patches(most: f64, high: f64, factor: f64) -> Rule {
+    Patches { most, high, factor }
+}
+
+/// Families by how the name of a model begins; the first that fits holds.
+const FAMILIES: [(&str, Rule); 38] = [
+    (
+        "gpt-4o-mini",
+        Tiles {
+            base: 2833,
+            tile: 5667,
+        },
+    ),
+    ("gpt-4.1-mini", patches(1536.0, 1536.0, 1.62)),
+    ("gpt-4.1-nano", patches(1536.0, 1536.0, 2.46)),
+    ("o4-mini", patches(1536.0, 1536.0, 1.72)),
+    ("gpt-5-mini", patches(1536.0, 1536.0, 1.2)),
+    ("gpt-5-nano", patches(1536.0, 1536.0, 1.5)),
+    ("gpt-5.4-mini", patches(1536.0, 1536.0, 1.2)),
+    ("gpt-5.4-nano", patches(1536.0, 1536.0, 1.2)),
+    ("gpt-5.2", patches(1536.0, 1536.0, 1.2)),
+    ("gpt-5.3", patches(1536.0, 1536.0, 1.2)),
+    ("gpt-5.4", patches(2500.0, 2500.0, 1.2)),
+    ("gpt-5.5", patches(10_000.0, 2500.0, 1.2)),
+    ("gpt-5.6", patches(10_000.0, 2500.0, 1.2)),
+    ("gpt-6", patches(f64::MAX, 2500.0, 1.2)),
+    (
+        "gpt-5",
+        Tiles {
+            base: 70,
+            tile: 140,
+        },
+    ),
+    (
+        "gpt-4",
+        Tiles {
+            base: 85,
+            tile: 170,
+        },
+    ),
+    (
+        "o1",
+        Tiles {
+            base: 75,
+            tile: 150,
+        },
+    ),
+    (
+        "o3",
+        Tiles {
+            base: 75,
+            tile: 150,
+        },
+    ),
+    (
+        "claude-sonnet-5",
+        Area {
+            side: 2000.0,
+            most: 4000.0,
+        },
+    ),
+    (
+        "claude-opus-5",
+        Area {
+            side: 2000.0,
+            most: 4000.0,
+        },
+    ),
+    (
+        "claude-haiku-5",
+        Area {
+            side: 2000.0,
+            most: 4000.0,
+        },
+    ),
+    (
+        "claude",
+        Area {
+            side: 1568.0,
+            most: 1600.0,
+        },
+    ),
+    ("gemini-3", Fixed(1100)),
+    ("gemini-4", Fixed(1100)),
+    ("gemini", Crops),
+    ("gemma-3", Fixed(256)),
+    ("llava-1.5", Fixed(576)),
+    ("llava-v1.5", Fixed(576)),
+    (
+        "qwen2-vl",
+        Merged {
+            patch: 28.0,
+            side: f64::MAX,
+        },
+    ),
+    (
+        "qwen2.5-vl",
+        Merged {
+            patch: 28.0,
+            side: f64::MAX,
+        },
+    ),
+    (
+        "qwen3-vl",
+        Merged {
+            patch: 32.0,
+            side: f64::MAX,
+        },
+    ),
+    (
+        "qwen3.",
+        Merged {
+            patch: 32.0,
+            side: f64::MAX,
+        },
+    ),
+    (
+        "pixtral",
+        Merged {
+            patch: 16.0,
+            side: 1024.0,
+        },
+    ),
+    (
+        "mistral-small",
+        Merged {
+            patch: 28.0,
+            side: 1540.0,
+        },
+    ),
+    (
+        "mistral-medium",
+        Merged {
+            patch: 28.0,
+            side: 1540.0,
+        },
+    ),
+    (
+        "mistral-large",
+        Merged {
+            patch: 28.0,
+            side: 1540.0,
+        },
+    ),
+    (
+        "ministral",
+        Merged {
+            patch: 28.0,
+            side: 1540.0,
+        },
+    ),
+    (
+        "kimi",
+        Merged {
+            patch: 28.0,
+            side: f64::MAX,
+        },
+    ),
+];
+
+/// How many tokens an image of this width and height is to a model, by its family; `None` where that is not known.
+#[must_use]
+pub fn image_tokens(model: &str, detail: Option<Detail>, width: u64, height: u64) -> Option<u64> {
+    let name = model.rsplit('/').next().unwrap_or(model).to_lowercase();
+    let (_, rule) = FAMILIES
+        .iter()
+        .find(|(family, _)| name.starts_with(family))?;
+    Some(rule.count(detail, width as f64, height as f64))
+}
+
+impl Rule {
+    fn count(self, detail: Option<Detail>, width: f64, height: f64) -> u64 {
+        let (longer, shorter) = (width.max(height), width.min(height));
+        let count = match self {
+            Fixed(tokens) => return tokens,
+            Tiles { base, .. } if detail == Some(Detail::Low) => return base,
+            Tiles { base, tile } => {
+                let scale = (2048.0 / longer).min(1.0);
+                let scale = scale * (768.0 / (shorter * scale)).min(1.0);
+                let tiles = |side: f64| (side * scale / 512.0).ceil().max(1.0);
+                return base + tile * (tiles(width) * tiles(height)) as u64;
+            }
+            Patches { most, high, factor } => {
+                let most = if detail == Some(Detail::High) {
+                    high
+                } else {
+                    most
+                };
+                fitted_patches(width, height, most) * factor
+            }
+            Area { side, most } => {
+                let scale = (side / longer).min(1.0);
+                (width * height * scale * scale / 750.0).min(most)
+            }
+            Crops if longer <= 384.0 => 258.0,
+            Crops => {
+                let unit = (shorter / 1.5).floor().max(1.0);
+                258.0 * (width / unit).ceil() * (height / unit).ceil()
+            }
+            Merged { patch, side } => {
+                let scale = (side / longer).min(1.0);
+                let patches = |length: f64| (length * scale / patch).round().max(1.0);
+                patches(width) * patches(height)
+            }
+        };
+        count.ceil() as u64
+    }
+}
+
+/// How many patches of 32 × 32 cover an image after it was made small enough for so many: the scale is chosen so that the
+/// sides are whole numbers of patches (OpenAI, same page).
+fn fitted_patches(width: f64, height: f64, most: f64) -> f64 {
+    let cover = |scale: f64| {
+        let patches = |side: f64| (side * scale / 32.0).ceil().max(1.0);
+        patches(width) * patches(height)
+    };
+    if cover(1.0) <= most {
+        return cover(1.0);
+    }
+    let scale = (32.0 * 32.0 * most / (width * height)).sqrt();
+    let whole = |side: f64| (side * scale / 32.0).floor().max(1.0) / (side * scale / 32.0);
+    cover(scale * whole(width).min(whole(height)) * (1.0 - 1e-9)).min(most)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn published_counts_come_out() {
+        let high = Some(Detail::High);
+        for (model, detail, width, height, tokens) in [
+            // platform.openai.com/docs/guides/images-vision
+            ("gpt-4o", high, 1024, 1024, 765),
+            ("gpt-4o", high, 2048, 4096, 1105),
+            ("gpt-4o", Some(Detail::Low), 4096, 8192, 85),
+            ("o4-mini", None, 1024, 1024, 1762),
+            ("gpt-4.1-mini", None, 1024, 1024, 1659),
+            // community.openai.com/t/1262691, without the words: 128 × 64
+            ("openai/gpt-4.1-2025-04-14", high, 128, 64, 255),
+            ("gpt-4o-mini", high, 128, 64, 8500),
+            // ai.google.dev/gemini-api/docs/tokens
+            ("gemini-2.5-flash", None, 384, 384, 258),
+            ("gemini-2.5-flash", None, 960, 540, 1548),
+            // docs.anthropic.com: 1.15 megapixels are about 1600 tokens
+            ("claude-sonnet-4-5", None, 1000, 1000, 1334),
+            ("claude-sonnet-4-5", None, 2560, 1440, 1600),
+            ("Qwen/Qwen2.5-VL-7B-Instruct", None, 1288, 728, 1196),
+        ] {
+            let counted = image_tokens(model, detail, width, height);
+            assert_eq!(counted, Some(tokens), "{model} {width} × {height}");
+        }
+        // 1800 × 2400 is more than 1536 patches: 33 × 44 of them.
+        assert_eq!(image_tokens("gpt-4.1-mini", None, 1800, 2400), Some(2353));
+        assert_eq!(image_tokens("my-model", None, 640, 480), None);
+    }
+}

@@ -1,0 +1,199 @@
+//! How many requests are on the wire at once: [`Window`] within [`Bounds`].
+
+use std::fmt;
+use std::num::NonZeroUsize;
+use std::str::FromStr;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use tokio::time::{Duration, Instant};
+
+use crate::error::{Error, Result};
+
+/// The least and the most requests at once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Bounds {
+    least: NonZeroUsize,
+    first: NonZeroUsize,
+    most: NonZeroUsize,
+}
+
+impl Bounds {
+    /// Where nobody says otherwise: from 8 up to 32 as the server keeps pace, down to 1 where it is overloaded.
+    pub const DEFAULT: Self = Self {
+        least: NonZeroUsize::MIN,
+        first: NonZeroUsize::new(8).unwrap(),
+        most: NonZeroUsize::new(32).unwrap(),
+    };
+
+    /// The most.
+    #[must_use]
+    pub fn most(self) -> usize {
+        self.most.get()
+    }
+}
+
+impl fmt::Display for Bounds {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.first == self.most {
+            write!(f, "{}", self.most)
+        } else {
+            write!(f, "{}-{}", self.first, self.most)
+        }
+    }
+}
+
+impl FromStr for Bounds {
+    type Err = Error;
+
+    /// Reads `32` (from there down to 1 and back) or `4-64` (from 4 up to 64, never below 4).
+    fn from_str(text: &str) -> Result<Self> {
+        let (first, most) = text.split_once('-').unwrap_or((text, text));
+        let range = text.contains('-');
+        match (first.trim().parse::<NonZeroUsize>(), most.trim().parse()) {
+            (Ok(first), Ok(most)) if first <= most => Ok(Self {
+                least: if range { first } else { NonZeroUsize::MIN },
+                first,
+                most,
+            }),
+            _ => Err(Error::usage(
+                "--concurrency",
+                format_args!(
+                    "{text:?} is neither a number of requests from 1 on nor a range like 4-64"
+                ),
+            )),
+        }
+    }
+}
+
+/// What an overload leaves of the window.
+const CUT: f64 = 0.7;
+
+/// A window in which replies take so much longer than in the quickest one is wide enough: the server only queues what comes
+/// on top.
+const QUEUEING: f64 = 1.5;
+
+/// The window of an endpoint: additive increase, multiplicative decrease (Chiu and Jain 1989, Comput. Netw. ISDN Syst. 17:1).
+///
+/// A success widens it by one request a round trip while the window is full and replies come no slower; an overload (429,
+/// 503, 529, a time-out) narrows it by a third, once for all that were under way then.
+#[derive(Debug)]
+pub(in crate::ask) struct Window {
+    bounds: Bounds,
+    state: Mutex<State>,
+}
+
+#[derive(Debug)]
+struct State {
+    width: f64,
+    /// Overloads of requests that were sent before do not count again.
+    cut_at: Option<Instant>,
+    /// Replies of the round under way and the time they took together.
+    replies: u32,
+    took: Duration,
+    /// The mean time of a reply in the quickest round.
+    quickest: Option<Duration>,
+    /// Whether the last round was slower than is worth a wider window.
+    queueing: bool,
+}
+
+impl Window {
+    pub(in crate::ask) fn new(bounds: Bounds) -> Self {
+        Self {
+            bounds,
+            state: Mutex::new(State {
+                width: bounds.first.get() as f64,
+                cut_at: None,
+                replies: 0,
+                took: Duration::ZERO,
+                quickest: None,
+                queueing: false,
+            }),
+        }
+    }
+
+    /// How many requests may be on the wire now.
+    pub(in crate::ask) fn width(&self) -> usize {
+        self.state().width as usize
+    }
+
+    /// Notes a reply that took so long.
+    pub(in crate::ask) fn succeeded(&self, took: Duration) {
+        let mut state = self.state();
+        state.replies += 1;
+        state.took += took;
+        if state.replies as f64 >= state.width {
+            let mean = state.took / state.replies;
+            let quickest = state.quickest.map_or(mean, |quickest| quickest.min(mean));
+            state.quickest = Some(quickest);
+            state.queueing = mean > quickest.mul_f64(QUEUEING);
+            (state.replies, state.took) = (0, Duration::ZERO);
+        }
+        if !state.queueing {
+            let wider = state.width + 1.0 / state.width;
+            state.width = wider.min(self.bounds.most.get() as f64);
+        }
+    }
+
+    /// Notes an overload that a request sent at this time met.
+    pub(in crate::ask) fn overloaded(&self, sent: Instant) {
+        let mut state = self.state();
+        if state.cut_at.is_none_or(|cut| sent > cut) {
+            state.cut_at = Some(Instant::now());
+            state.width = (state.width * CUT).max(self.bounds.least.get() as f64);
+        }
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bounds_read_back() {
+        for text in ["1", "32", "4-64"] {
+            assert_eq!(text.parse::<Bounds>().unwrap().to_string(), text);
+        }
+        assert_eq!(Bounds::DEFAULT.to_string(), "8-32");
+        for wrong in ["", "0", "-4", "8-4", "4-", "a", "4-8-16"] {
+            assert!(wrong.parse::<Bounds>().is_err(), "{wrong}");
+        }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn it_widens_one_by_one_and_narrows_by_a_third() {
+        let window = Window::new("8-32".parse().unwrap());
+        for _ in 0..9 {
+            window.succeeded(Duration::from_millis(200));
+        }
+        assert_eq!(window.width(), 9);
+        for _ in 0..2000 {
+            window.succeeded(Duration::from_millis(200));
+        }
+        assert_eq!(window.width(), 32);
+        let sent = Instant::now();
+        tokio::time::advance(Duration::from_millis(100)).await;
+        for _ in 0..32 {
+            window.overloaded(sent);
+        }
+        assert_eq!(window.width(), 22, "all of one moment count once");
+        for _ in 0..20 {
+            tokio::time::advance(Duration::from_millis(100)).await;
+            window.overloaded(Instant::now());
+        }
+        assert_eq!(window.width(), 8, "the lower bound");
+    }
+
+    #[test]
+    fn it_stays_where_the_server_only_queues() {
+        let window = Window::new("4-64".parse().unwrap());
+        // One slot: a reply takes as long as all that are before it.
+        for _ in 0..2000 {
+            window.succeeded(Duration::from_millis(100 * window.width() as u64));
+        }
+        assert!(window.width() <= 7, "{}", window.width());
+    }
+}

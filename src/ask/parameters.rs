@@ -1,0 +1,258 @@
+//! How a model is to speak: [`Parameters`].
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::Serialize;
+
+use crate::error::{Error, Result};
+use crate::types::Digest;
+
+/// What a model is called and how it is to speak; what is `None` is left out of the request.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parameters {
+    /// The model, by the endpoint's name.
+    pub model: String,
+    /// The sampling temperature.
+    pub temperature: Temperature,
+    /// The most tokens a reply may have. Reasoning models spend it on hidden reasoning first.
+    pub max_tokens: Option<u32>,
+    /// The field in which that limit is sent.
+    pub token_field: TokenField,
+    /// How hard a reasoning model is to think, in the endpoint's words.
+    pub reasoning_effort: Option<String>,
+    /// In what resolution the image is to be looked at.
+    pub detail: Option<Detail>,
+    /// What the server lets the model say.
+    pub constrain: Constrain,
+}
+
+impl Parameters {
+    /// The smallest request every server takes: the model at temperature 0 with room for a reasoned reply.
+    #[must_use]
+    pub fn new(model: String) -> Self {
+        Self {
+            model,
+            temperature: Temperature::Auto,
+            max_tokens: Some(Self::MAX_TOKENS),
+            token_field: TokenField::Auto,
+            reasoning_effort: None,
+            detail: None,
+            constrain: Constrain::None,
+        }
+    }
+
+    /// The token limit where none is set: a letter needs 16, a reasoning model burns hundreds before it.
+    pub const MAX_TOKENS: u32 = 1024;
+
+    /// The digest of all that can change a reply. How the limit is called does not; whether it is sent does.
+    pub(super) fn digest(&self) -> Digest {
+        let limit = self
+            .max_tokens
+            .filter(|_| self.token_field != TokenField::Omit);
+        let words = [
+            Some(self.model.clone()),
+            (self.temperature != Temperature::Server).then(|| self.temperature.to_string()),
+            limit.map(|value| value.to_string()),
+            self.reasoning_effort.clone(),
+            self.detail.map(|detail| detail.to_string()),
+            (self.constrain != Constrain::None).then(|| self.constrain.to_string()),
+        ];
+        let parts = words.map(|word| word.map_or(String::new(), |word| format!("={word}")));
+        Digest::of_parts(parts.iter().map(String::as_bytes))
+    }
+}
+
+/// The sampling temperature of a request.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Temperature {
+    /// 0, the likeliest answer, as repeatable as the server allows; the server's own where the model refuses any, as
+    /// reasoning models do.
+    Auto,
+    /// The server's own: none is sent.
+    Server,
+    /// This one.
+    Of(f64),
+}
+
+impl fmt::Display for Temperature {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Auto => f.pad("auto"),
+            Self::Server => f.pad("default"),
+            Self::Of(value) => write!(f, "{value}"),
+        }
+    }
+}
+
+impl FromStr for Temperature {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        match (text, text.parse::<f64>()) {
+            ("auto", _) => Ok(Self::Auto),
+            ("default", _) => Ok(Self::Server),
+            (_, Ok(value)) if value.is_finite() && value >= 0.0 => Ok(Self::Of(value)),
+            _ => Err(Error::usage(
+                "--temperature",
+                format_args!("{text:?} is neither a number from 0 on nor auto or default"),
+            )),
+        }
+    }
+}
+
+/// The field in which a token limit is sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TokenField {
+    /// `max_completion_tokens` at OpenAI itself, `max_tokens` elsewhere; the other one where the server asks for it.
+    Auto,
+    /// `max_tokens`: what every other server understands.
+    MaxTokens,
+    /// `max_completion_tokens`: what reasoning models of OpenAI demand.
+    MaxCompletionTokens,
+    /// None: no limit is sent.
+    Omit,
+}
+
+impl TokenField {
+    const NAMES: [(Self, &str); 4] = [
+        (Self::Auto, "auto"),
+        (Self::MaxTokens, "max_tokens"),
+        (Self::MaxCompletionTokens, "max_completion_tokens"),
+        (Self::Omit, "none"),
+    ];
+
+    /// The field for an endpoint of this host: never `Auto`.
+    pub(super) fn at(self, host: &str) -> Self {
+        match self {
+            Self::Auto if host == "api.openai.com" => Self::MaxCompletionTokens,
+            Self::Auto => Self::MaxTokens,
+            field => field,
+        }
+    }
+}
+
+/// In what resolution a server is to look at an image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Detail {
+    /// As the server thinks best.
+    Auto,
+    /// Small: what little can be seen in the dark is lost.
+    Low,
+    /// Large.
+    High,
+}
+
+impl Detail {
+    const NAMES: [(Self, &str); 3] = [
+        (Self::Auto, "auto"),
+        (Self::Low, "low"),
+        (Self::High, "high"),
+    ];
+}
+
+/// What a server lets a model say. Anything but `None` measures something else: what the model would say if it had to
+/// name a letter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Constrain {
+    /// Whatever it likes.
+    None,
+    /// A JSON object with the letter of a choice, by `response_format` (OpenAI, vLLM, SGLang, llama.cpp, Ollama, Gemini).
+    Json,
+    /// The letter of a choice alone, by `structured_outputs` (vLLM from 0.12).
+    Choice,
+}
+
+impl Constrain {
+    const NAMES: [(Self, &str); 3] = [
+        (Self::None, "none"),
+        (Self::Json, "json"),
+        (Self::Choice, "choice"),
+    ];
+}
+
+/// A setting that is one of a few words.
+macro_rules! named {
+    ($kind:ident, $flag:literal) => {
+        impl fmt::Display for $kind {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                let name = Self::NAMES.iter().find(|(value, _)| value == self);
+                f.pad(name.map_or("", |(_, name)| name))
+            }
+        }
+
+        impl FromStr for $kind {
+            type Err = Error;
+
+            fn from_str(text: &str) -> Result<Self> {
+                let found = Self::NAMES.iter().find(|(_, name)| *name == text);
+                found.map(|(value, _)| *value).ok_or_else(|| {
+                    let names = Self::NAMES.map(|(_, name)| name).join(", ");
+                    Error::usage($flag, format_args!("{text:?} is none of {names}"))
+                })
+            }
+        }
+    };
+}
+
+named!(TokenField, "--token-field");
+named!(Detail, "--detail");
+named!(Constrain, "--constrain");
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_read_back() {
+        for (field, name) in TokenField::NAMES {
+            assert_eq!(name.parse::<TokenField>().unwrap(), field);
+            assert_eq!(field.to_string(), name);
+        }
+        for (detail, name) in Detail::NAMES {
+            assert_eq!(name.parse::<Detail>().unwrap(), detail);
+        }
+        for (constrain, name) in Constrain::NAMES {
+            assert_eq!(name.parse::<Constrain>().unwrap(), constrain);
+        }
+        for text in ["auto", "default", "0.5"] {
+            assert_eq!(text.parse::<Temperature>().unwrap().to_string(), text);
+        }
+        for wrong in ["-1", "NaN", "inf", "", "hot"] {
+            assert!(wrong.parse::<Temperature>().is_err(), "{wrong}");
+        }
+        let wrong = "max".parse::<TokenField>().unwrap_err().to_string();
+        assert!(wrong.ends_with("none of auto, max_tokens, max_completion_tokens, none"));
+        assert!("ultra".parse::<Detail>().is_err());
+    }
+
+    #[test]
+    fn the_field_depends_on_the_host() {
+        let auto = TokenField::Auto;
+        assert_eq!(auto.at("api.openai.com"), TokenField::MaxCompletionTokens);
+        assert_eq!(auto.at("localhost"), TokenField::MaxTokens);
+        assert_eq!(TokenField::Omit.at("api.openai.com"), TokenField::Omit);
+    }
+
+    #[test]
+    fn the_digest_knows_what_decides_a_reply() {
+        let base = Parameters::new("m".into());
+        let mut others = vec![base.clone(); 7];
+        others[0].model = "n".into();
+        others[1].temperature = Temperature::Server;
+        others[2].token_field = TokenField::Omit;
+        others[3].reasoning_effort = Some(String::new());
+        others[4].detail = Some(Detail::High);
+        others[5].constrain = Constrain::Json;
+        others[6].temperature = Temperature::Of(0.0);
+        for other in &others {
+            assert_ne!(other.digest(), base.digest(), "{other:?}");
+        }
+        let renamed = Parameters {
+            token_field: TokenField::MaxTokens,
+            ..base.clone()
+        };
+        assert_eq!(renamed.digest(), base.digest());
+    }
+}

@@ -1,0 +1,162 @@
+//! What models cost: [`Prices`].
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::Deserialize;
+
+use crate::error::{Error, Result};
+use crate::types::Usage;
+
+/// What a model charges, in dollars for a million tokens.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Price {
+    /// For the tokens of prompts, images included.
+    pub input: f64,
+    /// For the tokens of replies, hidden reasoning included.
+    pub output: f64,
+    /// How many tokens an image is, where that is known better than by the model's family.
+    pub image_tokens: Option<u64>,
+}
+
+impl Price {
+    /// The dollars for so many tokens of a prompt and of a reply.
+    #[must_use]
+    pub fn of(&self, prompt: f64, reply: f64) -> f64 {
+        (prompt * self.input + reply * self.output) / 1e6
+    }
+
+    /// The dollars for what a request was charged; what the server did not tell counts as nothing.
+    #[must_use]
+    pub fn charged(&self, usage: Usage) -> f64 {
+        let tokens = |tokens: Option<u64>| tokens.unwrap_or(0) as f64;
+        self.of(tokens(usage.prompt_tokens), tokens(usage.completion_tokens))
+    }
+}
+
+/// A table of prices by model, with its date.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Prices {
+    /// The day on which the prices were looked up.
+    pub as_of: String,
+    /// What the Batch API charges, as a share of the price.
+    pub batch: f64,
+    models: BTreeMap<String, Price>,
+}
+
+impl Prices {
+    /// The table that comes with the program, `src/ask/prices.toml`.
+    ///
+    /// # Errors
+    /// None that a user could meet: its form is held by a test.
+    pub fn built_in() -> Result<Self> {
+        toml::from_str(include_str!("prices.toml"))
+            .map_err(|e| Error::usage("src/ask/prices.toml", e.message()))
+    }
+
+    /// Reads a table of the user's own, in the form of the built-in one.
+    ///
+    /// # Errors
+    /// Where it cannot be read, or a price is none.
+    pub fn load(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))?;
+        let wrong = |problem: String| {
+            let expected = "expected as-of = \"2026-11-20\", batch = 0.5 and [models] with lines like \
+                            gpt-4o = { input = 2.5, output = 10 }";
+            let problem = format!("{}: {problem}; {expected}", path.display());
+            Error::usage("--prices", problem)
+        };
+        let prices: Self = toml::from_str(&text).map_err(|e| wrong(e.message().to_owned()))?;
+        let numbers = prices.models.iter().flat_map(|(name, price)| {
+            [(name, price.input), (name, price.output)].map(|(name, n)| (name.as_str(), n))
+        });
+        let sound = |n: f64| n.is_finite() && n >= 0.0;
+        let mut numbers = numbers.chain([("batch", prices.batch)]);
+        if let Some((name, number)) = numbers.find(|(_, n)| !sound(*n)) {
+            return Err(wrong(format!("{name}: {number} is no price")));
+        }
+        drop(numbers);
+        Ok(prices)
+    }
+
+    /// The price of a model: by its name, by the name behind a provider's (`openai/gpt-4o`), or by that of the line it is a
+    /// dated version of (`gpt-4o-2024-08-06`).
+    #[must_use]
+    pub fn of(&self, model: &str) -> Option<Price> {
+        let bare = model.rsplit('/').next().unwrap_or(model);
+        [model, bare].into_iter().find_map(|name| {
+            let exact = self.models.get(name).copied();
+            exact.or_else(|| {
+                let mut lines = self.models.iter();
+                let line =
+                    lines.find(|(line, _)| name.strip_prefix(&***line).is_some_and(is_version));
+                line.map(|(_, price)| *price)
+            })
+        })
+    }
+}
+
+/// Whether what follows a name says only which version of it is meant: a date, `latest`, `preview`.
+fn is_version(rest: &str) -> bool {
+    rest.strip_prefix(['-', '@']).is_some_and(|version| {
+        version == "latest"
+            || version.starts_with("preview")
+            || (version.len() >= 4 && version.chars().all(|c| c.is_ascii_digit() || c == '-'))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_built_in_table_is_whole() {
+        let prices = Prices::built_in().unwrap();
+        assert!(prices.models.len() > 50);
+        assert!(prices.as_of.starts_with("20"));
+    }
+
+    #[test]
+    fn versions_cost_what_their_line_costs() {
+        let prices = Prices::built_in().unwrap();
+        let input = |model| prices.of(model).map(|price| price.input);
+        assert_eq!(input("gpt-4o"), Some(2.5));
+        assert_eq!(input("gpt-4o-2024-08-06"), Some(2.5));
+        assert_eq!(input("openai/gpt-4o-mini-2024-07-18"), Some(0.15));
+        assert_eq!(input("claude-haiku-4-5-20251001"), Some(1.0));
+        for unknown in ["gpt-4o-audio", "gpt-4", "my-model", "gpt-4o-"] {
+            assert_eq!(input(unknown), None, "{unknown}");
+        }
+        let price = prices.of("gpt-4o").unwrap();
+        let usage = Usage {
+            prompt_tokens: Some(1_000_000),
+            completion_tokens: Some(100_000),
+        };
+        assert!((price.charged(usage) - 3.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_table_of_ones_own_is_checked() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let load = |text: &str| {
+            std::fs::write(file.path(), text).unwrap();
+            Prices::load(file.path())
+        };
+        let good = "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\n\"m/x\" = { input = 1, output = 2, image-tokens = 900 }\n";
+        let price = load(good).unwrap().of("m/x").unwrap();
+        assert_eq!((price.input, price.image_tokens), (1.0, Some(900)));
+        for wrong in [
+            "",
+            &good.replace("input = 1", "input = -1"),
+            &good.replace("input = 1", "inptu = 1"),
+            &good.replace("batch = 0.5", "batch = nan"),
+            "models = 3",
+        ] {
+            let error = load(wrong).unwrap_err().to_string();
+            assert!(error.starts_with("--prices: "), "{error}");
+            assert!(error.contains("gpt-4o ="), "{error}");
+        }
+    }
+}

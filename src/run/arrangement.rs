@@ -1,0 +1,129 @@
+//! In which orders the choices of a question are shown: [`arrange`].
+
+use crate::config::{Order, Rotations, Showing};
+use crate::error::Result;
+use crate::types::{Choices, Digest, Question};
+
+/// A question as it is shown once.
+#[derive(Debug)]
+pub(super) struct Arranged {
+    /// The question with its choices in the order shown.
+    pub(super) question: Question,
+    /// How many times the same has been shown before.
+    pub(super) repeat: u32,
+    /// How many times it has been shown before, in whatever order.
+    pub(super) turn: u32,
+}
+
+/// Every way in which a question is shown: each rotation of its first order, all of them as often as is wanted.
+///
+/// The choices of a record are those shown, so its readings need no mapping back; two orders have two keys, because the
+/// choices enter them.
+pub(super) fn arrange(question: &Question, showing: Showing) -> Result<Vec<Arranged>> {
+    let choices = &question.choices;
+    let mut order: Vec<usize> = (0..choices.len()).collect();
+    if let Order::Shuffled(seed) = showing.order {
+        // Sorted by a digest each: a random order that other questions do not move.
+        order.sort_by_cached_key(|&index| {
+            let text = choices.texts()[index].as_bytes();
+            let parts = [
+                b"shuffle",
+                &seed.to_le_bytes()[..],
+                question.id.0.as_bytes(),
+                text,
+            ];
+            *Digest::of_parts(parts).as_bytes()
+        });
+    }
+    let rotations = match showing.rotations {
+        Rotations::One => 1,
+        Rotations::Every => choices.len(),
+    };
+    let mut arranged = Vec::new();
+    for repeat in 0..showing.repeats.get() {
+        for rotation in 0..rotations {
+            let mut order = order.clone();
+            order.rotate_left(rotation);
+            let texts = order.iter().map(|&index| choices.texts()[index].clone());
+            let truth = order.iter().position(|&index| index == choices.truth());
+            arranged.push(Arranged {
+                question: Question {
+                    choices: Choices::new(texts.collect(), truth.unwrap_or_default())?,
+                    ..question.clone()
+                },
+                repeat,
+                turn: arranged.len() as u32,
+            });
+        }
+    }
+    Ok(arranged)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+    use std::num::NonZeroU32;
+
+    use super::*;
+    use crate::types::{Family, FrameId, QuestionId};
+
+    fn question(id: usize) -> Question {
+        let texts = ["a", "b", "c"].map(str::to_owned).to_vec();
+        Question {
+            id: QuestionId(id.to_string()),
+            frame: FrameId("f".into()),
+            family: Family::Closest,
+            text: "?".into(),
+            choices: Choices::new(texts, 1).unwrap(),
+            evidence: serde_json::Value::Null,
+        }
+    }
+
+    fn shown(id: usize, order: Order, rotations: Rotations, repeats: u32) -> Vec<(String, u32)> {
+        let showing = Showing {
+            order,
+            rotations,
+            repeats: NonZeroU32::new(repeats).unwrap(),
+        };
+        let arranged = arrange(&question(id), showing).unwrap();
+        let shown = arranged.iter().map(|arranged| {
+            let choices = &arranged.question.choices;
+            assert_eq!(choices.texts()[choices.truth()], "b");
+            (choices.texts().concat(), arranged.repeat)
+        });
+        shown.collect()
+    }
+
+    #[test]
+    fn every_rotation_is_shown_as_often_as_wanted() {
+        let said = |text: &str, repeat| (text.to_owned(), repeat);
+        assert_eq!(shown(0, Order::Given, Rotations::One, 1), [said("abc", 0)]);
+        assert_eq!(
+            shown(0, Order::Given, Rotations::Every, 2),
+            [
+                said("abc", 0),
+                said("bca", 0),
+                said("cab", 0),
+                said("abc", 1),
+                said("bca", 1),
+                said("cab", 1)
+            ]
+        );
+    }
+
+    #[test]
+    fn shuffled_orders_are_all_as_frequent_and_stay() {
+        let mut counts = BTreeMap::<String, usize>::new();
+        for id in 0..6000 {
+            let order = shown(id, Order::Shuffled(7), Rotations::One, 1);
+            assert_eq!(order, shown(id, Order::Shuffled(7), Rotations::One, 1));
+            *counts.entry(order[0].0.clone()).or_default() += 1;
+        }
+        assert_eq!(counts.len(), 6);
+        // 1000 each, give or take four deviations.
+        assert!(
+            counts.values().all(|n| (885..=1115).contains(n)),
+            "{counts:?}"
+        );
+    }
+}

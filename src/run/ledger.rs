@@ -1,0 +1,142 @@
+//! What a run costs: [`Ledger`].
+
+use super::askers::Asker;
+use super::plan::Trial;
+use crate::ask::{Model, Parameters, Price, image_tokens};
+use crate::config::Money;
+use crate::error::{Error, Result};
+use crate::types::{ImageFacts, Record, Usage};
+
+/// How many characters of English a token is, by the rule of thumb of every provider.
+const CHARACTERS: f64 = 4.0;
+
+/// How many tokens a message has besides its words.
+const AROUND: f64 = 10.0;
+
+/// How many tokens a reply has that names a letter.
+pub(super) const LETTER: f64 = 4.0;
+
+/// Books what replies were charged, and says whether another question is within the means.
+#[derive(Debug)]
+pub(super) struct Ledger {
+    /// What each model charges; `None` for those that are free or unknown.
+    prices: Vec<Option<Price>>,
+    most: Option<f64>,
+    spent: f64,
+    /// The dearest reply so far.
+    dearest: Option<f64>,
+}
+
+impl Ledger {
+    /// A ledger that goes on from the kept records of a run.
+    ///
+    /// # Errors
+    /// Where `--max-cost` is said and a model has no price: it could not be kept to.
+    pub(super) fn new(money: &Money, askers: &[Asker], kept: &[Record]) -> Result<Self> {
+        let price = |asker: &Asker| {
+            let remote = asker.model.is_remote();
+            remote
+                .then(|| money.prices.of(asker.model.name()))
+                .flatten()
+        };
+        let prices: Vec<Option<Price>> = askers.iter().map(price).collect();
+        let unknown = askers
+            .iter()
+            .zip(&prices)
+            .find(|(asker, price)| asker.model.is_remote() && price.is_none());
+        if let (Some(_), Some((asker, _))) = (money.most, unknown) {
+            return Err(Error::usage(
+                "--max-cost",
+                format_args!(
+                    "no price of {} is known as of {}; state it in a table by --prices FILE",
+                    asker.model.name(),
+                    money.prices.as_of
+                ),
+            ));
+        }
+        let mut ledger = Self {
+            prices,
+            most: money.most,
+            spent: 0.0,
+            dearest: None,
+        };
+        for record in kept {
+            let asker = askers
+                .iter()
+                .position(|asker| asker.model.name() == record.model && asker.view == record.view);
+            if let (Some(asker), Some(usage)) = (asker, record.usage) {
+                ledger.charge(asker, usage);
+            }
+        }
+        Ok(ledger)
+    }
+
+    /// Books a reply; where the server does not say what it charges, what is likely for a prompt of so many tokens.
+    pub(super) fn book(&mut self, asker: usize, usage: Option<Usage>, likely: f64) {
+        match (usage, self.prices[asker]) {
+            (Some(usage), _) => self.charge(asker, usage),
+            (None, Some(price)) => self.add(price.of(likely, LETTER)),
+            (None, None) => {}
+        }
+    }
+
+    fn charge(&mut self, asker: usize, usage: Usage) {
+        if let Some(price) = self.prices[asker] {
+            self.add(price.charged(usage));
+        }
+    }
+
+    fn add(&mut self, dollars: f64) {
+        self.spent += dollars;
+        self.dearest = Some(self.dearest.map_or(dollars, |dearest| dearest.max(dollars)));
+    }
+
+    /// How many tokens the prompt of a trial is likely to have: its words by their length, its image by the model's family.
+    pub(super) fn likely(&self, asker: &Asker, trial: &Trial, image: Option<&ImageFacts>) -> f64 {
+        let price = self.prices[trial.asker];
+        let image = image.and_then(|image| image_of(asker, price, image.width, image.height));
+        words(&trial.prompt) + image.unwrap_or(0.0)
+    }
+
+    /// The dollars booked so far; `None` where no model has a price.
+    pub(super) fn spent(&self) -> Option<f64> {
+        self.prices
+            .iter()
+            .any(Option::is_some)
+            .then_some(self.spent)
+    }
+
+    /// Whether one more question is within `--max-cost`, with so many on the way that may each turn out as dear as the
+    /// dearest so far. Until the first reply is booked one at a time is asked: nobody knows how much a model thinks.
+    pub(super) fn affords(&self, on_the_way: usize, asker: usize, likely: f64) -> bool {
+        let (Some(most), Some(price)) = (self.most, self.prices[asker]) else {
+            return true;
+        };
+        let likely = price.of(likely, LETTER);
+        match self.dearest {
+            None => on_the_way == 0 && likely <= most,
+            Some(dearest) => self.spent + dearest.max(likely) * (on_the_way + 1) as f64 <= most,
+        }
+    }
+}
+
+/// How many tokens the words of a prompt are likely to have.
+pub(super) fn words(prompt: &str) -> f64 {
+    prompt.chars().count() as f64 / CHARACTERS + AROUND
+}
+
+/// How many tokens an image is to a model: by the table of prices, else by its family; `None` where nobody knows.
+pub(super) fn image_of(
+    asker: &Asker,
+    price: Option<Price>,
+    width: usize,
+    height: usize,
+) -> Option<f64> {
+    let Model::OpenAi(model) = &*asker.model else {
+        return None;
+    };
+    let Parameters { model, detail, .. } = model.parameters();
+    let stated = price.and_then(|price| price.image_tokens);
+    let counted = || image_tokens(model, *detail, width as u64, height as u64);
+    stated.or_else(counted).map(|tokens| tokens as f64)
+}
