@@ -5,8 +5,11 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use clap::error::ErrorKind;
-use darkqa_eval::cli::{Cli, Command, EvaluateArgs};
-use darkqa_eval::config::{self, Config, Enhance, Export, Import, Questions, Realism, Synthesize};
+use darkqa_eval::cli::{BatchCommand, Cli, Command, EvaluateArgs};
+use darkqa_eval::config::{
+    self, BatchExport, BatchImport, Config, Enhance, Export, Import, Questions, Realism, Report,
+    Synthesize,
+};
 use darkqa_eval::enhance;
 use darkqa_eval::run::export::export;
 use darkqa_eval::run::import::import;
@@ -81,6 +84,9 @@ enum Task {
     Import(Box<Import>),
     Export(Box<Export>),
     Enhance(Box<Enhance>),
+    BatchExport(Box<BatchExport>),
+    BatchImport(BatchImport),
+    Report(Report),
 }
 
 impl Job {
@@ -111,6 +117,15 @@ impl Job {
                 let quiet = said.quiet;
                 (quiet, Task::Import(Box::new(Import::resolve(said)?)))
             }
+            Some(Command::Batch(BatchCommand::Export(said))) => {
+                let quiet = said.evaluate.output.quiet;
+                let config = BatchExport::resolve(*said)?;
+                (quiet, Task::BatchExport(Box::new(config)))
+            }
+            Some(Command::Batch(BatchCommand::Import(said))) => {
+                (false, Task::BatchImport(BatchImport::resolve(said)))
+            }
+            Some(Command::Report(said)) => (false, Task::Report(Report::resolve(said))),
             Some(Command::Questions(said)) => {
                 let quiet = said.quiet;
                 (quiet, Task::Questions(Box::new(Questions::resolve(said)?)))
@@ -134,6 +149,9 @@ fn show(task: Task, progress: &Progress) -> anyhow::Result<ExitCode> {
         Task::Import(config) => import(&config, progress)?,
         Task::Export(config) => export(&config, progress)?,
         Task::Enhance(config) => run::enhance::enhance(&config, progress)?,
+        Task::BatchExport(config) => run::batch::export(&config, progress)?,
+        Task::BatchImport(config) => run::batch::import(&config)?,
+        Task::Report(config) => run::report::report(&config)?,
     };
     let written = std::io::stdout().lock().write_all(output.as_bytes());
     match (status, written) {

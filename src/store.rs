@@ -4,7 +4,7 @@
 //! arrived, so that a killed run loses nothing. `manifest.json` says what the run is; everything else is made again from
 //! these two.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::ffi::OsStr;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom, Write};
@@ -13,10 +13,14 @@ use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
 use crate::types::manifest::{RunManifest, SCHEMA};
-use crate::types::{Record, TrialKey};
+use crate::types::{Outcome, Record, TrialKey, Via};
 
 const MANIFEST: &str = "manifest.json";
 const RECORDS: &str = "records.jsonl";
+/// The folder of batches in a run.
+pub const BATCH: &str = "batch";
+/// The trials that were sent in batches.
+const TRIALS: &str = "trials.jsonl";
 /// What the name of a file ends in until it is whole.
 const UNFINISHED: &str = ".part";
 
@@ -83,6 +87,52 @@ impl Store {
     /// What the run holds: the last record of each trial, in the order of their first.
     pub fn records(&self) -> Result<Vec<Record>> {
         read_records(&self.folder)
+    }
+
+    /// Takes note that these trials are out in a batch.
+    pub fn append_to_batch(&mut self, records: &[Record]) -> Result<()> {
+        let path = self.folder.join(BATCH).join(TRIALS);
+        let mut lines = Vec::new();
+        for record in records {
+            serde_json::to_writer(&mut lines, record)
+                .map_err(|e| Error::file(&path, "write", e.into()))?;
+            lines.push(b'\n');
+        }
+        let file = OpenOptions::new()
+            .read(true)
+            .append(true)
+            .create(true)
+            .open(&path);
+        let written = file.and_then(|mut file| {
+            mend(&path, &file).map_err(std::io::Error::other)?;
+            file.write_all(&lines)?;
+            file.sync_all()
+        });
+        written.map_err(|e| Error::file(&path, "write", e))
+    }
+
+    /// The trials that were sent in batches, as they were before anything came of them, each as often as it was sent.
+    pub fn batched(&self) -> Result<Vec<Record>> {
+        lines(&self.folder.join(BATCH).join(TRIALS))
+    }
+
+    /// The trials that are out in a batch: sent more often than a reply or a failure of theirs was taken over.
+    pub fn out_in_batches(&self) -> Result<BTreeSet<TrialKey>> {
+        let mut out = HashMap::<TrialKey, usize>::new();
+        for record in self.batched()? {
+            *out.entry(record.key).or_default() += 1;
+        }
+        for record in lines(&self.folder.join(RECORDS))? {
+            if record.outcome != Outcome::Failed {
+                out.remove(&record.key);
+            } else if record.via == Via::Batch
+                && let Some(times) = out.get_mut(&record.key)
+            {
+                *times = times.saturating_sub(1);
+            }
+        }
+        let out = out.into_iter().filter(|(_, times)| *times > 0);
+        Ok(out.map(|(key, _)| key).collect())
     }
 
     /// The run folder.
@@ -154,31 +204,38 @@ fn write_manifest(folder: &Path, manifest: &RunManifest) -> Result<()> {
 pub fn read_records(folder: &Path) -> Result<Vec<Record>> {
     let mut latest = HashMap::<TrialKey, usize>::new();
     let mut records: Vec<Record> = Vec::new();
-    let path = folder.join(RECORDS);
-    let file = match File::open(&path) {
-        Ok(file) => file,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(records),
-        Err(e) => return Err(Error::file(&path, "read", e)),
-    };
-    let mut lines = BufReader::new(file);
-    let mut line = Vec::new();
-    for number in 1.. {
-        line.clear();
-        let read = lines.read_until(b'\n', &mut line);
-        read.map_err(|e| Error::file(&path, "read", e))?;
-        if line.pop() != Some(b'\n') {
-            break;
-        }
-        let record: Record = serde_json::from_slice(&line).map_err(|e| {
-            let problem = format!("not a record: {e}; restore the file, or use another --out");
-            Error::line(&path, number, problem)
-        })?;
+    for record in lines(&folder.join(RECORDS))? {
         if let Some(&index) = latest.get(&record.key) {
             records[index] = record;
         } else {
             latest.insert(record.key, records.len());
             records.push(record);
         }
+    }
+    Ok(records)
+}
+
+/// The whole lines of a file of records; none where there is no such file.
+fn lines(path: &Path) -> Result<Vec<Record>> {
+    let file = match File::open(path) {
+        Ok(file) => file,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
+        Err(e) => return Err(Error::file(path, "read", e)),
+    };
+    let mut records = Vec::new();
+    let mut file = BufReader::new(file);
+    let mut line = Vec::new();
+    for number in 1.. {
+        line.clear();
+        file.read_until(b'\n', &mut line)
+            .map_err(|e| Error::file(path, "read", e))?;
+        if line.pop() != Some(b'\n') {
+            break;
+        }
+        records.push(serde_json::from_slice(&line).map_err(|e| {
+            let problem = format!("not a record: {e}; restore the file, or use another --out");
+            Error::line(path, number, problem)
+        })?);
     }
     Ok(records)
 }
@@ -344,6 +401,7 @@ mod tests {
             strict: None,
             lenient: None,
             repeat: 0,
+            via: Via::Direct,
             outcome,
             failure: None,
             usage: None,

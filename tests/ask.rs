@@ -4,13 +4,13 @@
 mod support;
 
 use std::sync::Arc;
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use darkqa_eval::ask::{
-    Access, AskError, BaseUrl, Call, Constrain, Detail, Endpoint, Format, Model, OpenAi,
-    Parameters, Payload, Prompts, Random, Reach, Script, Secret, Sending, Temperature, TokenField,
+    Access, BaseUrl, Call, Constrain, Detail, Endpoint, Format, Model, OpenAi, Parameters, Payload,
+    Prompts, Random, Script, Secret, Sending, Temperature, TokenField,
 };
 use darkqa_eval::types::{
     Choices, Digest, FailureKind, Family, Finish, FrameId, Question, QuestionId, Reply, Rgb, View,
@@ -54,15 +54,6 @@ fn question(id: &str, text: &str) -> Question {
         choices: Choices::new(vec!["yes".into(), "no".into()], 0).unwrap(),
         evidence: Value::Null,
     }
-}
-
-/// Asks once, of an endpoint that plays these answers.
-async fn asked(answers: Vec<Answer>) -> (Result<Reply, AskError>, MockEndpoint) {
-    let mock = MockEndpoint::start(answers);
-    let reply = model_at(&mock, quick())
-        .ask("Red?", 2, Some(&image()))
-        .await;
-    (reply, mock)
 }
 
 #[tokio::test]
@@ -166,206 +157,6 @@ async fn base_urls_keep_their_path_and_query() {
 }
 
 #[tokio::test]
-async fn what_may_pass_is_tried_again() {
-    let html = Answer::new(200, "<html><title>Sign in</title>").header("content-type", "text/html");
-    let passing = [
-        Answer::error(500, "x", "oops"),
-        Answer::new(502, "<html>Bad gateway"),
-        Answer::new(529, ""),
-        Answer::new(408, ""),
-        Answer::new(409, ""),
-        Answer::error(429, "rate_limit_exceeded", "slow down"),
-        Answer::dropped(),
-        Answer::text("B").cut(20),
-        Answer::new(200, "{\"choices\":["),
-        Answer::new(200, ""),
-        Answer::json(200, &json!({"choices": []})),
-        Answer::json(200, &json!({"choices": null})),
-        html,
-        Answer::new(200, "data: {}\n\n").header("content-type", "text/event-stream"),
-        Answer::new(499, ""),
-        Answer::json(200, &json!({"error": {"message": "no", "code": 502}})),
-        Answer::json(200, &json!({"error": "overloaded"})),
-        Answer::error(400, "x", "odd").header("x-should-retry", "true"),
-    ];
-    for answer in passing {
-        let (reply, mock) = asked(vec![answer.clone(), Answer::text("B")]).await;
-        let reply = reply.unwrap_or_else(|error| panic!("{answer:?}: {error}"));
-        assert_eq!(
-            (reply.text.as_str(), reply.attempts),
-            ("B", 2),
-            "{answer:?}"
-        );
-        let requests = mock.requests();
-        assert_eq!(requests[0].body, requests[1].body);
-    }
-}
-
-#[tokio::test]
-async fn retries_come_to_an_end() {
-    for (answer, kind, status) in [
-        (
-            Answer::error(500, "x", "oops"),
-            FailureKind::Server,
-            Some(500),
-        ),
-        (
-            Answer::error(429, "x", "slow"),
-            FailureKind::RateLimit,
-            Some(429),
-        ),
-        (
-            Answer::new(200, "nonsense"),
-            FailureKind::Response,
-            Some(200),
-        ),
-        (Answer::dropped(), FailureKind::Connection, None),
-        (Answer::text("B").cut(9), FailureKind::Connection, None),
-        (
-            Answer::json(200, &json!({"error": "x"})),
-            FailureKind::Server,
-            Some(200),
-        ),
-    ] {
-        let mock = MockEndpoint::start([answer.clone()]);
-        let sending = Sending {
-            retries: 2,
-            ..quick()
-        };
-        let error = model_at(&mock, sending)
-            .ask("Red?", 2, None)
-            .await
-            .unwrap_err();
-        assert_eq!(
-            (error.failure.kind, error.failure.status),
-            (kind, status),
-            "{answer:?}"
-        );
-        assert_eq!((error.attempts, error.reach), (3, Reach::Trial));
-        assert_eq!(mock.requests().len(), 3);
-    }
-}
-
-#[tokio::test]
-async fn what_will_not_pass_is_not_tried_again() {
-    for (answer, reach, said) in [
-        (
-            Answer::error(400, "x", "bad image"),
-            Reach::Trial,
-            "bad image",
-        ),
-        (
-            Answer::new(413, "<html><title>Too Large</title>"),
-            Reach::Trial,
-            "--max-side",
-        ),
-        (
-            Answer::json(422, &json!({"detail": [{"msg": "field required"}]})),
-            Reach::Trial,
-            "field required",
-        ),
-        (
-            Answer::error(401, "x", "no"),
-            Reach::Endpoint,
-            "--api-key-env",
-        ),
-        (Answer::error(402, "x", "pay"), Reach::Endpoint, "credit"),
-        (Answer::error(403, "x", "no"), Reach::Endpoint, "key"),
-        (
-            Answer::json(
-                403,
-                &json!({"error": {"message": "no", "metadata": {"reasons": ["x"]}}}),
-            ),
-            Reach::Trial,
-            "no",
-        ),
-        (Answer::new(404, ""), Reach::Endpoint, "--base-url"),
-        (Answer::new(405, ""), Reach::Endpoint, "--base-url"),
-        (
-            Answer::new(307, "").header("location", "https://elsewhere.example/v1"),
-            Reach::Endpoint,
-            "elsewhere",
-        ),
-        (
-            Answer::error(429, "insufficient_quota", "no quota"),
-            Reach::Endpoint,
-            "credit",
-        ),
-        (
-            Answer::error(400, "model_not_found", "no such model"),
-            Reach::Endpoint,
-            "--model",
-        ),
-        (
-            Answer::error(500, "x", "oops").header("x-should-retry", "false"),
-            Reach::Trial,
-            "oops",
-        ),
-        (
-            Answer::json(
-                400,
-                &json!({"error": {"param": "temperature", "message": "only 1"}}),
-            ),
-            Reach::Endpoint,
-            "--temperature default",
-        ),
-        (
-            Answer::json(200, &json!({"error": {"message": "who?", "code": 401}})),
-            Reach::Endpoint,
-            "who?",
-        ),
-        (
-            Answer::new(200, vec![b' '; (16 << 20) + 1]),
-            Reach::Trial,
-            "16 MiB",
-        ),
-    ] {
-        let (reply, mock) = asked(vec![answer]).await;
-        let error = reply.unwrap_err();
-        assert_eq!((error.reach, error.attempts), (reach, 1), "{error}");
-        assert!(error.failure.message.contains(said), "{error}");
-        assert_eq!(mock.requests().len(), 1, "{error}");
-    }
-}
-
-#[tokio::test]
-async fn replies_without_an_answer_are_replies() {
-    let refusal = json!({"content": null, "refusal": "I cannot see"});
-    let (reply, _mock) = asked(vec![Answer::message(&refusal, "stop")]).await;
-    let reply = reply.unwrap();
-    assert_eq!(reply.text, "");
-    assert_eq!(reply.refusal.as_deref(), Some("I cannot see"));
-    for (finish, expected) in [
-        ("length", Finish::Length),
-        ("content_filter", Finish::Filter),
-    ] {
-        let thinking = json!({"content": null, "reasoning_content": "A? B?"});
-        let (reply, _mock) = asked(vec![Answer::message(&thinking, finish)]).await;
-        let reply = reply.unwrap();
-        assert_eq!((reply.text.as_str(), reply.finish), ("", expected));
-    }
-}
-
-#[tokio::test]
-async fn servers_that_say_nothing_time_out() {
-    for answer in [Answer::silent(), Answer::stuck()] {
-        let mock = MockEndpoint::start([answer]);
-        let sending = Sending {
-            timeout: Duration::from_millis(60),
-            retries: 1,
-            ..quick()
-        };
-        let error = model_at(&mock, sending)
-            .ask("Red?", 2, None)
-            .await
-            .unwrap_err();
-        assert_eq!(error.failure.kind, FailureKind::Timeout);
-        assert_eq!(error.attempts, 2);
-        assert!(error.failure.message.contains("--timeout"), "{error}");
-    }
-}
-
-#[tokio::test]
 async fn a_closed_port_is_a_connection_failure() {
     let port = {
         let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
@@ -417,19 +208,6 @@ async fn a_wait_asked_for_is_kept_by_all() {
     let reply = second.ask("Red?", 2, None).await.unwrap();
     assert_eq!(reply.attempts, 1);
     assert!(start.elapsed() >= Duration::from_millis(80));
-}
-
-#[tokio::test]
-async fn a_wait_too_long_is_given_up_at_once() {
-    let tomorrow = SystemTime::now() + Duration::from_hours(24);
-    for wait in ["600", "1e300", &httpdate::fmt_http_date(tomorrow)] {
-        let answer = Answer::error(429, "x", "slow").header("retry-after", wait);
-        let (reply, mock) = asked(vec![answer]).await;
-        let error = reply.unwrap_err();
-        assert!(error.failure.message.contains("--max-wait"), "{error}");
-        assert_eq!((error.attempts, error.reach), (1, Reach::Endpoint));
-        assert_eq!(mock.requests().len(), 1);
-    }
 }
 
 #[tokio::test]

@@ -5,6 +5,7 @@
 //! key, connections, pauses) lives in the endpoint and is shared by all models asked there.
 
 mod access;
+pub mod batch;
 mod body;
 mod complaint;
 mod endpoint;

@@ -4,10 +4,12 @@
 //! (see [`crate::config`]); so every field is an `Option`, a list or a switch, and no default stands here.
 
 mod asking;
+mod batch;
 mod enhance;
 mod export;
 mod import;
 mod questions;
+mod report;
 
 use std::num::{NonZeroU32, NonZeroU64, NonZeroUsize};
 use std::path::PathBuf;
@@ -15,10 +17,12 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 
 pub use asking::{ModelArgs, SendingArgs};
+pub use batch::{BatchCommand, BatchExportArgs, BatchImportArgs};
 pub use enhance::EnhanceArgs;
 pub use export::ExportArgs;
 pub use import::ImportArgs;
 pub use questions::QuestionsArgs;
+pub use report::ReportArgs;
 
 /// Measures how well a vision-language model sees in the dark.
 ///
@@ -56,6 +60,11 @@ pub enum Command {
     Export(Box<ExportArgs>),
     /// Enhance images by an ONNX model, as an evaluation would; or tell how it is fed and read
     Enhance(EnhanceArgs),
+    /// Ask through a Batch API, at half the price: write its input files, take over its output files
+    #[command(subcommand)]
+    Batch(BatchCommand),
+    /// Show what runs hold, from their records alone
+    Report(ReportArgs),
 }
 
 /// The flags of `synthesize`.
@@ -154,7 +163,8 @@ pub struct RealismArgs {
 const AFTER_HELP: &str = "\
 Precedence: flag, then environment (DARKQA_CONCURRENCY=16 for --concurrency 16), then --config FILE, then default.
 OPENAI_BASE_URL, OPENAI_API_KEY and ORT_DYLIB_PATH are defaults: whatever names another goes before them.
-Exit codes: 0 everything scored; 1 finished with failures; 2 usage, configuration or a fatal error; 130 interrupted.
+Exit codes: 0 everything scored; 1 finished with failures; 2 usage, configuration or a fatal error; 130 interrupted,
+or stopped by --max-cost.
 Results go to standard output, progress and logs to standard error (RUST_LOG=darkqa_eval=debug shows more).";
 
 /// The flags of an evaluation, by help heading.

@@ -1,6 +1,7 @@
 //! Everything a run is told, checked once; nothing later reads the world again.
 
 mod asking;
+mod batch;
 mod enhance;
 mod export;
 mod import;
@@ -9,6 +10,7 @@ mod light;
 mod money;
 mod questions;
 mod realism;
+mod report;
 mod showing;
 mod synthesize;
 
@@ -19,6 +21,7 @@ use std::str::FromStr;
 use std::time::Duration;
 
 pub use asking::{Ask, ModelName, Server};
+pub use batch::{BatchExport, BatchImport};
 pub use enhance::Enhance;
 pub use export::{Export, Form};
 pub use import::Import;
@@ -27,6 +30,7 @@ pub use light::{Light, Sensor};
 pub use money::Money;
 pub use questions::{Questions, Strangers};
 pub use realism::{PairPlace, Realism};
+pub use report::{Readings, Report};
 pub use showing::{Order, Rotations, Showing};
 pub use synthesize::{Existing, Product, Synthesize};
 
@@ -145,6 +149,12 @@ pub enum Show {
     Table,
     /// The summary as JSON.
     Json,
+}
+
+impl Show {
+    pub(crate) fn said(json: bool) -> Self {
+        if json { Self::Json } else { Self::Table }
+    }
 }
 
 /// What is left behind.
@@ -293,7 +303,7 @@ fn output(said: OutputArgs) -> Output {
     };
     Output {
         place,
-        show: if said.json { Show::Json } else { Show::Table },
+        show: Show::said(said.json),
     }
 }
 

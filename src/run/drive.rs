@@ -16,7 +16,7 @@ use super::ledger::Ledger;
 use super::plan::{Plan, Trial};
 use super::progress::{Bar, Progress};
 use super::recipe::Recipe;
-use super::record::record;
+use super::record;
 use super::stop::{End, Watch};
 use crate::ask::{AskError, Call, ImageLimit, Payload, Reach};
 use crate::config::Config;
@@ -287,8 +287,13 @@ impl Intake<'_> {
         self.bar
             .count(self.answered, self.watch.failures(), self.ledger.spent());
         let asker = &self.drive.askers[ready.trial.asker];
-        self.store
-            .append(&record(ready, asker.model.name(), result))
+        let image = ready.image.as_ref().map(|image| image.facts());
+        let model = asker.model.name();
+        let blank = record::blank(&ready.trial, ready.view, ready.condition, model, image);
+        self.store.append(&match result {
+            Ok(reply) => record::answered(blank, reply)?,
+            Err(error) => record::failed(blank, error.failure, error.attempts),
+        })
     }
 }
 

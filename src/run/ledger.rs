@@ -5,7 +5,7 @@ use super::plan::Trial;
 use crate::ask::{Model, Parameters, Price, image_tokens};
 use crate::config::Money;
 use crate::error::{Error, Result};
-use crate::types::{ImageFacts, Record, Usage};
+use crate::types::{ImageFacts, Record, Usage, Via};
 
 /// How many characters of English a token is, by the rule of thumb of every provider.
 const CHARACTERS: f64 = 4.0;
@@ -65,7 +65,10 @@ impl Ledger {
                 .iter()
                 .position(|asker| asker.model.name() == record.model && asker.view == record.view);
             if let (Some(asker), Some(usage)) = (asker, record.usage) {
-                ledger.charge(asker, usage);
+                match record.via {
+                    Via::Direct => ledger.charge(asker, usage),
+                    Via::Batch => ledger.charge_batch(asker, usage, money.prices.batch),
+                }
             }
         }
         Ok(ledger)
@@ -83,6 +86,13 @@ impl Ledger {
     fn charge(&mut self, asker: usize, usage: Usage) {
         if let Some(price) = self.prices[asker] {
             self.add(price.charged(usage));
+        }
+    }
+
+    /// Books a reply of a Batch API; it says nothing about what a request of its own costs.
+    fn charge_batch(&mut self, asker: usize, usage: Usage, share: f64) {
+        if let Some(price) = self.prices[asker] {
+            self.spent += share * price.charged(usage);
         }
     }
 

@@ -5,6 +5,7 @@
 
 mod arrangement;
 mod askers;
+pub mod batch;
 mod darkroom;
 mod drive;
 pub mod enhance;
@@ -23,33 +24,36 @@ pub mod questions;
 pub mod realism;
 mod recipe;
 mod record;
+pub mod report;
+mod stage;
 mod stop;
 pub mod synthesize;
 mod written;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use jiff::Timestamp;
 
 use crate::ask::ImageLimit;
-use crate::config::{Config, Data, Earnest, Enhancement, ModelName, RunPlace, Show};
-use crate::dataset::Dataset;
+use crate::config::{Config, Earnest, Enhancement, RunPlace, Show};
 use crate::enhance::{Enhancer, ModelFile, Runtime};
-use crate::error::{Error, Result};
-use crate::report;
+use crate::error::Result;
+use crate::report as reports;
 use crate::score::accuracy::summarize;
+use crate::score::chance::Offer;
 use crate::store::{self, Moved, Store};
 use crate::types::manifest::{Counts, RunManifest, SCHEMA, Status};
-use crate::types::{Family, Outcome, Question, Record, TrialKey, View};
+use crate::types::{Outcome, Question, Record, TrialKey};
 
 use darkroom::Darkroom;
 use drive::Drive;
 use forecast::Means;
 use identity::Identity;
 use ledger::Ledger;
-use plan::{Inputs, Plan};
+use plan::Plan;
 use progress::Progress;
+use stage::Stage;
 use stop::End;
 
 /// The folder of runs without a name of their own.
@@ -69,30 +73,22 @@ pub struct Verdict {
 /// # Errors
 /// Where nothing can be asked, or no further trial could succeed; what had arrived by then is kept.
 pub fn evaluate(config: &Config, progress: &Progress) -> Result<Verdict> {
-    let dataset = Dataset::open(&config.data.place, config.data.questions.as_deref())?
-        .with_most_pixels(config.data.most_pixels);
-    let questions = select(&dataset, &config.data)?;
-    let askers = askers::open(config)?;
-    // Where every model is blind, no image is read and no enhancer is opened.
-    let seeing = askers.iter().any(|asker| asker.view == View::Image);
-    let models = if seeing {
-        &*config.enhancement.models
-    } else {
-        &[]
-    };
-    let files = identity::enhancers(models)?;
-    let pictures = if seeing {
-        gallery::look_through(&dataset, &questions, progress)?
-    } else {
-        gallery::Gallery::new()
-    };
-    let inputs = Inputs::new(config, &questions, &pictures, &askers, &files)?;
+    Stage::set(config, progress, |stage| match config.earnest {
+        Earnest::Estimate => estimate(config, stage),
+        Earnest::Run => ask(config, stage, progress),
+    })
+}
 
-    let identity = identity::identity(config, &dataset, &inputs);
-    let folder = folder(config, &dataset, &identity)?;
-    if config.earnest == Earnest::Estimate {
-        return estimate(config, &dataset, &inputs, files, &folder);
-    }
+/// Asks what is left.
+fn ask(config: &Config, stage: Stage<'_>, progress: &Progress) -> Result<Verdict> {
+    let Stage {
+        dataset,
+        questions,
+        inputs,
+        files,
+        identity,
+        folder,
+    } = stage;
     let kept = store::read_manifest(&folder)?;
     // Opened before the folder is made, so that an enhancer that does not work leaves nothing behind.
     let opened = match &kept {
@@ -102,9 +98,10 @@ pub fn evaluate(config: &Config, progress: &Progress) -> Result<Verdict> {
     let mut manifest = manifest(config, identity, kept);
     let mut store = Store::open(&folder, &manifest, moved(config))?;
     let kept = store.records()?;
-    let ledger = Ledger::new(&config.money, &askers, &kept)?;
-    let plan = Plan::new(&inputs, &kept)?;
+    let ledger = Ledger::new(&config.money, inputs.askers, &kept)?;
+    let mut plan = Plan::new(&inputs, &kept)?;
     drop(kept);
+    leave_out(&mut plan, &store.out_in_batches()?, &folder);
     let trials = plan.keys.clone();
     let end = if plan.left() == 0 {
         End::Through
@@ -125,10 +122,10 @@ pub fn evaluate(config: &Config, progress: &Progress) -> Result<Verdict> {
         }
         let drive = Drive {
             config,
-            dataset: &dataset,
-            pictures: &pictures,
+            dataset,
+            pictures: inputs.pictures,
             recipe: &inputs.recipe,
-            askers: &askers,
+            askers: inputs.askers,
             progress,
             limit: limit(config),
         };
@@ -137,24 +134,37 @@ pub fn evaluate(config: &Config, progress: &Progress) -> Result<Verdict> {
     if let (End::Spent, Some(most)) = (&end, config.money.most) {
         tracing::warn!(
             "stopped: one more question could cost more than the {} of --max-cost; the same command with more goes on",
-            report::forecast::money(most)
+            reports::forecast::money(most)
         );
     }
-    manifest.settings.extend(askers::adapted(&askers));
-    show(config, &store, manifest, end, &trials, &questions)
+    manifest.settings.extend(askers::adapted(inputs.askers));
+    show(config, &store, manifest, end, &trials, questions)
+}
+
+/// Leaves out of a plan what a Batch API has been asked and has not answered: it would be paid for twice.
+fn leave_out(plan: &mut Plan, out: &BTreeSet<TrialKey>, folder: &Path) {
+    let left_out = plan.leave_out(out);
+    if left_out > 0 {
+        tracing::warn!(
+            "{left_out} trials are out in a batch and are not asked here; take their replies over by batch import, or delete {} \
+             to have them asked",
+            folder.join(store::BATCH).display()
+        );
+    }
 }
 
 /// Says what is left to ask and what it would take; sends nothing and leaves no file.
-fn estimate(
-    config: &Config,
-    dataset: &Dataset,
-    inputs: &Inputs<'_>,
-    files: Vec<ModelFile>,
-    folder: &Path,
-) -> Result<Verdict> {
-    let kept = store::read_records(folder)?;
+fn estimate(config: &Config, stage: Stage<'_>) -> Result<Verdict> {
+    let Stage {
+        dataset,
+        inputs,
+        files,
+        folder,
+        ..
+    } = stage;
+    let kept = store::read_records(&folder)?;
     let ledger = Ledger::new(&config.money, inputs.askers, &kept)?;
-    let plan = Plan::new(inputs, &kept)?;
+    let plan = Plan::new(&inputs, &kept)?;
     let (_, enhancers) = open_enhancers(files, &config.enhancement)?;
     let mut darkroom = Darkroom {
         dataset,
@@ -173,8 +183,8 @@ fn estimate(
     };
     let forecast = forecast::forecast(&means, &mut darkroom)?;
     let output = match config.output.show {
-        Show::Json => report::forecast::json(&forecast)?,
-        Show::Table => report::forecast::render(&forecast),
+        Show::Json => reports::forecast::json(&forecast)?,
+        Show::Table => reports::forecast::render(&forecast),
     };
     Ok(Verdict {
         status: Status::Complete,
@@ -199,22 +209,22 @@ fn show(
     questions: &[Question],
 ) -> Result<Verdict> {
     let records = in_order(store.records()?, trials)?;
-    let summary = summarize(&records, questions);
+    let summary = summarize(&records, questions.iter().map(Offer::from));
     let counts = count(trials.len(), &records);
     let status = end.status(counts);
     if (status, counts) != (manifest.status, manifest.counts) {
         (manifest.status, manifest.counts, manifest.updated) = (status, counts, now());
     }
-    store.write("summary.csv", &report::files::csv(&summary)?)?;
-    let json = report::files::json(&summary, &manifest, None)?;
+    store.write("summary.csv", &reports::files::csv(&summary)?)?;
+    let json = reports::files::json(&summary, &manifest, None)?;
     store.write("summary.json", json.as_bytes())?;
     store.write_manifest(&manifest)?;
     if let End::Stopped(error) = end {
         return Err(error);
     }
     let output = match config.output.show {
-        Show::Json => report::files::json(&summary, &manifest, Some(store.folder()))?,
-        Show::Table => report::table::render(&summary, &manifest, store.folder()),
+        Show::Json => reports::files::json(&summary, &manifest, Some(store.folder()))?,
+        Show::Table => reports::table::render(&summary, &manifest, store.folder()),
     };
     Ok(Verdict { status, output })
 }
@@ -225,42 +235,6 @@ fn moved(config: &Config) -> Moved {
         RunPlace::Resume(_) => Moved::Allowed,
         RunPlace::Named(_) | RunPlace::Automatic => Moved::Refused,
     }
-}
-
-/// The questions that are asked: of the chosen families, the first so many.
-fn select(dataset: &Dataset, config: &Data) -> Result<Vec<Question>> {
-    let wanted = |question: &&Question| {
-        config
-            .families
-            .as_ref()
-            .is_none_or(|list| list.contains(&question.family))
-    };
-    let there: BTreeSet<&Family> = dataset
-        .questions()
-        .iter()
-        .map(|question| &question.family)
-        .collect();
-    if let Some(missing) = config
-        .families
-        .iter()
-        .flatten()
-        .find(|family| !there.contains(family))
-    {
-        let there: Vec<&str> = there.into_iter().map(Family::name).collect();
-        let problem = format!(
-            "no question of the family {missing}; there are: {}",
-            there.join(", ")
-        );
-        return Err(Error::usage("--families", problem));
-    }
-    let limit = config.limit.map_or(usize::MAX, usize::from);
-    Ok(dataset
-        .questions()
-        .iter()
-        .filter(wanted)
-        .take(limit)
-        .cloned()
-        .collect())
 }
 
 fn open_enhancers(
@@ -282,56 +256,6 @@ fn open_enhancers(
         })
         .collect::<Result<_>>()?;
     Ok((Some(runtime), enhancers))
-}
-
-/// The models in the name of a folder.
-fn label(config: &Config) -> String {
-    let names = config
-        .ask
-        .models
-        .iter()
-        .chain(&config.ask.blind_models)
-        .map(|name| match name {
-            ModelName::Random => "random".to_owned(),
-            ModelName::Script(path) => path.file_stem().map_or_else(
-                || "script".to_owned(),
-                |stem| stem.to_string_lossy().into_owned(),
-            ),
-            ModelName::Remote(name) => name.clone(),
-        });
-    names
-        .take(2)
-        .collect::<Vec<_>>()
-        .join("-")
-        .chars()
-        .take(60)
-        .collect()
-}
-
-/// The folder of this run: the one named, else the newest with the same identity, else a new one.
-fn folder(config: &Config, dataset: &Dataset, identity: &Identity) -> Result<PathBuf> {
-    match &config.output.place {
-        RunPlace::Named(path) => Ok(path.clone()),
-        RunPlace::Resume(path) => match store::read_manifest(path)? {
-            Some(_) => Ok(path.clone()),
-            None => Err(Error::usage(
-                "--resume",
-                format_args!(
-                    "{}: no run in this folder; a new run takes --out",
-                    path.display()
-                ),
-            )),
-        },
-        RunPlace::Automatic => {
-            let hash = &identity::digest(identity).to_string()[..8];
-            let base = Path::new(RESULTS);
-            Ok(store::find(base, hash).unwrap_or_else(|| {
-                let time = Timestamp::now().strftime("%Y%m%d-%H%M%S");
-                let name = format!("{time}-{}-{}-{hash}", label(config), dataset.name());
-                base.join(name.replace(|c: char| !(c.is_alphanumeric() || "-_.".contains(c)), "_"))
-            }))
-        }
-    }
 }
 
 /// The manifest of a run under way; one that was kept goes on as it is.

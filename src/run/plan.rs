@@ -1,6 +1,6 @@
 //! What is left to ask: [`Plan`].
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::sync::Arc;
 
 use super::arrangement::arrange;
@@ -225,6 +225,19 @@ impl Plan {
             }
         }
         Ok(shots)
+    }
+
+    /// Asks none of these trials; how many there were.
+    pub(super) fn leave_out(&mut self, keys: &BTreeSet<TrialKey>) -> usize {
+        let before = self.left();
+        for frame in &mut self.frames {
+            for shot in &mut frame.shots {
+                shot.trials.retain(|trial| !keys.contains(&trial.key));
+            }
+            frame.shots.retain(|shot| !shot.trials.is_empty());
+        }
+        self.frames.retain(|frame| !frame.shots.is_empty());
+        before - self.left()
     }
 
     /// How many trials there are, answered or not.

@@ -83,6 +83,10 @@ impl Bar {
         self.0.inc(1);
     }
 
+    pub(super) fn advance(&self, steps: usize) {
+        self.0.inc(steps as u64);
+    }
+
     /// Shows how many trials are answered and how many have failed, and the dollars that went into them.
     pub(super) fn count(&self, answered: usize, failed: usize, spent: Option<f64>) {
         self.0.set_position((answered + failed) as u64);

@@ -1,26 +1,24 @@
 //! What came of a trial, as a line of `records.jsonl`.
 
-use super::drive::Ready;
-use crate::ask::AskError;
+use super::plan::Trial;
 use crate::error::Result;
 use crate::score::choice::readings;
-use crate::types::{Answer, Choices, Degradation, Finish, Outcome, Record, Reply, Variant};
+use crate::types::{
+    Answer, Choices, Condition, Degradation, Failure, Finish, ImageFacts, Outcome, Record, Reply,
+    Variant, Via, View,
+};
 
-/// The record of a trial: the reply with both readings, or the failure.
-pub(super) fn record(
-    ready: Ready,
+/// The record of a trial before anything came of it.
+pub(super) fn blank(
+    trial: &Trial,
+    view: View,
+    condition: Option<Condition>,
     model: &str,
-    result: std::result::Result<Reply, AskError>,
+    image: Option<&ImageFacts>,
 ) -> Record {
-    let Ready {
-        trial,
-        condition,
-        image,
-        view,
-    } = ready;
     let question = &*trial.question;
     let degradation = condition.as_ref().map(|condition| condition.degradation);
-    let mut record = Record {
+    Record {
         key: trial.key,
         question: question.id.clone(),
         frame: question.frame.clone(),
@@ -41,38 +39,49 @@ pub(super) fn record(
         strict: None,
         lenient: None,
         repeat: trial.repeat,
+        via: Via::Direct,
         outcome: Outcome::Failed,
         failure: None,
         usage: None,
         served_model: None,
         latency_ms: None,
         attempts: 0,
-        image: image.map(|image| image.facts().clone()),
-    };
-    match result {
-        Ok(reply) => {
-            read(&mut record, &reply, &question.choices);
-            record.reply = Some(reply.text);
-            record.refusal = reply.refusal;
-            record.finish = Some(reply.finish);
-            record.usage = reply.usage;
-            record.served_model = reply.served_model;
-            record.latency_ms = Some(reply.latency_ms);
-            record.attempts = reply.attempts;
-        }
-        Err(error) => {
-            record.failure = Some(error.failure);
-            record.attempts = error.attempts;
-        }
+        image: image.cloned(),
     }
-    record
+}
+
+/// The record with the reply and both its readings.
+pub(super) fn answered(mut record: Record, reply: Reply) -> Result<Record> {
+    let choices = choices(&record)?;
+    read(&mut record, &reply, &choices);
+    record.reply = Some(reply.text);
+    record.refusal = reply.refusal;
+    record.finish = Some(reply.finish);
+    record.usage = reply.usage;
+    record.served_model = reply.served_model;
+    record.latency_ms = Some(reply.latency_ms);
+    record.attempts = reply.attempts;
+    Ok(record)
+}
+
+/// The record with what went wrong after so many requests.
+pub(super) fn failed(record: Record, failure: Failure, attempts: u32) -> Record {
+    Record {
+        failure: Some(failure),
+        attempts,
+        ..record
+    }
+}
+
+fn choices(record: &Record) -> Result<Choices> {
+    Choices::new(record.choices.clone(), record.truth)
+        .map_err(|e| e.at(format!("the record of question {:?}", record.question.0)))
 }
 
 /// The record with its kept reply read as this version of the program reads.
 pub(super) fn reread(mut record: Record) -> Result<Record> {
     if let Some(text) = record.reply.clone() {
-        let choices = Choices::new(record.choices.clone(), record.truth)
-            .map_err(|e| e.at(format!("the record of question {:?}", record.question.0)))?;
+        let choices = choices(&record)?;
         let reply = Reply {
             refusal: record.refusal.clone(),
             finish: record.finish.clone().unwrap_or(Finish::Unknown),

@@ -4,11 +4,11 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use serde::Serialize;
 
-use super::chance::chance;
+use super::chance::{Offer, chance};
 use super::choice::Mode;
 use super::estimate::Estimate;
 use crate::types::{
-    EnhancerName, Family, Level, Outcome, Question, QuestionId, Reading, Record, Variant, View,
+    EnhancerName, Family, Level, Outcome, QuestionId, Reading, Record, Variant, View,
 };
 
 /// The name under which guessing stands among the models.
@@ -69,9 +69,10 @@ struct Tally<'a> {
     questions: HashMap<&'a QuestionId, (usize, usize)>,
 }
 
-/// Scores the records of a run; `questions` are those it asks, for the chance line.
+/// Scores the records of a run; `questions` are what it asks, for the chance line.
 #[must_use]
-pub fn summarize(records: &[Record], questions: &[Question]) -> Summary {
+pub fn summarize(records: &[Record], questions: impl IntoIterator<Item = Offer>) -> Summary {
+    let questions: Vec<Offer> = questions.into_iter().collect();
     let mut tallies = BTreeMap::<(Subject, Option<Family>, Mode), Tally<'_>>::new();
     for record in records {
         let subject = Subject {
@@ -107,7 +108,7 @@ pub fn summarize(records: &[Record], questions: &[Question]) -> Summary {
             always: tally.always(),
         });
     Summary {
-        cells: scored.chain(guesses(questions)).collect(),
+        cells: scored.chain(guesses(&questions)).collect(),
     }
 }
 
@@ -140,7 +141,7 @@ impl<'a> Tally<'a> {
     }
 }
 
-fn guesses(questions: &[Question]) -> Vec<Cell> {
+fn guesses(questions: &[Offer]) -> Vec<Cell> {
     let families: BTreeSet<&Family> = questions.iter().map(|question| &question.family).collect();
     let groups = std::iter::once(None).chain(families.into_iter().map(Some));
     let cells = groups.flat_map(|family| {

@@ -1,15 +1,33 @@
 //! What guessing would score.
 
 use super::estimate::Estimate;
-use crate::types::Question;
+use crate::types::{Family, Question};
+
+/// What a question offers.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Offer {
+    /// Its family.
+    pub family: Family,
+    /// How many choices it has.
+    pub choices: usize,
+}
+
+impl From<&Question> for Offer {
+    fn from(question: &Question) -> Self {
+        Self {
+            family: question.family.clone(),
+            choices: question.choices.len(),
+        }
+    }
+}
 
 /// The exact accuracy of a uniform guess: the mean of 1 / number of choices (DarkQA, section IV); `None` of no questions.
 ///
 /// Summed over counts of choices, so that the order of the questions cannot change a digit.
-pub fn chance<'a>(questions: impl IntoIterator<Item = &'a Question>) -> Option<Estimate> {
+pub fn chance<'a>(questions: impl IntoIterator<Item = &'a Offer>) -> Option<Estimate> {
     let mut counts = std::collections::BTreeMap::<usize, usize>::new();
     for question in questions {
-        *counts.entry(question.choices.len()).or_default() += 1;
+        *counts.entry(question.choices).or_default() += 1;
     }
     let n: usize = counts.values().sum();
     let sum: f64 = counts
@@ -22,16 +40,11 @@ pub fn chance<'a>(questions: impl IntoIterator<Item = &'a Question>) -> Option<E
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::{Choices, Family, FrameId, QuestionId};
 
-    fn question(choices: usize) -> Question {
-        Question {
-            id: QuestionId(choices.to_string()),
-            frame: FrameId("f".into()),
+    fn question(choices: usize) -> Offer {
+        Offer {
             family: Family::Closest,
-            text: "?".into(),
-            choices: Choices::new((0..choices).map(|i| i.to_string()).collect(), 0).unwrap(),
-            evidence: serde_json::Value::Null,
+            choices,
         }
     }
 

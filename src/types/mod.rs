@@ -17,7 +17,7 @@ pub use labels::{Label, Labels, SegmentName};
 pub use light::{DarkLevel, Degradation, Level, Stops, Variant, Variants};
 pub use question::{Answer, Choices, Family, Question, QuestionId, Why};
 pub use reply::{Finish, Reply, Usage};
-pub use trial::{Failure, FailureKind, ImageFacts, Outcome, Reading, Record, TrialKey, View};
+pub use trial::{Failure, FailureKind, ImageFacts, Outcome, Reading, Record, TrialKey, Via, View};
 
 #[cfg(test)]
 mod tests {

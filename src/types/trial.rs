@@ -164,6 +164,24 @@ pub struct ImageFacts {
     pub format: String,
 }
 
+/// How a question reached its model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Via {
+    /// As a request of its own.
+    #[default]
+    Direct,
+    /// In a file of a Batch API, which costs less.
+    Batch,
+}
+
+impl Via {
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands a reference")]
+    fn is_direct(&self) -> bool {
+        *self == Self::Direct
+    }
+}
+
 /// One line of `records.jsonl`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Record {
@@ -204,6 +222,9 @@ pub struct Record {
     /// How many times the same was asked before; left out of the file where it is the first.
     #[serde(default, skip_serializing_if = "is_first")]
     pub repeat: u32,
+    /// How it was asked; left out of the file where it was asked directly.
+    #[serde(default, skip_serializing_if = "Via::is_direct")]
+    pub via: Via,
     /// How it ended.
     pub outcome: Outcome,
     /// What went wrong, where it failed.

@@ -47,6 +47,10 @@ pub struct Answer {
 #[derive(Debug, Clone, Copy)]
 enum Manner {
     Whole,
+    /// The body as it stands, without a status line or headers of our making; then the connection closes.
+    Raw,
+    /// The head at once, the body byte by byte with so many milliseconds between.
+    Drip(u64),
     /// So many bytes of the body, whose whole length was announced; then the connection closes.
     Cut(usize),
     /// The connection closes without a byte.
@@ -108,6 +112,19 @@ impl Answer {
         self
     }
 
+    /// These bytes and nothing else.
+    pub fn raw(bytes: impl Into<Vec<u8>>) -> Self {
+        Self {
+            manner: Manner::Raw,
+            ..Self::new(200, bytes)
+        }
+    }
+
+    pub fn drip(mut self, milliseconds: u64) -> Self {
+        self.manner = Manner::Drip(milliseconds);
+        self
+    }
+
     pub fn dropped() -> Self {
         Self {
             manner: Manner::Dropped,
@@ -131,6 +148,10 @@ impl Answer {
 
     /// Writes it; says whether the connection can be used again.
     fn write(&self, stream: &mut TcpStream) -> std::io::Result<bool> {
+        if matches!(self.manner, Manner::Raw) {
+            stream.write_all(&self.body)?;
+            return Ok(false);
+        }
         let mut head = format!(
             "HTTP/1.1 {} Status\r\ncontent-length: {}\r\n",
             self.status,
@@ -144,7 +165,8 @@ impl Answer {
             Manner::Whole => self.body.len(),
             Manner::Cut(after) => after,
             Manner::Stuck => self.body.len() / 2,
-            Manner::Dropped => return Ok(false),
+            Manner::Drip(_) => 0,
+            Manner::Dropped | Manner::Raw => return Ok(false),
             Manner::Silent => {
                 drain(stream);
                 return Ok(false);
@@ -154,6 +176,13 @@ impl Answer {
         stream.write_all(&self.body[..sent])?;
         if matches!(self.manner, Manner::Stuck) {
             drain(stream);
+        }
+        if let Manner::Drip(milliseconds) = self.manner {
+            for byte in self.body.chunks(1) {
+                thread::sleep(std::time::Duration::from_millis(milliseconds));
+                stream.write_all(byte)?;
+            }
+            return Ok(true);
         }
         Ok(sent == self.body.len())
     }

@@ -1,0 +1,168 @@
+//! The lines of Batch API files: [`write()`] makes one, [`BatchLine`] reads one.
+
+use serde_json::Value;
+
+use super::complaint::Complaint;
+use super::openai::OpenAi;
+use super::parameters::Constrain;
+use super::payload::Payload;
+use super::request::constrained_letter;
+use super::response::{self, Flaw};
+use super::secret::Scrub;
+use crate::types::{Failure, FailureKind, Reply};
+
+/// One line of an input file: `{"custom_id", "method", "url", "body"}` with a line end, the body as it would be sent alone.
+///
+/// # Errors
+/// Where it cannot be written as JSON.
+pub fn write(
+    model: &OpenAi,
+    id: &str,
+    url: &str,
+    prompt: &str,
+    choices: usize,
+    image: Option<&Payload>,
+) -> Result<Vec<u8>, serde_json::Error> {
+    let (id, url) = (serde_json::to_string(id)?, serde_json::to_string(url)?);
+    let head = format!("{{\"custom_id\":{id},\"method\":\"POST\",\"url\":{url},\"body\":");
+    Ok([
+        head.as_bytes(),
+        &model.body(prompt, choices, image)?,
+        b"}\n",
+    ]
+    .concat())
+}
+
+/// One line of an output or error file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct BatchLine {
+    /// The id that the request was given.
+    pub id: String,
+    /// The reply, or why there is none.
+    pub result: Result<Reply, Failure>,
+}
+
+impl BatchLine {
+    /// Reads a line; `None` where it is none of such a file.
+    #[must_use]
+    pub fn read(line: &str) -> Option<Self> {
+        let line: Value = serde_json::from_str(line).ok()?;
+        let id = line.get("custom_id")?.as_str()?.to_owned();
+        Some(Self {
+            id,
+            result: result(&line),
+        })
+    }
+}
+
+fn result(line: &Value) -> Result<Reply, Failure> {
+    let response = line.get("response").filter(|response| !response.is_null());
+    let status = response.and_then(|response| response.get("status_code")?.as_u64());
+    let status = status.and_then(|status| u16::try_from(status).ok());
+    let error = line.get("error").filter(|error| !error.is_null());
+    let fail = |kind, said: &str| {
+        let said = Scrub::default().line(said);
+        Err(Failure {
+            kind,
+            status: status.filter(|status| (100..1000).contains(status)),
+            message: format!("the batch says: {said}"),
+        })
+    };
+    if let Some(error) = error {
+        let complaint = Complaint::of_error(error);
+        let kind = if complaint.is_any(&["batch_expired", "batch_cancelled"]) {
+            FailureKind::Timeout
+        } else {
+            FailureKind::Request
+        };
+        let code = complaint.code.unwrap_or_default();
+        return fail(kind, format!("{code} {}", complaint.message).trim());
+    }
+    let Some(body) = response.and_then(|response| response.get("body")) else {
+        return fail(
+            FailureKind::Response,
+            "a line with neither a response nor an error",
+        );
+    };
+    // The body of a reply that failed is a text with some servers.
+    let text = body
+        .as_str()
+        .map_or_else(|| body.to_string(), str::to_owned);
+    match status {
+        None | Some(200..300) => {
+            response::read(text.as_bytes(), "application/json").or_else(|flaw| match flaw {
+                Flaw::Said(complaint) => fail(FailureKind::Server, &complaint.message),
+                Flaw::Unreadable(what) => fail(FailureKind::Response, &what),
+            })
+        }
+        Some(code) => {
+            let complaint = Complaint::of_body(&text);
+            let kind = match code {
+                429 => FailureKind::RateLimit,
+                500.. => FailureKind::Server,
+                _ => FailureKind::Request,
+            };
+            fail(kind, &format!("{code} {}", complaint.message))
+        }
+    }
+}
+
+/// A reply with the letter that a constraint asked for in place of the object around it; as it is where it has none.
+#[must_use]
+pub fn unconstrained(reply: Reply, constrain: Constrain, choices: usize) -> Reply {
+    let letter = match constrain {
+        Constrain::None => None,
+        _ => constrained_letter(constrain, choices, &reply.text),
+    };
+    Reply {
+        text: letter.unwrap_or(reply.text),
+        ..reply
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_of_every_outcome_are_read() {
+        let read = |line: &str| BatchLine::read(line).unwrap();
+        let answered = read(
+            r#"{"id":"batch_req_1","custom_id":"k","response":{"status_code":200,"request_id":"r","body":{"choices":[{"message":{"content":"B"},"finish_reason":"stop"}],"usage":{"prompt_tokens":9}}},"error":null}"#,
+        );
+        assert_eq!(answered.id, "k");
+        let reply = answered.result.unwrap();
+        assert_eq!(reply.text, "B");
+        assert_eq!(reply.usage.unwrap().prompt_tokens, Some(9));
+        for (line, kind, said) in [
+            (
+                r#"{"custom_id":"k","response":null,"error":{"code":"batch_expired","message":"This request could not be executed before the completion window expired."}}"#,
+                FailureKind::Timeout,
+                "batch_expired This request",
+            ),
+            (
+                r#"{"custom_id":"k","response":{"status_code":400,"body":{"error":{"message":"bad image"}}},"error":null}"#,
+                FailureKind::Request,
+                "400 bad image",
+            ),
+            (
+                r#"{"custom_id":"k","response":{"status_code":429,"body":"slow \u001b[31mdown"}}"#,
+                FailureKind::RateLimit,
+                "429 slow [31mdown",
+            ),
+            (
+                r#"{"custom_id":"k","response":{"status_code":200,"body":{"choices":[]}}}"#,
+                FailureKind::Response,
+                "no choices",
+            ),
+            (r#"{"custom_id":"k"}"#, FailureKind::Response, "neither"),
+        ] {
+            let failure = read(line).result.unwrap_err();
+            assert_eq!(failure.kind, kind, "{line}");
+            assert!(failure.message.contains(said), "{}", failure.message);
+        }
+        for wrong in ["", "{}", r#"{"custom_id":7}"#, "[1]"] {
+            assert_eq!(BatchLine::read(wrong), None, "{wrong}");
+        }
+    }
+}

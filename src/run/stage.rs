@@ -1,0 +1,154 @@
+//! What every way of asking begins with: [`Stage`].
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use jiff::Timestamp;
+
+use super::gallery::{self, Gallery};
+use super::identity::{self, Identity};
+use super::plan::Inputs;
+use super::progress::Progress;
+use super::{RESULTS, askers};
+use crate::config::{Config, Data, ModelName, RunPlace};
+use crate::dataset::Dataset;
+use crate::enhance::ModelFile;
+use crate::error::{Error, Result};
+use crate::store;
+use crate::types::{Family, Question, View};
+
+/// Everything an evaluation is made of, opened and checked; nothing is asked, and nothing written.
+pub(super) struct Stage<'a> {
+    pub(super) dataset: &'a Dataset,
+    pub(super) questions: &'a [Question],
+    pub(super) inputs: Inputs<'a>,
+    /// The enhancement models, not yet loaded.
+    pub(super) files: Vec<ModelFile>,
+    pub(super) identity: Identity,
+    /// Where the run lies, or will.
+    pub(super) folder: PathBuf,
+}
+
+impl Stage<'_> {
+    /// Sets the stage and acts on it.
+    pub(super) fn set<T>(
+        config: &Config,
+        progress: &Progress,
+        act: impl FnOnce(Stage<'_>) -> Result<T>,
+    ) -> Result<T> {
+        let dataset = Dataset::open(&config.data.place, config.data.questions.as_deref())?
+            .with_most_pixels(config.data.most_pixels);
+        let questions = select(&dataset, &config.data)?;
+        let askers = askers::open(config)?;
+        // Where every model is blind, no image is read and no enhancer is opened.
+        let seeing = askers.iter().any(|asker| asker.view == View::Image);
+        let models = if seeing {
+            &*config.enhancement.models
+        } else {
+            &[]
+        };
+        let files = identity::enhancers(models)?;
+        let pictures = if seeing {
+            gallery::look_through(&dataset, &questions, progress)?
+        } else {
+            Gallery::new()
+        };
+        let inputs = Inputs::new(config, &questions, &pictures, &askers, &files)?;
+        let identity = identity::identity(config, &dataset, &inputs);
+        let folder = folder(config, &dataset, &identity)?;
+        act(Stage {
+            dataset: &dataset,
+            questions: &questions,
+            inputs,
+            files,
+            identity,
+            folder,
+        })
+    }
+}
+
+/// The questions that are asked: of the chosen families, the first so many.
+pub(super) fn select(dataset: &Dataset, config: &Data) -> Result<Vec<Question>> {
+    let wanted = |question: &&Question| {
+        config
+            .families
+            .as_ref()
+            .is_none_or(|list| list.contains(&question.family))
+    };
+    let there: BTreeSet<&Family> = dataset
+        .questions()
+        .iter()
+        .map(|question| &question.family)
+        .collect();
+    if let Some(missing) = config
+        .families
+        .iter()
+        .flatten()
+        .find(|family| !there.contains(family))
+    {
+        let there: Vec<&str> = there.into_iter().map(Family::name).collect();
+        let problem = format!(
+            "no question of the family {missing}; there are: {}",
+            there.join(", ")
+        );
+        return Err(Error::usage("--families", problem));
+    }
+    let limit = config.limit.map_or(usize::MAX, usize::from);
+    Ok(dataset
+        .questions()
+        .iter()
+        .filter(wanted)
+        .take(limit)
+        .cloned()
+        .collect())
+}
+
+/// The models in the name of a folder.
+fn label(config: &Config) -> String {
+    let names = config
+        .ask
+        .models
+        .iter()
+        .chain(&config.ask.blind_models)
+        .map(|name| match name {
+            ModelName::Random => "random".to_owned(),
+            ModelName::Script(path) => path.file_stem().map_or_else(
+                || "script".to_owned(),
+                |stem| stem.to_string_lossy().into_owned(),
+            ),
+            ModelName::Remote(name) => name.clone(),
+        });
+    names
+        .take(2)
+        .collect::<Vec<_>>()
+        .join("-")
+        .chars()
+        .take(60)
+        .collect()
+}
+
+/// The folder of this run: the one named, else the newest with the same identity, else a new one.
+fn folder(config: &Config, dataset: &Dataset, identity: &Identity) -> Result<PathBuf> {
+    match &config.output.place {
+        RunPlace::Named(path) => Ok(path.clone()),
+        RunPlace::Resume(path) => match store::read_manifest(path)? {
+            Some(_) => Ok(path.clone()),
+            None => Err(Error::usage(
+                "--resume",
+                format_args!(
+                    "{}: no run in this folder; a new run takes --out",
+                    path.display()
+                ),
+            )),
+        },
+        RunPlace::Automatic => {
+            let hash = &identity::digest(identity).to_string()[..8];
+            let base = Path::new(RESULTS);
+            Ok(store::find(base, hash).unwrap_or_else(|| {
+                let time = Timestamp::now().strftime("%Y%m%d-%H%M%S");
+                let name = format!("{time}-{}-{}-{hash}", label(config), dataset.name());
+                base.join(name.replace(|c: char| !(c.is_alphanumeric() || "-_.".contains(c)), "_"))
+            }))
+        }
+    }
+}

@@ -1,0 +1,233 @@
+//! Orders of choices, repeats, constraints, and reading again.
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+mod support;
+
+use std::collections::BTreeSet;
+use std::fs;
+
+use serde_json::{Value, json};
+use support::endpoint::{Answer, MockEndpoint};
+use support::run::{Bench, records};
+
+fn bench() -> Bench {
+    let bench = Bench::new();
+    let picture = image::RgbImage::from_pixel(64, 48, image::Rgb([90, 60, 30]));
+    picture.save(bench.path("a.png")).unwrap();
+    let lines = (0..6).map(|i| {
+        format!(
+            "{{\"id\":\"q{i}\",\"image\":\"a.png\",\"family\":\"color\",\"question\":\"What color is it, {i}?\",\"choices\":[\"red\",\"blue\",\"brown\"],\"answer\":\"brown\"}}\n"
+        )
+    });
+    bench.file("set.jsonl", lines.collect::<String>());
+    bench
+}
+
+const SET: [&str; 4] = ["--data", "set.jsonl", "--levels", "L0"];
+
+fn run(bench: &Bench, more: &[&str]) -> String {
+    let words: Vec<&str> = SET
+        .iter()
+        .chain(&["--out", "run"])
+        .chain(more)
+        .copied()
+        .collect();
+    bench.complete(&words)
+}
+
+#[test]
+fn every_rotation_is_asked_and_an_answer_by_position_averages_out() {
+    let bench = bench();
+    bench.file("script.jsonl", "{\"default\":\"A\"}");
+    let told = run(&bench, &["--model", "script:script.jsonl", "--circular"]);
+    let records = records(&bench.path("run"));
+    assert_eq!(records.len(), 18);
+    let truths: Vec<u64> = records
+        .iter()
+        .map(|r| r["truth"].as_u64().unwrap())
+        .collect();
+    for truth in 0..3 {
+        assert_eq!(truths.iter().filter(|t| **t == truth).count(), 6);
+    }
+    for record in &records {
+        let truth = record["truth"].as_u64().unwrap() as usize;
+        assert_eq!(record["choices"][truth], "brown");
+    }
+    // Always A: right in one rotation of three, never in all.
+    assert!(told.contains("33.3 ±"), "{told}");
+    assert!(
+        told.contains("right every time") && told.contains("0.0"),
+        "{told}"
+    );
+    let csv = fs::read_to_string(bench.path("run/summary.csv")).unwrap();
+    assert!(
+        csv.lines()
+            .next()
+            .unwrap()
+            .ends_with("value,low,high,always"),
+        "{csv}"
+    );
+    let text = "{\"default\":\"brown\"}";
+    bench.file("script.jsonl", text);
+    let words: Vec<&str> = SET
+        .iter()
+        .chain(&[
+            "--out",
+            "by-text",
+            "--model",
+            "script:script.jsonl",
+            "--circular",
+        ])
+        .copied()
+        .collect();
+    assert!(bench.complete(&words).contains("100.0"));
+}
+
+#[test]
+fn shuffled_orders_are_the_same_in_every_condition_and_run() {
+    let orders = |seed: &str| {
+        let bench = bench();
+        let words: Vec<&str> = [
+            "--data",
+            "set.jsonl",
+            "--levels",
+            "L0,L2",
+            "--out",
+            "run",
+            "--model",
+            "random",
+            "--shuffle-options",
+            "--seed",
+            seed,
+        ]
+        .to_vec();
+        bench.complete(&words);
+        let orders: BTreeSet<(String, String)> = records(&bench.path("run"))
+            .iter()
+            .map(|record| {
+                (
+                    record["question"].to_string(),
+                    record["choices"].to_string(),
+                )
+            })
+            .collect();
+        assert_eq!(orders.len(), 6, "one order a question");
+        orders
+    };
+    assert_eq!(orders("1"), orders("1"));
+    assert_ne!(orders("1"), orders("2"));
+    let kinds: BTreeSet<String> = orders("1").into_iter().map(|(_, order)| order).collect();
+    assert!(kinds.len() > 1);
+}
+
+#[test]
+fn repeats_are_trials_of_their_own() {
+    let bench = bench();
+    let mock = MockEndpoint::start([Answer::text("C")]);
+    let base = mock.base_url();
+    let words = ["--model", "m", "--base-url", &base, "--repeats", "3"];
+    run(&bench, &words);
+    assert_eq!(mock.requests().len(), 18);
+    let records = records(&bench.path("run"));
+    let repeats: Vec<u64> = records
+        .iter()
+        .map(|r| r["repeat"].as_u64().unwrap_or(0))
+        .collect();
+    for repeat in 0..3 {
+        assert_eq!(repeats.iter().filter(|r| **r == repeat).count(), 6);
+    }
+    run(&bench, &words);
+    assert_eq!(mock.requests().len(), 18, "none is asked again");
+}
+
+#[test]
+fn a_constraint_is_sent_and_its_object_is_read() {
+    let bench = bench();
+    let mock = MockEndpoint::start([Answer::text("{\"answer\": \"C\"}")]);
+    let base = mock.base_url();
+    run(
+        &bench,
+        &["--model", "m", "--base-url", &base, "--constrain", "json"],
+    );
+    let sent = &mock.requests()[0].json();
+    let schema = &sent["response_format"]["json_schema"]["schema"];
+    assert_eq!(
+        schema["properties"]["answer"]["enum"],
+        json!(["A", "B", "C"])
+    );
+    for record in records(&bench.path("run")) {
+        assert_eq!(
+            (&record["reply"], &record["outcome"]),
+            (&"C".into(), &"right".into())
+        );
+    }
+    // It measures something else, so it is another run.
+    let words: Vec<&str> = SET
+        .iter()
+        .chain(&["--out", "run", "--model", "m", "--base-url", &base])
+        .copied()
+        .collect();
+    assert!(bench.call(&words).stderr.contains("--constrain"));
+
+    let mock = MockEndpoint::start([Answer::text("I think C")]);
+    let base = mock.base_url();
+    let words: Vec<&str> = SET
+        .iter()
+        .chain(&[
+            "--out",
+            "free",
+            "--model",
+            "m",
+            "--base-url",
+            &base,
+            "--constrain",
+            "choice",
+        ])
+        .copied()
+        .collect();
+    let called = bench.call(&words);
+    assert_eq!(
+        mock.requests()[0].json()["structured_outputs"]["choice"],
+        json!(["A", "B", "C"])
+    );
+    assert!(
+        called.stderr.contains("--constrain choice"),
+        "said once: {called:?}"
+    );
+    assert_eq!(called.stderr.matches("--constrain choice").count(), 1);
+}
+
+#[test]
+fn kept_replies_are_read_again_without_a_call() {
+    let bench = bench();
+    bench.file("script.jsonl", "{\"default\":\"C\"}");
+    let table = run(&bench, &["--model", "script:script.jsonl"]);
+    let shown = bench.complete(&["report", "run"]);
+    assert_eq!(shown, table, "the same from the records alone");
+    // As an earlier version might have read them.
+    let path = bench.path("run/records.jsonl");
+    let old: String = fs::read_to_string(&path)
+        .unwrap()
+        .lines()
+        .map(|line| {
+            let mut record: Value = serde_json::from_str(line).unwrap();
+            record["strict"] = json!({"chosen": null, "why": "no_choice"});
+            record["outcome"] = "unparsed".into();
+            record.to_string() + "\n"
+        })
+        .collect();
+    fs::write(&path, &old).unwrap();
+    assert!(bench.complete(&["report", "run"]).contains("0.0 ±"));
+    let anew = bench.complete(&["report", "run", "--rescore"]);
+    assert!(
+        anew.starts_with("6 of 6 records read otherwise than before\n"),
+        "{anew}"
+    );
+    assert!(anew.ends_with(&table), "{anew}");
+    let again = bench.complete(&["report", "run", "--rescore"]);
+    assert!(again.starts_with("0 of 6"), "{again}");
+    let kept = fs::read_to_string(&path).unwrap();
+    assert!(kept.starts_with(&old), "what was kept is never changed");
+    let none = bench.call(&["report", "nowhere"]);
+    assert_eq!(none.code, Some(2));
+}

@@ -1,0 +1,156 @@
+//! What a run would cost, what it has cost, and where it stops.
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+mod support;
+
+use serde_json::Value;
+use support::endpoint::{Answer, MockEndpoint};
+use support::run::{Bench, records};
+
+/// Questions about one small picture.
+fn questions(bench: &Bench, count: usize) {
+    let picture = image::RgbImage::from_pixel(64, 48, image::Rgb([90, 60, 30]));
+    picture.save(bench.path("a.png")).unwrap();
+    let lines = (0..count).map(|i| {
+        format!(
+            "{{\"id\":\"q{i}\",\"image\":\"a.png\",\"family\":\"color\",\"question\":\"What color is it, {i}?\",\"choices\":[\"red\",\"blue\",\"brown\"],\"answer\":\"brown\"}}\n"
+        )
+    });
+    bench.file("set.jsonl", lines.collect::<String>());
+}
+
+const PRICES: &str = "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 1000, output = 0, image-tokens = 70 }\n";
+
+fn words<'a>(base: &'a str, more: &[&'a str]) -> Vec<&'a str> {
+    let mut words = vec![
+        "--data",
+        "set.jsonl",
+        "--model",
+        "m",
+        "--base-url",
+        base,
+        "--levels",
+        "L0",
+    ];
+    words.extend(more);
+    words
+}
+
+#[test]
+fn a_dry_run_sends_nothing_and_leaves_nothing() {
+    let bench = Bench::new();
+    questions(&bench, 3);
+    let mock = MockEndpoint::start([Answer::text("C")]);
+    let base = mock.base_url();
+    let dry = words(&base, &["--out", "run", "--dry-run"]);
+    let told = bench.complete(&dry);
+    assert!(told.contains("3 of 3 trials are left to ask"), "{told}");
+    assert!(told.contains("unknown"), "no price, no family: {told}");
+    assert!(mock.requests().is_empty());
+    assert!(!bench.path("run").exists());
+
+    bench.file("prices.toml", PRICES);
+    let json = words(
+        &base,
+        &[
+            "--out",
+            "run",
+            "--dry-run",
+            "--prices",
+            "prices.toml",
+            "--json",
+        ],
+    );
+    let told: Value = serde_json::from_str(&bench.complete(&json)).unwrap();
+    let line = &told["lines"][0];
+    assert_eq!(
+        (&line["requests"], &line["image_tokens"]),
+        (&3.into(), &210.0.into())
+    );
+    let (text, dollars) = (
+        line["text_tokens"].as_f64().unwrap(),
+        line["dollars"].as_f64().unwrap(),
+    );
+    assert!((dollars - (text + 210.0) / 1000.0).abs() < 1e-9, "{told}");
+
+    // What is answered is not counted again.
+    bench.complete(&words(&base, &["--out", "run", "--limit", "3"]));
+    let told = bench.complete(&words(
+        &base,
+        &["--out", "run", "--limit", "3", "--dry-run"],
+    ));
+    assert!(told.contains("0 of 3 trials are left to ask"), "{told}");
+}
+
+#[test]
+fn a_run_stops_before_it_costs_too_much_and_goes_on_with_more() {
+    let bench = Bench::new();
+    questions(&bench, 12);
+    bench.file("prices.toml", PRICES);
+    // 90 tokens of prompt and 1 of reply: 9 cents each.
+    let mock = MockEndpoint::start([Answer::text("C")]);
+    let base = mock.base_url();
+    let with = |most: &'static str| {
+        words(
+            &base,
+            &[
+                "--out",
+                "run",
+                "--prices",
+                "prices.toml",
+                "--max-cost",
+                most,
+            ],
+        )
+    };
+    let stopped = bench.call(&with("0.5"));
+    assert_eq!(stopped.code, Some(130), "{stopped:?}");
+    assert!(stopped.stderr.contains("--max-cost"), "{stopped:?}");
+    assert!(
+        stopped
+            .stdout
+            .contains("cancelled: 5 of 12 trials answered"),
+        "{}",
+        stopped.stdout
+    );
+    let again = bench.call(&with("0.5"));
+    assert_eq!(
+        (again.code, mock.requests().len()),
+        (Some(130), 5),
+        "nothing is asked beyond it"
+    );
+    let on = bench.call(&with("2"));
+    assert_eq!((on.code, mock.requests().len()), (Some(0), 12), "{on:?}");
+    assert_eq!(records(&bench.path("run")).len(), 12);
+}
+
+#[test]
+fn a_limit_needs_a_price() {
+    let bench = Bench::new();
+    questions(&bench, 1);
+    let refused = bench.call(&words("http://127.0.0.1:9/v1", &["--max-cost", "1"]));
+    assert_eq!(refused.code, Some(2));
+    assert!(refused.stderr.contains("--prices FILE"), "{refused:?}");
+    for wrong in ["0", "-1", "NaN"] {
+        let flag = format!("--max-cost={wrong}");
+        assert_eq!(
+            bench.call(&words("http://127.0.0.1:9/v1", &[&flag])).code,
+            Some(2)
+        );
+    }
+}
+
+#[test]
+fn an_image_beyond_the_limit_is_found_before_anything_is_asked() {
+    let bench = Bench::new();
+    questions(&bench, 2);
+    let mock = MockEndpoint::start([Answer::text("C")]);
+    let base = mock.base_url();
+    let refused = bench.call(&words(&base, &["--max-image", "0.00005"]));
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    assert!(
+        refused.stderr.contains("frame") && refused.stderr.contains("--max-side"),
+        "{refused:?}"
+    );
+    assert!(mock.requests().is_empty());
+}
