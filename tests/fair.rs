@@ -231,3 +231,44 @@ fn kept_replies_are_read_again_without_a_call() {
     let none = bench.call(&["report", "nowhere"]);
     assert_eq!(none.code, Some(2));
 }
+
+#[test]
+fn replies_without_an_answer_are_told_by_reason() {
+    let bench = bench();
+    let thinking = json!({"content": null, "reasoning_content": "hmm"});
+    let mut answers = vec![Answer::message(&thinking, "length"); 10];
+    answers.push(Answer::message(&json!({"content": null}), "content_filter"));
+    answers.push(Answer::message(
+        &json!({"content": null, "refusal": "no"}),
+        "stop",
+    ));
+    let mock = MockEndpoint::start(answers);
+    let base = mock.base_url();
+    let words = [
+        "--model",
+        "m",
+        "--base-url",
+        &base,
+        "--repeats",
+        "2",
+        "--concurrency",
+        "1",
+    ];
+    let words: Vec<&str> = SET
+        .iter()
+        .chain(&["--out", "run"])
+        .chain(&words)
+        .copied()
+        .collect();
+    let called = bench.call(&words);
+    assert!(
+        called.stdout.contains(
+            "10 cut at the token limit (--max-tokens), 1 refused, 1 withheld by a filter"
+        ),
+        "{called:?}"
+    );
+    assert!(
+        called.stderr.contains("10 of the first 10 replies"),
+        "{called:?}"
+    );
+}

@@ -1,5 +1,6 @@
 //! `summary.csv` and `summary.json`: every number of a run with its interval.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::Serialize;
@@ -8,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::score::accuracy::{Cell, Summary};
 use crate::score::choice::Mode;
 use crate::types::manifest::RunManifest;
-use crate::types::{EnhancerName, Family, Level, Variant, View};
+use crate::types::{EnhancerName, Family, Level, Variant, View, Why};
 
 /// The schema of `summary.json`.
 const SCHEMA: &str = "darkqa.summary/1";
@@ -87,6 +88,7 @@ struct Document<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     folder: Option<&'a Path>,
     run: &'a RunManifest,
+    unread: &'a BTreeMap<Why, usize>,
     rows: Vec<Row<'a>>,
 }
 
@@ -97,6 +99,7 @@ pub fn json(summary: &Summary, run: &RunManifest, folder: Option<&Path>) -> Resu
         schema: SCHEMA,
         folder,
         run,
+        unread: &summary.unread,
         rows,
     });
     text.map(|text| text + "\n")

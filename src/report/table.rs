@@ -10,7 +10,7 @@ use comfy_table::{CellAlignment, LineStyle, Table};
 use crate::score::accuracy::{Cell, Subject, Summary};
 use crate::score::choice::Mode;
 use crate::types::manifest::{Counts, RunManifest, Status};
-use crate::types::{EnhancerName, Level, Variant, View};
+use crate::types::{EnhancerName, Level, Variant, View, Why};
 
 /// One line of the table: a model in one variant, raw or enhanced, over the levels.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -138,8 +138,32 @@ pub fn render(summary: &Summary, run: &RunManifest, folder: &Path) -> String {
             chance.n
         );
     }
+    let _ = write!(text, "{}", unread(summary));
     let _ = writeln!(text, "run: {}", folder.display());
     text
+}
+
+/// Why replies could not be read, where that is not the model's own way of answering.
+fn unread(summary: &Summary) -> String {
+    let count = |why| summary.unread.get(&why).copied().unwrap_or(0);
+    let told: Vec<String> = [
+        (
+            count(Why::Truncated),
+            "cut at the token limit (--max-tokens)",
+        ),
+        (count(Why::Refused), "refused"),
+        (count(Why::Filtered), "withheld by a filter"),
+        (count(Why::Empty), "empty"),
+    ]
+    .into_iter()
+    .filter(|(count, _)| *count > 0)
+    .map(|(count, what)| format!("{count} {what}"))
+    .collect();
+    if told.is_empty() {
+        String::new()
+    } else {
+        format!("of the unparsed replies {}\n", told.join(", "))
+    }
 }
 
 fn levels(seen: &[Pair<'_>]) -> Table {

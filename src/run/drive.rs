@@ -24,7 +24,7 @@ use crate::dataset::Dataset;
 use crate::enhance::{Enhancer, Stopper};
 use crate::error::{Error, Result};
 use crate::store::Store;
-use crate::types::{Condition, Failure, FailureKind, ImageFacts, Reply, View};
+use crate::types::{Condition, Failure, FailureKind, Finish, ImageFacts, Reply, View};
 
 /// How many finished images may wait to be asked about.
 const IMAGES_AHEAD: usize = 2;
@@ -101,6 +101,7 @@ impl Drive<'_> {
             ledger,
             stoppers,
             answered: plan.trials() - plan.left(),
+            cut: Cut::default(),
         };
         std::thread::scope(|scope| {
             scope.spawn(move || cores.install(|| darkroom.develop(plan.frames, &out)));
@@ -140,6 +141,36 @@ struct Intake<'a> {
     stoppers: Vec<Stopper>,
     /// Trials with a reply, those of earlier calls included.
     answered: usize,
+    cut: Cut,
+}
+
+/// Counts replies that the token limit cut before an answer: the first ones tell whether it is too low.
+#[derive(Debug, Default)]
+struct Cut {
+    replies: usize,
+    cut: usize,
+}
+
+impl Cut {
+    /// So many replies are looked at.
+    const LOOKED_AT: usize = 10;
+
+    /// Takes note of a reply, and says so where most of the first were cut.
+    fn note(&mut self, reply: &Reply) {
+        if self.replies >= Self::LOOKED_AT {
+            return;
+        }
+        self.replies += 1;
+        self.cut += usize::from(reply.finish == Finish::Length && reply.text.trim().is_empty());
+        if self.replies == Self::LOOKED_AT && self.cut > Self::LOOKED_AT / 2 {
+            tracing::warn!(
+                "{} of the first {} replies were cut at the token limit before they said anything: a reasoning model needs a larger \
+                 --max-tokens, or a lower --reasoning-effort",
+                self.cut,
+                self.replies
+            );
+        }
+    }
 }
 
 impl Intake<'_> {
@@ -281,6 +312,7 @@ impl Intake<'_> {
         }
         if let Ok(reply) = &result {
             self.answered += 1;
+            self.cut.note(reply);
             self.ledger
                 .book(ready.trial.asker, reply.usage, self.likely(&ready));
         }

@@ -8,7 +8,7 @@ use super::chance::{Offer, chance};
 use super::choice::Mode;
 use super::estimate::Estimate;
 use crate::types::{
-    EnhancerName, Family, Level, Outcome, QuestionId, Reading, Record, Variant, View,
+    EnhancerName, Family, Level, Outcome, QuestionId, Reading, Record, Variant, View, Why,
 };
 
 /// The name under which guessing stands among the models.
@@ -57,6 +57,8 @@ pub struct Cell {
 pub struct Summary {
     /// The cells.
     pub cells: Vec<Cell>,
+    /// Why replies were unparsed in the strict reading, and how many.
+    pub unread: BTreeMap<Why, usize>,
 }
 
 #[derive(Default)]
@@ -109,7 +111,16 @@ pub fn summarize(records: &[Record], questions: impl IntoIterator<Item = Offer>)
         });
     Summary {
         cells: scored.chain(guesses(&questions)).collect(),
+        unread: unread(records),
     }
+}
+
+fn unread(records: &[Record]) -> BTreeMap<Why, usize> {
+    let mut unread = BTreeMap::new();
+    for why in records.iter().filter_map(|record| record.strict?.why) {
+        *unread.entry(why).or_default() += 1;
+    }
+    unread
 }
 
 impl<'a> Tally<'a> {

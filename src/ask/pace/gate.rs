@@ -1,6 +1,5 @@
 //! The turnstile of an endpoint: [`Gate`].
 
-use std::collections::VecDeque;
 use std::num::NonZeroU32;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -8,6 +7,7 @@ use std::time::Duration;
 use tokio::time::{Instant, sleep_until};
 
 use super::allowance::{Allowance, Asks};
+use super::learned::{Beforehand, Learned, WIDEST};
 
 /// What the user allows in a minute; `None` for any number.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -45,57 +45,12 @@ struct State {
     next: Instant,
     /// When the next one may pass at the earliest.
     earliest: Instant,
-    /// The distance learned from pauses.
-    learned: Duration,
-    /// That distance when the pause began that holds now.
-    tried: Duration,
-    /// How well it is known.
-    knowledge: Knowledge,
+    learned: Learned,
     /// The distance that the endpoint's own figures ask for.
     asked: Duration,
     /// Tokens of a request, on the mean.
     tokens: f64,
-    /// When the last ones passed since the last pause.
-    passed: VecDeque<Instant>,
-    /// When the pause began that holds now; `None` while there is none.
-    paused: Option<Instant>,
-    turned_away: usize,
-    /// How many the endpoint took before its first pause: what it holds in store.
-    store: Option<usize>,
 }
-
-/// How well the distance is known that an endpoint wants.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Knowledge {
-    Guessed,
-    Corrected,
-    Measured,
-}
-
-/// What a success leaves of a distance that was guessed, that was too short once, and that was measured: it is halved in 7,
-/// in 69 and in 3,465 successes.
-const EASING: [f64; 3] = [0.9, 0.99, 0.9998];
-
-/// What a pause makes of a distance that was too short.
-const SLOWER: f64 = 1.5;
-
-/// A measured rate is used to this share: a little below it nothing is turned away.
-const MARGIN: f64 = 0.97;
-
-/// Below this distance there is none.
-const NEGLIGIBLE: Duration = Duration::from_millis(1);
-
-/// The longest distance, so that one long pause does not leave a run crawling.
-const WIDEST: Duration = Duration::from_secs(5);
-
-/// The shortest time over which a rate is measured.
-const MEASURED: Duration = Duration::from_secs(1);
-
-/// Where nothing is known of the rate, so many pass in the length of the pause.
-const PROBES: u32 = 32;
-
-/// So many passes are remembered.
-const REMEMBERED: usize = 2048;
 
 impl Gate {
     pub(in crate::ask) fn new(quota: Quota) -> Self {
@@ -106,15 +61,9 @@ impl Gate {
                 shut_until: now,
                 next: now,
                 earliest: now,
-                learned: Duration::ZERO,
-                tried: Duration::ZERO,
-                knowledge: Knowledge::Guessed,
+                learned: Learned::new(),
                 asked: Duration::ZERO,
                 tokens: FIRST_TOKENS,
-                passed: VecDeque::new(),
-                paused: None,
-                turned_away: 0,
-                store: None,
             }),
         }
     }
@@ -127,11 +76,8 @@ impl Gate {
             let mut state = self.state();
             // Shut again while waiting: that turn is void.
             if state.shut_until <= turn {
-                state.renew(Instant::now());
-                state.passed.push_back(Instant::now());
-                if state.passed.len() > REMEMBERED {
-                    state.passed.pop_front();
-                }
+                let until = state.shut_until;
+                state.learned.pass(Instant::now(), until);
                 return;
             }
         }
@@ -139,7 +85,14 @@ impl Gate {
 
     /// Shuts the gate, as the endpoint turned a request away for so long.
     pub(in crate::ask) fn shut(&self, wait: Duration) {
-        self.state().turn_away(Instant::now(), wait, self.quota);
+        let beforehand = if self.quota == Quota::default() {
+            Beforehand::Unknown
+        } else {
+            Beforehand::Stated
+        };
+        let (now, mut state) = (Instant::now(), self.state());
+        state.learned.turn_away(now, wait, beforehand);
+        state.shut(now.checked_add(wait).unwrap_or(now));
     }
 
     /// Notes that a request succeeded, what it was charged, and what is left; pauses beyond `longest` are not kept.
@@ -150,12 +103,7 @@ impl Gate {
         }
         // What succeeds during a pause was sent before it, and says nothing about what comes after.
         if Instant::now() >= state.shut_until {
-            let eased = state.learned.mul_f64(EASING[state.knowledge as usize]);
-            state.learned = if eased < NEGLIGIBLE {
-                Duration::ZERO
-            } else {
-                eased
-            };
+            state.learned.ease();
         }
         state.asked = match left.asks(state.tokens) {
             Asks::Nothing => Duration::ZERO,
@@ -175,18 +123,6 @@ impl Gate {
 }
 
 impl State {
-    /// Counts anew where a pause is over.
-    fn renew(&mut self, now: Instant) {
-        if let Some(paused) = self.paused.filter(|_| now >= self.shut_until) {
-            if self.counted(paused) < MEASURED {
-                self.store = self.store.max(Some(self.taken()));
-            }
-            self.paused = None;
-            self.passed.clear();
-            self.turned_away = 0;
-        }
-    }
-
     fn reserve(&mut self, now: Instant, quota: Quota) -> Instant {
         let minute = |share: f64| Duration::from_secs_f64(60.0 * share);
         let requests = quota
@@ -196,7 +132,7 @@ impl State {
             .tokens
             .map(|most| minute(self.tokens / f64::from(most.get())));
         let quota = requests.max(tokens).unwrap_or_default();
-        let own = self.learned.max(self.asked);
+        let own = self.learned.spacing().max(self.asked);
         // The user's own quota lets a few pass early; what the endpoint has shown does not.
         let advance = if quota > own { ADVANCE } else { Duration::ZERO };
         let due = self.next.max(now).max(self.shut_until);
@@ -205,58 +141,6 @@ impl State {
         self.next = due + quota.max(own);
         self.earliest = turn + quota.max(own) / 2;
         turn
-    }
-
-    fn turn_away(&mut self, now: Instant, wait: Duration, quota: Quota) {
-        let quota_is_set = quota != Quota::default();
-        let paused = *self.paused.get_or_insert(now);
-        self.turned_away += 1;
-        let (taken, counted) = (self.taken(), self.counted(paused));
-        let rate = self.rate(paused);
-        if self.turned_away == 1 {
-            self.tried = self.learned;
-        }
-        let (knowledge, spacing) = match rate {
-            Some(rate) => (
-                Knowledge::Measured,
-                Duration::from_secs_f64(1.0 / (rate * MARGIN)),
-            ),
-            // Too fast, if not by much: it was right a moment ago.
-            None if !self.tried.is_zero() => (Knowledge::Corrected, self.tried.mul_f64(SLOWER)),
-            // The user knows the rate; something else has used it up.
-            None if quota_is_set => (Knowledge::Guessed, Duration::ZERO),
-            None if taken > 0 => {
-                let spacing = counted.saturating_add(wait) / taken as u32;
-                (Knowledge::Guessed, spacing)
-            }
-            None => (Knowledge::Guessed, wait / PROBES),
-        };
-        (self.knowledge, self.learned) = (knowledge, spacing.min(WIDEST));
-        self.shut(now.checked_add(wait).unwrap_or(now));
-    }
-
-    /// How many passed since the last pause and were not turned away.
-    fn taken(&self) -> usize {
-        self.passed.len().saturating_sub(self.turned_away)
-    }
-
-    /// How long they passed before this one began.
-    fn counted(&self, paused: Instant) -> Duration {
-        let first = self.passed.front();
-        first.map_or(Duration::ZERO, |first| paused - *first)
-    }
-
-    /// How many in a second the endpoint takes: it turned one away when, since some moment, more had passed than it held in
-    /// store and was filled up with since (a token bucket). That moment is the one that asks for the highest rate.
-    fn rate(&self, paused: Instant) -> Option<f64> {
-        let store = self.store? + self.turned_away;
-        let times = self.passed.iter().enumerate();
-        let rates = times.filter_map(|(before, since)| {
-            let flow = (self.passed.len() - before).checked_sub(store)?;
-            let lasted = paused - *since;
-            (flow > 0 && lasted >= MEASURED).then(|| flow as f64 / lasted.as_secs_f64())
-        });
-        rates.reduce(f64::max)
     }
 
     fn shut(&mut self, until: Instant) {
@@ -295,19 +179,19 @@ mod tests {
     async fn a_shut_gate_holds_all_and_lets_them_go_at_the_rate_shown() {
         let gate = free();
         let start = Instant::now();
-        for _ in 0..15 {
+        for _ in 0..45 {
             gate.pass().await;
         }
         for _ in 0..5 {
             gate.shut(Duration::from_secs(2));
         }
-        // Ten were taken, then a pause of 2 s: one in 200 ms.
+        // Forty were taken, then a pause of 2 s: one in 50 ms.
         let mut passed = Vec::new();
         for _ in 0..3 {
             gate.pass().await;
             passed.push(start.elapsed().as_millis());
         }
-        assert_eq!(passed, [2000, 2200, 2400]);
+        assert_eq!(passed, [2000, 2050, 2100]);
         for _ in 0..300 {
             ease(&gate);
         }

@@ -6,6 +6,7 @@
 
 mod allowance;
 mod gate;
+mod learned;
 mod wait;
 mod window;
 
