@@ -13,19 +13,6 @@ use support::run::{Bench, files, records};
 
 const QUESTIONS: usize = 4;
 
-fn bench() -> Bench {
-    let bench = Bench::new();
-    let picture = image::RgbImage::from_pixel(64, 48, image::Rgb([90, 60, 30]));
-    picture.save(bench.path("a.png")).unwrap();
-    let lines = (0..QUESTIONS).map(|i| {
-        format!(
-            "{{\"id\":\"q{i}\",\"image\":\"a.png\",\"family\":\"color\",\"question\":\"What color is it, {i}?\",\"choices\":[\"red\",\"blue\",\"brown\"],\"answer\":\"brown\"}}\n"
-        )
-    });
-    bench.file("set.jsonl", lines.collect::<String>());
-    bench
-}
-
 const RUN: [&str; 12] = [
     "--data",
     "set.jsonl",
@@ -83,7 +70,7 @@ fn expired(request: &Value) -> String {
 
 #[test]
 fn what_is_left_goes_out_in_files_and_comes_back_in_any_order() {
-    let bench = bench();
+    let bench = Bench::with_questions(QUESTIONS);
     let told = exported(&bench, &["--file-requests", "5"]);
     // L0, L3 in both variants, and blind: 4 conditions of 4 questions.
     assert!(told.starts_with("16 requests in 4 files"), "{told}");
@@ -170,7 +157,7 @@ fn what_is_left_goes_out_in_files_and_comes_back_in_any_order() {
 
 #[test]
 fn broken_files_are_named() {
-    let bench = bench();
+    let bench = Bench::with_questions(QUESTIONS);
     exported(&bench, &[]);
     let good = answer(&requests(&bench)[0], "C");
     bench.file("out.jsonl", format!("{good}\n{{\"custom\""));

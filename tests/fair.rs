@@ -10,19 +10,6 @@ use serde_json::{Value, json};
 use support::endpoint::{Answer, MockEndpoint};
 use support::run::{Bench, records};
 
-fn bench() -> Bench {
-    let bench = Bench::new();
-    let picture = image::RgbImage::from_pixel(64, 48, image::Rgb([90, 60, 30]));
-    picture.save(bench.path("a.png")).unwrap();
-    let lines = (0..6).map(|i| {
-        format!(
-            "{{\"id\":\"q{i}\",\"image\":\"a.png\",\"family\":\"color\",\"question\":\"What color is it, {i}?\",\"choices\":[\"red\",\"blue\",\"brown\"],\"answer\":\"brown\"}}\n"
-        )
-    });
-    bench.file("set.jsonl", lines.collect::<String>());
-    bench
-}
-
 const SET: [&str; 4] = ["--data", "set.jsonl", "--levels", "L0"];
 
 fn run(bench: &Bench, more: &[&str]) -> String {
@@ -37,7 +24,7 @@ fn run(bench: &Bench, more: &[&str]) -> String {
 
 #[test]
 fn every_rotation_is_asked_and_an_answer_by_position_averages_out() {
-    let bench = bench();
+    let bench = Bench::with_questions(6);
     bench.file("script.jsonl", "{\"default\":\"A\"}");
     let told = run(&bench, &["--model", "script:script.jsonl", "--circular"]);
     let records = records(&bench.path("run"));
@@ -86,7 +73,7 @@ fn every_rotation_is_asked_and_an_answer_by_position_averages_out() {
 #[test]
 fn shuffled_orders_are_the_same_in_every_condition_and_run() {
     let orders = |seed: &str| {
-        let bench = bench();
+        let bench = Bench::with_questions(6);
         let words: Vec<&str> = [
             "--data",
             "set.jsonl",
@@ -122,7 +109,7 @@ fn shuffled_orders_are_the_same_in_every_condition_and_run() {
 
 #[test]
 fn repeats_are_trials_of_their_own() {
-    let bench = bench();
+    let bench = Bench::with_questions(6);
     let mock = MockEndpoint::start([Answer::text("C")]);
     let base = mock.base_url();
     let words = ["--model", "m", "--base-url", &base, "--repeats", "3"];
@@ -142,7 +129,7 @@ fn repeats_are_trials_of_their_own() {
 
 #[test]
 fn a_constraint_is_sent_and_its_object_is_read() {
-    let bench = bench();
+    let bench = Bench::with_questions(6);
     let mock = MockEndpoint::start([Answer::text("{\"answer\": \"C\"}")]);
     let base = mock.base_url();
     run(
@@ -199,7 +186,7 @@ fn a_constraint_is_sent_and_its_object_is_read() {
 
 #[test]
 fn kept_replies_are_read_again_without_a_call() {
-    let bench = bench();
+    let bench = Bench::with_questions(6);
     bench.file("script.jsonl", "{\"default\":\"C\"}");
     let table = run(&bench, &["--model", "script:script.jsonl"]);
     let shown = bench.complete(&["report", "run"]);
@@ -234,7 +221,7 @@ fn kept_replies_are_read_again_without_a_call() {
 
 #[test]
 fn replies_without_an_answer_are_told_by_reason() {
-    let bench = bench();
+    let bench = Bench::with_questions(6);
     let thinking = json!({"content": null, "reasoning_content": "hmm"});
     let mut answers = vec![Answer::message(&thinking, "length"); 10];
     answers.push(Answer::message(&json!({"content": null}), "content_filter"));

@@ -7,18 +7,6 @@ use serde_json::Value;
 use support::endpoint::{Answer, MockEndpoint};
 use support::run::{Bench, records};
 
-/// Questions about one small picture.
-fn questions(bench: &Bench, count: usize) {
-    let picture = image::RgbImage::from_pixel(64, 48, image::Rgb([90, 60, 30]));
-    picture.save(bench.path("a.png")).unwrap();
-    let lines = (0..count).map(|i| {
-        format!(
-            "{{\"id\":\"q{i}\",\"image\":\"a.png\",\"family\":\"color\",\"question\":\"What color is it, {i}?\",\"choices\":[\"red\",\"blue\",\"brown\"],\"answer\":\"brown\"}}\n"
-        )
-    });
-    bench.file("set.jsonl", lines.collect::<String>());
-}
-
 const PRICES: &str = "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 1000, output = 0, image-tokens = 70 }\n";
 
 fn words<'a>(base: &'a str, more: &[&'a str]) -> Vec<&'a str> {
@@ -38,8 +26,7 @@ fn words<'a>(base: &'a str, more: &[&'a str]) -> Vec<&'a str> {
 
 #[test]
 fn a_dry_run_sends_nothing_and_leaves_nothing() {
-    let bench = Bench::new();
-    questions(&bench, 3);
+    let bench = Bench::with_questions(3);
     let mock = MockEndpoint::start([Answer::text("C")]);
     let base = mock.base_url();
     let dry = words(&base, &["--out", "run", "--dry-run"]);
@@ -84,8 +71,7 @@ fn a_dry_run_sends_nothing_and_leaves_nothing() {
 
 #[test]
 fn a_run_stops_before_it_costs_too_much_and_goes_on_with_more() {
-    let bench = Bench::new();
-    questions(&bench, 12);
+    let bench = Bench::with_questions(12);
     bench.file("prices.toml", PRICES);
     // 90 tokens of prompt and 1 of reply: 9 cents each.
     let mock = MockEndpoint::start([Answer::text("C")]);
@@ -126,8 +112,7 @@ fn a_run_stops_before_it_costs_too_much_and_goes_on_with_more() {
 
 #[test]
 fn a_limit_needs_a_price() {
-    let bench = Bench::new();
-    questions(&bench, 1);
+    let bench = Bench::with_questions(1);
     let refused = bench.call(&words("http://127.0.0.1:9/v1", &["--max-cost", "1"]));
     assert_eq!(refused.code, Some(2));
     assert!(refused.stderr.contains("--prices FILE"), "{refused:?}");
@@ -142,8 +127,7 @@ fn a_limit_needs_a_price() {
 
 #[test]
 fn an_image_beyond_the_limit_is_found_before_anything_is_asked() {
-    let bench = Bench::new();
-    questions(&bench, 2);
+    let bench = Bench::with_questions(2);
     let mock = MockEndpoint::start([Answer::text("C")]);
     let base = mock.base_url();
     let refused = bench.call(&words(&base, &["--max-image", "0.00005"]));

@@ -304,7 +304,14 @@ impl Endpoint {
             )
         } else {
             let said = self.scrub.line(&chain(&error.without_url()));
-            (FailureKind::Connection, format!("{}: {said}", self.base))
+            // An authority that nobody here knows signs with companies and in laboratories.
+            let hint = if said.contains("UnknownIssuer") {
+                "; name the authority that signed it by --ca-file"
+            } else {
+                ""
+            };
+            let message = format!("{}: {said}{hint}", self.base);
+            (FailureKind::Connection, message)
         };
         Miss::passing(failure(kind, message))
     }

@@ -114,12 +114,18 @@ pub fn render(forecast: &Forecast) -> String {
     if let (Some(spent), true) = (forecast.spent, *answered > 0) {
         let _ = write!(text, "; the {answered} answered ones cost {}", money(spent));
     }
+    if forecast.lines.is_empty() {
+        return text + ".\n";
+    }
     let _ = writeln!(text, ".\n{table}");
     let _ = writeln!(
         text,
         "dollars: from a letter a reply to every reply as long as --max-tokens allows; {prices}; by the Batch API {:.0} % of it",
         100.0 * forecast.batch
     );
+    if forecast.lines.iter().any(|line| line.dollars.is_none()) {
+        text.push_str("unknown: a table of --prices FILE can state the price of a model and its image-tokens\n");
+    }
     let _ = writeln!(
         text,
         "to send: {} in {images} images, the largest {:.2} MB ({sampled} made to find out)",

@@ -32,6 +32,23 @@ impl Bench {
         self.folder.path().join(name)
     }
 
+    /// A folder with `set.jsonl`: so many questions of three choices about one small brown picture, the third being true.
+    pub fn with_questions(count: usize) -> Self {
+        let bench = Self::new();
+        let picture = image::RgbImage::from_pixel(64, 48, image::Rgb([90, 60, 30]));
+        picture.save(bench.path("a.png")).unwrap();
+        let lines = (0..count).map(|i| {
+            let question = serde_json::json!({
+                "id": format!("q{i}"), "image": "a.png", "family": "color",
+                "question": format!("What color is it, {i}?"),
+                "choices": ["red", "blue", "brown"], "answer": "brown",
+            });
+            format!("{question}\n")
+        });
+        bench.file("set.jsonl", lines.collect::<String>());
+        bench
+    }
+
     /// Writes a file.
     pub fn file(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
         let path = self.path(name);

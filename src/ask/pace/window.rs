@@ -74,8 +74,8 @@ const QUEUEING: f64 = 1.5;
 
 /// The window of an endpoint: additive increase, multiplicative decrease (Chiu and Jain 1989, Comput. Netw. ISDN Syst. 17:1).
 ///
-/// A success widens it by one request a round trip while the window is full and replies come no slower; an overload (429,
-/// 503, 529, a time-out) narrows it by a third, once for all that were under way then.
+/// Each round of successes widens it by one request while replies come no slower; an overload (429, 503, 529, a time-out)
+/// narrows it by a third, once for all that were under way then.
 #[derive(Debug)]
 pub(in crate::ask) struct Window {
     bounds: Bounds,
