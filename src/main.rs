@@ -48,6 +48,11 @@ fn run() -> ExitCode {
                 ExitCode::from(FATAL)
             };
         }
+        Err(e) if e.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
+            // Half a command: its help says the other half, on standard error.
+            let _ = e.print();
+            return ExitCode::from(FATAL);
+        }
         Err(e) => return fail(&config::one_line(&e)),
     };
     let job = match Job::resolve(cli) {

@@ -25,6 +25,9 @@ const ADVANCE: Duration = Duration::from_millis(250);
 /// How many tokens a request is taken for until a reply says how many it was charged: an image and a letter.
 const FIRST_TOKENS: f64 = 1200.0;
 
+/// No request has more: what a server says beyond it is no number to wait by.
+const MOST_TOKENS: f64 = 1e7;
+
 /// What a reply's tokens count in the mean.
 const NEWEST: f64 = 0.1;
 
@@ -99,7 +102,8 @@ impl Gate {
     pub(in crate::ask) fn ease(&self, tokens: Option<u64>, left: Allowance, longest: Duration) {
         let mut state = self.state();
         if let Some(tokens) = tokens {
-            state.tokens += NEWEST * (tokens as f64 - state.tokens);
+            let tokens = (tokens as f64).min(MOST_TOKENS);
+            state.tokens += NEWEST * (tokens - state.tokens);
         }
         // What succeeds during a pause was sent before it, and says nothing about what comes after.
         if Instant::now() >= state.shut_until {
@@ -109,8 +113,9 @@ impl Gate {
             Asks::Nothing => Duration::ZERO,
             Asks::Spacing(spacing) => spacing.min(WIDEST),
             Asks::Pause(wait) => {
-                if wait <= longest {
-                    state.shut(Instant::now() + wait);
+                let until = Instant::now().checked_add(wait);
+                if let Some(until) = until.filter(|_| wait <= longest) {
+                    state.shut(until);
                 }
                 Duration::ZERO
             }
@@ -264,6 +269,29 @@ mod tests {
         }
         let took = start.elapsed().as_secs_f64();
         assert!((19.0..21.0).contains(&took), "{took}");
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn absurd_figures_of_a_server_stop_nothing() {
+        let quota = Quota {
+            requests: None,
+            tokens: NonZeroU32::new(u32::MAX),
+        };
+        let gate = Gate::new(quota);
+        let mut headers = reqwest::header::HeaderMap::new();
+        for (name, value) in [
+            ("x-ratelimit-remaining-requests", "0"),
+            ("x-ratelimit-reset-requests", "18446744073709551615"),
+        ] {
+            headers.insert(name, value.parse().unwrap());
+        }
+        let left = Allowance::read(&headers, std::time::SystemTime::now());
+        for _ in 0..10 {
+            gate.ease(Some(u64::MAX), left, Duration::from_mins(2));
+            gate.shut(Duration::MAX);
+        }
+        let passed = tokio::time::timeout(Duration::from_mins(1), gate.pass()).await;
+        assert!(passed.is_ok(), "a wait that no clock can show is none");
     }
 
     /// A server that holds `store` requests, has `first` of them at first and lets `rate` of them in each second; how long
