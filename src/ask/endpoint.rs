@@ -376,9 +376,10 @@ impl Endpoint {
                     self.sending.max_wait.as_secs_f64()
                 );
             }
-            Some(wait) if is_pause => self.gate.shut(wait),
+            Some(wait) if status == 429 => self.gate.shut(wait),
+            Some(wait) if is_pause => self.gate.hold(wait),
             // It does not say how long: all wait as long as the one that was turned away does first.
-            None if is_pause && again => self.gate.shut(self.sending.first_delay),
+            None if is_pause && again => self.gate.hold(self.sending.first_delay),
             _ => {}
         }
         Miss {

@@ -22,6 +22,10 @@ pub(super) struct Learned {
     turned_away: usize,
     /// How many the endpoint took before its first pause: what it holds in store.
     store: Option<usize>,
+    /// How many passed before the last pause that a longer distance had put off.
+    lasted: usize,
+    /// How many pauses since then have come no later for a longer distance.
+    vain: u32,
 }
 
 /// How well the distance is known that an endpoint wants.
@@ -54,6 +58,12 @@ const MEASURED: Duration = Duration::from_secs(1);
 /// Where nothing is known of the rate, so many at least pass in the length of the pause.
 const PROBES: u32 = 32;
 
+/// So many pauses that no distance puts off are not about the rate: some servers turn requests away at random.
+const VAIN: u32 = 8;
+
+/// So many of them, and the rate is looked for anew.
+const ANEW: u32 = 48;
+
 /// So many passes are remembered.
 const REMEMBERED: usize = 2048;
 
@@ -76,6 +86,8 @@ impl Learned {
             paused: None,
             turned_away: 0,
             store: None,
+            lasted: 0,
+            vain: 0,
         }
     }
 
@@ -116,6 +128,11 @@ impl Learned {
         self.turned_away += 1;
         if self.turned_away == 1 {
             self.tried = self.spacing;
+            self.compare();
+        }
+        if self.vain >= VAIN {
+            (self.knowledge, self.spacing) = (Knowledge::Guessed, self.tried);
+            return;
         }
         let (knowledge, spacing) = match self.rate(paused) {
             Some(rate) => (
@@ -132,6 +149,19 @@ impl Learned {
             }
         };
         (self.knowledge, self.spacing) = (knowledge, spacing.min(WIDEST));
+    }
+
+    /// Whether the distance kept since the last pause has put this one off: a limit on the rate is met later the slower
+    /// requests come.
+    fn compare(&mut self) {
+        let passed = self.passed.len();
+        if self.tried.is_zero() {
+            // No distance was kept that could have put it off.
+        } else if passed >= 2 * self.lasted {
+            (self.lasted, self.vain) = (passed, 0);
+        } else {
+            self.vain = (self.vain + 1) % ANEW;
+        }
     }
 
     /// How many passed since the last pause and were not turned away.
