@@ -19,8 +19,9 @@
 //! - [`types`]: the vocabulary. [`Frame`](types::Frame)s are seen, [`Question`](types::Question)s are asked, a
 //!   [`Condition`](types::Condition) is a degradation with or without an enhancer, a [`Reply`](types::Reply) is what a
 //!   model said, and a [`Record`](types::Record) is what came of one question for one model in one condition.
-//! - [`dataset`]: a folder or a ready-made set → images, their maps and questions.
-//! - [`questions`]: a frame with its maps → questions with one true answer, by rule; pure integers.
+//! - [`dataset`]: a folder, a ready-made set or the built-in rooms → images, their maps and questions.
+//! - [`questions`]: a frame with its maps → questions with one true answer, by rule; pure integers. And the observer: what
+//!   the rules could still answer from given pixels.
 //! - [`synthesis`]: a clean image → the same with less light; pure, given a noise key.
 //! - [`enhance`]: a dark image → a mended one, by the user's ONNX model.
 //! - [`ask`]: a prompt and an image → a reply; the only asynchronous stage.

@@ -7,8 +7,8 @@ use clap::Parser;
 use clap::error::ErrorKind;
 use darkqa_eval::cli::{BatchCommand, Cli, Command, EvaluateArgs};
 use darkqa_eval::config::{
-    self, BatchExport, BatchImport, Config, Enhance, Export, Import, Questions, Realism, Report,
-    Synthesize,
+    self, BatchExport, BatchImport, Config, Enhance, Export, Import, MakeRooms, Questions, Realism,
+    Report, Serve, Synthesize,
 };
 use darkqa_eval::enhance;
 use darkqa_eval::run::export::export;
@@ -16,6 +16,8 @@ use darkqa_eval::run::import::import;
 use darkqa_eval::run::progress::{Loudness, Progress};
 use darkqa_eval::run::questions::questions;
 use darkqa_eval::run::realism::realism;
+use darkqa_eval::run::rooms::rooms;
+use darkqa_eval::run::serve::serve;
 use darkqa_eval::run::synthesize::synthesize;
 use darkqa_eval::run::{self, Verdict, evaluate};
 use darkqa_eval::types::manifest::Status;
@@ -92,6 +94,8 @@ enum Task {
     BatchExport(Box<BatchExport>),
     BatchImport(BatchImport),
     Report(Report),
+    Rooms(MakeRooms),
+    Serve(Serve),
 }
 
 impl Job {
@@ -130,6 +134,14 @@ impl Job {
             Some(Command::Batch(BatchCommand::Import(said))) => {
                 (false, Task::BatchImport(BatchImport::resolve(said)))
             }
+            Some(Command::Rooms(said)) => {
+                let quiet = said.quiet;
+                (quiet, Task::Rooms(MakeRooms::resolve(said)?))
+            }
+            Some(Command::Serve(said)) => {
+                let quiet = said.quiet;
+                (quiet, Task::Serve(Serve::resolve(said)?))
+            }
             Some(Command::Report(said)) => (false, Task::Report(Report::resolve(said))),
             Some(Command::Questions(said)) => {
                 let quiet = said.quiet;
@@ -156,6 +168,8 @@ fn show(task: Task, progress: &Progress) -> anyhow::Result<ExitCode> {
         Task::Enhance(config) => run::enhance::enhance(&config, progress)?,
         Task::BatchExport(config) => run::batch::export(&config, progress)?,
         Task::BatchImport(config) => run::batch::import(&config)?,
+        Task::Rooms(config) => rooms(&config, progress)?,
+        Task::Serve(config) => serve(&config, progress)?,
         Task::Report(config) => run::report::report(&config)?,
     };
     let written = std::io::stdout().lock().write_all(output.as_bytes());

@@ -44,15 +44,34 @@ fn text<'a>(record: &'a Value, key: &str) -> &'a str {
 #[test]
 fn the_built_in_rooms_run_without_anything() {
     let bench = Bench::new();
-    let table = bench.complete(&["--model", "random", "--out", "run"]);
+    let words = [
+        "--model",
+        "observer",
+        "--blind-model",
+        "observer",
+        "--out",
+        "run",
+    ];
+    let table = bench.complete(&words);
     assert!(
         table.contains("untouched")
             && table.contains("with noise")
-            && table.contains("chance: 31.82 over 20"),
+            && table.contains("observer without images")
+            && table.contains("chance: "),
         "{table}"
     );
-    let records = records(&bench.path("run"));
-    assert_eq!(records.len(), 20 * 11);
+    let (records, blind): (Vec<Value>, Vec<Value>) = records(&bench.path("run"))
+        .into_iter()
+        .partition(|record| record["view"] == "image");
+    assert_eq!(records.len(), blind.len() * 11);
+    assert!(blind.len() >= 12, "{}", blind.len());
+    let right = |condition: &str| {
+        let of = records
+            .iter()
+            .filter(|record| record["condition"] == condition);
+        of.filter(|record| record["outcome"] == "right").count()
+    };
+    assert!(right("L0") * 10 >= blind.len() * 9, "{table}");
     let conditions: BTreeSet<&str> = records
         .iter()
         .map(|record| text(record, "condition"))
@@ -62,7 +81,7 @@ fn the_built_in_rooms_run_without_anything() {
         serde_json::from_slice(&fs::read(bench.path("run/manifest.json")).unwrap()).unwrap();
     assert_eq!(
         (&manifest["status"], &manifest["counts"]["answered"]),
-        (&json!("complete"), &json!(220))
+        (&json!("complete"), &json!(blind.len() * 12))
     );
 }
 
@@ -482,7 +501,16 @@ fn threads_and_order_change_no_byte() {
 #[test]
 fn the_reference_run_is_made_again() {
     let bench = Bench::new();
-    bench.complete(&["--model", "random", "--levels", "L0,L3", "--out", "run"]);
+    bench.complete(&[
+        "--model",
+        "observer",
+        "--data",
+        "rooms:frames=12,size=320x240",
+        "--levels",
+        "L0,L3",
+        "--out",
+        "run",
+    ]);
     let reference = Path::new(env!("CARGO_MANIFEST_DIR")).join("results/reference");
     let made = |run: &Path| -> BTreeMap<String, Value> {
         let kept = records(run).into_iter();

@@ -13,6 +13,7 @@ mod escapes;
 mod field;
 mod image_limit;
 mod image_tokens;
+mod local;
 mod openai;
 mod pace;
 mod parameters;
@@ -34,6 +35,7 @@ pub use endpoint::{Endpoint, Sending};
 pub use field::Refused;
 pub use image_limit::ImageLimit;
 pub use image_tokens::image_tokens;
+pub use local::{Local, Opinion};
 pub use openai::OpenAi;
 pub use pace::{Bounds, Quota};
 pub use parameters::{Constrain, Detail, Parameters, Temperature, TokenField};
@@ -71,6 +73,8 @@ pub enum Model {
     Random(Random),
     /// Replies out of a file.
     Script(Script),
+    /// What a function says.
+    Local(Local),
 }
 
 impl Model {
@@ -81,6 +85,7 @@ impl Model {
             Self::OpenAi(model) => model.name(),
             Self::Random(_) => Random::NAME,
             Self::Script(script) => script.name(),
+            Self::Local(local) => local.name(),
         }
     }
 
@@ -91,6 +96,7 @@ impl Model {
             Self::OpenAi(model) => model.digest(),
             Self::Random(random) => random.digest(),
             Self::Script(script) => script.digest(),
+            Self::Local(local) => local.digest(),
         }
     }
 
@@ -99,6 +105,8 @@ impl Model {
     pub fn width(&self) -> Option<usize> {
         match self {
             Self::OpenAi(model) => Some(model.endpoint().width()),
+            // It works on this machine's own cores.
+            Self::Local(_) => std::thread::available_parallelism().ok().map(usize::from),
             Self::Random(_) | Self::Script(_) => None,
         }
     }
@@ -125,6 +133,7 @@ impl Model {
             }
             Self::Random(random) => Ok(Reply::local(random.answer(call))),
             Self::Script(script) => script.answer(call.question, call.condition),
+            Self::Local(local) => tokio::task::block_in_place(|| local.answer(call)),
         }
     }
 }

@@ -9,7 +9,8 @@ use clap::Args;
 #[derive(Debug, Default, Args)]
 #[command(next_help_heading = "Model")]
 pub struct ModelArgs {
-    /// The model to ask, by its name at the endpoint; repeatable; built in: random, script:FILE
+    /// The model to ask, by its name at the endpoint; repeatable; built in: observer (frames
+    /// with maps), random, script:FILE
     #[arg(long, value_name = "NAME")]
     pub model: Vec<String>,
     /// Show the models no image: words alone

@@ -10,6 +10,8 @@ mod export;
 mod import;
 mod questions;
 mod report;
+mod rooms;
+mod serve;
 
 use std::num::{NonZeroU32, NonZeroU64, NonZeroUsize};
 use std::path::PathBuf;
@@ -23,6 +25,8 @@ pub use export::ExportArgs;
 pub use import::ImportArgs;
 pub use questions::QuestionsArgs;
 pub use report::ReportArgs;
+pub use rooms::RoomsArgs;
+pub use serve::ServeArgs;
 
 /// Measures how well a vision-language model sees in the dark.
 ///
@@ -58,11 +62,15 @@ pub enum Command {
     Import(ImportArgs),
     /// Write ready-made sets for other tools, one for each condition, with its images
     Export(Box<ExportArgs>),
+    /// Write the built-in rooms as frames with depth, class and segment maps
+    Rooms(RoomsArgs),
     /// Enhance images by an ONNX model, as an evaluation would; or tell how it is fed and read
     Enhance(EnhanceArgs),
     /// Ask through a Batch API, at half the price: write its input files, take over its output files
     #[command(subcommand)]
     Batch(BatchCommand),
+    /// Answer as the built-in models do behind an OpenAI-compatible endpoint on this machine, for trying clients without keys
+    Serve(ServeArgs),
     /// Show what runs hold, from their records alone
     Report(ReportArgs),
 }
@@ -197,10 +205,12 @@ pub struct EvaluateArgs {
 #[derive(Debug, Default, Args)]
 #[command(next_help_heading = "Data")]
 pub struct DataArgs {
-    /// A folder of frames, or a ready-made set (.tsv, .jsonl); default: small built-in rooms
-    #[arg(long, value_name = "DIR|FILE")]
+    /// A folder of frames, a ready-made set (.tsv, .jsonl), or built-in rooms, rooms:frames=N,seed=N,size=WIDTHxHEIGHT; default:
+    /// rooms:frames=48,seed=7,size=640x480
+    #[arg(long, value_name = "DIR|FILE|rooms:…")]
     pub data: Option<PathBuf>,
-    /// The questions about a folder of frames; default: questions.jsonl in it
+    /// The questions about a folder of frames; default: questions.jsonl in it, else made by rule
+    /// from its maps
     #[arg(long, value_name = "FILE")]
     pub questions: Option<PathBuf>,
     /// Only the first N questions

@@ -25,6 +25,8 @@ const AZURE_KEY: &str = "AZURE_OPENAI_API_KEY";
 pub enum ModelName {
     /// The built-in one that guesses.
     Random,
+    /// The built-in one that looks at what the pixels still hold.
+    Observer,
     /// The built-in one that answers out of a file.
     Script(PathBuf),
     /// One at the endpoint.
@@ -107,6 +109,7 @@ impl FromStr for ModelName {
         match text.trim() {
             "" => Err(Error::usage("--model", "the name of a model is empty")),
             "random" => Ok(Self::Random),
+            "observer" => Ok(Self::Observer),
             name => Ok(name.strip_prefix("script:").map_or_else(
                 || Self::Remote(name.to_owned()),
                 |path| Self::Script(path.into()),

@@ -94,7 +94,7 @@ impl Export {
         })?;
         Ok(Self {
             form,
-            data: data(merged.data),
+            data: data(merged.data)?,
             light: Light::resolve(&merged.light, &merged.sensor)?,
             enhancement: enhancement(merged.enhancement)?,
             out: said.out,

@@ -11,6 +11,8 @@ mod money;
 mod questions;
 mod realism;
 mod report;
+mod rooms;
+mod serve;
 mod showing;
 mod synthesize;
 
@@ -31,13 +33,15 @@ pub use money::Money;
 pub use questions::{Questions, Strangers};
 pub use realism::{PairPlace, Realism};
 pub use report::{Readings, Report};
+pub use rooms::MakeRooms;
+pub use serve::Serve;
 pub use showing::{Order, Rotations, Showing};
 pub use synthesize::{Existing, Product, Synthesize};
 
 use crate::ask::{Bounds, Format};
 use crate::cli::{DataArgs, EnhancementArgs, EvaluateArgs, OutputArgs, SendingArgs};
-use crate::dataset::Place;
 use crate::dataset::picture::MOST_PIXELS;
+use crate::dataset::{Place, Rooms};
 use crate::enhance::{Install, RuntimeSearch, Tiling};
 use crate::error::{Error, Result};
 use crate::types::{Family, Variants};
@@ -182,7 +186,7 @@ impl Config {
         let light = Light::resolve(&said.light, &said.sensor)?;
         Ok(Self {
             showing: Showing::said(&said.data, light.sensor.seed),
-            data: data(said.data),
+            data: data(said.data)?,
             light,
             enhancement: enhancement(said.enhancement)?,
             ask: asking::ask(said.model, &said.sending)?,
@@ -208,23 +212,38 @@ fn nameless(output: &OutputArgs) -> Error {
     let mend = if output.resume.is_some() {
         "--resume takes the same flags as the run had, the model's name among them"
     } else {
-        "a model's name at the endpoint, or random to try without one"
+        "a model's name at the endpoint, or observer or random to try without one"
     };
     Error::usage("--model", format_args!("no model is named: {mend}"))
 }
 
-fn data(said: DataArgs) -> Data {
+fn data(said: DataArgs) -> Result<Data> {
     let families = said.families.map(|list| {
         list.split(',')
             .map(|name| Family::from(name.trim()))
             .collect()
     });
-    Data {
-        place: said.data.map_or(Place::Rooms, Place::Path),
+    Ok(Data {
+        place: place(said.data)?,
         questions: said.questions,
         limit: said.limit,
         families,
         most_pixels: most_pixels(said.max_pixels),
+    })
+}
+
+/// Where the data are: a path, `rooms` or `rooms:frames=48,seed=7,size=1280x720`.
+fn place(said: Option<PathBuf>) -> Result<Place> {
+    let Some(path) = said else {
+        return Ok(Place::Rooms(Rooms::default()));
+    };
+    match path.to_str() {
+        Some("rooms") if !path.exists() => Ok(Place::Rooms(Rooms::default())),
+        Some(text) if text.starts_with("rooms:") => text["rooms:".len()..]
+            .parse()
+            .map(Place::Rooms)
+            .map_err(|e: Error| e.at("--data")),
+        _ => Ok(Place::Path(path)),
     }
 }
 

@@ -25,7 +25,7 @@ use super::maps::{DepthFile, Maps};
 use super::view::View;
 use super::{Dataset, Source, questions, spaces, stem};
 use crate::error::{Error, Result};
-use crate::types::{DepthKind, FrameId, Intrinsics, SegmentName, Segmentation};
+use crate::types::{DepthKind, FrameId, Intrinsics, Labels, SegmentName, Segmentation};
 
 /// The file that lists the frames of the common interface.
 const FRAMES: &str = "frames.jsonl";
@@ -125,11 +125,7 @@ impl Line {
 /// The frames of a folder, without questions, and what their numbers stand for.
 pub(super) fn frames(folder: &Path) -> Result<Dataset> {
     let about = about(folder)?;
-    let classes = folder.join(CLASSES);
-    let labels = classes
-        .exists()
-        .then(|| spaces::read(&classes))
-        .transpose()?;
+    let labels = labels(folder)?;
     let title = about.name.unwrap_or_default();
     let name = if title.is_empty() {
         stem(folder)
@@ -142,6 +138,13 @@ pub(super) fn frames(folder: &Path) -> Result<Dataset> {
         labels,
         ..dataset
     })
+}
+
+/// What the numbers of a folder stand for, where it says so.
+pub(super) fn labels(folder: &Path) -> Result<Option<Labels>> {
+    let classes = folder.join(CLASSES);
+    let there = classes.exists().then(|| spaces::read(&classes));
+    there.transpose()
 }
 
 fn about(folder: &Path) -> Result<About> {
@@ -182,29 +185,18 @@ fn segment_names(folder: &Path, scene: &str) -> Result<Arc<BTreeMap<u32, Segment
 }
 
 pub(super) fn open(folder: &Path, questions: Option<&Path>) -> Result<Dataset> {
-    let sources = sources(folder)?;
     let file = questions.map_or_else(|| folder.join(QUESTIONS), Path::to_owned);
     if questions.is_none() && !file.exists() {
+        if folder.join(FRAMES).exists() && folder.join(CLASSES).exists() {
+            return frames(folder);
+        }
         let problem = format_args!(
-            "no {QUESTIONS} in this folder; `darkqa-eval questions` makes them from frames with maps, --questions FILE names others"
+            "no {QUESTIONS} in this folder, and no {FRAMES} with {CLASSES} to make questions of; --questions FILE names some"
         );
         return Err(Error::data(folder.display(), problem));
     }
     let questions = questions::read(&file)?;
-    if let Some(stray) = questions
-        .iter()
-        .find(|question| !sources.contains_key(&question.frame))
-    {
-        let example = sources.keys().next().map_or("", |id| id.0.as_str());
-        let problem = format_args!(
-            "question {:?} is about the frame {:?}, which {} does not have (its frames are named like {example:?})",
-            stray.id.0,
-            stray.frame.0,
-            folder.display()
-        );
-        return Err(Error::data(file.display(), problem));
-    }
-    Ok(Dataset::new(stem(folder), sources, questions))
+    Dataset::new(stem(folder), sources(folder)?, Vec::new()).asked(questions, &file)
 }
 
 /// The frames of a folder: those that its list names, else its images.

@@ -31,6 +31,7 @@ use crate::types::{Digest, Frame, FrameId, Labels, Question};
 use maps::Maps;
 use picture::MOST_PIXELS;
 pub use picture::Picture;
+pub use rooms::Rooms;
 pub use view::FrameFiles;
 use view::View;
 
@@ -38,7 +39,7 @@ use view::View;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Place {
     /// The built-in rooms.
-    Rooms,
+    Rooms(Rooms),
     /// A folder or file of the user's.
     Path(PathBuf),
 }
@@ -93,6 +94,52 @@ impl Dataset {
         }
     }
 
+    /// The frames at a place, without questions. No image is read.
+    ///
+    /// # Errors
+    /// Where the place is no folder of frames.
+    pub fn open_unasked(place: &Place) -> Result<Self> {
+        match place {
+            Place::Rooms(rooms) => Ok(Self::of_rooms(*rooms)),
+            Place::Path(folder) => Self::of_frames(folder),
+        }
+    }
+
+    /// The built-in rooms, without questions. No image is made.
+    fn of_rooms(rooms: Rooms) -> Self {
+        let sources = rooms
+            .all()
+            .map(|(id, room)| (id, Source::Room(room)))
+            .collect();
+        Self {
+            title: rooms.title(),
+            labels: Some(rooms::labels()),
+            ..Self::new("rooms".to_owned(), sources, Vec::new())
+        }
+    }
+
+    /// The same with these questions.
+    #[must_use]
+    pub fn with_questions(self, questions: Vec<Question>) -> Self {
+        Self { questions, ..self }
+    }
+
+    /// The same with the questions of a file, each of which is about one of its frames.
+    fn asked(self, questions: Vec<Question>, file: &Path) -> Result<Self> {
+        let stray = questions
+            .iter()
+            .find(|question| !self.sources.contains_key(&question.frame));
+        if let Some(stray) = stray {
+            let example = self.sources.keys().next().map_or("", |id| id.0.as_str());
+            let problem = format_args!(
+                "question {:?} is about the frame {:?}, which {} does not have (its frames are named like {example:?})",
+                stray.id.0, stray.frame.0, self.name
+            );
+            return Err(Error::data(file.display(), problem));
+        }
+        Ok(self.with_questions(questions))
+    }
+
     /// The images at a place, an image file or a folder of frames, without questions. No image is read.
     pub fn of_images(path: &Path) -> Result<Self> {
         let sources = if path.is_dir() {
@@ -112,6 +159,18 @@ impl Dataset {
             ));
         }
         frames::frames(folder)
+    }
+
+    /// What the numbers of the semantic maps at a place stand for, whether or not it has questions.
+    ///
+    /// # Errors
+    /// With the file that cannot be read.
+    pub fn labels_at(place: &Place) -> Result<Option<Labels>> {
+        match place {
+            Place::Rooms(_) => Ok(Some(rooms::labels())),
+            Place::Path(path) if path.is_dir() => frames::labels(path),
+            Place::Path(_) => Ok(None),
+        }
     }
 
     /// What the numbers of the semantic maps stand for; `None` where the data set does not say.
@@ -136,15 +195,17 @@ impl Dataset {
 
     /// Opens the data at a place; `questions` overrides the questions beside a folder of frames.
     ///
-    /// No image is read. Every question is checked: its choices, its answer among them, its frame among the images.
+    /// No image is read. Every question is checked: its choices, its answer among them, its frame among the images. The
+    /// built-in rooms and a folder of frames with maps but without questions have none yet: they are made by rule, from what
+    /// [`Self::labels`] says of the maps, and given by [`Self::with_questions`].
     pub fn open(place: &Place, questions: Option<&Path>) -> Result<Self> {
         let dataset = match place {
-            Place::Rooms => {
-                refuse(
-                    questions,
-                    "the built-in rooms bring their own; name the frames with --data",
-                )?;
-                rooms::open()?
+            Place::Rooms(rooms) => {
+                let rooms = Self::of_rooms(*rooms);
+                match questions {
+                    Some(file) => rooms.asked(questions::read(file)?, file)?,
+                    None => rooms,
+                }
             }
             Place::Path(path) if multiple_choice::is_image_folder(path) => {
                 refuse(
@@ -159,7 +220,7 @@ impl Dataset {
                 multiple_choice::open(path)?
             }
         };
-        if dataset.questions.is_empty() {
+        if dataset.questions.is_empty() && dataset.labels.is_none() {
             return Err(Error::data(&dataset.name, "no questions in it"));
         }
         let mut seen = HashSet::new();
@@ -205,7 +266,7 @@ impl Dataset {
                 })
                 .map_err(|e| Error::file(path, "read", e)),
             Some(Source::Cell(cell)) => cell.picture(self.most_pixels),
-            Some(Source::Room(room)) => room.paint().map(Picture::Pixels),
+            Some(Source::Room(room)) => Ok(Picture::Drawn(room.clone())),
             None => Err(Error::data(
                 &self.name,
                 format_args!("no frame {:?} in it", frame.0),

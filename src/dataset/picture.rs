@@ -5,6 +5,7 @@ use std::io::Cursor;
 use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 
 use super::jpeg::Outline;
+use super::rooms::Room;
 use crate::error::{Error, Result};
 use crate::types::{Digest, Rgb};
 
@@ -28,15 +29,18 @@ pub enum Picture {
     },
     /// Pixels that were never a file.
     Pixels(Rgb),
+    /// A built-in room, drawn where it is needed.
+    Drawn(Room),
 }
 
 impl Picture {
-    /// The content: of the file, or of the pixels with their size.
+    /// The content: of the file, of the pixels with their size, or all that decides the pixels of a room.
     #[must_use]
     pub fn digest(&self) -> Digest {
         match self {
             Self::Encoded { bytes, .. } => Digest::of(bytes),
             Self::Pixels(rgb) => Digest::of_parts([&rgb.width().to_le_bytes()[..], rgb.samples()]),
+            Self::Drawn(room) => room.digest(),
         }
     }
 
@@ -47,6 +51,7 @@ impl Picture {
     pub fn check(&self) -> Result<(u32, u32)> {
         let (bytes, place, most_pixels) = match self {
             Self::Pixels(rgb) => return Ok((rgb.width() as u32, rgb.height() as u32)),
+            Self::Drawn(room) => return Ok(room.size().map(|side| side as u32).into()),
             Self::Encoded {
                 bytes,
                 place,
@@ -70,6 +75,7 @@ impl Picture {
     pub fn decode(&self) -> Result<Rgb> {
         let (bytes, place, most_pixels) = match self {
             Self::Pixels(rgb) => return Ok(rgb.clone()),
+            Self::Drawn(room) => return Ok(room.frame()?.rgb.clone()),
             Self::Encoded {
                 bytes,
                 place,

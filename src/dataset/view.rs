@@ -76,6 +76,9 @@ impl FrameFiles<'_> {
     /// # Errors
     /// With the file: an image or a map that is broken, a map of another size than the image.
     pub fn decode(&self) -> Result<Frame> {
+        if let Picture::Drawn(room) = &self.picture {
+            return Ok(room.frame()?.as_ref().clone());
+        }
         let rgb = self.picture.decode()?;
         let size = (rgb.height(), rgb.width());
         Ok(Frame {

@@ -14,6 +14,7 @@ mod color_tree;
 pub mod colors;
 pub mod frequency;
 pub mod generate;
+pub mod observer;
 pub mod pick;
 mod presence;
 pub mod room;

@@ -4,10 +4,12 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 
+use super::observer;
 use crate::ask::{Endpoint, Model, OpenAi, Parameters, Random, Script};
 use crate::config::{Config, ModelName};
+use crate::dataset::Dataset;
 use crate::error::{Error, Result};
-use crate::types::View;
+use crate::types::{Question, View};
 
 /// One model and whether it sees the images.
 #[derive(Debug, Clone)]
@@ -19,8 +21,15 @@ pub(super) struct Asker {
 }
 
 /// Opens all models; nothing is sent.
-pub(super) fn open(config: &Config) -> Result<Vec<Asker>> {
+pub(super) fn open(
+    config: &Config,
+    dataset: &Arc<Dataset>,
+    questions: &[Question],
+) -> Result<Vec<Asker>> {
     let ask = &config.ask;
+    let prior = Random {
+        seed: config.light.sensor.seed,
+    };
     let endpoint = match &ask.server {
         Some(server) => Some(Arc::new(Endpoint::open(
             server.access.clone(),
@@ -33,9 +42,11 @@ pub(super) fn open(config: &Config) -> Result<Vec<Asker>> {
     let mut askers: Vec<Asker> = Vec::new();
     for (name, view) in seen.chain(blind) {
         let model = Arc::new(match name {
-            ModelName::Random => Model::Random(Random {
-                seed: config.light.sensor.seed,
-            }),
+            ModelName::Random => Model::Random(prior),
+            ModelName::Observer => {
+                let place = &config.data.place;
+                Model::Local(observer::open(dataset, place, questions, prior)?)
+            }
             ModelName::Script(path) => Model::Script(Script::load(path)?),
             ModelName::Remote(name) => {
                 let endpoint = endpoint

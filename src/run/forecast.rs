@@ -122,7 +122,7 @@ fn line(
 ) -> Line {
     let limit = match &*asker.model {
         Model::OpenAi(model) => model.parameters().max_tokens,
-        Model::Random(_) | Model::Script(_) => None,
+        Model::Random(_) | Model::Script(_) | Model::Local(_) => None,
     };
     let reply_tokens = requests as f64 * LETTER;
     let longest = limit.map(|limit| requests as f64 * f64::from(limit));

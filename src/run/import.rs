@@ -4,22 +4,20 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Component, Path};
 
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder as _};
 use ndarray::Array2;
 use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::Verdict;
+use super::interface::{self, Place};
 use super::progress::Progress;
-use super::written::{png, write};
+use super::written::png;
 use crate::config::{Existing, Import};
 use crate::dataset::Picture;
 use crate::dataset::import::keyframes::choose;
-use crate::dataset::import::{Adapter, Incoming, Read, classes, open};
+use crate::dataset::import::{Adapter, Incoming, Read, open};
 use crate::error::{Error, Result};
-use crate::types::Segmentation;
 use crate::types::manifest::Status;
 
 /// The median depths of a frame of a room, in millimetres: outside of them its scale is wrong, or it looks at a wall.
@@ -69,20 +67,8 @@ pub fn import(config: &Import, progress: &Progress) -> Result<Verdict> {
     let mut scenes: Vec<&str> = frames.iter().map(|frame| frame.scene.as_str()).collect();
     scenes.dedup();
     for scene in &scenes {
-        let names = adapter.names(scene);
-        if !names.is_empty() {
-            let text =
-                serde_json::to_string_pretty(&names).map_err(|e| Error::data("segments", e))?;
-            write(
-                &config.out.join("scenes").join(scene).join("segments.json"),
-                text.as_bytes(),
-            )?;
-        }
+        interface::names(&config.out, scene, &adapter.names(scene))?;
     }
-    write(
-        &config.out.join("classes.json"),
-        classes(adapter.labels()).as_bytes(),
-    )?;
     let about = json!({
         "schema": "darkqa.dataset/1",
         "name": config.name,
@@ -90,12 +76,8 @@ pub fn import(config: &Import, progress: &Progress) -> Result<Verdict> {
         "depth_kind": adapter.depth_kind(),
         "source": config.kind.name(),
     });
-    write(
-        &config.out.join("dataset.json"),
-        format!("{about:#}\n").as_bytes(),
-    )?;
-    let lines: Vec<String> = made.iter().map(|made| made.line.to_string()).collect();
-    write(&list, (lines.join("\n") + "\n").as_bytes())?;
+    let lines = made.iter().map(|made| &made.line);
+    interface::finish(&config.out, adapter.labels(), &about, lines)?;
     let mut output = format!(
         "{}: {} frames of {} scenes{}\n{note}",
         config.out.display(),
@@ -121,7 +103,7 @@ pub fn import(config: &Import, progress: &Progress) -> Result<Verdict> {
 /// A frame that was written.
 struct Made {
     /// Its line of `frames.jsonl`.
-    line: Value,
+    line: Map<String, Value>,
     /// The median of its depth in millimetres.
     depth: Option<u32>,
 }
@@ -147,55 +129,34 @@ fn one(config: &Import, adapter: &dyn Adapter, frame: &Incoming) -> Result<Made>
         segments,
         room,
     } = adapter.read(frame, &rgb)?;
-    let place = |kind: &str, ending: &str| {
-        format!("scenes/{}/{kind}/{}.{ending}", frame.scene, frame.frame)
+    let place = Place {
+        out: &config.out,
+        scene: &frame.scene,
+        frame: &frame.frame,
     };
-    let mut line = json!({
-        "scene": frame.scene,
-        "frame": frame.frame,
-        "width": rgb.width(),
-        "height": rgb.height(),
-        "source": frame.rgb.file_name().map(|name| name.to_string_lossy()),
-    });
-    let mut say = |key: &str, value: Value| {
-        if let Some(line) = line.as_object_mut() {
-            line.insert(key.to_owned(), value);
-        }
-    };
+    let mut line = place.line(&rgb);
+    let source = frame.rgb.file_name().map(|name| name.to_string_lossy());
+    line.insert("source".to_owned(), json!(source));
     // A JPEG file stays one: what it has lost stays lost, and its pixels stay the same.
     let jpeg = frame
         .rgb
         .extension()
         .is_some_and(|end| !end.eq_ignore_ascii_case("png"));
-    let image = place("rgb", if jpeg { "jpg" } else { "png" });
     let content = match picture {
         Picture::Encoded { bytes, .. } if jpeg => bytes,
         _ => png(&rgb)?,
     };
-    write(&config.out.join(&image), &content)?;
-    say("rgb", json!(image));
+    let image = place.write("rgb", if jpeg { "jpg" } else { "png" }, &content)?;
+    line.insert("rgb".to_owned(), json!(image));
     let median = depth.as_ref().and_then(median);
-    if let Some(depth) = depth {
-        let path = place("depth", "png");
-        let units = depth.mapv(|depth| u16::try_from(depth).unwrap_or(u16::MAX));
-        write(&config.out.join(&path), &grey(&units)?)?;
-        say("depth", json!(path));
-        say("depth_scale", json!(0.001));
-        say("depth_kind", json!(adapter.depth_kind()));
+    if let Some(depth) = &depth {
+        place.depth(&mut line, depth, adapter.depth_kind())?;
     }
-    if let Some(semantic) = semantic {
-        let path = place("sem", "png");
-        write(&config.out.join(&path), &grey(&semantic)?)?;
-        say("sem", json!(path));
+    if let Some(semantic) = &semantic {
+        place.semantic(&mut line, semantic)?;
     }
-    if let Some(segments) = segments {
-        let path = write_segments(&config.out, &place, &segments)?;
-        say("over", json!(path));
-        let source = match adapter.segmentation() {
-            Segmentation::Instances => "renderer",
-            Segmentation::Parts => "superpixel",
-        };
-        say("over_source", json!(source));
+    if let Some(segments) = &segments {
+        place.segments(&mut line, segments, adapter.segmentation())?;
     }
     for (key, value) in [
         ("t", json!(frame.time)),
@@ -204,55 +165,13 @@ fn one(config: &Import, adapter: &dyn Adapter, frame: &Incoming) -> Result<Made>
         ("room_gt", json!(frame.room.clone().or(room))),
     ] {
         if !value.is_null() {
-            say(key, value);
+            line.insert(key.to_owned(), value);
         }
     }
     Ok(Made {
         line,
         depth: median,
     })
-}
-
-/// Segments as 16-bit PNG, or as `.npy` where there are too many; the path they lie at.
-fn write_segments(
-    out: &Path,
-    place: &impl Fn(&str, &str) -> String,
-    segments: &Array2<u32>,
-) -> Result<String> {
-    let most = segments.iter().copied().max().unwrap_or(0);
-    if u16::try_from(most).is_ok() {
-        let path = place("over", "png");
-        write(&out.join(&path), &grey(&segments.mapv(|id| id as u16))?)?;
-        return Ok(path);
-    }
-    let path = place("over", "npy");
-    let (height, width) = segments.dim();
-    let header =
-        format!("{{'descr': '<u4', 'fortran_order': False, 'shape': ({height}, {width}), }}");
-    // The numbers begin at a multiple of 64 bytes, after a newline (numpy.lib.format, version 1.0).
-    let length = (header.len() + 11).next_multiple_of(64) - 10;
-    let mut file = b"\x93NUMPY\x01\x00".to_vec();
-    file.extend((length as u16).to_le_bytes());
-    file.extend(format!("{header:<width$}\n", width = length - 1).bytes());
-    file.extend(segments.iter().flat_map(|id| id.to_le_bytes()));
-    write(&out.join(&path), &file)?;
-    Ok(path)
-}
-
-/// A map as 16-bit grey PNG.
-fn grey(map: &Array2<u16>) -> Result<Vec<u8>> {
-    let (height, width) = map.dim();
-    let samples: Vec<u8> = map.iter().flat_map(|value| value.to_ne_bytes()).collect();
-    let mut file = Vec::new();
-    PngEncoder::new_with_quality(&mut file, CompressionType::Fast, FilterType::Adaptive)
-        .write_image(
-            &samples,
-            width as u32,
-            height as u32,
-            ExtendedColorType::L16,
-        )
-        .map_err(|e| Error::data("map", e))?;
-    Ok(file)
 }
 
 /// The median of what has depth.

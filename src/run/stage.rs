@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use jiff::Timestamp;
 
@@ -9,7 +10,8 @@ use super::gallery::{self, Gallery};
 use super::identity::{self, Identity};
 use super::plan::Inputs;
 use super::progress::Progress;
-use super::{RESULTS, askers};
+use super::questions::by_rule::by_rule;
+use super::{RESULTS, askers, observer};
 use crate::config::{Config, Data, ModelName, RunPlace};
 use crate::dataset::Dataset;
 use crate::enhance::ModelFile;
@@ -36,10 +38,9 @@ impl Stage<'_> {
         progress: &Progress,
         act: impl FnOnce(Stage<'_>) -> Result<T>,
     ) -> Result<T> {
-        let dataset = Dataset::open(&config.data.place, config.data.questions.as_deref())?
-            .with_most_pixels(config.data.most_pixels);
+        let dataset = Arc::new(open(&config.data, progress)?);
         let questions = select(&dataset, &config.data)?;
-        let askers = askers::open(config)?;
+        let askers = askers::open(config, &dataset, &questions)?;
         // Where every model is blind, no image is read and no enhancer is opened.
         let seeing = askers.iter().any(|asker| asker.view == View::Image);
         let models = if seeing {
@@ -65,6 +66,17 @@ impl Stage<'_> {
             folder,
         })
     }
+}
+
+/// Opens the data; where they come without questions, they are made by rule.
+pub(super) fn open(config: &Data, progress: &Progress) -> Result<Dataset> {
+    let dataset = Dataset::open(&config.place, config.questions.as_deref())?
+        .with_most_pixels(config.most_pixels);
+    if !dataset.questions().is_empty() {
+        return Ok(dataset);
+    }
+    let questions = by_rule(&dataset, progress)?;
+    Ok(dataset.with_questions(questions))
 }
 
 /// The questions that are asked: of the chosen families, the first so many.
@@ -112,6 +124,7 @@ fn label(config: &Config) -> String {
         .chain(&config.ask.blind_models)
         .map(|name| match name {
             ModelName::Random => "random".to_owned(),
+            ModelName::Observer => observer::NAME.to_owned(),
             ModelName::Script(path) => path.file_stem().map_or_else(
                 || "script".to_owned(),
                 |stem| stem.to_string_lossy().into_owned(),

@@ -68,6 +68,8 @@ impl Bench {
                 command.env_remove(name);
             }
         }
+        // Where no data are named: few rooms, and small ones.
+        command.env("DARKQA_DATA", "rooms:frames=6,size=200x150");
         command.current_dir(self.folder.path()).args(words);
         command
     }

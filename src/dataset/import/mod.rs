@@ -11,7 +11,7 @@ mod hm3d;
 mod interface;
 pub mod keyframes;
 mod mp3d;
-mod names;
+pub(in crate::dataset) mod names;
 mod nyu;
 mod polygons;
 mod replica;

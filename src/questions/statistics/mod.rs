@@ -7,7 +7,7 @@ mod light;
 mod measure;
 mod opening;
 mod rim;
-mod scene;
+pub(in crate::questions) mod scene;
 mod shape;
 #[cfg(test)]
 mod tests;

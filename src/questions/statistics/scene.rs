@@ -23,14 +23,14 @@ enum Kinds<'a> {
 }
 
 /// The maps of a frame, as numbers.
-pub(super) struct Scene<'a> {
-    pub(super) size: [usize; 2],
+pub(in crate::questions) struct Scene<'a> {
+    pub(in crate::questions) size: [usize; 2],
     labels: &'a Labels,
     kinds: Kinds<'a>,
     /// The mask of each pixel, from 1; 0 for none.
-    pub(super) masks: Vec<u32>,
+    pub(in crate::questions) masks: Vec<u32>,
     /// The number of each mask in the map.
-    pub(super) numbers: Vec<u32>,
+    pub(in crate::questions) numbers: Vec<u32>,
     /// How many parts each mask is made of, where it is.
     pub(super) parts: Vec<usize>,
     /// The class of a number above those of a semantic map: that of a segment by its name alone.
@@ -41,7 +41,7 @@ pub(super) struct Scene<'a> {
 const NAMED: u32 = 1 << 16;
 
 impl<'a> Scene<'a> {
-    pub(super) fn of(frame: &'a Frame, labels: &'a Labels) -> Result<Self> {
+    pub(in crate::questions) fn of(frame: &'a Frame, labels: &'a Labels) -> Result<Self> {
         let size = [frame.rgb.width(), frame.rgb.height()];
         let mut scene = Self {
             size,

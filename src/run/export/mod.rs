@@ -13,7 +13,7 @@ use super::progress::Progress;
 use super::recipe::Recipe;
 use super::stage::select;
 use super::written::png;
-use super::{Verdict, identity, open_enhancers};
+use super::{Verdict, identity, open_enhancers, stage};
 use crate::ask::Format;
 use crate::config::{Existing, Export};
 use crate::dataset::Dataset;
@@ -28,8 +28,7 @@ use set::Set;
 /// # Errors
 /// Where the data cannot be read, a set is there already, or a file cannot be written.
 pub fn export(config: &Export, progress: &Progress) -> Result<Verdict> {
-    let dataset = Dataset::open(&config.data.place, config.data.questions.as_deref())?
-        .with_most_pixels(config.data.most_pixels);
+    let dataset = stage::open(&config.data, progress)?;
     let questions = select(&dataset, &config.data)?;
     let files = identity::enhancers(&config.enhancement.models)?;
     let recipe = Recipe {

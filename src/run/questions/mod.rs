@@ -1,5 +1,6 @@
 //! `questions`: multiple-choice questions about frames, by rule.
 
+pub(super) mod by_rule;
 mod checked;
 mod kept;
 

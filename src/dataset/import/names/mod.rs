@@ -24,7 +24,7 @@ static TABLES: LazyLock<[Table; 3]> = LazyLock::new(|| [OVERRIDES, HM3D, THOR].m
 
 /// What a word means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Meaning {
+pub(in crate::dataset) enum Meaning {
     /// A class of mpcat40.
     Class(&'static str),
     /// Nothing: the data set itself does not know.
@@ -40,7 +40,7 @@ fn spelled(word: &str) -> String {
 }
 
 /// What a word of a data set means; the suffixes `/otherroom` and `/outside` say where, not what.
-pub(super) fn meaning(word: &str) -> Meaning {
+pub(in crate::dataset) fn meaning(word: &str) -> Meaning {
     let word = spelled(word);
     let bare = [
         "/otherroom",

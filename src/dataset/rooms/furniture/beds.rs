@@ -1,0 +1,97 @@
+//! Beds, with their pillows.
+
+use glam::{Vec3, vec3};
+
+use super::super::dice::Dice;
+use super::super::mesh::Mesh;
+use super::super::paint::{ALL, Paint};
+use super::super::scene::{Piece, kind};
+use super::super::surface::{Pattern, Surface};
+use super::{Set, at, legs};
+
+/// A bed with its blanket, and one or two pillows.
+pub(in super::super) fn bed(dice: &mut Dice) -> Set {
+    let double = dice.chance(0.6);
+    let width = if double {
+        dice.between(1.45, 1.7)
+    } else {
+        dice.between(0.95, 1.1)
+    };
+    let length = 2.05;
+    let mut mesh = Mesh::default();
+    let wood = Surface::wood(Paint::of(&["brown", "white", "black"], dice), 0);
+    let sheet = Surface::cloth(Paint::nameless([238, 236, 230]));
+    let cover = Paint::of(&ALL, dice);
+    let blanket = Surface::cloth(cover);
+    legs(&mut mesh, vec3(width, 0.2, length), 0.06, 0.07, &wood);
+    mesh.block(
+        vec3(-width / 2.0, 0.16, 0.02),
+        vec3(width / 2.0, 0.3, length),
+        &wood,
+    );
+    let head = dice.between(0.85, 1.1);
+    mesh.soft(
+        vec3(-width / 2.0 - 0.03, 0.1, 0.0),
+        vec3(width / 2.0 + 0.03, head, 0.07),
+        0.03,
+        &wood,
+    );
+    mesh.soft(
+        vec3(-width / 2.0 + 0.02, 0.28, 0.07),
+        vec3(width / 2.0 - 0.02, 0.5, length - 0.02),
+        0.07,
+        &sheet,
+    );
+    // The blanket hangs over both sides and the foot, and is turned back at the head.
+    let from = dice.between(0.55, 0.7);
+    mesh.soft(
+        vec3(-width / 2.0 - 0.035, 0.2, from),
+        vec3(width / 2.0 + 0.035, 0.56, length + 0.035),
+        0.06,
+        &blanket,
+    );
+    mesh.soft(
+        vec3(-width / 2.0 - 0.03, 0.44, from - 0.16),
+        vec3(width / 2.0 + 0.03, 0.575, from + 0.06),
+        0.05,
+        &if dice.chance(0.5) { sheet } else { blanket },
+    );
+    let mut set = Set::of(Piece::new(kind("bed", "bed"), mesh, cover.name));
+    set.size = vec3(width + 0.1, head, length + 0.04);
+    let paint = Paint::of(&["white", "white", "grey", "pink", "yellow", "blue"], dice);
+    let count = if double { 2 } else { 1 };
+    for i in 0..count {
+        let x = (i as f32 - (count as f32 - 1.0) / 2.0) * width * 0.48;
+        let size = vec3(width / count as f32 * 0.8, 0.42, 0.17);
+        let piece = pillow("pillow", size, 0.95, &Surface::cloth(paint), paint.name);
+        set = set.and(piece, at(vec3(x, 0.56, 0.24), 0.0));
+    }
+    set
+}
+
+/// A pillow or cushion around its middle, leaning back by an angle.
+pub(in super::super) fn pillow(
+    word: &'static str,
+    size: Vec3,
+    lean: f32,
+    surface: &Surface,
+    color: &'static str,
+) -> Piece {
+    let mut mesh = Mesh::default();
+    mesh.pillow(Vec3::ZERO, size, -lean, surface);
+    Piece::new(kind(word, "cushion"), mesh, color)
+}
+
+/// A cushion for a sofa or a chair: around its middle.
+pub(in super::super) fn cushion(dice: &mut Dice) -> Piece {
+    let paint = Paint::of(&ALL, dice);
+    let mut surface = Surface::cloth(paint);
+    let mut name = paint.name;
+    if dice.chance(0.15) {
+        let other = Paint::of(&["white", "black"], dice);
+        surface = surface.with(Pattern::Stripes(0.05, other.color));
+        name = "";
+    }
+    let side = dice.between(0.38, 0.45);
+    pillow("cushion", vec3(side, side, 0.15), 0.3, &surface, name)
+}

@@ -1,0 +1,62 @@
+//! Parametric furniture: each function makes one piece, or a [`Set`] of pieces that belong together.
+
+pub(super) mod bath;
+pub(super) mod beds;
+pub(super) mod clutter;
+pub(super) mod kitchen;
+pub(super) mod lamps;
+pub(super) mod seats;
+pub(super) mod storage;
+pub(super) mod tables;
+pub(super) mod textiles;
+pub(super) mod walls;
+
+use glam::{Vec3, vec3};
+
+use super::mesh::Mesh;
+use super::scene::{Piece, Pose};
+use super::surface::Surface;
+
+/// Pieces that stand together, each with its place among them; the whole stands like one piece.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Set {
+    pub(super) pieces: Vec<(Piece, Pose)>,
+    /// Width, height and depth.
+    pub(super) size: Vec3,
+}
+
+impl Set {
+    /// One piece alone, its size taken from its shape.
+    pub(super) fn of(piece: Piece) -> Self {
+        let [low, high] = piece.mesh.bounds();
+        let width = 2.0 * high.x.max(-low.x);
+        let size = vec3(width, high.y, high.z);
+        Self {
+            pieces: vec![(piece, at(Vec3::ZERO, 0.0))],
+            size,
+        }
+    }
+
+    /// The same with one more piece.
+    pub(super) fn and(mut self, piece: Piece, pose: Pose) -> Self {
+        self.pieces.push((piece, pose));
+        self
+    }
+}
+
+/// A pose.
+pub(super) fn at(place: Vec3, angle: f32) -> Pose {
+    Pose { at: place, angle }
+}
+
+/// Four square legs below a plate.
+fn legs(mesh: &mut Mesh, size: Vec3, inset: f32, thick: f32, surface: &Surface) {
+    for (x, z) in [(-1.0, 0.0), (1.0, 0.0), (-1.0, 1.0), (1.0, 1.0)] {
+        let foot = vec3(
+            x * (size.x / 2.0 - inset),
+            0.0,
+            inset + z * (size.z - 2.0 * inset),
+        );
+        mesh.slab(foot, vec3(thick, size.y, thick), surface);
+    }
+}

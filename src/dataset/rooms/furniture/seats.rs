@@ -1,0 +1,225 @@
+//! Chairs, stools, sofas.
+
+use glam::{Vec3, vec3};
+
+use super::super::dice::Dice;
+use super::super::mesh::{Mesh, turn};
+use super::super::paint::{ALL, Paint};
+use super::super::scene::{Kind, Piece, kind};
+use super::super::surface::Surface;
+use super::beds::cushion;
+use super::{Set, at, legs};
+
+/// A chair with four legs and a back.
+pub(in super::super) fn chair(name: Kind, paint: Paint, dice: &mut Dice) -> Piece {
+    let surface = if dice.chance(0.5) {
+        Surface::wood(paint, 1)
+    } else {
+        Surface::gloss(paint)
+    };
+    chair_of(name, paint, &surface, usize::from(dice.chance(0.5)))
+}
+
+/// A chair in one of two styles: a back of slats, or a whole one.
+pub(in super::super) fn chair_of(
+    name: Kind,
+    paint: Paint,
+    surface: &Surface,
+    style: usize,
+) -> Piece {
+    let mut mesh = Mesh::default();
+    let (width, depth, seat) = (0.44, 0.44, 0.45);
+    legs(&mut mesh, vec3(width, seat, depth), 0.03, 0.04, surface);
+    mesh.soft(
+        vec3(-width / 2.0, seat - 0.03, 0.0),
+        vec3(width / 2.0, seat + 0.025, depth),
+        0.02,
+        surface,
+    );
+    let top = 0.94;
+    for x in [-1.0, 1.0] {
+        mesh.slab(
+            vec3(x * (width / 2.0 - 0.03), seat, 0.03),
+            vec3(0.04, top - seat, 0.04),
+            surface,
+        );
+    }
+    if style == 0 {
+        mesh.soft(
+            vec3(-width / 2.0, top - 0.12, 0.01),
+            vec3(width / 2.0, top, 0.05),
+            0.015,
+            surface,
+        );
+        for i in -2..=2 {
+            let x = i as f32 * 0.075;
+            mesh.slab(
+                vec3(x, seat, 0.03),
+                vec3(0.026, top - seat - 0.06, 0.018),
+                surface,
+            );
+        }
+    } else {
+        mesh.soft(
+            vec3(-width / 2.0, seat + 0.1, 0.01),
+            vec3(width / 2.0, top, 0.055),
+            0.02,
+            surface,
+        );
+    }
+    Piece::new(name, mesh, paint.name)
+}
+
+/// A chair on castors.
+pub(in super::super) fn office_chair(dice: &mut Dice) -> Piece {
+    let paint = Paint::of(
+        &["black", "black", "grey", "blue", "red", "green", "orange"],
+        dice,
+    );
+    let (cloth, frame) = (Surface::cloth(paint), Surface::plain([34, 34, 36]));
+    let mut mesh = Mesh::default();
+    for i in 0..5 {
+        let out = turn(std::f32::consts::TAU * i as f32 / 5.0);
+        let end = vec3(out.x * 0.3, 0.06, 0.3 + out.y * 0.3);
+        mesh.cone(vec3(0.0, 0.1, 0.3), end, [0.03, 0.02], &frame);
+        mesh.ball(vec3(end.x, 0.03, end.z), Vec3::splat(0.03), &frame);
+    }
+    mesh.rod(vec3(0.0, 0.08, 0.3), vec3(0.0, 0.44, 0.3), 0.03, &frame);
+    mesh.soft(
+        vec3(-0.25, 0.43, 0.05),
+        vec3(0.25, 0.53, 0.54),
+        0.045,
+        &cloth,
+    );
+    mesh.soft(
+        vec3(-0.23, 0.6, -0.01),
+        vec3(0.23, 1.12, 0.08),
+        0.04,
+        &cloth,
+    );
+    mesh.slab(vec3(0.0, 0.46, 0.03), vec3(0.08, 0.3, 0.04), &frame);
+    for x in [-0.28, 0.28] {
+        mesh.slab(vec3(x, 0.5, 0.28), vec3(0.03, 0.2, 0.04), &frame);
+        mesh.soft(
+            vec3(x - 0.035, 0.69, 0.14),
+            vec3(x + 0.035, 0.72, 0.42),
+            0.015,
+            &frame,
+        );
+    }
+    Piece::new(kind("office chair", "chair"), mesh, paint.name)
+}
+
+/// A stool with a round seat.
+pub(in super::super) fn stool(height: f32, dice: &mut Dice) -> Piece {
+    let paint = Paint::of(&ALL, dice);
+    let surface = if dice.chance(0.4) {
+        Surface::wood(paint, 0)
+    } else {
+        Surface::gloss(paint)
+    };
+    let mut mesh = Mesh::default();
+    let radius = 0.18;
+    for i in 0..4 {
+        let out = turn(std::f32::consts::TAU * (i as f32 + 0.5) / 4.0);
+        let foot = vec3(out.x * radius, 0.0, radius + out.y * radius);
+        let top = vec3(
+            out.x * radius * 0.6,
+            height - 0.03,
+            radius + out.y * radius * 0.6,
+        );
+        mesh.rod(foot, top, 0.017, &surface);
+    }
+    if height > 0.55 {
+        let ring = |i: usize| {
+            let out = turn(std::f32::consts::TAU * (i as f32 + 0.5) / 4.0);
+            vec3(
+                out.x * radius * 0.87,
+                height * 0.32,
+                radius + out.y * radius * 0.87,
+            )
+        };
+        (0..4).for_each(|i| mesh.rod(ring(i), ring(i + 1), 0.011, &surface));
+    }
+    mesh.lathe(
+        vec3(0.0, height - 0.045, radius),
+        &[(0.0, 0.0), (radius, 0.0), (radius, 0.045), (0.0, 0.045)],
+        &surface,
+    );
+    Piece::new(kind("stool", "stool"), mesh, paint.name)
+}
+
+/// A sofa for so many, with cushions.
+pub(in super::super) fn sofa(seats: usize, dice: &mut Dice) -> Set {
+    let paint = Paint::of(&ALL, dice);
+    let set = Set::of(upholstered(kind("sofa", "sofa"), seats, paint, dice));
+    let mut set = set;
+    let width = set.size.x;
+    for x in [-1.0, 1.0] {
+        if dice.chance(0.55) {
+            let mut piece = cushion(dice);
+            if piece.color == paint.name {
+                piece = cushion(dice);
+            }
+            set = set.and(
+                piece,
+                at(vec3(x * (width / 2.0 - 0.42), 0.64, 0.36), x * -0.2),
+            );
+        }
+    }
+    set
+}
+
+/// An armchair.
+pub(in super::super) fn armchair(dice: &mut Dice) -> Piece {
+    let paint = Paint::of(&ALL, dice);
+    upholstered(kind("armchair", "chair"), 1, paint, dice)
+}
+
+fn upholstered(name: Kind, seats: usize, paint: Paint, dice: &mut Dice) -> Piece {
+    let cloth = Surface::cloth(paint);
+    let foot = Surface::plain([64, 44, 30]);
+    let seat = dice.between(0.6, 0.68);
+    let arm = dice.between(0.14, 0.2);
+    let width = seats as f32 * seat + 2.0 * arm;
+    let (depth, back) = (0.9, dice.between(0.8, 0.9));
+    let mut mesh = Mesh::default();
+    legs(&mut mesh, vec3(width, 0.12, depth), 0.07, 0.05, &foot);
+    mesh.soft(
+        vec3(-width / 2.0, 0.1, 0.02),
+        vec3(width / 2.0, 0.34, depth),
+        0.04,
+        &cloth,
+    );
+    mesh.soft(
+        vec3(-width / 2.0, 0.12, 0.0),
+        vec3(width / 2.0, back, 0.2),
+        0.06,
+        &cloth,
+    );
+    for x in [-1.0, 1.0_f32] {
+        let (a, b) = (x * width / 2.0, x * (width / 2.0 - arm));
+        mesh.soft(
+            vec3(a.min(b), 0.1, 0.0),
+            vec3(a.max(b), 0.62, depth + 0.01),
+            0.06,
+            &cloth,
+        );
+    }
+    for i in 0..seats {
+        let left = -width / 2.0 + arm + i as f32 * seat;
+        mesh.soft(
+            vec3(left + 0.004, 0.32, 0.16),
+            vec3(left + seat - 0.004, 0.46, depth + 0.03),
+            0.05,
+            &cloth,
+        );
+        mesh.soft(
+            vec3(left + 0.006, 0.44, 0.13),
+            vec3(left + seat - 0.006, back + 0.03, 0.3),
+            0.07,
+            &cloth,
+        );
+    }
+    Piece::new(name, mesh, paint.name)
+}

@@ -1,0 +1,88 @@
+//! What is made of cloth and lies or hangs.
+
+use glam::{Vec3, vec2, vec3};
+
+use super::super::dice::Dice;
+use super::super::mesh::Mesh;
+use super::super::paint::{ALL, Paint};
+use super::super::scene::{Piece, kind};
+use super::super::surface::{Pattern, Surface};
+
+/// The two halves of a curtain at the sides of a window of a width, from y = 0 downwards, one thing each; their rod is the
+/// first's.
+pub(in super::super) fn curtains(window: f32, drop: f32, dice: &mut Dice) -> [Piece; 2] {
+    let paint = Paint::of(&ALL, dice);
+    let cloth = Surface::cloth(paint);
+    let width = dice.between(0.42, 0.6);
+    let name = kind("curtain", "curtain");
+    let half = |left: f32, rod: bool| {
+        let mut mesh = Mesh::default();
+        mesh.drape(vec3(left, 0.0, 0.08), width, drop, 0.13, &cloth);
+        if rod {
+            let reach = window / 2.0 + width;
+            let ends = [-reach, reach].map(|x| vec3(x, 0.02, 0.08));
+            mesh.rod(ends[0], ends[1], 0.013, &Surface::steel());
+        }
+        Piece::new(name, mesh, paint.name)
+    };
+    let out = window / 2.0 - 0.08;
+    [half(-out - width, true), half(out, false)]
+}
+
+/// A towel over a rail on the wall; the rail is at y = 0.
+pub(in super::super) fn towel(dice: &mut Dice) -> Piece {
+    let paint = Paint::of(&ALL, dice);
+    let cloth = Surface::paint(paint).with(Pattern::Pile);
+    let (width, drop) = (dice.between(0.36, 0.5), dice.between(0.55, 0.75));
+    let mut mesh = Mesh::default();
+    for (z, share) in [(0.09, 1.0), (0.045, 0.8)] {
+        let wave = |x: f32| 0.006 * super::super::mesh::turn(x * 14.0).y;
+        let row = |y: f32| -> Vec<Vec3> {
+            (0..=12)
+                .map(|i| {
+                    let x = (i as f32 / 12.0 - 0.5) * width;
+                    vec3(x, y, z + wave(x))
+                })
+                .collect()
+        };
+        mesh.grid(
+            &[row(0.012), row(-drop * share / 2.0), row(-drop * share)],
+            &cloth,
+        );
+    }
+    let (a, b) = (width / 2.0, 0.0);
+    mesh.block(vec3(-a, b, 0.045), vec3(a, b + 0.022, 0.095), &cloth);
+    let steel = Surface::steel();
+    let reach = width / 2.0 + 0.06;
+    mesh.rod(
+        vec3(-reach, 0.0, 0.068),
+        vec3(reach, 0.0, 0.068),
+        0.01,
+        &steel,
+    );
+    for x in [-reach, reach] {
+        mesh.rod(vec3(x, 0.0, 0.0), vec3(x, 0.0, 0.07), 0.012, &steel);
+    }
+    Piece::new(kind("towel", "towel"), mesh, paint.name)
+}
+
+/// A rug of a size, around its middle.
+pub(in super::super) fn rug(width: f32, depth: f32, dice: &mut Dice) -> Piece {
+    let tints = [
+        [158, 96, 84],
+        [92, 108, 132],
+        [196, 182, 156],
+        [120, 128, 104],
+        [150, 136, 150],
+    ];
+    let borders = [[226, 216, 196], [70, 58, 56], [206, 188, 140]];
+    let border = Surface::plain(dice.pick(&borders)).color;
+    let surface = Surface::plain(dice.pick(&tints)).with(Pattern::Rug(vec2(width, depth), border));
+    let mut mesh = Mesh::default();
+    mesh.block(
+        vec3(-width / 2.0, 0.0, -depth / 2.0),
+        vec3(width / 2.0, 0.012, depth / 2.0),
+        &surface,
+    );
+    Piece::new(kind("rug", "floor"), mesh, "")
+}

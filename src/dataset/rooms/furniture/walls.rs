@@ -1,0 +1,273 @@
+//! What hangs on walls or is part of them; the back of each is at z = 0.
+
+use glam::{Vec3, vec2, vec3};
+
+use super::super::dice::Dice;
+use super::super::mesh::Mesh;
+use super::super::paint::{Paint, rgb};
+use super::super::scene::{Light, Piece, kind};
+use super::super::surface::{Finish, Pattern, Surface};
+
+/// Four bars around a rectangle whose lower edge is at y = 0.
+fn frame(mesh: &mut Mesh, width: f32, height: f32, bar: f32, thick: f32, surface: &Surface) {
+    let (left, right) = (-width / 2.0, width / 2.0);
+    for [low, high] in [
+        [vec3(left - bar, -bar, 0.0), vec3(left, height + bar, thick)],
+        [
+            vec3(right, -bar, 0.0),
+            vec3(right + bar, height + bar, thick),
+        ],
+        [vec3(left, -bar, 0.0), vec3(right, 0.0, thick)],
+        [vec3(left, height, 0.0), vec3(right, height + bar, thick)],
+    ] {
+        mesh.block(low, high, surface);
+    }
+}
+
+fn sheet(mesh: &mut Mesh, width: f32, height: f32, z: f32, surface: &Surface) {
+    let (left, right) = (-width / 2.0, width / 2.0);
+    mesh.quad(
+        [
+            vec3(left, 0.0, z),
+            vec3(right, 0.0, z),
+            vec3(right, height, z),
+            vec3(left, height, z),
+        ],
+        surface,
+    );
+}
+
+/// A framed picture.
+pub(in super::super) fn picture(dice: &mut Dice) -> Piece {
+    let (width, height) = (dice.between(0.4, 0.85), dice.between(0.4, 0.65));
+    let wood = Surface::paint(Paint::of(&["black", "brown", "white"], dice));
+    let pattern = Pattern::Canvas(vec2(width, height), dice.below(1000) as u32);
+    let canvas = Surface::plain([200, 200, 200]).with(pattern);
+    let mut mesh = Mesh::default();
+    frame(&mut mesh, width, height, 0.03, 0.03, &wood);
+    sheet(&mut mesh, width, height, 0.015, &canvas);
+    Piece::new(kind("picture", "picture"), mesh, "")
+}
+
+/// A mirror of a size in its frame.
+pub(in super::super) fn mirror(width: f32, height: f32, dice: &mut Dice) -> Piece {
+    let rim = Surface::gloss(Paint::of(&["black", "brown", "grey", "white"], dice));
+    let glass = Surface::plain([255, 255, 255]).finished(Finish::Mirror);
+    let mut mesh = Mesh::default();
+    frame(&mut mesh, width, height, 0.025, 0.03, &rim);
+    sheet(&mut mesh, width, height, 0.015, &glass);
+    Piece::new(kind("mirror", "mirror"), mesh, "")
+}
+
+/// A flat television for the wall or, with a foot, for what it stands on.
+pub(in super::super) fn television(width: f32, foot: bool) -> Piece {
+    panel(kind("tv", "tv_monitor"), width, foot)
+}
+
+/// A computer's monitor on its foot.
+pub(in super::super) fn monitor(width: f32) -> Piece {
+    panel(kind("monitor", "tv_monitor"), width, true)
+}
+
+fn panel(name: super::super::scene::Kind, width: f32, foot: bool) -> Piece {
+    let height = width * 0.58;
+    let case = Surface::gloss(Paint::nameless([24, 24, 26]));
+    let screen = Surface::plain([34, 40, 52])
+        .with(Pattern::Screen(vec2(width, height)))
+        .finished(Finish::Glossy);
+    let mut mesh = Mesh::default();
+    let lift = if foot { 0.09 } else { 0.0 };
+    let z = if foot { 0.1 } else { 0.0 };
+    mesh.block(
+        vec3(-width / 2.0, lift, z),
+        vec3(width / 2.0, lift + height, z + 0.035),
+        &case,
+    );
+    mesh.block(
+        vec3(-width / 2.0 + 0.015, lift + 0.02, z + 0.035),
+        vec3(width / 2.0 - 0.015, lift + height - 0.015, z + 0.037),
+        &screen,
+    );
+    if foot {
+        mesh.slab(vec3(0.0, 0.0, 0.12), vec3(width * 0.36, 0.012, 0.2), &case);
+        mesh.slab(vec3(0.0, 0.0, 0.1), vec3(0.06, 0.14, 0.02), &case);
+    }
+    Piece::new(name, mesh, "black")
+}
+
+/// A window of a size whose sill is at y = 0, with the daylight that comes in.
+pub(in super::super) fn window(width: f32, height: f32, daylight: f32) -> Piece {
+    let white = Surface::plain([240, 240, 238]);
+    let view = Surface {
+        color: Vec3::ONE,
+        pattern: Pattern::Outdoors(height),
+        finish: Finish::Glow(1.15),
+    };
+    let mut mesh = Mesh::default();
+    sheet(&mut mesh, width, height, 0.012, &view);
+    frame(&mut mesh, width, height, 0.06, 0.05, &white);
+    mesh.block(vec3(-0.02, 0.0, 0.0), vec3(0.02, height, 0.04), &white);
+    mesh.block(
+        vec3(-width / 2.0, height * 0.55, 0.0),
+        vec3(width / 2.0, height * 0.55 + 0.03, 0.035),
+        &white,
+    );
+    mesh.block(
+        vec3(-width / 2.0 - 0.1, -0.08, 0.0),
+        vec3(width / 2.0 + 0.1, -0.05, 0.14),
+        &white,
+    );
+    let mut piece = Piece::new(kind("window", "window"), mesh, "");
+    piece.light = Some(Light::Panel {
+        corner: vec3(-width / 2.0, 0.0, 0.06),
+        edges: [vec3(width, 0.0, 0.0), vec3(0.0, height, 0.0)],
+        normal: Vec3::Z,
+        radiance: vec3(0.97, 1.0, 1.04) * daylight,
+    });
+    piece
+}
+
+/// Blinds before a window of a size whose sill is at y = 0, let down by a share.
+pub(in super::super) fn blinds(width: f32, height: f32, share: f32, dice: &mut Dice) -> Piece {
+    let paint = Paint::of(&["white", "white", "grey", "brown", "green", "blue"], dice);
+    let slat = Surface::paint(paint);
+    let mut mesh = Mesh::default();
+    mesh.block(
+        vec3(-width / 2.0, height - 0.02, 0.07),
+        vec3(width / 2.0, height + 0.04, 0.11),
+        &slat,
+    );
+    let count = (height * share / 0.05) as usize;
+    for i in 0..count {
+        let y = height - 0.03 - i as f32 * 0.05;
+        mesh.quad(
+            [
+                vec3(-width / 2.0, y - 0.02, 0.102),
+                vec3(width / 2.0, y - 0.02, 0.102),
+                vec3(width / 2.0, y + 0.02, 0.082),
+                vec3(-width / 2.0, y + 0.02, 0.082),
+            ],
+            &slat,
+        );
+    }
+    Piece::new(kind("blinds", "blinds"), mesh, paint.name)
+}
+
+/// A door in its frame.
+pub(in super::super) fn door(dice: &mut Dice) -> Piece {
+    let tints = [[236, 234, 228], [150, 104, 66], [206, 200, 190]];
+    let leaf = Surface::plain(dice.pick(&tints));
+    let rail = Surface::plain([238, 237, 233]);
+    let mut mesh = Mesh::default();
+    let (width, height) = (0.86, 2.02);
+    mesh.block(
+        vec3(-width / 2.0, 0.0, 0.0),
+        vec3(width / 2.0, height, 0.025),
+        &leaf,
+    );
+    for (low, high) in [(0.18, 0.85), (1.0, 1.86)] {
+        for x in [-0.2, 0.2] {
+            mesh.block(
+                vec3(x - 0.14, low, 0.025),
+                vec3(x + 0.14, high, 0.033),
+                &leaf,
+            );
+        }
+    }
+    for x in [-1.0, 1.0] {
+        mesh.slab(
+            vec3(x * (width / 2.0 + 0.03), 0.0, 0.02),
+            vec3(0.07, height, 0.05),
+            &rail,
+        );
+    }
+    mesh.block(
+        vec3(-width / 2.0 - 0.065, height, -0.005),
+        vec3(width / 2.0 + 0.065, height + 0.07, 0.045),
+        &rail,
+    );
+    let knob = vec3(width / 2.0 - 0.08, 1.0, 0.06);
+    mesh.ball(knob, vec3(0.028, 0.028, 0.02), &Surface::steel());
+    mesh.rod(knob - vec3(0.0, 0.0, 0.05), knob, 0.01, &Surface::steel());
+    Piece::new(kind("door", "door"), mesh, "")
+}
+
+/// A fireplace with its mantelpiece.
+pub(in super::super) fn fireplace(dice: &mut Dice) -> Piece {
+    let stone = Surface::plain(dice.pick(&[[236, 232, 224], [172, 88, 66], [150, 146, 140]]));
+    let stone = stone.with(Pattern::Tiles(0.11, rgb([206, 200, 190])));
+    let soot = Surface::plain([20, 19, 18]);
+    let wood = Surface::wood(Paint::nameless([92, 62, 40]), 0);
+    let shelf = Surface::wood(Paint::of(&["brown", "white"], dice), 0);
+    let (width, height, depth) = (1.4, 1.1, 0.36);
+    let (open, tall) = (0.76, 0.66);
+    let mut mesh = Mesh::default();
+    for x in [-1.0, 1.0_f32] {
+        let (a, b) = (x * width / 2.0, x * open / 2.0);
+        mesh.block(
+            vec3(a.min(b), 0.0, 0.0),
+            vec3(a.max(b), height, depth),
+            &stone,
+        );
+    }
+    mesh.block(
+        vec3(-open / 2.0, tall, 0.0),
+        vec3(open / 2.0, height, depth),
+        &stone,
+    );
+    mesh.block(
+        vec3(-width / 2.0 - 0.08, height, 0.0),
+        vec3(width / 2.0 + 0.08, height + 0.06, depth + 0.07),
+        &shelf,
+    );
+    mesh.block(
+        vec3(-open / 2.0, 0.0, 0.0),
+        vec3(open / 2.0, tall, 0.03),
+        &soot,
+    );
+    mesh.block(
+        vec3(-open / 2.0, 0.0, 0.0),
+        vec3(open / 2.0, 0.02, depth + 0.2),
+        &Surface::plain([88, 84, 80]),
+    );
+    for i in 0..4 {
+        let (x, y) = ((i % 2) as f32 * 0.1 - 0.05, 0.07 + 0.08 * (i / 2) as f32);
+        mesh.rod(
+            vec3(-0.26 + x, y, 0.14 + 0.08 * (i % 2) as f32),
+            vec3(0.26 + x, y + 0.03, 0.18),
+            0.042,
+            &wood,
+        );
+    }
+    let flame = Surface {
+        color: rgb([255, 168, 60]),
+        pattern: Pattern::Plain,
+        finish: Finish::Glow(0.9),
+    };
+    for (x, tall) in [
+        (-0.14, 0.2),
+        (0.0, 0.3),
+        (0.12, 0.22),
+        (0.2, 0.14),
+        (-0.22, 0.12),
+    ] {
+        mesh.vessel(
+            vec3(x, 0.14, 0.17),
+            &[
+                (0.03, 0.0),
+                (0.055, tall * 0.3),
+                (0.03, tall * 0.7),
+                (0.001, tall),
+            ],
+            0.7,
+            &flame,
+        );
+    }
+    let mut piece = Piece::new(kind("fireplace", "fireplace"), mesh, "");
+    piece.light = Some(Light::Bulb {
+        middle: vec3(0.0, 0.3, 0.3),
+        radius: 0.1,
+        radiance: vec3(1.0, 0.6, 0.3) * 5.0,
+    });
+    piece
+}

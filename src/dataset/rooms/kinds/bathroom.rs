@@ -1,0 +1,65 @@
+//! Bathrooms.
+
+use glam::vec3;
+
+use super::super::dice::Dice;
+use super::super::furniture::{Set, bath, clutter, storage, textiles, walls};
+use super::super::plan::{Dress, Ground, Plan, WALLS};
+use super::low_stool;
+
+pub(super) fn furnish(mut dice: Dice) -> Plan {
+    let size = vec3(dice.between(2.6, 3.3), 2.5, dice.between(2.8, 3.6));
+    let mut plan = Plan::new(size, Ground::Tiles, true, dice);
+    let door = plan.dice.pick(&WALLS);
+    plan.door(&[door]);
+    let tub = plan.dice.chance(0.65);
+    if tub {
+        plan.sight();
+        let set = Set::of(bath::bathtub(&mut plan.dice));
+        plan.corner(&set, &WALLS);
+    }
+    if !tub || plan.dice.chance(0.5) {
+        plan.sight();
+        let set = Set::of(bath::shower(&mut plan.dice));
+        plan.corner(&set, &WALLS);
+    }
+    if plan.dice.chance(0.92) {
+        plan.sight();
+        let set = Set::of(bath::toilet(&mut plan.dice));
+        if let Some(pose) = plan.stand(&set, &WALLS) {
+            plan.beside(&pose, bath::toilet_paper(), vec3(0.42, 0.72, -0.01), 0.0);
+        }
+    }
+    if plan.dice.chance(0.85) {
+        let set = if plan.dice.chance(0.7) {
+            bath::vanity(&mut plan.dice)
+        } else {
+            Set::of(bath::pedestal_sink(&mut plan.dice))
+        };
+        plan.sight();
+        if let Some(pose) = plan.stand(&set, &WALLS)
+            && plan.dice.chance(0.6)
+        {
+            let width = plan.dice.between(0.45, 0.65);
+            let piece = walls::mirror(width, 0.7, &mut plan.dice);
+            plan.above(&pose, piece, 1.22);
+        }
+    }
+    let dress = plan
+        .dice
+        .pick(&[Dress::Blinds, Dress::Bare, Dress::Curtains]);
+    plan.window(&WALLS, 0.75, 1.25, dress);
+    for _ in 0..2 {
+        plan.perhaps(0.7, 1.35, textiles::towel);
+    }
+    plan.maybe(0.4, low_stool);
+    plan.maybe(0.35, |_| clutter::basket());
+    if plan.dice.chance(0.3) {
+        plan.plant(1.0);
+    }
+    plan.perhaps(0.35, 1.45, storage::wall_shelf);
+    let middle = vec3(size.x / 2.0, 0.0, size.z / 2.0);
+    plan.rug(0.5, middle, [0.9, 0.6], 0.0);
+    plan.ceiling_lamp();
+    plan
+}

@@ -1,0 +1,89 @@
+//! Bedrooms.
+
+use glam::vec3;
+
+use super::super::dice::Dice;
+use super::super::furniture::{Set, at, beds, lamps, seats, storage, walls};
+use super::super::plan::{Dress, Ground, Plan, WALLS, Wall};
+use super::super::scene::kind;
+use super::{SMALL, dresser, low_stool, nightstand, sides};
+
+pub(super) fn furnish(mut dice: Dice) -> Plan {
+    let size = vec3(dice.between(3.6, 4.6), 2.6, dice.between(3.6, 4.6));
+    let ground = dice.pick(&[Ground::Wood, Ground::Carpet]);
+    let mut plan = Plan::new(size, ground, false, dice);
+    let wall = plan.dice.pick(&WALLS);
+    bed(&mut plan, wall);
+    plan.door(&[wall.opposite()]);
+    let width = plan.dice.between(1.1, 1.5);
+    let dress = if plan.dice.chance(0.75) {
+        Dress::Curtains
+    } else {
+        Dress::Blinds
+    };
+    plan.window(&sides(wall), width, 0.85, dress);
+    if let Some(pose) = plan.maybe(0.6, dresser) {
+        plan.sights.push(plan.scene.things.len() - 1);
+        if plan.dice.chance(0.5) {
+            let piece = walls::mirror(0.6, 0.7, &mut plan.dice);
+            plan.above(&pose, piece, 1.1);
+        } else if plan.dice.chance(0.4) {
+            plan.beside(
+                &pose,
+                walls::television(0.8, true),
+                vec3(0.0, 0.9, 0.05),
+                0.0,
+            );
+        } else {
+            plan.top(&pose, 0.92, &[-0.3, 0.1, 0.35], &SMALL);
+        }
+    }
+    plan.maybe(0.35, |dice| {
+        storage::cabinet(kind("wardrobe", "furniture"), vec3(1.2, 2.0, 0.58), 2, dice)
+    });
+    plan.maybe(0.4, |dice| {
+        let paint = super::super::paint::Paint::of(&super::super::paint::ALL, dice);
+        seats::chair(kind("chair", "chair"), paint, dice)
+    });
+    plan.maybe(0.3, low_stool);
+    plan.maybe(0.2, storage::bookshelf);
+    plan.plant(0.45);
+    plan.pictures(2);
+    plan.perhaps(0.2, 1.5, storage::wall_shelf);
+    plan.ceiling_lamp();
+    plan
+}
+
+/// A bed with what stands beside it.
+fn bed(plan: &mut Plan, wall: Wall) {
+    let set = beds::bed(&mut plan.dice);
+    let span = plan.width(wall);
+    let along = span / 2.0 + plan.dice.between(-0.3, 0.3);
+    let size = set.size;
+    plan.sight();
+    let Some(pose) = plan.stand_at(set, wall, along) else {
+        return;
+    };
+    let foot = at(pose.outward(vec3(0.0, 0.0, size.z * 0.75)), pose.angle);
+    plan.rug(0.5, foot.at, [size.x + 0.9, 1.5], pose.angle);
+    for side in [-1.0, 1.0] {
+        if plan.dice.chance(0.75) {
+            let stand = nightstand(&mut plan.dice);
+            let set = Set::of(stand);
+            let top = set.size.y;
+            let place = along + side * (size.x / 2.0 + set.size.x / 2.0 + 0.06);
+            if let Some(pose) = plan.stand_at(set, wall, place) {
+                if plan.dice.chance(0.75) {
+                    let lamp = lamps::table_lamp(&mut plan.dice);
+                    plan.beside(&pose, lamp, vec3(0.0, top, 0.05), 0.0);
+                } else {
+                    plan.top(&pose, top, &[0.0], &SMALL);
+                }
+            }
+        }
+    }
+    if plan.dice.chance(0.5) {
+        let piece = walls::picture(&mut plan.dice);
+        plan.above(&pose, piece, 1.4);
+    }
+}

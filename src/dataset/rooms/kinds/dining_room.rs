@@ -1,0 +1,125 @@
+//! Dining rooms.
+
+use glam::{Vec3, vec3};
+
+use super::super::dice::Dice;
+use super::super::furniture::{Set, at, clutter, lamps, seats, storage, tables, walls};
+use super::super::paint::{ALL, Paint};
+use super::super::plan::{Dress, Ground, Plan, WALLS};
+use super::super::scene::kind;
+use super::super::surface::Surface;
+use super::{SMALL, low_stool};
+
+pub(super) fn furnish(mut dice: Dice) -> Plan {
+    let size = vec3(dice.between(4.0, 4.9), 2.65, dice.between(4.0, 4.9));
+    let ground = dice.pick(&[Ground::Wood, Ground::Wood, Ground::Tiles]);
+    let mut plan = Plan::new(size, ground, false, dice);
+    table(&mut plan);
+    plan.door(&WALLS);
+    let width = plan.dice.between(1.2, 1.8);
+    let dress = if plan.dice.chance(0.7) {
+        Dress::Curtains
+    } else {
+        Dress::Bare
+    };
+    plan.window(&WALLS, width, 0.75, dress);
+    if plan.dice.chance(0.65) {
+        let (width, name) = (plan.dice.between(1.2, 1.6), kind("cabinet", "cabinet"));
+        let piece = storage::cabinet(name, vec3(width, 0.85, 0.45), 3, &mut plan.dice);
+        if let Some(pose) = plan.stand(&Set::of(piece), &WALLS) {
+            plan.sights.push(plan.scene.things.len() - 1);
+            plan.top(&pose, 0.85, &[-0.35, 0.0, 0.35], &SMALL);
+        }
+    }
+    plan.maybe(0.3, super::dresser);
+    plan.maybe(0.3, storage::bookshelf);
+    if plan.maybe(0.45, walls::fireplace).is_some() {
+        plan.sights.push(plan.scene.things.len() - 1);
+    }
+    plan.maybe(0.2, low_stool);
+    plan.plant(0.6);
+    plan.pictures(3);
+    plan.perhaps(0.2, 1.25, |dice| walls::mirror(0.6, 0.9, dice));
+    plan.perhaps(0.2, 1.45, storage::wall_shelf);
+    plan
+}
+
+/// The table, its chairs, and the lamp above.
+fn table(plan: &mut Plan) {
+    let name = kind("dining table", "table");
+    let middle = vec3(plan.size.x / 2.0, 0.0, plan.size.z / 2.0)
+        + vec3(
+            plan.dice.between(-0.4, 0.4),
+            0.0,
+            plan.dice.between(-0.4, 0.4),
+        );
+    let angle = if plan.dice.chance(0.5) {
+        0.0
+    } else {
+        std::f32::consts::FRAC_PI_2
+    };
+    let round = plan.dice.chance(0.3);
+    let (piece, length, depth) = if round {
+        (tables::round(name, 0.6, 0.75, &mut plan.dice), 1.2, 1.2)
+    } else {
+        let length = plan.dice.between(1.4, 1.8);
+        (
+            tables::table(name, vec3(length, 0.75, 0.9), &mut plan.dice),
+            length,
+            0.9,
+        )
+    };
+    plan.rug(0.4, middle, [length + 1.2, depth + 1.3], angle);
+    plan.sight();
+    let pose = at(
+        at(middle, angle).outward(vec3(0.0, 0.0, -depth / 2.0)),
+        angle,
+    );
+    plan.put(piece, pose);
+    // The chairs belong to the table: they are put without asking, and the whole is kept free.
+    let around = at(middle, angle);
+    plan.keep_free(
+        &at(around.outward(vec3(0.0, 0.0, -depth / 2.0 - 0.5)), angle),
+        vec3(length + 0.9, 0.0, depth + 1.0),
+        0.0,
+    );
+    let mut paint = Paint::of(&ALL, &mut plan.dice);
+    if plan.dice.chance(0.4) {
+        paint = Paint::of(&["brown"], &mut plan.dice);
+    }
+    let style = plan.dice.below(2);
+    let surface = if paint.name == "brown" {
+        Surface::wood(paint, 1)
+    } else {
+        Surface::paint(paint)
+    };
+    let seat = |plan: &mut Plan, place: Vec3, turned: f32| {
+        plan.sight();
+        let piece = seats::chair_of(kind("dining chair", "chair"), paint, &surface, style);
+        plan.beside(&around, piece, place, turned);
+    };
+    let out = depth / 2.0 + 0.3;
+    let columns: &[f32] = if round { &[0.0] } else { &[-0.36, 0.36] };
+    for x in columns {
+        seat(plan, vec3(*x, 0.0, -out), 0.0);
+        seat(plan, vec3(*x, 0.0, out), std::f32::consts::PI);
+    }
+    if round || plan.dice.chance(0.4) {
+        let side = length / 2.0 + 0.3;
+        seat(plan, vec3(-side, 0.0, 0.0), std::f32::consts::FRAC_PI_2);
+        seat(plan, vec3(side, 0.0, 0.0), -std::f32::consts::FRAC_PI_2);
+    }
+    let piece = if plan.dice.chance(0.5) {
+        clutter::fruit(&mut plan.dice)
+    } else {
+        clutter::vase(&mut plan.dice)
+    };
+    plan.beside(&pose, piece, vec3(0.0, 0.75, depth / 2.0 - 0.1), 0.0);
+    let ceiling = vec3(middle.x, plan.size.y, middle.z);
+    let lamp = if plan.dice.chance(0.5) {
+        lamps::chandelier(0.75)
+    } else {
+        lamps::pendant(0.95, &mut plan.dice)
+    };
+    plan.put(lamp, at(ceiling, 0.0));
+}

@@ -1,0 +1,366 @@
+//! Shapes of triangles: [`Mesh`], with the solids that furniture is made of.
+//!
+//! Lengths are metres; x goes to the right, y up and z to the front. A piece stands on y = 0, with its back at z = 0 and its
+//! middle at x = 0.
+
+use std::f32::consts::{PI, TAU};
+
+use glam::{Vec2, Vec3, vec2, vec3};
+
+use super::surface::Surface;
+
+/// A corner of a triangle: where it is, and the normal there.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Corner {
+    pub(super) at: Vec3,
+    pub(super) normal: Vec3,
+}
+
+/// Three corners, and which of the mesh's surfaces they have.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Face {
+    pub(super) corners: [Corner; 3],
+    pub(super) surface: usize,
+}
+
+impl Face {
+    /// Places all over it, its corners among them, about so far apart.
+    pub(super) fn places(&self, apart: f32) -> impl Iterator<Item = Vec3> {
+        let [a, b, c] = self.corners.map(|corner| corner.at);
+        let longest = (b - a).length().max((c - a).length()).max((c - b).length());
+        let count = (longest / apart).ceil().max(1.0) as usize;
+        (0..=count).flat_map(move |i| {
+            (0..=count - i).map(move |j| {
+                a + (b - a) * (i as f32 / count as f32) + (c - a) * (j as f32 / count as f32)
+            })
+        })
+    }
+}
+
+/// A shape of triangles.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Mesh {
+    pub(super) faces: Vec<Face>,
+    pub(super) surfaces: Vec<Surface>,
+}
+
+/// Sides of what is round.
+const SIDES: usize = 20;
+/// Rows of what is round in both ways.
+const ROWS: usize = 10;
+
+/// The sine and cosine of an angle, the same on every machine.
+pub(super) fn turn(angle: f32) -> Vec2 {
+    let (sine, cosine) = libm::sincosf(angle);
+    vec2(cosine, sine)
+}
+
+impl Mesh {
+    /// The place of a surface.
+    fn surface(&mut self, surface: &Surface) -> usize {
+        if let Some(known) = self.surfaces.iter().position(|known| known == surface) {
+            return known;
+        }
+        self.surfaces.push(surface.clone());
+        self.surfaces.len() - 1
+    }
+
+    fn triangle(&mut self, corners: [Corner; 3], surface: usize) {
+        let [a, b, c] = corners.map(|corner| corner.at);
+        if (b - a).cross(c - a).length_squared() > 1e-14 {
+            self.faces.push(Face { corners, surface });
+        }
+    }
+
+    /// A flat piece with four corners in their order around it.
+    pub(super) fn quad(&mut self, [a, b, c, d]: [Vec3; 4], surface: &Surface) {
+        let surface = self.surface(surface);
+        let normal = (b - a).cross(d - a).normalize_or_zero();
+        let corner = |at| Corner { at, normal };
+        self.triangle([a, b, c].map(corner), surface);
+        self.triangle([a, c, d].map(corner), surface);
+    }
+
+    /// A surface over a grid of corners, smooth; each row is as long as the first.
+    pub(super) fn grid(&mut self, rows: &[Vec<Vec3>], surface: &Surface) {
+        let surface = self.surface(surface);
+        let (height, width) = (rows.len(), rows.first().map_or(0, Vec::len));
+        let closed = |row: &Vec<Vec3>| row[0].distance_squared(row[width - 1]) < 1e-10;
+        let round = rows.iter().all(closed);
+        let normal = |y: usize, x: usize| {
+            let (left, right) = match (x, round) {
+                (0, true) => (width - 2, 1),
+                (x, true) if x == width - 1 => (x - 1, 1),
+                _ => (x.saturating_sub(1), (x + 1).min(width - 1)),
+            };
+            let along = rows[y][right] - rows[y][left];
+            let (above, below) = (y.saturating_sub(1), (y + 1).min(height - 1));
+            let mut across = rows[below][x] - rows[above][x];
+            let mut along_here = along;
+            if along.length_squared() < 1e-12 {
+                // The pole of something round: its neighbours' row tells.
+                let near = if y == 0 { 1 } else { y - 1 };
+                along_here = rows[near][right] - rows[near][left];
+            }
+            if across.length_squared() < 1e-12 {
+                across = rows[below][x] - rows[y][x];
+            }
+            along_here.cross(across).normalize_or_zero()
+        };
+        let corners: Vec<Vec<Corner>> = (0..height)
+            .map(|y| {
+                let corner = |x| Corner {
+                    at: rows[y][x],
+                    normal: normal(y, x),
+                };
+                (0..width).map(corner).collect()
+            })
+            .collect();
+        for pair in corners.windows(2) {
+            for x in 0..width - 1 {
+                let (a, b, c, d) = (pair[0][x], pair[0][x + 1], pair[1][x + 1], pair[1][x]);
+                self.triangle([a, b, c], surface);
+                self.triangle([a, c, d], surface);
+            }
+        }
+    }
+
+    /// A block with sharp edges.
+    pub(super) fn block(&mut self, low: Vec3, high: Vec3, surface: &Surface) {
+        let at = |x: usize, y: usize, z: usize| {
+            let pick = |which: usize, low: f32, high: f32| if which == 0 { low } else { high };
+            vec3(
+                pick(x, low.x, high.x),
+                pick(y, low.y, high.y),
+                pick(z, low.z, high.z),
+            )
+        };
+        for side in [
+            [at(0, 0, 1), at(1, 0, 1), at(1, 1, 1), at(0, 1, 1)],
+            [at(1, 0, 0), at(0, 0, 0), at(0, 1, 0), at(1, 1, 0)],
+            [at(1, 0, 1), at(1, 0, 0), at(1, 1, 0), at(1, 1, 1)],
+            [at(0, 0, 0), at(0, 0, 1), at(0, 1, 1), at(0, 1, 0)],
+            [at(0, 1, 1), at(1, 1, 1), at(1, 1, 0), at(0, 1, 0)],
+            [at(0, 0, 0), at(1, 0, 0), at(1, 0, 1), at(0, 0, 1)],
+        ] {
+            self.quad(side, surface);
+        }
+    }
+
+    /// A block by its middle on the floor plan, its bottom and its size.
+    pub(super) fn slab(&mut self, foot: Vec3, size: Vec3, surface: &Surface) {
+        let half = vec3(size.x / 2.0, 0.0, size.z / 2.0);
+        self.block(foot - half, foot + half + vec3(0.0, size.y, 0.0), surface);
+    }
+
+    /// A block whose edges are round: the sum of a block and a ball.
+    pub(super) fn soft(&mut self, low: Vec3, high: Vec3, radius: f32, surface: &Surface) {
+        let radius = radius.min((high - low).min_element() / 2.0 * 0.999);
+        let (middle, inner) = ((low + high) / 2.0, (high - low) / 2.0 - Vec3::splat(radius));
+        let ball = |row: usize, side: usize| {
+            let down = turn(PI * row as f32 / ROWS as f32);
+            let around = turn(TAU * (side as f32 + 0.5) / SIDES as f32);
+            vec3(around.x * down.y, down.x, around.y * down.y)
+        };
+        let sign = |value: f32| if value < 0.0 { -1.0 } else { 1.0 };
+        // Rows and sides are doubled where the block's flat faces lie, so that they stay flat.
+        let mut rows = Vec::new();
+        for (row, end) in (0..=ROWS).flat_map(|row| {
+            let twice = row == ROWS / 2;
+            [Some((row, 1.0)), twice.then_some((row, -1.0))]
+                .into_iter()
+                .flatten()
+        }) {
+            let height = if row == ROWS / 2 {
+                end
+            } else {
+                sign(ROWS as f32 / 2.0 - row as f32)
+            };
+            let side = |side: usize| {
+                let out = ball(row, side);
+                let corner = vec3(sign(out.x), height, sign(out.z)) * inner;
+                middle + corner + out * radius
+            };
+            let mut line: Vec<Vec3> = (0..SIDES).rev().map(side).collect();
+            line.push(line[0]);
+            rows.push(line);
+        }
+        let (top, bottom) = (rows[0].clone(), rows[rows.len() - 1].clone());
+        self.grid(&rows, surface);
+        self.lid(&top, Vec3::Y, surface);
+        self.lid(&bottom, Vec3::NEG_Y, surface);
+    }
+
+    /// Closes a flat ring.
+    fn lid(&mut self, ring: &[Vec3], normal: Vec3, surface: &Surface) {
+        let surface = self.surface(surface);
+        let middle = ring.iter().sum::<Vec3>() / ring.len() as f32;
+        for pair in ring.windows(2) {
+            let corner = |at| Corner { at, normal };
+            self.triangle([middle, pair[0], pair[1]].map(corner), surface);
+        }
+    }
+
+    /// Something turned on a lathe: radii at heights above a foot, from below.
+    pub(super) fn lathe(&mut self, foot: Vec3, profile: &[(f32, f32)], surface: &Surface) {
+        self.oval(foot, profile, 1.0, surface);
+    }
+
+    /// Something turned on a lathe, then drawn out along z by a factor.
+    pub(super) fn oval(
+        &mut self,
+        foot: Vec3,
+        profile: &[(f32, f32)],
+        depth: f32,
+        surface: &Surface,
+    ) {
+        let row = |&(radius, height): &(f32, f32)| -> Vec<Vec3> {
+            let point = |side: usize| {
+                let around = turn(TAU * (side % SIDES) as f32 / SIDES as f32);
+                foot + vec3(around.x * radius, height, around.y * radius * depth)
+            };
+            (0..=SIDES).map(point).collect()
+        };
+        // Each stretch between two radii has normals of its own: a lathe's edges are sharp.
+        for pair in profile.windows(2) {
+            self.grid(&[row(&pair[0]), row(&pair[1])], surface);
+        }
+    }
+
+    /// Something smooth turned on a lathe.
+    pub(super) fn vessel(
+        &mut self,
+        foot: Vec3,
+        profile: &[(f32, f32)],
+        depth: f32,
+        surface: &Surface,
+    ) {
+        let row = |&(radius, height): &(f32, f32)| -> Vec<Vec3> {
+            let point = |side: usize| {
+                let around = turn(TAU * (side % SIDES) as f32 / SIDES as f32);
+                foot + vec3(around.x * radius, height, around.y * radius * depth)
+            };
+            (0..=SIDES).map(point).collect()
+        };
+        let rows: Vec<Vec<Vec3>> = profile.iter().map(row).collect();
+        self.grid(&rows, surface);
+    }
+
+    /// A rod between two points, closed at its ends.
+    pub(super) fn rod(&mut self, from: Vec3, to: Vec3, radius: f32, surface: &Surface) {
+        self.cone(from, to, [radius, radius], surface);
+    }
+
+    /// A rod whose ends have radii of their own.
+    pub(super) fn cone(&mut self, from: Vec3, to: Vec3, radii: [f32; 2], surface: &Surface) {
+        let axis = (to - from).normalize_or_zero();
+        let aside = if axis.y.abs() > 0.9 { Vec3::X } else { Vec3::Y };
+        let across = axis.cross(aside).normalize_or_zero();
+        let over = axis.cross(across);
+        let ring = |middle: Vec3, radius: f32| -> Vec<Vec3> {
+            let point = |side: usize| {
+                let around = turn(TAU * (side % SIDES) as f32 / SIDES as f32);
+                middle + (across * around.x + over * around.y) * radius
+            };
+            (0..=SIDES).map(point).collect()
+        };
+        let (low, high) = (ring(from, radii[0]), ring(to, radii[1]));
+        self.grid(&[low.clone(), high.clone()], surface);
+        self.lid(&low, -axis, surface);
+        self.lid(&high, axis, surface);
+    }
+
+    /// An ellipsoid.
+    pub(super) fn ball(&mut self, middle: Vec3, radii: Vec3, surface: &Surface) {
+        let row = |row: usize| -> Vec<Vec3> {
+            let down = turn(PI * row as f32 / ROWS as f32);
+            let point = |side: usize| {
+                let around = turn(TAU * (side % SIDES) as f32 / SIDES as f32);
+                middle + vec3(around.x * down.y, down.x, around.y * down.y) * radii
+            };
+            (0..=SIDES).rev().map(point).collect()
+        };
+        let rows: Vec<Vec<Vec3>> = (0..=ROWS).map(row).collect();
+        self.grid(&rows, surface);
+    }
+
+    /// A pillow: thick in its middle, thin at its seam. `size` is its width, height and thickness as it stands; `lean` turns its
+    /// head back by an angle.
+    pub(super) fn pillow(&mut self, middle: Vec3, size: Vec3, lean: f32, surface: &Surface) {
+        const CELLS: usize = 10;
+        let tilt = turn(lean);
+        for side in [1.0_f32, -1.0] {
+            let point = |row: usize, column: usize| {
+                let along = |cell: usize| 2.0 * cell as f32 / CELLS as f32 - 1.0;
+                let (u, v) = (along(column) * side, -along(row));
+                let (u4, v4) = (u * u * u * u, v * v * v * v);
+                let swell = ((1.0 - u4) * (1.0 - v4)).max(0.0).sqrt();
+                // Corners stand out a little beyond the edges between them.
+                let pinch = vec2(1.0 - 0.06 * (1.0 - v * v), 1.0 - 0.06 * (1.0 - u * u));
+                let flat = vec3(u * pinch.x, v * pinch.y, side * swell) * size / 2.0;
+                let turned = vec3(
+                    flat.x,
+                    flat.y * tilt.x + flat.z * tilt.y,
+                    flat.z * tilt.x - flat.y * tilt.y,
+                );
+                middle + turned
+            };
+            let rows: Vec<Vec<Vec3>> = (0..=CELLS)
+                .map(|row| (0..=CELLS).map(|column| point(row, column)).collect())
+                .collect();
+            self.grid(&rows, surface);
+        }
+    }
+
+    /// Cloth that hangs in folds, from its upper edge at y to the lower: `width` along x, around z.
+    pub(super) fn drape(
+        &mut self,
+        left: Vec3,
+        width: f32,
+        drop: f32,
+        fold: f32,
+        surface: &Surface,
+    ) {
+        let columns = ((width / fold) as usize).max(1) * 8;
+        let point = |column: usize, height: f32| {
+            let share = column as f32 / columns as f32;
+            let wave = turn(TAU * share * width / fold).y;
+            let depth = 0.3 * fold * wave * (0.6 + 0.4 * height);
+            left + vec3(share * width, -height * drop, depth)
+        };
+        let rows: Vec<Vec<Vec3>> = [0.0, 0.33, 0.67, 1.0]
+            .iter()
+            .map(|height| (0..=columns).map(|column| point(column, *height)).collect())
+            .collect();
+        self.grid(&rows, surface);
+    }
+
+    /// Adds another shape, turned about y and moved.
+    pub(super) fn add(&mut self, other: &Self, at: Vec3, angle: f32) {
+        let facing = turn(angle);
+        let spin = |v: Vec3| {
+            vec3(
+                v.x * facing.x + v.z * facing.y,
+                v.y,
+                v.z * facing.x - v.x * facing.y,
+            )
+        };
+        let places: Vec<usize> = other.surfaces.iter().map(|s| self.surface(s)).collect();
+        self.faces.extend(other.faces.iter().map(|face| Face {
+            corners: face.corners.map(|corner| Corner {
+                at: at + spin(corner.at),
+                normal: spin(corner.normal),
+            }),
+            surface: places[face.surface],
+        }));
+    }
+
+    /// The corners of the box around it.
+    pub(super) fn bounds(&self) -> [Vec3; 2] {
+        let corners = self.faces.iter().flat_map(|face| face.corners);
+        corners.fold(
+            [Vec3::splat(f32::MAX), Vec3::splat(f32::MIN)],
+            |[low, high], corner| [low.min(corner.at), high.max(corner.at)],
+        )
+    }
+}

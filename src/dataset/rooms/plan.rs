@@ -1,0 +1,439 @@
+//! The floor plan of a room: four walls, and what stands and hangs where: [`Plan`].
+
+use std::f32::consts::{FRAC_PI_2, PI};
+
+use glam::{Vec3, vec3};
+
+use super::dice::Dice;
+use super::furniture::{Set, at, textiles, walls};
+use super::mesh::Mesh;
+use super::paint::rgb;
+use super::scene::{Piece, Pose, Scene, kind};
+use super::surface::{Pattern, Surface};
+
+/// A wall, named as on a map whose north is where z is 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Wall {
+    North,
+    East,
+    South,
+    West,
+}
+
+/// All walls.
+pub(super) const WALLS: [Wall; 4] = [Wall::North, Wall::East, Wall::South, Wall::West];
+
+impl Wall {
+    /// How far a piece is turned that stands with its back to the wall.
+    pub(super) fn angle(self) -> f32 {
+        match self {
+            Self::North => 0.0,
+            Self::East => -FRAC_PI_2,
+            Self::South => PI,
+            Self::West => FRAC_PI_2,
+        }
+    }
+
+    pub(super) fn opposite(self) -> Self {
+        match self {
+            Self::North => Self::South,
+            Self::East => Self::West,
+            Self::South => Self::North,
+            Self::West => Self::East,
+        }
+    }
+}
+
+/// What a room's floor is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Ground {
+    Wood,
+    Tiles,
+    Carpet,
+}
+
+/// A rectangle of the floor: the smallest x and z, and the largest.
+#[derive(Debug, Clone, Copy)]
+struct Area([f32; 4]);
+
+impl Area {
+    fn meets(&self, other: &Self, margin: f32) -> bool {
+        let [a, b] = [self.0, other.0];
+        a[0] < b[2] + margin && b[0] < a[2] + margin && a[1] < b[3] + margin && b[1] < a[3] + margin
+    }
+}
+
+/// A rectangle of a wall: along it, then up.
+#[derive(Debug, Clone, Copy)]
+struct Patch {
+    wall: Wall,
+    along: [f32; 2],
+    up: [f32; 2],
+}
+
+/// The room while it is furnished.
+pub(super) struct Plan {
+    pub(super) scene: Scene,
+    /// Width, height and depth.
+    pub(super) size: Vec3,
+    pub(super) dice: Dice,
+    /// What is worth looking at.
+    pub(super) sights: Vec<usize>,
+    areas: Vec<Area>,
+    patches: Vec<Patch>,
+}
+
+/// Places are tried so often before a piece is left out.
+const TRIES: usize = 60;
+
+impl Plan {
+    /// An empty room of a size.
+    pub(super) fn new(size: Vec3, ground: Ground, tiled: bool, mut dice: Dice) -> Self {
+        let tint = dice.pick(&[
+            [238, 236, 230],
+            [232, 228, 216],
+            [222, 230, 232],
+            [226, 232, 222],
+            [236, 226, 220],
+            [228, 226, 236],
+        ]);
+        let mut plan = Self {
+            scene: Scene::default(),
+            size,
+            sights: Vec::new(),
+            areas: Vec::new(),
+            patches: Vec::new(),
+            dice,
+        };
+        plan.ground(ground);
+        let ceiling = Surface::plain([246, 246, 244]);
+        let mut mesh = Mesh::default();
+        mesh.block(
+            vec3(0.0, size.y, 0.0),
+            vec3(size.x, size.y + 0.05, size.z),
+            &ceiling,
+        );
+        plan.put(
+            Piece::new(kind("ceiling", "ceiling"), mesh, ""),
+            at(Vec3::ZERO, 0.0),
+        );
+        for wall in WALLS {
+            let width = plan.width(wall);
+            let mut mesh = Mesh::default();
+            let paint = Surface::plain(tint);
+            let (left, right) = (-width / 2.0 - 0.05, width / 2.0 + 0.05);
+            mesh.block(vec3(left, 0.0, -0.05), vec3(right, size.y, 0.0), &paint);
+            if tiled {
+                let squares =
+                    Surface::plain([224, 232, 234]).with(Pattern::Tiles(0.2, Vec3::splat(0.6)));
+                mesh.block(vec3(left, 0.0, 0.0), vec3(right, 1.3, 0.008), &squares);
+            } else {
+                let board = Surface::plain([244, 244, 242]);
+                mesh.block(vec3(left, 0.0, 0.0), vec3(right, 0.09, 0.014), &board);
+            }
+            let pose = plan.on(wall, width / 2.0, 0.0);
+            plan.put(Piece::new(kind("wall", "wall"), mesh, ""), pose);
+        }
+        plan
+    }
+
+    fn ground(&mut self, ground: Ground) {
+        let dice = &mut self.dice;
+        let surface = match ground {
+            Ground::Wood => {
+                let tints = [
+                    [176, 128, 84],
+                    [142, 98, 62],
+                    [198, 160, 116],
+                    [156, 132, 108],
+                ];
+                Surface::plain(dice.pick(&tints)).with(Pattern::Boards(0.13))
+            }
+            Ground::Tiles => {
+                let tints = [[206, 202, 194], [174, 176, 178], [196, 184, 168]];
+                let joint = rgb([150, 146, 140]);
+                Surface::plain(dice.pick(&tints)).with(Pattern::Tiles(0.33, joint))
+            }
+            Ground::Carpet => {
+                let tints = [[188, 178, 164], [160, 162, 170], [172, 158, 146]];
+                Surface::plain(dice.pick(&tints)).with(Pattern::Pile)
+            }
+        };
+        let mut mesh = Mesh::default();
+        mesh.block(
+            vec3(0.0, -0.05, 0.0),
+            vec3(self.size.x, 0.0, self.size.z),
+            &surface,
+        );
+        self.put(
+            Piece::new(kind("floor", "floor"), mesh, ""),
+            at(Vec3::ZERO, 0.0),
+        );
+    }
+
+    /// The length of a wall.
+    pub(super) fn width(&self, wall: Wall) -> f32 {
+        match wall {
+            Wall::North | Wall::South => self.size.x,
+            Wall::East | Wall::West => self.size.z,
+        }
+    }
+
+    /// The pose of a piece whose back is at a wall, so far along it and so high.
+    pub(super) fn on(&self, wall: Wall, along: f32, up: f32) -> Pose {
+        let place = match wall {
+            Wall::North => vec3(along, up, 0.0),
+            Wall::East => vec3(self.size.x, up, along),
+            Wall::South => vec3(self.size.x - along, up, self.size.z),
+            Wall::West => vec3(0.0, up, self.size.z - along),
+        };
+        at(place, wall.angle())
+    }
+
+    /// Puts a piece anywhere; its number.
+    #[expect(clippy::needless_pass_by_value, reason = "a piece is put once")]
+    pub(super) fn put(&mut self, piece: Piece, pose: Pose) -> usize {
+        self.scene.put(&piece, pose);
+        self.scene.things.len() - 1
+    }
+
+    /// Puts a piece on or beside another one, in that one's own lengths.
+    pub(super) fn beside(&mut self, base: &Pose, piece: Piece, place: Vec3, angle: f32) -> usize {
+        self.put(piece, at(base.outward(place), base.angle + angle))
+    }
+
+    fn all(&mut self, set: Set, pose: &Pose) -> usize {
+        let first = self.scene.things.len();
+        for (piece, own) in set.pieces {
+            self.beside(pose, piece, own.at, own.angle);
+        }
+        first
+    }
+
+    fn area(pose: &Pose, size: Vec3, from: f32) -> Area {
+        let corners = [
+            vec3(-size.x / 2.0, 0.0, from),
+            vec3(size.x / 2.0, 0.0, from + size.z),
+        ]
+        .map(|corner| pose.outward(corner));
+        let (low, high) = (corners[0].min(corners[1]), corners[0].max(corners[1]));
+        Area([low.x, low.z, high.x, high.z])
+    }
+
+    fn free(&self, area: &Area) -> bool {
+        let Area([left, back, right, front]) = *area;
+        left > 0.0
+            && back > 0.0
+            && right < self.size.x
+            && front < self.size.z
+            && !self.areas.iter().any(|other| other.meets(area, 0.04))
+    }
+
+    fn open(&self, patch: &Patch) -> bool {
+        !self.patches.iter().any(|other| {
+            other.wall == patch.wall
+                && other.along[0] < patch.along[1]
+                && patch.along[0] < other.along[1]
+                && other.up[0] < patch.up[1]
+                && patch.up[0] < other.up[1]
+        })
+    }
+
+    /// Stands a set at a wall, so far along it, where nothing is in its way; its pose.
+    pub(super) fn stand_at(&mut self, set: Set, wall: Wall, along: f32) -> Option<Pose> {
+        let pose = self.on(wall, along, 0.0);
+        let pose = at(pose.outward(vec3(0.0, 0.0, 0.016)), pose.angle);
+        let area = Self::area(&pose, set.size, 0.0);
+        let half = set.size.x / 2.0;
+        let patch = Patch {
+            wall,
+            along: [along - half, along + half],
+            up: [0.0, set.size.y + 0.02],
+        };
+        if !self.free(&area) || !self.open(&patch) {
+            return None;
+        }
+        self.areas.push(area);
+        self.patches.push(patch);
+        self.all(set, &pose);
+        Some(pose)
+    }
+
+    /// Stands a set somewhere at one of these walls; `None` where there is no room for it.
+    pub(super) fn stand(&mut self, set: &Set, choices: &[Wall]) -> Option<Pose> {
+        (0..TRIES).find_map(|_| {
+            let wall = self.dice.pick(choices);
+            let half = set.size.x / 2.0 + 0.03;
+            let along = self.dice.between(half, self.width(wall) - half);
+            self.stand_at(set.clone(), wall, along)
+        })
+    }
+
+    /// Stands a set in the corner of a wall.
+    pub(super) fn corner(&mut self, set: &Set, choices: &[Wall]) -> Option<Pose> {
+        (0..TRIES).find_map(|_| {
+            let wall = self.dice.pick(choices);
+            let half = set.size.x / 2.0 + 0.04;
+            let along = if self.dice.chance(0.5) {
+                half
+            } else {
+                self.width(wall) - half
+            };
+            self.stand_at(set.clone(), wall, along)
+        })
+    }
+
+    /// Stands a set in the open, its middle at a place; its pose.
+    pub(super) fn amid(&mut self, set: Set, place: Vec3, angle: f32) -> Option<Pose> {
+        let back = at(place, angle).outward(vec3(0.0, 0.0, -set.size.z / 2.0));
+        let pose = at(back, angle);
+        let area = Self::area(&pose, set.size, 0.0);
+        if !self.free(&area) {
+            return None;
+        }
+        self.areas.push(area);
+        self.all(set, &pose);
+        Some(pose)
+    }
+
+    /// Keeps a part of the floor in front of a pose free of what comes later.
+    pub(super) fn keep_free(&mut self, pose: &Pose, size: Vec3, from: f32) {
+        let area = Self::area(pose, size, from);
+        self.areas.push(area);
+    }
+
+    /// Hangs a piece of a size on one of these walls, its lower edge so high, where nothing is behind or before it.
+    pub(super) fn hang(&mut self, piece: &Piece, choices: &[Wall], up: f32) -> Option<Pose> {
+        let [low, high] = piece.mesh.bounds();
+        let half = high.x.max(-low.x) + 0.06;
+        (0..TRIES).find_map(|_| {
+            let wall = self.dice.pick(choices);
+            let along = self.dice.between(half, self.width(wall) - half);
+            let patch = Patch {
+                wall,
+                along: [along - half, along + half],
+                up: [up + low.y - 0.05, up + high.y + 0.05],
+            };
+            self.open(&patch).then(|| {
+                self.patches.push(patch);
+                let pose = self.on(wall, along, up);
+                self.put(piece.clone(), pose);
+                pose
+            })
+        })
+    }
+
+    /// Hangs a piece above a pose at a wall, without asking what is there.
+    pub(super) fn above(&mut self, pose: &Pose, piece: Piece, up: f32) -> usize {
+        let [low, high] = piece.mesh.bounds();
+        let wall = WALLS
+            .into_iter()
+            .find(|wall| (wall.angle() - pose.angle).abs() < 1e-3);
+        if let Some(wall) = wall {
+            let along = match wall {
+                Wall::North => pose.at.x,
+                Wall::South => self.size.x - pose.at.x,
+                Wall::East => pose.at.z,
+                Wall::West => self.size.z - pose.at.z,
+            };
+            self.patches.push(Patch {
+                wall,
+                along: [along + low.x, along + high.x],
+                up: [up + low.y, up + high.y],
+            });
+        }
+        self.beside(pose, piece, vec3(0.0, up, 0.0), 0.0)
+    }
+
+    /// Cuts a door into one of these walls.
+    pub(super) fn door(&mut self, choices: &[Wall]) {
+        let door = Set::of(walls::door(&mut self.dice));
+        let size = door.size + vec3(0.05, 0.0, 0.0);
+        let set = Set { size, ..door };
+        for _ in 0..TRIES {
+            let wall = self.dice.pick(choices);
+            let half = size.x / 2.0 + 0.1;
+            let along = self.dice.between(half, self.width(wall) - half);
+            let pose = self.on(wall, along, 0.0);
+            let patch = Patch {
+                wall,
+                along: [along - half, along + half],
+                up: [0.0, size.y + 0.1],
+            };
+            if self.open(&patch) {
+                self.patches.push(patch);
+                self.keep_free(&pose, vec3(0.9, 0.0, 0.75), 0.0);
+                self.all(set, &pose);
+                return;
+            }
+        }
+    }
+
+    /// A window in one of these walls, with what hangs before it.
+    pub(super) fn window(&mut self, choices: &[Wall], width: f32, sill: f32, dress: Dress) {
+        let height = 2.2 - sill;
+        for _ in 0..TRIES {
+            let wall = self.dice.pick(choices);
+            let reach = width / 2.0 + if dress == Dress::Curtains { 0.62 } else { 0.15 };
+            let span = self.width(wall);
+            if span < 2.0 * reach + 0.1 {
+                continue;
+            }
+            let along = self.dice.between(reach + 0.05, span - reach - 0.05);
+            let patch = Patch {
+                wall,
+                along: [along - reach, along + reach],
+                up: [sill - 0.12, 2.3],
+            };
+            if !self.open(&patch) {
+                continue;
+            }
+            self.patches.push(patch);
+            let pose = self.on(wall, along, sill);
+            let daylight = self.dice.between(10.0, 14.0);
+            self.put(walls::window(width, height, daylight), pose);
+            match dress {
+                Dress::Bare => {}
+                Dress::Blinds => {
+                    let share = self.dice.between(0.3, 0.75);
+                    let piece = walls::blinds(width, height, share, &mut self.dice);
+                    self.put(piece, pose);
+                }
+                Dress::Curtains => {
+                    let drop = if self.dice.chance(0.7) {
+                        2.26
+                    } else {
+                        2.3 - sill + 0.15
+                    };
+                    let rail = at(vec3(pose.at.x, 2.3, pose.at.z), pose.angle);
+                    for piece in textiles::curtains(width, drop, &mut self.dice) {
+                        self.put(piece, rail);
+                    }
+                    if drop > 2.0 {
+                        // Nothing stands in the folds.
+                        let size = vec3(2.0 * reach, 0.0, 0.2);
+                        self.keep_free(&at(vec3(pose.at.x, 0.0, pose.at.z), pose.angle), size, 0.0);
+                    }
+                }
+            }
+            return;
+        }
+    }
+
+    /// Whether a person or a robot could be at a place of the floor.
+    pub(super) fn walkable(&self, place: Vec3, margin: f32) -> bool {
+        let point = Area([place.x, place.z, place.x, place.z]);
+        let inside = |value: f32, end: f32| (margin..=end - margin).contains(&value);
+        inside(place.x, self.size.x)
+            && inside(place.z, self.size.z)
+            && !self.areas.iter().any(|area| area.meets(&point, margin))
+    }
+}
+
+/// What hangs before a window.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Dress {
+    Bare,
+    Blinds,
+    Curtains,
+}

@@ -1,0 +1,86 @@
+//! `rooms`: the built-in rooms as files.
+
+use std::collections::BTreeMap;
+
+use rayon::ThreadPoolBuilder;
+use rayon::prelude::*;
+use serde_json::{Map, Value, json};
+
+use super::Verdict;
+use super::interface::{self, FRAMES, Place};
+use super::progress::Progress;
+use super::written::png;
+use crate::config::{Existing, MakeRooms};
+use crate::dataset::rooms::{self, Room};
+use crate::error::{Error, Result};
+use crate::types::manifest::Status;
+use crate::types::{FrameId, Labels};
+
+/// Writes the rooms in the common interface. So many frames as there are threads stand in memory at once.
+///
+/// # Errors
+/// Where the folder holds frames already, or a file cannot be written.
+pub fn rooms(config: &MakeRooms, progress: &Progress) -> Result<Verdict> {
+    let list = config.out.join(FRAMES);
+    if config.existing == Existing::Kept && list.exists() {
+        let problem =
+            "frames are there already; --force writes over them, another --out keeps both";
+        return Err(Error::data(list.display(), problem));
+    }
+    let threads = config.threads.map_or(0, std::num::NonZero::get);
+    let cores = ThreadPoolBuilder::new().num_threads(threads).build();
+    let cores = cores.map_err(|e| Error::usage("--threads", e))?;
+    let rooms: BTreeMap<FrameId, Room> = config.rooms.all().collect();
+    let bar = progress.bar("rooms", rooms.len());
+    let lines: Vec<Map<String, Value>> = cores.install(|| {
+        let lines = rooms
+            .values()
+            .collect::<Vec<_>>()
+            .into_par_iter()
+            .map(|room| {
+                let line = one(config, room);
+                bar.inc();
+                line
+            });
+        lines.collect::<Result<_>>()
+    })?;
+    drop(bar);
+    let about = json!({
+        "schema": "darkqa.dataset/1",
+        "name": config.rooms.title(),
+        "label_space": "mpcat40",
+        "source": format!("darkqa-eval rooms {} {}", rooms::VERSION, config.rooms),
+    });
+    let labels: Labels = rooms::labels();
+    interface::finish(&config.out, &labels, &about, lines.iter())?;
+    Ok(Verdict {
+        status: Status::Complete,
+        output: format!("{}: {} frames\n", config.out.display(), lines.len()),
+    })
+}
+
+fn one(config: &MakeRooms, room: &Room) -> Result<Map<String, Value>> {
+    let frame = room.frame()?;
+    let place = Place {
+        out: &config.out,
+        scene: &frame.scene,
+        frame: room.view(),
+    };
+    let mut line = place.line(&frame.rgb);
+    let image = place.write("rgb", "png", &png(&frame.rgb)?)?;
+    line.insert("rgb".to_owned(), json!(image));
+    if let Some(depth) = &frame.depth {
+        place.depth(&mut line, depth, frame.depth_kind)?;
+    }
+    if let Some(semantic) = &frame.semantic {
+        place.semantic(&mut line, semantic)?;
+    }
+    if let Some(segments) = &frame.segments {
+        place.segments(&mut line, segments, frame.segmentation)?;
+    }
+    line.insert("intrinsics".to_owned(), json!(frame.intrinsics));
+    line.insert("pose".to_owned(), json!(room.pose()));
+    line.insert("room_gt".to_owned(), json!(frame.room));
+    interface::names(&config.out, &frame.scene, &frame.names)?;
+    Ok(line)
+}

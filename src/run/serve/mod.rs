@@ -1,0 +1,177 @@
+//! `serve`: the built-in models behind an OpenAI-compatible endpoint on loopback, for trying clients and for CI without
+//! keys.
+//!
+//! `POST /v1/chat/completions` takes a multiple-choice question with or without an image and answers with a letter; `GET
+//! /v1/models` names the models. The observer has to know which frame an image shows: it is told by nothing but the image
+//! (`recognise`). Only this machine is answered, any key is accepted, nothing is charged and nothing is kept.
+
+mod completion;
+mod puzzle;
+mod recognise;
+mod request;
+
+use std::io::Write as _;
+use std::net::{Ipv4Addr, SocketAddr};
+use std::sync::Arc;
+
+use axum::Router;
+use axum::body::Bytes;
+use axum::extract::{DefaultBodyLimit, State};
+use axum::http::StatusCode;
+use axum::response::{IntoResponse as _, Response};
+use axum::routing::{get, post};
+use tokio::runtime;
+
+use super::Verdict;
+use super::interrupt::Interrupt;
+use super::observer;
+use super::progress::Progress;
+use crate::ask::{Call, Model, Random};
+use crate::config::Serve;
+use crate::dataset::Dataset;
+use crate::error::{Error, Result};
+use crate::types::manifest::Status;
+use crate::types::{Choices, Digest, Family, FrameId, Question, QuestionId};
+
+use completion::{Completion, Fault};
+use puzzle::Puzzle;
+use recognise::Likenesses;
+use request::Asked;
+
+/// The largest request that is read, in bytes.
+const LARGEST: usize = 64 << 20;
+
+/// What requests are answered with.
+struct Desk {
+    likenesses: Likenesses,
+    /// The models by the names they have here: `darkqa-eval --model observer` would be the one in its own process.
+    models: [(&'static str, Model); 2],
+}
+
+/// Answers requests until it is interrupted.
+///
+/// # Errors
+/// Where the frames cannot be read, or the port is taken.
+pub fn serve(config: &Serve, progress: &Progress) -> Result<Verdict> {
+    let dataset = Arc::new(Dataset::open_unasked(&config.place)?);
+    let prior = Random { seed: config.seed };
+    let models = [
+        (
+            "darkqa-observer",
+            Model::Local(observer::open(&dataset, &config.place, &[], prior)?),
+        ),
+        ("darkqa-random", Model::Random(prior)),
+    ];
+    let likenesses = Likenesses::of(&dataset, progress)?;
+    let desk = Arc::new(Desk { likenesses, models });
+    let runtime = runtime::Builder::new_multi_thread()
+        .enable_all()
+        .build()
+        .map_err(|e| Error::usage("serve", e))?;
+    runtime.block_on(listen(config, desk, progress))?;
+    Ok(Verdict {
+        status: Status::Complete,
+        output: String::new(),
+    })
+}
+
+async fn listen(config: &Serve, desk: Arc<Desk>, progress: &Progress) -> Result<()> {
+    let address = SocketAddr::from((Ipv4Addr::LOCALHOST, config.port));
+    let taken = |e| {
+        let problem = format!(
+            "{address} cannot be listened at: {e}; --port N takes another, 0 any that is free"
+        );
+        Error::usage("--port", problem)
+    };
+    let listener = tokio::net::TcpListener::bind(address)
+        .await
+        .map_err(taken)?;
+    let address = listener.local_addr().map_err(taken)?;
+    let names: Vec<&str> = desk.names().collect();
+    progress.say(&format!("models: {}; Ctrl-C ends it", names.join(", ")));
+    // Whoever waits for the address on standard output gets it at once; who does not read it is served all the same.
+    let mut out = std::io::stdout().lock();
+    let _ = writeln!(out, "http://{address}/v1").and_then(|()| out.flush());
+    drop(out);
+    let app = Router::new()
+        .route("/v1/models", get(models))
+        .route("/v1/chat/completions", post(complete))
+        .fallback(nowhere)
+        .layer(DefaultBodyLimit::max(LARGEST))
+        .with_state(desk);
+    let mut interrupt = Interrupt::listen()?;
+    axum::serve(listener, app)
+        .with_graceful_shutdown(async move { interrupt.next().await })
+        .await
+        .map_err(|e| Error::usage("serve", e))
+}
+
+async fn nowhere() -> Response {
+    let message = "there are GET /v1/models and POST /v1/chat/completions";
+    Fault::new(StatusCode::NOT_FOUND, message).into_response()
+}
+
+async fn models(State(desk): State<Arc<Desk>>) -> Response {
+    completion::models(desk.names())
+}
+
+async fn complete(State(desk): State<Arc<Desk>>, body: Bytes) -> Response {
+    match desk.answer(&body).await {
+        Ok(completion) => completion.into_response(),
+        Err(fault) => fault.into_response(),
+    }
+}
+
+impl Desk {
+    fn names(&self) -> impl Iterator<Item = &'static str> {
+        self.models.iter().map(|(name, _)| *name)
+    }
+
+    async fn answer(&self, body: &[u8]) -> Result<Completion, Fault> {
+        let asked = Asked::read(body)?;
+        let model = self.models.iter().find(|(name, _)| *name == asked.model);
+        let (_, model) = model.ok_or_else(|| {
+            let names: Vec<&str> = self.names().collect();
+            let message = format!(
+                "the model {:?} is none of {}",
+                asked.model,
+                names.join(", ")
+            );
+            Fault::new(StatusCode::NOT_FOUND, message).at("model", "model_not_found")
+        })?;
+        let puzzle = Puzzle::read(&asked.text)?;
+        let frame = asked
+            .image
+            .as_ref()
+            .and_then(|(image, _)| self.likenesses.most_like(image));
+        let words = Digest::of(asked.text.as_bytes()).to_string();
+        let image = asked.image.as_ref().map(|(_, payload)| payload);
+        let seen = image.map_or_else(String::new, |image| image.facts().digest.to_string());
+        let question = Question {
+            id: QuestionId(format!("{words} {seen}")),
+            family: Family::Other(String::new()),
+            text: puzzle.question,
+            choices: Choices::new(puzzle.choices, 0)
+                .map_err(|e| Fault::new(StatusCode::BAD_REQUEST, e.to_string()))?,
+            evidence: serde_json::Value::Null,
+            frame: frame.cloned().unwrap_or(FrameId(String::new())),
+        };
+        let call = Call {
+            question: &question,
+            condition: None,
+            prompt: &asked.text,
+            // What is no frame of the data is not seen.
+            image: image.filter(|_| frame.is_some()),
+            turn: 0,
+        };
+        let reply = model
+            .ask(call)
+            .await
+            .map_err(|e| Fault::new(StatusCode::INTERNAL_SERVER_ERROR, e.failure.message))?;
+        Ok(Completion {
+            model: asked.model,
+            text: reply.text,
+            form: asked.form,
+        })
+    }
+}

@@ -1,0 +1,81 @@
+//! Which frame an image shows: [`Likenesses`].
+//!
+//! The linear light of an image is averaged over a coarse grid, which leaves little of a sensor's noise, and correlated
+//! with that of every frame: a correlation does not change with how bright the image is. So frames are found again at every
+//! level that leaves a trace of them.
+
+use rayon::prelude::*;
+
+use crate::dataset::Dataset;
+use crate::error::Result;
+use crate::questions::observer::contrast::linear;
+use crate::run::progress::Progress;
+use crate::types::{FrameId, Rgb};
+
+/// Cells of the grid, across and down.
+const GRID: [usize; 2] = [32, 24];
+
+/// An image that correlates less than this with every frame shows none of them.
+const LEAST: f64 = 0.5;
+
+/// All frames, as they are recognised.
+pub(super) struct Likenesses(Vec<(FrameId, Vec<f64>)>);
+
+impl Likenesses {
+    /// Looks at every frame once.
+    pub(super) fn of(dataset: &Dataset, progress: &Progress) -> Result<Self> {
+        let names: Vec<&FrameId> = dataset.frames().collect();
+        let bar = progress.bar("looking at frames", names.len());
+        let seen = names.into_par_iter().map(|name| {
+            let image = dataset.picture(name)?.decode()?;
+            bar.inc();
+            Ok((name.clone(), likeness(&image)))
+        });
+        seen.collect::<Result<_>>().map(Self)
+    }
+
+    /// The frame that an image is most like; `None` where it is like none.
+    pub(super) fn most_like(&self, image: &Rgb) -> Option<&FrameId> {
+        let own = likeness(image);
+        let correlation =
+            |other: &[f64]| -> f64 { own.iter().zip(other).map(|(a, b)| a * b).sum() };
+        let found = self
+            .0
+            .iter()
+            .map(|(name, other)| (correlation(other), name));
+        let (most, name) = found.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        (most >= LEAST).then_some(name)
+    }
+}
+
+/// The light of each cell, as numbers of mean 0 and of squares that sum to 1.
+fn likeness(image: &Rgb) -> Vec<f64> {
+    let (width, height) = (image.width(), image.height());
+    let mut cells = vec![(0_u64, 0_u64); GRID[0] * GRID[1]];
+    let (pixels, _) = image.samples().as_chunks::<3>();
+    for (i, pixel) in pixels.iter().enumerate() {
+        let (x, y) = (i % width * GRID[0] / width, i / width * GRID[1] / height);
+        let (light, count) = &mut cells[y * GRID[0] + x];
+        *light += pixel
+            .iter()
+            .map(|code| u64::from(linear(*code)))
+            .sum::<u64>();
+        *count += 1;
+    }
+    // The square root, so that a window does not outweigh the room.
+    let lights: Vec<f64> = cells
+        .iter()
+        .map(|(light, count)| (*light as f64 / (*count).max(1) as f64).sqrt())
+        .collect();
+    let mean = lights.iter().sum::<f64>() / lights.len() as f64;
+    let size = lights
+        .iter()
+        .map(|light| (light - mean) * (light - mean))
+        .sum::<f64>()
+        .sqrt();
+    let size = if size > 0.0 { size } else { 1.0 };
+    lights
+        .into_iter()
+        .map(|light| (light - mean) / size)
+        .collect()
+}

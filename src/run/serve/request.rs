@@ -1,0 +1,121 @@
+//! What a request asks: [`Asked`].
+
+use axum::http::StatusCode;
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use serde::Deserialize;
+
+use super::completion::{Fault, Form};
+use crate::ask::{Format, Payload};
+use crate::dataset::Picture;
+use crate::dataset::picture::MOST_PIXELS;
+use crate::types::Rgb;
+
+/// A request, as far as it is used; whatever else it says is taken and makes no difference.
+#[derive(Deserialize)]
+struct Body {
+    model: String,
+    messages: Vec<Message>,
+    #[serde(default)]
+    stream: Option<bool>,
+}
+
+#[derive(Deserialize)]
+struct Message {
+    #[serde(default)]
+    content: Option<Content>,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Content {
+    Text(String),
+    Parts(Vec<Part>),
+}
+
+#[derive(Deserialize)]
+#[serde(tag = "type", rename_all = "snake_case")]
+enum Part {
+    Text { text: String },
+    ImageUrl { image_url: Link },
+}
+
+#[derive(Deserialize)]
+struct Link {
+    url: String,
+}
+
+/// What is asked.
+pub(super) struct Asked {
+    pub(super) model: String,
+    /// All texts, one after the other.
+    pub(super) text: String,
+    /// The last image, decoded and as it is looked at.
+    pub(super) image: Option<(Rgb, Payload)>,
+    pub(super) form: Form,
+}
+
+impl Asked {
+    /// Reads the body of a request.
+    pub(super) fn read(body: &[u8]) -> Result<Self, Fault> {
+        let wrong = |message: String| Fault::new(StatusCode::BAD_REQUEST, message);
+        let body: Body = serde_json::from_slice(body)
+            .map_err(|e| wrong(format!("the request is none that is understood: {e}")))?;
+        let (mut text, mut image) = (String::new(), None);
+        let mut say = |words: &str| {
+            text.push_str(words);
+            text.push('\n');
+        };
+        for message in body.messages {
+            match message.content {
+                None => {}
+                Some(Content::Text(words)) => say(&words),
+                Some(Content::Parts(parts)) => {
+                    for part in parts {
+                        match part {
+                            Part::Text { text } => say(&text),
+                            Part::ImageUrl { image_url } => image = Some(image_url.url),
+                        }
+                    }
+                }
+            }
+        }
+        Ok(Self {
+            model: body.model,
+            text,
+            image: image.map(|url| pixels(&url)).transpose()?,
+            form: if body.stream == Some(true) {
+                Form::Stream
+            } else {
+                Form::Whole
+            },
+        })
+    }
+}
+
+/// The pixels of a data URL.
+fn pixels(url: &str) -> Result<(Rgb, Payload), Fault> {
+    let wrong = |message: String| {
+        Fault::new(StatusCode::BAD_REQUEST, message).at("image_url", "invalid_image_url")
+    };
+    let data = url
+        .strip_prefix("data:image/")
+        .and_then(|rest| rest.split_once(";base64,"));
+    let (_, data) = data.ok_or_else(|| {
+        wrong(
+            "only data URLs are looked at: data:image/png;base64,… or data:image/jpeg;base64,…"
+                .to_owned(),
+        )
+    })?;
+    let bytes = STANDARD
+        .decode(data)
+        .map_err(|e| wrong(format!("the image is no base64: {e}")))?;
+    let picture = Picture::Encoded {
+        bytes,
+        place: "image_url".to_owned(),
+        most_pixels: MOST_PIXELS,
+    };
+    let rgb = picture.decode().map_err(|e| wrong(e.to_string()))?;
+    let payload = Payload::encode(&rgb, Format::Png, None).map_err(|e| wrong(e.to_string()))?;
+    Ok((rgb, payload))
+}
