@@ -7,11 +7,11 @@
 //!
 //! What it is: a line that says how much of the evidence the pixels still hold for one who need not find it, name it or tell
 //! it from other things: a model observer in the sense of medical imaging (Barrett, Yao, Rolland and Myers, "Model observers
-//! for assessment of image quality", PNAS 90:9758, 1993), with the signal known exactly and the decision by Rose's rule. As
-//! the decision is about contrast against noise, no change of brightness or gain helps it; of what an enhancer does, only
-//! what mends clipping, rounding or noise between pixels could, and it averages over those by itself. Where an enhancer does
-//! raise its line, it is by colours: a gain alone does not undo the tints that rounding and clipping leave near black, nor a
-//! tone curve that the dark image lacks, and an enhancer may have learned to.
+//! for assessment of image quality", PNAS 90:9758, 1993), with the place of the signal known and the decision by Rose's rule.
+//! As the decision is about contrast against noise, no change of brightness or gain helps it. Where an enhancer does raise
+//! its line, it is by two things: colours, for a gain alone does not undo the tints that rounding and clipping leave near
+//! black, nor a tone curve that the dark image lacks, and an enhancer may have learned to; and averaging over more than a
+//! cell, which the observer does along borders and not across.
 //!
 //! What it is not: a bound on every model. A model may do better where it knows what rooms look like and guesses what it
 //! cannot see, and where a part of a thing tells the whole: the observer asks for half of an outline. It will mostly do
@@ -77,9 +77,9 @@ impl Watched {
         let gain = self.light / mean_light(image).max(f64::MIN_POSITIVE);
         let look = Look::at(image, &self.masks, self.size, gain, palette);
         let number = |mask: usize| mask.checked_sub(1).and_then(|i| self.numbers.get(i));
-        let visible: BTreeMap<u32, [u64; Color::ALL.len()]> = look
+        let visible: BTreeMap<u32, Vec<Color>> = look
             .visible()
-            .filter_map(|mask| Some((*number(mask)?, look.colors(mask))))
+            .filter_map(|mask| Some((*number(mask)?, look.colors(mask, palette))))
             .collect();
         let mut seen = self.statistics.clone();
         seen.segments
@@ -110,8 +110,8 @@ pub struct Sight {
     /// How many there are.
     pub segments: usize,
     seen: FrameStatistics,
-    /// Of each segment that it sees, by number, how much of it has each colour.
-    colors: BTreeMap<u32, [u64; Color::ALL.len()]>,
+    /// The colours of each segment that it sees, by number, the first the most.
+    colors: BTreeMap<u32, Vec<Color>>,
 }
 
 impl Sight {
@@ -172,17 +172,12 @@ impl Sight {
             .iter()
             .filter(|segment| segment.class == class);
         let largest = segments.max_by_key(|segment| segment.area)?;
-        let colors = self.colors.get(&largest.id)?;
-        let offered = Color::ALL.iter().zip(colors).filter(|(color, count)| {
-            **count > 0
-                && question
-                    .choices
-                    .texts()
-                    .iter()
-                    .any(|text| text == color.name())
-        });
-        let most = offered.max_by_key(|(_, count)| **count)?;
-        Some(most.0.name().to_owned())
+        let mut colors = self.colors.get(&largest.id)?.iter();
+        let offered = |color: &&Color| {
+            let mut texts = question.choices.texts().iter();
+            texts.any(|text| text == color.name())
+        };
+        colors.find(offered).map(|color| color.name().to_owned())
     }
 
     /// The nearest of what is offered and seen. Whatever is not seen is less likely to be nearer than the nearest that is.
