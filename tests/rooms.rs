@@ -320,6 +320,21 @@ fn settings_that_make_no_sense_are_named() {
             "{refused:?}"
         );
     }
+    // A file without questions is no wish for those of the rules.
+    bench.file("empty.jsonl", "\n");
+    let words = [
+        "--model",
+        "random",
+        "--data",
+        "rooms:frames=1",
+        "--questions",
+        "empty.jsonl",
+    ];
+    let refused = bench.call(&words);
+    assert!(
+        refused.stderr.contains("empty.jsonl: no questions in it"),
+        "{refused:?}"
+    );
     let refused = bench.call(&["rooms", "--out", "x", "--size", "big"]);
     assert!(refused.stderr.starts_with("error: --size: "), "{refused:?}");
 }

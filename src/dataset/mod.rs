@@ -126,6 +126,9 @@ impl Dataset {
 
     /// The same with the questions of a file, each of which is about one of its frames.
     fn asked(self, questions: Vec<Question>, file: &Path) -> Result<Self> {
+        if questions.is_empty() {
+            return Err(Error::data(file.display(), "no questions in it"));
+        }
         let stray = questions
             .iter()
             .find(|question| !self.sources.contains_key(&question.frame));
