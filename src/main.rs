@@ -8,7 +8,7 @@ use clap::error::ErrorKind;
 use darkqa_eval::cli::{BatchCommand, Cli, Command, EvaluateArgs};
 use darkqa_eval::config::{
     self, BatchExport, BatchImport, Config, Enhance, Export, Import, MakeRooms, Questions, Realism,
-    Report, Serve, Synthesize,
+    Report, Serve, ShowItem, Synthesize,
 };
 use darkqa_eval::enhance;
 use darkqa_eval::run::export::export;
@@ -18,6 +18,7 @@ use darkqa_eval::run::questions::questions;
 use darkqa_eval::run::realism::realism;
 use darkqa_eval::run::rooms::rooms;
 use darkqa_eval::run::serve::serve;
+use darkqa_eval::run::show::show;
 use darkqa_eval::run::synthesize::synthesize;
 use darkqa_eval::run::{self, Verdict, evaluate};
 use darkqa_eval::types::manifest::Status;
@@ -70,7 +71,7 @@ fn run() -> ExitCode {
         .without_time()
         .with_writer(progress.clone())
         .init();
-    match show(job.task, &progress) {
+    match carry_out(job.task, &progress) {
         Ok(code) => code,
         // An error of this crate says its cause itself.
         Err(e) => fail(&e.to_string()),
@@ -94,6 +95,7 @@ enum Task {
     BatchExport(Box<BatchExport>),
     BatchImport(BatchImport),
     Report(Report),
+    Show(Box<ShowItem>),
     Rooms(MakeRooms),
     Serve(Serve),
 }
@@ -142,6 +144,7 @@ impl Job {
                 let quiet = said.quiet;
                 (quiet, Task::Serve(Serve::resolve(said)?))
             }
+            Some(Command::Show(said)) => (false, Task::Show(Box::new(ShowItem::resolve(said)?))),
             Some(Command::Report(said)) => (false, Task::Report(Report::resolve(said))),
             Some(Command::Questions(said)) => {
                 let quiet = said.quiet;
@@ -157,7 +160,7 @@ impl Job {
     }
 }
 
-fn show(task: Task, progress: &Progress) -> anyhow::Result<ExitCode> {
+fn carry_out(task: Task, progress: &Progress) -> anyhow::Result<ExitCode> {
     let Verdict { status, output } = match task {
         Task::Evaluate(said) => evaluate(&Config::resolve(*said)?, progress)?,
         Task::Synthesize(config) => synthesize(&config, progress)?,
@@ -170,6 +173,7 @@ fn show(task: Task, progress: &Progress) -> anyhow::Result<ExitCode> {
         Task::BatchImport(config) => run::batch::import(&config)?,
         Task::Rooms(config) => rooms(&config, progress)?,
         Task::Serve(config) => serve(&config, progress)?,
+        Task::Show(config) => show(*config)?,
         Task::Report(config) => run::report::report(&config)?,
     };
     let written = std::io::stdout().lock().write_all(output.as_bytes());

@@ -519,8 +519,15 @@ fn the_reference_run_is_made_again() {
     };
     // Trials, choices, replies and the very files that were sent, whatever machine made them.
     assert_eq!(made(&bench.path("run")), made(&reference));
-    let rows = |run: &Path| fs::read_to_string(run.join("summary.csv")).unwrap();
-    assert_eq!(rows(&bench.path("run")), rows(&reference));
+    for name in [
+        "summary.csv",
+        "comparisons.csv",
+        "thresholds.csv",
+        "figures/accuracy.svg",
+    ] {
+        let file = |run: &Path| fs::read_to_string(run.join(name)).unwrap();
+        assert_eq!(file(&bench.path("run")), file(&reference), "{name}");
+    }
 }
 
 #[test]

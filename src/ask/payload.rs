@@ -121,20 +121,30 @@ impl Payload {
         &self.facts
     }
 
+    /// The encoded file.
+    ///
+    /// # Errors
+    /// None but where memory is short: it was encoded here.
+    pub fn file(&self) -> Result<Vec<u8>> {
+        let base64 = self.data_url.splitn(2, |byte| *byte == b',').nth(1);
+        STANDARD.decode(base64.unwrap_or_default()).map_err(unfit)
+    }
+
     /// The pixels, as whoever receives the image sees them.
     ///
     /// # Errors
     /// None but where memory is short: it was encoded here.
     pub fn decode(&self) -> Result<Rgb> {
-        let base64 = self.data_url.splitn(2, |byte| *byte == b',').nth(1);
-        let file = STANDARD.decode(base64.unwrap_or_default()).map_err(unfit)?;
-        let image = image::load_from_memory(&file).map_err(unfit)?.into_rgb8();
+        let image = image::load_from_memory(&self.file()?)
+            .map_err(unfit)?
+            .into_rgb8();
         let (height, width) = (image.height() as usize, image.width() as usize);
         Rgb::new(height, width, image.into_raw())
     }
 
     /// `data:image/png;base64,…`, shared and not copied.
-    pub(super) fn data_url(&self) -> Bytes {
+    #[must_use]
+    pub fn data_url(&self) -> Bytes {
         self.data_url.clone()
     }
 

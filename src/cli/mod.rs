@@ -12,11 +12,13 @@ mod questions;
 mod report;
 mod rooms;
 mod serve;
+mod show;
 
 use std::num::{NonZeroU32, NonZeroU64, NonZeroUsize};
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
+use serde::Serialize;
 
 pub use asking::{ModelArgs, SendingArgs};
 pub use batch::{BatchCommand, BatchExportArgs, BatchImportArgs};
@@ -27,6 +29,7 @@ pub use questions::QuestionsArgs;
 pub use report::ReportArgs;
 pub use rooms::RoomsArgs;
 pub use serve::ServeArgs;
+pub use show::ShowArgs;
 
 /// Measures how well a vision-language model sees in the dark.
 ///
@@ -71,8 +74,10 @@ pub enum Command {
     Batch(BatchCommand),
     /// Answer as the built-in models do behind an OpenAI-compatible endpoint on this machine, for trying clients without keys
     Serve(ServeArgs),
-    /// Show what runs hold, from their records alone
+    /// Show what runs hold, from their records alone: tables, figures and one HTML file; several runs are compared
     Report(ReportArgs),
+    /// Make the images that one question was asked with again, bit for bit, and prove it by their digests
+    Show(ShowArgs),
 }
 
 /// The flags of `synthesize`.
@@ -202,7 +207,7 @@ pub struct EvaluateArgs {
 }
 
 /// Which images and questions.
-#[derive(Debug, Default, Args)]
+#[derive(Debug, Default, Args, Serialize)]
 #[command(next_help_heading = "Data")]
 pub struct DataArgs {
     /// A folder of frames, a ready-made set (.tsv, .jsonl), or built-in rooms, rooms:frames=N,seed=N,size=WIDTHxHEIGHT; default:
@@ -234,7 +239,7 @@ pub struct DataArgs {
 }
 
 /// How dark.
-#[derive(Debug, Default, Args)]
+#[derive(Debug, Default, Args, Serialize)]
 #[command(next_help_heading = "Light")]
 pub struct LightArgs {
     /// Levels, as L0-L5 or L0,L3; default: L0-L5
@@ -247,7 +252,7 @@ pub struct LightArgs {
 }
 
 /// What takes the noisy images.
-#[derive(Debug, Default, Args)]
+#[derive(Debug, Default, Args, Serialize)]
 #[command(next_help_heading = "Light")]
 pub struct SensorArgs {
     /// The seed of all random draws; default: 0
@@ -293,7 +298,7 @@ pub struct SensorArgs {
 }
 
 /// What mends the images.
-#[derive(Debug, Default, Args)]
+#[derive(Debug, Default, Args, Serialize)]
 #[command(next_help_heading = "Enhancement")]
 pub struct EnhancementArgs {
     /// An enhancement model as ONNX, or PRESET:FILE (zero-dce, zero-dce++, ruas-lol, ruas-upe, retinexformer, darkir, sci,

@@ -3,7 +3,7 @@
 //! All three are read by the one parser of [`crate::cli`], so that a value is understood alike wherever it stands, and
 //! its error names where that is.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::num::{NonZeroU64, NonZeroUsize};
 use std::path::{Path, PathBuf};
 use std::{env, fs};
@@ -156,6 +156,35 @@ fn file(path: &Path) -> Result<Layer> {
         layer = or(layer, parse(&origin, &flag, &texts)?);
     }
     Ok(layer)
+}
+
+/// The flags that a table of them sets, as [`file`] reads them.
+pub(super) fn read(
+    origin: &str,
+    table: &BTreeMap<String, serde_json::Value>,
+) -> Result<EvaluateArgs> {
+    let mut layer = Layer::default();
+    for (flag, value) in table {
+        let text = |value: &serde_json::Value| match value {
+            serde_json::Value::String(text) => text.clone(),
+            other => other.to_string(),
+        };
+        let texts: Vec<String> = match value {
+            serde_json::Value::Array(values) => values.iter().map(text).collect(),
+            single => vec![text(single)],
+        };
+        layer = or(layer, parse(&format!("{origin}, {flag}"), flag, &texts)?);
+    }
+    Ok(layer.said)
+}
+
+/// The first where it says something, else the second.
+pub(super) fn above(first: EvaluateArgs, second: EvaluateArgs) -> EvaluateArgs {
+    let layer = |said| Layer {
+        said,
+        off: BTreeSet::new(),
+    };
+    or(layer(first), layer(second)).said
 }
 
 /// What is wrong with a TOML file, in one line that names its own.

@@ -13,6 +13,7 @@ mod realism;
 mod report;
 mod rooms;
 mod serve;
+mod show;
 mod showing;
 mod synthesize;
 
@@ -35,6 +36,7 @@ pub use realism::{PairPlace, Realism};
 pub use report::{Readings, Report};
 pub use rooms::MakeRooms;
 pub use serve::Serve;
+pub use show::{Pictures, Recipe, ShowItem};
 pub use showing::{Order, Rotations, Showing};
 pub use synthesize::{Existing, Product, Synthesize};
 
@@ -72,6 +74,8 @@ pub struct Config {
     pub earnest: Earnest,
     /// What is left behind.
     pub output: Output,
+    /// What decides the images, as it was said.
+    pub recipe: Recipe,
 }
 
 /// Which images and questions.
@@ -185,17 +189,13 @@ impl Config {
         }
         let light = Light::resolve(&said.light, &said.sensor)?;
         Ok(Self {
+            recipe: show::recipe(&said)?,
             showing: Showing::said(&said.data, light.sensor.seed),
             data: data(said.data)?,
             light,
             enhancement: enhancement(said.enhancement)?,
             ask: asking::ask(said.model, &said.sending)?,
-            images: Images {
-                format: parsed("--image", said.sending.image.as_deref())?.unwrap_or(Format::Png),
-                max_side: said.sending.max_side,
-                largest: positive("--max-image", said.sending.max_image)?
-                    .map(|megabytes| (megabytes * 1e6) as usize),
-            },
+            images: images(&said.sending)?,
             pace: pace(&said.sending)?,
             money: Money::said(&said.sending)?,
             earnest: if said.sending.dry_run {
@@ -215,6 +215,15 @@ fn nameless(output: &OutputArgs) -> Error {
         "a model's name at the endpoint, or observer or random to try without one"
     };
     Error::usage("--model", format_args!("no model is named: {mend}"))
+}
+
+fn images(said: &SendingArgs) -> Result<Images> {
+    Ok(Images {
+        format: parsed("--image", said.image.as_deref())?.unwrap_or(Format::Png),
+        max_side: said.max_side,
+        largest: positive("--max-image", said.max_image)?
+            .map(|megabytes| (megabytes * 1e6) as usize),
+    })
 }
 
 fn data(said: DataArgs) -> Result<Data> {

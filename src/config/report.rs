@@ -19,6 +19,8 @@ pub enum Readings {
 pub struct Report {
     /// The run folders.
     pub runs: Vec<PathBuf>,
+    /// Where the report goes; `None` for the folder of the one run.
+    pub out: Option<PathBuf>,
     /// Which readings count.
     pub readings: Readings,
     /// In what form on standard output.
@@ -31,6 +33,7 @@ impl Report {
     pub fn resolve(said: ReportArgs) -> Self {
         Self {
             runs: said.runs,
+            out: said.out,
             readings: if said.rescore {
                 Readings::Anew
             } else {

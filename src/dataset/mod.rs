@@ -196,6 +196,16 @@ impl Dataset {
         self.sources.keys()
     }
 
+    /// The scene of a frame; empty where the data set says nothing of scenes.
+    #[must_use]
+    pub fn scene(&self, id: &FrameId) -> String {
+        match self.sources.get(id) {
+            Some(Source::File { view, .. }) => view.scene.clone(),
+            Some(Source::Room(room)) => room.scene(),
+            Some(Source::Cell(_)) | None => String::new(),
+        }
+    }
+
     /// Opens the data at a place; `questions` overrides the questions beside a folder of frames.
     ///
     /// No image is read. Every question is checked: its choices, its answer among them, its frame among the images. The

@@ -87,21 +87,48 @@ struct Document<'a> {
     schema: &'static str,
     #[serde(skip_serializing_if = "Option::is_none")]
     folder: Option<&'a Path>,
-    run: &'a RunManifest,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    run: Option<&'a RunManifest>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    runs: Vec<Compared<'a>>,
     unread: &'a BTreeMap<Why, usize>,
     rows: Vec<Row<'a>>,
 }
 
+/// A run among several.
+#[derive(Serialize)]
+struct Compared<'a> {
+    folder: &'a Path,
+    run: &'a RunManifest,
+}
+
+/// The summary of several runs as JSON: their folders and manifests, and the rows of the CSV.
+pub fn json_of_several(summary: &Summary, runs: &[(&RunManifest, &Path)]) -> Result<String> {
+    let runs = runs.iter().map(|&(run, folder)| Compared { folder, run });
+    written(&Document {
+        schema: SCHEMA,
+        folder: None,
+        run: None,
+        runs: runs.collect(),
+        unread: &summary.unread,
+        rows: rows(summary).collect(),
+    })
+}
+
 /// The summary as JSON: the run's manifest and the rows of the CSV; with the folder where it is not itself in there.
 pub fn json(summary: &Summary, run: &RunManifest, folder: Option<&Path>) -> Result<String> {
-    let rows = rows(summary).collect();
-    let text = serde_json::to_string_pretty(&Document {
+    written(&Document {
         schema: SCHEMA,
         folder,
-        run,
+        run: Some(run),
+        runs: Vec::new(),
         unread: &summary.unread,
-        rows,
-    });
-    text.map(|text| text + "\n")
+        rows: rows(summary).collect(),
+    })
+}
+
+fn written(document: &Document<'_>) -> Result<String> {
+    serde_json::to_string_pretty(document)
+        .map(|text| text + "\n")
         .map_err(|e| Error::data("summary.json", e))
 }

@@ -1,9 +1,17 @@
 //! Stage 7, SHOW: from the records alone; and [`sheet`], figures of pictures that are handed in.
 
+pub mod chart;
+pub mod csv;
+pub mod figures;
 pub mod files;
 pub mod forecast;
 pub mod histogram;
+pub mod latex;
+pub mod page;
+pub mod products;
 pub mod questions;
 pub mod realism;
 pub mod sheet;
+pub mod subject;
 pub mod table;
+pub mod verdicts;

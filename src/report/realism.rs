@@ -4,6 +4,7 @@ use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
 use comfy_table::{LineStyle, Table};
 use serde::Serialize;
 
+use super::csv::table_of;
 use super::histogram::{Line, histogram};
 use super::sheet::{self, CropRow};
 use crate::error::{Error, Result};
@@ -208,16 +209,6 @@ fn shown(mean: &Mean, digits: usize) -> String {
         Some([low, high]) => format!("{:.digits$} ±{:.digits$}", mean.value, (high - low) / 2.0),
         None => format!("{:.digits$}", mean.value),
     }
-}
-
-fn table_of(header: &[&str], rows: impl Iterator<Item = Vec<String>>) -> Result<Vec<u8>> {
-    let failed = |e: csv::Error| Error::data("CSV", e);
-    let mut table = csv::Writer::from_writer(Vec::new());
-    table.write_record(header).map_err(failed)?;
-    for row in rows {
-        table.write_record(row).map_err(failed)?;
-    }
-    table.into_inner().map_err(|e| Error::data("CSV", e))
 }
 
 /// A row a pair and way of making it.

@@ -7,6 +7,7 @@ use std::path::Path;
 use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
 use comfy_table::{CellAlignment, LineStyle, Table};
 
+use super::subject::light;
 use crate::score::accuracy::{Cell, Subject, Summary};
 use crate::score::choice::Mode;
 use crate::types::manifest::{Counts, RunManifest, Status};
@@ -30,13 +31,7 @@ impl<'a> Series<'a> {
     }
 
     fn label(&self) -> String {
-        let variant = match self.variant {
-            Variant::None => "untouched",
-            Variant::Ev => "exposure drop",
-            Variant::Noise => "with noise",
-        };
-        self.enhancer
-            .map_or(variant.to_owned(), |name| format!("{variant} + {name}"))
+        light(self.variant, self.enhancer)
     }
 }
 
@@ -80,10 +75,10 @@ impl Pair<'_> {
     }
 }
 
-/// Renders a summary: how far the run has come where it is not complete, accuracy by level, variant and enhancer, the
-/// blind and chance lines, and the run's folder.
+/// Renders a summary: how far each run has come where it is not complete, accuracy by level, variant and enhancer, the
+/// blind and chance lines, and the runs' folders.
 #[must_use]
-pub fn render(summary: &Summary, run: &RunManifest, folder: &Path) -> String {
+pub fn render(summary: &Summary, runs: &[(&RunManifest, &Path)]) -> String {
     let pairs = pairs(summary);
     let of_view = |view: Option<View>| {
         pairs
@@ -92,12 +87,18 @@ pub fn render(summary: &Summary, run: &RunManifest, folder: &Path) -> String {
             .filter(move |pair| pair.strict.subject.view == view)
     };
     let mut text = String::new();
-    if run.status != Status::Complete {
+    for (run, folder) in runs {
+        if run.status == Status::Complete {
+            continue;
+        }
         let Counts {
             trials,
             answered,
             failed,
         } = run.counts;
+        if runs.len() > 1 {
+            let _ = write!(text, "{}: ", folder.display());
+        }
         let _ = writeln!(
             text,
             "{}: {answered} of {trials} trials answered, {failed} failed",
@@ -139,7 +140,9 @@ pub fn render(summary: &Summary, run: &RunManifest, folder: &Path) -> String {
         );
     }
     let _ = write!(text, "{}", unread(summary));
-    let _ = writeln!(text, "run: {}", folder.display());
+    for (_, folder) in runs {
+        let _ = writeln!(text, "run: {}", folder.display());
+    }
     text
 }
 

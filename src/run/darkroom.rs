@@ -12,12 +12,13 @@ use tokio::sync::mpsc::Sender;
 use super::gallery::Gallery;
 use super::plan::{FramePlan, Shot, Trial};
 use super::recipe::Recipe;
+use super::thumbnail::Wanted;
 use crate::ask::{Format, ImageLimit, Payload};
 use crate::dataset::{Dataset, Picture};
 use crate::enhance::Enhancer;
 use crate::error::{Error, Result};
 use crate::synthesis::{Negative, NoiseKey, expose};
-use crate::types::{Condition, Degradation, FrameId, ImageFacts, Rgb};
+use crate::types::{Condition, Degradation, FrameId, ImageFacts, Rgb, Thumbnail};
 
 /// A shot with its image, or with what went wrong while it was made.
 #[derive(Debug)]
@@ -25,6 +26,8 @@ pub(super) struct Exposed {
     pub(super) condition: Option<Condition>,
     pub(super) trials: Vec<Trial>,
     pub(super) image: Result<Option<Arc<Payload>>>,
+    /// A small copy for the report, where one is wanted.
+    pub(super) thumbnail: Option<Thumbnail>,
 }
 
 /// What the thread works with.
@@ -87,19 +90,33 @@ impl Darkroom<'_> {
     }
 
     /// Makes the images of all frames until they are done or nobody waits for them any more.
-    pub(super) fn develop(mut self, frames: Vec<FramePlan>, out: &Sender<Exposed>) {
+    pub(super) fn develop(
+        mut self,
+        frames: Vec<FramePlan>,
+        wanted: &Wanted,
+        out: &Sender<Exposed>,
+    ) {
         for FramePlan { frame, shots } in frames {
-            let mut desk = Desk::new(frame);
+            let mut desk = Desk::new(frame.clone());
             for Shot { condition, trials } in shots {
                 let image = condition
                     .as_ref()
                     .map(|condition| self.image(&mut desk, condition))
                     .transpose();
+                let thumbnail = match (&condition, &image) {
+                    (Some(condition), Ok(Some(image))) => wanted.of(&frame, condition, image),
+                    _ => Ok(None),
+                };
+                let (image, thumbnail) = match thumbnail {
+                    Ok(thumbnail) => (image, thumbnail),
+                    Err(e) => (Err(e), None),
+                };
                 if out
                     .blocking_send(Exposed {
                         condition,
                         trials,
                         image,
+                        thumbnail,
                     })
                     .is_err()
                 {

@@ -18,6 +18,7 @@ use super::progress::{Bar, Progress};
 use super::recipe::Recipe;
 use super::record;
 use super::stop::{End, Watch};
+use super::thumbnail::Wanted;
 use crate::ask::{AskError, Call, ImageLimit, Payload, Reach};
 use crate::config::Config;
 use crate::dataset::Dataset;
@@ -39,6 +40,8 @@ pub(super) struct Drive<'a> {
     pub(super) progress: &'a Progress,
     /// What an image may be that leaves the machine.
     pub(super) limit: Option<ImageLimit>,
+    /// The small copies that are to be kept.
+    pub(super) wanted: &'a Wanted,
 }
 
 /// One trial with the image that it shares.
@@ -104,7 +107,7 @@ impl Drive<'_> {
             cut: Cut::default(),
         };
         std::thread::scope(|scope| {
-            scope.spawn(move || cores.install(|| darkroom.develop(plan.frames, &out)));
+            scope.spawn(move || cores.install(|| darkroom.develop(plan.frames, self.wanted, &out)));
             runtime.block_on(intake.ask(images))
         })
     }
@@ -254,7 +257,11 @@ impl Intake<'_> {
             condition,
             trials,
             image,
+            thumbnail,
         } = exposed;
+        if let Some(thumbnail) = thumbnail {
+            self.store.append_thumbnail(&thumbnail)?;
+        }
         let (image, broken) = match image {
             Ok(image) => (image, None),
             Err(e) => (None, Some(e.to_string())),

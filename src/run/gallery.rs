@@ -21,6 +21,15 @@ pub(super) struct Pictured {
 /// The pictures that are asked about, by frame.
 pub(super) type Gallery = BTreeMap<FrameId, Pictured>;
 
+/// Reads one image.
+pub(super) fn look_at(dataset: &Dataset, frame: &FrameId) -> Result<Pictured> {
+    let picture = dataset.picture(frame)?;
+    Ok(Pictured {
+        size: picture.check()?,
+        digest: picture.digest(),
+    })
+}
+
 /// Reads every image that is asked about once: a missing or broken one is found before anything is paid for, and its
 /// content enters the keys of its trials.
 pub(super) fn look_through(

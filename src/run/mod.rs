@@ -29,9 +29,11 @@ mod record;
 pub mod report;
 pub mod rooms;
 pub mod serve;
+pub mod show;
 mod stage;
 mod stop;
 pub mod synthesize;
+mod thumbnail;
 mod written;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -41,14 +43,13 @@ use jiff::Timestamp;
 
 use crate::ask::ImageLimit;
 use crate::config::{Config, Earnest, Enhancement, RunPlace, Show};
+use crate::dataset::Dataset;
 use crate::enhance::{Enhancer, ModelFile, Runtime};
 use crate::error::Result;
 use crate::report as reports;
-use crate::score::accuracy::summarize;
-use crate::score::chance::Offer;
 use crate::store::{self, Moved, Store};
 use crate::types::manifest::{Counts, RunManifest, SCHEMA, Status};
-use crate::types::{Outcome, Question, Record, TrialKey};
+use crate::types::{Listed, Outcome, Question, Record, TrialKey};
 
 use darkroom::Darkroom;
 use drive::Drive;
@@ -59,6 +60,7 @@ use plan::Plan;
 use progress::Progress;
 use stage::Stage;
 use stop::End;
+use thumbnail::Wanted;
 
 /// The folder of runs without a name of their own.
 const RESULTS: &str = "results";
@@ -101,6 +103,8 @@ fn ask(config: &Config, stage: Stage<'_>, progress: &Progress) -> Result<Verdict
     };
     let mut manifest = manifest(config, identity, kept);
     let mut store = Store::open(&folder, &manifest, moved(config))?;
+    store.write_questions(&listed(questions, dataset))?;
+    let wanted = Wanted::new(questions, store::read_thumbnails(&folder)?);
     let kept = store.records()?;
     let ledger = Ledger::new(&config.money, inputs.askers, &kept)?;
     let mut plan = Plan::new(&inputs, &kept)?;
@@ -132,6 +136,7 @@ fn ask(config: &Config, stage: Stage<'_>, progress: &Progress) -> Result<Verdict
             askers: inputs.askers,
             progress,
             limit: limit(config),
+            wanted: &wanted,
         };
         drive.run(plan, enhancers, ledger, &mut store)?
     };
@@ -142,7 +147,14 @@ fn ask(config: &Config, stage: Stage<'_>, progress: &Progress) -> Result<Verdict
         );
     }
     manifest.settings.extend(askers::adapted(inputs.askers));
-    show(config, &store, manifest, end, &trials, questions)
+    show(config, &store, manifest, end, &trials)
+}
+
+/// The questions as the run keeps them.
+fn listed(questions: &[Question], dataset: &Dataset) -> Vec<Listed> {
+    let list = questions.iter();
+    list.map(|question| Listed::new(question, &dataset.scene(&question.frame)))
+        .collect()
 }
 
 /// Leaves out of a plan what a Batch API has been asked and has not answered: it would be paid for twice.
@@ -210,26 +222,17 @@ fn show(
     mut manifest: RunManifest,
     end: End,
     trials: &[TrialKey],
-    questions: &[Question],
 ) -> Result<Verdict> {
     let records = in_order(store.records()?, trials)?;
-    let summary = summarize(&records, questions.iter().map(Offer::from));
     let counts = count(trials.len(), &records);
     let status = end.status(counts);
     if (status, counts) != (manifest.status, manifest.counts) {
         (manifest.status, manifest.counts, manifest.updated) = (status, counts, now());
     }
-    store.write("summary.csv", &reports::files::csv(&summary)?)?;
-    let json = reports::files::json(&summary, &manifest, None)?;
-    store.write("summary.json", json.as_bytes())?;
-    store.write_manifest(&manifest)?;
+    let output = report::leave(store, &manifest, &records, config.output.show)?;
     if let End::Stopped(error) = end {
         return Err(error);
     }
-    let output = match config.output.show {
-        Show::Json => reports::files::json(&summary, &manifest, Some(store.folder()))?,
-        Show::Table => reports::table::render(&summary, &manifest, store.folder()),
-    };
     Ok(Verdict { status, output })
 }
 
@@ -276,6 +279,7 @@ fn manifest(config: &Config, identity: Identity, kept: Option<RunManifest>) -> R
             platform: identity::platform(),
             identity,
             settings: identity::settings(config),
+            images: config.recipe.clone(),
             counts: Counts::default(),
         },
     }

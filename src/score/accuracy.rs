@@ -1,15 +1,15 @@
 //! The accuracy of each model in each condition: [`Summary`].
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
 use super::chance::{Offer, chance};
 use super::choice::Mode;
 use super::estimate::Estimate;
-use crate::types::{
-    EnhancerName, Family, Level, Outcome, QuestionId, Reading, Record, Variant, View, Why,
-};
+use super::grid::{Count, Grid, Mark};
+use super::health::healths;
+use crate::types::{EnhancerName, Family, Level, QuestionId, Record, Variant, View, Why};
 
 /// The name under which guessing stands among the models.
 pub const CHANCE: &str = "chance";
@@ -27,6 +27,42 @@ pub struct Subject {
     pub variant: Variant,
     /// What mended them; `None` for raw.
     pub enhancer: Option<EnhancerName>,
+}
+
+impl Subject {
+    /// Whom a record is of.
+    #[must_use]
+    pub fn of(record: &Record) -> Self {
+        Self {
+            model: record.model.clone(),
+            view: Some(record.view),
+            level: record.level,
+            variant: record.variant,
+            enhancer: record.enhancer.clone(),
+        }
+    }
+
+    /// What it is shown, as `L3-noise+zerodce`, or `blind`.
+    #[must_use]
+    pub fn condition(&self) -> String {
+        let Some(level) = self.level else {
+            return "blind".to_owned();
+        };
+        let variant = match self.variant {
+            Variant::None => String::new(),
+            variant => format!("-{variant}"),
+        };
+        let enhancer = self.enhancer.as_ref().map(|name| format!("+{name}"));
+        format!("{level}{variant}{}", enhancer.unwrap_or_default())
+    }
+
+    /// Whether it differs from another in the given respects alone.
+    #[must_use]
+    pub fn is_but(&self, other: &Self, change: impl FnOnce(&mut Self)) -> bool {
+        let mut changed = self.clone();
+        change(&mut changed);
+        changed == *other
+    }
 }
 
 /// The accuracy of one subject on one family, in one reading.
@@ -61,95 +97,87 @@ pub struct Summary {
     pub unread: BTreeMap<Why, usize>,
 }
 
-#[derive(Default)]
-struct Tally<'a> {
-    right: usize,
-    unparsed: usize,
-    failed: usize,
-    replies: usize,
-    /// How often each question was answered, and how often rightly.
-    questions: HashMap<&'a QuestionId, (usize, usize)>,
-}
-
-/// Scores the records of a run; `questions` are what it asks, for the chance line.
+/// Scores the items of a run; `questions` are what it asks, for the chance line.
 #[must_use]
-pub fn summarize(records: &[Record], questions: impl IntoIterator<Item = Offer>) -> Summary {
+pub fn summarize(grid: &Grid<'_>, questions: impl IntoIterator<Item = Offer>) -> Summary {
     let questions: Vec<Offer> = questions.into_iter().collect();
-    let mut tallies = BTreeMap::<(Subject, Option<Family>, Mode), Tally<'_>>::new();
-    for record in records {
-        let subject = Subject {
-            model: record.model.clone(),
-            view: Some(record.view),
-            level: record.level,
-            variant: record.variant,
-            enhancer: record.enhancer.clone(),
-        };
-        for family in [None, Some(record.family.clone())] {
-            for mode in Mode::ALL {
-                let reading = match mode {
-                    Mode::Strict => record.strict,
-                    Mode::Lenient => record.lenient,
-                };
-                tallies
-                    .entry((subject.clone(), family.clone(), mode))
-                    .or_default()
-                    .count(record, reading);
-            }
+    let families = grid.families();
+    let families: Vec<Option<&Family>> = std::iter::once(None)
+        .chain(families.into_iter().map(Some))
+        .collect();
+    let mut cells = Vec::new();
+    for subject in 0..grid.subjects.len() {
+        for family in &families {
+            cells.extend(Mode::ALL.map(|mode| cell(grid, subject, *family, mode)));
         }
     }
-    let scored = tallies
-        .into_iter()
-        .map(|((subject, family, mode), tally)| Cell {
-            subject,
-            family,
-            mode,
-            right: tally.right,
-            unparsed: tally.unparsed,
-            failed: tally.failed,
-            accuracy: tally.accuracy(),
-            always: tally.always(),
-        });
+    // A family that a subject was not asked about has no cell.
+    cells.retain(|cell| cell.accuracy.is_some() || cell.failed > 0);
+    cells.extend(guesses(&questions));
     Summary {
-        cells: scored.chain(guesses(&questions)).collect(),
-        unread: unread(records),
+        cells,
+        unread: unread(grid),
     }
 }
 
-fn unread(records: &[Record]) -> BTreeMap<Why, usize> {
+/// Why replies could not be read, in the strict reading.
+fn unread(grid: &Grid<'_>) -> BTreeMap<Why, usize> {
     let mut unread = BTreeMap::new();
-    for why in records.iter().filter_map(|record| record.strict?.why) {
-        *unread.entry(why).or_default() += 1;
+    for health in healths(grid) {
+        for (why, count) in health.unread {
+            *unread.entry(why).or_default() += count;
+        }
     }
     unread
 }
 
-impl<'a> Tally<'a> {
-    fn count(&mut self, record: &'a Record, reading: Option<Reading>) {
-        match reading {
-            Some(reading) if record.outcome != Outcome::Failed => {
-                let right = usize::from(reading.chosen == Some(record.truth));
-                self.replies += 1;
-                self.right += right;
-                self.unparsed += usize::from(reading.chosen.is_none());
-                let (replies, rights) = self.questions.entry(&record.question).or_default();
-                (*replies, *rights) = (*replies + 1, *rights + right);
-            }
-            _ => self.failed += 1,
+fn cell(grid: &Grid<'_>, subject: usize, family: Option<&Family>, mode: Mode) -> Cell {
+    let (mut unparsed, mut failed) = (0, 0);
+    for (_, mark) in grid.of_family(subject, family) {
+        failed += usize::from(mark == Mark::Failed);
+        unparsed += usize::from(mark.reading(mode) == Some(None));
+    }
+    let counts = grid.counts(subject, family, mode);
+    Cell {
+        subject: grid.subjects[subject].clone(),
+        family: family.cloned(),
+        mode,
+        right: counts.iter().map(|count| count.right as usize).sum(),
+        unparsed,
+        failed,
+        accuracy: Estimate::clustered(&counts),
+        always: always(grid, subject, family, mode),
+    }
+}
+
+/// The share of questions that were answered rightly every time; `None` where all were asked once.
+fn always(
+    grid: &Grid<'_>,
+    subject: usize,
+    family: Option<&Family>,
+    mode: Mode,
+) -> Option<Estimate> {
+    // Items of a question stand together.
+    let mut questions = BTreeMap::<(u32, &QuestionId), Count>::new();
+    for (item, mark) in grid.of_family(subject, family) {
+        if let Some(chosen) = mark.reading(mode) {
+            let count = questions
+                .entry((item.cluster, &item.record.question))
+                .or_default();
+            count.replies += 1;
+            count.right += u32::from(item.is_right(chosen));
         }
     }
-
-    fn accuracy(&self) -> Option<Estimate> {
-        Estimate::over(self.right, self.replies, self.questions.len())
+    if questions.values().all(|count| count.replies == 1) {
+        return None;
     }
-
-    fn always(&self) -> Option<Estimate> {
-        let mut counts = self.questions.values();
-        if counts.clone().all(|(replies, _)| *replies == 1) {
-            return None;
-        }
-        let always = counts.by_ref().filter(|(replies, right)| replies == right);
-        Estimate::share(always.count(), self.questions.len())
+    let mut clusters = vec![Count::default(); grid.clusters];
+    for ((cluster, _), count) in questions {
+        let cluster = &mut clusters[cluster as usize];
+        cluster.replies += 1;
+        cluster.right += u32::from(count.right == count.replies);
     }
+    Estimate::clustered(&clusters)
 }
 
 fn guesses(questions: &[Offer]) -> Vec<Cell> {

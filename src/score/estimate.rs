@@ -2,13 +2,20 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::grid::Count;
+use super::student::student;
+
 /// The 97.5 % quantile of the standard normal distribution, for 95 % intervals.
 const Z: f64 = 1.959_963_984_540_054;
 
-/// A share between 0 and 1 with its 95 % interval.
+/// How alike the replies of one cluster are taken to be where all of them are right, or none, so that the records cannot
+/// say: an intraclass correlation that is high for questions about one frame, which keeps the interval honest.
+const UNKNOWN_CORRELATION: f64 = 0.2;
+
+/// A share, or a difference of shares, with its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
-    /// The share itself.
+    /// The number itself.
     pub value: f64,
     /// The lower end of the interval.
     pub low: f64,
@@ -19,33 +26,77 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// The share of `right` among `n` trials with Wilson's score interval; `None` of no trials.
-    ///
-    /// The interval takes the trials as independent (Wilson 1927, J. Am. Stat. Assoc. 22:209): questions about one
-    /// frame share its light, so the true uncertainty is somewhat larger.
+    /// The share of `right` among `n` independent trials with Wilson's score interval (Wilson 1927, J. Am. Stat. Assoc.
+    /// 22:209); `None` of no trials.
     #[must_use]
     pub fn share(right: usize, n: usize) -> Option<Self> {
-        Self::over(right, n, n)
-    }
-
-    /// The share of `right` among `n` replies to fewer questions, each asked several times: the interval is that of the
-    /// number of questions, since replies to one question say little more than one of them.
-    #[must_use]
-    pub fn over(right: usize, n: usize, questions: usize) -> Option<Self> {
-        if n == 0 || right > n || questions == 0 {
+        if n == 0 || right > n {
             return None;
         }
-        let (count, value) = (questions as f64, right as f64 / n as f64);
-        let scale = 1.0 + Z * Z / count;
-        let center = (value + Z * Z / (2.0 * count)) / scale;
-        let half =
-            Z / scale * (value * (1.0 - value) / count + Z * Z / (4.0 * count * count)).sqrt();
-        Some(Self {
+        let value = right as f64 / n as f64;
+        Some(Self::wilson(value, n as f64, Z, n))
+    }
+
+    /// The share of right replies in clusters; `None` of no replies.
+    ///
+    /// Wilson's interval at the effective number of replies n / d, where the design effect d ≥ 1 is the variance of the
+    /// share between clusters (linearised, times C / (C − 1) for C clusters) over that of independent replies, and with
+    /// Student's quantile of C − 1 degrees of freedom in place of the normal one (Dean and Pagano 2015, J. Surv. Stat.
+    /// Methodol. 3:484, find it the best of seven for clustered shares). With one reply a cluster it is Wilson's own. Where
+    /// all replies are right, or none, d is 1 + 0.2 (m − 1) for clusters of m replies (Kish 1965, section 5.4).
+    #[must_use]
+    pub fn clustered(counts: &[Count]) -> Option<Self> {
+        let there = counts.iter().filter(|count| count.replies > 0);
+        let n: usize = there.clone().map(|count| count.replies as usize).sum();
+        if there.clone().all(|count| count.replies == 1) || there.clone().count() == 1 {
+            return Self::share(there.map(|count| count.right as usize).sum(), n);
+        }
+        let sums = there.map(|count| (f64::from(count.right), f64::from(count.replies)));
+        Self::scored(&sums.collect::<Vec<_>>(), 1.0, n)
+    }
+
+    /// The same for scores between 0 and 1 in place of right and wrong: `sums` holds, for each cluster, the sum of its scores
+    /// and their number. Scores that are means of several replies may count for up to `most` independent replies each. `n` is
+    /// what the estimate is said to rest on.
+    #[must_use]
+    pub(super) fn scored(sums: &[(f64, f64)], most: f64, n: usize) -> Option<Self> {
+        let all: f64 = sums.iter().map(|(_, n)| n).sum();
+        if all <= 0.0 {
+            return None;
+        }
+        let c = sums.len() as f64;
+        let value = (sums.iter().map(|(sum, _)| sum).sum::<f64>() / all).clamp(0.0, 1.0);
+        let independent = value * (1.0 - value) / all;
+        let effect = if independent > 1e-12 && sums.len() > 1 {
+            let off = |(sum, n): &(f64, f64)| (sum - value * n) * (sum - value * n);
+            let between: f64 = sums.iter().map(off).sum();
+            c / (c - 1.0) * between / (all * all) / independent
+        } else {
+            let squares: f64 = sums.iter().map(|(_, n)| n * n).sum();
+            1.0 + UNKNOWN_CORRELATION * (squares / all - 1.0)
+        };
+        let effective = all / effect.max(1.0 / most);
+        // Where clusters spread no more than independent replies would, nothing was estimated that Student's quantile allows for.
+        let quantile = if sums.len() > 1 && effect > 1.0 {
+            student(sums.len() - 1)
+        } else {
+            Z
+        };
+        Some(Self::wilson(value, effective, quantile, n))
+    }
+
+    fn wilson(value: f64, count: f64, quantile: f64, n: usize) -> Self {
+        let square = quantile * quantile;
+        let scale = 1.0 + square / count;
+        let center = (value + square / (2.0 * count)) / scale;
+        let spread = value * (1.0 - value) / count + square / (4.0 * count * count);
+        let half = quantile / scale * spread.sqrt();
+        Self {
             value,
-            low: (center - half).max(0.0),
-            high: (center + half).min(1.0),
+            low: (center - half).clamp(0.0, value),
+            high: (center + half).clamp(value, 1.0),
             n,
-        })
+        }
     }
 
     /// A share that is known exactly.
@@ -80,13 +131,37 @@ mod tests {
             );
         }
         assert_eq!(Estimate::share(0, 0), None);
-        let (once, thrice) = (Estimate::share(15, 148), Estimate::over(45, 444, 148));
-        assert_eq!(
-            thrice,
-            once.map(|once| Estimate { n: 444, ..once }),
-            "the interval of the questions"
-        );
         let all = Estimate::share(7, 7).unwrap();
         assert!(all.high <= 1.0 && all.low < 1.0);
+    }
+
+    fn counts(pairs: &[(u32, u32)]) -> Vec<Count> {
+        let count = |&(right, replies)| Count { right, replies };
+        pairs.iter().map(count).collect()
+    }
+
+    #[test]
+    fn replies_that_go_together_count_for_fewer() {
+        let share = |pairs: &[(u32, u32)]| Estimate::clustered(&counts(pairs)).unwrap();
+        let width = |estimate: Estimate| estimate.high - estimate.low;
+        // Half of eighty: every cluster half right, or each all right or all wrong.
+        let (spread, clumped) = (
+            share(&[(2, 4); 20]),
+            share(&[[(4, 4); 10], [(0, 4); 10]].concat()),
+        );
+        assert_eq!((spread.value, spread.n), (0.5, 80));
+        let independent = Estimate::share(40, 80).unwrap();
+        assert!(width(spread) >= width(independent) && width(spread) < 1.1 * width(independent));
+        assert!(width(clumped) > 1.9 * width(independent));
+        // One reply a cluster is Wilson's own; empty clusters are none.
+        let single = [vec![(1, 1); 15], vec![(0, 1); 133], vec![(0, 0); 9]].concat();
+        assert_eq!(
+            Estimate::clustered(&counts(&single)),
+            Estimate::share(15, 148)
+        );
+        // Nothing went wrong: less sure than as many independent replies.
+        let (all, alone) = (share(&[(4, 4); 20]), Estimate::share(80, 80).unwrap());
+        assert!(all.low < alone.low && all.low > 0.85, "{all:?}");
+        assert_eq!(Estimate::clustered(&[]), None);
     }
 }

@@ -67,6 +67,9 @@ pub struct RunManifest {
     pub identity: BTreeMap<String, Value>,
     /// What does not: concurrency, timeouts.
     pub settings: BTreeMap<String, Value>,
+    /// The flags that decide the images, as they were said; empty in runs of versions that kept none.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub images: BTreeMap<String, Value>,
     /// How many trials.
     pub counts: Counts,
 }

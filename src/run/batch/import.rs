@@ -10,8 +10,7 @@ use crate::ask::Constrain;
 use crate::ask::batch::{BatchLine, unconstrained};
 use crate::config::{BatchImport, Show};
 use crate::error::{Error, Result};
-use crate::report::{files, table};
-use crate::run::report::{kept, summary, write};
+use crate::run::report::{kept, leave};
 use crate::run::{Verdict, count, record};
 use crate::store::{Moved, Store};
 use crate::types::manifest::{RunManifest, Status};
@@ -66,12 +65,10 @@ pub fn import(config: &BatchImport) -> Result<Verdict> {
     } else {
         Status::Incomplete
     };
-    let summary = summary(&records);
-    write(&store, &manifest, &summary)?;
-    let output = match config.show {
-        Show::Json => files::json(&summary, &manifest, Some(folder))?,
-        Show::Table => told(&tally, out.len()) + &table::render(&summary, &manifest, folder),
-    };
+    let mut output = leave(&store, &manifest, &records, config.show)?;
+    if config.show == Show::Table {
+        output.insert_str(0, &told(&tally, out.len()));
+    }
     Ok(Verdict {
         status: manifest.status,
         output,

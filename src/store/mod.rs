@@ -1,22 +1,30 @@
 //! Stage 6, KEEP: `results/<run>/`.
 //!
 //! `records.jsonl` is the truth: one line a trial, appended and handed to the operating system the moment a reply has
-//! arrived, so that a killed run loses nothing. `manifest.json` says what the run is; everything else is made again from
-//! these two.
+//! arrived, so that a killed run loses nothing. `manifest.json` says what the run is, `questions.jsonl` what it asks, and
+//! `thumbnails.jsonl` has small copies of the images it showed; everything else is made again from these.
+
+mod lines;
 
 use std::collections::{BTreeSet, HashMap};
 use std::ffi::OsStr;
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{BufRead, BufReader, Read, Seek, SeekFrom, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
 use crate::types::manifest::{RunManifest, SCHEMA};
-use crate::types::{Outcome, Record, TrialKey, Via};
+use crate::types::{Listed, Outcome, Record, Thumbnail, TrialKey, Via};
+
+use lines::{append, json_lines, lines, mend};
 
 const MANIFEST: &str = "manifest.json";
 const RECORDS: &str = "records.jsonl";
+/// The questions of a run, with their words and scenes.
+const QUESTIONS: &str = "questions.jsonl";
+/// Small copies of images that were sent.
+const THUMBNAILS: &str = "thumbnails.jsonl";
 /// The folder of batches in a run.
 pub const BATCH: &str = "batch";
 /// The trials that were sent in batches.
@@ -92,23 +100,26 @@ impl Store {
     /// Takes note that these trials are out in a batch.
     pub fn append_to_batch(&mut self, records: &[Record]) -> Result<()> {
         let path = self.folder.join(BATCH).join(TRIALS);
-        let mut lines = Vec::new();
-        for record in records {
-            serde_json::to_writer(&mut lines, record)
-                .map_err(|e| Error::file(&path, "write", e.into()))?;
-            lines.push(b'\n');
-        }
-        let file = OpenOptions::new()
-            .read(true)
-            .append(true)
-            .create(true)
-            .open(&path);
-        let written = file.and_then(|mut file| {
-            mend(&path, &file).map_err(std::io::Error::other)?;
-            file.write_all(&lines)?;
-            file.sync_all()
-        });
-        written.map_err(|e| Error::file(&path, "write", e))
+        append(&path, records)?
+            .sync_all()
+            .map_err(|e| Error::file(&path, "write", e))
+    }
+
+    /// Keeps a small copy of an image.
+    pub fn append_thumbnail(&mut self, thumbnail: &Thumbnail) -> Result<()> {
+        append(
+            &self.folder.join(THUMBNAILS),
+            std::slice::from_ref(thumbnail),
+        )
+        .map(drop)
+    }
+
+    /// Keeps the questions of the run.
+    pub fn write_questions(&self, questions: &[Listed]) -> Result<()> {
+        self.write(
+            QUESTIONS,
+            &json_lines(&self.folder.join(QUESTIONS), questions)?,
+        )
     }
 
     /// The trials that were sent in batches, as they were before anything came of them, each as often as it was sent.
@@ -122,7 +133,7 @@ impl Store {
         for record in self.batched()? {
             *out.entry(record.key).or_default() += 1;
         }
-        for record in lines(&self.folder.join(RECORDS))? {
+        for record in lines::<Record>(&self.folder.join(RECORDS))? {
             if record.outcome != Outcome::Failed {
                 out.remove(&record.key);
             } else if record.via == Via::Batch
@@ -176,14 +187,17 @@ impl Store {
     }
 }
 
+/// Writes a file into a folder, whole or not at all; one that already says this is left as it is.
 fn write(folder: &Path, name: &str, content: &[u8]) -> Result<()> {
     if fs::read(folder.join(name)).is_ok_and(|there| there == content) {
         return Ok(());
     }
-    let (path, unfinished) = (
-        folder.join(name),
-        folder.join(format!(".{name}{UNFINISHED}")),
-    );
+    let path = folder.join(name);
+    let own = path.file_name().unwrap_or_default().to_string_lossy();
+    let unfinished = path.with_file_name(format!(".{own}{UNFINISHED}"));
+    if let Some(parent) = path.parent() {
+        fs::create_dir_all(parent).map_err(|e| Error::file(parent, "create", e))?;
+    }
     let written = File::create(&unfinished).and_then(|mut file| {
         file.write_all(content)?;
         file.sync_all()
@@ -204,7 +218,7 @@ fn write_manifest(folder: &Path, manifest: &RunManifest) -> Result<()> {
 pub fn read_records(folder: &Path) -> Result<Vec<Record>> {
     let mut latest = HashMap::<TrialKey, usize>::new();
     let mut records: Vec<Record> = Vec::new();
-    for record in lines(&folder.join(RECORDS))? {
+    for record in lines::<Record>(&folder.join(RECORDS))? {
         if let Some(&index) = latest.get(&record.key) {
             records[index] = record;
         } else {
@@ -215,29 +229,14 @@ pub fn read_records(folder: &Path) -> Result<Vec<Record>> {
     Ok(records)
 }
 
-/// The whole lines of a file of records; none where there is no such file.
-fn lines(path: &Path) -> Result<Vec<Record>> {
-    let file = match File::open(path) {
-        Ok(file) => file,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
-        Err(e) => return Err(Error::file(path, "read", e)),
-    };
-    let mut records = Vec::new();
-    let mut file = BufReader::new(file);
-    let mut line = Vec::new();
-    for number in 1.. {
-        line.clear();
-        file.read_until(b'\n', &mut line)
-            .map_err(|e| Error::file(path, "read", e))?;
-        if line.pop() != Some(b'\n') {
-            break;
-        }
-        records.push(serde_json::from_slice(&line).map_err(|e| {
-            let problem = format!("not a record: {e}; restore the file, or use another --out");
-            Error::line(path, number, problem)
-        })?);
-    }
-    Ok(records)
+/// The questions of a run; none where it was made by a version that kept none.
+pub fn read_questions(folder: &Path) -> Result<Vec<Listed>> {
+    lines(&folder.join(QUESTIONS))
+}
+
+/// The small copies of images of a run; none where it kept none.
+pub fn read_thumbnails(folder: &Path) -> Result<Vec<Thumbnail>> {
+    lines(&folder.join(THUMBNAILS))
 }
 
 /// The newest run folder in `base` whose name ends in `-<hash>`.
@@ -331,34 +330,6 @@ fn claim(folder: &Path, manifest: &RunManifest) -> Result<()> {
     write_manifest(folder, manifest)
 }
 
-/// Cuts a torn last line off: what stands after the last line end.
-fn mend(path: &Path, mut file: &File) -> Result<()> {
-    const STEP: u64 = 64 * 1024;
-    let unread = |e| Error::file(path, "read", e);
-    let length = file.metadata().map_err(unread)?.len();
-    let (mut end, mut whole) = (length, 0);
-    while end > 0 && whole == 0 {
-        let start = end.saturating_sub(STEP);
-        let mut chunk = vec![0; (end - start) as usize];
-        file.seek(SeekFrom::Start(start)).map_err(unread)?;
-        file.read_exact(&mut chunk).map_err(unread)?;
-        whole = chunk
-            .iter()
-            .rposition(|&byte| byte == b'\n')
-            .map_or(0, |at| start + at as u64 + 1);
-        end = start;
-    }
-    if whole == length {
-        return Ok(());
-    }
-    tracing::warn!(
-        "{}: the last line was cut off while it was written; that trial is asked again",
-        path.display()
-    );
-    file.set_len(whole)
-        .map_err(|e| Error::file(path, "write", e))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -377,6 +348,7 @@ mod tests {
             platform: BTreeMap::new(),
             identity: BTreeMap::from([("--seed".to_owned(), seed.into())]),
             settings: BTreeMap::new(),
+            images: BTreeMap::new(),
             counts: Counts::default(),
         }
     }

@@ -1,0 +1,382 @@
+//! Lines over darkness, panel by panel, as SVG: [`Chart`].
+//!
+//! Lines differ by colour (Okabe and Ito 2008, which people of any colour vision tell apart), by dash and by mark, so that
+//! they are told apart without colour, too. What is drawn in [`INK`], [`GRID`] and [`PAPER`] a page may draw in the colours
+//! of its own theme.
+
+use plotters::coord::Shift;
+use plotters::element::DashedPathElement;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+use crate::error::{Error, Result};
+use crate::score::estimate::Estimate;
+use crate::types::Level;
+
+/// Axes and words.
+const INK: RGBColor = RGBColor(34, 34, 34);
+/// Lines that help the eye.
+const GRID: RGBColor = RGBColor(221, 221, 221);
+/// The ground.
+const PAPER: RGBColor = RGBColor(255, 255, 255);
+
+/// Okabe and Ito's colours but for yellow, which is faint on white.
+const COLOURS: [RGBColor; 7] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+    RGBColor(110, 110, 110),
+];
+
+/// Lengths of dash and gap in pixels; the first is drawn through.
+const DASHES: [(i32, i32); 4] = [(0, 0), (9, 5), (2, 4), (14, 4)];
+
+/// The size of a panel in pixels, with its words.
+const PANEL: (i32, i32) = (400, 300);
+/// The space of a panel about its axes: left, top, right, bottom.
+const MARGIN: [i32; 4] = [52, 34, 14, 58];
+/// The height of a line of words.
+const ROW: i32 = 20;
+
+/// How a line looks: the same number is the same look in every figure of a report.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Look(pub usize);
+
+impl Look {
+    fn colour(self) -> RGBColor {
+        COLOURS[self.0 % COLOURS.len()]
+    }
+
+    fn dash(self) -> (i32, i32) {
+        DASHES[(self.0 + self.0 / COLOURS.len()) % DASHES.len()]
+    }
+}
+
+/// What stands in a panel.
+#[derive(Debug, Clone)]
+pub enum Shape {
+    /// Points over exposure drops, with the band of their intervals.
+    Curve(Vec<(Level, Estimate)>),
+    /// A level that holds in whatever light.
+    Flat(f64),
+}
+
+/// One line of a panel.
+#[derive(Debug, Clone)]
+pub struct Line {
+    /// What the legend calls it; lines of one name are one entry.
+    pub name: String,
+    /// How it looks.
+    pub look: Look,
+    /// Where it runs.
+    pub shape: Shape,
+}
+
+/// One panel.
+#[derive(Debug, Clone)]
+pub struct Panel {
+    /// What it shows, with its n.
+    pub title: String,
+    /// Its lines.
+    pub lines: Vec<Line>,
+}
+
+/// A figure of panels with one legend.
+#[derive(Debug, Clone)]
+pub struct Chart {
+    /// What is on the vertical axis, with its unit.
+    pub measure: &'static str,
+    /// The panels, row by row.
+    pub panels: Vec<Panel>,
+    /// How many stand in a row.
+    pub columns: usize,
+    /// What holds for all of it.
+    pub note: String,
+}
+
+type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+
+impl Chart {
+    /// Draws the figure.
+    ///
+    /// # Errors
+    /// Where it cannot be drawn.
+    pub fn svg(&self) -> Result<String> {
+        let columns = self.columns.clamp(1, self.panels.len().max(1));
+        let rows = self.panels.len().div_ceil(columns) as i32;
+        let width = columns as i32 * PANEL.0;
+        let legend = self.legend(width);
+        let below = legend.last().map_or(0, |(_, (_, y))| y + ROW) + ROW + 8;
+        let size = (width as u32, (rows * PANEL.1 + below) as u32);
+        let mut svg = String::new();
+        let drawn = {
+            let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
+            self.draw(&root, columns, rows, &legend)
+        };
+        drawn.map_err(|e| Error::data("figure", e))?;
+        Ok(svg)
+    }
+
+    /// The first line of each name, and where it stands below the panels.
+    fn legend(&self, width: i32) -> Vec<(&Line, (i32, i32))> {
+        let mut entries: Vec<(&Line, (i32, i32))> = Vec::new();
+        let (mut x, mut y) = (12, 4);
+        for line in self.panels.iter().flat_map(|panel| &panel.lines) {
+            if entries.iter().any(|(entry, _)| entry.name == line.name) {
+                continue;
+            }
+            let length = 62 + 7 * line.name.chars().count() as i32;
+            if x > 12 && x + length > width {
+                (x, y) = (12, y + ROW);
+            }
+            entries.push((line, (x, y)));
+            x += length;
+        }
+        entries
+    }
+
+    fn draw(
+        &self,
+        root: &Area<'_>,
+        columns: usize,
+        rows: i32,
+        legend: &[(&Line, (i32, i32))],
+    ) -> Result<(), String> {
+        let failed = |e: DrawingAreaErrorKind<_>| e.to_string();
+        root.fill(&PAPER).map_err(failed)?;
+        for (index, panel) in self.panels.iter().enumerate() {
+            let corner = (
+                (index % columns) as i32 * PANEL.0,
+                (index / columns) as i32 * PANEL.1,
+            );
+            let frame = Frame::new(corner, panel);
+            frame.axes(root, panel, self.measure)?;
+            for line in &panel.lines {
+                frame.line(root, line)?;
+            }
+        }
+        let top = rows * PANEL.1;
+        for (line, (x, y)) in legend {
+            let (x, y) = (*x, top + *y + ROW / 2);
+            stroke(root, line.look, flat(&line.shape), &[(x, y), (x + 34, y)])?;
+            if matches!(line.shape, Shape::Curve(_)) {
+                mark(root, line.look, (x + 17, y))?;
+            }
+            words(
+                root,
+                &line.name,
+                (x + 42, y),
+                13,
+                (HPos::Left, VPos::Center),
+            )?;
+        }
+        let last = legend.last().map_or(top, |(_, (_, y))| top + y + ROW);
+        words(
+            root,
+            &self.note,
+            (12, last + 12),
+            12,
+            (HPos::Left, VPos::Center),
+        )?;
+        root.present().map_err(failed)
+    }
+}
+
+fn flat(shape: &Shape) -> bool {
+    matches!(shape, Shape::Flat(_))
+}
+
+/// Where a panel's axes are.
+struct Frame {
+    left: i32,
+    top: i32,
+    width: i32,
+    height: i32,
+    levels: Vec<Level>,
+}
+
+impl Frame {
+    fn new((x, y): (i32, i32), panel: &Panel) -> Self {
+        let mut levels: Vec<Level> = panel
+            .lines
+            .iter()
+            .flat_map(|line| match &line.shape {
+                Shape::Curve(points) => points.iter().map(|(level, _)| *level).collect(),
+                Shape::Flat(_) => Vec::new(),
+            })
+            .collect();
+        levels.sort_unstable();
+        levels.dedup();
+        Self {
+            left: x + MARGIN[0],
+            top: y + MARGIN[1],
+            width: PANEL.0 - MARGIN[0] - MARGIN[2],
+            height: PANEL.1 - MARGIN[1] - MARGIN[3],
+            levels,
+        }
+    }
+
+    /// Drops are drawn to scale: the step from L3 to L4 is 1.5 EV and looks it.
+    fn x(&self, level: Level) -> i32 {
+        let darkest = self.levels.last().copied().unwrap_or(Level::L5);
+        let (drop, most) = (level.exposure_drop().0, darkest.exposure_drop().0);
+        let share = if most > 0.0 { drop / most } else { 0.5 };
+        self.left + 10 + ((self.width - 20) as f32 * share).round() as i32
+    }
+
+    fn y(&self, share: f64) -> i32 {
+        self.top + self.height - (f64::from(self.height) * share.clamp(0.0, 1.0)).round() as i32
+    }
+
+    fn axes(&self, root: &Area<'_>, panel: &Panel, measure: &str) -> Result<(), String> {
+        let right = self.left + self.width;
+        for step in 0..=5 {
+            let share = f64::from(step) / 5.0;
+            let y = self.y(share);
+            path(root, &[(self.left, y), (right, y)], GRID.stroke_width(1))?;
+            let label = (step * 20).to_string();
+            words(
+                root,
+                &label,
+                (self.left - 6, y),
+                12,
+                (HPos::Right, VPos::Center),
+            )?;
+        }
+        let bottom = self.top + self.height;
+        path(
+            root,
+            &[(self.left, bottom), (right, bottom)],
+            INK.stroke_width(1),
+        )?;
+        for level in &self.levels {
+            let x = self.x(*level);
+            path(root, &[(x, bottom), (x, bottom + 4)], INK.stroke_width(1))?;
+            let drop = level.exposure_drop().0;
+            words(
+                root,
+                &level.to_string(),
+                (x, bottom + 7),
+                12,
+                (HPos::Center, VPos::Top),
+            )?;
+            words(
+                root,
+                &drop.to_string(),
+                (x, bottom + 22),
+                11,
+                (HPos::Center, VPos::Top),
+            )?;
+        }
+        let middle = self.left + self.width / 2;
+        words(
+            root,
+            "level; exposure drop in EV",
+            (middle, bottom + 38),
+            12,
+            (HPos::Center, VPos::Top),
+        )?;
+        words(
+            root,
+            &panel.title,
+            (self.left - 40, self.top - 26),
+            14,
+            (HPos::Left, VPos::Top),
+        )?;
+        let turned = style(12, (HPos::Center, VPos::Top)).transform(FontTransform::Rotate270);
+        let place = (self.left - 48, self.top + self.height / 2);
+        root.draw(&Text::new(measure.to_owned(), place, turned))
+            .map_err(|e| e.to_string())
+    }
+
+    fn line(&self, root: &Area<'_>, line: &Line) -> Result<(), String> {
+        let points = match &line.shape {
+            Shape::Flat(share) => {
+                let y = self.y(*share);
+                let ends = [(self.left, y), (self.left + self.width, y)];
+                return stroke(root, line.look, true, &ends);
+            }
+            Shape::Curve(points) => points,
+        };
+        let upper = points
+            .iter()
+            .map(|(level, at)| (self.x(*level), self.y(at.high)));
+        let lower = points
+            .iter()
+            .rev()
+            .map(|(level, at)| (self.x(*level), self.y(at.low)));
+        let band: Vec<(i32, i32)> = upper.chain(lower).collect();
+        root.draw(&Polygon::new(band, line.look.colour().mix(0.14)))
+            .map_err(|e| e.to_string())?;
+        let middle = points
+            .iter()
+            .map(|(level, at)| (self.x(*level), self.y(at.value)));
+        let middle: Vec<(i32, i32)> = middle.collect();
+        stroke(root, line.look, false, &middle)?;
+        middle
+            .into_iter()
+            .try_for_each(|place| mark(root, line.look, place))
+    }
+}
+
+fn path(root: &Area<'_>, points: &[(i32, i32)], style: ShapeStyle) -> Result<(), String> {
+    root.draw(&PathElement::new(points.to_vec(), style))
+        .map_err(|e| e.to_string())
+}
+
+/// A line in its look; a flat one is thinner, and always broken.
+fn stroke(root: &Area<'_>, look: Look, flat: bool, points: &[(i32, i32)]) -> Result<(), String> {
+    let style = look.colour().stroke_width(if flat { 1 } else { 2 });
+    let dash = match look.dash() {
+        (0, _) if flat => (6, 4),
+        dash => dash,
+    };
+    if dash.0 == 0 {
+        return path(root, points, style);
+    }
+    root.draw(&DashedPathElement::new(
+        points.to_vec(),
+        dash.0,
+        dash.1,
+        style,
+    ))
+    .map_err(|e| e.to_string())
+}
+
+/// The mark of a look at a place.
+fn mark(root: &Area<'_>, look: Look, (x, y): (i32, i32)) -> Result<(), String> {
+    let (fill, open) = (look.colour().filled(), look.colour().stroke_width(2));
+    let drawn = match look.0 % 6 {
+        0 => root.draw(&Circle::new((x, y), 4, fill)),
+        1 => root.draw(&Rectangle::new([(x - 4, y - 4), (x + 4, y + 4)], fill)),
+        2 => root.draw(&TriangleMarker::new((x, y), 5, fill)),
+        3 => {
+            let corners = vec![(x, y - 5), (x + 5, y), (x, y + 5), (x - 5, y)];
+            root.draw(&Polygon::new(corners, look.colour()))
+        }
+        4 => root.draw(&Cross::new((x, y), 4, open)),
+        _ => root.draw(&Circle::new((x, y), 4, open)),
+    };
+    drawn.map_err(|e| e.to_string())
+}
+
+fn style(size: u32, (across, down): (HPos, VPos)) -> TextStyle<'static> {
+    let font = ("sans-serif", size).into_font();
+    TextStyle::from(font)
+        .color(&INK)
+        .pos(Pos::new(across, down))
+}
+
+fn words(
+    root: &Area<'_>,
+    text: &str,
+    place: (i32, i32),
+    size: u32,
+    anchor: (HPos, VPos),
+) -> Result<(), String> {
+    root.draw(&Text::new(text.to_owned(), place, style(size, anchor)))
+        .map_err(|e| e.to_string())
+}

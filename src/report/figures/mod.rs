@@ -1,0 +1,320 @@
+//! The paper's figures, and more: each a function from [`Findings`] to a [`Chart`].
+
+mod answers;
+mod thresholds;
+
+use std::collections::BTreeSet;
+
+use super::chart::{Chart, Line, Look, Panel, Shape};
+use super::subject::{family as family_name, light};
+use crate::error::Result;
+use crate::score::accuracy::{CHANCE, Subject};
+use crate::score::choice::Mode;
+use crate::score::estimate::Estimate;
+use crate::score::findings::Findings;
+use crate::types::{EnhancerName, Family, Level, Variant, View};
+
+/// One figure of a report.
+#[derive(Debug, Clone)]
+pub struct Figure {
+    /// Its name in files.
+    pub name: &'static str,
+    /// What it shows.
+    pub caption: String,
+    /// The drawing.
+    pub svg: String,
+}
+
+/// All figures that the records have something for.
+///
+/// # Errors
+/// Where one cannot be drawn.
+pub fn figures(findings: &Findings<'_>) -> Result<Vec<Figure>> {
+    let view = Overview::new(findings);
+    let charts = [
+        ("accuracy", view.accuracy()),
+        ("variants", view.variants()),
+        ("enhancers", view.enhancers()),
+        ("families", view.families()),
+        ("hallucination", view.hallucination()),
+        ("collapse", view.collapse()),
+    ];
+    let mut figures = Vec::new();
+    for (name, chart) in charts {
+        let Some((caption, chart)) = chart else {
+            continue;
+        };
+        let svg = chart.svg()?;
+        figures.push(Figure { name, caption, svg });
+    }
+    figures.extend(thresholds::figure(findings)?);
+    Ok(figures)
+}
+
+const ACCURACY: &str = "accuracy in %";
+
+/// What the figures are drawn from.
+struct Overview<'a> {
+    findings: &'a Findings<'a>,
+    /// Models that see, in order; each has the look of its place.
+    models: Vec<&'a str>,
+    enhancers: Vec<&'a EnhancerName>,
+}
+
+impl<'a> Overview<'a> {
+    fn new(findings: &'a Findings<'a>) -> Self {
+        let subjects = &findings.grid.subjects;
+        let seeing = subjects.iter().filter(|s| s.view == Some(View::Image));
+        let models: BTreeSet<&str> = seeing.map(|subject| &*subject.model).collect();
+        let enhancers: BTreeSet<&EnhancerName> = subjects
+            .iter()
+            .filter_map(|s| s.enhancer.as_ref())
+            .collect();
+        Self {
+            findings,
+            models: models.into_iter().collect(),
+            enhancers: enhancers.into_iter().collect(),
+        }
+    }
+
+    fn estimate(&self, subject: &Subject, family: Option<&Family>) -> Option<Estimate> {
+        let mut cells = self.findings.summary.cells.iter();
+        let cell = cells.find(|cell| {
+            cell.mode == Mode::Strict && cell.family.as_ref() == family && cell.subject == *subject
+        });
+        cell?.accuracy
+    }
+
+    /// The accuracy of a model over the levels, in one variant, raw or enhanced; L0 is the untouched frame.
+    fn points(
+        &self,
+        model: &str,
+        variant: Variant,
+        enhancer: Option<&EnhancerName>,
+        family: Option<&Family>,
+    ) -> Vec<(Level, Estimate)> {
+        let at = |level: Level| {
+            let light = level == Level::L0;
+            let subject = Subject {
+                model: model.to_owned(),
+                view: Some(View::Image),
+                level: Some(level),
+                variant: if light { Variant::None } else { variant },
+                enhancer: enhancer.filter(|_| !light).cloned(),
+            };
+            Some((level, self.estimate(&subject, family)?))
+        };
+        Level::ALL.into_iter().filter_map(at).collect()
+    }
+
+    /// The blind lines, each in the look of its model, and chance.
+    fn floors(&self, family: Option<&Family>) -> Vec<Line> {
+        let cells = self.findings.summary.cells.iter();
+        let here = cells.filter(|cell| {
+            cell.mode == Mode::Strict
+                && cell.family.as_ref() == family
+                && cell.subject.view != Some(View::Image)
+        });
+        let lines = here.filter_map(|cell| {
+            let model = &*cell.subject.model;
+            let (name, look) = if cell.subject.view.is_none() {
+                (CHANCE.to_owned(), Look(27))
+            } else {
+                (format!("{model} without images"), self.look(model))
+            };
+            let shape = Shape::Flat(cell.accuracy?.value);
+            Some(Line { name, look, shape })
+        });
+        lines.collect()
+    }
+
+    fn look(&self, model: &str) -> Look {
+        let place = self.models.iter().position(|known| *known == model);
+        Look(place.unwrap_or(self.models.len()))
+    }
+
+    /// The darkened variants that were asked, the noisy one first where only one is drawn.
+    fn variants_there(&self) -> Vec<Variant> {
+        [Variant::Ev, Variant::Noise]
+            .into_iter()
+            .filter(|variant| {
+                let mut subjects = self.findings.grid.subjects.iter();
+                subjects.any(|subject| subject.variant == *variant)
+            })
+            .collect()
+    }
+
+    /// The lines of all models in one variant.
+    fn lines(&self, variant: Variant, family: Option<&Family>) -> Vec<Line> {
+        let line = |model: &&str| Line {
+            name: (*model).to_owned(),
+            look: self.look(model),
+            shape: Shape::Curve(self.points(model, variant, None, family)),
+        };
+        self.models.iter().map(line).collect()
+    }
+
+    /// How the intervals were made, and on how many questions.
+    fn note(&self) -> String {
+        let (grid, unit) = (&self.findings.grid, self.findings.unit);
+        format!(
+            "n = {} questions in {} {unit}s; bands are 95 % intervals by {unit}; strict reading",
+            grid.items.len(),
+            grid.clusters
+        )
+    }
+
+    fn n(&self, family: Option<&Family>) -> usize {
+        let items = self.findings.grid.items.iter();
+        items.filter(|item| item.is_of(family)).count()
+    }
+
+    fn accuracy(&self) -> Option<(String, Chart)> {
+        let variants = self.variants_there();
+        let panels = variants.iter().map(|variant| {
+            let mut lines = self.lines(*variant, None);
+            lines.extend(self.floors(None));
+            Panel {
+                title: format!("{}, n {}", light(*variant, None), self.n(None)),
+                lines,
+            }
+        });
+        let panels: Vec<Panel> = panels.collect();
+        let caption = "Accuracy of each model by level, without enhancement. Broken lines: without images, and chance.";
+        self.chart(ACCURACY, panels, 2, caption)
+    }
+
+    /// The mean over models of each variant, with the range of the models.
+    fn variants(&self) -> Option<(String, Chart)> {
+        let variants = self.variants_there();
+        if variants.len() < 2 {
+            return None;
+        }
+        let line = |(index, variant): (usize, &Variant)| {
+            let curves = self.models.iter();
+            let curves: Vec<Vec<(Level, Estimate)>> = curves
+                .map(|model| self.points(model, *variant, None, None))
+                .collect();
+            Line {
+                name: light(*variant, None),
+                look: Look(index),
+                shape: Shape::Curve(mean(&curves)),
+            }
+        };
+        let mut lines: Vec<Line> = variants.iter().enumerate().map(line).collect();
+        let floors = self.floors(None).into_iter();
+        lines.extend(floors.filter(|line| line.name == CHANCE));
+        let models = self.models.len();
+        let title = if models == 1 {
+            format!("{}, n {}", self.models[0], self.n(None))
+        } else {
+            format!("mean of {models} models, n {} each", self.n(None))
+        };
+        let (caption, mut chart) = self.chart(
+            ACCURACY,
+            vec![Panel { title, lines }],
+            1,
+            "Exposure drop alone against exposure drop with sensor noise.",
+        )?;
+        if models > 1 {
+            chart.note = format!(
+                "bands are the range of the {models} models, not intervals; strict reading"
+            );
+        }
+        Some((caption, chart))
+    }
+
+    fn enhancers(&self) -> Option<(String, Chart)> {
+        let mut panels = Vec::new();
+        for variant in self.variants_there() {
+            for model in &self.models {
+                let line = |(index, enhancer): (usize, Option<&EnhancerName>)| {
+                    let points = self.points(model, variant, enhancer, None);
+                    // L0 alone is no line of an enhancer's.
+                    (points.len() > 1).then(|| Line {
+                        name: enhancer.map_or("raw".to_owned(), ToString::to_string),
+                        look: Look(index),
+                        shape: Shape::Curve(points),
+                    })
+                };
+                let all = std::iter::once(None).chain(self.enhancers.iter().copied().map(Some));
+                let lines: Vec<Line> = all.enumerate().filter_map(line).collect();
+                if lines.len() > 1 {
+                    let title = format!("{model}, {}, n {}", light(variant, None), self.n(None));
+                    panels.push(Panel { title, lines });
+                }
+            }
+        }
+        self.chart(
+            ACCURACY,
+            panels,
+            2,
+            "Each enhancer against the raw dark images, by level. L0 is the untouched frame.",
+        )
+    }
+
+    fn families(&self) -> Option<(String, Chart)> {
+        let variant = *self.variants_there().last()?;
+        let families = self.findings.grid.families();
+        let panels = families.into_iter().map(|family| {
+            let mut lines = self.lines(variant, Some(family));
+            lines.extend(self.floors(Some(family)));
+            let n = self.n(Some(family));
+            Panel {
+                title: format!("{}, n {n}", family_name(Some(family))),
+                lines,
+            }
+        });
+        let panels: Vec<Panel> = panels.collect();
+        let caption = format!(
+            "Accuracy by family, {}. Broken lines: without images, and chance.",
+            light(variant, None)
+        );
+        self.chart(ACCURACY, panels, 3, &caption)
+    }
+
+    /// A chart of panels of which some have lines.
+    fn chart(
+        &self,
+        measure: &'static str,
+        panels: Vec<Panel>,
+        columns: usize,
+        caption: &str,
+    ) -> Option<(String, Chart)> {
+        if panels.is_empty() || self.models.is_empty() {
+            return None;
+        }
+        let chart = Chart {
+            measure,
+            panels,
+            columns,
+            note: self.note(),
+        };
+        Some((caption.to_owned(), chart))
+    }
+}
+
+/// The mean of curves at the levels that all of them have, with their range; of one alone itself.
+fn mean(curves: &[Vec<(Level, Estimate)>]) -> Vec<(Level, Estimate)> {
+    if let [one] = curves {
+        return one.clone();
+    }
+    let at = |level: Level| {
+        let values: Option<Vec<f64>> = curves
+            .iter()
+            .map(|curve| {
+                let point = curve.iter().find(|(there, _)| *there == level);
+                point.map(|(_, estimate)| estimate.value)
+            })
+            .collect();
+        let values = values.filter(|values| !values.is_empty())?;
+        let estimate = Estimate {
+            value: values.iter().sum::<f64>() / values.len() as f64,
+            low: values.iter().copied().fold(f64::INFINITY, f64::min),
+            high: values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+            n: values.len(),
+        };
+        Some((level, estimate))
+    };
+    Level::ALL.into_iter().filter_map(at).collect()
+}

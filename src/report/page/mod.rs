@@ -1,0 +1,223 @@
+//! The one HTML file that people open first: [`page`].
+//!
+//! All numbers and figures are in it as text and SVG, so that it reads and prints without a script; the items, with their
+//! small images, are packed data that its script unfolds. It opens without a network, and its policy allows none.
+
+mod items;
+mod samples;
+mod sections;
+mod tables;
+
+use minijinja::value::Serde;
+use minijinja::{AutoEscape, Environment};
+use serde::Serialize;
+
+use super::figures::Figure;
+use crate::error::{Error, Result};
+use crate::score::findings::Findings;
+use crate::types::manifest::{RunManifest, Status};
+use crate::types::{Listed, Record, Thumbnail};
+
+/// The parts of the page.
+const PAGE: &str = include_str!("page.html");
+const STYLE: &str = include_str!("page.css");
+const SCRIPT: &str = include_str!("page.js");
+
+/// A run on the page.
+#[derive(Debug, Clone)]
+pub struct Run<'a> {
+    /// What it is called: its folder.
+    pub name: String,
+    /// Its manifest.
+    pub manifest: &'a RunManifest,
+    /// Its records, for what they took.
+    pub records: &'a [Record],
+}
+
+/// What is shown besides the findings.
+#[derive(Debug)]
+pub struct Shown<'a> {
+    /// The runs.
+    pub runs: Vec<Run<'a>>,
+    /// The questions, where they are kept.
+    pub questions: &'a [&'a Listed],
+    /// The small copies of images, where they are kept.
+    pub thumbnails: &'a [Thumbnail],
+}
+
+/// What the template is filled with.
+#[derive(Serialize)]
+struct Page {
+    title: String,
+    /// What must be read before any number.
+    alerts: Vec<String>,
+    intro: Vec<String>,
+    sections: Vec<sections::Section>,
+    runs: Vec<Facts>,
+    /// The items, packed.
+    data: String,
+    css: &'static str,
+    script: &'static str,
+}
+
+/// A run's facts, as rows of names and values.
+#[derive(Serialize)]
+struct Facts {
+    name: String,
+    rows: Vec<(String, String)>,
+}
+
+/// The page.
+///
+/// # Errors
+/// Where a figure cannot be drawn.
+pub fn page<'a>(
+    findings: &'a Findings<'a>,
+    figures: &[Figure],
+    shown: &Shown<'a>,
+) -> Result<String> {
+    let failed = |e: &dyn std::fmt::Display| Error::data("report.html", e);
+    let mut environment = Environment::new();
+    environment.set_auto_escape_callback(|_| AutoEscape::Html);
+    environment
+        .add_template("page", PAGE)
+        .map_err(|e| failed(&e))?;
+    let template = environment.get_template("page").map_err(|e| failed(&e))?;
+    let sections = sections::sections(findings, figures, shown.thumbnails);
+    let page = template.render(Serde(Page {
+        title: title(shown),
+        alerts: alerts(shown),
+        intro: intro(findings),
+        sections,
+        runs: shown.runs.iter().map(facts).collect(),
+        data: items::packed(findings, shown)?,
+        css: STYLE,
+        script: SCRIPT,
+    }));
+    page.map_err(|e| failed(&e))
+}
+
+fn title(shown: &Shown<'_>) -> String {
+    match &*shown.runs {
+        [one] => format!("Seeing in the dark: {}", one.name),
+        several => format!("Seeing in the dark: {} runs compared", several.len()),
+    }
+}
+
+/// What must be read before any number: which run is not whole.
+fn alerts(shown: &Shown<'_>) -> Vec<String> {
+    let broken = shown
+        .runs
+        .iter()
+        .filter(|run| run.manifest.status != Status::Complete || run.manifest.counts.failed > 0);
+    let told = broken.map(|run| {
+        let (status, counts) = (run.manifest.status, run.manifest.counts);
+        format!(
+            "{}: {status}; {} of {} trials answered, {} failed. Failed trials are not scored; the same command asks them again.",
+            run.name, counts.answered, counts.trials, counts.failed
+        )
+    });
+    told.collect()
+}
+
+fn intro(findings: &Findings<'_>) -> Vec<String> {
+    let (grid, unit) = (&findings.grid, findings.unit);
+    let frames: std::collections::BTreeSet<_> =
+        grid.items.iter().map(|item| &item.record.frame).collect();
+    vec![format!(
+        "{} items about {} frames, {} subjects (model × condition). Strict reading. Intervals are 95 %, by {unit} \
+         ({} clusters); differences are paired by item, tested by swapping whole {unit}s, and corrected by Holm over each table; \
+         “tied” says that nothing is shown, not that there is nothing.",
+        grid.items.len(),
+        frames.len(),
+        grid.subjects.len(),
+        grid.clusters
+    )]
+}
+
+fn facts(run: &Run<'_>) -> Facts {
+    let manifest = run.manifest;
+    let fact = |name: &str, value: String| (name.to_owned(), value);
+    let mut rows = vec![
+        fact("status", manifest.status.to_string()),
+        fact("made by", format!("darkqa-eval {}", manifest.version)),
+        fact("created", manifest.created.clone()),
+        fact("updated", manifest.updated.clone()),
+    ];
+    rows.extend(spent(run.records));
+    let texts = |map: &std::collections::BTreeMap<String, serde_json::Value>| {
+        let rows = map.iter().map(|(name, value)| match value {
+            serde_json::Value::String(text) => (name.clone(), text.clone()),
+            other => (name.clone(), other.to_string()),
+        });
+        rows.collect::<Vec<_>>()
+    };
+    rows.extend(
+        manifest
+            .platform
+            .iter()
+            .map(|(name, value)| (name.clone(), value.clone())),
+    );
+    rows.extend(texts(&manifest.identity));
+    rows.extend(texts(&manifest.settings));
+    Facts {
+        name: run.name.clone(),
+        rows,
+    }
+}
+
+/// What the replies took: requests, tokens, bytes, time, and who answered.
+fn spent(records: &[Record]) -> Vec<(String, String)> {
+    let requests: u64 = records
+        .iter()
+        .map(|record| u64::from(record.attempts))
+        .sum();
+    let tokens = |of: fn(&crate::types::Usage) -> Option<u64>| -> u64 {
+        let usages = records.iter().filter_map(|record| record.usage.as_ref());
+        usages.filter_map(of).sum()
+    };
+    let bytes: u64 = records
+        .iter()
+        .filter_map(|record| record.image.as_ref())
+        .map(|image| image.bytes as u64)
+        .sum();
+    let mut waits: Vec<u64> = records
+        .iter()
+        .filter_map(|record| record.latency_ms)
+        .collect();
+    waits.sort_unstable();
+    let served: std::collections::BTreeSet<&str> = records
+        .iter()
+        .filter_map(|record| record.served_model.as_deref())
+        .collect();
+    let at = |share: f64| {
+        let last = waits.len().saturating_sub(1) as f64;
+        waits
+            .get((last * share).round() as usize)
+            .map_or("–".to_owned(), |ms| format!("{ms} ms"))
+    };
+    let row = |name: &str, value: String| (name.to_owned(), value);
+    vec![
+        row(
+            "requests",
+            format!("{requests} for {} trials", records.len()),
+        ),
+        row(
+            "tokens",
+            format!(
+                "{} of prompts, {} of replies",
+                tokens(|usage| usage.prompt_tokens),
+                tokens(|usage| usage.completion_tokens)
+            ),
+        ),
+        row("image bytes", format!("{bytes}")),
+        row(
+            "latency",
+            format!("median {}, 95 % within {}", at(0.5), at(0.95)),
+        ),
+        row(
+            "served as",
+            served.into_iter().collect::<Vec<_>>().join(", "),
+        ),
+    ]
+}

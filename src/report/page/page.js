@@ -1,0 +1,362 @@
+"use strict";
+document.documentElement.classList.add("scripted");
+
+const $ = (id) => document.getElementById(id);
+const make = (tag, text, className) => {
+  const element = document.createElement(tag);
+  if (text !== undefined) element.textContent = text;
+  if (className) element.className = className;
+  return element;
+};
+
+// Theme: the system's until a person chooses.
+const theme = () => {
+  const root = document.documentElement;
+  const system = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";
+  const now = root.dataset.theme || system;
+  root.dataset.theme = now === "dark" ? "light" : "dark";
+};
+$("theme").addEventListener("click", theme);
+
+// What a reply hides: controls that turn the direction of text or show nothing are written out.
+const HIDDEN = /[\u0000-\u0008\u000b-\u001f\u007f-\u009f\u00ad\u061c\u115f\u180e\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb]/g;
+const reveal = (element, text) => {
+  element.replaceChildren();
+  let last = 0;
+  for (const found of text.matchAll(HIDDEN)) {
+    element.append(text.slice(last, found.index));
+    const code = found[0].codePointAt(0).toString(16).toUpperCase().padStart(4, "0");
+    element.append(make("span", "⟨U+" + code + "⟩", "hidden-sign"));
+    last = found.index + found[0].length;
+  }
+  element.append(text.slice(last));
+};
+const plain = (text) => text.replace(HIDDEN, "");
+
+const UNREAD = 26, FAILED = 27, ABSENT = 28;
+const letter = (index) => String.fromCharCode(65 + index);
+
+let data, state, shown = [];
+const ROWS = 300;
+
+const unpack = async () => {
+  const binary = atob($("data").textContent.trim());
+  const bytes = Uint8Array.from(binary, (c) => c.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return JSON.parse(await new Response(stream).text());
+};
+
+// What a subject made of an item.
+const chosen = (subject, item) => data.strict[subject][item];
+const isRight = (subject, item) => chosen(subject, item) === data.items[item].truth;
+const mark = (subject, item) => {
+  const code = chosen(subject, item);
+  if (code === ABSENT) return ["", "m-none", "not asked"];
+  if (code === FAILED) return ["!", "m-odd", "no reply"];
+  if (code === UNREAD) return ["?", "m-odd", "not readable"];
+  return isRight(subject, item) ? ["✓ " + letter(code), "m-right", "right"] : ["✗ " + letter(code), "m-wrong", "wrong"];
+};
+const find = (model, light, level) =>
+  data.subjects.findIndex((s) => s.model === model && s.light === light && s.level === level);
+// L0 is the untouched frame of every light; a blind model has one condition alone.
+const at = (model, light, level) => {
+  const there = find(model, light, level);
+  return there >= 0 || level !== "L0" ? there : find(model, "untouched", "L0");
+};
+const raw = (subject) => {
+  const s = data.subjects[subject];
+  return data.subjects.findIndex((o) => o.model === s.model && o.level === s.level && o.variant === s.variant && o.enhancer === null && o.light !== "blind");
+};
+
+const STATES = {
+  "all": () => true,
+  "right": (s, i) => isRight(s, i),
+  "wrong": (s, i) => chosen(s, i) < UNREAD && !isRight(s, i),
+  "not readable": (s, i) => chosen(s, i) === UNREAD,
+  "no reply": (s, i) => chosen(s, i) === FAILED,
+  "lost since L0": (s, i) => { const l = at(data.subjects[s].model, "untouched", "L0"); return l >= 0 && isRight(l, i) && chosen(s, i) < FAILED && !isRight(s, i); },
+  "found since L0": (s, i) => { const l = at(data.subjects[s].model, "untouched", "L0"); return l >= 0 && chosen(l, i) < FAILED && !isRight(l, i) && isRight(s, i); },
+  "rescued by the enhancer": (s, i) => { const r = raw(s); return r >= 0 && r !== s && chosen(r, i) < FAILED && !isRight(r, i) && isRight(s, i); },
+  "harmed by the enhancer": (s, i) => { const r = raw(s); return r >= 0 && r !== s && isRight(r, i) && chosen(s, i) < FAILED && !isRight(s, i); },
+  "models differ": (s, i) => {
+    const here = data.subjects[s];
+    const codes = data.subjects.map((o, n) => o.level === here.level && o.light === here.light ? chosen(n, i) : ABSENT).filter((c) => c < FAILED);
+    return new Set(codes).size > 1;
+  },
+};
+
+const fill = (select, values, value) => {
+  select.replaceChildren(...values.map((v) => { const o = make("option", v); o.value = v; return o; }));
+  select.value = values.includes(value) ? value : values[0];
+  return select.value;
+};
+const unique = (values) => [...new Set(values)];
+
+const lights = (model) => unique(data.subjects.filter((s) => s.model === model).map((s) => s.light));
+const levels = (model, light) => {
+  const there = data.subjects.filter((s) => s.model === model && s.light === light && s.level).map((s) => s.level);
+  return unique([...(there.length && find(model, "untouched", "L0") >= 0 ? ["L0"] : []), ...there]);
+};
+
+const subjectNow = () => state.light === "blind" ? find(state.model, "blind", null) : at(state.model, state.light, state.level);
+
+const choices = () => {
+  state.family = fill($("f-family"), ["all", ...data.families], state.family);
+  state.model = fill($("f-model"), unique(data.subjects.map((s) => s.model)), state.model);
+  state.light = fill($("f-light"), lights(state.model), state.light);
+  const there = levels(state.model, state.light);
+  state.level = there.length ? fill($("f-level"), there, state.level) : (fill($("f-level"), ["–"]), null);
+  state.show = fill($("f-state"), Object.keys(STATES), state.show);
+  $("f-words").value = state.words;
+};
+
+const select = () => {
+  const subject = subjectNow(), test = STATES[state.show], words = state.words.toLowerCase();
+  shown = [];
+  for (let i = 0; i < data.items.length; i++) {
+    const item = data.items[i], question = data.questions[item.question];
+    if (state.family !== "all" && data.families[question.family] !== state.family) continue;
+    if (subject < 0 || chosen(subject, i) === ABSENT || !test(subject, i)) continue;
+    if (words) {
+      const text = data.texts[data.replies[subject][i]] || "";
+      if (![question.text, question.id, data.frames[question.frame], text].some((t) => t.toLowerCase().includes(words))) continue;
+    }
+    shown.push(i);
+  }
+  $("f-count").textContent = shown.length + " of " + data.items.length + " items";
+};
+
+let drawn = 0;
+const drawList = (upTo) => {
+  const list = $("list"), subject = subjectNow();
+  list.querySelector(".more")?.remove();
+  for (; drawn < Math.min(upTo, shown.length); drawn++) {
+    const i = shown[drawn], item = data.items[i], question = data.questions[item.question];
+    const row = make("li"), [sign, name, word] = mark(subject, i);
+    row.dataset.item = i;
+    const badge = make("span", sign + " ", name);
+    badge.title = word;
+    row.append(badge, plain(question.text || question.id), make("span", data.frames[question.frame], "where"));
+    row.addEventListener("click", () => go(i));
+    list.append(row);
+  }
+  if (drawn < shown.length) {
+    const more = make("li", (shown.length - drawn) + " more", "more");
+    more.addEventListener("click", () => drawList(drawn + ROWS));
+    list.append(more);
+  }
+  current();
+};
+const current = () => {
+  for (const row of $("list").children) {
+    const here = Number(row.dataset.item) === state.item && row.dataset.item !== undefined;
+    row.setAttribute("aria-current", here);
+    if (here && row.scrollIntoView) {
+      const list = $("list"), top = row.offsetTop - list.offsetTop;
+      if (top < list.scrollTop || top + row.offsetHeight > list.scrollTop + list.clientHeight) list.scrollTop = top - list.clientHeight / 2;
+    }
+  }
+};
+
+const link = () => {
+  const said = { item: data.items[state.item].name, model: state.model, light: state.light, level: state.level, family: state.family, show: state.show, words: state.words };
+  const parts = Object.entries(said).filter(([k, v]) => v && !(k === "family" && v === "all") && !(k === "show" && v === "all"));
+  return "#" + parts.map(([k, v]) => k + "=" + encodeURIComponent(v)).join("&");
+};
+
+const refresh = () => {
+  choices();
+  select();
+  $("list").replaceChildren();
+  drawn = 0;
+  if (!shown.includes(state.item) && shown.length) state.item = shown[0];
+  drawList(Math.max(ROWS, shown.indexOf(state.item) + 50));
+  draw();
+};
+
+const go = (item) => {
+  state.item = item;
+  const place = shown.indexOf(item);
+  if (place >= drawn) drawList(place + 50);
+  current();
+  draw();
+};
+const step = (by) => {
+  const place = shown.indexOf(state.item);
+  const next = shown[Math.min(Math.max(place + by, 0), shown.length - 1)];
+  if (next !== undefined) go(next);
+};
+
+const pictures = (question) => {
+  const kept = data.thumbnails[question.frame], box = $("i-images");
+  box.replaceChildren();
+  const there = unique(data.subjects.filter((s) => s.level).map((s) => s.level)).sort();
+  const slider = $("i-level");
+  slider.max = Math.max(there.length - 1, 0);
+  const level = state.pictured && there.includes(state.pictured) ? state.pictured : (state.level || there[0]);
+  slider.value = Math.max(there.indexOf(level), 0);
+  $("i-level-name").textContent = level ? level + " (" + data.drops[level] + " EV)" : "";
+  $("i-pictures").hidden = !kept;
+  const remake = "darkqa-eval show " + data.runs[0] + " " + question.id;
+  $("i-remake").textContent = (kept ? "Small copies. " : "No small copy of this frame is kept. ") + "The images as they were sent, proved by digest: " + remake;
+  if (!kept) return;
+  const conditions = unique(data.subjects.filter((s) => s.level === level).map((s) => s.condition));
+  for (const condition of conditions) {
+    const image = kept[condition];
+    if (!image) continue;
+    const figure = make("figure"), whole = make("img", undefined, "whole"), crop = make("img", undefined, "crop");
+    whole.src = image.small;
+    whole.alt = condition + " of " + data.frames[question.frame];
+    crop.src = image.crop;
+    crop.alt = "middle of " + whole.alt;
+    const gain = image.stops > 0 ? "light × " + Math.round(2 ** image.stops) + " (" + image.stops + " EV)" : "as it is";
+    figure.append(whole, crop, make("figcaption", condition + "; below, its middle, " + gain));
+    box.append(figure);
+  }
+};
+
+const marks = (i) => {
+  const table = $("i-marks");
+  table.replaceChildren();
+  const there = unique(data.subjects.filter((s) => s.level).map((s) => s.level)).sort();
+  const head = make("tr");
+  head.append(make("th", "model"), make("th", "light"), ...there.map((l) => make("th", l)));
+  table.append(head);
+  const now = subjectNow();
+  for (const model of unique(data.subjects.map((s) => s.model))) {
+    for (const light of lights(model)) {
+      const row = make("tr");
+      const first = make("td", model), second = make("td", light, "text");
+      row.append(first, second);
+      for (const level of light === "blind" ? [null] : there) {
+        const subject = light === "untouched" && level !== "L0" ? -1 : at(model, light, level);
+        const own = subject >= 0 && (data.subjects[subject].light === light);
+        const [sign, name, word] = subject >= 0 ? mark(subject, i) : ["", "", ""];
+        const cell = make("td", own || light === "blind" ? sign : "", name);
+        cell.title = word;
+        if (own) {
+          cell.dataset.subject = subject;
+          cell.setAttribute("aria-selected", subject === now);
+          cell.addEventListener("click", () => { Object.assign(state, { model, light, level, pictured: level }); refresh(); });
+        }
+        row.append(cell);
+      }
+      table.append(row);
+    }
+  }
+};
+
+const reply = (subject, i) => {
+  if (subject < 0 || chosen(subject, i) === ABSENT) {
+    $("r-title").textContent = "";
+    $("r-text").textContent = "";
+    $("r-reading").textContent = "not asked";
+    return;
+  }
+  const s = data.subjects[subject];
+  $("r-title").textContent = "Reply of " + s.model + " at " + s.condition;
+  reveal($("r-text"), data.texts[data.replies[subject][i]] || "");
+  const said = (code) => code < UNREAD ? letter(code) : code === UNREAD ? "nothing" : "no reply";
+  const why = data.reasons[data.why[subject][i]];
+  $("r-reading").textContent = "strict reading: " + said(chosen(subject, i)) + (why ? " (" + why.replace(/_/g, " ") + ")" : "") + " · lenient: " + said(data.lenient[subject][i]) + " · " + mark(subject, i)[2];
+};
+
+const draw = () => {
+  if (state.item === null || !shown.length) {
+    $("item").hidden = true;
+    return;
+  }
+  $("item").hidden = false;
+  const i = state.item, item = data.items[i], question = data.questions[item.question];
+  const subject = subjectNow();
+  reveal($("i-question"), question.text || question.id);
+  $("i-id").textContent = item.name + " · " + data.frames[question.frame] + " · " + data.families[question.family];
+  $("i-link").href = link();
+  history.replaceState(null, "", link());
+  const list = data.choices[item.choices].map((choice, index) => {
+    const row = make("li");
+    reveal(row, letter(index) + ". " + choice);
+    if (index === item.truth) { row.classList.add("true"); row.title = "true"; row.append(" ✓"); }
+    if (subject >= 0 && chosen(subject, i) === index) { row.classList.add("chosen"); row.title = "chosen"; }
+    return row;
+  });
+  $("i-choices").replaceChildren(...list);
+  pictures(question);
+  marks(i);
+  reply(subject, i);
+  $("i-evidence").textContent = question.evidence ? JSON.stringify(question.evidence, null, 1) : "none";
+};
+
+const confusion = () => {
+  const all = data.confusions;
+  $("confusion").hidden = !all.length;
+  if (!all.length) return;
+  const of = (c) => data.subjects[c.subject];
+  const model = fill($("c-model"), unique(all.map((c) => of(c).model)), $("c-model").value);
+  const conditions = unique(all.filter((c) => of(c).model === model).map((c) => of(c).condition));
+  const condition = fill($("c-condition"), conditions, $("c-condition").value);
+  const families = unique(all.filter((c) => of(c).model === model && of(c).condition === condition).map((c) => c.family));
+  const family = fill($("c-family"), families, $("c-family").value);
+  const one = all.find((c) => of(c).model === model && of(c).condition === condition && c.family === family);
+  const table = $("c-table"), head = make("tr");
+  head.append(make("th", "true ↓ given →"), ...one.labels.map((l) => make("th", l)), make("th", "not readable"));
+  const rows = one.counts.map((row, truth) => {
+    const line = make("tr");
+    line.append(make("td", one.labels[truth]), ...row.map((n, given) => make("td", n || "·", n && given === truth ? "diagonal" : "")));
+    return line;
+  });
+  table.replaceChildren(head, ...rows);
+};
+
+const said = () => {
+  const parts = location.hash.slice(1).split("&").map((part) => part.split("="));
+  const found = {};
+  for (const [key, value] of parts) {
+    try { if (value !== undefined) found[key] = decodeURIComponent(value); } catch { /* no link of ours */ }
+  }
+  return found;
+};
+const follow = () => {
+  const link = said();
+  if (!link.item) return false;
+  const item = data.items.findIndex((i) => i.name === link.item);
+  if (item < 0) return false;
+  state = { family: link.family || "all", model: link.model, light: link.light, level: link.level, show: link.show || "all", words: link.words || "", item, pictured: null };
+  refresh();
+  if (shown.includes(item)) go(item);
+  return true;
+};
+
+const start = async () => {
+  data = await unpack();
+  const first = data.subjects.find((s) => s.light !== "blind") || data.subjects[0];
+  state = { family: "all", model: first?.model, light: undefined, level: undefined, show: "all", words: "", item: data.items.length ? 0 : null, pictured: null };
+  $("loading").hidden = true;
+  $("explorer").hidden = false;
+  const set = (key, id) => $(id).addEventListener("change", (event) => { state[key] = event.target.value; state.pictured = null; refresh(); });
+  set("family", "f-family"); set("model", "f-model"); set("light", "f-light"); set("level", "f-level"); set("show", "f-state");
+  $("f-words").addEventListener("input", (event) => { state.words = event.target.value; refresh(); });
+  $("next").addEventListener("click", () => step(1));
+  $("previous").addEventListener("click", () => step(-1));
+  $("i-level").addEventListener("input", (event) => {
+    const there = unique(data.subjects.filter((s) => s.level).map((s) => s.level)).sort();
+    state.pictured = there[Number(event.target.value)];
+    if (levels(state.model, state.light).includes(state.pictured)) { state.level = state.pictured; refresh(); } else { draw(); }
+  });
+  for (const id of ["c-model", "c-condition", "c-family"]) $(id)?.addEventListener("change", confusion);
+  if ($("confusion")) confusion();
+  if (data.subjects.length && !follow()) refresh();
+  if (said().item) $("items").scrollIntoView();
+  addEventListener("hashchange", () => { if (said().item && location.hash !== link()) { follow(); $("items").scrollIntoView(); } });
+  document.documentElement.dataset.ready = "true";
+};
+
+addEventListener("keydown", (event) => {
+  if (event.target.matches("input:not([type=range]), select, textarea") || event.ctrlKey || event.metaKey || event.altKey || !data) return;
+  const slide = (by) => { const s = $("i-level"); s.value = Number(s.value) + by; s.dispatchEvent(new Event("input")); };
+  const keys = { j: () => step(1), k: () => step(-1), "]": () => slide(1), "[": () => slide(-1), t: theme };
+  if (event.target.id === "list") Object.assign(keys, { ArrowDown: keys.j, ArrowUp: keys.k });
+  if (keys[event.key]) { keys[event.key](); event.preventDefault(); }
+});
+
+start().catch((error) => { $("loading").textContent = "The items cannot be shown here: " + error.message; throw error; });

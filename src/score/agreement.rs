@@ -1,0 +1,113 @@
+//! How far two models agree: [`Agreement`].
+
+use serde::Serialize;
+
+use super::accuracy::Subject;
+use super::bootstrap::Resamples;
+use super::choice::Mode;
+use super::comparison::{Kind, pairs};
+use super::estimate::Estimate;
+use super::grid::{Count, Grid};
+
+/// Two models in one condition, in the strict reading.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Agreement {
+    /// The one.
+    pub first: Subject,
+    /// The other.
+    pub second: Subject,
+    /// The share of items to which both gave the same answer.
+    pub same: Estimate,
+    /// Cohen's κ of being right: 0 where the two err independently, 1 where they err on the same items ("error
+    /// consistency", Geirhos et al. 2020, arXiv:2006.16736); `None` where one of them is always right or always wrong.
+    pub kappa: Option<Estimate>,
+}
+
+/// Of the items of a cluster that both replied to: all, those that both, the first, the second got right.
+#[derive(Debug, Clone, Copy, Default)]
+struct Rights {
+    all: f32,
+    both: f32,
+    first: f32,
+    second: f32,
+}
+
+/// Every pair of models in every condition.
+#[must_use]
+pub fn agreements(grid: &Grid<'_>, draws: &Resamples) -> Vec<Agreement> {
+    let pairs = pairs(grid, Kind::Model).into_iter();
+    pairs
+        .filter_map(|(first, second)| agreement(grid, draws, first, second))
+        .collect()
+}
+
+fn agreement(grid: &Grid<'_>, draws: &Resamples, first: usize, second: usize) -> Option<Agreement> {
+    let mut same = vec![Count::default(); grid.clusters];
+    let mut rights = vec![Rights::default(); grid.clusters];
+    for (index, item) in grid.items.iter().enumerate() {
+        let reading = |subject| grid.mark(subject, index).reading(Mode::Strict);
+        let (Some(a), Some(b)) = (reading(first), reading(second)) else {
+            continue;
+        };
+        let cluster = item.cluster as usize;
+        same[cluster].replies += 1;
+        same[cluster].right += u32::from(a.is_some() && a == b);
+        let (a, b) = (item.is_right(a), item.is_right(b));
+        let share = |truth: bool| f32::from(u8::from(truth));
+        let cluster = &mut rights[cluster];
+        cluster.all += 1.0;
+        cluster.both += share(a && b);
+        cluster.first += share(a);
+        cluster.second += share(b);
+    }
+    let same = Estimate::clustered(&same)?;
+    let total = |of: fn(&Rights) -> f32| rights.iter().map(|rights| f64::from(of(rights))).sum();
+    let value = kappa(
+        total(|r| r.all),
+        total(|r| r.both),
+        total(|r| r.first),
+        total(|r| r.second),
+    );
+    let interval = || {
+        let sums = |of: fn(&Rights) -> f32| draws.sums(&rights.iter().map(of).collect::<Vec<_>>());
+        let (all, both) = (sums(|r| r.all), sums(|r| r.both));
+        let (first, second) = (sums(|r| r.first), sums(|r| r.second));
+        let kappas = (0..all.len()).filter_map(|i| kappa(all[i], both[i], first[i], second[i]));
+        draws.interval(kappas.collect())
+    };
+    Some(Agreement {
+        first: grid.subjects[first].clone(),
+        second: grid.subjects[second].clone(),
+        kappa: value.map(|value| {
+            let [low, high] = interval();
+            Estimate {
+                value,
+                low: low.min(value),
+                high: high.max(value),
+                n: same.n,
+            }
+        }),
+        same,
+    })
+}
+
+/// Cohen's κ of two yes-or-no marks (Cohen 1960, Educ. Psychol. Meas. 20:37); `None` where chance alone explains all.
+fn kappa(all: f64, both: f64, first: f64, second: f64) -> Option<f64> {
+    let (a, b) = (first / all, second / all);
+    let seen = (all - first - second + 2.0 * both) / all;
+    let luck = a * b + (1.0 - a) * (1.0 - b);
+    (luck < 1.0).then(|| (seen - luck) / (1.0 - luck))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kappa_is_cohens() {
+        // Both right on 20 of 50, both wrong on 15: κ 0.4 (the example of the English Wikipedia's article on Cohen's κ).
+        assert!((kappa(50.0, 20.0, 25.0, 30.0).unwrap() - 0.4).abs() < 1e-12);
+        assert_eq!(kappa(10.0, 10.0, 10.0, 10.0), None);
+        assert!((kappa(4.0, 1.0, 2.0, 2.0).unwrap()).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,214 @@
+//! Every difference that is of interest, with its test: [`Comparison`].
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::accuracy::Subject;
+use super::choice::Mode;
+use super::grid::Grid;
+use super::paired::Paired;
+use super::significance::holm;
+use crate::types::{Family, Level, Variant, View};
+
+/// What is compared with what.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// A dark level with L0: what darkness costs.
+    Level,
+    /// Sensor noise with exposure drop alone, at one level.
+    Variant,
+    /// Enhanced with raw, at one level and variant.
+    Enhancer,
+    /// A model with another, in one condition.
+    Model,
+    /// A model that sees with one that has the words alone.
+    Blind,
+}
+
+impl Kind {
+    /// All, in the order of the tables.
+    pub const ALL: [Self; 5] = [
+        Self::Level,
+        Self::Variant,
+        Self::Enhancer,
+        Self::Model,
+        Self::Blind,
+    ];
+
+    /// The name in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Level => "level",
+            Self::Variant => "variant",
+            Self::Enhancer => "enhancer",
+            Self::Model => "model",
+            Self::Blind => "blind",
+        }
+    }
+}
+
+/// What a comparison shows at the 5 % level, after Holm's correction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// The first is better.
+    Better,
+    /// The first is worse.
+    Worse,
+    /// Nothing is shown; which is not to say that they are the same.
+    Tied,
+}
+
+impl Verdict {
+    /// The word in tables.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Better => "better",
+            Self::Worse => "worse",
+            Self::Tied => "tied",
+        }
+    }
+}
+
+/// One subject against another on the items that both replied to, in the strict reading.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Comparison {
+    /// What is compared.
+    pub kind: Kind,
+    /// The first: the darker, the noisy, the enhanced, the one that sees.
+    pub first: Subject,
+    /// What it is held against.
+    pub second: Subject,
+    /// The family; `None` for all.
+    pub family: Option<Family>,
+    /// The numbers.
+    pub paired: Paired,
+    /// The p-value after Holm's correction over all comparisons of this kind; those by family are corrected among
+    /// themselves.
+    pub holm: f64,
+    /// What that shows.
+    pub verdict: Verdict,
+}
+
+/// All comparisons of a grid, by kind, family and subjects.
+#[must_use]
+pub fn comparisons(grid: &Grid<'_>) -> Vec<Comparison> {
+    let families: Vec<Option<&Family>> = std::iter::once(None)
+        .chain(grid.families().into_iter().map(Some))
+        .collect();
+    let mut all = Vec::new();
+    for kind in Kind::ALL {
+        let pairs = pairs(grid, kind);
+        let (total, parts) = families.split_at(1);
+        for families in [total, parts] {
+            let jobs: Vec<(Option<&Family>, usize, usize)> = families
+                .iter()
+                .flat_map(|family| pairs.iter().map(move |(a, b)| (*family, *a, *b)))
+                .collect();
+            let paired = jobs.into_par_iter().filter_map(|(family, first, second)| {
+                let paired = Paired::new(grid, first, second, family, Mode::Strict)?;
+                Some((family, first, second, paired))
+            });
+            let paired: Vec<_> = paired.collect();
+            let values: Vec<f64> = paired.iter().map(|(.., paired)| paired.p).collect();
+            let corrected = paired.into_iter().zip(holm(&values));
+            all.extend(
+                corrected.map(|((family, first, second, paired), holm)| Comparison {
+                    kind,
+                    first: grid.subjects[first].clone(),
+                    second: grid.subjects[second].clone(),
+                    family: family.cloned(),
+                    verdict: verdict(paired.difference.value, holm),
+                    paired,
+                    holm,
+                }),
+            );
+        }
+    }
+    all
+}
+
+fn verdict(difference: f64, p: f64) -> Verdict {
+    if p >= 0.05 {
+        Verdict::Tied
+    } else if difference > 0.0 {
+        Verdict::Better
+    } else {
+        Verdict::Worse
+    }
+}
+
+/// The indices of the subjects that a kind compares.
+pub(super) fn pairs(grid: &Grid<'_>, kind: Kind) -> Vec<(usize, usize)> {
+    let mut pairs = Vec::new();
+    for (index, subject) in grid.subjects.iter().enumerate() {
+        let against: Vec<usize> = match kind {
+            Kind::Level => one(grid, subject, |other| {
+                (other.level, other.variant, other.enhancer) =
+                    (Some(Level::L0), Variant::None, None);
+            }),
+            Kind::Variant if subject.variant == Variant::Noise => {
+                one(grid, subject, |other| other.variant = Variant::Ev)
+            }
+            Kind::Enhancer if subject.enhancer.is_some() => {
+                one(grid, subject, |other| other.enhancer = None)
+            }
+            Kind::Model => later_models(grid, index),
+            Kind::Blind if subject.view == Some(View::Image) => blind(grid, subject),
+            _ => Vec::new(),
+        };
+        let sees = subject.view == Some(View::Image);
+        let raw = subject.enhancer.is_none();
+        // Darkness is what raw images show; what an enhancer leaves of it is read from the curves.
+        let fits = match kind {
+            Kind::Level => sees && raw && subject.level != Some(Level::L0),
+            _ => true,
+        };
+        if fits {
+            pairs.extend(against.into_iter().map(|other| (index, other)));
+        }
+    }
+    pairs
+}
+
+/// The subject that is another but for a change, where there is one.
+fn one(grid: &Grid<'_>, subject: &Subject, change: impl FnOnce(&mut Subject)) -> Vec<usize> {
+    let mut other = subject.clone();
+    change(&mut other);
+    grid.find(&other)
+        .filter(|_| other != *subject)
+        .into_iter()
+        .collect()
+}
+
+/// Other models in the same condition, each pair once.
+fn later_models(grid: &Grid<'_>, index: usize) -> Vec<usize> {
+    let subject = &grid.subjects[index];
+    let later = grid.subjects.iter().enumerate().skip(index + 1);
+    let same =
+        |other: &Subject| subject.is_but(other, |changed| changed.model.clone_from(&other.model));
+    later
+        .filter(|(_, other)| same(other))
+        .map(|(other, _)| other)
+        .collect()
+}
+
+/// The same model without images; all models without images where it was never asked so.
+fn blind(grid: &Grid<'_>, subject: &Subject) -> Vec<usize> {
+    let all = || {
+        let subjects = grid.subjects.iter().enumerate();
+        subjects.filter(|(_, other)| other.view == Some(View::Blind))
+    };
+    let own: Vec<usize> = all()
+        .filter(|(_, other)| other.model == subject.model)
+        .map(|(index, _)| index)
+        .collect();
+    if own.is_empty() {
+        all().map(|(index, _)| index).collect()
+    } else {
+        own
+    }
+}

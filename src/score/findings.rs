@@ -1,0 +1,75 @@
+//! All that records say: [`Findings`].
+
+use std::collections::BTreeMap;
+
+use super::accuracy::{Summary, summarize};
+use super::agreement::{Agreement, agreements};
+use super::bootstrap::Resamples;
+use super::chance::Offer;
+use super::cluster::{Clusters, Unit};
+use super::comparison::{Comparison, comparisons};
+use super::confusion::{Confusion, Hallucination, confusions, hallucinations};
+use super::curve::{Curve, curves};
+use super::flips::{Fall, falls};
+use super::grid::Grid;
+use super::health::{Health, healths};
+use crate::types::{FrameId, Record};
+
+/// All that records say.
+#[derive(Debug)]
+pub struct Findings<'a> {
+    /// The records, laid out.
+    pub grid: Grid<'a>,
+    /// What is taken as independent.
+    pub unit: Unit,
+    /// The accuracies.
+    pub summary: Summary,
+    /// What became of the trials besides.
+    pub health: Vec<Health>,
+    /// Differences.
+    pub comparisons: Vec<Comparison>,
+    /// Thresholds and areas, of all families together and of each.
+    pub curves: Vec<Curve>,
+    /// Answers against truths.
+    pub confusions: Vec<Confusion>,
+    /// False positives and negatives.
+    pub hallucinations: Vec<Hallucination>,
+    /// Where items fail first.
+    pub falls: Vec<Fall>,
+    /// How far models agree.
+    pub agreements: Vec<Agreement>,
+}
+
+impl<'a> Findings<'a> {
+    /// Finds all; `scenes` holds the scene of each frame where it is known, `questions` what was to be asked, for the chance
+    /// line.
+    #[must_use]
+    pub fn new(
+        records: &'a [Record],
+        scenes: &BTreeMap<FrameId, String>,
+        questions: impl IntoIterator<Item = Offer>,
+    ) -> Self {
+        let asked = records
+            .iter()
+            .map(|record| (&record.question, &record.frame));
+        let clusters = Clusters::new(asked, scenes);
+        let grid = Grid::new(records, &clusters);
+        let draws = Resamples::new(clusters.count());
+        let families = grid.families();
+        let families = std::iter::once(None).chain(families.into_iter().map(Some));
+        Self {
+            unit: clusters.unit(),
+            summary: summarize(&grid, questions),
+            health: healths(&grid),
+            comparisons: comparisons(&grid),
+            curves: families
+                .flat_map(|family| curves(&grid, &draws, family))
+                .collect(),
+            confusions: confusions(&grid),
+            hallucinations: hallucinations(&grid),
+            falls: falls(&grid),
+            agreements: agreements(&grid, &draws),
+            grid,
+        }
+    }
+}

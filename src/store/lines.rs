@@ -1,0 +1,111 @@
+//! Files of one JSON object a line, which a killed process may leave with half of its last one.
+
+use std::fs::{File, OpenOptions};
+use std::io::{BufRead, BufReader, Read, Seek, SeekFrom, Write};
+use std::path::Path;
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use crate::error::{Error, Result};
+use crate::types::{Listed, Record, Thumbnail};
+
+/// Appends lines to a file that is made where it does not exist.
+pub(super) fn append<T: Serialize>(path: &Path, values: &[T]) -> Result<File> {
+    let lines = json_lines(path, values)?;
+    let file = OpenOptions::new()
+        .read(true)
+        .append(true)
+        .create(true)
+        .open(path);
+    let written = file.and_then(|mut file| {
+        mend(path, &file).map_err(std::io::Error::other)?;
+        file.write_all(&lines)?;
+        Ok(file)
+    });
+    written.map_err(|e| Error::file(path, "write", e))
+}
+
+pub(super) fn json_lines<T: Serialize>(path: &Path, values: &[T]) -> Result<Vec<u8>> {
+    let mut lines = Vec::new();
+    for value in values {
+        serde_json::to_writer(&mut lines, value)
+            .map_err(|e| Error::file(path, "write", e.into()))?;
+        lines.push(b'\n');
+    }
+    Ok(lines)
+}
+
+/// The whole lines of a file of records, or of what else a run keeps; none where there is no such file.
+pub(super) fn lines<T: Line>(path: &Path) -> Result<Vec<T>> {
+    let file = match File::open(path) {
+        Ok(file) => file,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
+        Err(e) => return Err(Error::file(path, "read", e)),
+    };
+    let mut records = Vec::new();
+    let mut file = BufReader::new(file);
+    let mut line = Vec::new();
+    for number in 1.. {
+        line.clear();
+        file.read_until(b'\n', &mut line)
+            .map_err(|e| Error::file(path, "read", e))?;
+        if line.pop() != Some(b'\n') {
+            break;
+        }
+        records.push(serde_json::from_slice(&line).map_err(|e| {
+            let problem = format!(
+                "not {}: {e}; restore the file, or use another --out",
+                T::WHAT
+            );
+            Error::line(path, number, problem)
+        })?);
+    }
+    Ok(records)
+}
+
+/// What a line of a run's files holds.
+pub(super) trait Line: DeserializeOwned {
+    /// What it is called.
+    const WHAT: &str;
+}
+
+impl Line for Record {
+    const WHAT: &str = "a record";
+}
+
+impl Line for Listed {
+    const WHAT: &str = "a question";
+}
+
+impl Line for Thumbnail {
+    const WHAT: &str = "a thumbnail";
+}
+
+/// Cuts a torn last line off: what stands after the last line end.
+pub(super) fn mend(path: &Path, mut file: &File) -> Result<()> {
+    const STEP: u64 = 64 * 1024;
+    let unread = |e| Error::file(path, "read", e);
+    let length = file.metadata().map_err(unread)?.len();
+    let (mut end, mut whole) = (length, 0);
+    while end > 0 && whole == 0 {
+        let start = end.saturating_sub(STEP);
+        let mut chunk = vec![0; (end - start) as usize];
+        file.seek(SeekFrom::Start(start)).map_err(unread)?;
+        file.read_exact(&mut chunk).map_err(unread)?;
+        whole = chunk
+            .iter()
+            .rposition(|&byte| byte == b'\n')
+            .map_or(0, |at| start + at as u64 + 1);
+        end = start;
+    }
+    if whole == length {
+        return Ok(());
+    }
+    tracing::warn!(
+        "{}: the last line was cut off while it was written; that trial is asked again",
+        path.display()
+    );
+    file.set_len(whole)
+        .map_err(|e| Error::file(path, "write", e))
+}

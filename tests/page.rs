@@ -1,0 +1,229 @@
+//! The HTML report in a real browser.
+//!
+//! Needs Chromium or Chrome (`CHROME`, or on the path); where there is none, the test says so and does nothing. With
+//! `SHOTS=DIR` it leaves pictures of the page for people to look at.
+
+#![allow(clippy::unwrap_used)]
+
+mod support;
+
+use serde_json::{Value, json};
+use support::browser::{Browser, chromium};
+use support::run::Bench;
+
+/// The model that says what it is told.
+const SAID: &str = "script:said.jsonl";
+
+/// Replies that would break a page which trusted them.
+fn hostile() -> String {
+    let markup = "</script><script>document.title='owned'</script><img src=x onerror=alert(1)>";
+    let turned = "A\u{202e}evitcele\u{202c}\u{200b}";
+    let lines = [
+        json!({"question": "q0", "reply": markup}),
+        json!({"question": "q1", "reply": turned}),
+        json!({"question": "q2", "reply": "x".repeat(1_000_000)}),
+        json!({"question": "q3", "condition": "L5-noise", "reply": "A"}),
+        json!({"default": "C"}),
+    ];
+    lines.map(|line| format!("{line}\n")).concat()
+}
+
+#[test]
+#[expect(clippy::print_stderr, reason = "a test that does nothing says so")]
+fn the_page_works_in_a_browser() {
+    let Some(program) = chromium() else {
+        eprintln!("no Chromium here: the page is not tried");
+        return;
+    };
+    let bench = Bench::with_questions(40);
+    bench.file("said.jsonl", hostile());
+    let words = [
+        "--data",
+        "set.jsonl",
+        "--model",
+        SAID,
+        "--model",
+        "random",
+        "--blind-model",
+        "random",
+        "--out",
+        "run",
+    ];
+    let called = bench.call(&words);
+    assert_eq!(called.code, Some(0), "{called:?}");
+    let url = format!("file://{}", bench.path("run/report.html").display());
+
+    let mut browser = Browser::open(&program);
+    browser.window(1400, 900, "light");
+    browser.go(&url);
+    browser.wait("document.documentElement?.dataset.ready === 'true'");
+    browser.shot("light.png", true);
+    filters(&mut browser);
+    slider(&mut browser);
+    keyboard(&mut browser);
+    hostile_replies(&mut browser);
+    deep_link(&mut browser, &url);
+    themes(&mut browser);
+    narrow(&mut browser, &url);
+    assert!(browser.print("page.pdf") > 10_000);
+    assert_eq!(browser.complaints(&url), Vec::<String>::new());
+}
+
+fn count(browser: &mut Browser) -> Value {
+    browser.evaluate("document.querySelector('#f-count').textContent")
+}
+
+fn filters(browser: &mut Browser) {
+    let model = browser.evaluate("document.querySelector('#f-model').options[1].value");
+    assert_eq!(model, SAID);
+    browser.choose("#f-model", SAID);
+    assert_eq!(count(browser), "40 of 40 items");
+    // The markup, the turned letters and the long reply cannot be read; everything else is right.
+    browser.choose("#f-state", "not readable");
+    assert_eq!(count(browser), "3 of 40 items");
+    browser.choose("#f-state", "wrong");
+    assert_eq!(count(browser), "0 of 40 items");
+    browser.choose("#f-light", "with noise");
+    browser.choose("#f-level", "L5");
+    assert_eq!(count(browser), "1 of 40 items");
+    browser.choose("#f-state", "lost since L0");
+    assert_eq!(count(browser), "1 of 40 items");
+    assert_eq!(
+        browser.evaluate("document.querySelector('#i-id').textContent.split(' ')[0]"),
+        "q3"
+    );
+    browser.choose("#f-state", "all");
+    browser.choose("#f-family", "color");
+    assert_eq!(count(browser), "40 of 40 items");
+    browser.evaluate(
+        "(() => { const w = document.querySelector('#f-words'); w.value = 'is it, 17?'; w.dispatchEvent(new Event('input')); })()",
+    );
+    assert_eq!(count(browser), "1 of 40 items");
+    browser.shot("filtered.png", false);
+    browser.evaluate(
+        "(() => { const w = document.querySelector('#f-words'); w.value = ''; w.dispatchEvent(new Event('input')); })()",
+    );
+    assert_eq!(count(browser), "40 of 40 items");
+}
+
+fn slider(browser: &mut Browser) {
+    let shown = "[...document.querySelectorAll('#i-images figcaption')].map(c => c.textContent.split(';')[0])";
+    browser.press("[");
+    let images = browser.evaluate(shown);
+    assert_eq!(images, json!(["L4-ev", "L4-noise"]));
+    assert_eq!(
+        browser.evaluate("document.querySelector('#f-level').value"),
+        "L4"
+    );
+    let crop = browser.evaluate("document.querySelector('#i-images figcaption').textContent");
+    assert_eq!(crop, "L4-ev; below, its middle, light × 181 (7.5 EV)");
+    let loaded = "[...document.querySelectorAll('#i-images img')].every(i => i.complete && i.naturalWidth > 0)";
+    browser.wait(loaded);
+    browser.evaluate(
+        "(() => { const s = document.querySelector('#i-level'); s.value = 0; s.dispatchEvent(new Event('input')); })()",
+    );
+    assert_eq!(browser.evaluate(shown), json!(["L0"]));
+}
+
+fn keyboard(browser: &mut Browser) {
+    let item = "document.querySelector('#i-id').textContent.split(' ')[0]";
+    browser.evaluate("document.querySelector('#list li').click()");
+    let first = browser.evaluate(item);
+    browser.press("j");
+    let second = browser.evaluate(item);
+    assert_ne!(first, second);
+    browser.press("k");
+    assert_eq!(browser.evaluate(item), first);
+    browser.press("k");
+    assert_eq!(
+        browser.evaluate(item),
+        first,
+        "there is none before the first"
+    );
+    browser.click("#next");
+    assert_eq!(browser.evaluate(item), second);
+}
+
+fn hostile_replies(browser: &mut Browser) {
+    let open = |browser: &mut Browser, id: &str| {
+        browser.evaluate(&format!(
+            "location.hash = 'item={id}&model={SAID}&light=untouched&level=L0'"
+        ));
+        browser.wait(&format!(
+            "document.querySelector('#i-id').textContent.startsWith('{id} ')"
+        ));
+        browser.evaluate("document.querySelector('#r-text').textContent")
+    };
+    let markup = open(browser, "q0");
+    assert!(
+        markup.as_str().unwrap().starts_with("</script><script>"),
+        "{markup}"
+    );
+    browser.shot("hostile.png", false);
+    let turned = open(browser, "q1");
+    assert_eq!(turned, "A⟨U+202E⟩evitcele⟨U+202C⟩⟨U+200B⟩");
+    let long = open(browser, "q2");
+    let long = long.as_str().unwrap();
+    assert!(long.contains("cut here after 20000 of 1000000 characters"));
+    assert!(long.len() < 21_000);
+    assert_ne!(browser.evaluate("document.title"), "owned");
+    assert_eq!(
+        browser.evaluate("document.querySelectorAll('script').length"),
+        2
+    );
+}
+
+fn deep_link(browser: &mut Browser, url: &str) {
+    browser.go("about:blank");
+    browser.go(&format!(
+        "{url}#item=q3&model={SAID}&light=with%20noise&level=L5&show=wrong"
+    ));
+    browser.wait("document.documentElement?.dataset.ready === 'true'");
+    assert_eq!(count(browser), "1 of 40 items");
+    let title = browser.evaluate("document.querySelector('#r-title').textContent");
+    assert_eq!(title, format!("Reply of {SAID} at L5-noise"));
+    let reading = browser.evaluate("document.querySelector('#r-reading').textContent");
+    assert_eq!(reading, "strict reading: A · lenient: A · wrong");
+    // A link to nowhere shows the page all the same.
+    browser.go("about:blank");
+    browser.go(&format!("{url}#item=%zz&model=nobody"));
+    browser.wait("document.documentElement?.dataset.ready === 'true'");
+    assert_eq!(count(browser), "40 of 40 items");
+}
+
+fn themes(browser: &mut Browser) {
+    let ground = "getComputedStyle(document.body).backgroundColor";
+    let light = browser.evaluate(ground);
+    assert_eq!(light, "rgb(255, 255, 255)");
+    browser.press("t");
+    let dark = browser.evaluate(ground);
+    assert_eq!(dark, "rgb(20, 23, 27)");
+    let words = "getComputedStyle(document.querySelector('.drawing text')).fill";
+    assert_eq!(
+        browser.evaluate(words),
+        "rgb(230, 233, 237)",
+        "figures have the theme's ink"
+    );
+    browser.shot("dark.png", true);
+    browser.click("#theme");
+    assert_eq!(browser.evaluate(ground), light);
+    browser.window(1400, 900, "dark");
+    browser.evaluate("delete document.documentElement.dataset.theme");
+    assert_eq!(
+        browser.evaluate(ground),
+        dark,
+        "the system's theme is the first one"
+    );
+}
+
+fn narrow(browser: &mut Browser, url: &str) {
+    browser.window(390, 844, "light");
+    browser.go("about:blank");
+    browser.go(url);
+    browser.wait("document.documentElement?.dataset.ready === 'true'");
+    let wide = "document.documentElement.scrollWidth";
+    let wide = browser.evaluate(wide);
+    assert!(wide.as_u64().unwrap() <= 390, "nothing sticks out: {wide}");
+    browser.shot("narrow.png", true);
+    browser.window(1400, 900, "light");
+}

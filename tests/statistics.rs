@@ -1,0 +1,368 @@
+//! The statistics, held to simulated runs whose truth is known.
+//!
+//! Clusters have a right-rate of their own (beta with intraclass correlation ρ), so that their questions stand and fall
+//! together. The bounds are those of the claim: 95 % intervals hold the truth 93 to 97 times in a hundred, and tests reject
+//! what is true at most 5 times. Draws are fixed, so that no run of these tests differs from another.
+
+#![allow(clippy::unwrap_used, clippy::float_cmp)]
+#![expect(
+    clippy::print_stdout,
+    reason = "the measured rates, for whoever asks with --nocapture"
+)]
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use darkqa_eval::score::bootstrap::Resamples;
+use darkqa_eval::score::choice::Mode;
+use darkqa_eval::score::cluster::Clusters;
+use darkqa_eval::score::curve::curves;
+use darkqa_eval::score::estimate::Estimate;
+use darkqa_eval::score::findings::Findings;
+use darkqa_eval::score::grid::{Count, Grid};
+use darkqa_eval::score::paired::Paired;
+use darkqa_eval::types::{
+    Condition, DarkLevel, Degradation, Digest, EnhancerName, Family, FrameId, Level, Outcome,
+    QuestionId, Reading, Record, Variant, Via, View,
+};
+use rand::rngs::StdRng;
+use rand::{RngExt as _, SeedableRng as _};
+use rand_distr::{Beta, Distribution as _};
+
+/// The right-rate of a cluster about a mean, with an intraclass correlation.
+fn rate(random: &mut StdRng, mean: f64, correlation: f64) -> f64 {
+    if correlation == 0.0 || mean <= 0.0 || mean >= 1.0 {
+        return mean;
+    }
+    let scale = (1.0 - correlation) / correlation;
+    Beta::new(mean * scale, (1.0 - mean) * scale)
+        .unwrap()
+        .sample(random)
+}
+
+/// How often something holds, in percent.
+fn percent(times: usize, mut holds: impl FnMut() -> bool) -> f64 {
+    100.0 * (0..times).filter(|_| holds()).count() as f64 / times as f64
+}
+
+fn record(question: usize, frame: usize, subject: &Subject, right: bool) -> Record {
+    let name = format!("{question} {subject:?}");
+    let chosen = Reading {
+        chosen: Some(usize::from(!right)),
+        why: None,
+    };
+    Record {
+        key: Digest::of(name.as_bytes()).into(),
+        question: QuestionId(format!("q{question:05}")),
+        frame: FrameId(format!("f{frame:04}")),
+        family: Family::Color,
+        model: subject.model.to_owned(),
+        view: View::Image,
+        level: Some(subject.condition.degradation.level()),
+        variant: subject.condition.degradation.variant(),
+        enhancer: subject.condition.enhancer.clone(),
+        condition: Some(subject.condition.clone()),
+        choices: ["a", "b", "c"].map(str::to_owned).to_vec(),
+        truth: 0,
+        reply: Some(if right { "A" } else { "B" }.to_owned()),
+        refusal: None,
+        finish: None,
+        strict: Some(chosen),
+        lenient: Some(chosen),
+        repeat: 0,
+        via: Via::Direct,
+        outcome: if right {
+            Outcome::Right
+        } else {
+            Outcome::Wrong
+        },
+        failure: None,
+        usage: None,
+        served_model: None,
+        latency_ms: None,
+        attempts: 1,
+        image: None,
+    }
+}
+
+#[derive(Debug, Clone)]
+struct Subject {
+    model: &'static str,
+    condition: Condition,
+}
+
+fn at(level: Option<DarkLevel>) -> Subject {
+    let degradation = level.map_or(Degradation::None, Degradation::Sensor);
+    Subject {
+        model: "m",
+        condition: Condition::raw(degradation),
+    }
+}
+
+fn clusters_of(records: &[Record]) -> Clusters {
+    let asked = records
+        .iter()
+        .map(|record| (&record.question, &record.frame));
+    Clusters::new(asked, &BTreeMap::new())
+}
+
+/// So many questions about each of so many frames.
+fn sizes(random: &mut StdRng, frames: usize, least: usize, most: usize) -> Vec<usize> {
+    (0..frames)
+        .map(|_| random.random_range(least..=most))
+        .collect()
+}
+
+#[test]
+fn intervals_of_shares_hold_the_truth() {
+    let mut random = StdRng::seed_from_u64(8);
+    let (mut table, mut within) = (String::new(), true);
+    for (frames, least, most) in [(24, 4, 12), (48, 2, 6), (200, 2, 6)] {
+        for mean in [0.33, 0.6, 0.9] {
+            for correlation in [0.0, 0.2] {
+                let held = percent(4000, || {
+                    let sizes = sizes(&mut random, frames, least, most);
+                    let counts: Vec<Count> = sizes
+                        .into_iter()
+                        .map(|replies| {
+                            let rate = rate(&mut random, mean, correlation);
+                            let right = (0..replies).filter(|_| random.random_bool(rate)).count();
+                            Count {
+                                right: right as u32,
+                                replies: replies as u32,
+                            }
+                        })
+                        .collect();
+                    let estimate = Estimate::clustered(&counts).unwrap();
+                    (estimate.low..=estimate.high).contains(&mean)
+                });
+                let _ = writeln!(
+                    table,
+                    "{frames} frames, p {mean}, ρ {correlation}: {held:.1} %"
+                );
+                within &= (93.0..=97.0).contains(&held);
+            }
+        }
+    }
+    println!("{table}");
+    assert!(within, "{table}");
+}
+
+/// Two subjects on the same items, with these chances of (first alone, second alone) right in a cluster.
+fn pair(
+    random: &mut StdRng,
+    sizes: &[usize],
+    first: f64,
+    second: f64,
+    correlation: f64,
+) -> Vec<Record> {
+    let raw = at(Some(DarkLevel::L3));
+    let mut mended = raw.clone();
+    mended.condition.enhancer = Some(EnhancerName::new("e").unwrap());
+    let mut records = Vec::new();
+    for (frame, size) in sizes.iter().enumerate() {
+        // Whether the two differ, and in whose favour, goes by the frame.
+        let differ = rate(random, first + second, correlation);
+        let favour = rate(random, first / (first + second), correlation);
+        for question in 0..*size {
+            let question = frame * 100 + question;
+            let (a, b) = if random.random_bool(differ) {
+                let first = random.random_bool(favour);
+                (first, !first)
+            } else {
+                let both = random.random_bool(0.6);
+                (both, both)
+            };
+            records.push(record(question, frame, &mended, a));
+            records.push(record(question, frame, &raw, b));
+        }
+    }
+    records
+}
+
+fn paired(records: &[Record]) -> Paired {
+    let clusters = clusters_of(records);
+    let grid = Grid::new(records, &clusters);
+    let raw = grid
+        .subjects
+        .iter()
+        .position(|s| s.enhancer.is_none())
+        .unwrap();
+    Paired::new(&grid, 1 - raw, raw, None, Mode::Strict).unwrap()
+}
+
+#[test]
+fn intervals_of_differences_hold_the_truth() {
+    let mut random = StdRng::seed_from_u64(9);
+    let mut table = String::new();
+    for (frames, least, most) in [(24, 4, 12), (48, 2, 6)] {
+        for (first, second) in [(0.05, 0.05), (0.1, 0.02), (0.3, 0.1)] {
+            for correlation in [0.0, 0.1] {
+                let held = percent(1000, || {
+                    let sizes = sizes(&mut random, frames, least, most);
+                    let records = pair(&mut random, &sizes, first, second, correlation);
+                    let made = paired(&records).difference;
+                    (made.low..=made.high).contains(&(first - second))
+                });
+                let _ = writeln!(
+                    table,
+                    "{frames} frames, {first} − {second}, ρ {correlation}: {held:.1} %"
+                );
+                // A thousand runs: give or take 1.4 %.
+                assert!((92.5..=98.0).contains(&held), "{table}");
+            }
+        }
+    }
+    println!("{table}");
+}
+
+#[test]
+fn tests_keep_their_size_and_find_what_is_there() {
+    let mut random = StdRng::seed_from_u64(10);
+    let mut rejected = |first: f64, second: f64, correlation: f64| {
+        let (mut swapped, mut plain) = (0, 0);
+        for _ in 0..1000 {
+            let sizes = sizes(&mut random, 48, 2, 6);
+            let records = pair(&mut random, &sizes, first, second, correlation);
+            let paired = paired(&records);
+            swapped += usize::from(paired.p < 0.05);
+            plain += usize::from(paired.mcnemar < 0.05);
+        }
+        (swapped, plain)
+    };
+    let independent = rejected(0.1, 0.1, 0.0);
+    let together = rejected(0.1, 0.1, 0.4);
+    let real = rejected(0.2, 0.05, 0.0);
+    println!(
+        "of 1000, by swaps and by McNemar: independent {independent:?}, together {together:?}, real {real:?}"
+    );
+    // Give or take 1.4 %.
+    assert!(
+        independent.0 <= 64 && independent.1 <= 64,
+        "{independent:?}"
+    );
+    assert!(together.0 <= 64, "{together:?}");
+    assert!(
+        together.1 > 80,
+        "McNemar's test does not hold here, or this tests nothing: {together:?}"
+    );
+    assert!(real.0 > 900, "{real:?}");
+}
+
+/// The true accuracy at a drop: from 0.9 in the light to chance, half-way at 6.4 EV.
+fn psychometric(drop: f64) -> f64 {
+    1.0 / 3.0 + (0.9 - 1.0 / 3.0) / (1.0 + ((drop - 6.4) / 0.8).exp())
+}
+
+#[test]
+fn thresholds_are_recovered() {
+    let mut random = StdRng::seed_from_u64(11);
+    // What the estimator aims at: the curve of straight lines between the levels.
+    let drops: Vec<f64> = Level::ALL
+        .map(|level| f64::from(level.exposure_drop().0))
+        .to_vec();
+    let middle = f64::midpoint(psychometric(0.0), 1.0 / 3.0);
+    let after = drops
+        .iter()
+        .position(|drop| psychometric(*drop) < middle)
+        .unwrap();
+    let (near, far) = (drops[after - 1], drops[after]);
+    let (above, below) = (psychometric(near), psychometric(far));
+    let truth = near + (above - middle) / (above - below) * (far - near);
+    assert!((truth - 6.4).abs() < 0.1, "{truth}");
+    let (mut sum, times) = (0.0, 400);
+    let held = percent(times, || {
+        let sizes = sizes(&mut random, 60, 3, 7);
+        let mut records = Vec::new();
+        for (frame, size) in sizes.iter().enumerate() {
+            let luck = rate(&mut random, 0.5, 0.1) - 0.5;
+            for level in std::iter::once(None).chain(DarkLevel::ALL.map(Some)) {
+                let subject = at(level);
+                let drop = subject.condition.degradation.level().exposure_drop().0;
+                let rate = (psychometric(f64::from(drop)) + 0.3 * luck).clamp(0.0, 1.0);
+                for question in 0..*size {
+                    let right = random.random_bool(rate);
+                    records.push(record(frame * 100 + question, frame, &subject, right));
+                }
+            }
+        }
+        let clusters = clusters_of(&records);
+        let grid = Grid::new(&records, &clusters);
+        let made = curves(&grid, &Resamples::new(clusters.count()), None);
+        let threshold = made[0].threshold.unwrap();
+        sum += threshold.value;
+        (threshold.low..=threshold.high).contains(&truth)
+    });
+    let mean = sum / times as f64;
+    println!("true {truth:.3} EV, mean {mean:.3} EV, held {held:.1} %");
+    assert!((mean - truth).abs() < 0.08, "{mean} instead of {truth}");
+    assert!((92.0..=98.0).contains(&held), "{held}");
+}
+
+#[test]
+fn a_made_set_gives_the_papers_arithmetic() {
+    // Presence: of 4 truths "no" one is answered "yes"; of 5 truths "yes" three are answered "no", one cannot be read.
+    // Colour: of 8 replies 6 are "black", of which 2 are true.
+    let mut records = Vec::new();
+    let mut add = |family: Family, choices: &[&str], truth: usize, chosen: Option<usize>| {
+        let number = records.len();
+        let mut made = record(number, number, &at(None), chosen == Some(truth));
+        made.family = family;
+        made.choices = choices.iter().map(|&text| text.to_owned()).collect();
+        made.truth = truth;
+        made.strict = Some(Reading { chosen, why: None });
+        records.push(made);
+    };
+    for chosen in [0, 1, 1, 1] {
+        add(Family::Presence, &["yes", "no"], 1, Some(chosen));
+    }
+    for chosen in [Some(0), Some(1), Some(1), Some(1), None] {
+        add(Family::Presence, &["yes", "no"], 0, chosen);
+    }
+    for (truth, chosen) in [
+        (0, 0),
+        (0, 0),
+        (1, 0),
+        (1, 0),
+        (2, 0),
+        (2, 0),
+        (1, 1),
+        (2, 1),
+    ] {
+        add(
+            Family::Color,
+            &["black", "red", "blue"],
+            truth,
+            Some(chosen),
+        );
+    }
+    let offers = records
+        .iter()
+        .map(|record| darkqa_eval::score::chance::Offer {
+            family: record.family.clone(),
+            choices: record.choices.len(),
+        });
+    let findings = Findings::new(&records, &BTreeMap::new(), offers.collect::<Vec<_>>());
+    let rates = &findings.hallucinations[0];
+    assert_eq!(rates.false_positive.unwrap().value, 0.25);
+    assert_eq!(rates.false_negative.unwrap().value, 0.6);
+    let colours = findings
+        .confusions
+        .iter()
+        .find(|c| c.family == Family::Color)
+        .unwrap();
+    let collapse = colours.collapse().unwrap();
+    assert_eq!(
+        (&*collapse.top, collapse.share, collapse.truth),
+        ("black", 0.75, 0.25)
+    );
+    assert!((collapse.entropy - 0.811_278_124_459_132_8).abs() < 1e-12);
+    // Chance: 9 questions of two choices and 8 of three, 9/2 + 8/3 of 17, as a fraction 43/102.
+    let chance = findings
+        .summary
+        .cells
+        .iter()
+        .find(|cell| cell.subject.view.is_none() && cell.family.is_none());
+    assert!((chance.unwrap().accuracy.unwrap().value - 43.0 / 102.0).abs() < 1e-15);
+    assert_eq!(findings.grid.subjects[0].variant, Variant::None);
+}
