@@ -5,10 +5,10 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use clap::error::ErrorKind;
-use darkqa_eval::cli::{BatchCommand, Cli, Command, EvaluateArgs};
+use darkqa_eval::cli::{BatchCommand, Cli, Command, EvaluateArgs, StudyCommand};
 use darkqa_eval::config::{
     self, BatchExport, BatchImport, Config, Enhance, Export, Import, MakeRooms, Questions, Realism,
-    Report, Serve, ShowItem, Synthesize,
+    Report, Serve, ShowItem, StudyPack, StudyRead, Synthesize,
 };
 use darkqa_eval::enhance;
 use darkqa_eval::run::export::export;
@@ -19,6 +19,7 @@ use darkqa_eval::run::realism::realism;
 use darkqa_eval::run::rooms::rooms;
 use darkqa_eval::run::serve::serve;
 use darkqa_eval::run::show::show;
+use darkqa_eval::run::study;
 use darkqa_eval::run::synthesize::synthesize;
 use darkqa_eval::run::{self, Verdict, evaluate};
 use darkqa_eval::types::manifest::Status;
@@ -96,6 +97,8 @@ enum Task {
     BatchImport(BatchImport),
     Report(Report),
     Show(Box<ShowItem>),
+    StudyPack(Box<StudyPack>),
+    StudyRead(StudyRead),
     Rooms(MakeRooms),
     Serve(Serve),
 }
@@ -145,6 +148,13 @@ impl Job {
                 (quiet, Task::Serve(Serve::resolve(said)?))
             }
             Some(Command::Show(said)) => (false, Task::Show(Box::new(ShowItem::resolve(said)?))),
+            Some(Command::Study(StudyCommand::Pack(said))) => {
+                let quiet = said.quiet;
+                (quiet, Task::StudyPack(Box::new(StudyPack::resolve(said)?)))
+            }
+            Some(Command::Study(StudyCommand::Read(said))) => {
+                (false, Task::StudyRead(StudyRead::resolve(said)?))
+            }
             Some(Command::Report(said)) => (false, Task::Report(Report::resolve(said))),
             Some(Command::Questions(said)) => {
                 let quiet = said.quiet;
@@ -173,6 +183,8 @@ fn carry_out(task: Task, progress: &Progress) -> anyhow::Result<ExitCode> {
         Task::BatchImport(config) => run::batch::import(&config)?,
         Task::Rooms(config) => rooms(&config, progress)?,
         Task::Serve(config) => serve(&config, progress)?,
+        Task::StudyPack(config) => study::pack(*config, progress)?,
+        Task::StudyRead(config) => study::read(&config)?,
         Task::Show(config) => show(*config)?,
         Task::Report(config) => run::report::report(&config)?,
     };

@@ -227,3 +227,56 @@ fn narrow(browser: &mut Browser, url: &str) {
     browser.shot("narrow.png", true);
     browser.window(1400, 900, "light");
 }
+
+#[test]
+#[expect(clippy::print_stderr, reason = "a test that does nothing says so")]
+fn people_can_answer() {
+    let Some(program) = chromium() else {
+        eprintln!("no Chromium here: the page is not tried");
+        return;
+    };
+    let bench = Bench::with_questions(6);
+    bench.complete(&[
+        "--model",
+        "random",
+        "--data",
+        "set.jsonl",
+        "--levels",
+        "L0,L3",
+        "--out",
+        "run",
+    ]);
+    bench.complete(&["study", "pack", "run", "--out", "pack"]);
+    let url = format!("file://{}", bench.path("pack/study.html").display());
+    let mut browser = Browser::open(&program);
+    browser.window(1200, 800, "light");
+    browser.go(&url);
+    browser.wait("document.querySelector('#image')?.naturalWidth > 0");
+    let place = "document.querySelector('#count').textContent";
+    assert_eq!(browser.evaluate(place), "0 of 6");
+    browser.press("c");
+    browser.press("0");
+    browser.click("#choices button:nth-child(2)");
+    assert_eq!(browser.evaluate(place), "3 of 6");
+    browser.shot("study.png", false);
+    let answers = browser.evaluate("Object.values(answers).map(a => a.answer)");
+    let mut answers: Vec<Value> = answers.as_array().unwrap().clone();
+    answers.sort_by_key(ToString::to_string);
+    assert_eq!(answers, [json!("B"), json!("C"), Value::Null]);
+    // One frame: a person sees it in one condition alone, the next person in the next.
+    let seen = "[...new Set(Object.values(answers).map(a => a.condition))]";
+    assert_eq!(browser.evaluate(seen), json!(["L0"]));
+    browser.evaluate(
+        "(() => { const p = document.querySelector('#person'); p.value = 2; p.dispatchEvent(new Event('change')); })()",
+    );
+    assert_eq!(browser.evaluate(place), "0 of 6");
+    browser.press("A");
+    assert_eq!(browser.evaluate(seen), json!(["L3-ev"]));
+    // What was answered is there after the page was left.
+    browser.go(&url);
+    browser.wait("document.querySelector('#count')?.textContent === '3 of 6'");
+    let images = format!("{}/images/", bench.path("pack").display());
+    let complaints = browser.complaints(&url).into_iter();
+    let strange: Vec<String> = complaints.filter(|url| !url.contains(&images)).collect();
+    assert_eq!(strange, Vec::<String>::new());
+}

@@ -13,6 +13,7 @@ mod report;
 mod rooms;
 mod serve;
 mod show;
+mod study;
 
 use std::num::{NonZeroU32, NonZeroU64, NonZeroUsize};
 use std::path::PathBuf;
@@ -30,6 +31,7 @@ pub use report::ReportArgs;
 pub use rooms::RoomsArgs;
 pub use serve::ServeArgs;
 pub use show::ShowArgs;
+pub use study::{StudyCommand, StudyPackArgs, StudyReadArgs};
 
 /// Measures how well a vision-language model sees in the dark.
 ///
@@ -78,6 +80,9 @@ pub enum Command {
     Report(ReportArgs),
     /// Make the images that one question was asked with again, bit for bit, and prove it by their digests
     Show(ShowArgs),
+    /// Let people answer what the models were asked: write a page for them, take their answers over as a model's
+    #[command(subcommand)]
+    Study(StudyCommand),
 }
 
 /// The flags of `synthesize`.

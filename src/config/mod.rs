@@ -15,6 +15,7 @@ mod rooms;
 mod serve;
 mod show;
 mod showing;
+mod study;
 mod synthesize;
 
 use std::env;
@@ -36,8 +37,9 @@ pub use realism::{PairPlace, Realism};
 pub use report::{Readings, Report};
 pub use rooms::MakeRooms;
 pub use serve::Serve;
-pub use show::{Pictures, Recipe, ShowItem};
+pub use show::{Again, Pictures, Recipe, ShowItem};
 pub use showing::{Order, Rotations, Showing};
+pub use study::{StudyPack, StudyRead};
 pub use synthesize::{Existing, Product, Synthesize};
 
 use crate::ask::{Bounds, Format};

@@ -1,6 +1,7 @@
-//! What `show` is told, and how a run's images are made again: [`ShowItem`], [`Pictures`] and [`Recipe`].
+//! What `show` is told, and how a run's images are made again: [`ShowItem`], [`Again`] and [`Recipe`].
 
 use std::collections::BTreeMap;
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use serde_json::{Map, Value};
@@ -79,6 +80,49 @@ pub struct Pictures {
     pub images: Images,
 }
 
+/// What is said, after a run, of how its images are made again: where the data and the enhancers lie by now.
+#[derive(Debug)]
+pub struct Again(EvaluateArgs);
+
+impl Again {
+    pub(super) fn said(
+        data: Option<PathBuf>,
+        llie: Vec<PathBuf>,
+        threads: Option<NonZeroUsize>,
+        ort_lib: Option<PathBuf>,
+        offline: bool,
+    ) -> Self {
+        Self(EvaluateArgs {
+            data: DataArgs {
+                data,
+                ..DataArgs::default()
+            },
+            enhancement: EnhancementArgs {
+                llie,
+                threads,
+                ort_lib,
+                offline,
+                ..EnhancementArgs::default()
+            },
+            ..EvaluateArgs::default()
+        })
+    }
+
+    /// How the images of a run are made again, by its own flags and those said here.
+    ///
+    /// # Errors
+    /// Where a flag that the run was made with means nothing to this version.
+    pub fn pictures(self, recipe: &Recipe) -> Result<Pictures> {
+        let said = above(self.0, read("the manifest's images", recipe)?);
+        Ok(Pictures {
+            sensor: Sensor::resolve(&said.sensor)?,
+            images: images(&said.sending)?,
+            data: data(said.data)?,
+            enhancement: enhancement(said.enhancement)?,
+        })
+    }
+}
+
 /// Everything that `show` is told.
 #[derive(Debug)]
 pub struct ShowItem {
@@ -91,7 +135,7 @@ pub struct ShowItem {
     /// Where the images go; `None` for the run folder.
     pub out: Option<PathBuf>,
     /// What is said here of the data and the enhancers.
-    over: EvaluateArgs,
+    pub again: Again,
 }
 
 impl ShowItem {
@@ -100,42 +144,26 @@ impl ShowItem {
     /// # Errors
     /// [`Error::Usage`] with the flag that cannot be used.
     pub fn resolve(said: ShowArgs) -> Result<Self> {
-        let conditions = said.condition.iter();
-        let conditions =
-            conditions.map(|text| text.parse().map_err(|e: Error| e.at("--condition")));
         Ok(Self {
             run: said.run,
             item: said.item,
-            conditions: conditions.collect::<Result<_>>()?,
+            conditions: conditions(&said.condition)?,
             out: said.out,
-            over: EvaluateArgs {
-                data: DataArgs {
-                    data: said.data,
-                    ..DataArgs::default()
-                },
-                enhancement: EnhancementArgs {
-                    llie: said.llie,
-                    threads: said.threads,
-                    ort_lib: said.ort_lib,
-                    offline: said.offline,
-                    ..EnhancementArgs::default()
-                },
-                ..EvaluateArgs::default()
-            },
+            again: Again::said(
+                said.data,
+                said.llie,
+                said.threads,
+                said.ort_lib,
+                said.offline,
+            ),
         })
     }
+}
 
-    /// How the images of a run are made again, by its own flags and those said here.
-    ///
-    /// # Errors
-    /// Where a flag that the run was made with means nothing to this version.
-    pub fn pictures(self, recipe: &Recipe) -> Result<Pictures> {
-        let said = above(self.over, read("the manifest's images", recipe)?);
-        Ok(Pictures {
-            sensor: Sensor::resolve(&said.sensor)?,
-            images: images(&said.sending)?,
-            data: data(said.data)?,
-            enhancement: enhancement(said.enhancement)?,
-        })
-    }
+/// Conditions by their names.
+pub(super) fn conditions(said: &[String]) -> Result<Vec<Condition>> {
+    let parsed = said
+        .iter()
+        .map(|text| text.parse().map_err(|e: Error| e.at("--condition")));
+    parsed.collect()
 }

@@ -1,7 +1,7 @@
 //! Lines over darkness, panel by panel, as SVG: [`Chart`].
 //!
 //! Lines differ by colour (Okabe and Ito 2008, which people of any colour vision tell apart), by dash and by mark, so that
-//! they are told apart without colour, too. What is drawn in [`INK`], [`GRID`] and [`PAPER`] a page may draw in the colours
+//! they are told apart without colour, too. What is drawn in `INK`, `GRID` and `PAPER` a page may draw in the colours
 //! of its own theme.
 
 use plotters::coord::Shift;

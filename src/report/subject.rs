@@ -1,4 +1,4 @@
-//! What subjects are called: [`condition`], [`family`] and [`light`].
+//! What subjects and numbers are called in words: [`light`], [`family`], [`percent`] and others.
 
 use crate::score::accuracy::Subject;
 use crate::types::{EnhancerName, Family, Variant};

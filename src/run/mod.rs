@@ -3,6 +3,7 @@
 //! [`evaluate`] reads as the sentence it carries out: open the data, open the models, open the run folder, plan what is
 //! left to ask, send the darkroom to make the images and ask about them, score, show.
 
+mod again;
 mod arrangement;
 mod askers;
 pub mod batch;
@@ -32,6 +33,7 @@ pub mod serve;
 pub mod show;
 mod stage;
 mod stop;
+pub mod study;
 pub mod synthesize;
 mod thumbnail;
 mod written;

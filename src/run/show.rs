@@ -4,20 +4,17 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::Path;
 
-use super::darkroom::{Darkroom, Desk};
-use super::gallery::{Gallery, look_at};
+use super::Verdict;
+use super::again::Album;
 use super::inputs::stem;
-use super::recipe::Recipe;
 use super::report::kept;
 use super::written::write;
-use super::{Verdict, identity, open_enhancers};
-use crate::config::{Pictures, ShowItem};
-use crate::dataset::{Dataset, Place};
+use crate::config::ShowItem;
 use crate::error::{Error, Result};
 use crate::store;
-use crate::types::manifest::{RunManifest, Status};
+use crate::types::manifest::Status;
 use crate::types::question::letter;
-use crate::types::{Condition, Digest, FrameId, Listed, Outcome, Record};
+use crate::types::{Condition, Digest, Listed, Outcome, Record};
 
 /// Makes the images again, writes them, and says of each whether it is the one that was sent.
 ///
@@ -47,14 +44,15 @@ pub fn show(config: ShowItem) -> Result<Verdict> {
         .find(|listed| listed.id == first.question);
     let conditions = conditions(&records, &config.conditions, &folder)?;
     let out = config.out.clone().unwrap_or_else(|| folder.join("shown"));
-    let pictures = pictures(config, &manifest, &folder)?;
-    let mut again = Again::open(&pictures, &frame, &conditions)?;
+    let mut album = Album::open(config.again, &manifest, &folder, &conditions)?;
+    let mut desk = album.desk(&frame)?;
     let mut text = question(first, listed.as_ref());
     let mut all_same = true;
     for condition in &conditions {
-        let (file, digest, ending) = again.image(condition)?;
-        let path = out.join(format!("{}_{condition}.{ending}", stem(&frame)?));
-        write(&path, &file)?;
+        let made = album.image(&mut desk, condition)?;
+        let digest = made.digest;
+        let path = out.join(format!("{}_{condition}.{}", stem(&frame)?, made.ending));
+        write(&path, &made.file)?;
         let sent = sent(&records, condition);
         let proof = if sent.is_empty() {
             format!("nothing is known of what was sent; {digest} now")
@@ -81,16 +79,6 @@ pub fn show(config: ShowItem) -> Result<Verdict> {
     })
 }
 
-fn pictures(config: ShowItem, manifest: &RunManifest, folder: &Path) -> Result<Pictures> {
-    if manifest.images.is_empty() {
-        let problem =
-            "the run does not say how its images were made: an earlier version made it".to_owned();
-        let path = folder.to_owned();
-        return Err(Error::Run { path, problem });
-    }
-    config.pictures(&manifest.images)
-}
-
 /// The conditions that the item was shown in, or those of them that are wanted.
 fn conditions(records: &[Record], wanted: &[Condition], folder: &Path) -> Result<Vec<Condition>> {
     let there: BTreeSet<Condition> = records
@@ -115,83 +103,6 @@ fn conditions(records: &[Record], wanted: &[Condition], folder: &Path) -> Result
         return Err(Error::usage("--condition", problem));
     }
     Ok(wanted.to_vec())
-}
-
-/// What makes the images of one frame again.
-struct Again {
-    dataset: Dataset,
-    gallery: Gallery,
-    recipe: Recipe,
-    enhancers: Vec<crate::enhance::Enhancer>,
-    desk: Desk,
-}
-
-impl Again {
-    fn open(pictures: &Pictures, frame: &FrameId, conditions: &[Condition]) -> Result<Self> {
-        let dataset = frames(&pictures.data.place)?.with_most_pixels(pictures.data.most_pixels);
-        let elsewhere = |e: Error| {
-            let problem =
-                format_args!("{e}; where the data lie elsewhere by now, --data says where");
-            Error::data(frame, problem)
-        };
-        let found = look_at(&dataset, frame).map_err(elsewhere)?;
-        let mended = conditions
-            .iter()
-            .any(|condition| condition.enhancer.is_some());
-        let models = if mended {
-            &*pictures.enhancement.models
-        } else {
-            &[]
-        };
-        let files = identity::enhancers(models)?;
-        let recipe = Recipe {
-            seed: pictures.sensor.seed,
-            synthesis: pictures.sensor.synthesis.clone(),
-            format: pictures.images.format,
-            max_side: pictures.images.max_side,
-            enhancers: files
-                .iter()
-                .map(|file| (file.name().clone(), file.digest()))
-                .collect(),
-        };
-        let (_, enhancers) = open_enhancers(files, &pictures.enhancement)?;
-        Ok(Self {
-            dataset,
-            gallery: Gallery::from([(frame.clone(), found)]),
-            recipe,
-            enhancers,
-            desk: Desk::new(frame.clone()),
-        })
-    }
-
-    /// The file of the frame in a condition, its digest, and its ending.
-    fn image(&mut self, condition: &Condition) -> Result<(Vec<u8>, Digest, &'static str)> {
-        let mut darkroom = Darkroom {
-            dataset: &self.dataset,
-            pictures: &self.gallery,
-            recipe: &self.recipe,
-            enhancers: std::mem::take(&mut self.enhancers),
-            limit: None,
-        };
-        let image = darkroom.image(&mut self.desk, condition);
-        self.enhancers = darkroom.enhancers;
-        let image = image?;
-        let ending = if image.facts().format == "png" {
-            "png"
-        } else {
-            "jpg"
-        };
-        Ok((image.file()?, image.facts().digest, ending))
-    }
-}
-
-/// The frames at a place; questions that come with them are of no interest.
-fn frames(place: &Place) -> Result<Dataset> {
-    match place {
-        Place::Path(path) if path.join("frames.jsonl").is_file() => Dataset::of_frames(path),
-        Place::Path(_) => Dataset::open(place, None),
-        Place::Rooms(_) => Dataset::open_unasked(place),
-    }
 }
 
 fn question(record: &Record, listed: Option<&Listed>) -> String {

@@ -2,8 +2,9 @@
 
 use serde::Serialize;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::questions::Asked;
+use crate::report::script::embedded;
 use crate::types::Digest;
 
 /// The page, with a place for the questions.
@@ -61,10 +62,7 @@ struct Told<'a> {
 /// Where the questions cannot be written.
 pub fn page(items: &[Item<'_>]) -> Result<String> {
     let set = Digest::of_parts(items.iter().map(|item| item.id.as_bytes()));
-    let told = serde_json::to_string(&Told { set, items }).map_err(|e| Error::data("review", e))?;
-    // Within a script, "</" would end it.
-    let told = told.replace("</", "<\\/").replace("<!--", "<\\!--");
-    Ok(PAGE.replacen(PLACE, &told, 1))
+    Ok(PAGE.replacen(PLACE, &embedded(&Told { set, items })?, 1))
 }
 
 #[cfg(test)]

@@ -1,0 +1,81 @@
+//! The page on which people answer what the models were asked: [`page`].
+
+use serde::Serialize;
+
+use super::script::embedded;
+use crate::error::Result;
+use crate::types::Digest;
+
+/// The page, with a place for the questions.
+const PAGE: &str = include_str!("study.html");
+/// The place.
+const PLACE: &str = "/*STUDY*/null";
+
+/// A question as the page asks it; the true choice is not in it.
+#[derive(Debug, Clone, Serialize)]
+pub struct Asked {
+    /// Its name.
+    pub id: String,
+    /// The number of its frame.
+    pub frame: usize,
+    /// The question in words.
+    pub text: String,
+    /// The choices in the order shown.
+    pub choices: Vec<String>,
+    /// The frame in each condition, in one order for all.
+    pub shots: Vec<Shot>,
+}
+
+/// A frame in a condition.
+#[derive(Debug, Clone, Serialize)]
+pub struct Shot {
+    /// What was done to it; told to the file of answers, not to the person.
+    pub condition: String,
+    /// Where the image is, from the page.
+    pub image: String,
+}
+
+/// All that the page is told.
+#[derive(Serialize)]
+struct Told<'a> {
+    /// Under which the browser keeps answers until they are saved.
+    set: Digest,
+    items: &'a [Asked],
+}
+
+/// One file that asks a person by number: each frame in one condition alone, which goes on by one from person to person, so
+/// that as many people as there are conditions see every image once. Answers are taken from the keyboard and saved as lines
+/// of JSON.
+///
+/// # Errors
+/// Where the questions cannot be written.
+pub fn page(items: &[Asked]) -> Result<String> {
+    let names = items.iter().flat_map(|item| {
+        let shots = item.shots.iter().map(|shot| shot.image.as_bytes());
+        std::iter::once(item.id.as_bytes()).chain(shots)
+    });
+    let set = Digest::of_parts(names);
+    Ok(PAGE.replacen(PLACE, &embedded(&Told { set, items })?, 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_page_asks_and_does_not_tell() {
+        let asked = Asked {
+            id: "q".into(),
+            frame: 0,
+            text: "</script>?".into(),
+            choices: vec!["a".into(), "b".into()],
+            shots: vec![Shot {
+                condition: "L5-noise".into(),
+                image: "images/0.png".into(),
+            }],
+        };
+        let page = page(&[asked]).unwrap();
+        assert!(!page.contains(PLACE) && !page.contains("truth"));
+        assert_eq!(page.matches("</script").count(), 1);
+    }
+}

@@ -1,0 +1,7 @@
+//! `study`: people in the place of a model.
+
+mod pack;
+mod read;
+
+pub use pack::pack;
+pub use read::read;

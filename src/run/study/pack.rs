@@ -1,0 +1,135 @@
+//! `study pack`: a page on which people answer what the models were asked.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::config::StudyPack;
+use crate::error::{Error, Result};
+use crate::report::study::{Asked, Shot, page};
+use crate::run::Verdict;
+use crate::run::again::Album;
+use crate::run::progress::Progress;
+use crate::run::report::kept;
+use crate::run::written::write;
+use crate::store;
+use crate::types::manifest::Status;
+use crate::types::{Condition, Digest, FrameId, Listed, QuestionId, Record};
+
+/// Makes the page and its images, each the very file that the models were sent.
+///
+/// # Errors
+/// Where the run kept no questions, or its data or enhancers are not where they were.
+pub fn pack(config: StudyPack, progress: &Progress) -> Result<Verdict> {
+    let manifest = kept(&config.run)?;
+    let records = store::read_records(&config.run)?;
+    let listed = store::read_questions(&config.run)?;
+    let wrong = |problem: String| {
+        let path = config.run.clone();
+        Error::Run { path, problem }
+    };
+    let conditions = conditions(&records, &config.conditions)?;
+    if listed.is_empty() || conditions.is_empty() {
+        return Err(wrong(
+            "no questions about images are kept in this run".to_owned(),
+        ));
+    }
+    let shown = first_order(&records);
+    let chosen = chosen(listed, config.items.map_or(usize::MAX, usize::from));
+    let mut frames = BTreeMap::<FrameId, Vec<Listed>>::new();
+    for question in chosen {
+        frames
+            .entry(question.frame.clone())
+            .or_default()
+            .push(question);
+    }
+    let sent = sent(&records);
+    let mut album = Album::open(config.again, &manifest, &config.run, &conditions)?;
+    let bar = progress.bar("images", frames.len() * conditions.len());
+    let (mut asked, mut images) = (Vec::new(), 0);
+    for (number, (frame, questions)) in frames.into_iter().enumerate() {
+        let mut desk = album.desk(&frame)?;
+        let mut shots = Vec::new();
+        for condition in &conditions {
+            let made = album.image(&mut desk, condition)?;
+            if let Some(sent) = sent.get(&(frame.clone(), condition.clone()))
+                && *sent != made.digest
+            {
+                let problem = format!(
+                    "{frame} at {condition} is not the image that was sent: the data, an enhancement model or this program is another"
+                );
+                return Err(wrong(problem));
+            }
+            // The name says nothing of the level.
+            let name = Digest::of_parts([frame.0.as_bytes(), condition.to_string().as_bytes()]);
+            let name = format!("images/{}.{}", &name.to_string()[..16], made.ending);
+            write(&config.out.join(&name), &made.file)?;
+            shots.push(Shot {
+                condition: condition.to_string(),
+                image: name,
+            });
+            images += 1;
+            bar.inc();
+        }
+        asked.extend(questions.into_iter().map(|question| Asked {
+            frame: number,
+            choices: shown.get(&question.id).cloned().unwrap_or(question.choices),
+            id: question.id.0,
+            text: question.text,
+            shots: shots.clone(),
+        }));
+    }
+    drop(bar);
+    let path = config.out.join("study.html");
+    write(&path, page(&asked)?.as_bytes())?;
+    Ok(Verdict {
+        status: Status::Complete,
+        output: format!(
+            "{}: {} questions, {images} images, {} conditions; with {} people each image is seen by one of them\n",
+            path.display(),
+            asked.len(),
+            conditions.len(),
+            conditions.len()
+        ),
+    })
+}
+
+fn conditions(records: &[Record], wanted: &[Condition]) -> Result<Vec<Condition>> {
+    let there: BTreeSet<Condition> = records
+        .iter()
+        .filter_map(|record| record.condition.clone())
+        .collect();
+    if let Some(missing) = wanted.iter().find(|condition| !there.contains(condition)) {
+        let problem = format_args!("nothing was asked at {missing} in this run");
+        return Err(Error::usage("--condition", problem));
+    }
+    if wanted.is_empty() {
+        return Ok(there.into_iter().collect());
+    }
+    Ok(wanted.to_vec())
+}
+
+/// The choices of each question in the order that they were first shown in.
+fn first_order(records: &[Record]) -> BTreeMap<QuestionId, Vec<String>> {
+    let mut orders = BTreeMap::new();
+    for record in records {
+        orders
+            .entry(record.question.clone())
+            .or_insert_with(|| record.choices.clone());
+    }
+    orders
+}
+
+/// So many questions, those with the lowest digests of their names.
+fn chosen(mut listed: Vec<Listed>, most: usize) -> Vec<Listed> {
+    listed.sort_by_cached_key(|question| *Digest::of(question.id.0.as_bytes()).as_bytes());
+    listed.truncate(most);
+    listed
+}
+
+/// The digests of the images that were sent.
+fn sent(records: &[Record]) -> BTreeMap<(FrameId, Condition), Digest> {
+    let sent = records.iter().filter_map(|record| {
+        let place = (record.frame.clone(), record.condition.clone()?);
+        Some((place, record.image.as_ref()?.digest))
+    });
+    sent.collect()
+}

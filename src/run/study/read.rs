@@ -1,0 +1,221 @@
+//! `study read`: people's answers as a run of a model of their own.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::fmt::Write;
+use std::fs;
+use std::path::Path;
+
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use crate::config::{Show, StudyRead};
+use crate::error::{Error, Result};
+use crate::run::report::{kept, leave};
+use crate::run::{Verdict, count, now, record};
+use crate::store::{self, Moved, Store};
+use crate::types::manifest::{Counts, RunManifest, SCHEMA, Status};
+use crate::types::{Condition, Digest, QuestionId, Record, Reply, TrialKey};
+
+/// A line of a file of answers.
+#[derive(Debug, Deserialize)]
+struct Line {
+    question: Value,
+    condition: String,
+    #[serde(default)]
+    person: Value,
+    /// A letter or the text of a choice; nothing where the person could not tell.
+    answer: Option<String>,
+}
+
+/// What became of the lines.
+#[derive(Debug, Default)]
+struct Tally {
+    answers: usize,
+    /// Questions or conditions that the run has not asked.
+    strange: BTreeSet<String>,
+}
+
+/// Takes answers over. The same files read again change nothing, further files add to it, and a later answer of the same
+/// person to the same question in the same condition takes the place of the earlier one.
+///
+/// # Errors
+/// Where the folder holds no run or a line is no answer; or nothing in the files was asked in the run.
+pub fn read(config: &StudyRead) -> Result<Verdict> {
+    let manifest = kept(&config.run)?;
+    let asked = asked(store::read_records(&config.run)?);
+    let mut tally = Tally::default();
+    let mut lines = Vec::new();
+    for path in &config.files {
+        lines.extend(answers(path)?);
+    }
+    // Before the folder is made, so that files of another study leave nothing behind.
+    let known: Vec<(&Record, Line)> = lines
+        .into_iter()
+        .filter_map(|line| {
+            let (question, condition) = (name(&line.question), line.condition.clone());
+            let place = (QuestionId(question), condition.parse::<Condition>().ok()?);
+            let record = asked.get(&place);
+            if record.is_none() {
+                tally.strange.insert(format!("{} at {condition}", place.0));
+            }
+            Some((record?, line))
+        })
+        .collect();
+    if known.is_empty() {
+        let problem =
+            "no answer in the files is to a question and condition of this run".to_owned();
+        let path = config.run.clone();
+        return Err(Error::Run { path, problem });
+    }
+    let mut own = of_people(&manifest, config);
+    let mut store = Store::open(&config.out, &own, Moved::Allowed)?;
+    store.write_questions(&store::read_questions(&config.run)?)?;
+    let mut people = People::new(store.records()?);
+    for (asked, line) in known {
+        tally.answers += 1;
+        if let Some(record) = people.record(asked, &line, &config.name)? {
+            store.append(&record)?;
+        }
+    }
+    store.sync()?;
+    let records = store.records()?;
+    own.counts = count(records.len(), &records);
+    own.status = Status::Complete;
+    let mut output = leave(&store, &own, &records, config.show)?;
+    if config.show == Show::Table {
+        output.insert_str(0, &told(&tally));
+    }
+    Ok(Verdict {
+        status: Status::Complete,
+        output,
+    })
+}
+
+fn answers(path: &Path) -> Result<Vec<Line>> {
+    let text = fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))?;
+    let lines = text.trim_start_matches('\u{feff}').lines().enumerate();
+    lines
+        .filter(|(_, line)| !line.trim().is_empty())
+        .map(|(i, line)| serde_json::from_str(line).map_err(|e| Error::json_line(path, i + 1, &e)))
+        .collect()
+}
+
+/// A name that may have been written as a number.
+fn name(value: &Value) -> String {
+    value
+        .as_str()
+        .map_or_else(|| value.to_string(), str::to_owned)
+}
+
+/// A record of each question and condition that was asked with an image.
+fn asked(records: Vec<Record>) -> HashMap<(QuestionId, Condition), Record> {
+    let mut asked = HashMap::new();
+    for record in records {
+        if let Some(condition) = record.condition.clone() {
+            asked
+                .entry((record.question.clone(), condition))
+                .or_insert(record);
+        }
+    }
+    asked
+}
+
+/// The manifest of the people's run: the images are those of the run that they were asked about.
+fn of_people(run: &RunManifest, config: &StudyRead) -> RunManifest {
+    let identity = [
+        ("--model", json!([config.name])),
+        ("people asked about", json!(run.identity)),
+    ];
+    RunManifest {
+        schema: SCHEMA.to_owned(),
+        status: Status::Started,
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        created: now(),
+        updated: now(),
+        platform: BTreeMap::new(),
+        identity: identity
+            .map(|(name, value)| (name.to_owned(), value))
+            .into(),
+        settings: BTreeMap::new(),
+        images: run.images.clone(),
+        counts: Counts::default(),
+    }
+}
+
+/// Who has answered what: the first to answer an item is its first turn, so that people and models are compared item by item.
+struct People {
+    answers: HashMap<TrialKey, Record>,
+    next: HashMap<(QuestionId, Option<Condition>), u32>,
+}
+
+impl People {
+    fn new(kept: Vec<Record>) -> Self {
+        let mut people = Self {
+            answers: HashMap::new(),
+            next: HashMap::new(),
+        };
+        for record in kept {
+            let item = (record.question.clone(), record.condition.clone());
+            let next = people.next.entry(item).or_default();
+            *next = (*next).max(record.repeat + 1);
+            people.answers.insert(record.key, record);
+        }
+        people
+    }
+
+    /// The record of an answer; `None` where it is known already.
+    fn record(&mut self, asked: &Record, line: &Line, name: &str) -> Result<Option<Record>> {
+        let person = self::name(&line.person);
+        let place = asked
+            .condition
+            .as_ref()
+            .map(ToString::to_string)
+            .unwrap_or_default();
+        let head = ["darkqa.person/1", name, &person, &asked.question.0, &place];
+        let key: TrialKey = Digest::of_parts(head.map(str::as_bytes)).into();
+        let next = self
+            .next
+            .entry((asked.question.clone(), asked.condition.clone()))
+            .or_default();
+        let kept = self.answers.get(&key);
+        let turn = kept.map_or(*next, |kept| kept.repeat);
+        *next = (*next).max(turn + 1);
+        let blank = Record {
+            key,
+            model: name.to_owned(),
+            reply: None,
+            refusal: None,
+            finish: None,
+            strict: None,
+            lenient: None,
+            repeat: turn,
+            failure: None,
+            usage: None,
+            latency_ms: None,
+            ..asked.clone()
+        };
+        let reply = Reply {
+            served_model: Some(person),
+            ..Reply::local(line.answer.clone().unwrap_or_default())
+        };
+        let mut answered = record::answered(blank, reply)?;
+        answered.latency_ms = None;
+        if kept == Some(&answered) {
+            return Ok(None);
+        }
+        self.answers.insert(key, answered.clone());
+        Ok(Some(answered))
+    }
+}
+
+fn told(tally: &Tally) -> String {
+    let mut text = format!("{} answers taken over\n", tally.answers);
+    if let Some(first) = tally.strange.first() {
+        let count = tally.strange.len();
+        let _ = writeln!(
+            text,
+            "{count} items in the files were not asked in the run, as {first}"
+        );
+    }
+    text
+}

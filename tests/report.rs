@@ -1,0 +1,343 @@
+//! Reports on runs, comparisons of several, images shown again, and people in the place of a model.
+
+#![allow(clippy::unwrap_used)]
+
+mod support;
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::{Value, json};
+use support::run::{Bench, records};
+
+/// A run of the random model over both variants of two levels, in this folder.
+fn run(bench: &Bench, out: &str, further: &[&str]) {
+    let words = [
+        "--model",
+        "random",
+        "--data",
+        "set.jsonl",
+        "--levels",
+        "L0,L5",
+        "--out",
+        out,
+    ];
+    bench.complete(&[&words, further].concat());
+}
+
+fn csv(path: &Path) -> Vec<Vec<String>> {
+    let text = fs::read_to_string(path).unwrap();
+    let lines = text
+        .lines()
+        .map(|line| line.split(',').map(str::to_owned).collect());
+    lines.collect()
+}
+
+#[test]
+fn several_runs_become_one_comparison() {
+    let bench = Bench::with_questions(12);
+    run(&bench, "one", &[]);
+    run(&bench, "two", &["--seed", "1"]);
+    bench.file("said.jsonl", "{\"default\": \"C\"}\n");
+    bench.complete(&[
+        "--model",
+        "script:said.jsonl",
+        "--data",
+        "set.jsonl",
+        "--levels",
+        "L0,L5",
+        "--out",
+        "three",
+    ]);
+    let called = bench.call(&["report", "one", "two", "three", "--out", "all"]);
+    assert_eq!(called.code, Some(0), "{called:?}");
+    // Random draws by the condition and the question: the seed of the light does not change what it was asked at L0 and by
+    // exposure, so those trials are one; with noise the two runs answered differently, and the model stands twice.
+    for label in ["random (one)", "random (two)", "script:said.jsonl"] {
+        assert!(called.stdout.contains(label), "{label}: {called:?}");
+    }
+    assert!(called.stdout.contains("report: all/report.html"));
+    let page = fs::read_to_string(bench.path("all/report.html")).unwrap();
+    assert!(page.contains("Seeing in the dark: 3 runs compared"));
+    for name in [
+        "summary.csv",
+        "comparisons.csv",
+        "thresholds.csv",
+        "agreement.csv",
+        "tables.tex",
+        "figures/accuracy.svg",
+    ] {
+        assert!(bench.path("all").join(name).is_file(), "{name}");
+    }
+    let rows = csv(&bench.path("all/comparisons.csv"));
+    let place = |name: &str| rows[0].iter().position(|head| head == name).unwrap();
+    let models = rows
+        .iter()
+        .filter(|row| row[0] == "model" && row[place("family")] == "all");
+    let scripted = models.filter(|row| row[place("against_model")] == "script:said.jsonl");
+    // The scripted model is always right: whoever is held against it gains nothing.
+    for row in scripted {
+        assert_eq!(row[place("only_first")], "0", "{row:?}");
+        assert_eq!(row[place("second")], "1");
+    }
+    // Nothing is written where nothing is wanted.
+    let told = bench.call(&["report", "one", "three"]);
+    assert!(
+        told.stdout.contains("report: --out DIR writes it"),
+        "{told:?}"
+    );
+    let json = bench.call(&["report", "one", "three", "--json"]);
+    let json: Value = serde_json::from_str(&json.stdout).unwrap();
+    assert_eq!(json["runs"].as_array().unwrap().len(), 2);
+}
+
+#[test]
+fn runs_that_cannot_be_compared_are_named() {
+    let bench = Bench::with_questions(3);
+    run(&bench, "one", &[]);
+    let text = fs::read_to_string(bench.path("set.jsonl")).unwrap();
+    bench.file("set.jsonl", text.replace("\"id\":\"q", "\"id\":\"other"));
+    run(&bench, "strange", &[]);
+    bench.file("set.jsonl", text.replace("\"red\"", "\"pink\""));
+    run(&bench, "foreign", &[]);
+    let refused = |runs: [&str; 2]| bench.call(&["report", runs[0], runs[1]]);
+    let strange = refused(["one", "strange"]);
+    assert_eq!(strange.code, Some(2));
+    assert!(
+        strange
+            .stderr
+            .contains("strange: the run shares no question with one"),
+        "{strange:?}"
+    );
+    let foreign = refused(["one", "foreign"]);
+    assert!(
+        foreign
+            .stderr
+            .contains("has other choices or another truth in one"),
+        "{foreign:?}"
+    );
+    let none = refused(["one", "nowhere"]);
+    assert!(
+        none.stderr.contains("nowhere: no run in this folder"),
+        "{none:?}"
+    );
+}
+
+#[test]
+fn broken_records_are_named_or_passed_over() {
+    let bench = Bench::with_questions(3);
+    run(&bench, "run", &[]);
+    let path = bench.path("run/records.jsonl");
+    let whole = fs::read_to_string(&path).unwrap();
+    let report = || bench.call(&["report", "run"]);
+    // Cut while it was written: the last line is passed over.
+    fs::write(&path, &whole[..whole.len() - 40]).unwrap();
+    let cut = report();
+    assert_eq!(cut.code, Some(0), "{cut:?}");
+    assert_eq!(records(&bench.path("run")).len(), whole.lines().count() - 1);
+    // Something else among the lines.
+    fs::write(&path, format!("{{\"a\": 1}}\n{whole}")).unwrap();
+    let mixed = report();
+    assert_eq!(mixed.code, Some(2));
+    assert!(
+        mixed
+            .stderr
+            .contains("records.jsonl, line 1: not a record: missing field"),
+        "{mixed:?}"
+    );
+    fs::write(&path, "").unwrap();
+    let empty = report();
+    assert!(
+        empty.stderr.contains("run: the run has no records yet"),
+        "{empty:?}"
+    );
+    // A run of another schema.
+    fs::write(&path, &whole).unwrap();
+    let manifest = fs::read_to_string(bench.path("run/manifest.json")).unwrap();
+    bench.file(
+        "run/manifest.json",
+        manifest.replace("darkqa.run/1", "darkqa.run/9"),
+    );
+    let newer = report();
+    assert!(
+        newer
+            .stderr
+            .contains("the run has the schema \"darkqa.run/9\""),
+        "{newer:?}"
+    );
+}
+
+#[test]
+fn runs_of_earlier_versions_are_read() {
+    let bench = Bench::with_questions(3);
+    run(&bench, "run", &[]);
+    // What the first version wrote: no questions, no small copies, no recipe, records of the first fields alone.
+    for later in ["questions.jsonl", "thumbnails.jsonl", "report.html"] {
+        fs::remove_file(bench.path("run").join(later)).unwrap();
+    }
+    let path = bench.path("run/manifest.json");
+    let mut manifest: Value = serde_json::from_str(&fs::read_to_string(&path).unwrap()).unwrap();
+    manifest.as_object_mut().unwrap().remove("images");
+    fs::write(&path, manifest.to_string()).unwrap();
+    let lines = records(&bench.path("run")).into_iter().map(|mut record| {
+        let fields = record.as_object_mut().unwrap();
+        for later in ["refusal", "finish", "served_model", "repeat", "via"] {
+            fields.remove(later);
+        }
+        format!("{record}\n")
+    });
+    fs::write(bench.path("run/records.jsonl"), lines.collect::<String>()).unwrap();
+    let called = bench.call(&["report", "run"]);
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert!(called.stdout.contains("chance: 33.33 over 3 questions"));
+    assert!(bench.path("run/report.html").is_file());
+    let shown = bench.call(&["show", "run", "q0"]);
+    assert!(
+        shown
+            .stderr
+            .contains("the run does not say how its images were made"),
+        "{shown:?}"
+    );
+}
+
+#[test]
+fn what_was_sent_is_made_again() {
+    let bench = Bench::new();
+    bench.complete(&[
+        "--model", "random", "--levels", "L0,L4", "--limit", "4", "--seed", "3", "--out", "run",
+    ]);
+    let first = records(&bench.path("run")).remove(0);
+    let id = first["question"].as_str().unwrap();
+    let shown = bench.call(&["show", "run", id]);
+    assert_eq!(shown.code, Some(0), "{shown:?}");
+    assert_eq!(
+        shown
+            .stdout
+            .matches("the very bytes that were sent")
+            .count(),
+        3,
+        "{shown:?}"
+    );
+    for record in records(&bench.path("run"))
+        .iter()
+        .filter(|record| record["question"] == id)
+    {
+        let condition = record["condition"].as_str().unwrap();
+        let frame = record["frame"].as_str().unwrap();
+        let file = fs::read(bench.path(&format!("run/shown/{frame}_{condition}.png"))).unwrap();
+        assert_eq!(
+            json!(darkqa_eval::types::Digest::of(&file)),
+            record["image"]["digest"]
+        );
+    }
+    // Other rooms: what is made is something else, and that is said.
+    let other = bench.call(&[
+        "show",
+        "run",
+        id,
+        "--data",
+        "rooms:frames=6,size=200x150,seed=8",
+        "--out",
+        "other",
+    ]);
+    assert_eq!(other.code, Some(1), "{other:?}");
+    assert_eq!(
+        other.stdout.matches("NOT the bytes that were sent").count(),
+        3
+    );
+    let missing = bench.call(&["show", "run", id, "--condition", "L1-ev"]);
+    assert!(
+        missing
+            .stderr
+            .contains("the item was not asked at L1-ev; it was at L0, L4-ev, L4-noise"),
+        "{missing:?}"
+    );
+    let nobody = bench.call(&["show", "run", "nothing"]);
+    assert!(
+        nobody
+            .stderr
+            .contains("no question \"nothing\" in this run"),
+        "{nobody:?}"
+    );
+}
+
+#[test]
+fn people_enter_as_a_model() {
+    let bench = Bench::with_questions(6);
+    run(&bench, "run", &[]);
+    let packed = bench.call(&["study", "pack", "run", "--out", "pack"]);
+    assert_eq!(packed.code, Some(0), "{packed:?}");
+    assert!(
+        packed
+            .stdout
+            .contains("6 questions, 3 images, 3 conditions"),
+        "{packed:?}"
+    );
+    let page = fs::read_to_string(bench.path("pack/study.html")).unwrap();
+    assert!(!page.contains("truth"));
+    assert_eq!(fs::read_dir(bench.path("pack/images")).unwrap().count(), 3);
+    // Two people; the second cannot tell in the dark, and one line is of another study.
+    let line = |question: &str, condition: &str, person: u32, answer: Value| {
+        let line = json!({"question": question, "condition": condition, "person": person, "answer": answer});
+        format!("{line}\n")
+    };
+    let mut text = line("nobody", "L0", 1, json!("A"));
+    for i in 0..6 {
+        let question = format!("q{i}");
+        text += &line(&question, "L0", 1, json!("C"));
+        text += &line(&question, "L0", 2, json!("brown"));
+        text += &line(&question, "L5-noise", 2, Value::Null);
+    }
+    bench.file("answers.jsonl", &text);
+    let words = [
+        "study",
+        "read",
+        "run",
+        "answers.jsonl",
+        "--out",
+        "people",
+        "--name",
+        "people",
+    ];
+    let read = bench.call(&words);
+    assert_eq!(read.code, Some(0), "{read:?}");
+    assert!(
+        read.stdout.contains(
+            "18 answers taken over\n1 items in the files were not asked in the run, as nobody at L0"
+        ),
+        "{read:?}"
+    );
+    let made = records(&bench.path("people"));
+    assert_eq!(made.len(), 18);
+    assert_eq!(
+        made.iter()
+            .filter(|record| record["outcome"] == "right")
+            .count(),
+        12
+    );
+    assert_eq!(
+        made.iter()
+            .filter(|record| record["strict"]["why"] == "empty")
+            .count(),
+        6
+    );
+    // The same again changes nothing.
+    bench.call(&words);
+    assert!(records(&bench.path("people")) == made);
+    let both = bench.call(&["report", "run", "people", "--out", "both"]);
+    assert_eq!(both.code, Some(0), "{both:?}");
+    let rows = csv(&bench.path("both/comparisons.csv"));
+    let held = rows
+        .iter()
+        .find(|row| row[0] == "model" && row[2] == "L0")
+        .unwrap();
+    assert_eq!((&*held[1], &*held[3], &*held[6]), ("people", "random", "6"));
+    bench.file("answers.jsonl", "{\"question\": 1}\n");
+    let broken = bench.call(&words);
+    assert!(
+        broken
+            .stderr
+            .contains("answers.jsonl, line 1: missing field `condition`"),
+        "{broken:?}"
+    );
+}
