@@ -139,7 +139,7 @@ fn accuracy(findings: &Findings<'_>) -> String {
     )
 }
 
-/// A row a subject with images and without; a column a family. What is below the same model without images is underlined.
+/// A row a subject with images and without; a column a family. What is below a model without images is underlined.
 fn families(findings: &Findings<'_>) -> String {
     let families = findings.grid.families();
     let rows = findings.grid.subjects.iter().map(|subject| {
@@ -171,7 +171,7 @@ fn families(findings: &Findings<'_>) -> String {
         .into_iter()
         .chain(names)
         .collect();
-    let caption = "Accuracy in \\% by family. Underlined: below the same model without images.";
+    let caption = "Accuracy in \\% by family. Underlined: below a model without images (its own, where it was asked so).";
     table(
         caption,
         &format!("ll{}", "r".repeat(families.len())),

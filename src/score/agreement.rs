@@ -91,12 +91,14 @@ fn agreement(grid: &Grid<'_>, draws: &Resamples, first: usize, second: usize) ->
     })
 }
 
-/// Cohen's κ of two yes-or-no marks (Cohen 1960, Educ. Psychol. Meas. 20:37); `None` where chance alone explains all.
+/// Cohen's κ of two yes-or-no marks (Cohen 1960, Educ. Psychol. Meas. 20:37); `None` where one of them
+/// does not vary.
 fn kappa(all: f64, both: f64, first: f64, second: f64) -> Option<f64> {
     let (a, b) = (first / all, second / all);
     let seen = (all - first - second + 2.0 * both) / all;
     let luck = a * b + (1.0 - a) * (1.0 - b);
-    (luck < 1.0).then(|| (seen - luck) / (1.0 - luck))
+    let varies = |share: f64| share > 0.0 && share < 1.0;
+    (varies(a) && varies(b)).then(|| (seen - luck) / (1.0 - luck))
 }
 
 #[cfg(test)]

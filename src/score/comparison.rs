@@ -1,5 +1,7 @@
 //! Every difference that is of interest, with its test: [`Comparison`].
 
+use std::collections::BTreeMap;
+
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -86,8 +88,8 @@ pub struct Comparison {
     pub family: Option<Family>,
     /// The numbers.
     pub paired: Paired,
-    /// The p-value after Holm's correction over all comparisons of this kind; those by family are corrected among
-    /// themselves.
+    /// The p-value after Holm's correction over all comparisons of this kind and these models, so that another model in the
+    /// report changes no verdict; those by family are corrected among themselves.
     pub holm: f64,
     /// What that shows.
     pub verdict: Verdict,
@@ -99,33 +101,43 @@ pub fn comparisons(grid: &Grid<'_>) -> Vec<Comparison> {
     let families: Vec<Option<&Family>> = std::iter::once(None)
         .chain(grid.families().into_iter().map(Some))
         .collect();
-    let mut all = Vec::new();
+    let mut jobs = Vec::new();
     for kind in Kind::ALL {
         let pairs = pairs(grid, kind);
-        let (total, parts) = families.split_at(1);
-        for families in [total, parts] {
-            let jobs: Vec<(Option<&Family>, usize, usize)> = families
-                .iter()
-                .flat_map(|family| pairs.iter().map(move |(a, b)| (*family, *a, *b)))
-                .collect();
-            let paired = jobs.into_par_iter().filter_map(|(family, first, second)| {
-                let paired = Paired::new(grid, first, second, family, Mode::Strict)?;
-                Some((family, first, second, paired))
-            });
-            let paired: Vec<_> = paired.collect();
-            let values: Vec<f64> = paired.iter().map(|(.., paired)| paired.p).collect();
-            let corrected = paired.into_iter().zip(holm(&values));
-            all.extend(
-                corrected.map(|((family, first, second, paired), holm)| Comparison {
-                    kind,
-                    first: grid.subjects[first].clone(),
-                    second: grid.subjects[second].clone(),
-                    family: family.cloned(),
-                    verdict: verdict(paired.difference.value, holm),
-                    paired,
-                    holm,
-                }),
-            );
+        for family in &families {
+            jobs.extend(pairs.iter().map(|(a, b)| (kind, *family, *a, *b)));
+        }
+    }
+    let paired = jobs
+        .into_par_iter()
+        .filter_map(|(kind, family, first, second)| {
+            Some(Comparison {
+                kind,
+                first: grid.subjects[first].clone(),
+                second: grid.subjects[second].clone(),
+                family: family.cloned(),
+                paired: Paired::new(grid, first, second, family, Mode::Strict)?,
+                holm: 1.0,
+                verdict: Verdict::Tied,
+            })
+        });
+    corrected(paired.collect())
+}
+
+/// The comparisons with their verdicts, after Holm's correction within each set of them.
+fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
+    let mut sets = BTreeMap::<_, Vec<usize>>::new();
+    for (index, one) in all.iter().enumerate() {
+        let models = (one.first.model.clone(), one.second.model.clone());
+        let set = (one.kind, one.family.is_some(), models);
+        sets.entry(set).or_default().push(index);
+    }
+    for set in sets.into_values() {
+        let values: Vec<f64> = set.iter().map(|index| all[*index].paired.p).collect();
+        for (index, holm) in set.into_iter().zip(holm(&values)) {
+            let one = &mut all[index];
+            one.holm = holm;
+            one.verdict = verdict(one.paired.difference.value, holm);
         }
     }
     all

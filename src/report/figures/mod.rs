@@ -51,6 +51,9 @@ pub fn figures(findings: &Findings<'_>) -> Result<Vec<Figure>> {
     Ok(figures)
 }
 
+/// The built-in models: a floor and a ceiling, not models under test.
+const BUILT_IN: [&str; 2] = ["random", "observer"];
+
 const ACCURACY: &str = "accuracy in %";
 
 /// What the figures are drawn from.
@@ -128,6 +131,17 @@ impl<'a> Overview<'a> {
         lines.collect()
     }
 
+    /// The models that a mean is taken over: not the built-in ones, where there are others.
+    fn judged(&self) -> Vec<&'a str> {
+        let others = self.models.iter().filter(|model| !BUILT_IN.contains(model));
+        let others: Vec<&str> = others.copied().collect();
+        if others.is_empty() {
+            self.models.clone()
+        } else {
+            others
+        }
+    }
+
     fn look(&self, model: &str) -> Look {
         let place = self.models.iter().position(|known| *known == model);
         Look(place.unwrap_or(self.models.len()))
@@ -186,12 +200,12 @@ impl<'a> Overview<'a> {
 
     /// The mean over models of each variant, with the range of the models.
     fn variants(&self) -> Option<(String, Chart)> {
-        let variants = self.variants_there();
+        let (variants, models) = (self.variants_there(), self.judged());
         if variants.len() < 2 {
             return None;
         }
         let line = |(index, variant): (usize, &Variant)| {
-            let curves = self.models.iter();
+            let curves = models.iter();
             let curves: Vec<Vec<(Level, Estimate)>> = curves
                 .map(|model| self.points(model, *variant, None, None))
                 .collect();
@@ -204,11 +218,9 @@ impl<'a> Overview<'a> {
         let mut lines: Vec<Line> = variants.iter().enumerate().map(line).collect();
         let floors = self.floors(None).into_iter();
         lines.extend(floors.filter(|line| line.name == CHANCE));
-        let models = self.models.len();
-        let title = if models == 1 {
-            format!("{}, n {}", self.models[0], self.n(None))
-        } else {
-            format!("mean of {models} models, n {} each", self.n(None))
+        let title = match &*models {
+            [one] => format!("{one}, n {}", self.n(None)),
+            several => format!("mean of {} models, n {} each", several.len(), self.n(None)),
         };
         let (caption, mut chart) = self.chart(
             ACCURACY,
@@ -216,9 +228,10 @@ impl<'a> Overview<'a> {
             1,
             "Exposure drop alone against exposure drop with sensor noise.",
         )?;
-        if models > 1 {
+        if models.len() > 1 {
             chart.note = format!(
-                "bands are the range of the {models} models, not intervals; strict reading"
+                "bands are the range of the {} models, not intervals; strict reading",
+                models.len()
             );
         }
         Some((caption, chart))

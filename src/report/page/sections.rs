@@ -66,7 +66,7 @@ pub(super) fn sections(
         section(
             "families",
             "Families of questions",
-            "Underlined: below the same model without images, where pictures in the dark do more harm than none.",
+            "Underlined: below a model without images (its own, where it was asked so), where pictures in the dark do more harm than none.",
             take(&["families"]),
             vec![tables::families(findings)],
         ),

@@ -13,8 +13,9 @@ use crate::run::darkroom::{Darkroom, Desk};
 use crate::run::plan::{Plan, Shot};
 use crate::run::progress::Progress;
 use crate::run::stage::Stage;
-use crate::run::{Verdict, limit, manifest, moved, open_enhancers, record};
-use crate::store::{BATCH, Store, read_manifest};
+use crate::run::thumbnail::Wanted;
+use crate::run::{Verdict, limit, listed, manifest, moved, open_enhancers, record};
+use crate::store::{BATCH, Store, read_manifest, read_thumbnails};
 use crate::types::View;
 use crate::types::manifest::{Counts, Status};
 
@@ -42,6 +43,8 @@ fn write(config: &BatchExport, stage: Stage<'_>, progress: &Progress) -> Result<
     let kept = read_manifest(&stage.folder)?;
     let mut manifest = manifest(evaluation, stage.identity, kept);
     let mut store = Store::open(&stage.folder, &manifest, moved(evaluation))?;
+    store.write_questions(&listed(stage.questions, stage.dataset))?;
+    let wanted = Wanted::new(stage.questions, read_thumbnails(&stage.folder)?);
     let records = store.records()?;
     let mut plan = Plan::new(&stage.inputs, &records)?;
     let out = plan.leave_out(&store.out_in_batches()?);
@@ -82,6 +85,11 @@ fn write(config: &BatchExport, stage: Stage<'_>, progress: &Progress) -> Result<
             let image = condition
                 .map(|c| darkroom.image(&mut desk, c))
                 .transpose()?;
+            if let (Some(condition), Some(image)) = (condition, &image)
+                && let Some(thumbnail) = wanted.of(&frame.frame, condition, image)?
+            {
+                requests.store.append_thumbnail(&thumbnail)?;
+            }
             requests.add(shot, image.as_deref())?;
             bar.advance(shot.trials.len());
         }
