@@ -214,6 +214,9 @@ fn themes(browser: &mut Browser) {
         dark,
         "the system's theme is the first one"
     );
+    browser.call("Emulation.setEmulatedMedia", &json!({"media": "print"}));
+    assert_eq!(browser.evaluate(ground), light, "paper is white");
+    browser.call("Emulation.setEmulatedMedia", &json!({"media": ""}));
 }
 
 fn narrow(browser: &mut Browser, url: &str) {

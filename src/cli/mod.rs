@@ -30,7 +30,7 @@ pub use questions::QuestionsArgs;
 pub use report::ReportArgs;
 pub use rooms::RoomsArgs;
 pub use serve::ServeArgs;
-pub use show::ShowArgs;
+pub use show::{AgainArgs, ShowArgs};
 pub use study::{StudyCommand, StudyPackArgs, StudyReadArgs};
 
 /// Measures how well a vision-language model sees in the dark.

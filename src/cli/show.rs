@@ -20,6 +20,14 @@ pub struct ShowArgs {
     /// Where the images go; default: shown in the folder of the run
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Where everything lies by now.
+    #[command(flatten)]
+    pub again: AgainArgs,
+}
+
+/// How the images of a run are made again.
+#[derive(Debug, Args)]
+pub struct AgainArgs {
     /// The data, where they lie elsewhere by now
     #[arg(long, value_name = "DIR|FILE|rooms:…")]
     pub data: Option<PathBuf>,

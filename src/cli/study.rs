@@ -5,6 +5,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
+use super::AgainArgs;
+
 /// What can be done with people's answers.
 #[derive(Debug, Subcommand)]
 pub enum StudyCommand {
@@ -29,21 +31,9 @@ pub struct StudyPackArgs {
     /// Only these conditions, as L3-noise+zerodce; repeatable; default: all of the run
     #[arg(long, value_name = "CONDITION")]
     pub condition: Vec<String>,
-    /// The data, where they lie elsewhere by now
-    #[arg(long, value_name = "DIR|FILE|rooms:…")]
-    pub data: Option<PathBuf>,
-    /// The enhancement models, where they lie elsewhere by now; repeatable
-    #[arg(long, value_name = "FILE")]
-    pub llie: Vec<PathBuf>,
-    /// Threads, 1024 at most; default: all cores
-    #[arg(long, value_name = "N")]
-    pub threads: Option<NonZeroUsize>,
-    /// The ONNX Runtime library to load; default: ORT_DYLIB_PATH, else found, else installed once by pip
-    #[arg(long, value_name = "FILE")]
-    pub ort_lib: Option<PathBuf>,
-    /// Never install ONNX Runtime
-    #[arg(long)]
-    pub offline: bool,
+    /// Where everything lies by now.
+    #[command(flatten)]
+    pub again: AgainArgs,
     /// No progress
     #[arg(long)]
     pub quiet: bool,

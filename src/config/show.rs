@@ -1,14 +1,13 @@
 //! What `show` is told, and how a run's images are made again: [`ShowItem`], [`Again`] and [`Recipe`].
 
 use std::collections::BTreeMap;
-use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use serde_json::{Map, Value};
 
 use super::layers::{above, read};
 use super::{Data, Enhancement, Images, Sensor, data, enhancement, images};
-use crate::cli::{DataArgs, EnhancementArgs, EvaluateArgs, ShowArgs};
+use crate::cli::{AgainArgs, DataArgs, EnhancementArgs, EvaluateArgs, ShowArgs};
 use crate::error::{Error, Result};
 use crate::types::Condition;
 
@@ -85,23 +84,17 @@ pub struct Pictures {
 pub struct Again(EvaluateArgs);
 
 impl Again {
-    pub(super) fn said(
-        data: Option<PathBuf>,
-        llie: Vec<PathBuf>,
-        threads: Option<NonZeroUsize>,
-        ort_lib: Option<PathBuf>,
-        offline: bool,
-    ) -> Self {
+    pub(super) fn said(said: AgainArgs) -> Self {
         Self(EvaluateArgs {
             data: DataArgs {
-                data,
+                data: said.data,
                 ..DataArgs::default()
             },
             enhancement: EnhancementArgs {
-                llie,
-                threads,
-                ort_lib,
-                offline,
+                llie: said.llie,
+                threads: said.threads,
+                ort_lib: said.ort_lib,
+                offline: said.offline,
                 ..EnhancementArgs::default()
             },
             ..EvaluateArgs::default()
@@ -149,13 +142,7 @@ impl ShowItem {
             item: said.item,
             conditions: conditions(&said.condition)?,
             out: said.out,
-            again: Again::said(
-                said.data,
-                said.llie,
-                said.threads,
-                said.ort_lib,
-                said.offline,
-            ),
+            again: Again::said(said.again),
         })
     }
 }

@@ -38,13 +38,7 @@ impl StudyPack {
             out: said.out,
             items: said.items,
             conditions: super::show::conditions(&said.condition)?,
-            again: Again::said(
-                said.data,
-                said.llie,
-                said.threads,
-                said.ort_lib,
-                said.offline,
-            ),
+            again: Again::said(said.again),
         })
     }
 }
