@@ -11,6 +11,7 @@ pub mod page;
 pub mod products;
 pub mod questions;
 pub mod realism;
+mod samples;
 mod script;
 pub mod sheet;
 pub mod study;

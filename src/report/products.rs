@@ -2,6 +2,7 @@
 
 use super::figures::figures;
 use super::page::{Shown, page};
+use super::samples::{figure, samples};
 use super::{csv, files, latex};
 use crate::error::Result;
 use crate::score::findings::Findings;
@@ -30,6 +31,12 @@ pub fn products<'a>(
             figure.svg.into_bytes(),
         )
     }));
+    if let Some(samples) = samples(shown.thumbnails) {
+        files.push((
+            "figures/samples.svg".to_owned(),
+            figure(&samples).into_bytes(),
+        ));
+    }
     files.push((PAGE.to_owned(), page.into_bytes()));
     Ok(files)
 }

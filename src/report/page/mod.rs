@@ -4,7 +4,6 @@
 //! small images, are packed data that its script unfolds. It opens without a network, and its policy allows none.
 
 mod items;
-mod samples;
 mod sections;
 mod tables;
 
@@ -32,6 +31,8 @@ pub struct Run<'a> {
     pub manifest: &'a RunManifest,
     /// Its records, for what they took.
     pub records: &'a [Record],
+    /// What they cost, in words, where that is known.
+    pub cost: Option<String>,
 }
 
 /// What is shown besides the findings.
@@ -145,6 +146,7 @@ fn facts(run: &Run<'_>) -> Facts {
         fact("updated", manifest.updated.clone()),
     ];
     rows.extend(spent(run.records));
+    rows.extend(run.cost.iter().map(|cost| fact("cost", cost.clone())));
     let texts = |map: &std::collections::BTreeMap<String, serde_json::Value>| {
         let rows = map.iter().map(|(name, value)| match value {
             serde_json::Value::String(text) => (name.clone(), text.clone()),

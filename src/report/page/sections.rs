@@ -2,8 +2,9 @@
 
 use serde::Serialize;
 
-use super::{samples, tables};
+use super::tables;
 use crate::report::figures::Figure;
+use crate::report::samples::{Samples, samples};
 use crate::score::comparison::Kind;
 use crate::score::findings::Findings;
 use crate::types::Thumbnail;
@@ -15,7 +16,7 @@ pub(super) struct Section {
     title: &'static str,
     note: String,
     figures: Vec<Drawing>,
-    samples: Option<samples::Samples>,
+    samples: Option<Samples>,
     tables: Vec<tables::Table>,
 }
 
@@ -71,7 +72,7 @@ pub(super) fn sections(
             vec![tables::families(findings)],
         ),
         Section {
-            samples: samples::samples(thumbnails),
+            samples: samples(thumbnails),
             ..section(
                 "enhancers",
                 "Enhancement",

@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 
 use super::Kept;
+use super::cost::cost;
 use crate::error::{Error, Result};
 use crate::types::manifest::RunManifest;
 use crate::types::{Listed, Outcome, QuestionId, Record, Thumbnail, TrialKey, View};
@@ -22,6 +23,7 @@ pub(super) struct Part {
     pub(super) folder: PathBuf,
     pub(super) name: String,
     pub(super) manifest: RunManifest,
+    pub(super) cost: Option<String>,
     /// Where its records are among all.
     pub(super) records: Range<usize>,
 }
@@ -46,6 +48,7 @@ pub(super) fn merge(runs: Vec<Kept>) -> Result<Merged> {
     let mut pictured = BTreeSet::new();
     for (run, name) in runs.into_iter().zip(names) {
         let first = merged.records.len();
+        let cost = cost(&run.records)?;
         for mut record in run.records {
             if known.contains(&record.key) {
                 continue;
@@ -62,6 +65,7 @@ pub(super) fn merge(runs: Vec<Kept>) -> Result<Merged> {
             folder: run.folder,
             name,
             manifest: run.manifest,
+            cost,
             records: first..merged.records.len(),
         });
         let questions = run.questions.into_iter();

@@ -1,5 +1,6 @@
 //! `report`: what runs hold, from their records alone.
 
+mod cost;
 mod merge;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -19,6 +20,7 @@ use crate::store::{self, Moved, Store};
 use crate::types::manifest::{RunManifest, Status};
 use crate::types::{FrameId, Listed, QuestionId, Record, Thumbnail};
 
+use cost::cost;
 use merge::merge;
 
 /// A run as it lies in its folder.
@@ -136,16 +138,14 @@ fn compare(runs: Vec<Kept>, config: &Report) -> Result<String> {
         return Ok(text);
     };
     let questions: Vec<&Listed> = merged.questions.iter().collect();
+    let runs = merged.runs.iter().map(|run| page::Run {
+        name: run.name.clone(),
+        manifest: &run.manifest,
+        records: &merged.records[run.records.clone()],
+        cost: run.cost.clone(),
+    });
     let shown = Shown {
-        runs: merged
-            .runs
-            .iter()
-            .map(|run| page::Run {
-                name: run.name.clone(),
-                manifest: &run.manifest,
-                records: &merged.records[run.records.clone()],
-            })
-            .collect(),
+        runs: runs.collect(),
         questions: &questions,
         thumbnails: &merged.thumbnails,
     };
@@ -217,6 +217,7 @@ pub(super) fn leave(
             name: name.to_string_lossy().into_owned(),
             manifest,
             records,
+            cost: cost(records)?,
         }],
         questions: &listed,
         thumbnails: &thumbnails,

@@ -1,0 +1,174 @@
+//! The first frames over the levels, as small pictures: [`samples`], and as a figure: [`figure`].
+
+use std::collections::BTreeSet;
+use std::fmt::Write;
+
+use serde::Serialize;
+
+use super::subject::light;
+use crate::types::{Condition, EnhancerName, FrameId, Level, Thumbnail, Variant};
+
+#[derive(Serialize)]
+pub(super) struct Samples {
+    levels: Vec<String>,
+    rows: Vec<SampleRow>,
+}
+
+#[derive(Serialize)]
+struct SampleRow {
+    name: String,
+    images: Vec<Option<Image>>,
+}
+
+#[derive(Serialize)]
+struct Image {
+    url: String,
+    alt: String,
+}
+
+/// How many frames are shown as samples.
+const SAMPLES: usize = 3;
+
+/// The first frames over the levels: exposure drop, noise, and each enhancer.
+pub(super) fn samples(thumbnails: &[Thumbnail]) -> Option<Samples> {
+    let mut frames: Vec<&FrameId> = thumbnails
+        .iter()
+        .map(|thumbnail| &thumbnail.frame)
+        .collect();
+    frames.sort_unstable();
+    frames.dedup();
+    let level = |thumbnail: &Thumbnail| thumbnail.condition.degradation.level();
+    let levels: BTreeSet<Level> = thumbnails.iter().map(level).collect();
+    let lines: BTreeSet<(Variant, Option<&EnhancerName>)> = thumbnails
+        .iter()
+        .map(|t| {
+            (
+                t.condition.degradation.variant(),
+                t.condition.enhancer.as_ref(),
+            )
+        })
+        .filter(|(variant, _)| *variant != Variant::None)
+        .collect();
+    let lines = if lines.is_empty() {
+        BTreeSet::from([(Variant::None, None)])
+    } else {
+        lines
+    };
+    let mut rows = Vec::new();
+    for frame in frames.into_iter().take(SAMPLES) {
+        for (variant, enhancer) in &lines {
+            let of = |condition: &Condition, at: Level| {
+                let degradation = condition.degradation;
+                degradation.level() == at
+                    && (degradation.variant() == *variant
+                        && condition.enhancer.as_ref() == *enhancer
+                        || at == Level::L0 && enhancer.is_none())
+            };
+            let images = levels.iter().map(|at| {
+                let mut here = thumbnails
+                    .iter()
+                    .filter(|thumbnail| thumbnail.frame == *frame);
+                let found = here.find(|thumbnail| of(&thumbnail.condition, *at))?;
+                Some(Image {
+                    url: found.small.clone(),
+                    alt: format!("{} at {}", frame, found.condition),
+                })
+            });
+            rows.push(SampleRow {
+                name: format!("{frame}, {}", light(*variant, *enhancer)),
+                images: images.collect(),
+            });
+        }
+    }
+    let named = levels
+        .iter()
+        .map(|level| format!("{level}, {} EV", level.exposure_drop().0));
+    (!rows.is_empty()).then(|| Samples {
+        levels: named.collect(),
+        rows,
+    })
+}
+
+/// The width and height of a picture of the figure, and of what stands beside and above them, in pixels.
+const CELL: [usize; 2] = [200, 150];
+const HEAD: [usize; 2] = [180, 28];
+
+/// The samples as a figure of their own, the pictures within it.
+pub(super) fn figure(samples: &Samples) -> String {
+    let size = [
+        HEAD[0] + samples.levels.len() * (CELL[0] + 4),
+        HEAD[1] + samples.rows.len() * (CELL[1] + 4),
+    ];
+    let mut svg = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" \
+         font-family=\"sans-serif\" font-size=\"13\">\n<rect width=\"100%\" height=\"100%\" fill=\"#FFFFFF\"/>\n",
+        size[0], size[1]
+    );
+    for (index, level) in samples.levels.iter().enumerate() {
+        let x = HEAD[0] + index * (CELL[0] + 4) + CELL[0] / 2;
+        let _ = writeln!(
+            svg,
+            "<text x=\"{x}\" y=\"18\" text-anchor=\"middle\">{level}</text>"
+        );
+    }
+    for (index, row) in samples.rows.iter().enumerate() {
+        let y = HEAD[1] + index * (CELL[1] + 4);
+        for (line, words) in row.name.split(", ").enumerate() {
+            let baseline = y + CELL[1] / 2 + line * 18;
+            let words = escaped(words);
+            let _ = writeln!(svg, "<text x=\"8\" y=\"{baseline}\">{words}</text>");
+        }
+        for (column, image) in row.images.iter().enumerate() {
+            let x = HEAD[0] + column * (CELL[0] + 4);
+            if let Some(image) = image {
+                let _ = writeln!(
+                    svg,
+                    "<image x=\"{x}\" y=\"{y}\" width=\"{}\" height=\"{}\" href=\"{}\"/>",
+                    CELL[0], CELL[1], image.url
+                );
+            }
+        }
+    }
+    svg + "</svg>\n"
+}
+
+/// Escapes what XML reads as its own.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::types::Digest;
+
+    #[test]
+    fn each_line_has_its_pictures_and_no_name_breaks_the_figure() {
+        let thumbnail = |condition: &str| Thumbnail {
+            frame: FrameId("a<b>&c".into()),
+            condition: condition.parse().unwrap(),
+            image: Digest::of(condition.as_bytes()),
+            small: format!("data:{condition}"),
+            crop: String::new(),
+            stops: 0.0,
+        };
+        let kept = ["L0", "L3-ev", "L3-noise", "L3-noise+lift"].map(thumbnail);
+        let samples = samples(&kept).unwrap();
+        let urls = |row: &SampleRow| -> Vec<String> {
+            let urls = row
+                .images
+                .iter()
+                .map(|image| image.as_ref().map(|i| i.url.clone()));
+            urls.map(Option::unwrap_or_default).collect()
+        };
+        let rows: Vec<Vec<String>> = samples.rows.iter().map(urls).collect();
+        assert_eq!(rows[0], ["data:L0", "data:L3-ev"]);
+        assert_eq!(rows[1], ["data:L0", "data:L3-noise"]);
+        assert_eq!(rows[2], ["", "data:L3-noise+lift"]);
+        let svg = figure(&samples);
+        assert_eq!(svg.matches("<image").count(), 5);
+        assert!(svg.contains("a&lt;b&gt;&amp;c") && !svg.contains("a<b>"));
+    }
+}
