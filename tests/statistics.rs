@@ -270,7 +270,12 @@ fn thresholds_are_recovered() {
     let (above, below) = (psychometric(near), psychometric(far));
     let truth = near + (above - middle) / (above - below) * (far - near);
     assert!((truth - 6.4).abs() < 0.1, "{truth}");
-    let (mut sum, times) = (0.0, 400);
+    let heights = drops.windows(2).map(|drop| {
+        let mean = f64::midpoint(psychometric(drop[0]), psychometric(drop[1]));
+        (drop[1] - drop[0]) * mean
+    });
+    let true_area = heights.sum::<f64>() / 9.0;
+    let (mut sum, mut areas, times) = (0.0, 0, 400);
     let held = percent(times, || {
         let sizes = sizes(&mut random, 60, 3, 7);
         let mut records = Vec::new();
@@ -279,7 +284,7 @@ fn thresholds_are_recovered() {
             for level in std::iter::once(None).chain(DarkLevel::ALL.map(Some)) {
                 let subject = at(level);
                 let drop = subject.condition.degradation.level().exposure_drop().0;
-                let rate = (psychometric(f64::from(drop)) + 0.3 * luck).clamp(0.0, 1.0);
+                let rate = (psychometric(f64::from(drop)) + 0.2 * luck).clamp(0.0, 1.0);
                 for question in 0..*size {
                     let right = random.random_bool(rate);
                     records.push(record(frame * 100 + question, frame, &subject, right));
@@ -291,10 +296,13 @@ fn thresholds_are_recovered() {
         let made = curves(&grid, &Resamples::new(clusters.count()), None);
         let threshold = made[0].threshold.unwrap();
         sum += threshold.value;
+        areas += usize::from((made[0].area.low..=made[0].area.high).contains(&true_area));
         (threshold.low..=threshold.high).contains(&truth)
     });
     let mean = sum / times as f64;
-    println!("true {truth:.3} EV, mean {mean:.3} EV, held {held:.1} %");
+    let areas = 100.0 * areas as f64 / times as f64;
+    println!("true {truth:.3} EV, mean {mean:.3} EV, held {held:.1} %; areas held {areas:.1} %");
+    assert!((92.0..=98.0).contains(&areas), "{areas}");
     assert!((mean - truth).abs() < 0.08, "{mean} instead of {truth}");
     assert!((92.0..=98.0).contains(&held), "{held}");
 }
