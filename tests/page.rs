@@ -92,6 +92,15 @@ fn filters(browser: &mut Browser) {
         browser.evaluate("document.querySelector('#i-id').textContent.split(' ')[0]"),
         "q3"
     );
+    // Held against another subject, item by item.
+    browser.choose("#f-against", &format!("{SAID} L4-ev"));
+    browser.choose("#f-state", "wrong here, right there");
+    assert_eq!(count(browser), "1 of 40 items");
+    browser.choose("#f-state", "right here, wrong there");
+    assert_eq!(count(browser), "0 of 40 items");
+    browser.choose("#f-state", "another answer there");
+    assert_eq!(count(browser), "1 of 40 items");
+    browser.choose("#f-against", "–");
     browser.choose("#f-state", "all");
     browser.choose("#f-family", "color");
     assert_eq!(count(browser), "40 of 40 items");

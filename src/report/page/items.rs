@@ -71,6 +71,7 @@ struct Data<'a> {
 
 #[derive(Serialize)]
 struct Subject<'a> {
+    name: String,
     model: &'a str,
     condition: String,
     /// What the levels of one line have in common.
@@ -239,6 +240,7 @@ fn code(mark: Mark, mode: Mode) -> u8 {
 
 fn subjects<'a>(grid: &'a Grid<'_>) -> Vec<Subject<'a>> {
     let subject = |subject: &'a crate::score::accuracy::Subject| Subject {
+        name: crate::report::subject::name(subject),
         model: &subject.model,
         condition: subject.condition(),
         light: match subject.view {

@@ -68,6 +68,10 @@ const raw = (subject) => {
   return data.subjects.findIndex((o) => o.model === s.model && o.level === s.level && o.variant === s.variant && o.enhancer === null && o.light !== "blind");
 };
 
+// What the selected subject is held against, where something is.
+const there = () => data.subjects.findIndex((s) => s.name === state.against);
+const both = (s, i) => there() >= 0 && chosen(s, i) < FAILED && chosen(there(), i) < FAILED;
+
 const STATES = {
   "all": () => true,
   "right": (s, i) => isRight(s, i),
@@ -78,6 +82,9 @@ const STATES = {
   "found since L0": (s, i) => { const l = at(data.subjects[s].model, "untouched", "L0"); return l >= 0 && chosen(l, i) < FAILED && !isRight(l, i) && isRight(s, i); },
   "rescued by the enhancer": (s, i) => { const r = raw(s); return r >= 0 && r !== s && chosen(r, i) < FAILED && !isRight(r, i) && isRight(s, i); },
   "harmed by the enhancer": (s, i) => { const r = raw(s); return r >= 0 && r !== s && isRight(r, i) && chosen(s, i) < FAILED && !isRight(s, i); },
+  "right here, wrong there": (s, i) => isRight(s, i) && both(s, i) && !isRight(there(), i),
+  "wrong here, right there": (s, i) => both(s, i) && !isRight(s, i) && isRight(there(), i),
+  "another answer there": (s, i) => both(s, i) && chosen(s, i) !== chosen(there(), i),
   "models differ": (s, i) => {
     const here = data.subjects[s];
     const codes = data.subjects.map((o, n) => o.level === here.level && o.light === here.light ? chosen(n, i) : ABSENT).filter((c) => c < FAILED);
@@ -106,7 +113,9 @@ const choices = () => {
   state.light = fill($("f-light"), lights(state.model), state.light);
   const there = levels(state.model, state.light);
   state.level = there.length ? fill($("f-level"), there, state.level) : (fill($("f-level"), ["–"]), null);
-  state.show = fill($("f-state"), Object.keys(STATES), state.show);
+  state.against = fill($("f-against"), ["–", ...data.subjects.map((s) => s.name)], state.against);
+  const states = Object.keys(STATES).filter((name) => state.against !== "–" || !name.endsWith(" there"));
+  state.show = fill($("f-state"), states, state.show);
   $("f-words").value = state.words;
 };
 
@@ -159,8 +168,8 @@ const current = () => {
 };
 
 const link = () => {
-  const said = { item: data.items[state.item].name, model: state.model, light: state.light, level: state.level, family: state.family, show: state.show, words: state.words };
-  const parts = Object.entries(said).filter(([k, v]) => v && !(k === "family" && v === "all") && !(k === "show" && v === "all"));
+  const said = { item: data.items[state.item].name, model: state.model, light: state.light, level: state.level, family: state.family, against: state.against, show: state.show, words: state.words };
+  const parts = Object.entries(said).filter(([k, v]) => v && !(k === "family" && v === "all") && !(k === "show" && v === "all") && !(k === "against" && v === "–"));
   return "#" + parts.map(([k, v]) => k + "=" + encodeURIComponent(v)).join("&");
 };
 
@@ -321,7 +330,7 @@ const follow = () => {
   if (!link.item) return false;
   const item = data.items.findIndex((i) => i.name === link.item);
   if (item < 0) return false;
-  state = { family: link.family || "all", model: link.model, light: link.light, level: link.level, show: link.show || "all", words: link.words || "", item, pictured: null };
+  state = { family: link.family || "all", model: link.model, light: link.light, level: link.level, against: link.against || "–", show: link.show || "all", words: link.words || "", item, pictured: null };
   refresh();
   if (shown.includes(item)) go(item);
   return true;
@@ -330,11 +339,11 @@ const follow = () => {
 const start = async () => {
   data = await unpack();
   const first = data.subjects.find((s) => s.light !== "blind") || data.subjects[0];
-  state = { family: "all", model: first?.model, light: undefined, level: undefined, show: "all", words: "", item: data.items.length ? 0 : null, pictured: null };
+  state = { family: "all", model: first?.model, light: undefined, level: undefined, against: "–", show: "all", words: "", item: data.items.length ? 0 : null, pictured: null };
   $("loading").hidden = true;
   $("explorer").hidden = false;
   const set = (key, id) => $(id).addEventListener("change", (event) => { state[key] = event.target.value; state.pictured = null; refresh(); });
-  set("family", "f-family"); set("model", "f-model"); set("light", "f-light"); set("level", "f-level"); set("show", "f-state");
+  set("family", "f-family"); set("model", "f-model"); set("light", "f-light"); set("level", "f-level"); set("against", "f-against"); set("show", "f-state");
   $("f-words").addEventListener("input", (event) => { state.words = event.target.value; refresh(); });
   $("next").addEventListener("click", () => step(1));
   $("previous").addEventListener("click", () => step(-1));
