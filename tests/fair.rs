@@ -71,6 +71,29 @@ fn every_rotation_is_asked_and_an_answer_by_position_averages_out() {
 }
 
 #[test]
+fn chance_is_that_of_what_is_asked() {
+    let bench = Bench::with_questions(1);
+    let question = |id: &str, choices: &[&str]| {
+        let question = json!({
+            "id": id, "image": "a.png", "family": "color", "question": "What color is it?", "choices": choices,
+            "answer": "brown",
+        });
+        format!("{question}\n")
+    };
+    let two = question("two", &["red", "brown"]);
+    let four = question("four", &["red", "brown", "blue", "green"]);
+    bench.file("set.jsonl", two + &four);
+    bench.file("script.jsonl", "{\"default\":\"A\"}");
+    // Two replies with a half and four with a quarter each: two of six, as for the one who always says A.
+    let told = run(&bench, &["--model", "script:script.jsonl", "--circular"]);
+    assert!(told.contains("33.3 ±"), "{told}");
+    assert!(
+        told.contains("chance: 33.33 over 6 orders of choices"),
+        "{told}"
+    );
+}
+
+#[test]
 fn shuffled_orders_are_the_same_in_every_condition_and_run() {
     let orders = |seed: &str| {
         let bench = Bench::with_questions(6);

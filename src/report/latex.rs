@@ -127,7 +127,7 @@ fn accuracy(findings: &Findings<'_>) -> String {
         .chain(levels.iter().map(ToString::to_string))
         .collect();
     let caption = format!(
-        "Accuracy in \\% (strict reading) with half of the 95\\,\\% interval by {}; {} questions.",
+        "Accuracy in \\% (strict reading) with half of the 95\\,\\% interval by {}; {} items.",
         findings.unit,
         findings.grid.items.len()
     );

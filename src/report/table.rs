@@ -134,9 +134,14 @@ pub fn render(summary: &Summary, runs: &[(&RunManifest, &Path)]) -> String {
     for chance in of_view(None).filter_map(|pair| pair.strict.accuracy) {
         let _ = writeln!(
             text,
-            "chance: {:.2} over {} questions",
+            "chance: {:.2} over {} {}",
             100.0 * chance.value,
-            chance.n
+            chance.n,
+            if pairs.iter().any(|pair| pair.strict.always.is_some()) {
+                "orders of choices"
+            } else {
+                "questions"
+            }
         );
     }
     let _ = write!(text, "{}", unread(summary));

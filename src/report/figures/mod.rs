@@ -172,7 +172,7 @@ impl<'a> Overview<'a> {
     fn note(&self) -> String {
         let (grid, unit) = (&self.findings.grid, self.findings.unit);
         format!(
-            "n = {} questions in {} {unit}s; bands are 95 % intervals by {unit}; strict reading",
+            "n = {} items in {} {unit}s; bands are 95 % intervals by {unit}; strict reading",
             grid.items.len(),
             grid.clusters
         )

@@ -172,25 +172,33 @@ fn find<'a>(records: &'a [Record], questions: &[Listed]) -> Findings<'a> {
         .iter()
         .map(|question| (question.frame.clone(), question.scene.clone()));
     let scenes: BTreeMap<FrameId, String> = scenes.collect();
-    if questions.is_empty() {
-        return Findings::new(records, &scenes, asked(records));
-    }
-    let offers = questions.iter().map(|question| Offer {
-        family: question.family.clone(),
-        choices: question.choices.len(),
-    });
-    Findings::new(records, &scenes, offers)
+    Findings::new(records, &scenes, offers(records, questions))
 }
 
-/// The questions in records, each once.
-fn asked(records: &[Record]) -> Vec<Offer> {
-    let mut seen = BTreeSet::<&QuestionId>::new();
-    let first = records
-        .iter()
-        .filter(|record| seen.insert(&record.question));
-    let offers = first.map(|record| Offer {
-        family: record.family.clone(),
-        choices: record.choices.len(),
+/// What is offered, for the chance line: each question as often as it has orders of its choices, since an answer to each order
+/// counts for itself; those not asked yet once. A run that kept no questions has those in its records.
+fn offers(records: &[Record], questions: &[Listed]) -> Vec<Offer> {
+    let mut orders = BTreeMap::<&QuestionId, BTreeSet<&[String]>>::new();
+    let mut all = BTreeMap::<&QuestionId, Offer>::new();
+    for record in records {
+        orders
+            .entry(&record.question)
+            .or_default()
+            .insert(&record.choices);
+        all.entry(&record.question).or_insert_with(|| Offer {
+            family: record.family.clone(),
+            choices: record.choices.len(),
+        });
+    }
+    for question in questions {
+        all.entry(&question.id).or_insert_with(|| Offer {
+            family: question.family.clone(),
+            choices: question.choices.len(),
+        });
+    }
+    let offers = all.into_iter().flat_map(|(question, offer)| {
+        let times = orders.get(question).map_or(1, BTreeSet::len);
+        std::iter::repeat_n(offer, times)
     });
     offers.collect()
 }
