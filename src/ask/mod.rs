@@ -15,6 +15,7 @@ mod image_limit;
 mod image_tokens;
 mod local;
 mod openai;
+pub mod openeqa;
 mod pace;
 mod parameters;
 mod payload;

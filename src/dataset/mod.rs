@@ -11,6 +11,7 @@ mod jpeg;
 mod maps;
 pub mod multiple_choice;
 mod npy;
+pub mod openeqa;
 pub mod pairs;
 pub mod picture;
 pub mod questions;

@@ -26,6 +26,7 @@ pub mod findings;
 pub mod flips;
 pub mod grid;
 pub mod health;
+pub mod llm_match;
 pub mod paired;
 pub mod realism;
 pub mod significance;

@@ -1,0 +1,174 @@
+//! OpenEQA's episodic-memory questions and the walks that they are about: [`OpenQuestion`], [`questions`] and [`sampled`].
+//! After `facebookresearch/open-eqa` at cfa3fce.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use crate::error::{Error, Result};
+
+/// An open question about a walk.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+pub struct OpenQuestion {
+    /// Its name.
+    #[serde(rename = "question_id")]
+    pub id: String,
+    /// The question in words.
+    #[serde(rename = "question")]
+    pub text: String,
+    /// The true answer.
+    pub answer: String,
+    /// Other answers that are right, too; `None` where the item has no such key, which decides the judge's prompt.
+    #[serde(rename = "extra_answers")]
+    pub extra: Option<Vec<String>>,
+    /// What it asks for, as "object localization".
+    pub category: String,
+    /// The walk, as `hm3d-v0/000-hm3d-BFRyYbPCCPE`.
+    #[serde(rename = "episode_history")]
+    pub episode: String,
+}
+
+impl OpenQuestion {
+    /// The split that it belongs to: the first part of its walk's name, as `hm3d-v0`.
+    #[must_use]
+    pub fn split(&self) -> &str {
+        self.episode.split('/').next().unwrap_or_default()
+    }
+}
+
+/// Reads a file of questions, a JSON array as upstream's `open-eqa-v0.json`.
+///
+/// # Errors
+/// Where it cannot be read or is no such array, is empty, or has two questions of one id.
+pub fn questions(path: &Path) -> Result<Vec<OpenQuestion>> {
+    let text = fs::read(path).map_err(|e| Error::file(path, "read", e))?;
+    let wrong = |problem: String| Error::data(path.display(), problem);
+    let questions: Vec<OpenQuestion> = serde_json::from_slice(&text).map_err(|e| {
+        wrong(format!(
+            "{e}; a JSON array of {{\"question_id\", \"question\", \"answer\", \"category\", \"episode_history\"}} expected"
+        ))
+    })?;
+    if questions.is_empty() {
+        return Err(wrong("no questions in it".to_owned()));
+    }
+    let mut seen = BTreeSet::new();
+    if let Some(twice) = questions.iter().find(|question| !seen.insert(&question.id)) {
+        return Err(wrong(format!("two questions have the id {:?}", twice.id)));
+    }
+    Ok(questions)
+}
+
+/// The frames of a walk, by name: the files of its folder that end in `-rgb.png`.
+///
+/// # Errors
+/// Where the folder is missing or has none.
+pub fn walk(frames: &Path, episode: &str) -> Result<Vec<PathBuf>> {
+    let folder = frames.join(episode);
+    let entries = fs::read_dir(&folder).map_err(|e| Error::file(&folder, "read", e))?;
+    let mut paths = Vec::new();
+    for entry in entries {
+        let path = entry.map_err(|e| Error::file(&folder, "read", e))?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        if name.ends_with("-rgb.png") {
+            paths.push(path);
+        }
+    }
+    if paths.is_empty() {
+        let problem = "no frame in it: files that end in -rgb.png expected";
+        return Err(Error::data(folder.display(), problem));
+    }
+    paths.sort();
+    Ok(paths)
+}
+
+/// The indices of the frames that a model is shown: `np.round(np.linspace(0, n - 1, k))`, which rounds halves to even and
+/// repeats frames where there are fewer than `k`. Empty of no frames.
+#[must_use]
+pub fn sampled(n: usize, k: usize) -> Vec<usize> {
+    if n == 0 {
+        return Vec::new();
+    }
+    let last = (n - 1) as f64;
+    // numpy: arange(k) · step, and the end itself in the last place.
+    let step = if k > 1 { last / (k - 1) as f64 } else { 0.0 };
+    let at = |index: usize| {
+        let place = if index + 1 == k && k > 1 {
+            last
+        } else {
+            index as f64 * step
+        };
+        place.round_ties_even() as usize
+    };
+    (0..k).map(at).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_sampled_as_numpy_does() {
+        // numpy 2.4: np.round(np.linspace(0, n - 1, k)).astype(int).
+        assert_eq!(sampled(9, 5), [0, 2, 4, 6, 8]);
+        assert_eq!(sampled(4, 3), [0, 2, 3]);
+        assert_eq!(sampled(6, 3), [0, 2, 5]);
+        assert_eq!(sampled(3, 7), [0, 0, 1, 1, 1, 2, 2]);
+        assert_eq!(sampled(168, 5), [0, 42, 84, 125, 167]);
+        assert_eq!((sampled(1, 3), sampled(5, 1)), (vec![0, 0, 0], vec![0]));
+        assert!(sampled(0, 4).is_empty());
+    }
+
+    #[test]
+    fn questions_are_read_and_checked() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let read = |text: &str| {
+            fs::write(file.path(), text).unwrap();
+            questions(file.path())
+        };
+        let one = r#"{"question": "Where?", "answer": "there", "category": "object localization",
+            "question_id": "a", "episode_history": "hm3d-v0/000-x"}"#;
+        let extra =
+            one.replace("\"a\"", "\"b\"")
+                .replacen('{', "{\"extra_answers\": [\"here\"], ", 1);
+        let made = read(&format!("[{one}, {extra}]")).unwrap();
+        assert_eq!((made[0].split(), &made[0].extra), ("hm3d-v0", &None));
+        assert_eq!(made[1].extra.as_deref(), Some(&["here".to_owned()][..]));
+        for (text, says) in [
+            ("[]", "no questions in it"),
+            ("{}", "a JSON array of"),
+            (
+                &*format!("[{one}, {one}]"),
+                "two questions have the id \"a\"",
+            ),
+        ] {
+            let error = read(text).unwrap_err().to_string();
+            assert!(error.contains(says), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_walk_is_its_colour_frames_by_name() {
+        let base = tempfile::tempdir().unwrap();
+        let folder = base.path().join("hm3d-v0/000-x");
+        fs::create_dir_all(&folder).unwrap();
+        assert!(
+            walk(base.path(), "hm3d-v0/000-x")
+                .unwrap_err()
+                .to_string()
+                .contains("-rgb.png")
+        );
+        for name in [
+            "00010-rgb.png",
+            "00002-rgb.png",
+            "00002-depth.png",
+            "intrinsic_color.txt",
+        ] {
+            fs::write(folder.join(name), "").unwrap();
+        }
+        let names: Vec<_> = walk(base.path(), "hm3d-v0/000-x").unwrap();
+        assert!(names[0].ends_with("00002-rgb.png") && names.len() == 2);
+        assert!(walk(base.path(), "nowhere").is_err());
+    }
+}
