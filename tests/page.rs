@@ -28,11 +28,19 @@ fn hostile() -> String {
     lines.map(|line| format!("{line}\n")).concat()
 }
 
-#[test]
+/// A browser, where there is one.
 #[expect(clippy::print_stderr, reason = "a test that does nothing says so")]
-fn the_page_works_in_a_browser() {
-    let Some(program) = chromium() else {
+fn browser() -> Option<Browser> {
+    let program = chromium();
+    if program.is_none() {
         eprintln!("no Chromium here: the page is not tried");
+    }
+    Some(Browser::open(&program?))
+}
+
+#[test]
+fn the_page_works_in_a_browser() {
+    let Some(mut browser) = browser() else {
         return;
     };
     let bench = Bench::with_questions(40);
@@ -53,7 +61,6 @@ fn the_page_works_in_a_browser() {
     assert_eq!(called.code, Some(0), "{called:?}");
     let url = format!("file://{}", bench.path("run/report.html").display());
 
-    let mut browser = Browser::open(&program);
     browser.window(1400, 900, "light");
     browser.go(&url);
     browser.wait("document.documentElement?.dataset.ready === 'true'");
@@ -241,10 +248,8 @@ fn narrow(browser: &mut Browser, url: &str) {
 }
 
 #[test]
-#[expect(clippy::print_stderr, reason = "a test that does nothing says so")]
 fn people_can_answer() {
-    let Some(program) = chromium() else {
-        eprintln!("no Chromium here: the page is not tried");
+    let Some(mut browser) = browser() else {
         return;
     };
     let bench = Bench::with_questions(6);
@@ -260,7 +265,6 @@ fn people_can_answer() {
     ]);
     bench.complete(&["study", "pack", "run", "--out", "pack"]);
     let url = format!("file://{}", bench.path("pack/study.html").display());
-    let mut browser = Browser::open(&program);
     browser.window(1200, 800, "light");
     browser.go(&url);
     browser.wait("document.querySelector('#image')?.naturalWidth > 0");

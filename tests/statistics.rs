@@ -10,6 +10,8 @@
     reason = "the measured rates, for whoever asks with --nocapture"
 )]
 
+mod support;
+
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
@@ -22,12 +24,15 @@ use darkqa_eval::score::findings::Findings;
 use darkqa_eval::score::grid::{Count, Grid};
 use darkqa_eval::score::paired::Paired;
 use darkqa_eval::types::{
-    Condition, DarkLevel, Degradation, Digest, EnhancerName, Family, FrameId, Level, Outcome,
-    QuestionId, Reading, Record, Variant, Via, View,
+    Condition, DarkLevel, Degradation, EnhancerName, Family, Level, Reading, Record, Variant,
 };
 use rand::rngs::StdRng;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::{Beta, Distribution as _};
+use support::made::record;
+
+/// The only model.
+const MODEL: &str = "m";
 
 /// The right-rate of a cluster about a mean, with an intraclass correlation.
 fn rate(random: &mut StdRng, mean: f64, correlation: f64) -> f64 {
@@ -45,58 +50,9 @@ fn percent(times: usize, mut holds: impl FnMut() -> bool) -> f64 {
     100.0 * (0..times).filter(|_| holds()).count() as f64 / times as f64
 }
 
-fn record(question: usize, frame: usize, subject: &Subject, right: bool) -> Record {
-    let name = format!("{question} {subject:?}");
-    let chosen = Reading {
-        chosen: Some(usize::from(!right)),
-        why: None,
-    };
-    Record {
-        key: Digest::of(name.as_bytes()).into(),
-        question: QuestionId(format!("q{question:05}")),
-        frame: FrameId(format!("f{frame:04}")),
-        family: Family::Color,
-        model: subject.model.to_owned(),
-        view: View::Image,
-        level: Some(subject.condition.degradation.level()),
-        variant: subject.condition.degradation.variant(),
-        enhancer: subject.condition.enhancer.clone(),
-        condition: Some(subject.condition.clone()),
-        choices: ["a", "b", "c"].map(str::to_owned).to_vec(),
-        truth: 0,
-        reply: Some(if right { "A" } else { "B" }.to_owned()),
-        refusal: None,
-        finish: None,
-        strict: Some(chosen),
-        lenient: Some(chosen),
-        repeat: 0,
-        via: Via::Direct,
-        outcome: if right {
-            Outcome::Right
-        } else {
-            Outcome::Wrong
-        },
-        failure: None,
-        usage: None,
-        served_model: None,
-        latency_ms: None,
-        attempts: 1,
-        image: None,
-    }
-}
-
-#[derive(Debug, Clone)]
-struct Subject {
-    model: &'static str,
-    condition: Condition,
-}
-
-fn at(level: Option<DarkLevel>) -> Subject {
-    let degradation = level.map_or(Degradation::None, Degradation::Sensor);
-    Subject {
-        model: "m",
-        condition: Condition::raw(degradation),
-    }
+/// The untouched frame, or one with noise.
+fn at(level: Option<DarkLevel>) -> Condition {
+    Condition::raw(level.map_or(Degradation::None, Degradation::Sensor))
 }
 
 fn clusters_of(records: &[Record]) -> Clusters {
@@ -158,7 +114,7 @@ fn pair(
 ) -> Vec<Record> {
     let raw = at(Some(DarkLevel::L3));
     let mut mended = raw.clone();
-    mended.condition.enhancer = Some(EnhancerName::new("e").unwrap());
+    mended.enhancer = Some(EnhancerName::new("e").unwrap());
     let mut records = Vec::new();
     for (frame, size) in sizes.iter().enumerate() {
         // Whether the two differ, and in whose favour, goes by the frame.
@@ -173,8 +129,8 @@ fn pair(
                 let both = random.random_bool(0.6);
                 (both, both)
             };
-            records.push(record(question, frame, &mended, a));
-            records.push(record(question, frame, &raw, b));
+            records.push(record(MODEL, &mended, (question, frame), a));
+            records.push(record(MODEL, &raw, (question, frame), b));
         }
     }
     records
@@ -282,12 +238,17 @@ fn thresholds_are_recovered() {
         for (frame, size) in sizes.iter().enumerate() {
             let luck = rate(&mut random, 0.5, 0.1) - 0.5;
             for level in std::iter::once(None).chain(DarkLevel::ALL.map(Some)) {
-                let subject = at(level);
-                let drop = subject.condition.degradation.level().exposure_drop().0;
+                let condition = at(level);
+                let drop = condition.degradation.level().exposure_drop().0;
                 let rate = (psychometric(f64::from(drop)) + 0.2 * luck).clamp(0.0, 1.0);
                 for question in 0..*size {
                     let right = random.random_bool(rate);
-                    records.push(record(frame * 100 + question, frame, &subject, right));
+                    records.push(record(
+                        MODEL,
+                        &condition,
+                        (frame * 100 + question, frame),
+                        right,
+                    ));
                 }
             }
         }
@@ -314,7 +275,7 @@ fn a_made_set_gives_the_papers_arithmetic() {
     let mut records = Vec::new();
     let mut add = |family: Family, choices: &[&str], truth: usize, chosen: Option<usize>| {
         let number = records.len();
-        let mut made = record(number, number, &at(None), chosen == Some(truth));
+        let mut made = record(MODEL, &at(None), (number, number), chosen == Some(truth));
         made.family = family;
         made.choices = choices.iter().map(|&text| text.to_owned()).collect();
         made.truth = truth;

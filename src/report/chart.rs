@@ -16,9 +16,9 @@ use crate::types::Level;
 /// Axes and words.
 const INK: RGBColor = RGBColor(34, 34, 34);
 /// Lines that help the eye.
-const GRID: RGBColor = RGBColor(221, 221, 221);
+pub(super) const GRID: RGBColor = RGBColor(221, 221, 221);
 /// The ground.
-const PAPER: RGBColor = RGBColor(255, 255, 255);
+pub(super) const PAPER: RGBColor = RGBColor(255, 255, 255);
 
 /// Okabe and Ito's colours but for yellow, which is faint on white.
 const COLOURS: [RGBColor; 7] = [
@@ -46,7 +46,7 @@ const ROW: i32 = 20;
 pub struct Look(pub usize);
 
 impl Look {
-    fn colour(self) -> RGBColor {
+    pub(super) fn colour(self) -> RGBColor {
         COLOURS[self.0 % COLOURS.len()]
     }
 
@@ -97,7 +97,7 @@ pub struct Chart {
     pub note: String,
 }
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 impl Chart {
     /// Draws the figure.
@@ -322,7 +322,11 @@ impl Frame {
     }
 }
 
-fn path(root: &Area<'_>, points: &[(i32, i32)], style: ShapeStyle) -> Result<(), String> {
+pub(super) fn path(
+    root: &Area<'_>,
+    points: &[(i32, i32)],
+    style: ShapeStyle,
+) -> Result<(), String> {
     root.draw(&PathElement::new(points.to_vec(), style))
         .map_err(|e| e.to_string())
 }
@@ -370,7 +374,7 @@ fn style(size: u32, (across, down): (HPos, VPos)) -> TextStyle<'static> {
         .pos(Pos::new(across, down))
 }
 
-fn words(
+pub(super) fn words(
     root: &Area<'_>,
     text: &str,
     place: (i32, i32),

@@ -326,31 +326,6 @@ fn agreement(findings: &Findings<'_>) -> Table {
     }
 }
 
-/// Every reason for which a reply cannot be read.
-const REASONS: [Why; 9] = [
-    Why::Empty,
-    Why::Refused,
-    Why::Truncated,
-    Why::Filtered,
-    Why::Ambiguous,
-    Why::OutOfRange,
-    Why::Contradiction,
-    Why::Negated,
-    Why::NoChoice,
-];
-
-/// Every way in which a trial fails.
-const FAILURES: [FailureKind; 8] = [
-    FailureKind::Connection,
-    FailureKind::Timeout,
-    FailureKind::RateLimit,
-    FailureKind::Server,
-    FailureKind::Request,
-    FailureKind::Filtered,
-    FailureKind::Response,
-    FailureKind::Image,
-];
-
 fn health(findings: &Findings<'_>) -> Table {
     let rest = [
         "replies",
@@ -377,8 +352,8 @@ fn health(findings: &Findings<'_>) -> Table {
     let rows = findings.health.iter().map(|health| {
         let mut row = subject(&health.subject);
         let counts = [health.replies, health.read, health.lenient_only].into_iter();
-        let unread = REASONS.map(|why| health.unread.get(&why).copied().unwrap_or(0));
-        let failed = FAILURES.map(|kind| health.failed.get(&kind).copied().unwrap_or(0));
+        let unread = Why::ALL.map(|why| health.unread.get(&why).copied().unwrap_or(0));
+        let failed = FailureKind::ALL.map(|kind| health.failed.get(&kind).copied().unwrap_or(0));
         row.extend(
             counts
                 .chain(unread)

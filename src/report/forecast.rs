@@ -2,10 +2,10 @@
 
 use std::fmt::Write;
 
-use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
-use comfy_table::{CellAlignment, LineStyle, Table};
+use comfy_table::CellAlignment;
 use serde::Serialize;
 
+use super::table::plain;
 use crate::error::{Error, Result};
 
 /// What is left to ask of one model.
@@ -72,8 +72,7 @@ pub fn json(forecast: &Forecast) -> Result<String> {
 /// The forecast for people.
 #[must_use]
 pub fn render(forecast: &Forecast) -> String {
-    let mut table = Table::new();
-    table.load_style(UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none()));
+    let mut table = plain();
     table.set_header([
         "model",
         "requests",

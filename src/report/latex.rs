@@ -1,14 +1,13 @@
 //! The main tables for a paper, as LaTeX with booktabs: [`tables`].
 
-use std::collections::BTreeSet;
 use std::fmt::Write;
 
-use super::subject::{family as family_name, light, p, percent, points};
-use crate::score::accuracy::{Cell, Subject};
+use super::ladder::Ladder;
+use super::subject::{family as family_name, p, percent, points};
+use crate::score::accuracy::Cell;
 use crate::score::choice::Mode;
-use crate::score::comparison::{Comparison, Kind, Verdict};
+use crate::score::comparison::{Kind, Verdict};
 use crate::score::findings::Findings;
-use crate::types::{Family, Level, View};
 
 /// The tables: accuracy by level, accuracy by family with what is below blind marked, enhanced against raw.
 #[must_use]
@@ -56,14 +55,6 @@ fn table(caption: &str, columns: &str, head: &[String], rows: &[Vec<String>]) ->
     text + "    \\bottomrule\n  \\end{tabular}\n\\end{table}\n"
 }
 
-fn strict<'a>(
-    findings: &'a Findings<'_>,
-    family: Option<&'a Family>,
-) -> impl Iterator<Item = &'a Cell> {
-    let cells = findings.summary.cells.iter();
-    cells.filter(move |cell| cell.mode == Mode::Strict && cell.family.as_ref() == family)
-}
-
 /// Accuracy with half of its interval.
 fn shown(cell: Option<&Cell>) -> String {
     cell.and_then(|cell| cell.accuracy).map_or_else(
@@ -80,39 +71,21 @@ fn shown(cell: Option<&Cell>) -> String {
 
 /// A row a model, variant and enhancer; a column a level.
 fn accuracy(findings: &Findings<'_>) -> String {
-    let cells: Vec<&Cell> = strict(findings, None).collect();
-    let seen = || {
-        cells
-            .iter()
-            .filter(|cell| cell.subject.view == Some(View::Image))
-    };
-    let levels: BTreeSet<Level> = seen().filter_map(|cell| cell.subject.level).collect();
-    let lines: BTreeSet<_> = seen()
-        .map(|cell| {
-            (
-                &cell.subject.model,
-                &cell.subject.enhancer,
-                cell.subject.variant,
-            )
-        })
-        .collect();
-    let mut rows: Vec<Vec<String>> = Vec::new();
-    for (model, enhancer, variant) in lines {
-        let mut row = vec![escaped(model), escaped(&light(variant, enhancer.as_ref()))];
-        row.extend(levels.iter().map(|level| {
-            let mut here = seen().filter(|cell| {
-                let subject = &cell.subject;
-                (&subject.model, &subject.enhancer, subject.variant) == (model, enhancer, variant)
-            });
-            let cell = here.find(|cell| cell.subject.level == Some(*level));
+    let Ladder {
+        levels,
+        series,
+        floors,
+    } = Ladder::new(&findings.summary);
+    let rows = series.iter().map(|(series, cells)| {
+        let at = levels.iter().map(|level| {
+            let cell = cells.get(level);
             cell.map_or(String::new(), |cell| shown(Some(cell)))
-        }));
-        rows.push(row);
-    }
-    for cell in cells
-        .iter()
-        .filter(|cell| cell.subject.view != Some(View::Image))
-    {
+        });
+        let name = [escaped(series.model), escaped(&series.light())];
+        name.into_iter().chain(at).collect()
+    });
+    let mut rows: Vec<Vec<String>> = rows.collect();
+    for cell in floors {
         let name = match cell.subject.view {
             Some(_) => format!("{} without images", cell.subject.model),
             None => "chance".to_owned(),
@@ -144,9 +117,9 @@ fn families(findings: &Findings<'_>) -> String {
     let families = findings.grid.families();
     let rows = findings.grid.subjects.iter().map(|subject| {
         let cells = families.iter().map(|family| {
-            let mut cells = strict(findings, Some(family));
-            let cell = shown(cells.find(|cell| cell.subject == *subject));
-            if below_blind(findings, subject, Some(family)).is_some() {
+            let summary = &findings.summary;
+            let cell = shown(summary.cell(subject, Some(family), Mode::Strict));
+            if findings.below_blind(subject, Some(family)) {
                 format!("\\underline{{{cell}}}")
             } else {
                 cell
@@ -157,7 +130,7 @@ fn families(findings: &Findings<'_>) -> String {
     });
     let mut rows: Vec<Vec<String>> = rows.collect();
     let chance = families.iter().map(|family| {
-        let mut cells = strict(findings, Some(family));
+        let mut cells = findings.summary.of(Some(family), Mode::Strict);
         let cell = cells.find(|cell| cell.subject.view.is_none());
         let share = cell.and_then(|cell| cell.accuracy);
         share.map_or("--".to_owned(), |share| percent(share.value))
@@ -178,21 +151,6 @@ fn families(findings: &Findings<'_>) -> String {
         &head,
         &rows,
     )
-}
-
-/// The comparison with the blind line that a subject falls below, where it does.
-#[must_use]
-pub fn below_blind<'a>(
-    findings: &'a Findings<'_>,
-    subject: &Subject,
-    family: Option<&Family>,
-) -> Option<&'a Comparison> {
-    findings.comparisons.iter().find(|one| {
-        one.kind == Kind::Blind
-            && one.family.as_ref() == family
-            && one.first == *subject
-            && one.paired.difference.value < 0.0
-    })
 }
 
 fn enhancers(findings: &Findings<'_>) -> Option<String> {

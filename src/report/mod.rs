@@ -6,6 +6,7 @@ pub mod figures;
 pub mod files;
 pub mod forecast;
 pub mod histogram;
+mod ladder;
 pub mod latex;
 pub mod page;
 pub mod products;

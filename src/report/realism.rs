@@ -1,12 +1,11 @@
 //! What a comparison with real pairs shows: [`Summary`], and the files and figures beside it.
 
-use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
-use comfy_table::{LineStyle, Table};
 use serde::Serialize;
 
 use super::csv::table_of;
 use super::histogram::{Line, histogram};
 use super::sheet::{self, CropRow};
+use super::table::plain;
 use crate::error::{Error, Result};
 use crate::score::realism::mean::Mean;
 use crate::score::realism::residual::{Bins, Empty, Residuals};
@@ -159,8 +158,7 @@ impl Summary {
             "bins empty",
             "D_KL (other rule)",
         ];
-        let mut table = Table::new();
-        table.load_style(UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none()));
+        let mut table = plain();
         table.set_header(&header[..columns]);
         table.add_row(&self.exposure.cells("exposure drop alone")[..columns]);
         table.add_row(&self.noise.cells("with sensor noise")[..columns]);

@@ -1,39 +1,17 @@
 //! The table at the end of a run.
 
-use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::Path;
 
 use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
 use comfy_table::{CellAlignment, LineStyle, Table};
 
-use super::subject::light;
-use crate::score::accuracy::{Cell, Subject, Summary};
+use super::ladder::{Ladder, Series};
+use super::subject::percent;
+use crate::score::accuracy::{Cell, Summary};
 use crate::score::choice::Mode;
 use crate::types::manifest::{Counts, RunManifest, Status};
-use crate::types::{EnhancerName, Level, Variant, View, Why};
-
-/// One line of the table: a model in one variant, raw or enhanced, over the levels.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-struct Series<'a> {
-    model: &'a str,
-    enhancer: Option<&'a EnhancerName>,
-    variant: Variant,
-}
-
-impl<'a> Series<'a> {
-    fn of(subject: &'a Subject) -> Self {
-        Self {
-            model: &subject.model,
-            enhancer: subject.enhancer.as_ref(),
-            variant: subject.variant,
-        }
-    }
-
-    fn label(&self) -> String {
-        light(self.variant, self.enhancer)
-    }
-}
+use crate::types::{Level, Why};
 
 /// The lenient figure in brackets where it is not the strict one.
 fn differing(strict: &str, lenient: &str) -> String {
@@ -51,9 +29,13 @@ struct Pair<'a> {
     lenient: &'a Cell,
 }
 
-impl Pair<'_> {
+impl<'a> Pair<'a> {
+    fn of(summary: &'a Summary, strict: &'a Cell) -> Option<Self> {
+        let lenient = summary.cell(&strict.subject, strict.family.as_ref(), Mode::Lenient)?;
+        Some(Self { strict, lenient })
+    }
+
     fn accuracy(self) -> String {
-        let percent = |share: f64| format!("{:.1}", 100.0 * share);
         match (self.strict.accuracy, self.lenient.accuracy) {
             (Some(strict), Some(lenient)) => {
                 let half = percent((strict.high - strict.low) / 2.0);
@@ -66,8 +48,7 @@ impl Pair<'_> {
 
     /// The share of questions that were answered rightly every time.
     fn always(self) -> Option<String> {
-        let always = self.strict.always?;
-        Some(format!("{:.1}", 100.0 * always.value))
+        Some(percent(self.strict.always?.value))
     }
 
     fn replies(self) -> usize {
@@ -79,13 +60,7 @@ impl Pair<'_> {
 /// blind and chance lines, and the runs' folders.
 #[must_use]
 pub fn render(summary: &Summary, runs: &[(&RunManifest, &Path)]) -> String {
-    let pairs = pairs(summary);
-    let of_view = |view: Option<View>| {
-        pairs
-            .iter()
-            .copied()
-            .filter(move |pair| pair.strict.subject.view == view)
-    };
+    let ladder = Ladder::new(summary);
     let mut text = String::new();
     for (run, folder) in runs {
         if run.status == Status::Complete {
@@ -108,11 +83,14 @@ pub fn render(summary: &Summary, runs: &[(&RunManifest, &Path)]) -> String {
     text.push_str(
         "Accuracy in %: strict ± half of the 95 % interval (lenient where it differs); n replies at each level\n",
     );
-    let seen: Vec<Pair<'_>> = of_view(Some(View::Image)).collect();
-    if !seen.is_empty() {
-        let _ = writeln!(text, "{}", levels(&seen));
+    if !ladder.series.is_empty() {
+        let _ = writeln!(text, "{}", levels(summary, &ladder));
     }
-    for pair in of_view(Some(View::Blind)) {
+    let floors = ladder.floors.iter();
+    let (chance, blind): (Vec<&Cell>, Vec<&Cell>) =
+        floors.partition(|cell| cell.subject.view.is_none());
+    let blind = blind.into_iter();
+    for pair in blind.filter_map(|strict| Pair::of(summary, strict)) {
         let Cell {
             unparsed,
             failed,
@@ -131,13 +109,15 @@ pub fn render(summary: &Summary, runs: &[(&RunManifest, &Path)]) -> String {
         }
         let _ = writeln!(text, ", unparsed {unparsed}{lenient}, failed {failed}");
     }
-    for chance in of_view(None).filter_map(|pair| pair.strict.accuracy) {
+    let mut all = summary.of(None, Mode::Strict);
+    let repeated = all.any(|cell| cell.always.is_some());
+    for chance in chance.into_iter().filter_map(|cell| cell.accuracy) {
         let _ = writeln!(
             text,
             "chance: {:.2} over {} {}",
             100.0 * chance.value,
             chance.n,
-            if pairs.iter().any(|pair| pair.strict.always.is_some()) {
+            if repeated {
                 "orders of choices"
             } else {
                 "questions"
@@ -174,39 +154,32 @@ fn unread(summary: &Summary) -> String {
     }
 }
 
-fn levels(seen: &[Pair<'_>]) -> Table {
-    let levels: BTreeSet<Level> = seen
-        .iter()
-        .filter_map(|pair| pair.strict.subject.level)
-        .collect();
-    let series: BTreeSet<Series<'_>> = seen
-        .iter()
-        .map(|pair| Series::of(&pair.strict.subject))
-        .collect();
+/// An empty table in the style of all of them.
+pub(super) fn plain() -> Table {
     let mut table = Table::new();
     table.load_style(UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none()));
-    let names = levels.iter().map(ToString::to_string);
+    table
+}
+
+fn levels(summary: &Summary, ladder: &Ladder<'_>) -> Table {
+    let names = ladder.levels.iter().map(ToString::to_string);
     let head = ["model", "light"]
         .map(str::to_owned)
         .into_iter()
-        .chain(names);
-    table.set_header(head.chain(["n", "unparsed", "failed"].map(str::to_owned)));
-    for line in &series {
-        let pairs = seen
-            .iter()
-            .copied()
-            .filter(|pair| Series::of(&pair.strict.subject) == *line);
-        let pairs: Vec<Pair<'_>> = pairs.collect();
-        table.add_row(row(line, &pairs, &levels));
-        if pairs.iter().any(|pair| pair.strict.always.is_some()) {
-            let always = levels.iter().map(|level| {
-                let at = pairs
-                    .iter()
-                    .find(|pair| pair.strict.subject.level == Some(*level));
-                at.and_then(|pair| pair.always()).unwrap_or_default()
-            });
+        .chain(names)
+        .chain(["n", "unparsed", "failed"].map(str::to_owned));
+    let mut table = plain();
+    table.set_header(head);
+    for (series, cells) in &ladder.series {
+        let pair = |level: &Level| Pair::of(summary, cells.get(level).copied()?);
+        let pairs: Vec<Option<Pair<'_>>> = ladder.levels.iter().map(pair).collect();
+        table.add_row(row(series, &pairs));
+        if cells.values().any(|cell| cell.always.is_some()) {
+            let always = pairs
+                .iter()
+                .map(|pair| pair.and_then(Pair::always).unwrap_or_default());
             let label = [String::new(), "  right every time".to_owned()];
-            table.add_row(label.into_iter().chain(always).collect::<Vec<_>>());
+            table.add_row(label.into_iter().chain(always));
         }
     }
     for column in table.column_iter_mut().skip(2) {
@@ -215,16 +188,12 @@ fn levels(seen: &[Pair<'_>]) -> Table {
     table
 }
 
-fn row(line: &Series<'_>, pairs: &[Pair<'_>], levels: &BTreeSet<Level>) -> Vec<String> {
-    let at = |level: &Level| {
-        pairs
-            .iter()
-            .find(|pair| pair.strict.subject.level.as_ref() == Some(level))
-    };
-    let accuracies = levels
+fn row(series: &Series<'_>, pairs: &[Option<Pair<'_>>]) -> Vec<String> {
+    let accuracies = pairs
         .iter()
-        .map(|level| at(level).map_or(String::new(), |pair| pair.accuracy()));
-    let sum = |count: fn(&Pair<'_>) -> usize| pairs.iter().map(count).sum::<usize>();
+        .map(|pair| pair.map_or(String::new(), Pair::accuracy));
+    let pairs: Vec<&Pair<'_>> = pairs.iter().flatten().collect();
+    let sum = |count: fn(&Pair<'_>) -> usize| pairs.iter().map(|pair| count(pair)).sum::<usize>();
     let replies = pairs.iter().map(|pair| pair.replies());
     let n = match (replies.clone().min(), replies.max()) {
         (Some(least), Some(most)) if least != most => format!("{least}–{most}"),
@@ -236,26 +205,9 @@ fn row(line: &Series<'_>, pairs: &[Pair<'_>], levels: &BTreeSet<Level>) -> Vec<S
     );
     let unparsed = format!("{strict}{}", differing(&strict, &lenient));
     let counts = [n, unparsed, sum(|pair| pair.strict.failed).to_string()];
-    [line.model.to_owned(), line.label()]
+    [series.model.to_owned(), series.light()]
         .into_iter()
         .chain(accuracies)
         .chain(counts)
-        .collect()
-}
-
-fn pairs(summary: &Summary) -> Vec<Pair<'_>> {
-    let all = |mode: Mode| {
-        summary
-            .cells
-            .iter()
-            .filter(move |cell| cell.family.is_none() && cell.mode == mode)
-    };
-    all(Mode::Strict)
-        .filter_map(|strict| {
-            Some(Pair {
-                strict,
-                lenient: all(Mode::Lenient).find(|cell| cell.subject == strict.subject)?,
-            })
-        })
         .collect()
 }

@@ -2,13 +2,12 @@
 
 use std::fmt::Write;
 
-use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
-use comfy_table::{CellAlignment, LineStyle, Table};
+use comfy_table::{CellAlignment, Table};
 
-use super::subject::{light, p, percent, points, reach, stops};
+use super::subject::{light, name, p, percent, points, reach, stops};
+use super::table::plain;
 use crate::score::comparison::{Comparison, Kind, Verdict};
 use crate::score::findings::Findings;
-use crate::types::Variant;
 
 /// Thresholds and comparisons, all families together; nothing where there is one condition alone.
 #[must_use]
@@ -43,12 +42,6 @@ fn title(kind: Kind) -> &'static str {
         Kind::Model => "Model against model, paired by question",
         Kind::Blind => "With images against without, paired by question",
     }
-}
-
-fn plain() -> Table {
-    let mut table = Table::new();
-    table.load_style(UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none()));
-    table
 }
 
 fn thresholds(findings: &Findings<'_>) -> Option<Table> {
@@ -135,13 +128,8 @@ fn compared(findings: &Findings<'_>, kind: Kind) -> Option<String> {
 fn named(one: &Comparison) -> String {
     let (first, second) = (&one.first, &one.second);
     match one.kind {
-        Kind::Level | Kind::Variant | Kind::Enhancer => {
-            format!("{} {}", first.model, first.condition())
-        }
         Kind::Model => format!("{} – {}, {}", first.model, second.model, first.condition()),
-        Kind::Blind if first.variant == Variant::None || first.model == second.model => {
-            format!("{} {}", first.model, first.condition())
-        }
-        Kind::Blind => format!("{} {} – {}", first.model, first.condition(), second.model),
+        _ if first.model == second.model => name(first),
+        _ => format!("{} – {}", name(first), second.model),
     }
 }

@@ -231,7 +231,7 @@ fn show(
     if (status, counts) != (manifest.status, manifest.counts) {
         (manifest.status, manifest.counts, manifest.updated) = (status, counts, now());
     }
-    let output = report::leave(store, &manifest, &records, config.output.show)?;
+    let output = report::leave(store, &manifest, records, config.output.show)?;
     if let End::Stopped(error) = end {
         return Err(error);
     }

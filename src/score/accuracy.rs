@@ -8,7 +8,7 @@ use super::chance::{Offer, chance};
 use super::choice::Mode;
 use super::estimate::Estimate;
 use super::grid::{Count, Grid, Mark};
-use super::health::healths;
+use super::health::Health;
 use crate::types::{EnhancerName, Family, Level, QuestionId, Record, Variant, View, Why};
 
 /// The name under which guessing stands among the models.
@@ -56,12 +56,22 @@ impl Subject {
         format!("{level}{variant}{}", enhancer.unwrap_or_default())
     }
 
-    /// Whether it differs from another in the given respects alone.
+    /// A model that sees, at a level of a variant, raw or enhanced; L0 is the untouched frame of every variant and enhancer.
     #[must_use]
-    pub fn is_but(&self, other: &Self, change: impl FnOnce(&mut Self)) -> bool {
-        let mut changed = self.clone();
-        change(&mut changed);
-        changed == *other
+    pub fn seeing(
+        model: &str,
+        level: Level,
+        variant: Variant,
+        enhancer: Option<&EnhancerName>,
+    ) -> Self {
+        let light = level == Level::L0;
+        Self {
+            model: model.to_owned(),
+            view: Some(View::Image),
+            level: Some(level),
+            variant: if light { Variant::None } else { variant },
+            enhancer: enhancer.filter(|_| !light).cloned(),
+        }
     }
 }
 
@@ -97,14 +107,35 @@ pub struct Summary {
     pub unread: BTreeMap<Why, usize>,
 }
 
-/// Scores the items of a run; `questions` are what it asks, for the chance line.
+impl Summary {
+    /// The cells of a family in one reading; of `None` those of all families together.
+    pub fn of<'s>(
+        &'s self,
+        family: Option<&'s Family>,
+        mode: Mode,
+    ) -> impl Iterator<Item = &'s Cell> + Clone {
+        let cells = self.cells.iter();
+        cells.filter(move |cell| cell.mode == mode && cell.family.as_ref() == family)
+    }
+
+    /// The cell of a subject.
+    #[must_use]
+    pub fn cell(&self, subject: &Subject, family: Option<&Family>, mode: Mode) -> Option<&Cell> {
+        self.cells.iter().find(|cell| {
+            cell.mode == mode && cell.family.as_ref() == family && cell.subject == *subject
+        })
+    }
+}
+
+/// Scores the items of a run; `health` is that of its subjects, and `questions` are what it asks, for the chance line.
 #[must_use]
-pub fn summarize(grid: &Grid<'_>, questions: impl IntoIterator<Item = Offer>) -> Summary {
+pub fn summarize(
+    grid: &Grid<'_>,
+    health: &[Health],
+    questions: impl IntoIterator<Item = Offer>,
+) -> Summary {
     let questions: Vec<Offer> = questions.into_iter().collect();
-    let families = grid.families();
-    let families: Vec<Option<&Family>> = std::iter::once(None)
-        .chain(families.into_iter().map(Some))
-        .collect();
+    let families = grid.groups();
     let mut cells = Vec::new();
     for subject in 0..grid.subjects.len() {
         for family in &families {
@@ -116,17 +147,15 @@ pub fn summarize(grid: &Grid<'_>, questions: impl IntoIterator<Item = Offer>) ->
     cells.extend(guesses(&questions));
     Summary {
         cells,
-        unread: unread(grid),
+        unread: unread(health),
     }
 }
 
 /// Why replies could not be read, in the strict reading.
-fn unread(grid: &Grid<'_>) -> BTreeMap<Why, usize> {
+fn unread(health: &[Health]) -> BTreeMap<Why, usize> {
     let mut unread = BTreeMap::new();
-    for health in healths(grid) {
-        for (why, count) in health.unread {
-            *unread.entry(why).or_default() += count;
-        }
+    for (why, count) in health.iter().flat_map(|health| &health.unread) {
+        *unread.entry(*why).or_default() += count;
     }
     unread
 }

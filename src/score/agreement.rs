@@ -1,7 +1,5 @@
 //! How far two models agree: [`Agreement`].
 
-use serde::Serialize;
-
 use super::accuracy::Subject;
 use super::bootstrap::Resamples;
 use super::choice::Mode;
@@ -10,7 +8,7 @@ use super::estimate::Estimate;
 use super::grid::{Count, Grid};
 
 /// Two models in one condition, in the strict reading.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Agreement {
     /// The one.
     pub first: Subject,

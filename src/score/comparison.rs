@@ -2,19 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use rayon::prelude::*;
-use serde::Serialize;
-
 use super::accuracy::Subject;
 use super::choice::Mode;
 use super::grid::Grid;
 use super::paired::Paired;
 use super::significance::holm;
 use crate::types::{Family, Level, Variant, View};
+use rayon::prelude::*;
 
 /// What is compared with what.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Kind {
     /// A dark level with L0: what darkness costs.
     Level,
@@ -52,8 +49,7 @@ impl Kind {
 }
 
 /// What a comparison shows at the 5 % level, after Holm's correction.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     /// The first is better.
     Better,
@@ -76,7 +72,7 @@ impl Verdict {
 }
 
 /// One subject against another on the items that both replied to, in the strict reading.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
     /// What is compared.
     pub kind: Kind,
@@ -98,9 +94,7 @@ pub struct Comparison {
 /// All comparisons of a grid, by kind, family and subjects.
 #[must_use]
 pub fn comparisons(grid: &Grid<'_>) -> Vec<Comparison> {
-    let families: Vec<Option<&Family>> = std::iter::once(None)
-        .chain(grid.families().into_iter().map(Some))
-        .collect();
+    let families = grid.groups();
     let mut jobs = Vec::new();
     for kind in Kind::ALL {
         let pairs = pairs(grid, kind);
@@ -158,10 +152,11 @@ pub(super) fn pairs(grid: &Grid<'_>, kind: Kind) -> Vec<(usize, usize)> {
     let mut pairs = Vec::new();
     for (index, subject) in grid.subjects.iter().enumerate() {
         let against: Vec<usize> = match kind {
-            Kind::Level => one(grid, subject, |other| {
-                (other.level, other.variant, other.enhancer) =
-                    (Some(Level::L0), Variant::None, None);
-            }),
+            // Darkness is what raw images show; what an enhancer leaves of it is read from the curves.
+            Kind::Level if subject.variant != Variant::None && subject.enhancer.is_none() => {
+                let light = Subject::seeing(&subject.model, Level::L0, subject.variant, None);
+                grid.find(&light).into_iter().collect()
+            }
             Kind::Variant if subject.variant == Variant::Noise => {
                 one(grid, subject, |other| other.variant = Variant::Ev)
             }
@@ -172,16 +167,7 @@ pub(super) fn pairs(grid: &Grid<'_>, kind: Kind) -> Vec<(usize, usize)> {
             Kind::Blind if subject.view == Some(View::Image) => blind(grid, subject),
             _ => Vec::new(),
         };
-        let sees = subject.view == Some(View::Image);
-        let raw = subject.enhancer.is_none();
-        // Darkness is what raw images show; what an enhancer leaves of it is read from the curves.
-        let fits = match kind {
-            Kind::Level => sees && raw && subject.level != Some(Level::L0),
-            _ => true,
-        };
-        if fits {
-            pairs.extend(against.into_iter().map(|other| (index, other)));
-        }
+        pairs.extend(against.into_iter().map(|other| (index, other)));
     }
     pairs
 }
@@ -190,20 +176,16 @@ pub(super) fn pairs(grid: &Grid<'_>, kind: Kind) -> Vec<(usize, usize)> {
 fn one(grid: &Grid<'_>, subject: &Subject, change: impl FnOnce(&mut Subject)) -> Vec<usize> {
     let mut other = subject.clone();
     change(&mut other);
-    grid.find(&other)
-        .filter(|_| other != *subject)
-        .into_iter()
-        .collect()
+    grid.find(&other).into_iter().collect()
 }
 
 /// Other models in the same condition, each pair once.
 fn later_models(grid: &Grid<'_>, index: usize) -> Vec<usize> {
     let subject = &grid.subjects[index];
     let later = grid.subjects.iter().enumerate().skip(index + 1);
-    let same =
-        |other: &Subject| subject.is_but(other, |changed| changed.model.clone_from(&other.model));
+    let light = |of: &Subject| (of.view, of.level, of.variant, of.enhancer.clone());
     later
-        .filter(|(_, other)| same(other))
+        .filter(|(_, other)| other.model != subject.model && light(other) == light(subject))
         .map(|(other, _)| other)
         .collect()
 }

@@ -2,8 +2,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use serde::Serialize;
-
 use super::accuracy::Subject;
 use super::choice::Mode;
 use super::estimate::Estimate;
@@ -14,7 +12,7 @@ use crate::types::Family;
 const MOST_LABELS: usize = 26;
 
 /// The answers of one subject to one family, in the strict reading.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Confusion {
     /// Whose.
     pub subject: Subject,
@@ -76,7 +74,7 @@ fn counts(grid: &Grid<'_>, subject: usize, family: &Family, labels: &[String]) -
 }
 
 /// How the answers given are spread, beside the true ones: a model that no longer sees says the same to everything.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Collapse {
     /// The answer given most often.
     pub top: String,
@@ -139,7 +137,7 @@ fn entropy(counts: impl Iterator<Item = usize> + Clone) -> f64 {
 }
 
 /// How often a model sees what is not there, and overlooks what is.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Hallucination {
     /// Whose.
     pub subject: Subject,

@@ -1,7 +1,5 @@
 //! Accuracy over darkness as a whole: [`Curve`], with its threshold and area.
 
-use serde::Serialize;
-
 use super::accuracy::Subject;
 use super::bootstrap::Resamples;
 use super::choice::Mode;
@@ -10,7 +8,7 @@ use super::grid::{Count, Grid, Mark};
 use crate::types::{EnhancerName, Family, Level, Variant, View};
 
 /// The exposure drop at which a model's accuracy is half-way between that in the light and chance.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Threshold {
     /// In EV; infinite where the darkest level is still above it.
     pub value: f64,
@@ -21,7 +19,7 @@ pub struct Threshold {
 }
 
 /// One model in one variant, raw or enhanced, over the levels.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
     /// The model.
     pub model: String,

@@ -2,18 +2,18 @@
 
 use std::collections::BTreeMap;
 
-use super::accuracy::{Summary, summarize};
+use super::accuracy::{Subject, Summary, summarize};
 use super::agreement::{Agreement, agreements};
 use super::bootstrap::Resamples;
 use super::chance::Offer;
 use super::cluster::{Clusters, Unit};
-use super::comparison::{Comparison, comparisons};
+use super::comparison::{Comparison, Kind, comparisons};
 use super::confusion::{Confusion, Hallucination, confusions, hallucinations};
 use super::curve::{Curve, curves};
 use super::flips::{Fall, falls};
 use super::grid::Grid;
 use super::health::{Health, healths};
-use crate::types::{FrameId, Record};
+use crate::types::{Family, FrameId, Record};
 
 /// All that records say.
 #[derive(Debug)]
@@ -55,14 +55,15 @@ impl<'a> Findings<'a> {
         let clusters = Clusters::new(asked, scenes);
         let grid = Grid::new(records, &clusters);
         let draws = Resamples::new(clusters.count());
-        let families = grid.families();
-        let families = std::iter::once(None).chain(families.into_iter().map(Some));
+        let health = healths(&grid);
         Self {
             unit: clusters.unit(),
-            summary: summarize(&grid, questions),
-            health: healths(&grid),
+            summary: summarize(&grid, &health, questions),
+            health,
             comparisons: comparisons(&grid),
-            curves: families
+            curves: grid
+                .groups()
+                .into_iter()
                 .flat_map(|family| curves(&grid, &draws, family))
                 .collect(),
             confusions: confusions(&grid),
@@ -71,5 +72,16 @@ impl<'a> Findings<'a> {
             agreements: agreements(&grid, &draws),
             grid,
         }
+    }
+
+    /// Whether a subject falls below a model without images: its own, where it was asked so.
+    #[must_use]
+    pub fn below_blind(&self, subject: &Subject, family: Option<&Family>) -> bool {
+        self.comparisons.iter().any(|one| {
+            one.kind == Kind::Blind
+                && one.family.as_ref() == family
+                && one.first == *subject
+                && one.paired.difference.value < 0.0
+        })
     }
 }

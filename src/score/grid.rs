@@ -1,11 +1,11 @@
 //! Records laid out for counting: every subject by every item, as a [`Grid`].
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::accuracy::Subject;
 use super::choice::Mode;
 use super::cluster::Clusters;
-use crate::types::{Family, Outcome, QuestionId, Record};
+use crate::types::{Family, Outcome, QuestionId, Reading, Record};
 
 /// What came of one item for one subject.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -177,9 +177,16 @@ impl<'a> Grid<'a> {
     /// The families asked about, in order.
     #[must_use]
     pub fn families(&self) -> Vec<&'a Family> {
-        let families: std::collections::BTreeSet<&Family> =
+        let families: BTreeSet<&Family> =
             self.items.iter().map(|item| &item.record.family).collect();
         families.into_iter().collect()
+    }
+
+    /// What is counted by itself: all families together, then each.
+    #[must_use]
+    pub fn groups(&self) -> Vec<Option<&'a Family>> {
+        let families = self.families().into_iter().map(Some);
+        std::iter::once(None).chain(families).collect()
     }
 }
 
@@ -198,10 +205,9 @@ fn place(record: &Record) -> impl Ord + '_ {
 }
 
 fn mark(record: &Record) -> Mark {
-    let chosen = |reading: crate::types::Reading| {
-        reading
-            .chosen
-            .map(|index| index.min(usize::from(u8::MAX)) as u8)
+    let chosen = |reading: Reading| {
+        let index = reading.chosen?;
+        Some(index.min(usize::from(u8::MAX)) as u8)
     };
     match (record.outcome, record.strict) {
         (Outcome::Failed, _) | (_, None) => Mark::Failed,

@@ -2,15 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
-
 use super::accuracy::Subject;
 use super::choice::Mode;
 use super::grid::{Grid, Mark};
 use crate::types::{FailureKind, Record, Why};
 
 /// What became of the trials of one subject.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Health {
     /// Whose.
     pub subject: Subject,

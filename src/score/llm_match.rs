@@ -1,11 +1,8 @@
 //! LLM-Match, OpenEQA's score of open answers by a judging model (Majumdar et al. 2024, CVPR, section 4): what is done to an
 //! answer before, how a mark is read, and what marks come to. After `facebookresearch/open-eqa` at cfa3fce.
 
-use serde::Serialize;
-
 /// How a judge's reply is read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Protocol {
     /// As upstream's `parse_score`, character for character.
     Upstream,

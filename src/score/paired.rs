@@ -1,7 +1,5 @@
 //! Two subjects on the same items: [`Paired`].
 
-use serde::Serialize;
-
 use super::choice::Mode;
 use super::estimate::Estimate;
 use super::grid::Grid;
@@ -10,7 +8,7 @@ use super::student::student;
 use crate::types::Family;
 
 /// How one subject does against another on the items that both replied to.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Paired {
     /// The accuracy of the first.
     pub first: f64,

@@ -216,6 +216,21 @@ pub enum Why {
     NoChoice,
 }
 
+impl Why {
+    /// All of them.
+    pub const ALL: [Self; 9] = [
+        Self::Empty,
+        Self::Refused,
+        Self::Truncated,
+        Self::Filtered,
+        Self::Ambiguous,
+        Self::OutOfRange,
+        Self::Contradiction,
+        Self::Negated,
+        Self::NoChoice,
+    ];
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -114,6 +114,20 @@ pub enum FailureKind {
     Image,
 }
 
+impl FailureKind {
+    /// All of them.
+    pub const ALL: [Self; 8] = [
+        Self::Connection,
+        Self::Timeout,
+        Self::RateLimit,
+        Self::Server,
+        Self::Request,
+        Self::Filtered,
+        Self::Response,
+        Self::Image,
+    ];
+}
+
 /// A trial without a reply.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Failure {

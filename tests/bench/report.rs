@@ -4,6 +4,13 @@
 
 #![expect(clippy::unwrap_used, reason = "what is made here can be written")]
 
+#[path = "../support/made.rs"]
+#[expect(
+    unreachable_pub,
+    reason = "the tests share it as a module of their support"
+)]
+mod made;
+
 use std::collections::BTreeMap;
 use std::hint::black_box;
 
@@ -11,10 +18,8 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use darkqa_eval::report::page::Shown;
 use darkqa_eval::report::products::products;
 use darkqa_eval::score::findings::Findings;
-use darkqa_eval::types::{
-    Condition, DarkLevel, Degradation, Digest, Family, FrameId, Outcome, QuestionId, Reading,
-    Record, Via, View,
-};
+use darkqa_eval::types::{Condition, DarkLevel, Degradation, Digest, Family, Record};
+use made::record;
 
 /// Eleven conditions of five models on four questions about each of 456 frames: 100,320 records.
 fn records() -> Vec<Record> {
@@ -28,54 +33,18 @@ fn records() -> Vec<Record> {
     for model in 0..5 {
         for condition in &conditions {
             for question in 0..4 * 456 {
-                records.push(record(model, condition, question));
+                let name = format!("model-{model}");
+                let drawn = Digest::of(format!("{name} {condition} {question}").as_bytes());
+                let level = condition.degradation.level();
+                let right = u32::from(drawn.as_bytes()[0]) > 30 * level as u32;
+                records.push(Record {
+                    family: Family::PAPER[question % 4].clone(),
+                    ..record(&name, condition, (question, question / 4), right)
+                });
             }
         }
     }
     records
-}
-
-fn record(model: usize, condition: &Condition, question: usize) -> Record {
-    let name = Digest::of(format!("{model} {condition} {question}").as_bytes());
-    let drawn = name.as_bytes()[0];
-    let level = condition.degradation.level();
-    let right = u32::from(drawn) > 30 * level as u32;
-    let chosen = Reading {
-        chosen: Some(usize::from(!right)),
-        why: None,
-    };
-    Record {
-        key: name.into(),
-        question: QuestionId(format!("q{question:05}")),
-        frame: FrameId(format!("f{:04}", question / 4)),
-        family: Family::PAPER[question % 4].clone(),
-        model: format!("model-{model}"),
-        view: View::Image,
-        level: Some(level),
-        variant: condition.degradation.variant(),
-        enhancer: None,
-        condition: Some(condition.clone()),
-        choices: ["yes", "no"].map(str::to_owned).to_vec(),
-        truth: 0,
-        reply: Some(if right { "A" } else { "B" }.to_owned()),
-        refusal: None,
-        finish: None,
-        strict: Some(chosen),
-        lenient: Some(chosen),
-        repeat: 0,
-        via: Via::Direct,
-        outcome: if right {
-            Outcome::Right
-        } else {
-            Outcome::Wrong
-        },
-        failure: None,
-        usage: None,
-        served_model: None,
-        latency_ms: Some(100),
-        attempts: 1,
-        image: None,
-    }
 }
 
 fn bench(c: &mut Criterion) {

@@ -214,16 +214,10 @@ impl Mesh {
         depth: f32,
         surface: &Surface,
     ) {
-        let row = |&(radius, height): &(f32, f32)| -> Vec<Vec3> {
-            let point = |side: usize| {
-                let around = turn(TAU * (side % SIDES) as f32 / SIDES as f32);
-                foot + vec3(around.x * radius, height, around.y * radius * depth)
-            };
-            (0..=SIDES).map(point).collect()
-        };
         // Each stretch between two radii has normals of its own: a lathe's edges are sharp.
         for pair in profile.windows(2) {
-            self.grid(&[row(&pair[0]), row(&pair[1])], surface);
+            let rings = [pair[0], pair[1]].map(|at| ring(foot, at, depth));
+            self.grid(&rings, surface);
         }
     }
 
@@ -235,15 +229,8 @@ impl Mesh {
         depth: f32,
         surface: &Surface,
     ) {
-        let row = |&(radius, height): &(f32, f32)| -> Vec<Vec3> {
-            let point = |side: usize| {
-                let around = turn(TAU * (side % SIDES) as f32 / SIDES as f32);
-                foot + vec3(around.x * radius, height, around.y * radius * depth)
-            };
-            (0..=SIDES).map(point).collect()
-        };
-        let rows: Vec<Vec<Vec3>> = profile.iter().map(row).collect();
-        self.grid(&rows, surface);
+        let rings = profile.iter().map(|at| ring(foot, *at, depth));
+        self.grid(&rings.collect::<Vec<_>>(), surface);
     }
 
     /// A rod between two points, closed at its ends.
@@ -363,4 +350,12 @@ impl Mesh {
             |[low, high], corner| [low.min(corner.at), high.max(corner.at)],
         )
     }
+}
+/// The points of a lathe's ring, closed: its radius and height above a foot, drawn out along z by a factor.
+fn ring(foot: Vec3, (radius, height): (f32, f32), depth: f32) -> Vec<Vec3> {
+    let point = |side: usize| {
+        let around = turn(TAU * (side % SIDES) as f32 / SIDES as f32);
+        foot + vec3(around.x * radius, height, around.y * radius * depth)
+    };
+    (0..=SIDES).map(point).collect()
 }

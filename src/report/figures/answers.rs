@@ -2,10 +2,10 @@
 
 use super::super::chart::{Chart, Line, Panel, Shape};
 use super::super::subject::{family as family_name, light};
-use super::Overview;
+use super::{GROUND, Overview};
 use crate::score::confusion::{Confusion, Hallucination};
 use crate::score::estimate::Estimate;
-use crate::types::{Family, Level, Variant, View};
+use crate::types::Family;
 
 impl Overview<'_> {
     pub(super) fn hallucination(&self) -> Option<(String, Chart)> {
@@ -14,21 +14,10 @@ impl Overview<'_> {
             return None;
         }
         let panel = |title: &str, rate: fn(&Hallucination) -> Option<Estimate>| {
-            let lines = self.models.iter().map(|model| {
-                let points = Level::ALL.into_iter().filter_map(|level| {
-                    let rates = &self.findings.hallucinations;
-                    let rates = rates
-                        .iter()
-                        .find(|rates| raw(&rates.subject, model, level, variant));
-                    Some((level, rate(rates?)?))
-                });
-                Line {
-                    name: (*model).to_owned(),
-                    look: self.look(model),
-                    shape: Shape::Curve(points.collect()),
-                }
+            let lines = self.lines(variant, |subject| {
+                let mut rates = self.findings.hallucinations.iter();
+                rate(rates.find(|rates| rates.subject == *subject)?)
             });
-            let lines: Vec<Line> = lines.collect();
             let n = lines.iter().find_map(|line| match &line.shape {
                 Shape::Curve(points) => points.first().map(|(_, rate)| rate.n),
                 Shape::Flat(_) => None,
@@ -51,29 +40,20 @@ impl Overview<'_> {
     pub(super) fn collapse(&self) -> Option<(String, Chart)> {
         let variant = *self.variants_there().last()?;
         let of_family = |family: Family| {
-            let confusions = &self.findings.confusions;
             let mut truth = None;
-            let lines = self.models.iter().map(|model| {
-                let points = Level::ALL.into_iter().filter_map(|level| {
-                    let confusion = confusions.iter().find(|confusion| {
-                        confusion.family == family && raw(&confusion.subject, model, level, variant)
-                    });
-                    let confusion = confusion?;
-                    truth = truth.or_else(|| commonest_truth(confusion));
-                    let collapse = confusion.collapse()?;
-                    Some((level, Estimate::exact(collapse.share, collapse.n)))
-                });
-                Line {
-                    name: (*model).to_owned(),
-                    look: self.look(model),
-                    shape: Shape::Curve(points.collect()),
-                }
+            let mut lines = self.lines(variant, |subject| {
+                let mut confusions = self.findings.confusions.iter();
+                let confusion = confusions.find(|confusion| {
+                    confusion.family == family && confusion.subject == *subject
+                })?;
+                truth = truth.or_else(|| commonest_truth(confusion));
+                let collapse = confusion.collapse()?;
+                Some(Estimate::exact(collapse.share, collapse.n))
             });
-            let mut lines: Vec<Line> = lines.collect();
             let (share, n) = truth?;
             lines.push(Line {
                 name: "commonest true answer".to_owned(),
-                look: super::Look(27),
+                look: GROUND,
                 shape: Shape::Flat(share),
             });
             let title = format!("{}, n {n}", family_name(Some(&family)));
@@ -96,23 +76,4 @@ fn commonest_truth(confusion: &Confusion) -> Option<(f64, usize)> {
     let truths = confusion.shares().into_iter().map(|(_, truth)| truth);
     let (all, most) = truths.fold((0, 0), |(all, most), n| (all + n, most.max(n)));
     (all > 0).then(|| (most as f64 / all as f64, all))
-}
-
-/// Whether a subject is a model at a level without enhancement; L0 belongs to every variant.
-fn raw(
-    subject: &crate::score::accuracy::Subject,
-    model: &str,
-    level: Level,
-    variant: Variant,
-) -> bool {
-    let variant = if level == Level::L0 {
-        Variant::None
-    } else {
-        variant
-    };
-    subject.view == Some(View::Image)
-        && subject.model == model
-        && subject.level == Some(level)
-        && subject.variant == variant
-        && subject.enhancer.is_none()
 }

@@ -54,6 +54,9 @@ pub fn figures(findings: &Findings<'_>) -> Result<Vec<Figure>> {
 /// The built-in models: a floor and a ceiling, not models under test.
 const BUILT_IN: [&str; 2] = ["random", "observer"];
 
+/// The look of what no model says: chance, and the truth.
+const GROUND: Look = Look(27);
+
 const ACCURACY: &str = "accuracy in %";
 
 /// What the figures are drawn from.
@@ -80,14 +83,6 @@ impl<'a> Overview<'a> {
         }
     }
 
-    fn estimate(&self, subject: &Subject, family: Option<&Family>) -> Option<Estimate> {
-        let mut cells = self.findings.summary.cells.iter();
-        let cell = cells.find(|cell| {
-            cell.mode == Mode::Strict && cell.family.as_ref() == family && cell.subject == *subject
-        });
-        cell?.accuracy
-    }
-
     /// The accuracy of a model over the levels, in one variant, raw or enhanced; L0 is the untouched frame.
     fn points(
         &self,
@@ -96,32 +91,25 @@ impl<'a> Overview<'a> {
         enhancer: Option<&EnhancerName>,
         family: Option<&Family>,
     ) -> Vec<(Level, Estimate)> {
+        let summary = &self.findings.summary;
         let at = |level: Level| {
-            let light = level == Level::L0;
-            let subject = Subject {
-                model: model.to_owned(),
-                view: Some(View::Image),
-                level: Some(level),
-                variant: if light { Variant::None } else { variant },
-                enhancer: enhancer.filter(|_| !light).cloned(),
-            };
-            Some((level, self.estimate(&subject, family)?))
+            let subject = Subject::seeing(model, level, variant, enhancer);
+            Some((
+                level,
+                summary.cell(&subject, family, Mode::Strict)?.accuracy?,
+            ))
         };
         Level::ALL.into_iter().filter_map(at).collect()
     }
 
     /// The blind lines, each in the look of its model, and chance.
     fn floors(&self, family: Option<&Family>) -> Vec<Line> {
-        let cells = self.findings.summary.cells.iter();
-        let here = cells.filter(|cell| {
-            cell.mode == Mode::Strict
-                && cell.family.as_ref() == family
-                && cell.subject.view != Some(View::Image)
-        });
+        let cells = self.findings.summary.of(family, Mode::Strict);
+        let here = cells.filter(|cell| cell.subject.view != Some(View::Image));
         let lines = here.filter_map(|cell| {
             let model = &*cell.subject.model;
             let (name, look) = if cell.subject.view.is_none() {
-                (CHANCE.to_owned(), Look(27))
+                (CHANCE.to_owned(), GROUND)
             } else {
                 (format!("{model} without images"), self.look(model))
             };
@@ -147,7 +135,7 @@ impl<'a> Overview<'a> {
         Look(place.unwrap_or(self.models.len()))
     }
 
-    /// The darkened variants that were asked, the noisy one first where only one is drawn.
+    /// The darkened variants that were asked; where only one is drawn it is the last, the noisy one.
     fn variants_there(&self) -> Vec<Variant> {
         [Variant::Ev, Variant::Noise]
             .into_iter()
@@ -158,14 +146,34 @@ impl<'a> Overview<'a> {
             .collect()
     }
 
-    /// The lines of all models in one variant.
-    fn lines(&self, variant: Variant, family: Option<&Family>) -> Vec<Line> {
-        let line = |model: &&str| Line {
-            name: (*model).to_owned(),
-            look: self.look(model),
-            shape: Shape::Curve(self.points(model, variant, None, family)),
+    /// The lines of all models in one variant, raw, of some number of each subject.
+    fn lines(
+        &self,
+        variant: Variant,
+        mut number: impl FnMut(&Subject) -> Option<Estimate>,
+    ) -> Vec<Line> {
+        let line = |model: &&str| {
+            let points = Level::ALL.into_iter().filter_map(|level| {
+                let subject = Subject::seeing(model, level, variant, None);
+                Some((level, number(&subject)?))
+            });
+            Line {
+                name: (*model).to_owned(),
+                look: self.look(model),
+                shape: Shape::Curve(points.collect()),
+            }
         };
         self.models.iter().map(line).collect()
+    }
+
+    /// The lines of the accuracy of all models, with what they are held against.
+    fn accuracies(&self, variant: Variant, family: Option<&Family>) -> Vec<Line> {
+        let summary = &self.findings.summary;
+        let mut lines = self.lines(variant, |subject| {
+            summary.cell(subject, family, Mode::Strict)?.accuracy
+        });
+        lines.extend(self.floors(family));
+        lines
     }
 
     /// How the intervals were made, and on how many questions.
@@ -185,13 +193,9 @@ impl<'a> Overview<'a> {
 
     fn accuracy(&self) -> Option<(String, Chart)> {
         let variants = self.variants_there();
-        let panels = variants.iter().map(|variant| {
-            let mut lines = self.lines(*variant, None);
-            lines.extend(self.floors(None));
-            Panel {
-                title: format!("{}, n {}", light(*variant, None), self.n(None)),
-                lines,
-            }
+        let panels = variants.iter().map(|variant| Panel {
+            title: format!("{}, n {}", light(*variant, None), self.n(None)),
+            lines: self.accuracies(*variant, None),
         });
         let panels: Vec<Panel> = panels.collect();
         let caption = "Accuracy of each model by level, without enhancement. Broken lines: without images, and chance.";
@@ -270,12 +274,10 @@ impl<'a> Overview<'a> {
         let variant = *self.variants_there().last()?;
         let families = self.findings.grid.families();
         let panels = families.into_iter().map(|family| {
-            let mut lines = self.lines(variant, Some(family));
-            lines.extend(self.floors(Some(family)));
             let n = self.n(Some(family));
             Panel {
                 title: format!("{}, n {n}", family_name(Some(family))),
-                lines,
+                lines: self.accuracies(variant, Some(family)),
             }
         });
         let panels: Vec<Panel> = panels.collect();

@@ -1,18 +1,15 @@
 //! The darkness thresholds side by side.
 
 use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters::style::text_anchor::{HPos, VPos};
 
+use super::super::chart::{Area, GRID, Look, PAPER, path, words};
 use super::super::subject::{light, stops};
 use super::Figure;
 use crate::error::{Error, Result};
 use crate::score::curve::{Curve, Threshold};
 use crate::score::findings::Findings;
 
-/// Axes and words; as in the other figures.
-const INK: RGBColor = RGBColor(34, 34, 34);
-const GRID: RGBColor = RGBColor(221, 221, 221);
-const DOT: RGBColor = RGBColor(0, 114, 178);
 /// The width of the names, of the axis, and of the numbers, in pixels.
 const NAMES: i32 = 330;
 const AXIS: i32 = 400;
@@ -40,7 +37,7 @@ pub(super) fn figure(findings: &Findings<'_>) -> Result<Option<Figure>> {
     let mut svg = String::new();
     let drawn = {
         let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
-        draw(&root, &rows, &findings.unit.to_string()).map_err(|e| e.to_string())
+        draw(&root, &rows, &findings.unit.to_string())
     };
     drawn.map_err(|e| Error::data("figure", e))?;
     let caption =
@@ -54,47 +51,39 @@ pub(super) fn figure(findings: &Findings<'_>) -> Result<Option<Figure>> {
     }))
 }
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
-type Drawn<'a> =
-    std::result::Result<(), DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>>;
-
-fn draw<'a>(root: &Area<'a>, rows: &[(&Curve, Threshold)], unit: &str) -> Drawn<'a> {
-    let style = |across, down| {
-        let font = ("sans-serif", 13).into_font();
-        TextStyle::from(font)
-            .color(&INK)
-            .pos(Pos::new(across, down))
-    };
+fn draw(root: &Area<'_>, rows: &[(&Curve, Threshold)], unit: &str) -> Result<(), String> {
+    let failed = |e: DrawingAreaErrorKind<_>| e.to_string();
     let x = |ev: f64| NAMES + (ev.clamp(0.0, MOST) / MOST * f64::from(AXIS)).round() as i32;
-    root.fill(&RGBColor(255, 255, 255))?;
+    let dot = Look(0).colour();
+    root.fill(&PAPER).map_err(failed)?;
     let bottom = 12 + rows.len() as i32 * ROW;
     for tick in 0..=9 {
         let at = x(f64::from(tick));
-        let line = vec![(at, 8), (at, bottom)];
-        root.draw(&PathElement::new(line, GRID.stroke_width(1)))?;
-        let label = style(HPos::Center, VPos::Top);
-        root.draw(&Text::new(tick.to_string(), (at, bottom + 6), label))?;
+        path(root, &[(at, 8), (at, bottom)], GRID.stroke_width(1))?;
+        let below = (HPos::Center, VPos::Top);
+        words(root, &tick.to_string(), (at, bottom + 6), 13, below)?;
     }
     for (row, (curve, threshold)) in (0..).zip(rows) {
         let y = 12 + row * ROW + ROW / 2;
-        let name = format!(
-            "{}, {}",
-            curve.model,
-            light(curve.variant, curve.enhancer.as_ref())
-        );
-        root.draw(&Text::new(
-            name,
+        let light = light(curve.variant, curve.enhancer.as_ref());
+        let name = format!("{}, {light}", curve.model);
+        words(
+            root,
+            &name,
             (NAMES - 14, y),
-            style(HPos::Right, VPos::Center),
-        ))?;
-        let ends = vec![(x(threshold.low), y), (x(threshold.high), y)];
-        root.draw(&PathElement::new(ends, DOT.stroke_width(2)))?;
+            13,
+            (HPos::Right, VPos::Center),
+        )?;
+        let ends = [(x(threshold.low), y), (x(threshold.high), y)];
+        path(root, &ends, dot.stroke_width(2))?;
         if threshold.high.is_infinite() {
             let tip = vec![(x(MOST) + 8, y), (x(MOST), y - 5), (x(MOST), y + 5)];
-            root.draw(&Polygon::new(tip, DOT))?;
+            root.draw(&Polygon::new(tip, dot)).map_err(failed)?;
         }
         if threshold.value.is_finite() {
-            root.draw(&Circle::new((x(threshold.value), y), 5, DOT.filled()))?;
+            let place = (x(threshold.value), y);
+            let point = Circle::new(place, 5, dot.filled());
+            root.draw(&point).map_err(failed)?;
         }
         let darkest = curve.darkest.exposure_drop().0;
         let number = format!(
@@ -104,10 +93,10 @@ fn draw<'a>(root: &Area<'a>, rows: &[(&Curve, Threshold)], unit: &str) -> Drawn<
             stops(threshold.high, darkest)
         );
         let place = (NAMES + AXIS + 16, y);
-        root.draw(&Text::new(number, place, style(HPos::Left, VPos::Center)))?;
+        words(root, &number, place, 13, (HPos::Left, VPos::Center))?;
     }
     let below = format!("darkness threshold in EV, with 95 % interval by {unit}");
     let place = (NAMES + AXIS / 2, bottom + 30);
-    root.draw(&Text::new(below, place, style(HPos::Center, VPos::Top)))?;
-    root.present()
+    words(root, &below, place, 13, (HPos::Center, VPos::Top))?;
+    root.present().map_err(failed)
 }

@@ -165,7 +165,7 @@ fn data<'a>(findings: &'a Findings<'a>, shown: &Shown<'a>, room: Room) -> Data<'
     let listed: HashMap<&QuestionId, &Listed> = shown
         .questions
         .iter()
-        .map(|question| (&question.id, *question))
+        .map(|question| (&question.id, question))
         .collect();
     let (mut frames, mut families) = (Distinct::new(), Distinct::new());
     let (mut asked, mut choices) = (Distinct::new(), Distinct::new());

@@ -41,7 +41,7 @@ pub struct Shown<'a> {
     /// The runs.
     pub runs: Vec<Run<'a>>,
     /// The questions, where they are kept.
-    pub questions: &'a [&'a Listed],
+    pub questions: &'a [Listed],
     /// The small copies of images, where they are kept.
     pub thumbnails: &'a [Thumbnail],
 }

@@ -99,6 +99,7 @@ const fill = (select, values, value) => {
 };
 const unique = (values) => [...new Set(values)];
 
+const everyLevel = () => unique(data.subjects.filter((s) => s.level).map((s) => s.level)).sort();
 const lights = (model) => unique(data.subjects.filter((s) => s.model === model).map((s) => s.light));
 const levels = (model, light) => {
   const there = data.subjects.filter((s) => s.model === model && s.light === light && s.level).map((s) => s.level);
@@ -199,7 +200,7 @@ const step = (by) => {
 const pictures = (question) => {
   const kept = data.thumbnails[question.frame], box = $("i-images");
   box.replaceChildren();
-  const there = unique(data.subjects.filter((s) => s.level).map((s) => s.level)).sort();
+  const there = everyLevel();
   const slider = $("i-level");
   slider.max = Math.max(there.length - 1, 0);
   const level = state.pictured && there.includes(state.pictured) ? state.pictured : (state.level || there[0]);
@@ -227,7 +228,7 @@ const pictures = (question) => {
 const marks = (i) => {
   const table = $("i-marks");
   table.replaceChildren();
-  const there = unique(data.subjects.filter((s) => s.level).map((s) => s.level)).sort();
+  const there = everyLevel();
   const head = make("tr");
   head.append(make("th", "model"), make("th", "light"), ...there.map((l) => make("th", l)));
   table.append(head);
@@ -348,7 +349,7 @@ const start = async () => {
   $("next").addEventListener("click", () => step(1));
   $("previous").addEventListener("click", () => step(-1));
   $("i-level").addEventListener("input", (event) => {
-    const there = unique(data.subjects.filter((s) => s.level).map((s) => s.level)).sort();
+    const there = everyLevel();
     state.pictured = there[Number(event.target.value)];
     if (levels(state.model, state.light).includes(state.pictured)) { state.level = state.pictured; refresh(); } else { draw(); }
   });

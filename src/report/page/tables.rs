@@ -1,20 +1,18 @@
 //! The tables of the page.
 
-use std::collections::BTreeSet;
-
 use serde::Serialize;
 
-use crate::report::latex::below_blind;
+use crate::report::ladder::Ladder;
 use crate::report::subject::{
     family as family_name, light, name, p, percent, points, reach, stops,
 };
-use crate::score::accuracy::{Cell as Score, Subject};
+use crate::score::accuracy::Subject;
 use crate::score::choice::Mode;
 use crate::score::comparison::{Comparison, Kind};
 use crate::score::curve::Curve;
 use crate::score::estimate::Estimate;
 use crate::score::findings::Findings;
-use crate::types::{EnhancerName, Family, Level, Variant, View, Why};
+use crate::types::Why;
 
 #[derive(Serialize)]
 pub(super) struct Table {
@@ -56,15 +54,6 @@ fn table(caption: impl Into<String>, head: &[&str], rows: Vec<Vec<Cell>>) -> Tab
     }
 }
 
-fn scores<'a>(
-    findings: &'a Findings<'_>,
-    mode: Mode,
-    family: Option<&'a Family>,
-) -> impl Iterator<Item = &'a Score> {
-    let cells = findings.summary.cells.iter();
-    cells.filter(move |cell| cell.mode == mode && cell.family.as_ref() == family)
-}
-
 fn interval(estimate: Option<Estimate>) -> String {
     estimate.map_or("–".to_owned(), |e| {
         format!(
@@ -84,42 +73,26 @@ pub(super) fn accuracy(findings: &Findings<'_>) -> Vec<Table> {
 }
 
 fn by_level(findings: &Findings<'_>) -> Table {
-    let cells: Vec<&Score> = scores(findings, Mode::Strict, None).collect();
-    let seen = || {
-        cells
-            .iter()
-            .filter(|cell| cell.subject.view == Some(View::Image))
-    };
-    let levels: BTreeSet<Level> = seen().filter_map(|cell| cell.subject.level).collect();
-    let lines: BTreeSet<(&str, Option<&EnhancerName>, Variant)> = seen()
-        .map(|cell| {
-            let subject = &cell.subject;
-            (&*subject.model, subject.enhancer.as_ref(), subject.variant)
-        })
-        .collect();
+    let Ladder {
+        levels,
+        series,
+        floors,
+    } = Ladder::new(&findings.summary);
     let shown = |estimate: Option<Estimate>| {
         estimate.map_or("–".to_owned(), |e| {
             format!("{} ±{}", percent(e.value), percent((e.high - e.low) / 2.0))
         })
     };
-    let row = |(model, enhancer, variant): (&str, Option<&EnhancerName>, Variant)| {
+    let rows = series.iter().map(|(series, cells)| {
         let at = levels.iter().map(|level| {
-            let cell = seen().find(|cell| {
-                let subject = &cell.subject;
-                subject.level == Some(*level)
-                    && (&*subject.model, subject.enhancer.as_ref(), subject.variant)
-                        == (model, enhancer, variant)
-            });
+            let cell = cells.get(level);
             Cell::new(cell.map_or(String::new(), |cell| shown(cell.accuracy)))
         });
-        let head = [Cell::new(model), Cell::of(light(variant, enhancer), "text")];
-        head.into_iter().chain(at).collect::<Vec<Cell>>()
-    };
-    let mut rows: Vec<Vec<Cell>> = lines.into_iter().map(row).collect();
-    let floors = cells
-        .iter()
-        .filter(|cell| cell.subject.view != Some(View::Image));
-    rows.extend(floors.map(|cell| {
+        let head = [Cell::new(series.model), Cell::of(series.light(), "text")];
+        head.into_iter().chain(at).collect()
+    });
+    let mut rows: Vec<Vec<Cell>> = rows.collect();
+    rows.extend(floors.into_iter().map(|cell| {
         let (light, value) = match (cell.subject.view, cell.accuracy) {
             (None, Some(chance)) => ("guessing", format!("{:.2}", 100.0 * chance.value)),
             (_, accuracy) => ("without images", shown(accuracy)),
@@ -140,10 +113,10 @@ fn by_level(findings: &Findings<'_>) -> Table {
 }
 
 fn every_subject(findings: &Findings<'_>) -> Table {
-    let rows = scores(findings, Mode::Strict, None).map(|cell| {
+    let summary = &findings.summary;
+    let rows = summary.of(None, Mode::Strict).map(|cell| {
         let subject = &cell.subject;
-        let mut lenient = scores(findings, Mode::Lenient, None);
-        let lenient = lenient.find(|other| other.subject == *subject);
+        let lenient = summary.cell(subject, None, Mode::Lenient);
         let lenient = lenient.and_then(|cell| cell.accuracy);
         let shown = match subject.view {
             None => "guessing".to_owned(),
@@ -220,13 +193,10 @@ fn curves(caption: &str, curves: &[&Curve]) -> Table {
 }
 
 pub(super) fn families(findings: &Findings<'_>) -> Table {
-    let families = findings.grid.families();
-    let all: Vec<Option<&Family>> = std::iter::once(None)
-        .chain(families.into_iter().map(Some))
-        .collect();
+    let all = findings.grid.groups();
     let row = |model: &str, condition: String, subject: Option<&Subject>| {
         let cells = all.iter().map(|family| {
-            let mut cells = scores(findings, Mode::Strict, *family);
+            let mut cells = findings.summary.of(*family, Mode::Strict);
             let cell = cells.find(|cell| match subject {
                 Some(subject) => cell.subject == *subject,
                 None => cell.subject.view.is_none(),
@@ -234,8 +204,8 @@ pub(super) fn families(findings: &Findings<'_>) -> Table {
             let text = cell
                 .and_then(|cell| cell.accuracy)
                 .map(|e| percent(e.value));
-            let below = subject.and_then(|subject| below_blind(findings, subject, *family));
-            let class = if below.is_some() { "below" } else { "" };
+            let below = subject.is_some_and(|subject| findings.below_blind(subject, *family));
+            let class = if below { "below" } else { "" };
             Cell::of(text.unwrap_or("–".to_owned()), class)
         });
         let name = [Cell::new(model), Cell::of(condition, "text")];
@@ -369,9 +339,9 @@ pub(super) fn health(findings: &Findings<'_>) -> Table {
             let of = health.replies.max(1) as f64;
             format!("{count} ({} %)", percent(count as f64 / of))
         };
-        let form = health.replies
-            - health.read
-            - health.unread_for(&[Why::Refused, Why::Filtered, Why::Truncated, Why::Empty]);
+        let told = health.unread_for(&[Why::Refused, Why::Filtered, Why::Truncated, Why::Empty]);
+        // A foreign record may give a reason beside a choice.
+        let form = (health.replies - health.read).saturating_sub(told);
         vec![
             Cell::new(name(&health.subject)),
             Cell::new(health.replies.to_string()),

@@ -5,9 +5,9 @@ pub mod review;
 
 use std::fmt::Write as _;
 
-use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
-use comfy_table::{CellAlignment, LineStyle, Table};
+use comfy_table::CellAlignment;
 
+use super::table::plain;
 use crate::error::{Error, Result};
 use crate::questions::summary::{Baselines, Summary};
 use crate::types::Family;
@@ -18,8 +18,7 @@ const REASONS: usize = 3;
 /// The table at the end: questions by family with what came of their candidates and what not looking would score.
 #[must_use]
 pub fn table(summary: &Summary) -> String {
-    let mut table = Table::new();
-    table.load_style(UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none()));
+    let mut table = plain();
     table.set_header([
         "family",
         "questions",

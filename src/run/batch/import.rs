@@ -65,7 +65,7 @@ pub fn import(config: &BatchImport) -> Result<Verdict> {
     } else {
         Status::Incomplete
     };
-    let mut output = leave(&store, &manifest, &records, config.show)?;
+    let mut output = leave(&store, &manifest, records, config.show)?;
     if config.show == Show::Table {
         output.insert_str(0, &told(&tally, out.len()));
     }

@@ -2,11 +2,14 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::Kept;
 use super::cost::cost;
 use crate::error::{Error, Result};
+use crate::report::page::{self, Shown};
+use crate::score::chance::Offer;
+use crate::score::findings::Findings;
 use crate::types::manifest::RunManifest;
 use crate::types::{Listed, Outcome, QuestionId, Record, Thumbnail, TrialKey, View};
 
@@ -28,15 +31,49 @@ pub(super) struct Part {
     pub(super) records: Range<usize>,
 }
 
+impl Merged {
+    /// What the records say.
+    pub(super) fn findings(&self) -> Findings<'_> {
+        let scenes = self.questions.iter();
+        let scenes = scenes.map(|question| (question.frame.clone(), question.scene.clone()));
+        let offers = offers(&self.records, &self.questions);
+        Findings::new(&self.records, &scenes.collect(), offers)
+    }
+
+    /// What the page shows besides.
+    pub(super) fn shown(&self) -> Shown<'_> {
+        let runs = self.runs.iter().map(|run| page::Run {
+            name: run.name.clone(),
+            manifest: &run.manifest,
+            records: &self.records[run.records.clone()],
+            cost: run.cost.clone(),
+        });
+        Shown {
+            runs: runs.collect(),
+            questions: &self.questions,
+            thumbnails: &self.thumbnails,
+        }
+    }
+
+    /// The runs and where they lie.
+    pub(super) fn places(&self) -> Vec<(&RunManifest, &Path)> {
+        let runs = self.runs.iter();
+        runs.map(|run| (&run.manifest, &*run.folder)).collect()
+    }
+}
+
 /// Puts runs together. A model that answered the same item in two of them in different ways (another seed, prompt or
 /// parameter) stands once for each, with the run's name; a trial that two of them share counts once.
 ///
 /// # Errors
 /// Where a run shares no question with the others, or one of one name has other choices or another truth.
 pub(super) fn merge(runs: Vec<Kept>) -> Result<Merged> {
-    agree(&runs)?;
+    let mut twice = BTreeSet::new();
+    if runs.len() > 1 {
+        agree(&runs)?;
+        twice = answered_twice(&runs);
+    }
     let names = names(&runs);
-    let twice = answered_twice(&runs);
     let mut merged = Merged {
         runs: Vec::new(),
         records: Vec::new(),
@@ -78,6 +115,34 @@ pub(super) fn merge(runs: Vec<Kept>) -> Result<Merged> {
         }));
     }
     Ok(merged)
+}
+
+/// What is offered, for the chance line: each question as often as it has orders of its choices, since an answer to each order
+/// counts for itself; those not asked yet once. A run that kept no questions has those in its records.
+fn offers(records: &[Record], questions: &[Listed]) -> Vec<Offer> {
+    let mut orders = BTreeMap::<&QuestionId, BTreeSet<&[String]>>::new();
+    let mut all = BTreeMap::<&QuestionId, Offer>::new();
+    for record in records {
+        orders
+            .entry(&record.question)
+            .or_default()
+            .insert(&record.choices);
+        all.entry(&record.question).or_insert_with(|| Offer {
+            family: record.family.clone(),
+            choices: record.choices.len(),
+        });
+    }
+    for question in questions {
+        all.entry(&question.id).or_insert_with(|| Offer {
+            family: question.family.clone(),
+            choices: question.choices.len(),
+        });
+    }
+    let offers = all.into_iter().flat_map(|(question, offer)| {
+        let times = orders.get(question).map_or(1, BTreeSet::len);
+        std::iter::repeat_n(offer, times)
+    });
+    offers.collect()
 }
 
 /// What runs are called: their folders' names, or their paths where two have one name.

@@ -3,7 +3,6 @@
 mod cost;
 mod merge;
 
-use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -11,17 +10,14 @@ use super::written;
 use super::{Verdict, count, record};
 use crate::config::{Readings, Report, Show};
 use crate::error::{Error, Result};
-use crate::report::page::{self, Shown};
 use crate::report::products::{PAGE, products};
 use crate::report::{files, table, verdicts};
-use crate::score::chance::Offer;
 use crate::score::findings::Findings;
 use crate::store::{self, Moved, Store};
 use crate::types::manifest::{RunManifest, Status};
-use crate::types::{FrameId, Listed, QuestionId, Record, Thumbnail};
+use crate::types::{Listed, Record, Thumbnail};
 
-use cost::cost;
-use merge::merge;
+use merge::{Merged, merge};
 
 /// A run as it lies in its folder.
 struct Kept {
@@ -94,23 +90,20 @@ pub fn report(config: &Report) -> Result<Verdict> {
         .iter()
         .map(|folder| Kept::open(folder, config.readings, &mut said))
         .collect();
-    let (mut runs, mut output) = (runs?, said);
+    let (merged, mut output) = (merge(runs?)?, said);
     if config.show == Show::Json {
         output.clear();
     }
-    let output = if let [run] = &mut *runs
-        && config.out.is_none()
-    {
-        match Store::open(&run.folder, &run.manifest, Moved::Allowed) {
-            Ok(store) => output + &leave(&store, &run.manifest, &run.records, config.show)?,
+    output += &match (&*merged.runs, &config.out) {
+        ([run], None) => match Store::open(&run.folder, &run.manifest, Moved::Allowed) {
+            Ok(store) => in_its_folder(&store, &run.manifest, &merged, config.show)?,
             // A run under way, or in a folder that cannot be written to, is shown all the same.
             Err(held) => {
                 tracing::warn!("the report is not written: {held}");
-                output + &compare(runs, config)?
+                compare(&merged, config)?
             }
-        }
-    } else {
-        output + &compare(runs, config)?
+        },
+        _ => compare(&merged, config)?,
     };
     Ok(Verdict {
         status: Status::Complete,
@@ -119,14 +112,9 @@ pub fn report(config: &Report) -> Result<Verdict> {
 }
 
 /// Shows several runs as one, and leaves the report where it is wanted.
-fn compare(runs: Vec<Kept>, config: &Report) -> Result<String> {
-    let merged = merge(runs)?;
-    let findings = find(&merged.records, &merged.questions);
-    let places: Vec<(&RunManifest, &Path)> = merged
-        .runs
-        .iter()
-        .map(|run| (&run.manifest, &*run.folder))
-        .collect();
+fn compare(merged: &Merged, config: &Report) -> Result<String> {
+    let findings = merged.findings();
+    let places = merged.places();
     let mut text = match config.show {
         Show::Json => files::json_of_several(&findings.summary, &places)?,
         Show::Table => told(&findings, &places),
@@ -137,19 +125,7 @@ fn compare(runs: Vec<Kept>, config: &Report) -> Result<String> {
         }
         return Ok(text);
     };
-    let questions: Vec<&Listed> = merged.questions.iter().collect();
-    let runs = merged.runs.iter().map(|run| page::Run {
-        name: run.name.clone(),
-        manifest: &run.manifest,
-        records: &merged.records[run.records.clone()],
-        cost: run.cost.clone(),
-    });
-    let shown = Shown {
-        runs: runs.collect(),
-        questions: &questions,
-        thumbnails: &merged.thumbnails,
-    };
-    for (name, content) in products(&findings, &shown)? {
+    for (name, content) in products(&findings, &merged.shown())? {
         written::write(&out.join(name), &content)?;
     }
     if config.show == Show::Table {
@@ -166,43 +142,6 @@ pub(super) fn kept(folder: &Path) -> Result<RunManifest> {
     })
 }
 
-/// What records say about questions; of a run that kept no questions those in its records are taken.
-fn find<'a>(records: &'a [Record], questions: &[Listed]) -> Findings<'a> {
-    let scenes = questions
-        .iter()
-        .map(|question| (question.frame.clone(), question.scene.clone()));
-    let scenes: BTreeMap<FrameId, String> = scenes.collect();
-    Findings::new(records, &scenes, offers(records, questions))
-}
-
-/// What is offered, for the chance line: each question as often as it has orders of its choices, since an answer to each order
-/// counts for itself; those not asked yet once. A run that kept no questions has those in its records.
-fn offers(records: &[Record], questions: &[Listed]) -> Vec<Offer> {
-    let mut orders = BTreeMap::<&QuestionId, BTreeSet<&[String]>>::new();
-    let mut all = BTreeMap::<&QuestionId, Offer>::new();
-    for record in records {
-        orders
-            .entry(&record.question)
-            .or_default()
-            .insert(&record.choices);
-        all.entry(&record.question).or_insert_with(|| Offer {
-            family: record.family.clone(),
-            choices: record.choices.len(),
-        });
-    }
-    for question in questions {
-        all.entry(&question.id).or_insert_with(|| Offer {
-            family: question.family.clone(),
-            choices: question.choices.len(),
-        });
-    }
-    let offers = all.into_iter().flat_map(|(question, offer)| {
-        let times = orders.get(question).map_or(1, BTreeSet::len);
-        std::iter::repeat_n(offer, times)
-    });
-    offers.collect()
-}
-
 fn told(findings: &Findings<'_>, runs: &[(&RunManifest, &Path)]) -> String {
     table::render(&findings.summary, runs) + &verdicts::render(findings)
 }
@@ -211,26 +150,28 @@ fn told(findings: &Findings<'_>, runs: &[(&RunManifest, &Path)]) -> String {
 pub(super) fn leave(
     store: &Store,
     manifest: &RunManifest,
-    records: &[Record],
+    records: Vec<Record>,
     show: Show,
 ) -> Result<String> {
     let folder = store.folder();
-    let questions = store::read_questions(folder)?;
-    let thumbnails = store::read_thumbnails(folder)?;
-    let findings = find(records, &questions);
-    let listed: Vec<&Listed> = questions.iter().collect();
-    let name = folder.file_name().unwrap_or(folder.as_os_str());
-    let shown = Shown {
-        runs: vec![page::Run {
-            name: name.to_string_lossy().into_owned(),
-            manifest,
-            records,
-            cost: cost(records)?,
-        }],
-        questions: &listed,
-        thumbnails: &thumbnails,
+    let run = Kept {
+        folder: folder.to_owned(),
+        manifest: manifest.clone(),
+        records,
+        questions: store::read_questions(folder)?,
+        thumbnails: store::read_thumbnails(folder)?,
     };
-    for (name, content) in products(&findings, &shown)? {
+    in_its_folder(store, manifest, &merge(vec![run])?, show)
+}
+
+fn in_its_folder(
+    store: &Store,
+    manifest: &RunManifest,
+    merged: &Merged,
+    show: Show,
+) -> Result<String> {
+    let (folder, findings) = (store.folder(), merged.findings());
+    for (name, content) in products(&findings, &merged.shown())? {
         store.write(&name, &content)?;
     }
     let json = files::json(&findings.summary, manifest, None)?;

@@ -81,7 +81,7 @@ pub fn read(config: &StudyRead) -> Result<Verdict> {
     let records = store.records()?;
     own.counts = count(records.len(), &records);
     own.status = Status::Complete;
-    let mut output = leave(&store, &own, &records, config.show)?;
+    let mut output = leave(&store, &own, records, config.show)?;
     if config.show == Show::Table {
         output.insert_str(0, &told(&tally));
     }
