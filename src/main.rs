@@ -7,12 +7,13 @@ use clap::Parser;
 use clap::error::ErrorKind;
 use darkqa_eval::cli::{BatchCommand, Cli, Command, EvaluateArgs, StudyCommand};
 use darkqa_eval::config::{
-    self, BatchExport, BatchImport, Config, Enhance, Export, Import, MakeRooms, Questions, Realism,
-    Report, Serve, ShowItem, StudyPack, StudyRead, Synthesize,
+    self, BatchExport, BatchImport, Config, Enhance, Export, Import, MakeRooms, OpenEqa, Questions,
+    Realism, Report, Serve, ShowItem, StudyPack, StudyRead, Synthesize,
 };
 use darkqa_eval::enhance;
 use darkqa_eval::run::export::export;
 use darkqa_eval::run::import::import;
+use darkqa_eval::run::openeqa::openeqa;
 use darkqa_eval::run::progress::{Loudness, Progress};
 use darkqa_eval::run::questions::questions;
 use darkqa_eval::run::realism::realism;
@@ -93,6 +94,7 @@ enum Task {
     Import(Box<Import>),
     Export(Box<Export>),
     Enhance(Box<Enhance>),
+    OpenEqa(Box<OpenEqa>),
     BatchExport(Box<BatchExport>),
     BatchImport(BatchImport),
     Report(Report),
@@ -130,6 +132,10 @@ impl Job {
             Some(Command::Import(said)) => {
                 let quiet = said.quiet;
                 (quiet, Task::Import(Box::new(Import::resolve(said)?)))
+            }
+            Some(Command::OpenEqa(said)) => {
+                let quiet = said.output.quiet;
+                (quiet, Task::OpenEqa(Box::new(OpenEqa::resolve(*said)?)))
             }
             Some(Command::Batch(BatchCommand::Export(said))) => {
                 let quiet = said.evaluate.output.quiet;
@@ -179,6 +185,7 @@ fn carry_out(task: Task, progress: &Progress) -> anyhow::Result<ExitCode> {
         Task::Import(config) => import(&config, progress)?,
         Task::Export(config) => export(&config, progress)?,
         Task::Enhance(config) => run::enhance::enhance(&config, progress)?,
+        Task::OpenEqa(config) => openeqa(&config, progress)?,
         Task::BatchExport(config) => run::batch::export(&config, progress)?,
         Task::BatchImport(config) => run::batch::import(&config)?,
         Task::Rooms(config) => rooms(&config, progress)?,

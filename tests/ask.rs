@@ -9,8 +9,8 @@ use std::time::{Duration, Instant};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use darkqa_eval::ask::{
-    Access, BaseUrl, Call, Constrain, Detail, Endpoint, Format, Model, OpenAi, Parameters, Payload,
-    Prompts, Random, Script, Secret, Sending, Temperature, TokenField,
+    Access, BaseUrl, Call, Constrain, Detail, Endpoint, Format, Message, Model, OpenAi, Parameters,
+    Payload, Prompts, Query, Random, Script, Secret, Sending, Temperature, TokenField,
 };
 use darkqa_eval::types::{
     Choices, Digest, FailureKind, Family, Finish, FrameId, Question, QuestionId, Reply, Rgb, View,
@@ -60,11 +60,13 @@ fn question(id: &str, text: &str) -> Question {
 async fn a_request_is_the_smallest_every_server_takes() {
     let mock = MockEndpoint::start([Answer::text("B")]);
     let hostile = "say \"url\":\"\" \u{1F512} \\\"}}]}]} \n{{ x }}\u{0}";
-    let image = image();
-    let reply = model_at(&mock, quick())
-        .ask(hostile, 2, Some(&image))
-        .await
-        .unwrap();
+    let images = [Arc::new(image())];
+    let message = Message {
+        before: hostile,
+        images: &images,
+        behind: "",
+    };
+    let reply = model_at(&mock, quick()).ask(message, 2).await.unwrap();
     assert_eq!((reply.text.as_str(), reply.attempts), ("B", 1));
     assert_eq!(reply.finish, Finish::Stop);
     assert_eq!(reply.served_model.as_deref(), Some("mock-1"));
@@ -90,7 +92,7 @@ async fn a_request_is_the_smallest_every_server_takes() {
         .strip_prefix("data:image/png;base64,")
         .unwrap();
     let file = STANDARD.decode(base64).unwrap();
-    assert_eq!(Digest::of(&file), image.facts().digest);
+    assert_eq!(Digest::of(&file), images[0].facts().digest);
     let expected = json!({
         "model": "m", "temperature": 0.0, "max_tokens": 1024,
         "messages": [{"role": "user", "content": [
@@ -108,6 +110,7 @@ async fn what_is_set_is_sent_and_what_is_not_is_left_out() {
     let parameters = Parameters {
         model: "m".into(),
         temperature: Temperature::Server,
+        seed: Some(1234),
         max_tokens: Some(16),
         token_field: TokenField::MaxCompletionTokens,
         reasoning_effort: Some("low".into()),
@@ -115,14 +118,20 @@ async fn what_is_set_is_sent_and_what_is_not_is_left_out() {
         constrain: Constrain::None,
     };
     let model = OpenAi::new(endpoint.clone(), parameters);
-    model.ask("Red?", 2, Some(&image())).await.unwrap();
+    let images = [image(), image()].map(Arc::new);
+    let message = Message {
+        before: "Look \\\"url\":\"\"",
+        images: &images,
+        behind: "\"url\":\"\" Red?",
+    };
+    model.ask(message, 2).await.unwrap();
     let bare = Parameters {
         temperature: Temperature::Server,
         max_tokens: None,
         ..Parameters::new("m".into())
     };
     let model = OpenAi::new(endpoint, bare);
-    model.ask("Red?", 2, None).await.unwrap();
+    model.ask(Message::words("Red?"), 2).await.unwrap();
 
     let requests = mock.requests();
     assert_eq!(requests[0].header("authorization"), None);
@@ -133,7 +142,14 @@ async fn what_is_set_is_sent_and_what_is_not_is_left_out() {
     );
     assert_eq!(body["max_completion_tokens"], 16);
     assert_eq!(body["reasoning_effort"], "low");
-    assert_eq!(body.as_object().unwrap().len(), 4);
+    assert_eq!(body["seed"], 1234);
+    assert_eq!(body.as_object().unwrap().len(), 5);
+    let parts = body["messages"][0]["content"].as_array().unwrap();
+    assert_eq!(parts.len(), 4);
+    assert_eq!(parts[0]["text"], message.before);
+    assert_eq!(parts[1], parts[2]);
+    assert!(parts[1]["image_url"]["url"].as_str().unwrap().len() > 100);
+    assert_eq!(parts[3]["text"], message.behind);
     let blind = json!({"model": "m", "messages": [{"role": "user", "content": "Red?"}]});
     assert_eq!(requests[1].json(), blind);
 }
@@ -151,7 +167,7 @@ async fn base_urls_keep_their_path_and_query() {
     ] {
         let endpoint = endpoint_at(&format!("{root}{base}"), None, quick());
         let model = OpenAi::new(endpoint, Parameters::new("m".into()));
-        model.ask("Red?", 2, None).await.unwrap();
+        model.ask(Message::words("Red?"), 2).await.unwrap();
         assert_eq!(mock.requests().pop().unwrap().line, line);
     }
 }
@@ -168,7 +184,7 @@ async fn a_closed_port_is_a_connection_failure() {
     };
     let endpoint = endpoint_at(&format!("http://127.0.0.1:{port}/v1"), None, sending);
     let model = OpenAi::new(endpoint, Parameters::new("m".into()));
-    let error = model.ask("Red?", 2, None).await.unwrap_err();
+    let error = model.ask(Message::words("Red?"), 2).await.unwrap_err();
     assert_eq!(error.failure.kind, FailureKind::Connection);
     assert!(
         error.failure.message.to_lowercase().contains("refused"),
@@ -188,7 +204,10 @@ async fn a_wait_asked_for_is_kept_by_all() {
         let mock = MockEndpoint::start([answer, Answer::text("B")]);
         let model = model_at(&mock, quick());
         let start = Instant::now();
-        assert_eq!(model.ask("Red?", 2, None).await.unwrap().attempts, 2);
+        assert_eq!(
+            model.ask(Message::words("Red?"), 2).await.unwrap().attempts,
+            2
+        );
         assert!(start.elapsed() >= Duration::from_millis(50));
     }
     // One request is turned away; another one, asked in the meanwhile, waits as well.
@@ -204,8 +223,8 @@ async fn a_wait_asked_for_is_kept_by_all() {
     let first = OpenAi::new(endpoint.clone(), Parameters::new("m".into()));
     let second = OpenAi::new(endpoint, Parameters::new("n".into()));
     let start = Instant::now();
-    first.ask("Red?", 2, None).await.unwrap_err();
-    let reply = second.ask("Red?", 2, None).await.unwrap();
+    first.ask(Message::words("Red?"), 2).await.unwrap_err();
+    let reply = second.ask(Message::words("Red?"), 2).await.unwrap();
     assert_eq!(reply.attempts, 1);
     assert!(start.elapsed() >= Duration::from_millis(80));
 }
@@ -214,9 +233,15 @@ async fn a_wait_asked_for_is_kept_by_all() {
 async fn a_request_dropped_leaves_the_model_usable() {
     let mock = MockEndpoint::start([Answer::silent(), Answer::text("B")]);
     let model = model_at(&mock, quick());
-    let asked = tokio::time::timeout(Duration::from_millis(50), model.ask("Red?", 2, None));
+    let asked = tokio::time::timeout(
+        Duration::from_millis(50),
+        model.ask(Message::words("Red?"), 2),
+    );
     assert!(asked.await.is_err());
-    assert_eq!(model.ask("Red?", 2, None).await.unwrap().text, "B");
+    assert_eq!(
+        model.ask(Message::words("Red?"), 2).await.unwrap().text,
+        "B"
+    );
 }
 
 #[tokio::test]
@@ -240,7 +265,7 @@ async fn keys_are_in_no_error_and_no_debug_output() {
                 ..quick()
             },
         );
-        let error = model.ask("Red?", 2, None).await.unwrap_err();
+        let error = model.ask(Message::words("Red?"), 2).await.unwrap_err();
         let shown = format!("{error:?} {error} {model:?}");
         assert!(!shown.contains("sk-very"), "{shown}");
         assert!(error.failure.message.contains("[secret]"), "{error}");
@@ -257,7 +282,7 @@ async fn keys_are_in_no_error_and_no_debug_output() {
         endpoint_at(&base, None, quick()),
         Parameters::new("m".into()),
     );
-    let error = model.ask("Red?", 2, None).await.unwrap_err();
+    let error = model.ask(Message::words("Red?"), 2).await.unwrap_err();
     let shown = format!("{error:?} {model:?}");
     for secret in ["us3r", "passw0rd", "t0ken"] {
         assert!(!error.failure.message.contains(secret), "{shown}");
@@ -303,10 +328,9 @@ async fn scripts_and_guesses_answer_without_an_endpoint() {
         .render(View::Blind, &asked)
         .unwrap();
     let call = |question, condition| Call {
-        question,
+        query: Query::Choice(question),
         condition,
-        prompt: &prompt,
-        image: None,
+        message: Message::words(&prompt),
         turn: 0,
     };
     std::fs::write(
@@ -325,7 +349,15 @@ async fn scripts_and_guesses_answer_without_an_endpoint() {
         let reply = script.ask(call(question, condition)).await.unwrap();
         assert_eq!(reply, Reply::local(said.into()));
     }
+    // Who only guesses letters knows nothing to say to an open question.
+    let open = Call {
+        query: Query::Open(&unknown.id),
+        ..call(&asked, None)
+    };
+    assert_eq!(script.ask(open).await.unwrap().text, "C");
     let random = Model::Random(Random { seed: 1 });
+    let error = random.ask(open).await.unwrap_err();
+    assert!(error.to_string().contains("q2 has no choices"), "{error}");
     let reply = random.ask(call(&asked, None)).await.unwrap();
     assert!(["A", "B"].contains(&reply.text.as_str()));
     assert_eq!(random.name(), "random");

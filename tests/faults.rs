@@ -9,8 +9,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
 use darkqa_eval::ask::{
-    Access, AskError, Endpoint, Format, OpenAi, Parameters, Payload, Reach, Secret, Sending,
-    Temperature,
+    Access, AskError, Endpoint, Format, Message, OpenAi, Parameters, Payload, Reach, Secret,
+    Sending, Temperature,
 };
 use darkqa_eval::types::{FailureKind, Finish, Reply, Rgb};
 use serde_json::{Value, json};
@@ -45,7 +45,12 @@ async fn asked_with(answers: Vec<Answer>, sending: Sending, parameters: Paramete
     let endpoint = Arc::new(Endpoint::open(access, sending).unwrap());
     let model = OpenAi::new(endpoint, parameters);
     let started = Instant::now();
-    let result = model.ask("Red?", 2, Some(&image())).await;
+    let images = [Arc::new(image())];
+    let message = Message {
+        images: &images,
+        ..Message::words("Red?")
+    };
+    let result = model.ask(message, 2).await;
     Asked {
         result,
         waited: started.elapsed(),

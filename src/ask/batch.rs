@@ -2,10 +2,10 @@
 
 use serde_json::Value;
 
+use super::Message;
 use super::complaint::Complaint;
 use super::openai::OpenAi;
 use super::parameters::Constrain;
-use super::payload::Payload;
 use super::request::constrained_letter;
 use super::response::{self, Flaw};
 use super::secret::Scrub;
@@ -19,18 +19,12 @@ pub fn write(
     model: &OpenAi,
     id: &str,
     url: &str,
-    prompt: &str,
+    message: Message<'_>,
     choices: usize,
-    image: Option<&Payload>,
 ) -> Result<Vec<u8>, serde_json::Error> {
     let (id, url) = (serde_json::to_string(id)?, serde_json::to_string(url)?);
     let head = format!("{{\"custom_id\":{id},\"method\":\"POST\",\"url\":{url},\"body\":");
-    Ok([
-        head.as_bytes(),
-        &model.body(prompt, choices, image)?,
-        b"}\n",
-    ]
-    .concat())
+    Ok([head.as_bytes(), &model.body(message, choices)?, b"}\n"].concat())
 }
 
 /// One line of an output or error file.

@@ -1,7 +1,8 @@
-//! The body of a request: [`Parts`], words around an image that many requests share.
+//! The body of a request: [`Parts`], words around images that many requests share.
 
 use std::convert::Infallible;
 use std::pin::Pin;
+use std::sync::Arc;
 use std::task::{Context, Poll};
 
 use bytes::Bytes;
@@ -10,13 +11,14 @@ use http_body::{Body, Frame, SizeHint};
 /// Pieces of bytes sent one after the other as one body of known length; cloning it copies no bytes.
 #[derive(Debug, Clone)]
 pub(super) struct Parts {
-    pieces: [Bytes; 3],
+    pieces: Arc<[Bytes]>,
     next: usize,
 }
 
 impl Parts {
     /// The body of these pieces, in order; empty ones are passed over.
-    pub(super) fn new(pieces: [Bytes; 3]) -> Self {
+    pub(super) fn new(pieces: impl IntoIterator<Item = Bytes>) -> Self {
+        let pieces = pieces.into_iter().collect();
         Self { pieces, next: 0 }
     }
 

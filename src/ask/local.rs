@@ -4,10 +4,10 @@ use std::fmt;
 
 use super::{AskError, Call, Random, Reach, failure};
 use crate::types::question::letter;
-use crate::types::{Digest, FailureKind, Reply};
+use crate::types::{Digest, FailureKind, Question, Reply};
 
 /// What a function says to a question: the index of a choice, or `None` where it does not know.
-pub type Opinion = dyn Fn(&Call<'_>) -> Result<Option<usize>, String> + Send + Sync;
+pub type Opinion = dyn Fn(&Question, &Call<'_>) -> Result<Option<usize>, String> + Send + Sync;
 
 /// A model whose answers a function gives. Where it does not know, any choice is as likely as another, and the same one for
 /// the same seed, question, condition and turn.
@@ -49,10 +49,10 @@ impl Local {
         ])
     }
 
-    pub(super) fn answer(&self, call: Call<'_>) -> Result<Reply, AskError> {
-        match (self.opinion)(&call) {
+    pub(super) fn answer(&self, question: &Question, call: Call<'_>) -> Result<Reply, AskError> {
+        match (self.opinion)(question, &call) {
             Ok(Some(choice)) => Ok(Reply::local(letter(choice).to_string())),
-            Ok(None) => Ok(Reply::local(self.prior.answer(call))),
+            Ok(None) => Ok(Reply::local(self.prior.answer(question, call))),
             Err(message) => Err(AskError {
                 failure: failure(FailureKind::Request, message),
                 attempts: 1,

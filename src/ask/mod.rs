@@ -1,11 +1,12 @@
 //! Stage 4, ask: a prompt and an image go out, a [`Reply`] comes back. The only asynchronous stage.
 //!
 //! [`Prompts`] turn a question into words, [`Payload`] an image into the text of a data URL; both are CPU work and done before.
-//! A [`Model`] takes the two as a [`Call`]. [`OpenAi`] is a model behind an [`Endpoint`]; what belongs to one server (address,
+//! A [`Model`] takes the two as the [`Message`] of a [`Call`]. [`OpenAi`] is a model behind an [`Endpoint`]; what belongs to one server (address,
 //! key, connections, pauses) lives in the endpoint and is shared by all models asked there.
 
 mod access;
 pub mod batch;
+pub mod bilinear;
 mod body;
 mod complaint;
 mod endpoint;
@@ -48,19 +49,87 @@ pub use script::Script;
 pub use secret::Secret;
 pub use url::BaseUrl;
 
-use crate::types::{Condition, Digest, Failure, FailureKind, Question, Reply};
+use std::sync::Arc;
+
+use crate::types::{Condition, Digest, Failure, FailureKind, Question, QuestionId, Reply};
+
+/// What is put to a model.
+#[derive(Debug, Clone, Copy)]
+pub enum Query<'a> {
+    /// A question with choices.
+    Choice(&'a Question),
+    /// A question that is answered in words of one's own, by its name.
+    Open(&'a QuestionId),
+}
+
+impl<'a> Query<'a> {
+    /// The name of the question.
+    #[must_use]
+    pub fn id(self) -> &'a QuestionId {
+        match self {
+            Self::Choice(question) => &question.id,
+            Self::Open(id) => id,
+        }
+    }
+
+    /// How many choices there are; 0 where the answer is open.
+    #[must_use]
+    pub fn choices(self) -> usize {
+        match self {
+            Self::Choice(question) => question.choices.len(),
+            Self::Open(_) => 0,
+        }
+    }
+
+    /// The question with choices, for models that know no other.
+    fn choice(self) -> Result<&'a Question, AskError> {
+        match self {
+            Self::Choice(question) => Ok(question),
+            Self::Open(id) => Err(AskError {
+                failure: failure(
+                    FailureKind::Request,
+                    format!("question {id} has no choices, and this model can only choose"),
+                ),
+                attempts: 0,
+                reach: Reach::Endpoint,
+                refused: None,
+            }),
+        }
+    }
+}
+
+/// The one message of a conversation: words, images, and the words behind them.
+#[derive(Debug, Clone, Copy)]
+pub struct Message<'a> {
+    /// The words before the images; all of them where there are no images.
+    pub before: &'a str,
+    /// The images; none for a question put in words alone.
+    pub images: &'a [Arc<Payload>],
+    /// The words behind the images; empty for none.
+    pub behind: &'a str,
+}
+
+impl<'a> Message<'a> {
+    /// Words alone.
+    #[must_use]
+    pub fn words(before: &'a str) -> Self {
+        Self {
+            before,
+            images: &[],
+            behind: "",
+        }
+    }
+}
 
 /// Everything a model needs to answer one question.
 #[derive(Debug, Clone, Copy)]
 pub struct Call<'a> {
-    /// The question; models made in process look at it, the others at `prompt`.
-    pub question: &'a Question,
-    /// What the image shows; `None` where no image is shown.
+    /// The question; models made in process look at it, the others at the message.
+    pub query: Query<'a>,
+    /// What the images show; `None` where none are shown.
     pub condition: Option<&'a Condition>,
-    /// The question as [`Prompts`] rendered it.
-    pub prompt: &'a str,
-    /// The image; `None` for a question put in words alone.
-    pub image: Option<&'a Payload>,
+    /// The question in words, with its images.
+    pub message: Message<'a>,
     /// How many times the question was put before, in whatever order of its choices.
     pub turn: u32,
 }
@@ -128,13 +197,16 @@ impl Model {
     /// Puts one question. Dropping the future gives up the request and leaves nothing behind.
     pub async fn ask(&self, call: Call<'_>) -> Result<Reply, AskError> {
         match self {
-            Self::OpenAi(model) => {
-                let choices = call.question.choices.len();
-                model.ask(call.prompt, choices, call.image).await
+            Self::OpenAi(model) => model.ask(call.message, call.query.choices()).await,
+            Self::Random(random) => {
+                let question = call.query.choice()?;
+                Ok(Reply::local(random.answer(question, call)))
             }
-            Self::Random(random) => Ok(Reply::local(random.answer(call))),
-            Self::Script(script) => script.answer(call.question, call.condition),
-            Self::Local(local) => tokio::task::block_in_place(|| local.answer(call)),
+            Self::Script(script) => script.answer(call.query.id(), call.condition),
+            Self::Local(local) => {
+                let question = call.query.choice()?;
+                tokio::task::block_in_place(|| local.answer(question, call))
+            }
         }
     }
 }

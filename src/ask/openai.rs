@@ -8,10 +8,9 @@ use tracing::warn;
 use super::endpoint::Endpoint;
 use super::field::Refused;
 use super::parameters::{Constrain, Parameters, Temperature, TokenField};
-use super::payload::Payload;
 use super::request::{self, Asked, Fields};
 use super::verdict::Sent;
-use super::{AskError, Reach, failure};
+use super::{AskError, Message, Reach, failure};
 use crate::types::{Digest, FailureKind, Reply};
 
 /// One model of an OpenAI-compatible endpoint, asked with one set of parameters.
@@ -74,18 +73,9 @@ impl OpenAi {
         self.parameters.digest()
     }
 
-    /// Sends a prompt that offers so many choices, with an image or in words alone, as the one message of a conversation.
-    pub async fn ask(
-        &self,
-        prompt: &str,
-        choices: usize,
-        image: Option<&Payload>,
-    ) -> Result<Reply, AskError> {
-        let asked = Asked {
-            prompt,
-            choices,
-            image,
-        };
+    /// Sends the one message of a conversation, which offers so many choices (0 where the answer is open).
+    pub async fn ask(&self, message: Message<'_>, choices: usize) -> Result<Reply, AskError> {
+        let asked = Asked { message, choices };
         let mut attempts = 0;
         loop {
             let fields = self.fields();
@@ -113,17 +103,8 @@ impl OpenAi {
     ///
     /// # Errors
     /// Where it cannot be written as JSON.
-    pub fn body(
-        &self,
-        prompt: &str,
-        choices: usize,
-        image: Option<&Payload>,
-    ) -> Result<Vec<u8>, serde_json::Error> {
-        let asked = Asked {
-            prompt,
-            choices,
-            image,
-        };
+    pub fn body(&self, message: Message<'_>, choices: usize) -> Result<Vec<u8>, serde_json::Error> {
+        let asked = Asked { message, choices };
         request::body(&self.parameters, self.fields(), asked).map(|parts| parts.joined())
     }
 
@@ -140,7 +121,7 @@ impl OpenAi {
         let sent = Sent {
             parameters: &self.parameters,
             fields,
-            has_image: asked.image.is_some(),
+            has_image: !asked.message.images.is_empty(),
             has_key: self.endpoint.has_key(),
         };
         self.endpoint.ask(&body, sent).await

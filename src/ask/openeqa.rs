@@ -26,11 +26,13 @@ pub fn blind(question: &str) -> String {
     formatted(BLIND.trim(), &[("question", question)])
 }
 
-/// The answer in a blind model's reply: the line behind the first "A:"; `None` where there is none, which is an error upstream.
+/// The answer in a blind model's reply (`parse_output`): the line behind the first "A:", without further ones in it; `None`
+/// where there is none, which is an error upstream.
 #[must_use]
-pub fn blind_answer(reply: &str) -> Option<&str> {
+pub fn blind_answer(reply: &str) -> Option<String> {
     let (_, behind) = reply.split_once("A:")?;
-    Some(behind.split('\n').next().unwrap_or(behind).trim())
+    let line = behind.split('\n').next().unwrap_or(behind);
+    Some(line.replace("A:", "").trim().to_owned())
 }
 
 /// What the judge is asked about an answer. Whether there are extra answers decides the template, also where the list is empty.
@@ -180,8 +182,13 @@ mod tests {
         assert_eq!(behind, "User Query: Where is {answer}?");
         let blind = blind("Is it?");
         assert!(blind.starts_with("You are an intelligent") && blind.ends_with("\n\nQ: Is it?"));
-        assert_eq!(blind_answer("A: a bed \nExplanation: x"), Some("a bed"));
-        assert_eq!(blind_answer("Answer: a bed"), None);
+        for (reply, answer) in [
+            ("A: a bed \nExplanation: x", Some("a bed")),
+            ("Q: Is it?\nA: A: a bed", Some("a bed")),
+            ("Answer: a bed", None),
+        ] {
+            assert_eq!(blind_answer(reply).as_deref(), answer);
+        }
         let plain = judged("Q {prediction}", "it's", None, "{answer}");
         assert!(
             plain.ends_with(

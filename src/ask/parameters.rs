@@ -15,6 +15,8 @@ pub struct Parameters {
     pub model: String,
     /// The sampling temperature.
     pub temperature: Temperature,
+    /// What the server's sampling starts from, where it takes that: with a temperature above 0 replies are then more alike.
+    pub seed: Option<u64>,
     /// The most tokens a reply may have. Reasoning models spend it on hidden reasoning first.
     pub max_tokens: Option<u32>,
     /// The field in which that limit is sent.
@@ -34,6 +36,7 @@ impl Parameters {
         Self {
             model,
             temperature: Temperature::Auto,
+            seed: None,
             max_tokens: Some(Self::MAX_TOKENS),
             token_field: TokenField::Auto,
             reasoning_effort: None,
@@ -59,7 +62,8 @@ impl Parameters {
             (self.constrain != Constrain::None).then(|| self.constrain.to_string()),
         ];
         let parts = words.map(|word| word.map_or(String::new(), |word| format!("={word}")));
-        Digest::of_parts(parts.iter().map(String::as_bytes))
+        let seed = self.seed.map(|seed| format!("seed {seed}"));
+        Digest::of_parts(parts.iter().chain(&seed).map(String::as_bytes))
     }
 }
 
@@ -238,7 +242,7 @@ mod tests {
     #[test]
     fn the_digest_knows_what_decides_a_reply() {
         let base = Parameters::new("m".into());
-        let mut others = vec![base.clone(); 7];
+        let mut others = vec![base.clone(); 8];
         others[0].model = "n".into();
         others[1].temperature = Temperature::Server;
         others[2].token_field = TokenField::Omit;
@@ -246,6 +250,7 @@ mod tests {
         others[4].detail = Some(Detail::High);
         others[5].constrain = Constrain::Json;
         others[6].temperature = Temperature::Of(0.0);
+        others[7].seed = Some(0);
         for other in &others {
             assert_ne!(other.digest(), base.digest(), "{other:?}");
         }

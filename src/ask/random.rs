@@ -1,8 +1,8 @@
 //! The model that guesses: [`Random`].
 
 use super::Call;
-use crate::types::Digest;
 use crate::types::question::letter;
+use crate::types::{Digest, Question};
 
 /// Answers with the letter of any choice, each as likely; the same one for the same seed, question, condition and turn, in
 /// whatever order they are asked.
@@ -20,8 +20,7 @@ impl Random {
         Digest::of_parts([Self::NAME.as_bytes(), &self.seed.to_le_bytes()])
     }
 
-    pub(super) fn answer(self, call: Call<'_>) -> String {
-        let question = call.question;
+    pub(super) fn answer(self, question: &Question, call: Call<'_>) -> String {
         let mut shown = call.condition.map(ToString::to_string).unwrap_or_default();
         if call.turn > 0 {
             shown = format!("{shown} turn {}", call.turn);
@@ -49,7 +48,8 @@ impl Random {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::{Choices, Condition, Family, FrameId, Question, QuestionId};
+    use crate::ask::{Message, Query};
+    use crate::types::{Choices, Condition, Family, FrameId, QuestionId};
 
     fn question(id: usize, choices: usize) -> Question {
         let texts = (0..choices).map(|i| format!("choice {i}")).collect();
@@ -65,13 +65,12 @@ mod tests {
 
     fn guess(seed: u64, question: &Question, condition: Option<&Condition>, turn: u32) -> String {
         let call = Call {
-            question,
+            query: Query::Choice(question),
             condition,
-            prompt: "",
-            image: None,
+            message: Message::words(""),
             turn,
         };
-        Random { seed }.answer(call)
+        Random { seed }.answer(question, call)
     }
 
     #[test]

@@ -1,12 +1,11 @@
 //! What is said to an endpoint: the JSON of one request, [`body`].
 
-use bytes::Bytes;
 use serde::Serialize;
 use serde_json::{Value, json};
 
+use super::Message;
 use super::body::Parts;
 use super::parameters::{Constrain, Detail, Parameters, Temperature, TokenField};
-use super::payload::Payload;
 use crate::types::question::letter;
 
 /// Which of the fields that servers quarrel about a request has; found out once for a whole run.
@@ -35,20 +34,19 @@ impl Fields {
 /// What one request asks.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Asked<'a> {
-    /// The words.
-    pub(super) prompt: &'a str,
-    /// How many choices they offer.
+    /// The words and images.
+    pub(super) message: Message<'a>,
+    /// How many choices they offer; 0 where the answer is open.
     pub(super) choices: usize,
-    /// The image; `None` for words alone.
-    pub(super) image: Option<&'a Payload>,
 }
 
-// The order of fields matters: the image must come last, see `IMAGE_TAIL`.
 #[derive(Serialize)]
 struct Request<'a> {
     model: &'a str,
     #[serde(skip_serializing_if = "Option::is_none")]
     temperature: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    seed: Option<u64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     max_tokens: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -59,11 +57,11 @@ struct Request<'a> {
     response_format: Option<Value>,
     #[serde(skip_serializing_if = "Option::is_none")]
     structured_outputs: Option<Value>,
-    messages: [Message<'a>; 1],
+    messages: [Turn<'a>; 1],
 }
 
 #[derive(Serialize)]
-struct Message<'a> {
+struct Turn<'a> {
     role: &'static str,
     content: Content<'a>,
 }
@@ -73,7 +71,7 @@ struct Message<'a> {
 #[serde(untagged)]
 enum Content<'a> {
     Words(&'a str),
-    Parts([Part<'a>; 2]),
+    Parts(Vec<Part<'a>>),
 }
 
 #[derive(Serialize)]
@@ -90,64 +88,77 @@ struct ImageUrl {
     url: &'static str,
 }
 
-/// The end of every request with an image, behind the data URL. The image is the last value of the last part of the last message
-/// of the last field, so the place for it lies at a fixed distance from the end, whatever the question says: nothing
-/// is searched for, and no question can contain the mark.
-const IMAGE_TAIL: &[u8] = br#""}}]}]}"#;
+/// Where an image goes: a field without a value. No question can contain it, whatever it says: within a text every quotation
+/// mark has a backslash before it.
+const PLACE: &str = r#""url":"""#;
 
 /// The field of the object that `--constrain json` asks for.
 const ANSWER: &str = "answer";
 
-/// The body of one request: the text first, the image (where there is one) second, its bytes shared and not copied.
+/// The body of one request: words, images, and the words behind them, the images' bytes shared and not copied.
 pub(super) fn body(
     parameters: &Parameters,
     fields: Fields,
     asked: Asked<'_>,
 ) -> Result<Parts, serde_json::Error> {
-    let Asked {
-        prompt,
-        choices,
-        image,
-    } = asked;
+    let Asked { message, choices } = asked;
     let limit = |name| parameters.max_tokens.filter(|_| fields.token_field == name);
-    let content = match image {
-        None => Content::Words(prompt),
-        Some(_) => Content::Parts([
-            Part::Text { text: prompt },
-            Part::ImageUrl {
-                image_url: ImageUrl {
-                    detail: parameters.detail,
-                    url: "",
-                },
-            },
-        ]),
-    };
     let letters: Vec<char> = (0..choices).map(letter).collect();
     let constrained =
         |kind, value: fn(&[char]) -> Value| (parameters.constrain == kind).then(|| value(&letters));
-    let mut json = serde_json::to_vec(&Request {
+    let json = serde_json::to_string(&Request {
         model: &parameters.model,
         temperature: fields.temperature,
+        seed: parameters.seed,
         max_tokens: limit(TokenField::MaxTokens),
         max_completion_tokens: limit(TokenField::MaxCompletionTokens),
         reasoning_effort: parameters.reasoning_effort.as_deref(),
         response_format: constrained(Constrain::Json, schema),
         structured_outputs: constrained(Constrain::Choice, |letters| json!({"choice": letters})),
-        messages: [Message {
+        messages: [Turn {
             role: "user",
-            content,
+            content: content(message, parameters.detail),
         }],
     })?;
-    let Some(image) = image else {
-        return Ok(Parts::new([json.into(), Bytes::new(), Bytes::new()]));
+    if message.images.is_empty() {
+        return Ok(Parts::new([json.into()]));
+    }
+    debug_assert_eq!(json.matches(PLACE).count(), message.images.len());
+    let (open, close) = PLACE.split_at(PLACE.len() - 1);
+    let mut pieces = Vec::with_capacity(2 * message.images.len() + 1);
+    let mut begin = "";
+    let mut images = message.images.iter();
+    for words in json.split(PLACE) {
+        match images.next() {
+            Some(image) => {
+                pieces.push([begin, words, open].concat().into());
+                pieces.push(image.data_url());
+            }
+            None => pieces.push([begin, words].concat().into()),
+        }
+        begin = close;
+    }
+    Ok(Parts::new(pieces))
+}
+
+/// What a message holds, with a place for each image.
+fn content(message: Message<'_>, detail: Option<Detail>) -> Content<'_> {
+    let Message {
+        before,
+        images,
+        behind,
+    } = message;
+    if images.is_empty() && behind.is_empty() {
+        return Content::Words(before);
+    }
+    let words = |text| Part::Text { text };
+    let image = || Part::ImageUrl {
+        image_url: ImageUrl { detail, url: "" },
     };
-    debug_assert!(json.ends_with(IMAGE_TAIL));
-    json.truncate(json.len().saturating_sub(IMAGE_TAIL.len()));
-    Ok(Parts::new([
-        json.into(),
-        image.data_url(),
-        Bytes::from_static(IMAGE_TAIL),
-    ]))
+    let parts = std::iter::once(words(before))
+        .chain(images.iter().map(|_| image()))
+        .chain((!behind.is_empty()).then(|| words(behind)));
+    Content::Parts(parts.collect())
 }
 
 /// An object with one of the letters, as OpenAI's `json_schema` format.

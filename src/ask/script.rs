@@ -8,7 +8,7 @@ use serde::Deserialize;
 
 use super::{AskError, Reach, failure};
 use crate::error::{Error, Result};
-use crate::types::{Condition, Digest, FailureKind, Question, QuestionId, Reply};
+use crate::types::{Condition, Digest, FailureKind, QuestionId, Reply};
 
 /// Replies out of a JSONL file, one a line:
 /// `{"question": "<id>", "reply": ".."}`, the same with `"condition": "L3-noise"` for one condition, `{"default": ".."}` for the rest.
@@ -100,10 +100,9 @@ impl Script {
 
     pub(super) fn answer(
         &self,
-        question: &Question,
+        id: &QuestionId,
         condition: Option<&Condition>,
     ) -> Result<Reply, AskError> {
-        let id = &question.id;
         let reply = condition
             .and_then(|condition| self.replies.get(&Cue::Shown(id.clone(), condition.clone())))
             .or_else(|| self.replies.get(&Cue::Asked(id.clone())))

@@ -22,14 +22,23 @@ pub struct BatchExportArgs {
     /// The evaluation.
     #[command(flatten)]
     pub evaluate: EvaluateArgs,
+    /// Its files.
+    #[command(flatten)]
+    pub files: BatchFileArgs,
+}
+
+/// What the files are like.
+#[derive(Debug, Default, Args)]
+#[command(next_help_heading = "Batch")]
+pub struct BatchFileArgs {
     /// The most bytes of a file, in MB; default: 200
-    #[arg(long, value_name = "MB", help_heading = "Batch")]
+    #[arg(long, value_name = "MB")]
     pub file_size: Option<NonZeroU64>,
     /// The most requests of a file; default: 50000
-    #[arg(long, value_name = "N", help_heading = "Batch")]
+    #[arg(long, value_name = "N")]
     pub file_requests: Option<NonZeroUsize>,
     /// The path that each line asks; default: /v1/chat/completions
-    #[arg(long, value_name = "PATH", help_heading = "Batch")]
+    #[arg(long, value_name = "PATH")]
     pub url: Option<String>,
 }
 

@@ -8,6 +8,7 @@ mod batch;
 mod enhance;
 mod export;
 mod import;
+mod openeqa;
 mod questions;
 mod report;
 mod rooms;
@@ -22,10 +23,11 @@ use clap::{Args, Parser, Subcommand};
 use serde::Serialize;
 
 pub use asking::{ModelArgs, SendingArgs};
-pub use batch::{BatchCommand, BatchExportArgs, BatchImportArgs};
+pub use batch::{BatchCommand, BatchExportArgs, BatchFileArgs, BatchImportArgs};
 pub use enhance::EnhanceArgs;
 pub use export::ExportArgs;
 pub use import::ImportArgs;
+pub use openeqa::OpenEqaArgs;
 pub use questions::QuestionsArgs;
 pub use report::ReportArgs;
 pub use rooms::RoomsArgs;
@@ -74,6 +76,12 @@ pub enum Command {
     /// Ask through a Batch API, at half the price: write its input files, take over its output files
     #[command(subcommand)]
     Batch(BatchCommand),
+    /// Ask OpenEQA's open questions about walks through dark houses, the answers marked by a judge (LLM-Match)
+    ///
+    /// The frames of each walk are darkened, scaled and sent with upstream's prompts, byte for byte; so are the answers to the
+    /// judge. The same answer to the same question is judged once. What was answered or marked is never asked again.
+    #[command(name = "openeqa")]
+    OpenEqa(Box<OpenEqaArgs>),
     /// Answer as the built-in models do behind an OpenAI-compatible endpoint on this machine, for trying clients without keys
     Serve(ServeArgs),
     /// Show what runs hold, from their records alone: tables, figures and one HTML file; several runs are compared

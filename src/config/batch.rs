@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::{Config, Show, merge};
-use crate::cli::{BatchExportArgs, BatchImportArgs};
+use crate::cli::{BatchExportArgs, BatchFileArgs, BatchImportArgs};
 use crate::error::{Error, Result};
 
 /// The most bytes of one file at OpenAI and Azure.
@@ -15,17 +15,41 @@ const FILE_REQUESTS: usize = 50_000;
 /// The path that each line asks.
 const URL: &str = "/v1/chat/completions";
 
+/// What the input files of a Batch API are like.
+#[derive(Debug)]
+pub struct BatchFiles {
+    /// The most bytes of a file.
+    pub most_bytes: u64,
+    /// The most requests of a file.
+    pub most_requests: usize,
+    /// The path that each line asks.
+    pub url: String,
+}
+
+impl BatchFiles {
+    pub(super) fn resolve(said: BatchFileArgs) -> Result<Self> {
+        let url = said.url.unwrap_or_else(|| URL.to_owned());
+        if !url.starts_with('/') {
+            let problem = format_args!("{url:?}; a path expected, as {URL}");
+            return Err(Error::usage("--url", problem));
+        }
+        Ok(Self {
+            most_bytes: said
+                .file_size
+                .map_or(FILE_BYTES, |size| size.get().saturating_mul(1_000_000)),
+            most_requests: said.file_requests.map_or(FILE_REQUESTS, usize::from),
+            url,
+        })
+    }
+}
+
 /// Everything `batch export` is told.
 #[derive(Debug)]
 pub struct BatchExport {
     /// The evaluation.
     pub evaluation: Config,
-    /// The most bytes of a file.
-    pub file_bytes: u64,
-    /// The most requests of a file.
-    pub file_requests: usize,
-    /// The path that each line asks.
-    pub url: String,
+    /// What the files are like.
+    pub files: BatchFiles,
 }
 
 impl BatchExport {
@@ -34,18 +58,10 @@ impl BatchExport {
     /// # Errors
     /// [`Error::Usage`] with the flag that cannot be used.
     pub fn resolve(said: BatchExportArgs) -> Result<Self> {
-        let url = said.url.unwrap_or_else(|| URL.to_owned());
-        if !url.starts_with('/') {
-            let problem = format_args!("{url:?}; a path expected, as {URL}");
-            return Err(Error::usage("--url", problem));
-        }
+        let files = BatchFiles::resolve(said.files)?;
         Ok(Self {
             evaluation: Config::resolve(merge(said.evaluate)?)?,
-            file_bytes: said
-                .file_size
-                .map_or(FILE_BYTES, |size| size.get().saturating_mul(1_000_000)),
-            file_requests: said.file_requests.map_or(FILE_REQUESTS, usize::from),
-            url,
+            files,
         })
     }
 }

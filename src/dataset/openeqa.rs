@@ -8,13 +8,14 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use crate::error::{Error, Result};
+use crate::types::QuestionId;
 
 /// An open question about a walk.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 pub struct OpenQuestion {
     /// Its name.
     #[serde(rename = "question_id")]
-    pub id: String,
+    pub id: QuestionId,
     /// The question in words.
     #[serde(rename = "question")]
     pub text: String,
@@ -55,7 +56,7 @@ pub fn questions(path: &Path) -> Result<Vec<OpenQuestion>> {
     }
     let mut seen = BTreeSet::new();
     if let Some(twice) = questions.iter().find(|question| !seen.insert(&question.id)) {
-        return Err(wrong(format!("two questions have the id {:?}", twice.id)));
+        return Err(wrong(format!("two questions have the id {:?}", twice.id.0)));
     }
     Ok(questions)
 }

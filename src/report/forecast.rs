@@ -19,11 +19,11 @@ pub struct Line {
     pub text_tokens: f64,
     /// Tokens of all images; `None` where nobody knows how the model counts them.
     pub image_tokens: Option<f64>,
-    /// Tokens of all replies if each names a letter.
+    /// Tokens of all replies if each is short: a letter, a mark, a sentence.
     pub reply_tokens: f64,
     /// Tokens of all replies if each is as long as `--max-tokens` allows; `None` without a limit.
     pub longest_reply_tokens: Option<f64>,
-    /// Dollars if each reply names a letter; `None` where no price is known.
+    /// Dollars if each reply is short; `None` where no price is known.
     pub dollars: Option<f64>,
     /// Dollars if each reply is as long as `--max-tokens` allows.
     pub most_dollars: Option<f64>,
@@ -60,6 +60,11 @@ pub struct Forecast {
     pub prices: String,
     /// What the Batch API charges, as a share of the price.
     pub batch: f64,
+    /// What the shortest reply is taken to be, in words.
+    pub reply: &'static str,
+    /// The size of the largest request in bytes, where requests hold many images.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub largest_request: Option<f64>,
 }
 
 /// The forecast as JSON.
@@ -119,7 +124,8 @@ pub fn render(forecast: &Forecast) -> String {
     let _ = writeln!(text, ".\n{table}");
     let _ = writeln!(
         text,
-        "dollars: from a letter a reply to every reply as long as --max-tokens allows; {prices}; by the Batch API {:.0} % of it",
+        "dollars: from {} a reply to every reply as long as --max-tokens allows; {prices}; by the Batch API {:.0} % of it",
+        forecast.reply,
         100.0 * forecast.batch
     );
     if forecast.lines.iter().any(|line| line.dollars.is_none()) {
@@ -131,6 +137,9 @@ pub fn render(forecast: &Forecast) -> String {
         bytes(forecast.bytes),
         forecast.largest_image as f64 / 1e6
     );
+    if let Some(request) = forecast.largest_request {
+        let _ = writeln!(text, "a request has up to {}", bytes(request));
+    }
     let _ = writeln!(
         text,
         "time: {} of waiting ({pace}), {} of making images beside it",

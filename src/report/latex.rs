@@ -21,7 +21,7 @@ pub fn tables(findings: &Findings<'_>) -> String {
 }
 
 /// Escapes what LaTeX reads as its own.
-fn escaped(text: &str) -> String {
+pub(super) fn escaped(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
@@ -42,7 +42,7 @@ fn escaped(text: &str) -> String {
     escaped
 }
 
-fn table(caption: &str, columns: &str, head: &[String], rows: &[Vec<String>]) -> String {
+pub(super) fn table(caption: &str, columns: &str, head: &[String], rows: &[Vec<String>]) -> String {
     let line = |cells: &[String]| format!("    {} \\\\\n", cells.join(" & "));
     let mut text = String::from("\n\\begin{table}\n  \\centering\n");
     let _ = writeln!(text, "  \\caption{{{caption}}}");

@@ -8,6 +8,7 @@ pub mod forecast;
 pub mod histogram;
 mod ladder;
 pub mod latex;
+pub mod openeqa;
 pub mod page;
 pub mod products;
 pub mod questions;

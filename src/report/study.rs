@@ -16,23 +16,23 @@ const PLACE: &str = "/*STUDY*/null";
 pub struct Asked {
     /// Its name.
     pub id: String,
-    /// The number of its frame.
+    /// The number of its frame or walk.
     pub frame: usize,
     /// The question in words.
     pub text: String,
-    /// The choices in the order shown.
+    /// The choices in the order shown; none where the answer is open.
     pub choices: Vec<String>,
-    /// The frame in each condition, in one order for all.
+    /// The frame or walk in each condition, in one order for all.
     pub shots: Vec<Shot>,
 }
 
-/// A frame in a condition.
+/// A frame or a walk in a condition.
 #[derive(Debug, Clone, Serialize)]
 pub struct Shot {
     /// What was done to it; told to the file of answers, not to the person.
     pub condition: String,
-    /// Where the image is, from the page.
-    pub image: String,
+    /// Where the images are, from the page: one of a frame, all of a walk.
+    pub images: Vec<String>,
 }
 
 /// All that the page is told.
@@ -43,15 +43,16 @@ struct Told<'a> {
     items: &'a [Asked],
 }
 
-/// One file that asks a person by number: each frame in one condition alone, which goes on by one from person to person, so
-/// that as many people as there are conditions see every image once. Answers are taken from the keyboard and saved as lines
-/// of JSON.
+/// One file that asks a person by number: each frame or walk in one condition alone, which goes on by one from person to person, so
+/// that as many people as there are conditions see every image once. Choices are taken from the keyboard and saved as lines
+/// of JSON, open answers as an array that `openeqa --answers` takes.
 ///
 /// # Errors
 /// Where the questions cannot be written.
 pub fn page(items: &[Asked]) -> Result<String> {
     let names = items.iter().flat_map(|item| {
-        let shots = item.shots.iter().map(|shot| shot.image.as_bytes());
+        let images = item.shots.iter().flat_map(|shot| &shot.images);
+        let shots = images.map(String::as_bytes);
         std::iter::once(item.id.as_bytes()).chain(shots)
     });
     let set = Digest::of_parts(names);
@@ -71,7 +72,7 @@ mod tests {
             choices: vec!["a".into(), "b".into()],
             shots: vec![Shot {
                 condition: "L5-noise".into(),
-                image: "images/0.png".into(),
+                images: vec!["images/0.png".into()],
             }],
         };
         let page = page(&[asked]).unwrap();

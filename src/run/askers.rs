@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::observer;
 use crate::ask::{Endpoint, Model, OpenAi, Parameters, Random, Script};
-use crate::config::{Config, ModelName};
+use crate::config::{Ask, Config, ModelName, Server};
 use crate::dataset::Dataset;
 use crate::error::{Error, Result};
 use crate::types::{Question, View};
@@ -20,6 +20,16 @@ pub(super) struct Asker {
     pub(super) view: View,
 }
 
+impl Asker {
+    pub(super) fn new(model: Model, view: View) -> Self {
+        Self {
+            digest: model.digest().to_string().into(),
+            model: Arc::new(model),
+            view,
+        }
+    }
+}
+
 /// Opens all models; nothing is sent.
 pub(super) fn open(
     config: &Config,
@@ -30,54 +40,78 @@ pub(super) fn open(
     let prior = Random {
         seed: config.light.sensor.seed,
     };
-    let endpoint = match &ask.server {
-        Some(server) => Some(Arc::new(Endpoint::open(
-            server.access.clone(),
-            server.sending,
-        )?)),
-        None => None,
-    };
+    let endpoint = endpoint(ask.server.as_ref())?;
     let seen = ask.models.iter().map(|name| (name, ask.view));
     let blind = ask.blind_models.iter().map(|name| (name, View::Blind));
     let mut askers: Vec<Asker> = Vec::new();
     for (name, view) in seen.chain(blind) {
-        let model = Arc::new(match name {
+        let model = match name {
             ModelName::Random => Model::Random(prior),
             ModelName::Observer => {
                 let place = &config.data.place;
                 Model::Local(observer::open(dataset, place, questions, prior)?)
             }
-            ModelName::Script(path) => Model::Script(Script::load(path)?),
-            ModelName::Remote(name) => {
-                let endpoint = endpoint
-                    .as_ref()
-                    .ok_or_else(|| Error::usage("--base-url", "no endpoint is known"))?;
-                Model::OpenAi(OpenAi::new(
-                    Arc::clone(endpoint),
-                    Parameters {
-                        model: name.clone(),
-                        ..ask.parameters.clone()
-                    },
-                ))
-            }
-        });
-        if askers
-            .iter()
-            .any(|asker| asker.view == view && asker.model.name() == model.name())
-        {
-            return Err(Error::usage(
-                "--model",
-                format_args!("{} is named twice", model.name()),
-            ));
-        }
-        let digest = model.digest().to_string().into();
-        askers.push(Asker {
-            model,
-            digest,
-            view,
-        });
+            name => speaker(name, endpoint.as_ref(), &ask.parameters)?,
+        };
+        add(&mut askers, Asker::new(model, view))?;
     }
     Ok(askers)
+}
+
+/// Opens the models of open questions; nothing is sent.
+pub(super) fn open_speakers(ask: &Ask) -> Result<Vec<Asker>> {
+    let endpoint = endpoint(ask.server.as_ref())?;
+    let seen = ask.models.iter().map(|name| (name, ask.view));
+    let blind = ask.blind_models.iter().map(|name| (name, View::Blind));
+    let mut askers: Vec<Asker> = Vec::new();
+    for (name, view) in seen.chain(blind) {
+        let model = speaker(name, endpoint.as_ref(), &ask.parameters)?;
+        add(&mut askers, Asker::new(model, view))?;
+    }
+    Ok(askers)
+}
+
+/// The endpoint, ready to be talked to.
+pub(super) fn endpoint(server: Option<&Server>) -> Result<Option<Arc<Endpoint>>> {
+    let open = |server: &Server| Endpoint::open(server.access.clone(), server.sending);
+    Ok(server.map(open).transpose()?.map(Arc::new))
+}
+
+/// A model that answers in words.
+pub(super) fn speaker(
+    name: &ModelName,
+    endpoint: Option<&Arc<Endpoint>>,
+    parameters: &Parameters,
+) -> Result<Model> {
+    match name {
+        ModelName::Script(path) => Ok(Model::Script(Script::load(path)?)),
+        ModelName::Remote(name) => {
+            let endpoint =
+                endpoint.ok_or_else(|| Error::usage("--base-url", "no endpoint is known"))?;
+            let parameters = Parameters {
+                model: name.clone(),
+                ..parameters.clone()
+            };
+            Ok(Model::OpenAi(OpenAi::new(Arc::clone(endpoint), parameters)))
+        }
+        ModelName::Random | ModelName::Observer => Err(Error::usage(
+            "--model",
+            "a model that answers in words expected",
+        )),
+    }
+}
+
+fn add(askers: &mut Vec<Asker>, asker: Asker) -> Result<()> {
+    let name = asker.model.name();
+    let mut others = askers.iter();
+    if others.any(|other| other.view == asker.view && other.model.name() == name) {
+        return Err(Error::usage(
+            "--model",
+            format_args!("{name} is named twice"),
+        ));
+    }
+    askers.push(asker);
+    Ok(())
 }
 
 /// How requests had to differ from what was tried first, by model; for the manifest.

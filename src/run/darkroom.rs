@@ -10,25 +10,16 @@ use std::sync::Arc;
 use tokio::sync::mpsc::Sender;
 
 use super::gallery::Gallery;
-use super::plan::{FramePlan, Shot, Trial};
+use super::plan::{Choice, FramePlan, Shot};
 use super::recipe::Recipe;
 use super::thumbnail::Wanted;
+use super::trial::{Exposed, Slide};
 use crate::ask::{Format, ImageLimit, Payload};
 use crate::dataset::{Dataset, Picture};
 use crate::enhance::Enhancer;
 use crate::error::{Error, Result};
 use crate::synthesis::{Negative, NoiseKey, expose};
 use crate::types::{Condition, Degradation, FrameId, ImageFacts, Rgb, Thumbnail};
-
-/// A shot with its image, or with what went wrong while it was made.
-#[derive(Debug)]
-pub(super) struct Exposed {
-    pub(super) condition: Option<Condition>,
-    pub(super) trials: Vec<Trial>,
-    pub(super) image: Result<Option<Arc<Payload>>>,
-    /// A small copy for the report, where one is wanted.
-    pub(super) thumbnail: Option<Thumbnail>,
-}
 
 /// What the thread works with.
 pub(super) struct Darkroom<'a> {
@@ -43,7 +34,7 @@ pub(super) struct Darkroom<'a> {
 
 impl Darkroom<'_> {
     /// Makes the first image of each enhancer, so that one that does not work is found before anything is asked.
-    pub(super) fn rehearse(&mut self, frames: &[FramePlan]) -> Result<()> {
+    fn rehearse(&mut self, frames: &[FramePlan]) -> Result<()> {
         let shots = frames.iter().flat_map(|plan| {
             let conditions = plan.shots.iter().filter_map(|shot| shot.condition.as_ref());
             conditions.map(|condition| (&plan.frame, condition))
@@ -89,41 +80,60 @@ impl Darkroom<'_> {
         Ok(largest)
     }
 
+    /// Makes what would stop a run halfway before anything is paid for: [`Self::rehearse`] and, where images leave the machine,
+    /// [`Self::largest`], of which it is said where nobody knows whether the endpoint takes it.
+    pub(super) fn check(&mut self, frames: &[FramePlan]) -> Result<()> {
+        self.rehearse(frames)?;
+        if self.limit.is_some() {
+            warn_of_large(self.largest(frames)?.as_ref(), self.limit);
+        }
+        Ok(())
+    }
+
     /// Makes the images of all frames until they are done or nobody waits for them any more.
     pub(super) fn develop(
         mut self,
         frames: Vec<FramePlan>,
         wanted: &Wanted,
-        out: &Sender<Exposed>,
+        out: &Sender<Exposed<Choice>>,
     ) {
         for FramePlan { frame, shots } in frames {
             let mut desk = Desk::new(frame.clone());
             for Shot { condition, trials } in shots {
-                let image = condition
-                    .as_ref()
-                    .map(|condition| self.image(&mut desk, condition))
-                    .transpose();
-                let thumbnail = match (&condition, &image) {
-                    (Some(condition), Ok(Some(image))) => wanted.of(&frame, condition, image),
-                    _ => Ok(None),
+                let made = self.expose(&mut desk, condition.as_ref(), wanted);
+                let (images, thumbnail, problem) = match made {
+                    Ok((image, thumbnail)) => (image, thumbnail, None),
+                    Err(problem) => (None, None, Some(problem.to_string())),
                 };
-                let (image, thumbnail) = match thumbnail {
-                    Ok(thumbnail) => (image, thumbnail),
-                    Err(e) => (Err(e), None),
-                };
-                if out
-                    .blocking_send(Exposed {
+                let exposed = Exposed {
+                    slide: Slide {
                         condition,
-                        trials,
-                        image,
-                        thumbnail,
-                    })
-                    .is_err()
-                {
+                        images: images.into_iter().collect(),
+                    },
+                    trials,
+                    problem,
+                    thumbnail,
+                };
+                if out.blocking_send(exposed).is_err() {
                     return;
                 }
             }
         }
+    }
+
+    /// The image of a shot, and a small copy of it where one is wanted.
+    pub(super) fn expose(
+        &mut self,
+        desk: &mut Desk,
+        condition: Option<&Condition>,
+        wanted: &Wanted,
+    ) -> Result<(Option<Arc<Payload>>, Option<Thumbnail>)> {
+        let Some(condition) = condition else {
+            return Ok((None, None));
+        };
+        let image = self.image(desk, condition)?;
+        let thumbnail = wanted.of(&desk.frame, condition, &image)?;
+        Ok((Some(image), thumbnail))
     }
 
     pub(super) fn image(&mut self, desk: &mut Desk, condition: &Condition) -> Result<Arc<Payload>> {
@@ -166,6 +176,23 @@ impl Darkroom<'_> {
         let enhancer =
             enhancer.ok_or_else(|| Error::data(condition, "this enhancer is not open"))?;
         enhancer.enhance(dark).map(Cow::Owned)
+    }
+}
+
+/// Images from this size on, in bytes, are more than some servers and proxies take.
+const LARGE: usize = 5_000_000;
+
+/// Says so where images are large and nobody knows whether the endpoint takes them.
+fn warn_of_large(largest: Option<&ImageFacts>, limit: Option<ImageLimit>) {
+    if let Some(image) = largest
+        && image.bytes > LARGE
+        && limit == Some(ImageLimit::UNKNOWN)
+    {
+        tracing::warn!(
+            "images are up to {:.1} MB, {:.1} MB as sent; where the server answers 413, --max-side or --image jpeg:95 makes them smaller",
+            image.bytes as f64 / 1e6,
+            image.bytes as f64 / 0.75e6
+        );
     }
 }
 

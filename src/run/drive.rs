@@ -3,112 +3,83 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use rayon::ThreadPoolBuilder;
 use tokio::runtime;
-use tokio::sync::mpsc::{self, Receiver};
+use tokio::sync::mpsc::{self, Receiver, Sender};
 use tokio::task::{JoinError, JoinSet};
 
 use super::askers::Asker;
-use super::darkroom::{Darkroom, Exposed};
-use super::gallery::Gallery;
 use super::interrupt::Interrupt;
 use super::ledger::Ledger;
-use super::plan::{Plan, Trial};
 use super::progress::{Bar, Progress};
-use super::recipe::Recipe;
-use super::record;
+use super::record::Entry as _;
 use super::stop::{End, Watch};
-use super::thumbnail::Wanted;
-use crate::ask::{AskError, Call, ImageLimit, Payload, Reach};
-use crate::config::Config;
-use crate::dataset::Dataset;
-use crate::enhance::{Enhancer, Stopper};
+use super::trial::{Exposed, Item, Slide, Trial};
+use crate::ask::{AskError, Call, Reach};
+use crate::config::Pace;
+use crate::enhance::Stopper;
 use crate::error::{Error, Result};
 use crate::store::Store;
-use crate::types::{Condition, Failure, FailureKind, Finish, ImageFacts, Reply, View};
+use crate::types::{Failure, FailureKind, Finish, Reply};
 
-/// How many finished images may wait to be asked about.
-const IMAGES_AHEAD: usize = 2;
+/// How many finished slides may wait to be asked about.
+const SLIDES_AHEAD: usize = 2;
 
 /// What a run is driven with.
 pub(super) struct Drive<'a> {
-    pub(super) config: &'a Config,
-    pub(super) dataset: &'a Dataset,
-    pub(super) pictures: &'a Gallery,
-    pub(super) recipe: &'a Recipe,
     pub(super) askers: &'a [Asker],
     pub(super) progress: &'a Progress,
-    /// What an image may be that leaves the machine.
-    pub(super) limit: Option<ImageLimit>,
-    /// The small copies that are to be kept.
-    pub(super) wanted: &'a Wanted,
+    pub(super) pace: &'a Pace,
+    /// Where the models are asked, for messages.
+    pub(super) endpoint: String,
 }
 
-/// One trial with the image that it shares.
-pub(super) struct Ready {
-    pub(super) trial: Trial,
-    pub(super) view: View,
-    pub(super) condition: Option<Condition>,
-    pub(super) image: Option<Arc<Payload>>,
+/// How far a run has come.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Tally {
+    /// All trials.
+    pub(super) trials: usize,
+    /// Those that have a reply.
+    pub(super) answered: usize,
+}
+
+/// One trial with the slide that it shares.
+struct Ready<I> {
+    trial: Trial<I>,
+    slide: Arc<Slide>,
 }
 
 /// One trial with what came of it.
-type Done = (Ready, Result<Reply, AskError>);
+type Done<I> = (Ready<I>, Result<Reply, AskError>);
 
 impl Drive<'_> {
-    /// Asks everything that is left.
-    pub(super) fn run(
+    /// Asks what `make` hands out, which works on a thread of its own until nobody takes its slides any more; `stoppers`
+    /// end what it is at.
+    pub(super) fn run<I: Item>(
         &self,
-        plan: Plan,
-        enhancers: Vec<Enhancer>,
+        tally: Tally,
         ledger: Ledger,
-        store: &mut Store,
+        store: &mut Store<I::Record>,
+        stoppers: Vec<Stopper>,
+        make: impl FnOnce(&Sender<Exposed<I>>) + Send,
     ) -> Result<End> {
-        if plan.left() == 0 {
-            return Ok(End::Through);
-        }
-        let unstarted = |e: &dyn std::fmt::Display| {
-            Error::usage("--threads", format_args!("cannot be started: {e}"))
-        };
-        let threads = self.config.enhancement.threads.map_or(0, usize::from);
-        let cores = ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .map_err(|e| unstarted(&e))?;
         let runtime = runtime::Builder::new_multi_thread()
             .enable_all()
             .build()
             .map_err(|e| unstarted(&e))?;
-        let (out, images) = mpsc::channel(IMAGES_AHEAD);
-        let bar = self
-            .progress
-            .trials(plan.trials(), plan.trials() - plan.left());
-        let stoppers: Vec<Stopper> = enhancers.iter().map(Enhancer::stopper).collect();
-        let mut darkroom = Darkroom {
-            dataset: self.dataset,
-            pictures: self.pictures,
-            recipe: self.recipe,
-            enhancers,
-            limit: self.limit,
-        };
-        cores.install(|| darkroom.rehearse(&plan.frames))?;
-        if self.limit.is_some() {
-            let largest = cores.install(|| darkroom.largest(&plan.frames))?;
-            warn_of_large(largest.as_ref(), self.limit);
-        }
-        let intake = Intake {
+        let (out, slides) = mpsc::channel(SLIDES_AHEAD);
+        let intake = Intake::<I> {
             drive: self,
             store,
-            bar,
+            bar: self.progress.trials(tally.trials, tally.answered),
             watch: self.watch(),
             ledger,
             stoppers,
-            answered: plan.trials() - plan.left(),
+            answered: tally.answered,
             cut: Cut::default(),
         };
         std::thread::scope(|scope| {
-            scope.spawn(move || cores.install(|| darkroom.develop(plan.frames, self.wanted, &out)));
-            runtime.block_on(intake.ask(images))
+            scope.spawn(move || make(&out));
+            runtime.block_on(intake.ask(slides))
         })
     }
 
@@ -116,28 +87,28 @@ impl Drive<'_> {
     fn width(&self) -> usize {
         let widths = self.askers.iter().filter_map(|asker| asker.model.width());
         // Models of one endpoint share its window.
-        widths.max().unwrap_or(self.config.pace.concurrency.most())
+        widths.max().unwrap_or(self.pace.concurrency.most())
     }
 
     fn watch(&self) -> Watch {
-        let server = self.config.ask.server.as_ref();
-        let endpoint = server.map_or("built-in models".to_owned(), |server| {
-            server.access.base.to_string()
-        });
-        let pace = &self.config.pace;
         Watch::new(
-            endpoint,
+            self.endpoint.clone(),
             self.askers,
-            pace.concurrency.most(),
-            pace.max_failures,
+            self.pace.concurrency.most(),
+            self.pace.max_failures,
         )
     }
 }
 
+/// A thread that the system does not give.
+pub(super) fn unstarted(problem: &dyn std::fmt::Display) -> Error {
+    Error::usage("--threads", format_args!("cannot be started: {problem}"))
+}
+
 /// Where replies come in and are kept.
-struct Intake<'a> {
+struct Intake<'a, I: Item> {
     drive: &'a Drive<'a>,
-    store: &'a mut Store,
+    store: &'a mut Store<I::Record>,
     bar: Bar,
     watch: Watch,
     ledger: Ledger,
@@ -176,10 +147,10 @@ impl Cut {
     }
 }
 
-impl Intake<'_> {
-    async fn ask(mut self, mut images: Receiver<Exposed>) -> Result<End> {
-        let mut waiting = VecDeque::<Ready>::new();
-        let mut asking = JoinSet::<Done>::new();
+impl<I: Item> Intake<'_, I> {
+    async fn ask(mut self, mut slides: Receiver<Exposed<I>>) -> Result<End> {
+        let mut waiting = VecDeque::<Ready<I>>::new();
+        let mut asking = JoinSet::<Done<I>>::new();
         let mut interrupt = Interrupt::listen()?;
         let mut more = true;
         loop {
@@ -191,7 +162,8 @@ impl Intake<'_> {
                     continue;
                 }
                 let likely = self.likely(&ready);
-                if !self.ledger.affords(asking.len(), ready.trial.asker, likely) {
+                let place = ready.trial.asker;
+                if !self.ledger.affords(asking.len(), place, likely, I::REPLY) {
                     waiting.push_front(ready);
                     break;
                 }
@@ -207,14 +179,14 @@ impl Intake<'_> {
             tokio::select! {
                 () = interrupt.next() => self.watch.interrupted(),
                 Some(done) = asking.join_next() => self.keep(done)?,
-                exposed = images.recv(), if more && waiting.is_empty() => match exposed {
+                exposed = slides.recv(), if more && waiting.is_empty() => match exposed {
                     Some(exposed) => waiting.extend(self.accept(exposed)?),
                     None => more = false,
                 },
             }
         }
-        // The darkroom ends as soon as nobody waits for its images.
-        drop(images);
+        // The darkroom ends as soon as nobody waits for its slides.
+        drop(slides);
         if self.watch.stopped() {
             self.stoppers.iter().for_each(Stopper::stop);
             self.drain(asking, interrupt).await?;
@@ -225,7 +197,11 @@ impl Intake<'_> {
 
     /// Waits for the requests on the wire, for they may be paid for already; a second interrupt gives them up. What
     /// waits for its turn or for a retry is given up at once.
-    async fn drain(&mut self, mut asking: JoinSet<Done>, mut interrupt: Interrupt) -> Result<()> {
+    async fn drain(
+        &mut self,
+        mut asking: JoinSet<Done<I>>,
+        mut interrupt: Interrupt,
+    ) -> Result<()> {
         if !asking.is_empty() {
             let count = asking.len();
             self.drive.progress.say(&format!(
@@ -245,62 +221,49 @@ impl Intake<'_> {
     }
 
     /// How many tokens the prompt of a trial is likely to have.
-    fn likely(&self, ready: &Ready) -> f64 {
+    fn likely(&self, ready: &Ready<I>) -> f64 {
         let asker = &self.drive.askers[ready.trial.asker];
-        let image = ready.image.as_ref().map(|image| image.facts());
-        self.ledger.likely(asker, &ready.trial, image)
+        let images = ready.slide.images.iter().map(|image| image.facts());
+        self.ledger.likely(asker, &ready.trial, images)
     }
 
-    /// Makes trials out of an image, or failures out of a failed one.
-    fn accept(&mut self, exposed: Exposed) -> Result<Vec<Ready>> {
+    /// Makes trials ready to be asked, or failures out of those without their images.
+    fn accept(&mut self, exposed: Exposed<I>) -> Result<Vec<Ready<I>>> {
         let Exposed {
-            condition,
+            slide,
             trials,
-            image,
+            problem,
             thumbnail,
         } = exposed;
         if let Some(thumbnail) = thumbnail {
             self.store.append_thumbnail(&thumbnail)?;
         }
-        let (image, broken) = match image {
-            Ok(image) => (image, None),
-            Err(e) => (None, Some(e.to_string())),
-        };
-        let view = if condition.is_some() {
-            View::Image
-        } else {
-            View::Blind
-        };
+        let slide = Arc::new(slide);
         let ready = trials.into_iter().map(|trial| Ready {
             trial,
-            view,
-            condition: condition.clone(),
-            image: image.clone(),
+            slide: Arc::clone(&slide),
         });
-        let Some(message) = broken else {
+        let Some(message) = problem else {
             return Ok(ready.collect());
         };
-        for ready in ready {
-            let failure = Failure {
+        let error = AskError {
+            failure: Failure {
                 kind: FailureKind::Image,
                 status: None,
-                message: message.clone(),
-            };
-            self.keep(Ok((
-                ready,
-                Err(AskError {
-                    failure,
-                    attempts: 0,
-                    reach: Reach::Trial,
-                    refused: None,
-                }),
-            )))?;
+                message,
+            },
+            attempts: 0,
+            reach: Reach::Trial,
+            refused: None,
+        };
+        for ready in ready {
+            self.keep(Ok((ready, Err(error.clone()))))?;
         }
         Ok(Vec::new())
     }
 
     /// Keeps what came of one trial.
-    fn keep(&mut self, done: Result<Done, JoinError>) -> Result<()> {
+    fn keep(&mut self, done: Result<Done<I>, JoinError>) -> Result<()> {
         let (ready, result) = match done {
             Ok(done) => done,
             Err(aborted) if aborted.is_cancelled() => return Ok(()),
@@ -310,7 +273,7 @@ impl Intake<'_> {
         match &result {
             Ok(_) => self.watch.succeeded(trial.asker),
             Err(error) => {
-                self.watch.failed(trial.asker, error, &trial.question.frame);
+                self.watch.failed(trial.asker, error, trial.item.place());
                 // Where the model itself is at fault or the run ends, the trial was never really made.
                 if error.reach != Reach::Trial {
                     return Ok(());
@@ -320,47 +283,28 @@ impl Intake<'_> {
         if let Ok(reply) = &result {
             self.answered += 1;
             self.cut.note(reply);
-            self.ledger
-                .book(ready.trial.asker, reply.usage, self.likely(&ready));
+            let (asker, likely) = (ready.trial.asker, self.likely(&ready));
+            self.ledger.book(asker, reply.usage, likely, I::REPLY);
         }
         self.bar
             .count(self.answered, self.watch.failures(), self.ledger.spent());
         let asker = &self.drive.askers[ready.trial.asker];
-        let image = ready.image.as_ref().map(|image| image.facts());
-        let model = asker.model.name();
-        let blank = record::blank(&ready.trial, ready.view, ready.condition, model, image);
+        let blank = I::blank(&ready.trial, &ready.slide, asker.model.name());
         self.store.append(&match result {
-            Ok(reply) => record::answered(blank, reply)?,
-            Err(error) => record::failed(blank, error.failure, error.attempts),
+            Ok(reply) => blank.answered(reply)?,
+            Err(error) => blank.failed_by(error.failure, error.attempts),
         })
     }
 }
 
-/// Images from this size on, in bytes, are more than some servers and proxies take.
-const LARGE: usize = 5_000_000;
-
-/// Says so where images are large and nobody knows whether the endpoint takes them.
-fn warn_of_large(largest: Option<&ImageFacts>, limit: Option<ImageLimit>) {
-    if let Some(image) = largest
-        && image.bytes > LARGE
-        && limit == Some(ImageLimit::UNKNOWN)
-    {
-        tracing::warn!(
-            "images are up to {:.1} MB, {:.1} MB as sent; where the server answers 413, --max-side or --image jpeg:95 makes them smaller",
-            image.bytes as f64 / 1e6,
-            image.bytes as f64 / 0.75e6
-        );
-    }
-}
-
 /// Puts one question to its model.
-async fn put(asker: Asker, ready: Ready) -> Done {
+async fn put<I: Item>(asker: Asker, ready: Ready<I>) -> Done<I> {
+    let Ready { trial, slide } = &ready;
     let call = Call {
-        question: &ready.trial.question,
-        condition: ready.condition.as_ref(),
-        prompt: &ready.trial.prompt,
-        image: ready.image.as_deref(),
-        turn: ready.trial.turn,
+        query: trial.item.query(),
+        condition: slide.condition.as_ref(),
+        message: trial.prompt.message(&slide.images),
+        turn: trial.item.turn(),
     };
     let result = asker.model.ask(call).await;
     (ready, result)

@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use super::darkroom::{Darkroom, Desk};
-use super::ledger::{LETTER, Ledger, image_of, words};
-use super::plan::{FramePlan, Plan};
+use super::ledger::{Ledger, image_of, words};
+use super::plan::{Choice, FramePlan, Plan};
+use super::trial::{Item as _, Prompt};
 use crate::ask::{ImageLimit, Model, Payload, Price};
-use crate::config::Config;
+use crate::config::{Config, Server};
 use crate::error::Result;
 use crate::report::forecast::{Forecast, Line};
 use crate::run::askers::Asker;
@@ -20,7 +21,7 @@ const SAMPLED: usize = 3;
 const REPLY_SECONDS: f64 = 2.0;
 
 /// Bytes of a request besides its image and its words.
-const AROUND: f64 = 300.0;
+pub(super) const AROUND: f64 = 300.0;
 
 /// What a forecast is made of.
 pub(super) struct Means<'a> {
@@ -49,7 +50,8 @@ pub(super) fn forecast(means: &Means<'_>, darkroom: &mut Darkroom<'_>) -> Result
         for trial in &shot.trials {
             if means.askers[trial.asker].model.is_remote() {
                 let image = image.map_or(0.0, |bytes| bytes * 4.0 / 3.0);
-                bytes += image + trial.prompt.len() as f64 + AROUND;
+                let words = trial.prompt.parts().concat().len();
+                bytes += image + words as f64 + AROUND;
             }
         }
     }
@@ -58,7 +60,9 @@ pub(super) fn forecast(means: &Means<'_>, darkroom: &mut Darkroom<'_>) -> Result
         .iter()
         .map(|line| line.text_tokens + line.image_tokens.unwrap_or(0.0) + line.reply_tokens)
         .sum();
-    let (asking_seconds, pace) = waiting(means, requests as f64, tokens);
+    let server = config.ask.server.as_ref();
+    let latencies = means.kept.iter().filter_map(|record| record.latency_ms);
+    let (asking_seconds, pace) = waiting(server, latencies, requests as f64, tokens);
     let largest = sample.images.iter().max_by_key(|image| image.bytes);
     let prices = &config.money.prices;
     Ok(Forecast {
@@ -79,6 +83,8 @@ pub(super) fn forecast(means: &Means<'_>, darkroom: &mut Darkroom<'_>) -> Result
         pace,
         prices: format!("prices of {}", prices.as_of),
         batch: prices.batch,
+        reply: "a letter",
+        largest_request: None,
     })
 }
 
@@ -96,7 +102,7 @@ fn lines(means: &Means<'_>, darkroom: &Darkroom<'_>) -> Vec<Line> {
                 .map(|pictured| pictured.size);
             for shot in &frame.shots {
                 let trials = shot.trials.iter().filter(|trial| trial.asker == index);
-                let prompts: Vec<&str> = trials.map(|trial| &*trial.prompt).collect();
+                let prompts: Vec<&Prompt> = trials.map(|trial| &trial.prompt).collect();
                 requests += prompts.len();
                 text += prompts.iter().map(|prompt| words(prompt)).sum::<f64>();
                 if let (Some(_), Some((width, height))) = (&shot.condition, size) {
@@ -108,23 +114,24 @@ fn lines(means: &Means<'_>, darkroom: &Darkroom<'_>) -> Vec<Line> {
                 }
             }
         }
-        line(asker, price, requests, text, image)
+        line(asker, price, requests, [text, Choice::REPLY], image)
     });
     lines.filter(|line| line.requests > 0).collect()
 }
 
-fn line(
+/// What is left of one model: requests, the tokens of all their words and of each likely reply, and those of all images.
+pub(super) fn line(
     asker: &Asker,
     price: Option<Price>,
     requests: usize,
-    text_tokens: f64,
+    [text_tokens, reply]: [f64; 2],
     image_tokens: Option<f64>,
 ) -> Line {
     let limit = match &*asker.model {
         Model::OpenAi(model) => model.parameters().max_tokens,
         Model::Random(_) | Model::Script(_) | Model::Local(_) => None,
     };
-    let reply_tokens = requests as f64 * LETTER;
+    let reply_tokens = requests as f64 * reply;
     let longest = limit.map(|limit| requests as f64 * f64::from(limit));
     let blind = if asker.view == View::Blind {
         " (blind)"
@@ -145,14 +152,16 @@ fn line(
 }
 
 /// How long all replies take, and what that rests on: the user's limits, and replies as slow as those kept.
-fn waiting(means: &Means<'_>, requests: f64, tokens: f64) -> (f64, String) {
-    let Some(server) = &means.config.ask.server else {
+pub(super) fn waiting(
+    server: Option<&Server>,
+    latencies_ms: impl Iterator<Item = u64>,
+    requests: f64,
+    tokens: f64,
+) -> (f64, String) {
+    let Some(server) = server else {
         return (0.0, "built-in models alone".to_owned());
     };
-    let kept: Vec<f64> = means
-        .kept
-        .iter()
-        .filter_map(|record| record.latency_ms)
+    let kept: Vec<f64> = latencies_ms
         .filter(|ms| *ms > 0)
         .map(|ms| ms as f64 / 1e3)
         .collect();

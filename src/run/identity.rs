@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::plan::Inputs;
 use crate::ask::Constrain;
-use crate::config::{Config, Order, Rotations, Showing};
+use crate::config::{Ask, Config, Enhancement, Order, Pace, Rotations, Showing};
 use crate::dataset::Dataset;
 use crate::enhance::{ModelFile, Tiling};
 use crate::error::{Error, Result};
@@ -152,20 +152,24 @@ pub(super) fn digest(identity: &Identity) -> Digest {
 }
 
 /// What does not decide a reply, but may explain how a run went.
-pub(super) fn settings(config: &Config) -> BTreeMap<String, Value> {
+pub(super) fn settings(
+    pace: &Pace,
+    enhancement: &Enhancement,
+    ask: &Ask,
+) -> BTreeMap<String, Value> {
     let mut settings = BTreeMap::from([
         (
             "--concurrency".to_owned(),
-            json!(config.pace.concurrency.to_string()),
+            json!(pace.concurrency.to_string()),
         ),
-        ("--max-failures".to_owned(), json!(config.pace.max_failures)),
-        ("--threads".to_owned(), json!(config.enhancement.threads)),
+        ("--max-failures".to_owned(), json!(pace.max_failures)),
+        ("--threads".to_owned(), json!(enhancement.threads)),
         (
             "--token-field".to_owned(),
-            json!(config.ask.parameters.token_field.to_string()),
+            json!(ask.parameters.token_field.to_string()),
         ),
     ]);
-    if let Some(server) = &config.ask.server {
+    if let Some(server) = &ask.server {
         let sending = server.sending;
         settings.insert("--timeout".to_owned(), json!(sending.timeout.as_secs_f64()));
         settings.insert("--retries".to_owned(), json!(sending.retries));

@@ -1,20 +1,17 @@
 //! What a run costs: [`Ledger`].
 
 use super::askers::Asker;
-use super::plan::Trial;
+use super::trial::{Item, Prompt, Trial};
 use crate::ask::{Model, Parameters, Price, image_tokens};
 use crate::config::Money;
 use crate::error::{Error, Result};
-use crate::types::{ImageFacts, Record, Usage, Via};
+use crate::types::{ImageFacts, Kept, Usage, Via};
 
 /// How many characters of English a token is, by the rule of thumb of every provider.
 const CHARACTERS: f64 = 4.0;
 
 /// How many tokens a message has besides its words.
 const AROUND: f64 = 10.0;
-
-/// How many tokens a reply has that names a letter.
-pub(super) const LETTER: f64 = 4.0;
 
 /// Books what replies were charged, and says whether another question is within the means.
 #[derive(Debug)]
@@ -32,7 +29,7 @@ impl Ledger {
     ///
     /// # Errors
     /// Where `--max-cost` is said and a model has no price: it could not be kept to.
-    pub(super) fn new(money: &Money, askers: &[Asker], kept: &[Record]) -> Result<Self> {
+    pub(super) fn new(money: &Money, askers: &[Asker], kept: &[impl Kept]) -> Result<Self> {
         let price = |asker: &Asker| {
             let remote = asker.model.is_remote();
             remote
@@ -61,24 +58,27 @@ impl Ledger {
             dearest: None,
         };
         for record in kept {
-            let asker = askers
-                .iter()
-                .position(|asker| asker.model.name() == record.model && asker.view == record.view);
-            if let (Some(asker), Some(usage)) = (asker, record.usage) {
-                match record.via {
-                    Via::Direct => ledger.charge(asker, usage),
-                    Via::Batch => ledger.charge_batch(asker, usage, money.prices.batch),
-                }
+            let Some((price, usage)) = record
+                .charged()
+                .and_then(|(model, usage)| Some((money.prices.of(model)?, usage)))
+            else {
+                continue;
+            };
+            let dollars = price.charged(usage);
+            match record.via() {
+                Via::Direct | Via::File => ledger.add(dollars),
+                // It says nothing about what a request of its own costs.
+                Via::Batch => ledger.spent += money.prices.batch * dollars,
             }
         }
         Ok(ledger)
     }
 
-    /// Books a reply; where the server does not say what it charges, what is likely for a prompt of so many tokens.
-    pub(super) fn book(&mut self, asker: usize, usage: Option<Usage>, likely: f64) {
+    /// Books a reply; where the server does not say what it charges, what is likely for a prompt and a reply of so many tokens.
+    pub(super) fn book(&mut self, asker: usize, usage: Option<Usage>, likely: f64, reply: f64) {
         match (usage, self.prices[asker]) {
             (Some(usage), _) => self.charge(asker, usage),
-            (None, Some(price)) => self.add(price.of(likely, LETTER)),
+            (None, Some(price)) => self.add(price.of(likely, reply)),
             (None, None) => {}
         }
     }
@@ -89,23 +89,21 @@ impl Ledger {
         }
     }
 
-    /// Books a reply of a Batch API; it says nothing about what a request of its own costs.
-    fn charge_batch(&mut self, asker: usize, usage: Usage, share: f64) {
-        if let Some(price) = self.prices[asker] {
-            self.spent += share * price.charged(usage);
-        }
-    }
-
     fn add(&mut self, dollars: f64) {
         self.spent += dollars;
         self.dearest = Some(self.dearest.map_or(dollars, |dearest| dearest.max(dollars)));
     }
 
-    /// How many tokens the prompt of a trial is likely to have: its words by their length, its image by the model's family.
-    pub(super) fn likely(&self, asker: &Asker, trial: &Trial, image: Option<&ImageFacts>) -> f64 {
+    /// How many tokens the prompt of a trial is likely to have: its words by their length, its images by the model's family.
+    pub(super) fn likely<'a, I: Item>(
+        &self,
+        asker: &Asker,
+        trial: &Trial<I>,
+        images: impl Iterator<Item = &'a ImageFacts>,
+    ) -> f64 {
         let price = self.prices[trial.asker];
-        let image = image.and_then(|image| image_of(asker, price, image.width, image.height));
-        words(&trial.prompt) + image.unwrap_or(0.0)
+        let images = images.map(|image| image_of(asker, price, image.width, image.height));
+        words(&trial.prompt) + images.map(|tokens| tokens.unwrap_or(0.0)).sum::<f64>()
     }
 
     /// The dollars booked so far; `None` where no model has a price.
@@ -118,11 +116,11 @@ impl Ledger {
 
     /// Whether one more question is within `--max-cost`, with so many on the way that may each turn out as dear as the
     /// dearest so far. Until the first reply is booked one at a time is asked: nobody knows how much a model thinks.
-    pub(super) fn affords(&self, on_the_way: usize, asker: usize, likely: f64) -> bool {
+    pub(super) fn affords(&self, on_the_way: usize, asker: usize, likely: f64, reply: f64) -> bool {
         let (Some(most), Some(price)) = (self.most, self.prices[asker]) else {
             return true;
         };
-        let likely = price.of(likely, LETTER);
+        let likely = price.of(likely, reply);
         match self.dearest {
             None => on_the_way == 0 && likely <= most,
             Some(dearest) => self.spent + dearest.max(likely) * (on_the_way + 1) as f64 <= most,
@@ -131,8 +129,9 @@ impl Ledger {
 }
 
 /// How many tokens the words of a prompt are likely to have.
-pub(super) fn words(prompt: &str) -> f64 {
-    prompt.chars().count() as f64 / CHARACTERS + AROUND
+pub(super) fn words(prompt: &Prompt) -> f64 {
+    let characters = prompt.parts().map(|part| part.chars().count());
+    characters.iter().sum::<usize>() as f64 / CHARACTERS + AROUND
 }
 
 /// How many tokens an image is to a model: by the table of prices, else by its family; `None` where nobody knows.

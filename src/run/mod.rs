@@ -20,6 +20,7 @@ mod interface;
 mod interrupt;
 mod ledger;
 mod observer;
+pub mod openeqa;
 mod plan;
 
 pub mod progress;
@@ -36,25 +37,30 @@ mod stop;
 pub mod study;
 pub mod synthesize;
 mod thumbnail;
+mod trial;
 mod written;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use jiff::Timestamp;
+use rayon::ThreadPoolBuilder;
+use serde_json::Value;
 
 use crate::ask::ImageLimit;
-use crate::config::{Config, Earnest, Enhancement, RunPlace, Show};
+use crate::config::{
+    Ask, Config, Earnest, Enhancement, Images, Output, Recipe, RunPlace, Server, Show,
+};
 use crate::dataset::Dataset;
 use crate::enhance::{Enhancer, ModelFile, Runtime};
 use crate::error::Result;
 use crate::report as reports;
 use crate::store::{self, Moved, Store};
-use crate::types::manifest::{Counts, RunManifest, SCHEMA, Status};
-use crate::types::{Listed, Outcome, Question, Record, TrialKey};
+use crate::types::manifest::{Counts, RunManifest, Status};
+use crate::types::{Kept, Listed, Outcome, Question, Record, TrialKey};
 
 use darkroom::Darkroom;
-use drive::Drive;
+use drive::{Drive, Tally, unstarted};
 use forecast::Means;
 use identity::Identity;
 use ledger::Ledger;
@@ -97,14 +103,16 @@ fn ask(config: &Config, stage: Stage<'_>, progress: &Progress) -> Result<Verdict
         identity,
         folder,
     } = stage;
-    let kept = store::read_manifest(&folder)?;
+    let kept = store::read_manifest(&folder, Record::SCHEMA)?;
     // Opened before the folder is made, so that an enhancer that does not work leaves nothing behind.
     let opened = match &kept {
         Some(manifest) if manifest.status == Status::Complete => Err(files),
         _ => Ok(open_enhancers(files, &config.enhancement)?),
     };
-    let mut manifest = manifest(config, identity, kept);
-    let mut store = Store::open(&folder, &manifest, moved(config))?;
+    let settings = identity::settings(&config.pace, &config.enhancement, &config.ask);
+    let images = config.recipe.clone();
+    let mut manifest = manifest(Record::SCHEMA, identity, settings, images, kept);
+    let mut store = Store::open(&folder, &manifest, moved(&config.output))?;
     store.write_questions(&listed(questions, dataset))?;
     let wanted = Wanted::new(questions, store::read_thumbnails(&folder)?);
     let kept = store.records()?;
@@ -130,17 +138,32 @@ fn ask(config: &Config, stage: Stage<'_>, progress: &Progress) -> Result<Verdict
                 trials.len()
             ));
         }
-        let drive = Drive {
-            config,
+        let cores = ThreadPoolBuilder::new()
+            .num_threads(config.enhancement.threads.map_or(0, usize::from))
+            .build()
+            .map_err(|e| unstarted(&e))?;
+        let stoppers = enhancers.iter().map(Enhancer::stopper).collect();
+        let mut darkroom = Darkroom {
             dataset,
             pictures: inputs.pictures,
             recipe: &inputs.recipe,
+            enhancers,
+            limit: limit(&config.ask, &config.images),
+        };
+        cores.install(|| darkroom.check(&plan.frames))?;
+        let drive = Drive {
             askers: inputs.askers,
             progress,
-            limit: limit(config),
-            wanted: &wanted,
+            pace: &config.pace,
+            endpoint: endpoint(config.ask.server.as_ref()),
         };
-        drive.run(plan, enhancers, ledger, &mut store)?
+        let tally = Tally {
+            trials: trials.len(),
+            answered: trials.len() - plan.left(),
+        };
+        drive.run(tally, ledger, &mut store, stoppers, |out| {
+            cores.install(|| darkroom.develop(plan.frames, &wanted, out));
+        })?
     };
     if let (End::Spent, Some(most)) = (&end, config.money.most) {
         tracing::warn!(
@@ -150,6 +173,13 @@ fn ask(config: &Config, stage: Stage<'_>, progress: &Progress) -> Result<Verdict
     }
     manifest.settings.extend(askers::adapted(inputs.askers));
     show(config, &store, manifest, end, &trials)
+}
+
+/// Where the models are asked, in words.
+fn endpoint(server: Option<&Server>) -> String {
+    server.map_or("built-in models".to_owned(), |server| {
+        server.access.base.to_string()
+    })
 }
 
 /// The questions as the run keeps them.
@@ -180,7 +210,7 @@ fn estimate(config: &Config, stage: Stage<'_>) -> Result<Verdict> {
         folder,
         ..
     } = stage;
-    let kept = store::read_records(&folder)?;
+    let kept: Vec<Record> = store::read_records(&folder)?;
     let ledger = Ledger::new(&config.money, inputs.askers, &kept)?;
     let plan = Plan::new(&inputs, &kept)?;
     let (_, enhancers) = open_enhancers(files, &config.enhancement)?;
@@ -197,7 +227,7 @@ fn estimate(config: &Config, stage: Stage<'_>) -> Result<Verdict> {
         plan: &plan,
         ledger: &ledger,
         kept: &kept,
-        limit: limit(config),
+        limit: limit(&config.ask, &config.images),
     };
     let forecast = forecast::forecast(&means, &mut darkroom)?;
     let output = match config.output.show {
@@ -211,10 +241,10 @@ fn estimate(config: &Config, stage: Stage<'_>) -> Result<Verdict> {
 }
 
 /// The largest image that the endpoint takes; `None` where all models are built in.
-fn limit(config: &Config) -> Option<ImageLimit> {
-    let server = config.ask.server.as_ref()?;
+fn limit(ask: &Ask, images: &Images) -> Option<ImageLimit> {
+    let server = ask.server.as_ref()?;
     let known = || ImageLimit::of(&server.access.base);
-    Some(config.images.largest.map_or_else(known, ImageLimit::stated))
+    Some(images.largest.map_or_else(known, ImageLimit::stated))
 }
 
 /// Scores what a run holds, and leaves it in its folder where that says anything new.
@@ -239,8 +269,8 @@ fn show(
 }
 
 /// Whether the run may lie at another address than before: only where it is named as the one to go on with.
-fn moved(config: &Config) -> Moved {
-    match config.output.place {
+fn moved(output: &Output) -> Moved {
+    match output.place {
         RunPlace::Resume(_) => Moved::Allowed,
         RunPlace::Named(_) | RunPlace::Automatic => Moved::Refused,
     }
@@ -268,20 +298,26 @@ fn open_enhancers(
 }
 
 /// The manifest of a run under way; one that was kept goes on as it is.
-fn manifest(config: &Config, identity: Identity, kept: Option<RunManifest>) -> RunManifest {
+fn manifest(
+    schema: &str,
+    identity: Identity,
+    settings: BTreeMap<String, Value>,
+    images: Recipe,
+    kept: Option<RunManifest>,
+) -> RunManifest {
     let version = env!("CARGO_PKG_VERSION").to_owned();
     match kept {
         Some(kept) if kept.status == Status::Complete => RunManifest { identity, ..kept },
         kept => RunManifest {
-            schema: SCHEMA.to_owned(),
+            schema: schema.to_owned(),
             status: Status::Started,
             version,
             created: kept.map_or_else(now, |manifest| manifest.created),
             updated: now(),
             platform: identity::platform(),
             identity,
-            settings: identity::settings(config),
-            images: config.recipe.clone(),
+            settings,
+            images,
             counts: Counts::default(),
         },
     }

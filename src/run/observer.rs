@@ -64,17 +64,17 @@ impl Eye {
         })
     }
 
-    fn opinion(&self, call: &Call<'_>) -> Result<Option<usize>, String> {
-        let Some(image) = call.image else {
+    fn opinion(&self, question: &Question, call: &Call<'_>) -> Result<Option<usize>, String> {
+        let Some(image) = call.message.images.first() else {
             return Ok(None);
         };
-        let frame = &call.question.frame;
+        let frame = &question.frame;
         let sight = self.sights.get((frame.clone(), image.facts().digest), || {
             let watched = self.watched(frame)?;
             let pixels = image.decode().map_err(|e| e.to_string())?;
             Ok(Arc::new(watched.look(&pixels, &self.palette)))
         })?;
-        Ok(sight.answer(call.question, &self.rules))
+        Ok(sight.answer(question, &self.rules))
     }
 }
 
@@ -117,6 +117,6 @@ pub(super) fn open(
     if let Some(first) = questions.first() {
         eye.watched(&first.frame).map_err(unusable)?;
     }
-    let opinion = Box::new(move |call: &Call<'_>| eye.opinion(call));
+    let opinion = Box::new(move |question: &Question, call: &Call<'_>| eye.opinion(question, call));
     Ok(Local::new(NAME.to_owned(), digest, prior, opinion))
 }

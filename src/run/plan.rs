@@ -7,6 +7,7 @@ use super::arrangement::arrange;
 use super::askers::Asker;
 use super::gallery::Gallery;
 use super::recipe::Recipe;
+use super::trial::{Prompt, Trial};
 use crate::ask::Prompts;
 use crate::config::{Config, Light, Showing};
 use crate::enhance::ModelFile;
@@ -93,13 +94,10 @@ pub(super) fn conditions(
     all
 }
 
-/// One question for one model.
+/// A question with choices, in one order of them.
 #[derive(Debug, Clone)]
-pub(super) struct Trial {
-    pub(super) key: TrialKey,
+pub(super) struct Choice {
     pub(super) question: Arc<Question>,
-    pub(super) prompt: Arc<str>,
-    pub(super) asker: usize,
     /// How many times the same was asked before.
     pub(super) repeat: u32,
     /// How many times the question was put before, in whatever order of its choices.
@@ -110,7 +108,7 @@ pub(super) struct Trial {
 #[derive(Debug)]
 pub(super) struct Shot {
     pub(super) condition: Option<Condition>,
-    pub(super) trials: Vec<Trial>,
+    pub(super) trials: Vec<Trial<Choice>>,
 }
 
 /// All shots of one frame.
@@ -208,11 +206,13 @@ impl Plan {
                     if !answered.contains(&key) {
                         trials.push(Trial {
                             key,
-                            question: Arc::clone(&asked.question),
-                            prompt: Arc::clone(prompt),
                             asker: index,
-                            repeat: asked.repeat,
-                            turn: asked.turn,
+                            prompt: Prompt::of(Arc::clone(prompt)),
+                            item: Choice {
+                                question: Arc::clone(&asked.question),
+                                repeat: asked.repeat,
+                                turn: asked.turn,
+                            },
                         });
                     }
                 }

@@ -1,22 +1,89 @@
 //! What came of a trial, as a line of `records.jsonl`.
 
-use super::plan::Trial;
+use super::plan::Choice;
+use super::trial::{Item, Slide, Trial};
+use crate::ask::Query;
 use crate::error::Result;
 use crate::score::choice::readings;
 use crate::types::{
-    Answer, Choices, Condition, Degradation, Failure, Finish, ImageFacts, Outcome, Record, Reply,
-    Variant, Via, View,
+    Answer, Choices, Degradation, Failure, Finish, Kept, Outcome, Record, Reply, Variant, Via,
 };
 
-/// The record of a trial before anything came of it.
-pub(super) fn blank(
-    trial: &Trial,
-    view: View,
-    condition: Option<Condition>,
-    model: &str,
-    image: Option<&ImageFacts>,
-) -> Record {
-    let question = &*trial.question;
+/// A record that something comes of.
+pub(super) trait Entry: Kept + Send {
+    /// How many choices the question had; 0 where the answer is open.
+    fn choices(&self) -> usize;
+
+    /// The record with the reply and what is read from it.
+    fn answered(self, reply: Reply) -> Result<Self>;
+
+    /// The record with what went wrong after so many requests.
+    fn failed_by(self, failure: Failure, attempts: u32) -> Self;
+
+    /// The record as one that was asked in a batch.
+    fn batched(self) -> Self;
+}
+
+impl Item for Choice {
+    type Record = Record;
+
+    // It names a letter.
+    const REPLY: f64 = 4.0;
+
+    fn query(&self) -> Query<'_> {
+        Query::Choice(&self.question)
+    }
+
+    fn place(&self) -> &str {
+        &self.question.frame.0
+    }
+
+    fn turn(&self) -> u32 {
+        self.turn
+    }
+
+    fn blank(trial: &Trial<Self>, slide: &Slide, model: &str) -> Record {
+        blank(trial, slide, model)
+    }
+}
+
+impl Entry for Record {
+    fn choices(&self) -> usize {
+        self.choices.len()
+    }
+
+    fn answered(mut self, reply: Reply) -> Result<Self> {
+        let choices = choices(&self)?;
+        read(&mut self, &reply, &choices);
+        self.reply = Some(reply.text);
+        self.refusal = reply.refusal;
+        self.finish = Some(reply.finish);
+        self.usage = reply.usage;
+        self.served_model = reply.served_model;
+        self.latency_ms = Some(reply.latency_ms);
+        self.attempts = reply.attempts;
+        Ok(self)
+    }
+
+    fn failed_by(self, failure: Failure, attempts: u32) -> Self {
+        Self {
+            failure: Some(failure),
+            attempts,
+            ..self
+        }
+    }
+
+    fn batched(self) -> Self {
+        Self {
+            via: Via::Batch,
+            ..self
+        }
+    }
+}
+
+fn blank(trial: &Trial<Choice>, slide: &Slide, model: &str) -> Record {
+    let question = &*trial.item.question;
+    let condition = slide.condition.clone();
     let degradation = condition.as_ref().map(|condition| condition.degradation);
     Record {
         key: trial.key,
@@ -24,7 +91,7 @@ pub(super) fn blank(
         frame: question.frame.clone(),
         family: question.family.clone(),
         model: model.to_owned(),
-        view,
+        view: slide.view(),
         level: degradation.map(Degradation::level),
         variant: degradation.map_or(Variant::None, Degradation::variant),
         enhancer: condition
@@ -38,7 +105,7 @@ pub(super) fn blank(
         finish: None,
         strict: None,
         lenient: None,
-        repeat: trial.repeat,
+        repeat: trial.item.repeat,
         via: Via::Direct,
         outcome: Outcome::Failed,
         failure: None,
@@ -46,30 +113,7 @@ pub(super) fn blank(
         served_model: None,
         latency_ms: None,
         attempts: 0,
-        image: image.cloned(),
-    }
-}
-
-/// The record with the reply and both its readings.
-pub(super) fn answered(mut record: Record, reply: Reply) -> Result<Record> {
-    let choices = choices(&record)?;
-    read(&mut record, &reply, &choices);
-    record.reply = Some(reply.text);
-    record.refusal = reply.refusal;
-    record.finish = Some(reply.finish);
-    record.usage = reply.usage;
-    record.served_model = reply.served_model;
-    record.latency_ms = Some(reply.latency_ms);
-    record.attempts = reply.attempts;
-    Ok(record)
-}
-
-/// The record with what went wrong after so many requests.
-pub(super) fn failed(record: Record, failure: Failure, attempts: u32) -> Record {
-    Record {
-        failure: Some(failure),
-        attempts,
-        ..record
+        image: slide.images.first().map(|image| image.facts().clone()),
     }
 }
 

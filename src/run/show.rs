@@ -24,7 +24,7 @@ pub fn show(config: ShowItem) -> Result<Verdict> {
     let folder = config.run.clone();
     let manifest = kept(&folder)?;
     let item = config.item.split('#').next().unwrap_or_default().to_owned();
-    let records: Vec<Record> = store::read_records(&folder)?
+    let records: Vec<Record> = store::read_records::<Record>(&folder)?
         .into_iter()
         .filter(|record| record.question.0 == item)
         .collect();

@@ -12,12 +12,12 @@ use super::plan::Inputs;
 use super::progress::Progress;
 use super::questions::by_rule::by_rule;
 use super::{RESULTS, askers, observer};
-use crate::config::{Config, Data, ModelName, RunPlace};
+use crate::config::{Ask, Config, Data, ModelName, RunPlace};
 use crate::dataset::Dataset;
 use crate::enhance::ModelFile;
 use crate::error::{Error, Result};
 use crate::store;
-use crate::types::{Family, Question, View};
+use crate::types::{Digest, Family, Kept as _, Question, Record, View};
 
 /// Everything an evaluation is made of, opened and checked; nothing is asked, and nothing written.
 pub(super) struct Stage<'a> {
@@ -56,7 +56,10 @@ impl Stage<'_> {
         };
         let inputs = Inputs::new(config, &questions, &pictures, &askers, &files)?;
         let identity = identity::identity(config, &dataset, &inputs);
-        let folder = folder(config, &dataset, &identity)?;
+        let label = label(&config.ask);
+        let hash = identity::digest(&identity);
+        let schema = Record::SCHEMA;
+        let folder = folder(&config.output.place, schema, &label, dataset.name(), hash)?;
         act(Stage {
             dataset: &dataset,
             questions: &questions,
@@ -116,12 +119,11 @@ pub(super) fn select(dataset: &Dataset, config: &Data) -> Result<Vec<Question>> 
 }
 
 /// The models in the name of a folder.
-fn label(config: &Config) -> String {
-    let names = config
-        .ask
+pub(super) fn label(ask: &Ask) -> String {
+    let names = ask
         .models
         .iter()
-        .chain(&config.ask.blind_models)
+        .chain(&ask.blind_models)
         .map(|name| match name {
             ModelName::Random => "random".to_owned(),
             ModelName::Observer => observer::NAME.to_owned(),
@@ -140,11 +142,17 @@ fn label(config: &Config) -> String {
         .collect()
 }
 
-/// The folder of this run: the one named, else the newest with the same identity, else a new one.
-fn folder(config: &Config, dataset: &Dataset, identity: &Identity) -> Result<PathBuf> {
-    match &config.output.place {
+/// The folder of a run: the one named, else the newest whose identity has this hash, else a new one.
+pub(super) fn folder(
+    place: &RunPlace,
+    schema: &str,
+    label: &str,
+    data: &str,
+    hash: Digest,
+) -> Result<PathBuf> {
+    match place {
         RunPlace::Named(path) => Ok(path.clone()),
-        RunPlace::Resume(path) => match store::read_manifest(path)? {
+        RunPlace::Resume(path) => match store::read_manifest(path, schema)? {
             Some(_) => Ok(path.clone()),
             None => Err(Error::usage(
                 "--resume",
@@ -155,11 +163,11 @@ fn folder(config: &Config, dataset: &Dataset, identity: &Identity) -> Result<Pat
             )),
         },
         RunPlace::Automatic => {
-            let hash = &identity::digest(identity).to_string()[..8];
+            let hash = &hash.to_string()[..8];
             let base = Path::new(RESULTS);
             Ok(store::find(base, hash).unwrap_or_else(|| {
                 let time = Timestamp::now().strftime("%Y%m%d-%H%M%S");
-                let name = format!("{time}-{}-{}-{hash}", label(config), dataset.name());
+                let name = format!("{time}-{label}-{data}-{hash}");
                 base.join(name.replace(|c: char| !(c.is_alphanumeric() || "-_.".contains(c)), "_"))
             }))
         }

@@ -6,7 +6,7 @@ use super::askers::Asker;
 use crate::ask::{AskError, Reach};
 use crate::error::Error;
 use crate::types::manifest::{Counts, Status};
-use crate::types::{Failure, FailureKind, FrameId};
+use crate::types::{Failure, FailureKind};
 
 /// How many trials of a model may fail before any has succeeded: the next would too.
 const AT_FIRST: usize = 5;
@@ -44,9 +44,9 @@ struct Health {
     succeeded: bool,
     /// Failures since the last success that the server or the way to it is to blame for.
     outage: usize,
-    /// Requests refused before any success, by the frames they were about: one frame may be at fault by itself.
+    /// Requests refused before any success, by the frames or walks they were about: one may be at fault by itself.
     refusals: usize,
-    refused_frames: BTreeSet<FrameId>,
+    refused_places: BTreeSet<String>,
     /// It is asked nothing more.
     retired: bool,
 }
@@ -118,8 +118,8 @@ impl Watch {
         (health.succeeded, health.outage) = (true, 0);
     }
 
-    /// Takes note of a failure about a frame.
-    pub(super) fn failed(&mut self, asker: usize, error: &AskError, frame: &FrameId) {
+    /// Takes note of a failure about a frame or walk.
+    pub(super) fn failed(&mut self, asker: usize, error: &AskError, place: &str) {
         if error.reach == Reach::Interrupted {
             return;
         }
@@ -131,11 +131,11 @@ impl Watch {
             FailureKind::Image | FailureKind::Filtered => {}
             FailureKind::Request => {
                 health.refusals += 1;
-                health.refused_frames.insert(frame.clone());
+                health.refused_places.insert(place.to_owned());
             }
             _ => health.outage += 1,
         }
-        let refused = health.refusals >= AT_FIRST && health.refused_frames.len() > 1;
+        let refused = health.refusals >= AT_FIRST && health.refused_places.len() > 1;
         let patience = if health.succeeded {
             self.patience
         } else {
@@ -215,11 +215,7 @@ mod tests {
         }
         for i in 0..times {
             watch.succeeded(1);
-            watch.failed(
-                0,
-                &error(kind, Reach::Trial),
-                &FrameId((i % frames).to_string()),
-            );
+            watch.failed(0, &error(kind, Reach::Trial), &(i % frames).to_string());
         }
         assert!(!watch.stopped(), "the other model goes on");
         watch.retired(0)
@@ -255,11 +251,7 @@ mod tests {
             if i % 10 == 0 {
                 watch.succeeded(0);
             }
-            watch.failed(
-                0,
-                &error(FailureKind::Server, Reach::Trial),
-                &FrameId(i.to_string()),
-            );
+            watch.failed(0, &error(FailureKind::Server, Reach::Trial), &i.to_string());
         }
         assert!(!watch.retired(0));
     }
@@ -267,42 +259,22 @@ mod tests {
     #[test]
     fn the_run_stops_when_no_model_is_left_or_too_much_has_failed() {
         let mut watch = watch(2, None);
-        watch.failed(
-            0,
-            &error(FailureKind::Request, Reach::Endpoint),
-            &FrameId("a".into()),
-        );
+        watch.failed(0, &error(FailureKind::Request, Reach::Endpoint), "a");
         assert!(watch.retired(0) && !watch.stopped());
-        watch.failed(
-            1,
-            &error(FailureKind::Request, Reach::Endpoint),
-            &FrameId("a".into()),
-        );
+        watch.failed(1, &error(FailureKind::Request, Reach::Endpoint), "a");
         assert!(watch.stopped());
 
         let mut watch = self::watch(1, Some(2));
-        watch.failed(
-            0,
-            &error(FailureKind::Image, Reach::Trial),
-            &FrameId("a".into()),
-        );
+        watch.failed(0, &error(FailureKind::Image, Reach::Trial), "a");
         assert!(!watch.stopped());
-        watch.failed(
-            0,
-            &error(FailureKind::Image, Reach::Trial),
-            &FrameId("b".into()),
-        );
+        watch.failed(0, &error(FailureKind::Image, Reach::Trial), "b");
         assert!(watch.stopped() && matches!(watch.into_end(), End::Stopped(_)));
     }
 
     #[test]
     fn what_was_given_up_has_not_failed() {
         let mut watch = watch(1, Some(1));
-        watch.failed(
-            0,
-            &error(FailureKind::Connection, Reach::Interrupted),
-            &FrameId("a".into()),
-        );
+        watch.failed(0, &error(FailureKind::Connection, Reach::Interrupted), "a");
         assert!(!watch.stopped() && watch.failures() == 0);
     }
 

@@ -9,7 +9,9 @@ use super::choice::Mode;
 use super::estimate::Estimate;
 use super::grid::{Count, Grid, Mark};
 use super::health::Health;
-use crate::types::{EnhancerName, Family, Level, QuestionId, Record, Variant, View, Why};
+use crate::types::{
+    Condition, Degradation, EnhancerName, Family, Level, QuestionId, Record, Variant, View, Why,
+};
 
 /// The name under which guessing stands among the models.
 pub const CHANCE: &str = "chance";
@@ -39,6 +41,19 @@ impl Subject {
             level: record.level,
             variant: record.variant,
             enhancer: record.enhancer.clone(),
+        }
+    }
+
+    /// Whoever answers under a name, and what was shown; `None` where nothing was.
+    #[must_use]
+    pub fn shown(model: &str, condition: Option<&Condition>) -> Self {
+        let degradation = condition.map(|condition| condition.degradation);
+        Self {
+            model: model.to_owned(),
+            view: Some(condition.map_or(View::Blind, |_| View::Image)),
+            level: degradation.map(Degradation::level),
+            variant: degradation.map_or(Variant::None, Degradation::variant),
+            enhancer: condition.and_then(|condition| condition.enhancer.clone()),
         }
     }
 

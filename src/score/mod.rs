@@ -27,6 +27,7 @@ pub mod flips;
 pub mod grid;
 pub mod health;
 pub mod llm_match;
+pub mod open;
 pub mod paired;
 pub mod realism;
 pub mod significance;

@@ -34,6 +34,13 @@ struct Pairs {
     lost: i64,
 }
 
+impl Pairs {
+    /// The sum of their differences, and their number.
+    fn net(&self) -> (f64, f64) {
+        ((self.gained - self.lost) as f64, self.all as f64)
+    }
+}
+
 impl Paired {
     /// Pairs two subjects by item; `None` where no item has a reply of both.
     #[must_use]
@@ -71,10 +78,11 @@ impl Paired {
         let (gained, lost) = (sum(|pairs| pairs.gained), sum(|pairs| pairs.lost));
         let differences = clusters.iter().map(|cluster| cluster.gained - cluster.lost);
         let differences: Vec<i64> = differences.collect();
+        let nets: Vec<(f64, f64)> = clusters.iter().map(Pairs::net).collect();
         Some(Self {
             first: right[0] as f64 / n as f64,
             second: right[1] as f64 / n as f64,
-            difference: difference(&clusters, n),
+            difference: difference(&nets, n),
             gained,
             lost,
             mcnemar: mcnemar(gained, lost),
@@ -85,13 +93,13 @@ impl Paired {
 
 /// The difference with its interval: that of Bonett and Price (2012, J. Educ. Behav. Stat. 37:479), which adds one pair in
 /// each direction so that few or no discordant pairs do not look like certainty; with the variance between clusters in place
-/// of that of independent pairs, and Student's quantile.
-fn difference(clusters: &[Pairs], n: usize) -> Estimate {
+/// of that of independent pairs, and Student's quantile. `clusters` holds, for each, the sum of its pairs' differences (of
+/// scores between 0 and 1) and their number; `n` is the number of all pairs.
+pub(super) fn difference(clusters: &[(f64, f64)], n: usize) -> Estimate {
     let (all, c) = (n as f64, clusters.len() as f64);
-    let net = |pairs: &Pairs| (pairs.gained - pairs.lost) as f64;
-    let sum: f64 = clusters.iter().map(net).sum();
+    let sum: f64 = clusters.iter().map(|(net, _)| net).sum();
     let value = sum / all;
-    let off = |pairs: &Pairs| net(pairs) - value * pairs.all as f64;
+    let off = |(net, pairs): &(f64, f64)| net - value * pairs;
     let between: f64 = clusters.iter().map(|pairs| off(pairs) * off(pairs)).sum();
     let variance = if clusters.len() > 1 {
         c / (c - 1.0) * between
@@ -114,12 +122,12 @@ mod tests {
     use super::*;
 
     fn estimate(clusters: &[(i64, i64, i64)]) -> Estimate {
-        let pairs = clusters
+        let clusters = clusters
             .iter()
-            .map(|&(all, gained, lost)| Pairs { all, gained, lost })
-            .collect::<Vec<_>>();
-        let n = pairs.iter().map(|pairs| pairs.all).sum::<i64>() as usize;
-        difference(&pairs, n)
+            .map(|&(all, gained, lost)| Pairs { all, gained, lost });
+        let clusters: Vec<(f64, f64)> = clusters.map(|pairs| pairs.net()).collect();
+        let n = clusters.iter().map(|(_, pairs)| pairs).sum::<f64>() as usize;
+        difference(&clusters, n)
     }
 
     #[test]

@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::error::{Error, Result};
-use crate::types::{Listed, Record, Thumbnail};
+use crate::types::{Kept, Listed, Thumbnail};
 
 /// Appends lines to a file that is made where it does not exist.
 pub(super) fn append<T: Serialize>(path: &Path, values: &[T]) -> Result<File> {
@@ -70,7 +70,7 @@ pub(super) trait Line: DeserializeOwned {
     const WHAT: &str;
 }
 
-impl Line for Record {
+impl<R: Kept> Line for R {
     const WHAT: &str = "a record";
 }
 

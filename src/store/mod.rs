@@ -10,12 +10,13 @@ use std::collections::{BTreeSet, HashMap};
 use std::ffi::OsStr;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::Write;
+use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
-use crate::types::manifest::{RunManifest, SCHEMA};
-use crate::types::{Listed, Outcome, Record, Thumbnail, TrialKey, Via};
+use crate::types::manifest::RunManifest;
+use crate::types::{Kept, Listed, Record, Thumbnail, TrialKey, Via};
 
 use lines::{append, json_lines, lines, mend};
 
@@ -49,13 +50,14 @@ const ADDRESS: &str = "--base-url";
 
 /// An open run folder, held by this process alone.
 #[derive(Debug)]
-pub struct Store {
+pub struct Store<R = Record> {
     folder: PathBuf,
     records: File,
     synced: Instant,
+    kind: PhantomData<R>,
 }
 
-impl Store {
+impl<R: Kept> Store<R> {
     /// Opens a run folder, which is made where it does not exist.
     ///
     /// A last line that was cut off while it was written is taken away, so that the next one begins a line.
@@ -64,7 +66,7 @@ impl Store {
     /// Where the folder holds something else, another run (the message names the flag that differs), a broken record, or
     /// is held by another process.
     pub fn open(folder: &Path, manifest: &RunManifest, moved: Moved) -> Result<Self> {
-        match read_manifest(folder)? {
+        match read_manifest(folder, R::SCHEMA)? {
             Some(kept) => agree(folder, &kept, manifest, moved)?,
             None => claim(folder, manifest)?,
         }
@@ -89,16 +91,17 @@ impl Store {
             folder: folder.to_owned(),
             records,
             synced: Instant::now(),
+            kind: PhantomData,
         })
     }
 
     /// What the run holds: the last record of each trial, in the order of their first.
-    pub fn records(&self) -> Result<Vec<Record>> {
+    pub fn records(&self) -> Result<Vec<R>> {
         read_records(&self.folder)
     }
 
     /// Takes note that these trials are out in a batch.
-    pub fn append_to_batch(&mut self, records: &[Record]) -> Result<()> {
+    pub fn append_to_batch(&mut self, records: &[R]) -> Result<()> {
         let path = self.folder.join(BATCH).join(TRIALS);
         append(&path, records)?
             .sync_all()
@@ -123,7 +126,7 @@ impl Store {
     }
 
     /// The trials that were sent in batches, as they were before anything came of them, each as often as it was sent.
-    pub fn batched(&self) -> Result<Vec<Record>> {
+    pub fn batched(&self) -> Result<Vec<R>> {
         lines(&self.folder.join(BATCH).join(TRIALS))
     }
 
@@ -131,13 +134,13 @@ impl Store {
     pub fn out_in_batches(&self) -> Result<BTreeSet<TrialKey>> {
         let mut out = HashMap::<TrialKey, usize>::new();
         for record in self.batched()? {
-            *out.entry(record.key).or_default() += 1;
+            *out.entry(record.key()).or_default() += 1;
         }
-        for record in lines::<Record>(&self.folder.join(RECORDS))? {
-            if record.outcome != Outcome::Failed {
-                out.remove(&record.key);
-            } else if record.via == Via::Batch
-                && let Some(times) = out.get_mut(&record.key)
+        for record in lines::<R>(&self.folder.join(RECORDS))? {
+            if !record.failed() {
+                out.remove(&record.key());
+            } else if record.via() == Via::Batch
+                && let Some(times) = out.get_mut(&record.key())
             {
                 *times = times.saturating_sub(1);
             }
@@ -153,7 +156,7 @@ impl Store {
     }
 
     /// Appends one record: once this returns, killing the process cannot lose it.
-    pub fn append(&mut self, record: &Record) -> Result<()> {
+    pub fn append(&mut self, record: &R) -> Result<()> {
         let path = || self.folder.join(RECORDS);
         let mut line =
             serde_json::to_vec(record).map_err(|e| Error::file(path(), "write", e.into()))?;
@@ -215,14 +218,14 @@ fn write_manifest(folder: &Path, manifest: &RunManifest) -> Result<()> {
 
 /// What a run folder holds: the last record of each trial, in the order of their first; a last line that was cut off while it
 /// was written is passed over.
-pub fn read_records(folder: &Path) -> Result<Vec<Record>> {
+pub fn read_records<R: Kept>(folder: &Path) -> Result<Vec<R>> {
     let mut latest = HashMap::<TrialKey, usize>::new();
-    let mut records: Vec<Record> = Vec::new();
-    for record in lines::<Record>(&folder.join(RECORDS))? {
-        if let Some(&index) = latest.get(&record.key) {
+    let mut records: Vec<R> = Vec::new();
+    for record in lines::<R>(&folder.join(RECORDS))? {
+        if let Some(&index) = latest.get(&record.key()) {
             records[index] = record;
         } else {
-            latest.insert(record.key, records.len());
+            latest.insert(record.key(), records.len());
             records.push(record);
         }
     }
@@ -254,8 +257,34 @@ pub fn find(base: &Path, hash: &str) -> Option<PathBuf> {
         .max()
 }
 
+/// The schema of the run in a folder; `None` where there is none.
+///
+/// # Errors
+/// Where its manifest cannot be read.
+pub fn schema(folder: &Path) -> Result<Option<String>> {
+    Ok(any_manifest(folder)?.map(|manifest| manifest.schema))
+}
+
 /// The manifest of a run folder; `None` where there is none.
-pub fn read_manifest(folder: &Path) -> Result<Option<RunManifest>> {
+///
+/// # Errors
+/// Where it cannot be read, or is that of a run with other records than those of `schema`.
+pub fn read_manifest(folder: &Path, schema: &str) -> Result<Option<RunManifest>> {
+    let Some(manifest) = any_manifest(folder)? else {
+        return Ok(None);
+    };
+    if manifest.schema == schema {
+        return Ok(Some(manifest));
+    }
+    let problem = format!(
+        "the run has the schema {:?}, {schema:?} is expected here; use another folder",
+        manifest.schema
+    );
+    let path = folder.join(MANIFEST);
+    Err(Error::Run { path, problem })
+}
+
+fn any_manifest(folder: &Path) -> Result<Option<RunManifest>> {
     let path = folder.join(MANIFEST);
     let text = match fs::read(&path) {
         Ok(text) => text,
@@ -269,19 +298,12 @@ pub fn read_manifest(folder: &Path) -> Result<Option<RunManifest>> {
         }
         Err(e) => return Err(Error::file(path, "read", e)),
     };
-    let manifest: RunManifest = serde_json::from_slice(&text).map_err(|e| Error::Run {
-        path: path.clone(),
-        problem: format!("not the manifest of a run: {e}"),
-    })?;
-    if manifest.schema == SCHEMA {
-        Ok(Some(manifest))
-    } else {
-        let problem = format!(
-            "the run has the schema {:?}, this program writes {SCHEMA:?}; use another --out",
-            manifest.schema
-        );
-        Err(Error::Run { path, problem })
-    }
+    serde_json::from_slice(&text)
+        .map(Some)
+        .map_err(|e| Error::Run {
+            path: path.clone(),
+            problem: format!("not the manifest of a run: {e}"),
+        })
 }
 
 /// Makes sure that a kept run is the one now asked for.
@@ -338,9 +360,11 @@ mod tests {
     use crate::types::manifest::{Counts, Status};
     use crate::types::{Digest, Family, FrameId, Outcome, QuestionId, Variant, View};
 
+    type Store = super::Store<Record>;
+
     fn manifest(seed: u64) -> RunManifest {
         RunManifest {
-            schema: SCHEMA.into(),
+            schema: Record::SCHEMA.into(),
             status: Status::Started,
             version: "0".into(),
             created: String::new(),

@@ -11,7 +11,11 @@ use crate::types::{DarkLevel, Digest, FrameId};
 
 /// What a frame's noise is drawn from: the run's seed and the frame's name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct NoiseKey(Digest);
+pub struct NoiseKey {
+    noise: Digest,
+    /// What the state of the camera is drawn from: the same, but where one camera took several frames.
+    camera: Digest,
+}
 
 impl NoiseKey {
     /// The key of a frame under a seed.
@@ -22,20 +26,42 @@ impl NoiseKey {
             &seed.to_le_bytes(),
             frame.0.as_bytes(),
         ];
-        Self(Digest::of_parts(parts))
+        let noise = Digest::of_parts(parts);
+        Self {
+            noise,
+            camera: noise,
+        }
+    }
+
+    /// The key of the same frame as the camera took it that took all frames of a walk: noise of its own, but the state of the
+    /// camera drawn from the walk's key.
+    #[must_use]
+    pub fn taken_on(self, walk: &Self) -> Self {
+        Self {
+            camera: walk.camera,
+            ..self
+        }
     }
 
     /// The key of the same frame at one level, for noise of its own.
     #[must_use]
     pub fn at(&self, level: DarkLevel) -> Self {
         let level = level.level().to_string();
-        Self(Digest::of_parts([self.0.as_bytes(), level.as_bytes()]))
+        let at = |digest: &Digest| Digest::of_parts([digest.as_bytes(), level.as_bytes()]);
+        Self {
+            noise: at(&self.noise),
+            camera: at(&self.camera),
+        }
     }
 
     /// The numbers of one component, unrelated to those of every other.
     #[must_use]
     pub fn stream(&self, component: Component) -> Stream {
-        let digest = Digest::of_parts([self.0.as_bytes(), component.name().as_bytes()]);
+        let of = match component {
+            Component::Camera => self.camera,
+            Component::Row | Component::Field => self.noise,
+        };
+        let digest = Digest::of_parts([of.as_bytes(), component.name().as_bytes()]);
         let [low, high] = [0, 4].map(|at| {
             let mut word = [0; 4];
             word.copy_from_slice(&digest.as_bytes()[at..at + 4]);

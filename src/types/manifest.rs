@@ -6,9 +6,6 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// The schema of `manifest.json`.
-pub const SCHEMA: &str = "darkqa.run/1";
-
 /// How far a run has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -51,7 +48,7 @@ pub struct Counts {
 /// The content of `manifest.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunManifest {
-    /// [`SCHEMA`].
+    /// That of its records: [`Kept::SCHEMA`](super::Kept::SCHEMA).
     pub schema: String,
     /// How far it has come.
     pub status: Status,

@@ -187,11 +187,13 @@ pub enum Via {
     Direct,
     /// In a file of a Batch API, which costs less.
     Batch,
+    /// Not at all: the answer was given in a file, by people or another program.
+    File,
 }
 
 impl Via {
     #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands a reference")]
-    fn is_direct(&self) -> bool {
+    pub(super) fn is_direct(&self) -> bool {
         *self == Self::Direct
     }
 }

@@ -6,31 +6,31 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 use crate::store::Store;
-use crate::types::Record;
+use crate::types::Kept;
 
 /// Where a file is written until it is whole.
 const PART: &str = "part";
 
 /// The input files of one model, split by bytes and by requests.
-pub(super) struct Files {
+pub(super) struct Files<R> {
     folder: PathBuf,
     stem: String,
     most_bytes: u64,
     most_requests: usize,
-    open: Option<Open>,
+    open: Option<Open<R>>,
     /// The whole ones, with their requests.
     done: Vec<(PathBuf, usize)>,
 }
 
-struct Open {
+struct Open<R> {
     path: PathBuf,
     file: BufWriter<File>,
     bytes: u64,
     /// The trials in it, as the records that they will become.
-    blanks: Vec<Record>,
+    blanks: Vec<R>,
 }
 
-impl Files {
+impl<R: Kept> Files<R> {
     pub(super) fn new(folder: &Path, model: &str, most_bytes: u64, most_requests: usize) -> Self {
         let safe = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
         Self {
@@ -47,7 +47,7 @@ impl Files {
     ///
     /// # Errors
     /// Where it alone is larger than a file may be, or cannot be written.
-    pub(super) fn add(&mut self, line: &[u8], blank: Record, store: &mut Store) -> Result<()> {
+    pub(super) fn add(&mut self, line: &[u8], blank: R, store: &mut Store<R>) -> Result<()> {
         let size = line.len() as u64;
         if size > self.most_bytes {
             let megabytes = size as f64 / 1e6;
@@ -76,13 +76,13 @@ impl Files {
     }
 
     /// Ends the last file; all of them with their requests.
-    pub(super) fn finish(mut self, store: &mut Store) -> Result<Vec<(PathBuf, usize)>> {
+    pub(super) fn finish(mut self, store: &mut Store<R>) -> Result<Vec<(PathBuf, usize)>> {
         self.close(store)?;
         Ok(self.done)
     }
 
     /// A new file, numbered on from those that lie there.
-    fn next(&self) -> Result<Open> {
+    fn next(&self) -> Result<Open<R>> {
         let path = (1..=u32::MAX)
             .map(|n| self.folder.join(format!("{}-{n:03}.jsonl", self.stem)))
             .find(|path| !path.exists())
@@ -99,7 +99,7 @@ impl Files {
 
     /// Makes the open file whole. Its trials are noted as out before it bears its name, so that none is handed in whose
     /// replies nobody would know.
-    fn close(&mut self, store: &mut Store) -> Result<()> {
+    fn close(&mut self, store: &mut Store<R>) -> Result<()> {
         let Some(open) = self.open.take() else {
             return Ok(());
         };

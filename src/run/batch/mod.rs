@@ -7,6 +7,8 @@
 mod export;
 mod file;
 mod import;
+mod replies;
+pub(in crate::run) mod requests;
 
 pub use export::export;
 pub use import::import;

@@ -13,7 +13,7 @@ pub(super) fn cost(records: &[Record]) -> Result<Option<String>> {
         match (prices.of(&record.model), record.usage) {
             (Some(price), Some(usage)) => {
                 let share = match record.via {
-                    Via::Direct => 1.0,
+                    Via::Direct | Via::File => 1.0,
                     Via::Batch => prices.batch,
                 };
                 dollars += share * price.charged(usage);

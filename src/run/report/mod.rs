@@ -15,7 +15,7 @@ use crate::report::{files, table, verdicts};
 use crate::score::findings::Findings;
 use crate::store::{self, Moved, Store};
 use crate::types::manifest::{RunManifest, Status};
-use crate::types::{Listed, Record, Thumbnail};
+use crate::types::{Kept as _, Listed, Record, Thumbnail};
 
 use merge::{Merged, merge};
 
@@ -136,7 +136,7 @@ fn compare(merged: &Merged, config: &Report) -> Result<String> {
 
 /// The manifest of a run.
 pub(super) fn kept(folder: &Path) -> Result<RunManifest> {
-    store::read_manifest(folder)?.ok_or_else(|| Error::Run {
+    store::read_manifest(folder, Record::SCHEMA)?.ok_or_else(|| Error::Run {
         path: folder.to_owned(),
         problem: "no run in this folder: it has no manifest.json".to_owned(),
     })

@@ -26,7 +26,7 @@ use super::Verdict;
 use super::interrupt::Interrupt;
 use super::observer;
 use super::progress::Progress;
-use crate::ask::{Call, Model, Random};
+use crate::ask::{Call, Message, Model, Query, Random};
 use crate::config::Serve;
 use crate::dataset::Dataset;
 use crate::error::{Error, Result};
@@ -146,6 +146,7 @@ impl Desk {
             .and_then(|(image, _)| self.likenesses.most_like(image));
         let words = Digest::of(asked.text.as_bytes()).to_string();
         let image = asked.image.as_ref().map(|(_, payload)| payload);
+        let images = image.map(std::slice::from_ref);
         let seen = image.map_or_else(String::new, |image| image.facts().digest.to_string());
         let question = Question {
             id: QuestionId(format!("{words} {seen}")),
@@ -157,11 +158,13 @@ impl Desk {
             frame: frame.cloned().unwrap_or(FrameId(String::new())),
         };
         let call = Call {
-            question: &question,
+            query: Query::Choice(&question),
             condition: None,
-            prompt: &asked.text,
-            // What is no frame of the data is not seen.
-            image: image.filter(|_| frame.is_some()),
+            message: Message {
+                // What is no frame of the data is not seen.
+                images: images.filter(|_| frame.is_some()).unwrap_or_default(),
+                ..Message::words(&asked.text)
+            },
             turn: 0,
         };
         let reply = model

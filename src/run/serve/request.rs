@@ -1,5 +1,7 @@
 //! What a request asks: [`Asked`].
 
+use std::sync::Arc;
+
 use axum::http::StatusCode;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -51,7 +53,7 @@ pub(super) struct Asked {
     /// All texts, one after the other.
     pub(super) text: String,
     /// The last image, decoded and as it is looked at.
-    pub(super) image: Option<(Rgb, Payload)>,
+    pub(super) image: Option<(Rgb, Arc<Payload>)>,
     pub(super) form: Form,
 }
 
@@ -94,7 +96,7 @@ impl Asked {
 }
 
 /// The pixels of a data URL.
-fn pixels(url: &str) -> Result<(Rgb, Payload), Fault> {
+fn pixels(url: &str) -> Result<(Rgb, Arc<Payload>), Fault> {
     let wrong = |message: String| {
         Fault::new(StatusCode::BAD_REQUEST, message).at("image_url", "invalid_image_url")
     };
@@ -117,5 +119,5 @@ fn pixels(url: &str) -> Result<(Rgb, Payload), Fault> {
     };
     let rgb = picture.decode().map_err(|e| wrong(e.to_string()))?;
     let payload = Payload::encode(&rgb, Format::Png, None).map_err(|e| wrong(e.to_string()))?;
-    Ok((rgb, payload))
+    Ok((rgb, Arc::new(payload)))
 }

@@ -64,7 +64,7 @@ pub fn pack(config: StudyPack, progress: &Progress) -> Result<Verdict> {
             write(&config.out.join(&name), &made.file)?;
             shots.push(Shot {
                 condition: condition.to_string(),
-                image: name,
+                images: vec![name],
             });
             images += 1;
             bar.inc();

@@ -10,11 +10,12 @@ use serde_json::{Value, json};
 
 use crate::config::{Show, StudyRead};
 use crate::error::{Error, Result};
+use crate::run::record::Entry as _;
 use crate::run::report::{kept, leave};
-use crate::run::{Verdict, count, now, record};
+use crate::run::{Verdict, count, now};
 use crate::store::{self, Moved, Store};
-use crate::types::manifest::{Counts, RunManifest, SCHEMA, Status};
-use crate::types::{Condition, Digest, QuestionId, Record, Reply, TrialKey};
+use crate::types::manifest::{Counts, RunManifest, Status};
+use crate::types::{Condition, Digest, Kept as _, QuestionId, Record, Reply, TrialKey};
 
 /// A line of a file of answers.
 #[derive(Debug, Deserialize)]
@@ -127,7 +128,7 @@ fn of_people(run: &RunManifest, config: &StudyRead) -> RunManifest {
         ("people asked about", json!(run.identity)),
     ];
     RunManifest {
-        schema: SCHEMA.to_owned(),
+        schema: Record::SCHEMA.to_owned(),
         status: Status::Started,
         version: env!("CARGO_PKG_VERSION").to_owned(),
         created: now(),
@@ -198,7 +199,7 @@ impl People {
             served_model: Some(person),
             ..Reply::local(line.answer.clone().unwrap_or_default())
         };
-        let mut answered = record::answered(blank, reply)?;
+        let mut answered = blank.answered(reply)?;
         answered.latency_ms = None;
         if kept == Some(&answered) {
             return Ok(None);

@@ -1,0 +1,164 @@
+//! An image in another size, as OpenCV makes it: [`bilinear`].
+
+use crate::error::Result;
+use crate::types::Rgb;
+
+/// The weight of one whole, in OpenCV's fixed point (`INTER_RESIZE_COEF_SCALE`).
+const ONE: f32 = 2048.0;
+
+/// A sample between two of the source: the first of them, the second, and their weights.
+#[derive(Debug, Clone, Copy)]
+struct Tap {
+    at: [usize; 2],
+    weights: [i32; 2],
+}
+
+/// The image with its longer side of so many pixels, smaller or larger than it was: what
+/// `cv2.resize(image, None, fx=f, fy=f)` with f = side / max(height, width) returns, without any smoothing before, so that
+/// what noise there is stays noise.
+///
+/// The arithmetic is that of `resizeGeneric_` for 8-bit images with `INTER_LINEAR` (OpenCV 4, modules/imgproc/src/resize.cpp).
+/// Against OpenCV 5.0 it is the same bit for bit where images shrink, and off by one code in fewer than one sample of a
+/// thousand where they grow.
+///
+/// # Errors
+/// Never but where memory is short.
+pub fn bilinear(image: &Rgb, side: usize) -> Result<Rgb> {
+    let (height, width) = (image.height(), image.width());
+    if height.max(width) == side {
+        return Ok(image.clone());
+    }
+    let factor = side as f64 / height.max(width) as f64;
+    let columns = taps(width, factor);
+    let rows = taps(height, factor);
+    let mut samples = Vec::with_capacity(rows.len() * columns.len() * 3);
+    // The two source rows of the last row made, by their number: the next one mostly needs one of them.
+    let mut kept = [const { (usize::MAX, Vec::new()) }; 2];
+    for tap in &rows {
+        let [above, below] = tap.at;
+        if kept[0].0 != above {
+            if kept[1].0 == above {
+                kept.swap(0, 1);
+            } else {
+                across(image, above, &columns, &mut kept[0].1);
+                kept[0].0 = above;
+            }
+        }
+        if below != above && kept[1].0 != below {
+            across(image, below, &columns, &mut kept[1].1);
+            kept[1].0 = below;
+        }
+        let below = usize::from(below != above);
+        let pairs = kept[0].1.iter().zip(&kept[below].1);
+        samples.extend(pairs.map(|(above, below)| {
+            let [first, second] = tap.weights;
+            let sum = ((first * (above >> 4)) >> 16) + ((second * (below >> 4)) >> 16);
+            ((sum + 2) >> 2).clamp(0, 255) as u8
+        }));
+    }
+    Rgb::new(rows.len(), columns.len(), samples)
+}
+
+/// The taps along a side of `length` pixels that is scaled by a factor.
+fn taps(length: usize, factor: f64) -> Vec<Tap> {
+    let count = ((length as f64 * factor).round_ties_even() as usize).max(1);
+    let last = length - 1;
+    let tap = |index: usize| {
+        let place = ((index as f64 + 0.5) / factor - 0.5) as f32;
+        let floor = place.floor();
+        let (first, off) = match floor {
+            floor if floor < 0.0 => (0, 0.0),
+            floor if floor as usize >= last => (last, 0.0),
+            floor => (floor as usize, place - floor),
+        };
+        Tap {
+            at: [first, (first + 1).min(last)],
+            weights: [1.0 - off, off].map(|weight| (weight * ONE).round_ties_even() as i32),
+        }
+    };
+    (0..count).map(tap).collect()
+}
+
+/// One row of the source at the columns of the result.
+fn across(image: &Rgb, row: usize, columns: &[Tap], out: &mut Vec<i32>) {
+    let width = 3 * image.width();
+    let line = &image.samples()[row * width..][..width];
+    out.clear();
+    for tap in columns {
+        let [left, right] = tap.at.map(|column| 3 * column);
+        let [first, second] = tap.weights;
+        for channel in 0..3 {
+            let (a, b) = (line[left + channel], line[right + channel]);
+            out.push(first * i32::from(a) + second * i32::from(b));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An image of numbers without a pattern.
+    fn noise(height: usize, width: usize) -> Rgb {
+        let mut state = 12_345_u32;
+        let samples = (0..height * width * 3).map(|_| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 24) as u8
+        });
+        Rgb::new(height, width, samples.collect()).unwrap()
+    }
+
+    #[test]
+    fn sides_are_opencvs() {
+        for (from, side, to) in [
+            ([1080, 1920], 512, [288, 512]),
+            ([968, 1296], 512, [382, 512]),
+            ([333, 777], 512, [219, 512]),
+            ([1, 5], 512, [102, 512]),
+            ([3, 1000], 100, [1, 100]),
+        ] {
+            let image = bilinear(&Rgb::black(from[0], from[1]), side).unwrap();
+            assert_eq!([image.height(), image.width()], to);
+        }
+    }
+
+    #[test]
+    fn pixels_are_opencvs() {
+        // cv2 5.0.0 on the same images: the sum of all samples, and the first and last ones.
+        let golden = [
+            (
+                [90, 160],
+                48,
+                495_481,
+                [83, 169, 120, 114, 67, 102],
+                [99, 111, 119, 56, 225, 99],
+            ),
+            (
+                [121, 81],
+                50,
+                625_372,
+                [97, 168, 85, 177, 113, 104],
+                [138, 135, 96, 203, 141, 68],
+            ),
+            (
+                [64, 64],
+                32,
+                391_554,
+                [110, 93, 130, 169, 99, 160],
+                [126, 135, 159, 140, 136, 51],
+            ),
+        ];
+        for (from, side, sum, first, last) in golden {
+            let made = bilinear(&noise(from[0], from[1]), side).unwrap();
+            let samples = made.samples();
+            let total: u64 = samples.iter().map(|code| u64::from(*code)).sum();
+            assert_eq!(
+                (total, &samples[..6], &samples[samples.len() - 6..]),
+                (sum, &first[..], &last[..]),
+                "{from:?}"
+            );
+        }
+        let same = noise(7, 9);
+        assert_eq!(bilinear(&same, 9).unwrap(), same);
+    }
+}

@@ -1,0 +1,113 @@
+//! The flags of `openeqa`.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::{
+    BatchFileArgs, EnhancementArgs, LightArgs, ModelArgs, OutputArgs, SendingArgs, SensorArgs,
+};
+
+/// The flags of `openeqa`.
+#[derive(Debug, Args)]
+pub struct OpenEqaArgs {
+    /// The questions, as open-eqa-v0.json
+    #[arg(long, value_name = "FILE", help_heading = "OpenEQA")]
+    pub questions: PathBuf,
+    /// The folder of walks: the frames of a question lie in DIR/EPISODE_HISTORY/*-rgb.png
+    #[arg(long, value_name = "DIR", help_heading = "OpenEQA")]
+    pub frames: PathBuf,
+    /// Only questions of these splits, as hm3d-v0,scannet-v0
+    #[arg(long, value_name = "LIST", help_heading = "OpenEQA")]
+    pub splits: Option<String>,
+    /// Only questions of these categories, as "object localization,world knowledge"
+    #[arg(long, value_name = "LIST", help_heading = "OpenEQA")]
+    pub categories: Option<String>,
+    /// Only the questions whose ids stand in this file, a JSON array, as open-eqa-v0-184-questions.json
+    #[arg(long, value_name = "FILE", help_heading = "OpenEQA")]
+    pub subset: Option<PathBuf>,
+    /// Only the first N questions
+    #[arg(long, value_name = "N", help_heading = "OpenEQA")]
+    pub limit: Option<NonZeroUsize>,
+    /// How many frames of a walk are shown, spread evenly over it; default: 50, as upstream shows GPT-4V (Claude 3: 20,
+    /// Gemini: 15)
+    #[arg(long, value_name = "K", help_heading = "OpenEQA")]
+    pub num_frames: Option<NonZeroUsize>,
+    /// The longer side of the frames as sent, in pixels, or native; scaled as upstream does (OpenCV, bilinear); default: 512
+    #[arg(long, value_name = "PIXELS|native", help_heading = "OpenEQA")]
+    pub image_size: Option<String>,
+    /// Where light is taken: before the frames are scaled (native) or after (resized), which averages noise away; default:
+    /// native
+    #[arg(long, value_name = "native|resized", help_heading = "OpenEQA")]
+    pub degrade: Option<String>,
+    /// Which frames one state of the camera takes: a walk (episode) or each its own (frame); default: episode
+    #[arg(long, value_name = "episode|frame", help_heading = "OpenEQA")]
+    pub sensor: Option<String>,
+    /// What the servers' sampling starts from, or none; default: 1234
+    #[arg(long, value_name = "N|none", help_heading = "OpenEQA")]
+    pub sampling_seed: Option<String>,
+    /// Answers of people or another program, as upstream's files ([{"question_id", "answer"}], with "level" or "condition"
+    /// beside them where it is not L0), to be marked like a model's; repeatable
+    #[arg(long, value_name = "NAME=FILE", help_heading = "OpenEQA")]
+    pub answers: Vec<String>,
+    /// The model that marks the answers; default: none, answers are gathered and not marked
+    #[arg(long, value_name = "NAME", help_heading = "Judge")]
+    pub judge: Option<String>,
+    /// How answers are judged and marks read: upstream (answers cut after their last full stop, marks read to the letter) or
+    /// tolerant (whole answers, marks read as people would); default: upstream
+    #[arg(long, value_name = "upstream|tolerant", help_heading = "Judge")]
+    pub protocol: Option<String>,
+    /// The judge's endpoint; default: that of the models
+    #[arg(long, value_name = "URL", help_heading = "Judge")]
+    pub judge_base_url: Option<String>,
+    /// The variable that holds the key of the judge's endpoint, or none; default: that of the models
+    #[arg(
+        long,
+        value_name = "NAME|none",
+        help_heading = "Judge",
+        conflicts_with = "judge_api_key_file"
+    )]
+    pub judge_api_key_env: Option<String>,
+    /// A file that holds the key of the judge's endpoint
+    #[arg(long, value_name = "FILE", help_heading = "Judge")]
+    pub judge_api_key_file: Option<PathBuf>,
+    /// The judge's sampling temperature; default: 0.2
+    #[arg(long, value_name = "T|auto|default", help_heading = "Judge")]
+    pub judge_temperature: Option<String>,
+    /// The most tokens of a judge's reply; default: 32
+    #[arg(long, value_name = "N", help_heading = "Judge")]
+    pub judge_max_tokens: Option<std::num::NonZeroU32>,
+    /// Write a page on which people answer the questions about the frames into this folder, and ask no model
+    #[arg(
+        long,
+        value_name = "DIR",
+        help_heading = "OpenEQA",
+        conflicts_with_all = ["batch", "dry_run"]
+    )]
+    pub study: Option<PathBuf>,
+    /// Write what is left to ask as files of a Batch API, answers first and then marks, and ask nothing
+    #[arg(long, help_heading = "Batch", conflicts_with = "dry_run")]
+    pub batch: bool,
+    /// Their files.
+    #[command(flatten)]
+    pub files: BatchFileArgs,
+    /// Light.
+    #[command(flatten)]
+    pub light: LightArgs,
+    /// Light, as a sensor sees it.
+    #[command(flatten)]
+    pub sensors: SensorArgs,
+    /// Enhancement.
+    #[command(flatten)]
+    pub enhancement: EnhancementArgs,
+    /// Model.
+    #[command(flatten)]
+    pub model: ModelArgs,
+    /// Sending.
+    #[command(flatten)]
+    pub sending: SendingArgs,
+    /// Output.
+    #[command(flatten)]
+    pub output: OutputArgs,
+}

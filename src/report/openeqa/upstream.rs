@@ -1,0 +1,81 @@
+//! Answers and marks as the files of `facebookresearch/open-eqa`, which its scripts read: [`files`].
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::{OpenReport, Told};
+use crate::error::{Error, Result};
+use crate::score::accuracy::Subject;
+use crate::score::open::Outcome;
+
+/// The folder of these files.
+const FOLDER: &str = "upstream";
+
+#[derive(Serialize)]
+struct Answer<'a> {
+    question_id: &'a str,
+    answer: Option<&'a str>,
+}
+
+/// For each model in each condition `NAME.json`, its answers, and where a judge has marked them `NAME-JUDGE-metrics.json`. What
+/// was not answered or not marked is left out. Where several people answered one question there is no such file, which has one
+/// answer a question.
+pub(super) fn files(report: &OpenReport<'_>) -> Result<Vec<(String, Vec<u8>)>> {
+    let mut by_subject = BTreeMap::<&Subject, BTreeMap<usize, Vec<&Told>>>::new();
+    for told in report.answers {
+        if told.outcome != Outcome::Missing {
+            let questions = by_subject.entry(&told.subject).or_default();
+            questions.entry(told.question).or_default().push(told);
+        }
+    }
+    let mut made = Vec::new();
+    for (subject, questions) in by_subject {
+        let single: Option<Vec<(usize, &Told)>> = questions
+            .into_iter()
+            .map(|(question, told)| match &told[..] {
+                [one] => Some((question, *one)),
+                _ => None,
+            })
+            .collect();
+        let Some(single) = single else {
+            continue;
+        };
+        let stem = safe(&format!("{}-{}", subject.model, subject.condition()));
+        let answers = single.iter().map(|(question, told)| Answer {
+            question_id: &report.questions[*question].0,
+            answer: told.answer.as_deref(),
+        });
+        let answers: Vec<Answer<'_>> = answers.collect();
+        made.push((format!("{FOLDER}/{stem}.json"), written(&answers)?));
+        let Some(judge) = report.judge else {
+            continue;
+        };
+        let marks = single.iter().filter_map(|(question, told)| {
+            let mark = match told.outcome {
+                Outcome::Marked(mark) => mark,
+                // Upstream's own score of an answer that is none.
+                Outcome::Null => 0,
+                Outcome::Missing | Outcome::Unjudged | Outcome::Unmarked => return None,
+            };
+            Some((&*report.questions[*question].0, mark))
+        });
+        let marks: serde_json::Map<String, serde_json::Value> = marks
+            .map(|(id, mark)| (id.to_owned(), mark.into()))
+            .collect();
+        let name = format!("{FOLDER}/{stem}-{}-metrics.json", safe(judge));
+        made.push((name, written(&marks)?));
+    }
+    Ok(made)
+}
+
+/// A name for a file.
+fn safe(name: &str) -> String {
+    name.replace(|c: char| !(c.is_alphanumeric() || "-_.+".contains(c)), "_")
+}
+
+fn written(value: &impl Serialize) -> Result<Vec<u8>> {
+    let mut text = serde_json::to_vec_pretty(value).map_err(|e| Error::data(FOLDER, e))?;
+    text.push(b'\n');
+    Ok(text)
+}
