@@ -18,7 +18,8 @@
 //!
 //! - [`types`]: the vocabulary. [`Frame`](types::Frame)s are seen, [`Question`](types::Question)s are asked, a
 //!   [`Condition`](types::Condition) is a degradation with or without an enhancer, a [`Reply`](types::Reply) is what a
-//!   model said, and a [`Record`](types::Record) is what came of one question for one model in one condition.
+//!   model said, and a [`Record`](types::Record) is what came of one question for one model in one condition; of an open
+//!   question, or of a mark for an answer, it is an [`OpenRecord`](types::OpenRecord).
 //! - [`dataset`]: a folder, a ready-made set or the built-in rooms → images, their maps and questions.
 //! - [`questions`]: a frame with its maps → questions with one true answer, by rule; pure integers. And the observer: what
 //!   the rules could still answer from given pixels.
@@ -27,7 +28,7 @@
 //! - [`ask`]: a prompt and an image → a reply; the only asynchronous stage.
 //! - [`score`]: a reply → a choice; records → numbers with their intervals.
 //! - [`store`]: `results/<run>/`, append-only and resumable.
-//! - [`report`]: tables and files, from the records alone; figures of pictures that are handed in.
+//! - [`report`]: tables, figures and one HTML file, from the records alone; figures of pictures that are handed in.
 //! - [`run`]: the only place that sees every stage, and the only bridge between CPU work and waiting.
 //! - [`cli`] is what the user typed; [`config`] is what it means, checked once.
 //!

@@ -14,80 +14,13 @@ use image::{Rgb, RgbImage};
 use serde_json::{Value, json};
 
 use support::endpoint::{Answer, MockEndpoint, Request};
-use support::run::{Bench, Called, called};
+use support::house::House;
+use support::run::called;
 
 /// Upstream's prompt for an answer with images, up to them.
 const VISION: &str = "You are an intelligent question answering agent. I will ask you questions about an indoor space and you must provide an answer.\n\
 You will be shown a set of images that have been collected from a single location.\n\
 Given a user query, you must output `text` to answer to the question asked by the user.\n";
-
-/// A file of questions and two walks of three frames, the second shorter than what is shown of it.
-struct House(Bench);
-
-impl House {
-    fn new() -> Self {
-        let bench = Bench::new();
-        for (walk, frames) in [("hm3d-v0/000-a", 5_u32), ("scannet-v0/001-b", 2)] {
-            for frame in 0..frames {
-                // Flat grey of its own, so that a frame is known again by its pixels.
-                let grey = 100 + 20 * frame as u8;
-                let picture = RgbImage::from_pixel(96, 64, Rgb([grey; 3]));
-                let path = bench.path(&format!("walks/{walk}/{frame:05}-rgb.png"));
-                fs::create_dir_all(path.parent().unwrap()).unwrap();
-                picture.save(path).unwrap();
-            }
-        }
-        let question = |id: &str, text: &str, answer: &str, walk: &str, category: &str| json!({"question_id": id, "question": text, "answer": answer, "category": category, "episode_history": walk});
-        let mut extra = question(
-            "q2",
-            "Where's the {sofa}?",
-            "Near the café's door",
-            "hm3d-v0/000-a",
-            "object localization",
-        );
-        extra["extra_answers"] = json!(["By the stairs", "it's here", "\"both\" it's", "日本"]);
-        let all = json!([
-            question(
-                "q1",
-                "What colour is it?",
-                "brown",
-                "hm3d-v0/000-a",
-                "attribute recognition"
-            ),
-            extra,
-            question(
-                "q3",
-                "Is it “safe”?",
-                "No",
-                "scannet-v0/001-b",
-                "world knowledge"
-            ),
-        ]);
-        bench.file("questions.json", all.to_string());
-        Self(bench)
-    }
-
-    fn call(&self, words: &[&str]) -> Called {
-        called(&mut self.0.command(&flags(words)))
-    }
-
-    fn read(&self, path: &str) -> Value {
-        serde_json::from_slice(&fs::read(self.0.path(path)).unwrap()).unwrap()
-    }
-}
-
-/// The flags of all calls, and some more.
-fn flags<'a>(more: &[&'a str]) -> Vec<&'a str> {
-    let own = [
-        "openeqa",
-        "--questions",
-        "questions.json",
-        "--frames",
-        "walks",
-    ];
-    let few = ["--num-frames", "3", "--image-size", "48"];
-    [&own[..], &few, more].concat()
-}
 
 /// What an endpoint was sent.
 fn sent(mock: &MockEndpoint) -> Vec<Value> {
@@ -641,6 +574,41 @@ fn a_run_goes_on_where_it_was_stopped() {
         "{}",
         called.stderr
     );
+}
+
+#[test]
+fn a_model_that_is_gone_keeps_nobody_elses_answers_from_their_marks() {
+    let house = House::new();
+    let mock = MockEndpoint::answering(|request| {
+        if request["model"] == "gone" {
+            Answer::error(404, "model_not_found", "no such model")
+        } else {
+            Answer::text("5")
+        }
+    });
+    let base = mock.base_url();
+    let called = house.call(&[
+        "--model",
+        "gone",
+        "--model",
+        "m",
+        "--judge",
+        "j",
+        "--base-url",
+        &base,
+        "--levels",
+        "L0",
+        "--out",
+        "run",
+    ]);
+    assert_eq!(called.code, Some(2), "{called:?}");
+    assert!(called.stderr.contains("no such model"), "{}", called.stderr);
+    let summary = house.read("run/summary.json");
+    let mut rows = summary["rows"].as_array().unwrap().iter();
+    let row = rows
+        .find(|row| row["model"] == "m" && row["by"] == "all")
+        .unwrap();
+    assert_eq!((&row["value"], &row["n"]), (&json!(1.0), &json!(3)));
 }
 
 #[test]

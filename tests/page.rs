@@ -9,6 +9,8 @@ mod support;
 
 use serde_json::{Value, json};
 use support::browser::{Browser, chromium};
+use support::endpoint::{Answer, MockEndpoint};
+use support::house::House;
 use support::run::Bench;
 
 /// The model that says what it is told.
@@ -292,6 +294,136 @@ fn people_can_answer() {
     browser.go(&url);
     browser.wait("document.querySelector('#count')?.textContent === '3 of 6'");
     let images = format!("{}/images/", bench.path("pack").display());
+    let complaints = browser.complaints(&url).into_iter();
+    let strange: Vec<String> = complaints.filter(|url| !url.contains(&images)).collect();
+    assert_eq!(strange, Vec::<String>::new());
+}
+
+#[test]
+fn the_page_of_open_questions_works_in_a_browser() {
+    let Some(mut browser) = browser() else {
+        return;
+    };
+    let house = House::new();
+    let markup = "</script><img src=x onerror=alert(1)>\u{202e}dna.\u{0}";
+    let replies = [
+        json!({"question": "q1", "reply": markup}),
+        json!({"question": "q2", "condition": "L4-noise", "reply": "in the dark"}),
+        json!({"default": "a sofa"}),
+    ];
+    house.0.file(
+        "said.jsonl",
+        replies.map(|line| format!("{line}\n")).concat(),
+    );
+    let mark = |prompt: &str| {
+        if prompt.ends_with("in the dark") {
+            "1"
+        } else {
+            "5"
+        }
+    };
+    let judge = MockEndpoint::answering(move |request| {
+        let prompt = request["messages"][0]["content"]
+            .as_str()
+            .unwrap_or_default();
+        Answer::text(mark(prompt))
+    });
+    let base = judge.base_url();
+    let called = house.call(&[
+        "--model",
+        SAID,
+        "--judge",
+        "j",
+        "--judge-base-url",
+        &base,
+        "--levels",
+        "L0,L4",
+        "--out",
+        "run",
+    ]);
+    assert_eq!(called.code, Some(0), "{called:?}");
+    let url = format!("file://{}", house.0.path("run/report.html").display());
+    browser.window(1200, 900, "light");
+    browser.go(&url);
+    browser.wait("document.querySelector('#f-count')?.textContent === '3 of 3 questions'");
+    browser.shot("open.png", true);
+    let texts = "document.querySelector('#q-q1').textContent";
+    let text = browser.evaluate(texts);
+    assert!(
+        text.as_str()
+            .unwrap()
+            .contains("</script><img src=x onerror=alert(1)>⟨U+202E⟩dna.⟨U+0000⟩"),
+        "{text}"
+    );
+    assert_eq!(
+        browser.evaluate("document.querySelectorAll('.walk img').length"),
+        4
+    );
+    let count = "document.querySelector('#f-count').textContent";
+    browser.click("#f-lost");
+    assert_eq!(browser.evaluate(count), "1 of 3 questions");
+    assert_eq!(
+        browser.evaluate("document.querySelectorAll('.walk:not([hidden])').length"),
+        1
+    );
+    browser.click("#f-lost");
+    browser.choose("#f-category", "world knowledge");
+    assert_eq!(browser.evaluate(count), "1 of 3 questions");
+    browser.go("about:blank");
+    browser.go(&format!("{url}#q-q3"));
+    browser.wait("document.querySelector('#q-q3')?.open");
+    assert_eq!(browser.complaints(&url), Vec::<String>::new());
+}
+
+#[test]
+fn people_can_answer_in_their_own_words() {
+    let Some(mut browser) = browser() else {
+        return;
+    };
+    let house = House::new();
+    let called = house.call(&["--study", "study", "--levels", "L0,L4"]);
+    assert_eq!(called.code, Some(0), "{called:?}");
+    let url = format!("file://{}", house.0.path("study/study.html").display());
+    browser.window(1200, 800, "light");
+    browser.go(&url);
+    browser.wait("document.querySelector('#image')?.naturalWidth > 0");
+    let frame = "document.querySelector('#place').textContent";
+    assert!(
+        browser
+            .evaluate(frame)
+            .as_str()
+            .unwrap()
+            .starts_with("1 / ")
+    );
+    browser.click("#play");
+    browser.wait("document.querySelector('#place').textContent.startsWith('2 / ')");
+    browser.click("#play");
+    browser.evaluate("document.querySelector('#answer').value = ' by the door '");
+    browser.click("#say");
+    browser.shot("open-study.png", false);
+    browser.click("#none");
+    let place = "document.querySelector('#count').textContent";
+    assert_eq!(browser.evaluate(place), "2 of 3");
+    let saved = browser.evaluate("JSON.stringify(order.filter((i) => items[i].id in answers).map((i) => answers[items[i].id]))");
+    // What the page saves is what the program takes.
+    house.0.file("answers.json", saved.as_str().unwrap());
+    house.0.file("j.jsonl", "{\"default\": \"5\"}");
+    let called = house.call(&[
+        "--answers",
+        "human=answers.json",
+        "--judge",
+        "script:j.jsonl",
+        "--out",
+        "run",
+    ]);
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert!(
+        called.stdout.contains("2 of 2 answers scored")
+            && called.stdout.contains("1 without an answer"),
+        "{}",
+        called.stdout
+    );
+    let images = format!("{}/images/", house.0.path("study").display());
     let complaints = browser.complaints(&url).into_iter();
     let strange: Vec<String> = complaints.filter(|url| !url.contains(&images)).collect();
     assert_eq!(strange, Vec::<String>::new());

@@ -15,6 +15,7 @@ mod support;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+use darkqa_eval::score::accuracy::Subject;
 use darkqa_eval::score::bootstrap::Resamples;
 use darkqa_eval::score::choice::Mode;
 use darkqa_eval::score::cluster::Clusters;
@@ -22,6 +23,7 @@ use darkqa_eval::score::curve::curves;
 use darkqa_eval::score::estimate::Estimate;
 use darkqa_eval::score::findings::Findings;
 use darkqa_eval::score::grid::{Count, Grid};
+use darkqa_eval::score::open::{Against, Group, OpenSummary, Outcome, Scored, Topic, open_summary};
 use darkqa_eval::score::paired::Paired;
 use darkqa_eval::types::{
     Condition, DarkLevel, Degradation, EnhancerName, Family, Level, Reading, Record, Variant,
@@ -97,6 +99,101 @@ fn intervals_of_shares_hold_the_truth() {
                     "{frames} frames, p {mean}, ρ {correlation}: {held:.1} %"
                 );
                 within &= (93.0..=97.0).contains(&held);
+            }
+        }
+    }
+    println!("{table}");
+    assert!(within, "{table}");
+}
+
+/// Marks of good answers and of bad ones.
+type Marks = ([i64; 4], [i64; 4]);
+
+fn points(marks: [i64; 4]) -> f64 {
+    marks
+        .iter()
+        .map(|mark| (mark - 1) as f64 / 4.0)
+        .sum::<f64>()
+        / 4.0
+}
+
+/// Open answers about walks on lit and on dark frames: good with a rate of the walk's own; in the dark three in ten are bad in any
+/// case.
+fn walks(
+    random: &mut StdRng,
+    walks: usize,
+    (good, bad): Marks,
+    mean: f64,
+    rho: f64,
+) -> OpenSummary {
+    let (mut answers, mut topics) = (Vec::new(), Vec::new());
+    for walk in 0..walks {
+        let rate = rate(random, mean, rho);
+        for _ in 0..random.random_range(5..=13) {
+            let mut mark = |good_one: bool| {
+                let marks = if good_one { good } else { bad };
+                marks[random.random_range(0..4)]
+            };
+            let question = topics.len();
+            let (lit, dark) = (mark(true), mark(false));
+            let (is_good, kept) = (random.random_bool(rate), random.random_bool(0.7));
+            let lit = if is_good {
+                lit
+            } else {
+                bad[random.random_range(0..4)]
+            };
+            for (level, mark) in [
+                (None, lit),
+                (Some(DarkLevel::L4), if kept { lit } else { dark }),
+            ] {
+                answers.push(Scored {
+                    subject: Subject::shown(MODEL, Some(&at(level))),
+                    question,
+                    outcome: Outcome::Marked(mark),
+                    cut: false,
+                });
+            }
+            topics.push(Topic {
+                episode: walk.to_string(),
+                category: String::new(),
+                split: String::new(),
+            });
+        }
+    }
+    open_summary(&answers, &topics)
+}
+
+#[test]
+fn intervals_of_open_scores_hold_the_truth() {
+    let mut random = StdRng::seed_from_u64(11);
+    let (mut table, mut within) = (String::new(), true);
+    let polar = ([5; 4], [1; 4]);
+    let graded = ([5, 5, 4, 3], [1, 1, 2, 3]);
+    for (name, marks) in [("1 or 5", polar), ("1 to 5", graded)] {
+        for count in [16, 32, 63] {
+            for (mean, rho) in [(0.5, 0.0), (0.75, 0.1), (0.9, 0.1)] {
+                let (good, bad) = (points(marks.0), points(marks.1));
+                let truth = mean * good + (1.0 - mean) * bad;
+                let drop = -0.3 * (truth - bad);
+                let (mut scores, mut drops) = (0, 0);
+                for _ in 0..1000 {
+                    let summary = walks(&mut random, count, marks, mean, rho);
+                    let dark = Subject::shown(MODEL, Some(&at(Some(DarkLevel::L4))));
+                    let lit = Subject::shown(MODEL, Some(&at(None)));
+                    let score = summary.cell(&lit, &Group::All).unwrap().score.unwrap();
+                    let change = summary.change(&dark, Against::Lit, &Group::All).unwrap();
+                    scores += usize::from((score.low..=score.high).contains(&truth));
+                    let change = change.difference;
+                    drops += usize::from((change.low..=change.high).contains(&drop));
+                }
+                let (scores, drops) = (scores as f64 / 10.0, drops as f64 / 10.0);
+                let _ = writeln!(
+                    table,
+                    "marks {name}, {count} walks, mean {mean}, ρ {rho}: score {scores:.1} %, drop {drops:.1} %"
+                );
+                within &= [scores, drops]
+                    .iter()
+                    .all(|held| (93.0..=97.0).contains(held));
             }
         }
     }

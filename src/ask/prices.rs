@@ -124,9 +124,11 @@ mod tests {
         let input = |model| prices.of(model).map(|price| price.input);
         assert_eq!(input("gpt-4o"), Some(2.5));
         assert_eq!(input("gpt-4o-2024-08-06"), Some(2.5));
+        assert_eq!(input("gpt-4-0613"), Some(30.0));
+        assert_eq!(input("gpt-4-1106-preview"), Some(10.0));
         assert_eq!(input("openai/gpt-4o-mini-2024-07-18"), Some(0.15));
         assert_eq!(input("claude-haiku-4-5-20251001"), Some(1.0));
-        for unknown in ["gpt-4o-audio", "gpt-4", "my-model", "gpt-4o-"] {
+        for unknown in ["gpt-4o-audio", "gpt-3", "my-model", "gpt-4o-"] {
             assert_eq!(input(unknown), None, "{unknown}");
         }
         let price = prices.of("gpt-4o").unwrap();

@@ -80,7 +80,7 @@ pub enum Command {
     ///
     /// The frames of each walk are darkened, scaled and sent with upstream's prompts, byte for byte; so are the answers to the
     /// judge. The same answer to the same question is judged once. What was answered or marked is never asked again.
-    #[command(name = "openeqa")]
+    #[command(name = "openeqa", mut_args(openeqa::own))]
     OpenEqa(Box<OpenEqaArgs>),
     /// Answer as the built-in models do behind an OpenAI-compatible endpoint on this machine, for trying clients without keys
     Serve(ServeArgs),

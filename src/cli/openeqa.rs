@@ -3,7 +3,7 @@
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Arg, Args};
 
 use super::{
     BatchFileArgs, EnhancementArgs, LightArgs, ModelArgs, OutputArgs, SendingArgs, SensorArgs,
@@ -37,8 +37,8 @@ pub struct OpenEqaArgs {
     /// The longer side of the frames as sent, in pixels, or native; scaled as upstream does (OpenCV, bilinear); default: 512
     #[arg(long, value_name = "PIXELS|native", help_heading = "OpenEQA")]
     pub image_size: Option<String>,
-    /// Where light is taken: before the frames are scaled (native) or after (resized), which averages noise away; default:
-    /// native
+    /// Where light is taken: before the frames are scaled (native), as a camera would, or after (resized), where the scaling
+    /// averages no noise away; default: native
     #[arg(long, value_name = "native|resized", help_heading = "OpenEQA")]
     pub degrade: Option<String>,
     /// Which frames one state of the camera takes: a walk (episode) or each its own (frame); default: episode
@@ -61,7 +61,8 @@ pub struct OpenEqaArgs {
     /// The judge's endpoint; default: that of the models
     #[arg(long, value_name = "URL", help_heading = "Judge")]
     pub judge_base_url: Option<String>,
-    /// The variable that holds the key of the judge's endpoint, or none; default: that of the models
+    /// The variable that holds the key of the judge's endpoint, or none; default: OPENAI_API_KEY, or without
+    /// --judge-base-url that of the models
     #[arg(
         long,
         value_name = "NAME|none",
@@ -110,4 +111,32 @@ pub struct OpenEqaArgs {
     /// Output.
     #[command(flatten)]
     pub output: OutputArgs,
+}
+
+/// Flags that this command shares with an evaluation, with the defaults that they have here; those without a meaning here are not
+/// shown.
+pub(super) fn own(arg: Arg) -> Arg {
+    match arg.get_id().as_str() {
+        "constrain" | "prompts" | "max_side" => arg.hide(true),
+        "levels" => arg.help("Levels, as L0-L5 or L0,L3; default: L0,L2,L4, as in the paper's table"),
+        "variant" => arg.help(
+            "Which of the paired variants: ev (exposure drop alone), noise (with sensor noise), both; default: noise",
+        ),
+        "model" => arg.help(
+            "The model to ask, by its name at the endpoint; repeatable; built in: script:FILE",
+        ),
+        "temperature" => arg.help(
+            "Sampling temperature; default for the server's own; auto for 0, or the server's own where the model refuses any other; \
+             default: 0.2",
+        ),
+        "max_tokens" => {
+            arg.help("The most tokens of an answer, hidden reasoning included; default: 128")
+        }
+        "out" => arg.help(
+            "The run folder, which models, levels and judges may be added to; default: results/TIME-MODEL-QUESTIONS-HASH, found \
+             again by the same command",
+        ),
+        "resume" => arg.help("Go on with the run in this folder, also at another address of the same models"),
+        _ => arg,
+    }
 }

@@ -12,6 +12,7 @@ pub mod openeqa;
 pub mod page;
 pub mod products;
 pub mod questions;
+mod readable;
 pub mod realism;
 mod samples;
 mod script;

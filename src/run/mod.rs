@@ -114,7 +114,8 @@ fn ask(config: &Config, stage: Stage<'_>, progress: &Progress) -> Result<Verdict
     let mut manifest = manifest(Record::SCHEMA, identity, settings, images, kept);
     let mut store = Store::open(&folder, &manifest, moved(&config.output))?;
     store.write_questions(&listed(questions, dataset))?;
-    let wanted = Wanted::new(questions, store::read_thumbnails(&folder)?);
+    let frames = questions.iter().map(|question| &question.frame);
+    let wanted = Wanted::new(frames, store::read_thumbnails(&folder)?);
     let kept = store.records()?;
     let ledger = Ledger::new(&config.money, inputs.askers, &kept)?;
     let mut plan = Plan::new(&inputs, &kept)?;
@@ -262,7 +263,7 @@ fn show(
         (manifest.status, manifest.counts, manifest.updated) = (status, counts, now());
     }
     let output = report::leave(store, &manifest, records, config.output.show)?;
-    if let End::Stopped(error) = end {
+    if let End::Stopped(error) | End::Retired(error) = end {
         return Err(error);
     }
     Ok(Verdict { status, output })

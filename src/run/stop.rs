@@ -23,8 +23,10 @@ pub(super) enum End {
     Interrupted,
     /// The next question would have gone beyond `--max-cost`.
     Spent,
-    /// A model could not be asked any further, or too much had failed.
+    /// No model could be asked any further, or too much had failed.
     Stopped(Error),
+    /// One model could not be asked any further; the others were.
+    Retired(Error),
 }
 
 impl End {
@@ -33,7 +35,7 @@ impl End {
             _ if counts.answered == counts.trials => Status::Complete,
             Self::Through => Status::Incomplete,
             Self::Interrupted | Self::Spent => Status::Cancelled,
-            Self::Stopped(_) => Status::Stopped,
+            Self::Stopped(_) | Self::Retired(_) => Status::Stopped,
         }
     }
 }
@@ -99,7 +101,10 @@ impl Watch {
     }
 
     pub(super) fn into_end(self) -> End {
-        self.end.unwrap_or(End::Through)
+        match self.end {
+            Some(End::Stopped(error)) if !self.stopped => End::Retired(error),
+            end => end.unwrap_or(End::Through),
+        }
     }
 
     pub(super) fn interrupted(&mut self) {

@@ -5,7 +5,7 @@ use std::num::NonZeroU32;
 
 use crate::ask::{Format, Payload};
 use crate::error::Result;
-use crate::types::{Condition, Digest, FrameId, Question, Rgb, Thumbnail};
+use crate::types::{Condition, Digest, FrameId, Rgb, Thumbnail};
 
 /// Copies of so many frames are kept, so that a report stays small whatever the run's size.
 const MOST_FRAMES: usize = 48;
@@ -26,8 +26,11 @@ pub(super) struct Wanted {
 impl Wanted {
     /// Those of all frames where there are few, else of those with the lowest digests, whatever the order or shard in which
     /// they come; but for those that are there.
-    pub(super) fn new(questions: &[Question], there: Vec<Thumbnail>) -> Self {
-        let frames: BTreeSet<&FrameId> = questions.iter().map(|question| &question.frame).collect();
+    pub(super) fn new<'a>(
+        frames: impl IntoIterator<Item = &'a FrameId>,
+        there: Vec<Thumbnail>,
+    ) -> Self {
+        let frames: BTreeSet<&FrameId> = frames.into_iter().collect();
         let mut ranked: Vec<&FrameId> = frames.into_iter().collect();
         ranked.sort_by_cached_key(|frame| *Digest::of(frame.0.as_bytes()).as_bytes());
         let there = there.into_iter().map(|kept| (kept.frame, kept.condition));

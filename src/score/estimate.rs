@@ -67,7 +67,8 @@ impl Estimate {
         let c = sums.len() as f64;
         let value = (sums.iter().map(|(sum, _)| sum).sum::<f64>() / all).clamp(0.0, 1.0);
         let independent = value * (1.0 - value) / all;
-        let effect = if independent > 1e-12 && sums.len() > 1 {
+        let spread = independent > 1e-12 && sums.len() > 1;
+        let effect = if spread {
             let off = |(sum, n): &(f64, f64)| (sum - value * n) * (sum - value * n);
             let between: f64 = sums.iter().map(off).sum();
             c / (c - 1.0) * between / (all * all) / independent
@@ -76,8 +77,9 @@ impl Estimate {
             1.0 + UNKNOWN_CORRELATION * (squares / all - 1.0)
         };
         let effective = all / effect.max(1.0 / most);
-        // Where clusters spread no more than independent replies would, nothing was estimated that Student's quantile allows for.
-        let quantile = if sums.len() > 1 && effect > 1.0 {
+        // Where clusters spread no more than they are taken to at least, nothing was estimated that Student's quantile allows for.
+        let least = if spread { 1.0 / most } else { 1.0 };
+        let quantile = if sums.len() > 1 && effect > least {
             student(sums.len() - 1)
         } else {
             Z

@@ -6,6 +6,7 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use darkqa_eval::ask::bilinear::bilinear;
 use darkqa_eval::ask::{Format, Payload};
 use darkqa_eval::synthesis::exposure::expose_into;
 use darkqa_eval::synthesis::noise::{self, Term};
@@ -118,5 +119,22 @@ fn request(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, ladder, parts, request);
+/// A frame of a walk, in the size of HM3D's, as OpenEQA's protocol sends it.
+fn walk(c: &mut Criterion) {
+    let clean = frame(1080, 1920);
+    let (key, paper) = (key(), Synthesis::default());
+    let mut group = c.benchmark_group("1920x1080");
+    group.bench_function("scaled to 512", |b| {
+        b.iter(|| bilinear(black_box(&clean), 512));
+    });
+    group.bench_function("noise L4, scaled to 512, to PNG body", |b| {
+        b.iter(|| {
+            let dark = Negative::new(&clean, &key, &paper, DarkLevel::L4).develop(DarkLevel::L4);
+            Payload::encode(&bilinear(&dark, 512)?, Format::Png, None)
+        });
+    });
+    group.finish();
+}
+
+criterion_group!(benches, ladder, parts, request, walk);
 criterion_main!(benches);

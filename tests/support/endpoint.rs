@@ -193,25 +193,44 @@ fn drain(stream: &mut TcpStream) {
     let _ = stream.read_to_end(&mut Vec::new());
 }
 
-/// The endpoint: one thread a connection, answers in the order of the requests; the last answer is given again for ever.
+/// The endpoint: one thread a connection.
 pub struct MockEndpoint {
     address: SocketAddr,
     shared: Arc<Shared>,
 }
 
 struct Shared {
-    answers: Mutex<VecDeque<Answer>>,
+    answer: Box<dyn Fn(&Request) -> Answer + Send + Sync>,
     requests: Mutex<Vec<Request>>,
     closing: AtomicBool,
 }
 
 impl MockEndpoint {
-    /// Starts it on a free port of this machine.
+    /// One that answers in the order of the requests; the last answer is given again for ever.
     pub fn start(answers: impl IntoIterator<Item = Answer>) -> Self {
+        let answers: VecDeque<Answer> = answers.into_iter().collect();
+        let answers = Mutex::new(answers);
+        Self::serving(Box::new(move |_| {
+            let mut answers = answers.lock().unwrap();
+            if answers.len() > 1 {
+                answers.pop_front().unwrap()
+            } else {
+                answers[0].clone()
+            }
+        }))
+    }
+
+    /// One that looks at what it is asked.
+    pub fn answering(answer: impl Fn(&Value) -> Answer + Send + Sync + 'static) -> Self {
+        Self::serving(Box::new(move |request| answer(&request.json())))
+    }
+
+    /// Starts it on a free port of this machine.
+    fn serving(answer: Box<dyn Fn(&Request) -> Answer + Send + Sync>) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = listener.local_addr().unwrap();
         let shared = Arc::new(Shared {
-            answers: Mutex::new(answers.into_iter().collect()),
+            answer,
             requests: Mutex::new(Vec::new()),
             closing: AtomicBool::new(false),
         });
@@ -252,15 +271,8 @@ impl Shared {
     fn serve(&self, mut stream: TcpStream) -> std::io::Result<()> {
         let mut reader = BufReader::new(stream.try_clone()?);
         while let Some(request) = read(&mut reader)? {
-            self.requests.lock().unwrap().push(request);
-            let answer = {
-                let mut answers = self.answers.lock().unwrap();
-                if answers.len() > 1 {
-                    answers.pop_front().unwrap()
-                } else {
-                    answers[0].clone()
-                }
-            };
+            self.requests.lock().unwrap().push(request.clone());
+            let answer = (self.answer)(&request);
             if !answer.write(&mut stream)? {
                 break;
             }

@@ -11,6 +11,7 @@
 
 pub mod browser;
 pub mod endpoint;
+pub mod house;
 pub mod made;
 pub mod onnx;
 pub mod run;

@@ -1,17 +1,20 @@
 //! What a run of open questions leaves: [`products`], and the table at its end.
 
+mod figure;
 mod files;
 mod latex;
+mod page;
 mod rows;
 pub mod table;
 mod upstream;
 
 use crate::error::Result;
+use crate::report::products::PAGE;
 use crate::score::accuracy::Subject;
 use crate::score::llm_match::Protocol;
 use crate::score::open::{Group, OpenSummary, Outcome};
-use crate::types::QuestionId;
 use crate::types::manifest::RunManifest;
+use crate::types::{QuestionId, Thumbnail};
 
 pub use files::json;
 
@@ -26,10 +29,31 @@ pub struct OpenReport<'a> {
     pub judge: Option<&'a str>,
     /// How they were judged.
     pub protocol: Protocol,
+    /// What the run is called: its folder.
+    pub name: &'a str,
     /// The questions in the order of their file.
-    pub questions: &'a [QuestionId],
+    pub questions: &'a [Asked<'a>],
     /// The answers, each to one of the questions.
     pub answers: &'a [Told],
+    /// The small copies of images, by walk and condition.
+    pub thumbnails: &'a [Thumbnail],
+}
+
+/// An open question.
+#[derive(Debug, Clone, Copy)]
+pub struct Asked<'a> {
+    /// Its name.
+    pub id: &'a QuestionId,
+    /// The question in words.
+    pub text: &'a str,
+    /// The true answer.
+    pub answer: &'a str,
+    /// Other answers that are right, too.
+    pub extra: Option<&'a [String]>,
+    /// Its category.
+    pub category: &'a str,
+    /// Its walk.
+    pub episode: &'a str,
 }
 
 /// One answer.
@@ -45,7 +69,8 @@ pub struct Told {
     pub outcome: Outcome,
 }
 
-/// The files of a run by name: the numbers as CSV, the table as LaTeX, and answers and marks as upstream's own files.
+/// The files of a run by name: the numbers as CSV, the table as LaTeX, the figures as SVG, answers and marks as upstream's own
+/// files, and the page.
 ///
 /// # Errors
 /// Where one cannot be made.
@@ -54,7 +79,14 @@ pub fn products(report: &OpenReport<'_>) -> Result<Vec<(String, Vec<u8>)>> {
         ("summary.csv".to_owned(), files::csv(report.summary)?),
         ("tables.tex".to_owned(), latex::table(report).into_bytes()),
     ];
+    let figures = figure::figures(report)?;
+    let page = page::page(report, &figures)?;
+    made.extend(figures.into_iter().map(|figure| {
+        let name = format!("figures/{}.svg", figure.name);
+        (name, figure.svg.into_bytes())
+    }));
     made.extend(upstream::files(report)?);
+    made.push((PAGE.to_owned(), page.into_bytes()));
     Ok(made)
 }
 

@@ -7,6 +7,7 @@ use comfy_table::{CellAlignment, Table};
 
 use super::rows::Rows;
 use super::{OpenReport, coverage};
+use crate::report::products::PAGE;
 use crate::report::table::plain;
 use crate::score::accuracy::Subject;
 use crate::score::open::{Group, OpenCell};
@@ -61,6 +62,7 @@ pub fn render(report: &OpenReport<'_>, folder: &Path) -> String {
         let _ = writeln!(text, "{line}");
     }
     let _ = writeln!(text, "run: {}", folder.display());
+    let _ = writeln!(text, "report: {}", folder.join(PAGE).display());
     text
 }
 

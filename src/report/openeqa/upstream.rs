@@ -43,7 +43,7 @@ pub(super) fn files(report: &OpenReport<'_>) -> Result<Vec<(String, Vec<u8>)>> {
         };
         let stem = safe(&format!("{}-{}", subject.model, subject.condition()));
         let answers = single.iter().map(|(question, told)| Answer {
-            question_id: &report.questions[*question].0,
+            question_id: &report.questions[*question].id.0,
             answer: told.answer.as_deref(),
         });
         let answers: Vec<Answer<'_>> = answers.collect();
@@ -58,7 +58,7 @@ pub(super) fn files(report: &OpenReport<'_>) -> Result<Vec<(String, Vec<u8>)>> {
                 Outcome::Null => 0,
                 Outcome::Missing | Outcome::Unjudged | Outcome::Unmarked => return None,
             };
-            Some((&*report.questions[*question].0, mark))
+            Some((&*report.questions[*question].id.0, mark))
         });
         let marks: serde_json::Map<String, serde_json::Value> = marks
             .map(|(id, mark)| (id.to_owned(), mark.into()))

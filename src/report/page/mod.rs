@@ -19,7 +19,7 @@ use crate::types::{Listed, Record, Thumbnail};
 
 /// The parts of the page.
 const PAGE: &str = include_str!("page.html");
-const STYLE: &str = include_str!("page.css");
+pub(super) const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
 
 /// A run on the page.
@@ -139,14 +139,22 @@ fn intro(findings: &Findings<'_>) -> Vec<String> {
 fn facts(run: &Run<'_>) -> Facts {
     let manifest = run.manifest;
     let fact = |name: &str, value: String| (name.to_owned(), value);
-    let mut rows = vec![
-        fact("status", manifest.status.to_string()),
-        fact("made by", format!("darkqa-eval {}", manifest.version)),
-        fact("created", manifest.created.clone()),
-        fact("updated", manifest.updated.clone()),
-    ];
+    let mut rows = about(manifest);
     rows.extend(spent(run.records));
     rows.extend(run.cost.iter().map(|cost| fact("cost", cost.clone())));
+    rows.extend(settings(manifest));
+    Facts {
+        name: run.name.clone(),
+        rows,
+    }
+}
+
+/// What a manifest says, as rows of names and values.
+pub(super) fn manifest_facts(manifest: &RunManifest) -> Vec<(String, String)> {
+    [about(manifest), settings(manifest)].concat()
+}
+
+fn settings(manifest: &RunManifest) -> Vec<(String, String)> {
     let texts = |map: &std::collections::BTreeMap<String, serde_json::Value>| {
         let rows = map.iter().map(|(name, value)| match value {
             serde_json::Value::String(text) => (name.clone(), text.clone()),
@@ -154,18 +162,22 @@ fn facts(run: &Run<'_>) -> Facts {
         });
         rows.collect::<Vec<_>>()
     };
-    rows.extend(
-        manifest
-            .platform
-            .iter()
-            .map(|(name, value)| (name.clone(), value.clone())),
-    );
-    rows.extend(texts(&manifest.identity));
-    rows.extend(texts(&manifest.settings));
-    Facts {
-        name: run.name.clone(),
-        rows,
-    }
+    let platform = manifest.platform.iter();
+    let platform = platform.map(|(name, value)| (name.clone(), value.clone()));
+    platform
+        .chain(texts(&manifest.identity))
+        .chain(texts(&manifest.settings))
+        .collect()
+}
+
+fn about(manifest: &RunManifest) -> Vec<(String, String)> {
+    let fact = |name: &str, value: String| (name.to_owned(), value);
+    vec![
+        fact("status", manifest.status.to_string()),
+        fact("made by", format!("darkqa-eval {}", manifest.version)),
+        fact("created", manifest.created.clone()),
+        fact("updated", manifest.updated.clone()),
+    ]
 }
 
 /// What the replies took: requests, tokens, bytes, time, and who answered.

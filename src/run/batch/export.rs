@@ -36,7 +36,8 @@ fn write(config: &BatchExport, stage: Stage<'_>, progress: &Progress) -> Result<
     let mut manifest = manifest(Record::SCHEMA, stage.identity, settings, images, kept);
     let mut store = Store::open(&stage.folder, &manifest, moved(&evaluation.output))?;
     store.write_questions(&listed(stage.questions, stage.dataset))?;
-    let wanted = Wanted::new(stage.questions, read_thumbnails(&stage.folder)?);
+    let frames = stage.questions.iter().map(|question| &question.frame);
+    let wanted = Wanted::new(frames, read_thumbnails(&stage.folder)?);
     let records = store.records()?;
     let mut plan = Plan::new(&stage.inputs, &records)?;
     let out = plan.leave_out(&store.out_in_batches()?);

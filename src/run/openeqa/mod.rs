@@ -24,6 +24,7 @@ use super::drive::{Drive, Tally, unstarted};
 use super::ledger::Ledger;
 use super::progress::Progress;
 use super::stop::End;
+use super::thumbnail::Wanted;
 use super::trial::{Exposed, Slide};
 use super::{Verdict, endpoint, identity, manifest, moved, open_enhancers};
 use crate::config::{OpenEqa, OpenTask};
@@ -32,7 +33,7 @@ use crate::error::{Error, Result};
 use crate::report::forecast::money;
 use crate::store::{self, Store};
 use crate::types::manifest::RunManifest;
-use crate::types::{Kept as _, OpenRecord, TrialKey};
+use crate::types::{FrameId, Kept as _, OpenRecord, TrialKey};
 
 use marks::{Kept, Marks, predictions};
 use plan::Plan;
@@ -103,8 +104,12 @@ impl<'a> Run<'a> {
     /// Asks what is left: answers, and then marks.
     fn ask(mut self) -> Result<Verdict> {
         let mut end = self.answers()?;
-        if matches!(end, End::Through) {
-            end = self.marks()?;
+        if matches!(end, End::Through | End::Retired(_)) {
+            // What the other models have answered is marked all the same.
+            let marked = self.marks()?;
+            if matches!(end, End::Through) {
+                end = marked;
+            }
         }
         if let (End::Spent, Some(most)) = (&end, self.config.money.most) {
             tracing::warn!(
@@ -165,9 +170,12 @@ impl<'a> Run<'a> {
             pace: &self.config.pace,
             endpoint: endpoint(self.config.ask.server.as_ref()),
         };
+        let names = self.stage.episodes.iter();
+        let names: Vec<FrameId> = names.map(|episode| FrameId(episode.name.clone())).collect();
+        let wanted = Wanted::new(&names, store::read_thumbnails(self.store.folder())?);
         let cores = &self.cores;
         drive.run(tally, ledger, &mut self.store, stoppers, |out| {
-            cores.install(|| theatre.show(plan.walks, out));
+            cores.install(|| theatre.show(plan.walks, &wanted, out));
         })
     }
 

@@ -11,13 +11,14 @@ use super::stage::Stage;
 use crate::config::{OpenEqa, Show};
 use crate::dataset::openeqa::OpenQuestion;
 use crate::error::Result;
-use crate::report::openeqa::{OpenReport, Told, json as summary_json, products, table};
+use crate::report::openeqa::{Asked, OpenReport, Told, json as summary_json, products, table};
 use crate::run::stop::End;
 use crate::run::{Verdict, now};
 use crate::score::llm_match::{Protocol, mark};
 use crate::score::open::{Outcome, Scored, Topic, open_summary};
+use crate::store;
+use crate::types::TrialKey;
 use crate::types::manifest::{Counts, Status};
-use crate::types::{QuestionId, TrialKey};
 
 /// What a run was told that decides no answer by itself, and may explain what it holds.
 pub(super) fn settings(config: &OpenEqa, stage: &Stage<'_>) -> BTreeMap<String, Value> {
@@ -73,7 +74,11 @@ impl Run<'_> {
             })
             .collect();
         let summary = open_summary(&scored, &topics);
-        let ids: Vec<QuestionId> = self.stage.questions.iter().map(|q| q.id.clone()).collect();
+        let asked: Vec<Asked<'_>> = self.stage.questions.iter().map(|q| asked(q)).collect();
+        let folder = self.store.folder();
+        let thumbnails = store::read_thumbnails(folder)?;
+        let name = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
+        let name = name.file_name().unwrap_or(name.as_os_str());
         let told = predicted.into_iter().zip(outcomes);
         let told: Vec<Told> = told
             .map(|(prediction, outcome)| Told {
@@ -88,8 +93,10 @@ impl Run<'_> {
             manifest: &self.manifest,
             judge: self.stage.judge.as_ref().map(|judge| judge.model.name()),
             protocol,
-            questions: &ids,
+            name: &name.to_string_lossy(),
+            questions: &asked,
             answers: &told,
+            thumbnails: &thumbnails,
         };
         for (name, content) in products(&report)? {
             self.store.write(&name, &content)?;
@@ -97,12 +104,11 @@ impl Run<'_> {
         self.store
             .write("summary.json", summary_json(&report, None)?.as_bytes())?;
         self.store.write_manifest(&self.manifest)?;
-        let folder = self.store.folder();
         let output = match self.config.output.show {
             Show::Table => table::render(&report, folder),
             Show::Json => summary_json(&report, Some(folder))?,
         };
-        if let End::Stopped(error) = end {
+        if let End::Stopped(error) | End::Retired(error) = end {
             return Err(error);
         }
         Ok(Verdict { status, output })
@@ -138,6 +144,17 @@ fn outcome(prediction: &Prediction, kept: &Kept, protocol: Protocol) -> Outcome 
     // Read anew: alike in every table, also where an earlier version has kept it.
     let reply = record.reply.as_deref().unwrap_or_default();
     mark(reply, protocol).map_or(Outcome::Unmarked, Outcome::Marked)
+}
+
+fn asked(question: &OpenQuestion) -> Asked<'_> {
+    Asked {
+        id: &question.id,
+        text: &question.text,
+        answer: &question.answer,
+        extra: question.extra.as_deref(),
+        category: &question.category,
+        episode: &question.episode,
+    }
 }
 
 fn topic(question: &OpenQuestion) -> Topic {

@@ -22,6 +22,7 @@ use crate::enhance::Enhancer;
 use crate::error::{Error, Result};
 use crate::run::limit;
 use crate::run::recipe::Recipe;
+use crate::run::thumbnail::Wanted;
 use crate::run::trial::{Exposed, Slide};
 use crate::synthesis::{Negative, NoiseKey, expose};
 use crate::types::{Condition, Degradation, FrameId, ImageFacts, Rgb};
@@ -92,7 +93,12 @@ impl<'a> Theatre<'a> {
     }
 
     /// Makes walk after walk until all are done or nobody waits for them any more.
-    pub(super) fn show(mut self, walks: Vec<WalkPlan>, out: &Sender<Exposed<Open>>) {
+    pub(super) fn show(
+        mut self,
+        walks: Vec<WalkPlan>,
+        wanted: &Wanted,
+        out: &Sender<Exposed<Open>>,
+    ) {
         for walk in walks {
             let conditions: Vec<&Condition> = Plan::conditions(&walk).into_iter().collect();
             let made = self.walk(walk.episode, &conditions);
@@ -104,16 +110,23 @@ impl<'a> Theatre<'a> {
                 let images = condition
                     .as_ref()
                     .and_then(|condition| shown.remove(condition));
+                let images = images.unwrap_or_default();
                 // Who is shown nothing is asked all the same.
                 let problem = problem.as_ref().filter(|_| condition.is_some());
+                let frame = FrameId(self.episodes[walk.episode].name.clone());
+                let thumbnail = match (&condition, images.get(images.len() / 2)) {
+                    (Some(condition), Some(middle)) => wanted.of(&frame, condition, middle),
+                    _ => Ok(None),
+                };
                 let exposed = Exposed {
-                    slide: Slide {
-                        condition,
-                        images: images.unwrap_or_default(),
-                    },
+                    slide: Slide { condition, images },
                     trials,
                     problem: problem.cloned(),
-                    thumbnail: None,
+                    // A picture for the report is worth no failed answer.
+                    thumbnail: thumbnail.unwrap_or_else(|problem| {
+                        tracing::warn!("no small copy of {frame} is kept: {problem}");
+                        None
+                    }),
                 };
                 if out.blocking_send(exposed).is_err() {
                     return;

@@ -1,0 +1,304 @@
+//! The one HTML file of a run of open questions: [`page`]. All of it is text, SVG and small images; its script only filters.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use minijinja::value::Serde;
+use minijinja::{AutoEscape, Environment};
+use serde::Serialize;
+
+use super::rows::Rows;
+use super::{OpenReport, Told, coverage};
+use crate::error::{Error, Result};
+use crate::report::figures::Figure;
+use crate::report::page::{STYLE, manifest_facts};
+use crate::report::readable::readable;
+use crate::score::accuracy::Subject;
+use crate::score::open::{Group, Outcome};
+use crate::types::{Level, View};
+
+/// The template.
+const PAGE: &str = include_str!("page.html");
+
+#[derive(Serialize)]
+struct Page {
+    title: String,
+    alerts: Vec<String>,
+    intro: Vec<String>,
+    figures: Vec<Drawing>,
+    tables: Vec<Table>,
+    categories: BTreeSet<String>,
+    walks: Vec<Walk>,
+    facts: Vec<(String, String)>,
+    css: &'static str,
+}
+
+#[derive(Serialize)]
+struct Drawing {
+    svg: String,
+    caption: String,
+}
+
+#[derive(Serialize)]
+struct Table {
+    caption: String,
+    head: Vec<String>,
+    rows: Vec<Vec<String>>,
+}
+
+#[derive(Serialize)]
+struct Walk {
+    name: String,
+    images: Vec<Image>,
+    items: Vec<Item>,
+}
+
+#[derive(Serialize)]
+struct Image {
+    url: String,
+    caption: String,
+}
+
+#[derive(Serialize)]
+struct Item {
+    id: String,
+    text: String,
+    answer: String,
+    extra: String,
+    category: String,
+    /// The marks of models that see, in words.
+    marks: Vec<String>,
+    /// Whether some model's mark at its darkest is below that on the lit frames.
+    lost: bool,
+    rows: Vec<Row>,
+}
+
+#[derive(Serialize)]
+struct Row {
+    model: String,
+    shown: String,
+    mark: String,
+    answer: String,
+}
+
+/// The page.
+///
+/// # Errors
+/// Where the template cannot be filled.
+pub(super) fn page(report: &OpenReport<'_>, figures: &[Figure]) -> Result<String> {
+    let failed = |e: &dyn std::fmt::Display| Error::data("report.html", e);
+    let mut environment = Environment::new();
+    environment.set_auto_escape_callback(|_| AutoEscape::Html);
+    environment
+        .add_template("page", PAGE)
+        .map_err(|e| failed(&e))?;
+    let template = environment.get_template("page").map_err(|e| failed(&e))?;
+    let drawings = figures.iter().map(|figure| Drawing {
+        svg: figure.svg.clone(),
+        caption: figure.caption.clone(),
+    });
+    let asked = report.questions.iter();
+    let page = template.render(Serde(Page {
+        title: format!("OpenEQA in the dark: {}", report.name),
+        alerts: alerts(report),
+        intro: intro(report),
+        figures: drawings.collect(),
+        tables: tables(report),
+        categories: asked.map(|question| question.category.to_owned()).collect(),
+        walks: walks(report),
+        facts: manifest_facts(report.manifest),
+        css: STYLE,
+    }));
+    page.map_err(|e| failed(&e))
+}
+
+/// What must be read before any number.
+fn alerts(report: &OpenReport<'_>) -> Vec<String> {
+    let (status, counts) = (report.manifest.status, report.manifest.counts);
+    let mut alerts = Vec::new();
+    let unmarked = report.answers.iter();
+    let unmarked = unmarked.filter(|told| told.outcome == Outcome::Unmarked);
+    match unmarked.count() {
+        0 => {}
+        n => alerts.push(format!(
+            "{n} answers are not scored: the judge's replies to them have no mark."
+        )),
+    }
+    if counts.answered < counts.trials {
+        alerts.push(format!(
+            "{status}: {} of {} answers and marks there, {} failed; what is not there is not scored.",
+            counts.answered, counts.trials, counts.failed
+        ));
+    }
+    if report.judge.is_none() {
+        alerts.push("Nothing is marked: no judge was named.".to_owned());
+    }
+    alerts
+}
+
+fn intro(report: &OpenReport<'_>) -> Vec<String> {
+    let (summary, judge) = (report.summary, report.judge.unwrap_or("nobody"));
+    vec![
+        format!(
+            "{} questions about {} walks. Score: 100 · mean((mark − 1) / 4), marks from 1 to 5 by {judge}, protocol {}. Intervals are \
+             95 %, by {} ({} clusters); drops are of unrounded means, on the questions that are scored in both.",
+            report.questions.len(),
+            report
+                .questions
+                .iter()
+                .map(|q| q.episode)
+                .collect::<BTreeSet<_>>()
+                .len(),
+            report.protocol,
+            summary.unit,
+            summary.clusters
+        ),
+        coverage(report).join("; ") + ".",
+    ]
+}
+
+/// All scores, and those by split and category.
+fn tables(report: &OpenReport<'_>) -> Vec<Table> {
+    let rows = Rows::new(report.summary);
+    let levels = || rows.levels.iter().map(ToString::to_string);
+    let head = |first: &[&str]| {
+        let own = first.iter().map(ToString::to_string);
+        own.chain(levels()).collect::<Vec<_>>()
+    };
+    let groups = report.summary.groups();
+    let whole = rows.lines.keys().map(|line| {
+        let at = |level: &Level| rows.shown(rows.cell(line, *level, &Group::All));
+        let own = [line.model.to_owned(), line.light()];
+        own.into_iter().chain(rows.levels.iter().map(at)).collect()
+    });
+    let blind = rows.blind.iter().map(|subject| {
+        let cell = report.summary.cell(subject, &Group::All);
+        vec![
+            subject.model.clone(),
+            "without images".to_owned(),
+            rows.shown(cell),
+        ]
+    });
+    let mut tables = vec![Table {
+        caption: "Score in % ± half of the 95 % interval (difference from L0)".to_owned(),
+        head: head(&["model", "light"]),
+        rows: whole.chain(blind).collect(),
+    }];
+    let parts: Vec<&&Group> = groups
+        .iter()
+        .filter(|group| ***group != Group::All)
+        .collect();
+    for line in rows.lines.keys().filter(|_| !parts.is_empty()) {
+        let by = parts.iter().map(|group| {
+            let at = |level: &Level| rows.shown(rows.cell(line, *level, group));
+            let name = std::iter::once(group.name().to_owned());
+            name.chain(rows.levels.iter().map(at)).collect()
+        });
+        tables.push(Table {
+            caption: format!("{}, {}", line.model, line.light()),
+            head: head(&["split or category"]),
+            rows: by.collect(),
+        });
+    }
+    tables
+}
+
+fn walks(report: &OpenReport<'_>) -> Vec<Walk> {
+    let mut told = BTreeMap::<usize, Vec<&Told>>::new();
+    for one in report.answers {
+        told.entry(one.question).or_default().push(one);
+    }
+    let mut walks: Vec<Walk> = Vec::new();
+    let mut places = BTreeMap::new();
+    for (index, question) in report.questions.iter().enumerate() {
+        let place = *places.entry(question.episode).or_insert_with(|| {
+            walks.push(Walk {
+                name: question.episode.to_owned(),
+                images: images(report, question.episode),
+                items: Vec::new(),
+            });
+            walks.len() - 1
+        });
+        let own = told.remove(&index).unwrap_or_default();
+        walks[place].items.push(Item {
+            id: question.id.0.clone(),
+            text: readable(question.text),
+            answer: readable(question.answer),
+            extra: question
+                .extra
+                .map_or(String::new(), |extra| readable(&extra.join("; "))),
+            category: question.category.to_owned(),
+            marks: marks(&own),
+            lost: lost(&own),
+            rows: own.into_iter().map(row).collect(),
+        });
+    }
+    walks
+}
+
+fn images(report: &OpenReport<'_>, episode: &str) -> Vec<Image> {
+    let own = report.thumbnails.iter();
+    let mut own: Vec<_> = own
+        .filter(|thumbnail| thumbnail.frame.0 == episode)
+        .collect();
+    own.sort_by_key(|thumbnail| &thumbnail.condition);
+    let image = |thumbnail: &&crate::types::Thumbnail| Image {
+        url: thumbnail.small.clone(),
+        caption: format!(
+            "{}, the frame in the middle of the walk",
+            thumbnail.condition
+        ),
+    };
+    own.iter().map(image).collect()
+}
+
+fn row(told: &Told) -> Row {
+    Row {
+        model: told.subject.model.clone(),
+        shown: told.subject.condition(),
+        mark: match told.outcome {
+            Outcome::Marked(mark) => mark.to_string(),
+            Outcome::Null => "0 (no answer)".to_owned(),
+            Outcome::Unmarked => "none in the judge's reply".to_owned(),
+            Outcome::Unjudged => "not judged".to_owned(),
+            Outcome::Missing => "–".to_owned(),
+        },
+        answer: match (&told.answer, told.outcome) {
+            (Some(answer), _) => readable(answer),
+            (None, Outcome::Missing) => "not answered".to_owned(),
+            (None, _) => "none".to_owned(),
+        },
+    }
+}
+
+/// `gpt-4o L0 5 · L2-noise 4`, a text for each model that sees.
+fn marks(told: &[&Told]) -> Vec<String> {
+    let mut by_model = BTreeMap::<&str, Vec<String>>::new();
+    for one in told {
+        if one.subject.view == Some(View::Image) {
+            let mark = match one.outcome {
+                Outcome::Marked(mark) => mark.to_string(),
+                Outcome::Null => "0".to_owned(),
+                _ => "–".to_owned(),
+            };
+            let model = by_model.entry(&one.subject.model).or_default();
+            model.push(format!("{} {mark}", one.subject.condition()));
+        }
+    }
+    let models = by_model.into_iter();
+    models
+        .map(|(model, marks)| format!("{model}: {}", marks.join(" · ")))
+        .collect()
+}
+
+fn lost(told: &[&Told]) -> bool {
+    let points = |subject: &Subject| {
+        let mut own = told.iter().filter(|one| one.subject == *subject);
+        own.find_map(|one| one.outcome.points())
+    };
+    told.iter().any(|one| {
+        let subject = &one.subject;
+        let lit = Subject::seeing(&subject.model, Level::L0, subject.variant, None);
+        let pair = points(&lit).zip(one.outcome.points());
+        subject.level.is_some() && pair.is_some_and(|(lit, here)| here < lit)
+    })
+}
