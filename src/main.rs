@@ -7,12 +7,13 @@ use clap::Parser;
 use clap::error::ErrorKind;
 use darkqa_eval::cli::{BatchCommand, Cli, Command, EvaluateArgs, StudyCommand};
 use darkqa_eval::config::{
-    self, BatchExport, BatchImport, Config, Enhance, Export, Import, MakeRooms, OpenEqa, Questions,
-    Realism, Report, Serve, ShowItem, StudyPack, StudyRead, Synthesize,
+    self, BatchExport, BatchImport, Config, Enhance, Export, Import, MakeRooms, Merge, OpenEqa,
+    Questions, Realism, Report, Serve, ShowItem, StudyPack, StudyRead, Synthesize,
 };
 use darkqa_eval::enhance;
 use darkqa_eval::run::export::export;
 use darkqa_eval::run::import::import;
+use darkqa_eval::run::merge::merge;
 use darkqa_eval::run::openeqa::openeqa;
 use darkqa_eval::run::progress::{Loudness, Progress};
 use darkqa_eval::run::questions::questions;
@@ -98,6 +99,7 @@ enum Task {
     BatchExport(Box<BatchExport>),
     BatchImport(BatchImport),
     Report(Report),
+    Merge(Merge),
     Show(Box<ShowItem>),
     StudyPack(Box<StudyPack>),
     StudyRead(StudyRead),
@@ -161,6 +163,7 @@ impl Job {
             Some(Command::Study(StudyCommand::Read(said))) => {
                 (false, Task::StudyRead(StudyRead::resolve(said)?))
             }
+            Some(Command::Merge(said)) => (false, Task::Merge(Merge::resolve(said))),
             Some(Command::Report(said)) => (false, Task::Report(Report::resolve(said))),
             Some(Command::Questions(said)) => {
                 let quiet = said.quiet;
@@ -193,6 +196,7 @@ fn carry_out(task: Task, progress: &Progress) -> anyhow::Result<ExitCode> {
         Task::StudyPack(config) => study::pack(*config, progress)?,
         Task::StudyRead(config) => study::read(&config)?,
         Task::Show(config) => show(*config)?,
+        Task::Merge(config) => merge(&config)?,
         Task::Report(config) => run::report::report(&config)?,
     };
     let written = std::io::stdout().lock().write_all(output.as_bytes());

@@ -8,6 +8,7 @@ mod batch;
 mod enhance;
 mod export;
 mod import;
+mod merge;
 mod openeqa;
 mod questions;
 mod report;
@@ -27,6 +28,7 @@ pub use batch::{BatchCommand, BatchExportArgs, BatchFileArgs, BatchImportArgs};
 pub use enhance::EnhanceArgs;
 pub use export::ExportArgs;
 pub use import::ImportArgs;
+pub use merge::MergeArgs;
 pub use openeqa::OpenEqaArgs;
 pub use questions::QuestionsArgs;
 pub use report::ReportArgs;
@@ -86,6 +88,8 @@ pub enum Command {
     Serve(ServeArgs),
     /// Show what runs hold, from their records alone: tables, figures and one HTML file; several runs are compared
     Report(ReportArgs),
+    /// Put the shards of an evaluation together as the one run that they are
+    Merge(MergeArgs),
     /// Make the images that one question was asked with again, bit for bit, and prove it by their digests
     Show(ShowArgs),
     /// Let people answer what the models were asked: write a page for them, take their answers over as a model's
@@ -214,9 +218,25 @@ pub struct EvaluateArgs {
     /// Sending.
     #[command(flatten)]
     pub sending: SendingArgs,
+    /// Scale.
+    #[command(flatten)]
+    pub scale: ScaleArgs,
     /// Output.
     #[command(flatten)]
     pub output: OutputArgs,
+}
+
+/// How it is spread over processes.
+#[derive(Debug, Default, Args)]
+#[command(next_help_heading = "Scale")]
+pub struct ScaleArgs {
+    /// Do one of N parts, by frames: I/N; auto/N or auto as the batch system says (Slurm arrays, indexed Kubernetes jobs);
+    /// none for everything. --rpm, --tpm and --max-cost are for all parts together; default: auto in a Slurm array, else none
+    #[arg(long, value_name = "I/N|auto/N|auto|none")]
+    pub shard: Option<String>,
+    /// Say at the end where the time went, what binds and what would help
+    #[arg(long)]
+    pub timings: bool,
 }
 
 /// Which images and questions.

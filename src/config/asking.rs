@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::{env, fs};
 
-use super::{parsed, seconds};
+use super::{Shard, parsed, seconds};
 use crate::ask::{
     Access, Authorities, BaseUrl, Bounds, Constrain, KeyHeader, Parameters, Quota, Secret, Sending,
     Temperature, TokenField,
@@ -59,7 +59,7 @@ pub struct Server {
     pub sending: Sending,
 }
 
-pub(super) fn ask(said: ModelArgs, sending: &SendingArgs) -> Result<Ask> {
+pub(super) fn ask(said: ModelArgs, sending: &SendingArgs, shard: Shard) -> Result<Ask> {
     let names = |flag: &'static str, names: &[String]| -> Result<Vec<ModelName>> {
         names
             .iter()
@@ -93,7 +93,7 @@ pub(super) fn ask(said: ModelArgs, sending: &SendingArgs) -> Result<Ask> {
         view: if said.blind { View::Blind } else { View::Image },
         blind_models,
         server: if remote {
-            Some(server(&said, sending)?)
+            Some(server(&said, sending, shard)?)
         } else {
             None
         },
@@ -118,7 +118,8 @@ impl FromStr for ModelName {
     }
 }
 
-fn server(said: &ModelArgs, sending: &SendingArgs) -> Result<Server> {
+/// The endpoint; what may be sent to it in a minute is this part's share.
+fn server(said: &ModelArgs, sending: &SendingArgs, shard: Shard) -> Result<Server> {
     let base = said
         .base_url
         .clone()
@@ -143,8 +144,8 @@ fn server(said: &ModelArgs, sending: &SendingArgs) -> Result<Server> {
             max_wait: seconds("--max-wait", sending.max_wait)?.unwrap_or(defaults.max_wait),
             concurrency: concurrency(sending)?,
             quota: Quota {
-                requests: sending.rpm,
-                tokens: sending.tpm,
+                requests: sending.rpm.map(|rpm| shard.share(rpm)),
+                tokens: sending.tpm.map(|tpm| shard.share(tpm)),
             },
             ..defaults
         },

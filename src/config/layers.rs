@@ -12,8 +12,8 @@ use clap::{Arg, ArgAction, CommandFactory, Parser};
 use toml::{Table, Value};
 
 use crate::cli::{
-    Cli, DataArgs, EnhancementArgs, EvaluateArgs, LightArgs, ModelArgs, OutputArgs, SendingArgs,
-    SensorArgs,
+    Cli, DataArgs, EnhancementArgs, EvaluateArgs, LightArgs, ModelArgs, OutputArgs, ScaleArgs,
+    SendingArgs, SensorArgs,
 };
 use crate::error::{Error, Result};
 
@@ -312,6 +312,7 @@ fn or(first: Layer, second: Layer) -> Layer {
             },
             first.sending, second.sending, off
         ),
+        scale: first_set!(ScaleArgs { shard; ; timings }, first.scale, second.scale, off),
         output: first_set!(OutputArgs { out, resume, config; ; json, quiet }, first.output, output, off),
     };
     below.extend(off);

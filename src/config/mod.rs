@@ -7,6 +7,7 @@ mod export;
 mod import;
 mod layers;
 mod light;
+mod merge;
 mod money;
 mod openeqa;
 mod questions;
@@ -14,6 +15,7 @@ mod realism;
 mod report;
 mod rooms;
 mod serve;
+mod shard;
 mod show;
 mod showing;
 mod study;
@@ -32,6 +34,7 @@ pub use export::{Export, Form};
 pub use import::Import;
 pub use layers::{merge, one_line};
 pub use light::{Light, Sensor};
+pub use merge::{Merge, Missing};
 pub use money::Money;
 pub use openeqa::{CameraOf, Chosen, Darkened, Given, Judge, OpenEqa, OpenTask, Walk};
 pub use questions::{Questions, Strangers};
@@ -39,6 +42,7 @@ pub use realism::{PairPlace, Realism};
 pub use report::{Readings, Report};
 pub use rooms::MakeRooms;
 pub use serve::Serve;
+pub use shard::Shard;
 pub use show::{Again, Pictures, Recipe, ShowItem};
 pub use showing::{Order, Rotations, Showing};
 pub use study::{StudyPack, StudyRead};
@@ -76,6 +80,10 @@ pub struct Config {
     pub money: Money,
     /// Whether anything is sent.
     pub earnest: Earnest,
+    /// Which part of it this is.
+    pub shard: Shard,
+    /// Whether it is said where the time went.
+    pub timings: Timing,
     /// What is left behind.
     pub output: Output,
     /// What decides the images, as it was said.
@@ -143,6 +151,15 @@ pub enum Earnest {
     Estimate,
 }
 
+/// Whether it is said where the time went.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Timing {
+    /// It is.
+    Told,
+    /// It is not.
+    Kept,
+}
+
 /// Where the run is kept.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum RunPlace {
@@ -152,6 +169,18 @@ pub enum RunPlace {
     Named(PathBuf),
     /// This folder, which must hold a run.
     Resume(PathBuf),
+}
+
+impl RunPlace {
+    /// Where a part of a run is kept: in a folder of its own within that of the whole.
+    #[must_use]
+    pub fn of(&self, shard: Shard) -> Self {
+        match self {
+            Self::Named(path) if shard.is_part() => Self::Named(path.join(shard.folder())),
+            Self::Resume(path) if shard.is_part() => Self::Resume(path.join(shard.folder())),
+            place => place.clone(),
+        }
+    }
 }
 
 /// What standard output gets.
@@ -191,17 +220,24 @@ impl Config {
         if said.model.model.is_empty() && said.model.blind_model.is_empty() {
             return Err(nameless(&said.output));
         }
+        let shard = Shard::said(said.scale.shard.as_deref(), |name| env::var(name).ok())?;
         let light = Light::resolve(&said.light, &said.sensor)?;
         Ok(Self {
+            shard,
+            timings: if said.scale.timings {
+                Timing::Told
+            } else {
+                Timing::Kept
+            },
             recipe: show::recipe(&said)?,
             showing: Showing::said(&said.data, light.sensor.seed),
             data: data(said.data)?,
             light,
             enhancement: enhancement(said.enhancement)?,
-            ask: asking::ask(said.model, &said.sending)?,
+            ask: asking::ask(said.model, &said.sending, shard)?,
             images: images(&said.sending)?,
             pace: pace(&said.sending)?,
-            money: Money::said(&said.sending)?,
+            money: Money::said(&said.sending, shard)?,
             earnest: if said.sending.dry_run {
                 Earnest::Estimate
             } else {

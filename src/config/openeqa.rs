@@ -8,7 +8,7 @@ use std::str::FromStr;
 use super::asking::ask;
 use super::layers::merge;
 use super::{
-    Ask, BatchFiles, Enhancement, Images, Light, ModelName, Money, Output, Pace, Server,
+    Ask, BatchFiles, Enhancement, Images, Light, ModelName, Money, Output, Pace, Server, Shard,
     enhancement, images, most_pixels, nameless, output, pace, parsed,
 };
 use crate::ask::Parameters;
@@ -222,7 +222,7 @@ impl OpenEqa {
             max_tokens: shared.model.max_tokens.or(Some(ANSWER_TOKENS)),
             ..shared.model
         };
-        let mut ask = ask(model, &shared.sending)?;
+        let mut ask = ask(model, &shared.sending, Shard::WHOLE)?;
         ask.parameters.seed = seed;
         ask.models
             .iter()
@@ -252,7 +252,7 @@ impl OpenEqa {
             protocol: parsed("--protocol", said.protocol.as_deref())?.unwrap_or(Protocol::Upstream),
             images: images(&shared.sending)?,
             pace: pace(&shared.sending)?,
-            money: Money::said(&shared.sending)?,
+            money: Money::said(&shared.sending, Shard::WHOLE)?,
             task,
             output: output(shared.output),
         })
@@ -312,6 +312,7 @@ impl JudgeArgs {
                 ..ModelArgs::default()
             },
             sending,
+            Shard::WHOLE,
         )
         .map_err(|e| e.at("the judge"))?;
         let Some(model) = asked.models.into_iter().next() else {

@@ -74,9 +74,14 @@ impl<'a> Row<'a> {
 /// The summary as CSV: `model, view, level, variant, enhancer, family, mode, n, right, unparsed, failed, value, low,
 /// high`, and `always` where questions were asked more than once; a cell is empty where there is nothing to say.
 pub fn csv(summary: &Summary) -> Result<Vec<u8>> {
+    as_csv(rows(summary))
+}
+
+/// Rows of a summary as CSV.
+pub(super) fn as_csv(rows: impl Iterator<Item = impl Serialize>) -> Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let unwritten = |e: &dyn std::fmt::Display| Error::data("summary.csv", e);
-    for row in rows(summary) {
+    for row in rows {
         writer.serialize(row).map_err(|e| unwritten(&e))?;
     }
     writer.into_inner().map_err(|e| unwritten(&e))
@@ -127,7 +132,8 @@ pub fn json(summary: &Summary, run: &RunManifest, folder: Option<&Path>) -> Resu
     })
 }
 
-fn written(document: &Document<'_>) -> Result<String> {
+/// A summary as JSON.
+pub(super) fn written(document: &impl Serialize) -> Result<String> {
     serde_json::to_string_pretty(document)
         .map(|text| text + "\n")
         .map_err(|e| Error::data("summary.json", e))

@@ -20,4 +20,5 @@ pub mod sheet;
 pub mod study;
 pub mod subject;
 pub mod table;
+mod template;
 pub mod verdicts;

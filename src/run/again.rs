@@ -1,6 +1,7 @@
 //! The images of a run, made again: [`Album`].
 
 use std::path::Path;
+use std::sync::Arc;
 
 use super::darkroom::{Darkroom, Desk};
 use super::gallery::{Gallery, look_at};
@@ -93,6 +94,7 @@ impl Album {
             recipe: &self.recipe,
             enhancers: std::mem::take(&mut self.enhancers),
             limit: None,
+            timings: Arc::default(),
         };
         let image = darkroom.image(desk, condition);
         self.enhancers = darkroom.enhancers;

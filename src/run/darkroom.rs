@@ -1,18 +1,20 @@
-//! The darkroom: one thread that makes the images, in the order of the plan.
+//! The darkroom: it makes the images, frame by frame in the order of the plan.
 //!
 //! Each is loaded, darkened, mended and encoded once for all the questions about it. The channel is bounded, so that
-//! memory holds the images in flight and a few more.
+//! memory holds the images in flight, one or two more, and the frame that each core is at.
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
+use rayon::ThreadPool;
 use tokio::sync::mpsc::Sender;
 
 use super::gallery::Gallery;
 use super::plan::{Choice, FramePlan, Shot};
 use super::recipe::Recipe;
 use super::thumbnail::Wanted;
+use super::timings::{Step, Timings};
 use super::trial::{Exposed, Slide};
 use crate::ask::{Format, ImageLimit, Payload};
 use crate::dataset::{Dataset, Picture};
@@ -30,6 +32,7 @@ pub(super) struct Darkroom<'a> {
     pub(super) enhancers: Vec<Enhancer>,
     /// What an image may be; `None` where nobody far away looks at it.
     pub(super) limit: Option<ImageLimit>,
+    pub(super) timings: Arc<Timings>,
 }
 
 impl Darkroom<'_> {
@@ -91,9 +94,41 @@ impl Darkroom<'_> {
     }
 
     /// Makes the images of all frames until they are done or nobody waits for them any more.
+    ///
+    /// Each of `benches`, which has one thread, takes frame after frame. Where there is an enhancer, which has threads of its own and
+    /// takes one image at a time, or there are few frames, all `cores` work on one frame, row by row.
     pub(super) fn develop(
         mut self,
         frames: Vec<FramePlan>,
+        wanted: &Wanted,
+        (cores, benches): (&ThreadPool, &[ThreadPool]),
+        out: &Sender<Exposed<Choice>>,
+    ) {
+        if !self.enhancers.is_empty() || frames.len() < 2 * benches.len() {
+            return cores.install(|| self.one_by_one(frames.into_iter(), wanted, out));
+        }
+        let frames = Mutex::new(frames.into_iter());
+        let next = || frames.lock().unwrap_or_else(PoisonError::into_inner).next();
+        std::thread::scope(|scope| {
+            for bench in benches {
+                let mut own = Darkroom {
+                    dataset: self.dataset,
+                    pictures: self.pictures,
+                    recipe: self.recipe,
+                    enhancers: Vec::new(),
+                    limit: self.limit,
+                    timings: Arc::clone(&self.timings),
+                };
+                scope.spawn(move || {
+                    bench.install(|| own.one_by_one(std::iter::from_fn(next), wanted, out));
+                });
+            }
+        });
+    }
+
+    fn one_by_one(
+        &mut self,
+        frames: impl Iterator<Item = FramePlan>,
         wanted: &Wanted,
         out: &Sender<Exposed<Choice>>,
     ) {
@@ -114,7 +149,9 @@ impl Darkroom<'_> {
                     problem,
                     thumbnail,
                 };
-                if out.blocking_send(exposed).is_err() {
+                let timings = Arc::clone(&self.timings);
+                let gone = timings.time(Step::Waiting, || out.blocking_send(exposed).is_err());
+                if gone {
                     return;
                 }
             }
@@ -140,6 +177,9 @@ impl Darkroom<'_> {
         let Recipe {
             format, max_side, ..
         } = *self.recipe;
+        let timings = Arc::clone(&self.timings);
+        let read = || desk.picture(self.dataset, self.pictures).map(drop);
+        timings.time(Step::Decode, read)?;
         let picture = desk.picture(self.dataset, self.pictures)?;
         // The file itself, where it is the very image that would be encoded.
         if *condition == Condition::raw(Degradation::None)
@@ -150,7 +190,9 @@ impl Darkroom<'_> {
             return self.within(payload);
         }
         let pixels = self.pixels(desk, condition)?;
-        self.within(Payload::encode(&pixels, format, max_side)?)
+        let encode = || Payload::encode(&pixels, format, max_side);
+        let payload = timings.time(Step::Encode, encode)?;
+        self.within(payload)
     }
 
     fn within(&self, payload: Payload) -> Result<Arc<Payload>> {
@@ -166,8 +208,14 @@ impl Darkroom<'_> {
         desk: &'d mut Desk,
         condition: &Condition,
     ) -> Result<Cow<'d, Rgb>> {
-        desk.picture(self.dataset, self.pictures)?;
-        let dark = desk.dark(self.recipe, condition.degradation)?;
+        let timings = &self.timings;
+        timings.time(Step::Decode, || {
+            desk.picture(self.dataset, self.pictures)?;
+            desk.decode()
+        })?;
+        let dark = timings.time(Step::Darken, || {
+            desk.dark(self.recipe, condition.degradation)
+        })?;
         let Some(name) = &condition.enhancer else {
             return Ok(Cow::Borrowed(dark));
         };
@@ -175,7 +223,8 @@ impl Darkroom<'_> {
         let enhancer = enhancers.find(|enhancer| enhancer.name() == name);
         let enhancer =
             enhancer.ok_or_else(|| Error::data(condition, "this enhancer is not open"))?;
-        enhancer.enhance(dark).map(Cow::Owned)
+        let mended = timings.time(Step::Enhance, || enhancer.enhance(dark));
+        mended.map(Cow::Owned)
     }
 }
 
@@ -229,19 +278,33 @@ impl Desk {
         })
     }
 
-    /// The frame in one degradation; the last one is kept for the enhancers that follow.
-    fn dark(&mut self, recipe: &Recipe, degradation: Degradation) -> Result<&Rgb> {
+    /// The frame as it lies in the data.
+    fn decode(&mut self) -> Result<&Rgb> {
         let Self {
             frame,
             picture,
             clean,
-            negative,
-            dark,
+            ..
         } = self;
-        let clean = once(clean, || match picture {
+        once(clean, || match picture {
             Some(picture) => picture.decode(),
             None => Err(Error::data(&*frame, "the frame was not read")),
-        })?;
+        })
+    }
+
+    /// The frame in one degradation; the last one is kept for the enhancers that follow.
+    fn dark(&mut self, recipe: &Recipe, degradation: Degradation) -> Result<&Rgb> {
+        self.decode()?;
+        let Self {
+            frame,
+            clean,
+            negative,
+            dark,
+            ..
+        } = self;
+        let Some(clean) = clean else {
+            return Err(Error::data(&*frame, "the frame was not read"));
+        };
         if dark.as_ref().is_some_and(|(made, _)| *made != degradation) {
             *dark = None;
         }

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 use std::sync::Arc;
+use std::time::Instant;
 
 use tokio::runtime;
 use tokio::sync::mpsc::{self, Receiver, Sender};
@@ -13,6 +14,7 @@ use super::ledger::Ledger;
 use super::progress::{Bar, Progress};
 use super::record::Entry as _;
 use super::stop::{End, Watch};
+use super::timings::{Step, Timings};
 use super::trial::{Exposed, Item, Slide, Trial};
 use crate::ask::{AskError, Call, Reach};
 use crate::config::Pace;
@@ -31,6 +33,7 @@ pub(super) struct Drive<'a> {
     pub(super) pace: &'a Pace,
     /// Where the models are asked, for messages.
     pub(super) endpoint: String,
+    pub(super) timings: &'a Timings,
 }
 
 /// How far a run has come.
@@ -176,11 +179,23 @@ impl<I: Item> Intake<'_, I> {
             if through || self.watch.stopped() {
                 break;
             }
+            let state = match asking.len() {
+                0 => Some(Step::Idle),
+                n if n >= self.drive.width() => Some(Step::Full),
+                _ => None,
+            };
+            let since = Instant::now();
             tokio::select! {
                 () = interrupt.next() => self.watch.interrupted(),
-                Some(done) = asking.join_next() => self.keep(done)?,
+                Some(done) = asking.join_next() => {
+                    self.waited(state, since);
+                    self.keep(done)?;
+                }
                 exposed = slides.recv(), if more && waiting.is_empty() => match exposed {
-                    Some(exposed) => waiting.extend(self.accept(exposed)?),
+                    Some(exposed) => {
+                        self.waited(state, since);
+                        waiting.extend(self.accept(exposed)?);
+                    }
                     None => more = false,
                 },
             }
@@ -193,6 +208,13 @@ impl<I: Item> Intake<'_, I> {
         }
         self.store.sync()?;
         Ok(self.watch.into_end())
+    }
+
+    /// Takes note of how long it waited, and in what state.
+    fn waited(&self, state: Option<Step>, since: Instant) {
+        if let Some(state) = state {
+            self.drive.timings.add(state, since.elapsed());
+        }
     }
 
     /// Waits for the requests on the wire, for they may be paid for already; a second interrupt gives them up. What

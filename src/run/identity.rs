@@ -5,13 +5,14 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
+use super::merge::SHARD;
 use super::plan::Inputs;
 use crate::ask::Constrain;
 use crate::config::{Ask, Config, Enhancement, Order, Pace, Rotations, Showing};
 use crate::dataset::Dataset;
 use crate::enhance::{ModelFile, Tiling};
 use crate::error::{Error, Result};
-use crate::synthesis::{VERSION, exposure};
+use crate::synthesis::{Synthesis, VERSION, exposure};
 use crate::types::{Digest, View};
 
 /// Flags and contents that decide the replies.
@@ -36,10 +37,12 @@ pub(super) fn enhancers(models: &[PathBuf]) -> Result<Vec<ModelFile>> {
 
 /// What decides the replies. A run is only resumed by a command with the same.
 pub(super) fn identity(config: &Config, dataset: &Dataset, inputs: &Inputs<'_>) -> Identity {
+    // Of a set, so that the digest of a whole run follows from those of its shards.
     let images = inputs
         .pictures
         .iter()
-        .flat_map(|(frame, pictured)| [frame.0.as_bytes(), pictured.digest.as_bytes()]);
+        .map(|(frame, pictured)| [frame.0.as_bytes(), pictured.digest.as_bytes()])
+        .map(Digest::of_parts);
     let (ask, synthesis) = (&config.ask, &config.light.sensor.synthesis);
     let names = |view| -> BTreeSet<&str> {
         inputs
@@ -69,22 +72,13 @@ pub(super) fn identity(config: &Config, dataset: &Dataset, inputs: &Inputs<'_>) 
     let fields = [
         (
             "--data",
-            json!({"name": dataset.name(), "images": Digest::of_parts(images)}),
+            json!({"name": dataset.name(), "images": Digest::of_set(images)}),
         ),
         ("--questions", json!(dataset.questions_digest())),
         ("--families", json!(config.data.families)),
         ("--limit", json!(config.data.limit)),
         ("--levels", json!(levels)),
         ("--variant", json!(config.light.variants.to_string())),
-        ("--seed", json!(config.light.sensor.seed)),
-        ("--profile or --amplify", json!(synthesis.amplify)),
-        ("--profile or --tone", json!(synthesis.tone)),
-        ("--draws", json!(synthesis.draws)),
-        ("--profile or --coupling", json!(synthesis.coupling)),
-        (
-            "--camera, --gain, --ratio or --fixed",
-            json!(synthesis.camera),
-        ),
         ("--llie", json!(enhancers)),
         ("--llie-on", json!(config.enhancement.on.to_string())),
         ("--model", json!(names(View::Image))),
@@ -108,7 +102,6 @@ pub(super) fn identity(config: &Config, dataset: &Dataset, inputs: &Inputs<'_>) 
         ("--reasoning-effort", json!(ask.parameters.reasoning_effort)),
         ("--detail", json!(ask.parameters.detail)),
         ("what the models answer by", json!(models)),
-        ("synthesis", json!([exposure::VERSION, VERSION])),
     ];
     // Tiles give what the whole image does, or all but one sample in a thousand of it.
     let tiling = config.enhancement.tiling;
@@ -118,14 +111,34 @@ pub(super) fn identity(config: &Config, dataset: &Dataset, inputs: &Inputs<'_>) 
     let constrain = ask.parameters.constrain;
     let constrain =
         (constrain != Constrain::None).then(|| ("--constrain", json!(constrain.to_string())));
+    let shard = config.shard;
+    let shard = shard.is_part().then(|| (SHARD, json!(shard.to_string())));
     fields
         .into_iter()
+        .chain(light(config.light.sensor.seed, synthesis))
         .chain(tiling)
         .chain(side)
         .chain(constrain)
         .chain(showing(config.showing))
+        .chain(shard)
         .map(|(field, value)| (field.to_owned(), value))
         .collect()
+}
+
+/// What decides how frames are darkened.
+pub(super) fn light(seed: u64, synthesis: &Synthesis) -> [(&'static str, Value); 7] {
+    [
+        ("--seed", json!(seed)),
+        ("--profile or --amplify", json!(synthesis.amplify)),
+        ("--profile or --tone", json!(synthesis.tone)),
+        ("--draws", json!(synthesis.draws)),
+        ("--profile or --coupling", json!(synthesis.coupling)),
+        (
+            "--camera, --gain, --ratio or --fixed",
+            json!(synthesis.camera),
+        ),
+        ("synthesis", json!([exposure::VERSION, VERSION])),
+    ]
 }
 
 /// How choices are shown and how often, where that is not the usual way.

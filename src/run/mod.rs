@@ -19,6 +19,7 @@ mod inputs;
 mod interface;
 mod interrupt;
 mod ledger;
+pub mod merge;
 mod observer;
 pub mod openeqa;
 mod plan;
@@ -37,19 +38,22 @@ mod stop;
 pub mod study;
 pub mod synthesize;
 mod thumbnail;
+mod timings;
 mod trial;
 mod written;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
 
 use jiff::Timestamp;
-use rayon::ThreadPoolBuilder;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde_json::Value;
 
 use crate::ask::ImageLimit;
 use crate::config::{
-    Ask, Config, Earnest, Enhancement, Images, Output, Recipe, RunPlace, Server, Show,
+    Ask, Config, Earnest, Enhancement, Images, Output, Recipe, RunPlace, Server, Show, Timing,
 };
 use crate::dataset::Dataset;
 use crate::enhance::{Enhancer, ModelFile, Runtime};
@@ -69,6 +73,7 @@ use progress::Progress;
 use stage::Stage;
 use stop::End;
 use thumbnail::Wanted;
+use timings::Timings;
 
 /// The folder of runs without a name of their own.
 const RESULTS: &str = "results";
@@ -139,10 +144,10 @@ fn ask(config: &Config, stage: Stage<'_>, progress: &Progress) -> Result<Verdict
                 trials.len()
             ));
         }
-        let cores = ThreadPoolBuilder::new()
-            .num_threads(config.enhancement.threads.map_or(0, usize::from))
-            .build()
-            .map_err(|e| unstarted(&e))?;
+        let cores = pool(config.enhancement.threads.map_or(0, usize::from))?;
+        let threads = cores.current_num_threads();
+        let benches: Vec<ThreadPool> = (0..threads).map(|_| pool(1)).collect::<Result<_>>()?;
+        let timings = Arc::<Timings>::default();
         let stoppers = enhancers.iter().map(Enhancer::stopper).collect();
         let mut darkroom = Darkroom {
             dataset,
@@ -150,6 +155,7 @@ fn ask(config: &Config, stage: Stage<'_>, progress: &Progress) -> Result<Verdict
             recipe: &inputs.recipe,
             enhancers,
             limit: limit(&config.ask, &config.images),
+            timings: Arc::clone(&timings),
         };
         cores.install(|| darkroom.check(&plan.frames))?;
         let drive = Drive {
@@ -157,14 +163,20 @@ fn ask(config: &Config, stage: Stage<'_>, progress: &Progress) -> Result<Verdict
             progress,
             pace: &config.pace,
             endpoint: endpoint(config.ask.server.as_ref()),
+            timings: &timings,
         };
+        let started = Instant::now();
         let tally = Tally {
             trials: trials.len(),
             answered: trials.len() - plan.left(),
         };
-        drive.run(tally, ledger, &mut store, stoppers, |out| {
-            cores.install(|| darkroom.develop(plan.frames, &wanted, out));
-        })?
+        let end = drive.run(tally, ledger, &mut store, stoppers, |out| {
+            darkroom.develop(plan.frames, &wanted, (&cores, &benches), out);
+        })?;
+        if config.timings == Timing::Told {
+            progress.note(&timings.told(started.elapsed(), threads));
+        }
+        end
     };
     if let (End::Spent, Some(most)) = (&end, config.money.most) {
         tracing::warn!(
@@ -174,6 +186,12 @@ fn ask(config: &Config, stage: Stage<'_>, progress: &Progress) -> Result<Verdict
     }
     manifest.settings.extend(askers::adapted(inputs.askers));
     show(config, &store, manifest, end, &trials)
+}
+
+/// So many threads; 0 for one a core.
+fn pool(threads: usize) -> Result<ThreadPool> {
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.map_err(|e| unstarted(&e))
 }
 
 /// Where the models are asked, in words.
@@ -221,6 +239,7 @@ fn estimate(config: &Config, stage: Stage<'_>) -> Result<Verdict> {
         recipe: &inputs.recipe,
         enhancers,
         limit: None,
+        timings: Arc::default(),
     };
     let means = Means {
         config,

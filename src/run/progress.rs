@@ -45,6 +45,12 @@ impl Progress {
         let _ = self.bars.println(line);
     }
 
+    /// Says one line above the bars to whoever listens, a pipe included.
+    pub(super) fn note(&self, line: &str) {
+        // A line that cannot be shown is no reason to stop.
+        let _ = writeln!(self.make_writer(), "{line}");
+    }
+
     /// A plain bar for a step of known length, gone when it is dropped.
     pub(super) fn bar(&self, what: &'static str, length: usize) -> Bar {
         let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len}");

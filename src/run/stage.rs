@@ -1,6 +1,6 @@
 //! What every way of asking begins with: [`Stage`].
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -12,12 +12,12 @@ use super::plan::Inputs;
 use super::progress::Progress;
 use super::questions::by_rule::by_rule;
 use super::{RESULTS, askers, observer};
-use crate::config::{Ask, Config, Data, ModelName, RunPlace};
+use crate::config::{Ask, Config, Data, ModelName, RunPlace, Shard};
 use crate::dataset::Dataset;
 use crate::enhance::ModelFile;
 use crate::error::{Error, Result};
 use crate::store;
-use crate::types::{Digest, Family, Kept as _, Question, Record, View};
+use crate::types::{Digest, Family, FrameId, Kept as _, Question, Record, View};
 
 /// Everything an evaluation is made of, opened and checked; nothing is asked, and nothing written.
 pub(super) struct Stage<'a> {
@@ -39,7 +39,7 @@ impl Stage<'_> {
         act: impl FnOnce(Stage<'_>) -> Result<T>,
     ) -> Result<T> {
         let dataset = Arc::new(open(&config.data, progress)?);
-        let questions = select(&dataset, &config.data)?;
+        let questions = part(select(&dataset, &config.data)?, config.shard)?;
         let askers = askers::open(config, &dataset, &questions)?;
         // Where every model is blind, no image is read and no enhancer is opened.
         let seeing = askers.iter().any(|asker| asker.view == View::Image);
@@ -59,7 +59,8 @@ impl Stage<'_> {
         let label = label(&config.ask);
         let hash = identity::digest(&identity);
         let schema = Record::SCHEMA;
-        let folder = folder(&config.output.place, schema, &label, dataset.name(), hash)?;
+        let place = config.output.place.of(config.shard);
+        let folder = folder(&place, schema, &label, dataset.name(), hash)?;
         act(Stage {
             dataset: &dataset,
             questions: &questions,
@@ -116,6 +117,29 @@ pub(super) fn select(dataset: &Dataset, config: &Data) -> Result<Vec<Question>> 
         .take(limit)
         .cloned()
         .collect())
+}
+
+/// The questions about the frames of a shard, which are dealt out one by one in the order in which they are first asked about.
+fn part(questions: Vec<Question>, shard: Shard) -> Result<Vec<Question>> {
+    if !shard.is_part() {
+        return Ok(questions);
+    }
+    let mut places = BTreeMap::<FrameId, usize>::new();
+    for question in &questions {
+        let next = places.len();
+        places.entry(question.frame.clone()).or_insert(next);
+    }
+    let own = questions.into_iter();
+    let own = own.filter(|question| places.get(&question.frame).is_some_and(|at| shard.has(*at)));
+    let own: Vec<Question> = own.collect();
+    if own.is_empty() {
+        let problem = format!(
+            "{shard} is empty: there are {} frames; as many parts at most expected",
+            places.len()
+        );
+        return Err(Error::usage("--shard", problem));
+    }
+    Ok(own)
 }
 
 /// The models in the name of a folder.

@@ -40,6 +40,11 @@ impl Wanted {
         }
     }
 
+    /// Whether copies of a frame are wanted at all.
+    pub(super) fn wants(&self, frame: &FrameId) -> bool {
+        self.frames.contains(frame)
+    }
+
     /// A copy of an image as it was sent, where it is wanted.
     pub(super) fn of(
         &self,

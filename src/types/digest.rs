@@ -29,6 +29,18 @@ impl Digest {
         Self(*hasher.finalize().as_bytes())
     }
 
+    /// The digest of a set of digests, whatever their order: each bit says whether an odd number of them have it. Sets without a
+    /// member in common have one together that follows from their own.
+    pub fn of_set(digests: impl IntoIterator<Item = Self>) -> Self {
+        let mut together = [0; 32];
+        for digest in digests {
+            for (byte, own) in together.iter_mut().zip(digest.0) {
+                *byte ^= own;
+            }
+        }
+        Self(together)
+    }
+
     /// The 32 bytes.
     #[must_use]
     pub fn as_bytes(&self) -> &[u8; 32] {

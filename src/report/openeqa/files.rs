@@ -5,7 +5,8 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::OpenReport;
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::report::files::{as_csv, written};
 use crate::score::estimate::Estimate;
 use crate::score::open::{Against, OpenSummary};
 use crate::types::manifest::RunManifest;
@@ -83,12 +84,7 @@ fn rows(summary: &OpenSummary) -> impl Iterator<Item = Row<'_>> {
 
 /// The summary as CSV.
 pub(super) fn csv(summary: &OpenSummary) -> Result<Vec<u8>> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    let unwritten = |e: &dyn std::fmt::Display| Error::data("summary.csv", e);
-    for row in rows(summary) {
-        writer.serialize(row).map_err(|e| unwritten(&e))?;
-    }
-    writer.into_inner().map_err(|e| unwritten(&e))
+    as_csv(rows(summary))
 }
 
 #[derive(Serialize)]
@@ -108,7 +104,7 @@ struct Document<'a> {
 /// there.
 pub fn json(report: &OpenReport<'_>, folder: Option<&Path>) -> Result<String> {
     let summary = report.summary;
-    let document = Document {
+    written(&Document {
         schema: SCHEMA,
         folder,
         run: report.manifest,
@@ -117,8 +113,5 @@ pub fn json(report: &OpenReport<'_>, folder: Option<&Path>) -> Result<String> {
         clustered_by: summary.unit,
         clusters: summary.clusters,
         rows: rows(summary).collect(),
-    };
-    serde_json::to_string_pretty(&document)
-        .map(|text| text + "\n")
-        .map_err(|e| Error::data("summary.json", e))
+    })
 }

@@ -2,16 +2,15 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use minijinja::value::Serde;
-use minijinja::{AutoEscape, Environment};
 use serde::Serialize;
 
 use super::rows::Rows;
 use super::{OpenReport, Told, coverage};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::report::figures::Figure;
 use crate::report::page::{STYLE, manifest_facts};
 use crate::report::readable::readable;
+use crate::report::template::filled;
 use crate::score::accuracy::Subject;
 use crate::score::open::{Group, Outcome};
 use crate::types::{Level, View};
@@ -85,30 +84,25 @@ struct Row {
 /// # Errors
 /// Where the template cannot be filled.
 pub(super) fn page(report: &OpenReport<'_>, figures: &[Figure]) -> Result<String> {
-    let failed = |e: &dyn std::fmt::Display| Error::data("report.html", e);
-    let mut environment = Environment::new();
-    environment.set_auto_escape_callback(|_| AutoEscape::Html);
-    environment
-        .add_template("page", PAGE)
-        .map_err(|e| failed(&e))?;
-    let template = environment.get_template("page").map_err(|e| failed(&e))?;
     let drawings = figures.iter().map(|figure| Drawing {
         svg: figure.svg.clone(),
         caption: figure.caption.clone(),
     });
     let asked = report.questions.iter();
-    let page = template.render(Serde(Page {
-        title: format!("OpenEQA in the dark: {}", report.name),
-        alerts: alerts(report),
-        intro: intro(report),
-        figures: drawings.collect(),
-        tables: tables(report),
-        categories: asked.map(|question| question.category.to_owned()).collect(),
-        walks: walks(report),
-        facts: manifest_facts(report.manifest),
-        css: STYLE,
-    }));
-    page.map_err(|e| failed(&e))
+    filled(
+        PAGE,
+        Page {
+            title: format!("OpenEQA in the dark: {}", report.name),
+            alerts: alerts(report),
+            intro: intro(report),
+            figures: drawings.collect(),
+            tables: tables(report),
+            categories: asked.map(|question| question.category.to_owned()).collect(),
+            walks: walks(report),
+            facts: manifest_facts(report.manifest),
+            css: STYLE,
+        },
+    )
 }
 
 /// What must be read before any number.

@@ -7,12 +7,11 @@ mod items;
 mod sections;
 mod tables;
 
-use minijinja::value::Serde;
-use minijinja::{AutoEscape, Environment};
 use serde::Serialize;
 
 use super::figures::Figure;
-use crate::error::{Error, Result};
+use super::template::filled;
+use crate::error::Result;
 use crate::score::findings::Findings;
 use crate::types::manifest::{RunManifest, Status};
 use crate::types::{Listed, Record, Thumbnail};
@@ -77,25 +76,20 @@ pub fn page<'a>(
     figures: &[Figure],
     shown: &Shown<'a>,
 ) -> Result<String> {
-    let failed = |e: &dyn std::fmt::Display| Error::data("report.html", e);
-    let mut environment = Environment::new();
-    environment.set_auto_escape_callback(|_| AutoEscape::Html);
-    environment
-        .add_template("page", PAGE)
-        .map_err(|e| failed(&e))?;
-    let template = environment.get_template("page").map_err(|e| failed(&e))?;
     let sections = sections::sections(findings, figures, shown.thumbnails);
-    let page = template.render(Serde(Page {
-        title: title(shown),
-        alerts: alerts(shown),
-        intro: intro(findings),
-        sections,
-        runs: shown.runs.iter().map(facts).collect(),
-        data: items::packed(findings, shown)?,
-        css: STYLE,
-        script: SCRIPT,
-    }));
-    page.map_err(|e| failed(&e))
+    filled(
+        PAGE,
+        Page {
+            title: title(shown),
+            alerts: alerts(shown),
+            intro: intro(findings),
+            sections,
+            runs: shown.runs.iter().map(facts).collect(),
+            data: items::packed(findings, shown)?,
+            css: STYLE,
+            script: SCRIPT,
+        },
+    )
 }
 
 fn title(shown: &Shown<'_>) -> String {

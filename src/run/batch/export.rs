@@ -1,5 +1,7 @@
 //! `batch export`: what is left to ask, as input files.
 
+use std::sync::Arc;
+
 use super::requests::{Requests, remote, told};
 use crate::config::BatchExport;
 use crate::error::Result;
@@ -55,6 +57,7 @@ fn write(config: &BatchExport, stage: Stage<'_>, progress: &Progress) -> Result<
         recipe: &stage.inputs.recipe,
         enhancers,
         limit: limit(&evaluation.ask, &evaluation.images),
+        timings: Arc::default(),
     };
     darkroom.largest(&plan.frames)?;
     let bar = progress.bar("writing requests", left);

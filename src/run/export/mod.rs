@@ -3,6 +3,7 @@
 mod set;
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use rayon::ThreadPoolBuilder;
 
@@ -54,6 +55,7 @@ pub fn export(config: &Export, progress: &Progress) -> Result<Verdict> {
         recipe: &recipe,
         enhancers,
         limit: None,
+        timings: Arc::default(),
     };
     let names = names(pictures.keys());
     let bar = progress.bar("images", pictures.len() * conditions.len());

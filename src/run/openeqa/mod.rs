@@ -25,6 +25,7 @@ use super::ledger::Ledger;
 use super::progress::Progress;
 use super::stop::End;
 use super::thumbnail::Wanted;
+use super::timings::Timings;
 use super::trial::{Exposed, Slide};
 use super::{Verdict, endpoint, identity, manifest, moved, open_enhancers};
 use crate::config::{OpenEqa, OpenTask};
@@ -169,6 +170,7 @@ impl<'a> Run<'a> {
             progress: self.progress,
             pace: &self.config.pace,
             endpoint: endpoint(self.config.ask.server.as_ref()),
+            timings: &Timings::default(),
         };
         let names = self.stage.episodes.iter();
         let names: Vec<FrameId> = names.map(|episode| FrameId(episode.name.clone())).collect();
@@ -202,6 +204,7 @@ impl<'a> Run<'a> {
             progress: self.progress,
             pace: &self.config.pace,
             endpoint: endpoint(server.and_then(|judge| judge.server.as_ref())),
+            timings: &Timings::default(),
         };
         let exposed = Exposed {
             slide: Slide::default(),

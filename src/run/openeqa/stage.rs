@@ -19,7 +19,6 @@ use crate::run::plan::conditions;
 use crate::run::progress::Progress;
 use crate::run::recipe::Recipe;
 use crate::run::stage::{folder, label};
-use crate::synthesis::{VERSION, exposure};
 use crate::types::{Condition, Digest, Kept as _, OpenRecord, View};
 
 /// Everything an evaluation by open questions is made of, opened and checked; nothing is asked, and nothing written.
@@ -250,7 +249,7 @@ fn walks(
 /// What all answers and marks of a run have in common. Models, levels, enhancers and the judge are not among it: what a run holds
 /// is found by its content, so that they may be added to it and nothing is paid for twice.
 fn identity(config: &OpenEqa, questions: &[OpenQuestion], recipe: &Recipe) -> Identity {
-    let (ask, walk, synthesis) = (&config.ask, &config.walk, &recipe.synthesis);
+    let (ask, walk) = (&config.ask, &config.walk);
     let asked = questions.iter().flat_map(|question| {
         [&*question.id.0, &*question.text, &*question.episode].map(str::as_bytes)
     });
@@ -265,15 +264,6 @@ fn identity(config: &OpenEqa, questions: &[OpenQuestion], recipe: &Recipe) -> Id
         ("--image-size", json!(walk.side)),
         ("--degrade", json!(walk.darkened.to_string())),
         ("--sensor", json!(walk.camera.to_string())),
-        ("--seed", json!(recipe.seed)),
-        ("--profile or --amplify", json!(synthesis.amplify)),
-        ("--profile or --tone", json!(synthesis.tone)),
-        ("--draws", json!(synthesis.draws)),
-        ("--profile or --coupling", json!(synthesis.coupling)),
-        (
-            "--camera, --gain, --ratio or --fixed",
-            json!(synthesis.camera),
-        ),
         ("--image", json!(config.images.format.to_string())),
         ("--base-url", json!(base)),
         ("--temperature", json!(parameters.temperature.to_string())),
@@ -288,13 +278,13 @@ fn identity(config: &OpenEqa, questions: &[OpenQuestion], recipe: &Recipe) -> Id
         ("--sampling-seed", json!(parameters.seed)),
         ("--reasoning-effort", json!(parameters.reasoning_effort)),
         ("--detail", json!(parameters.detail)),
-        ("synthesis", json!([exposure::VERSION, VERSION])),
     ];
     let tiling = config.enhancement.tiling;
     let tiling = (tiling != Tiling::Auto).then(|| ("--tile", json!(tiling.to_string())));
     let side = config.enhancement.most_side;
     let side = side.map(|side| ("--llie-max-side", json!(side)));
-    let fields = fields.into_iter().chain(tiling).chain(side);
+    let light = identity::light(recipe.seed, &recipe.synthesis);
+    let fields = fields.into_iter().chain(light).chain(tiling).chain(side);
     fields
         .map(|(field, value)| (field.to_owned(), value))
         .collect()

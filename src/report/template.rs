@@ -1,0 +1,22 @@
+//! The HTML of a page from its template: [`filled`].
+
+use minijinja::value::Serde;
+use minijinja::{AutoEscape, Environment};
+use serde::Serialize;
+
+use crate::error::{Error, Result};
+
+/// A template with its values; each is escaped as HTML.
+///
+/// # Errors
+/// Where the template cannot be filled.
+pub(super) fn filled(template: &str, values: impl Serialize) -> Result<String> {
+    let failed = |e: &dyn std::fmt::Display| Error::data("report.html", e);
+    let mut environment = Environment::new();
+    environment.set_auto_escape_callback(|_| AutoEscape::Html);
+    environment
+        .add_template("page", template)
+        .map_err(|e| failed(&e))?;
+    let template = environment.get_template("page").map_err(|e| failed(&e))?;
+    template.render(Serde(values)).map_err(|e| failed(&e))
+}

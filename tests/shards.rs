@@ -1,0 +1,232 @@
+//! One evaluation in parts: the same records and the same summary as in one piece, whoever names the parts.
+
+#![allow(clippy::unwrap_used)]
+
+mod support;
+
+use std::collections::BTreeMap;
+use std::fs;
+
+use serde_json::Value;
+use support::endpoint::{Answer, MockEndpoint};
+use support::run::{Bench, called, files, records};
+
+/// The evaluation in question.
+const EVALUATION: [&str; 8] = [
+    "--model",
+    "random",
+    "--blind-model",
+    "random",
+    "--levels",
+    "L0,L2",
+    "--data",
+    "rooms:frames=10,size=200x150",
+];
+
+fn with<'a>(more: &[&'a str]) -> Vec<&'a str> {
+    [&EVALUATION[..], more].concat()
+}
+
+/// The records by key, without the time they took.
+fn timeless(run: &std::path::Path) -> BTreeMap<String, Value> {
+    let mut all = BTreeMap::new();
+    for mut record in records(run) {
+        record["latency_ms"] = Value::Null;
+        let key = record["key"].as_str().unwrap().to_owned();
+        assert!(all.insert(key, record).is_none(), "no trial twice");
+    }
+    all
+}
+
+#[test]
+fn parts_are_together_what_one_run_is() {
+    let bench = Bench::new();
+    bench.complete(&with(&["--out", "whole"]));
+    for part in ["1/4", "2/4", "3/4", "4/4"] {
+        bench.complete(&with(&["--out", "parts", "--shard", part]));
+    }
+    let folders: Vec<String> = fs::read_dir(bench.path("parts"))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    assert_eq!(folders.len(), 4);
+    assert!(folders.contains(&"shard-2-of-4".to_owned()), "{folders:?}");
+    let told = bench.complete(&["merge", "parts", "--out", "merged"]);
+    let (whole, merged) = (bench.path("whole"), bench.path("merged"));
+    assert_eq!(timeless(&whole), timeless(&merged));
+    // Every product but those that hold times, byte for byte.
+    let timed = [
+        "manifest.json",
+        "records.jsonl",
+        "summary.json",
+        "report.html",
+        "thumbnails.jsonl",
+    ];
+    let mut compared = 0;
+    for path in files(&whole) {
+        let name = path.strip_prefix(&whole).unwrap();
+        if timed.iter().any(|timed| name.ends_with(timed)) {
+            continue;
+        }
+        assert_eq!(
+            fs::read(&path).unwrap(),
+            fs::read(merged.join(name)).unwrap(),
+            "{}",
+            name.display()
+        );
+        compared += 1;
+    }
+    assert!(compared > 8, "{compared}");
+    let rows = |run: &std::path::Path| -> Value {
+        let text = fs::read(run.join("summary.json")).unwrap();
+        serde_json::from_slice::<Value>(&text).unwrap()["rows"].take()
+    };
+    assert_eq!(rows(&whole), rows(&merged));
+    // It is the run that the whole command goes on with, and there is nothing left to ask.
+    let before = fs::read(merged.join("records.jsonl")).unwrap();
+    assert_eq!(bench.complete(&with(&["--out", "merged"])), told);
+    assert_eq!(fs::read(merged.join("records.jsonl")).unwrap(), before);
+    // Merging again changes nothing.
+    assert_eq!(bench.complete(&["merge", "parts", "--out", "merged"]), told);
+    assert_eq!(fs::read(merged.join("records.jsonl")).unwrap(), before);
+}
+
+#[test]
+fn a_batch_system_says_which_part_it_is() {
+    let bench = Bench::new();
+    let task = |variables: &[(&str, &str)], more: &[&str]| {
+        let mut command = bench.command(&with(more));
+        command.envs(variables.iter().copied());
+        called(&mut command)
+    };
+    let slurm = [
+        ("SLURM_ARRAY_TASK_ID", "3"),
+        ("SLURM_ARRAY_TASK_MIN", "2"),
+        ("SLURM_ARRAY_TASK_COUNT", "2"),
+    ];
+    let said = task(&slurm, &["--out", "array"]);
+    assert_eq!(said.code, Some(0), "{said:?}");
+    assert!(
+        said.stderr
+            .contains("task 2 of a Slurm array of 2: this process does shard 2/2"),
+        "{}",
+        said.stderr
+    );
+    assert!(bench.path("array/shard-2-of-2/manifest.json").exists());
+    let whole = task(&slurm, &["--out", "all", "--shard", "none"]);
+    assert_eq!(whole.code, Some(0), "{whole:?}");
+    assert!(bench.path("all/manifest.json").exists());
+    let pod = [("JOB_COMPLETION_INDEX", "1")];
+    let lost = task(&pod, &["--out", "pod"]);
+    assert_eq!(lost.code, Some(2));
+    assert!(lost.stderr.contains("--shard auto/N"), "{}", lost.stderr);
+    let found = task(&pod, &["--out", "pod", "--shard", "auto/3"]);
+    assert_eq!(found.code, Some(0), "{found:?}");
+    assert!(bench.path("pod/shard-2-of-3/manifest.json").exists());
+}
+
+#[test]
+fn missing_double_and_foreign_parts_are_named() {
+    let bench = Bench::new();
+    bench.complete(&with(&["--out", "parts", "--shard", "1/3"]));
+    bench.complete(&with(&["--out", "parts", "--shard", "3/3"]));
+    let refused = |words: &[&str], says: &str| {
+        let said = bench.call(&[&["merge"], words].concat());
+        assert_eq!(said.code, Some(2), "{said:?}");
+        assert!(said.stderr.contains(says), "{says}: {}", said.stderr);
+    };
+    refused(
+        &["parts", "--out", "m"],
+        "1 shards are missing: 2/3; --partial",
+    );
+    assert!(!bench.path("m").exists());
+    let partial = bench.call(&["merge", "parts", "--out", "m", "--partial"]);
+    assert_eq!(partial.code, Some(1), "{partial:?}");
+    assert!(
+        partial.stdout.starts_with("incomplete:"),
+        "{}",
+        partial.stdout
+    );
+    bench.complete(&with(&["--out", "again", "--shard", "3/3"]));
+    refused(
+        &["parts", "again", "--out", "n"],
+        "shard 3/3 is there twice, also in",
+    );
+    bench.complete(&with(&["--out", "other", "--shard", "2/3", "--seed", "9"]));
+    refused(&["parts", "other", "--out", "n"], "is of another run than");
+    bench.complete(&with(&["--out", "four", "--shard", "2/4"]));
+    refused(
+        &["parts", "four", "--out", "n"],
+        "is no part of the same run",
+    );
+    bench.complete(&with(&["--out", "whole"]));
+    refused(&["whole", "--out", "n"], "the run is no shard");
+    refused(&["nowhere", "--out", "n"], "nowhere");
+    let empty = bench.call(&with(&["--out", "x", "--shard", "11/11"]));
+    assert!(
+        empty.stderr.contains("11/11 is empty: there are 10 frames"),
+        "{}",
+        empty.stderr
+    );
+}
+
+#[test]
+fn limits_and_means_are_shared_by_the_parts() {
+    let bench = Bench::with_questions(6);
+    let mock = MockEndpoint::start([Answer::text("B")]);
+    let base = mock.base_url();
+    let words = [
+        "--model",
+        "m",
+        "--base-url",
+        &base,
+        "--data",
+        "set.jsonl",
+        "--levels",
+        "L0",
+        "--rpm",
+        "7000",
+        "--out",
+        "run",
+        "--shard",
+        "1/1",
+    ];
+    bench.complete(&words);
+    let manifest: Value =
+        serde_json::from_slice(&fs::read(bench.path("run/manifest.json")).unwrap()).unwrap();
+    assert_eq!(manifest["settings"]["--rpm"], 7000);
+    let words = [
+        "--model",
+        "m",
+        "--base-url",
+        &base,
+        "--levels",
+        "L0",
+        "--rpm",
+        "7001",
+        "--out",
+        "part",
+        "--shard",
+        "2/2",
+    ];
+    bench.complete(&words);
+    let path = bench.path("part/shard-2-of-2/manifest.json");
+    let manifest: Value = serde_json::from_slice(&fs::read(path).unwrap()).unwrap();
+    assert_eq!(manifest["settings"]["--rpm"], 3500);
+    // Half of what may be spent is less than a reply costs.
+    let words = [
+        "--model",
+        "gpt-4o",
+        "--base-url",
+        &base,
+        "--levels",
+        "L0",
+        "--max-cost",
+        "0.0001",
+        "--out",
+        "dear",
+        "--shard",
+        "1/2",
+    ];
+    assert_eq!(bench.call(&words).code, Some(130));
+}
