@@ -7,6 +7,8 @@ mod support;
 use std::collections::BTreeMap;
 use std::fs;
 
+use clap::Parser as _;
+use darkqa_eval::cli::Cli;
 use serde_json::Value;
 use support::endpoint::{Answer, MockEndpoint};
 use support::run::{Bench, called, files, records};
@@ -20,7 +22,7 @@ const EVALUATION: [&str; 8] = [
     "--levels",
     "L0,L2",
     "--data",
-    "rooms:frames=10,size=200x150",
+    "rooms:frames=6,size=120x90",
 ];
 
 fn with<'a>(more: &[&'a str]) -> Vec<&'a str> {
@@ -162,9 +164,9 @@ fn missing_double_and_foreign_parts_are_named() {
     bench.complete(&with(&["--out", "whole"]));
     refused(&["whole", "--out", "n"], "the run is no shard");
     refused(&["nowhere", "--out", "n"], "nowhere");
-    let empty = bench.call(&with(&["--out", "x", "--shard", "11/11"]));
+    let empty = bench.call(&with(&["--out", "x", "--shard", "7/7"]));
     assert!(
-        empty.stderr.contains("11/11 is empty: there are 10 frames"),
+        empty.stderr.contains("7/7 is empty: there are 6 frames"),
         "{}",
         empty.stderr
     );
@@ -229,4 +231,87 @@ fn limits_and_means_are_shared_by_the_parts() {
         "1/2",
     ];
     assert_eq!(bench.call(&words).code, Some(130));
+}
+
+#[test]
+fn the_job_of_kubernetes_says_flags_that_there_are() {
+    let text = include_str!("../src/run/cluster/job.yaml");
+    let flags = text
+        .lines()
+        .filter_map(|line| line.trim().strip_prefix("- --"));
+    let flags: Vec<String> = flags.map(|flag| format!("--{flag}")).collect();
+    assert!(flags.len() > 4);
+    let words = std::iter::once("darkqa-eval".to_owned()).chain(flags);
+    let said = Cli::try_parse_from(words).unwrap().evaluate;
+    let shard = said.scale.shard.unwrap();
+    let parts = shard.strip_prefix("auto/").unwrap();
+    for field in ["completions", "parallelism"] {
+        assert!(text.contains(&format!("\n  {field}: {parts}\n")), "{field}");
+    }
+}
+
+/// The script as a node runs it, with a `scontrol` that writes down what it is told.
+#[cfg(unix)]
+#[test]
+fn the_script_of_slurm_has_a_stopped_task_started_again() {
+    use std::os::unix::fs::PermissionsExt as _;
+    use std::time::{Duration, Instant};
+
+    let bench = Bench::with_questions(400);
+    let mock = MockEndpoint::answering(|_| {
+        std::thread::sleep(Duration::from_millis(20));
+        Answer::text("B")
+    });
+    let control = bench.file("bin/scontrol", "#!/bin/sh\necho \"$@\" >> told\n");
+    fs::set_permissions(&control, fs::Permissions::from_mode(0o755)).unwrap();
+    let program = std::path::Path::new(env!("CARGO_BIN_EXE_darkqa-eval"));
+    let folders = [bench.path("bin"), program.parent().unwrap().to_owned()];
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let path = folders.into_iter().chain(std::env::split_paths(&path));
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/src/run/cluster/slurm.sh");
+    let base = mock.base_url();
+    let words = [
+        script,
+        "--model",
+        "m",
+        "--base-url",
+        &base,
+        "--data",
+        "set.jsonl",
+        "--levels",
+        "L0",
+        "--concurrency",
+        "1",
+        "--out",
+        "run",
+    ];
+    let variables = [
+        ("SLURM_ARRAY_JOB_ID", "7"),
+        ("SLURM_ARRAY_TASK_ID", "0"),
+        ("SLURM_ARRAY_TASK_COUNT", "1"),
+    ];
+    let mut task = std::process::Command::new("bash")
+        .args(words)
+        .current_dir(bench.path(""))
+        .envs(variables)
+        .env("PATH", std::env::join_paths(path).unwrap())
+        .env_remove("OPENAI_API_KEY")
+        .spawn()
+        .unwrap();
+    let begun = Instant::now();
+    while mock.requests().len() < 5 && begun.elapsed() < Duration::from_mins(1) {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let id = task.id().to_string();
+    let killed = std::process::Command::new("kill")
+        .args(["-TERM", &id])
+        .status();
+    assert!(killed.unwrap().success());
+    assert_eq!(task.wait().unwrap().code(), Some(130));
+    assert_eq!(
+        fs::read_to_string(bench.path("told")).unwrap(),
+        "requeue 7_0\n"
+    );
+    let answered = records(&bench.path("run")).len();
+    assert!((5..400).contains(&answered), "{answered}");
 }

@@ -135,6 +135,12 @@ fn ask(config: &Config, stage: Stage<'_>, progress: &Progress) -> Result<Verdict
         let version =
             runtime.map(|runtime| ("onnxruntime".to_owned(), runtime.version().to_owned()));
         manifest.platform.extend(version);
+        // A killed run says how much there was to ask.
+        manifest.counts = Counts {
+            trials: trials.len(),
+            answered: trials.len() - plan.left(),
+            failed: 0,
+        };
         store.write_manifest(&manifest)?;
         if plan.left() < trials.len() {
             let answered = trials.len() - plan.left();
