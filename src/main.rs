@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use clap::error::ErrorKind;
-use darkqa_eval::cli::{BatchCommand, Cli, Command, EvaluateArgs, StudyCommand};
+use darkqa_eval::cli::{BatchCommand, Cli, Command, EvaluateArgs, OpenEqaArgs, StudyCommand};
 use darkqa_eval::config::{
     self, BatchExport, BatchImport, Config, Enhance, Export, Import, MakeRooms, Merge, OpenEqa,
     Questions, Realism, Report, Serve, ShowItem, StudyPack, StudyRead, Synthesize,
@@ -95,7 +95,7 @@ enum Task {
     Import(Box<Import>),
     Export(Box<Export>),
     Enhance(Box<Enhance>),
-    OpenEqa(Box<OpenEqa>),
+    OpenEqa(Box<OpenEqaArgs>),
     BatchExport(Box<BatchExport>),
     BatchImport(BatchImport),
     Report(Report),
@@ -137,7 +137,7 @@ impl Job {
             }
             Some(Command::OpenEqa(said)) => {
                 let quiet = said.output.quiet;
-                (quiet, Task::OpenEqa(Box::new(OpenEqa::resolve(*said)?)))
+                (quiet, Task::OpenEqa(said))
             }
             Some(Command::Batch(BatchCommand::Export(said))) => {
                 let quiet = said.evaluate.output.quiet;
@@ -188,7 +188,7 @@ fn carry_out(task: Task, progress: &Progress) -> anyhow::Result<ExitCode> {
         Task::Import(config) => import(&config, progress)?,
         Task::Export(config) => export(&config, progress)?,
         Task::Enhance(config) => run::enhance::enhance(&config, progress)?,
-        Task::OpenEqa(config) => openeqa(&config, progress)?,
+        Task::OpenEqa(said) => openeqa(&OpenEqa::resolve(*said)?, progress)?,
         Task::BatchExport(config) => run::batch::export(&config, progress)?,
         Task::BatchImport(config) => run::batch::import(&config)?,
         Task::Rooms(config) => rooms(&config, progress)?,

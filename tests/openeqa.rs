@@ -14,7 +14,7 @@ use image::{Rgb, RgbImage};
 use serde_json::{Value, json};
 
 use support::endpoint::{Answer, MockEndpoint, Request};
-use support::house::House;
+use support::house::{House, flags};
 use support::run::called;
 
 /// Upstream's prompt for an answer with images, up to them.
@@ -609,6 +609,35 @@ fn a_model_that_is_gone_keeps_nobody_elses_answers_from_their_marks() {
         .find(|row| row["model"] == "m" && row["by"] == "all")
         .unwrap();
     assert_eq!((&row["value"], &row["n"]), (&json!(1.0), &json!(3)));
+}
+
+#[test]
+fn an_array_is_told_that_each_of_its_tasks_does_everything() {
+    let house = House::new();
+    house.0.file("a.jsonl", "{\"default\": \"an answer\"}");
+    let words = flags(&[
+        "--model",
+        "script:a.jsonl",
+        "--levels",
+        "L0",
+        "--out",
+        "run",
+    ]);
+    let mut command = house.0.command(&words);
+    command.envs([
+        ("SLURM_ARRAY_TASK_ID", "1"),
+        ("SLURM_ARRAY_TASK_MIN", "0"),
+        ("SLURM_ARRAY_TASK_COUNT", "4"),
+    ]);
+    let called = called(&mut command);
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert!(
+        called
+            .stderr
+            .contains("task 2 of a Slurm array of 4: openeqa is not spread"),
+        "{}",
+        called.stderr
+    );
 }
 
 #[test]

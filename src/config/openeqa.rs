@@ -185,6 +185,7 @@ impl OpenEqa {
     /// # Errors
     /// [`Error::Usage`] with the flag that cannot be used.
     pub fn resolve(said: OpenEqaArgs) -> Result<Self> {
+        Shard::warn_unspread("openeqa", |name| std::env::var(name).ok())?;
         let judge = JudgeArgs::of(&said);
         let shared = merge(EvaluateArgs {
             light: said.light,

@@ -63,7 +63,7 @@ impl House {
 }
 
 /// The flags of all calls, and some more.
-fn flags<'a>(more: &[&'a str]) -> Vec<&'a str> {
+pub fn flags<'a>(more: &[&'a str]) -> Vec<&'a str> {
     let own = [
         "openeqa",
         "--questions",
