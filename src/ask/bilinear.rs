@@ -59,9 +59,20 @@ pub fn bilinear(image: &Rgb, side: usize) -> Result<Rgb> {
     Rgb::new(rows.len(), columns.len(), samples)
 }
 
+/// The height and width of an image whose longer side is scaled to so many pixels.
+#[must_use]
+pub fn size(height: usize, width: usize, side: usize) -> [usize; 2] {
+    let factor = side as f64 / height.max(width) as f64;
+    [height, width].map(|length| scaled(length, factor))
+}
+
+fn scaled(length: usize, factor: f64) -> usize {
+    ((length as f64 * factor).round_ties_even() as usize).max(1)
+}
+
 /// The taps along a side of `length` pixels that is scaled by a factor.
 fn taps(length: usize, factor: f64) -> Vec<Tap> {
-    let count = ((length as f64 * factor).round_ties_even() as usize).max(1);
+    let count = scaled(length, factor);
     let last = length - 1;
     let tap = |index: usize| {
         let place = ((index as f64 + 0.5) / factor - 0.5) as f32;

@@ -1,11 +1,11 @@
 //! The images of a run, made again: [`Album`].
 
 use std::path::Path;
-use std::sync::Arc;
 
 use super::darkroom::{Darkroom, Desk};
 use super::gallery::{Gallery, look_at};
 use super::recipe::Recipe;
+use super::timings::Timings;
 use super::{identity, open_enhancers};
 use crate::config::Again;
 use crate::dataset::{Dataset, Place};
@@ -56,16 +56,7 @@ impl Album {
             &[]
         };
         let files = identity::enhancers(models)?;
-        let recipe = Recipe {
-            seed: pictures.sensor.seed,
-            synthesis: pictures.sensor.synthesis.clone(),
-            format: pictures.images.format,
-            max_side: pictures.images.max_side,
-            enhancers: files
-                .iter()
-                .map(|file| (file.name().clone(), file.digest()))
-                .collect(),
-        };
+        let recipe = Recipe::new(&pictures.sensor, &pictures.images, &files);
         let (_, enhancers) = open_enhancers(files, &pictures.enhancement)?;
         Ok(Self {
             dataset,
@@ -94,7 +85,7 @@ impl Album {
             recipe: &self.recipe,
             enhancers: std::mem::take(&mut self.enhancers),
             limit: None,
-            timings: Arc::default(),
+            timings: &Timings::default(),
         };
         let image = darkroom.image(desk, condition);
         self.enhancers = darkroom.enhancers;

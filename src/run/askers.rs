@@ -40,33 +40,41 @@ pub(super) fn open(
     let prior = Random {
         seed: config.light.sensor.seed,
     };
-    let endpoint = endpoint(ask.server.as_ref())?;
-    let seen = ask.models.iter().map(|name| (name, ask.view));
-    let blind = ask.blind_models.iter().map(|name| (name, View::Blind));
-    let mut askers: Vec<Asker> = Vec::new();
-    for (name, view) in seen.chain(blind) {
-        let model = match name {
-            ModelName::Random => Model::Random(prior),
-            ModelName::Observer => {
-                let place = &config.data.place;
-                Model::Local(observer::open(dataset, place, questions, prior)?)
-            }
-            name => speaker(name, endpoint.as_ref(), &ask.parameters)?,
-        };
-        add(&mut askers, Asker::new(model, view))?;
-    }
-    Ok(askers)
+    gather(ask, |name, endpoint| match name {
+        ModelName::Random => Ok(Model::Random(prior)),
+        ModelName::Observer => {
+            let place = &config.data.place;
+            observer::open(dataset, place, questions, prior).map(Model::Local)
+        }
+        name => speaker(name, endpoint, &ask.parameters),
+    })
 }
 
 /// Opens the models of open questions; nothing is sent.
 pub(super) fn open_speakers(ask: &Ask) -> Result<Vec<Asker>> {
+    gather(ask, |name, endpoint| {
+        speaker(name, endpoint, &ask.parameters)
+    })
+}
+
+/// The models that see and those that do not, none of them twice.
+fn gather(
+    ask: &Ask,
+    open: impl Fn(&ModelName, Option<&Arc<Endpoint>>) -> Result<Model>,
+) -> Result<Vec<Asker>> {
     let endpoint = endpoint(ask.server.as_ref())?;
     let seen = ask.models.iter().map(|name| (name, ask.view));
     let blind = ask.blind_models.iter().map(|name| (name, View::Blind));
     let mut askers: Vec<Asker> = Vec::new();
     for (name, view) in seen.chain(blind) {
-        let model = speaker(name, endpoint.as_ref(), &ask.parameters)?;
-        add(&mut askers, Asker::new(model, view))?;
+        let asker = Asker::new(open(name, endpoint.as_ref())?, view);
+        let name = asker.model.name();
+        let mut others = askers.iter();
+        if others.any(|other| other.view == view && other.model.name() == name) {
+            let problem = format_args!("{name} is named twice");
+            return Err(Error::usage("--model", problem));
+        }
+        askers.push(asker);
     }
     Ok(askers)
 }
@@ -101,22 +109,11 @@ pub(super) fn speaker(
     }
 }
 
-fn add(askers: &mut Vec<Asker>, asker: Asker) -> Result<()> {
-    let name = asker.model.name();
-    let mut others = askers.iter();
-    if others.any(|other| other.view == asker.view && other.model.name() == name) {
-        return Err(Error::usage(
-            "--model",
-            format_args!("{name} is named twice"),
-        ));
-    }
-    askers.push(asker);
-    Ok(())
-}
-
 /// How requests had to differ from what was tried first, by model; for the manifest.
-pub(super) fn adapted(askers: &[Asker]) -> impl Iterator<Item = (String, Value)> {
-    askers.iter().filter_map(|asker| {
+pub(super) fn adapted<'a>(
+    askers: impl IntoIterator<Item = &'a Asker>,
+) -> impl Iterator<Item = (String, Value)> {
+    askers.into_iter().filter_map(|asker| {
         let Model::OpenAi(model) = &*asker.model else {
             return None;
         };

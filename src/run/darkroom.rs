@@ -20,7 +20,7 @@ use crate::ask::{Format, ImageLimit, Payload};
 use crate::dataset::{Dataset, Picture};
 use crate::enhance::Enhancer;
 use crate::error::{Error, Result};
-use crate::synthesis::{Negative, NoiseKey, expose};
+use crate::synthesis::{Film, NoiseKey};
 use crate::types::{Condition, Degradation, FrameId, ImageFacts, Rgb, Thumbnail};
 
 /// What the thread works with.
@@ -32,7 +32,7 @@ pub(super) struct Darkroom<'a> {
     pub(super) enhancers: Vec<Enhancer>,
     /// What an image may be; `None` where nobody far away looks at it.
     pub(super) limit: Option<ImageLimit>,
-    pub(super) timings: Arc<Timings>,
+    pub(super) timings: &'a Timings,
 }
 
 impl Darkroom<'_> {
@@ -117,7 +117,7 @@ impl Darkroom<'_> {
                     recipe: self.recipe,
                     enhancers: Vec::new(),
                     limit: self.limit,
-                    timings: Arc::clone(&self.timings),
+                    timings: self.timings,
                 };
                 scope.spawn(move || {
                     bench.install(|| own.one_by_one(std::iter::from_fn(next), wanted, out));
@@ -149,8 +149,8 @@ impl Darkroom<'_> {
                     problem,
                     thumbnail,
                 };
-                let timings = Arc::clone(&self.timings);
-                let gone = timings.time(Step::Waiting, || out.blocking_send(exposed).is_err());
+                let send = || out.blocking_send(exposed).is_err();
+                let gone = self.timings.time(Step::Waiting, send);
                 if gone {
                     return;
                 }
@@ -177,7 +177,7 @@ impl Darkroom<'_> {
         let Recipe {
             format, max_side, ..
         } = *self.recipe;
-        let timings = Arc::clone(&self.timings);
+        let timings = self.timings;
         let read = || desk.picture(self.dataset, self.pictures).map(drop);
         timings.time(Step::Decode, read)?;
         let picture = desk.picture(self.dataset, self.pictures)?;
@@ -208,7 +208,7 @@ impl Darkroom<'_> {
         desk: &'d mut Desk,
         condition: &Condition,
     ) -> Result<Cow<'d, Rgb>> {
-        let timings = &self.timings;
+        let timings = self.timings;
         timings.time(Step::Decode, || {
             desk.picture(self.dataset, self.pictures)?;
             desk.decode()
@@ -250,7 +250,7 @@ pub(super) struct Desk {
     frame: FrameId,
     picture: Option<Picture>,
     clean: Option<Rgb>,
-    negative: Option<Negative>,
+    film: Film,
     dark: Option<(Degradation, Rgb)>,
 }
 
@@ -260,7 +260,7 @@ impl Desk {
             frame,
             picture: None,
             clean: None,
-            negative: None,
+            film: Film::default(),
             dark: None,
         }
     }
@@ -298,7 +298,7 @@ impl Desk {
         let Self {
             frame,
             clean,
-            negative,
+            film,
             dark,
             ..
         } = self;
@@ -309,18 +309,8 @@ impl Desk {
             *dark = None;
         }
         let (_, image) = once(dark, || {
-            let image = match degradation {
-                Degradation::None => clean.clone(),
-                Degradation::Exposure(level) => expose(clean, level),
-                Degradation::Sensor(level) => {
-                    let key = NoiseKey::new(recipe.seed, frame);
-                    if negative.as_ref().is_some_and(|kept| !kept.serves(level)) {
-                        *negative = None;
-                    }
-                    let take = || Ok(Negative::new(clean, &key, &recipe.synthesis, level));
-                    once(negative, take)?.develop(level)
-                }
-            };
+            let key = NoiseKey::new(recipe.seed, frame);
+            let image = film.degrade(clean, degradation, &key, &recipe.synthesis);
             Ok((degradation, image))
         })?;
         Ok(image)

@@ -9,6 +9,7 @@ use tokio::sync::mpsc::{self, Receiver, Sender};
 use tokio::task::{JoinError, JoinSet};
 
 use super::askers::Asker;
+use super::cores::unstarted;
 use super::interrupt::Interrupt;
 use super::ledger::Ledger;
 use super::progress::{Bar, Progress};
@@ -19,7 +20,7 @@ use super::trial::{Exposed, Item, Slide, Trial};
 use crate::ask::{AskError, Call, Reach};
 use crate::config::Pace;
 use crate::enhance::Stopper;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::store::Store;
 use crate::types::{Failure, FailureKind, Finish, Reply};
 
@@ -101,11 +102,6 @@ impl Drive<'_> {
             self.pace.max_failures,
         )
     }
-}
-
-/// A thread that the system does not give.
-pub(super) fn unstarted(problem: &dyn std::fmt::Display) -> Error {
-    Error::usage("--threads", format_args!("cannot be started: {problem}"))
 }
 
 /// Where replies come in and are kept.

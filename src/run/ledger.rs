@@ -29,7 +29,11 @@ impl Ledger {
     ///
     /// # Errors
     /// Where `--max-cost` is said and a model has no price: it could not be kept to.
-    pub(super) fn new(money: &Money, askers: &[Asker], kept: &[impl Kept]) -> Result<Self> {
+    pub(super) fn new<'a, R: Kept + 'a>(
+        money: &Money,
+        askers: &[Asker],
+        kept: impl IntoIterator<Item = &'a R>,
+    ) -> Result<Self> {
         let price = |asker: &Asker| {
             let remote = asker.model.is_remote();
             remote

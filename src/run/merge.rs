@@ -12,7 +12,7 @@ use super::{Verdict, count};
 use crate::config::{Merge, Missing, Shard};
 use crate::error::{Error, Result};
 use crate::store::{self, Moved, Store};
-use crate::types::manifest::{RunManifest, Status};
+use crate::types::manifest::{RunManifest, Status, differences};
 use crate::types::{Digest, Kept as _, Listed, QuestionId, Record, Thumbnail, TrialKey};
 
 /// The field of a run's identity that names its shard.
@@ -165,23 +165,11 @@ fn agree(parts: &[Part]) -> Result<()> {
             );
             return wrong(part, problem);
         }
-        let own = part.common();
-        let fields: BTreeSet<&String> = common.keys().chain(own.keys()).collect();
-        if let Some(field) = fields
-            .into_iter()
-            .find(|field| common.get(*field) != own.get(*field))
-        {
-            let said = |identity: &BTreeMap<String, Value>| {
-                identity
-                    .get(field)
-                    .map_or("unset".to_owned(), ToString::to_string)
-            };
+        if let Some((field, own, there)) = differences(&part.common(), &common).next() {
             let problem = format!(
-                "shard {} is of another run than {}: its {field} is {}, there it is {}",
+                "shard {} is of another run than {}: its {field} is {own}, there it is {there}",
                 part.shard,
-                first.folder.display(),
-                said(&own),
-                said(&common)
+                first.folder.display()
             );
             return wrong(part, problem);
         }

@@ -7,6 +7,7 @@ mod again;
 mod arrangement;
 mod askers;
 pub mod batch;
+mod cores;
 mod darkroom;
 mod drive;
 pub mod enhance;
@@ -43,12 +44,12 @@ mod trial;
 mod written;
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::num::NonZeroUsize;
 use std::path::Path;
-use std::sync::Arc;
 use std::time::Instant;
 
 use jiff::Timestamp;
-use rayon::{ThreadPool, ThreadPoolBuilder};
+use rayon::ThreadPool;
 use serde_json::Value;
 
 use crate::ask::ImageLimit;
@@ -63,8 +64,9 @@ use crate::store::{self, Moved, Store};
 use crate::types::manifest::{Counts, RunManifest, Status};
 use crate::types::{Kept, Listed, Outcome, Question, Record, TrialKey};
 
+use cores::pool;
 use darkroom::Darkroom;
-use drive::{Drive, Tally, unstarted};
+use drive::{Drive, Tally};
 use forecast::Means;
 use identity::Identity;
 use ledger::Ledger;
@@ -150,10 +152,12 @@ fn ask(config: &Config, stage: Stage<'_>, progress: &Progress) -> Result<Verdict
                 trials.len()
             ));
         }
-        let cores = pool(config.enhancement.threads.map_or(0, usize::from))?;
+        let cores = pool(config.enhancement.threads)?;
         let threads = cores.current_num_threads();
-        let benches: Vec<ThreadPool> = (0..threads).map(|_| pool(1)).collect::<Result<_>>()?;
-        let timings = Arc::<Timings>::default();
+        let benches: Vec<ThreadPool> = (0..threads)
+            .map(|_| pool(Some(NonZeroUsize::MIN)))
+            .collect::<Result<_>>()?;
+        let timings = Timings::default();
         let stoppers = enhancers.iter().map(Enhancer::stopper).collect();
         let mut darkroom = Darkroom {
             dataset,
@@ -161,7 +165,7 @@ fn ask(config: &Config, stage: Stage<'_>, progress: &Progress) -> Result<Verdict
             recipe: &inputs.recipe,
             enhancers,
             limit: limit(&config.ask, &config.images),
-            timings: Arc::clone(&timings),
+            timings: &timings,
         };
         cores.install(|| darkroom.check(&plan.frames))?;
         let drive = Drive {
@@ -192,12 +196,6 @@ fn ask(config: &Config, stage: Stage<'_>, progress: &Progress) -> Result<Verdict
     }
     manifest.settings.extend(askers::adapted(inputs.askers));
     show(config, &store, manifest, end, &trials)
-}
-
-/// So many threads; 0 for one a core.
-fn pool(threads: usize) -> Result<ThreadPool> {
-    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
-    pool.map_err(|e| unstarted(&e))
 }
 
 /// Where the models are asked, in words.
@@ -245,7 +243,7 @@ fn estimate(config: &Config, stage: Stage<'_>) -> Result<Verdict> {
         recipe: &inputs.recipe,
         enhancers,
         limit: None,
-        timings: Arc::default(),
+        timings: &Timings::default(),
     };
     let means = Means {
         config,

@@ -37,16 +37,7 @@ impl<'a> Inputs<'a> {
         askers: &'a [Asker],
         files: &[ModelFile],
     ) -> Result<Self> {
-        let recipe = Recipe {
-            seed: config.light.sensor.seed,
-            synthesis: config.light.sensor.synthesis.clone(),
-            format: config.images.format,
-            max_side: config.images.max_side,
-            enhancers: files
-                .iter()
-                .map(|file| (file.name().clone(), file.digest()))
-                .collect(),
-        };
+        let recipe = Recipe::new(&config.light.sensor, &config.images, files);
         let prompts = config
             .ask
             .prompts

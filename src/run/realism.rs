@@ -8,10 +8,10 @@
 use std::fs;
 use std::path::Path;
 
-use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
 
 use super::Verdict;
+use super::cores::pool;
 use super::progress::Progress;
 use super::written::{png, write};
 use crate::config::{PairPlace, Realism, Show};
@@ -54,9 +54,7 @@ pub fn realism(config: &Realism, progress: &Progress) -> Result<Verdict> {
     for path in &unmatched {
         tracing::warn!("{}: no partner in the other light", path.display());
     }
-    let threads = config.threads.map_or(0, std::num::NonZero::get);
-    let cores = ThreadPoolBuilder::new().num_threads(threads).build();
-    let cores = cores.map_err(|e| Error::usage("--threads", e))?;
+    let cores = pool(config.threads)?;
     let bar = progress.bar("pairs", pairs.len());
     let results: Vec<Option<Work>> = cores.install(|| {
         let pairs = pairs.par_iter().enumerate();

@@ -3,7 +3,8 @@
 use serde_json::json;
 
 use crate::ask::Format;
-use crate::enhance;
+use crate::config::{Images, Sensor};
+use crate::enhance::{self, ModelFile};
 use crate::synthesis::{self, Synthesis};
 use crate::types::{Condition, Degradation, Digest, EnhancerName, FrameId};
 
@@ -18,6 +19,19 @@ pub(super) struct Recipe {
 }
 
 impl Recipe {
+    pub(super) fn new(sensor: &Sensor, images: &Images, files: &[ModelFile]) -> Self {
+        let enhancers = files.iter();
+        Self {
+            seed: sensor.seed,
+            synthesis: sensor.synthesis.clone(),
+            format: images.format,
+            max_side: images.max_side,
+            enhancers: enhancers
+                .map(|file| (file.name().clone(), file.digest()))
+                .collect(),
+        }
+    }
+
     /// The digest of everything that decides the image of a frame in a condition, and of nothing else: a run with another
     /// seed has other noise, but the same untouched frames and exposure drops.
     pub(super) fn digest(

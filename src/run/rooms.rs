@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
 use super::Verdict;
+use super::cores::pool;
 use super::interface::{self, FRAMES, Place};
 use super::progress::Progress;
 use super::written::png;
@@ -27,9 +27,7 @@ pub fn rooms(config: &MakeRooms, progress: &Progress) -> Result<Verdict> {
             "frames are there already; --force writes over them, another --out keeps both";
         return Err(Error::data(list.display(), problem));
     }
-    let threads = config.threads.map_or(0, std::num::NonZero::get);
-    let cores = ThreadPoolBuilder::new().num_threads(threads).build();
-    let cores = cores.map_err(|e| Error::usage("--threads", e))?;
+    let cores = pool(config.threads)?;
     let rooms: BTreeMap<FrameId, Room> = config.rooms.all().collect();
     let bar = progress.bar("rooms", rooms.len());
     let lines: Vec<Map<String, Value>> = cores.install(|| {

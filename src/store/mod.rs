@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
-use crate::types::manifest::RunManifest;
+use crate::types::manifest::{RunManifest, differences};
 use crate::types::{Kept, Listed, Record, Thumbnail, TrialKey, Via};
 
 use lines::{append, json_lines, lines, mend};
@@ -308,16 +308,7 @@ fn any_manifest(folder: &Path) -> Result<Option<RunManifest>> {
 
 /// Makes sure that a kept run is the one now asked for.
 fn agree(folder: &Path, kept: &RunManifest, now: &RunManifest, moved: Moved) -> Result<()> {
-    let said = |manifest: &RunManifest, field: &str| {
-        let value = manifest.identity.get(field);
-        value.map_or("unset".to_owned(), ToString::to_string)
-    };
-    let fields = kept.identity.keys().chain(now.identity.keys());
-    for field in fields.map(String::as_str) {
-        let (before, after) = (said(kept, field), said(now, field));
-        if before == after {
-            continue;
-        }
+    for (field, before, after) in differences(&kept.identity, &now.identity) {
         if field == ADDRESS && moved == Moved::Allowed {
             tracing::warn!("this run was begun at {before}; it goes on at {after}");
             continue;

@@ -26,6 +26,7 @@ pub mod camera;
 pub mod colour;
 pub mod curve;
 pub mod exposure;
+mod film;
 mod isp;
 pub mod lanes;
 pub mod negative;
@@ -39,6 +40,7 @@ pub mod unprocess;
 
 pub use camera::{Calibration, CameraModel, CameraState, Sampling};
 pub use exposure::{expose, expose_by};
+pub use film::Film;
 pub use negative::{Negative, ladder};
 pub use profile::{Amplify, Coupling, Draws, Profile, Synthesis, Tone};
 pub use random::NoiseKey;
@@ -51,14 +53,10 @@ pub const VERSION: u32 = 2;
 
 /// The frame under a degradation.
 ///
-/// For several levels of one frame with noise, a [`Negative`] gives the same images for less work.
+/// For several levels of one frame with noise, a [`Film`] gives the same images for less work.
 #[must_use]
 pub fn degrade(clean: &Rgb, how: Degradation, key: &NoiseKey, synthesis: &Synthesis) -> Rgb {
-    match how {
-        Degradation::None => clean.clone(),
-        Degradation::Exposure(level) => expose(clean, level),
-        Degradation::Sensor(level) => Negative::new(clean, key, synthesis, level).develop(level),
-    }
+    Film::default().degrade(clean, how, key, synthesis)
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! What a run is: [`RunManifest`].
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
@@ -43,6 +43,22 @@ pub struct Counts {
     pub answered: usize,
     /// Without one, after all retries.
     pub failed: usize,
+}
+
+/// The fields in which two identities differ, each with what the one says and what the other says; `unset` where it says nothing.
+pub fn differences<'a>(
+    one: &'a BTreeMap<String, Value>,
+    other: &'a BTreeMap<String, Value>,
+) -> impl Iterator<Item = (&'a str, String, String)> {
+    let fields: BTreeSet<&String> = one.keys().chain(other.keys()).collect();
+    let said = |identity: &BTreeMap<String, Value>, field: &String| {
+        let value = identity.get(field);
+        value.map_or("unset".to_owned(), ToString::to_string)
+    };
+    fields.into_iter().filter_map(move |field| {
+        let (first, second) = (said(one, field), said(other, field));
+        (first != second).then_some((field.as_str(), first, second))
+    })
 }
 
 /// The content of `manifest.json`.

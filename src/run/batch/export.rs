@@ -1,7 +1,5 @@
 //! `batch export`: what is left to ask, as input files.
 
-use std::sync::Arc;
-
 use super::requests::{Requests, remote, told};
 use crate::config::BatchExport;
 use crate::error::Result;
@@ -11,6 +9,7 @@ use crate::run::plan::{FramePlan, Plan, Shot};
 use crate::run::progress::Progress;
 use crate::run::stage::Stage;
 use crate::run::thumbnail::Wanted;
+use crate::run::timings::Timings;
 use crate::run::trial::Slide;
 use crate::run::{Verdict, limit, listed, manifest, moved, open_enhancers};
 use crate::store::{Store, read_manifest, read_thumbnails};
@@ -57,7 +56,7 @@ fn write(config: &BatchExport, stage: Stage<'_>, progress: &Progress) -> Result<
         recipe: &stage.inputs.recipe,
         enhancers,
         limit: limit(&evaluation.ask, &evaluation.images),
-        timings: Arc::default(),
+        timings: &Timings::default(),
     };
     darkroom.largest(&plan.frames)?;
     let bar = progress.bar("writing requests", left);

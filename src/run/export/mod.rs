@@ -3,16 +3,15 @@
 mod set;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
 
-use rayon::ThreadPoolBuilder;
-
+use super::cores::pool;
 use super::darkroom::{Darkroom, Desk};
 use super::gallery::look_through;
 use super::plan::conditions;
 use super::progress::Progress;
 use super::recipe::Recipe;
 use super::stage::select;
+use super::timings::Timings;
 use super::written::png;
 use super::{Verdict, identity, open_enhancers, stage};
 use crate::ask::Format;
@@ -43,9 +42,7 @@ pub fn export(config: &Export, progress: &Progress) -> Result<Verdict> {
             .collect(),
     };
     let conditions = conditions(&config.light, config.enhancement.on, &recipe.enhancers);
-    let threads = config.enhancement.threads.map_or(0, std::num::NonZero::get);
-    let cores = ThreadPoolBuilder::new().num_threads(threads).build();
-    let cores = cores.map_err(|e| Error::usage("--threads", e))?;
+    let cores = pool(config.enhancement.threads)?;
     let pictures = cores.install(|| look_through(&dataset, &questions, progress))?;
     let mut sets = open_sets(config, &dataset, &conditions, &questions)?;
     let (_, enhancers) = open_enhancers(files, &config.enhancement)?;
@@ -55,7 +52,7 @@ pub fn export(config: &Export, progress: &Progress) -> Result<Verdict> {
         recipe: &recipe,
         enhancers,
         limit: None,
-        timings: Arc::default(),
+        timings: &Timings::default(),
     };
     let names = names(pictures.keys());
     let bar = progress.bar("images", pictures.len() * conditions.len());

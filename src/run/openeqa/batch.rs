@@ -16,14 +16,15 @@ use crate::types::manifest::Status;
 impl Run<'_> {
     /// Writes the files, and notes their trials in the run as out.
     pub(super) fn export(mut self, files: &BatchFiles) -> Result<Verdict> {
-        let (answered, out) = self.there()?;
+        let kept = self.kept()?;
+        let (answered, out) = self.there(&kept)?;
         let there = answered.union(&out).copied().collect();
         let plan = Plan::new(&self.stage, &there);
         self.store.write_manifest(&self.manifest)?;
         let written = if plan.left() > 0 {
             self.export_answers(plan, files)?
         } else {
-            let marks = self.left_to_mark(&there)?;
+            let marks = self.left_to_mark(&kept, &there);
             let judge = self.stage.judge.as_slice();
             remote(judge)?;
             let mut requests = Requests::<Judged>::new(judge, files, &mut self.store)?;

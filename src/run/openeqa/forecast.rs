@@ -1,14 +1,14 @@
 //! What a run of open questions would take, found out without sending anything: [`estimate`].
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
 use super::item::{Judged, Open};
-use super::marks::{Marks, predictions};
+use super::marks::{Kept, Marks, predictions};
 use super::plan::{Plan, WalkPlan};
 use super::stage::Stage;
 use super::theatre::{Sample, Theatre};
 use crate::ask::openeqa::judged;
-use crate::ask::{ImageLimit, Price};
+use crate::ask::{ImageLimit, Price, bilinear};
 use crate::config::{OpenEqa, Show};
 use crate::error::Result;
 use crate::report::forecast::{Forecast, Line, json, render};
@@ -19,7 +19,7 @@ use crate::run::trial::{Item, Prompt};
 use crate::run::{Verdict, limit, open_enhancers};
 use crate::store;
 use crate::types::manifest::Status;
-use crate::types::{Condition, Kept as _, OpenRecord, View};
+use crate::types::{self, Condition, OpenRecord, View};
 
 /// An answer as it may be: as long as one with so many tokens.
 const ANSWER: &str =
@@ -28,14 +28,16 @@ const ANSWER: &str =
 /// Says what is left to ask and what it would take; sends nothing and leaves no file.
 pub(super) fn estimate(config: &OpenEqa, mut stage: Stage<'_>) -> Result<Verdict> {
     let records: Vec<OpenRecord> = store::read_records(&stage.folder)?;
-    let answered = records.iter().filter(|record| !record.failed());
+    let answered = records
+        .iter()
+        .filter(|record| !types::Kept::failed(*record));
     let there = answered.map(|record| record.key).collect();
     let plan = Plan::new(&stage, &there);
     let given = super::all_given(config, &stage)?;
     let everyone: Vec<Asker> = stage.askers.iter().chain(&stage.judge).cloned().collect();
     let ledger = Ledger::new(&config.money, &everyone, &records)?;
     let kept = records.iter().cloned();
-    let kept: HashMap<_, _> = kept.map(|record| (record.key, record)).collect();
+    let kept: Kept = kept.map(|record| (record.key, record)).collect();
     let predicted = predictions(&stage, &plan.due, &given, &kept, config.protocol);
     let marks = Marks::new(&stage, &predicted, &there);
     let files = std::mem::take(&mut stage.files);
@@ -117,14 +119,10 @@ impl Sizes {
             let reel = episode.reel.as_ref().ok()?;
             let (width, height) = reel.stills.first()?.size;
             let (width, height) = (width as usize, height as usize);
-            let scale = |side: usize| match stage.walk.side {
-                Some(most) => {
-                    let factor = most as f64 / width.max(height) as f64;
-                    (side as f64 * factor).round_ties_even() as usize
-                }
-                None => side,
-            };
-            Some((scale(width), scale(height), reel.order.len()))
+            let side = stage.walk.side;
+            let [height, width] =
+                side.map_or([height, width], |side| bilinear::size(height, width, side));
+            Some((width, height, reel.order.len()))
         });
         Self {
             bytes: bytes.collect(),

@@ -72,24 +72,19 @@ pub(super) fn given(
                 entry.question_id
             )));
         }
+        let key = key(&config.name, entry, &condition, person.as_deref());
         let degradation = condition.degradation;
         records.push(OpenRecord {
             view: View::Image,
             level: Some(degradation.level()),
             variant: degradation.variant(),
             enhancer: condition.enhancer.clone(),
+            condition: Some(condition),
+            person,
             reply: entry.answer.clone(),
             via: Via::File,
-            ..empty(
-                key(&config.name, entry, &condition, person.as_deref()),
-                &stage.questions[index],
-                Step::Answer,
-                &config.name,
-            )
+            ..empty(key, &stage.questions[index], Step::Answer, &config.name)
         });
-        if let Some(record) = records.last_mut() {
-            (record.condition, record.person) = (Some(condition), person);
-        }
     }
     passed_over(path, &strange, entries.len());
     Ok(records)

@@ -1,6 +1,6 @@
 //! What the judge is to mark: the [`Prediction`]s of a run, and the [`Marks`] that are left.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
 use super::item::Judged;
@@ -14,7 +14,7 @@ use crate::score::llm_match::{Protocol, shortened};
 use crate::types::{Digest, OpenRecord, TrialKey, View};
 
 /// The records of a run by their keys.
-pub(super) type Kept = HashMap<TrialKey, OpenRecord>;
+pub(super) type Kept = BTreeMap<TrialKey, OpenRecord>;
 
 /// What is known of one answer.
 #[derive(Debug, Clone, PartialEq, Eq)]

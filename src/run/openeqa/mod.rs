@@ -17,10 +17,11 @@ mod theatre;
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
-use rayon::{ThreadPool, ThreadPoolBuilder};
+use rayon::ThreadPool;
 
 use super::askers;
-use super::drive::{Drive, Tally, unstarted};
+use super::cores::pool;
+use super::drive::{Drive, Tally};
 use super::ledger::Ledger;
 use super::progress::Progress;
 use super::stop::End;
@@ -36,8 +37,8 @@ use crate::store::{self, Store};
 use crate::types::manifest::RunManifest;
 use crate::types::{FrameId, Kept as _, OpenRecord, TrialKey};
 
-use marks::{Kept, Marks, predictions};
-use plan::Plan;
+use marks::{Kept, Marks, Prediction, predictions};
+use plan::{Due, Plan};
 use stage::Stage;
 use theatre::Theatre;
 
@@ -65,6 +66,8 @@ struct Run<'a> {
     manifest: RunManifest,
     /// The answers that were given in files.
     given: Vec<OpenRecord>,
+    /// Every answer that is due, there or not.
+    due: Vec<Due>,
 }
 
 impl<'a> Run<'a> {
@@ -77,25 +80,23 @@ impl<'a> Run<'a> {
         let mut manifest = manifest(
             OpenRecord::SCHEMA,
             stage.identity.clone(),
-            settings.clone(),
+            BTreeMap::new(),
             BTreeMap::new(),
             kept,
         );
+        // Those of the last command, whatever the run was begun with: judge and protocol may be others.
         manifest.settings = settings;
         let mut store = Store::<OpenRecord>::open(&stage.folder, &manifest, moved(&config.output))?;
         let there: HashSet<TrialKey> = store.records()?.iter().map(|record| record.key).collect();
         for record in given.iter().filter(|record| !there.contains(&record.key)) {
             store.append(record)?;
         }
-        let cores = ThreadPoolBuilder::new()
-            .num_threads(config.enhancement.threads.map_or(0, usize::from))
-            .build()
-            .map_err(|e| unstarted(&e))?;
         Ok(Self {
             config,
+            due: Plan::new(&stage, &HashSet::new()).due,
             stage,
             progress,
-            cores,
+            cores: pool(config.enhancement.threads)?,
             store,
             manifest,
             given,
@@ -119,10 +120,7 @@ impl<'a> Run<'a> {
             );
         }
         let askers = self.stage.askers.iter().chain(&self.stage.judge);
-        let adapted: Vec<_> = askers
-            .flat_map(|asker| askers::adapted(std::slice::from_ref(asker)))
-            .collect();
-        self.manifest.settings.extend(adapted);
+        self.manifest.settings.extend(askers::adapted(askers));
         self.show(end)
     }
 
@@ -133,17 +131,17 @@ impl<'a> Run<'a> {
     }
 
     /// The trials that have a reply, and those that are out in a batch.
-    fn there(&self) -> Result<(HashSet<TrialKey>, HashSet<TrialKey>)> {
-        let records = self.store.records()?;
-        let answered = records.iter().filter(|record| !record.failed());
+    fn there(&self, kept: &Kept) -> Result<(HashSet<TrialKey>, HashSet<TrialKey>)> {
+        let answered = kept.values().filter(|record| !record.failed());
         let answered: HashSet<TrialKey> = answered.map(|record| record.key).collect();
-        let out = self.store.out_in_batches()?;
-        let out = out.into_iter().filter(|key| !answered.contains(key));
-        Ok((answered.clone(), out.collect()))
+        let mut out = self.store.out_in_batches()?;
+        out.retain(|key| !answered.contains(key));
+        Ok((answered, out.into_iter().collect()))
     }
 
     fn answers(&mut self) -> Result<End> {
-        let (answered, out) = self.there()?;
+        let kept = self.kept()?;
+        let (answered, out) = self.there(&kept)?;
         let plan = Plan::new(&self.stage, &answered.union(&out).copied().collect());
         self.left_out(plan.due.iter().filter(|due| out.contains(&due.key)).count());
         let left = plan.left();
@@ -160,7 +158,7 @@ impl<'a> Run<'a> {
         let mut theatre = Theatre::new(self.config, &self.stage, enhancers);
         self.cores.install(|| theatre.sample(&plan.walks))?;
         let askers = &self.stage.askers;
-        let ledger = Ledger::new(&self.config.money, askers, &self.store.records()?)?;
+        let ledger = Ledger::new(&self.config.money, askers, kept.values())?;
         let tally = Tally {
             trials: plan.due.len(),
             answered: plan.due.len() - left,
@@ -185,15 +183,15 @@ impl<'a> Run<'a> {
         let Some(judge) = self.stage.judge.clone() else {
             return Ok(End::Through);
         };
-        let (marked, out) = self.there()?;
-        let marks = self.left_to_mark(&marked.union(&out).copied().collect())?;
+        let kept = self.kept()?;
+        let (marked, out) = self.there(&kept)?;
+        let marks = self.left_to_mark(&kept, &marked.union(&out).copied().collect());
         self.left_out(marks.due.iter().filter(|key| out.contains(key)).count());
         if marks.left.is_empty() {
             return Ok(End::Through);
         }
         let judge = std::slice::from_ref(&judge);
-        let kept: Vec<OpenRecord> = self.store.records()?;
-        let ledger = Ledger::new(&self.config.money, judge, &kept)?;
+        let ledger = Ledger::new(&self.config.money, judge, kept.values())?;
         let tally = Tally {
             trials: marks.due.len(),
             answered: marks.due.len() - marks.left.len(),
@@ -219,12 +217,14 @@ impl<'a> Run<'a> {
     }
 
     /// The answers that are to be marked and have no mark among those that are `there`.
-    fn left_to_mark(&self, there: &HashSet<TrialKey>) -> Result<Marks> {
-        let due = Plan::new(&self.stage, &HashSet::new()).due;
-        let kept = self.kept()?;
+    fn left_to_mark(&self, kept: &Kept, there: &HashSet<TrialKey>) -> Marks {
+        Marks::new(&self.stage, &self.predictions(kept), there)
+    }
+
+    /// Every answer that is due or was given.
+    fn predictions(&self, kept: &Kept) -> Vec<Prediction> {
         let protocol = self.config.protocol;
-        let predictions = predictions(&self.stage, &due, &self.given, &kept, protocol);
-        Ok(Marks::new(&self.stage, &predictions, there))
+        predictions(&self.stage, &self.due, &self.given, kept, protocol)
     }
 
     /// Says what a Batch API has been asked and has not answered: asked here, it would be paid for twice.

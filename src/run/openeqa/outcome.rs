@@ -5,8 +5,7 @@ use std::collections::{BTreeMap, HashSet};
 use serde_json::{Value, json};
 
 use super::Run;
-use super::marks::{Kept, Prediction, Said, predictions};
-use super::plan::Plan;
+use super::marks::{Kept, Prediction, Said};
 use super::stage::Stage;
 use crate::config::{OpenEqa, Show};
 use crate::dataset::openeqa::OpenQuestion;
@@ -45,14 +44,13 @@ impl Run<'_> {
     /// Scores what the run holds, and leaves it in its folder.
     pub(super) fn show(mut self, end: End) -> Result<Verdict> {
         let kept = self.kept()?;
-        let due = Plan::new(&self.stage, &HashSet::new()).due;
         let protocol = self.config.protocol;
-        let predicted = predictions(&self.stage, &due, &self.given, &kept, protocol);
+        let predicted = self.predictions(&kept);
         let outcomes: Vec<Outcome> = predicted
             .iter()
             .map(|prediction| outcome(prediction, &kept, protocol))
             .collect();
-        let counts = counts(due.iter().map(|due| due.key), &predicted, &kept);
+        let counts = counts(self.due.iter().map(|due| due.key), &predicted, &kept);
         let unmarked = outcomes.contains(&Outcome::Unmarked);
         let status = match end.status(counts) {
             // Everything came, and not all of it is scored.

@@ -54,16 +54,7 @@ impl<'a> Stage<'a> {
             &[]
         };
         let files = identity::enhancers(models)?;
-        let recipe = Recipe {
-            seed: config.light.sensor.seed,
-            synthesis: config.light.sensor.synthesis.clone(),
-            format: config.images.format,
-            max_side: None,
-            enhancers: files
-                .iter()
-                .map(|file| (file.name().clone(), file.digest()))
-                .collect(),
-        };
+        let recipe = Recipe::new(&config.light.sensor, &config.images, &files);
         let episodes = if seeing {
             walks(config, &questions, progress)?
         } else {

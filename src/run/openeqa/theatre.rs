@@ -24,8 +24,8 @@ use crate::run::limit;
 use crate::run::recipe::Recipe;
 use crate::run::thumbnail::Wanted;
 use crate::run::trial::{Exposed, Slide};
-use crate::synthesis::{Negative, NoiseKey, expose};
-use crate::types::{Condition, Degradation, FrameId, ImageFacts, Rgb};
+use crate::synthesis::{Film, NoiseKey};
+use crate::types::{Condition, FrameId, ImageFacts, Rgb};
 
 /// What the thread works with.
 pub(super) struct Theatre<'a> {
@@ -176,18 +176,10 @@ impl<'a> Theatre<'a> {
             clean = self.scaled(clean)?;
         }
         let key = self.key(walk, still);
-        let mut negative: Option<Negative> = None;
-        let mut dark = |degradation| match degradation {
-            Degradation::None => clean.clone(),
-            Degradation::Exposure(level) => expose(&clean, level),
-            Degradation::Sensor(level) => {
-                let kept = negative.take().filter(|kept| kept.serves(level));
-                let take = || Negative::new(&clean, &key, &self.recipe.synthesis, level);
-                negative.insert(kept.unwrap_or_else(take)).develop(level)
-            }
-        };
+        let mut film = Film::default();
         let print = |condition: &&Condition| {
-            let image = dark(condition.degradation);
+            let synthesis = &self.recipe.synthesis;
+            let image = film.degrade(&clean, condition.degradation, &key, synthesis);
             match condition.enhancer {
                 None => self.sent(image).map(Print::Ready),
                 Some(_) => Ok(Print::Dark(image)),

@@ -6,17 +6,17 @@ mod sidecar;
 use std::fs;
 use std::path::Path;
 
-use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
 
 use super::Verdict;
+use super::cores::pool;
 use super::inputs::{Entry, Inputs, stem};
 use super::progress::{Bar, Progress};
 use super::written::{png, write};
 use crate::config::{Existing, Light, Product, Synthesize};
 use crate::dataset::Picture;
 use crate::error::{Error, Result};
-use crate::synthesis::{Negative, NoiseKey, expose};
+use crate::synthesis::{Film, NoiseKey};
 use crate::types::manifest::Status;
 use crate::types::{Degradation, FrameId, Rgb, Variants};
 use sidecar::Sidecar;
@@ -29,9 +29,7 @@ use sidecar::Sidecar;
 /// Where nothing can be made: no such input, two frames of one name, no folder to write to.
 pub fn synthesize(config: &Synthesize, progress: &Progress) -> Result<Verdict> {
     let frames = Inputs::open(&config.inputs, config.most_pixels)?;
-    let threads = config.threads.map_or(0, std::num::NonZero::get);
-    let cores = ThreadPoolBuilder::new().num_threads(threads).build();
-    let cores = cores.map_err(|e| Error::usage("--threads", e))?;
+    let cores = pool(config.threads)?;
     fs::create_dir_all(&config.out).map_err(|e| Error::file(&config.out, "make", e))?;
     if let Product::Replay(file) = &config.product {
         return cores.install(|| replay(config, &frames, file));
@@ -129,7 +127,7 @@ fn one(config: &Synthesize, frames: &Inputs, entry: &Entry, files: &[File], bar:
             entry,
             picture,
             clean: None,
-            negative: None,
+            film: Film::default(),
         },
         Err(e) => {
             tracing::error!("{e}");
@@ -162,7 +160,7 @@ struct Work<'a> {
     entry: &'a Entry,
     picture: Picture,
     clean: Option<Rgb>,
-    negative: Option<Negative>,
+    film: Film,
 }
 
 /// Whether an image was made.
@@ -210,16 +208,8 @@ impl Work<'_> {
             Some(clean) => clean,
             none => none.insert(self.picture.decode()?),
         };
-        Ok(match degradation {
-            Degradation::None => clean.clone(),
-            Degradation::Exposure(level) => expose(clean, level),
-            Degradation::Sensor(level) => {
-                let kept = self.negative.take().filter(|kept| kept.serves(level));
-                let synthesis = &self.config.light.sensor.synthesis;
-                let negative = kept.unwrap_or_else(|| Negative::new(clean, key, synthesis, level));
-                self.negative.insert(negative).develop(level)
-            }
-        })
+        let synthesis = &self.config.light.sensor.synthesis;
+        Ok(self.film.degrade(clean, degradation, key, synthesis))
     }
 }
 
