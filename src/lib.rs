@@ -71,6 +71,8 @@ pub mod config;
 pub mod dataset;
 pub mod enhance;
 pub mod error;
+pub mod files;
+pub mod job;
 pub mod questions;
 pub mod report;
 pub mod run;

@@ -11,11 +11,14 @@ use darkqa_eval::config::{
     Questions, Realism, Report, Serve, ShowItem, StudyPack, StudyRead, Synthesize,
 };
 use darkqa_eval::enhance;
+use darkqa_eval::job::Outcome;
+use darkqa_eval::job::merge::merge;
+use darkqa_eval::job::progress::{Loudness, Progress};
+use darkqa_eval::job::report::report;
+use darkqa_eval::run::evaluate::{evaluate, export_batch};
 use darkqa_eval::run::export::export;
 use darkqa_eval::run::import::import;
-use darkqa_eval::run::merge::merge;
 use darkqa_eval::run::openeqa::openeqa;
-use darkqa_eval::run::progress::{Loudness, Progress};
 use darkqa_eval::run::questions::questions;
 use darkqa_eval::run::realism::realism;
 use darkqa_eval::run::rooms::rooms;
@@ -23,7 +26,7 @@ use darkqa_eval::run::serve::serve;
 use darkqa_eval::run::show::show;
 use darkqa_eval::run::study;
 use darkqa_eval::run::synthesize::synthesize;
-use darkqa_eval::run::{self, Verdict, evaluate};
+use darkqa_eval::run::{self, batch};
 use darkqa_eval::types::manifest::Status;
 use tracing_subscriber::EnvFilter;
 
@@ -180,7 +183,7 @@ impl Job {
 }
 
 fn carry_out(task: Task, progress: &Progress) -> anyhow::Result<ExitCode> {
-    let Verdict { status, output } = match task {
+    let Outcome { status, output } = match task {
         Task::Evaluate(said) => evaluate(&Config::resolve(*said)?, progress)?,
         Task::Synthesize(config) => synthesize(&config, progress)?,
         Task::Realism(config) => realism(&config, progress)?,
@@ -189,15 +192,15 @@ fn carry_out(task: Task, progress: &Progress) -> anyhow::Result<ExitCode> {
         Task::Export(config) => export(&config, progress)?,
         Task::Enhance(config) => run::enhance::enhance(&config, progress)?,
         Task::OpenEqa(said) => openeqa(&OpenEqa::resolve(*said)?, progress)?,
-        Task::BatchExport(config) => run::batch::export(&config, progress)?,
-        Task::BatchImport(config) => run::batch::import(&config)?,
+        Task::BatchExport(config) => export_batch(&config.evaluation, &config.files, progress)?,
+        Task::BatchImport(config) => batch::import(&config)?,
         Task::Rooms(config) => rooms(&config, progress)?,
         Task::Serve(config) => serve(&config, progress)?,
         Task::StudyPack(config) => study::pack(*config, progress)?,
         Task::StudyRead(config) => study::read(&config)?,
         Task::Show(config) => show(*config)?,
         Task::Merge(config) => merge(&config)?,
-        Task::Report(config) => run::report::report(&config)?,
+        Task::Report(config) => report(&config)?,
     };
     let written = std::io::stdout().lock().write_all(output.as_bytes());
     match (status, written) {

@@ -230,7 +230,7 @@ pub struct EvaluateArgs {
 #[derive(Debug, Default, Args)]
 #[command(next_help_heading = "Scale")]
 pub struct ScaleArgs {
-    /// Do one of N parts, by frames: I/N; auto/N or auto as the batch system says (Slurm arrays, indexed Kubernetes jobs);
+    /// Do one of N parts, by frames or walks: I/N; auto/N or auto as the batch system says (Slurm arrays, indexed Kubernetes jobs);
     /// none for everything. --rpm, --tpm and --max-cost are for all parts together; default: auto in a Slurm array, else none
     #[arg(long, value_name = "I/N|auto/N|auto|none")]
     pub shard: Option<String>,

@@ -6,7 +6,8 @@ use std::path::PathBuf;
 use clap::{Arg, Args};
 
 use super::{
-    BatchFileArgs, EnhancementArgs, LightArgs, ModelArgs, OutputArgs, SendingArgs, SensorArgs,
+    BatchFileArgs, EnhancementArgs, LightArgs, ModelArgs, OutputArgs, ScaleArgs, SendingArgs,
+    SensorArgs,
 };
 
 /// The flags of `openeqa`.
@@ -108,6 +109,9 @@ pub struct OpenEqaArgs {
     /// Sending.
     #[command(flatten)]
     pub sending: SendingArgs,
+    /// Scale.
+    #[command(flatten)]
+    pub scale: ScaleArgs,
     /// Output.
     #[command(flatten)]
     pub output: OutputArgs,

@@ -36,7 +36,7 @@ pub use layers::{merge, one_line};
 pub use light::{Light, Sensor};
 pub use merge::{Merge, Missing};
 pub use money::Money;
-pub use openeqa::{CameraOf, Chosen, Darkened, Given, Judge, OpenEqa, OpenTask, Walk};
+pub use openeqa::{AnswersFile, CameraOf, Chosen, Darkened, Judge, OpenEqa, OpenTask, Walk};
 pub use questions::{Questions, Strangers};
 pub use realism::{PairPlace, Realism};
 pub use report::{Readings, Report};
@@ -66,9 +66,16 @@ pub struct Config {
     pub data: Data,
     /// In which order choices are shown, and how often.
     pub showing: Showing,
+    /// What it shares with every other experiment.
+    pub job: JobSettings,
+}
+
+/// The settings that every experiment has.
+#[derive(Debug)]
+pub struct JobSettings {
     /// How dark.
     pub light: Light,
-    /// What mends the images.
+    /// What enhances the images.
     pub enhancement: Enhancement,
     /// Who is asked.
     pub ask: Ask,
@@ -79,11 +86,11 @@ pub struct Config {
     /// What it may cost.
     pub money: Money,
     /// Whether anything is sent.
-    pub earnest: Earnest,
+    pub mode: Mode,
     /// Which part of it this is.
     pub shard: Shard,
-    /// Whether it is said where the time went.
-    pub timings: Timing,
+    /// Print at the end how long each step took.
+    pub show_timings: bool,
     /// What is left behind.
     pub output: Output,
     /// What decides the images, as it was said.
@@ -144,20 +151,11 @@ pub struct Pace {
 
 /// Whether anything is sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Earnest {
-    /// It is.
+pub enum Mode {
+    /// Ask what is left.
     Run,
-    /// Only what it would take is said.
-    Estimate,
-}
-
-/// Whether it is said where the time went.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Timing {
-    /// It is.
-    Told,
-    /// It is not.
-    Kept,
+    /// Say what that would take, and send nothing.
+    DryRun,
 }
 
 /// Where the run is kept.
@@ -222,29 +220,30 @@ impl Config {
         }
         let shard = Shard::said(said.scale.shard.as_deref(), |name| env::var(name).ok())?;
         let light = Light::resolve(&said.light, &said.sensor)?;
+        let recipe = show::recipe(&said)?;
         Ok(Self {
-            shard,
-            timings: if said.scale.timings {
-                Timing::Told
-            } else {
-                Timing::Kept
-            },
-            recipe: show::recipe(&said)?,
             showing: Showing::said(&said.data, light.sensor.seed),
             data: data(said.data)?,
-            light,
-            enhancement: enhancement(said.enhancement)?,
-            ask: asking::ask(said.model, &said.sending, shard)?,
-            images: images(&said.sending)?,
-            pace: pace(&said.sending)?,
-            money: Money::said(&said.sending, shard)?,
-            earnest: if said.sending.dry_run {
-                Earnest::Estimate
-            } else {
-                Earnest::Run
+            job: JobSettings {
+                shard,
+                show_timings: said.scale.timings,
+                recipe,
+                light,
+                enhancement: enhancement(said.enhancement)?,
+                ask: asking::ask(said.model, &said.sending, shard)?,
+                images: images(&said.sending)?,
+                pace: pace(&said.sending)?,
+                money: Money::said(&said.sending, shard)?,
+                mode: Mode::said(said.sending.dry_run),
+                output: output(said.output),
             },
-            output: output(said.output),
         })
+    }
+}
+
+impl Mode {
+    fn said(dry_run: bool) -> Self {
+        if dry_run { Self::DryRun } else { Self::Run }
     }
 }
 
@@ -460,9 +459,9 @@ mod tests {
     #[test]
     fn built_in_models_need_no_endpoint() {
         let config = resolve(&["--model", "random", "--blind-model", "script:a.jsonl"]).unwrap();
-        assert!(config.ask.server.is_none());
+        assert!(config.job.ask.server.is_none());
         assert_eq!(
-            config.ask.blind_models,
+            config.job.ask.blind_models,
             [ModelName::Script("a.jsonl".into())]
         );
     }

@@ -5,11 +5,15 @@ use std::num::{NonZeroU32, NonZeroUsize};
 use std::path::PathBuf;
 use std::str::FromStr;
 
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+
 use super::asking::ask;
 use super::layers::merge;
+use super::show;
 use super::{
-    Ask, BatchFiles, Enhancement, Images, Light, ModelName, Money, Output, Pace, Server, Shard,
-    enhancement, images, most_pixels, nameless, output, pace, parsed,
+    BatchFiles, JobSettings, Light, Mode, ModelName, Money, Server, Shard, enhancement, images,
+    most_pixels, nameless, output, pace, parsed,
 };
 use crate::ask::Parameters;
 use crate::cli::{EvaluateArgs, LightArgs, ModelArgs, OpenEqaArgs, SendingArgs};
@@ -38,34 +42,20 @@ const MARK_TOKENS: NonZeroU32 = NonZeroU32::new(32).unwrap();
 pub struct OpenEqa {
     /// The file of questions.
     pub questions: PathBuf,
-    /// The folder of walks.
-    pub frames: PathBuf,
     /// Which questions.
     pub chosen: Chosen,
     /// How a walk is shown.
     pub walk: Walk,
-    /// How dark.
-    pub light: Light,
-    /// What mends the images.
-    pub enhancement: Enhancement,
-    /// Who is asked.
-    pub ask: Ask,
     /// Answers of people or other programs.
-    pub given: Vec<Given>,
+    pub answers: Vec<AnswersFile>,
     /// Who marks the answers; `None` for nobody.
     pub judge: Option<Judge>,
     /// How answers are judged.
     pub protocol: Protocol,
-    /// How images are sent.
-    pub images: Images,
-    /// How much at once, and when to give up.
-    pub pace: Pace,
-    /// What it may cost.
-    pub money: Money,
     /// What is to be done.
     pub task: OpenTask,
-    /// What is left behind.
-    pub output: Output,
+    /// What it shares with every other experiment.
+    pub job: JobSettings,
 }
 
 /// Which questions of a file.
@@ -82,8 +72,10 @@ pub struct Chosen {
 }
 
 /// How a walk is shown.
-#[derive(Debug)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Walk {
+    /// The folder of walks.
+    pub folder: PathBuf,
     /// How many of its frames.
     pub frames: usize,
     /// Their longer side in pixels; `None` for as they are.
@@ -97,7 +89,8 @@ pub struct Walk {
 }
 
 /// Where light is taken from a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Darkened {
     /// In its own size, as a camera would.
     Native,
@@ -106,7 +99,8 @@ pub enum Darkened {
 }
 
 /// What one state of the camera takes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum CameraOf {
     /// All frames of a walk: one camera recorded it.
     Episode,
@@ -148,7 +142,7 @@ either!(CameraOf, "--sensor": "episode" = Episode, "frame" = Frame);
 
 /// Answers of people or another program.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Given {
+pub struct AnswersFile {
     /// What they stand under among the models.
     pub name: String,
     /// The file.
@@ -169,10 +163,8 @@ pub struct Judge {
 /// What is to be done.
 #[derive(Debug)]
 pub enum OpenTask {
-    /// Ask what is left.
+    /// Ask what is left, or say what that would take.
     Run,
-    /// Say what that would take.
-    Estimate,
     /// Write it as files of a Batch API.
     Batch(BatchFiles),
     /// Write a page for people.
@@ -185,8 +177,8 @@ impl OpenEqa {
     /// # Errors
     /// [`Error::Usage`] with the flag that cannot be used.
     pub fn resolve(said: OpenEqaArgs) -> Result<Self> {
-        Shard::warn_unspread("openeqa", |name| std::env::var(name).ok())?;
         let judge = JudgeArgs::of(&said);
+        let walk = Walk::resolve(&said)?;
         let shared = merge(EvaluateArgs {
             light: said.light,
             sensor: said.sensors,
@@ -194,19 +186,28 @@ impl OpenEqa {
             model: said.model,
             sending: said.sending,
             output: said.output,
+            scale: said.scale,
             ..EvaluateArgs::default()
         })?;
         refuse(&shared.model, &shared.sending)?;
-        let given = said.answers.iter().map(|text| given(text));
-        let given: Vec<Given> = given.collect::<Result<_>>()?;
-        let task = match (said.study, said.batch, shared.sending.dry_run) {
-            (Some(folder), _, _) => OpenTask::Study(folder),
-            (None, true, _) => OpenTask::Batch(BatchFiles::resolve(said.files)?),
-            (None, false, true) => OpenTask::Estimate,
-            (None, false, false) => OpenTask::Run,
+        let mut recipe = show::recipe(&shared)?;
+        let walk = Walk {
+            most_pixels: most_pixels(shared.data.max_pixels),
+            ..walk
         };
+        recipe.insert(show::WALK.to_owned(), json!(walk));
+        let answers = said.answers.iter().map(|text| answers_file(text));
+        let answers: Vec<AnswersFile> = answers.collect::<Result<_>>()?;
+        let task = match (said.study, said.batch) {
+            (Some(folder), _) => OpenTask::Study(folder),
+            (None, true) => OpenTask::Batch(BatchFiles::resolve(said.files)?),
+            (None, false) => OpenTask::Run,
+        };
+        let shard = Shard::said(shared.scale.shard.as_deref(), |name| {
+            std::env::var(name).ok()
+        })?;
         let nobody = shared.model.model.is_empty() && shared.model.blind_model.is_empty();
-        if nobody && given.is_empty() && !matches!(task, OpenTask::Study(_)) {
+        if nobody && answers.is_empty() && !matches!(task, OpenTask::Study(_)) {
             return Err(nameless(&shared.output));
         }
         let light = LightArgs {
@@ -214,7 +215,7 @@ impl OpenEqa {
             variant: shared.light.variant.or_else(|| Some(VARIANT.to_owned())),
         };
         let seed = sampling_seed(said.sampling_seed.as_deref())?;
-        let judge = judge.resolve(&shared.model, &shared.sending, seed)?;
+        let judge = judge.resolve(&shared.model, &shared.sending, seed, shard)?;
         let model = ModelArgs {
             temperature: shared
                 .model
@@ -223,39 +224,51 @@ impl OpenEqa {
             max_tokens: shared.model.max_tokens.or(Some(ANSWER_TOKENS)),
             ..shared.model
         };
-        let mut ask = ask(model, &shared.sending, Shard::WHOLE)?;
+        let mut ask = ask(model, &shared.sending, shard)?;
         ask.parameters.seed = seed;
         ask.models
             .iter()
             .chain(&ask.blind_models)
             .try_for_each(speaks)?;
         Ok(Self {
+            walk,
             questions: said.questions,
-            frames: said.frames,
             chosen: Chosen {
                 splits: said.splits.as_deref().map(list),
                 categories: said.categories.as_deref().map(list),
                 subset: said.subset,
                 limit: said.limit,
             },
-            walk: Walk {
-                frames: said.num_frames.map_or(FRAMES, usize::from),
-                side: side(said.image_size.as_deref())?,
-                darkened: parsed("--degrade", said.degrade.as_deref())?.unwrap_or(Darkened::Native),
-                camera: parsed("--sensor", said.sensor.as_deref())?.unwrap_or(CameraOf::Episode),
-                most_pixels: most_pixels(shared.data.max_pixels),
-            },
-            light: Light::resolve(&light, &shared.sensor)?,
-            enhancement: enhancement(shared.enhancement)?,
-            ask,
-            given,
+            answers,
             judge,
             protocol: parsed("--protocol", said.protocol.as_deref())?.unwrap_or(Protocol::Upstream),
-            images: images(&shared.sending)?,
-            pace: pace(&shared.sending)?,
-            money: Money::said(&shared.sending, Shard::WHOLE)?,
             task,
-            output: output(shared.output),
+            job: JobSettings {
+                light: Light::resolve(&light, &shared.sensor)?,
+                enhancement: enhancement(shared.enhancement)?,
+                ask,
+                images: images(&shared.sending)?,
+                pace: pace(&shared.sending)?,
+                money: Money::said(&shared.sending, shard)?,
+                mode: Mode::said(shared.sending.dry_run),
+                shard,
+                show_timings: shared.scale.timings,
+                output: output(shared.output),
+                recipe,
+            },
+        })
+    }
+}
+
+impl Walk {
+    fn resolve(said: &OpenEqaArgs) -> Result<Self> {
+        Ok(Self {
+            folder: said.frames.clone(),
+            frames: said.num_frames.map_or(FRAMES, usize::from),
+            side: side(said.image_size.as_deref())?,
+            darkened: parsed("--degrade", said.degrade.as_deref())?.unwrap_or(Darkened::Native),
+            camera: parsed("--sensor", said.sensor.as_deref())?.unwrap_or(CameraOf::Episode),
+            most_pixels: most_pixels(None),
         })
     }
 }
@@ -287,6 +300,7 @@ impl JudgeArgs {
         models: &ModelArgs,
         sending: &SendingArgs,
         seed: Option<u64>,
+        shard: Shard,
     ) -> Result<Option<Judge>> {
         let Some(name) = self.name else {
             return Ok(None);
@@ -313,7 +327,7 @@ impl JudgeArgs {
                 ..ModelArgs::default()
             },
             sending,
-            Shard::WHOLE,
+            shard,
         )
         .map_err(|e| e.at("the judge"))?;
         let Some(model) = asked.models.into_iter().next() else {
@@ -372,9 +386,9 @@ fn list(text: &str) -> Vec<String> {
 }
 
 /// `human=answers.json`.
-fn given(text: &str) -> Result<Given> {
+fn answers_file(text: &str) -> Result<AnswersFile> {
     match text.split_once('=') {
-        Some((name, path)) if !name.trim().is_empty() && !path.is_empty() => Ok(Given {
+        Some((name, path)) if !name.trim().is_empty() && !path.is_empty() => Ok(AnswersFile {
             name: name.trim().to_owned(),
             path: path.into(),
         }),
@@ -437,14 +451,15 @@ mod tests {
         let local = "http://127.0.0.1:1/v1";
         let config = resolve(&["--model", "m", "--judge", "j", "--base-url", local]).unwrap();
         let levels: Vec<String> = config
+            .job
             .light
             .levels
             .iter()
             .map(ToString::to_string)
             .collect();
         assert_eq!(levels, ["L0", "L2", "L4"]);
-        assert_eq!(config.light.variants, Variants::Noise);
-        let parameters = &config.ask.parameters;
+        assert_eq!(config.job.light.variants, Variants::Noise);
+        let parameters = &config.job.ask.parameters;
         assert_eq!(
             (
                 parameters.temperature,

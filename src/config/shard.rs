@@ -101,27 +101,6 @@ impl Shard {
         }
     }
 
-    /// Says so where a batch system runs several processes and what they do is not spread over them.
-    ///
-    /// # Errors
-    /// Where the batch system says what is no number.
-    pub(super) fn warn_unspread(
-        command: &str,
-        variable: impl Fn(&str) -> Option<String>,
-    ) -> Result<()> {
-        let several = |system: &System| match system {
-            System::Slurm { of, .. } => of.get() > 1,
-            System::Kubernetes { .. } => true,
-        };
-        if let Some(system) = System::of(&variable)?.filter(several) {
-            tracing::warn!(
-                "{system}: {command} is not spread over them, and this one does and pays for all that it is told; --subset or --splits \
-                 tell each its own"
-            );
-        }
-        Ok(())
-    }
-
     fn new(index: u32, of: NonZeroU32) -> Option<Self> {
         (index < of.get()).then_some(Self { index, of })
     }

@@ -6,13 +6,16 @@ use std::path::PathBuf;
 use serde_json::{Map, Value};
 
 use super::layers::{above, read};
-use super::{Data, Enhancement, Images, Sensor, data, enhancement, images};
+use super::{Data, Enhancement, Images, Sensor, Walk, data, enhancement, images};
 use crate::cli::{AgainArgs, DataArgs, EnhancementArgs, EvaluateArgs, ShowArgs};
 use crate::error::{Error, Result};
 use crate::types::Condition;
 
 /// The flags that decide the images of a run, as they were said; a manifest keeps them.
 pub type Recipe = BTreeMap<String, Value>;
+
+/// How walks are shown stands under this name among the flags.
+pub(super) const WALK: &str = "walk";
 
 /// The flags of an evaluation that decide no pixel, though they stand among those that do.
 const NO_PIXELS: [&str; 10] = [
@@ -77,6 +80,8 @@ pub struct Pictures {
     pub enhancement: Enhancement,
     /// How they are sent.
     pub images: Images,
+    /// How walks are shown; `None` if frames are shown one by one.
+    pub walk: Option<Walk>,
 }
 
 /// What is said, after a run, of how its images are made again: where the data and the enhancers lie by now.
@@ -106,8 +111,19 @@ impl Again {
     /// # Errors
     /// Where a flag that the run was made with means nothing to this version.
     pub fn pictures(self, recipe: &Recipe) -> Result<Pictures> {
-        let said = above(self.0, read("the manifest's images", recipe)?);
+        let mut recipe = recipe.clone();
+        let walk = recipe.remove(WALK);
+        let said = above(self.0, read("the manifest's images", &recipe)?);
+        let walk = walk.map(|walk| {
+            let mut walk: Walk =
+                serde_json::from_value(walk).map_err(|e| Error::data("the manifest's walk", e))?;
+            if let Some(folder) = said.data.data.clone() {
+                walk.folder = folder;
+            }
+            Ok(walk)
+        });
         Ok(Pictures {
+            walk: walk.transpose()?,
             sensor: Sensor::resolve(&said.sensor)?,
             images: images(&said.sending)?,
             data: data(said.data)?,

@@ -5,8 +5,10 @@
 
 mod beside;
 mod dialect;
+pub(crate) mod frame_folder;
 pub mod frames;
 pub mod import;
+pub(crate) mod inputs;
 mod jpeg;
 mod maps;
 pub mod multiple_choice;

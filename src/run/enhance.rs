@@ -2,13 +2,14 @@
 
 use std::path::Path;
 
-use super::Verdict;
-use super::inputs::{Entry, Inputs};
-use super::progress::Progress;
-use super::written::{png, write};
 use crate::config::{Enhance, Existing};
+use crate::dataset::inputs::{Entry, Inputs};
 use crate::enhance::{Enhancer, ModelFile};
 use crate::error::{Error, Result};
+use crate::files::{png, write};
+use crate::job::Outcome;
+use crate::job::enhancers::OpenEnhancers;
+use crate::job::progress::Progress;
 use crate::types::manifest::Status;
 
 /// Makes the images, or describes the model.
@@ -17,16 +18,16 @@ use crate::types::manifest::Status;
 ///
 /// # Errors
 /// Where nothing can be made: no such model or input, two images of one name, no folder to write to.
-pub fn enhance(config: &Enhance, progress: &Progress) -> Result<Verdict> {
+pub fn enhance(config: &Enhance, progress: &Progress) -> Result<Outcome> {
     let files = config.enhancement.models.iter();
     let files = files
         .map(|path| ModelFile::read(path))
         .collect::<Result<Vec<_>>>()?;
-    let (_runtime, enhancers) = super::open_enhancers(files, &config.enhancement)?;
+    let enhancers = OpenEnhancers::load(files, &config.enhancement)?.take()?;
     let [mut enhancer] = <[Enhancer; 1]>::try_from(enhancers)
         .map_err(|_| Error::usage("MODEL", "one model expected"))?;
     let Some(out) = &config.out else {
-        return Ok(Verdict {
+        return Ok(Outcome {
             status: Status::Complete,
             output: enhancer.describe(),
         });
@@ -54,7 +55,7 @@ pub fn enhance(config: &Enhance, progress: &Progress) -> Result<Verdict> {
         0 => String::new(),
         n => format!(", {n} {what}"),
     };
-    Ok(Verdict {
+    Ok(Outcome {
         status: if failed == 0 {
             Status::Complete
         } else {

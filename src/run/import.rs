@@ -9,15 +9,15 @@ use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
-use super::Verdict;
-use super::interface::{self, Place};
-use super::progress::Progress;
-use super::written::png;
 use crate::config::{Existing, Import};
 use crate::dataset::Picture;
+use crate::dataset::frame_folder::{self, Place};
 use crate::dataset::import::keyframes::choose;
 use crate::dataset::import::{Adapter, Incoming, Read, open};
 use crate::error::{Error, Result};
+use crate::files::png;
+use crate::job::Outcome;
+use crate::job::progress::Progress;
 use crate::types::manifest::Status;
 
 /// The median depths of a frame of a room, in millimetres: outside of them its scale is wrong, or it looks at a wall.
@@ -32,7 +32,7 @@ const NAMED: usize = 12;
 ///
 /// # Errors
 /// Where there are no frames, the folder holds others already, most depths are none of a room, or nothing could be read.
-pub fn import(config: &Import, progress: &Progress) -> Result<Verdict> {
+pub fn import(config: &Import, progress: &Progress) -> Result<Outcome> {
     let list = config.out.join("frames.jsonl");
     if config.existing == Existing::Kept && list.exists() {
         let problem =
@@ -67,7 +67,7 @@ pub fn import(config: &Import, progress: &Progress) -> Result<Verdict> {
     let mut scenes: Vec<&str> = frames.iter().map(|frame| frame.scene.as_str()).collect();
     scenes.dedup();
     for scene in &scenes {
-        interface::names(&config.out, scene, &adapter.names(scene))?;
+        frame_folder::names(&config.out, scene, &adapter.names(scene))?;
     }
     let about = json!({
         "schema": "darkqa.dataset/1",
@@ -77,7 +77,7 @@ pub fn import(config: &Import, progress: &Progress) -> Result<Verdict> {
         "source": config.kind.name(),
     });
     let lines = made.iter().map(|made| &made.line);
-    interface::finish(&config.out, adapter.labels(), &about, lines)?;
+    frame_folder::finish(&config.out, adapter.labels(), &about, lines)?;
     let mut output = format!(
         "{}: {} frames of {} scenes{}\n{note}",
         config.out.display(),
@@ -90,7 +90,7 @@ pub fn import(config: &Import, progress: &Progress) -> Result<Verdict> {
         }
     );
     output.push_str(&words(adapter.unlisted()));
-    Ok(Verdict {
+    Ok(Outcome {
         status: if failed == 0 {
             Status::Complete
         } else {

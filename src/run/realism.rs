@@ -10,14 +10,14 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use super::Verdict;
-use super::cores::pool;
-use super::progress::Progress;
-use super::written::{png, write};
 use crate::config::{PairPlace, Realism, Show};
 use crate::dataset::Picture;
 use crate::dataset::pairs::{Pair, Pairs};
 use crate::error::{Error, Result};
+use crate::files::{png, write};
+use crate::job::Outcome;
+use crate::job::progress::Progress;
+use crate::job::workers::pool;
 use crate::report;
 use crate::report::realism::{Rules, Source, Summary};
 use crate::score::realism::residual::{Residuals, divergence};
@@ -46,7 +46,7 @@ struct Work {
 ///
 /// # Errors
 /// Where there is no pair, none can be compared, or a file cannot be written.
-pub fn realism(config: &Realism, progress: &Progress) -> Result<Verdict> {
+pub fn realism(config: &Realism, progress: &Progress) -> Result<Outcome> {
     let Pairs { pairs, unmatched } = match &config.pairs {
         PairPlace::Together(folder) => Pairs::open(folder)?,
         PairPlace::Apart { normal, low } => Pairs::of_folders(normal, low)?,
@@ -86,7 +86,7 @@ pub fn realism(config: &Realism, progress: &Progress) -> Result<Verdict> {
     if let Some(out) = &config.out {
         files(out, &works, &summary)?;
     }
-    Ok(Verdict {
+    Ok(Outcome {
         status: if failed == 0 {
             Status::Complete
         } else {

@@ -5,14 +5,14 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
-use super::Verdict;
-use super::cores::pool;
-use super::interface::{self, FRAMES, Place};
-use super::progress::Progress;
-use super::written::png;
 use crate::config::{Existing, MakeRooms};
+use crate::dataset::frame_folder::{self, FRAMES, Place};
 use crate::dataset::rooms::{self, Room};
 use crate::error::{Error, Result};
+use crate::files::png;
+use crate::job::Outcome;
+use crate::job::progress::Progress;
+use crate::job::workers::pool;
 use crate::types::manifest::Status;
 use crate::types::{FrameId, Labels};
 
@@ -20,7 +20,7 @@ use crate::types::{FrameId, Labels};
 ///
 /// # Errors
 /// Where the folder holds frames already, or a file cannot be written.
-pub fn rooms(config: &MakeRooms, progress: &Progress) -> Result<Verdict> {
+pub fn rooms(config: &MakeRooms, progress: &Progress) -> Result<Outcome> {
     let list = config.out.join(FRAMES);
     if config.existing == Existing::Kept && list.exists() {
         let problem =
@@ -50,8 +50,8 @@ pub fn rooms(config: &MakeRooms, progress: &Progress) -> Result<Verdict> {
         "source": format!("darkqa-eval rooms {} {}", rooms::VERSION, config.rooms),
     });
     let labels: Labels = rooms::labels();
-    interface::finish(&config.out, &labels, &about, lines.iter())?;
-    Ok(Verdict {
+    frame_folder::finish(&config.out, &labels, &about, lines.iter())?;
+    Ok(Outcome {
         status: Status::Complete,
         output: format!("{}: {} frames\n", config.out.display(), lines.len()),
     })
@@ -79,6 +79,6 @@ fn one(config: &MakeRooms, room: &Room) -> Result<Map<String, Value>> {
     line.insert("intrinsics".to_owned(), json!(frame.intrinsics));
     line.insert("pose".to_owned(), json!(room.pose()));
     line.insert("room_gt".to_owned(), json!(frame.room));
-    interface::names(&config.out, &frame.scene, &frame.names)?;
+    frame_folder::names(&config.out, &frame.scene, &frame.names)?;
     Ok(line)
 }

@@ -2,58 +2,77 @@
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
-use std::path::Path;
 
-use super::Verdict;
-use super::again::Album;
-use super::inputs::stem;
-use super::report::kept;
-use super::written::write;
 use crate::config::ShowItem;
+use crate::dataset::inputs::stem;
 use crate::error::{Error, Result};
-use crate::store;
-use crate::types::manifest::Status;
+use crate::files::write;
+use crate::job::Outcome;
+use crate::job::rebuild::{ImageRebuilder, RebuiltImage};
+use crate::job::stored::AnyRun;
+use crate::types::manifest::{RunManifest, Status};
 use crate::types::question::letter;
-use crate::types::{Condition, Digest, Listed, Outcome, Record};
+use crate::types::{self, Condition, Digest, FrameId, Listed, OpenRecord, Record};
+
+/// What one model made of the item.
+struct Answer {
+    model: String,
+    condition: Option<Condition>,
+    outcome: &'static str,
+    reply: String,
+    /// The digest of what was sent.
+    sent: Option<Digest>,
+}
+
+/// The item, and what the models made of it.
+struct Item {
+    source: FrameId,
+    text: String,
+    answers: Vec<Answer>,
+}
 
 /// Makes the images again, writes them, and says of each whether it is the one that was sent.
 ///
 /// # Errors
-/// Where the run or the item is not there, or its data or enhancers are not where they were.
-pub fn show(config: ShowItem) -> Result<Verdict> {
+/// If the run or the item is not there, or its data or enhancers are not where they were.
+pub fn show(config: ShowItem) -> Result<Outcome> {
     let folder = config.run.clone();
-    let manifest = kept(&folder)?;
-    let item = config.item.split('#').next().unwrap_or_default().to_owned();
-    let records: Vec<Record> = store::read_records::<Record>(&folder)?
-        .into_iter()
-        .filter(|record| record.question.0 == item)
-        .collect();
-    let Some(first) = records.first() else {
+    let name = config.item.split('#').next().unwrap_or_default();
+    let (manifest, item) = read(AnyRun::open(&folder)?, name);
+    let Some(item) = item else {
         let problem = format!(
-            "no question {item:?} in this run; report.html and questions.jsonl have their ids"
+            "no question {name:?} in this run; report.html and questions.jsonl have their ids"
         );
         return Err(Error::Run {
             path: folder,
             problem,
         });
     };
-    let frame = first.frame.clone();
-    let listed = store::read_questions(&folder)?;
-    let listed = listed
-        .into_iter()
-        .find(|listed| listed.id == first.question);
-    let conditions = conditions(&records, &config.conditions, &folder)?;
+    let conditions = conditions(&item.answers, &config)?;
     let out = config.out.clone().unwrap_or_else(|| folder.join("shown"));
-    let mut album = Album::open(config.again, &manifest, &folder, &conditions)?;
-    let mut desk = album.desk(&frame)?;
-    let mut text = question(first, listed.as_ref());
+    let mut rebuilder = ImageRebuilder::open(config.again, &manifest, &folder, &conditions)?;
+    let images = rebuilder.images(&item.source, &conditions)?;
+    let mut text = item.text;
     let mut all_same = true;
-    for condition in &conditions {
-        let made = album.image(&mut desk, condition)?;
-        let digest = made.digest;
-        let path = out.join(format!("{}_{condition}.{}", stem(&frame)?, made.ending));
-        write(&path, &made.file)?;
-        let sent = sent(&records, condition);
+    for (condition, images) in conditions.iter().zip(images) {
+        let several = images.len() > 1;
+        for (place, image) in images.iter().enumerate() {
+            let place = if several {
+                format!("_{place:03}")
+            } else {
+                String::new()
+            };
+            let name = format!(
+                "{}_{condition}{place}.{}",
+                stem(&item.source)?,
+                image.ending
+            );
+            let path = out.join(name);
+            write(&path, &image.file)?;
+            let _ = writeln!(text, "{condition}: {}", path.display());
+        }
+        let digest = together(&images);
+        let sent = sent(&item.answers, condition);
         let proof = if sent.is_empty() {
             format!("nothing is known of what was sent; {digest} now")
         } else if sent.iter().all(|sent| *sent == digest) {
@@ -62,14 +81,14 @@ pub fn show(config: ShowItem) -> Result<Verdict> {
             all_same = false;
             format!("NOT the bytes that were sent: {digest} now")
         };
-        let _ = writeln!(text, "{condition}: {}: {proof}", path.display());
-        text += &replies(&records, Some(condition));
+        let _ = writeln!(text, "{condition}: {proof}");
+        text += &replies(&item.answers, Some(condition));
     }
-    text += &replies(&records, None);
+    text += &replies(&item.answers, None);
     if !all_same {
         text += "what decides the images is not as it was: the data, an enhancement model, or this program\n";
     }
-    Ok(Verdict {
+    Ok(Outcome {
         status: if all_same {
             Status::Complete
         } else {
@@ -79,33 +98,43 @@ pub fn show(config: ShowItem) -> Result<Verdict> {
     })
 }
 
-/// The conditions that the item was shown in, or those of them that are wanted.
-fn conditions(records: &[Record], wanted: &[Condition], folder: &Path) -> Result<Vec<Condition>> {
-    let there: BTreeSet<Condition> = records
-        .iter()
-        .filter_map(|record| record.condition.clone())
-        .collect();
-    if there.is_empty() {
-        let problem =
-            "the item was asked without images alone: there is nothing to show".to_owned();
-        let path = folder.to_owned();
-        return Err(Error::Run { path, problem });
+/// The manifest of a run and one item of it; `None` if nothing was asked about it.
+fn read(run: AnyRun, name: &str) -> (RunManifest, Option<Item>) {
+    match run {
+        AnyRun::Choice(run) => {
+            let own = run
+                .records
+                .iter()
+                .filter(|record| record.question.0 == name);
+            let records: Vec<&Record> = own.collect();
+            let item = records.first().map(|first| Item {
+                source: first.frame.clone(),
+                text: choice_text(first, listed(&run.questions, name)),
+                answers: records.iter().map(|record| choice_answer(record)).collect(),
+            });
+            (run.manifest, item)
+        }
+        AnyRun::Open(run) => {
+            let own = run
+                .records
+                .iter()
+                .filter(|record| record.question.0 == name);
+            let records: Vec<&OpenRecord> = own.collect();
+            let item = records.first().map(|first| Item {
+                source: FrameId(first.episode.clone()),
+                text: open_text(first, listed(&run.questions, name)),
+                answers: records.iter().map(|record| open_answer(record)).collect(),
+            });
+            (run.manifest, item)
+        }
     }
-    if wanted.is_empty() {
-        return Ok(there.into_iter().collect());
-    }
-    if let Some(missing) = wanted.iter().find(|condition| !there.contains(condition)) {
-        let there: Vec<String> = there.iter().map(ToString::to_string).collect();
-        let problem = format!(
-            "the item was not asked at {missing}; it was at {}",
-            there.join(", ")
-        );
-        return Err(Error::usage("--condition", problem));
-    }
-    Ok(wanted.to_vec())
 }
 
-fn question(record: &Record, listed: Option<&Listed>) -> String {
+fn listed<'a>(questions: &'a [Listed], name: &str) -> Option<&'a Listed> {
+    questions.iter().find(|question| question.id.0 == name)
+}
+
+fn choice_text(record: &Record, listed: Option<&Listed>) -> String {
     let mut text = format!("{}, about {}\n", record.question, record.frame);
     if let Some(listed) = listed {
         let _ = writeln!(text, "{}", listed.text);
@@ -121,44 +150,110 @@ fn question(record: &Record, listed: Option<&Listed>) -> String {
     text
 }
 
-/// The digests of what was sent in a condition.
-fn sent(records: &[Record], condition: &Condition) -> BTreeSet<Digest> {
-    let there = records
-        .iter()
-        .filter(|record| record.condition.as_ref() == Some(condition));
-    there
-        .filter_map(|record| Some(record.image.as_ref()?.digest))
-        .collect()
+fn choice_answer(record: &Record) -> Answer {
+    Answer {
+        model: record.model.clone(),
+        condition: record.condition.clone(),
+        outcome: match record.outcome {
+            types::Outcome::Right => "right",
+            types::Outcome::Wrong => "wrong",
+            types::Outcome::Unparsed => "not readable",
+            types::Outcome::Failed => "failed",
+        },
+        reply: reply(record.reply.as_deref(), record.failure.as_ref()),
+        sent: record.image.as_ref().map(|image| image.digest),
+    }
 }
 
-/// What each model made of the item in a condition, or without an image; replies in the form of a JSON text, so that nothing
-/// in them reaches the terminal as a control.
-fn replies(records: &[Record], condition: Option<&Condition>) -> String {
-    let mut text = String::new();
-    for record in records
+fn open_text(record: &OpenRecord, listed: Option<&Listed>) -> String {
+    let mut text = format!("{}, about {}\n", record.question, record.episode);
+    if let Some(listed) = listed {
+        let _ = writeln!(text, "{}\n  {}  (true)", listed.text, listed.answer);
+    }
+    text
+}
+
+fn open_answer(record: &OpenRecord) -> Answer {
+    Answer {
+        model: record.model.clone(),
+        condition: record.condition.clone(),
+        outcome: match (&record.failure, &record.judged) {
+            (Some(_), _) => "failed",
+            (None, Some(_)) => "marked",
+            (None, None) => "answered",
+        },
+        reply: reply(record.reply.as_deref(), record.failure.as_ref()),
+        sent: record.images.as_ref().map(|images| images.digest),
+    }
+}
+
+fn reply(reply: Option<&str>, failure: Option<&types::Failure>) -> String {
+    let message = failure.map(|failure| failure.message.as_str());
+    let text = reply.or(message).unwrap_or_default();
+    text.chars().take(200).collect()
+}
+
+/// The conditions that the item was shown in, or those of them that are wanted.
+fn conditions(answers: &[Answer], config: &ShowItem) -> Result<Vec<Condition>> {
+    let wanted = &config.conditions;
+    let there = answers.iter().filter_map(|answer| answer.condition.clone());
+    let there: BTreeSet<Condition> = there.collect();
+    if there.is_empty() {
+        let problem =
+            "the item was asked without images alone: there is nothing to show".to_owned();
+        let path = config.run.clone();
+        return Err(Error::Run { path, problem });
+    }
+    if wanted.is_empty() {
+        return Ok(there.into_iter().collect());
+    }
+    if let Some(missing) = wanted.iter().find(|condition| !there.contains(condition)) {
+        let there: Vec<String> = there.iter().map(ToString::to_string).collect();
+        let problem = format!(
+            "the item was not asked at {missing}; it was at {}",
+            there.join(", ")
+        );
+        return Err(Error::usage("--condition", problem));
+    }
+    Ok(wanted.clone())
+}
+
+/// The digest of images that are sent together, as a record has it.
+fn together(images: &[RebuiltImage]) -> Digest {
+    match images {
+        [only] => only.digest,
+        several => Digest::of_parts(several.iter().map(|image| &image.digest.as_bytes()[..])),
+    }
+}
+
+/// The digests of what was sent in a condition.
+fn sent(answers: &[Answer], condition: &Condition) -> BTreeSet<Digest> {
+    let there = answers
         .iter()
-        .filter(|record| record.condition.as_ref() == condition)
+        .filter(|answer| answer.condition.as_ref() == Some(condition));
+    there.filter_map(|answer| answer.sent).collect()
+}
+
+/// What each model made of the item in a condition, or without an image; replies in the form of a JSON text, so that nothing in them
+/// reaches the terminal as a control.
+fn replies(answers: &[Answer], condition: Option<&Condition>) -> String {
+    let mut text = String::new();
+    let without = if condition.is_none() {
+        " without an image"
+    } else {
+        ""
+    };
+    for answer in answers
+        .iter()
+        .filter(|one| one.condition.as_ref() == condition)
     {
-        let without = if condition.is_none() {
-            " without an image"
-        } else {
-            ""
-        };
-        let outcome = match record.outcome {
-            Outcome::Right => "right",
-            Outcome::Wrong => "wrong",
-            Outcome::Unparsed => "not readable",
-            Outcome::Failed => "failed",
-        };
-        let failure = || {
-            record
-                .failure
-                .as_ref()
-                .map(|failure| failure.message.as_str())
-        };
-        let said = record.reply.as_deref().or_else(failure).unwrap_or_default();
-        let said: String = said.chars().take(200).collect();
-        let _ = writeln!(text, "  {}{without}: {outcome}: {said:?}", record.model);
+        let Answer {
+            model,
+            outcome,
+            reply,
+            ..
+        } = answer;
+        let _ = writeln!(text, "  {model}{without}: {outcome}: {reply:?}");
     }
     text
 }

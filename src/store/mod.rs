@@ -15,8 +15,8 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
-use crate::types::manifest::{RunManifest, differences};
-use crate::types::{Kept, Listed, Record, Thumbnail, TrialKey, Via};
+use crate::types::manifest::{ColumnDifference, RunManifest, differences};
+use crate::types::{Kept, Listed, QuestionId, Record, Thumbnail, TrialKey, Via};
 
 use lines::{append, json_lines, lines, mend};
 
@@ -115,6 +115,37 @@ impl<R: Kept> Store<R> {
             std::slice::from_ref(thumbnail),
         )
         .map(drop)
+    }
+
+    /// Keeps the questions of the run, these and those that it had, in the order of the data.
+    ///
+    /// # Errors
+    /// If one that it had is another by now: other words, choices, answer or image.
+    pub fn add_questions(&self, questions: Vec<Listed>) -> Result<()> {
+        let kept = read_questions(&self.folder)?;
+        let places: HashMap<&QuestionId, &Listed> = questions
+            .iter()
+            .map(|question| (&question.id, question))
+            .collect();
+        let mut rest = Vec::new();
+        for known in kept {
+            match places.get(&known.id) {
+                None => rest.push(known),
+                Some(now) if known.is_same(now) => {}
+                Some(_) => {
+                    let problem = format!(
+                        "the question {} is another in this run: its words, choices, answer or image were changed; use another --out",
+                        known.id
+                    );
+                    let path = self.folder.clone();
+                    return Err(Error::Run { path, problem });
+                }
+            }
+        }
+        drop(places);
+        let mut all = [questions, rest].concat();
+        all.sort_by_key(|question| question.place);
+        self.write_questions(&all)
     }
 
     /// Keeps the questions of the run.
@@ -306,23 +337,45 @@ fn any_manifest(folder: &Path) -> Result<Option<RunManifest>> {
         })
 }
 
-/// Makes sure that a kept run is the one now asked for.
+/// Makes sure that a kept run is the one now asked for: the same identity, and every known value of a column what it was.
 fn agree(folder: &Path, kept: &RunManifest, now: &RunManifest, moved: Moved) -> Result<()> {
-    for (field, before, after) in differences(&kept.identity, &now.identity) {
-        if field == ADDRESS && moved == Moved::Allowed {
-            tracing::warn!("this run was begun at {before}; it goes on at {after}");
+    let wrong = |problem: String| {
+        let path = folder.to_owned();
+        Err(Error::Run { path, problem })
+    };
+    if let Some((field, before, after)) = differences(&kept.identity, &now.identity).next() {
+        return wrong(format!(
+            "this run has another {field}: it was {before}, now it is {after}; use another --out, or the same {field}"
+        ));
+    }
+    if kept.shard != now.shard {
+        let [before, after] = [kept, now].map(|run| run.shard.as_deref().unwrap_or("none"));
+        return wrong(format!(
+            "this run has another --shard: it was {before}, now it is {after}; use another --out, or the same --shard"
+        ));
+    }
+    for difference in kept.column_differences(now) {
+        let ColumnDifference {
+            column,
+            value,
+            field,
+            first: before,
+            second: after,
+        } = difference;
+        let address = field == ADDRESS;
+        if address && moved == Moved::Allowed {
+            tracing::warn!("{value} was asked at {before} in this run; it goes on at {after}");
             continue;
         }
-        let hint = if field == ADDRESS {
+        let hint = if address {
             " (the same model at another address: --resume)"
         } else {
             ""
         };
-        let problem = format!(
-            "this run has another {field}: it was {before}, now it is {after}; use another --out, or the same {field}{hint}"
-        );
-        let path = folder.to_owned();
-        return Err(Error::Run { path, problem });
+        return wrong(format!(
+            "the {column} {value} has another {field} in this run: it was {before}, now it is {after}; use another --out, or the same \
+             {field}{hint}"
+        ));
     }
     Ok(())
 }
@@ -364,6 +417,8 @@ mod tests {
             identity: BTreeMap::from([("--seed".to_owned(), seed.into())]),
             settings: BTreeMap::new(),
             images: BTreeMap::new(),
+            columns: BTreeMap::new(),
+            shard: None,
             counts: Counts::default(),
         }
     }

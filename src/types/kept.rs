@@ -20,6 +20,9 @@ pub trait Kept: Clone + Serialize + DeserializeOwned {
     /// How it was asked.
     fn via(&self) -> Via;
 
+    /// How long the reply took, in milliseconds.
+    fn latency_ms(&self) -> Option<u64>;
+
     /// The model that was asked, and what the reply was charged, where the server said so.
     fn charged(&self) -> Option<(&str, Usage)>;
 }
@@ -37,6 +40,10 @@ impl Kept for Record {
 
     fn via(&self) -> Via {
         self.via
+    }
+
+    fn latency_ms(&self) -> Option<u64> {
+        self.latency_ms
     }
 
     fn charged(&self) -> Option<(&str, Usage)> {

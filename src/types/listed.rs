@@ -13,6 +13,9 @@ use super::question::{Family, Question, QuestionId};
 pub struct Listed {
     /// The question's name.
     pub id: QuestionId,
+    /// Its place among all questions of the data, those that were not asked included.
+    #[serde(default)]
+    pub place: usize,
     /// The scene of its frame; empty where the data set says nothing of scenes.
     #[serde(default)]
     pub scene: String,
@@ -27,25 +30,47 @@ pub struct Listed {
     pub choices: Vec<String>,
     /// The text of the true one.
     pub answer: String,
+    /// Other answers that are right, too; of open questions alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub extra_answers: Option<Vec<String>>,
     /// What makes it true.
     #[serde(default)]
     pub evidence: Value,
+    /// The digest of what it is about: the file of its frame, or those of its walk in the order shown. `None` if nobody was to see it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub image: Option<Digest>,
 }
 
 impl Listed {
+    /// Whether it asks the same as another of its name, about the same image if both say which.
+    #[must_use]
+    pub fn is_same(&self, other: &Self) -> bool {
+        let words = |question: &Self| Self {
+            image: None,
+            evidence: Value::Null,
+            place: 0,
+            ..question.clone()
+        };
+        let images = self.image.zip(other.image);
+        words(self) == words(other) && images.is_none_or(|(own, theirs)| own == theirs)
+    }
+
     /// A question about a frame of this scene.
     #[must_use]
-    pub fn new(question: &Question, scene: &str) -> Self {
+    pub fn new(question: &Question, place: usize, scene: &str) -> Self {
         let choices = question.choices.texts();
         Self {
             id: question.id.clone(),
+            place,
             scene: scene.to_owned(),
             frame: question.frame.clone(),
             family: question.family.clone(),
             text: question.text.clone(),
             choices: choices.to_vec(),
             answer: choices[question.choices.truth()].clone(),
+            extra_answers: None,
             evidence: question.evidence.clone(),
+            image: None,
         }
     }
 }

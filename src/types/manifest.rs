@@ -61,6 +61,60 @@ pub fn differences<'a>(
     })
 }
 
+/// A value of a column that two runs hold and that stands for different things: the value, the field in which they differ, and what
+/// the one says and what the other says.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ColumnDifference<'a> {
+    /// The column, as `model`.
+    pub column: &'a str,
+    /// The value, as `gpt-4o`.
+    pub value: &'a str,
+    /// The flag.
+    pub field: String,
+    /// What the first says.
+    pub first: String,
+    /// What the second says.
+    pub second: String,
+}
+
+impl RunManifest {
+    /// The values of columns that both hold and that do not stand for the same.
+    #[must_use]
+    pub fn column_differences<'a>(&'a self, other: &'a Self) -> Vec<ColumnDifference<'a>> {
+        let mut found = Vec::new();
+        for (column, values) in &self.columns {
+            for (value, own) in values {
+                let there = other
+                    .columns
+                    .get(column)
+                    .and_then(|values| values.get(value));
+                let Some(there) = there else {
+                    continue;
+                };
+                let [one, two] = [own, there].map(fields);
+                found.extend(differences(&one, &two).map(|(field, first, second)| {
+                    ColumnDifference {
+                        column,
+                        value,
+                        field: field.to_owned(),
+                        first,
+                        second,
+                    }
+                }));
+            }
+        }
+        found
+    }
+}
+
+/// The fields of an object; those without a value are left out.
+fn fields(object: &Value) -> BTreeMap<String, Value> {
+    let fields = object.as_object().into_iter().flatten();
+    let said = fields.filter(|(_, value)| !value.is_null());
+    said.map(|(field, value)| (field.clone(), value.clone()))
+        .collect()
+}
+
 /// The content of `manifest.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunManifest {
@@ -76,8 +130,15 @@ pub struct RunManifest {
     pub updated: String,
     /// The platform and the libraries that touched the pixels.
     pub platform: BTreeMap<String, String>,
-    /// What decides the replies, by flag: a run is only resumed with the same.
+    /// What all trials share and no column tells apart, by flag: a run is only resumed with the same.
     pub identity: BTreeMap<String, Value>,
+    /// What each value of a column of the tables stands for, by column and value: models, enhancers, light readings. A value may be
+    /// added to a run; one that it holds stays what it was.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub columns: BTreeMap<String, BTreeMap<String, Value>>,
+    /// Which part of an evaluation it is, as `2/4`; `None` for all of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shard: Option<String>,
     /// What does not: concurrency, timeouts.
     pub settings: BTreeMap<String, Value>,
     /// The flags that decide the images, as they were said; empty in runs of versions that kept none.

@@ -110,6 +110,10 @@ impl Kept for OpenRecord {
         self.via
     }
 
+    fn latency_ms(&self) -> Option<u64> {
+        self.latency_ms
+    }
+
     fn charged(&self) -> Option<(&str, Usage)> {
         Some((&self.model, self.usage?))
     }

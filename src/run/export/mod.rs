@@ -4,20 +4,22 @@ mod set;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::cores::pool;
-use super::darkroom::{Darkroom, Desk};
-use super::gallery::look_through;
-use super::plan::conditions;
-use super::progress::Progress;
-use super::recipe::Recipe;
-use super::stage::select;
-use super::timings::Timings;
-use super::written::png;
-use super::{Verdict, identity, open_enhancers, stage};
-use crate::ask::Format;
 use crate::config::{Existing, Export};
 use crate::dataset::Dataset;
 use crate::error::{Error, Result};
+use crate::files::png;
+use crate::job::Outcome;
+use crate::job::conditions::conditions;
+use crate::job::enhancers::OpenEnhancers;
+use crate::job::frame_work::{FrameWork, Steps};
+use crate::job::identity;
+use crate::job::image_pipeline::ImagePipeline;
+use crate::job::progress::Progress;
+use crate::job::questions::{open_data, select};
+use crate::job::recipe::Recipe;
+use crate::job::source::{Source, inspect_all};
+use crate::job::timings::Timings;
+use crate::job::workers::pool;
 use crate::types::manifest::Status;
 use crate::types::{Condition, FrameId, Question};
 
@@ -27,48 +29,44 @@ use set::Set;
 ///
 /// # Errors
 /// Where the data cannot be read, a set is there already, or a file cannot be written.
-pub fn export(config: &Export, progress: &Progress) -> Result<Verdict> {
-    let dataset = stage::open(&config.data, progress)?;
+pub fn export(config: &Export, progress: &Progress) -> Result<Outcome> {
+    let dataset = open_data(&config.data, progress)?;
     let questions = select(&dataset, &config.data)?;
     let files = identity::enhancers(&config.enhancement.models)?;
-    let recipe = Recipe {
-        seed: config.light.sensor.seed,
-        synthesis: config.light.sensor.synthesis.clone(),
-        format: Format::Png,
-        max_side: None,
-        enhancers: files
-            .iter()
-            .map(|file| (file.name().clone(), file.digest()))
-            .collect(),
-    };
+    let recipe = Recipe::lossless(&config.light.sensor, &files);
     let conditions = conditions(&config.light, config.enhancement.on, &recipe.enhancers);
-    let cores = pool(config.enhancement.threads)?;
-    let pictures = cores.install(|| look_through(&dataset, &questions, progress))?;
+    let workers = pool(config.enhancement.threads)?;
+    let sources = workers.install(|| inspect_all(&dataset, &questions, progress))?;
     let mut sets = open_sets(config, &dataset, &conditions, &questions)?;
-    let (_, enhancers) = open_enhancers(files, &config.enhancement)?;
-    let mut darkroom = Darkroom {
-        dataset: &dataset,
-        pictures: &pictures,
-        recipe: &recipe,
-        enhancers,
-        limit: None,
-        timings: &Timings::default(),
+    let mut pipeline = ImagePipeline {
+        steps: Steps {
+            frames: &dataset,
+            recipe: &recipe,
+            limit: None,
+            timings: &Timings::default(),
+        },
+        enhancers: OpenEnhancers::load(files, &config.enhancement)?.take()?,
     };
-    let names = names(pictures.keys());
-    let bar = progress.bar("images", pictures.len() * conditions.len());
-    cores.install(|| {
-        for frame in pictures.keys() {
+    let frames: BTreeMap<&FrameId, &Source> = sources
+        .iter()
+        .map(|source| (&source.name, source))
+        .collect();
+    let names = names(frames.keys().copied());
+    let bar = progress.bar("images", frames.len() * conditions.len());
+    workers.install(|| {
+        for (frame, source) in &frames {
             let of_frame: Vec<(usize, &Question)> = questions
                 .iter()
                 .enumerate()
-                .filter(|(_, question)| question.frame == *frame)
+                .filter(|(_, question)| question.frame == **frame)
                 .collect();
-            let mut desk = Desk::new(frame.clone());
-            for (condition, set) in conditions.iter().zip(&mut sets) {
-                let pixels = darkroom.pixels(&mut desk, condition)?;
-                let image = png(&pixels)?;
-                set.take(&names[frame], &image, &of_frame)?;
-                bar.inc();
+            for planned in &source.frames {
+                let mut work = FrameWork::planned(pipeline.steps, source, planned);
+                for (condition, set) in conditions.iter().zip(&mut sets) {
+                    let pixels = pipeline.pixels(&mut work, condition)?;
+                    set.take(&names[frame], &png(&pixels)?, &of_frame)?;
+                    bar.inc();
+                }
             }
         }
         Ok::<(), Error>(())
@@ -78,12 +76,12 @@ pub fn export(config: &Export, progress: &Progress) -> Result<Verdict> {
     for set in sets {
         paths.push(set.finish()?.display().to_string());
     }
-    Ok(Verdict {
+    Ok(Outcome {
         status: Status::Complete,
         output: format!(
             "{} questions about {} images in {} conditions:\n{}\n",
             questions.len(),
-            pictures.len(),
+            sources.len(),
             conditions.len(),
             paths.join("\n")
         ),

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use crate::config::Form;
 use crate::error::{Error, Result};
-use crate::run::written::write;
+use crate::files::write;
 use crate::types::question::letter;
 use crate::types::{Choices, Condition, Question};
 

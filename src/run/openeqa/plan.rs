@@ -1,139 +1,70 @@
-//! What is to be answered, and what of it is left: [`Plan`].
+//! The answers that are asked for: [`answers`].
 
-use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::episode::{Episode, Reel};
-use super::item::Open;
-use super::stage::Stage;
+use super::record::OpenItem;
+use super::setup::Setup;
 use crate::ask::openeqa::{blind, vision};
 use crate::dataset::openeqa::OpenQuestion;
-use crate::run::askers::Asker;
-use crate::run::trial::{Prompt, Trial};
-use crate::types::{Condition, Digest, TrialKey, View};
+use crate::job::models::ModelUnderTest;
+use crate::job::plan::{SourcePlan, TrialGroup};
+use crate::job::trial::{KeyFacts, Prompt, Trial};
+use crate::types::{Condition, Digest, View};
 
-/// A question to a model in a condition.
-#[derive(Debug, Clone)]
-pub(super) struct Due {
-    pub(super) key: TrialKey,
-    /// The question's place in the file.
-    pub(super) question: usize,
-    /// The model's place among those of the run.
-    pub(super) asker: usize,
-    /// `None` where nothing is shown.
-    pub(super) condition: Option<Condition>,
-}
-
-/// The questions about a walk in one condition that have no answer yet.
-#[derive(Debug)]
-pub(super) struct Shot {
-    pub(super) condition: Option<Condition>,
-    pub(super) trials: Vec<Trial<Open>>,
-}
-
-/// What is left to ask about a walk.
-#[derive(Debug)]
-pub(super) struct WalkPlan {
-    /// The walk's place among those of the run.
-    pub(super) episode: usize,
-    pub(super) shots: Vec<Shot>,
-}
-
-/// All answers of a run, and those that are left.
-#[derive(Debug)]
-pub(super) struct Plan {
-    /// Every answer, given or not, walk by walk.
-    pub(super) due: Vec<Due>,
-    pub(super) walks: Vec<WalkPlan>,
-}
-
-impl Plan {
-    /// Lays out all answers, and leaves out those that are there or on their way.
-    pub(super) fn new(stage: &Stage, there: &HashSet<TrialKey>) -> Self {
-        let mut by_episode = BTreeMap::<&str, Vec<usize>>::new();
-        for (index, question) in stage.questions.iter().enumerate() {
-            by_episode.entry(&question.episode).or_default().push(index);
-        }
-        let mut plan = Self {
-            due: Vec::new(),
-            walks: Vec::new(),
-        };
-        for (index, episode) in stage.episodes.iter().enumerate() {
-            let questions = by_episode.remove(&*episode.name).unwrap_or_default();
-            let conditions = std::iter::once(None).chain(stage.conditions.iter().map(Some));
-            let shots = conditions
-                .map(|condition| plan.shot(stage, episode, condition, &questions, there))
-                .filter(|shot| !shot.trials.is_empty());
-            let shots: Vec<Shot> = shots.collect();
-            if !shots.is_empty() {
-                plan.walks.push(WalkPlan {
-                    episode: index,
-                    shots,
-                });
+/// All answers, walk by walk: without images first, and then condition by condition.
+pub(super) fn answers(setup: &Setup<'_>) -> Vec<SourcePlan<OpenItem>> {
+    let mut by_walk = BTreeMap::<&str, Vec<&Arc<OpenQuestion>>>::new();
+    for question in &setup.questions {
+        by_walk.entry(&question.episode).or_default().push(question);
+    }
+    let walks = setup.sources.iter().enumerate();
+    walks
+        .map(|(source, walk)| {
+            let questions = by_walk.remove(&*walk.name.0).unwrap_or_default();
+            let conditions = std::iter::once(None).chain(setup.conditions.iter().map(Some));
+            let groups =
+                conditions.filter_map(|condition| group(setup, source, condition, &questions));
+            SourcePlan {
+                source,
+                groups: groups.collect(),
             }
-        }
-        plan
-    }
+        })
+        .collect()
+}
 
-    fn shot(
-        &mut self,
-        stage: &Stage,
-        episode: &Episode,
-        condition: Option<&Condition>,
-        questions: &[usize],
-        there: &HashSet<TrialKey>,
-    ) -> Shot {
-        let view = if condition.is_some() {
-            View::Image
-        } else {
-            View::Blind
-        };
-        let askers = stage.askers.iter().enumerate();
-        let askers: Vec<(usize, &Asker)> = askers.filter(|(_, asker)| asker.view == view).collect();
-        let mut shot = Shot {
-            condition: condition.cloned(),
-            trials: Vec::new(),
-        };
-        if askers.is_empty() {
-            return shot;
+/// The answers in a condition; `None` if no model is asked in it.
+fn group(
+    setup: &Setup<'_>,
+    source: usize,
+    condition: Option<&Condition>,
+    questions: &[&Arc<OpenQuestion>],
+) -> Option<TrialGroup<OpenItem>> {
+    let view = condition.map_or(View::Blind, |_| View::Image);
+    let models = setup.models.iter().enumerate();
+    let models: Vec<(usize, &ModelUnderTest)> =
+        models.filter(|(_, model)| model.view == view).collect();
+    if models.is_empty() {
+        return None;
+    }
+    let images: Option<Digest> =
+        condition.map(|condition| setup.recipe.stimulus(&setup.sources[source], condition));
+    let mut trials = Vec::new();
+    for question in questions {
+        let prompt = prompt(question, view);
+        for &(index, model) in &models {
+            trials.push(Trial {
+                key: KeyFacts::new(model, &question.id, &prompt, condition, images).key(),
+                model: index,
+                prompt: prompt.clone(),
+                item: OpenItem::Answer(Arc::clone(question)),
+            });
         }
-        let shown = condition.map(|condition| shown(stage, episode, condition));
-        for &question in questions {
-            let prompt = prompt(&stage.questions[question], view);
-            for &(index, asker) in &askers {
-                let key = key(asker, &stage.questions[question], &prompt, condition, shown);
-                self.due.push(Due {
-                    key,
-                    question,
-                    asker: index,
-                    condition: condition.cloned(),
-                });
-                if !there.contains(&key) {
-                    shot.trials.push(Trial {
-                        key,
-                        asker: index,
-                        prompt: prompt.clone(),
-                        item: Open(Arc::clone(&stage.questions[question])),
-                    });
-                }
-            }
-        }
-        shot
     }
-
-    /// How many answers are left.
-    pub(super) fn left(&self) -> usize {
-        let shots = self.walks.iter().flat_map(|walk| &walk.shots);
-        shots.map(|shot| shot.trials.len()).sum()
-    }
-
-    /// The conditions in which something is left to ask about a walk.
-    pub(super) fn conditions(walk: &WalkPlan) -> BTreeSet<&Condition> {
-        let conditions = walk.shots.iter();
-        conditions
-            .filter_map(|shot| shot.condition.as_ref())
-            .collect()
-    }
+    Some(TrialGroup {
+        condition: condition.cloned(),
+        trials,
+    })
 }
 
 /// The words of a question for a model that sees the walk, or for one that does not.
@@ -148,43 +79,4 @@ fn prompt(question: &OpenQuestion, view: View) -> Prompt {
             }
         }
     }
-}
-
-/// The digest of everything that decides the images of a walk in a condition.
-fn shown(stage: &Stage, episode: &Episode, condition: &Condition) -> Digest {
-    let Ok(Reel { stills, order }) = &episode.reel else {
-        return Digest::of(b"no frames");
-    };
-    let walk = &stage.walk;
-    let made = format!("{:?} {} {}", walk.side, walk.darkened, walk.camera);
-    let frames: Vec<Digest> = stills
-        .iter()
-        .map(|still| stage.recipe.digest(&still.id, &still.digest, condition))
-        .collect();
-    let order = order.iter().map(|place| &frames[*place].as_bytes()[..]);
-    Digest::of_parts(std::iter::once(made.as_bytes()).chain(order))
-}
-
-fn key(
-    asker: &Asker,
-    question: &OpenQuestion,
-    prompt: &Prompt,
-    condition: Option<&Condition>,
-    shown: Option<Digest>,
-) -> TrialKey {
-    // Built-in models answer by the names of question and condition, so these decide the reply too.
-    let condition = condition.map_or("blind".to_owned(), ToString::to_string);
-    let shown = shown.map_or("no image".to_owned(), |digest| digest.to_string());
-    let [before, behind] = prompt.parts();
-    let parts = [
-        "darkqa.openeqa/1",
-        asker.model.name(),
-        &question.id.0,
-        before,
-        behind,
-        &asker.digest,
-        &condition,
-        &shown,
-    ];
-    Digest::of_parts(parts.map(str::as_bytes)).into()
 }

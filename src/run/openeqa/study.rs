@@ -3,46 +3,52 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::episode::Episode;
-use super::stage::Stage;
-use super::theatre::Theatre;
+use super::setup::Setup;
 use crate::ask::Payload;
-use crate::config::OpenEqa;
+use crate::enhance::ModelFile;
 use crate::error::Result;
+use crate::files::write;
+use crate::job::enhancers::OpenEnhancers;
+use crate::job::experiment::Experiment as _;
+use crate::job::progress::Progress;
+use crate::job::timings::Timings;
+use crate::job::workers::pool;
+use crate::job::{Outcome, limit, pipeline};
 use crate::report::study::{Asked, Shot, page};
-use crate::run::progress::Progress;
-use crate::run::written::write;
-use crate::run::{Verdict, open_enhancers};
 use crate::types::manifest::Status;
 use crate::types::{Condition, Digest};
 
 /// Writes the page and its images, each the very file that a model would be sent; the true answers are not in it.
 ///
 /// # Errors
-/// Where a frame cannot be made or a file not be written.
+/// If a frame cannot be made or a file not be written.
 pub(super) fn pack(
-    config: &OpenEqa,
-    mut stage: Stage<'_>,
+    setup: &Setup<'_>,
+    files: Vec<ModelFile>,
     folder: &Path,
     progress: &Progress,
-) -> Result<Verdict> {
-    let files = std::mem::take(&mut stage.files);
-    let (_, enhancers) = open_enhancers(files, &config.enhancement)?;
-    let conditions: Vec<&Condition> = stage.conditions.iter().collect();
-    let mut theatre = Theatre::new(config, &stage, enhancers);
-    let bar = progress.bar("walks", stage.episodes.len());
+) -> Result<Outcome> {
+    let settings = setup.settings();
+    let mut enhancers = OpenEnhancers::load(files, &settings.enhancement)?;
+    let limit = limit(&settings.ask, &settings.images);
+    let timings = Timings::default();
+    let mut pipeline = pipeline(setup, enhancers.take()?, limit, &timings);
+    let workers = pool(settings.enhancement.threads)?;
+    let conditions: Vec<&Condition> = setup.conditions.iter().collect();
+    let bar = progress.bar("walks", setup.sources.len());
     let (mut asked, mut images, mut walks) = (Vec::new(), 0, 0);
-    for (number, Episode { name, reel }) in stage.episodes.iter().enumerate() {
-        if reel.is_err() {
+    for (number, walk) in setup.sources.iter().enumerate() {
+        if walk.problem.is_some() {
             continue;
         }
-        let shown = theatre.walk(number, &conditions)?;
+        let shown = workers.install(|| pipeline.images(walk, &conditions))?;
         let mut shots = Vec::new();
-        for (condition, payloads) in shown {
-            let sent = once(payloads);
-            let mut names = Vec::with_capacity(sent.len());
-            for (place, payload) in sent.iter().enumerate() {
-                let name = image(name, &condition, place, payload);
+        for (condition, mut payloads) in conditions.iter().zip(shown) {
+            // A frame that only repeats the one before is shown once.
+            payloads.dedup_by(|next, before| Arc::ptr_eq(next, before));
+            let mut names = Vec::with_capacity(payloads.len());
+            for (place, payload) in payloads.iter().enumerate() {
+                let name = image(&walk.name.0, condition, place, payload);
                 write(&folder.join(&name), &payload.file()?)?;
                 names.push(name);
             }
@@ -53,10 +59,10 @@ pub(super) fn pack(
             });
         }
         walks += 1;
-        let questions = stage
+        let questions = setup
             .questions
             .iter()
-            .filter(|question| question.episode == *name);
+            .filter(|question| question.episode == walk.name.0);
         asked.extend(questions.map(|question| Asked {
             id: question.id.0.clone(),
             frame: number,
@@ -69,7 +75,7 @@ pub(super) fn pack(
     drop(bar);
     let path = folder.join("study.html");
     write(&path, page(&asked)?.as_bytes())?;
-    Ok(Verdict {
+    Ok(Outcome {
         status: Status::Complete,
         output: format!(
             "{}: {} questions about {walks} walks, {images} images, {} conditions; a person sees each walk in one of them, and {} people \
@@ -80,13 +86,6 @@ pub(super) fn pack(
             conditions.len()
         ),
     })
-}
-
-/// The images without those that only repeat the one before.
-fn once(payloads: Vec<Arc<Payload>>) -> Vec<Arc<Payload>> {
-    let mut sent: Vec<Arc<Payload>> = payloads;
-    sent.dedup_by(|next, before| Arc::ptr_eq(next, before));
-    sent
 }
 
 /// The name of an image, which says nothing of the level.

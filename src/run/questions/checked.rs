@@ -8,10 +8,10 @@ use serde::Deserialize;
 
 use crate::dataset::Dataset;
 use crate::error::{Error, Result};
+use crate::files::write;
 use crate::questions::Asked;
 use crate::questions::statistics::FrameStatistics;
 use crate::report::questions::review::{Item, page};
-use crate::run::written::write;
 use crate::types::QuestionId;
 
 /// A line of what a person said.

@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use crate::error::{Error, Result};
+use crate::files::write;
 use crate::questions::statistics::FrameStatistics;
-use crate::run::written::write;
 use crate::types::Digest;
 
 /// What was measured, by content.

@@ -1,6 +1,5 @@
 //! `questions`: multiple-choice questions about frames, by rule.
 
-pub(super) mod by_rule;
 mod checked;
 mod kept;
 
@@ -11,12 +10,12 @@ use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::Verdict;
-use super::progress::Progress;
-use super::written::write;
 use crate::config::{Questions, Show, Strangers};
 use crate::dataset::Dataset;
 use crate::error::{Error, Result};
+use crate::files::write;
+use crate::job::Outcome;
+use crate::job::progress::Progress;
 use crate::questions::statistics::{self, FrameStatistics, measure, strangers};
 use crate::questions::summary::Summary;
 use crate::questions::survey::{Reason, Verdict as Candidate};
@@ -33,7 +32,7 @@ use kept::Kept;
 ///
 /// # Errors
 /// Where there are no frames, no classes, or a file cannot be written.
-pub fn questions(config: &Questions, progress: &Progress) -> Result<Verdict> {
+pub fn questions(config: &Questions, progress: &Progress) -> Result<Outcome> {
     let dataset = Dataset::of_frames(&config.data)?.with_most_pixels(config.most_pixels);
     let labels = dataset.labels().ok_or_else(|| {
         let problem = "no classes.json in this folder, which says what the numbers of its maps stand for; `darkqa-eval import` writes one";
@@ -75,7 +74,7 @@ pub fn questions(config: &Questions, progress: &Progress) -> Result<Verdict> {
         checked::review(page, &dataset, &frames, &made.asked)?;
     }
     warn(&made, config);
-    Ok(Verdict {
+    Ok(Outcome {
         status: if failed == 0 {
             Status::Complete
         } else {

@@ -22,14 +22,14 @@ use axum::response::{IntoResponse as _, Response};
 use axum::routing::{get, post};
 use tokio::runtime;
 
-use super::Verdict;
-use super::interrupt::Interrupt;
-use super::observer;
-use super::progress::Progress;
 use crate::ask::{Call, Message, Model, Query, Random};
 use crate::config::Serve;
 use crate::dataset::Dataset;
 use crate::error::{Error, Result};
+use crate::job::Outcome;
+use crate::job::interrupt::Interrupt;
+use crate::job::observer;
+use crate::job::progress::Progress;
 use crate::types::manifest::Status;
 use crate::types::{Choices, Digest, Family, FrameId, Question, QuestionId};
 
@@ -52,7 +52,7 @@ struct Desk {
 ///
 /// # Errors
 /// Where the frames cannot be read, or the port is taken.
-pub fn serve(config: &Serve, progress: &Progress) -> Result<Verdict> {
+pub fn serve(config: &Serve, progress: &Progress) -> Result<Outcome> {
     let dataset = Arc::new(Dataset::open_unasked(&config.place)?);
     let prior = Random { seed: config.seed };
     let models = [
@@ -69,7 +69,7 @@ pub fn serve(config: &Serve, progress: &Progress) -> Result<Verdict> {
         .build()
         .map_err(|e| Error::usage("serve", e))?;
     runtime.block_on(listen(config, desk, progress))?;
-    Ok(Verdict {
+    Ok(Outcome {
         status: Status::Complete,
         output: String::new(),
     })

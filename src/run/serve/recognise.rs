@@ -8,8 +8,8 @@ use rayon::prelude::*;
 
 use crate::dataset::Dataset;
 use crate::error::Result;
+use crate::job::progress::Progress;
 use crate::questions::observer::contrast::linear;
-use crate::run::progress::Progress;
 use crate::types::{FrameId, Rgb};
 
 /// Cells of the grid, across and down.

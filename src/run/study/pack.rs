@@ -4,13 +4,12 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::config::StudyPack;
 use crate::error::{Error, Result};
+use crate::files::write;
+use crate::job::Outcome;
+use crate::job::progress::Progress;
+use crate::job::rebuild::ImageRebuilder;
+use crate::job::stored::{AnyRun, StoredRun};
 use crate::report::study::{Asked, Shot, page};
-use crate::run::Verdict;
-use crate::run::again::Album;
-use crate::run::progress::Progress;
-use crate::run::report::kept;
-use crate::run::written::write;
-use crate::store;
 use crate::types::manifest::Status;
 use crate::types::{Condition, Digest, FrameId, Listed, QuestionId, Record};
 
@@ -18,10 +17,22 @@ use crate::types::{Condition, Digest, FrameId, Listed, QuestionId, Record};
 ///
 /// # Errors
 /// Where the run kept no questions, or its data or enhancers are not where they were.
-pub fn pack(config: StudyPack, progress: &Progress) -> Result<Verdict> {
-    let manifest = kept(&config.run)?;
-    let records = store::read_records(&config.run)?;
-    let listed = store::read_questions(&config.run)?;
+pub fn pack(config: StudyPack, progress: &Progress) -> Result<Outcome> {
+    let StoredRun {
+        manifest,
+        records,
+        questions: listed,
+        ..
+    } = match AnyRun::open(&config.run)? {
+        AnyRun::Choice(run) => run,
+        AnyRun::Open(run) => {
+            let problem = "the run asked open questions: openeqa --study DIR makes their page";
+            return Err(Error::Run {
+                path: run.folder,
+                problem: problem.to_owned(),
+            });
+        }
+    };
     let wrong = |problem: String| {
         let path = config.run.clone();
         Error::Run { path, problem }
@@ -42,14 +53,13 @@ pub fn pack(config: StudyPack, progress: &Progress) -> Result<Verdict> {
             .push(question);
     }
     let sent = sent(&records);
-    let mut album = Album::open(config.again, &manifest, &config.run, &conditions)?;
+    let mut rebuilder = ImageRebuilder::open(config.again, &manifest, &config.run, &conditions)?;
     let bar = progress.bar("images", frames.len() * conditions.len());
     let (mut asked, mut images) = (Vec::new(), 0);
     for (number, (frame, questions)) in frames.into_iter().enumerate() {
-        let mut desk = album.desk(&frame)?;
         let mut shots = Vec::new();
-        for condition in &conditions {
-            let made = album.image(&mut desk, condition)?;
+        let rebuilt = rebuilder.images(&frame, &conditions)?;
+        for (condition, made) in conditions.iter().zip(rebuilt.iter().flatten()) {
             if let Some(sent) = sent.get(&(frame.clone(), condition.clone()))
                 && *sent != made.digest
             {
@@ -80,7 +90,7 @@ pub fn pack(config: StudyPack, progress: &Progress) -> Result<Verdict> {
     drop(bar);
     let path = config.out.join("study.html");
     write(&path, page(&asked)?.as_bytes())?;
-    Ok(Verdict {
+    Ok(Outcome {
         status: Status::Complete,
         output: format!(
             "{}: {} questions, {images} images, {} conditions; with {} people each image is seen by one of them\n",

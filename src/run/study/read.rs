@@ -10,10 +10,11 @@ use serde_json::{Value, json};
 
 use crate::config::{Show, StudyRead};
 use crate::error::{Error, Result};
-use crate::run::record::Entry as _;
-use crate::run::report::{kept, leave};
-use crate::run::{Verdict, count, now};
-use crate::store::{self, Moved, Store};
+use crate::job::report::choice;
+use crate::job::stored::{AnyRun, StoredRun};
+use crate::job::trial::Entry as _;
+use crate::job::{Outcome, count, now};
+use crate::store::{Moved, Store};
 use crate::types::manifest::{Counts, RunManifest, Status};
 use crate::types::{Condition, Digest, Kept as _, QuestionId, Record, Reply, TrialKey};
 
@@ -41,9 +42,23 @@ struct Tally {
 ///
 /// # Errors
 /// Where the folder holds no run or a line is no answer; or nothing in the files was asked in the run.
-pub fn read(config: &StudyRead) -> Result<Verdict> {
-    let manifest = kept(&config.run)?;
-    let asked = asked(store::read_records(&config.run)?);
+pub fn read(config: &StudyRead) -> Result<Outcome> {
+    let StoredRun {
+        manifest,
+        records,
+        questions,
+        ..
+    } = match AnyRun::open(&config.run)? {
+        AnyRun::Choice(run) => run,
+        AnyRun::Open(run) => {
+            let problem = "the run asked open questions: openeqa --answers NAME=FILE reads what people answered";
+            return Err(Error::Run {
+                path: run.folder,
+                problem: problem.to_owned(),
+            });
+        }
+    };
+    let asked = asked(records);
     let mut tally = Tally::default();
     let mut lines = Vec::new();
     for path in &config.files {
@@ -70,7 +85,7 @@ pub fn read(config: &StudyRead) -> Result<Verdict> {
     }
     let mut own = of_people(&manifest, config);
     let mut store = Store::open(&config.out, &own, Moved::Allowed)?;
-    store.write_questions(&store::read_questions(&config.run)?)?;
+    store.write_questions(&questions)?;
     let mut people = People::new(store.records()?);
     for (asked, line) in known {
         tally.answers += 1;
@@ -82,11 +97,12 @@ pub fn read(config: &StudyRead) -> Result<Verdict> {
     let records = store.records()?;
     own.counts = count(records.len(), &records);
     own.status = Status::Complete;
-    let mut output = leave(&store, &own, records, config.show)?;
+    drop(records);
+    let mut output = choice::write(&store, &mut own, config.show)?;
     if config.show == Show::Table {
         output.insert_str(0, &told(&tally));
     }
-    Ok(Verdict {
+    Ok(Outcome {
         status: Status::Complete,
         output,
     })
@@ -137,6 +153,8 @@ fn of_people(run: &RunManifest, config: &StudyRead) -> RunManifest {
         identity: identity
             .map(|(name, value)| (name.to_owned(), value))
             .into(),
+        columns: BTreeMap::new(),
+        shard: None,
         settings: BTreeMap::new(),
         images: run.images.clone(),
         counts: Counts::default(),

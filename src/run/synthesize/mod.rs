@@ -8,15 +8,19 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use super::Verdict;
-use super::cores::pool;
-use super::inputs::{Entry, Inputs, stem};
-use super::progress::{Bar, Progress};
-use super::written::{png, write};
 use crate::config::{Existing, Light, Product, Synthesize};
 use crate::dataset::Picture;
+use crate::dataset::inputs::{Entry, Inputs, stem};
 use crate::error::{Error, Result};
-use crate::synthesis::{Film, NoiseKey};
+use crate::files::{png, write};
+use crate::job::Outcome;
+use crate::job::frame_work::{FrameWork, Steps};
+use crate::job::progress::{Bar, Progress};
+use crate::job::recipe::Recipe;
+use crate::job::source::Frames;
+use crate::job::timings::Timings;
+use crate::job::workers::pool;
+use crate::synthesis::NoiseKey;
 use crate::types::manifest::Status;
 use crate::types::{Degradation, FrameId, Rgb, Variants};
 use sidecar::Sidecar;
@@ -27,7 +31,7 @@ use sidecar::Sidecar;
 ///
 /// # Errors
 /// Where nothing can be made: no such input, two frames of one name, no folder to write to.
-pub fn synthesize(config: &Synthesize, progress: &Progress) -> Result<Verdict> {
+pub fn synthesize(config: &Synthesize, progress: &Progress) -> Result<Outcome> {
     let frames = Inputs::open(&config.inputs, config.most_pixels)?;
     let cores = pool(config.threads)?;
     fs::create_dir_all(&config.out).map_err(|e| Error::file(&config.out, "make", e))?;
@@ -60,7 +64,7 @@ struct Tally {
 }
 
 impl Tally {
-    fn verdict(self, config: &Synthesize, frames: usize) -> Verdict {
+    fn verdict(self, config: &Synthesize, frames: usize) -> Outcome {
         let Self { made, kept, failed } = self;
         let kept = match kept {
             0 => String::new(),
@@ -70,7 +74,7 @@ impl Tally {
             0 => String::new(),
             n => format!(", {n} failed"),
         };
-        Verdict {
+        Outcome {
             status: if failed == 0 {
                 Status::Complete
             } else {
@@ -121,20 +125,25 @@ fn files(config: &Synthesize) -> Vec<File> {
 /// Makes all images of one frame.
 fn one(config: &Synthesize, frames: &Inputs, entry: &Entry, files: &[File], bar: &Bar) -> Tally {
     let mut tally = Tally::default();
-    let mut work = match frames.picture(entry) {
-        Ok(picture) => Work {
-            config,
-            entry,
-            picture,
-            clean: None,
-            film: Film::default(),
-        },
-        Err(e) => {
-            tracing::error!("{e}");
-            tally.failed = files.len();
-            return tally;
-        }
+    let frames = OneFrame { frames, entry };
+    let recipe = Recipe::lossless(&config.light.sensor, &[]);
+    let timings = Timings::default();
+    let steps = Steps {
+        frames: &frames,
+        recipe: &recipe,
+        limit: None,
+        timings: &timings,
     };
+    let mut work = Work {
+        config,
+        entry,
+        frame: FrameWork::of(steps, entry.id.clone()),
+    };
+    if let Err(e) = work.frame.picture() {
+        tracing::error!("{e}");
+        tally.failed = files.len();
+        return tally;
+    }
     for file in files {
         let made = match file {
             File::Image(degradation) => work.image(*degradation),
@@ -154,13 +163,23 @@ fn one(config: &Synthesize, frames: &Inputs, entry: &Entry, files: &[File], bar:
     tally
 }
 
-/// One frame being worked on: each step is done when it is first needed, and once.
+/// One frame of the inputs, whose name may be that of a frame of another input.
+struct OneFrame<'a> {
+    frames: &'a Inputs,
+    entry: &'a Entry,
+}
+
+impl Frames for OneFrame<'_> {
+    fn picture(&self, _: &FrameId) -> Result<Picture> {
+        self.frames.picture(self.entry)
+    }
+}
+
+/// One frame being worked on.
 struct Work<'a> {
     config: &'a Synthesize,
     entry: &'a Entry,
-    picture: Picture,
-    clean: Option<Rgb>,
-    film: Film,
+    frame: FrameWork<'a>,
 }
 
 /// Whether an image was made.
@@ -174,7 +193,13 @@ impl Work<'_> {
         let light = &self.config.light;
         let key = NoiseKey::new(light.sensor.seed, &self.entry.id);
         let name = format!("{}_{degradation}", self.entry.stem);
-        let sidecar = Sidecar::new(&self.entry.id, &self.picture, degradation, light, &key);
+        let sidecar = Sidecar::new(
+            &self.entry.id,
+            self.frame.picture()?,
+            degradation,
+            light,
+            &key,
+        );
         let [image, json] = [".png", ".json"].map(|end| self.config.out.join(name.clone() + end));
         if self.config.existing == Existing::Kept && image.exists() && json.exists() {
             if sidecar.is_at(&json)? {
@@ -183,8 +208,7 @@ impl Work<'_> {
             let problem = "made from another image or with other settings; --force makes it again, another --out keeps both";
             return Err(Error::data(json.display(), problem));
         }
-        let dark = self.dark(degradation, &key)?;
-        write(&image, &png(&dark)?)?;
+        write(&image, &png(self.frame.degraded(degradation)?)?)?;
         write(&json, sidecar.text().as_bytes())?;
         Ok(Made::New)
     }
@@ -198,23 +222,14 @@ impl Work<'_> {
         if self.config.existing == Existing::Kept && path.exists() {
             return Ok(Made::Kept);
         }
-        let figure = draw(&self.picture.decode()?, &self.entry.id, &self.config.light);
+        let figure = draw(self.frame.clean()?, &self.entry.id, &self.config.light);
         write(&path, &png(&figure)?)?;
         Ok(Made::New)
-    }
-
-    fn dark(&mut self, degradation: Degradation, key: &NoiseKey) -> Result<Rgb> {
-        let clean = match &mut self.clean {
-            Some(clean) => clean,
-            none => none.insert(self.picture.decode()?),
-        };
-        let synthesis = &self.config.light.sensor.synthesis;
-        Ok(self.film.degrade(clean, degradation, key, synthesis))
     }
 }
 
 /// Makes the one image again that a file tells of.
-fn replay(config: &Synthesize, frames: &Inputs, file: &Path) -> Result<Verdict> {
+fn replay(config: &Synthesize, frames: &Inputs, file: &Path) -> Result<Outcome> {
     let sidecar = Sidecar::read(file)?;
     let [entry] = &frames.entries[..] else {
         let problem = format_args!(

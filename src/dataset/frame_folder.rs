@@ -1,0 +1,153 @@
+//! Frames written into a folder of the common interface, as [`crate::dataset::frames`] reads it: [`Place`].
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder as _};
+use ndarray::Array2;
+use serde_json::{Map, Value, json};
+
+use crate::dataset::import::classes;
+use crate::error::{Error, Result};
+use crate::files::write;
+use crate::types::{DepthKind, Labels, Rgb, SegmentName, Segmentation};
+
+/// The list of the frames.
+pub(crate) const FRAMES: &str = "frames.jsonl";
+
+/// Where the files of one frame go.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Place<'a> {
+    pub(crate) out: &'a Path,
+    pub(crate) scene: &'a str,
+    pub(crate) frame: &'a str,
+}
+
+/// A line of the list.
+type Line = Map<String, Value>;
+
+impl Place<'_> {
+    /// What begins the line of the frame.
+    pub(crate) fn line(&self, rgb: &Rgb) -> Line {
+        let facts = [
+            ("scene", json!(self.scene)),
+            ("frame", json!(self.frame)),
+            ("width", json!(rgb.width())),
+            ("height", json!(rgb.height())),
+        ];
+        facts
+            .map(|(key, value)| (key.to_owned(), value))
+            .into_iter()
+            .collect()
+    }
+
+    /// Writes one of its files; the path below the folder.
+    pub(crate) fn write(&self, kind: &str, ending: &str, bytes: &[u8]) -> Result<String> {
+        let path = format!("scenes/{}/{kind}/{}.{ending}", self.scene, self.frame);
+        write(&self.out.join(&path), bytes)?;
+        Ok(path)
+    }
+
+    /// Writes its depth: millimetres as 16-bit PNG.
+    pub(crate) fn depth(
+        &self,
+        line: &mut Line,
+        depth: &Array2<u32>,
+        kind: DepthKind,
+    ) -> Result<()> {
+        let units = depth.mapv(|depth| u16::try_from(depth).unwrap_or(u16::MAX));
+        let path = self.write("depth", "png", &grey(&units)?)?;
+        line.insert("depth".to_owned(), json!(path));
+        line.insert("depth_scale".to_owned(), json!(0.001));
+        line.insert("depth_kind".to_owned(), json!(kind));
+        Ok(())
+    }
+
+    /// Writes its classes.
+    pub(crate) fn semantic(&self, line: &mut Line, semantic: &Array2<u16>) -> Result<()> {
+        let path = self.write("sem", "png", &grey(semantic)?)?;
+        line.insert("sem".to_owned(), json!(path));
+        Ok(())
+    }
+
+    /// Writes its segments: as 16-bit PNG, or as `.npy` where there are too many.
+    pub(crate) fn segments(
+        &self,
+        line: &mut Line,
+        segments: &Array2<u32>,
+        segmentation: Segmentation,
+    ) -> Result<()> {
+        let most = segments.iter().copied().max().unwrap_or(0);
+        let path = if u16::try_from(most).is_ok() {
+            self.write("over", "png", &grey(&segments.mapv(|id| id as u16))?)?
+        } else {
+            self.write("over", "npy", &npy(segments))?
+        };
+        let source = match segmentation {
+            Segmentation::Instances => "renderer",
+            Segmentation::Parts => "superpixel",
+        };
+        line.insert("over".to_owned(), json!(path));
+        line.insert("over_source".to_owned(), json!(source));
+        Ok(())
+    }
+}
+
+/// Writes what is known of the segments of a scene by name, where anything is.
+pub(crate) fn names(out: &Path, scene: &str, names: &BTreeMap<u32, SegmentName>) -> Result<()> {
+    if names.is_empty() {
+        return Ok(());
+    }
+    let text = serde_json::to_string_pretty(names).map_err(|e| Error::data("segments", e))?;
+    let path = out.join("scenes").join(scene).join("segments.json");
+    write(&path, text.as_bytes())
+}
+
+/// Writes what tells of the whole folder; the list of frames last, for with it the folder is complete.
+pub(crate) fn finish<'a>(
+    out: &Path,
+    labels: &Labels,
+    about: &Value,
+    lines: impl Iterator<Item = &'a Line>,
+) -> Result<()> {
+    write(&out.join("classes.json"), classes(labels).as_bytes())?;
+    write(&out.join("dataset.json"), format!("{about:#}\n").as_bytes())?;
+    let mut list = String::new();
+    for line in lines {
+        let line = serde_json::to_string(line).map_err(|e| Error::data(FRAMES, e))?;
+        list.push_str(&line);
+        list.push('\n');
+    }
+    write(&out.join(FRAMES), list.as_bytes())
+}
+
+/// Numbers as `.npy` (numpy.lib.format, version 1.0).
+fn npy(segments: &Array2<u32>) -> Vec<u8> {
+    let (height, width) = segments.dim();
+    let header =
+        format!("{{'descr': '<u4', 'fortran_order': False, 'shape': ({height}, {width}), }}");
+    // The numbers begin at a multiple of 64 bytes, after a newline.
+    let length = (header.len() + 11).next_multiple_of(64) - 10;
+    let mut file = b"\x93NUMPY\x01\x00".to_vec();
+    file.extend((length as u16).to_le_bytes());
+    file.extend(format!("{header:<width$}\n", width = length - 1).bytes());
+    file.extend(segments.iter().flat_map(|id| id.to_le_bytes()));
+    file
+}
+
+/// A map as 16-bit grey PNG.
+fn grey(map: &Array2<u16>) -> Result<Vec<u8>> {
+    let (height, width) = map.dim();
+    let samples: Vec<u8> = map.iter().flat_map(|value| value.to_ne_bytes()).collect();
+    let mut file = Vec::new();
+    PngEncoder::new_with_quality(&mut file, CompressionType::Fast, FilterType::Adaptive)
+        .write_image(
+            &samples,
+            width as u32,
+            height as u32,
+            ExtendedColorType::L16,
+        )
+        .map_err(|e| Error::data("map", e))?;
+    Ok(file)
+}

@@ -1,0 +1,69 @@
+//! The images that a command is given by files and folders: [`Inputs`].
+
+use std::collections::BTreeMap;
+use std::path::{Component, Path, PathBuf};
+
+use super::{Dataset, Picture};
+use crate::error::{Error, Result};
+use crate::types::FrameId;
+
+/// The frames of all inputs.
+pub(crate) struct Inputs {
+    sets: Vec<Dataset>,
+    pub(crate) entries: Vec<Entry>,
+}
+
+/// One frame, and what its files are called.
+pub(crate) struct Entry {
+    set: usize,
+    pub(crate) id: FrameId,
+    /// The path below the output folder, without the ending.
+    pub(crate) stem: String,
+}
+
+impl Inputs {
+    /// Lists the frames; no image is read.
+    ///
+    /// # Errors
+    /// Where an input is missing, two frames would have one name, or a name leads out of a folder.
+    pub(crate) fn open(inputs: &[PathBuf], most_pixels: u64) -> Result<Self> {
+        let sets: Vec<Dataset> = inputs
+            .iter()
+            .map(|path| Ok(Dataset::of_images(path)?.with_most_pixels(most_pixels)))
+            .collect::<Result<_>>()?;
+        let mut entries = Vec::new();
+        let mut taken: BTreeMap<String, String> = BTreeMap::new();
+        for (set, (dataset, input)) in sets.iter().zip(inputs).enumerate() {
+            for id in dataset.frames() {
+                let stem = stem(id)?;
+                let whole = format!("{:?} of {}", id.0, input.display());
+                if let Some(other) = taken.insert(stem.clone(), whole.clone()) {
+                    let problem = format!(
+                        "{whole} and {other} would both be written as {stem}; give each its own --out"
+                    );
+                    return Err(Error::usage("INPUT", problem));
+                }
+                let id = id.clone();
+                entries.push(Entry { set, id, stem });
+            }
+        }
+        Ok(Self { sets, entries })
+    }
+
+    pub(crate) fn picture(&self, entry: &Entry) -> Result<Picture> {
+        self.sets[entry.set].picture(&entry.id)
+    }
+}
+
+/// The name of a frame's files: its own, without the ending of an image.
+pub(crate) fn stem(id: &FrameId) -> Result<String> {
+    let path = Path::new(&id.0);
+    if !path
+        .components()
+        .all(|part| matches!(part, Component::Normal(_)))
+    {
+        let problem = "this name of a frame leads out of the output folder";
+        return Err(Error::data(format_args!("{:?}", id.0), problem));
+    }
+    Ok(id.bare().to_owned())
+}

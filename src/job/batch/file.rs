@@ -1,0 +1,117 @@
+//! The input files of one model: [`Files`].
+
+use std::fs::{self, File};
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+use crate::store::Store;
+use crate::types::Kept;
+
+/// Where a file is written until it is whole.
+const PART: &str = "part";
+
+/// The input files of one model, split by bytes and by requests.
+pub(crate) struct Files<R> {
+    folder: PathBuf,
+    stem: String,
+    most_bytes: u64,
+    most_requests: usize,
+    open: Option<Open<R>>,
+    /// The whole ones, with their requests.
+    done: Vec<(PathBuf, usize)>,
+}
+
+struct Open<R> {
+    path: PathBuf,
+    file: BufWriter<File>,
+    bytes: u64,
+    /// The trials in it, as the records that they will become.
+    blanks: Vec<R>,
+}
+
+impl<R: Kept> Files<R> {
+    pub(crate) fn new(folder: &Path, model: &str, most_bytes: u64, most_requests: usize) -> Self {
+        let safe = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+        Self {
+            folder: folder.to_owned(),
+            stem: model.replace(|c| !safe(c), "_"),
+            most_bytes,
+            most_requests,
+            open: None,
+            done: Vec::new(),
+        }
+    }
+
+    /// Adds one line, and what is known of its trial.
+    ///
+    /// # Errors
+    /// Where it alone is larger than a file may be, or cannot be written.
+    pub(crate) fn add(&mut self, line: &[u8], blank: R, store: &mut Store<R>) -> Result<()> {
+        let size = line.len() as u64;
+        if size > self.most_bytes {
+            let megabytes = size as f64 / 1e6;
+            let problem = format!(
+                "one request is {megabytes:.1} MB, more than a whole file; make images smaller by --max-side or --image jpeg:95"
+            );
+            return Err(Error::usage("--file-size", problem));
+        }
+        let full = self.open.as_ref().is_some_and(|open| {
+            open.bytes + size > self.most_bytes || open.blanks.len() >= self.most_requests
+        });
+        if full {
+            self.close(store)?;
+        }
+        let open = match self.open.take() {
+            Some(open) => open,
+            None => self.next()?,
+        };
+        let open = self.open.insert(open);
+        open.file
+            .write_all(line)
+            .map_err(|e| Error::file(&open.path, "write", e))?;
+        open.bytes += size;
+        open.blanks.push(blank);
+        Ok(())
+    }
+
+    /// Ends the last file; all of them with their requests.
+    pub(crate) fn finish(mut self, store: &mut Store<R>) -> Result<Vec<(PathBuf, usize)>> {
+        self.close(store)?;
+        Ok(self.done)
+    }
+
+    /// A new file, numbered on from those that lie there.
+    fn next(&self) -> Result<Open<R>> {
+        let path = (1..=u32::MAX)
+            .map(|n| self.folder.join(format!("{}-{n:03}.jsonl", self.stem)))
+            .find(|path| !path.exists())
+            .unwrap_or_default();
+        let part = path.with_extension(PART);
+        let file = File::create(&part).map_err(|e| Error::file(&part, "create", e))?;
+        Ok(Open {
+            path,
+            file: BufWriter::new(file),
+            bytes: 0,
+            blanks: Vec::new(),
+        })
+    }
+
+    /// Makes the open file whole. Its trials are noted as out before it bears its name, so that none is handed in whose
+    /// replies nobody would know.
+    fn close(&mut self, store: &mut Store<R>) -> Result<()> {
+        let Some(open) = self.open.take() else {
+            return Ok(());
+        };
+        let unwritten = |e| Error::file(&open.path, "write", e);
+        let whole = open.file.into_inner();
+        whole
+            .map_err(std::io::IntoInnerError::into_error)
+            .and_then(|file| file.sync_all())
+            .map_err(unwritten)?;
+        store.append_to_batch(&open.blanks)?;
+        fs::rename(open.path.with_extension(PART), &open.path).map_err(unwritten)?;
+        self.done.push((open.path.clone(), open.blanks.len()));
+        Ok(())
+    }
+}

@@ -1,0 +1,71 @@
+//! The enhancement models of a command: [`OpenEnhancers`], loaded when they are needed.
+
+use crate::config::Enhancement;
+use crate::enhance::{Enhancer, ModelFile};
+use crate::error::Result;
+
+/// Enhancement models, and ONNX Runtime if there are any.
+pub(crate) struct OpenEnhancers<'a> {
+    settings: Option<&'a Enhancement>,
+    files: Vec<ModelFile>,
+    pub(crate) enhancers: Vec<Enhancer>,
+    version: Option<String>,
+}
+
+impl<'a> OpenEnhancers<'a> {
+    /// The models in these files, loaded at once unless they may not be needed at all.
+    pub(crate) fn new(
+        files: Vec<ModelFile>,
+        settings: &'a Enhancement,
+        perhaps_unneeded: bool,
+    ) -> Result<Self> {
+        if perhaps_unneeded {
+            return Ok(Self {
+                settings: Some(settings),
+                files,
+                enhancers: Vec::new(),
+                version: None,
+            });
+        }
+        Self::load(files, settings)
+    }
+
+    /// The models in these files, loaded.
+    ///
+    /// # Errors
+    /// If ONNX Runtime is not there, or a file is no model that it runs.
+    pub(crate) fn load(files: Vec<ModelFile>, settings: &'a Enhancement) -> Result<Self> {
+        let mut opened = Self {
+            settings: None,
+            files: Vec::new(),
+            enhancers: Vec::new(),
+            version: None,
+        };
+        if files.is_empty() {
+            return Ok(opened);
+        }
+        let runtime = settings.runtime.open()?;
+        for file in files {
+            let enhancer = Enhancer::open(file, &runtime, settings.threads)?
+                .with_tiling(settings.tiling)
+                .with_most_side(settings.most_side);
+            opened.enhancers.push(enhancer);
+        }
+        opened.version = Some(runtime.version().to_owned());
+        Ok(opened)
+    }
+
+    /// The models, loaded now if they are not yet.
+    pub(crate) fn take(&mut self) -> Result<Vec<Enhancer>> {
+        if let Some(settings) = self.settings.take() {
+            *self = Self::load(std::mem::take(&mut self.files), settings)?;
+        }
+        Ok(std::mem::take(&mut self.enhancers))
+    }
+
+    /// ONNX Runtime and its version, if it was opened; for the manifest.
+    pub(crate) fn version(&self) -> Option<(String, String)> {
+        let version = self.version.clone()?;
+        Some(("onnxruntime".to_owned(), version))
+    }
+}

@@ -1,0 +1,299 @@
+//! What a run would take, found out without sending anything: [`estimate`].
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use super::budget::{Budget, image_of, words};
+use super::experiment::{Expected, Experiment, RecordOf};
+use super::frame_work::FrameWork;
+use super::image_pipeline::ImagePipeline;
+use super::models::ModelUnderTest;
+use super::plan::Plan;
+use super::trial::Item as _;
+use crate::ask::{Model, Price};
+use crate::config::Server;
+use crate::error::Result;
+use crate::report::forecast::{Forecast, Line};
+use crate::types::{Condition, ImageFacts, Kept as _, View};
+
+/// How many sources are made into images, to know their size; of those with an enhancer one.
+const SAMPLED: usize = 3;
+
+/// How long a reply takes if nothing is known of the endpoint, in seconds.
+const REPLY_SECONDS: f64 = 2.0;
+
+/// Bytes of a request besides its images and its words.
+const AROUND: f64 = 300.0;
+
+/// Bytes of base64 text for each byte of an image.
+const BASE64: f64 = 4.0 / 3.0;
+
+/// Lays out what is left to ask, with the sizes of a few images that are made for it.
+pub(crate) fn estimate<E: Experiment>(
+    experiment: &E,
+    plans: &[Plan<E::Item>],
+    stored: &[RecordOf<E>],
+    pipeline: &mut ImagePipeline<'_>,
+) -> Result<Forecast> {
+    let settings = experiment.settings();
+    let (money, sources) = (&settings.money, experiment.sources());
+    let to_come = plans
+        .first()
+        .map_or_else(Vec::new, |plan| experiment.to_come(&plan.sources));
+    let (mut lines, mut everyone) = (Vec::new(), Vec::new());
+    for (phase, plan) in plans.iter().enumerate() {
+        let coming = if phase == 0 { &[] } else { &to_come[..] };
+        lines.extend(self::lines(experiment, phase, plan, coming));
+        everyone.extend(experiment.models(phase).iter().cloned());
+    }
+    let budget = Budget::new(money, &everyone, stored)?;
+    let sample = match plans.first() {
+        Some(plan) => Sample::make(experiment, plan, pipeline)?,
+        None => Sample::default(),
+    };
+    let (mut bytes, mut largest_request, mut images, mut seconds) = (0.0, 0.0_f64, 0, 0.0);
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    for (phase, plan) in plans.iter().enumerate() {
+        let models = experiment.models(phase);
+        for (place, group) in plan.groups() {
+            let source = &sources[place];
+            let mean = group
+                .condition
+                .as_ref()
+                .and_then(|condition| sample.mean(condition));
+            let shown = mean.map_or(0.0, |mean| mean.bytes * BASE64 * source.order.len() as f64);
+            for trial in &group.trials {
+                if models[trial.model].model.is_remote() {
+                    let request = shown + trial.prompt.parts().concat().len() as f64 + AROUND;
+                    bytes += request;
+                    largest_request = largest_request.max(request);
+                }
+            }
+            if group.condition.is_some() {
+                images += source.order.len();
+                // The frames of a walk are made side by side, a frame alone by all cores together.
+                let frames = source.frames.len() as f64;
+                let side_by_side = if source.frames.len() > 1 { cores } else { 1 };
+                seconds += mean.map_or(0.0, |mean| mean.seconds * frames / side_by_side as f64);
+            }
+        }
+    }
+    let requests: usize = lines.iter().map(|line| line.requests).sum();
+    let tokens = lines
+        .iter()
+        .map(|line| line.text_tokens + line.image_tokens.unwrap_or(0.0) + line.reply_tokens)
+        .sum();
+    let latencies = stored.iter().filter_map(|record| record.latency_ms());
+    let (asking_seconds, pace) = waiting(experiment.server(), latencies, requests as f64, tokens);
+    let largest = sample.images.iter().max_by_key(|image| image.bytes);
+    let limit = super::limit(&settings.ask, &settings.images);
+    let planned: usize = plans.iter().map(|plan| plan.keys.len()).sum();
+    let left: usize = plans.iter().map(Plan::left).sum();
+    Ok(Forecast {
+        lines,
+        trials: planned + to_come.len(),
+        answered: planned - left,
+        spent: budget.spent(),
+        images,
+        bytes,
+        largest_image: largest.map_or(0, |image| image.bytes),
+        sampled: sample.images.len(),
+        too_large: limit
+            .zip(largest)
+            .and_then(|(limit, image)| limit.check(image).err())
+            .map(|problem| problem.to_string()),
+        making_seconds: seconds,
+        asking_seconds,
+        pace,
+        prices: format!("prices of {}", money.prices.as_of),
+        batch: money.prices.batch,
+        reply: E::REPLY,
+        largest_request: sources
+            .iter()
+            .any(|source| source.order.len() > 1)
+            .then_some(largest_request),
+    })
+}
+
+/// What is left of each model of a phase that is asked over a network.
+fn lines<E: Experiment>(
+    experiment: &E,
+    phase: usize,
+    plan: &Plan<E::Item>,
+    coming: &[Expected],
+) -> Vec<Line> {
+    let sources = experiment.sources();
+    let models = experiment.models(phase).iter().enumerate();
+    let remote = models.filter(|(_, model)| model.model.is_remote());
+    let lines = remote.map(|(index, model)| {
+        let price = experiment.settings().money.prices.of(model.model.name());
+        let mut tokens = Tokens {
+            image: Some(0.0),
+            ..Tokens::default()
+        };
+        for (place, group) in plan.groups() {
+            let own = group.trials.iter().filter(|trial| trial.model == index);
+            let before = tokens.requests;
+            for trial in own {
+                tokens.add(words(&trial.prompt), trial.item.reply_tokens());
+            }
+            let source = &sources[place];
+            if let (Some(_), Some(frame)) = (&group.condition, source.frames.first()) {
+                let (width, height) = experiment.recipe().scaling.of(frame.size);
+                let each = image_of(model, price, width, height);
+                let images = (source.order.len() * (tokens.requests - before)) as f64;
+                let known = tokens.image.zip(each);
+                tokens.image = known.map(|(sofar, each)| sofar + each * images);
+            }
+        }
+        for expected in coming.iter().filter(|expected| expected.model == index) {
+            tokens.add(expected.words, expected.reply);
+        }
+        line(model, price, &tokens, E::PHASES[phase])
+    });
+    lines.filter(|line| line.requests > 0).collect()
+}
+
+/// Tokens of the requests to one model.
+#[derive(Debug, Default)]
+struct Tokens {
+    requests: usize,
+    words: f64,
+    reply: f64,
+    /// Those of all images; `None` if nobody knows.
+    image: Option<f64>,
+}
+
+impl Tokens {
+    fn add(&mut self, words: f64, reply: f64) {
+        self.requests += 1;
+        self.words += words;
+        self.reply += reply;
+    }
+}
+
+/// What is left of one model.
+fn line(model: &ModelUnderTest, price: Option<Price>, tokens: &Tokens, phase: &str) -> Line {
+    let requests = tokens.requests as f64;
+    let longest = max_tokens(&model.model).map(|limit| requests * f64::from(limit));
+    let role = match (phase, model.view) {
+        ("marks", _) => " (judge)",
+        (_, View::Blind) => " (blind)",
+        (_, View::Image) => "",
+    };
+    let dollars = |reply: f64| Some(price?.of(tokens.words + tokens.image?, reply));
+    Line {
+        model: format!("{}{role}", model.model.name()),
+        requests: tokens.requests,
+        text_tokens: tokens.words,
+        image_tokens: tokens.image,
+        reply_tokens: tokens.reply,
+        longest_reply_tokens: longest,
+        dollars: dollars(tokens.reply),
+        most_dollars: longest.and_then(dollars),
+    }
+}
+
+/// The most tokens of a reply; `None` without a limit.
+fn max_tokens(model: &Model) -> Option<u32> {
+    match model {
+        Model::OpenAi(model) => model.parameters().max_tokens,
+        Model::Random(_) | Model::Script(_) | Model::Local(_) => None,
+    }
+}
+
+/// How long all replies take, and what that rests on: the user's limits, and replies as slow as those kept.
+fn waiting(
+    server: Option<&Server>,
+    latencies_ms: impl Iterator<Item = u64>,
+    requests: f64,
+    tokens: f64,
+) -> (f64, String) {
+    let Some(server) = server else {
+        return (0.0, "built-in models alone".to_owned());
+    };
+    let kept: Vec<f64> = latencies_ms
+        .filter(|ms| *ms > 0)
+        .map(|ms| ms as f64 / 1e3)
+        .collect();
+    let (each, known) = if kept.is_empty() {
+        (REPLY_SECONDS, "assumed")
+    } else {
+        (kept.iter().sum::<f64>() / kept.len() as f64, "as so far")
+    };
+    let sending = &server.sending;
+    let wide = sending.concurrency.most();
+    let mut slowest = (
+        requests * each / wide as f64,
+        format!("{each:.1} s a reply {known}, {wide} at once"),
+    );
+    let minutes = |number: f64, quota: Option<std::num::NonZeroU32>| {
+        quota.map(|quota| 60.0 * number / f64::from(quota.get()))
+    };
+    let quotas = [
+        ("--rpm", minutes(requests, sending.quota.requests)),
+        ("--tpm", minutes(tokens, sending.quota.tokens)),
+    ];
+    for (flag, seconds) in quotas {
+        if let Some(seconds) = seconds.filter(|seconds| *seconds > slowest.0) {
+            slowest = (seconds, format!("by {flag}"));
+        }
+    }
+    slowest
+}
+
+/// The mean size and time of an image.
+#[derive(Debug, Clone, Copy)]
+struct Mean {
+    bytes: f64,
+    seconds: f64,
+}
+
+/// Images that were made to know their size and time.
+#[derive(Default)]
+struct Sample {
+    images: Vec<ImageFacts>,
+    /// Sum of bytes, of seconds, and how many, by condition.
+    sums: BTreeMap<Condition, (f64, f64, usize)>,
+}
+
+impl Sample {
+    /// Makes the images of the middle frame of a few sources spread over the plan.
+    fn make<E: Experiment>(
+        experiment: &E,
+        plan: &Plan<E::Item>,
+        pipeline: &mut ImagePipeline<'_>,
+    ) -> Result<Self> {
+        let mut sample = Self::default();
+        let sources = experiment.sources();
+        let shown = plan.sources.iter().filter_map(|part| {
+            let source = &sources[part.source];
+            Some((part, source, source.middle()?))
+        });
+        let shown: Vec<_> = shown.collect();
+        let step = shown.len().div_ceil(SAMPLED).max(1);
+        for (i, (part, source, frame)) in shown.into_iter().step_by(step).enumerate() {
+            let mut work = FrameWork::planned(pipeline.steps, source, frame);
+            let conditions = part.conditions();
+            for condition in conditions.filter(|one| i == 0 || one.enhancer.is_none()) {
+                let started = Instant::now();
+                let image = pipeline.image(&mut work, condition)?;
+                let facts = image.facts();
+                let (bytes, seconds, n) = sample.sums.entry(condition.clone()).or_default();
+                *bytes += facts.bytes as f64;
+                *seconds += started.elapsed().as_secs_f64();
+                *n += 1;
+                sample.images.push(facts.clone());
+            }
+        }
+        Ok(sample)
+    }
+
+    fn mean(&self, condition: &Condition) -> Option<Mean> {
+        let (bytes, seconds, n) = self.sums.get(condition)?;
+        Some(Mean {
+            bytes: bytes / *n as f64,
+            seconds: seconds / *n as f64,
+        })
+    }
+}

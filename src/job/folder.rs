@@ -1,0 +1,86 @@
+//! Where a run lies: [`find`].
+
+use std::path::{Path, PathBuf};
+
+use jiff::Timestamp;
+use serde_json::json;
+
+use super::experiment::{Experiment, RecordOf};
+use super::identity;
+use super::observer;
+use super::plan::Plan;
+use crate::config::{Ask, ModelName, Output, RunPlace};
+use crate::error::{Error, Result};
+use crate::store::{self, Moved};
+use crate::types::Kept as _;
+
+/// The folder of runs without a name of their own.
+const RESULTS: &str = "results";
+
+/// The folder of a run: the one named, else the newest of the same identity and plan, else a new one.
+pub(crate) fn find<E: Experiment>(experiment: &E) -> Result<PathBuf> {
+    let settings = experiment.settings();
+    match settings.output.place.of(settings.shard) {
+        RunPlace::Named(path) => Ok(path),
+        RunPlace::Resume(path) => match store::read_manifest(&path, RecordOf::<E>::SCHEMA)? {
+            Some(_) => Ok(path),
+            None => Err(Error::usage(
+                "--resume",
+                format_args!(
+                    "{}: no run in this folder; a new run takes --out",
+                    path.display()
+                ),
+            )),
+        },
+        RunPlace::Automatic => automatic(experiment),
+    }
+}
+
+fn automatic<E: Experiment>(experiment: &E) -> Result<PathBuf> {
+    let settings = experiment.settings();
+    let notes: Vec<_> = experiment.notes();
+    let facts = json!({
+        "identity": experiment.identity(),
+        "columns": experiment.columns(),
+        "shard": settings.shard.to_string(),
+        "trials": Plan::new(experiment.plan(0, &[])?).keys,
+        "notes": notes,
+    });
+    let hash = &identity::digest(&facts).to_string()[..8];
+    let base = Path::new(RESULTS);
+    Ok(store::find(base, hash).unwrap_or_else(|| {
+        let time = Timestamp::now().strftime("%Y%m%d-%H%M%S");
+        let (models, data) = (label(&settings.ask), experiment.data());
+        let name = format!("{time}-{models}-{data}-{hash}");
+        base.join(name.replace(|c: char| !(c.is_alphanumeric() || "-_.".contains(c)), "_"))
+    }))
+}
+
+/// The models in the name of a folder.
+fn label(ask: &Ask) -> String {
+    let models = ask.models.iter().chain(&ask.blind_models);
+    let names = models.map(|name| match name {
+        ModelName::Random => "random".to_owned(),
+        ModelName::Observer => observer::NAME.to_owned(),
+        ModelName::Script(path) => path.file_stem().map_or_else(
+            || "script".to_owned(),
+            |stem| stem.to_string_lossy().into_owned(),
+        ),
+        ModelName::Remote(name) => name.clone(),
+    });
+    let names: Vec<String> = names.take(2).collect();
+    names.join("-").chars().take(60).collect()
+}
+
+/// Whether the run may lie at another address than before: only if it is named as the one to go on with.
+pub(crate) fn moved(output: &Output) -> Moved {
+    match output.place {
+        RunPlace::Resume(_) => Moved::Allowed,
+        RunPlace::Named(_) | RunPlace::Automatic => Moved::Refused,
+    }
+}
+
+/// Now, in UTC, to the second.
+pub(crate) fn now() -> String {
+    Timestamp::now().strftime("%Y-%m-%dT%H:%M:%SZ").to_string()
+}

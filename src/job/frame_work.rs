@@ -1,0 +1,204 @@
+//! One frame on its way to an image: [`FrameWork`], and the [`Steps`] that it goes through.
+
+use std::sync::Arc;
+
+use super::recipe::{Recipe, Scaling};
+use super::source::{Frames, Source, SourceFrame};
+use super::timings::{Step, Timings};
+use crate::ask::bilinear::bilinear;
+use crate::ask::{Format, ImageLimit, Payload};
+use crate::config::Darkened;
+use crate::dataset::Picture;
+use crate::error::{Error, Result};
+use crate::synthesis::{Film, NoiseKey};
+use crate::types::{Condition, Degradation, Digest, FrameId, Rgb};
+
+/// What every image is made with.
+#[derive(Clone, Copy)]
+pub(crate) struct Steps<'a> {
+    pub(crate) frames: &'a dyn Frames,
+    pub(crate) recipe: &'a Recipe,
+    /// What an image may be; `None` if all models are built in.
+    pub(crate) limit: Option<ImageLimit>,
+    pub(crate) timings: &'a Timings,
+}
+
+impl Steps<'_> {
+    /// The image as it is sent.
+    pub(crate) fn payload(&self, image: &Rgb) -> Result<Arc<Payload>> {
+        let format = self.recipe.format;
+        let encode = || match self.recipe.scaling {
+            Scaling::MaxSide(side) => Payload::encode(image, format, Some(side)),
+            Scaling::LongerSide(side) if longer_side(image) != side => {
+                Payload::encode(&bilinear(image, side)?, format, None)
+            }
+            Scaling::Never | Scaling::LongerSide(_) => Payload::encode(image, format, None),
+        };
+        self.within(self.timings.time(Step::Encode, encode)?)
+    }
+
+    fn within(&self, payload: Payload) -> Result<Arc<Payload>> {
+        if let Some(limit) = &self.limit {
+            limit.check(payload.facts())?;
+        }
+        Ok(Arc::new(payload))
+    }
+}
+
+fn longer_side(image: &Rgb) -> usize {
+    image.height().max(image.width())
+}
+
+/// A frame in one condition, as far as it comes without an enhancer.
+pub(crate) enum Staged {
+    /// As it is sent.
+    Ready(Arc<Payload>),
+    /// Still to be enhanced.
+    Degraded(Rgb),
+}
+
+/// Cached steps of one frame: each is computed when it is first needed, and once.
+pub(crate) struct FrameWork<'a> {
+    steps: Steps<'a>,
+    frame: FrameId,
+    key: NoiseKey,
+    /// The digest of the file that the plan was made with.
+    planned: Option<Digest>,
+    picture: Option<Picture>,
+    clean: Option<Rgb>,
+    film: Film,
+    degraded: Option<(Degradation, Rgb)>,
+}
+
+impl<'a> FrameWork<'a> {
+    /// A frame of a planned source. Its file is read when it is needed, and must still be the planned one.
+    pub(crate) fn planned(steps: Steps<'a>, source: &Source, frame: &SourceFrame) -> Self {
+        let key = steps.recipe.noise(source, &frame.id);
+        Self::new(steps, frame.id.clone(), key, Some(frame.digest))
+    }
+
+    /// A frame alone, whatever its file is.
+    pub(crate) fn of(steps: Steps<'a>, frame: FrameId) -> Self {
+        let key = NoiseKey::new(steps.recipe.seed, &frame);
+        Self::new(steps, frame, key, None)
+    }
+
+    fn new(steps: Steps<'a>, frame: FrameId, key: NoiseKey, planned: Option<Digest>) -> Self {
+        Self {
+            steps,
+            frame,
+            key,
+            planned,
+            picture: None,
+            clean: None,
+            film: Film::default(),
+            degraded: None,
+        }
+    }
+
+    /// The frame in a condition: as it is sent, or what the enhancer takes.
+    pub(crate) fn stage(&mut self, condition: &Condition) -> Result<Staged> {
+        if let Some(payload) = self.as_it_is(condition)? {
+            return Ok(Staged::Ready(payload));
+        }
+        let steps = self.steps;
+        let degraded = self.degraded(condition.degradation)?;
+        match condition.enhancer {
+            None => steps.payload(degraded).map(Staged::Ready),
+            Some(_) => Ok(Staged::Degraded(degraded.clone())),
+        }
+    }
+
+    /// The file itself, if it is the very image that would be encoded.
+    fn as_it_is(&mut self, condition: &Condition) -> Result<Option<Arc<Payload>>> {
+        let Recipe {
+            format, scaling, ..
+        } = *self.steps.recipe;
+        let side = match scaling {
+            Scaling::Never => None,
+            Scaling::MaxSide(side) => Some(side),
+            Scaling::LongerSide(_) => return Ok(None),
+        };
+        if *condition != Condition::raw(Degradation::None) || format != Format::Png {
+            return Ok(None);
+        }
+        let Picture::Encoded { bytes, .. } = self.picture()? else {
+            return Ok(None);
+        };
+        let payload = Payload::of_plain_png(bytes, side);
+        payload
+            .map(|payload| self.steps.within(payload))
+            .transpose()
+    }
+
+    /// The frame's file; an error if it is not the one that the plan was made with.
+    pub(crate) fn picture(&mut self) -> Result<&Picture> {
+        let (steps, frame, planned) = (self.steps, &self.frame, self.planned);
+        once(&mut self.picture, || {
+            let read = || steps.frames.picture(frame);
+            let picture = steps.timings.time(Step::Decode, read)?;
+            if planned.is_none_or(|planned| planned == picture.digest()) {
+                return Ok(picture);
+            }
+            let problem = "the image was changed while the run was under way; put it back, or begin a new run";
+            Err(Error::data(frame, problem))
+        })
+    }
+
+    /// The frame before its light is reduced: in its own size, or scaled before that.
+    pub(crate) fn clean(&mut self) -> Result<&Rgb> {
+        if self.clean.is_none() {
+            let Steps {
+                recipe, timings, ..
+            } = self.steps;
+            let picture = self.picture()?;
+            let clean = timings.time(Step::Decode, || picture.decode())?;
+            self.clean = Some(match (recipe.scaled, recipe.scaling) {
+                (Darkened::Resized, Scaling::LongerSide(side)) if longer_side(&clean) != side => {
+                    bilinear(&clean, side)?
+                }
+                _ => clean,
+            });
+        }
+        once(&mut self.clean, || {
+            Err(Error::data(&self.frame, "the frame was not read"))
+        })
+    }
+
+    /// The frame in one degradation; the last one is kept for the enhancers that follow.
+    pub(crate) fn degraded(&mut self, degradation: Degradation) -> Result<&Rgb> {
+        self.clean()?;
+        let Self {
+            steps,
+            frame,
+            key,
+            clean,
+            film,
+            degraded,
+            ..
+        } = self;
+        let Some(clean) = clean else {
+            return Err(Error::data(&*frame, "the frame was not read"));
+        };
+        if degraded
+            .as_ref()
+            .is_some_and(|(made, _)| *made != degradation)
+        {
+            *degraded = None;
+        }
+        let (_, image) = once(degraded, || {
+            let degrade = || film.degrade(clean, degradation, key, &steps.recipe.synthesis);
+            Ok((degradation, steps.timings.time(Step::Darken, degrade)))
+        })?;
+        Ok(image)
+    }
+}
+
+/// What is in a slot, made first if it is empty.
+fn once<T>(slot: &mut Option<T>, make: impl FnOnce() -> Result<T>) -> Result<&T> {
+    let value = match slot.take() {
+        Some(value) => value,
+        None => make()?,
+    };
+    Ok(slot.insert(value))
+}

@@ -1,0 +1,149 @@
+//! What a run is: what all its trials share ([`Identity`]), and what each value of a column stands for ([`Columns`]).
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use serde_json::{Value, json};
+
+use super::models::ModelUnderTest;
+use super::recipe::{Recipe, Scaling};
+use crate::ask::Model;
+use crate::config::{Enhancement, JobSettings};
+use crate::enhance::{self, ModelFile, Tiling};
+use crate::error::{Error, Result};
+use crate::synthesis::{VERSION, exposure};
+use crate::types::{Digest, Variants};
+
+/// What all trials of a run share and no column tells apart, by flag.
+pub(crate) type Identity = BTreeMap<String, Value>;
+
+/// What each value of a column of the tables stands for: by column, by value.
+pub(crate) type Columns = BTreeMap<String, BTreeMap<String, Value>>;
+
+/// The enhancement models' files, each under a name of its own.
+pub(crate) fn enhancers(models: &[PathBuf]) -> Result<Vec<ModelFile>> {
+    let mut enhancers: Vec<ModelFile> = Vec::new();
+    for path in models {
+        let file = ModelFile::read(path)?;
+        if enhancers.iter().any(|other| other.name() == file.name()) {
+            let problem = format_args!(
+                "two models are named {}; rename one of the files",
+                file.name()
+            );
+            return Err(Error::usage("--llie", problem));
+        }
+        enhancers.push(file);
+    }
+    Ok(enhancers)
+}
+
+/// What all trials share whose images are made by this recipe.
+pub(crate) fn images(recipe: &Recipe) -> impl Iterator<Item = (String, Value)> {
+    let scaling = match recipe.scaling {
+        Scaling::Never => None,
+        Scaling::MaxSide(side) => Some(("--max-side", json!(side))),
+        Scaling::LongerSide(side) => Some(("--image-size", json!(side))),
+    };
+    let fields = [
+        ("--image", json!(recipe.format.to_string())),
+        ("--seed", json!(recipe.seed)),
+        ("synthesis", json!([exposure::VERSION, VERSION])),
+        ("enhancement", json!(enhance::VERSION)),
+    ];
+    let fields = fields.into_iter().chain(scaling);
+    fields.map(|(field, value)| (field.to_owned(), value))
+}
+
+/// What the models, the enhancers and the noise of a run stand for.
+pub(crate) fn columns<'a>(
+    models: impl IntoIterator<Item = &'a ModelUnderTest>,
+    recipe: &Recipe,
+    settings: &JobSettings,
+) -> Columns {
+    let models = models.into_iter();
+    let models = models.map(|one| (one.model.name().to_owned(), model(one)));
+    let enhancers = recipe.enhancers.iter();
+    let enhancers = enhancers.map(|(name, digest)| {
+        let content = enhancer(digest, &settings.enhancement);
+        (name.as_str().to_owned(), content)
+    });
+    let noisy = settings.light.variants != Variants::Ev;
+    let noise = noisy.then(|| ("noise".to_owned(), json!(recipe.synthesis)));
+    let columns: [(&str, BTreeMap<String, Value>); 3] = [
+        ("model", models.collect()),
+        ("enhancer", enhancers.collect()),
+        ("reading", noise.into_iter().collect()),
+    ];
+    let filled = columns.into_iter().filter(|(_, values)| !values.is_empty());
+    filled
+        .map(|(column, values)| (column.to_owned(), values))
+        .collect()
+}
+
+/// What decides the replies of a model besides the question and the images.
+fn model(model: &ModelUnderTest) -> Value {
+    let Model::OpenAi(remote) = &*model.model else {
+        return json!({ "answers by": *model.digest });
+    };
+    let parameters = remote.parameters();
+    json!({
+        "--base-url": model.address,
+        "--temperature": parameters.temperature.to_string(),
+        "--max-tokens": parameters.max_tokens,
+        "--token-field": parameters.token_field.to_string(),
+        "--reasoning-effort": parameters.reasoning_effort,
+        "--detail": parameters.detail,
+        "--constrain": parameters.constrain.to_string(),
+        "--sampling-seed": parameters.seed,
+    })
+}
+
+/// What decides the pixels that an enhancer makes. Tiles of its own choice give what the whole image does, or all but one sample in
+/// a thousand of it.
+fn enhancer(digest: &Digest, settings: &Enhancement) -> Value {
+    let tile = (settings.tiling != Tiling::Auto).then(|| settings.tiling.to_string());
+    json!({
+        "--llie": digest,
+        "--tile": tile,
+        "--llie-max-side": settings.most_side,
+    })
+}
+
+/// The content of all that a command asks for, by which its folder is found again.
+pub(crate) fn digest(facts: &Value) -> Digest {
+    Digest::of(facts.to_string().as_bytes())
+}
+
+/// What does not decide a reply, but may explain how a run went.
+pub(crate) fn settings(job: &JobSettings) -> BTreeMap<String, Value> {
+    let mut settings = vec![
+        ("--concurrency", json!(job.pace.concurrency.to_string())),
+        ("--max-failures", json!(job.pace.max_failures)),
+        ("--threads", json!(job.enhancement.threads)),
+    ];
+    if let Some(server) = &job.ask.server {
+        let sending = server.sending;
+        settings.extend([
+            ("--timeout", json!(sending.timeout.as_secs_f64())),
+            ("--retries", json!(sending.retries)),
+            ("--max-wait", json!(sending.max_wait.as_secs_f64())),
+            ("--rpm", json!(sending.quota.requests)),
+            ("--tpm", json!(sending.quota.tokens)),
+        ]);
+    }
+    let settings = settings.into_iter();
+    settings
+        .map(|(field, value)| (field.to_owned(), value))
+        .collect()
+}
+
+/// Where the run was made.
+pub(crate) fn platform() -> BTreeMap<String, String> {
+    let facts = [
+        ("system", std::env::consts::OS),
+        ("processor", std::env::consts::ARCH),
+    ];
+    facts
+        .map(|(fact, value)| (fact.to_owned(), value.to_owned()))
+        .into()
+}

@@ -1,0 +1,281 @@
+//! `merge`: the shards of a run as the one run that they are together.
+
+use std::collections::{BTreeSet, HashMap};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::report::{choice, open};
+use super::stored::{Asked, StoredRun, in_order};
+use super::thumbnail::Wanted;
+use super::trial::Entry;
+use super::{Outcome, count};
+use crate::config::{Merge, Missing, Shard, Show};
+use crate::error::{Error, Result};
+use crate::store::{self, Moved, Store};
+use crate::types::manifest::{RunManifest, Status, differences};
+use crate::types::{Listed, OpenRecord, Record, Thumbnail, TrialKey};
+
+/// A shard as it lies in its folder.
+struct Part<R> {
+    shard: Shard,
+    run: StoredRun<R>,
+}
+
+impl<R: Entry> Part<R> {
+    fn open(folder: &Path) -> Result<Self> {
+        let run = StoredRun::open(folder)?;
+        let Some(shard) = run.manifest.shard.as_deref() else {
+            let problem = "the run is no shard: it was made without --shard".to_owned();
+            let path = folder.to_owned();
+            return Err(Error::Run { path, problem });
+        };
+        Ok(Self {
+            shard: shard.parse()?,
+            run,
+        })
+    }
+}
+
+/// Merges shards: the records of all, in the order of the questions, and the report that one run would have left.
+///
+/// # Errors
+/// If a folder holds no shard, two hold one, one is of another run, or some are missing and that is refused.
+pub fn merge(config: &Merge) -> Result<Outcome> {
+    let folders = folders(&config.runs)?;
+    let kinds: Result<Vec<Asked>> = folders.iter().map(|folder| Asked::of(folder)).collect();
+    let kinds = kinds?;
+    if let Some(other) = kinds.iter().position(|kind| *kind != kinds[0]) {
+        let problem = format!(
+            "questions with choices and open ones cannot be one run: {} is of the other kind",
+            folders[0].display()
+        );
+        let path = folders[other].clone();
+        return Err(Error::Run { path, problem });
+    }
+    match kinds.first() {
+        Some(Asked::Open) => merge_all::<OpenRecord>(config, &folders, open::write),
+        _ => merge_all::<Record>(config, &folders, choice::write),
+    }
+}
+
+fn merge_all<R: Entry + PartialEq>(
+    config: &Merge,
+    folders: &[PathBuf],
+    write: impl FnOnce(&Store<R>, &mut RunManifest, Show) -> Result<String>,
+) -> Result<Outcome> {
+    let parts: Result<Vec<Part<R>>> = folders.iter().map(|folder| Part::open(folder)).collect();
+    let mut parts = parts?;
+    parts.sort_by_key(|part| part.shard);
+    agree(&parts)?;
+    let missing = missing(&parts, config.missing)?;
+    unfinished(&parts);
+    let mut manifest = whole(&parts)?;
+    let mut questions: Vec<Listed> = parts
+        .iter()
+        .flat_map(|part| part.run.questions.clone())
+        .collect();
+    questions.sort_by_key(|question| question.place);
+    let (records, thumbnails) = together(parts, &questions)?;
+    manifest.counts = count(manifest.counts.trials, &records);
+    manifest.status = if missing == 0 && manifest.counts.answered == manifest.counts.trials {
+        Status::Complete
+    } else {
+        Status::Incomplete
+    };
+    let mut store = Store::<R>::open(&config.out, &manifest, Moved::Refused)?;
+    store.write_questions(&questions)?;
+    let there: HashMap<TrialKey, R> = store
+        .records()?
+        .into_iter()
+        .map(|record| (record.key(), record))
+        .collect();
+    for record in &records {
+        if there.get(&record.key()) != Some(record) {
+            store.append(record)?;
+        }
+    }
+    store.sync()?;
+    let drawn: BTreeSet<_> = store::read_thumbnails(&config.out)?
+        .into_iter()
+        .map(|thumbnail| (thumbnail.frame, thumbnail.condition))
+        .collect();
+    for thumbnail in thumbnails {
+        if !drawn.contains(&(thumbnail.frame.clone(), thumbnail.condition.clone())) {
+            store.append_thumbnail(&thumbnail)?;
+        }
+    }
+    let output = write(&store, &mut manifest, config.show)?;
+    Ok(Outcome {
+        status: manifest.status,
+        output,
+    })
+}
+
+/// The folders of shards among those named and directly in them.
+fn folders(named: &[PathBuf]) -> Result<Vec<PathBuf>> {
+    let mut folders = Vec::new();
+    for path in named {
+        if store::schema(path)?.is_some() {
+            folders.push(path.clone());
+            continue;
+        }
+        let entries = fs::read_dir(path).map_err(|e| Error::file(path, "read", e))?;
+        let mut inside = Vec::new();
+        for entry in entries {
+            let entry = entry.map_err(|e| Error::file(path, "read", e))?.path();
+            if store::schema(&entry)?.is_some() {
+                inside.push(entry);
+            }
+        }
+        if inside.is_empty() {
+            let problem = "neither a run nor a folder of runs".to_owned();
+            let path = path.clone();
+            return Err(Error::Run { path, problem });
+        }
+        inside.sort();
+        folders.extend(inside);
+    }
+    Ok(folders)
+}
+
+/// Makes sure that all are shards of one run, and none is there twice.
+fn agree<R>(parts: &[Part<R>]) -> Result<()> {
+    let wrong = |part: &Part<R>, problem: String| {
+        let path = part.run.folder.clone();
+        Err(Error::Run { path, problem })
+    };
+    let Some(first) = parts.first() else {
+        return Ok(());
+    };
+    for part in parts {
+        if part.shard.of() != first.shard.of() {
+            let problem = format!(
+                "shard {} is no part of the same run as {}, which is shard {}",
+                part.shard,
+                first.run.folder.display(),
+                first.shard
+            );
+            return wrong(part, problem);
+        }
+        if let Some((field, own, there)) = difference(&part.run.manifest, &first.run.manifest) {
+            let problem = format!(
+                "shard {} is of another run than {}: its {field} is {own}, there it is {there}",
+                part.shard,
+                first.run.folder.display()
+            );
+            return wrong(part, problem);
+        }
+    }
+    let twice = parts.windows(2).find(|pair| pair[0].shard == pair[1].shard);
+    match twice {
+        None => Ok(()),
+        Some(pair) => {
+            let problem = format!(
+                "shard {} is there twice, also in {}; name one of them",
+                pair[1].shard,
+                pair[0].run.folder.display()
+            );
+            wrong(&pair[1], problem)
+        }
+    }
+}
+
+/// How many shards are missing; an error that names them, where that is refused.
+fn missing<R>(parts: &[Part<R>], refused: Missing) -> Result<usize> {
+    let Some(first) = parts.first() else {
+        return Ok(0);
+    };
+    let there: BTreeSet<Shard> = parts.iter().map(|part| part.shard).collect();
+    let absent = Shard::all(first.shard.of()).filter(|shard| !there.contains(shard));
+    let absent: Vec<String> = absent.map(|shard| shard.to_string()).collect();
+    if absent.is_empty() {
+        return Ok(0);
+    }
+    let told = format!("{} shards are missing: {}", absent.len(), absent.join(", "));
+    if refused == Missing::Refused {
+        return Err(Error::Run {
+            path: first.run.folder.clone(),
+            problem: format!("{told}; --partial merges what there is"),
+        });
+    }
+    tracing::warn!("{told}; the summary is of what there is");
+    Ok(absent.len())
+}
+
+/// Says which shards are not done.
+fn unfinished<R>(parts: &[Part<R>]) {
+    for part in parts {
+        let (status, counts) = (part.run.manifest.status, part.run.manifest.counts);
+        if status != Status::Complete {
+            tracing::warn!(
+                "{}: shard {} is {status}: {} of {} trials answered",
+                part.run.folder.display(),
+                part.shard,
+                counts.answered,
+                counts.trials
+            );
+        }
+    }
+}
+
+/// In what two shards are of different runs: the field, and what the one and the other say.
+fn difference(one: &RunManifest, other: &RunManifest) -> Option<(String, String, String)> {
+    let identity = differences(&one.identity, &other.identity).next();
+    let identity = identity.map(|(field, own, there)| (field.to_owned(), own, there));
+    identity.or_else(|| {
+        let column = one.column_differences(other).into_iter().next()?;
+        let field = format!("{} of the {} {}", column.field, column.column, column.value);
+        Some((field, column.first, column.second))
+    })
+}
+
+/// The manifest of the run that the shards are together.
+fn whole<R>(parts: &[Part<R>]) -> Result<RunManifest> {
+    let manifests = parts.iter().map(|part| &part.run.manifest);
+    let first = manifests.clone().next();
+    let mut manifest = first
+        .ok_or_else(|| Error::usage("RUN", "no shard is named"))?
+        .clone();
+    manifest.shard = None;
+    for other in manifests.clone() {
+        for (column, values) in &other.columns {
+            let all = manifest.columns.entry(column.clone()).or_default();
+            all.extend(values.clone());
+        }
+    }
+    let created = manifests.clone().map(|one| one.created.clone()).min();
+    let updated = manifests.clone().map(|one| one.updated.clone()).max();
+    manifest.created = created.unwrap_or_default();
+    manifest.updated = updated.unwrap_or_default();
+    manifest.counts.trials = manifests.map(|one| one.counts.trials).sum();
+    Ok(manifest)
+}
+
+/// The records of all shards in the order of the questions, and the small copies of images that one run would have kept.
+fn together<R: Entry>(
+    parts: Vec<Part<R>>,
+    questions: &[Listed],
+) -> Result<(Vec<R>, Vec<Thumbnail>)> {
+    let wanted = Wanted::new(questions.iter().map(|question| &question.frame), Vec::new());
+    let (mut records, mut thumbnails) = (Vec::new(), Vec::new());
+    let mut keys = HashMap::<TrialKey, PathBuf>::new();
+    for Part { run, .. } in parts {
+        for record in run.records {
+            if let Some(other) = keys.insert(record.key(), run.folder.clone()) {
+                let problem = format!(
+                    "the trial {} is in {} as well: these are not the shards of one run",
+                    record.key(),
+                    other.display()
+                );
+                return Err(Error::Run {
+                    path: run.folder,
+                    problem,
+                });
+            }
+            records.push(record);
+        }
+        let kept = run.thumbnails.into_iter();
+        thumbnails.extend(kept.filter(|thumbnail| wanted.wants(&thumbnail.frame)));
+    }
+    Ok((in_order(records, questions), thumbnails))
+}

@@ -1,0 +1,122 @@
+//! The observer as a model: [`open`].
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use crate::ask::{Call, Local, Random};
+use crate::dataset::{Dataset, Place};
+use crate::error::{Error, Result};
+use crate::questions::colors::Palette;
+use crate::questions::observer::{Sight, VERSION, Watched, understood};
+use crate::questions::rules::Rules;
+use crate::types::{Digest, FrameId, Labels, Question};
+
+/// The name in records and tables.
+pub(crate) const NAME: &str = "observer";
+
+/// So many frames and sights are kept: questions about one image come together.
+const KEPT: usize = 40;
+
+/// What was made last, each for its name. One who needs what another is making waits for it.
+struct Shelf<K, V>(Mutex<VecDeque<(K, Arc<OnceLock<V>>)>>);
+
+impl<K: PartialEq, V: Clone> Shelf<K, V> {
+    fn new() -> Self {
+        Self(Mutex::new(VecDeque::new()))
+    }
+
+    fn get(&self, name: K, make: impl FnOnce() -> V) -> V {
+        let place = {
+            let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let found = kept.iter().find(|(known, _)| *known == name);
+            if let Some((_, place)) = found {
+                Arc::clone(place)
+            } else {
+                let place = Arc::new(OnceLock::new());
+                kept.push_back((name, Arc::clone(&place)));
+                if kept.len() > KEPT {
+                    kept.pop_front();
+                }
+                place
+            }
+        };
+        place.get_or_init(make).clone()
+    }
+}
+
+/// What the observer looks with.
+struct Eye {
+    dataset: Arc<Dataset>,
+    labels: Labels,
+    rules: Rules,
+    palette: Palette,
+    frames: Shelf<FrameId, Result<Arc<Watched>, String>>,
+    sights: Shelf<(FrameId, Digest), Result<Arc<Sight>, String>>,
+}
+
+impl Eye {
+    fn watched(&self, frame: &FrameId) -> Result<Arc<Watched>, String> {
+        self.frames.get(frame.clone(), || {
+            let seen = self.dataset.frame(frame).map_err(|e| e.to_string())?;
+            Watched::new(&seen, &self.labels, &self.rules, &self.palette)
+                .map(Arc::new)
+                .map_err(|e| e.to_string())
+        })
+    }
+
+    fn opinion(&self, question: &Question, call: &Call<'_>) -> Result<Option<usize>, String> {
+        let Some(image) = call.message.images.first() else {
+            return Ok(None);
+        };
+        let frame = &question.frame;
+        let sight = self.sights.get((frame.clone(), image.facts().digest), || {
+            let watched = self.watched(frame)?;
+            let pixels = image.decode().map_err(|e| e.to_string())?;
+            Ok(Arc::new(watched.look(&pixels, &self.palette)))
+        })?;
+        Ok(sight.answer(question, &self.rules))
+    }
+}
+
+/// Opens the observer of a data set.
+///
+/// # Errors
+/// Where the frames have no maps, or a question is none of the rulebook's.
+pub(crate) fn open(
+    dataset: &Arc<Dataset>,
+    place: &Place,
+    questions: &[Question],
+    prior: Random,
+) -> Result<Local> {
+    let unusable = |problem: String| Error::usage("--model", format!("{NAME}: {problem}"));
+    let labels = Dataset::labels_at(place)?.ok_or_else(|| {
+        unusable(format!(
+            "{} has no maps: frames with segments or classes (frames.jsonl, classes.json) are needed",
+            dataset.name()
+        ))
+    })?;
+    let rules = Rules::built_in()?;
+    if let Some(strange) = questions
+        .iter()
+        .find(|question| !understood(question, &rules))
+    {
+        return Err(unusable(format!(
+            "the question {:?} ({:?}) is none of the rulebook's, which are all that it understands",
+            strange.id.0, strange.text
+        )));
+    }
+    let digest = Digest::of_parts([&VERSION.to_le_bytes()[..], rules.digest().as_bytes()]);
+    let eye = Eye {
+        dataset: Arc::clone(dataset),
+        labels,
+        rules,
+        palette: Palette::built_in()?,
+        frames: Shelf::new(),
+        sights: Shelf::new(),
+    };
+    if let Some(first) = questions.first() {
+        eye.watched(&first.frame).map_err(unusable)?;
+    }
+    let opinion = Box::new(move |question: &Question, call: &Call<'_>| eye.opinion(question, call));
+    Ok(Local::new(NAME.to_owned(), digest, prior, opinion))
+}

@@ -1,0 +1,107 @@
+//! The answers to open questions, as they are judged: [`predictions`].
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::sync::Arc;
+
+use crate::ask::openeqa::blind_answer;
+use crate::score::accuracy::Subject;
+use crate::score::llm_match::{Protocol, shortened};
+use crate::types::{OpenRecord, QuestionId, Step, Via, View};
+
+/// What is known of one answer.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum AnswerState {
+    /// Nothing yet, or nothing came.
+    Missing,
+    /// There is none: worth nothing, not judged.
+    Null,
+    /// This, as it is judged.
+    Text {
+        answer: Arc<str>,
+        /// Whether the protocol has cut it.
+        cut: bool,
+    },
+}
+
+/// One answer to one question.
+#[derive(Debug, Clone)]
+pub(crate) struct Prediction {
+    pub(crate) subject: Subject,
+    /// The question's place among those of the run.
+    pub(crate) question: usize,
+    /// The answer before the protocol did anything to it.
+    pub(crate) full_answer: Option<String>,
+    pub(crate) state: AnswerState,
+}
+
+/// Every answer of a run, question by question: those that were asked for, there or not, and those of files. Whoever was asked one
+/// question was asked all.
+pub(crate) fn predictions(
+    records: &[OpenRecord],
+    questions: &[&QuestionId],
+    protocol: Protocol,
+) -> Vec<Prediction> {
+    let places: HashMap<&QuestionId, usize> = questions.iter().copied().zip(0..).collect();
+    let mut answers = BTreeMap::<(usize, Subject), Vec<&OpenRecord>>::new();
+    let mut asked = BTreeSet::new();
+    for record in records.iter().filter(|record| record.step == Step::Answer) {
+        let subject = Subject::shown(&record.model, record.condition.as_ref());
+        if record.via != Via::File {
+            asked.insert(subject.clone());
+        }
+        if let Some(&question) = places.get(&record.question) {
+            let of_subject = answers.entry((question, subject)).or_default();
+            of_subject.push(record);
+        }
+    }
+    for question in 0..questions.len() {
+        for subject in &asked {
+            answers.entry((question, subject.clone())).or_default();
+        }
+    }
+    let mut predictions = Vec::new();
+    for ((question, subject), records) in answers {
+        let missing = records.is_empty().then_some(None);
+        for record in records.into_iter().map(Some).chain(missing) {
+            let (full_answer, state) = state(record, protocol);
+            predictions.push(Prediction {
+                subject: subject.clone(),
+                question,
+                full_answer,
+                state,
+            });
+        }
+    }
+    predictions
+}
+
+fn state(record: Option<&OpenRecord>, protocol: Protocol) -> (Option<String>, AnswerState) {
+    let Some(record) = record.filter(|record| record.failure.is_none()) else {
+        return (None, AnswerState::Missing);
+    };
+    let Some(full) = full_answer(record, protocol) else {
+        return (None, AnswerState::Null);
+    };
+    let answer = match protocol {
+        Protocol::Upstream => shortened(&full),
+        Protocol::Tolerant => &full,
+    };
+    let state = AnswerState::Text {
+        answer: answer.into(),
+        cut: answer != full,
+    };
+    (Some(full), state)
+}
+
+/// The answer in a model's reply; `None` if there is none, which is an error upstream. A reply that is null, empty or refused is no
+/// answer.
+fn full_answer(record: &OpenRecord, protocol: Protocol) -> Option<String> {
+    let reply = record.reply.as_deref();
+    let reply = reply.filter(|reply| record.refusal.is_none() && !reply.trim().is_empty())?;
+    match (record.view, blind_answer(reply), protocol) {
+        (View::Image, _, _) => Some(reply.to_owned()),
+        (View::Blind, Some(answer), _) => Some(answer),
+        (View::Blind, None, Protocol::Upstream) => None,
+        (View::Blind, None, Protocol::Tolerant) => Some(reply.trim().to_owned()),
+    }
+}

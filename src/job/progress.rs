@@ -1,0 +1,131 @@
+//! Progress on standard error: [`Progress`].
+
+use std::fmt;
+use std::io::{self, IsTerminal, Write};
+use std::time::Duration;
+
+use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+use tracing_subscriber::fmt::MakeWriter;
+
+use crate::report::forecast::money;
+
+/// Where progress is shown: on a terminal, or nowhere.
+#[derive(Debug, Clone)]
+pub struct Progress {
+    bars: MultiProgress,
+}
+
+/// Whether progress is wanted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Loudness {
+    /// Where standard error is a terminal.
+    Normal,
+    /// Never.
+    Quiet,
+}
+
+impl Progress {
+    /// Progress on standard error.
+    #[must_use]
+    pub fn new(loudness: Loudness) -> Self {
+        let shown = loudness == Loudness::Normal && io::stderr().is_terminal();
+        let target = if shown {
+            ProgressDrawTarget::stderr()
+        } else {
+            ProgressDrawTarget::hidden()
+        };
+        Self {
+            bars: MultiProgress::with_draw_target(target),
+        }
+    }
+
+    /// Says one line above the bars; a pipe and `--quiet` hear nothing.
+    pub fn say(&self, line: &str) {
+        // A line that cannot be shown is no reason to stop.
+        let _ = self.bars.println(line);
+    }
+
+    /// Says one line above the bars to whoever listens, a pipe included.
+    pub(crate) fn note(&self, line: &str) {
+        // A line that cannot be shown is no reason to stop.
+        let _ = writeln!(self.make_writer(), "{line}");
+    }
+
+    /// A plain bar for a step of known length, gone when it is dropped.
+    pub(crate) fn bar(&self, what: &'static str, length: usize) -> Bar {
+        let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len}");
+        let bar = self
+            .bars
+            .add(ProgressBar::new(length as u64).with_message(what));
+        Bar(style.map_or(bar.clone(), |style| bar.with_style(style)))
+    }
+
+    /// The bar of the trials: answered, failed, rate, time left.
+    pub(crate) fn trials(&self, trials: usize, answered: usize) -> Bar {
+        let bar = ProgressBar::new(trials as u64).with_position(answered as u64);
+        let bar = self.bars.add(bar);
+        bar.reset_eta();
+        bar.enable_steady_tick(Duration::from_millis(500));
+        let style = ProgressStyle::with_template("{wide_bar} {msg} of {len} · {rate} · {eta} left");
+        let bar = Bar(style.map_or(bar.clone(), |style| {
+            bar.with_style(style.with_key("rate", rate))
+        }));
+        bar.count(answered, 0, None);
+        bar
+    }
+}
+
+/// Trials a second, with one digit behind the point.
+fn rate(state: &ProgressState, out: &mut dyn fmt::Write) {
+    // A rate that cannot be shown is no reason to stop.
+    let _ = write!(out, "{:.1}/s", state.per_sec());
+}
+
+/// A bar that goes away with its step.
+pub(crate) struct Bar(ProgressBar);
+
+impl Bar {
+    pub(crate) fn inc(&self) {
+        self.0.inc(1);
+    }
+
+    pub(crate) fn advance(&self, steps: usize) {
+        self.0.inc(steps as u64);
+    }
+
+    /// Shows how many trials are answered and how many have failed, and the dollars that went into them.
+    pub(crate) fn count(&self, answered: usize, failed: usize, spent: Option<f64>) {
+        self.0.set_position((answered + failed) as u64);
+        let spent = spent.map_or(String::new(), |dollars| format!(", {}", money(dollars)));
+        self.0
+            .set_message(format!("{answered} answered, {failed} failed{spent}"));
+    }
+}
+
+impl Drop for Bar {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}
+
+/// Log lines go above the bars, to standard error.
+#[derive(Debug)]
+pub struct Above(MultiProgress);
+
+impl Write for Above {
+    fn write(&mut self, line: &[u8]) -> io::Result<usize> {
+        self.0.suspend(|| io::stderr().write(line))
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        io::stderr().flush()
+    }
+}
+
+impl<'a> MakeWriter<'a> for Progress {
+    type Writer = Above;
+
+    fn make_writer(&'a self) -> Above {
+        Above(self.bars.clone())
+    }
+}

@@ -1,0 +1,59 @@
+//! The questions of data that come without: made by rule, with the rulebook and the balance that are built in.
+
+use std::collections::BTreeSet;
+
+use rayon::prelude::*;
+
+use super::progress::Progress;
+use crate::dataset::Dataset;
+use crate::error::{Error, Result};
+use crate::questions::balance::Balanced;
+use crate::questions::colors::Palette;
+use crate::questions::room::RoomSource;
+use crate::questions::rules::Rules;
+use crate::questions::statistics::{FrameStatistics, measure};
+use crate::questions::{Order, generate};
+use crate::types::{Digest, Family, FrameId, Question};
+
+/// Makes the questions, as `questions` without flags does.
+///
+/// # Errors
+/// With the frame that cannot be measured; where nothing can be asked.
+pub(crate) fn by_rule(dataset: &Dataset, progress: &Progress) -> Result<Vec<Question>> {
+    let labels = dataset.labels().ok_or_else(|| {
+        Error::data(
+            dataset.name(),
+            "no questions, and no classes to make them of",
+        )
+    })?;
+    let (rules, palette) = (Rules::built_in()?, Palette::built_in()?);
+    let names: Vec<&FrameId> = dataset.frames().collect();
+    let bar = progress.bar("making questions", names.len());
+    let frames = names.par_iter().map(|name| {
+        let frame = dataset.frame(name)?;
+        let key = Digest::of(name.0.as_bytes());
+        let statistics = measure(&frame, labels, &rules, &palette, key);
+        bar.inc();
+        statistics
+    });
+    let frames: Vec<FrameStatistics> = frames.collect::<Result<_>>()?;
+    drop(bar);
+    let order = Order {
+        dataset: dataset.title(),
+        labels,
+        rules: &rules,
+        palette: &palette,
+        families: Family::PAPER.into_iter().collect(),
+        room_source: RoomSource::default(),
+        balance: Balanced::default(),
+        rejected: BTreeSet::new(),
+    };
+    let made = generate(&frames, &order, |_, _| {})?;
+    if made.asked.is_empty() {
+        return Err(Error::data(
+            dataset.name(),
+            "the rules ask nothing about these frames; `darkqa-eval questions DATA --out FILE --candidates FILE` tells why",
+        ));
+    }
+    Ok(made.asked.into_iter().map(|asked| asked.question).collect())
+}

@@ -1,0 +1,193 @@
+//! What came of open questions: scored from the records, and left in the run folder.
+
+use std::collections::HashMap;
+
+use serde_json::Value;
+
+use crate::config::Show;
+use crate::error::Result;
+use crate::job::predictions::{AnswerState, Prediction, predictions};
+use crate::job::stored::StoredRun;
+use crate::report::openeqa::{Asked, OpenReport, Told, json as summary_json, products, table};
+use crate::score::llm_match::{Protocol, mark};
+use crate::score::open::{OpenSummary, Outcome, Scored, Topic, open_summary};
+use crate::store::Store;
+use crate::types::manifest::{RunManifest, Status};
+use crate::types::{Listed, OpenRecord, QuestionId, Step};
+
+/// The setting of a run that names who marked the answers.
+pub(crate) const JUDGE: &str = "--judge";
+/// The setting of a run that says how answers are judged.
+pub(crate) const PROTOCOL: &str = "--protocol";
+
+/// The scores of a run.
+pub(crate) struct Scores<'a> {
+    run: &'a StoredRun<OpenRecord>,
+    judge: Option<String>,
+    protocol: Protocol,
+    summary: OpenSummary,
+    answers: Vec<Told>,
+}
+
+impl<'a> Scores<'a> {
+    /// Scores what a run holds by the marks of the judge that it names.
+    pub(crate) fn new(run: &'a StoredRun<OpenRecord>) -> Result<Self> {
+        let setting = |name| run.manifest.settings.get(name).and_then(Value::as_str);
+        let judge = setting(JUDGE).map(str::to_owned);
+        let protocol = setting(PROTOCOL).map_or(Ok(Protocol::Upstream), str::parse)?;
+        let ids: Vec<&QuestionId> = run.questions.iter().map(|question| &question.id).collect();
+        let predicted = predictions(&run.records, &ids, protocol);
+        let marks = marks(&run.records, judge.as_deref());
+        let (mut scored, mut answers) = (Vec::new(), Vec::new());
+        for prediction in predicted {
+            let outcome = outcome(&prediction, ids[prediction.question], &marks, protocol);
+            scored.push(Scored {
+                subject: prediction.subject.clone(),
+                question: prediction.question,
+                outcome,
+                cut: matches!(prediction.state, AnswerState::Text { cut: true, .. }),
+            });
+            answers.push(Told {
+                subject: prediction.subject,
+                question: prediction.question,
+                answer: prediction.full_answer,
+                outcome,
+            });
+        }
+        let topics: Vec<Topic> = run.questions.iter().map(topic).collect();
+        Ok(Self {
+            summary: open_summary(&scored, &topics),
+            run,
+            judge,
+            protocol,
+            answers,
+        })
+    }
+
+    /// Whether a mark came that cannot be read.
+    fn unmarked(&self) -> bool {
+        let mut answers = self.answers.iter();
+        answers.any(|answer| answer.outcome == Outcome::Unmarked)
+    }
+
+    /// Acts on what is said of the run.
+    fn with_report<T>(&self, act: impl FnOnce(&OpenReport<'_>) -> Result<T>) -> Result<T> {
+        let asked: Vec<Asked<'_>> = self.run.questions.iter().map(asked).collect();
+        act(&OpenReport {
+            summary: &self.summary,
+            manifest: &self.run.manifest,
+            judge: self.judge.as_deref(),
+            protocol: self.protocol,
+            name: &self.run.name(),
+            questions: &asked,
+            answers: &self.answers,
+            thumbnails: &self.run.thumbnails,
+        })
+    }
+
+    /// The files of the report by name.
+    pub(crate) fn products(&self) -> Result<Vec<(String, Vec<u8>)>> {
+        self.with_report(products)
+    }
+
+    /// What belongs on standard output.
+    pub(crate) fn shown(&self, show: Show) -> Result<String> {
+        let folder = &self.run.folder;
+        self.with_report(|report| match show {
+            Show::Table => Ok(table::render(report, folder)),
+            Show::Json => summary_json(report, Some(folder)),
+        })
+    }
+
+    /// Writes the report and the manifest into the run's folder.
+    pub(crate) fn write(&self, store: &Store<OpenRecord>) -> Result<()> {
+        for (name, content) in self.products()? {
+            store.write(&name, &content)?;
+        }
+        let json = self.with_report(|report| summary_json(report, None))?;
+        store.write("summary.json", json.as_bytes())?;
+        store.write_manifest(&self.run.manifest)
+    }
+}
+
+/// Several runs as one.
+///
+/// # Errors
+/// If their answers were marked by different judges or judged by different protocols, or one asked another question of the same name.
+pub(crate) fn combine(mut runs: Vec<StoredRun<OpenRecord>>) -> Result<StoredRun<OpenRecord>> {
+    let first = runs.remove(0);
+    if !runs.is_empty() {
+        todo!();
+    }
+    Ok(first)
+}
+
+/// Scores what a run holds and leaves the report in its folder; what belongs on standard output. A run that is complete but for marks
+/// that cannot be read is incomplete.
+pub(crate) fn write(
+    store: &Store<OpenRecord>,
+    manifest: &mut RunManifest,
+    show: Show,
+) -> Result<String> {
+    let mut run = StoredRun::of(store.folder(), manifest.clone())?;
+    if manifest.status == Status::Complete && Scores::new(&run)?.unmarked() {
+        manifest.status = Status::Incomplete;
+        run.manifest.status = Status::Incomplete;
+    }
+    let scores = Scores::new(&run)?;
+    scores.write(store)?;
+    scores.shown(show)
+}
+
+/// The marks of a judge, by question and answer.
+type Marks<'a> = HashMap<(&'a QuestionId, &'a str), &'a OpenRecord>;
+
+fn marks<'a>(records: &'a [OpenRecord], judge: Option<&str>) -> Marks<'a> {
+    let marks = records.iter().filter(|record| {
+        let own = record.step == Step::Mark && Some(&*record.model) == judge;
+        own && record.failure.is_none()
+    });
+    marks
+        .filter_map(|record| Some(((&record.question, record.judged.as_deref()?), record)))
+        .collect()
+}
+
+/// What came of an answer.
+fn outcome(
+    prediction: &Prediction,
+    question: &QuestionId,
+    marks: &Marks<'_>,
+    protocol: Protocol,
+) -> Outcome {
+    let answer = match &prediction.state {
+        AnswerState::Missing => return Outcome::Missing,
+        AnswerState::Null => return Outcome::Null,
+        AnswerState::Text { answer, .. } => answer,
+    };
+    let Some(record) = marks.get(&(question, &**answer)) else {
+        return Outcome::Unjudged;
+    };
+    // Read again: alike in every table, also if an earlier version has kept it.
+    let reply = record.reply.as_deref().unwrap_or_default();
+    mark(reply, protocol).map_or(Outcome::Unmarked, Outcome::Marked)
+}
+
+fn asked(question: &Listed) -> Asked<'_> {
+    Asked {
+        id: &question.id,
+        text: &question.text,
+        answer: &question.answer,
+        extra: question.extra_answers.as_deref(),
+        category: question.family.name(),
+        episode: &question.frame.0,
+    }
+}
+
+fn topic(question: &Listed) -> Topic {
+    let episode = question.frame.0.clone();
+    Topic {
+        split: episode.split('/').next().unwrap_or_default().to_owned(),
+        category: question.family.name().to_owned(),
+        episode,
+    }
+}

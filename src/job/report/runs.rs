@@ -1,0 +1,156 @@
+//! One run or several, of whatever was asked: [`report`].
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use super::choice::{in_its_folder, text};
+use super::combine::{Combined, combine};
+use super::open;
+use crate::config::{Readings, Report, Show};
+use crate::error::{Error, Result};
+use crate::files;
+use crate::job::stored::{AnyRun, StoredRun};
+use crate::job::{Outcome, count};
+use crate::report::files::json_of_several;
+use crate::report::products::{PAGE, products};
+use crate::store::{Moved, Store};
+use crate::types::manifest::Status;
+use crate::types::{OpenRecord, Record};
+
+/// Shows a run, or compares several of one kind; if readings are made again, those that changed are kept with their run.
+///
+/// # Errors
+/// If a folder holds no run, a record is broken, or the runs asked different questions.
+pub fn report(config: &Report) -> Result<Outcome> {
+    let (mut choice, mut open) = (Vec::new(), Vec::new());
+    for folder in &config.runs {
+        match AnyRun::open(folder)? {
+            AnyRun::Choice(run) => choice.push(run),
+            AnyRun::Open(run) => open.push(run),
+        }
+    }
+    let output = match (choice.is_empty(), open.is_empty()) {
+        (_, true) => of_choices(config, choice)?,
+        (true, false) => of_open(config, open)?,
+        (false, false) => {
+            return Err(Error::usage(
+                "RUN",
+                "runs of questions with choices and of open questions cannot be compared; report each kind alone",
+            ));
+        }
+    };
+    Ok(Outcome {
+        status: Status::Complete,
+        output,
+    })
+}
+
+fn of_choices(config: &Report, mut runs: Vec<StoredRun<Record>>) -> Result<String> {
+    let mut output = String::new();
+    for run in &mut runs {
+        if run.records.is_empty() {
+            return Err(no_records(run.folder.clone()));
+        }
+        if config.readings == Readings::Anew {
+            let changed = reread(run)?;
+            let records = run.records.len();
+            let _ = writeln!(
+                output,
+                "{changed} of {records} records read otherwise than before"
+            );
+            run.manifest.counts = count(run.manifest.counts.trials, &run.records);
+        }
+    }
+    if config.show == Show::Json {
+        output.clear();
+    }
+    let combined = combine(runs)?;
+    output += &match (&*combined.runs, &config.out) {
+        ([run], None) => match Store::open(&run.folder, &run.manifest, Moved::Allowed) {
+            Ok(store) => in_its_folder(&store, &run.manifest, &combined, config.show)?,
+            // A run under way, or in a folder that cannot be written to, is shown all the same.
+            Err(held) => {
+                tracing::warn!("the report is not written: {held}");
+                compare(&combined, config)?
+            }
+        },
+        _ => compare(&combined, config)?,
+    };
+    Ok(output)
+}
+
+/// Shows several runs as one, and writes the report where it is wanted.
+fn compare(combined: &Combined, config: &Report) -> Result<String> {
+    let findings = combined.findings();
+    let places = combined.places();
+    let shown = match config.show {
+        Show::Json => json_of_several(&findings.summary, &places)?,
+        Show::Table => text(&findings, &places),
+    };
+    let made = match config.out {
+        Some(_) => products(&findings, &combined.shown())?,
+        None => Vec::new(),
+    };
+    elsewhere(config, shown, made)
+}
+
+/// Writes a report into `--out`, or says that this would.
+fn elsewhere(config: &Report, mut text: String, made: Vec<(String, Vec<u8>)>) -> Result<String> {
+    let Some(out) = &config.out else {
+        if config.show == Show::Table {
+            text += "report: --out DIR writes it\n";
+        }
+        return Ok(text);
+    };
+    for (name, content) in made {
+        files::write(&out.join(name), &content)?;
+    }
+    if config.show == Show::Table {
+        let _ = writeln!(text, "report: {}", out.join(PAGE).display());
+    }
+    Ok(text)
+}
+
+fn of_open(config: &Report, runs: Vec<StoredRun<OpenRecord>>) -> Result<String> {
+    if let Some(run) = runs.iter().find(|run| run.records.is_empty()) {
+        return Err(no_records(run.folder.clone()));
+    }
+    let alone = runs.len() == 1;
+    let run = open::combine(runs)?;
+    let scores = open::Scores::new(&run)?;
+    if alone && config.out.is_none() {
+        match Store::open(&run.folder, &run.manifest, Moved::Allowed) {
+            Ok(store) => {
+                scores.write(&store)?;
+                return scores.shown(config.show);
+            }
+            Err(held) => tracing::warn!("the report is not written: {held}"),
+        }
+    }
+    let made = match config.out {
+        Some(_) => scores.products()?,
+        None => Vec::new(),
+    };
+    elsewhere(config, scores.shown(config.show)?, made)
+}
+
+/// Reads all kept replies again and keeps the readings that changed; how many did.
+fn reread(run: &mut StoredRun<Record>) -> Result<usize> {
+    let mut store = Store::open(&run.folder, &run.manifest, Moved::Allowed)?;
+    let mut changed = 0;
+    for record in &mut run.records {
+        let now = crate::job::record::reread(record.clone())?;
+        if now != *record {
+            store.append(&now)?;
+            changed += 1;
+            *record = now;
+        }
+    }
+    store.sync()?;
+    Ok(changed)
+}
+
+fn no_records(path: PathBuf) -> Error {
+    let problem = "the run has no records yet: nothing to report".to_owned();
+    Error::Run { path, problem }
+}

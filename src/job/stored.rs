@@ -1,0 +1,136 @@
+//! Runs as they lie in their folders: [`StoredRun`], and [`AnyRun`] of whatever was asked.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use super::trial::Entry;
+use crate::error::{Error, Result};
+use crate::store;
+use crate::types::manifest::RunManifest;
+use crate::types::{Kept as _, Listed, OpenRecord, QuestionId, Record, Thumbnail};
+
+/// A run as it lies in its folder.
+pub(crate) struct StoredRun<R> {
+    pub(crate) folder: PathBuf,
+    pub(crate) manifest: RunManifest,
+    pub(crate) records: Vec<R>,
+    pub(crate) questions: Vec<Listed>,
+    pub(crate) thumbnails: Vec<Thumbnail>,
+}
+
+impl<R: Entry> StoredRun<R> {
+    /// Reads a run folder.
+    ///
+    /// # Errors
+    /// If it holds no run of such records.
+    pub(crate) fn open(folder: &Path) -> Result<Self> {
+        let manifest = store::read_manifest(folder, R::SCHEMA)?;
+        Self::of(folder, manifest.ok_or_else(|| no_run(folder))?)
+    }
+
+    /// Reads the rest of a run folder, whose manifest is this.
+    pub(crate) fn of(folder: &Path, manifest: RunManifest) -> Result<Self> {
+        let questions = store::read_questions(folder)?;
+        Ok(Self {
+            records: in_order(store::read_records(folder)?, &questions),
+            questions,
+            thumbnails: store::read_thumbnails(folder)?,
+            folder: folder.to_owned(),
+            manifest,
+        })
+    }
+
+    /// What the run is called: its folder's own name.
+    pub(crate) fn name(&self) -> String {
+        name(&self.folder)
+    }
+}
+
+/// Records in the order of the questions, conditions and models, whatever order the replies came in.
+pub(crate) fn in_order<R: Entry>(records: Vec<R>, questions: &[Listed]) -> Vec<R> {
+    let ids = questions.iter().map(|question| &question.id);
+    let places: HashMap<&QuestionId, usize> = ids.zip(0..).collect();
+    let place = |record: &R| places.get(record.question()).copied();
+    let mut placed: Vec<(Option<usize>, R)> = records
+        .into_iter()
+        .map(|record| (place(&record), record))
+        .collect();
+    fn order<R: Entry>((place, record): &(Option<usize>, R)) -> impl Ord + '_ {
+        let asked = (record.condition(), record.model(), record.repeat());
+        (*place, asked, record.key())
+    }
+    placed.sort_by(|one, other| order(one).cmp(&order(other)));
+    placed.into_iter().map(|(_, record)| record).collect()
+}
+
+/// What a run in this folder is called: the folder's own name.
+pub(crate) fn name(folder: &Path) -> String {
+    let whole = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
+    let name = whole.file_name().unwrap_or(whole.as_os_str());
+    name.to_string_lossy().into_owned()
+}
+
+/// A run, by what was asked in it. The one place that tells experiments apart by the schema of their folders.
+pub(crate) enum AnyRun {
+    /// Questions with choices.
+    Choice(StoredRun<Record>),
+    /// Open questions.
+    Open(StoredRun<OpenRecord>),
+}
+
+/// What was asked in a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Asked {
+    /// Questions with choices.
+    Choice,
+    /// Open questions.
+    Open,
+}
+
+impl Asked {
+    /// What was asked in the run of a folder.
+    ///
+    /// # Errors
+    /// If there is no run in it, or one of another version.
+    pub(crate) fn of(folder: &Path) -> Result<Self> {
+        let schema = store::schema(folder)?.ok_or_else(|| no_run(folder))?;
+        if schema == OpenRecord::SCHEMA {
+            return Ok(Self::Open);
+        }
+        // Says what is wrong with any other schema.
+        store::read_manifest(folder, Record::SCHEMA)?;
+        Ok(Self::Choice)
+    }
+}
+
+impl AnyRun {
+    /// Reads a run folder.
+    ///
+    /// # Errors
+    /// If it holds no run.
+    pub(crate) fn open(folder: &Path) -> Result<Self> {
+        Ok(match Asked::of(folder)? {
+            Asked::Choice => Self::Choice(StoredRun::open(folder)?),
+            Asked::Open => Self::Open(StoredRun::open(folder)?),
+        })
+    }
+}
+
+/// The manifest of the run in a folder, whatever was asked in it.
+///
+/// # Errors
+/// If it holds no run.
+pub(crate) fn manifest(folder: &Path) -> Result<RunManifest> {
+    let schema = match Asked::of(folder)? {
+        Asked::Choice => Record::SCHEMA,
+        Asked::Open => OpenRecord::SCHEMA,
+    };
+    store::read_manifest(folder, schema)?.ok_or_else(|| no_run(folder))
+}
+
+fn no_run(folder: &Path) -> Error {
+    Error::Run {
+        path: folder.to_owned(),
+        problem: "no run in this folder: it has no manifest.json".to_owned(),
+    }
+}

@@ -1,0 +1,46 @@
+//! `batch import`: the output of a Batch API, as records.
+
+use crate::config::{BatchImport, Show};
+use crate::error::Result;
+use crate::job::batch::replies;
+use crate::job::report::{choice, open};
+use crate::job::stored::{Asked, manifest};
+use crate::job::trial::Entry;
+use crate::job::{Outcome, count};
+use crate::store::{Moved, Store};
+use crate::types::manifest::{RunManifest, Status};
+use crate::types::{OpenRecord, Record};
+
+/// Imports the replies of output and error files, each of them once, however often a file is given.
+///
+/// # Errors
+/// If the folder holds no run or no batch, or a line is not one of such a file: those before it are kept.
+pub fn import(config: &BatchImport) -> Result<Outcome> {
+    match Asked::of(&config.run)? {
+        Asked::Choice => import_into::<Record>(config, choice::write),
+        Asked::Open => import_into::<OpenRecord>(config, open::write),
+    }
+}
+
+fn import_into<R: Entry>(
+    config: &BatchImport,
+    write: impl FnOnce(&Store<R>, &mut RunManifest, Show) -> Result<String>,
+) -> Result<Outcome> {
+    let mut manifest = manifest(&config.run)?;
+    let mut store = Store::<R>::open(&config.run, &manifest, Moved::Allowed)?;
+    let imported = replies::import(&mut store, &manifest, &config.files)?;
+    manifest.counts = count(manifest.counts.trials, &store.records()?);
+    manifest.status = if manifest.counts.answered == manifest.counts.trials {
+        Status::Complete
+    } else {
+        Status::Incomplete
+    };
+    let mut output = write(&store, &mut manifest, config.show)?;
+    if config.show == Show::Table {
+        output.insert_str(0, &imported);
+    }
+    Ok(Outcome {
+        status: manifest.status,
+        output,
+    })
+}

@@ -1,0 +1,31 @@
+//! Questions with choices, asked about each frame: [`evaluate`].
+
+mod choice_order;
+mod plan;
+mod record;
+mod setup;
+
+use crate::config::{BatchFiles, Config};
+use crate::error::Result;
+use crate::job::progress::Progress;
+use crate::job::{Job, Outcome};
+
+use setup::Setup;
+
+/// Runs an evaluation, or goes on with it; a dry run says what that would take.
+///
+/// # Errors
+/// If nothing can be asked, or no further trial could succeed; what had arrived by then is kept.
+pub fn evaluate(config: &Config, progress: &Progress) -> Result<Outcome> {
+    let (setup, files) = Setup::open(config, progress)?;
+    Job::new(&setup, files, progress)?.run()
+}
+
+/// Writes what is left to ask as files of a Batch API, and notes their trials in the run as sent.
+///
+/// # Errors
+/// If a model is built in, an image is larger than the endpoint takes, or a file cannot be written.
+pub fn export_batch(config: &Config, files: &BatchFiles, progress: &Progress) -> Result<Outcome> {
+    let (setup, models) = Setup::open(config, progress)?;
+    Job::new(&setup, models, progress)?.export_batch(files)
+}

@@ -1,0 +1,126 @@
+//! The trials of an evaluation: [`trials`].
+
+use std::sync::Arc;
+
+use super::choice_order::arrange;
+use super::setup::Setup;
+use crate::error::Result;
+use crate::job::experiment::Experiment as _;
+use crate::job::models::ModelUnderTest;
+use crate::job::plan::{SourcePlan, TrialGroup};
+use crate::job::trial::{KeyFacts, Prompt, Trial};
+use crate::types::{Condition, Digest, Question, View};
+
+/// A question with choices, in one order of them.
+#[derive(Debug, Clone)]
+pub(crate) struct ChoiceItem {
+    pub(super) question: Arc<Question>,
+    /// How many times the same was asked before.
+    pub(super) repeat: u32,
+    /// How many times the question was put before, in whatever order of its choices.
+    pub(super) turn: u32,
+}
+
+/// A question as it is shown once, with its words for models that see the image and for those that do not.
+struct Shown {
+    item: ChoiceItem,
+    image: Prompt,
+    blind: Prompt,
+}
+
+/// All trials, frame by frame: words alone first, and then condition by condition.
+pub(super) fn trials(setup: &Setup<'_>) -> Result<Vec<SourcePlan<ChoiceItem>>> {
+    let mut by_source: Vec<Vec<&Question>> = vec![Vec::new(); setup.sources.len()];
+    for question in &setup.questions {
+        by_source[setup.places[&question.frame]].push(question);
+    }
+    let plan = by_source
+        .into_iter()
+        .enumerate()
+        .map(|(source, questions)| {
+            Ok(SourcePlan {
+                source,
+                groups: groups(setup, source, &questions)?,
+            })
+        });
+    plan.collect()
+}
+
+fn groups(
+    setup: &Setup<'_>,
+    source: usize,
+    questions: &[&Question],
+) -> Result<Vec<TrialGroup<ChoiceItem>>> {
+    let mut shown = Vec::new();
+    for question in questions {
+        for arranged in arrange(question, setup.config.showing)? {
+            let prompt = |view| {
+                let words = setup.prompts.render(view, &arranged.question)?;
+                Ok(Prompt::of(words.into()))
+            };
+            shown.push(Shown {
+                image: prompt(View::Image)?,
+                blind: prompt(View::Blind)?,
+                item: ChoiceItem {
+                    question: Arc::new(arranged.question),
+                    repeat: arranged.repeat,
+                    turn: arranged.turn,
+                },
+            });
+        }
+    }
+    let all = std::iter::once(None).chain(setup.conditions.iter().map(Some));
+    let groups = all.filter_map(|condition| group(setup, source, condition, &shown));
+    Ok(groups.collect())
+}
+
+/// The trials in a condition; `None` if no model is asked in it.
+fn group(
+    setup: &Setup<'_>,
+    source: usize,
+    condition: Option<&Condition>,
+    shown: &[Shown],
+) -> Option<TrialGroup<ChoiceItem>> {
+    let view = condition.map_or(View::Blind, |_| View::Image);
+    let models = setup.models.iter().enumerate();
+    let models: Vec<(usize, &ModelUnderTest)> =
+        models.filter(|(_, model)| model.view == view).collect();
+    if models.is_empty() {
+        return None;
+    }
+    let image = condition.map(|condition| {
+        let source = &setup.sources[source];
+        setup.recipe().stimulus(source, condition)
+    });
+    let trials = shown.iter().flat_map(|shown| {
+        let prompt = match view {
+            View::Image => &shown.image,
+            View::Blind => &shown.blind,
+        };
+        models.iter().map(move |&(index, model)| Trial {
+            key: facts(shown, prompt, model, condition, image).key(),
+            model: index,
+            prompt: prompt.clone(),
+            item: shown.item.clone(),
+        })
+    });
+    Some(TrialGroup {
+        condition: condition.cloned(),
+        trials: trials.collect(),
+    })
+}
+
+fn facts<'a>(
+    shown: &'a Shown,
+    prompt: &'a Prompt,
+    model: &'a ModelUnderTest,
+    condition: Option<&'a Condition>,
+    image: Option<Digest>,
+) -> KeyFacts<'a> {
+    let question = &*shown.item.question;
+    KeyFacts {
+        choices: question.choices.texts(),
+        repeat: shown.item.repeat,
+        ..KeyFacts::new(model, &question.id, prompt, condition, image)
+    }
+}

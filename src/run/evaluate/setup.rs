@@ -1,0 +1,188 @@
+//! An evaluation, opened and checked: [`Setup`].
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use serde_json::json;
+
+use super::plan::{ChoiceItem, trials};
+use crate::ask::{Model, Prompts, Random};
+use crate::config::{Config, JobSettings, ModelName, Order, Rotations, Show};
+use crate::dataset::Dataset;
+use crate::enhance::ModelFile;
+use crate::error::Result;
+use crate::job::conditions::conditions;
+use crate::job::experiment::Experiment;
+use crate::job::identity::{self, Columns, Identity};
+use crate::job::models::{self, ModelUnderTest};
+use crate::job::observer;
+use crate::job::plan::SourcePlan;
+use crate::job::progress::Progress;
+use crate::job::questions::{open_data, select};
+use crate::job::recipe::Recipe;
+use crate::job::report;
+use crate::job::shard::part;
+use crate::job::source::{Frames, Source, first_asked, inspect_all};
+use crate::store::Store;
+use crate::types::manifest::RunManifest;
+use crate::types::{Condition, FrameId, Listed, Question, QuestionId, Record, View};
+
+/// Everything an evaluation is made of, opened and checked; nothing is asked, and nothing written.
+pub(super) struct Setup<'a> {
+    pub(super) config: &'a Config,
+    dataset: Arc<Dataset>,
+    pub(super) questions: Vec<Question>,
+    pub(super) sources: Vec<Source>,
+    /// The place of each frame among the sources.
+    pub(super) places: HashMap<FrameId, usize>,
+    pub(super) models: Vec<ModelUnderTest>,
+    pub(super) prompts: Prompts,
+    pub(super) conditions: Vec<Condition>,
+    recipe: Recipe,
+}
+
+impl<'a> Setup<'a> {
+    /// Opens the data and the models; the enhancement models are read and not yet loaded.
+    pub(super) fn open(config: &'a Config, progress: &Progress) -> Result<(Self, Vec<ModelFile>)> {
+        let job = &config.job;
+        let dataset = Arc::new(open_data(&config.data, progress)?);
+        let questions = part(select(&dataset, &config.data)?, job.shard, |question| {
+            question.frame.0.clone()
+        })?;
+        let models = open_models(config, &dataset, &questions)?;
+        // If every model is blind, no image is read and no enhancer is opened.
+        let seeing = models.iter().any(|model| model.view == View::Image);
+        let enhancers = if seeing {
+            &*job.enhancement.models
+        } else {
+            &[]
+        };
+        let files = identity::enhancers(enhancers)?;
+        let sources = if seeing {
+            inspect_all(&dataset, &questions, progress)?
+        } else {
+            let frames = first_asked(&questions).into_iter();
+            frames
+                .map(|question| Source::unseen(question.frame.clone()))
+                .collect()
+        };
+        let recipe = Recipe::new(&job.light.sensor, &job.images, &files);
+        let prompts = job.ask.prompts.as_deref();
+        let names = sources.iter().map(|source| source.name.clone());
+        let setup = Self {
+            config,
+            places: names.zip(0..).collect(),
+            sources,
+            models,
+            prompts: prompts.map_or_else(Prompts::built_in, Prompts::load)?,
+            conditions: conditions(&job.light, job.enhancement.on, &recipe.enhancers),
+            recipe,
+            questions,
+            dataset,
+        };
+        Ok((setup, files))
+    }
+}
+
+impl Experiment for Setup<'_> {
+    type Item = ChoiceItem;
+
+    const PHASES: &'static [&'static str] = &["answers"];
+    const REPLY: &'static str = "a letter";
+
+    fn settings(&self) -> &JobSettings {
+        &self.config.job
+    }
+
+    fn data(&self) -> &str {
+        self.dataset.name()
+    }
+
+    fn models(&self, _: usize) -> &[ModelUnderTest] {
+        &self.models
+    }
+
+    fn sources(&self) -> &[Source] {
+        &self.sources
+    }
+
+    fn frames(&self) -> &dyn Frames {
+        &*self.dataset
+    }
+
+    fn recipe(&self) -> &Recipe {
+        &self.recipe
+    }
+
+    fn questions(&self) -> Vec<Listed> {
+        let all = self.dataset.questions().iter();
+        let places: HashMap<&QuestionId, usize> =
+            all.map(|question| &question.id).zip(0..).collect();
+        let questions = self.questions.iter();
+        questions
+            .map(|question| {
+                let source = &self.sources[self.places[&question.frame]];
+                Listed {
+                    image: source.frames.first().map(|frame| frame.digest),
+                    ..Listed::new(
+                        question,
+                        places[&question.id],
+                        &self.dataset.scene(&question.frame),
+                    )
+                }
+            })
+            .collect()
+    }
+
+    fn identity(&self) -> Identity {
+        let showing = self.config.showing;
+        let shuffled = showing.order != Order::Given;
+        let every = showing.rotations == Rotations::Every;
+        let fields = [
+            Some(("--data", json!(self.dataset.name()))),
+            Some(("--prompts", json!(self.prompts.digest()))),
+            shuffled.then_some(("--shuffle-options", true.into())),
+            every.then_some(("--circular", true.into())),
+        ];
+        let fields = fields.into_iter().flatten();
+        fields
+            .map(|(field, value)| (field.to_owned(), value))
+            .chain(identity::images(&self.recipe))
+            .collect()
+    }
+
+    fn columns(&self) -> Columns {
+        identity::columns(&self.models, &self.recipe, &self.config.job)
+    }
+
+    fn plan(&self, _: usize, _: &[Record]) -> Result<Vec<SourcePlan<ChoiceItem>>> {
+        trials(self)
+    }
+
+    fn report(
+        &self,
+        store: &Store<Record>,
+        manifest: &mut RunManifest,
+        show: Show,
+    ) -> Result<String> {
+        report::choice::write(store, manifest, show)
+    }
+}
+
+/// Opens all models; nothing is sent.
+fn open_models(
+    config: &Config,
+    dataset: &Arc<Dataset>,
+    questions: &[Question],
+) -> Result<Vec<ModelUnderTest>> {
+    let prior = Random {
+        seed: config.job.light.sensor.seed,
+    };
+    models::open_all(&config.job.ask, |name| match name {
+        ModelName::Observer => {
+            let place = &config.data.place;
+            observer::open(dataset, place, questions, prior).map(Model::Local)
+        }
+        _ => Ok(Model::Random(prior)),
+    })
+}

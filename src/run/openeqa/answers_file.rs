@@ -1,0 +1,139 @@
+//! Answers of people or other programs, as upstream's result files hold them: [`read`].
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::Path;
+use std::sync::Arc;
+
+use serde::Deserialize;
+use serde_json::Value;
+
+use super::questions::some;
+use super::record::empty;
+use crate::config::AnswersFile;
+use crate::dataset::openeqa::OpenQuestion;
+use crate::error::{Error, Result};
+use crate::types::{
+    Condition, Degradation, Digest, Level, OpenRecord, Step, TrialKey, Variants, Via, View,
+};
+
+/// An entry of a file; other fields are ignored.
+#[derive(Debug, Deserialize)]
+struct Entry {
+    question_id: String,
+    /// `null` where it could not be told.
+    answer: Option<String>,
+    /// What was shown, as `L2-noise`.
+    condition: Option<Condition>,
+    /// The same by its level alone.
+    level: Option<Level>,
+    /// Who gave it, where several people did.
+    annotator: Option<Value>,
+}
+
+/// The answers of a file as records, in its order. Those to questions that are not asked are passed over, named and counted.
+///
+/// # Errors
+/// Where the file cannot be read, says twice what one person answered, or a level without its variant.
+pub(super) fn read(
+    config: &AnswersFile,
+    questions: &[Arc<OpenQuestion>],
+    variants: Variants,
+) -> Result<Vec<OpenRecord>> {
+    let path = &config.path;
+    let text = fs::read(path).map_err(|e| Error::file(path, "read", e))?;
+    let wrong = |problem: String| Error::data(path.display(), problem);
+    let entries: Vec<Entry> = serde_json::from_slice(&text).map_err(|e| {
+        wrong(format!(
+            "{e}; a JSON array of {{\"question_id\", \"answer\"}} expected, with \"condition\" or \"level\" and \"annotator\" \
+             where there are several"
+        ))
+    })?;
+    let known: BTreeMap<&str, usize> = questions
+        .iter()
+        .enumerate()
+        .map(|(index, question)| (&*question.id.0, index))
+        .collect();
+    let (mut records, mut strange) = (Vec::new(), Vec::new());
+    let mut seen = BTreeSet::new();
+    for entry in &entries {
+        let Some(&index) = known.get(&*entry.question_id) else {
+            strange.push(&*entry.question_id);
+            continue;
+        };
+        let condition = condition(entry, variants)
+            .map_err(|problem| wrong(format!("question {}: {problem}", entry.question_id)))?;
+        let person = entry.annotator.as_ref().map(|name| match name {
+            Value::String(name) => name.clone(),
+            other => other.to_string(),
+        });
+        if !seen.insert((index, condition.clone(), person.clone())) {
+            return Err(wrong(format!(
+                "question {} is answered twice at {condition}; \"annotator\" tells people apart",
+                entry.question_id
+            )));
+        }
+        let key = key(&config.name, entry, &condition, person.as_deref());
+        let degradation = condition.degradation;
+        records.push(OpenRecord {
+            view: View::Image,
+            level: Some(degradation.level()),
+            variant: degradation.variant(),
+            enhancer: condition.enhancer.clone(),
+            condition: Some(condition),
+            person,
+            reply: entry.answer.clone(),
+            via: Via::File,
+            ..empty(key, &questions[index], Step::Answer, &config.name)
+        });
+    }
+    passed_over(path, &strange, entries.len());
+    Ok(records)
+}
+
+fn passed_over(path: &Path, strange: &[&str], all: usize) {
+    if !strange.is_empty() {
+        tracing::warn!(
+            "{}: {} of {all} answers are to questions that are not asked: {}",
+            path.display(),
+            strange.len(),
+            some(strange)
+        );
+    }
+}
+
+/// What was shown to whoever gave an answer: the lit frames where nothing is said, as in upstream's own files.
+fn condition(entry: &Entry, variants: Variants) -> std::result::Result<Condition, String> {
+    let dark = match (&entry.condition, entry.level) {
+        (Some(condition), _) => return Ok(condition.clone()),
+        (None, level) => level.and_then(Level::dark),
+    };
+    let Some(dark) = dark else {
+        return Ok(Condition::raw(Degradation::None));
+    };
+    let both = [Degradation::Exposure(dark), Degradation::Sensor(dark)];
+    let mut fitting = both
+        .into_iter()
+        .filter(|degradation| variants.include(degradation.variant()));
+    match (fitting.next(), fitting.next()) {
+        (Some(degradation), None) => Ok(Condition::raw(degradation)),
+        _ => Err(format!(
+            "\"level\" does not say which variant was shown; \"condition\": \"{}\" does",
+            both[1]
+        )),
+    }
+}
+
+fn key(name: &str, entry: &Entry, condition: &Condition, person: Option<&str>) -> TrialKey {
+    let condition = condition.to_string();
+    let answer = entry.answer.as_ref().map(|answer| format!("={answer}"));
+    let parts = [
+        "darkqa.given/1",
+        name,
+        &entry.question_id,
+        &condition,
+        person.unwrap_or_default(),
+        answer.as_deref().unwrap_or_default(),
+    ];
+    Digest::of_parts(parts.map(str::as_bytes)).into()
+}

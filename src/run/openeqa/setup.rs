@@ -1,0 +1,315 @@
+//! An evaluation by open questions, opened and checked: [`Setup`].
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::path::Path;
+use std::sync::Arc;
+
+use serde_json::{Value, json};
+
+use super::answers_file;
+use super::marks::{marks, prompt};
+use super::plan::answers;
+use super::questions::{select, some};
+use super::record::OpenItem;
+use crate::config::{JobSettings, Judge, OpenEqa, OpenTask, Server, Show};
+use crate::dataset::openeqa::{self, OpenQuestion};
+use crate::enhance::ModelFile;
+use crate::error::{Error, Result};
+use crate::job::budget::words;
+use crate::job::conditions::conditions;
+use crate::job::experiment::{Expected, Experiment};
+use crate::job::identity::{self, Columns, Identity};
+use crate::job::models::{self, ModelUnderTest};
+use crate::job::plan::SourcePlan;
+use crate::job::progress::Progress;
+use crate::job::recipe::Recipe;
+use crate::job::report::open as score;
+use crate::job::shard::part;
+use crate::job::source::{Frames, Source};
+use crate::job::trial::Item as _;
+use crate::job::walk::WalkFolder;
+use crate::store::Store;
+use crate::types::manifest::RunManifest;
+use crate::types::{Condition, Family, FrameId, Listed, OpenRecord, QuestionId, View};
+
+/// An answer as it may be: as long as one with so many tokens.
+const ANSWER: &str =
+    "There is a small round table with two chairs next to the window of the living room.";
+
+/// Everything an evaluation by open questions is made of, opened and checked; nothing is asked, and nothing written.
+pub(super) struct Setup<'a> {
+    pub(super) config: &'a OpenEqa,
+    /// The questions that are asked, in the order of the file.
+    pub(super) questions: Vec<Arc<OpenQuestion>>,
+    /// The place of each question in the file.
+    file_places: HashMap<QuestionId, usize>,
+    walks: WalkFolder,
+    /// The walks, in the order of the questions.
+    pub(super) sources: Vec<Source>,
+    pub(super) conditions: Vec<Condition>,
+    pub(super) models: Vec<ModelUnderTest>,
+    pub(super) judge: Option<ModelUnderTest>,
+    pub(super) recipe: Recipe,
+    /// The answers of files.
+    given: Vec<OpenRecord>,
+}
+
+impl<'a> Setup<'a> {
+    /// Opens the questions, the walks and the models; the enhancement models are read and not yet loaded.
+    pub(super) fn open(config: &'a OpenEqa, progress: &Progress) -> Result<(Self, Vec<ModelFile>)> {
+        let job = &config.job;
+        let all = openeqa::questions(&config.questions)?;
+        let ids = all.iter().map(|question| question.id.clone());
+        let file_places = ids.zip(0..).collect();
+        let questions = part(select(all, &config.chosen)?, job.shard, |question| {
+            question.episode.clone()
+        })?;
+        let models = models::open_all(&job.ask, |name| {
+            models::open(name, None, &job.ask.parameters)
+        })?;
+        let judge = config.judge.as_ref().map(judge).transpose()?;
+        // If nobody sees a frame, none is read and no enhancer is opened.
+        let study = matches!(config.task, OpenTask::Study(_));
+        let seeing = study || models.iter().any(|model| model.view == View::Image);
+        let enhancers = if seeing {
+            &*job.enhancement.models
+        } else {
+            &[]
+        };
+        let files = identity::enhancers(enhancers)?;
+        let recipe = Recipe::new(&job.light.sensor, &job.images, &files).of_walks(&config.walk);
+        let walks = WalkFolder::new(&config.walk);
+        let names = names(&questions);
+        let (sources, conditions) = if seeing {
+            let sources = walks.inspect(&names, &config.walk, progress);
+            warn_of_unseen(&sources, &questions)?;
+            let on = job.enhancement.on;
+            (sources, conditions(&job.light, on, &recipe.enhancers))
+        } else {
+            let unseen = |name| Source::unseen(FrameId(name));
+            (names.into_iter().map(unseen).collect(), Vec::new())
+        };
+        let mut setup = Self {
+            config,
+            questions: questions.into_iter().map(Arc::new).collect(),
+            file_places,
+            walks,
+            sources,
+            conditions,
+            models,
+            judge,
+            recipe,
+            given: Vec::new(),
+        };
+        setup.given = setup.answers_of_files()?;
+        Ok((setup, files))
+    }
+
+    /// The place of a question's walk among the sources.
+    pub(super) fn walk_of(&self, question: &OpenQuestion) -> usize {
+        let mut sources = self.sources.iter();
+        let place = sources.position(|source| source.name.0 == question.episode);
+        place.unwrap_or_default()
+    }
+
+    /// The answers of all files.
+    fn answers_of_files(&self) -> Result<Vec<OpenRecord>> {
+        let models = self.models.iter();
+        let mut names: BTreeSet<&str> = models.map(|model| model.model.name()).collect();
+        let mut all = Vec::new();
+        for file in &self.config.answers {
+            if !names.insert(&file.name) {
+                let problem = format_args!("{} is named twice among models and answers", file.name);
+                return Err(Error::usage("--answers", problem));
+            }
+            let variants = self.config.job.light.variants;
+            all.extend(answers_file::read(file, &self.questions, variants)?);
+        }
+        Ok(all)
+    }
+}
+
+impl Experiment for Setup<'_> {
+    type Item = OpenItem;
+
+    const PHASES: &'static [&'static str] = &["answers", "marks"];
+    const REPLY: &'static str = "a sentence or a mark";
+
+    fn settings(&self) -> &JobSettings {
+        &self.config.job
+    }
+
+    fn server(&self) -> Option<&Server> {
+        let judge = self.config.judge.as_ref();
+        let own = self.config.job.ask.server.as_ref();
+        own.or(judge.and_then(|judge| judge.server.as_ref()))
+    }
+
+    fn data(&self) -> &str {
+        let stem = self.config.questions.file_stem().map(Path::new);
+        stem.and_then(Path::to_str).unwrap_or("openeqa")
+    }
+
+    fn models(&self, phase: usize) -> &[ModelUnderTest] {
+        match phase {
+            0 => &self.models,
+            _ => self.judge.as_slice(),
+        }
+    }
+
+    fn sources(&self) -> &[Source] {
+        &self.sources
+    }
+
+    fn frames(&self) -> &dyn Frames {
+        &self.walks
+    }
+
+    fn recipe(&self) -> &Recipe {
+        &self.recipe
+    }
+
+    fn questions(&self) -> Vec<Listed> {
+        let walks: HashMap<&str, &Source> = self
+            .sources
+            .iter()
+            .map(|source| (&*source.name.0, source))
+            .collect();
+        let questions = self.questions.iter().map(|question| {
+            let walk = walks.get(&*question.episode);
+            let walk = walk.filter(|walk| !walk.frames.is_empty());
+            Listed {
+                id: question.id.clone(),
+                place: self.file_places[&question.id],
+                scene: question.episode.clone(),
+                frame: FrameId(question.episode.clone()),
+                family: Family::from(&*question.category),
+                text: question.text.clone(),
+                choices: Vec::new(),
+                answer: question.answer.clone(),
+                extra_answers: question.extra.clone(),
+                evidence: Value::Null,
+                image: walk.map(|walk| walk.digest()),
+            }
+        });
+        questions.collect()
+    }
+
+    fn identity(&self) -> Identity {
+        let walk = &self.config.walk;
+        let fields = [
+            ("--num-frames", json!(walk.frames)),
+            ("--image-size", json!(walk.side)),
+            ("--degrade", json!(walk.darkened)),
+            ("--sensor", json!(walk.camera)),
+        ];
+        let fields = fields.map(|(field, value)| (field.to_owned(), value));
+        fields
+            .into_iter()
+            .chain(identity::images(&self.recipe))
+            .collect()
+    }
+
+    fn columns(&self) -> Columns {
+        let models = self.models.iter().chain(&self.judge);
+        identity::columns(models, &self.recipe, &self.config.job)
+    }
+
+    fn notes(&self) -> Vec<(&'static str, Value)> {
+        let judge = self.judge.as_ref().map(|judge| judge.model.name());
+        let answers: Vec<&str> = self.config.answers.iter().map(|file| &*file.name).collect();
+        vec![
+            (score::JUDGE, json!(judge)),
+            (score::PROTOCOL, json!(self.config.protocol.to_string())),
+            ("--frames", json!(self.config.walk.folder)),
+            ("--answers", json!(answers)),
+        ]
+    }
+
+    fn given(&self) -> &[OpenRecord] {
+        &self.given
+    }
+
+    fn plan(&self, phase: usize, stored: &[OpenRecord]) -> Result<Vec<SourcePlan<OpenItem>>> {
+        Ok(match phase {
+            0 => answers(self),
+            _ => marks(self, stored),
+        })
+    }
+
+    fn to_come(&self, left: &[SourcePlan<OpenItem>]) -> Vec<Expected> {
+        if self.judge.is_none() {
+            return Vec::new();
+        }
+        let groups = left.iter().flat_map(|part| &part.groups);
+        let trials = groups.flat_map(|group| &group.trials);
+        // Each answer that is still to come may be unlike any other.
+        let marks = trials.filter_map(|trial| match &trial.item {
+            OpenItem::Answer(question) => {
+                let mark = OpenItem::Mark {
+                    question: Arc::clone(question),
+                    answer: ANSWER.into(),
+                };
+                Some(Expected {
+                    model: 0,
+                    words: words(&prompt(question, ANSWER)),
+                    reply: mark.reply_tokens(),
+                })
+            }
+            OpenItem::Mark { .. } => None,
+        });
+        marks.collect()
+    }
+
+    fn report(
+        &self,
+        store: &Store<OpenRecord>,
+        manifest: &mut RunManifest,
+        show: Show,
+    ) -> Result<String> {
+        score::write(store, manifest, show)
+    }
+}
+
+fn judge(config: &Judge) -> Result<ModelUnderTest> {
+    let server = config.server.as_ref();
+    let endpoint = models::endpoint(server)?;
+    let model = models::open(&config.model, endpoint.as_ref(), &config.parameters)?;
+    Ok(ModelUnderTest::new(model, View::Blind, server))
+}
+
+/// The walks of the questions in their order.
+fn names(questions: &[OpenQuestion]) -> Vec<String> {
+    let mut seen = BTreeSet::new();
+    let first = questions
+        .iter()
+        .filter(|question| seen.insert(&question.episode));
+    first.map(|question| question.episode.clone()).collect()
+}
+
+/// Names and counts the walks that cannot be shown; only if that is all of them it is an error.
+fn warn_of_unseen(sources: &[Source], questions: &[OpenQuestion]) -> Result<()> {
+    let missing: BTreeMap<&str, &str> = sources
+        .iter()
+        .filter_map(|source| Some((&*source.name.0, source.problem.as_deref()?)))
+        .collect();
+    let Some(problem) = missing.values().next() else {
+        return Ok(());
+    };
+    if missing.len() == sources.len() {
+        let problem =
+            format!("no walk can be shown: {problem}; DIR/EPISODE_HISTORY/*-rgb.png expected");
+        return Err(Error::usage("--frames", problem));
+    }
+    let lost = questions.iter();
+    let lost = lost.filter(|question| missing.contains_key(&*question.episode));
+    let walks: Vec<&str> = missing.keys().copied().collect();
+    tracing::warn!(
+        "{} of {} walks cannot be shown ({}): their {} questions are left unanswered; the first: {problem}",
+        walks.len(),
+        sources.len(),
+        some(&walks),
+        lost.count()
+    );
+    Ok(())
+}
