@@ -60,7 +60,7 @@ fn at(level: Option<DarkLevel>) -> Condition {
 fn clusters_of(records: &[Record]) -> Clusters {
     let asked = records
         .iter()
-        .map(|record| (&record.question, &record.frame));
+        .map(|record| (&record.question, &record.detail.frame));
     Clusters::new(asked, &BTreeMap::new())
 }
 
@@ -405,8 +405,8 @@ fn a_made_set_gives_the_papers_arithmetic() {
     let offers = records
         .iter()
         .map(|record| darkqa_eval::score::chance::Offer {
-            family: record.family.clone(),
-            choices: record.choices.len(),
+            family: record.detail.family.clone(),
+            choices: record.detail.choices.len(),
         });
     let findings = Findings::new(&records, &BTreeMap::new(), offers.collect::<Vec<_>>());
     let rates = &findings.hallucinations[0];

@@ -20,7 +20,7 @@ use crate::ask::{Format, ImageLimit, Payload};
 use crate::dataset::{Dataset, Picture};
 use crate::enhance::Enhancer;
 use crate::error::{Error, Result};
-use crate::synthesis::{Film, NoiseKey};
+use crate::synthesis::{Exposures, NoiseKey};
 use crate::types::{Condition, Degradation, FrameId, ImageFacts, Rgb, Thumbnail};
 
 /// What the thread works with.
@@ -182,7 +182,7 @@ impl Darkroom<'_> {
         timings.time(Step::Decode, read)?;
         let picture = desk.picture(self.dataset, self.pictures)?;
         // The file itself, where it is the very image that would be encoded.
-        if *condition == Condition::raw(Degradation::None)
+        if *condition == Condition::L0
             && format == Format::Png
             && let Picture::Encoded { bytes, .. } = picture
             && let Some(payload) = Payload::of_plain_png(bytes, max_side)
@@ -214,7 +214,7 @@ impl Darkroom<'_> {
             desk.decode()
         })?;
         let dark = timings.time(Step::Darken, || {
-            desk.dark(self.recipe, condition.degradation)
+            desk.dark(self.recipe, condition.degradation.as_ref())
         })?;
         let Some(name) = &condition.enhancer else {
             return Ok(Cow::Borrowed(dark));
@@ -250,8 +250,8 @@ pub(super) struct Desk {
     frame: FrameId,
     picture: Option<Picture>,
     clean: Option<Rgb>,
-    film: Film,
-    dark: Option<(Degradation, Rgb)>,
+    exposures: Exposures,
+    dark: Option<(Option<Degradation>, Rgb)>,
 }
 
 impl Desk {
@@ -260,7 +260,7 @@ impl Desk {
             frame,
             picture: None,
             clean: None,
-            film: Film::default(),
+            exposures: Exposures::default(),
             dark: None,
         }
     }
@@ -293,25 +293,25 @@ impl Desk {
     }
 
     /// The frame in one degradation; the last one is kept for the enhancers that follow.
-    fn dark(&mut self, recipe: &Recipe, degradation: Degradation) -> Result<&Rgb> {
+    fn dark(&mut self, recipe: &Recipe, how: Option<&Degradation>) -> Result<&Rgb> {
         self.decode()?;
         let Self {
             frame,
             clean,
-            film,
+            exposures,
             dark,
             ..
         } = self;
         let Some(clean) = clean else {
             return Err(Error::data(&*frame, "the frame was not read"));
         };
-        if dark.as_ref().is_some_and(|(made, _)| *made != degradation) {
+        if dark.as_ref().is_some_and(|(made, _)| made.as_ref() != how) {
             *dark = None;
         }
         let (_, image) = once(dark, || {
             let key = NoiseKey::new(recipe.seed, frame);
-            let image = film.degrade(clean, degradation, &key, &recipe.synthesis);
-            Ok((degradation, image))
+            let image = exposures.degrade(clean, how, &key, recipe.readings.of(how)?);
+            Ok((how.cloned(), image))
         })?;
         Ok(image)
     }

@@ -13,7 +13,6 @@ use super::cores::unstarted;
 use super::interrupt::Interrupt;
 use super::ledger::Ledger;
 use super::progress::{Bar, Progress};
-use super::record::Entry as _;
 use super::stop::{End, Watch};
 use super::timings::{Step, Timings};
 use super::trial::{Exposed, Item, Slide, Trial};
@@ -62,7 +61,7 @@ impl Drive<'_> {
         &self,
         tally: Tally,
         ledger: Ledger,
-        store: &mut Store<I::Record>,
+        store: &mut Store<I::Detail>,
         stoppers: Vec<Stopper>,
         make: impl FnOnce(&Sender<Exposed<I>>) + Send,
     ) -> Result<End> {
@@ -107,7 +106,7 @@ impl Drive<'_> {
 /// Where replies come in and are kept.
 struct Intake<'a, I: Item> {
     drive: &'a Drive<'a>,
-    store: &'a mut Store<I::Record>,
+    store: &'a mut Store<I::Detail>,
     bar: Bar,
     watch: Watch,
     ledger: Ledger,

@@ -12,7 +12,7 @@ use crate::config::{Ask, Config, Enhancement, Order, Pace, Rotations, Showing};
 use crate::dataset::Dataset;
 use crate::enhance::{ModelFile, Tiling};
 use crate::error::{Error, Result};
-use crate::synthesis::{Synthesis, VERSION, exposure};
+use crate::synthesis::{Readings, VERSION, exposure};
 use crate::types::{Digest, View};
 
 /// Flags and contents that decide the replies.
@@ -43,7 +43,7 @@ pub(super) fn identity(config: &Config, dataset: &Dataset, inputs: &Inputs<'_>) 
         .iter()
         .map(|(frame, pictured)| [frame.0.as_bytes(), pictured.digest.as_bytes()])
         .map(Digest::of_parts);
-    let (ask, synthesis) = (&config.ask, &config.light.sensor.synthesis);
+    let (ask, readings) = (&config.ask, &config.light.sensor.readings);
     let names = |view| -> BTreeSet<&str> {
         inputs
             .askers
@@ -115,7 +115,7 @@ pub(super) fn identity(config: &Config, dataset: &Dataset, inputs: &Inputs<'_>) 
     let shard = shard.is_part().then(|| (SHARD, json!(shard.to_string())));
     fields
         .into_iter()
-        .chain(light(config.light.sensor.seed, synthesis))
+        .chain(light(config.light.sensor.seed, readings))
         .chain(tiling)
         .chain(side)
         .chain(constrain)
@@ -126,8 +126,15 @@ pub(super) fn identity(config: &Config, dataset: &Dataset, inputs: &Inputs<'_>) 
 }
 
 /// What decides how frames are darkened.
-pub(super) fn light(seed: u64, synthesis: &Synthesis) -> [(&'static str, Value); 7] {
-    [
+pub(super) fn light(seed: u64, readings: &Readings) -> Vec<(&'static str, Value)> {
+    let Ok(synthesis) = readings.only() else {
+        return vec![
+            ("--seed", json!(seed)),
+            ("--profile", json!(readings)),
+            ("synthesis", json!([exposure::VERSION, VERSION])),
+        ];
+    };
+    vec![
         ("--seed", json!(seed)),
         ("--profile or --amplify", json!(synthesis.amplify)),
         ("--profile or --tone", json!(synthesis.tone)),

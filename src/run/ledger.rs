@@ -5,7 +5,7 @@ use super::trial::{Item, Prompt, Trial};
 use crate::ask::{Model, Parameters, Price, image_tokens};
 use crate::config::Money;
 use crate::error::{Error, Result};
-use crate::types::{ImageFacts, Kept, Usage, Via};
+use crate::types::{ImageFacts, Record, Usage, Via};
 
 /// How many characters of English a token is, by the rule of thumb of every provider.
 const CHARACTERS: f64 = 4.0;
@@ -29,10 +29,10 @@ impl Ledger {
     ///
     /// # Errors
     /// Where `--max-cost` is said and a model has no price: it could not be kept to.
-    pub(super) fn new<'a, R: Kept + 'a>(
+    pub(super) fn new<'a, D: 'a>(
         money: &Money,
         askers: &[Asker],
-        kept: impl IntoIterator<Item = &'a R>,
+        kept: impl IntoIterator<Item = &'a Record<D>>,
     ) -> Result<Self> {
         let price = |asker: &Asker| {
             let remote = asker.model.is_remote();
@@ -62,14 +62,11 @@ impl Ledger {
             dearest: None,
         };
         for record in kept {
-            let Some((price, usage)) = record
-                .charged()
-                .and_then(|(model, usage)| Some((money.prices.of(model)?, usage)))
-            else {
+            let (Some(price), Some(usage)) = (money.prices.of(&record.model), record.usage) else {
                 continue;
             };
             let dollars = price.charged(usage);
-            match record.via() {
+            match record.via {
                 Via::Direct | Via::File => ledger.add(dollars),
                 // It says nothing about what a request of its own costs.
                 Via::Batch => ledger.spent += money.prices.batch * dollars,

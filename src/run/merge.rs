@@ -13,7 +13,7 @@ use crate::config::{Merge, Missing, Shard};
 use crate::error::{Error, Result};
 use crate::store::{self, Moved, Store};
 use crate::types::manifest::{RunManifest, Status, differences};
-use crate::types::{Digest, Kept as _, Listed, QuestionId, Record, Thumbnail, TrialKey};
+use crate::types::{ChoiceDetail, Digest, QuestionId, Record, RunQuestion, Thumbnail, TrialKey};
 
 /// The field of a run's identity that names its shard.
 pub(super) const SHARD: &str = "--shard";
@@ -27,7 +27,7 @@ struct Part {
     shard: Shard,
     manifest: RunManifest,
     records: Vec<Record>,
-    questions: Vec<Listed>,
+    questions: Vec<RunQuestion>,
     thumbnails: Vec<Thumbnail>,
 }
 
@@ -89,7 +89,7 @@ pub fn merge(config: &Merge) -> Result<Verdict> {
     } else {
         Status::Incomplete
     };
-    let mut store = Store::<Record>::open(&config.out, &manifest, Moved::Refused)?;
+    let mut store = Store::<ChoiceDetail>::open(&config.out, &manifest, Moved::Refused)?;
     store.write_questions(&questions)?;
     let there: HashMap<TrialKey, Record> = store
         .records()?
@@ -247,7 +247,7 @@ fn whole(parts: &[Part]) -> Result<RunManifest> {
 }
 
 /// The questions of all shards in the order of the whole: the frames were dealt out to the shards one by one.
-fn interleaved(parts: &[Part]) -> Vec<Listed> {
+fn interleaved(parts: &[Part]) -> Vec<RunQuestion> {
     let mut frames: Vec<_> = parts
         .iter()
         .map(|part| {
@@ -257,7 +257,7 @@ fn interleaved(parts: &[Part]) -> Vec<Listed> {
         .collect();
     let mut all = Vec::new();
     loop {
-        let dealt: Vec<&[Listed]> = frames.iter_mut().filter_map(Iterator::next).collect();
+        let dealt: Vec<&[RunQuestion]> = frames.iter_mut().filter_map(Iterator::next).collect();
         if dealt.is_empty() {
             return all;
         }
@@ -266,14 +266,14 @@ fn interleaved(parts: &[Part]) -> Vec<Listed> {
 }
 
 /// The records of all shards in the order of the questions, and the small copies of images that one run would have kept.
-fn together(parts: Vec<Part>, questions: &[Listed]) -> Result<(Vec<Record>, Vec<Thumbnail>)> {
+fn together(parts: Vec<Part>, questions: &[RunQuestion]) -> Result<(Vec<Record>, Vec<Thumbnail>)> {
     let places: HashMap<&QuestionId, usize> = questions.iter().map(|q| &q.id).zip(0..).collect();
     let wanted = Wanted::new(questions.iter().map(|question| &question.frame), Vec::new());
     let (mut records, mut thumbnails) = (Vec::new(), Vec::new());
     let mut keys = HashMap::<TrialKey, PathBuf>::new();
     for part in parts {
         for record in part.records {
-            if let Some(other) = keys.insert(record.key(), part.folder.clone()) {
+            if let Some(other) = keys.insert(record.key, part.folder.clone()) {
                 let problem = format!(
                     "the trial {} is in {} as well: these are not the shards of one run",
                     record.key,
@@ -297,7 +297,7 @@ fn together(parts: Vec<Part>, questions: &[Listed]) -> Result<(Vec<Record>, Vec<
             record.view,
             record.model.clone(),
             condition,
-            record.repeat,
+            record.detail.repeat,
             record.key,
         )
     });

@@ -62,7 +62,7 @@ use crate::error::Result;
 use crate::report as reports;
 use crate::store::{self, Moved, Store};
 use crate::types::manifest::{Counts, RunManifest, Status};
-use crate::types::{Kept, Listed, Outcome, Question, Record, TrialKey};
+use crate::types::{ChoiceDetail, Detail, Outcome, Question, Record, RunQuestion, TrialKey};
 
 use cores::pool;
 use darkroom::Darkroom;
@@ -110,7 +110,7 @@ fn ask(config: &Config, stage: Stage<'_>, progress: &Progress) -> Result<Verdict
         identity,
         folder,
     } = stage;
-    let kept = store::read_manifest(&folder, Record::SCHEMA)?;
+    let kept = store::read_manifest(&folder, ChoiceDetail::SCHEMA)?;
     // Opened before the folder is made, so that an enhancer that does not work leaves nothing behind.
     let opened = match &kept {
         Some(manifest) if manifest.status == Status::Complete => Err(files),
@@ -118,7 +118,7 @@ fn ask(config: &Config, stage: Stage<'_>, progress: &Progress) -> Result<Verdict
     };
     let settings = identity::settings(&config.pace, &config.enhancement, &config.ask);
     let images = config.recipe.clone();
-    let mut manifest = manifest(Record::SCHEMA, identity, settings, images, kept);
+    let mut manifest = manifest(ChoiceDetail::SCHEMA, identity, settings, images, kept);
     let mut store = Store::open(&folder, &manifest, moved(&config.output))?;
     store.write_questions(&listed(questions, dataset))?;
     let frames = questions.iter().map(|question| &question.frame);
@@ -206,9 +206,9 @@ fn endpoint(server: Option<&Server>) -> String {
 }
 
 /// The questions as the run keeps them.
-fn listed(questions: &[Question], dataset: &Dataset) -> Vec<Listed> {
+fn listed(questions: &[Question], dataset: &Dataset) -> Vec<RunQuestion> {
     let list = questions.iter();
-    list.map(|question| Listed::new(question, &dataset.scene(&question.frame)))
+    list.map(|question| RunQuestion::new(question, &dataset.scene(&question.frame)))
         .collect()
 }
 
@@ -360,13 +360,13 @@ fn in_order(records: Vec<Record>, keys: &[TrialKey]) -> Result<Vec<Record>> {
         .map(|record| (record.key, record))
         .collect();
     let records = keys.iter().filter_map(|key| by_key.remove(key));
-    records.map(record::reread).collect()
+    records.map(Record::reread).collect()
 }
 
 fn count(trials: usize, records: &[Record]) -> Counts {
     let failed = records
         .iter()
-        .filter(|record| record.outcome == Outcome::Failed)
+        .filter(|record| record.detail.outcome == Outcome::Failed)
         .count();
     Counts {
         trials,

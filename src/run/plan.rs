@@ -13,8 +13,7 @@ use crate::config::{Config, Light, Showing};
 use crate::enhance::ModelFile;
 use crate::error::{Error, Result};
 use crate::types::{
-    Condition, Degradation, Digest, EnhancerName, FrameId, Outcome, Question, Record, TrialKey,
-    Variants, View,
+    Condition, Digest, EnhancerName, FrameId, KindSet, Outcome, Question, Record, TrialKey, View,
 };
 
 /// What a plan is made of.
@@ -59,28 +58,21 @@ impl<'a> Inputs<'a> {
 /// developed once for all that use it.
 pub(super) fn conditions(
     light: &Light,
-    on: Variants,
+    on: KindSet,
     enhancers: &[(EnhancerName, Digest)],
 ) -> Vec<Condition> {
     let mut all = Vec::new();
-    for level in &light.levels {
-        let Some(dark) = level.dark() else {
-            all.push(Condition::raw(Degradation::None));
-            continue;
-        };
-        for degradation in [Degradation::Exposure(dark), Degradation::Sensor(dark)] {
-            if !light.variants.include(degradation.variant()) {
-                continue;
-            }
-            all.push(Condition::raw(degradation));
-            if on.include(degradation.variant()) {
-                let mended = |(name, _): &(EnhancerName, Digest)| Condition {
-                    degradation,
-                    enhancer: Some(name.clone()),
-                };
-                all.extend(enhancers.iter().map(mended));
-            }
-        }
+    for degradation in light.degradations() {
+        let enhanced = degradation.as_ref().filter(|how| on.includes(how.kind()));
+        let enhanced = enhanced.map(|how| {
+            enhancers.iter().map(|(name, _)| Condition {
+                degradation: Some(how.clone()),
+                enhancer: Some(name.clone()),
+            })
+        });
+        let enhanced: Vec<Condition> = enhanced.into_iter().flatten().collect();
+        all.push(Condition::raw(degradation));
+        all.extend(enhanced);
     }
     all
 }
@@ -123,7 +115,7 @@ impl Plan {
     pub(super) fn new(inputs: &Inputs<'_>, kept: &[Record]) -> Result<Self> {
         let answered: HashSet<TrialKey> = kept
             .iter()
-            .filter(|record| record.outcome != Outcome::Failed)
+            .filter(|record| record.detail.outcome != Outcome::Failed)
             .map(|record| record.key)
             .collect();
         let mut by_frame: Vec<(&FrameId, Vec<&Question>)> = Vec::new();
@@ -275,7 +267,7 @@ impl Shown {
             condition: condition.to_string(),
             image: inputs
                 .recipe
-                .digest(frame, &picture.digest, condition)
+                .digest(frame, &picture.digest, condition)?
                 .to_string(),
         })
     }

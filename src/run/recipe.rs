@@ -1,20 +1,24 @@
 //! What decides the pixels that are sent, as a digest.
 
-use serde_json::json;
+use std::num::NonZeroU32;
+
+use serde::Serialize;
 
 use crate::ask::Format;
 use crate::config::{Images, Sensor};
 use crate::enhance::{self, ModelFile};
-use crate::synthesis::{self, Synthesis};
-use crate::types::{Condition, Degradation, Digest, EnhancerName, FrameId};
+use crate::error::Result;
+use crate::synthesis::{self, Readings, Synthesis};
+use crate::types::degradation::Kind;
+use crate::types::{Condition, Digest, EnhancerName, FrameId, Severity};
 
 /// Everything but the frame and the condition that decides an image.
 #[derive(Debug)]
 pub(super) struct Recipe {
     pub(super) seed: u64,
-    pub(super) synthesis: Synthesis,
+    pub(super) readings: Readings,
     pub(super) format: Format,
-    pub(super) max_side: Option<std::num::NonZeroU32>,
+    pub(super) max_side: Option<NonZeroU32>,
     pub(super) enhancers: Vec<(EnhancerName, Digest)>,
 }
 
@@ -23,7 +27,7 @@ impl Recipe {
         let enhancers = files.iter();
         Self {
             seed: sensor.seed,
-            synthesis: sensor.synthesis.clone(),
+            readings: sensor.readings.clone(),
             format: images.format,
             max_side: images.max_side,
             enhancers: enhancers
@@ -34,40 +38,71 @@ impl Recipe {
 
     /// The digest of everything that decides the image of a frame in a condition, and of nothing else: a run with another
     /// seed has other noise, but the same untouched frames and exposure drops.
+    ///
+    /// # Errors
+    /// If the condition has a reading that the recipe lacks.
     pub(super) fn digest(
         &self,
         frame: &FrameId,
         picture: &Digest,
         condition: &Condition,
-    ) -> Digest {
-        let light = match condition.degradation {
-            Degradation::None => "untouched".to_owned(),
-            Degradation::Exposure(_) => format!("synthesis {}", synthesis::exposure::VERSION),
-            Degradation::Sensor(_) => {
-                format!(
-                    "synthesis {} seed {} frame {} {}",
-                    synthesis::VERSION,
-                    self.seed,
-                    frame,
-                    json!(self.synthesis)
-                )
-            }
-        };
-        let mended = condition
-            .enhancer
-            .as_ref()
-            .and_then(|name| self.enhancers.iter().find(|(known, _)| known == name));
-        let mended = mended.map_or("raw".to_owned(), |(_, digest)| {
-            format!("enhance {} {digest}", enhance::VERSION)
+    ) -> Result<Digest> {
+        let how = condition.degradation.as_ref();
+        let degradation = how.map(|how| {
+            let kind = how.kind();
+            let random = synthesis::is_random(kind);
+            Ok(DegradationFacts {
+                kind,
+                severity: how.severity(),
+                version: synthesis::version(kind),
+                reading: how
+                    .reading()
+                    .map(|_| self.readings.of(Some(how)))
+                    .transpose()?,
+                seed: random.then_some(self.seed),
+                frame: random.then_some(frame),
+            })
         });
-        let sent = format!("{} {:?}", self.format, self.max_side);
-        let parts = [
-            picture.to_string(),
-            condition.degradation.to_string(),
-            light,
-            mended,
-            sent,
-        ];
-        Digest::of_parts(parts.iter().map(String::as_bytes))
+        let enhancer = condition.enhancer.as_ref();
+        let enhancer =
+            enhancer.and_then(|name| self.enhancers.iter().find(|(known, _)| known == name));
+        let facts = ImageFacts {
+            picture: *picture,
+            degradation: degradation.transpose()?,
+            enhancer: enhancer.map(|(_, digest)| EnhancerFacts {
+                digest: *digest,
+                version: enhance::VERSION,
+            }),
+            format: self.format.to_string(),
+            max_side: self.max_side,
+        };
+        Digest::canonical("darkqa.image/2", &facts)
     }
+}
+
+/// What decides an image.
+#[derive(Serialize)]
+struct ImageFacts<'a> {
+    picture: Digest,
+    degradation: Option<DegradationFacts<'a>>,
+    enhancer: Option<EnhancerFacts>,
+    format: String,
+    max_side: Option<NonZeroU32>,
+}
+
+/// What decides a degraded frame beside the frame's content; seed and frame only if the kind draws random numbers.
+#[derive(Serialize)]
+struct DegradationFacts<'a> {
+    kind: Kind,
+    severity: Severity,
+    version: u32,
+    reading: Option<&'a Synthesis>,
+    seed: Option<u64>,
+    frame: Option<&'a FrameId>,
+}
+
+#[derive(Serialize)]
+struct EnhancerFacts {
+    digest: Digest,
+    version: u32,
 }

@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::store;
 use crate::types::manifest::Status;
 use crate::types::question::letter;
-use crate::types::{Condition, Digest, Listed, Outcome, Record};
+use crate::types::{ChoiceDetail, Condition, Digest, Outcome, Record, RunQuestion};
 
 /// Makes the images again, writes them, and says of each whether it is the one that was sent.
 ///
@@ -24,7 +24,7 @@ pub fn show(config: ShowItem) -> Result<Verdict> {
     let folder = config.run.clone();
     let manifest = kept(&folder)?;
     let item = config.item.split('#').next().unwrap_or_default().to_owned();
-    let records: Vec<Record> = store::read_records::<Record>(&folder)?
+    let records: Vec<Record> = store::read_records::<ChoiceDetail>(&folder)?
         .into_iter()
         .filter(|record| record.question.0 == item)
         .collect();
@@ -37,7 +37,7 @@ pub fn show(config: ShowItem) -> Result<Verdict> {
             problem,
         });
     };
-    let frame = first.frame.clone();
+    let frame = first.detail.frame.clone();
     let listed = store::read_questions(&folder)?;
     let listed = listed
         .into_iter()
@@ -105,13 +105,13 @@ fn conditions(records: &[Record], wanted: &[Condition], folder: &Path) -> Result
     Ok(wanted.to_vec())
 }
 
-fn question(record: &Record, listed: Option<&Listed>) -> String {
-    let mut text = format!("{}, about {}\n", record.question, record.frame);
+fn question(record: &Record, listed: Option<&RunQuestion>) -> String {
+    let mut text = format!("{}, about {}\n", record.question, record.detail.frame);
     if let Some(listed) = listed {
         let _ = writeln!(text, "{}", listed.text);
     }
-    for (index, choice) in record.choices.iter().enumerate() {
-        let truth = if index == record.truth {
+    for (index, choice) in record.detail.choices.iter().enumerate() {
+        let truth = if index == record.detail.truth {
             "  (true)"
         } else {
             ""
@@ -127,7 +127,7 @@ fn sent(records: &[Record], condition: &Condition) -> BTreeSet<Digest> {
         .iter()
         .filter(|record| record.condition.as_ref() == Some(condition));
     there
-        .filter_map(|record| Some(record.image.as_ref()?.digest))
+        .filter_map(|record| Some(record.detail.image.as_ref()?.digest))
         .collect()
 }
 
@@ -144,7 +144,7 @@ fn replies(records: &[Record], condition: Option<&Condition>) -> String {
         } else {
             ""
         };
-        let outcome = match record.outcome {
+        let outcome = match record.detail.outcome {
             Outcome::Right => "right",
             Outcome::Wrong => "wrong",
             Outcome::Unparsed => "not readable",

@@ -17,7 +17,7 @@ use crate::dataset::Dataset;
 use crate::enhance::ModelFile;
 use crate::error::{Error, Result};
 use crate::store;
-use crate::types::{Digest, Family, FrameId, Kept as _, Question, Record, View};
+use crate::types::{ChoiceDetail, Detail, Digest, Family, FrameId, Question, View};
 
 /// Everything an evaluation is made of, opened and checked; nothing is asked, and nothing written.
 pub(super) struct Stage<'a> {
@@ -58,7 +58,7 @@ impl Stage<'_> {
         let identity = identity::identity(config, &dataset, &inputs);
         let label = label(&config.ask);
         let hash = identity::digest(&identity);
-        let schema = Record::SCHEMA;
+        let schema = ChoiceDetail::SCHEMA;
         let place = config.output.place.of(config.shard);
         let folder = folder(&place, schema, &label, dataset.name(), hash)?;
         act(Stage {

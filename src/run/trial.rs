@@ -2,14 +2,13 @@
 
 use std::sync::Arc;
 
-use super::record::Entry;
 use crate::ask::{Message, Payload, Query};
-use crate::types::{Condition, Thumbnail, TrialKey, View};
+use crate::types::{Condition, Detail, Record, Thumbnail, TrialKey};
 
 /// What a trial is about: a question with choices, an open one, or an answer that is to be judged.
 pub(super) trait Item: Clone + Send + Sync + 'static {
-    /// What is kept of it.
-    type Record: Entry;
+    /// What its record has beside what all have.
+    type Detail: Detail;
 
     /// How many tokens a reply is likely to have.
     const REPLY: f64;
@@ -24,7 +23,7 @@ pub(super) trait Item: Clone + Send + Sync + 'static {
     fn turn(&self) -> u32;
 
     /// The record of a trial for a model before anything came of it.
-    fn blank(trial: &Trial<Self>, slide: &Slide, model: &str) -> Self::Record;
+    fn blank(trial: &Trial<Self>, slide: &Slide, model: &str) -> Record<Self::Detail>;
 }
 
 /// One item for one model.
@@ -75,16 +74,6 @@ pub(super) struct Slide {
     /// `None` where nothing is shown.
     pub(super) condition: Option<Condition>,
     pub(super) images: Vec<Arc<Payload>>,
-}
-
-impl Slide {
-    pub(super) fn view(&self) -> View {
-        if self.condition.is_some() {
-            View::Image
-        } else {
-            View::Blind
-        }
-    }
 }
 
 /// A slide with its trials, as the darkroom hands it out.

@@ -14,7 +14,7 @@ use crate::run::trial::Slide;
 use crate::run::{Verdict, limit, listed, manifest, moved, open_enhancers};
 use crate::store::{Store, read_manifest, read_thumbnails};
 use crate::types::manifest::{Counts, Status};
-use crate::types::{Kept as _, Record};
+use crate::types::{ChoiceDetail, Detail};
 
 /// Writes the input files, and notes their trials in the run as out.
 ///
@@ -31,10 +31,10 @@ fn write(config: &BatchExport, stage: Stage<'_>, progress: &Progress) -> Result<
     let askers = stage.inputs.askers;
     remote(askers)?;
     let (_, enhancers) = open_enhancers(stage.files, &evaluation.enhancement)?;
-    let kept = read_manifest(&stage.folder, Record::SCHEMA)?;
+    let kept = read_manifest(&stage.folder, ChoiceDetail::SCHEMA)?;
     let settings = settings(&evaluation.pace, &evaluation.enhancement, &evaluation.ask);
     let images = evaluation.recipe.clone();
-    let mut manifest = manifest(Record::SCHEMA, stage.identity, settings, images, kept);
+    let mut manifest = manifest(ChoiceDetail::SCHEMA, stage.identity, settings, images, kept);
     let mut store = Store::open(&stage.folder, &manifest, moved(&evaluation.output))?;
     store.write_questions(&listed(stage.questions, stage.dataset))?;
     let frames = stage.questions.iter().map(|question| &question.frame);

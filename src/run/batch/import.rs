@@ -7,14 +7,14 @@ use crate::run::report::{kept, leave};
 use crate::run::{Verdict, count};
 use crate::store::{self, Moved, Store};
 use crate::types::manifest::Status;
-use crate::types::{Kept as _, OpenRecord};
+use crate::types::{Detail, OpenDetail};
 
 /// Takes the replies of output and error files over; each of them once, however often a file is given.
 ///
 /// # Errors
 /// Where the folder holds no run or no batch, or a line is none of such a file: those before it are kept.
 pub fn import(config: &BatchImport) -> Result<Verdict> {
-    if store::schema(&config.run)?.as_deref() == Some(OpenRecord::SCHEMA) {
+    if store::schema(&config.run)?.as_deref() == Some(OpenDetail::SCHEMA) {
         return import_open(config);
     }
     let mut manifest = kept(&config.run)?;
@@ -43,13 +43,13 @@ fn import_open(config: &BatchImport) -> Result<Verdict> {
         let problem = "this is a run of open questions: openeqa --json shows its summary";
         return Err(Error::usage("--json", problem));
     }
-    let manifest = store::read_manifest(&config.run, OpenRecord::SCHEMA)?;
+    let manifest = store::read_manifest(&config.run, OpenDetail::SCHEMA)?;
     let Some(manifest) = manifest else {
         let problem = "no run in this folder: it has no manifest.json".to_owned();
         let path = config.run.clone();
         return Err(Error::Run { path, problem });
     };
-    let mut store = Store::<OpenRecord>::open(&config.run, &manifest, Moved::Allowed)?;
+    let mut store = Store::<OpenDetail>::open(&config.run, &manifest, Moved::Allowed)?;
     let said = take_over(&mut store, &manifest, &config.files)?;
     Ok(Verdict {
         status: Status::Complete,

@@ -17,8 +17,8 @@ pub(in crate::run) struct Requests<'a, I: Item> {
     askers: &'a [Asker],
     url: &'a str,
     /// Those of each asker.
-    files: Vec<Files<I::Record>>,
-    pub(in crate::run) store: &'a mut Store<I::Record>,
+    files: Vec<Files<I::Detail>>,
+    pub(in crate::run) store: &'a mut Store<I::Detail>,
 }
 
 impl<'a, I: Item> Requests<'a, I> {
@@ -29,7 +29,7 @@ impl<'a, I: Item> Requests<'a, I> {
     pub(in crate::run) fn new(
         askers: &'a [Asker],
         config: &'a BatchFiles,
-        store: &'a mut Store<I::Record>,
+        store: &'a mut Store<I::Detail>,
     ) -> Result<Self> {
         let folder = store.folder().join(BATCH);
         fs::create_dir_all(&folder).map_err(|e| Error::file(&folder, "create", e))?;

@@ -33,7 +33,7 @@ pub fn export(config: &Export, progress: &Progress) -> Result<Verdict> {
     let files = identity::enhancers(&config.enhancement.models)?;
     let recipe = Recipe {
         seed: config.light.sensor.seed,
-        synthesis: config.light.sensor.synthesis.clone(),
+        readings: config.light.sensor.readings.clone(),
         format: Format::Png,
         max_side: None,
         enhancers: files

@@ -19,7 +19,7 @@ impl Run<'_> {
         let kept = self.kept()?;
         let (answered, out) = self.there(&kept)?;
         let there = answered.union(&out).copied().collect();
-        let plan = Plan::new(&self.stage, &there);
+        let plan = Plan::new(&self.stage, &there)?;
         self.store.write_manifest(&self.manifest)?;
         let written = if plan.left() > 0 {
             self.export_answers(plan, files)?

@@ -19,7 +19,7 @@ use crate::run::trial::{Item, Prompt};
 use crate::run::{Verdict, limit, open_enhancers};
 use crate::store;
 use crate::types::manifest::Status;
-use crate::types::{self, Condition, OpenRecord, View};
+use crate::types::{Condition, OpenDetail, Record, View};
 
 /// An answer as it may be: as long as one with so many tokens.
 const ANSWER: &str =
@@ -27,12 +27,10 @@ const ANSWER: &str =
 
 /// Says what is left to ask and what it would take; sends nothing and leaves no file.
 pub(super) fn estimate(config: &OpenEqa, mut stage: Stage<'_>) -> Result<Verdict> {
-    let records: Vec<OpenRecord> = store::read_records(&stage.folder)?;
-    let answered = records
-        .iter()
-        .filter(|record| !types::Kept::failed(*record));
+    let records: Vec<Record<OpenDetail>> = store::read_records(&stage.folder)?;
+    let answered = records.iter().filter(|record| !record.failed());
     let there = answered.map(|record| record.key).collect();
-    let plan = Plan::new(&stage, &there);
+    let plan = Plan::new(&stage, &there)?;
     let given = super::all_given(config, &stage)?;
     let everyone: Vec<Asker> = stage.askers.iter().chain(&stage.judge).cloned().collect();
     let ledger = Ledger::new(&config.money, &everyone, &records)?;
@@ -167,7 +165,7 @@ fn forecast(
     samples: &[Sample],
     sizes: &Sizes,
     lines: Vec<Line>,
-    records: &[OpenRecord],
+    records: &[Record<OpenDetail>],
     spent: Option<f64>,
 ) -> Forecast {
     let (mut bytes, mut largest_request, mut images, mut seconds) = (0.0, 0.0_f64, 0, 0.0);

@@ -5,12 +5,9 @@ use std::sync::Arc;
 use crate::ask::{Payload, Query};
 use crate::dataset::openeqa::OpenQuestion;
 use crate::error::Result;
-use crate::run::record::Entry;
 use crate::run::trial::{Item, Slide, Trial};
 use crate::score::llm_match::{Protocol, mark};
-use crate::types::{
-    Degradation, Digest, Failure, OpenRecord, Reply, Step, TrialKey, Variant, Via, View, WalkFacts,
-};
+use crate::types::{Detail, Digest, OpenDetail, Record, Reply, Step, WalkFacts};
 
 /// An open question.
 #[derive(Debug, Clone)]
@@ -25,7 +22,7 @@ pub(super) struct Judged {
 }
 
 impl Item for Open {
-    type Record = OpenRecord;
+    type Detail = OpenDetail;
 
     // A short sentence.
     const REPLY: f64 = 20.0;
@@ -42,26 +39,19 @@ impl Item for Open {
         0
     }
 
-    fn blank(trial: &Trial<Self>, slide: &Slide, model: &str) -> OpenRecord {
+    fn blank(trial: &Trial<Self>, slide: &Slide, model: &str) -> Record<OpenDetail> {
         let condition = slide.condition.clone();
-        let degradation = condition.as_ref().map(|condition| condition.degradation);
-        OpenRecord {
-            key: trial.key,
-            view: slide.view(),
-            level: degradation.map(Degradation::level),
-            variant: degradation.map_or(Variant::None, Degradation::variant),
-            enhancer: condition
-                .as_ref()
-                .and_then(|condition| condition.enhancer.clone()),
-            condition,
-            images: facts(&slide.images),
-            ..empty(trial.key, &trial.item.0, Step::Answer, model)
-        }
+        let images = facts(&slide.images);
+        let detail = OpenDetail {
+            images,
+            ..detail(&trial.item.0, Step::Answer)
+        };
+        Record::blank(trial.key, trial.item.0.id.clone(), model, condition, detail)
     }
 }
 
 impl Item for Judged {
-    type Record = OpenRecord;
+    type Detail = OpenDetail;
 
     // "Your mark: 5".
     const REPLY: f64 = 4.0;
@@ -79,80 +69,42 @@ impl Item for Judged {
         0
     }
 
-    fn blank(trial: &Trial<Self>, _: &Slide, model: &str) -> OpenRecord {
+    fn blank(trial: &Trial<Self>, _: &Slide, model: &str) -> Record<OpenDetail> {
         let item = &trial.item;
-        OpenRecord {
+        let detail = OpenDetail {
             judged: Some(item.answer.to_string()),
-            ..empty(trial.key, &item.question, Step::Mark, model)
-        }
+            ..detail(&item.question, Step::Mark)
+        };
+        Record::blank(trial.key, item.question.id.clone(), model, None, detail)
     }
 }
 
-impl Entry for OpenRecord {
-    fn choices(&self) -> usize {
-        0
-    }
+impl Detail for OpenDetail {
+    const SCHEMA: &'static str = "darkqa.openeqa/2";
 
-    fn answered(mut self, reply: Reply) -> Result<Self> {
+    fn read(&mut self, reply: &Reply) -> Result<()> {
         if self.step == Step::Mark {
             self.upstream = mark(&reply.text, Protocol::Upstream);
             self.tolerant = mark(&reply.text, Protocol::Tolerant);
         }
-        Ok(Self {
-            reply: Some(reply.text),
-            refusal: reply.refusal,
-            finish: Some(reply.finish),
-            usage: reply.usage,
-            served_model: reply.served_model,
-            latency_ms: Some(reply.latency_ms),
-            attempts: reply.attempts,
-            ..self
-        })
+        Ok(())
     }
 
-    fn failed_by(self, failure: Failure, attempts: u32) -> Self {
-        Self {
-            failure: Some(failure),
-            attempts,
-            ..self
-        }
-    }
-
-    fn batched(self) -> Self {
-        Self {
-            via: Via::Batch,
-            ..self
-        }
+    fn choices(&self) -> usize {
+        0
     }
 }
 
-/// A record with nothing but what it is about.
-pub(super) fn empty(key: TrialKey, question: &OpenQuestion, step: Step, model: &str) -> OpenRecord {
-    OpenRecord {
-        key,
+/// What is known of a trial before it is made.
+pub(super) fn detail(question: &OpenQuestion, step: Step) -> OpenDetail {
+    OpenDetail {
         step,
-        question: question.id.clone(),
         episode: question.episode.clone(),
         category: question.category.clone(),
-        model: model.to_owned(),
-        view: View::Blind,
-        condition: None,
-        level: None,
-        variant: Variant::None,
-        enhancer: None,
         person: None,
         judged: None,
-        reply: None,
-        refusal: None,
-        finish: None,
         upstream: None,
         tolerant: None,
-        via: Via::Direct,
-        failure: None,
-        usage: None,
-        served_model: None,
-        latency_ms: None,
-        attempts: 0,
         images: None,
     }
 }

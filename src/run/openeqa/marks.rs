@@ -11,10 +11,10 @@ use crate::run::openeqa::plan::Due;
 use crate::run::trial::{Prompt, Trial};
 use crate::score::accuracy::Subject;
 use crate::score::llm_match::{Protocol, shortened};
-use crate::types::{Digest, OpenRecord, TrialKey, View};
+use crate::types::{Digest, OpenDetail, Record, TrialKey, View};
 
 /// The records of a run by their keys.
-pub(super) type Kept = BTreeMap<TrialKey, OpenRecord>;
+pub(super) type Kept = BTreeMap<TrialKey, Record<OpenDetail>>;
 
 /// What is known of one answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -48,7 +48,7 @@ pub(super) struct Prediction {
 pub(super) fn predictions(
     stage: &Stage<'_>,
     due: &[Due],
-    given: &[OpenRecord],
+    given: &[Record<OpenDetail>],
     kept: &Kept,
     protocol: Protocol,
 ) -> Vec<Prediction> {
@@ -99,7 +99,7 @@ pub(super) fn predictions(
 }
 
 /// The answer in a model's reply; `None` where there is none, which is an error upstream.
-fn whole(record: &OpenRecord, protocol: Protocol) -> Option<String> {
+fn whole(record: &Record<OpenDetail>, protocol: Protocol) -> Option<String> {
     let reply = record.reply.as_deref()?;
     match (record.view, blind_answer(reply), protocol) {
         (View::Image, _, _) => Some(reply.to_owned()),

@@ -35,7 +35,7 @@ use crate::error::{Error, Result};
 use crate::report::forecast::money;
 use crate::store::{self, Store};
 use crate::types::manifest::RunManifest;
-use crate::types::{FrameId, Kept as _, OpenRecord, TrialKey};
+use crate::types::{Detail, FrameId, OpenDetail, Record, TrialKey};
 
 use marks::{Kept, Marks, Prediction, predictions};
 use plan::{Due, Plan};
@@ -62,10 +62,10 @@ struct Run<'a> {
     stage: Stage<'a>,
     progress: &'a Progress,
     cores: ThreadPool,
-    store: Store<OpenRecord>,
+    store: Store<OpenDetail>,
     manifest: RunManifest,
     /// The answers that were given in files.
-    given: Vec<OpenRecord>,
+    given: Vec<Record<OpenDetail>>,
     /// Every answer that is due, there or not.
     due: Vec<Due>,
 }
@@ -74,11 +74,11 @@ impl<'a> Run<'a> {
     /// Opens the run folder, and takes the answers of files over into it.
     fn open(config: &'a OpenEqa, stage: Stage<'a>, progress: &'a Progress) -> Result<Self> {
         let given = all_given(config, &stage)?;
-        let kept = store::read_manifest(&stage.folder, OpenRecord::SCHEMA)?;
+        let kept = store::read_manifest(&stage.folder, OpenDetail::SCHEMA)?;
         let mut settings = identity::settings(&config.pace, &config.enhancement, &config.ask);
         settings.extend(outcome::settings(config, &stage));
         let mut manifest = manifest(
-            OpenRecord::SCHEMA,
+            OpenDetail::SCHEMA,
             stage.identity.clone(),
             BTreeMap::new(),
             BTreeMap::new(),
@@ -86,14 +86,14 @@ impl<'a> Run<'a> {
         );
         // Those of the last command, whatever the run was begun with: judge and protocol may be others.
         manifest.settings = settings;
-        let mut store = Store::<OpenRecord>::open(&stage.folder, &manifest, moved(&config.output))?;
+        let mut store = Store::<OpenDetail>::open(&stage.folder, &manifest, moved(&config.output))?;
         let there: HashSet<TrialKey> = store.records()?.iter().map(|record| record.key).collect();
         for record in given.iter().filter(|record| !there.contains(&record.key)) {
             store.append(record)?;
         }
         Ok(Self {
             config,
-            due: Plan::new(&stage, &HashSet::new()).due,
+            due: Plan::new(&stage, &HashSet::new())?.due,
             stage,
             progress,
             cores: pool(config.enhancement.threads)?,
@@ -142,7 +142,7 @@ impl<'a> Run<'a> {
     fn answers(&mut self) -> Result<End> {
         let kept = self.kept()?;
         let (answered, out) = self.there(&kept)?;
-        let plan = Plan::new(&self.stage, &answered.union(&out).copied().collect());
+        let plan = Plan::new(&self.stage, &answered.union(&out).copied().collect())?;
         self.left_out(plan.due.iter().filter(|due| out.contains(&due.key)).count());
         let left = plan.left();
         if left == 0 {
@@ -240,7 +240,7 @@ impl<'a> Run<'a> {
 }
 
 /// The answers of all files.
-fn all_given(config: &OpenEqa, stage: &Stage<'_>) -> Result<Vec<OpenRecord>> {
+fn all_given(config: &OpenEqa, stage: &Stage<'_>) -> Result<Vec<Record<OpenDetail>>> {
     let mut names: BTreeSet<&str> = stage
         .askers
         .iter()

@@ -8,6 +8,7 @@ use super::item::Open;
 use super::stage::Stage;
 use crate::ask::openeqa::{blind, vision};
 use crate::dataset::openeqa::OpenQuestion;
+use crate::error::Result;
 use crate::run::askers::Asker;
 use crate::run::trial::{Prompt, Trial};
 use crate::types::{Condition, Digest, TrialKey, View};
@@ -49,7 +50,7 @@ pub(super) struct Plan {
 
 impl Plan {
     /// Lays out all answers, and leaves out those that are there or on their way.
-    pub(super) fn new(stage: &Stage, there: &HashSet<TrialKey>) -> Self {
+    pub(super) fn new(stage: &Stage, there: &HashSet<TrialKey>) -> Result<Self> {
         let mut by_episode = BTreeMap::<&str, Vec<usize>>::new();
         for (index, question) in stage.questions.iter().enumerate() {
             by_episode.entry(&question.episode).or_default().push(index);
@@ -61,10 +62,10 @@ impl Plan {
         for (index, episode) in stage.episodes.iter().enumerate() {
             let questions = by_episode.remove(&*episode.name).unwrap_or_default();
             let conditions = std::iter::once(None).chain(stage.conditions.iter().map(Some));
-            let shots = conditions
-                .map(|condition| plan.shot(stage, episode, condition, &questions, there))
-                .filter(|shot| !shot.trials.is_empty());
-            let shots: Vec<Shot> = shots.collect();
+            let shots =
+                conditions.map(|condition| plan.shot(stage, episode, condition, &questions, there));
+            let mut shots: Vec<Shot> = shots.collect::<Result<_>>()?;
+            shots.retain(|shot| !shot.trials.is_empty());
             if !shots.is_empty() {
                 plan.walks.push(WalkPlan {
                     episode: index,
@@ -72,7 +73,7 @@ impl Plan {
                 });
             }
         }
-        plan
+        Ok(plan)
     }
 
     fn shot(
@@ -82,7 +83,7 @@ impl Plan {
         condition: Option<&Condition>,
         questions: &[usize],
         there: &HashSet<TrialKey>,
-    ) -> Shot {
+    ) -> Result<Shot> {
         let view = if condition.is_some() {
             View::Image
         } else {
@@ -95,9 +96,10 @@ impl Plan {
             trials: Vec::new(),
         };
         if askers.is_empty() {
-            return shot;
+            return Ok(shot);
         }
         let shown = condition.map(|condition| shown(stage, episode, condition));
+        let shown = shown.transpose()?;
         for &question in questions {
             let prompt = prompt(&stage.questions[question], view);
             for &(index, asker) in &askers {
@@ -118,7 +120,7 @@ impl Plan {
                 }
             }
         }
-        shot
+        Ok(shot)
     }
 
     /// How many answers are left.
@@ -151,18 +153,20 @@ fn prompt(question: &OpenQuestion, view: View) -> Prompt {
 }
 
 /// The digest of everything that decides the images of a walk in a condition.
-fn shown(stage: &Stage, episode: &Episode, condition: &Condition) -> Digest {
+fn shown(stage: &Stage, episode: &Episode, condition: &Condition) -> Result<Digest> {
     let Ok(Reel { stills, order }) = &episode.reel else {
-        return Digest::of(b"no frames");
+        return Ok(Digest::of(b"no frames"));
     };
     let walk = &stage.walk;
     let made = format!("{:?} {} {}", walk.side, walk.darkened, walk.camera);
     let frames: Vec<Digest> = stills
         .iter()
         .map(|still| stage.recipe.digest(&still.id, &still.digest, condition))
-        .collect();
+        .collect::<Result<_>>()?;
     let order = order.iter().map(|place| &frames[*place].as_bytes()[..]);
-    Digest::of_parts(std::iter::once(made.as_bytes()).chain(order))
+    Ok(Digest::of_parts(
+        std::iter::once(made.as_bytes()).chain(order),
+    ))
 }
 
 fn key(

@@ -19,7 +19,7 @@ use crate::run::plan::conditions;
 use crate::run::progress::Progress;
 use crate::run::recipe::Recipe;
 use crate::run::stage::{folder, label};
-use crate::types::{Condition, Digest, Kept as _, OpenRecord, View};
+use crate::types::{Condition, Detail, Digest, OpenDetail, View};
 
 /// Everything an evaluation by open questions is made of, opened and checked; nothing is asked, and nothing written.
 pub(super) struct Stage<'a> {
@@ -69,7 +69,7 @@ impl<'a> Stage<'a> {
         let stem = config.questions.file_stem().unwrap_or_default();
         let folder = folder(
             &config.output.place,
-            OpenRecord::SCHEMA,
+            OpenDetail::SCHEMA,
             &label(&config.ask),
             &stem.to_string_lossy(),
             asked(config, &identity, &conditions, judge.as_ref()),
@@ -274,7 +274,7 @@ fn identity(config: &OpenEqa, questions: &[OpenQuestion], recipe: &Recipe) -> Id
     let tiling = (tiling != Tiling::Auto).then(|| ("--tile", json!(tiling.to_string())));
     let side = config.enhancement.most_side;
     let side = side.map(|side| ("--llie-max-side", json!(side)));
-    let light = identity::light(recipe.seed, &recipe.synthesis);
+    let light = identity::light(recipe.seed, &recipe.readings);
     let fields = fields.into_iter().chain(light).chain(tiling).chain(side);
     fields
         .map(|(field, value)| (field.to_owned(), value))

@@ -24,7 +24,7 @@ use crate::run::limit;
 use crate::run::recipe::Recipe;
 use crate::run::thumbnail::Wanted;
 use crate::run::trial::{Exposed, Slide};
-use crate::synthesis::{Film, NoiseKey};
+use crate::synthesis::{Exposures, NoiseKey};
 use crate::types::{Condition, FrameId, ImageFacts, Rgb};
 
 /// What the thread works with.
@@ -176,10 +176,11 @@ impl<'a> Theatre<'a> {
             clean = self.scaled(clean)?;
         }
         let key = self.key(walk, still);
-        let mut film = Film::default();
+        let mut exposures = Exposures::default();
         let print = |condition: &&Condition| {
-            let synthesis = &self.recipe.synthesis;
-            let image = film.degrade(&clean, condition.degradation, &key, synthesis);
+            let how = condition.degradation.as_ref();
+            let synthesis = self.recipe.readings.of(how)?;
+            let image = exposures.degrade(&clean, how, &key, synthesis);
             match condition.enhancer {
                 None => self.sent(image).map(Print::Ready),
                 Some(_) => Ok(Print::Dark(image)),

@@ -11,13 +11,13 @@ use crate::report::page::{self, Shown};
 use crate::score::chance::Offer;
 use crate::score::findings::Findings;
 use crate::types::manifest::RunManifest;
-use crate::types::{Listed, Outcome, QuestionId, Record, Thumbnail, TrialKey, View};
+use crate::types::{Outcome, QuestionId, Record, RunQuestion, Thumbnail, TrialKey, View};
 
 /// Several runs as one.
 pub(super) struct Merged {
     pub(super) runs: Vec<Part>,
     pub(super) records: Vec<Record>,
-    pub(super) questions: Vec<Listed>,
+    pub(super) questions: Vec<RunQuestion>,
     pub(super) thumbnails: Vec<Thumbnail>,
 }
 
@@ -90,7 +90,7 @@ pub(super) fn merge(runs: Vec<Kept>) -> Result<Merged> {
             if known.contains(&record.key) {
                 continue;
             }
-            if record.outcome != Outcome::Failed {
+            if record.detail.outcome != Outcome::Failed {
                 known.insert(record.key);
             }
             if twice.contains(&(record.view, record.model.clone())) {
@@ -119,17 +119,17 @@ pub(super) fn merge(runs: Vec<Kept>) -> Result<Merged> {
 
 /// What is offered, for the chance line: each question as often as it has orders of its choices, since an answer to each order
 /// counts for itself; those not asked yet once. A run that kept no questions has those in its records.
-fn offers(records: &[Record], questions: &[Listed]) -> Vec<Offer> {
+fn offers(records: &[Record], questions: &[RunQuestion]) -> Vec<Offer> {
     let mut orders = BTreeMap::<&QuestionId, BTreeSet<&[String]>>::new();
     let mut all = BTreeMap::<&QuestionId, Offer>::new();
     for record in records {
         orders
             .entry(&record.question)
             .or_default()
-            .insert(&record.choices);
+            .insert(&record.detail.choices);
         all.entry(&record.question).or_insert_with(|| Offer {
-            family: record.family.clone(),
-            choices: record.choices.len(),
+            family: record.detail.family.clone(),
+            choices: record.detail.choices.len(),
         });
     }
     for question in questions {
@@ -165,7 +165,7 @@ fn answered_twice(runs: &[Kept]) -> BTreeSet<(View, String)> {
             let item = (
                 (record.view, &record.model),
                 (&record.condition, &record.question),
-                (&record.choices, record.repeat),
+                (&record.detail.choices, record.detail.repeat),
             );
             let (key, place) = *keys.entry(item).or_insert((record.key, index));
             if key != record.key && place != index {
@@ -186,8 +186,8 @@ fn agree(runs: &[Kept]) -> Result<()> {
     for (index, run) in runs.iter().enumerate() {
         let (mut shared, others) = (false, !questions.is_empty());
         for record in &run.records {
-            let choices: BTreeSet<&String> = record.choices.iter().collect();
-            let Some(truth) = record.choices.get(record.truth) else {
+            let choices: BTreeSet<&String> = record.detail.choices.iter().collect();
+            let Some(truth) = record.detail.choices.get(record.detail.truth) else {
                 let problem = format!("the record {} has no true choice", record.key);
                 return wrong(run, problem);
             };

@@ -7,7 +7,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use super::written;
-use super::{Verdict, count, record};
+use super::{Verdict, count};
 use crate::config::{Readings, Report, Show};
 use crate::error::{Error, Result};
 use crate::report::products::{PAGE, products};
@@ -15,7 +15,7 @@ use crate::report::{files, table, verdicts};
 use crate::score::findings::Findings;
 use crate::store::{self, Moved, Store};
 use crate::types::manifest::{RunManifest, Status};
-use crate::types::{Kept as _, Listed, Record, Thumbnail};
+use crate::types::{ChoiceDetail, Detail, Record, RunQuestion, Thumbnail};
 
 use merge::{Merged, merge};
 
@@ -24,7 +24,7 @@ struct Kept {
     folder: PathBuf,
     manifest: RunManifest,
     records: Vec<Record>,
-    questions: Vec<Listed>,
+    questions: Vec<RunQuestion>,
     thumbnails: Vec<Thumbnail>,
 }
 
@@ -68,7 +68,7 @@ fn reread(folder: &Path, manifest: &RunManifest, records: &mut [Record]) -> Resu
     let mut store = Store::open(folder, manifest, Moved::Allowed)?;
     let mut changed = 0;
     for record in records {
-        let anew = record::reread(record.clone())?;
+        let anew = record.clone().reread()?;
         if anew != *record {
             store.append(&anew)?;
             changed += 1;
@@ -136,7 +136,7 @@ fn compare(merged: &Merged, config: &Report) -> Result<String> {
 
 /// The manifest of a run.
 pub(super) fn kept(folder: &Path) -> Result<RunManifest> {
-    store::read_manifest(folder, Record::SCHEMA)?.ok_or_else(|| Error::Run {
+    store::read_manifest(folder, ChoiceDetail::SCHEMA)?.ok_or_else(|| Error::Run {
         path: folder.to_owned(),
         problem: "no run in this folder: it has no manifest.json".to_owned(),
     })

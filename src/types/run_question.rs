@@ -1,4 +1,4 @@
-//! What a run asked, as it keeps it beside its records: [`Listed`] questions and [`Thumbnail`]s of their images.
+//! What a run asked, as it keeps it beside its records: [`RunQuestion`] questions and [`Thumbnail`]s of their images.
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -10,7 +10,7 @@ use super::question::{Family, Question, QuestionId};
 
 /// One line of a run's `questions.jsonl`: a question with the scene of its frame. It reads back as a file of questions, too.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Listed {
+pub struct RunQuestion {
     /// The question's name.
     pub id: QuestionId,
     /// The scene of its frame; empty where the data set says nothing of scenes.
@@ -32,7 +32,7 @@ pub struct Listed {
     pub evidence: Value,
 }
 
-impl Listed {
+impl RunQuestion {
     /// A question about a frame of this scene.
     #[must_use]
     pub fn new(question: &Question, scene: &str) -> Self {
