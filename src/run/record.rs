@@ -5,6 +5,7 @@ use super::trial::{Item, Slide, Trial};
 use crate::ask::Query;
 use crate::error::Result;
 use crate::score::choice::readings;
+use crate::types::detail::ChoiceLine;
 use crate::types::{Answer, ChoiceDetail, Choices, Detail, Outcome, Record, Reply};
 
 impl Item for Choice {
@@ -31,6 +32,8 @@ impl Item for Choice {
 }
 
 impl Detail for ChoiceDetail {
+    type Line = ChoiceLine;
+
     const SCHEMA: &'static str = "darkqa.run/2";
 
     /// Enters both readings of a reply and the outcome, which is the strict one's.

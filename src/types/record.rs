@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use super::condition::Condition;
 use super::detail::{ChoiceDetail, Detail};
@@ -12,7 +12,7 @@ use super::trial_key::TrialKey;
 use crate::error::Result;
 
 /// One line of `records.jsonl`: what every trial has, and what its experiment adds.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Record<D = ChoiceDetail> {
     /// What decides the reply, as a digest.
     pub key: TrialKey,
@@ -23,7 +23,7 @@ pub struct Record<D = ChoiceDetail> {
     /// Whether it saw the images.
     pub view: View,
     /// What it saw; `None` where it saw nothing. A line has what follows from it in columns too.
-    #[serde(flatten, with = "shown")]
+    #[serde(flatten, serialize_with = "shown::serialize")]
     pub condition: Option<Condition>,
     /// The reply; `None` where it failed.
     pub reply: Option<String>,
@@ -32,7 +32,7 @@ pub struct Record<D = ChoiceDetail> {
     /// Why the model stopped; `None` where it failed.
     pub finish: Option<Finish>,
     /// How it was asked; left out of the file where it was asked directly.
-    #[serde(default, skip_serializing_if = "Via::is_direct")]
+    #[serde(skip_serializing_if = "Via::is_direct")]
     pub via: Via,
     /// What went wrong, where it failed.
     pub failure: Option<Failure>,
@@ -47,6 +47,12 @@ pub struct Record<D = ChoiceDetail> {
     /// What the experiment adds.
     #[serde(flatten)]
     pub detail: D,
+}
+
+impl<'de, D: Detail> Deserialize<'de> for Record<D> {
+    fn deserialize<S: Deserializer<'de>>(deserializer: S) -> std::result::Result<Self, S::Error> {
+        D::Line::deserialize(deserializer).map(Into::into)
+    }
 }
 
 impl<D> Record<D> {
@@ -146,7 +152,7 @@ impl<D: Detail> Record<D> {
 
 /// The columns that follow from a condition.
 mod shown {
-    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+    use serde::{Serialize, Serializer};
 
     use crate::types::degradation::{Axis, Degradation, ReadingName, Severity};
     use crate::types::{AxisLevel, Condition, EnhancerName};
@@ -162,11 +168,6 @@ mod shown {
         severity: Option<Severity>,
         reading: Option<&'a ReadingName>,
         enhancer: Option<&'a EnhancerName>,
-    }
-
-    #[derive(Deserialize)]
-    struct Read {
-        condition: Option<Condition>,
     }
 
     #[expect(clippy::ref_option, reason = "serde hands a reference")]
@@ -189,12 +190,6 @@ mod shown {
             enhancer: condition.and_then(|condition| condition.enhancer.as_ref()),
         }
         .serialize(serializer)
-    }
-
-    pub(super) fn deserialize<'de, D: Deserializer<'de>>(
-        deserializer: D,
-    ) -> Result<Option<Condition>, D::Error> {
-        Ok(Read::deserialize(deserializer)?.condition)
     }
 }
 

@@ -7,6 +7,7 @@ use crate::dataset::openeqa::OpenQuestion;
 use crate::error::Result;
 use crate::run::trial::{Item, Slide, Trial};
 use crate::score::llm_match::{Protocol, mark};
+use crate::types::detail::OpenLine;
 use crate::types::{Detail, Digest, OpenDetail, Record, Reply, Step, WalkFacts};
 
 /// An open question.
@@ -80,6 +81,8 @@ impl Item for Judged {
 }
 
 impl Detail for OpenDetail {
+    type Line = OpenLine;
+
     const SCHEMA: &'static str = "darkqa.openeqa/2";
 
     fn read(&mut self, reply: &Reply) -> Result<()> {
