@@ -19,7 +19,7 @@
 //! - [`types`]: the vocabulary. [`Frame`](types::Frame)s are seen, [`Question`](types::Question)s are asked, a
 //!   [`Condition`](types::Condition) is a degradation with or without an enhancer, a [`Reply`](types::Reply) is what a
 //!   model said, and a [`Record`](types::Record) is what came of one question for one model in one condition; of an open
-//!   question, or of a mark for an answer, it is an [`OpenRecord`](types::OpenRecord).
+//!   question, or of a mark for an answer, its detail is an [`OpenDetail`](types::OpenDetail).
 //! - [`dataset`]: a folder, a ready-made set or the built-in rooms → images, their maps and questions.
 //! - [`questions`]: a frame with its maps → questions with one true answer, by rule; pure integers. And the observer: what
 //!   the rules could still answer from given pixels.

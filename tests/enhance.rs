@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use darkqa_eval::dataset::Rooms;
 use darkqa_eval::enhance::{Enhancer, Install, ModelFile, Runtime, RuntimeSearch, Tiling};
 use darkqa_eval::synthesis::{Negative, NoiseKey, Synthesis, expose};
-use darkqa_eval::types::{DarkLevel, Rgb};
+use darkqa_eval::types::{Rgb, Severity};
 use support::onnx::Size::{Known, Named};
 use support::onnx::{self, Graph, Type};
 use tempfile::TempDir;
@@ -561,7 +561,7 @@ fn the_trained_enhancer_brings_a_room_back() {
     for (id, room) in rooms.all() {
         let lit = room.frame().unwrap().rgb.clone();
         let (mut negative, key) = (None, NoiseKey::new(0, &id));
-        for level in DarkLevel::ALL {
+        for level in Severity::LADDER {
             let film = negative
                 .get_or_insert_with(|| Negative::new(&lit, &key, &Synthesis::default(), level));
             for (dark, gain) in [(expose(&lit, level), 12.0), (film.develop(level), 8.0)] {

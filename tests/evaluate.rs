@@ -182,6 +182,8 @@ fn a_record_and_a_row_keep_the_contract() {
         "condition",
         "level",
         "variant",
+        "ev",
+        "reading",
         "enhancer",
         "choices",
         "truth",
@@ -205,6 +207,8 @@ fn a_record_and_a_row_keep_the_contract() {
         ),
         ("L1", "ev", "unparsed")
     );
+    assert_eq!(record["ev"], 2.0);
+    assert_eq!(record["reading"], Value::Null);
     assert_eq!(record["strict"], json!({"chosen": null, "why": "refused"}));
     assert_eq!(record["image"]["format"], "png");
 
@@ -212,7 +216,7 @@ fn a_record_and_a_row_keep_the_contract() {
     let mut lines = csv.lines();
     assert_eq!(
         lines.next().unwrap(),
-        "model,view,level,variant,enhancer,family,mode,n,right,unparsed,failed,value,low,high"
+        "model,view,level,variant,enhancer,family,mode,n,right,unparsed,failed,value,low,high,reading"
     );
     let all: Vec<&str> = lines.filter(|line| line.contains(",all,")).collect();
     // a1 is right both times; a2 and b1 say **A**, which is not strict: b1's A is right in the lenient reading.

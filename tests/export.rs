@@ -8,7 +8,7 @@ use std::path::Path;
 use assert_cmd::Command;
 use darkqa_eval::dataset::{Dataset, Place};
 use darkqa_eval::synthesis::expose;
-use darkqa_eval::types::{DarkLevel, Question, Rgb};
+use darkqa_eval::types::{Question, Rgb, Severity};
 use image::{Rgb as Pixel, RgbImage};
 use tempfile::TempDir;
 
@@ -91,7 +91,7 @@ fn every_form_is_read_back() {
             for question in original.questions() {
                 let clean = original.picture(&question.frame).unwrap().decode().unwrap();
                 let expected = if degraded {
-                    expose(&clean, DarkLevel::L2)
+                    expose(&clean, Severity::L2)
                 } else {
                     clean
                 };

@@ -7,6 +7,7 @@ mod support;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
+use std::sync::LazyLock;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -27,11 +28,23 @@ fn sent(mock: &MockEndpoint) -> Vec<Value> {
     mock.requests().iter().map(Request::json).collect()
 }
 
+/// What every line of `records.jsonl` must be.
+static SCHEMA: LazyLock<jsonschema::Validator> = LazyLock::new(|| {
+    let schema = serde_json::from_str(include_str!("data/open_record.schema.json")).unwrap();
+    jsonschema::validator_for(&schema).unwrap()
+});
+
+/// The records of a run; each is held to the schema.
 fn records(run: &Path) -> Vec<Value> {
     let text = fs::read_to_string(run.join("records.jsonl")).unwrap();
-    text.lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect()
+    let lines = text.lines().map(|line| serde_json::from_str(line).unwrap());
+    let records: Vec<Value> = lines.collect();
+    for record in &records {
+        if let Err(breach) = SCHEMA.validate(record) {
+            panic!("{breach} at {}: {record}", breach.instance_path());
+        }
+    }
+    records
 }
 
 /// The words of a request, with a mark for each image.
@@ -252,6 +265,12 @@ fn marks_come_to_upstreams_score() {
         "run",
     ]);
     assert_eq!(called.code, Some(0), "{called:?}");
+    let dark = records(&house.0.path("run")).into_iter();
+    let dark: Vec<Value> = dark.filter(|record| record["level"] == "L2").collect();
+    assert_eq!(
+        (&dark[0]["ev"], &dark[0]["reading"]),
+        (&json!(4.0), &json!("paper"))
+    );
     // What was answered alike at L2 is not judged again.
     assert_eq!(judge.requests().len(), 4);
     let summary = house.read("run/summary.json");
@@ -570,7 +589,7 @@ fn a_run_goes_on_where_it_was_stopped() {
     );
     let called = house.0.call(&["report", "run"]);
     assert!(
-        called.stderr.contains("darkqa.openeqa/1"),
+        called.stderr.contains("darkqa.openeqa/2"),
         "{}",
         called.stderr
     );

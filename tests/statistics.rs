@@ -25,8 +25,10 @@ use darkqa_eval::score::findings::Findings;
 use darkqa_eval::score::grid::{Count, Grid};
 use darkqa_eval::score::open::{Against, Group, OpenSummary, Outcome, Scored, Topic, open_summary};
 use darkqa_eval::score::paired::Paired;
+use darkqa_eval::types::degradation::Kind;
 use darkqa_eval::types::{
-    Condition, DarkLevel, Degradation, EnhancerName, Family, Level, Reading, Record, Variant,
+    AnswerReading, AxisLevel, Condition, Degradation, EnhancerName, Family, KindReading, Record,
+    Severity,
 };
 use rand::rngs::StdRng;
 use rand::{RngExt as _, SeedableRng as _};
@@ -53,14 +55,15 @@ fn percent(times: usize, mut holds: impl FnMut() -> bool) -> f64 {
 }
 
 /// The untouched frame, or one with noise.
-fn at(level: Option<DarkLevel>) -> Condition {
-    Condition::raw(level.map_or(Degradation::None, Degradation::Sensor))
+fn at(severity: Option<Severity>) -> Condition {
+    let noisy = |severity| Degradation::new(Kind::Sensor, severity, None).unwrap();
+    Condition::raw(severity.map(noisy))
 }
 
 fn clusters_of(records: &[Record]) -> Clusters {
     let asked = records
         .iter()
-        .map(|record| (&record.question, &record.frame));
+        .map(|record| (&record.question, &record.detail.frame));
     Clusters::new(asked, &BTreeMap::new())
 }
 
@@ -144,7 +147,7 @@ fn walks(
             };
             for (level, mark) in [
                 (None, lit),
-                (Some(DarkLevel::L4), if kept { lit } else { dark }),
+                (Some(Severity::L4), if kept { lit } else { dark }),
             ] {
                 answers.push(Scored {
                     subject: Subject::shown(MODEL, Some(&at(level))),
@@ -178,7 +181,7 @@ fn intervals_of_open_scores_hold_the_truth() {
                 let (mut scores, mut drops) = (0, 0);
                 for _ in 0..1000 {
                     let summary = walks(&mut random, count, marks, mean, rho);
-                    let dark = Subject::shown(MODEL, Some(&at(Some(DarkLevel::L4))));
+                    let dark = Subject::shown(MODEL, Some(&at(Some(Severity::L4))));
                     let lit = Subject::shown(MODEL, Some(&at(None)));
                     let score = summary.cell(&lit, &Group::All).unwrap().score.unwrap();
                     let change = summary.change(&dark, Against::Lit, &Group::All).unwrap();
@@ -209,7 +212,7 @@ fn pair(
     second: f64,
     correlation: f64,
 ) -> Vec<Record> {
-    let raw = at(Some(DarkLevel::L3));
+    let raw = at(Some(Severity::L3));
     let mut mended = raw.clone();
     mended.enhancer = Some(EnhancerName::new("e").unwrap());
     let mut records = Vec::new();
@@ -311,9 +314,9 @@ fn psychometric(drop: f64) -> f64 {
 fn thresholds_are_recovered() {
     let mut random = StdRng::seed_from_u64(11);
     // What the estimator aims at: the curve of straight lines between the levels.
-    let drops: Vec<f64> = Level::ALL
-        .map(|level| f64::from(level.exposure_drop().0))
-        .to_vec();
+    let levels = Severity::LADDER.map(|severity| AxisLevel::new(Kind::Sensor, severity));
+    let levels = std::iter::once(AxisLevel::L0).chain(levels);
+    let drops: Vec<f64> = levels.map(AxisLevel::value).collect();
     let middle = f64::midpoint(psychometric(0.0), 1.0 / 3.0);
     let after = drops
         .iter()
@@ -334,10 +337,10 @@ fn thresholds_are_recovered() {
         let mut records = Vec::new();
         for (frame, size) in sizes.iter().enumerate() {
             let luck = rate(&mut random, 0.5, 0.1) - 0.5;
-            for level in std::iter::once(None).chain(DarkLevel::ALL.map(Some)) {
+            for level in std::iter::once(None).chain(Severity::LADDER.map(Some)) {
                 let condition = at(level);
-                let drop = condition.degradation.level().exposure_drop().0;
-                let rate = (psychometric(f64::from(drop)) + 0.2 * luck).clamp(0.0, 1.0);
+                let drop = condition.level().value();
+                let rate = (psychometric(drop) + 0.2 * luck).clamp(0.0, 1.0);
                 for question in 0..*size {
                     let right = random.random_bool(rate);
                     records.push(record(
@@ -373,10 +376,10 @@ fn a_made_set_gives_the_papers_arithmetic() {
     let mut add = |family: Family, choices: &[&str], truth: usize, chosen: Option<usize>| {
         let number = records.len();
         let mut made = record(MODEL, &at(None), (number, number), chosen == Some(truth));
-        made.family = family;
-        made.choices = choices.iter().map(|&text| text.to_owned()).collect();
-        made.truth = truth;
-        made.strict = Some(Reading { chosen, why: None });
+        made.detail.family = family;
+        made.detail.choices = choices.iter().map(|&text| text.to_owned()).collect();
+        made.detail.truth = truth;
+        made.detail.strict = Some(AnswerReading { chosen, why: None });
         records.push(made);
     };
     for chosen in [0, 1, 1, 1] {
@@ -405,8 +408,8 @@ fn a_made_set_gives_the_papers_arithmetic() {
     let offers = records
         .iter()
         .map(|record| darkqa_eval::score::chance::Offer {
-            family: record.family.clone(),
-            choices: record.choices.len(),
+            family: record.detail.family.clone(),
+            choices: record.detail.choices.len(),
         });
     let findings = Findings::new(&records, &BTreeMap::new(), offers.collect::<Vec<_>>());
     let rates = &findings.hallucinations[0];
@@ -430,5 +433,5 @@ fn a_made_set_gives_the_papers_arithmetic() {
         .iter()
         .find(|cell| cell.subject.view.is_none() && cell.family.is_none());
     assert!((chance.unwrap().accuracy.unwrap().value - 43.0 / 102.0).abs() < 1e-15);
-    assert_eq!(findings.grid.subjects[0].variant, Variant::None);
+    assert_eq!(findings.grid.subjects[0].variant, KindReading::NONE);
 }

@@ -47,6 +47,34 @@ fn files_are_what_an_evaluation_sends() {
         compared += 1;
     }
     assert_eq!(compared, 4);
+    assert!(bench.path("out/a_L4-noise@physical.png").exists());
+}
+
+/// Free drops of light and two readings at once: exposure has no readings, and each noisy image has the name of its own.
+#[test]
+fn any_drop_and_several_readings_are_made() {
+    let bench = Bench::new();
+    frames(&bench);
+    let light = ["--levels", "L0,3.3", "--profile", "paper,eld"];
+    let made = bench.call(&[&["synthesize", "frames", "--out", "out"], &light[..]].concat());
+    assert_eq!(made.code, Some(0), "{made:?}");
+    let names = ["L0", "E3.3-ev", "E3.3-noise", "E3.3-noise@eld"];
+    let files = names.map(|name| fs::read(bench.path(&format!("out/a_{name}.png"))).unwrap());
+    assert_ne!(files[2], files[3]);
+    assert_eq!(made.stdout, "out: 4 made of 1 frames\n");
+    // Camera and noise are those of the frame, whatever the reading: common random numbers.
+    let states = ["E3.3-noise", "E3.3-noise@eld"]
+        .map(|name| json_of(&bench.path(&format!("out/a_{name}.json")))["sensor"]["state"].clone());
+    assert_eq!(states[0], states[1]);
+    let refused = bench.call(
+        &[
+            &["synthesize", "frames", "--out", "more", "--tone", "none"],
+            &light[..],
+        ]
+        .concat(),
+    );
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    assert!(refused.stderr.contains("--tone: beside several profiles"));
 }
 
 #[test]
@@ -103,10 +131,11 @@ fn a_file_makes_its_image_again() {
         "3",
     ]);
     assert_eq!(made.code, Some(0), "{made:?}");
-    let sidecar = json_of(&bench.path("out/a_L3-noise.json"));
+    let sidecar = json_of(&bench.path("out/a_L3-noise@custom.json"));
+    assert_eq!(sidecar["sensor"]["reading"], "custom");
     assert_eq!(sidecar["sensor"]["model"]["name"], "nikon-d850");
     assert_eq!(sidecar["drop"], 6.0);
-    for condition in ["L3-noise", "L3-ev"] {
+    for condition in ["L3-noise@custom", "L3-ev"] {
         let from = format!("out/a_{condition}.json");
         let again = bench.call(&[
             "synthesize",
@@ -130,7 +159,7 @@ fn a_file_makes_its_image_again() {
         "--out",
         "again",
         "--from",
-        "out/a_L3-noise.json",
+        "out/a_L3-noise@custom.json",
     ]);
     assert_eq!(wrong.code, Some(2));
     assert!(wrong.stderr.contains("another image"), "{}", wrong.stderr);

@@ -275,7 +275,7 @@ pub struct DataArgs {
 #[derive(Debug, Default, Args, Serialize)]
 #[command(next_help_heading = "Light")]
 pub struct LightArgs {
-    /// Levels, as L0-L5 or L0,L3; default: L0-L5
+    /// Levels, as L0-L5 or L0,L3, and exposure drops in EV up to 16, as L0,3.3; default: L0-L5
     #[arg(long, value_name = "LEVELS")]
     pub levels: Option<String>,
     /// Which of the paired variants: ev (exposure drop alone), noise (with sensor noise), both; default: both
@@ -291,9 +291,12 @@ pub struct SensorArgs {
     /// The seed of all random draws; default: 0
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
-    /// The sensor noise as a whole: paper (DarkQA to the letter) or physical (--amplify all --tone before-ev
-    /// --coupling photon); flags beside it go before its parts; default: paper
-    #[arg(long, value_name = "paper|physical")]
+    /// Light readings, how the paper's noise is understood: paper (DarkQA to the letter), eld (--amplify all), level
+    /// (--coupling photon), physical (--amplify all --tone before-ev --coupling photon), several as paper,eld, or all;
+    /// flags beside one go before its parts and make it custom; default: paper
+    ///
+    /// Conditions with noise carry the reading's name, as L3-noise@physical; that of paper is bare, L3-noise.
+    #[arg(long, value_name = "LIST")]
     pub profile: Option<String>,
     /// What the light ratio r amplifies: shot-only (the paper's wording: read, row and quantisation noise act after it) or
     /// all (as ELD and all public code); default: shot-only

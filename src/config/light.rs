@@ -6,16 +6,19 @@ use std::path::Path;
 use super::parsed;
 use crate::cli::{LightArgs, SensorArgs};
 use crate::error::{Error, Result};
-use crate::synthesis::{Calibration, CameraModel, Coupling, Sampling, Synthesis};
-use crate::types::{Level, Variants};
+use crate::synthesis::{
+    Calibration, CameraModel, Coupling, LightReading, Readings, Sampling, Synthesis,
+};
+use crate::types::degradation::Kind;
+use crate::types::{AxisLevel, Degradation, KindSet, ReadingName, Severity};
 
 /// How dark.
 #[derive(Debug)]
 pub struct Light {
     /// The levels, lightest first, none twice.
-    pub levels: Vec<Level>,
-    /// The variants of the dark ones.
-    pub variants: Variants,
+    pub levels: Vec<AxisLevel>,
+    /// The kinds of degradation at all levels but L0.
+    pub variants: KindSet,
     /// What takes the noisy images.
     pub sensor: Sensor,
 }
@@ -25,15 +28,15 @@ pub struct Light {
 pub struct Sensor {
     /// The seed of all random draws.
     pub seed: u64,
-    /// The sensor branch.
-    pub synthesis: Synthesis,
+    /// The light readings of the sensor branch.
+    pub readings: Readings,
 }
 
 impl Sensor {
     pub(super) fn resolve(said: &SensorArgs) -> Result<Self> {
         Ok(Self {
             seed: said.seed.unwrap_or(0),
-            synthesis: synthesis(said)?,
+            readings: readings(said)?,
         })
     }
 }
@@ -41,20 +44,72 @@ impl Sensor {
 impl Light {
     pub(super) fn resolve(said: &LightArgs, sensor: &SensorArgs) -> Result<Self> {
         Ok(Self {
-            levels: said
-                .levels
-                .as_deref()
-                .map_or(Ok(Level::ALL.to_vec()), levels)?,
-            variants: parsed("--variant", said.variant.as_deref())?.unwrap_or(Variants::Both),
+            levels: levels(said.levels.as_deref().unwrap_or("L0-L5"))?,
+            variants: parsed("--variant", said.variant.as_deref())?.unwrap_or(KindSet::BOTH),
             sensor: Sensor::resolve(sensor)?,
         })
     }
 }
 
-/// A profile, and what is said beside it.
-fn synthesis(said: &SensorArgs) -> Result<Synthesis> {
-    let profile = parsed("--profile", said.profile.as_deref())?.unwrap_or_default();
-    let of = Synthesis::of(profile, camera(said)?);
+impl Light {
+    /// What is done to each frame, level by level: each kind, in each light reading if it has readings; `None` is L0.
+    pub fn degradations(&self) -> Vec<Option<Degradation>> {
+        let mut all = Vec::new();
+        for level in &self.levels {
+            let Some(severity) = level.severity() else {
+                all.push(None);
+                continue;
+            };
+            let kinds = self.variants.kinds();
+            for kind in kinds.filter(|kind| AxisLevel::new(*kind, severity) == *level) {
+                let readings: Vec<Option<ReadingName>> = if kind.has_readings() {
+                    let readings = self.sensor.readings.iter();
+                    readings.map(|(name, _)| Some(name.clone())).collect()
+                } else {
+                    vec![None]
+                };
+                let made = readings
+                    .into_iter()
+                    .filter_map(|reading| Degradation::new(kind, severity, reading).ok());
+                all.extend(made.map(Some));
+            }
+        }
+        all
+    }
+}
+
+/// The readings of `--profile`; one alone with the parts that stand beside it.
+fn readings(said: &SensorArgs) -> Result<Readings> {
+    let names = said.profile.as_deref().unwrap_or("paper");
+    let named = match names {
+        "all" => LightReading::ALL.to_vec(),
+        list => {
+            let names = list
+                .split(',')
+                .map(|name| parsed("--profile", Some(name.trim())));
+            let named: Result<Vec<Option<LightReading>>> = names.collect();
+            named?.into_iter().flatten().collect()
+        }
+    };
+    let camera = camera(said)?;
+    if let [reading] = named[..] {
+        return synthesis(said, Synthesis::of(reading, camera)).map(Readings::from);
+    }
+    let parts = [
+        ("--amplify", &said.amplify),
+        ("--tone", &said.tone),
+        ("--draws", &said.draws),
+        ("--coupling", &said.coupling),
+    ];
+    if let Some((flag, _)) = parts.into_iter().find(|(_, part)| part.is_some()) {
+        let problem = "beside several profiles it would make them the same; name one profile";
+        return Err(Error::usage(flag, problem));
+    }
+    Ok(Readings::named(&named, &camera))
+}
+
+/// A reading with the parts that are said beside it.
+fn synthesis(said: &SensorArgs, of: Synthesis) -> Result<Synthesis> {
     let synthesis = Synthesis {
         amplify: parsed("--amplify", said.amplify.as_deref())?.unwrap_or(of.amplify),
         tone: parsed("--tone", said.tone.as_deref())?.unwrap_or(of.tone),
@@ -97,32 +152,65 @@ fn is_file(path: &Path) -> bool {
     path.extension().is_some() || path.components().count() > 1
 }
 
-/// Reads `L0-L5` or `L0,L3`, in any order, none twice.
-fn levels(text: &str) -> Result<Vec<Level>> {
+/// The most levels of a run.
+const MOST_LEVELS: usize = 200;
+
+/// Reads `L0-L5`, `L0,L3` or numbers of EV, in any order, none twice.
+fn levels(text: &str) -> Result<Vec<AxisLevel>> {
     let mut levels = Vec::new();
     for part in text.split(',').map(str::trim) {
-        let read = |level: &str| level.trim().parse::<Level>().map_err(|e| e.at("--levels"));
         match part.split_once('-') {
-            None => levels.push(read(part)?),
+            None => levels.push(level(part)?),
             Some((first, last)) => {
-                let (first, last) = (read(first)?, read(last)?);
+                let (first, last) = (level(first.trim())?, level(last.trim())?);
+                if !part.to_ascii_uppercase().starts_with('L') {
+                    let problem = format_args!(
+                        "{part:?} is no range; levels are L0-L5, numbers of EV stand alone, as {first},{last}"
+                    );
+                    return Err(Error::usage("--levels", problem));
+                }
                 if first > last {
                     return Err(Error::usage(
                         "--levels",
                         format_args!("{part:?} runs backwards; {last}-{first} is meant?"),
                     ));
                 }
-                levels.extend(
-                    Level::ALL
-                        .into_iter()
-                        .filter(|level| (first..=last).contains(level)),
-                );
+                let named = LIGHT.ladder().iter();
+                let named = named.map(|severity| AxisLevel::new(LIGHT, *severity));
+                let all = std::iter::once(AxisLevel::L0).chain(named);
+                levels.extend(all.filter(|level| (first..=last).contains(level)));
             }
         }
     }
     levels.sort_unstable();
     levels.dedup();
+    if levels.len() > MOST_LEVELS {
+        let problem = format_args!("{} levels; {MOST_LEVELS} is the most", levels.len());
+        return Err(Error::usage("--levels", problem));
+    }
     Ok(levels)
+}
+
+/// The kind whose names levels of light have.
+const LIGHT: Kind = Kind::ALL[0];
+
+/// One level: a name, or a number of EV.
+fn level(text: &str) -> Result<AxisLevel> {
+    let number = text.starts_with(|c: char| c.is_ascii_digit());
+    if text.eq_ignore_ascii_case("L0") || number && text.parse::<f64>() == Ok(0.0) {
+        return Ok(AxisLevel::L0);
+    }
+    let severity = if number {
+        text.parse::<Severity>()
+    } else {
+        LIGHT.severity(text)
+    };
+    let severity = severity.map_err(|e| e.at("--levels"))?;
+    if severity > LIGHT.largest() {
+        let problem = format_args!("{text} EV is above {}", LIGHT.largest());
+        return Err(Error::usage("--levels", problem));
+    }
+    Ok(AxisLevel::new(LIGHT, severity))
 }
 
 #[cfg(test)]
@@ -132,12 +220,24 @@ mod tests {
 
     #[test]
     fn levels_are_read_in_any_form() {
-        assert_eq!(levels("L0-L5").unwrap(), Level::ALL);
-        assert_eq!(levels("l3, L0,L3").unwrap(), [Level::L0, Level::L3]);
+        let names = |text| -> Vec<String> {
+            let levels = levels(text).unwrap();
+            levels.iter().map(ToString::to_string).collect()
+        };
+        assert_eq!(names("L0-L5"), ["L0", "L1", "L2", "L3", "L4", "L5"]);
+        assert_eq!(names("l3, L0,L3"), ["L0", "L3"]);
+        assert_eq!(
+            names("L4-L5,3.30,6,0,E11"),
+            ["L0", "E3.3", "L3", "L4", "L5", "E11"]
+        );
         for (wrong, says) in [
             ("L6", "\"L6\" is none of"),
             ("", "\"\" is none of"),
             ("L3-L1", "runs backwards"),
+            ("0-5", "is no range"),
+            ("3.333", "two decimals"),
+            ("16.5", "above 16"),
+            ("-2", "none of"),
         ] {
             let error = levels(wrong).unwrap_err().to_string();
             assert!(
@@ -148,18 +248,49 @@ mod tests {
     }
 
     #[test]
+    fn profiles_are_a_list_and_parts_stand_beside_one() {
+        let names = |profile: &str, tone: Option<&str>| -> Result<Vec<String>> {
+            let said = SensorArgs {
+                profile: Some(profile.into()),
+                tone: tone.map(Into::into),
+                ..SensorArgs::default()
+            };
+            let readings = Sensor::resolve(&said)?.readings;
+            Ok(readings.iter().map(|(name, _)| name.to_string()).collect())
+        };
+        assert_eq!(
+            names("physical,paper", None).unwrap(),
+            ["paper", "physical"]
+        );
+        assert_eq!(
+            names("all", None).unwrap(),
+            ["paper", "eld", "level", "physical"]
+        );
+        assert_eq!(names("physical", Some("none")).unwrap(), ["custom"]);
+        assert_eq!(names("physical", Some("before-ev")).unwrap(), ["physical"]);
+        let error = names("paper,eld", Some("none")).unwrap_err().to_string();
+        assert!(
+            error.starts_with("--tone: beside several profiles"),
+            "{error}"
+        );
+        let error = names("paper,all", None).unwrap_err().to_string();
+        assert!(error.starts_with("--profile: "), "{error}");
+    }
+
+    #[test]
     fn a_flag_goes_before_its_part_of_the_profile() {
         let said = SensorArgs {
             profile: Some("physical".into()),
             tone: Some("none".into()),
             ..SensorArgs::default()
         };
-        let synthesis = Sensor::resolve(&said).unwrap().synthesis;
+        let readings = Sensor::resolve(&said).unwrap().readings;
+        let synthesis = readings.only().unwrap();
         assert_eq!(synthesis.amplify, Amplify::All);
         assert_eq!(synthesis.tone, Tone::None);
         assert_eq!(synthesis.coupling, Coupling::Photon);
         let default = Sensor::resolve(&SensorArgs::default()).unwrap();
-        assert_eq!(default.synthesis, Synthesis::default());
+        assert_eq!(default.readings, Readings::default());
     }
 
     #[test]
@@ -169,7 +300,7 @@ mod tests {
                 camera: Some(name.into()),
                 ..SensorArgs::default()
             };
-            Sensor::resolve(&said).map(|sensor| sensor.synthesis.camera)
+            Sensor::resolve(&said).map(|sensor| sensor.readings.only().unwrap().camera.clone())
         };
         assert_eq!(camera("sony-a7s2").unwrap(), CameraModel::default());
         assert_ne!(camera("nikon-d850").unwrap(), CameraModel::default());

@@ -54,7 +54,7 @@ use crate::dataset::picture::MOST_PIXELS;
 use crate::dataset::{Place, Rooms};
 use crate::enhance::{Install, RuntimeSearch, Tiling};
 use crate::error::{Error, Result};
-use crate::types::{Family, Variants};
+use crate::types::{Family, KindSet};
 
 /// The most threads that can be asked for: more than any machine has use for, fewer than stop one.
 const MOST_THREADS: usize = 1024;
@@ -118,7 +118,7 @@ pub struct Enhancement {
     /// The ONNX files.
     pub models: Vec<PathBuf>,
     /// The variants that are mended.
-    pub on: Variants,
+    pub on: KindSet,
     /// How images are cut.
     pub tiling: Tiling,
     /// The longest side of an image that is enhanced in its own size; `None` for any.
@@ -304,7 +304,7 @@ fn enhancement(said: EnhancementArgs) -> Result<Enhancement> {
     });
     Ok(Enhancement {
         models: said.llie,
-        on: parsed("--llie-on", said.llie_on.as_deref())?.unwrap_or(Variants::Noise),
+        on: parsed("--llie-on", said.llie_on.as_deref())?.unwrap_or(KindSet::NOISE),
         tiling: tiling(said.tile.as_deref())?,
         most_side: said.llie_max_side,
         threads: threads(said.threads)?,

@@ -433,7 +433,7 @@ mod tests {
     use super::*;
     use crate::ask::Temperature;
     use crate::cli::{Cli, Command};
-    use crate::types::Variants;
+    use crate::types::KindSet;
 
     fn resolve(words: &[&str]) -> Result<OpenEqa> {
         let words = ["darkqa-eval", "openeqa", "--questions", "q.json"]
@@ -458,7 +458,7 @@ mod tests {
             .map(ToString::to_string)
             .collect();
         assert_eq!(levels, ["L0", "L2", "L4"]);
-        assert_eq!(config.job.light.variants, Variants::Noise);
+        assert_eq!(config.job.light.variants, KindSet::NOISE);
         let parameters = &config.job.ask.parameters;
         assert_eq!(
             (

@@ -9,7 +9,6 @@ use super::{Show, most_pixels, parsed, threads};
 use crate::cli::RealismArgs;
 use crate::error::{Error, Result};
 use crate::score::realism::residual::{Bins, Empty};
-use crate::types::Stops;
 
 /// The exposure drops that can be asked for, in EV.
 const DROPS: [f32; 2] = [-20.0, 20.0];
@@ -20,7 +19,7 @@ pub struct Realism {
     /// Where the pairs are.
     pub pairs: PairPlace,
     /// The exposure drop of every pair; `None` to estimate each.
-    pub drop: Option<Stops>,
+    pub drop: Option<f32>,
     /// The bins of the divergence.
     pub bins: Bins,
     /// What is done about empty ones.
@@ -76,7 +75,7 @@ impl Realism {
                 (None, Some(normal), Some(low)) => PairPlace::Apart { normal, low },
                 _ => return Err(Error::usage("PAIRS", "a folder of pairs is needed")),
             },
-            drop: said.ev.map(Stops),
+            drop: said.ev,
             bins: parsed("--kl-bins", said.kl_bins.as_deref())?.unwrap_or_default(),
             empty: parsed("--kl-empty", said.kl_empty.as_deref())?.unwrap_or_default(),
             sensor: Sensor::resolve(&shared.sensor)?,

@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use serde::Serialize;
+
 use super::Picture;
 use super::maps::MapFiles;
 use crate::error::Result;
@@ -21,33 +23,30 @@ pub(super) struct View {
 
 impl View {
     /// All of it that says what is seen.
-    fn digest(&self) -> Digest {
-        let camera = self.intrinsics.map_or_else(Vec::new, |camera| {
-            let numbers = [camera.fx, camera.fy, camera.cx, camera.cy];
-            numbers.iter().flat_map(|n| n.to_le_bytes()).collect()
-        });
-        let kinds = format!("{:?} {:?}", self.depth_kind, self.segmentation);
-        let names = self.names.iter().flat_map(|(id, name)| {
-            let region = name
-                .region
-                .map_or_else(String::new, |region| region.to_string());
-            [
-                id.to_string(),
-                name.name.clone(),
-                name.canonical.clone(),
-                region,
-            ]
-        });
-        let names: Vec<String> = names.collect();
-        let room = self.room.as_deref().unwrap_or_default();
-        let head = [
-            self.scene.as_bytes(),
-            &camera,
-            kinds.as_bytes(),
-            room.as_bytes(),
-        ];
-        Digest::of_parts(head.into_iter().chain(names.iter().map(String::as_bytes)))
+    fn digest(&self) -> Result<Digest> {
+        Digest::canonical(
+            "darkqa.view/1",
+            &Facts {
+                scene: &self.scene,
+                depth_kind: self.depth_kind,
+                intrinsics: self.intrinsics,
+                segmentation: self.segmentation,
+                names: self.names.iter().collect(),
+                room: self.room.as_deref(),
+            },
+        )
     }
+}
+
+/// The content of a [`View`].
+#[derive(Serialize)]
+struct Facts<'a> {
+    scene: &'a str,
+    depth_kind: DepthKind,
+    intrinsics: Option<Intrinsics>,
+    segmentation: Segmentation,
+    names: Vec<(&'a u32, &'a SegmentName)>,
+    room: Option<&'a str>,
 }
 
 /// The files of a frame as they lie in the data set, undecoded.
@@ -62,13 +61,18 @@ pub struct FrameFiles<'a> {
 impl FrameFiles<'_> {
     /// The content of all files, and of what is said about them; not the name.
     #[must_use]
-    pub fn digest(&self) -> Digest {
+    ///
+    /// # Errors
+    /// If a number of the camera is not finite.
+    pub fn digest(&self) -> Result<Digest> {
         let parts = [
             self.picture.digest(),
             self.maps.digest(),
-            self.view.digest(),
+            self.view.digest()?,
         ];
-        Digest::of_parts(parts.iter().map(|part| &part.as_bytes()[..]))
+        Ok(Digest::of_parts(
+            parts.iter().map(|part| &part.as_bytes()[..]),
+        ))
     }
 
     /// The frame.

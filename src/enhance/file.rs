@@ -1,6 +1,9 @@
 //! An enhancement model as it lies on disk: [`ModelFile`].
 
+use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
+
+use serde::Serialize;
 
 use crate::error::{Error, Result};
 use crate::types::{Digest, EnhancerName};
@@ -38,11 +41,12 @@ impl ModelFile {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         let name = EnhancerName::new(&stem)?;
         let text = sidecar::text_for(path)?;
+        let sidecar = Sidecar::parse(path, &text)?;
         Ok(Self {
             path: path.to_owned(),
             name,
-            digest: digest(path, &bytes, &text, &weights, preset.as_ref())?,
-            sidecar: Sidecar::parse(path, &text)?,
+            digest: digest(path, &bytes, &sidecar, &weights, preset.as_ref())?,
+            sidecar,
             preset,
             bytes,
             weights,
@@ -55,32 +59,48 @@ impl ModelFile {
         &self.name
     }
 
-    /// The digest of everything the user gave: the model, its sidecar, its external data and its preset.
+    /// The digest of everything that the user gave: the model, its external data, and what sidecar and preset state.
     #[must_use]
     pub fn digest(&self) -> Digest {
         self.digest
     }
 }
 
-/// The digest of a model's content, its sidecar's text and its external data; each file is hashed alone, so that only one
-/// is in memory at a time.
+/// What decides an enhanced image beside the dark one.
+#[derive(Serialize)]
+struct Facts<'a> {
+    file: Digest,
+    /// External data by where the model says that it lies.
+    external: BTreeMap<&'a str, Digest>,
+    convention: Sidecar,
+}
+
+/// The digest of a model's content, its external data and the convention that sidecar and preset state together; each file
+/// is hashed alone, so that only one is in memory at a time.
 fn digest(
     path: &Path,
     bytes: &[u8],
-    sidecar: &str,
+    sidecar: &Sidecar,
     weights: &Weights,
     preset: Option<&Preset>,
 ) -> Result<Digest> {
-    let mut digests = vec![Digest::of(bytes), Digest::of(sidecar.as_bytes())];
+    let mut external = BTreeMap::new();
     for location in &weights.external {
         let file = external_path(path, location)?;
         let content = std::fs::read(&file).map_err(|e| Error::file(file, "read", e))?;
-        digests.extend([Digest::of(location.as_bytes()), Digest::of(&content)]);
+        external.insert(location.as_ref(), Digest::of(&content));
     }
-    digests.extend(preset.map(|preset| Digest::of(format!("{:?}", preset.states).as_bytes())));
-    Ok(Digest::of_parts(
-        digests.iter().map(|d| d.as_bytes().as_slice()),
-    ))
+    let sidecar = sidecar.clone();
+    let convention = match preset {
+        None => sidecar,
+        Some(preset) => sidecar.over(&preset.states),
+    };
+    let facts = Facts {
+        file: Digest::of(bytes),
+        external,
+        convention: convention.resolved(),
+    };
+    Digest::canonical("darkqa.enhancer/2", &facts)
 }
 
 /// The path of a file with external data, which must lie in the model's folder or below (ONNX Runtime refuses others too).
@@ -149,6 +169,30 @@ mod tests {
         let all = [first, second, third, digest()];
         for (i, one) in all.iter().enumerate() {
             assert!(!all[..i].contains(one), "{i}");
+        }
+    }
+
+    #[test]
+    fn what_holds_anyway_may_be_stated() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.onnx");
+        std::fs::write(&path, model("a.bin")).unwrap();
+        std::fs::write(folder.path().join("a.bin"), [1]).unwrap();
+        let digest = |sidecar: &str| {
+            std::fs::write(folder.path().join("a.onnx.toml"), sidecar).unwrap();
+            ModelFile::read(&path).unwrap().digest()
+        };
+        let bare = digest("");
+        for same in [
+            "# a remark",
+            "color = \"rgb\"\npad = \"reflect\"\nrounding = \"round\"",
+            "multiple = 1\nmean = [0, 0, 0]\nstd = [1, 1, 1]",
+            "[extra]",
+        ] {
+            assert_eq!(digest(same), bare, "{same}");
+        }
+        for other in ["color = \"bgr\"", "mean = [0.1, 0, 0]", "[extra]\na = 0"] {
+            assert_ne!(digest(other), bare, "{other}");
         }
     }
 

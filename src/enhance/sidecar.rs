@@ -6,13 +6,13 @@ use std::io::ErrorKind;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::convention::{Color, Layout, Pad, Range, Rounding, Tile};
 use crate::error::{Error, Result};
 
 /// The statements of a sidecar; every key may be missing, an unknown key is an error.
-#[derive(Debug, Default, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Default, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Sidecar {
     /// The dimensions of the input.
@@ -40,12 +40,12 @@ pub(super) struct Sidecar {
     /// How a value becomes a byte.
     pub(super) rounding: Option<Rounding>,
     /// The values of further inputs of one number each.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub(super) extra: BTreeMap<String, f32>,
 }
 
 /// An output by its place, counted from 0, or by its name.
-#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(
     untagged,
     expecting = "`output` is an index from 0 or a name in quotes"
@@ -107,6 +107,22 @@ impl Sidecar {
             )));
         }
         Ok(read)
+    }
+
+    /// The same without the statements that say what holds anyway: two sidecars that mean the same have one digest.
+    pub(super) fn resolved(self) -> Self {
+        fn unless<T: PartialEq>(stated: Option<T>, usual: &T) -> Option<T> {
+            stated.filter(|stated| stated != usual)
+        }
+        Self {
+            color: unless(self.color, &Color::default()),
+            mean: unless(self.mean, &[0.0; 3]),
+            std: unless(self.std, &[1.0; 3]),
+            multiple: unless(self.multiple, &NonZeroUsize::MIN),
+            pad: unless(self.pad, &Pad::default()),
+            rounding: unless(self.rounding, &Rounding::default()),
+            ..self
+        }
     }
 
     /// What is stated here, and for the rest what a preset states.

@@ -5,7 +5,7 @@ use super::trial::{Item, Prompt, Trial};
 use crate::ask::{Model, Parameters, Price, image_tokens};
 use crate::config::Money;
 use crate::error::{Error, Result};
-use crate::types::{ImageFacts, Kept, Usage, Via};
+use crate::types::{ImageFacts, Record, Usage, Via};
 
 /// How many characters of English a token is, by the rule of thumb of every provider.
 const CHARACTERS: f64 = 4.0;
@@ -29,10 +29,10 @@ impl Budget {
     ///
     /// # Errors
     /// Where `--max-cost` is said and a model has no price: it could not be kept to.
-    pub(crate) fn new<'a, R: Kept + 'a>(
+    pub(crate) fn new<D>(
         money: &Money,
         models: &[ModelUnderTest],
-        kept: impl IntoIterator<Item = &'a R>,
+        stored: &[Record<D>],
     ) -> Result<Self> {
         let price = |model: &ModelUnderTest| {
             let remote = model.model.is_remote();
@@ -61,15 +61,13 @@ impl Budget {
             spent: 0.0,
             highest_cost: None,
         };
-        for record in kept {
-            let Some((price, usage)) = record
-                .charged()
-                .and_then(|(model, usage)| Some((money.prices.of(model)?, usage)))
-            else {
+        for record in stored {
+            let price = money.prices.of(&record.model);
+            let Some((price, usage)) = price.zip(record.usage) else {
                 continue;
             };
             let dollars = price.charged(usage);
-            match record.via() {
+            match record.via {
                 Via::Direct | Via::File => budget.add(dollars),
                 // It says nothing about what a request of its own costs.
                 Via::Batch => budget.spent += money.prices.batch * dollars,

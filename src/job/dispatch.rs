@@ -14,7 +14,7 @@ use super::interrupt::Interrupt;
 use super::models::ModelUnderTest;
 use super::progress::{Bar, Progress};
 use super::timings::{Step, Timings};
-use super::trial::{Entry as _, Item, PreparedGroup, Stimulus, Trial};
+use super::trial::{Item, PreparedGroup, Stimulus, Trial};
 use super::workers::unstarted;
 use crate::ask::{AskError, Call, Reach};
 use crate::config::Pace;
@@ -59,7 +59,7 @@ impl Dispatcher<'_> {
         &self,
         tally: Tally,
         budget: Budget,
-        store: &mut Store<I::Record>,
+        store: &mut Store<I::Detail>,
         stoppers: Vec<Stopper>,
         make: impl FnOnce(&Sender<PreparedGroup<I>>) + Send,
     ) -> Result<EndReason> {
@@ -103,7 +103,7 @@ impl Dispatcher<'_> {
 /// Where replies come in and are kept.
 struct ReplySink<'a, I: Item> {
     dispatcher: &'a Dispatcher<'a>,
-    store: &'a mut Store<I::Record>,
+    store: &'a mut Store<I::Detail>,
     bar: Bar,
     breaker: CircuitBreaker,
     budget: Budget,

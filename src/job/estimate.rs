@@ -14,7 +14,7 @@ use crate::ask::{Model, Price};
 use crate::config::Server;
 use crate::error::Result;
 use crate::report::forecast::{Forecast, Line};
-use crate::types::{Condition, ImageFacts, Kept as _, View};
+use crate::types::{Condition, ImageFacts, View};
 
 /// How many sources are made into images, to know their size; of those with an enhancer one.
 const SAMPLED: usize = 3;
@@ -83,7 +83,7 @@ pub(crate) fn estimate<E: Experiment>(
         .iter()
         .map(|line| line.text_tokens + line.image_tokens.unwrap_or(0.0) + line.reply_tokens)
         .sum();
-    let latencies = stored.iter().filter_map(|record| record.latency_ms());
+    let latencies = stored.iter().filter_map(|record| record.latency_ms);
     let (asking_seconds, pace) = waiting(experiment.server(), latencies, requests as f64, tokens);
     let largest = sample.images.iter().max_by_key(|image| image.bytes);
     let limit = super::limit(&settings.ask, &settings.images);

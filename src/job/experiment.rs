@@ -11,11 +11,14 @@ use super::trial::Item;
 use crate::config::{JobSettings, Server, Show};
 use crate::error::Result;
 use crate::store::Store;
-use crate::types::Listed;
 use crate::types::manifest::RunManifest;
+use crate::types::{Record, RunQuestion};
 
 /// The record of a trial of an experiment.
-pub(crate) type RecordOf<E> = <<E as Experiment>::Item as Item>::Record;
+pub(crate) type RecordOf<E> = Record<DetailOf<E>>;
+
+/// What an experiment adds to a record.
+pub(crate) type DetailOf<E> = <<E as Experiment>::Item as Item>::Detail;
 
 /// A request of a later phase that no plan can know yet.
 #[derive(Debug, Clone, Copy)]
@@ -63,7 +66,7 @@ pub(crate) trait Experiment: Sync {
     fn recipe(&self) -> &Recipe;
 
     /// The questions, as the run keeps them.
-    fn questions(&self) -> Vec<Listed>;
+    fn questions(&self) -> Vec<RunQuestion>;
 
     /// What all trials share and no column tells apart.
     fn identity(&self) -> Identity;
@@ -93,7 +96,7 @@ pub(crate) trait Experiment: Sync {
     /// changed before it is written: not all that came may be scored.
     fn report(
         &self,
-        store: &Store<RecordOf<Self>>,
+        store: &Store<DetailOf<Self>>,
         manifest: &mut RunManifest,
         show: Show,
     ) -> Result<String>;

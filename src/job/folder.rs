@@ -5,14 +5,13 @@ use std::path::{Path, PathBuf};
 use jiff::Timestamp;
 use serde_json::json;
 
-use super::experiment::{Experiment, RecordOf};
-use super::identity;
+use super::experiment::{DetailOf, Experiment};
 use super::observer;
 use super::plan::Plan;
 use crate::config::{Ask, ModelName, Output, RunPlace};
 use crate::error::{Error, Result};
 use crate::store::{self, Moved};
-use crate::types::Kept as _;
+use crate::types::{Detail as _, Digest};
 
 /// The folder of runs without a name of their own.
 const RESULTS: &str = "results";
@@ -22,7 +21,7 @@ pub(crate) fn find<E: Experiment>(experiment: &E) -> Result<PathBuf> {
     let settings = experiment.settings();
     match settings.output.place.of(settings.shard) {
         RunPlace::Named(path) => Ok(path),
-        RunPlace::Resume(path) => match store::read_manifest(&path, RecordOf::<E>::SCHEMA)? {
+        RunPlace::Resume(path) => match store::read_manifest(&path, DetailOf::<E>::SCHEMA)? {
             Some(_) => Ok(path),
             None => Err(Error::usage(
                 "--resume",
@@ -46,7 +45,7 @@ fn automatic<E: Experiment>(experiment: &E) -> Result<PathBuf> {
         "trials": Plan::new(experiment.plan(0, &[])?).keys,
         "notes": notes,
     });
-    let hash = &identity::digest(&facts).to_string()[..8];
+    let hash = &Digest::canonical("darkqa.command/2", &facts)?.to_string()[..8];
     let base = Path::new(RESULTS);
     Ok(store::find(base, hash).unwrap_or_else(|| {
         let time = Timestamp::now().strftime("%Y%m%d-%H%M%S");

@@ -10,7 +10,7 @@ use crate::ask::{Format, ImageLimit, Payload};
 use crate::config::Darkened;
 use crate::dataset::Picture;
 use crate::error::{Error, Result};
-use crate::synthesis::{Film, NoiseKey};
+use crate::synthesis::{Exposures, NoiseKey};
 use crate::types::{Condition, Degradation, Digest, FrameId, Rgb};
 
 /// What every image is made with.
@@ -66,8 +66,8 @@ pub(crate) struct FrameWork<'a> {
     planned: Option<Digest>,
     picture: Option<Picture>,
     clean: Option<Rgb>,
-    film: Film,
-    degraded: Option<(Degradation, Rgb)>,
+    exposures: Exposures,
+    degraded: Option<(Option<Degradation>, Rgb)>,
 }
 
 impl<'a> FrameWork<'a> {
@@ -91,7 +91,7 @@ impl<'a> FrameWork<'a> {
             planned,
             picture: None,
             clean: None,
-            film: Film::default(),
+            exposures: Exposures::default(),
             degraded: None,
         }
     }
@@ -102,7 +102,7 @@ impl<'a> FrameWork<'a> {
             return Ok(Staged::Ready(payload));
         }
         let steps = self.steps;
-        let degraded = self.degraded(condition.degradation)?;
+        let degraded = self.degraded(condition.degradation.as_ref())?;
         match condition.enhancer {
             None => steps.payload(degraded).map(Staged::Ready),
             Some(_) => Ok(Staged::Degraded(degraded.clone())),
@@ -119,7 +119,7 @@ impl<'a> FrameWork<'a> {
             Scaling::MaxSide(side) => Some(side),
             Scaling::LongerSide(_) => return Ok(None),
         };
-        if *condition != Condition::raw(Degradation::None) || format != Format::Png {
+        if *condition != Condition::L0 || format != Format::Png {
             return Ok(None);
         }
         let Picture::Encoded { bytes, .. } = self.picture()? else {
@@ -166,14 +166,14 @@ impl<'a> FrameWork<'a> {
     }
 
     /// The frame in one degradation; the last one is kept for the enhancers that follow.
-    pub(crate) fn degraded(&mut self, degradation: Degradation) -> Result<&Rgb> {
+    pub(crate) fn degraded(&mut self, how: Option<&Degradation>) -> Result<&Rgb> {
         self.clean()?;
         let Self {
             steps,
             frame,
             key,
             clean,
-            film,
+            exposures,
             degraded,
             ..
         } = self;
@@ -182,13 +182,14 @@ impl<'a> FrameWork<'a> {
         };
         if degraded
             .as_ref()
-            .is_some_and(|(made, _)| *made != degradation)
+            .is_some_and(|(made, _)| made.as_ref() != how)
         {
             *degraded = None;
         }
         let (_, image) = once(degraded, || {
-            let degrade = || film.degrade(clean, degradation, key, &steps.recipe.synthesis);
-            Ok((degradation, steps.timings.time(Step::Darken, degrade)))
+            let reading = steps.recipe.readings.of(how)?;
+            let degrade = || exposures.degrade(clean, how, key, reading);
+            Ok((how.cloned(), steps.timings.time(Step::Darken, degrade)))
         })?;
         Ok(image)
     }

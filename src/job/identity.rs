@@ -1,6 +1,6 @@
 //! What a run is: what all its trials share ([`Identity`]), and what each value of a column stands for ([`Columns`]).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use serde_json::{Value, json};
@@ -11,8 +11,9 @@ use crate::ask::Model;
 use crate::config::{Enhancement, JobSettings};
 use crate::enhance::{self, ModelFile, Tiling};
 use crate::error::{Error, Result};
-use crate::synthesis::{VERSION, exposure};
-use crate::types::{Digest, Variants};
+use crate::synthesis::version;
+use crate::types::degradation::Kind;
+use crate::types::{Degradation, Digest, ReadingName};
 
 /// What all trials of a run share and no column tells apart, by flag.
 pub(crate) type Identity = BTreeMap<String, Value>;
@@ -47,7 +48,7 @@ pub(crate) fn images(recipe: &Recipe) -> impl Iterator<Item = (String, Value)> {
     let fields = [
         ("--image", json!(recipe.format.to_string())),
         ("--seed", json!(recipe.seed)),
-        ("synthesis", json!([exposure::VERSION, VERSION])),
+        ("synthesis", json!(Kind::ALL.map(version))),
         ("enhancement", json!(enhance::VERSION)),
     ];
     let fields = fields.into_iter().chain(scaling);
@@ -67,12 +68,19 @@ pub(crate) fn columns<'a>(
         let content = enhancer(digest, &settings.enhancement);
         (name.as_str().to_owned(), content)
     });
-    let noisy = settings.light.variants != Variants::Ev;
-    let noise = noisy.then(|| ("noise".to_owned(), json!(recipe.synthesis)));
+    let degradations = settings.light.degradations();
+    let readings = degradations
+        .iter()
+        .flatten()
+        .filter_map(Degradation::reading);
+    let readings: BTreeSet<&ReadingName> = readings.collect();
+    let noise = recipe.readings.iter();
+    let noise = noise.filter(|(name, _)| readings.contains(name));
+    let noise = noise.map(|(name, content)| (name.to_string(), json!(content)));
     let columns: [(&str, BTreeMap<String, Value>); 3] = [
         ("model", models.collect()),
         ("enhancer", enhancers.collect()),
-        ("reading", noise.into_iter().collect()),
+        ("reading", noise.collect()),
     ];
     let filled = columns.into_iter().filter(|(_, values)| !values.is_empty());
     filled
@@ -107,11 +115,6 @@ fn enhancer(digest: &Digest, settings: &Enhancement) -> Value {
         "--tile": tile,
         "--llie-max-side": settings.most_side,
     })
-}
-
-/// The content of all that a command asks for, by which its folder is found again.
-pub(crate) fn digest(facts: &Value) -> Digest {
-    Digest::of(facts.to_string().as_bytes())
 }
 
 /// What does not decide a reply, but may explain how a run went.

@@ -276,7 +276,7 @@ impl<'a> ImagePipeline<'a> {
         work: &'w mut FrameWork<'_>,
         condition: &Condition,
     ) -> Result<Cow<'w, Rgb>> {
-        let degraded = work.degraded(condition.degradation)?;
+        let degraded = work.degraded(condition.degradation.as_ref())?;
         match &condition.enhancer {
             None => Ok(Cow::Borrowed(degraded)),
             Some(name) => self.enhanced(degraded, name).map(Cow::Owned),

@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
-use super::experiment::{Experiment, RecordOf};
+use super::experiment::{DetailOf, Experiment};
 use super::folder::now;
 use super::identity;
 use crate::config::Recipe;
-use crate::types::Kept;
 use crate::types::manifest::{Counts, RunManifest, Status};
+use crate::types::{Detail as _, Record};
 
 /// The manifest of a run; one that was kept goes on as it is, with the columns that are new.
 pub(crate) fn of<E: Experiment>(experiment: &E, kept: Option<RunManifest>) -> RunManifest {
@@ -26,7 +26,7 @@ pub(crate) fn of<E: Experiment>(experiment: &E, kept: Option<RunManifest>) -> Ru
         columns.entry(column).or_default().extend(values);
     }
     let manifest = RunManifest {
-        schema: RecordOf::<E>::SCHEMA.to_owned(),
+        schema: DetailOf::<E>::SCHEMA.to_owned(),
         status: Status::Started,
         version: env!("CARGO_PKG_VERSION").to_owned(),
         created: now(),
@@ -81,7 +81,7 @@ fn together(kept: &Recipe, now: Recipe) -> Recipe {
 }
 
 /// How many of these trials have a reply, and how many failed.
-pub(crate) fn count<R: Kept>(trials: usize, records: &[R]) -> Counts {
+pub(crate) fn count<D>(trials: usize, records: &[Record<D>]) -> Counts {
     let failed = records.iter().filter(|record| record.failed()).count();
     Counts {
         trials,

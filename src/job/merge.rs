@@ -7,21 +7,20 @@ use std::path::{Path, PathBuf};
 use super::report::{choice, open};
 use super::stored::{Asked, StoredRun, in_order};
 use super::thumbnail::Wanted;
-use super::trial::Entry;
 use super::{Outcome, count};
 use crate::config::{Merge, Missing, Shard, Show};
 use crate::error::{Error, Result};
 use crate::store::{self, Moved, Store};
 use crate::types::manifest::{RunManifest, Status, differences};
-use crate::types::{Listed, OpenRecord, Record, Thumbnail, TrialKey};
+use crate::types::{ChoiceDetail, Detail, OpenDetail, Record, RunQuestion, Thumbnail, TrialKey};
 
 /// A shard as it lies in its folder.
-struct Part<R> {
+struct Part<D> {
     shard: Shard,
-    run: StoredRun<R>,
+    run: StoredRun<D>,
 }
 
-impl<R: Entry> Part<R> {
+impl<D: Detail> Part<D> {
     fn open(folder: &Path) -> Result<Self> {
         let run = StoredRun::open(folder)?;
         let Some(shard) = run.manifest.shard.as_deref() else {
@@ -53,24 +52,24 @@ pub fn merge(config: &Merge) -> Result<Outcome> {
         return Err(Error::Run { path, problem });
     }
     match kinds.first() {
-        Some(Asked::Open) => merge_all::<OpenRecord>(config, &folders, open::write),
-        _ => merge_all::<Record>(config, &folders, choice::write),
+        Some(Asked::Open) => merge_all::<OpenDetail>(config, &folders, open::write),
+        _ => merge_all::<ChoiceDetail>(config, &folders, choice::write),
     }
 }
 
-fn merge_all<R: Entry + PartialEq>(
+fn merge_all<D: Detail + PartialEq>(
     config: &Merge,
     folders: &[PathBuf],
-    write: impl FnOnce(&Store<R>, &mut RunManifest, Show) -> Result<String>,
+    write: impl FnOnce(&Store<D>, &mut RunManifest, Show) -> Result<String>,
 ) -> Result<Outcome> {
-    let parts: Result<Vec<Part<R>>> = folders.iter().map(|folder| Part::open(folder)).collect();
+    let parts: Result<Vec<Part<D>>> = folders.iter().map(|folder| Part::open(folder)).collect();
     let mut parts = parts?;
     parts.sort_by_key(|part| part.shard);
     agree(&parts)?;
     let missing = missing(&parts, config.missing)?;
     unfinished(&parts);
     let mut manifest = whole(&parts)?;
-    let mut questions: Vec<Listed> = parts
+    let mut questions: Vec<RunQuestion> = parts
         .iter()
         .flat_map(|part| part.run.questions.clone())
         .collect();
@@ -82,15 +81,15 @@ fn merge_all<R: Entry + PartialEq>(
     } else {
         Status::Incomplete
     };
-    let mut store = Store::<R>::open(&config.out, &manifest, Moved::Refused)?;
+    let mut store = Store::<D>::open(&config.out, &manifest, Moved::Refused)?;
     store.write_questions(&questions)?;
-    let there: HashMap<TrialKey, R> = store
+    let there: HashMap<TrialKey, Record<D>> = store
         .records()?
         .into_iter()
-        .map(|record| (record.key(), record))
+        .map(|record| (record.key, record))
         .collect();
     for record in &records {
-        if there.get(&record.key()) != Some(record) {
+        if there.get(&record.key) != Some(record) {
             store.append(record)?;
         }
     }
@@ -139,8 +138,8 @@ fn folders(named: &[PathBuf]) -> Result<Vec<PathBuf>> {
 }
 
 /// Makes sure that all are shards of one run, and none is there twice.
-fn agree<R>(parts: &[Part<R>]) -> Result<()> {
-    let wrong = |part: &Part<R>, problem: String| {
+fn agree<D>(parts: &[Part<D>]) -> Result<()> {
+    let wrong = |part: &Part<D>, problem: String| {
         let path = part.run.folder.clone();
         Err(Error::Run { path, problem })
     };
@@ -181,7 +180,7 @@ fn agree<R>(parts: &[Part<R>]) -> Result<()> {
 }
 
 /// How many shards are missing; an error that names them, where that is refused.
-fn missing<R>(parts: &[Part<R>], refused: Missing) -> Result<usize> {
+fn missing<D>(parts: &[Part<D>], refused: Missing) -> Result<usize> {
     let Some(first) = parts.first() else {
         return Ok(0);
     };
@@ -203,7 +202,7 @@ fn missing<R>(parts: &[Part<R>], refused: Missing) -> Result<usize> {
 }
 
 /// Says which shards are not done.
-fn unfinished<R>(parts: &[Part<R>]) {
+fn unfinished<D>(parts: &[Part<D>]) {
     for part in parts {
         let (status, counts) = (part.run.manifest.status, part.run.manifest.counts);
         if status != Status::Complete {
@@ -230,7 +229,7 @@ fn difference(one: &RunManifest, other: &RunManifest) -> Option<(String, String,
 }
 
 /// The manifest of the run that the shards are together.
-fn whole<R>(parts: &[Part<R>]) -> Result<RunManifest> {
+fn whole<D>(parts: &[Part<D>]) -> Result<RunManifest> {
     let manifests = parts.iter().map(|part| &part.run.manifest);
     let first = manifests.clone().next();
     let mut manifest = first
@@ -252,19 +251,19 @@ fn whole<R>(parts: &[Part<R>]) -> Result<RunManifest> {
 }
 
 /// The records of all shards in the order of the questions, and the small copies of images that one run would have kept.
-fn together<R: Entry>(
-    parts: Vec<Part<R>>,
-    questions: &[Listed],
-) -> Result<(Vec<R>, Vec<Thumbnail>)> {
+fn together<D: Detail>(
+    parts: Vec<Part<D>>,
+    questions: &[RunQuestion],
+) -> Result<(Vec<Record<D>>, Vec<Thumbnail>)> {
     let wanted = Wanted::new(questions.iter().map(|question| &question.frame), Vec::new());
     let (mut records, mut thumbnails) = (Vec::new(), Vec::new());
     let mut keys = HashMap::<TrialKey, PathBuf>::new();
     for Part { run, .. } in parts {
         for record in run.records {
-            if let Some(other) = keys.insert(record.key(), run.folder.clone()) {
+            if let Some(other) = keys.insert(record.key, run.folder.clone()) {
                 let problem = format!(
                     "the trial {} is in {} as well: these are not the shards of one run",
-                    record.key(),
+                    record.key,
                     other.display()
                 );
                 return Err(Error::Run {

@@ -28,7 +28,6 @@ pub(crate) mod questions;
 mod questions_by_rule;
 pub(crate) mod rebuild;
 pub(crate) mod recipe;
-pub(crate) mod record;
 pub mod report;
 pub(crate) mod shard;
 pub(crate) mod source;
@@ -50,13 +49,13 @@ use crate::error::Result;
 use crate::report::forecast::{json, money, render};
 use crate::store::{self, Store};
 use crate::types::manifest::{Counts, RunManifest, Status};
-use crate::types::{Kept, Thumbnail, TrialKey};
+use crate::types::{Detail as _, Record, Thumbnail, TrialKey};
 
 use budget::Budget;
 use circuit_breaker::EndReason;
 use dispatch::{Dispatcher, Tally};
 use enhancers::OpenEnhancers;
-use experiment::{Experiment, RecordOf};
+use experiment::{DetailOf, Experiment, RecordOf};
 use frame_work::Steps;
 use image_pipeline::ImagePipeline;
 use plan::Plan;
@@ -155,7 +154,7 @@ impl<'a, E: Experiment> Job<'a, E> {
             progress,
         } = self;
         let settings = experiment.settings();
-        let kept = store::read_manifest(&folder, RecordOf::<E>::SCHEMA)?;
+        let kept = store::read_manifest(&folder, DetailOf::<E>::SCHEMA)?;
         let complete = kept
             .as_ref()
             .is_some_and(|kept| kept.status == Status::Complete);
@@ -167,10 +166,10 @@ impl<'a, E: Experiment> Job<'a, E> {
         let there: HashSet<TrialKey> = if experiment.given().is_empty() {
             HashSet::new()
         } else {
-            store.records()?.iter().map(Kept::key).collect()
+            store.records()?.iter().map(|record| record.key).collect()
         };
         for record in experiment.given() {
-            if !there.contains(&record.key()) {
+            if !there.contains(&record.key) {
                 store.append(record)?;
             }
         }
@@ -190,7 +189,7 @@ pub(crate) struct OpenRun<'a, E: Experiment> {
     experiment: &'a E,
     progress: &'a Progress,
     enhancers: OpenEnhancers<'a>,
-    store: Store<RecordOf<E>>,
+    store: Store<DetailOf<E>>,
     manifest: RunManifest,
     /// Every trial planned so far.
     keys: HashSet<TrialKey>,
@@ -331,7 +330,7 @@ impl<E: Experiment> OpenRun<'_, E> {
     /// Scores what the run holds, and leaves the report in its folder.
     fn finish(mut self, end: EndReason) -> Result<Outcome> {
         let stored = self.store.records()?;
-        self.keys.extend(stored.iter().map(Kept::key));
+        self.keys.extend(stored.iter().map(|record| record.key));
         let counts = count(self.keys.len(), &stored);
         drop(stored);
         let status = end.status(counts);
@@ -386,7 +385,7 @@ fn wanted<E: Experiment>(experiment: &E, folder: &Path) -> Result<Wanted> {
 }
 
 /// The trials that have a reply.
-fn answered<R: Kept>(stored: &[R]) -> HashSet<TrialKey> {
+fn answered<D>(stored: &[Record<D>]) -> HashSet<TrialKey> {
     let answered = stored.iter().filter(|record| !record.failed());
-    answered.map(Kept::key).collect()
+    answered.map(|record| record.key).collect()
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::ask::openeqa::blind_answer;
 use crate::score::accuracy::Subject;
 use crate::score::llm_match::{Protocol, shortened};
-use crate::types::{OpenRecord, QuestionId, Step, Via, View};
+use crate::types::{OpenDetail, QuestionId, Record, Step, Via, View};
 
 /// What is known of one answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -37,14 +37,17 @@ pub(crate) struct Prediction {
 /// Every answer of a run, question by question: those that were asked for, there or not, and those of files. Whoever was asked one
 /// question was asked all.
 pub(crate) fn predictions(
-    records: &[OpenRecord],
+    records: &[Record<OpenDetail>],
     questions: &[&QuestionId],
     protocol: Protocol,
 ) -> Vec<Prediction> {
     let places: HashMap<&QuestionId, usize> = questions.iter().copied().zip(0..).collect();
-    let mut answers = BTreeMap::<(usize, Subject), Vec<&OpenRecord>>::new();
+    let mut answers = BTreeMap::<(usize, Subject), Vec<&Record<OpenDetail>>>::new();
     let mut asked = BTreeSet::new();
-    for record in records.iter().filter(|record| record.step == Step::Answer) {
+    for record in records
+        .iter()
+        .filter(|record| record.detail.step == Step::Answer)
+    {
         let subject = Subject::shown(&record.model, record.condition.as_ref());
         if record.via != Via::File {
             asked.insert(subject.clone());
@@ -75,7 +78,7 @@ pub(crate) fn predictions(
     predictions
 }
 
-fn state(record: Option<&OpenRecord>, protocol: Protocol) -> (Option<String>, AnswerState) {
+fn state(record: Option<&Record<OpenDetail>>, protocol: Protocol) -> (Option<String>, AnswerState) {
     let Some(record) = record.filter(|record| record.failure.is_none()) else {
         return (None, AnswerState::Missing);
     };
@@ -95,7 +98,7 @@ fn state(record: Option<&OpenRecord>, protocol: Protocol) -> (Option<String>, An
 
 /// The answer in a model's reply; `None` if there is none, which is an error upstream. A reply that is null, empty or refused is no
 /// answer.
-fn full_answer(record: &OpenRecord, protocol: Protocol) -> Option<String> {
+fn full_answer(record: &Record<OpenDetail>, protocol: Protocol) -> Option<String> {
     let reply = record.reply.as_deref();
     let reply = reply.filter(|reply| record.refusal.is_none() && !reply.trim().is_empty())?;
     match (record.view, blind_answer(reply), protocol) {

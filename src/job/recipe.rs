@@ -2,17 +2,20 @@
 
 use std::num::NonZeroU32;
 
-use serde_json::json;
+use serde::Serialize;
 
-use super::source::Source;
+use super::source::{Source, SourceFrame};
 use crate::ask::{Format, Payload, bilinear};
 use crate::config::{CameraOf, Darkened, Images, Sensor, Walk};
 use crate::enhance::{self, ModelFile};
-use crate::synthesis::{self, NoiseKey, Synthesis};
-use crate::types::{Condition, Degradation, Digest, EnhancerName, FrameId};
+use crate::error::Result;
+use crate::synthesis::{self, NoiseKey, Readings, Synthesis};
+use crate::types::degradation::Kind;
+use crate::types::{Condition, Digest, EnhancerName, FrameId, Severity};
 
 /// In what size an image is sent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub(crate) enum Scaling {
     /// In its own.
     Never,
@@ -43,7 +46,7 @@ impl Scaling {
 #[derive(Debug)]
 pub(crate) struct Recipe {
     pub(crate) seed: u64,
-    pub(crate) synthesis: Synthesis,
+    pub(crate) readings: Readings,
     pub(crate) format: Format,
     pub(crate) scaling: Scaling,
     /// Whether light is reduced before or after scaling.
@@ -67,7 +70,7 @@ impl Recipe {
         let enhancers = files.iter();
         Self {
             seed: sensor.seed,
-            synthesis: sensor.synthesis.clone(),
+            readings: sensor.readings.clone(),
             format: Format::Png,
             scaling: Scaling::Never,
             scaled: Darkened::Native,
@@ -97,52 +100,90 @@ impl Recipe {
         }
     }
 
-    /// The digest of everything that decides the images of a source in a condition.
-    pub(crate) fn stimulus(&self, source: &Source, condition: &Condition) -> Digest {
-        let images: Vec<Digest> = source
+    /// The digest of everything that decides the images of a source in a condition, and of nothing else: a run with another seed has
+    /// other noise, but the same untouched frames and exposure drops.
+    ///
+    /// # Errors
+    /// If the condition has a reading that the recipe lacks.
+    pub(crate) fn stimulus(&self, source: &Source, condition: &Condition) -> Result<Digest> {
+        let images: Vec<ImageFacts<'_>> = source
             .frames
             .iter()
-            .map(|frame| self.digest(&frame.id, &frame.digest, condition))
-            .collect();
-        let shown = source.order.iter().map(|place| images[*place].to_string());
-        let shown: Vec<String> = shown.collect();
-        Digest::of_parts(shown.iter().map(String::as_bytes))
+            .map(|frame| self.facts(source, frame, condition))
+            .collect::<Result<_>>()?;
+        let shown: Vec<&ImageFacts<'_>> =
+            source.order.iter().map(|place| &images[*place]).collect();
+        Digest::canonical("darkqa.images/2", &shown)
     }
 
-    /// The digest of everything that decides the image of a frame in a condition, and of nothing else: a run with another
-    /// seed has other noise, but the same untouched frames and exposure drops.
-    fn digest(&self, frame: &FrameId, picture: &Digest, condition: &Condition) -> Digest {
-        let light = match condition.degradation {
-            Degradation::None => "untouched".to_owned(),
-            Degradation::Exposure(_) => format!("synthesis {}", synthesis::exposure::VERSION),
-            Degradation::Sensor(_) => {
-                format!(
-                    "synthesis {} seed {} frame {} {}",
-                    synthesis::VERSION,
-                    self.seed,
-                    frame,
-                    json!(self.synthesis)
-                )
-            }
-        };
-        let mended = condition
-            .enhancer
-            .as_ref()
-            .and_then(|name| self.enhancers.iter().find(|(known, _)| known == name));
-        let mended = mended.map_or("raw".to_owned(), |(_, digest)| {
-            format!("enhance {} {digest}", enhance::VERSION)
+    fn facts<'a>(
+        &'a self,
+        source: &'a Source,
+        frame: &'a SourceFrame,
+        condition: &Condition,
+    ) -> Result<ImageFacts<'a>> {
+        let how = condition.degradation.as_ref();
+        let degradation = how.map(|how| {
+            let kind = how.kind();
+            let random = synthesis::is_random(kind);
+            let of_source = random && self.camera_of == CameraOf::Episode;
+            Ok(DegradationFacts {
+                kind,
+                severity: how.severity(),
+                version: synthesis::version(kind),
+                reading: how
+                    .reading()
+                    .map(|_| self.readings.of(Some(how)))
+                    .transpose()?,
+                seed: random.then_some(self.seed),
+                frame: random.then_some(&frame.id),
+                camera_of: of_source.then_some(&source.name),
+            })
         });
-        let sent = format!(
-            "{} {:?} {} {}",
-            self.format, self.scaling, self.scaled, self.camera_of
-        );
-        let parts = [
-            picture.to_string(),
-            condition.degradation.to_string(),
-            light,
-            mended,
-            sent,
-        ];
-        Digest::of_parts(parts.iter().map(String::as_bytes))
+        let enhancer = condition.enhancer.as_ref();
+        let enhancer =
+            enhancer.and_then(|name| self.enhancers.iter().find(|(known, _)| known == name));
+        Ok(ImageFacts {
+            picture: frame.digest,
+            degradation: degradation.transpose()?,
+            enhancer: enhancer.map(|(_, digest)| EnhancerFacts {
+                digest: *digest,
+                version: enhance::VERSION,
+            }),
+            format: self.format.to_string(),
+            scaling: self.scaling,
+            scaled_before: (self.scaled == Darkened::Resized).then_some(true),
+        })
     }
+}
+
+/// What decides an image.
+#[derive(Serialize)]
+struct ImageFacts<'a> {
+    picture: Digest,
+    degradation: Option<DegradationFacts<'a>>,
+    enhancer: Option<EnhancerFacts>,
+    format: String,
+    scaling: Scaling,
+    /// Whether it was scaled before its light was reduced.
+    scaled_before: Option<bool>,
+}
+
+/// What decides a degraded frame besides the frame's content; seed and frame only if the kind draws random numbers.
+#[derive(Serialize)]
+struct DegradationFacts<'a> {
+    kind: Kind,
+    severity: Severity,
+    version: u32,
+    reading: Option<&'a Synthesis>,
+    seed: Option<u64>,
+    frame: Option<&'a FrameId>,
+    /// The source whose frames one state of the camera takes.
+    camera_of: Option<&'a FrameId>,
+}
+
+#[derive(Serialize)]
+struct EnhancerFacts {
+    digest: Digest,
+    version: u32,
 }

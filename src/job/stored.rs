@@ -3,28 +3,27 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use super::trial::Entry;
 use crate::error::{Error, Result};
 use crate::store;
 use crate::types::manifest::RunManifest;
-use crate::types::{Kept as _, Listed, OpenRecord, QuestionId, Record, Thumbnail};
+use crate::types::{ChoiceDetail, Detail, OpenDetail, QuestionId, Record, RunQuestion, Thumbnail};
 
 /// A run as it lies in its folder.
-pub(crate) struct StoredRun<R> {
+pub(crate) struct StoredRun<D> {
     pub(crate) folder: PathBuf,
     pub(crate) manifest: RunManifest,
-    pub(crate) records: Vec<R>,
-    pub(crate) questions: Vec<Listed>,
+    pub(crate) records: Vec<Record<D>>,
+    pub(crate) questions: Vec<RunQuestion>,
     pub(crate) thumbnails: Vec<Thumbnail>,
 }
 
-impl<R: Entry> StoredRun<R> {
+impl<D: Detail> StoredRun<D> {
     /// Reads a run folder.
     ///
     /// # Errors
     /// If it holds no run of such records.
     pub(crate) fn open(folder: &Path) -> Result<Self> {
-        let manifest = store::read_manifest(folder, R::SCHEMA)?;
+        let manifest = store::read_manifest(folder, D::SCHEMA)?;
         Self::of(folder, manifest.ok_or_else(|| no_run(folder))?)
     }
 
@@ -47,19 +46,26 @@ impl<R: Entry> StoredRun<R> {
 }
 
 /// Records in the order of the questions, conditions and models, whatever order the replies came in.
-pub(crate) fn in_order<R: Entry>(records: Vec<R>, questions: &[Listed]) -> Vec<R> {
+pub(crate) fn in_order<D: Detail>(
+    records: Vec<Record<D>>,
+    questions: &[RunQuestion],
+) -> Vec<Record<D>> {
     let ids = questions.iter().map(|question| &question.id);
     let places: HashMap<&QuestionId, usize> = ids.zip(0..).collect();
-    let place = |record: &R| places.get(record.question()).copied();
-    let mut placed: Vec<(Option<usize>, R)> = records
+    let place = |record: &Record<D>| places.get(&record.question).copied();
+    let mut placed: Vec<(Option<usize>, Record<D>)> = records
         .into_iter()
         .map(|record| (place(&record), record))
         .collect();
-    fn order<R: Entry>((place, record): &(Option<usize>, R)) -> impl Ord + '_ {
-        let asked = (record.condition(), record.model(), record.repeat());
-        (*place, asked, record.key())
-    }
-    placed.sort_by(|one, other| order(one).cmp(&order(other)));
+    placed.sort_by(|(place, record), (other_place, other)| {
+        let asked = |record: &Record<D>| (record.detail.repeat(), record.key);
+        (place, &record.condition, &record.model, asked(record)).cmp(&(
+            other_place,
+            &other.condition,
+            &other.model,
+            asked(other),
+        ))
+    });
     placed.into_iter().map(|(_, record)| record).collect()
 }
 
@@ -73,9 +79,9 @@ pub(crate) fn name(folder: &Path) -> String {
 /// A run, by what was asked in it. The one place that tells experiments apart by the schema of their folders.
 pub(crate) enum AnyRun {
     /// Questions with choices.
-    Choice(StoredRun<Record>),
+    Choice(StoredRun<ChoiceDetail>),
     /// Open questions.
-    Open(StoredRun<OpenRecord>),
+    Open(StoredRun<OpenDetail>),
 }
 
 /// What was asked in a run.
@@ -94,11 +100,11 @@ impl Asked {
     /// If there is no run in it, or one of another version.
     pub(crate) fn of(folder: &Path) -> Result<Self> {
         let schema = store::schema(folder)?.ok_or_else(|| no_run(folder))?;
-        if schema == OpenRecord::SCHEMA {
+        if schema == OpenDetail::SCHEMA {
             return Ok(Self::Open);
         }
         // Says what is wrong with any other schema.
-        store::read_manifest(folder, Record::SCHEMA)?;
+        store::read_manifest(folder, ChoiceDetail::SCHEMA)?;
         Ok(Self::Choice)
     }
 }
@@ -122,8 +128,8 @@ impl AnyRun {
 /// If it holds no run.
 pub(crate) fn manifest(folder: &Path) -> Result<RunManifest> {
     let schema = match Asked::of(folder)? {
-        Asked::Choice => Record::SCHEMA,
-        Asked::Open => OpenRecord::SCHEMA,
+        Asked::Choice => ChoiceDetail::SCHEMA,
+        Asked::Open => OpenDetail::SCHEMA,
     };
     store::read_manifest(folder, schema)?.ok_or_else(|| no_run(folder))
 }

@@ -68,7 +68,10 @@ impl Wanted {
 fn thumbnail(frame: &FrameId, condition: &Condition, sent: &Payload) -> Result<Thumbnail> {
     let image = sent.decode()?;
     let stops = match condition.enhancer {
-        None => condition.degradation.level().exposure_drop().0,
+        None => condition
+            .degradation
+            .as_ref()
+            .map_or(0.0, |how| how.kind().relight(how.severity())),
         Some(_) => 0.0,
     };
     let jpeg: Format = FORMAT.parse()?;

@@ -2,17 +2,17 @@
 
 use std::sync::Arc;
 
+use serde::Serialize;
+
 use super::models::ModelUnderTest;
 use crate::ask::{Message, Payload, Query};
 use crate::error::Result;
-use crate::types::{
-    Condition, Digest, Failure, Kept, QuestionId, Reply, Thumbnail, TrialKey, View,
-};
+use crate::types::{Condition, Detail, Digest, QuestionId, Record, Thumbnail, TrialKey};
 
 /// What a trial is about: a question with choices, an open one, or an answer that is to be judged.
 pub(crate) trait Item: Clone + Send + Sync + 'static {
     /// What is kept of it.
-    type Record: Entry;
+    type Detail: Detail;
 
     /// How many tokens a reply is likely to have.
     fn reply_tokens(&self) -> f64;
@@ -27,34 +27,7 @@ pub(crate) trait Item: Clone + Send + Sync + 'static {
     fn turn(&self) -> u32;
 
     /// The record of a trial for a model before anything came of it.
-    fn blank(trial: &Trial<Self>, stimulus: &Stimulus, model: &str) -> Self::Record;
-}
-
-/// A record that something comes of.
-pub(crate) trait Entry: Kept + Send {
-    /// The model that was asked.
-    fn model(&self) -> &str;
-
-    /// What was asked.
-    fn question(&self) -> &QuestionId;
-
-    /// What was shown; `None` for words alone.
-    fn condition(&self) -> Option<&Condition>;
-
-    /// How many times the same was asked before.
-    fn repeat(&self) -> u32;
-
-    /// How many choices the question had; 0 if the answer is open.
-    fn choices(&self) -> usize;
-
-    /// The record with the reply and what is read from it.
-    fn answered(self, reply: Reply) -> Result<Self>;
-
-    /// The record with what went wrong after so many requests.
-    fn failed_by(self, failure: Failure, attempts: u32) -> Self;
-
-    /// The record as one that was asked in a batch.
-    fn batched(self) -> Self;
+    fn blank(trial: &Trial<Self>, stimulus: &Stimulus, model: &str) -> Record<Self::Detail>;
 }
 
 /// One item for one model.
@@ -69,21 +42,22 @@ pub(crate) struct Trial<I> {
 
 /// Everything that decides a reply, as it enters the key of a trial. Built-in models answer by the names of question and condition,
 /// so these decide it, too.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize)]
 pub(crate) struct KeyFacts<'a> {
-    pub(crate) model: &'a str,
+    model: &'a str,
     /// What the model answers by.
-    pub(crate) parameters: &'a str,
-    pub(crate) question: &'a str,
-    pub(crate) before: &'a str,
-    pub(crate) behind: &'a str,
-    /// The choices in the order shown; none if the answer is open.
-    pub(crate) choices: &'a [String],
-    pub(crate) repeat: u32,
+    parameters: &'a str,
+    question: &'a QuestionId,
+    before: &'a str,
+    behind: Option<&'a str>,
+    /// The choices in the order shown; `None` if the answer is open.
+    choices: Option<&'a [String]>,
+    /// How many times the same was asked before; `None` the first time.
+    repeat: Option<u32>,
     /// `None` if nothing is shown.
-    pub(crate) condition: Option<&'a Condition>,
+    condition: Option<&'a Condition>,
     /// The digest of all that decides the images.
-    pub(crate) image: Option<Digest>,
+    image: Option<Digest>,
 }
 
 impl<'a> KeyFacts<'a> {
@@ -95,24 +69,31 @@ impl<'a> KeyFacts<'a> {
         condition: Option<&'a Condition>,
         image: Option<Digest>,
     ) -> Self {
-        let [before, behind] = prompt.parts();
         Self {
             model: model.model.name(),
             parameters: &model.digest,
-            question: &question.0,
-            before,
-            behind,
-            choices: &[],
-            repeat: 0,
+            question,
+            before: &prompt.before,
+            behind: prompt.behind.as_deref(),
+            choices: None,
+            repeat: None,
             condition,
             image,
         }
     }
 
+    /// The facts of a question with these choices, in the order shown, that was asked so many times before.
+    pub(crate) fn with_choices(self, choices: &'a [String], repeat: u32) -> Self {
+        Self {
+            choices: Some(choices),
+            repeat: (repeat > 0).then_some(repeat),
+            ..self
+        }
+    }
+
     /// The key of the trial.
-    pub(crate) fn key(&self) -> TrialKey {
-        let text = format!("{self:?}");
-        Digest::of(text.as_bytes()).into()
+    pub(crate) fn key(&self) -> Result<TrialKey> {
+        Digest::canonical("darkqa.trial/2", self).map(Into::into)
     }
 }
 
@@ -154,16 +135,6 @@ pub(crate) struct Stimulus {
     /// `None` where nothing is shown.
     pub(crate) condition: Option<Condition>,
     pub(crate) images: Vec<Arc<Payload>>,
-}
-
-impl Stimulus {
-    pub(crate) fn view(&self) -> View {
-        if self.condition.is_some() {
-            View::Image
-        } else {
-            View::Blind
-        }
-    }
 }
 
 /// A stimulus with its trials, as the image pipeline hands it out.

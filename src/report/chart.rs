@@ -11,7 +11,8 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use crate::error::{Error, Result};
 use crate::score::estimate::Estimate;
-use crate::types::Level;
+use crate::types::AxisLevel;
+use crate::types::degradation::Axis;
 
 /// Axes and words.
 const INK: RGBColor = RGBColor(34, 34, 34);
@@ -59,7 +60,7 @@ impl Look {
 #[derive(Debug, Clone)]
 pub enum Shape {
     /// Points over exposure drops, with the band of their intervals.
-    Curve(Vec<(Level, Estimate)>),
+    Curve(Vec<(AxisLevel, Estimate)>),
     /// A level that holds in whatever light.
     Flat(f64),
 }
@@ -195,12 +196,12 @@ struct Frame {
     top: i32,
     width: i32,
     height: i32,
-    levels: Vec<Level>,
+    levels: Vec<AxisLevel>,
 }
 
 impl Frame {
     fn new((x, y): (i32, i32), panel: &Panel) -> Self {
-        let mut levels: Vec<Level> = panel
+        let mut levels: Vec<AxisLevel> = panel
             .lines
             .iter()
             .flat_map(|line| match &line.shape {
@@ -220,11 +221,18 @@ impl Frame {
     }
 
     /// Drops are drawn to scale: the step from L3 to L4 is 1.5 EV and looks it.
-    fn x(&self, level: Level) -> i32 {
-        let darkest = self.levels.last().copied().unwrap_or(Level::L5);
-        let (drop, most) = (level.exposure_drop().0, darkest.exposure_drop().0);
+    fn x(&self, level: AxisLevel) -> i32 {
+        let darkest = self.levels.last().copied().unwrap_or(AxisLevel::L0);
+        let (drop, most) = (level.value() as f32, darkest.value() as f32);
         let share = if most > 0.0 { drop / most } else { 0.5 };
         self.left + 10 + ((self.width - 20) as f32 * share).round() as i32
+    }
+
+    /// What stands under the levels.
+    fn axis_title(&self) -> String {
+        let axis = self.levels.iter().find_map(|level| level.axis());
+        let Axis { title, unit } = axis.unwrap_or(Axis::LIGHT);
+        format!("level; {title} in {unit}")
     }
 
     fn y(&self, share: f64) -> i32 {
@@ -255,7 +263,7 @@ impl Frame {
         for level in &self.levels {
             let x = self.x(*level);
             path(root, &[(x, bottom), (x, bottom + 4)], INK.stroke_width(1))?;
-            let drop = level.exposure_drop().0;
+            let drop = level.value();
             words(
                 root,
                 &level.to_string(),
@@ -274,7 +282,7 @@ impl Frame {
         let middle = self.left + self.width / 2;
         words(
             root,
-            "level; exposure drop in EV",
+            &self.axis_title(),
             (middle, bottom + 38),
             12,
             (HPos::Center, VPos::Top),

@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::score::accuracy::Subject;
 use crate::score::estimate::Estimate;
 use crate::score::findings::Findings;
-use crate::types::{FailureKind, Family, Level, Why};
+use crate::types::{AxisLevel, FailureKind, Family, Why};
 
 /// All tables beside `summary.csv`, by file name; those without a row are left out.
 ///
@@ -157,7 +157,7 @@ fn thresholds(findings: &Findings<'_>) -> Table {
                 .map(ToString::to_string)
                 .unwrap_or_default(),
             family(curve.family.as_ref()),
-            curve.darkest.exposure_drop().0.to_string(),
+            curve.darkest.value().to_string(),
         ];
         let area = numbers(Some(curve.area));
         let row = head.into_iter().chain(threshold).chain(area);
@@ -273,9 +273,9 @@ fn flips(findings: &Findings<'_>) -> Table {
             let record = item.record;
             vec![
                 record.question.to_string(),
-                record.frame.to_string(),
-                record.family.to_string(),
-                record.repeat.to_string(),
+                record.detail.frame.to_string(),
+                record.detail.family.to_string(),
+                record.detail.repeat.to_string(),
                 fall.model.clone(),
                 fall.variant.to_string(),
                 fall.enhancer
@@ -283,7 +283,7 @@ fn flips(findings: &Findings<'_>) -> Table {
                     .map(ToString::to_string)
                     .unwrap_or_default(),
                 first
-                    .map(|level: Level| level.to_string())
+                    .map(|level: AxisLevel| level.to_string())
                     .unwrap_or_default(),
             ]
         })

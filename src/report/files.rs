@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::score::accuracy::{Cell, Summary};
 use crate::score::choice::Mode;
 use crate::types::manifest::RunManifest;
-use crate::types::{EnhancerName, Family, Level, Variant, View, Why};
+use crate::types::{AxisLevel, EnhancerName, Family, ReadingName, View, Why};
 
 /// The schema of `summary.json`.
 const SCHEMA: &str = "darkqa.summary/1";
@@ -19,8 +19,8 @@ const SCHEMA: &str = "darkqa.summary/1";
 struct Row<'a> {
     model: &'a str,
     view: Option<View>,
-    level: Option<Level>,
-    variant: Variant,
+    level: Option<AxisLevel>,
+    variant: &'static str,
     enhancer: Option<&'a EnhancerName>,
     family: &'a str,
     mode: Mode,
@@ -38,6 +38,7 @@ struct Row<'a> {
         reason = "the column may be absent, and a cell in it empty"
     )]
     always: Option<Option<f64>>,
+    reading: Option<&'a ReadingName>,
 }
 
 fn rows(summary: &Summary) -> impl Iterator<Item = Row<'_>> {
@@ -55,7 +56,7 @@ impl<'a> Row<'a> {
             model: &subject.model,
             view: subject.view,
             level: subject.level,
-            variant: subject.variant,
+            variant: subject.variant.word(),
             enhancer: subject.enhancer.as_ref(),
             family: cell.family.as_ref().map_or(Family::TOTAL, Family::name),
             mode: cell.mode,
@@ -67,12 +68,13 @@ impl<'a> Row<'a> {
             low: cell.accuracy.map(|accuracy| accuracy.low),
             high: cell.accuracy.map(|accuracy| accuracy.high),
             always: None,
+            reading: subject.variant.reading.as_ref(),
         }
     }
 }
 
 /// The summary as CSV: `model, view, level, variant, enhancer, family, mode, n, right, unparsed, failed, value, low,
-/// high`, and `always` where questions were asked more than once; a cell is empty where there is nothing to say.
+/// high`, `always` where questions were asked more than once, and `reading`; a cell is empty where there is nothing to say.
 pub fn csv(summary: &Summary) -> Result<Vec<u8>> {
     as_csv(rows(summary))
 }

@@ -5,14 +5,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::subject::light;
 use crate::score::accuracy::{Cell, Subject, Summary};
 use crate::score::choice::Mode;
-use crate::types::{EnhancerName, Level, Variant, View};
+use crate::types::{AxisLevel, EnhancerName, KindReading, View};
 
 /// A model in one variant, raw or enhanced.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Series<'a> {
     pub(super) model: &'a str,
     enhancer: Option<&'a EnhancerName>,
-    variant: Variant,
+    variant: &'a KindReading,
 }
 
 impl<'a> Series<'a> {
@@ -20,7 +20,7 @@ impl<'a> Series<'a> {
         Self {
             model: &subject.model,
             enhancer: subject.enhancer.as_ref(),
-            variant: subject.variant,
+            variant: &subject.variant,
         }
     }
 
@@ -33,9 +33,9 @@ impl<'a> Series<'a> {
 /// The accuracies of models that see, all families together, in the strict reading.
 pub(super) struct Ladder<'a> {
     /// The levels of all series.
-    pub(super) levels: BTreeSet<Level>,
+    pub(super) levels: BTreeSet<AxisLevel>,
     /// The cells of each series by level.
-    pub(super) series: BTreeMap<Series<'a>, BTreeMap<Level, &'a Cell>>,
+    pub(super) series: BTreeMap<Series<'a>, BTreeMap<AxisLevel, &'a Cell>>,
     /// The cells without a level: models without images, and chance.
     pub(super) floors: Vec<&'a Cell>,
 }

@@ -6,7 +6,8 @@ use std::fmt::Write;
 use serde::Serialize;
 
 use super::subject::light;
-use crate::types::{Condition, EnhancerName, FrameId, Level, Thumbnail, Variant};
+use crate::types::degradation::Axis;
+use crate::types::{AxisLevel, Condition, EnhancerName, FrameId, KindReading, Thumbnail};
 
 #[derive(Serialize)]
 pub(super) struct Samples {
@@ -37,32 +38,26 @@ pub(super) fn samples(thumbnails: &[Thumbnail]) -> Option<Samples> {
         .collect();
     frames.sort_unstable();
     frames.dedup();
-    let level = |thumbnail: &Thumbnail| thumbnail.condition.degradation.level();
-    let levels: BTreeSet<Level> = thumbnails.iter().map(level).collect();
-    let lines: BTreeSet<(Variant, Option<&EnhancerName>)> = thumbnails
+    let level = |thumbnail: &Thumbnail| thumbnail.condition.level();
+    let levels: BTreeSet<AxisLevel> = thumbnails.iter().map(level).collect();
+    let lines: BTreeSet<(KindReading, Option<&EnhancerName>)> = thumbnails
         .iter()
-        .map(|t| {
-            (
-                t.condition.degradation.variant(),
-                t.condition.enhancer.as_ref(),
-            )
-        })
-        .filter(|(variant, _)| *variant != Variant::None)
+        .map(|t| (t.condition.kind_reading(), t.condition.enhancer.as_ref()))
+        .filter(|(variant, _)| *variant != KindReading::NONE)
         .collect();
     let lines = if lines.is_empty() {
-        BTreeSet::from([(Variant::None, None)])
+        BTreeSet::from([(KindReading::NONE, None)])
     } else {
         lines
     };
     let mut rows = Vec::new();
     for frame in frames.into_iter().take(SAMPLES) {
         for (variant, enhancer) in &lines {
-            let of = |condition: &Condition, at: Level| {
-                let degradation = condition.degradation;
-                degradation.level() == at
-                    && (degradation.variant() == *variant
+            let of = |condition: &Condition, at: AxisLevel| {
+                condition.level() == at
+                    && (condition.kind_reading() == *variant
                         && condition.enhancer.as_ref() == *enhancer
-                        || at == Level::L0 && enhancer.is_none())
+                        || at == AxisLevel::L0 && enhancer.is_none())
             };
             let images = levels.iter().map(|at| {
                 let mut here = thumbnails
@@ -75,14 +70,17 @@ pub(super) fn samples(thumbnails: &[Thumbnail]) -> Option<Samples> {
                 })
             });
             rows.push(SampleRow {
-                name: format!("{frame}, {}", light(*variant, *enhancer)),
+                name: format!("{frame}, {}", light(variant, *enhancer)),
                 images: images.collect(),
             });
         }
     }
+    // The untouched frames stand on the axis of the others.
+    let axis = levels.iter().find_map(|level| level.axis());
+    let unit = axis.unwrap_or(Axis::LIGHT).unit;
     let named = levels
         .iter()
-        .map(|level| format!("{level}, {} EV", level.exposure_drop().0));
+        .map(|level| format!("{level}, {} {unit}", level.value()));
     (!rows.is_empty()).then(|| Samples {
         levels: named.collect(),
         rows,

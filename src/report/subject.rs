@@ -1,17 +1,16 @@
 //! What subjects and numbers are called in words: [`light`], [`family`], [`percent`] and others.
 
 use crate::score::accuracy::Subject;
-use crate::types::{EnhancerName, Family, Variant};
+use crate::types::{EnhancerName, Family, KindReading};
 
 /// A variant in words, with what mended it.
 #[must_use]
-pub fn light(variant: Variant, enhancer: Option<&EnhancerName>) -> String {
-    let variant = match variant {
-        Variant::None => "untouched",
-        Variant::Ev => "exposure drop",
-        Variant::Noise => "with noise",
-    };
-    enhancer.map_or(variant.to_owned(), |name| format!("{variant} + {name}"))
+pub fn light(variant: &KindReading, enhancer: Option<&EnhancerName>) -> String {
+    let variant = variant.title();
+    match enhancer {
+        None => variant,
+        Some(name) => format!("{variant} + {name}"),
+    }
 }
 
 /// A family in words: the paper's five by their names, others as they are.
@@ -62,7 +61,7 @@ pub fn p(value: f64) -> String {
 
 /// An interval of exposure drops in EV; one that lies beyond the darkest level as a whole is none.
 #[must_use]
-pub fn reach(low: f64, high: f64, darkest: f32) -> String {
+pub fn reach(low: f64, high: f64, darkest: f64) -> String {
     if low.is_infinite() {
         "–".to_owned()
     } else {
@@ -72,7 +71,7 @@ pub fn reach(low: f64, high: f64, darkest: f32) -> String {
 
 /// An exposure drop in EV; beyond the darkest level that was asked it is more than that.
 #[must_use]
-pub fn stops(value: f64, darkest: f32) -> String {
+pub fn stops(value: f64, darkest: f64) -> String {
     if value.is_infinite() {
         format!("> {darkest}")
     } else {

@@ -11,7 +11,7 @@ use super::subject::percent;
 use crate::score::accuracy::{Cell, Summary};
 use crate::score::choice::Mode;
 use crate::types::manifest::{Counts, RunManifest, Status};
-use crate::types::{Level, Why};
+use crate::types::{AxisLevel, Why};
 
 /// The lenient figure in brackets where it is not the strict one.
 fn differing(strict: &str, lenient: &str) -> String {
@@ -171,7 +171,7 @@ fn levels(summary: &Summary, ladder: &Ladder<'_>) -> Table {
     let mut table = plain();
     table.set_header(head);
     for (series, cells) in &ladder.series {
-        let pair = |level: &Level| Pair::of(summary, cells.get(level).copied()?);
+        let pair = |level: &AxisLevel| Pair::of(summary, cells.get(level).copied()?);
         let pairs: Vec<Option<Pair<'_>>> = ladder.levels.iter().map(pair).collect();
         table.add_row(row(series, &pairs));
         if cells.values().any(|cell| cell.always.is_some()) {

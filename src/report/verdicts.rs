@@ -52,7 +52,7 @@ fn thresholds(findings: &Findings<'_>) -> Option<Table> {
         .iter()
         .filter(|curve| curve.family.is_none())
     {
-        let darkest = curve.darkest.exposure_drop().0;
+        let darkest = curve.darkest.value();
         let (value, interval) = match curve.threshold {
             None => ("–".to_owned(), "not above chance at L0".to_owned()),
             Some(threshold) => (
@@ -63,7 +63,7 @@ fn thresholds(findings: &Findings<'_>) -> Option<Table> {
         let half = percent((curve.area.high - curve.area.low) / 2.0);
         table.add_row([
             curve.model.clone(),
-            light(curve.variant, curve.enhancer.as_ref()),
+            light(&curve.variant, curve.enhancer.as_ref()),
             value,
             interval,
             format!("{} ±{half}", percent(curve.area.value)),

@@ -5,11 +5,10 @@ use crate::error::Result;
 use crate::job::batch::replies;
 use crate::job::report::{choice, open};
 use crate::job::stored::{Asked, manifest};
-use crate::job::trial::Entry;
 use crate::job::{Outcome, count};
 use crate::store::{Moved, Store};
 use crate::types::manifest::{RunManifest, Status};
-use crate::types::{OpenRecord, Record};
+use crate::types::{ChoiceDetail, Detail, OpenDetail};
 
 /// Imports the replies of output and error files, each of them once, however often a file is given.
 ///
@@ -17,17 +16,17 @@ use crate::types::{OpenRecord, Record};
 /// If the folder holds no run or no batch, or a line is not one of such a file: those before it are kept.
 pub fn import(config: &BatchImport) -> Result<Outcome> {
     match Asked::of(&config.run)? {
-        Asked::Choice => import_into::<Record>(config, choice::write),
-        Asked::Open => import_into::<OpenRecord>(config, open::write),
+        Asked::Choice => import_into::<ChoiceDetail>(config, choice::write),
+        Asked::Open => import_into::<OpenDetail>(config, open::write),
     }
 }
 
-fn import_into<R: Entry>(
+fn import_into<D: Detail>(
     config: &BatchImport,
-    write: impl FnOnce(&Store<R>, &mut RunManifest, Show) -> Result<String>,
+    write: impl FnOnce(&Store<D>, &mut RunManifest, Show) -> Result<String>,
 ) -> Result<Outcome> {
     let mut manifest = manifest(&config.run)?;
-    let mut store = Store::<R>::open(&config.run, &manifest, Moved::Allowed)?;
+    let mut store = Store::<D>::open(&config.run, &manifest, Moved::Allowed)?;
     let imported = replies::import(&mut store, &manifest, &config.files)?;
     manifest.counts = count(manifest.counts.trials, &store.records()?);
     manifest.status = if manifest.counts.answered == manifest.counts.trials {

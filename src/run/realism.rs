@@ -78,7 +78,7 @@ pub fn realism(config: &Realism, progress: &Progress) -> Result<Outcome> {
     };
     let source = Source {
         seed: config.sensor.seed,
-        synthesis: serde_json::json!(config.sensor.synthesis),
+        synthesis: serde_json::json!(config.sensor.readings.only()?),
         unmatched: unmatched.len(),
         failed,
     };
@@ -117,13 +117,14 @@ fn compare(config: &Realism, pair: &Pair, shown: bool) -> Result<Work> {
         Some(drop) => drop,
         None => exposure_drop(&normal, &real)?,
     };
-    let exposure = expose_by(&normal, drop);
-    let synthesis = &config.sensor.synthesis;
+    let exposure = expose_by(&normal, f64::from(drop));
+    let synthesis = config.sensor.readings.only()?;
     let key = NoiseKey::new(config.sensor.seed, &FrameId(pair.name.clone()));
-    let state = synthesis.state_by(&key, drop);
+    let state = synthesis.state_by(&key, f64::from(drop));
     let take = |terms: &[Term]| {
         let (amplify, tone) = (synthesis.amplify, synthesis.tone);
-        Negative::taken(&normal, &key, state.clone(), amplify, tone, terms).develop_by(drop)
+        Negative::taken(&normal, &key, state.clone(), amplify, tone, terms)
+            .develop_by(f64::from(drop))
     };
     let (noise, clean) = (take(&Term::ALL), take(&[]));
     let residuals = [&real, &noise, &exposure].map(|image| Residuals::of(image, &exposure));
@@ -141,7 +142,7 @@ fn compare(config: &Realism, pair: &Pair, shown: bool) -> Result<Work> {
     Ok(Work {
         compared: Compared {
             pair: pair.name.clone(),
-            drop: drop.0,
+            drop,
             exposure: measured(&exposure, &of_exposure)?,
             noise: measured(&noise, &of_noise)?,
             clean_psnr: psnr(&real, &clean)?,

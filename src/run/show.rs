@@ -12,7 +12,7 @@ use crate::job::rebuild::{ImageRebuilder, RebuiltImage};
 use crate::job::stored::AnyRun;
 use crate::types::manifest::{RunManifest, Status};
 use crate::types::question::letter;
-use crate::types::{self, Condition, Digest, FrameId, Listed, OpenRecord, Record};
+use crate::types::{self, Condition, Digest, FrameId, OpenDetail, Record, RunQuestion};
 
 /// What one model made of the item.
 struct Answer {
@@ -108,7 +108,7 @@ fn read(run: AnyRun, name: &str) -> (RunManifest, Option<Item>) {
                 .filter(|record| record.question.0 == name);
             let records: Vec<&Record> = own.collect();
             let item = records.first().map(|first| Item {
-                source: first.frame.clone(),
+                source: first.detail.frame.clone(),
                 text: choice_text(first, listed(&run.questions, name)),
                 answers: records.iter().map(|record| choice_answer(record)).collect(),
             });
@@ -119,9 +119,9 @@ fn read(run: AnyRun, name: &str) -> (RunManifest, Option<Item>) {
                 .records
                 .iter()
                 .filter(|record| record.question.0 == name);
-            let records: Vec<&OpenRecord> = own.collect();
+            let records: Vec<&Record<OpenDetail>> = own.collect();
             let item = records.first().map(|first| Item {
-                source: FrameId(first.episode.clone()),
+                source: FrameId(first.detail.episode.clone()),
                 text: open_text(first, listed(&run.questions, name)),
                 answers: records.iter().map(|record| open_answer(record)).collect(),
             });
@@ -130,17 +130,17 @@ fn read(run: AnyRun, name: &str) -> (RunManifest, Option<Item>) {
     }
 }
 
-fn listed<'a>(questions: &'a [Listed], name: &str) -> Option<&'a Listed> {
+fn listed<'a>(questions: &'a [RunQuestion], name: &str) -> Option<&'a RunQuestion> {
     questions.iter().find(|question| question.id.0 == name)
 }
 
-fn choice_text(record: &Record, listed: Option<&Listed>) -> String {
-    let mut text = format!("{}, about {}\n", record.question, record.frame);
+fn choice_text(record: &Record, listed: Option<&RunQuestion>) -> String {
+    let mut text = format!("{}, about {}\n", record.question, record.detail.frame);
     if let Some(listed) = listed {
         let _ = writeln!(text, "{}", listed.text);
     }
-    for (index, choice) in record.choices.iter().enumerate() {
-        let truth = if index == record.truth {
+    for (index, choice) in record.detail.choices.iter().enumerate() {
+        let truth = if index == record.detail.truth {
             "  (true)"
         } else {
             ""
@@ -154,36 +154,36 @@ fn choice_answer(record: &Record) -> Answer {
     Answer {
         model: record.model.clone(),
         condition: record.condition.clone(),
-        outcome: match record.outcome {
+        outcome: match record.detail.outcome {
             types::Outcome::Right => "right",
             types::Outcome::Wrong => "wrong",
             types::Outcome::Unparsed => "not readable",
             types::Outcome::Failed => "failed",
         },
         reply: reply(record.reply.as_deref(), record.failure.as_ref()),
-        sent: record.image.as_ref().map(|image| image.digest),
+        sent: record.detail.image.as_ref().map(|image| image.digest),
     }
 }
 
-fn open_text(record: &OpenRecord, listed: Option<&Listed>) -> String {
-    let mut text = format!("{}, about {}\n", record.question, record.episode);
+fn open_text(record: &Record<OpenDetail>, listed: Option<&RunQuestion>) -> String {
+    let mut text = format!("{}, about {}\n", record.question, record.detail.episode);
     if let Some(listed) = listed {
         let _ = writeln!(text, "{}\n  {}  (true)", listed.text, listed.answer);
     }
     text
 }
 
-fn open_answer(record: &OpenRecord) -> Answer {
+fn open_answer(record: &Record<OpenDetail>) -> Answer {
     Answer {
         model: record.model.clone(),
         condition: record.condition.clone(),
-        outcome: match (&record.failure, &record.judged) {
+        outcome: match (&record.failure, &record.detail.judged) {
             (Some(_), _) => "failed",
             (None, Some(_)) => "marked",
             (None, None) => "answered",
         },
         reply: reply(record.reply.as_deref(), record.failure.as_ref()),
-        sent: record.images.as_ref().map(|images| images.digest),
+        sent: record.detail.images.as_ref().map(|images| images.digest),
     }
 }
 

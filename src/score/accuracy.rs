@@ -10,7 +10,7 @@ use super::estimate::Estimate;
 use super::grid::{Count, Grid, Mark};
 use super::health::Health;
 use crate::types::{
-    Condition, Degradation, EnhancerName, Family, Level, QuestionId, Record, Variant, View, Why,
+    AxisLevel, Condition, EnhancerName, Family, KindReading, QuestionId, Record, View, Why,
 };
 
 /// The name under which guessing stands among the models.
@@ -23,10 +23,10 @@ pub struct Subject {
     pub model: String,
     /// Whether it saw the images; `None` for chance.
     pub view: Option<View>,
-    /// How dark they were; `None` where none was seen.
-    pub level: Option<Level>,
-    /// The variant.
-    pub variant: Variant,
+    /// How far they were degraded; `None` where none was seen.
+    pub level: Option<AxisLevel>,
+    /// The kind of degradation, in its light reading.
+    pub variant: KindReading,
     /// What mended them; `None` for raw.
     pub enhancer: Option<EnhancerName>,
 }
@@ -35,24 +35,17 @@ impl Subject {
     /// Whom a record is of.
     #[must_use]
     pub fn of(record: &Record) -> Self {
-        Self {
-            model: record.model.clone(),
-            view: Some(record.view),
-            level: record.level,
-            variant: record.variant,
-            enhancer: record.enhancer.clone(),
-        }
+        Self::shown(&record.model, record.condition.as_ref())
     }
 
     /// Whoever answers under a name, and what was shown; `None` where nothing was.
     #[must_use]
     pub fn shown(model: &str, condition: Option<&Condition>) -> Self {
-        let degradation = condition.map(|condition| condition.degradation);
         Self {
             model: model.to_owned(),
             view: Some(condition.map_or(View::Blind, |_| View::Image)),
-            level: degradation.map(Degradation::level),
-            variant: degradation.map_or(Variant::None, Degradation::variant),
+            level: condition.map(Condition::level),
+            variant: condition.map_or(KindReading::NONE, Condition::kind_reading),
             enhancer: condition.and_then(|condition| condition.enhancer.clone()),
         }
     }
@@ -63,9 +56,9 @@ impl Subject {
         let Some(level) = self.level else {
             return "blind".to_owned();
         };
-        let variant = match self.variant {
-            Variant::None => String::new(),
-            variant => format!("-{variant}"),
+        let variant = match self.variant.kind {
+            None => String::new(),
+            Some(_) => format!("-{}", self.variant),
         };
         let enhancer = self.enhancer.as_ref().map(|name| format!("+{name}"));
         format!("{level}{variant}{}", enhancer.unwrap_or_default())
@@ -75,16 +68,20 @@ impl Subject {
     #[must_use]
     pub fn seeing(
         model: &str,
-        level: Level,
-        variant: Variant,
+        level: AxisLevel,
+        variant: &KindReading,
         enhancer: Option<&EnhancerName>,
     ) -> Self {
-        let light = level == Level::L0;
+        let light = level == AxisLevel::L0;
         Self {
             model: model.to_owned(),
             view: Some(View::Image),
             level: Some(level),
-            variant: if light { Variant::None } else { variant },
+            variant: if light {
+                KindReading::NONE
+            } else {
+                variant.clone()
+            },
             enhancer: enhancer.filter(|_| !light).cloned(),
         }
     }
@@ -237,7 +234,7 @@ fn guesses(questions: &[Offer]) -> Vec<Cell> {
                 model: CHANCE.to_owned(),
                 view: None,
                 level: None,
-                variant: Variant::None,
+                variant: KindReading::NONE,
                 enhancer: None,
             },
             family: family.cloned(),

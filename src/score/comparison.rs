@@ -7,7 +7,7 @@ use super::choice::Mode;
 use super::grid::Grid;
 use super::paired::Paired;
 use super::significance::holm;
-use crate::types::{Family, Level, Variant, View};
+use crate::types::{AxisLevel, Family, KindReading, View};
 use rayon::prelude::*;
 
 /// What is compared with what.
@@ -153,13 +153,21 @@ pub(super) fn pairs(grid: &Grid<'_>, kind: Kind) -> Vec<(usize, usize)> {
     for (index, subject) in grid.subjects.iter().enumerate() {
         let against: Vec<usize> = match kind {
             // Darkness is what raw images show; what an enhancer leaves of it is read from the curves.
-            Kind::Level if subject.variant != Variant::None && subject.enhancer.is_none() => {
-                let light = Subject::seeing(&subject.model, Level::L0, subject.variant, None);
+            Kind::Level if subject.variant.kind.is_some() && subject.enhancer.is_none() => {
+                let light =
+                    Subject::seeing(&subject.model, AxisLevel::L0, &KindReading::NONE, None);
                 grid.find(&light).into_iter().collect()
             }
-            Kind::Variant if subject.variant == Variant::Noise => {
-                one(grid, subject, |other| other.variant = Variant::Ev)
-            }
+            Kind::Variant => match subject.variant.kind.and_then(|kind| kind.base()) {
+                None => Vec::new(),
+                // The same level of the kind that it adds something to, which has no readings.
+                base => one(grid, subject, |other| {
+                    other.variant = KindReading {
+                        kind: base,
+                        reading: None,
+                    };
+                }),
+            },
             Kind::Enhancer if subject.enhancer.is_some() => {
                 one(grid, subject, |other| other.enhancer = None)
             }
@@ -183,7 +191,7 @@ fn one(grid: &Grid<'_>, subject: &Subject, change: impl FnOnce(&mut Subject)) ->
 fn later_models(grid: &Grid<'_>, index: usize) -> Vec<usize> {
     let subject = &grid.subjects[index];
     let later = grid.subjects.iter().enumerate().skip(index + 1);
-    let light = |of: &Subject| (of.view, of.level, of.variant, of.enhancer.clone());
+    let light = |of: &Subject| (of.view, of.level, of.variant.clone(), of.enhancer.clone());
     later
         .filter(|(_, other)| other.model != subject.model && light(other) == light(subject))
         .map(|(other, _)| other)

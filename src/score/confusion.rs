@@ -32,9 +32,9 @@ pub fn confusions(grid: &Grid<'_>) -> Vec<Confusion> {
         let items = grid
             .items
             .iter()
-            .filter(|item| item.record.family == *family);
+            .filter(|item| item.record.detail.family == *family);
         let labels: BTreeSet<&str> = items
-            .flat_map(|item| item.record.choices.iter().map(String::as_str))
+            .flat_map(|item| item.record.detail.choices.iter().map(String::as_str))
             .collect();
         if labels.len() > MOST_LABELS {
             continue;
@@ -62,10 +62,10 @@ fn counts(grid: &Grid<'_>, subject: usize, family: &Family, labels: &[String]) -
             continue;
         };
         let place = |index: usize| {
-            let text = item.record.choices.get(index)?;
+            let text = item.record.detail.choices.get(index)?;
             labels.binary_search(text).ok()
         };
-        if let Some(truth) = place(item.record.truth) {
+        if let Some(truth) = place(item.record.detail.truth) {
             let given = chosen.and_then(|index| place(usize::from(index)));
             counts[truth][given.unwrap_or(labels.len())] += 1;
         }
@@ -165,14 +165,14 @@ pub fn hallucinations(grid: &Grid<'_>) -> Vec<Hallucination> {
 fn rate(grid: &Grid<'_>, subject: usize, truth: &str, said: &str) -> Option<Estimate> {
     let mut clusters = BTreeMap::<u32, Count>::new();
     for (item, mark) in grid.of_family(subject, Some(&Family::Presence)) {
-        let choices = &item.record.choices;
+        let choices = &item.record.detail.choices;
         let is = |index: usize, text: &str| {
             choices
                 .get(index)
                 .is_some_and(|choice| choice.eq_ignore_ascii_case(text))
         };
         if let Some(chosen) = mark.reading(Mode::Strict)
-            && is(item.record.truth, truth)
+            && is(item.record.detail.truth, truth)
         {
             let count = clusters.entry(item.cluster).or_default();
             count.replies += 1;

@@ -5,7 +5,7 @@ use super::bootstrap::Resamples;
 use super::choice::Mode;
 use super::estimate::Estimate;
 use super::grid::{Count, Grid, Mark};
-use crate::types::{EnhancerName, Family, Level, Variant, View};
+use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
 
 /// The exposure drop at which a model's accuracy is half-way between that in the light and chance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,13 +24,13 @@ pub struct Curve {
     /// The model.
     pub model: String,
     /// The variant.
-    pub variant: Variant,
+    pub variant: KindReading,
     /// The enhancer; `None` for raw.
     pub enhancer: Option<EnhancerName>,
     /// The family; `None` for all.
     pub family: Option<Family>,
     /// The darkest level of it.
-    pub darkest: Level,
+    pub darkest: AxisLevel,
     /// The darkness threshold; `None` where the accuracy in the light is not above chance, so that there is nothing to lose.
     pub threshold: Option<Threshold>,
     /// The mean accuracy from L0 to the darkest level, by the trapezoid rule over EV; `n` is the replies.
@@ -40,20 +40,20 @@ pub struct Curve {
 /// The line of one model in one variant, raw or enhanced.
 pub(super) struct Points {
     pub(super) model: String,
-    pub(super) variant: Variant,
+    pub(super) variant: KindReading,
     pub(super) enhancer: Option<EnhancerName>,
     /// Its levels, lightest first, with the index of the subject of each; L0 is the untouched frame for all.
-    pub(super) subjects: Vec<(Level, usize)>,
+    pub(super) subjects: Vec<(AxisLevel, usize)>,
 }
 
 impl Points {
     /// The lines of a grid of which L0 and a darker level were asked.
     pub(super) fn all(grid: &Grid<'_>) -> Vec<Self> {
         let dark = grid.subjects.iter().filter(|subject| {
-            subject.view == Some(View::Image) && subject.variant != Variant::None
+            subject.view == Some(View::Image) && subject.variant != KindReading::NONE
         });
-        let mut lines: Vec<(&str, Variant, Option<&EnhancerName>)> = dark
-            .map(|subject| (&*subject.model, subject.variant, subject.enhancer.as_ref()))
+        let mut lines: Vec<(&str, &KindReading, Option<&EnhancerName>)> = dark
+            .map(|subject| (&*subject.model, &subject.variant, subject.enhancer.as_ref()))
             .collect();
         lines.sort_unstable();
         lines.dedup();
@@ -61,31 +61,31 @@ impl Points {
             let of_line = |subject: &Subject| {
                 subject.view == Some(View::Image)
                     && subject.model == model
-                    && (subject.level == Some(Level::L0) && subject.enhancer.is_none()
-                        || subject.variant == variant && subject.enhancer.as_ref() == enhancer)
+                    && (subject.level == Some(AxisLevel::L0) && subject.enhancer.is_none()
+                        || subject.variant == *variant && subject.enhancer.as_ref() == enhancer)
             };
             let subjects = grid.subjects.iter().enumerate();
             let of_line = subjects.filter(|(_, subject)| of_line(subject));
-            let mut subjects: Vec<(Level, usize)> = of_line
+            let mut subjects: Vec<(AxisLevel, usize)> = of_line
                 .filter_map(|(index, subject)| Some((subject.level?, index)))
                 .collect();
             subjects.sort_unstable();
             Self {
                 model: model.to_owned(),
-                variant,
+                variant: variant.clone(),
                 enhancer: enhancer.cloned(),
                 subjects,
             }
         });
         points
-            .filter(|points| points.subjects.len() > 1 && points.subjects[0].0 == Level::L0)
+            .filter(|points| points.subjects.len() > 1 && points.subjects[0].0 == AxisLevel::L0)
             .collect()
     }
 
-    /// The exposure drops of the levels, in EV.
+    /// The severities of the levels, in the unit of their axis; 0 at L0.
     fn drops(&self) -> Vec<f64> {
-        let drop = |(level, _): &(Level, usize)| f64::from(level.exposure_drop().0);
-        self.subjects.iter().map(drop).collect()
+        let subjects = self.subjects.iter();
+        subjects.map(|(level, _)| level.value()).collect()
     }
 }
 
@@ -154,7 +154,7 @@ fn guesses(grid: &Grid<'_>, light: usize, family: Option<&Family>) -> Vec<f32> {
     let mut guesses = vec![0.0_f32; grid.clusters];
     for (item, mark) in grid.of_family(light, family) {
         if let Mark::Read { .. } = mark {
-            guesses[item.cluster as usize] += 1.0 / item.record.choices.len() as f32;
+            guesses[item.cluster as usize] += 1.0 / item.record.detail.choices.len() as f32;
         }
     }
     guesses

@@ -51,7 +51,7 @@ impl<'a> Findings<'a> {
     ) -> Self {
         let asked = records
             .iter()
-            .map(|record| (&record.question, &record.frame));
+            .map(|record| (&record.question, &record.detail.frame));
         let clusters = Clusters::new(asked, scenes);
         let grid = Grid::new(records, &clusters);
         let draws = Resamples::new(clusters.count());

@@ -3,7 +3,7 @@
 use super::choice::Mode;
 use super::curve::Points;
 use super::grid::Grid;
-use crate::types::{EnhancerName, Level, Variant};
+use crate::types::{AxisLevel, EnhancerName, KindReading};
 
 /// One model in one variant, raw or enhanced: at which level its items fail first.
 #[derive(Debug, Clone, PartialEq)]
@@ -11,12 +11,12 @@ pub struct Fall {
     /// The model.
     pub model: String,
     /// The variant.
-    pub variant: Variant,
+    pub variant: KindReading,
     /// The enhancer; `None` for raw.
     pub enhancer: Option<EnhancerName>,
     /// By item of the grid: the first level at which it is not answered rightly; `None` where it never fails, or a level
     /// before has no reply.
-    pub first: Vec<Option<Level>>,
+    pub first: Vec<Option<AxisLevel>>,
 }
 
 /// Where items fail first, for every curve of a grid.
@@ -34,7 +34,7 @@ pub fn falls(grid: &Grid<'_>) -> Vec<Fall> {
     lines.collect()
 }
 
-fn first_failing(grid: &Grid<'_>, points: &Points, item: usize) -> Option<Level> {
+fn first_failing(grid: &Grid<'_>, points: &Points, item: usize) -> Option<AxisLevel> {
     for &(level, subject) in &points.subjects {
         let chosen = grid.mark(subject, item).reading(Mode::Strict)?;
         if !grid.items[item].is_right(chosen) {

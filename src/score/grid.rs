@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use super::accuracy::Subject;
 use super::choice::Mode;
 use super::cluster::Clusters;
-use crate::types::{Family, Outcome, QuestionId, Reading, Record};
+use crate::types::{AnswerReading, Family, Outcome, QuestionId, Record};
 
 /// What came of one item for one subject.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,13 +48,13 @@ impl Item<'_> {
     /// Whether a reading is the true choice.
     #[must_use]
     pub fn is_right(&self, chosen: Option<u8>) -> bool {
-        chosen.map(usize::from) == Some(self.record.truth)
+        chosen.map(usize::from) == Some(self.record.detail.truth)
     }
 
     /// Whether it is of a family; of `None` all are.
     #[must_use]
     pub fn is_of(&self, family: Option<&Family>) -> bool {
-        family.is_none_or(|family| self.record.family == *family)
+        family.is_none_or(|family| self.record.detail.family == *family)
     }
 }
 
@@ -91,7 +91,7 @@ impl<'a> Grid<'a> {
         let mut numbers = HashMap::<(&QuestionId, &[String], u32), usize>::new();
         let mut items: Vec<Item<'a>> = Vec::new();
         for record in records {
-            let Some(cluster) = clusters.of(&record.frame, &record.question) else {
+            let Some(cluster) = clusters.of(&record.detail.frame, &record.question) else {
                 continue;
             };
             subjects.entry(Subject::of(record)).or_default();
@@ -177,8 +177,11 @@ impl<'a> Grid<'a> {
     /// The families asked about, in order.
     #[must_use]
     pub fn families(&self) -> Vec<&'a Family> {
-        let families: BTreeSet<&Family> =
-            self.items.iter().map(|item| &item.record.family).collect();
+        let families: BTreeSet<&Family> = self
+            .items
+            .iter()
+            .map(|item| &item.record.detail.family)
+            .collect();
         families.into_iter().collect()
     }
 
@@ -191,29 +194,33 @@ impl<'a> Grid<'a> {
 }
 
 fn key(record: &Record) -> (&QuestionId, &[String], u32) {
-    (&record.question, &record.choices, record.repeat)
+    (
+        &record.question,
+        &record.detail.choices,
+        record.detail.repeat,
+    )
 }
 
 /// What items are ordered by.
 fn place(record: &Record) -> impl Ord + '_ {
     (
-        &record.frame,
+        &record.detail.frame,
         &record.question,
-        record.repeat,
-        &record.choices,
+        record.detail.repeat,
+        &record.detail.choices,
     )
 }
 
 fn mark(record: &Record) -> Mark {
-    let chosen = |reading: Reading| {
+    let chosen = |reading: AnswerReading| {
         let index = reading.chosen?;
         Some(index.min(usize::from(u8::MAX)) as u8)
     };
-    match (record.outcome, record.strict) {
+    match (record.detail.outcome, record.detail.strict) {
         (Outcome::Failed, _) | (_, None) => Mark::Failed,
         (_, Some(strict)) => Mark::Read {
             strict: chosen(strict),
-            lenient: record.lenient.and_then(chosen),
+            lenient: record.detail.lenient.and_then(chosen),
         },
     }
 }

@@ -36,7 +36,7 @@ impl Health {
         self.read += usize::from(strict.is_some());
         let lenient = mark.reading(Mode::Lenient).flatten();
         self.lenient_only += usize::from(strict.is_none() && lenient.is_some());
-        if let Some(why) = record.strict.and_then(|reading| reading.why) {
+        if let Some(why) = record.detail.strict.and_then(|reading| reading.why) {
             *self.unread.entry(why).or_default() += 1;
         }
     }

@@ -30,5 +30,6 @@ pub mod llm_match;
 pub mod open;
 pub mod paired;
 pub mod realism;
+mod record;
 pub mod significance;
 mod student;

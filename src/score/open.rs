@@ -9,7 +9,7 @@ use super::accuracy::Subject;
 use super::estimate::Estimate;
 use super::llm_match::points;
 use super::paired::difference;
-use crate::types::{Level, View};
+use crate::types::{AxisLevel, View};
 
 /// How many independent right-or-wrong replies a mark may count for: one on a scale of five steps varies less than such a reply
 /// of the same mean, at least where it is not all or nothing.
@@ -263,8 +263,8 @@ fn others(subject: &Subject) -> Vec<(Against, Subject)> {
         return Vec::new();
     };
     let seeing =
-        |level, enhancer| Subject::seeing(&subject.model, level, subject.variant, enhancer);
-    let lit = (level != Level::L0).then(|| (Against::Lit, seeing(Level::L0, None)));
+        |level, enhancer| Subject::seeing(&subject.model, level, &subject.variant, enhancer);
+    let lit = (level != AxisLevel::L0).then(|| (Against::Lit, seeing(AxisLevel::L0, None)));
     let raw = subject
         .enhancer
         .is_some()

@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::error::{Error, Result};
-use crate::types::{Kept, Listed, Thumbnail};
+use crate::types::{Detail, Record, RunQuestion, Thumbnail};
 
 /// Appends lines to a file that is made where it does not exist.
 pub(super) fn append<T: Serialize>(path: &Path, values: &[T]) -> Result<File> {
@@ -70,11 +70,11 @@ pub(super) trait Line: DeserializeOwned {
     const WHAT: &str;
 }
 
-impl<R: Kept> Line for R {
+impl<D: Detail> Line for Record<D> {
     const WHAT: &str = "a record";
 }
 
-impl Line for Listed {
+impl Line for RunQuestion {
     const WHAT: &str = "a question";
 }
 

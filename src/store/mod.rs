@@ -16,7 +16,9 @@ use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
 use crate::types::manifest::{ColumnDifference, RunManifest, differences};
-use crate::types::{Kept, Listed, QuestionId, Record, Thumbnail, TrialKey, Via};
+use crate::types::{
+    ChoiceDetail, Detail, QuestionId, Record, RunQuestion, Thumbnail, TrialKey, Via,
+};
 
 use lines::{append, json_lines, lines, mend};
 
@@ -50,14 +52,14 @@ const ADDRESS: &str = "--base-url";
 
 /// An open run folder, held by this process alone.
 #[derive(Debug)]
-pub struct Store<R = Record> {
+pub struct Store<D = ChoiceDetail> {
     folder: PathBuf,
     records: File,
     synced: Instant,
-    kind: PhantomData<R>,
+    kind: PhantomData<D>,
 }
 
-impl<R: Kept> Store<R> {
+impl<D: Detail> Store<D> {
     /// Opens a run folder, which is made where it does not exist.
     ///
     /// A last line that was cut off while it was written is taken away, so that the next one begins a line.
@@ -66,7 +68,7 @@ impl<R: Kept> Store<R> {
     /// Where the folder holds something else, another run (the message names the flag that differs), a broken record, or
     /// is held by another process.
     pub fn open(folder: &Path, manifest: &RunManifest, moved: Moved) -> Result<Self> {
-        match read_manifest(folder, R::SCHEMA)? {
+        match read_manifest(folder, D::SCHEMA)? {
             Some(kept) => agree(folder, &kept, manifest, moved)?,
             None => claim(folder, manifest)?,
         }
@@ -96,12 +98,12 @@ impl<R: Kept> Store<R> {
     }
 
     /// What the run holds: the last record of each trial, in the order of their first.
-    pub fn records(&self) -> Result<Vec<R>> {
+    pub fn records(&self) -> Result<Vec<Record<D>>> {
         read_records(&self.folder)
     }
 
     /// Takes note that these trials are out in a batch.
-    pub fn append_to_batch(&mut self, records: &[R]) -> Result<()> {
+    pub fn append_to_batch(&mut self, records: &[Record<D>]) -> Result<()> {
         let path = self.folder.join(BATCH).join(TRIALS);
         append(&path, records)?
             .sync_all()
@@ -121,9 +123,9 @@ impl<R: Kept> Store<R> {
     ///
     /// # Errors
     /// If one that it had is another by now: other words, choices, answer or image.
-    pub fn add_questions(&self, questions: Vec<Listed>) -> Result<()> {
+    pub fn add_questions(&self, questions: Vec<RunQuestion>) -> Result<()> {
         let kept = read_questions(&self.folder)?;
-        let places: HashMap<&QuestionId, &Listed> = questions
+        let places: HashMap<&QuestionId, &RunQuestion> = questions
             .iter()
             .map(|question| (&question.id, question))
             .collect();
@@ -149,7 +151,7 @@ impl<R: Kept> Store<R> {
     }
 
     /// Keeps the questions of the run.
-    pub fn write_questions(&self, questions: &[Listed]) -> Result<()> {
+    pub fn write_questions(&self, questions: &[RunQuestion]) -> Result<()> {
         self.write(
             QUESTIONS,
             &json_lines(&self.folder.join(QUESTIONS), questions)?,
@@ -157,7 +159,7 @@ impl<R: Kept> Store<R> {
     }
 
     /// The trials that were sent in batches, as they were before anything came of them, each as often as it was sent.
-    pub fn batched(&self) -> Result<Vec<R>> {
+    pub fn batched(&self) -> Result<Vec<Record<D>>> {
         lines(&self.folder.join(BATCH).join(TRIALS))
     }
 
@@ -165,13 +167,13 @@ impl<R: Kept> Store<R> {
     pub fn out_in_batches(&self) -> Result<BTreeSet<TrialKey>> {
         let mut out = HashMap::<TrialKey, usize>::new();
         for record in self.batched()? {
-            *out.entry(record.key()).or_default() += 1;
+            *out.entry(record.key).or_default() += 1;
         }
-        for record in lines::<R>(&self.folder.join(RECORDS))? {
+        for record in lines::<Record<D>>(&self.folder.join(RECORDS))? {
             if !record.failed() {
-                out.remove(&record.key());
-            } else if record.via() == Via::Batch
-                && let Some(times) = out.get_mut(&record.key())
+                out.remove(&record.key);
+            } else if record.via == Via::Batch
+                && let Some(times) = out.get_mut(&record.key)
             {
                 *times = times.saturating_sub(1);
             }
@@ -187,7 +189,7 @@ impl<R: Kept> Store<R> {
     }
 
     /// Appends one record: once this returns, killing the process cannot lose it.
-    pub fn append(&mut self, record: &R) -> Result<()> {
+    pub fn append(&mut self, record: &Record<D>) -> Result<()> {
         let path = || self.folder.join(RECORDS);
         let mut line =
             serde_json::to_vec(record).map_err(|e| Error::file(path(), "write", e.into()))?;
@@ -249,14 +251,14 @@ fn write_manifest(folder: &Path, manifest: &RunManifest) -> Result<()> {
 
 /// What a run folder holds: the last record of each trial, in the order of their first; a last line that was cut off while it
 /// was written is passed over.
-pub fn read_records<R: Kept>(folder: &Path) -> Result<Vec<R>> {
+pub fn read_records<D: Detail>(folder: &Path) -> Result<Vec<Record<D>>> {
     let mut latest = HashMap::<TrialKey, usize>::new();
-    let mut records: Vec<R> = Vec::new();
-    for record in lines::<R>(&folder.join(RECORDS))? {
-        if let Some(&index) = latest.get(&record.key()) {
+    let mut records: Vec<Record<D>> = Vec::new();
+    for record in lines::<Record<D>>(&folder.join(RECORDS))? {
+        if let Some(&index) = latest.get(&record.key) {
             records[index] = record;
         } else {
-            latest.insert(record.key(), records.len());
+            latest.insert(record.key, records.len());
             records.push(record);
         }
     }
@@ -264,7 +266,7 @@ pub fn read_records<R: Kept>(folder: &Path) -> Result<Vec<R>> {
 }
 
 /// The questions of a run; none where it was made by a version that kept none.
-pub fn read_questions(folder: &Path) -> Result<Vec<Listed>> {
+pub fn read_questions(folder: &Path) -> Result<Vec<RunQuestion>> {
     lines(&folder.join(QUESTIONS))
 }
 
@@ -307,13 +309,34 @@ pub fn read_manifest(folder: &Path, schema: &str) -> Result<Option<RunManifest>>
     if manifest.schema == schema {
         return Ok(Some(manifest));
     }
-    let problem = format!(
-        "the run has the schema {:?}, {schema:?} is expected here; use another folder",
-        manifest.schema
-    );
+    let problem = refusal(&manifest.schema, schema, &manifest.version);
     let path = folder.join(MANIFEST);
     Err(Error::Run { path, problem })
 }
+
+/// Why a run of one schema is not taken where another is expected.
+fn refusal(found: &str, expected: &str, version: &str) -> String {
+    let parts = |schema: &str| -> Option<(String, u32)> {
+        let (name, number) = schema.rsplit_once('/')?;
+        Some((name.to_owned(), number.parse().ok()?))
+    };
+    // The number is that of the program's version: it rises for runs of all kinds at once.
+    let newest = parts(expected).map_or(0, |(_, number)| number);
+    match parts(found) {
+        Some((name, number)) if KINDS.contains(&&*name) && number < newest => format!(
+            "this run was made by an earlier version of darkqa-eval ({version}, schema {found:?}); run it again with this one"
+        ),
+        Some((name, number)) if KINDS.contains(&&*name) && number == newest => format!(
+            "the run has the schema {found:?}, {expected:?} is expected here; use another folder"
+        ),
+        _ => format!(
+            "the schema {found:?} is not known to this version of darkqa-eval; the run was made by version {version}: read it with that"
+        ),
+    }
+}
+
+/// The kinds of runs, by the names of their schemas.
+const KINDS: [&str; 2] = ["darkqa.run", "darkqa.openeqa"];
 
 fn any_manifest(folder: &Path) -> Result<Option<RunManifest>> {
     let path = folder.join(MANIFEST);
@@ -402,13 +425,13 @@ mod tests {
     use std::collections::BTreeMap;
 
     use crate::types::manifest::{Counts, Status};
-    use crate::types::{Digest, Family, FrameId, Outcome, QuestionId, Variant, View};
+    use crate::types::{Digest, Family, FrameId, Outcome, QuestionId};
 
-    type Store = super::Store<Record>;
+    type Store = super::Store;
 
     fn manifest(seed: u64) -> RunManifest {
         RunManifest {
-            schema: Record::SCHEMA.into(),
+            schema: ChoiceDetail::SCHEMA.into(),
             status: Status::Started,
             version: "0".into(),
             created: String::new(),
@@ -424,33 +447,45 @@ mod tests {
     }
 
     fn record(name: &str, outcome: Outcome) -> Record {
-        Record {
-            key: Digest::of(name.as_bytes()).into(),
-            question: QuestionId(name.into()),
+        let detail = ChoiceDetail {
             frame: FrameId("f".into()),
             family: Family::Color,
-            model: "m".into(),
-            view: View::Blind,
-            condition: None,
-            level: None,
-            variant: Variant::None,
-            enhancer: None,
             choices: vec!["a".into(), "b".into()],
             truth: 0,
-            reply: Some("A\u{2028}\n".into()),
-            refusal: None,
-            finish: None,
+            repeat: 0,
             strict: None,
             lenient: None,
-            repeat: 0,
-            via: Via::Direct,
             outcome,
-            failure: None,
-            usage: None,
-            served_model: None,
-            latency_ms: None,
-            attempts: 1,
             image: None,
+        };
+        let key = Digest::of(name.as_bytes()).into();
+        Record {
+            reply: Some("A\u{2028}\n".into()),
+            attempts: 1,
+            ..Record::blank(key, QuestionId(name.into()), "m", None, detail)
+        }
+    }
+
+    #[test]
+    fn runs_of_other_versions_are_refused_by_what_they_are() {
+        let base = tempfile::tempdir().unwrap();
+        for (schema, says) in [
+            (
+                "darkqa.run/1",
+                "made by an earlier version of darkqa-eval (0",
+            ),
+            ("darkqa.openeqa/1", "run it again"),
+            ("darkqa.openeqa/2", "\"darkqa.run/2\" is expected here"),
+            ("darkqa.run/9", "is not known to this version"),
+            ("something", "is not known to this version"),
+        ] {
+            let manifest = RunManifest {
+                schema: schema.into(),
+                ..manifest(0)
+            };
+            write_manifest(base.path(), &manifest).unwrap();
+            let error = read_manifest(base.path(), ChoiceDetail::SCHEMA).unwrap_err();
+            assert!(error.to_string().contains(says), "{error}");
         }
     }
 

@@ -29,14 +29,14 @@ pub fn inverse_smoothstep(display: f64) -> f64 {
 
 /// The factor 2^−ΔEV by which light falls (DarkQA, eq. 2).
 #[must_use]
-pub fn light_left(drop: crate::types::Stops) -> f64 {
-    libm::exp2(-f64::from(drop.0))
+pub fn light_left(drop_ev: f64) -> f64 {
+    libm::exp2(-drop_ev)
 }
 
 /// The factor 2^(−ΔEV/2.2) by which display values fall: the exposure drop behind the gamma (DarkQA, eqs. 2 and 3).
 #[must_use]
-pub fn display_left(drop: crate::types::Stops) -> f64 {
-    libm::exp2(-f64::from(drop.0) / GAMMA)
+pub fn display_left(drop_ev: f64) -> f64 {
+    libm::exp2(-drop_ev / GAMMA)
 }
 
 /// The tone curve 3x² − 2x³, for values in [0, 1].

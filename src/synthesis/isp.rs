@@ -11,8 +11,7 @@ use super::camera::CameraState;
 use super::curve;
 use super::lanes::{Isa, Kernel, LANES, Lanes};
 use super::piecewise::Piecewise;
-use super::profile::Tone;
-use crate::types::Stops;
+use super::reading::Tone;
 
 /// Gamma compression of light from 2⁻³¹ up; below 10⁻⁸ it is that of 10⁻⁸.
 static GAMMA: LazyLock<Piecewise> = LazyLock::new(|| Piecewise::new(-31, curve::gamma_compress));
@@ -74,10 +73,10 @@ impl Developer {
     }
 
     /// The 8-bit codes of display values after an exposure drop.
-    pub(super) fn encode(&self, display: &[f32], drop: Stops, codes: &mut [u8]) {
+    pub(super) fn encode(&self, display: &[f32], drop_ev: f64, codes: &mut [u8]) {
         self.isa.run(Encode {
             display,
-            left: curve::display_left(drop) as f32,
+            left: curve::display_left(drop_ev) as f32,
             tone: self.tone,
             codes,
         });
@@ -205,7 +204,7 @@ impl Kernel for Encode<'_> {
 mod tests {
     use super::super::camera::tests::median;
     use super::*;
-    use crate::types::DarkLevel;
+    use crate::types::Severity;
 
     fn developer(tone: Tone) -> Developer {
         Developer::new(&median(), tone, Isa::best())
@@ -214,12 +213,12 @@ mod tests {
     /// Against the paper's own order of operations, but where light lies on the very edge between two codes.
     #[test]
     fn codes_are_the_papers_formula() {
-        for level in DarkLevel::ALL {
-            let left = curve::light_left(level.exposure_drop());
+        for level in Severity::LADDER {
+            let left = curve::light_left(level.value());
             let light: Vec<f32> = (0..=300_000).map(|step| step as f32 / 300_000.0).collect();
             let display: Vec<f32> = light.iter().map(|x| GAMMA.at(x.max(DARKEST))).collect();
             let mut codes = vec![0; light.len()];
-            developer(Tone::None).encode(&display, level.exposure_drop(), &mut codes);
+            developer(Tone::None).encode(&display, level.value(), &mut codes);
             for (light, code) in light.iter().zip(codes) {
                 let due = curve::gamma_compress(left * f64::from(*light));
                 let edge = (due * 255.0 + 0.5).fract();
@@ -232,15 +231,15 @@ mod tests {
 
     #[test]
     fn codes_have_their_ends() {
-        let ends = DarkLevel::ALL.map(|level| {
+        let ends = Severity::LADDER.map(|level| {
             let mut codes = [7; 2];
             let display = [GAMMA.at(DARKEST), GAMMA.at(1.0)];
-            developer(Tone::None).encode(&display, level.exposure_drop(), &mut codes);
+            developer(Tone::None).encode(&display, level.value(), &mut codes);
             codes
         });
         assert_eq!(ends, [[0, 136], [0, 72], [0, 39], [0, 24], [0, 15]]);
         let mut codes = [0; 2];
-        developer(Tone::None).encode(&[0.9, 1.0], Stops(-3.0), &mut codes);
+        developer(Tone::None).encode(&[0.9, 1.0], -3.0, &mut codes);
         assert_eq!(codes, [255, 255]);
     }
 

@@ -26,24 +26,24 @@ pub mod camera;
 pub mod colour;
 pub mod curve;
 pub mod exposure;
-mod film;
+mod exposures;
 mod isp;
 pub mod lanes;
 pub mod negative;
 pub mod noise;
 pub mod piecewise;
 pub mod poisson;
-pub mod profile;
 pub mod quantile;
 pub mod random;
+mod reading;
 pub mod unprocess;
 
 pub use camera::{Calibration, CameraModel, CameraState, Sampling};
 pub use exposure::{expose, expose_by};
-pub use film::Film;
+pub use exposures::{Exposures, is_random, version};
 pub use negative::{Negative, ladder};
-pub use profile::{Amplify, Coupling, Draws, Profile, Synthesis, Tone};
 pub use random::NoiseKey;
+pub use reading::{Amplify, Coupling, Draws, LightReading, Readings, Synthesis, Tone};
 
 use crate::types::{Degradation, Rgb};
 
@@ -53,10 +53,16 @@ pub const VERSION: u32 = 2;
 
 /// The frame under a degradation.
 ///
-/// For several levels of one frame with noise, a [`Film`] gives the same images for less work.
+/// `synthesis` is the content of the degradation's light reading. For several degradations of one frame, [`Exposures`] gives
+/// the same images for less work.
 #[must_use]
-pub fn degrade(clean: &Rgb, how: Degradation, key: &NoiseKey, synthesis: &Synthesis) -> Rgb {
-    Film::default().degrade(clean, how, key, synthesis)
+pub fn degrade(
+    clean: &Rgb,
+    how: Option<&Degradation>,
+    key: &NoiseKey,
+    synthesis: &Synthesis,
+) -> Rgb {
+    Exposures::default().degrade(clean, how, key, synthesis)
 }
 
 #[cfg(test)]

@@ -7,10 +7,10 @@ use super::camera::CameraState;
 use super::isp::Developer;
 use super::lanes::Isa;
 use super::noise::{Noise, Term};
-use super::profile::{Amplify, Coupling, Draws, Synthesis, Tone};
 use super::random::NoiseKey;
+use super::reading::{Amplify, Coupling, Draws, Synthesis, Tone};
 use super::unprocess::Unprocess;
-use crate::types::{DarkLevel, Rgb, Stops};
+use crate::types::{Rgb, Severity};
 
 /// Rows of a band: it and its neighbours' edges stay in a core's cache from RAW to code.
 const BAND: usize = 32;
@@ -24,7 +24,7 @@ pub struct Negative {
     developer: Developer,
     balanced: Bayer,
     /// The one level that it serves; `None` for all.
-    only: Option<DarkLevel>,
+    only: Option<Severity>,
     /// Height and width of the frame.
     size: [usize; 2],
 }
@@ -32,10 +32,10 @@ pub struct Negative {
 impl Negative {
     /// Takes `clean` for a level, with camera and noise drawn from the key.
     #[must_use]
-    pub fn new(clean: &Rgb, key: &NoiseKey, synthesis: &Synthesis, level: DarkLevel) -> Self {
-        let shot = Shot::new(key, synthesis, level, Isa::best());
+    pub fn new(clean: &Rgb, key: &NoiseKey, synthesis: &Synthesis, severity: Severity) -> Self {
+        let shot = Shot::new(key, synthesis, severity, Isa::best());
         Self {
-            only: (!synthesis.shares_negative()).then_some(level),
+            only: (!synthesis.shares_negative()).then_some(severity),
             ..Self::of(clean, shot)
         }
     }
@@ -70,8 +70,8 @@ impl Negative {
 
     /// Whether it is the negative of a level.
     #[must_use]
-    pub fn serves(&self, level: DarkLevel) -> bool {
-        self.only.is_none_or(|only| only == level)
+    pub fn serves(&self, severity: Severity) -> bool {
+        self.only.is_none_or(|only| only == severity)
     }
 
     /// The camera that took it.
@@ -82,13 +82,13 @@ impl Negative {
 
     /// The sRGB image at a level.
     #[must_use]
-    pub fn develop(&self, level: DarkLevel) -> Rgb {
-        self.develop_by(level.exposure_drop())
+    pub fn develop(&self, severity: Severity) -> Rgb {
+        self.develop_by(severity.value())
     }
 
     /// The sRGB image after any exposure drop.
     #[must_use]
-    pub fn develop_by(&self, drop: Stops) -> Rgb {
+    pub fn develop_by(&self, drop_ev: f64) -> Rgb {
         let [height, width] = self.size;
         let mut dark = Rgb::black(height, width);
         let rows = dark.samples_mut().par_chunks_mut(3 * width).enumerate();
@@ -96,7 +96,7 @@ impl Negative {
             || vec![0.0; 3 * width],
             |display, (row, codes)| {
                 self.developer.display(&self.balanced, row, display);
-                self.developer.encode(display, drop, codes);
+                self.developer.encode(display, drop_ev, codes);
             },
         );
         dark
@@ -113,7 +113,7 @@ pub fn ladder(
     clean: &Rgb,
     key: &NoiseKey,
     synthesis: &Synthesis,
-    levels: &[DarkLevel],
+    levels: &[Severity],
     dark: &mut [Rgb],
 ) {
     let isa = Isa::best();
@@ -138,11 +138,11 @@ struct Shot {
 }
 
 impl Shot {
-    fn new(key: &NoiseKey, synthesis: &Synthesis, level: DarkLevel, isa: Isa) -> Self {
-        let state = synthesis.state(key, level);
+    fn new(key: &NoiseKey, synthesis: &Synthesis, severity: Severity, isa: Isa) -> Self {
+        let state = synthesis.state(key, severity);
         let key = match synthesis.draws {
             Draws::Shared => *key,
-            Draws::Fresh => key.at(level),
+            Draws::Fresh => key.at(severity),
         };
         let Synthesis { amplify, tone, .. } = *synthesis;
         Self::with(&key, state, amplify, tone, &Term::ALL, isa)
@@ -173,7 +173,7 @@ impl Shot {
     }
 
     /// Develops the levels band by band.
-    fn develop(&self, clean: &Rgb, levels: &[DarkLevel], dark: &mut [Rgb]) {
+    fn develop(&self, clean: &Rgb, levels: &[Severity], dark: &mut [Rgb]) {
         let (height, width) = (clean.height(), clean.width());
         let mut bands: Vec<Vec<&mut [u8]>> = Vec::new();
         bands.resize_with(height.div_ceil(BAND), Vec::new);
@@ -203,7 +203,7 @@ impl Shot {
                     self.developer.display(raw, lead + row, display);
                     for (level, part) in levels.iter().zip(&mut parts) {
                         let codes = &mut part[row * 3 * width..][..3 * width];
-                        self.developer.encode(display, level.exposure_drop(), codes);
+                        self.developer.encode(display, level.value(), codes);
                     }
                 }
             },
@@ -214,18 +214,18 @@ impl Shot {
 impl Synthesis {
     /// The camera of the frame that `key` belongs to, as it is at a level.
     #[must_use]
-    pub fn state(&self, key: &NoiseKey, level: DarkLevel) -> CameraState {
-        self.state_by(key, level.exposure_drop())
+    pub fn state(&self, key: &NoiseKey, severity: Severity) -> CameraState {
+        self.state_by(key, severity.value())
     }
 
     /// The same as it is after any exposure drop; light that is not lost is no reason to amplify.
     #[must_use]
-    pub fn state_by(&self, key: &NoiseKey, drop: Stops) -> CameraState {
+    pub fn state_by(&self, key: &NoiseKey, drop_ev: f64) -> CameraState {
         let drawn = CameraState::draw(key, &self.camera);
         match self.coupling {
             Coupling::Independent => drawn,
             Coupling::Photon => CameraState {
-                ratio: libm::exp2(f64::from(drop.0).max(0.0)),
+                ratio: libm::exp2(drop_ev.max(0.0)),
                 ..drawn
             },
         }
@@ -270,8 +270,8 @@ mod tests {
             for (amplify, tone) in choices {
                 let develop = |isa: &Isa| {
                     let shot = Shot::with(&key, state.clone(), amplify, tone, &Term::ALL, *isa);
-                    let mut dark = DarkLevel::ALL.map(|_| Rgb::black(40, 150));
-                    shot.develop(&clean, &DarkLevel::ALL, &mut dark);
+                    let mut dark = Severity::LADDER.map(|_| Rgb::black(40, 150));
+                    shot.develop(&clean, &Severity::LADDER, &mut dark);
                     dark
                 };
                 let baseline = develop(&Isa::Baseline);

@@ -13,9 +13,9 @@ use super::bayer::{Bayer, Line, Plane};
 use super::camera::CameraState;
 use super::lanes::{Isa, Kernel, LANES, Lanes};
 use super::poisson;
-use super::profile::Amplify;
 use super::quantile::Quantile;
 use super::random::{Component, NoiseKey, Site, Stream};
+use super::reading::Amplify;
 
 /// One term of the noise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

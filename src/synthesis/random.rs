@@ -7,7 +7,8 @@
 use std::f64::consts::PI;
 
 use super::lanes::{LANES, Lanes};
-use crate::types::{DarkLevel, Digest, FrameId};
+use crate::types::degradation::Kind;
+use crate::types::{Digest, FrameId, Severity};
 
 /// What a frame's noise is drawn from: the run's seed and the frame's name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,10 +44,10 @@ impl NoiseKey {
         }
     }
 
-    /// The key of the same frame at one level, for noise of its own.
+    /// The key of the same frame at one severity, for noise of its own. What enters is the label: `L3`, or `E3.3`.
     #[must_use]
-    pub fn at(&self, level: DarkLevel) -> Self {
-        let level = level.level().to_string();
+    pub fn at(&self, severity: Severity) -> Self {
+        let level = Kind::Sensor.label(severity);
         let at = |digest: &Digest| Digest::of_parts([digest.as_bytes(), level.as_bytes()]);
         Self {
             noise: at(&self.noise),

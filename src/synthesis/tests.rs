@@ -3,10 +3,19 @@
 use super::camera::tests::median;
 use super::noise::Term;
 use super::*;
-use crate::types::{DarkLevel, Digest, FrameId, Stops};
+use crate::types::degradation::Kind;
+use crate::types::{Digest, FrameId, Severity};
 
 fn key(seed: u64, frame: &str) -> NoiseKey {
     NoiseKey::new(seed, &FrameId(frame.to_owned()))
+}
+
+fn sensor(severity: Severity) -> Degradation {
+    Degradation::new(Kind::Sensor, severity, None).unwrap()
+}
+
+fn exposure_of(severity: Severity) -> Degradation {
+    Degradation::new(Kind::Exposure, severity, None).unwrap()
 }
 
 fn flat(code: u8, size: usize) -> Rgb {
@@ -41,23 +50,18 @@ fn statistics(image: &Rgb) -> [[f64; 2]; 3] {
 #[test]
 fn the_untouched_level_is_untouched() {
     let clean = ramps(5, 7);
-    let same = degrade(
-        &clean,
-        Degradation::None,
-        &key(1, "a"),
-        &Synthesis::default(),
-    );
+    let same = degrade(&clean, None, &key(1, "a"), &Synthesis::default());
     assert_eq!(same, clean);
 }
 
 #[test]
 fn one_negative_gives_what_the_door_gives() {
     let (clean, key, paper) = (ramps(10, 14), key(1, "a"), Synthesis::default());
-    let negative = Negative::new(&clean, &key, &paper, DarkLevel::L1);
-    for level in DarkLevel::ALL {
-        let alone = degrade(&clean, Degradation::Sensor(level), &key, &paper);
+    let negative = Negative::new(&clean, &key, &paper, Severity::L1);
+    for level in Severity::LADDER {
+        let alone = degrade(&clean, Some(&sensor(level)), &key, &paper);
         assert_eq!(alone, negative.develop(level));
-        let exposed = degrade(&clean, Degradation::Exposure(level), &key, &paper);
+        let exposed = degrade(&clean, Some(&exposure_of(level)), &key, &paper);
         assert_eq!(exposed, expose(&clean, level));
     }
 }
@@ -67,19 +71,14 @@ fn one_negative_gives_what_the_door_gives() {
 fn bytes_are_those_of_this_version() {
     let clean = ramps(48, 63);
     let mut bytes = Vec::new();
-    for level in DarkLevel::ALL {
+    for level in Severity::LADDER {
         bytes.extend_from_slice(expose(&clean, level).samples());
     }
     let exposure = Digest::of(&bytes).to_string();
     bytes.clear();
     for frame in ["first", "second", "third", "fourth"] {
-        let negative = Negative::new(
-            &clean,
-            &key(20, frame),
-            &Synthesis::default(),
-            DarkLevel::L1,
-        );
-        for level in DarkLevel::ALL {
+        let negative = Negative::new(&clean, &key(20, frame), &Synthesis::default(), Severity::L1);
+        for level in Severity::LADDER {
             bytes.extend_from_slice(negative.develop(level).samples());
         }
     }
@@ -101,22 +100,22 @@ fn bytes_of_every_choice_are_those_of_this_version() {
     let clean = ramps(37, 130);
     let camera = || CameraModel::preset("nikon-d850").unwrap();
     let choices = [
-        Synthesis::of(Profile::Physical, CameraModel::default()),
-        Synthesis::of(Profile::Physical, camera()),
+        Synthesis::of(LightReading::Physical, CameraModel::default()),
+        Synthesis::of(LightReading::Physical, camera()),
         Synthesis {
             draws: Draws::Fresh,
             tone: Tone::AfterEv,
-            ..Synthesis::of(Profile::Paper, camera())
+            ..Synthesis::of(LightReading::Paper, camera())
         },
     ];
     let mut bytes = Vec::new();
     for synthesis in &choices {
-        let mut dark = DarkLevel::ALL.map(|_| Rgb::black(37, 130));
+        let mut dark = Severity::LADDER.map(|_| Rgb::black(37, 130));
         ladder(
             &clean,
             &key(20, "frame"),
             synthesis,
-            &DarkLevel::ALL,
+            &Severity::LADDER,
             &mut dark,
         );
         for image in &dark {
@@ -137,9 +136,9 @@ fn threads_do_not_enter() {
                 &ramps(61, 40),
                 &key(3, "a"),
                 &Synthesis::default(),
-                DarkLevel::L1,
+                Severity::L1,
             );
-            DarkLevel::ALL.map(|level| negative.develop(level))
+            Severity::LADDER.map(|level| negative.develop(level))
         })
     };
     let one = develop(1);
@@ -160,7 +159,7 @@ fn seed_and_frame_enter() {
             Tone::None,
             &Term::ALL,
         );
-        negative.develop(DarkLevel::L1)
+        negative.develop(Severity::L1)
     };
     let first = take(1, "a");
     for other in [take(2, "a"), take(1, "b")] {
@@ -183,8 +182,8 @@ fn every_size_is_kept() {
         (5, 4),
     ] {
         let clean = ramps(height, width);
-        let how = Degradation::Sensor(DarkLevel::L2);
-        let dark = degrade(&clean, how, &key(1, "a"), &Synthesis::default());
+        let how = sensor(Severity::L2);
+        let dark = degrade(&clean, Some(&how), &key(1, "a"), &Synthesis::default());
         assert_eq!((dark.height(), dark.width()), (height, width));
     }
 }
@@ -193,14 +192,10 @@ fn every_size_is_kept() {
 #[test]
 fn flat_greys_have_their_figures() {
     let cases = [
-        (
-            128,
-            DarkLevel::L1,
-            [[66.1, 15.2], [67.3, 9.4], [67.0, 11.0]],
-        ),
-        (128, DarkLevel::L3, [[18.7, 4.3], [19.1, 2.7], [19.0, 3.1]]),
-        (128, DarkLevel::L5, [[7.3, 1.7], [7.4, 1.1], [7.4, 1.3]]),
-        (32, DarkLevel::L3, [[7.5, 4.4], [7.9, 3.2], [7.7, 3.6]]),
+        (128, Severity::L1, [[66.1, 15.2], [67.3, 9.4], [67.0, 11.0]]),
+        (128, Severity::L3, [[18.7, 4.3], [19.1, 2.7], [19.0, 3.1]]),
+        (128, Severity::L5, [[7.3, 1.7], [7.4, 1.1], [7.4, 1.3]]),
+        (32, Severity::L3, [[7.5, 4.4], [7.9, 3.2], [7.7, 3.6]]),
     ];
     for (code, level, due) in cases {
         let clean = flat(code, 512);
@@ -230,7 +225,7 @@ fn noise_shrinks_with_the_light() {
         Tone::None,
         &Term::ALL,
     );
-    let [light, dark] = [DarkLevel::L1, DarkLevel::L2]
+    let [light, dark] = [Severity::L1, Severity::L2]
         .map(|level| statistics(&negative.develop(level)).map(|[_, deviation]| deviation));
     for (light, dark) in light.iter().zip(dark) {
         assert!((dark / light * f64::exp2(2.0 / 2.2) - 1.0).abs() < 0.02);
@@ -250,7 +245,7 @@ fn without_noise_a_mid_grey_and_white_are_the_exposure_branchs() {
                 continue;
             }
             let negative = Negative::taken(&clean, &key, state, Amplify::ShotOnly, Tone::None, &[]);
-            for level in DarkLevel::ALL {
+            for level in Severity::LADDER {
                 assert_eq!(
                     negative.develop(level),
                     expose(&clean, level),
@@ -271,7 +266,7 @@ fn a_grey_ramp_returns_from_the_sensor() {
         let tone = Tone::BeforeEv;
         let key = key(seed, "a");
         let negative = Negative::taken(&clean, &key, state, Amplify::ShotOnly, tone, &[]);
-        let back = negative.develop_by(Stops(0.0));
+        let back = negative.develop_by(0.0);
         for (column, codes) in back.samples().chunks(3).enumerate() {
             for code in codes {
                 assert!(
@@ -289,9 +284,9 @@ fn the_tone_curve_stands_where_it_is_told_to() {
     let clean = flat(100, 4);
     let develop = |tone| {
         let negative = Negative::taken(&clean, &key(1, "a"), median(), Amplify::All, tone, &[]);
-        negative.develop(DarkLevel::L1)
+        negative.develop(Severity::L1)
     };
-    assert_eq!(develop(Tone::BeforeEv), expose(&clean, DarkLevel::L1));
+    assert_eq!(develop(Tone::BeforeEv), expose(&clean, Severity::L1));
     let dark = f64::from(develop(Tone::None).samples()[0]) / 255.0;
     let after = develop(Tone::AfterEv).samples()[0];
     let due = dark * dark * (3.0 - 2.0 * dark) * 255.0;
@@ -301,14 +296,14 @@ fn the_tone_curve_stands_where_it_is_told_to() {
 /// Light lost is photons lost: the signal over the noise falls with the level as it does not where r is drawn.
 #[test]
 fn coupling_makes_the_ratio_the_drop() {
-    let physical = Synthesis::of(Profile::Physical, CameraModel::default());
-    let ratios = DarkLevel::ALL.map(|level| physical.state(&key(1, "a"), level).ratio);
+    let physical = Synthesis::of(LightReading::Physical, CameraModel::default());
+    let ratios = Severity::LADDER.map(|level| physical.state(&key(1, "a"), level).ratio);
     for (found, due) in ratios.iter().zip([4.0, 16.0, 64.0, 181.02, 512.0]) {
         assert!((found - due).abs() < 0.01, "{found}");
     }
     let paper = Synthesis::default();
     let state = |level| paper.state(&key(1, "a"), level);
-    assert_eq!(state(DarkLevel::L1), state(DarkLevel::L5));
+    assert_eq!(state(Severity::L1), state(Severity::L5));
 }
 
 /// Every way to make a frame's ladder gives the images of its negatives, for every size and set of instructions.
@@ -316,7 +311,7 @@ fn coupling_makes_the_ratio_the_drop() {
 fn ladders_are_their_negatives() {
     let settings = [
         Synthesis::default(),
-        Synthesis::of(Profile::Physical, CameraModel::default()),
+        Synthesis::of(LightReading::Physical, CameraModel::default()),
         Synthesis {
             draws: Draws::Fresh,
             tone: Tone::AfterEv,
@@ -326,9 +321,9 @@ fn ladders_are_their_negatives() {
     for (height, width) in [(1, 1), (2, 3), (33, 130), (64, 129), (67, 300)] {
         let (clean, key) = (ramps(height, width), key(6, "a"));
         for synthesis in &settings {
-            let mut dark = DarkLevel::ALL.map(|_| Rgb::black(height, width));
-            ladder(&clean, &key, synthesis, &DarkLevel::ALL, &mut dark);
-            for (level, dark) in DarkLevel::ALL.into_iter().zip(&dark) {
+            let mut dark = Severity::LADDER.map(|_| Rgb::black(height, width));
+            ladder(&clean, &key, synthesis, &Severity::LADDER, &mut dark);
+            for (level, dark) in Severity::LADDER.into_iter().zip(&dark) {
                 let negative = Negative::new(&clean, &key, synthesis, level);
                 assert!(negative.serves(level));
                 assert_eq!(
@@ -349,11 +344,10 @@ fn fresh_draws_are_each_levels_own() {
     };
     let clean = flat(128, 32);
     let at = |level| Negative::new(&clean, &key(1, "a"), &fresh, level);
-    assert!(!at(DarkLevel::L1).serves(DarkLevel::L2));
-    let [first, second] =
-        [DarkLevel::L1, DarkLevel::L2].map(|level| at(level).develop(DarkLevel::L3));
+    assert!(!at(Severity::L1).serves(Severity::L2));
+    let [first, second] = [Severity::L1, Severity::L2].map(|level| at(level).develop(Severity::L3));
     assert_ne!(first, second);
-    assert_eq!(at(DarkLevel::L1).state(), at(DarkLevel::L2).state());
+    assert_eq!(at(Severity::L1).state(), at(Severity::L2).state());
 }
 
 #[test]

@@ -5,7 +5,8 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use super::light::Degradation;
+use super::axis_level::{AxisLevel, KindReading};
+use super::degradation::Degradation;
 use crate::error::Error;
 
 /// The name of an enhancement model as it stands in tables and records: letters, digits, `_`, `-` and `.`.
@@ -40,31 +41,55 @@ impl fmt::Display for EnhancerName {
     }
 }
 
-/// One way in which a frame is shown: how dark, and mended by what.
+/// One way in which a frame is shown: degraded or not, enhanced or not.
+///
+/// Its name is `LABEL-KIND[@READING][+ENHANCER]`, or `L0[+ENHANCER]`; `&` is reserved for several degradations in a row.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Condition {
-    /// What happened to its light.
-    pub degradation: Degradation,
-    /// What mended it; `None` for raw.
+    /// What was done to the frame; `None` for L0, the untouched frame.
+    pub degradation: Option<Degradation>,
+    /// The enhancer; `None` for raw.
     pub enhancer: Option<EnhancerName>,
 }
 
 impl Condition {
+    /// The untouched frame.
+    pub const L0: Self = Self {
+        degradation: None,
+        enhancer: None,
+    };
+
     /// The condition without an enhancer.
     #[must_use]
-    pub fn raw(degradation: Degradation) -> Self {
+    pub fn raw(degradation: Option<Degradation>) -> Self {
         Self {
             degradation,
             enhancer: None,
         }
     }
+
+    /// The column `level`.
+    #[must_use]
+    pub fn level(&self) -> AxisLevel {
+        self.degradation.as_ref().into()
+    }
+
+    /// The column `variant`, with the light reading.
+    #[must_use]
+    pub fn kind_reading(&self) -> KindReading {
+        self.degradation.as_ref().into()
+    }
 }
 
 impl fmt::Display for Condition {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.degradation {
+            None => f.write_str("L0")?,
+            Some(degradation) => write!(f, "{degradation}")?,
+        }
         match &self.enhancer {
-            None => write!(f, "{}", self.degradation),
-            Some(name) => write!(f, "{}+{name}", self.degradation),
+            None => Ok(()),
+            Some(name) => write!(f, "+{name}"),
         }
     }
 }
@@ -77,8 +102,12 @@ impl FromStr for Condition {
             None => (text, None),
             Some((degradation, name)) => (degradation, Some(EnhancerName::new(name)?)),
         };
+        let degradation = match degradation {
+            "L0" => None,
+            other => Some(other.parse()?),
+        };
         Ok(Self {
-            degradation: degradation.parse()?,
+            degradation,
             enhancer,
         })
     }
@@ -110,11 +139,57 @@ mod tests {
 
     #[test]
     fn conditions_read_back() {
-        for text in ["L0", "L3-ev", "L5-noise+zero-dce.v2", "L0+ruas"] {
+        for text in [
+            "L0",
+            "L3-ev",
+            "E3.3-ev",
+            "L5-noise+zero-dce.v2",
+            "L0+ruas",
+            "L3-noise@physical",
+            "E3.3-noise@eld+zerodce",
+            "E0.01-noise@my-own.reading_2+a",
+        ] {
             assert_eq!(text.parse::<Condition>().unwrap().to_string(), text);
         }
-        for wrong in ["L3-noise+", "L3-noise+a b", "L3-noise+a+b"] {
-            assert!(wrong.parse::<Condition>().is_err(), "{wrong}");
+    }
+
+    #[test]
+    fn what_is_no_condition_is_refused() {
+        let cases = [
+            ("L3-noise+", "no name for an enhancer"),
+            ("L3-noise+a b", "no name for an enhancer"),
+            ("L3-noise+a+b", "no name for an enhancer"),
+            ("L0-ev", "none of L0"),
+            ("L6-ev", "none of L0"),
+            ("L3", "not of that form"),
+            ("", "not of that form"),
+            ("L3-raw", "\"raw\""),
+            ("L3-noise-x", "\"noise-x\""),
+            ("L3-ev@eld", "no light readings; write L3-ev"),
+            ("L3-noise@paper", "without its name"),
+            ("L3-noise@", "no name of a light reading"),
+            ("L3-noise@a&b", "no name of a light reading"),
+            ("E6-noise", "is written L3"),
+            ("E3.30-ev", "is written E3.3"),
+            ("E3.333-ev", "two decimals"),
+            ("E0-ev", "0 or too large"),
+            ("E16.01-ev", "above E16"),
+            ("E1e1-ev", "no decimal number"),
+        ];
+        for (text, says) in cases {
+            let error = text.parse::<Condition>().unwrap_err().to_string();
+            assert!(error.contains(says), "{text}: {error}");
         }
+    }
+
+    #[test]
+    fn order_is_by_severity() {
+        let mut names = ["L3-ev", "L0", "E5-noise@eld", "E5-noise", "L2-noise"];
+        let key = |name: &&str| name.parse::<Condition>().unwrap();
+        names.sort_by_key(key);
+        assert_eq!(
+            names,
+            ["L0", "L2-noise", "E5-noise", "E5-noise@eld", "L3-ev"]
+        );
     }
 }

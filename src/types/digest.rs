@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+use super::canonical::canonical;
 use crate::error::Error;
 
 /// A BLAKE3 digest, written as 64 hexadecimal digits.
@@ -16,6 +17,19 @@ impl Digest {
     #[must_use]
     pub fn of(bytes: &[u8]) -> Self {
         Self(*blake3::hash(bytes).as_bytes())
+    }
+
+    /// The digest of a value as canonical JSON: keys sorted, nulls and absent fields left out at every depth. `domain` says
+    /// what is digested and how, as `darkqa.trial/2`, so that equal values of two kinds have two digests.
+    ///
+    /// # Errors
+    /// If a number in it is infinite or not a number, or a map has keys that are no text.
+    pub fn canonical(domain: &'static str, value: &impl Serialize) -> Result<Self, Error> {
+        let text = canonical(value).map_err(|e| Error::data(domain, e))?;
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(domain.as_bytes()).update(&[0]);
+        hasher.update(text.as_bytes());
+        Ok(Self(*hasher.finalize().as_bytes()))
     }
 
     /// The digest of several parts in order, each with its length, so that no two lists of parts fall together.
@@ -81,5 +95,22 @@ impl<'de> Deserialize<'de> for Digest {
         String::deserialize(deserializer)?
             .parse()
             .map_err(serde::de::Error::custom)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn canonical_digests_are_of_domain_and_text() {
+        let digest = |domain, value: [Option<u8>; 2]| {
+            Digest::canonical(domain, &std::collections::BTreeMap::from([("a", value)])).unwrap()
+        };
+        let value = [Some(1), None];
+        let one = digest("darkqa.test/1", value);
+        assert_eq!(one, Digest::of(b"darkqa.test/1\0{\"a\":[1,null]}"));
+        assert_ne!(one, digest("darkqa.test/2", value));
+        assert!(Digest::canonical("darkqa.test/1", &f32::NAN).is_err());
     }
 }

@@ -118,7 +118,7 @@ fn fields(object: &Value) -> BTreeMap<String, Value> {
 /// The content of `manifest.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunManifest {
-    /// That of its records: [`Kept::SCHEMA`](super::Kept::SCHEMA).
+    /// That of its records: [`Detail::SCHEMA`](super::Detail::SCHEMA).
     pub schema: String,
     /// How far it has come.
     pub status: Status,

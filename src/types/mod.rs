@@ -1,29 +1,36 @@
 //! The shared vocabulary: no input or output, no pixel mathematics.
 
+pub mod axis_level;
+mod canonical;
 pub mod condition;
+pub mod degradation;
+pub mod detail;
 pub mod digest;
 pub mod frame;
-pub mod kept;
+pub mod kind_set;
 pub mod labels;
-pub mod light;
-pub mod listed;
 pub mod manifest;
-pub mod open;
 pub mod question;
+pub mod record;
 pub mod reply;
-pub mod trial;
+pub mod run_question;
+pub mod trial_key;
 
+pub use axis_level::{AxisLevel, KindReading};
 pub use condition::{Condition, EnhancerName};
+pub use degradation::{Degradation, ReadingName, Severity};
+pub use detail::{
+    AnswerReading, ChoiceDetail, Detail, ImageFacts, OpenDetail, Outcome, Step, WalkFacts,
+};
 pub use digest::Digest;
 pub use frame::{DepthKind, Frame, FrameId, Intrinsics, Rgb, Segmentation};
-pub use kept::Kept;
+pub use kind_set::KindSet;
 pub use labels::{Label, Labels, SegmentName};
-pub use light::{DarkLevel, Degradation, Level, Stops, Variant, Variants};
-pub use listed::{Listed, Thumbnail};
-pub use open::{OpenRecord, Step, WalkFacts};
 pub use question::{Answer, Choices, Family, Question, QuestionId, Why};
+pub use record::{Failure, FailureKind, Record, Via, View};
 pub use reply::{Finish, Reply, Usage};
-pub use trial::{Failure, FailureKind, ImageFacts, Outcome, Reading, Record, TrialKey, Via, View};
+pub use run_question::{RunQuestion, Thumbnail};
+pub use trial_key::TrialKey;
 
 #[cfg(test)]
 mod tests {
@@ -31,14 +38,19 @@ mod tests {
 
     use proptest::prelude::*;
 
+    use super::degradation::Kind;
     use super::*;
 
-    fn degradation() -> impl Strategy<Value = Degradation> {
-        (prop::sample::select(&DarkLevel::ALL[..]), 0..3).prop_map(|(dark, kind)| match kind {
-            0 => Degradation::None,
-            1 => Degradation::Exposure(dark),
-            _ => Degradation::Sensor(dark),
-        })
+    fn degradation() -> impl Strategy<Value = Option<Degradation>> {
+        let kind = prop::sample::select(&Kind::ALL[..]);
+        let reading = prop::option::of("[A-Za-z0-9_.-]{1,12}");
+        prop::option::of(
+            (kind, 1..=1600_u16, reading).prop_map(|(kind, severity, reading)| {
+                let reading = reading.filter(|_| kind.has_readings());
+                let reading = reading.map(|name| ReadingName::new(&name).unwrap());
+                Degradation::new(kind, Severity::hundredths(severity), reading).unwrap()
+            }),
+        )
     }
 
     proptest! {
@@ -49,6 +61,16 @@ mod tests {
             prop_assert_eq!(&condition.to_string().parse::<Condition>().unwrap(), &condition);
             let json = serde_json::to_string(&condition).unwrap();
             prop_assert_eq!(serde_json::from_str::<Condition>(&json).unwrap(), condition);
+        }
+
+        #[test]
+        fn labels_read_back_in_order(one in 1..=1600_u16, other in 1..=1600_u16) {
+            let severities = [one, other].map(Severity::hundredths);
+            for (kind, severity) in Kind::ALL.into_iter().zip(severities) {
+                prop_assert_eq!(kind.severity(&kind.label(severity)).unwrap(), severity);
+            }
+            let [one_level, other_level] = severities.map(|s| AxisLevel::new(Kind::ALL[0], s));
+            prop_assert_eq!(one_level.cmp(&other_level), one.cmp(&other));
         }
 
         #[test]
@@ -67,7 +89,7 @@ mod tests {
         }
 
         #[test]
-        fn no_text_is_read_as_another(text in "(L[0-6])?-?(ev|noise|raw)?(\\+[a-z]{0,3})?|\\PC{0,12}") {
+        fn no_text_is_read_as_another(text in "(L[0-6]|E[0-9]{1,2}(\\.[0-9]{0,3})?)?-?(ev|noise|raw)?(@[a-z&]{0,3})?(\\+[a-z]{0,3})?|\\PC{0,12}") {
             if let Ok(condition) = text.parse::<Condition>() {
                 prop_assert_eq!(condition.to_string().to_lowercase(), text.to_lowercase());
             }

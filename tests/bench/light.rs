@@ -14,7 +14,7 @@ use darkqa_eval::synthesis::unprocess::unprocess;
 use darkqa_eval::synthesis::{
     Amplify, Draws, Negative, NoiseKey, Synthesis, expose, ladder as develop_ladder,
 };
-use darkqa_eval::types::{DarkLevel, FrameId, Rgb};
+use darkqa_eval::types::{FrameId, Rgb, Severity};
 
 /// A frame with edges, ramps and some texture, made by integer arithmetic.
 #[expect(clippy::unwrap_used, reason = "the size fits the samples")]
@@ -36,36 +36,52 @@ fn key() -> NoiseKey {
 fn ladder(c: &mut Criterion) {
     let clean = frame(1440, 2560);
     let (key, paper) = (key(), Synthesis::default());
-    let mut dark = DarkLevel::ALL.map(|_| Rgb::black(1440, 2560));
+    let mut dark = Severity::LADDER.map(|_| Rgb::black(1440, 2560));
     let mut group = c.benchmark_group("2560x1440");
     group.sample_size(10);
     group.throughput(Throughput::Elements((1440 * 2560) as u64));
     group.bench_function("exposure, five levels", |b| {
         b.iter(|| {
-            for (level, dark) in DarkLevel::ALL.into_iter().zip(&mut dark) {
-                expose_into(black_box(&clean), level.exposure_drop(), dark);
+            for (level, dark) in Severity::LADDER.into_iter().zip(&mut dark) {
+                expose_into(black_box(&clean), level.value(), dark);
             }
         });
     });
     group.bench_function("exposure, five levels, new images", |b| {
-        b.iter(|| DarkLevel::ALL.map(|level| expose(black_box(&clean), level)));
+        b.iter(|| Severity::LADDER.map(|level| expose(black_box(&clean), level)));
     });
     group.bench_function("noise, five levels", |b| {
-        b.iter(|| develop_ladder(black_box(&clean), &key, &paper, &DarkLevel::ALL, &mut dark));
+        b.iter(|| {
+            develop_ladder(
+                black_box(&clean),
+                &key,
+                &paper,
+                &Severity::LADDER,
+                &mut dark,
+            )
+        });
     });
     let fresh = Synthesis {
         draws: Draws::Fresh,
         ..Synthesis::default()
     };
     group.bench_function("noise, five levels, fresh draws", |b| {
-        b.iter(|| develop_ladder(black_box(&clean), &key, &fresh, &DarkLevel::ALL, &mut dark));
+        b.iter(|| {
+            develop_ladder(
+                black_box(&clean),
+                &key,
+                &fresh,
+                &Severity::LADDER,
+                &mut dark,
+            )
+        });
     });
     group.bench_function("noise, negative", |b| {
-        b.iter(|| Negative::new(black_box(&clean), &key, &paper, DarkLevel::L3));
+        b.iter(|| Negative::new(black_box(&clean), &key, &paper, Severity::L3));
     });
-    let negative = Negative::new(&clean, &key, &paper, DarkLevel::L3);
+    let negative = Negative::new(&clean, &key, &paper, Severity::L3);
     group.bench_function("noise, one level from the negative", |b| {
-        b.iter(|| negative.develop(black_box(DarkLevel::L3)));
+        b.iter(|| negative.develop(black_box(Severity::L3)));
     });
     group.finish();
 }
@@ -74,7 +90,7 @@ fn ladder(c: &mut Criterion) {
 fn parts(c: &mut Criterion) {
     let clean = frame(1440, 2560);
     let (key, paper) = (key(), Synthesis::default());
-    let state = paper.state(&key, DarkLevel::L3);
+    let state = paper.state(&key, Severity::L3);
     let mut group = c.benchmark_group("parts, 2560x1440");
     group.sample_size(10);
     group.throughput(Throughput::Elements((1440 * 2560) as u64));
@@ -104,14 +120,14 @@ fn request(c: &mut Criterion) {
     let (key, paper) = (key(), Synthesis::default());
     let mut group = c.benchmark_group("1280x720");
     group.sample_size(10);
-    let noisy = || Negative::new(&clean, &key, &paper, DarkLevel::L3).develop(DarkLevel::L3);
+    let noisy = || Negative::new(&clean, &key, &paper, Severity::L3).develop(Severity::L3);
     group.bench_function("noise L3", |b| b.iter(noisy));
     let dark = noisy();
     group.bench_function("noise L3 to PNG body", |b| {
         b.iter(|| Payload::encode(black_box(&dark), Format::Png, None));
     });
     group.bench_function("frame to request, exposure L3", |b| {
-        b.iter(|| Payload::encode(&expose(black_box(&clean), DarkLevel::L3), Format::Png, None));
+        b.iter(|| Payload::encode(&expose(black_box(&clean), Severity::L3), Format::Png, None));
     });
     group.bench_function("frame to request, noise L3", |b| {
         b.iter(|| Payload::encode(&noisy(), Format::Png, None));
@@ -129,7 +145,7 @@ fn walk(c: &mut Criterion) {
     });
     group.bench_function("noise L4, scaled to 512, to PNG body", |b| {
         b.iter(|| {
-            let dark = Negative::new(&clean, &key, &paper, DarkLevel::L4).develop(DarkLevel::L4);
+            let dark = Negative::new(&clean, &key, &paper, Severity::L4).develop(Severity::L4);
             Payload::encode(&bilinear(&dark, 512)?, Format::Png, None)
         });
     });

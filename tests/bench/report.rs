@@ -18,15 +18,17 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use darkqa_eval::report::page::Shown;
 use darkqa_eval::report::products::products;
 use darkqa_eval::score::findings::Findings;
-use darkqa_eval::types::{Condition, DarkLevel, Degradation, Digest, Family, Record};
+use darkqa_eval::types::degradation::Kind;
+use darkqa_eval::types::{Condition, Degradation, Digest, Family, Record, Severity};
 use made::record;
 
 /// Eleven conditions of five models on four questions about each of 456 frames: 100,320 records.
 fn records() -> Vec<Record> {
-    let dark = DarkLevel::ALL.into_iter();
-    let dark = dark.flat_map(|level| [Degradation::Exposure(level), Degradation::Sensor(level)]);
-    let conditions: Vec<Condition> = std::iter::once(Degradation::None)
-        .chain(dark)
+    let dark = Severity::LADDER.into_iter();
+    let dark = dark
+        .flat_map(|severity| Kind::ALL.map(|kind| Degradation::new(kind, severity, None).unwrap()));
+    let conditions: Vec<Condition> = std::iter::once(None)
+        .chain(dark.map(Some))
         .map(Condition::raw)
         .collect();
     let mut records = Vec::new();
@@ -35,12 +37,13 @@ fn records() -> Vec<Record> {
             for question in 0..4 * 456 {
                 let name = format!("model-{model}");
                 let drawn = Digest::of(format!("{name} {condition} {question}").as_bytes());
-                let level = condition.degradation.level();
-                let right = u32::from(drawn.as_bytes()[0]) > 30 * level as u32;
-                records.push(Record {
-                    family: Family::PAPER[question % 4].clone(),
-                    ..record(&name, condition, (question, question / 4), right)
-                });
+                let severity = condition.level().severity();
+                let severities = Severity::LADDER.iter();
+                let level = severities.filter(|s| Some(**s) <= severity).count() as u32;
+                let right = u32::from(drawn.as_bytes()[0]) > 30 * level;
+                let mut record = record(&name, condition, (question, question / 4), right);
+                record.detail.family = Family::PAPER[question % 4].clone();
+                records.push(record);
             }
         }
     }

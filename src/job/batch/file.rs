@@ -6,31 +6,31 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 use crate::store::Store;
-use crate::types::Kept;
+use crate::types::{Detail, Record};
 
 /// Where a file is written until it is whole.
 const PART: &str = "part";
 
 /// The input files of one model, split by bytes and by requests.
-pub(crate) struct Files<R> {
+pub(crate) struct Files<D> {
     folder: PathBuf,
     stem: String,
     most_bytes: u64,
     most_requests: usize,
-    open: Option<Open<R>>,
+    open: Option<Open<D>>,
     /// The whole ones, with their requests.
     done: Vec<(PathBuf, usize)>,
 }
 
-struct Open<R> {
+struct Open<D> {
     path: PathBuf,
     file: BufWriter<File>,
     bytes: u64,
     /// The trials in it, as the records that they will become.
-    blanks: Vec<R>,
+    blanks: Vec<Record<D>>,
 }
 
-impl<R: Kept> Files<R> {
+impl<D: Detail> Files<D> {
     pub(crate) fn new(folder: &Path, model: &str, most_bytes: u64, most_requests: usize) -> Self {
         let safe = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
         Self {
@@ -47,7 +47,12 @@ impl<R: Kept> Files<R> {
     ///
     /// # Errors
     /// Where it alone is larger than a file may be, or cannot be written.
-    pub(crate) fn add(&mut self, line: &[u8], blank: R, store: &mut Store<R>) -> Result<()> {
+    pub(crate) fn add(
+        &mut self,
+        line: &[u8],
+        blank: Record<D>,
+        store: &mut Store<D>,
+    ) -> Result<()> {
         let size = line.len() as u64;
         if size > self.most_bytes {
             let megabytes = size as f64 / 1e6;
@@ -76,13 +81,13 @@ impl<R: Kept> Files<R> {
     }
 
     /// Ends the last file; all of them with their requests.
-    pub(crate) fn finish(mut self, store: &mut Store<R>) -> Result<Vec<(PathBuf, usize)>> {
+    pub(crate) fn finish(mut self, store: &mut Store<D>) -> Result<Vec<(PathBuf, usize)>> {
         self.close(store)?;
         Ok(self.done)
     }
 
     /// A new file, numbered on from those that lie there.
-    fn next(&self) -> Result<Open<R>> {
+    fn next(&self) -> Result<Open<D>> {
         let path = (1..=u32::MAX)
             .map(|n| self.folder.join(format!("{}-{n:03}.jsonl", self.stem)))
             .find(|path| !path.exists())
@@ -99,7 +104,7 @@ impl<R: Kept> Files<R> {
 
     /// Makes the open file whole. Its trials are noted as out before it bears its name, so that none is handed in whose
     /// replies nobody would know.
-    fn close(&mut self, store: &mut Store<R>) -> Result<()> {
+    fn close(&mut self, store: &mut Store<D>) -> Result<()> {
         let Some(open) = self.open.take() else {
             return Ok(());
         };

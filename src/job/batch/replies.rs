@@ -9,10 +9,9 @@ use std::path::{Path, PathBuf};
 use crate::ask::Constrain;
 use crate::ask::batch::{BatchLine, unconstrained};
 use crate::error::{Error, Result};
-use crate::job::trial::Entry;
 use crate::store::Store;
 use crate::types::manifest::RunManifest;
-use crate::types::{Reply, TrialKey};
+use crate::types::{Detail, Record, Reply, TrialKey};
 
 /// What became of the lines.
 #[derive(Debug, Default)]
@@ -29,8 +28,8 @@ struct Tally {
 ///
 /// # Errors
 /// Where nothing of the run is out in a batch, or a line is none of such a file: those before it are kept.
-pub(crate) fn import<R: Entry>(
-    store: &mut Store<R>,
+pub(crate) fn import<D: Detail>(
+    store: &mut Store<D>,
     manifest: &RunManifest,
     files: &[PathBuf],
 ) -> Result<String> {
@@ -41,10 +40,8 @@ pub(crate) fn import<R: Entry>(
         let path = store.folder().to_owned();
         return Err(Error::Run { path, problem });
     }
-    let blanks: HashMap<TrialKey, R> = blanks
-        .into_iter()
-        .map(|blank| (blank.key(), blank))
-        .collect();
+    let blanks: HashMap<TrialKey, Record<D>> =
+        blanks.into_iter().map(|blank| (blank.key, blank)).collect();
     let mut out = store.out_in_batches()?;
     let mut tally = Tally::default();
     for path in files {
@@ -68,12 +65,12 @@ fn not_a_line(path: &Path, line: usize) -> Error {
     Error::line(path, line, problem)
 }
 
-fn take<R: Entry>(
+fn take<D: Detail>(
     line: BatchLine,
-    blanks: &HashMap<TrialKey, R>,
+    blanks: &HashMap<TrialKey, Record<D>>,
     manifest: &RunManifest,
     out: &mut BTreeSet<TrialKey>,
-    store: &mut Store<R>,
+    store: &mut Store<D>,
     tally: &mut Tally,
 ) -> Result<()> {
     let key = line.id.parse::<TrialKey>().ok();
@@ -81,7 +78,7 @@ fn take<R: Entry>(
         tally.strange += 1;
         return Ok(());
     };
-    if !out.remove(&blank.key()) {
+    if !out.remove(&blank.key) {
         tally.again += 1;
         return Ok(());
     }
@@ -89,8 +86,8 @@ fn take<R: Entry>(
     let record = match line.result {
         Ok(reply) => {
             tally.answered += 1;
-            let constrain = constrain(manifest, blank.model())?;
-            let choices = blank.choices();
+            let constrain = constrain(manifest, &blank.model)?;
+            let choices = blank.detail.choices().len();
             let reply = Reply {
                 attempts: 1,
                 ..unconstrained(reply, constrain, choices)

@@ -17,8 +17,8 @@ pub(crate) struct Requests<'a, I: Item> {
     models: &'a [ModelUnderTest],
     url: &'a str,
     /// Those of each model.
-    files: Vec<Files<I::Record>>,
-    store: &'a mut Store<I::Record>,
+    files: Vec<Files<I::Detail>>,
+    store: &'a mut Store<I::Detail>,
 }
 
 impl<'a, I: Item> Requests<'a, I> {
@@ -29,7 +29,7 @@ impl<'a, I: Item> Requests<'a, I> {
     pub(crate) fn new(
         models: &'a [ModelUnderTest],
         config: &'a BatchFiles,
-        store: &'a mut Store<I::Record>,
+        store: &'a mut Store<I::Detail>,
     ) -> Result<Self> {
         let folder = store.folder().join(BATCH);
         fs::create_dir_all(&folder).map_err(|e| Error::file(&folder, "create", e))?;

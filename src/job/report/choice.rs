@@ -5,14 +5,13 @@ use std::path::Path;
 use super::combine::{Combined, combine};
 use crate::config::Show;
 use crate::error::Result;
-use crate::job::record::reread;
 use crate::job::stored::StoredRun;
 use crate::report::products::{PAGE, products};
 use crate::report::{files, table, verdicts};
 use crate::score::findings::Findings;
 use crate::store::Store;
-use crate::types::Record;
 use crate::types::manifest::RunManifest;
+use crate::types::{ChoiceDetail, Record};
 
 pub(super) fn text(findings: &Findings<'_>, runs: &[(&RunManifest, &Path)]) -> String {
     table::render(&findings.summary, runs) + &verdicts::render(findings)
@@ -20,8 +19,8 @@ pub(super) fn text(findings: &Findings<'_>, runs: &[(&RunManifest, &Path)]) -> S
 
 /// Writes the whole report of a run into its folder; what belongs on standard output.
 pub(crate) fn write(store: &Store, manifest: &mut RunManifest, show: Show) -> Result<String> {
-    let mut run = StoredRun::<Record>::of(store.folder(), manifest.clone())?;
-    let records = run.records.into_iter().map(reread);
+    let mut run = StoredRun::<ChoiceDetail>::of(store.folder(), manifest.clone())?;
+    let records = run.records.into_iter().map(Record::reread);
     run.records = records.collect::<Result<_>>()?;
     in_its_folder(store, manifest, &combine(vec![run])?, show)
 }

@@ -1,35 +1,19 @@
-//! Several runs as one: [`combine`].
+//! Several runs of questions with choices as one: [`combine`].
 
-use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
-use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 
-use super::cost::cost;
+use super::join::{Joined, join};
 use crate::error::{Error, Result};
 use crate::job::stored::StoredRun;
 use crate::report::page::{self, Shown};
 use crate::score::chance::Offer;
 use crate::score::findings::Findings;
 use crate::types::manifest::RunManifest;
-use crate::types::{Listed, Outcome, QuestionId, Record, Thumbnail, TrialKey, View};
+use crate::types::{ChoiceDetail, QuestionId, Record, RunQuestion};
 
 /// Several runs as one.
-pub(super) struct Combined {
-    pub(super) runs: Vec<Part>,
-    pub(super) records: Vec<Record>,
-    pub(super) questions: Vec<Listed>,
-    pub(super) thumbnails: Vec<Thumbnail>,
-}
-
-/// One of them.
-pub(super) struct Part {
-    pub(super) folder: PathBuf,
-    pub(super) name: String,
-    pub(super) manifest: RunManifest,
-    pub(super) cost: Option<String>,
-    /// Where its records are among all.
-    pub(super) records: Range<usize>,
-}
+pub(super) type Combined = Joined<ChoiceDetail>;
 
 impl Combined {
     /// What the records say.
@@ -62,74 +46,30 @@ impl Combined {
     }
 }
 
-/// Puts runs together. A model that answered the same item in two of them in different ways (another seed, prompt or
-/// parameter) stands once for each, with the run's name; a trial that two of them share counts once.
+/// Puts runs together, as [`join`] does.
 ///
 /// # Errors
-/// Where a run shares no question with the others, or one of one name has other choices or another truth.
-pub(super) fn combine(runs: Vec<StoredRun<Record>>) -> Result<Combined> {
-    let mut twice = BTreeSet::new();
+/// If a run shares no question with the others, or one of one name has other choices or another truth.
+pub(super) fn combine(runs: Vec<StoredRun<ChoiceDetail>>) -> Result<Combined> {
     if runs.len() > 1 {
         agree(&runs)?;
-        twice = answered_twice(&runs);
     }
-    let names = names(&runs);
-    let mut combined = Combined {
-        runs: Vec::new(),
-        records: Vec::new(),
-        questions: Vec::new(),
-        thumbnails: Vec::new(),
-    };
-    let mut known = HashSet::<TrialKey>::new();
-    let mut listed = BTreeSet::<QuestionId>::new();
-    let mut pictured = BTreeSet::new();
-    for (run, name) in runs.into_iter().zip(names) {
-        let first = combined.records.len();
-        let cost = cost(&run.records)?;
-        for mut record in run.records {
-            if known.contains(&record.key) {
-                continue;
-            }
-            if record.outcome != Outcome::Failed {
-                known.insert(record.key);
-            }
-            if twice.contains(&(record.view, record.model.clone())) {
-                record.model = format!("{} ({name})", record.model);
-            }
-            combined.records.push(record);
-        }
-        combined.runs.push(Part {
-            folder: run.folder,
-            name,
-            manifest: run.manifest,
-            cost,
-            records: first..combined.records.len(),
-        });
-        let questions = run.questions.into_iter();
-        combined
-            .questions
-            .extend(questions.filter(|question| listed.insert(question.id.clone())));
-        let thumbnails = run.thumbnails.into_iter();
-        combined.thumbnails.extend(thumbnails.filter(|thumbnail| {
-            pictured.insert((thumbnail.frame.clone(), thumbnail.condition.clone()))
-        }));
-    }
-    Ok(combined)
+    join(runs, |_| true)
 }
 
 /// What is offered, for the chance line: each question as often as it has orders of its choices, since an answer to each order
 /// counts for itself; those not asked yet once. A run that kept no questions has those in its records.
-fn offers(records: &[Record], questions: &[Listed]) -> Vec<Offer> {
+fn offers(records: &[Record], questions: &[RunQuestion]) -> Vec<Offer> {
     let mut orders = BTreeMap::<&QuestionId, BTreeSet<&[String]>>::new();
     let mut all = BTreeMap::<&QuestionId, Offer>::new();
     for record in records {
         orders
             .entry(&record.question)
             .or_default()
-            .insert(&record.choices);
+            .insert(&record.detail.choices);
         all.entry(&record.question).or_insert_with(|| Offer {
-            family: record.family.clone(),
-            choices: record.choices.len(),
+            family: record.detail.family.clone(),
+            choices: record.detail.choices.len(),
         });
     }
     for question in questions {
@@ -145,49 +85,18 @@ fn offers(records: &[Record], questions: &[Listed]) -> Vec<Offer> {
     offers.collect()
 }
 
-/// What runs are called: their folders' names, or their paths where two have one name.
-fn names(runs: &[StoredRun<Record>]) -> Vec<String> {
-    let short: Vec<String> = runs.iter().map(StoredRun::name).collect();
-    let distinct: BTreeSet<&String> = short.iter().collect();
-    if distinct.len() == runs.len() {
-        return short;
-    }
-    let paths = runs.iter().map(|run| run.folder.display().to_string());
-    paths.collect()
-}
-
-/// The models that answered the same item in two runs as different trials.
-fn answered_twice(runs: &[StoredRun<Record>]) -> BTreeSet<(View, String)> {
-    let mut keys = HashMap::new();
-    let mut twice = BTreeSet::new();
-    for (index, run) in runs.iter().enumerate() {
-        for record in &run.records {
-            let item = (
-                (record.view, &record.model),
-                (&record.condition, &record.question),
-                (&record.choices, record.repeat),
-            );
-            let (key, place) = *keys.entry(item).or_insert((record.key, index));
-            if key != record.key && place != index {
-                twice.insert((record.view, record.model.clone()));
-            }
-        }
-    }
-    twice
-}
-
 /// Makes sure that runs can be compared.
-fn agree(runs: &[StoredRun<Record>]) -> Result<()> {
+fn agree(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
     let mut questions = BTreeMap::<&QuestionId, (usize, BTreeSet<&String>, &String)>::new();
-    let wrong = |run: &StoredRun<Record>, problem: String| {
+    let wrong = |run: &StoredRun<ChoiceDetail>, problem: String| {
         let path = run.folder.clone();
         Err(Error::Run { path, problem })
     };
     for (index, run) in runs.iter().enumerate() {
         let (mut shared, others) = (false, !questions.is_empty());
         for record in &run.records {
-            let choices: BTreeSet<&String> = record.choices.iter().collect();
-            let Some(truth) = record.choices.get(record.truth) else {
+            let choices: BTreeSet<&String> = record.detail.choices.iter().collect();
+            let Some(truth) = record.detail.choices.get(record.detail.truth) else {
                 let problem = format!("the record {} has no true choice", record.key);
                 return wrong(run, problem);
             };

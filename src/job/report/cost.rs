@@ -6,7 +6,7 @@ use crate::report::forecast::money;
 use crate::types::{Record, Via};
 
 /// What the replies of a run cost at list prices, in words; nothing where no model of it has a known price.
-pub(super) fn cost(records: &[Record]) -> Result<Option<String>> {
+pub(super) fn cost<D>(records: &[Record<D>]) -> Result<Option<String>> {
     let prices = Prices::built_in()?;
     let (mut dollars, mut counted, mut left) = (0.0, 0_usize, 0_usize);
     for record in records.iter().filter(|record| record.reply.is_some()) {

@@ -3,6 +3,7 @@
 pub(crate) mod choice;
 mod combine;
 mod cost;
+mod join;
 pub(crate) mod open;
 mod runs;
 

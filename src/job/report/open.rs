@@ -1,19 +1,21 @@
 //! What came of open questions: scored from the records, and left in the run folder.
 
 use std::collections::HashMap;
+use std::path::PathBuf;
 
 use serde_json::Value;
 
+use super::join::join;
 use crate::config::Show;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::job::predictions::{AnswerState, Prediction, predictions};
-use crate::job::stored::StoredRun;
+use crate::job::stored::{StoredRun, in_order};
 use crate::report::openeqa::{Asked, OpenReport, Told, json as summary_json, products, table};
 use crate::score::llm_match::{Protocol, mark};
 use crate::score::open::{OpenSummary, Outcome, Scored, Topic, open_summary};
 use crate::store::Store;
 use crate::types::manifest::{RunManifest, Status};
-use crate::types::{Listed, OpenRecord, QuestionId, Step};
+use crate::types::{OpenDetail, QuestionId, Record, RunQuestion, Step};
 
 /// The setting of a run that names who marked the answers.
 pub(crate) const JUDGE: &str = "--judge";
@@ -22,7 +24,7 @@ pub(crate) const PROTOCOL: &str = "--protocol";
 
 /// The scores of a run.
 pub(crate) struct Scores<'a> {
-    run: &'a StoredRun<OpenRecord>,
+    run: &'a StoredRun<OpenDetail>,
     judge: Option<String>,
     protocol: Protocol,
     summary: OpenSummary,
@@ -31,7 +33,7 @@ pub(crate) struct Scores<'a> {
 
 impl<'a> Scores<'a> {
     /// Scores what a run holds by the marks of the judge that it names.
-    pub(crate) fn new(run: &'a StoredRun<OpenRecord>) -> Result<Self> {
+    pub(crate) fn new(run: &'a StoredRun<OpenDetail>) -> Result<Self> {
         let setting = |name| run.manifest.settings.get(name).and_then(Value::as_str);
         let judge = setting(JUDGE).map(str::to_owned);
         let protocol = setting(PROTOCOL).map_or(Ok(Protocol::Upstream), str::parse)?;
@@ -100,7 +102,7 @@ impl<'a> Scores<'a> {
     }
 
     /// Writes the report and the manifest into the run's folder.
-    pub(crate) fn write(&self, store: &Store<OpenRecord>) -> Result<()> {
+    pub(crate) fn write(&self, store: &Store<OpenDetail>) -> Result<()> {
         for (name, content) in self.products()? {
             store.write(&name, &content)?;
         }
@@ -110,22 +112,60 @@ impl<'a> Scores<'a> {
     }
 }
 
-/// Several runs as one.
+/// Several runs as one, as [`join`] puts them together.
 ///
 /// # Errors
-/// If their answers were marked by different judges or judged by different protocols, or one asked another question of the same name.
-pub(crate) fn combine(mut runs: Vec<StoredRun<OpenRecord>>) -> Result<StoredRun<OpenRecord>> {
-    let first = runs.remove(0);
-    if !runs.is_empty() {
-        todo!();
+/// If their answers were marked by different judges or read by different protocols, or one has another question of the same name.
+pub(crate) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<StoredRun<OpenDetail>> {
+    let mut questions = HashMap::<QuestionId, RunQuestion>::new();
+    let mut marked: Option<(PathBuf, [Option<Value>; 2])> = None;
+    for run in &runs {
+        let wrong = |problem: String| {
+            let path = run.folder.clone();
+            Err(Error::Run { path, problem })
+        };
+        let by = [JUDGE, PROTOCOL].map(|name| run.manifest.settings.get(name).cloned());
+        match &marked {
+            Some((other, their)) if *their != by => {
+                return wrong(format!(
+                    "its answers were marked by another judge or read by another protocol than those of {}; report them each alone",
+                    other.display()
+                ));
+            }
+            Some(_) => {}
+            None => marked = Some((run.folder.clone(), by)),
+        }
+        for question in &run.questions {
+            let known = questions
+                .entry(question.id.clone())
+                .or_insert_with(|| question.clone());
+            if !known.is_same(&RunQuestion {
+                image: None,
+                ..question.clone()
+            }) {
+                return wrong(format!(
+                    "the question {} is another in the other runs; report them each alone",
+                    question.id
+                ));
+            }
+        }
     }
-    Ok(first)
+    let joined = join(runs, |record| record.detail.step == Step::Answer)?;
+    let first = joined.runs.into_iter().next();
+    let first = first.ok_or_else(|| Error::usage("RUN", "no run is named"))?;
+    Ok(StoredRun {
+        records: in_order(joined.records, &joined.questions),
+        folder: first.folder,
+        manifest: first.manifest,
+        questions: joined.questions,
+        thumbnails: joined.thumbnails,
+    })
 }
 
 /// Scores what a run holds and leaves the report in its folder; what belongs on standard output. A run that is complete but for marks
 /// that cannot be read is incomplete.
 pub(crate) fn write(
-    store: &Store<OpenRecord>,
+    store: &Store<OpenDetail>,
     manifest: &mut RunManifest,
     show: Show,
 ) -> Result<String> {
@@ -140,15 +180,15 @@ pub(crate) fn write(
 }
 
 /// The marks of a judge, by question and answer.
-type Marks<'a> = HashMap<(&'a QuestionId, &'a str), &'a OpenRecord>;
+type Marks<'a> = HashMap<(&'a QuestionId, &'a str), &'a Record<OpenDetail>>;
 
-fn marks<'a>(records: &'a [OpenRecord], judge: Option<&str>) -> Marks<'a> {
+fn marks<'a>(records: &'a [Record<OpenDetail>], judge: Option<&str>) -> Marks<'a> {
     let marks = records.iter().filter(|record| {
-        let own = record.step == Step::Mark && Some(&*record.model) == judge;
+        let own = record.detail.step == Step::Mark && Some(&*record.model) == judge;
         own && record.failure.is_none()
     });
     marks
-        .filter_map(|record| Some(((&record.question, record.judged.as_deref()?), record)))
+        .filter_map(|record| Some(((&record.question, record.detail.judged.as_deref()?), record)))
         .collect()
 }
 
@@ -172,7 +212,7 @@ fn outcome(
     mark(reply, protocol).map_or(Outcome::Unmarked, Outcome::Marked)
 }
 
-fn asked(question: &Listed) -> Asked<'_> {
+fn asked(question: &RunQuestion) -> Asked<'_> {
     Asked {
         id: &question.id,
         text: &question.text,
@@ -183,7 +223,7 @@ fn asked(question: &Listed) -> Asked<'_> {
     }
 }
 
-fn topic(question: &Listed) -> Topic {
+fn topic(question: &RunQuestion) -> Topic {
     let episode = question.frame.0.clone();
     Topic {
         split: episode.split('/').next().unwrap_or_default().to_owned(),

@@ -15,7 +15,7 @@ use crate::report::files::json_of_several;
 use crate::report::products::{PAGE, products};
 use crate::store::{Moved, Store};
 use crate::types::manifest::Status;
-use crate::types::{OpenRecord, Record};
+use crate::types::{ChoiceDetail, OpenDetail};
 
 /// Shows a run, or compares several of one kind; if readings are made again, those that changed are kept with their run.
 ///
@@ -45,7 +45,7 @@ pub fn report(config: &Report) -> Result<Outcome> {
     })
 }
 
-fn of_choices(config: &Report, mut runs: Vec<StoredRun<Record>>) -> Result<String> {
+fn of_choices(config: &Report, mut runs: Vec<StoredRun<ChoiceDetail>>) -> Result<String> {
     let mut output = String::new();
     for run in &mut runs {
         if run.records.is_empty() {
@@ -111,7 +111,7 @@ fn elsewhere(config: &Report, mut text: String, made: Vec<(String, Vec<u8>)>) ->
     Ok(text)
 }
 
-fn of_open(config: &Report, runs: Vec<StoredRun<OpenRecord>>) -> Result<String> {
+fn of_open(config: &Report, runs: Vec<StoredRun<OpenDetail>>) -> Result<String> {
     if let Some(run) = runs.iter().find(|run| run.records.is_empty()) {
         return Err(no_records(run.folder.clone()));
     }
@@ -135,11 +135,11 @@ fn of_open(config: &Report, runs: Vec<StoredRun<OpenRecord>>) -> Result<String> 
 }
 
 /// Reads all kept replies again and keeps the readings that changed; how many did.
-fn reread(run: &mut StoredRun<Record>) -> Result<usize> {
+fn reread(run: &mut StoredRun<ChoiceDetail>) -> Result<usize> {
     let mut store = Store::open(&run.folder, &run.manifest, Moved::Allowed)?;
     let mut changed = 0;
     for record in &mut run.records {
-        let now = crate::job::record::reread(record.clone())?;
+        let now = record.clone().reread()?;
         if now != *record {
             store.append(&now)?;
             changed += 1;

@@ -9,12 +9,12 @@ use crate::types::Family;
 
 impl Overview<'_> {
     pub(super) fn hallucination(&self) -> Option<(String, Chart)> {
-        let variant = *self.variants_there().last()?;
+        let variant = self.noisiest()?;
         if self.findings.hallucinations.is_empty() {
             return None;
         }
         let panel = |title: &str, rate: fn(&Hallucination) -> Option<Estimate>| {
-            let lines = self.lines(variant, |subject| {
+            let lines = self.lines(&variant, |subject| {
                 let mut rates = self.findings.hallucinations.iter();
                 rate(rates.find(|rates| rates.subject == *subject)?)
             });
@@ -31,17 +31,17 @@ impl Overview<'_> {
         ];
         let caption = format!(
             "Object recognition: false positives (left) and false negatives (right) by level, {}.",
-            light(variant, None)
+            light(&variant, None)
         );
         self.chart("share of replies in %", panels, 2, &caption)
     }
 
     /// How often the commonest answer is given, by level, against how often the commonest is true.
     pub(super) fn collapse(&self) -> Option<(String, Chart)> {
-        let variant = *self.variants_there().last()?;
+        let variant = self.noisiest()?;
         let of_family = |family: Family| {
             let mut truth = None;
-            let mut lines = self.lines(variant, |subject| {
+            let mut lines = self.lines(&variant, |subject| {
                 let mut confusions = self.findings.confusions.iter();
                 let confusion = confusions.find(|confusion| {
                     confusion.family == family && confusion.subject == *subject
@@ -63,7 +63,7 @@ impl Overview<'_> {
         let panels: Vec<Panel> = panels.filter_map(of_family).collect();
         let caption = format!(
             "Answer collapse, {}: how often the answer given most often is given, by level.",
-            light(variant, None)
+            light(&variant, None)
         );
         let (caption, mut chart) = self.chart("share of replies in %", panels, 2, &caption)?;
         "shares of all replies, strict reading; what the answers are is in collapse.csv"

@@ -12,7 +12,7 @@ use crate::score::accuracy::{CHANCE, Subject};
 use crate::score::choice::Mode;
 use crate::score::estimate::Estimate;
 use crate::score::findings::Findings;
-use crate::types::{EnhancerName, Family, Level, Variant, View};
+use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
 
 /// One figure of a report.
 #[derive(Debug, Clone)]
@@ -65,6 +65,7 @@ struct Overview<'a> {
     /// Models that see, in order; each has the look of its place.
     models: Vec<&'a str>,
     enhancers: Vec<&'a EnhancerName>,
+    levels: BTreeSet<AxisLevel>,
 }
 
 impl<'a> Overview<'a> {
@@ -80,6 +81,7 @@ impl<'a> Overview<'a> {
             findings,
             models: models.into_iter().collect(),
             enhancers: enhancers.into_iter().collect(),
+            levels: subjects.iter().filter_map(|s| s.level).collect(),
         }
     }
 
@@ -87,19 +89,19 @@ impl<'a> Overview<'a> {
     fn points(
         &self,
         model: &str,
-        variant: Variant,
+        variant: &KindReading,
         enhancer: Option<&EnhancerName>,
         family: Option<&Family>,
-    ) -> Vec<(Level, Estimate)> {
+    ) -> Vec<(AxisLevel, Estimate)> {
         let summary = &self.findings.summary;
-        let at = |level: Level| {
+        let at = |level: AxisLevel| {
             let subject = Subject::seeing(model, level, variant, enhancer);
             Some((
                 level,
                 summary.cell(&subject, family, Mode::Strict)?.accuracy?,
             ))
         };
-        Level::ALL.into_iter().filter_map(at).collect()
+        self.levels.iter().copied().filter_map(at).collect()
     }
 
     /// The blind lines, each in the look of its model, and chance.
@@ -135,25 +137,30 @@ impl<'a> Overview<'a> {
         Look(place.unwrap_or(self.models.len()))
     }
 
-    /// The darkened variants that were asked; where only one is drawn it is the last, the noisy one.
-    fn variants_there(&self) -> Vec<Variant> {
-        [Variant::Ev, Variant::Noise]
-            .into_iter()
-            .filter(|variant| {
-                let mut subjects = self.findings.grid.subjects.iter();
-                subjects.any(|subject| subject.variant == *variant)
-            })
-            .collect()
+    /// What is drawn where one variant has to do: the last kind that was asked, the noisy one, in its first reading.
+    fn noisiest(&self) -> Option<KindReading> {
+        let variants = self.variants_there();
+        let kind = variants.last()?.kind;
+        variants.into_iter().find(|variant| variant.kind == kind)
+    }
+
+    /// The kinds that were asked, in each light reading.
+    fn variants_there(&self) -> Vec<KindReading> {
+        let subjects = self.findings.grid.subjects.iter();
+        let variants = subjects.map(|subject| &subject.variant);
+        let degraded = variants.filter(|variant| variant.kind.is_some());
+        let degraded: BTreeSet<&KindReading> = degraded.collect();
+        degraded.into_iter().cloned().collect()
     }
 
     /// The lines of all models in one variant, raw, of some number of each subject.
     fn lines(
         &self,
-        variant: Variant,
+        variant: &KindReading,
         mut number: impl FnMut(&Subject) -> Option<Estimate>,
     ) -> Vec<Line> {
         let line = |model: &&str| {
-            let points = Level::ALL.into_iter().filter_map(|level| {
+            let points = self.levels.iter().filter_map(|&level| {
                 let subject = Subject::seeing(model, level, variant, None);
                 Some((level, number(&subject)?))
             });
@@ -167,7 +174,7 @@ impl<'a> Overview<'a> {
     }
 
     /// The lines of the accuracy of all models, with what they are held against.
-    fn accuracies(&self, variant: Variant, family: Option<&Family>) -> Vec<Line> {
+    fn accuracies(&self, variant: &KindReading, family: Option<&Family>) -> Vec<Line> {
         let summary = &self.findings.summary;
         let mut lines = self.lines(variant, |subject| {
             summary.cell(subject, family, Mode::Strict)?.accuracy
@@ -194,8 +201,8 @@ impl<'a> Overview<'a> {
     fn accuracy(&self) -> Option<(String, Chart)> {
         let variants = self.variants_there();
         let panels = variants.iter().map(|variant| Panel {
-            title: format!("{}, n {}", light(*variant, None), self.n(None)),
-            lines: self.accuracies(*variant, None),
+            title: format!("{}, n {}", light(variant, None), self.n(None)),
+            lines: self.accuracies(variant, None),
         });
         let panels: Vec<Panel> = panels.collect();
         let caption = "Accuracy of each model by level, without enhancement. Broken lines: without images, and chance.";
@@ -208,13 +215,13 @@ impl<'a> Overview<'a> {
         if variants.len() < 2 {
             return None;
         }
-        let line = |(index, variant): (usize, &Variant)| {
+        let line = |(index, variant): (usize, &KindReading)| {
             let curves = models.iter();
-            let curves: Vec<Vec<(Level, Estimate)>> = curves
-                .map(|model| self.points(model, *variant, None, None))
+            let curves: Vec<Vec<(AxisLevel, Estimate)>> = curves
+                .map(|model| self.points(model, variant, None, None))
                 .collect();
             Line {
-                name: light(*variant, None),
+                name: light(variant, None),
                 look: Look(index),
                 shape: Shape::Curve(mean(&curves)),
             }
@@ -246,7 +253,7 @@ impl<'a> Overview<'a> {
         for variant in self.variants_there() {
             for model in &self.models {
                 let line = |(index, enhancer): (usize, Option<&EnhancerName>)| {
-                    let points = self.points(model, variant, enhancer, None);
+                    let points = self.points(model, &variant, enhancer, None);
                     // L0 alone is no line of an enhancer's.
                     (points.len() > 1).then(|| Line {
                         name: enhancer.map_or("raw".to_owned(), ToString::to_string),
@@ -257,7 +264,7 @@ impl<'a> Overview<'a> {
                 let all = std::iter::once(None).chain(self.enhancers.iter().copied().map(Some));
                 let lines: Vec<Line> = all.enumerate().filter_map(line).collect();
                 if lines.len() > 1 {
-                    let title = format!("{model}, {}, n {}", light(variant, None), self.n(None));
+                    let title = format!("{model}, {}, n {}", light(&variant, None), self.n(None));
                     panels.push(Panel { title, lines });
                 }
             }
@@ -271,7 +278,7 @@ impl<'a> Overview<'a> {
     }
 
     fn families(&self) -> Option<(String, Chart)> {
-        let variant = *self.variants_there().last()?;
+        let variant = &self.noisiest()?;
         let families = self.findings.grid.families();
         let panels = families.into_iter().map(|family| {
             let n = self.n(Some(family));
@@ -310,11 +317,11 @@ impl<'a> Overview<'a> {
 }
 
 /// The mean of curves at the levels that all of them have, with their range; of one alone itself.
-fn mean(curves: &[Vec<(Level, Estimate)>]) -> Vec<(Level, Estimate)> {
+fn mean(curves: &[Vec<(AxisLevel, Estimate)>]) -> Vec<(AxisLevel, Estimate)> {
     if let [one] = curves {
         return one.clone();
     }
-    let at = |level: Level| {
+    let at = |level: AxisLevel| {
         let values: Option<Vec<f64>> = curves
             .iter()
             .map(|curve| {
@@ -331,5 +338,6 @@ fn mean(curves: &[Vec<(Level, Estimate)>]) -> Vec<(Level, Estimate)> {
         };
         Some((level, estimate))
     };
-    Level::ALL.into_iter().filter_map(at).collect()
+    let levels: BTreeSet<AxisLevel> = curves.iter().flatten().map(|(level, _)| *level).collect();
+    levels.into_iter().filter_map(at).collect()
 }

@@ -65,7 +65,7 @@ fn draw(root: &Area<'_>, rows: &[(&Curve, Threshold)], unit: &str) -> Result<(),
     }
     for (row, (curve, threshold)) in (0..).zip(rows) {
         let y = 12 + row * ROW + ROW / 2;
-        let light = light(curve.variant, curve.enhancer.as_ref());
+        let light = light(&curve.variant, curve.enhancer.as_ref());
         let name = format!("{}, {light}", curve.model);
         words(
             root,
@@ -85,7 +85,7 @@ fn draw(root: &Area<'_>, rows: &[(&Curve, Threshold)], unit: &str) -> Result<(),
             let point = Circle::new(place, 5, dot.filled());
             root.draw(&point).map_err(failed)?;
         }
-        let darkest = curve.darkest.exposure_drop().0;
+        let darkest = curve.darkest.value();
         let number = format!(
             "{} [{}, {}]",
             stops(threshold.value, darkest),

@@ -10,7 +10,7 @@ use crate::report::files::{as_csv, written};
 use crate::score::estimate::Estimate;
 use crate::score::open::{Against, OpenSummary};
 use crate::types::manifest::RunManifest;
-use crate::types::{EnhancerName, Level, Variant, View};
+use crate::types::{AxisLevel, EnhancerName, ReadingName, View};
 
 /// The schema of `summary.json`.
 const SCHEMA: &str = "darkqa.openeqa-summary/1";
@@ -20,8 +20,8 @@ const SCHEMA: &str = "darkqa.openeqa-summary/1";
 struct Row<'a> {
     model: &'a str,
     view: Option<View>,
-    level: Option<Level>,
-    variant: Variant,
+    level: Option<AxisLevel>,
+    variant: &'static str,
     enhancer: Option<&'a EnhancerName>,
     by: &'static str,
     group: &'a str,
@@ -44,6 +44,7 @@ struct Row<'a> {
     gain: Option<f64>,
     gain_low: Option<f64>,
     gain_high: Option<f64>,
+    reading: Option<&'a ReadingName>,
 }
 
 fn rows(summary: &OpenSummary) -> impl Iterator<Item = Row<'_>> {
@@ -57,7 +58,7 @@ fn rows(summary: &OpenSummary) -> impl Iterator<Item = Row<'_>> {
             model: &subject.model,
             view: subject.view,
             level: subject.level,
-            variant: subject.variant,
+            variant: subject.variant.word(),
             enhancer: subject.enhancer.as_ref(),
             by: cell.group.kind(),
             group: cell.group.name(),
@@ -78,6 +79,7 @@ fn rows(summary: &OpenSummary) -> impl Iterator<Item = Row<'_>> {
             gain: gain.map(|gain| gain.value),
             gain_low: gain.map(|gain| gain.low),
             gain_high: gain.map(|gain| gain.high),
+            reading: subject.variant.reading.as_ref(),
         }
     })
 }

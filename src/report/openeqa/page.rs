@@ -13,7 +13,7 @@ use crate::report::readable::readable;
 use crate::report::template::filled;
 use crate::score::accuracy::Subject;
 use crate::score::open::{Group, Outcome};
-use crate::types::{Level, View};
+use crate::types::{AxisLevel, View};
 
 /// The template.
 const PAGE: &str = include_str!("page.html");
@@ -160,7 +160,7 @@ fn tables(report: &OpenReport<'_>) -> Vec<Table> {
     };
     let groups = report.summary.groups();
     let whole = rows.lines.keys().map(|line| {
-        let at = |level: &Level| rows.shown(rows.cell(line, *level, &Group::All));
+        let at = |level: &AxisLevel| rows.shown(rows.cell(line, *level, &Group::All));
         let own = [line.model.to_owned(), line.light()];
         own.into_iter().chain(rows.levels.iter().map(at)).collect()
     });
@@ -183,7 +183,7 @@ fn tables(report: &OpenReport<'_>) -> Vec<Table> {
         .collect();
     for line in rows.lines.keys().filter(|_| !parts.is_empty()) {
         let by = parts.iter().map(|group| {
-            let at = |level: &Level| rows.shown(rows.cell(line, *level, group));
+            let at = |level: &AxisLevel| rows.shown(rows.cell(line, *level, group));
             let name = std::iter::once(group.name().to_owned());
             name.chain(rows.levels.iter().map(at)).collect()
         });
@@ -291,7 +291,7 @@ fn lost(told: &[&Told]) -> bool {
     };
     told.iter().any(|one| {
         let subject = &one.subject;
-        let lit = Subject::seeing(&subject.model, Level::L0, subject.variant, None);
+        let lit = Subject::seeing(&subject.model, AxisLevel::L0, &subject.variant, None);
         let pair = points(&lit).zip(one.outcome.points());
         subject.level.is_some() && pair.is_some_and(|(lit, here)| here < lit)
     })

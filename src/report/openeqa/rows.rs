@@ -5,14 +5,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::report::subject::{light, percent, points};
 use crate::score::accuracy::Subject;
 use crate::score::open::{Against, Group, OpenCell, OpenSummary};
-use crate::types::{EnhancerName, Level, Variant, View};
+use crate::types::{AxisLevel, EnhancerName, KindReading, View};
 
 /// A model in one variant, raw or enhanced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Line<'a> {
     pub(super) model: &'a str,
     enhancer: Option<&'a EnhancerName>,
-    variant: Variant,
+    variant: &'a KindReading,
 }
 
 impl Line<'_> {
@@ -26,9 +26,9 @@ impl Line<'_> {
 pub(super) struct Rows<'a> {
     summary: &'a OpenSummary,
     /// The levels of all lines.
-    pub(super) levels: BTreeSet<Level>,
+    pub(super) levels: BTreeSet<AxisLevel>,
     /// Those that see; each with the lit frames of its model among its levels.
-    pub(super) lines: BTreeMap<Line<'a>, BTreeSet<Level>>,
+    pub(super) lines: BTreeMap<Line<'a>, BTreeSet<AxisLevel>>,
     /// Those that do not.
     pub(super) blind: Vec<&'a Subject>,
 }
@@ -49,7 +49,7 @@ impl<'a> Rows<'a> {
                     let line = Line {
                         model: &subject.model,
                         enhancer: subject.enhancer.as_ref(),
-                        variant: subject.variant,
+                        variant: &subject.variant,
                     };
                     rows.lines.entry(line).or_default().insert(level);
                 }
@@ -60,20 +60,20 @@ impl<'a> Rows<'a> {
         let dark: BTreeSet<&str> = rows
             .lines
             .keys()
-            .filter(|line| line.variant != Variant::None)
+            .filter(|line| line.variant.kind.is_some())
             .map(|line| line.model)
             .collect();
         let lit: BTreeSet<&str> = rows
             .lines
             .keys()
-            .filter(|line| line.variant == Variant::None)
+            .filter(|line| line.variant.kind.is_none())
             .map(|line| line.model)
             .collect();
         rows.lines
-            .retain(|line, _| line.variant != Variant::None || !dark.contains(line.model));
+            .retain(|line, _| line.variant.kind.is_some() || !dark.contains(line.model));
         for (line, levels) in &mut rows.lines {
             if lit.contains(line.model) {
-                levels.insert(Level::L0);
+                levels.insert(AxisLevel::L0);
             }
         }
         rows
@@ -83,7 +83,7 @@ impl<'a> Rows<'a> {
     pub(super) fn cell(
         &self,
         line: &Line<'_>,
-        level: Level,
+        level: AxisLevel,
         group: &Group,
     ) -> Option<&'a OpenCell> {
         let there = self

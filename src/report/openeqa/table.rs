@@ -11,7 +11,7 @@ use crate::report::products::PAGE;
 use crate::report::table::plain;
 use crate::score::accuracy::Subject;
 use crate::score::open::{Group, OpenCell};
-use crate::types::Level;
+use crate::types::AxisLevel;
 use crate::types::manifest::{Counts, Status};
 
 /// Renders a run: how far it has come where it is not complete, scores by level, by split and by category, what they rest on, and
@@ -125,7 +125,7 @@ fn groups(report: &OpenReport<'_>, rows: &Rows<'_>) -> Table {
             } else {
                 Default::default()
             };
-            let at = |level: &Level| rows.shown(rows.cell(line, *level, group));
+            let at = |level: &AxisLevel| rows.shown(rows.cell(line, *level, group));
             let same = |subject: &&&Subject| subject.model == line.model;
             let blind = blind.map(|_| {
                 let subject = rows.blind.iter().find(same).or(rows.blind.first());

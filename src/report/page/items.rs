@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::score::choice::Mode;
 use crate::score::findings::Findings;
 use crate::score::grid::{Grid, Mark};
-use crate::types::{FrameId, Level, Listed, QuestionId, Thumbnail, View, Why};
+use crate::types::{AxisLevel, FrameId, QuestionId, RunQuestion, Thumbnail, View, Why};
 
 /// The codes of marks beside the indices of choices.
 const UNREAD: u8 = 26;
@@ -52,7 +52,7 @@ struct Room {
 #[derive(Serialize)]
 struct Data<'a> {
     runs: Vec<String>,
-    drops: BTreeMap<String, f32>,
+    drops: BTreeMap<String, f64>,
     families: Vec<&'a str>,
     frames: Vec<&'a str>,
     subjects: Vec<Subject<'a>>,
@@ -76,7 +76,7 @@ struct Subject<'a> {
     condition: String,
     /// What the levels of one line have in common.
     light: String,
-    level: Option<Level>,
+    level: Option<AxisLevel>,
     variant: String,
     enhancer: Option<&'a str>,
 }
@@ -162,7 +162,7 @@ fn pack(data: &Data<'_>) -> Result<String> {
 
 fn data<'a>(findings: &'a Findings<'a>, shown: &Shown<'a>, room: Room) -> Data<'a> {
     let grid = &findings.grid;
-    let listed: HashMap<&QuestionId, &Listed> = shown
+    let listed: HashMap<&QuestionId, &RunQuestion> = shown
         .questions
         .iter()
         .map(|question| (&question.id, question))
@@ -179,8 +179,8 @@ fn data<'a>(findings: &'a Findings<'a>, shown: &Shown<'a>, room: Room) -> Data<'
             let listed = listed.get(&record.question);
             questions.push(Question {
                 id: &record.question.0,
-                frame: frames.place(&*record.frame.0),
-                family: families.place(record.family.name()),
+                frame: frames.place(&*record.detail.frame.0),
+                family: families.place(record.detail.family.name()),
                 text: listed.map_or("", |listed| &listed.text),
                 evidence: listed
                     .map(|listed| &listed.evidence)
@@ -195,8 +195,8 @@ fn data<'a>(findings: &'a Findings<'a>, shown: &Shown<'a>, room: Room) -> Data<'
                 turn => format!("{}#{turn}", record.question),
             },
             question: number,
-            choices: choices.place(record.choices.as_slice()),
-            truth: record.truth,
+            choices: choices.place(record.detail.choices.as_slice()),
+            truth: record.detail.truth,
         });
     }
     let (texts, replies) = replies(grid, room.text);
@@ -210,9 +210,7 @@ fn data<'a>(findings: &'a Findings<'a>, shown: &Shown<'a>, room: Room) -> Data<'
     let (reasons, why) = reasons(grid);
     Data {
         runs: shown.runs.iter().map(|run| run.name.clone()).collect(),
-        drops: Level::ALL
-            .map(|level| (level.to_string(), level.exposure_drop().0))
-            .into(),
+        drops: drops(grid),
         thumbnails: thumbnails(shown.thumbnails, &frames.places, room.pictures),
         families: families.list,
         frames: frames.list,
@@ -230,6 +228,14 @@ fn data<'a>(findings: &'a Findings<'a>, shown: &Shown<'a>, room: Room) -> Data<'
     }
 }
 
+/// The severity of each level that stands in the grid, by its name.
+fn drops(grid: &Grid<'_>) -> BTreeMap<String, f64> {
+    let levels = grid.subjects.iter().filter_map(|subject| subject.level);
+    levels
+        .map(|level| (level.to_string(), level.value()))
+        .collect()
+}
+
 fn code(mark: Mark, mode: Mode) -> u8 {
     match mark {
         Mark::Absent => ABSENT,
@@ -245,7 +251,7 @@ fn subjects<'a>(grid: &'a Grid<'_>) -> Vec<Subject<'a>> {
         condition: subject.condition(),
         light: match subject.view {
             Some(View::Blind) => "blind".to_owned(),
-            _ => crate::report::subject::light(subject.variant, subject.enhancer.as_ref()),
+            _ => crate::report::subject::light(&subject.variant, subject.enhancer.as_ref()),
         },
         level: subject.level,
         variant: subject.variant.to_string(),
@@ -265,7 +271,7 @@ fn reasons(grid: &Grid<'_>) -> (Vec<Value>, Vec<Vec<usize>>) {
     for subject in 0..grid.subjects.len() {
         let why = (0..grid.items.len()).map(|item| {
             let record = grid.record(subject, item);
-            reasons.place(record.and_then(|record| record.strict?.why))
+            reasons.place(record.and_then(|record| record.detail.strict?.why))
         });
         places.push(why.collect());
     }

@@ -14,7 +14,7 @@ use super::template::filled;
 use crate::error::Result;
 use crate::score::findings::Findings;
 use crate::types::manifest::{RunManifest, Status};
-use crate::types::{Listed, Record, Thumbnail};
+use crate::types::{Record, RunQuestion, Thumbnail};
 
 /// The parts of the page.
 const PAGE: &str = include_str!("page.html");
@@ -40,7 +40,7 @@ pub struct Shown<'a> {
     /// The runs.
     pub runs: Vec<Run<'a>>,
     /// The questions, where they are kept.
-    pub questions: &'a [Listed],
+    pub questions: &'a [RunQuestion],
     /// The small copies of images, where they are kept.
     pub thumbnails: &'a [Thumbnail],
 }
@@ -117,8 +117,11 @@ fn alerts(shown: &Shown<'_>) -> Vec<String> {
 
 fn intro(findings: &Findings<'_>) -> Vec<String> {
     let (grid, unit) = (&findings.grid, findings.unit);
-    let frames: std::collections::BTreeSet<_> =
-        grid.items.iter().map(|item| &item.record.frame).collect();
+    let frames: std::collections::BTreeSet<_> = grid
+        .items
+        .iter()
+        .map(|item| &item.record.detail.frame)
+        .collect();
     vec![format!(
         "{} items about {} frames, {} subjects (model × condition). Strict reading. Intervals are 95 %, by {unit} \
          ({} clusters); differences are paired by item, tested by swapping whole {unit}s, and corrected by Holm over the comparisons of one kind and model; \
@@ -186,7 +189,7 @@ fn spent(records: &[Record]) -> Vec<(String, String)> {
     };
     let bytes: u64 = records
         .iter()
-        .filter_map(|record| record.image.as_ref())
+        .filter_map(|record| record.detail.image.as_ref())
         .map(|image| image.bytes as u64)
         .sum();
     let mut waits: Vec<u64> = records

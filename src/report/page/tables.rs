@@ -165,7 +165,7 @@ pub(super) fn thresholds(findings: &Findings<'_>) -> Vec<Table> {
 
 fn curves(caption: &str, curves: &[&Curve]) -> Table {
     let rows = curves.iter().map(|curve| {
-        let darkest = curve.darkest.exposure_drop().0;
+        let darkest = curve.darkest.value();
         let threshold = curve
             .threshold
             .map_or("not above chance at L0".to_owned(), |t| {
@@ -174,7 +174,7 @@ fn curves(caption: &str, curves: &[&Curve]) -> Table {
             });
         vec![
             Cell::new(&curve.model),
-            Cell::of(light(curve.variant, curve.enhancer.as_ref()), "text"),
+            Cell::of(light(&curve.variant, curve.enhancer.as_ref()), "text"),
             Cell::of(family_name(curve.family.as_ref()), "text"),
             Cell::new(threshold),
             Cell::new(interval(Some(curve.area))),

@@ -1,13 +1,14 @@
 //! The paper's example figure: both variants by level.
 
 use super::{CELL, Canvas, GAP, LINE, fitted, letter_width, mean};
-use crate::types::{DarkLevel, Rgb};
+use crate::types::degradation::Axis;
+use crate::types::{AxisLevel, Rgb};
 
 /// One level of a frame.
 #[derive(Debug, Clone)]
 pub struct LevelColumn {
     /// Which.
-    pub level: DarkLevel,
+    pub level: AxisLevel,
     /// By exposure drop alone.
     pub exposure: Rgb,
     /// With the sensor's noise.
@@ -49,8 +50,8 @@ pub fn levels(clean: &Rgb, columns: &[LevelColumn]) -> Rgb {
     }
     for (index, column) in columns.iter().enumerate() {
         let left = left(index + 1);
-        let level = column.level.level();
-        let label = format!("{level} -{} EV", column.level.exposure_drop().0);
+        let unit = column.level.axis().unwrap_or(Axis::LIGHT).unit;
+        let label = format!("{} -{} {unit}", column.level, column.level.value());
         sheet.write([GAP, left], cell, &label, [0; 3]);
         for (top, image) in tops.into_iter().zip([&column.exposure, &column.noise]) {
             sheet.put([top, left], size, |row, column| {
@@ -64,13 +65,13 @@ pub fn levels(clean: &Rgb, columns: &[LevelColumn]) -> Rgb {
     sheet.finish()
 }
 
-/// By how much an inset is amplified; L1 and L2 can be seen as they are.
-fn amplification(level: DarkLevel) -> Option<u16> {
-    match level {
-        DarkLevel::L1 | DarkLevel::L2 => None,
-        DarkLevel::L3 => Some(10),
-        DarkLevel::L4 => Some(20),
-        DarkLevel::L5 => Some(50),
+/// By how much an inset is amplified; up to 5 EV, images can be seen as they are.
+fn amplification(level: AxisLevel) -> Option<u16> {
+    match level.value() {
+        ..5.0 => None,
+        5.0..7.0 => Some(10),
+        7.0..8.5 => Some(20),
+        _ => Some(50),
     }
 }
 
@@ -111,14 +112,16 @@ fn lighter(factor: u16) -> [u8; 256] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::types::Severity;
+    use crate::types::degradation::Kind;
 
     fn grey(height: usize, width: usize, code: u8) -> Rgb {
         Rgb::new(height, width, vec![code; height * width * 3]).unwrap()
     }
 
-    fn sheet(height: usize, width: usize, levels_of: &[DarkLevel]) -> Rgb {
-        let column = |level: &DarkLevel| LevelColumn {
-            level: *level,
+    fn sheet(height: usize, width: usize, levels_of: &[Severity]) -> Rgb {
+        let column = |level: &Severity| LevelColumn {
+            level: AxisLevel::new(Kind::ALL[0], *level),
             exposure: grey(height, width, 3),
             noise: grey(height, width, 4),
         };
@@ -128,7 +131,7 @@ mod tests {
 
     #[test]
     fn insets_are_amplified_by_their_level() {
-        let sheet = sheet(100, 300, &[DarkLevel::L1, DarkLevel::L5]);
+        let sheet = sheet(100, 300, &[Severity::L1, Severity::L5]);
         let has = |code: u8| {
             let pixels = sheet.samples().chunks(3);
             pixels.filter(|pixel| **pixel == [code; 3]).count()
@@ -142,7 +145,7 @@ mod tests {
     #[test]
     fn every_size_has_a_sheet() {
         for (height, width) in [(1, 1), (3, 500), (500, 3), (7, 7), (720, 1280)] {
-            for levels in [&[][..], &[DarkLevel::L4], &DarkLevel::ALL] {
+            for levels in [&[][..], &[Severity::L4], &Severity::LADDER] {
                 let sheet = sheet(height, width, levels);
                 assert!(sheet.width() <= 2400, "{}", sheet.width());
             }

@@ -70,8 +70,8 @@ fn groups(
         }
     }
     let all = std::iter::once(None).chain(setup.conditions.iter().map(Some));
-    let groups = all.filter_map(|condition| group(setup, source, condition, &shown));
-    Ok(groups.collect())
+    let groups = all.filter_map(|condition| group(setup, source, condition, &shown).transpose());
+    groups.collect()
 }
 
 /// The trials in a condition; `None` if no model is asked in it.
@@ -80,34 +80,38 @@ fn group(
     source: usize,
     condition: Option<&Condition>,
     shown: &[Shown],
-) -> Option<TrialGroup<ChoiceItem>> {
+) -> Result<Option<TrialGroup<ChoiceItem>>> {
     let view = condition.map_or(View::Blind, |_| View::Image);
     let models = setup.models.iter().enumerate();
     let models: Vec<(usize, &ModelUnderTest)> =
         models.filter(|(_, model)| model.view == view).collect();
     if models.is_empty() {
-        return None;
+        return Ok(None);
     }
     let image = condition.map(|condition| {
         let source = &setup.sources[source];
         setup.recipe().stimulus(source, condition)
     });
-    let trials = shown.iter().flat_map(|shown| {
+    let image = image.transpose()?;
+    let mut trials = Vec::with_capacity(shown.len() * models.len());
+    for shown in shown {
         let prompt = match view {
             View::Image => &shown.image,
             View::Blind => &shown.blind,
         };
-        models.iter().map(move |&(index, model)| Trial {
-            key: facts(shown, prompt, model, condition, image).key(),
-            model: index,
-            prompt: prompt.clone(),
-            item: shown.item.clone(),
-        })
-    });
-    Some(TrialGroup {
+        for &(index, model) in &models {
+            trials.push(Trial {
+                key: facts(shown, prompt, model, condition, image).key()?,
+                model: index,
+                prompt: prompt.clone(),
+                item: shown.item.clone(),
+            });
+        }
+    }
+    Ok(Some(TrialGroup {
         condition: condition.cloned(),
-        trials: trials.collect(),
-    })
+        trials,
+    }))
 }
 
 fn facts<'a>(
@@ -118,9 +122,6 @@ fn facts<'a>(
     image: Option<Digest>,
 ) -> KeyFacts<'a> {
     let question = &*shown.item.question;
-    KeyFacts {
-        choices: question.choices.texts(),
-        repeat: shown.item.repeat,
-        ..KeyFacts::new(model, &question.id, prompt, condition, image)
-    }
+    let facts = KeyFacts::new(model, &question.id, prompt, condition, image);
+    facts.with_choices(question.choices.texts(), shown.item.repeat)
 }

@@ -25,7 +25,9 @@ use crate::job::shard::part;
 use crate::job::source::{Frames, Source, first_asked, inspect_all};
 use crate::store::Store;
 use crate::types::manifest::RunManifest;
-use crate::types::{Condition, FrameId, Listed, Question, QuestionId, Record, View};
+use crate::types::{
+    ChoiceDetail, Condition, FrameId, Question, QuestionId, Record, RunQuestion, View,
+};
 
 /// Everything an evaluation is made of, opened and checked; nothing is asked, and nothing written.
 pub(super) struct Setup<'a> {
@@ -114,7 +116,7 @@ impl Experiment for Setup<'_> {
         &self.recipe
     }
 
-    fn questions(&self) -> Vec<Listed> {
+    fn questions(&self) -> Vec<RunQuestion> {
         let all = self.dataset.questions().iter();
         let places: HashMap<&QuestionId, usize> =
             all.map(|question| &question.id).zip(0..).collect();
@@ -122,9 +124,9 @@ impl Experiment for Setup<'_> {
         questions
             .map(|question| {
                 let source = &self.sources[self.places[&question.frame]];
-                Listed {
+                RunQuestion {
                     image: source.frames.first().map(|frame| frame.digest),
-                    ..Listed::new(
+                    ..RunQuestion::new(
                         question,
                         places[&question.id],
                         &self.dataset.scene(&question.frame),
@@ -161,7 +163,7 @@ impl Experiment for Setup<'_> {
 
     fn report(
         &self,
-        store: &Store<Record>,
+        store: &Store<ChoiceDetail>,
         manifest: &mut RunManifest,
         show: Show,
     ) -> Result<String> {

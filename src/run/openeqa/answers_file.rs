@@ -9,12 +9,13 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::questions::some;
-use super::record::empty;
+use super::record::detail;
 use crate::config::AnswersFile;
 use crate::dataset::openeqa::OpenQuestion;
 use crate::error::{Error, Result};
+use crate::types::degradation::Kind;
 use crate::types::{
-    Condition, Degradation, Digest, Level, OpenRecord, Step, TrialKey, Variants, Via, View,
+    Condition, Degradation, Digest, KindSet, OpenDetail, Record, Step, TrialKey, Via,
 };
 
 /// An entry of a file; other fields are ignored.
@@ -26,7 +27,7 @@ struct Entry {
     /// What was shown, as `L2-noise`.
     condition: Option<Condition>,
     /// The same by its level alone.
-    level: Option<Level>,
+    level: Option<String>,
     /// Who gave it, where several people did.
     annotator: Option<Value>,
 }
@@ -38,8 +39,8 @@ struct Entry {
 pub(super) fn read(
     config: &AnswersFile,
     questions: &[Arc<OpenQuestion>],
-    variants: Variants,
-) -> Result<Vec<OpenRecord>> {
+    variants: KindSet,
+) -> Result<Vec<Record<OpenDetail>>> {
     let path = &config.path;
     let text = fs::read(path).map_err(|e| Error::file(path, "read", e))?;
     let wrong = |problem: String| Error::data(path.display(), problem);
@@ -74,17 +75,17 @@ pub(super) fn read(
             )));
         }
         let key = key(&config.name, entry, &condition, person.as_deref());
-        let degradation = condition.degradation;
-        records.push(OpenRecord {
-            view: View::Image,
-            level: Some(degradation.level()),
-            variant: degradation.variant(),
-            enhancer: condition.enhancer.clone(),
-            condition: Some(condition),
+        let question = &questions[index];
+        let detail = OpenDetail {
             person,
+            ..detail(question, Step::Answer)
+        };
+        let condition = Some(condition);
+        let record = Record::blank(key, question.id.clone(), &config.name, condition, detail);
+        records.push(Record {
             reply: entry.answer.clone(),
             via: Via::File,
-            ..empty(key, &questions[index], Step::Answer, &config.name)
+            ..record
         });
     }
     passed_over(path, &strange, entries.len());
@@ -103,23 +104,25 @@ fn passed_over(path: &Path, strange: &[&str], all: usize) {
 }
 
 /// What was shown to whoever gave an answer: the lit frames where nothing is said, as in upstream's own files.
-fn condition(entry: &Entry, variants: Variants) -> std::result::Result<Condition, String> {
-    let dark = match (&entry.condition, entry.level) {
+fn condition(entry: &Entry, variants: KindSet) -> std::result::Result<Condition, String> {
+    let level = match (&entry.condition, entry.level.as_deref()) {
         (Some(condition), _) => return Ok(condition.clone()),
-        (None, level) => level.and_then(Level::dark),
+        (None, None | Some("L0")) => return Ok(Condition::L0),
+        (None, Some(level)) => level,
     };
-    let Some(dark) = dark else {
-        return Ok(Condition::raw(Degradation::None));
-    };
-    let both = [Degradation::Exposure(dark), Degradation::Sensor(dark)];
-    let mut fitting = both
-        .into_iter()
-        .filter(|degradation| variants.include(degradation.variant()));
-    match (fitting.next(), fitting.next()) {
-        (Some(degradation), None) => Ok(Condition::raw(degradation)),
+    let mut degradations = Vec::new();
+    for kind in Kind::ALL {
+        let severity = kind.severity(level).map_err(|e| e.to_string())?;
+        let degradation = Degradation::new(kind, severity, None).map_err(|e| e.to_string())?;
+        degradations.push(degradation);
+    }
+    let example = degradations.last().map(ToString::to_string);
+    degradations.retain(|how| variants.includes(how.kind()));
+    match (degradations.pop(), degradations.is_empty()) {
+        (Some(degradation), true) => Ok(Condition::raw(Some(degradation))),
         _ => Err(format!(
             "\"level\" does not say which variant was shown; \"condition\": \"{}\" does",
-            both[1]
+            example.unwrap_or_default()
         )),
     }
 }

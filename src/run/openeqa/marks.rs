@@ -7,11 +7,12 @@ use super::record::OpenItem;
 use super::setup::Setup;
 use crate::ask::openeqa::judged;
 use crate::dataset::openeqa::OpenQuestion;
+use crate::error::Result;
 use crate::job::models::ModelUnderTest;
 use crate::job::plan::{SourcePlan, TrialGroup};
 use crate::job::predictions::{AnswerState, predictions};
 use crate::job::trial::{Prompt, Trial};
-use crate::types::{Digest, OpenRecord, QuestionId, TrialKey};
+use crate::types::{Digest, OpenDetail, QuestionId, Record, TrialKey};
 
 /// The words that have an answer marked.
 pub(super) fn prompt(question: &OpenQuestion, answer: &str) -> Prompt {
@@ -20,16 +21,18 @@ pub(super) fn prompt(question: &OpenQuestion, answer: &str) -> Prompt {
 }
 
 /// The same answer to the same question is judged once, whatever model gave it in whatever condition.
-fn key(judge: &ModelUnderTest, prompt: &Prompt) -> TrialKey {
-    let [words, _] = prompt.parts();
-    let parts = ["darkqa.mark/1", judge.model.name(), &judge.digest, words];
-    Digest::of_parts(parts.map(str::as_bytes)).into()
+fn key(judge: &ModelUnderTest, prompt: &Prompt) -> Result<TrialKey> {
+    let facts = (judge.model.name(), &*judge.digest, &*prompt.before);
+    Digest::canonical("darkqa.mark/2", &facts).map(Into::into)
 }
 
 /// The marks of a run, each answer to a question once, walk by walk.
-pub(super) fn marks(setup: &Setup<'_>, records: &[OpenRecord]) -> Vec<SourcePlan<OpenItem>> {
+pub(super) fn marks(
+    setup: &Setup<'_>,
+    records: &[Record<OpenDetail>],
+) -> Result<Vec<SourcePlan<OpenItem>>> {
     let Some(judge) = &setup.judge else {
-        return Vec::new();
+        return Ok(Vec::new());
     };
     let ids: Vec<&QuestionId> = setup
         .questions
@@ -45,7 +48,7 @@ pub(super) fn marks(setup: &Setup<'_>, records: &[OpenRecord]) -> Vec<SourcePlan
         };
         let question = &setup.questions[prediction.question];
         let prompt = prompt(question, &answer);
-        let key = key(judge, &prompt);
+        let key = key(judge, &prompt)?;
         if planned.insert(key) {
             by_walk[setup.walk_of(question)].push(Trial {
                 key,
@@ -66,5 +69,5 @@ pub(super) fn marks(setup: &Setup<'_>, records: &[OpenRecord]) -> Vec<SourcePlan
             trials,
         }],
     });
-    plan.collect()
+    Ok(plan.collect())
 }

@@ -7,13 +7,14 @@ use super::record::OpenItem;
 use super::setup::Setup;
 use crate::ask::openeqa::{blind, vision};
 use crate::dataset::openeqa::OpenQuestion;
+use crate::error::Result;
 use crate::job::models::ModelUnderTest;
 use crate::job::plan::{SourcePlan, TrialGroup};
 use crate::job::trial::{KeyFacts, Prompt, Trial};
 use crate::types::{Condition, Digest, View};
 
 /// All answers, walk by walk: without images first, and then condition by condition.
-pub(super) fn answers(setup: &Setup<'_>) -> Vec<SourcePlan<OpenItem>> {
+pub(super) fn answers(setup: &Setup<'_>) -> Result<Vec<SourcePlan<OpenItem>>> {
     let mut by_walk = BTreeMap::<&str, Vec<&Arc<OpenQuestion>>>::new();
     for question in &setup.questions {
         by_walk.entry(&question.episode).or_default().push(question);
@@ -23,12 +24,12 @@ pub(super) fn answers(setup: &Setup<'_>) -> Vec<SourcePlan<OpenItem>> {
         .map(|(source, walk)| {
             let questions = by_walk.remove(&*walk.name.0).unwrap_or_default();
             let conditions = std::iter::once(None).chain(setup.conditions.iter().map(Some));
-            let groups =
-                conditions.filter_map(|condition| group(setup, source, condition, &questions));
-            SourcePlan {
+            let groups = conditions
+                .filter_map(|condition| group(setup, source, condition, &questions).transpose());
+            Ok(SourcePlan {
                 source,
-                groups: groups.collect(),
-            }
+                groups: groups.collect::<Result<_>>()?,
+            })
         })
         .collect()
 }
@@ -39,32 +40,33 @@ fn group(
     source: usize,
     condition: Option<&Condition>,
     questions: &[&Arc<OpenQuestion>],
-) -> Option<TrialGroup<OpenItem>> {
+) -> Result<Option<TrialGroup<OpenItem>>> {
     let view = condition.map_or(View::Blind, |_| View::Image);
     let models = setup.models.iter().enumerate();
     let models: Vec<(usize, &ModelUnderTest)> =
         models.filter(|(_, model)| model.view == view).collect();
     if models.is_empty() {
-        return None;
+        return Ok(None);
     }
-    let images: Option<Digest> =
-        condition.map(|condition| setup.recipe.stimulus(&setup.sources[source], condition));
+    let walk = &setup.sources[source];
+    let images = condition.map(|condition| setup.recipe.stimulus(walk, condition));
+    let images: Option<Digest> = images.transpose()?;
     let mut trials = Vec::new();
     for question in questions {
         let prompt = prompt(question, view);
         for &(index, model) in &models {
             trials.push(Trial {
-                key: KeyFacts::new(model, &question.id, &prompt, condition, images).key(),
+                key: KeyFacts::new(model, &question.id, &prompt, condition, images).key()?,
                 model: index,
                 prompt: prompt.clone(),
                 item: OpenItem::Answer(Arc::clone(question)),
             });
         }
     }
-    Some(TrialGroup {
+    Ok(Some(TrialGroup {
         condition: condition.cloned(),
         trials,
-    })
+    }))
 }
 
 /// The words of a question for a model that sees the walk, or for one that does not.

@@ -4,13 +4,8 @@ use std::sync::Arc;
 
 use crate::ask::{Payload, Query};
 use crate::dataset::openeqa::OpenQuestion;
-use crate::error::Result;
-use crate::job::trial::{Entry, Item, Stimulus, Trial};
-use crate::score::llm_match::{Protocol, mark};
-use crate::types::{
-    Condition, Degradation, Digest, Failure, OpenRecord, QuestionId, Reply, Step, TrialKey,
-    Variant, Via, View, WalkFacts,
-};
+use crate::job::trial::{Item, Stimulus, Trial};
+use crate::types::{Digest, OpenDetail, Record, Step, WalkFacts};
 
 /// What one trial is about.
 #[derive(Debug, Clone)]
@@ -34,7 +29,7 @@ impl OpenItem {
 }
 
 impl Item for OpenItem {
-    type Record = OpenRecord;
+    type Detail = OpenDetail;
 
     fn reply_tokens(&self) -> f64 {
         match self {
@@ -61,112 +56,34 @@ impl Item for OpenItem {
         0
     }
 
-    fn blank(trial: &Trial<Self>, stimulus: &Stimulus, model: &str) -> OpenRecord {
+    fn blank(trial: &Trial<Self>, stimulus: &Stimulus, model: &str) -> Record<OpenDetail> {
         let question = trial.item.question();
-        match &trial.item {
-            Self::Mark { answer, .. } => OpenRecord {
-                judged: Some(answer.to_string()),
-                ..empty(trial.key, question, Step::Mark, model)
-            },
-            Self::Answer(_) => {
-                let condition = stimulus.condition.clone();
-                let degradation = condition.as_ref().map(|condition| condition.degradation);
-                OpenRecord {
-                    view: stimulus.view(),
-                    level: degradation.map(Degradation::level),
-                    variant: degradation.map_or(Variant::None, Degradation::variant),
-                    enhancer: condition
-                        .as_ref()
-                        .and_then(|condition| condition.enhancer.clone()),
-                    condition,
-                    images: facts(&stimulus.images),
-                    ..empty(trial.key, question, Step::Answer, model)
-                }
+        let (condition, detail) = match &trial.item {
+            Self::Mark { answer, .. } => {
+                let judged = Some(answer.to_string());
+                let detail = detail(question, Step::Mark);
+                (None, OpenDetail { judged, ..detail })
             }
-        }
-    }
-}
-impl Entry for OpenRecord {
-    fn model(&self) -> &str {
-        &self.model
-    }
-
-    fn question(&self) -> &QuestionId {
-        &self.question
-    }
-
-    fn condition(&self) -> Option<&Condition> {
-        self.condition.as_ref()
-    }
-
-    fn repeat(&self) -> u32 {
-        0
-    }
-
-    fn choices(&self) -> usize {
-        0
-    }
-
-    fn answered(mut self, reply: Reply) -> Result<Self> {
-        if self.step == Step::Mark {
-            self.upstream = mark(&reply.text, Protocol::Upstream);
-            self.tolerant = mark(&reply.text, Protocol::Tolerant);
-        }
-        Ok(Self {
-            reply: Some(reply.text),
-            refusal: reply.refusal,
-            finish: Some(reply.finish),
-            usage: reply.usage,
-            served_model: reply.served_model,
-            latency_ms: Some(reply.latency_ms),
-            attempts: reply.attempts,
-            ..self
-        })
-    }
-
-    fn failed_by(self, failure: Failure, attempts: u32) -> Self {
-        Self {
-            failure: Some(failure),
-            attempts,
-            ..self
-        }
-    }
-
-    fn batched(self) -> Self {
-        Self {
-            via: Via::Batch,
-            ..self
-        }
+            Self::Answer(_) => {
+                let images = facts(&stimulus.images);
+                let detail = detail(question, Step::Answer);
+                (stimulus.condition.clone(), OpenDetail { images, ..detail })
+            }
+        };
+        Record::blank(trial.key, question.id.clone(), model, condition, detail)
     }
 }
 
-/// A record with nothing but what it is about.
-pub(super) fn empty(key: TrialKey, question: &OpenQuestion, step: Step, model: &str) -> OpenRecord {
-    OpenRecord {
-        key,
+/// What is known of a trial before it is made.
+pub(super) fn detail(question: &OpenQuestion, step: Step) -> OpenDetail {
+    OpenDetail {
         step,
-        question: question.id.clone(),
         episode: question.episode.clone(),
         category: question.category.clone(),
-        model: model.to_owned(),
-        view: View::Blind,
-        condition: None,
-        level: None,
-        variant: Variant::None,
-        enhancer: None,
         person: None,
         judged: None,
-        reply: None,
-        refusal: None,
-        finish: None,
         upstream: None,
         tolerant: None,
-        via: Via::Direct,
-        failure: None,
-        usage: None,
-        served_model: None,
-        latency_ms: None,
-        attempts: 0,
         images: None,
     }
 }

@@ -30,7 +30,7 @@ use crate::job::trial::Item as _;
 use crate::job::walk::WalkFolder;
 use crate::store::Store;
 use crate::types::manifest::RunManifest;
-use crate::types::{Condition, Family, FrameId, Listed, OpenRecord, QuestionId, View};
+use crate::types::{Condition, Family, FrameId, OpenDetail, QuestionId, Record, RunQuestion, View};
 
 /// An answer as it may be: as long as one with so many tokens.
 const ANSWER: &str =
@@ -51,7 +51,7 @@ pub(super) struct Setup<'a> {
     pub(super) judge: Option<ModelUnderTest>,
     pub(super) recipe: Recipe,
     /// The answers of files.
-    given: Vec<OpenRecord>,
+    given: Vec<Record<OpenDetail>>,
 }
 
 impl<'a> Setup<'a> {
@@ -113,7 +113,7 @@ impl<'a> Setup<'a> {
     }
 
     /// The answers of all files.
-    fn answers_of_files(&self) -> Result<Vec<OpenRecord>> {
+    fn answers_of_files(&self) -> Result<Vec<Record<OpenDetail>>> {
         let models = self.models.iter();
         let mut names: BTreeSet<&str> = models.map(|model| model.model.name()).collect();
         let mut all = Vec::new();
@@ -169,7 +169,7 @@ impl Experiment for Setup<'_> {
         &self.recipe
     }
 
-    fn questions(&self) -> Vec<Listed> {
+    fn questions(&self) -> Vec<RunQuestion> {
         let walks: HashMap<&str, &Source> = self
             .sources
             .iter()
@@ -178,7 +178,7 @@ impl Experiment for Setup<'_> {
         let questions = self.questions.iter().map(|question| {
             let walk = walks.get(&*question.episode);
             let walk = walk.filter(|walk| !walk.frames.is_empty());
-            Listed {
+            RunQuestion {
                 id: question.id.clone(),
                 place: self.file_places[&question.id],
                 scene: question.episode.clone(),
@@ -226,14 +226,18 @@ impl Experiment for Setup<'_> {
         ]
     }
 
-    fn given(&self) -> &[OpenRecord] {
+    fn given(&self) -> &[Record<OpenDetail>] {
         &self.given
     }
 
-    fn plan(&self, phase: usize, stored: &[OpenRecord]) -> Result<Vec<SourcePlan<OpenItem>>> {
+    fn plan(
+        &self,
+        phase: usize,
+        stored: &[Record<OpenDetail>],
+    ) -> Result<Vec<SourcePlan<OpenItem>>> {
         Ok(match phase {
-            0 => answers(self),
-            _ => marks(self, stored),
+            0 => answers(self)?,
+            _ => marks(self, stored)?,
         })
     }
 
@@ -263,7 +267,7 @@ impl Experiment for Setup<'_> {
 
     fn report(
         &self,
-        store: &Store<OpenRecord>,
+        store: &Store<OpenDetail>,
         manifest: &mut RunManifest,
         show: Show,
     ) -> Result<String> {

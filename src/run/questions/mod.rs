@@ -173,7 +173,7 @@ fn one(
     name: &FrameId,
 ) -> Result<FrameStatistics> {
     let files = dataset.files(name)?;
-    let seen = files.digest();
+    let seen = files.digest()?;
     let parts = [&context.as_bytes()[..], seen.as_bytes(), name.0.as_bytes()];
     let key = Digest::of_parts(parts);
     let found = if let Some(found) = kept.get(key) {

@@ -11,7 +11,7 @@ use crate::job::rebuild::ImageRebuilder;
 use crate::job::stored::{AnyRun, StoredRun};
 use crate::report::study::{Asked, Shot, page};
 use crate::types::manifest::Status;
-use crate::types::{Condition, Digest, FrameId, Listed, QuestionId, Record};
+use crate::types::{Condition, Digest, FrameId, QuestionId, Record, RunQuestion};
 
 /// Makes the page and its images, each the very file that the models were sent.
 ///
@@ -45,7 +45,7 @@ pub fn pack(config: StudyPack, progress: &Progress) -> Result<Outcome> {
     }
     let shown = first_order(&records);
     let chosen = chosen(listed, config.items.map_or(usize::MAX, usize::from));
-    let mut frames = BTreeMap::<FrameId, Vec<Listed>>::new();
+    let mut frames = BTreeMap::<FrameId, Vec<RunQuestion>>::new();
     for question in chosen {
         frames
             .entry(question.frame.clone())
@@ -123,13 +123,13 @@ fn first_order(records: &[Record]) -> BTreeMap<QuestionId, Vec<String>> {
     for record in records {
         orders
             .entry(record.question.clone())
-            .or_insert_with(|| record.choices.clone());
+            .or_insert_with(|| record.detail.choices.clone());
     }
     orders
 }
 
 /// So many questions, those with the lowest digests of their names.
-fn chosen(mut listed: Vec<Listed>, most: usize) -> Vec<Listed> {
+fn chosen(mut listed: Vec<RunQuestion>, most: usize) -> Vec<RunQuestion> {
     listed.sort_by_cached_key(|question| *Digest::of(question.id.0.as_bytes()).as_bytes());
     listed.truncate(most);
     listed
@@ -138,8 +138,8 @@ fn chosen(mut listed: Vec<Listed>, most: usize) -> Vec<Listed> {
 /// The digests of the images that were sent.
 fn sent(records: &[Record]) -> BTreeMap<(FrameId, Condition), Digest> {
     let sent = records.iter().filter_map(|record| {
-        let place = (record.frame.clone(), record.condition.clone()?);
-        Some((place, record.image.as_ref()?.digest))
+        let place = (record.detail.frame.clone(), record.condition.clone()?);
+        Some((place, record.detail.image.as_ref()?.digest))
     });
     sent.collect()
 }

@@ -12,11 +12,11 @@ use crate::config::{Show, StudyRead};
 use crate::error::{Error, Result};
 use crate::job::report::choice;
 use crate::job::stored::{AnyRun, StoredRun};
-use crate::job::trial::Entry as _;
+
 use crate::job::{Outcome, count, now};
 use crate::store::{Moved, Store};
 use crate::types::manifest::{Counts, RunManifest, Status};
-use crate::types::{Condition, Digest, Kept as _, QuestionId, Record, Reply, TrialKey};
+use crate::types::{ChoiceDetail, Condition, Detail, Digest, QuestionId, Record, Reply, TrialKey};
 
 /// A line of a file of answers.
 #[derive(Debug, Deserialize)]
@@ -144,7 +144,7 @@ fn of_people(run: &RunManifest, config: &StudyRead) -> RunManifest {
         ("people asked about", json!(run.identity)),
     ];
     RunManifest {
-        schema: Record::SCHEMA.to_owned(),
+        schema: ChoiceDetail::SCHEMA.to_owned(),
         status: Status::Started,
         version: env!("CARGO_PKG_VERSION").to_owned(),
         created: now(),
@@ -176,7 +176,7 @@ impl People {
         for record in kept {
             let item = (record.question.clone(), record.condition.clone());
             let next = people.next.entry(item).or_default();
-            *next = (*next).max(record.repeat + 1);
+            *next = (*next).max(record.detail.repeat + 1);
             people.answers.insert(record.key, record);
         }
         people
@@ -197,22 +197,14 @@ impl People {
             .entry((asked.question.clone(), asked.condition.clone()))
             .or_default();
         let kept = self.answers.get(&key);
-        let turn = kept.map_or(*next, |kept| kept.repeat);
+        let turn = kept.map_or(*next, |kept| kept.detail.repeat);
         *next = (*next).max(turn + 1);
-        let blank = Record {
-            key,
-            model: name.to_owned(),
-            reply: None,
-            refusal: None,
-            finish: None,
-            strict: None,
-            lenient: None,
+        let detail = ChoiceDetail {
             repeat: turn,
-            failure: None,
-            usage: None,
-            latency_ms: None,
-            ..asked.clone()
+            ..asked.detail.clone()
         };
+        let (question, condition) = (asked.question.clone(), asked.condition.clone());
+        let blank = Record::blank(key, question, name, condition, detail);
         let reply = Reply {
             served_model: Some(person),
             ..Reply::local(line.answer.clone().unwrap_or_default())

@@ -22,7 +22,7 @@ use crate::job::timings::Timings;
 use crate::job::workers::pool;
 use crate::synthesis::NoiseKey;
 use crate::types::manifest::Status;
-use crate::types::{Degradation, FrameId, Rgb, Variants};
+use crate::types::{Condition, Degradation, FrameId, Rgb};
 use sidecar::Sidecar;
 
 /// Makes the images that the command asks for.
@@ -89,9 +89,9 @@ impl Tally {
 }
 
 /// One file of a frame.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 enum File {
-    Image(Degradation),
+    Image(Option<Degradation>),
     LevelSheet,
     NoiseSheet,
 }
@@ -102,21 +102,7 @@ fn files(config: &Synthesize) -> Vec<File> {
         Product::LevelSheet => vec![File::LevelSheet],
         Product::NoiseSheet => vec![File::NoiseSheet],
         Product::Images | Product::Replay(_) => {
-            let degradations = config
-                .light
-                .levels
-                .iter()
-                .flat_map(|level| match level.dark() {
-                    None => vec![Degradation::None],
-                    Some(dark) => {
-                        let (ev, noise) = (Degradation::Exposure(dark), Degradation::Sensor(dark));
-                        match config.light.variants {
-                            Variants::Ev => vec![ev],
-                            Variants::Noise => vec![noise],
-                            Variants::Both => vec![ev, noise],
-                        }
-                    }
-                });
+            let degradations = config.light.degradations().into_iter();
             degradations.map(File::Image).collect()
         }
     }
@@ -146,7 +132,7 @@ fn one(config: &Synthesize, frames: &Inputs, entry: &Entry, files: &[File], bar:
     }
     for file in files {
         let made = match file {
-            File::Image(degradation) => work.image(*degradation),
+            File::Image(degradation) => work.image(degradation.as_ref()),
             File::LevelSheet => work.sheet("levels", sheet::levels),
             File::NoiseSheet => work.sheet("noise", sheet::terms),
         };
@@ -189,17 +175,13 @@ enum Made {
 }
 
 impl Work<'_> {
-    fn image(&mut self, degradation: Degradation) -> Result<Made> {
+    fn image(&mut self, how: Option<&Degradation>) -> Result<Made> {
         let light = &self.config.light;
         let key = NoiseKey::new(light.sensor.seed, &self.entry.id);
-        let name = format!("{}_{degradation}", self.entry.stem);
-        let sidecar = Sidecar::new(
-            &self.entry.id,
-            self.frame.picture()?,
-            degradation,
-            light,
-            &key,
-        );
+        let condition = Condition::raw(how.cloned());
+        let name = format!("{}_{condition}", self.entry.stem);
+        let picture = self.frame.picture()?;
+        let sidecar = Sidecar::new(&self.entry.id, picture, how, light, &key)?;
         let [image, json] = [".png", ".json"].map(|end| self.config.out.join(name.clone() + end));
         if self.config.existing == Existing::Kept && image.exists() && json.exists() {
             if sidecar.is_at(&json)? {
@@ -208,13 +190,17 @@ impl Work<'_> {
             let problem = "made from another image or with other settings; --force makes it again, another --out keeps both";
             return Err(Error::data(json.display(), problem));
         }
-        write(&image, &png(self.frame.degraded(degradation)?)?)?;
+        write(&image, &png(self.frame.degraded(how)?)?)?;
         write(&json, sidecar.text().as_bytes())?;
         Ok(Made::New)
     }
 
     /// A figure; it has no file beside it, so one that is there is kept whatever it shows.
-    fn sheet(&mut self, kind: &str, draw: fn(&Rgb, &FrameId, &Light) -> Rgb) -> Result<Made> {
+    fn sheet(
+        &mut self,
+        kind: &str,
+        draw: fn(&Rgb, &FrameId, &Light) -> Result<Rgb>,
+    ) -> Result<Made> {
         let path = self
             .config
             .out
@@ -222,7 +208,7 @@ impl Work<'_> {
         if self.config.existing == Existing::Kept && path.exists() {
             return Ok(Made::Kept);
         }
-        let figure = draw(self.frame.clean()?, &self.entry.id, &self.config.light);
+        let figure = draw(self.frame.clean()?, &self.entry.id, &self.config.light)?;
         write(&path, &png(&figure)?)?;
         Ok(Made::New)
     }

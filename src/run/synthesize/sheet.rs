@@ -3,48 +3,46 @@
 use ndarray::Array2;
 
 use crate::config::Light;
+use crate::error::Result;
 use crate::report::sheet::{self, LevelColumn, Signal};
 use crate::synthesis::bayer::Bayer;
 use crate::synthesis::noise::{self, Term};
 use crate::synthesis::unprocess::unprocess;
 use crate::synthesis::{Draws, NoiseKey, expose, ladder};
-use crate::types::{DarkLevel, FrameId, Level, Rgb};
+use crate::types::{AxisLevel, FrameId, Rgb, Severity};
 
-fn dark_levels(light: &Light) -> Vec<DarkLevel> {
-    light
-        .levels
-        .iter()
-        .copied()
-        .filter_map(Level::dark)
-        .collect()
+fn severities(light: &Light) -> Vec<Severity> {
+    let levels = light.levels.iter();
+    levels.filter_map(|level| level.severity()).collect()
 }
 
 /// Both variants of a frame by level.
-pub(super) fn levels(clean: &Rgb, frame: &FrameId, light: &Light) -> Rgb {
-    let levels = dark_levels(light);
+pub(super) fn levels(clean: &Rgb, frame: &FrameId, light: &Light) -> Result<Rgb> {
+    let severities = severities(light);
     let key = NoiseKey::new(light.sensor.seed, frame);
-    let mut noisy: Vec<Rgb> = levels
+    let mut noisy: Vec<Rgb> = severities
         .iter()
         .map(|_| Rgb::black(clean.height(), clean.width()))
         .collect();
-    ladder(clean, &key, &light.sensor.synthesis, &levels, &mut noisy);
-    let columns: Vec<LevelColumn> = levels
-        .into_iter()
-        .zip(noisy)
-        .map(|(level, noise)| LevelColumn {
-            level,
-            exposure: expose(clean, level),
+    let synthesis = light.sensor.readings.only()?;
+    ladder(clean, &key, synthesis, &severities, &mut noisy);
+    let levels = light.levels.iter().filter(|level| **level != AxisLevel::L0);
+    let columns = levels.zip(severities).zip(noisy);
+    let columns: Vec<LevelColumn> = columns
+        .map(|((level, severity), noise)| LevelColumn {
+            level: *level,
+            exposure: expose(clean, severity),
             noise,
         })
         .collect();
-    sheet::levels(clean, &columns)
+    Ok(sheet::levels(clean, &columns))
 }
 
 /// The terms of a frame's noise, at the darkest level that is asked for (which matters where levels share no negative).
-pub(super) fn terms(clean: &Rgb, frame: &FrameId, light: &Light) -> Rgb {
-    let level = dark_levels(light).pop().unwrap_or(DarkLevel::L5);
+pub(super) fn terms(clean: &Rgb, frame: &FrameId, light: &Light) -> Result<Rgb> {
+    let level = severities(light).pop().unwrap_or(Severity::L5);
     let (synthesis, frame) = (
-        &light.sensor.synthesis,
+        light.sensor.readings.only()?,
         NoiseKey::new(light.sensor.seed, frame),
     );
     let key = match synthesis.draws {
@@ -75,7 +73,7 @@ pub(super) fn terms(clean: &Rgb, frame: &FrameId, light: &Light) -> Rgb {
         state.system_gain, state.ratio
     );
     signals.push(signal(name, under(&Term::ALL)));
-    sheet::noise(&signals)
+    Ok(sheet::noise(&signals))
 }
 
 fn adu(raw: &Bayer, range: f32) -> Array2<f32> {

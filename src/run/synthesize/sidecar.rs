@@ -11,9 +11,10 @@ use crate::dataset::Picture;
 use crate::error::{Error, Result};
 use crate::synthesis::noise::Term;
 use crate::synthesis::{
-    self, Amplify, CameraState, Coupling, Draws, Negative, NoiseKey, Tone, expose, exposure,
+    self, Amplify, CameraState, Coupling, Draws, Negative, NoiseKey, Synthesis, Tone, degrade,
+    exposure,
 };
-use crate::types::{Degradation, FrameId, Rgb};
+use crate::types::{Condition, Degradation, FrameId, ReadingName, Rgb};
 
 /// The schema of these files.
 const SCHEMA: &str = "darkqa.image/1";
@@ -27,9 +28,9 @@ pub(super) struct Sidecar {
     frame: String,
     /// The content of the image that it was made from.
     source: String,
-    condition: String,
+    condition: Condition,
     /// The exposure drop in EV.
-    drop: f32,
+    drop: f64,
     /// The version of the branch of the synthesis.
     synthesis: u32,
     sensor: Option<Sensor>,
@@ -39,6 +40,9 @@ pub(super) struct Sidecar {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Sensor {
     seed: u64,
+    /// The light reading that the parts below make up.
+    #[serde(default = "paper")]
+    reading: ReadingName,
     amplify: Amplify,
     tone: Tone,
     draws: Draws,
@@ -52,33 +56,33 @@ impl Sidecar {
     pub(super) fn new(
         frame: &FrameId,
         picture: &Picture,
-        degradation: Degradation,
+        how: Option<&Degradation>,
         light: &Light,
         key: &NoiseKey,
-    ) -> Self {
-        let synthesis = &light.sensor.synthesis;
-        let sensor = match degradation {
-            Degradation::Sensor(level) => Some(Sensor {
+    ) -> Result<Self> {
+        let synthesis = light.sensor.readings.of(how)?;
+        let sensor = how.and_then(|how| {
+            Some(Sensor {
                 seed: light.sensor.seed,
+                reading: how.reading()?.clone(),
                 amplify: synthesis.amplify,
                 tone: synthesis.tone,
                 draws: synthesis.draws,
                 coupling: synthesis.coupling,
                 model: serde_json::json!(synthesis.camera),
-                state: synthesis.state(key, level),
-            }),
-            _ => None,
-        };
-        Self {
+                state: synthesis.state(key, how.severity()),
+            })
+        });
+        Ok(Self {
             schema: SCHEMA.to_owned(),
             darkqa_eval: env!("CARGO_PKG_VERSION").to_owned(),
             frame: frame.0.clone(),
             source: picture.digest().to_string(),
-            condition: degradation.to_string(),
-            drop: degradation.level().exposure_drop().0,
-            synthesis: version(degradation),
+            condition: Condition::raw(how.cloned()),
+            drop: how.map_or(0.0, |how| how.severity().value()),
+            synthesis: version(how),
             sensor,
-        }
+        })
     }
 
     pub(super) fn read(path: &Path) -> Result<Self> {
@@ -120,47 +124,49 @@ impl Sidecar {
     /// Where the picture is another one, or this program's synthesis is not that which made it.
     pub(super) fn replay(&self, picture: &Picture, path: &Path) -> Result<Rgb> {
         let wrong = |problem: String| Error::data(path.display(), problem);
-        let degradation: Degradation = self
-            .condition
-            .parse()
-            .map_err(|e: Error| e.at(path.display().to_string()))?;
+        let how = self.condition.degradation.as_ref();
         if self.source != picture.digest().to_string() {
             let problem = "made from another image than INPUT (their contents differ)";
             return Err(wrong(problem.to_owned()));
         }
-        if self.synthesis != version(degradation) {
+        if self.synthesis != version(how) {
             return Err(wrong(format!(
                 "made by synthesis {} of darkqa-eval {}; this one has synthesis {}",
                 self.synthesis,
                 self.darkqa_eval,
-                version(degradation)
+                version(how)
             )));
         }
         let clean = picture.decode()?;
-        Ok(match (degradation, &self.sensor) {
-            (Degradation::None, _) => clean,
-            (Degradation::Exposure(level), _) => expose(&clean, level),
-            (Degradation::Sensor(level), Some(sensor)) => {
-                let frame = NoiseKey::new(sensor.seed, &self.frame());
-                let key = match sensor.draws {
-                    Draws::Shared => frame,
-                    Draws::Fresh => frame.at(level),
-                };
-                let Sensor { amplify, tone, .. } = *sensor;
-                let state = sensor.state.clone();
-                Negative::taken(&clean, &key, state, amplify, tone, &Term::ALL).develop(level)
-            }
-            (Degradation::Sensor(_), None) => {
+        let (severity, sensor) = match (how, &self.sensor) {
+            (None, _) => return Ok(clean),
+            (Some(how), Some(sensor)) => (how.severity(), sensor),
+            (Some(how), None) if how.reading().is_some() => {
                 return Err(wrong("the sensor's state is missing".to_owned()));
             }
-        })
+            (how, None) => {
+                let key = NoiseKey::new(0, &self.frame());
+                return Ok(degrade(&clean, how, &key, &Synthesis::default()));
+            }
+        };
+        let frame = NoiseKey::new(sensor.seed, &self.frame());
+        let key = match sensor.draws {
+            Draws::Shared => frame,
+            Draws::Fresh => frame.at(severity),
+        };
+        let Sensor { amplify, tone, .. } = *sensor;
+        let state = sensor.state.clone();
+        let negative = Negative::taken(&clean, &key, state, amplify, tone, &Term::ALL);
+        Ok(negative.develop(severity))
     }
 }
 
-/// The version of the branch that makes a degradation.
-fn version(degradation: Degradation) -> u32 {
-    match degradation {
-        Degradation::Sensor(_) => synthesis::VERSION,
-        Degradation::None | Degradation::Exposure(_) => exposure::VERSION,
-    }
+/// The reading of files that name none.
+fn paper() -> ReadingName {
+    ReadingName::PAPER
+}
+
+/// The version of the branch that makes a degradation; an untouched frame has that of the exposure branch.
+fn version(how: Option<&Degradation>) -> u32 {
+    how.map_or(exposure::VERSION, |how| synthesis::version(how.kind()))
 }

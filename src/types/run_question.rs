@@ -1,4 +1,4 @@
-//! What a run asked, as it keeps it beside its records: [`Listed`] questions and [`Thumbnail`]s of their images.
+//! What a run asked, as it keeps it beside its records: [`RunQuestion`] questions and [`Thumbnail`]s of their images.
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -10,7 +10,7 @@ use super::question::{Family, Question, QuestionId};
 
 /// One line of a run's `questions.jsonl`: a question with the scene of its frame. It reads back as a file of questions, too.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Listed {
+pub struct RunQuestion {
     /// The question's name.
     pub id: QuestionId,
     /// Its place among all questions of the data, those that were not asked included.
@@ -41,7 +41,7 @@ pub struct Listed {
     pub image: Option<Digest>,
 }
 
-impl Listed {
+impl RunQuestion {
     /// Whether it asks the same as another of its name, about the same image if both say which.
     #[must_use]
     pub fn is_same(&self, other: &Self) -> bool {

@@ -1,0 +1,117 @@
+//! Several runs as one, whatever was asked: [`join`].
+
+use std::collections::{BTreeSet, HashMap, HashSet};
+use std::ops::Range;
+use std::path::PathBuf;
+
+use super::cost::cost;
+use crate::error::Result;
+use crate::job::stored::StoredRun;
+use crate::types::manifest::RunManifest;
+use crate::types::{Detail, QuestionId, Record, RunQuestion, Thumbnail, TrialKey, View};
+
+/// Several runs as one.
+pub(super) struct Joined<D> {
+    pub(super) runs: Vec<Part>,
+    pub(super) records: Vec<Record<D>>,
+    pub(super) questions: Vec<RunQuestion>,
+    pub(super) thumbnails: Vec<Thumbnail>,
+}
+
+/// One of them.
+pub(super) struct Part {
+    pub(super) folder: PathBuf,
+    pub(super) name: String,
+    pub(super) manifest: RunManifest,
+    pub(super) cost: Option<String>,
+    /// Where its records are among all.
+    pub(super) records: Range<usize>,
+}
+
+/// Puts runs together. A model that answered the same item in two of them in different ways (another seed, prompt or
+/// parameter) stands once for each, with the run's name; a trial that two of them share counts once. Models are told apart by the
+/// records that are `compared`.
+pub(super) fn join<D: Detail>(
+    runs: Vec<StoredRun<D>>,
+    compared: impl Fn(&Record<D>) -> bool,
+) -> Result<Joined<D>> {
+    let twice = answered_twice(&runs, compared);
+    let names = names(&runs);
+    let mut joined = Joined {
+        runs: Vec::new(),
+        records: Vec::new(),
+        questions: Vec::new(),
+        thumbnails: Vec::new(),
+    };
+    let mut known = HashSet::<TrialKey>::new();
+    let mut listed = BTreeSet::<QuestionId>::new();
+    let mut pictured = BTreeSet::new();
+    for (run, name) in runs.into_iter().zip(names) {
+        let first = joined.records.len();
+        let cost = cost(&run.records)?;
+        for mut record in run.records {
+            if known.contains(&record.key) {
+                continue;
+            }
+            if !record.failed() {
+                known.insert(record.key);
+            }
+            if twice.contains(&(record.view, record.model.clone())) {
+                record.model = format!("{} ({name})", record.model);
+            }
+            joined.records.push(record);
+        }
+        joined.runs.push(Part {
+            folder: run.folder,
+            name,
+            manifest: run.manifest,
+            cost,
+            records: first..joined.records.len(),
+        });
+        let questions = run.questions.into_iter();
+        let new = questions.filter(|question| listed.insert(question.id.clone()));
+        joined.questions.extend(new);
+        let thumbnails = run.thumbnails.into_iter();
+        joined.thumbnails.extend(thumbnails.filter(|thumbnail| {
+            pictured.insert((thumbnail.frame.clone(), thumbnail.condition.clone()))
+        }));
+    }
+    Ok(joined)
+}
+
+/// What runs are called: their folders' names, or their paths where two have one name.
+fn names<D: Detail>(runs: &[StoredRun<D>]) -> Vec<String> {
+    let short: Vec<String> = runs.iter().map(StoredRun::name).collect();
+    let distinct: BTreeSet<&String> = short.iter().collect();
+    if distinct.len() == runs.len() {
+        return short;
+    }
+    let paths = runs.iter().map(|run| run.folder.display().to_string());
+    paths.collect()
+}
+
+/// The models that answered the same item in two runs as different trials.
+fn answered_twice<D: Detail>(
+    runs: &[StoredRun<D>],
+    compared: impl Fn(&Record<D>) -> bool,
+) -> BTreeSet<(View, String)> {
+    let mut keys = HashMap::new();
+    let mut twice = BTreeSet::new();
+    if runs.len() < 2 {
+        return twice;
+    }
+    for (index, run) in runs.iter().enumerate() {
+        for record in run.records.iter().filter(|record| compared(record)) {
+            let item = (
+                (record.view, &record.model),
+                (&record.condition, &record.question),
+                (record.detail.choices(), record.detail.repeat()),
+            );
+            let (key, place) = *keys.entry(item).or_insert((record.key, index));
+            if key != record.key && place != index {
+                twice.insert((record.view, record.model.clone()));
+            }
+        }
+    }
+    twice
+}

@@ -1,0 +1,58 @@
+//! What a reply says, as it is entered in the record of its trial.
+
+use super::choice::readings;
+use super::llm_match::{Protocol, mark};
+use crate::error::Result;
+use crate::types::detail::{ChoiceLine, OpenLine};
+use crate::types::{Answer, ChoiceDetail, Choices, Detail, OpenDetail, Outcome, Reply, Step};
+
+impl Detail for ChoiceDetail {
+    type Line = ChoiceLine;
+
+    const SCHEMA: &'static str = "darkqa.run/2";
+
+    /// Enters both readings of a reply and the outcome, which is the strict one's.
+    fn read(&mut self, reply: &Reply) -> Result<()> {
+        let choices = Choices::new(self.choices.clone(), self.truth)?;
+        let (strict, lenient) = readings(reply, &choices);
+        self.outcome = match strict {
+            Answer::Chosen(index) if index == choices.truth() => Outcome::Right,
+            Answer::Chosen(_) => Outcome::Wrong,
+            Answer::Unparsed(_) => Outcome::Unparsed,
+        };
+        self.strict = Some(strict.into());
+        self.lenient = Some(lenient.into());
+        Ok(())
+    }
+
+    fn choices(&self) -> &[String] {
+        &self.choices
+    }
+
+    fn repeat(&self) -> u32 {
+        self.repeat
+    }
+}
+
+impl Detail for OpenDetail {
+    type Line = OpenLine;
+
+    const SCHEMA: &'static str = "darkqa.openeqa/2";
+
+    /// Enters the mark that both protocols read in a judge's reply.
+    fn read(&mut self, reply: &Reply) -> Result<()> {
+        if self.step == Step::Mark {
+            self.upstream = mark(&reply.text, Protocol::Upstream);
+            self.tolerant = mark(&reply.text, Protocol::Tolerant);
+        }
+        Ok(())
+    }
+
+    fn choices(&self) -> &[String] {
+        &[]
+    }
+
+    fn repeat(&self) -> u32 {
+        0
+    }
+}

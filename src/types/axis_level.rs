@@ -1,0 +1,126 @@
+//! What the columns `level` and `variant` of tables hold: [`AxisLevel`] and [`KindReading`].
+
+use std::fmt;
+
+use serde::{Serialize, Serializer};
+
+use super::degradation::{Axis, Degradation, Kind, ReadingName, Severity};
+
+/// A place on the axis of a curve: L0, the untouched frame, or a severity; the same for all kinds of one axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct AxisLevel(Option<(Severity, Kind)>);
+
+impl AxisLevel {
+    /// The untouched frame, at the beginning of every axis.
+    pub const L0: Self = Self(None);
+
+    /// The level of a severity of a kind.
+    #[must_use]
+    pub fn new(kind: Kind, severity: Severity) -> Self {
+        // The first kind of an axis stands for all of it.
+        let mut kinds = Kind::ALL.into_iter();
+        let first = kinds.find(|other| other.axis() == kind.axis());
+        Self(Some((severity, first.unwrap_or(kind))))
+    }
+
+    /// The severity; `None` for L0.
+    #[must_use]
+    pub fn severity(self) -> Option<Severity> {
+        self.0.map(|(severity, _)| severity)
+    }
+
+    /// The axis; `None` for L0, which is on all of them.
+    #[must_use]
+    pub fn axis(self) -> Option<Axis> {
+        self.0.map(|(_, kind)| kind.axis())
+    }
+
+    /// The distance from L0 in the axis' unit.
+    #[must_use]
+    pub fn value(self) -> f64 {
+        self.severity().map_or(0.0, Severity::value)
+    }
+}
+
+impl From<Option<&Degradation>> for AxisLevel {
+    fn from(degradation: Option<&Degradation>) -> Self {
+        degradation.map_or(Self::L0, |how| Self::new(how.kind(), how.severity()))
+    }
+}
+
+impl fmt::Display for AxisLevel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            None => f.pad("L0"),
+            Some((severity, kind)) => f.pad(&kind.label(severity)),
+        }
+    }
+}
+
+impl Serialize for AxisLevel {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+/// A kind of degradation in one light reading, at any severity: what the levels of a curve have in common.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+pub struct KindReading {
+    /// The kind; `None` for untouched frames.
+    pub kind: Option<Kind>,
+    /// The light reading; `None` if the kind has none.
+    pub reading: Option<ReadingName>,
+}
+
+impl KindReading {
+    /// Untouched frames.
+    pub const NONE: Self = Self {
+        kind: None,
+        reading: None,
+    };
+
+    /// The word of the kind, or `none`.
+    #[must_use]
+    pub fn word(&self) -> &'static str {
+        self.kind.map_or("none", Kind::word)
+    }
+
+    /// The name in captions: `with noise`; with the reading if that is not the paper's.
+    #[must_use]
+    pub fn title(&self) -> String {
+        let kind = self.kind.map_or("untouched", Kind::title);
+        self.named_reading()
+            .map_or(kind.to_owned(), |reading| format!("{kind} @{reading}"))
+    }
+
+    fn named_reading(&self) -> Option<&ReadingName> {
+        self.reading
+            .as_ref()
+            .filter(|name| **name != ReadingName::PAPER)
+    }
+}
+
+impl From<Option<&Degradation>> for KindReading {
+    fn from(degradation: Option<&Degradation>) -> Self {
+        Self {
+            kind: degradation.map(Degradation::kind),
+            reading: degradation.and_then(|how| how.reading().cloned()),
+        }
+    }
+}
+
+impl fmt::Display for KindReading {
+    /// `none`, `ev`, `noise` or `noise@eld`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.named_reading() {
+            None => f.pad(self.word()),
+            Some(reading) => f.pad(&format!("{}@{reading}", self.word())),
+        }
+    }
+}
+
+impl Serialize for KindReading {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}

@@ -1,0 +1,408 @@
+//! What was done to a frame: [`Degradation`]; and the registry of its kinds: [`Kind`].
+
+use std::borrow::Cow;
+use std::fmt;
+use std::num::NonZeroU16;
+use std::str::FromStr;
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use crate::error::Error;
+
+/// What is in the way of a frame: a kind of degradation at one severity, in one light reading if the kind has readings.
+///
+/// The untouched frame, L0, is no degradation: it is `None` of an `Option`.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Degradation {
+    // The order of the fields is the order of degradations: by severity first.
+    severity: Severity,
+    kind: Kind,
+    reading: Option<ReadingName>,
+}
+
+impl Degradation {
+    /// A degradation; of a kind with readings and without a name, it is in the reading `paper`.
+    ///
+    /// # Errors
+    /// If the severity is beyond what the kind takes, or a reading is named for a kind that has none.
+    pub fn new(
+        kind: Kind,
+        severity: Severity,
+        reading: Option<ReadingName>,
+    ) -> Result<Self, Error> {
+        if severity > kind.largest() {
+            let problem = format_args!(
+                "{} {} is more than a {} takes; the largest is {}",
+                severity,
+                kind.axis().unit,
+                kind.title(),
+                kind.largest()
+            );
+            return Err(Error::usage("condition", problem));
+        }
+        if let Some(reading) = reading.as_ref().filter(|_| !kind.has_readings()) {
+            let problem = format_args!(
+                "{}-{kind}@{reading}: {kind} has no light readings; write {}-{kind}",
+                kind.label(severity),
+                kind.label(severity)
+            );
+            return Err(Error::usage("condition", problem));
+        }
+        let reading = reading.or_else(|| kind.has_readings().then_some(ReadingName::PAPER));
+        Ok(Self {
+            severity,
+            kind,
+            reading,
+        })
+    }
+
+    /// The kind.
+    #[must_use]
+    pub fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    /// The severity, in the kind's unit.
+    #[must_use]
+    pub fn severity(&self) -> Severity {
+        self.severity
+    }
+
+    /// The light reading; `None` if the kind has no readings.
+    #[must_use]
+    pub fn reading(&self) -> Option<&ReadingName> {
+        self.reading.as_ref()
+    }
+
+    /// The severity as it is named: `L3`, or `E3.3` for 3.3 EV.
+    #[must_use]
+    pub fn label(&self) -> String {
+        self.kind.label(self.severity)
+    }
+}
+
+impl fmt::Display for Degradation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}-{}", self.label(), self.kind)?;
+        match &self.reading {
+            Some(reading) if *reading != ReadingName::PAPER => write!(f, "@{reading}"),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl FromStr for Degradation {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        let wrong = |problem: &dyn fmt::Display| {
+            let form = "the form is L0, L3-ev, L3-noise, E3.3-noise or L3-noise@READING";
+            Error::usage("condition", format_args!("{text:?}: {problem}; {form}"))
+        };
+        let (plain, reading) = match text.split_once('@') {
+            None => (text, None),
+            Some((plain, reading)) => (plain, Some(ReadingName::new(reading)?)),
+        };
+        let (label, word) = plain
+            .split_once('-')
+            .ok_or_else(|| wrong(&"not of that form"))?;
+        let kind = Kind::of_word(word)
+            .ok_or_else(|| wrong(&format_args!("no kind of degradation is named {word:?}")))?;
+        if reading == Some(ReadingName::PAPER) {
+            return Err(wrong(&"the reading paper is written without its name"));
+        }
+        let severity = kind.severity(label).map_err(|e| wrong(&e))?;
+        Self::new(kind, severity, reading)
+    }
+}
+
+/// A kind of degradation. A new one is described in this `impl` and made in [`synthesis`](crate::synthesis); nothing else
+/// lists them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Kind {
+    /// Less light and nothing else.
+    Exposure,
+    /// Less light, with the noise of a sensor.
+    Sensor,
+}
+
+impl Kind {
+    /// All kinds, in the order of tables.
+    pub const ALL: [Self; 2] = [Self::Exposure, Self::Sensor];
+
+    /// The word in conditions, in the column `variant` and in `--variant`.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Exposure => "ev",
+            Self::Sensor => "noise",
+        }
+    }
+
+    /// The name in captions and tables.
+    #[must_use]
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Exposure => "exposure drop",
+            Self::Sensor => "with noise",
+        }
+    }
+
+    /// The quantity that the severity measures; kinds of one axis share a panel.
+    #[must_use]
+    pub fn axis(self) -> Axis {
+        match self {
+            Self::Exposure | Self::Sensor => Axis::LIGHT,
+        }
+    }
+
+    /// The severities of the paper; what is asked if nobody says otherwise.
+    #[must_use]
+    pub fn ladder(self) -> &'static [Severity] {
+        match self {
+            Self::Exposure | Self::Sensor => &Severity::LADDER,
+        }
+    }
+
+    /// The largest severity.
+    #[must_use]
+    pub fn largest(self) -> Severity {
+        match self {
+            // Fewer than three of 256 codes are left there.
+            Self::Exposure | Self::Sensor => Severity::hundredths(1600),
+        }
+    }
+
+    /// Whether the kind can be understood in several ways: by light readings.
+    #[must_use]
+    pub fn has_readings(self) -> bool {
+        self == Self::Sensor
+    }
+
+    /// The kind that this one adds something to, and is compared with.
+    #[must_use]
+    pub fn base(self) -> Option<Self> {
+        (self == Self::Sensor).then_some(Self::Exposure)
+    }
+
+    /// The light that a small copy of a degraded image is given back, in EV; 0 for a kind that takes no light.
+    #[must_use]
+    pub fn relight(self, severity: Severity) -> f32 {
+        match self {
+            Self::Exposure | Self::Sensor => severity.value() as f32,
+        }
+    }
+
+    /// The name of a severity: `L1` to `L5` for the paper's drops of light, else `E3.3`.
+    #[must_use]
+    pub fn label(self, severity: Severity) -> String {
+        let place = self.ladder().iter().position(|named| *named == severity);
+        match place {
+            Some(place) => format!("L{}", place + 1),
+            None => format!("E{severity}"),
+        }
+    }
+
+    /// The severity of a name.
+    ///
+    /// # Errors
+    /// If it is no name of a severity, or a severity that has another name.
+    pub fn severity(self, label: &str) -> Result<Severity, Error> {
+        let wrong = |problem: String| Error::usage("level", problem);
+        let upper = label.to_ascii_uppercase();
+        let named = self
+            .ladder()
+            .iter()
+            .find(|severity| self.label(**severity) == upper);
+        if let Some(severity) = named {
+            return Ok(*severity);
+        }
+        let Some(number) = upper.strip_prefix('E') else {
+            return Err(wrong(format!(
+                "{label:?} is none of L0, L1, L2, L3, L4, L5, nor of the form E3.3"
+            )));
+        };
+        let severity = number.parse::<Severity>()?;
+        if self.label(severity) != upper {
+            let due = self.label(severity);
+            return Err(wrong(format!("{label:?} is written {due}")));
+        }
+        if severity > self.largest() {
+            return Err(wrong(format!("{label:?} is above E{}", self.largest())));
+        }
+        Ok(severity)
+    }
+
+    /// The kind of a [word](Self::word).
+    #[must_use]
+    pub fn of_word(word: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.word() == word)
+    }
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.word())
+    }
+}
+
+impl Serialize for Kind {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.word())
+    }
+}
+
+/// The quantity on the axis of a curve.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Axis {
+    /// What is measured.
+    pub title: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+}
+
+impl Axis {
+    /// Light that is missing, in exposure values: one EV is a factor of two.
+    pub const LIGHT: Self = Self {
+        title: "exposure drop",
+        unit: "EV",
+    };
+}
+
+/// How strong a degradation is: hundredths of its kind's unit, so that equality and order are exact.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Severity(NonZeroU16);
+
+impl Severity {
+    /// L1: 2 EV.
+    pub const L1: Self = Self::hundredths(200);
+    /// L2: 4 EV.
+    pub const L2: Self = Self::hundredths(400);
+    /// L3: 6 EV.
+    pub const L3: Self = Self::hundredths(600);
+    /// L4: 7.5 EV.
+    pub const L4: Self = Self::hundredths(750);
+    /// L5: 9 EV.
+    pub const L5: Self = Self::hundredths(900);
+    /// The exposure drops of the paper (DarkQA, section III), smallest first.
+    pub const LADDER: [Self; 5] = [Self::L1, Self::L2, Self::L3, Self::L4, Self::L5];
+
+    /// So many hundredths; 0 is taken as 1, for no severity is none.
+    #[must_use]
+    pub const fn hundredths(count: u16) -> Self {
+        match NonZeroU16::new(count) {
+            Some(count) => Self(count),
+            None => Self(NonZeroU16::MIN),
+        }
+    }
+
+    /// The severity in the kind's unit.
+    #[must_use]
+    pub fn value(self) -> f64 {
+        f64::from(self.0.get()) / 100.0
+    }
+}
+
+impl fmt::Display for Severity {
+    /// The shortest decimal.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.value())
+    }
+}
+
+impl Serialize for Severity {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_f64(self.value())
+    }
+}
+
+impl FromStr for Severity {
+    type Err = Error;
+
+    /// Reads a decimal number above 0 with two decimals at most.
+    fn from_str(text: &str) -> Result<Self, Error> {
+        let (whole, part) = text.split_once('.').unwrap_or((text, "0"));
+        let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+        if !digits(whole) || !digits(part) {
+            let problem = format_args!("{text:?} is no decimal number, as 3.3");
+            return Err(Error::usage("level", problem));
+        }
+        if part.len() > 2 {
+            let problem = format_args!("{text:?} has more than two decimals");
+            return Err(Error::usage("level", problem));
+        }
+        let count = format!("{whole}{part:0<2}").parse::<u16>().ok();
+        count
+            .and_then(NonZeroU16::new)
+            .map(Self)
+            .ok_or_else(|| Error::usage("level", format_args!("{text:?} is 0 or too large")))
+    }
+}
+
+/// The name of a light reading: letters, digits, `_`, `.` and `-`.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize)]
+pub struct ReadingName(Cow<'static, str>);
+
+impl ReadingName {
+    /// The paper to the letter: the reading that is written without its name.
+    pub const PAPER: Self = Self(Cow::Borrowed("paper"));
+    /// Choices that match no named reading.
+    pub const CUSTOM: Self = Self(Cow::Borrowed("custom"));
+
+    /// Checks a name.
+    ///
+    /// # Errors
+    /// If it is empty or holds other characters.
+    pub fn new(name: &str) -> Result<Self, Error> {
+        let fits = |c: char| c.is_ascii_alphanumeric() || "_.-".contains(c);
+        if name.is_empty() || !name.chars().all(fits) {
+            let problem = format_args!(
+                "{name:?} is no name of a light reading: letters, digits, '_', '.' and '-' only"
+            );
+            return Err(Error::usage("reading", problem));
+        }
+        // Most records are in the paper's reading: its name costs no memory.
+        Ok(if name == Self::PAPER.as_str() {
+            Self::PAPER
+        } else {
+            Self(Cow::Owned(name.to_owned()))
+        })
+    }
+
+    /// A name that is known to be right.
+    pub(crate) const fn of(name: &'static str) -> Self {
+        Self(Cow::Borrowed(name))
+    }
+
+    /// The name.
+    #[must_use]
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl Ord for ReadingName {
+    /// `paper` first, the others by the alphabet.
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        let place = |name: &Self| *name != Self::PAPER;
+        (place(self), &self.0).cmp(&(place(other), &other.0))
+    }
+}
+
+impl PartialOrd for ReadingName {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl fmt::Display for ReadingName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(&self.0)
+    }
+}
+
+impl<'de> Deserialize<'de> for ReadingName {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Self::new(&String::deserialize(deserializer)?).map_err(serde::de::Error::custom)
+    }
+}

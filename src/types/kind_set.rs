@@ -1,0 +1,86 @@
+//! A choice among kinds of degradation: [`KindSet`].
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::degradation::Kind;
+use crate::error::Error;
+
+/// A set of kinds that is not empty.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct KindSet(u16);
+
+impl KindSet {
+    /// The two kinds of the paper, `both`.
+    pub const BOTH: Self = Self(1 << Kind::Exposure as u16 | 1 << Kind::Sensor as u16);
+
+    /// Sensor noise, which enhancers are shown if nobody says otherwise.
+    pub const NOISE: Self = Self(1 << Kind::Sensor as u16);
+
+    /// One kind alone.
+    #[must_use]
+    pub fn only(kind: Kind) -> Self {
+        Self(1 << kind as u16)
+    }
+
+    /// Whether a kind is among them.
+    #[must_use]
+    pub fn includes(self, kind: Kind) -> bool {
+        self.0 & Self::only(kind).0 != 0
+    }
+
+    /// The kinds, in the order of tables.
+    pub fn kinds(self) -> impl Iterator<Item = Kind> {
+        Kind::ALL
+            .into_iter()
+            .filter(move |kind| self.includes(*kind))
+    }
+}
+
+impl fmt::Display for KindSet {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if *self == Self::BOTH {
+            return f.pad("both");
+        }
+        let words: Vec<&str> = self.kinds().map(Kind::word).collect();
+        f.pad(&words.join(","))
+    }
+}
+
+impl FromStr for KindSet {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        if text == "both" {
+            return Ok(Self::BOTH);
+        }
+        let kinds = text.split(',').map(|word| {
+            let words = Kind::ALL.map(Kind::word).join(", ");
+            Kind::of_word(word).map(Self::only).ok_or_else(|| {
+                Error::usage("variant", format_args!("{word:?} is none of {words}, both"))
+            })
+        });
+        kinds
+            .reduce(|all, one| Ok(Self(all?.0 | one?.0)))
+            .unwrap_or(Ok(Self::BOTH))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sets_read_back() {
+        for (text, written) in [
+            ("ev", "ev"),
+            ("noise", "noise"),
+            ("both", "both"),
+            ("noise,ev", "both"),
+        ] {
+            assert_eq!(text.parse::<KindSet>().unwrap().to_string(), written);
+        }
+        let wrong = "raw".parse::<KindSet>().unwrap_err().to_string();
+        assert!(wrong.contains("none of ev, noise, both"), "{wrong}");
+    }
+}

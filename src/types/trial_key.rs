@@ -1,0 +1,69 @@
+//! The name of a trial: [`TrialKey`].
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use super::digest::Digest;
+use crate::error::Error;
+
+/// The digest of everything that decides a reply: question and choices as shown, the recipe of the image, prompt, model
+/// and parameters. Two trials with one key are one trial.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct TrialKey([u8; 16]);
+
+impl From<Digest> for TrialKey {
+    fn from(digest: Digest) -> Self {
+        let mut key = [0; 16];
+        key.copy_from_slice(&digest.as_bytes()[..16]);
+        Self(key)
+    }
+}
+
+impl fmt::Display for TrialKey {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:032x}", u128::from_be_bytes(self.0))
+    }
+}
+
+impl FromStr for TrialKey {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        let digits = text.len() == 32 && text.bytes().all(|b| b.is_ascii_hexdigit());
+        let key = digits
+            .then(|| u128::from_str_radix(text, 16).ok())
+            .flatten();
+        key.map(|key| Self(key.to_be_bytes()))
+            .ok_or_else(|| Error::data("key", format_args!("{text:?} is no key of 32 digits")))
+    }
+}
+
+impl Serialize for TrialKey {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl<'de> Deserialize<'de> for TrialKey {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        String::deserialize(deserializer)?
+            .parse()
+            .map_err(serde::de::Error::custom)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_read_back() {
+        let key = TrialKey::from(Digest::of(b"a trial"));
+        assert_eq!(key.to_string().parse::<TrialKey>().unwrap(), key);
+        for wrong in ["", "12", &"g".repeat(32), &format!("+{}", "1".repeat(31))] {
+            assert!(wrong.parse::<TrialKey>().is_err(), "{wrong}");
+        }
+    }
+}
