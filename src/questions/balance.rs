@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::str::FromStr;
 
-use super::generate::Asked;
 use super::rules::Balance;
+use super::survey::Asked;
 use crate::error::Error;
 use crate::types::{Digest, Family};
 

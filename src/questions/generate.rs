@@ -11,7 +11,7 @@ use super::pick::Picker;
 use super::room::{RoomSigns, RoomSource, classify};
 use super::rules::{Book, Rules};
 use super::statistics::FrameStatistics;
-use super::survey::{Claim, Fallen, Reason, Survey, Verdict};
+use super::survey::{Asked, Claim, Fallen, Reason, Survey, Verdict};
 use super::{affordance, closest, color, presence, room_type};
 use crate::error::Result;
 use crate::types::{Choices, Digest, Family, FrameId, Labels, Question, QuestionId};
@@ -35,25 +35,6 @@ pub struct Order<'a> {
     pub balance: Balanced,
     /// The questions that a person has rejected.
     pub rejected: BTreeSet<QuestionId>,
-}
-
-/// A question that is asked, with what it is about.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Asked {
-    /// The question.
-    pub question: Question,
-    /// What it is about: a class, an activity, or nothing.
-    pub about: String,
-    /// The scene of its frame.
-    pub scene: String,
-}
-
-impl Asked {
-    /// The true answer.
-    #[must_use]
-    pub fn answer(&self) -> &str {
-        &self.question.choices.texts()[self.question.choices.truth()]
-    }
 }
 
 /// Why a question that holds is not asked.

@@ -26,4 +26,5 @@ pub mod survey;
 #[cfg(test)]
 mod tests;
 
-pub use generate::{Asked, Generated, Order, generate};
+pub use generate::{Generated, Order, generate};
+pub use survey::Asked;

@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
-use super::generate::{Asked, Generated, Left, Order, Tally, stated};
+use super::generate::{Generated, Left, Order, Tally, stated};
 use super::statistics::FrameStatistics;
-use super::survey::Reason;
+use super::survey::{Asked, Reason};
 use crate::types::{Digest, Family};
 
 /// The schema of the summary as JSON.

@@ -8,7 +8,7 @@ use super::pick::Picker;
 use super::room::RoomSigns;
 use super::rules::Book;
 use super::statistics::{FrameStatistics, Segment};
-use crate::types::{Family, Labels};
+use crate::types::{Family, Labels, Question};
 
 /// What the rules see of a frame.
 #[derive(Debug, Clone, Copy)]
@@ -51,6 +51,25 @@ impl Claim {
     #[must_use]
     pub fn answer(&self) -> &str {
         self.choices.get(self.truth).map_or("", String::as_str)
+    }
+}
+
+/// A question that is asked, with what it is about.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Asked {
+    /// The question.
+    pub question: Question,
+    /// What it is about: a class, an activity, or nothing.
+    pub about: String,
+    /// The scene of its frame.
+    pub scene: String,
+}
+
+impl Asked {
+    /// The true answer.
+    #[must_use]
+    pub fn answer(&self) -> &str {
+        &self.question.choices.texts()[self.question.choices.truth()]
     }
 }
 

@@ -9,86 +9,8 @@ use super::choice::Mode;
 use super::estimate::Estimate;
 use super::grid::{Count, Grid, Mark};
 use super::health::Health;
-use crate::types::{
-    Condition, Degradation, EnhancerName, Family, Level, QuestionId, Record, Variant, View, Why,
-};
-
-/// The name under which guessing stands among the models.
-pub const CHANCE: &str = "chance";
-
-/// What a cell of a table is about.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-pub struct Subject {
-    /// The model, or [`CHANCE`].
-    pub model: String,
-    /// Whether it saw the images; `None` for chance.
-    pub view: Option<View>,
-    /// How dark they were; `None` where none was seen.
-    pub level: Option<Level>,
-    /// The variant.
-    pub variant: Variant,
-    /// What mended them; `None` for raw.
-    pub enhancer: Option<EnhancerName>,
-}
-
-impl Subject {
-    /// Whom a record is of.
-    #[must_use]
-    pub fn of(record: &Record) -> Self {
-        Self {
-            model: record.model.clone(),
-            view: Some(record.view),
-            level: record.level,
-            variant: record.variant,
-            enhancer: record.enhancer.clone(),
-        }
-    }
-
-    /// Whoever answers under a name, and what was shown; `None` where nothing was.
-    #[must_use]
-    pub fn shown(model: &str, condition: Option<&Condition>) -> Self {
-        let degradation = condition.map(|condition| condition.degradation);
-        Self {
-            model: model.to_owned(),
-            view: Some(condition.map_or(View::Blind, |_| View::Image)),
-            level: degradation.map(Degradation::level),
-            variant: degradation.map_or(Variant::None, Degradation::variant),
-            enhancer: condition.and_then(|condition| condition.enhancer.clone()),
-        }
-    }
-
-    /// What it is shown, as `L3-noise+zerodce`, or `blind`.
-    #[must_use]
-    pub fn condition(&self) -> String {
-        let Some(level) = self.level else {
-            return "blind".to_owned();
-        };
-        let variant = match self.variant {
-            Variant::None => String::new(),
-            variant => format!("-{variant}"),
-        };
-        let enhancer = self.enhancer.as_ref().map(|name| format!("+{name}"));
-        format!("{level}{variant}{}", enhancer.unwrap_or_default())
-    }
-
-    /// A model that sees, at a level of a variant, raw or enhanced; L0 is the untouched frame of every variant and enhancer.
-    #[must_use]
-    pub fn seeing(
-        model: &str,
-        level: Level,
-        variant: Variant,
-        enhancer: Option<&EnhancerName>,
-    ) -> Self {
-        let light = level == Level::L0;
-        Self {
-            model: model.to_owned(),
-            view: Some(View::Image),
-            level: Some(level),
-            variant: if light { Variant::None } else { variant },
-            enhancer: enhancer.filter(|_| !light).cloned(),
-        }
-    }
-}
+use super::subject::{CHANCE, Subject};
+use crate::types::{Family, QuestionId, Variant, Why};
 
 /// The accuracy of one subject on one family, in one reading.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use super::accuracy::Subject;
 use super::choice::Mode;
 use super::cluster::Clusters;
+use super::subject::Subject;
 use crate::types::{Family, Outcome, QuestionId, Reading, Record};
 
 /// What came of one item for one subject.

@@ -32,3 +32,4 @@ pub mod paired;
 pub mod realism;
 pub mod significance;
 mod student;
+pub mod subject;

@@ -9,8 +9,8 @@ use crate::ask::openeqa::{blind_answer, judged};
 use crate::run::askers::Asker;
 use crate::run::openeqa::plan::Due;
 use crate::run::trial::{Prompt, Trial};
-use crate::score::accuracy::Subject;
 use crate::score::llm_match::{Protocol, shortened};
+use crate::score::subject::Subject;
 use crate::types::{Digest, OpenRecord, TrialKey, View};
 
 /// The records of a run by their keys.
