@@ -13,7 +13,7 @@ use tokio::sync::mpsc::Sender;
 use super::gallery::Gallery;
 use super::plan::{Choice, FramePlan, Shot};
 use super::recipe::Recipe;
-use super::thumbnail::Wanted;
+use super::thumbnail::{Wanted, thumbnail};
 use super::timings::{Step, Timings};
 use super::trial::{Exposed, Slide};
 use crate::ask::{Format, ImageLimit, Payload};
@@ -168,12 +168,32 @@ impl Darkroom<'_> {
         let Some(condition) = condition else {
             return Ok((None, None));
         };
-        let image = self.image(desk, condition)?;
-        let thumbnail = wanted.of(&desk.frame, condition, &image)?;
-        Ok((Some(image), thumbnail))
+        let frame = desk.frame.clone();
+        let (image, encoded) = self.print(desk, condition)?;
+        if !wanted.lacks(&frame, condition) {
+            return Ok((Some(image), None));
+        }
+        let timings = self.timings;
+        let encoded = match encoded {
+            Some(encoded) => encoded,
+            None => Cow::Borrowed(timings.time(Step::Decode, || desk.decode())?),
+        };
+        let copy = || thumbnail(&frame, condition, &image, Some(&*encoded));
+        let copy = timings.time(Step::Encode, copy)?;
+        Ok((Some(image), Some(copy)))
     }
 
     pub(super) fn image(&mut self, desk: &mut Desk, condition: &Condition) -> Result<Arc<Payload>> {
+        Ok(self.print(desk, condition)?.0)
+    }
+
+    /// The image of a condition as it is sent, and the pixels that were encoded; `None` where the frame's own file is sent, which
+    /// needs no decoding.
+    fn print<'d>(
+        &mut self,
+        desk: &'d mut Desk,
+        condition: &Condition,
+    ) -> Result<(Arc<Payload>, Option<Cow<'d, Rgb>>)> {
         let Recipe {
             format, max_side, ..
         } = *self.recipe;
@@ -187,12 +207,17 @@ impl Darkroom<'_> {
             && let Picture::Encoded { bytes, .. } = picture
             && let Some(payload) = Payload::of_plain_png(bytes, max_side)
         {
-            return self.within(payload);
+            return Ok((self.within(payload)?, None));
         }
         let pixels = self.pixels(desk, condition)?;
-        let encode = || Payload::encode(&pixels, format, max_side);
-        let payload = timings.time(Step::Encode, encode)?;
-        self.within(payload)
+        let (payload, pixels) = timings.time(Step::Encode, || {
+            let pixels = match Payload::scaled(&pixels, max_side)? {
+                Cow::Owned(scaled) => Cow::Owned(scaled),
+                Cow::Borrowed(_) => pixels,
+            };
+            Ok((Payload::encode(&pixels, format, None)?, pixels))
+        })?;
+        Ok((self.within(payload)?, Some(pixels)))
     }
 
     fn within(&self, payload: Payload) -> Result<Arc<Payload>> {
@@ -324,4 +349,81 @@ fn once<T>(slot: &mut Option<T>, make: impl FnOnce() -> Result<T>) -> Result<&T>
         None => make()?,
     };
     Ok(slot.insert(value))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::num::NonZeroU32;
+
+    use super::*;
+    use crate::run::gallery::look_at;
+    use crate::synthesis::Synthesis;
+
+    /// A folder with one frame as a plain PNG file, and the frame's name.
+    fn frame() -> (tempfile::TempDir, Dataset, FrameId) {
+        let folder = tempfile::tempdir().unwrap();
+        let samples = (0..40 * 60 * 3).map(|i| (i * i % 251) as u8).collect();
+        let pixels = Rgb::new(40, 60, samples).unwrap();
+        let file = Payload::encode(&pixels, Format::Png, None).unwrap().file();
+        std::fs::write(folder.path().join("a.png"), file.unwrap()).unwrap();
+        let dataset = Dataset::of_images(folder.path()).unwrap();
+        let name = dataset.frames().next().unwrap().clone();
+        (folder, dataset, name)
+    }
+
+    /// What is sent and kept of the frame, and whether it was decoded.
+    fn exposed(
+        condition: &str,
+        (format, max_side): (&str, Option<u32>),
+        wanted: bool,
+    ) -> (Arc<Payload>, Option<Thumbnail>, bool) {
+        let (_folder, dataset, frame) = frame();
+        let pictures = [(frame.clone(), look_at(&dataset, &frame).unwrap())].into();
+        let recipe = Recipe {
+            seed: 0,
+            synthesis: Synthesis::default(),
+            format: format.parse().unwrap(),
+            max_side: max_side.and_then(NonZeroU32::new),
+            enhancers: Vec::new(),
+        };
+        let mut darkroom = Darkroom {
+            dataset: &dataset,
+            pictures: &pictures,
+            recipe: &recipe,
+            enhancers: Vec::new(),
+            limit: None,
+            timings: &Timings::default(),
+        };
+        let wanted = Wanted::new(wanted.then_some(&frame), Vec::new());
+        let mut desk = Desk::new(frame);
+        let condition = condition.parse().unwrap();
+        let (image, copy) = darkroom
+            .expose(&mut desk, Some(&condition), &wanted)
+            .unwrap();
+        (image.unwrap(), copy, desk.clean.is_some())
+    }
+
+    #[test]
+    fn a_file_that_is_sent_as_it_is_is_decoded_for_a_copy_alone() {
+        let (sent, copy, decoded) = exposed("L0", ("png", None), false);
+        assert!(copy.is_none() && !decoded);
+        let (folder, ..) = frame();
+        let file = std::fs::read(folder.path().join("a.png")).unwrap();
+        assert_eq!(sent.file().unwrap(), file);
+        let (sent, copy, decoded) = exposed("L0", ("png", None), true);
+        assert!(decoded);
+        assert_eq!(copy.unwrap().image, sent.facts().digest);
+    }
+
+    #[test]
+    fn copies_show_what_was_sent() {
+        for condition in ["L0", "L2-ev", "L3-noise"] {
+            for how in [("png", None), ("png", Some(50)), ("jpeg:60", Some(50))] {
+                let (sent, copy, _) = exposed(condition, how, true);
+                let copy = copy.unwrap();
+                let of_file = thumbnail(&copy.frame, &copy.condition, &sent, None).unwrap();
+                assert_eq!(copy, of_file, "{condition} {how:?}");
+            }
+        }
+    }
 }

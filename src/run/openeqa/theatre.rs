@@ -22,7 +22,7 @@ use crate::enhance::Enhancer;
 use crate::error::{Error, Result};
 use crate::run::limit;
 use crate::run::recipe::Recipe;
-use crate::run::thumbnail::Wanted;
+use crate::run::thumbnail::{Wanted, thumbnail};
 use crate::run::trial::{Exposed, Slide};
 use crate::synthesis::{Film, NoiseKey};
 use crate::types::{Condition, FrameId, ImageFacts, Rgb};
@@ -115,7 +115,9 @@ impl<'a> Theatre<'a> {
                 let problem = problem.as_ref().filter(|_| condition.is_some());
                 let frame = FrameId(self.episodes[walk.episode].name.clone());
                 let thumbnail = match (&condition, images.get(images.len() / 2)) {
-                    (Some(condition), Some(middle)) => wanted.of(&frame, condition, middle),
+                    (Some(condition), Some(middle)) if wanted.lacks(&frame, condition) => {
+                        thumbnail(&frame, condition, middle, None).map(Some)
+                    }
                     _ => Ok(None),
                 };
                 let exposed = Exposed {
