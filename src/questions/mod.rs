@@ -17,6 +17,7 @@ pub mod generate;
 pub mod observer;
 pub mod pick;
 mod presence;
+pub mod reason;
 pub mod room;
 mod room_type;
 pub mod rules;
