@@ -20,8 +20,8 @@ const ROOMS: [(&str, &[&str]); 14] = [
     ("tokio", &["ask", "run", "main.rs", "score/judge.rs"]),
     ("reqwest", &["ask", "run", "main.rs"]),
     ("ort", &["enhance"]),
-    ("rand", &["synthesis", "ask/random.rs"]),
-    ("rand_distr", &["synthesis", "ask/random.rs"]),
+    ("rand", &["synthesis", "score/bootstrap.rs"]),
+    ("rand_distr", &["synthesis", "score/bootstrap.rs"]),
     ("clap", &["cli", "config", "main.rs"]),
     (
         "image",

@@ -15,7 +15,6 @@ mod support;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use darkqa_eval::score::accuracy::Subject;
 use darkqa_eval::score::bootstrap::Resamples;
 use darkqa_eval::score::choice::Mode;
 use darkqa_eval::score::cluster::Clusters;
@@ -25,6 +24,7 @@ use darkqa_eval::score::findings::Findings;
 use darkqa_eval::score::grid::{Count, Grid};
 use darkqa_eval::score::open::{Against, Group, OpenSummary, Outcome, Scored, Topic, open_summary};
 use darkqa_eval::score::paired::Paired;
+use darkqa_eval::score::subject::Subject;
 use darkqa_eval::types::degradation::Kind;
 use darkqa_eval::types::{
     AnswerReading, AxisLevel, Condition, Degradation, EnhancerName, Family, KindReading, Record,

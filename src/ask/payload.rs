@@ -1,5 +1,6 @@
 //! An image as it is sent: [`Payload`], in a [`Format`].
 
+use std::borrow::Cow;
 use std::fmt;
 use std::num::NonZeroU32;
 use std::str::FromStr;
@@ -80,19 +81,37 @@ pub struct Payload {
 }
 
 impl Payload {
-    /// Encodes an image, made smaller (Lanczos3) where its longer side is beyond `max_side` pixels; never larger.
+    /// Encodes an image as [`Self::scaled`] makes it.
     ///
     /// # Errors
     /// Where the image is larger than the format allows.
     pub fn encode(image: &Rgb, format: Format, max_side: Option<NonZeroU32>) -> Result<Self> {
+        let image = Self::scaled(image, max_side)?;
         let (width, height) = (side(image.width())?, side(image.height())?);
-        match fitted(width, height, max_side) {
-            None => Self::of_samples(image.samples(), width, height, format),
-            Some(smaller) => {
-                let samples = resize(image.samples(), (width, height), smaller)?;
-                Self::of_samples(&samples, smaller.0, smaller.1, format)
+        let mut file = Vec::new();
+        match format {
+            Format::Png => write_png(image.samples(), width, height, &mut file)?,
+            Format::Jpeg(quality) => {
+                write_jpeg(image.samples(), width, height, quality, &mut file)?
             }
         }
+        Ok(Self::of_file(&file, width, height, format))
+    }
+
+    /// The pixels that are encoded: the image made smaller (Lanczos3) where its longer side is beyond `max_side` pixels, never
+    /// larger.
+    ///
+    /// # Errors
+    /// Where a side is too long for any format.
+    pub fn scaled(image: &Rgb, max_side: Option<NonZeroU32>) -> Result<Cow<'_, Rgb>> {
+        let from = (side(image.width())?, side(image.height())?);
+        let Some((width, height)) = fitted(from.0, from.1, max_side) else {
+            return Ok(Cow::Borrowed(image));
+        };
+        let source = ImageBuffer::<image::Rgb<u8>, _>::from_raw(from.0, from.1, image.samples());
+        let source = source.ok_or_else(|| unfit("its samples do not fill its sides"))?;
+        let smaller = imageops::resize(&source, width, height, imageops::FilterType::Lanczos3);
+        Rgb::new(height as usize, width as usize, smaller.into_raw()).map(Cow::Owned)
     }
 
     /// The bytes of a PNG file as they are, without decoding or encoding: only where that is the same as encoding its
@@ -142,19 +161,18 @@ impl Payload {
         Rgb::new(height, width, image.into_raw())
     }
 
+    /// As [`Self::decode`], without decoding where those that were encoded are at hand and the format loses nothing.
+    pub(crate) fn seen<'a>(&self, encoded: Option<&'a Rgb>) -> Result<Cow<'a, Rgb>> {
+        match encoded {
+            Some(pixels) if self.facts.format == Format::Png.name() => Ok(Cow::Borrowed(pixels)),
+            _ => self.decode().map(Cow::Owned),
+        }
+    }
+
     /// `data:image/png;base64,…`, shared and not copied.
     #[must_use]
     pub fn data_url(&self) -> Bytes {
         self.data_url.clone()
-    }
-
-    fn of_samples(samples: &[u8], width: u32, height: u32, format: Format) -> Result<Self> {
-        let mut file = Vec::new();
-        match format {
-            Format::Png => write_png(samples, width, height, &mut file)?,
-            Format::Jpeg(quality) => write_jpeg(samples, width, height, quality, &mut file)?,
-        }
-        Ok(Self::of_file(&file, width, height, format))
     }
 
     fn of_file(file: &[u8], width: u32, height: u32, format: Format) -> Self {
@@ -193,12 +211,6 @@ fn fitted(width: u32, height: u32, max_side: Option<NonZeroU32>) -> Option<(u32,
     let (longer, most) = (u64::from(width.max(height)), u64::from(max_side?.get()));
     let scaled = |side: u32| ((u64::from(side) * most + longer / 2) / longer).max(1) as u32;
     (longer > most).then(|| (scaled(width), scaled(height)))
-}
-
-fn resize(samples: &[u8], from: (u32, u32), to: (u32, u32)) -> Result<Vec<u8>> {
-    let source = ImageBuffer::<image::Rgb<u8>, _>::from_raw(from.0, from.1, samples);
-    let source = source.ok_or_else(|| unfit("its samples do not fill its sides"))?;
-    Ok(imageops::resize(&source, to.0, to.1, imageops::FilterType::Lanczos3).into_raw())
 }
 
 /// Lossless at the lowest effort: 26 times faster than the usual effort for files 2 % larger.

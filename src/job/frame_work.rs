@@ -1,5 +1,6 @@
 //! One frame on its way to an image: [`FrameWork`], and the [`Steps`] that it goes through.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::recipe::{Recipe, Scaling};
@@ -24,17 +25,20 @@ pub(crate) struct Steps<'a> {
 }
 
 impl Steps<'_> {
-    /// The image as it is sent.
-    pub(crate) fn payload(&self, image: &Rgb) -> Result<Arc<Payload>> {
-        let format = self.recipe.format;
-        let encode = || match self.recipe.scaling {
-            Scaling::MaxSide(side) => Payload::encode(image, format, Some(side)),
-            Scaling::LongerSide(side) if longer_side(image) != side => {
-                Payload::encode(&bilinear(image, side)?, format, None)
-            }
-            Scaling::Never | Scaling::LongerSide(_) => Payload::encode(image, format, None),
-        };
-        self.within(self.timings.time(Step::Encode, encode)?)
+    /// The image as it is sent, and the pixels that were encoded.
+    pub(crate) fn payload<'p>(&self, image: &'p Rgb) -> Result<(Arc<Payload>, Cow<'p, Rgb>)> {
+        let (payload, encoded) = self.timings.time(Step::Encode, || {
+            let encoded = match self.recipe.scaling {
+                Scaling::MaxSide(side) => Payload::scaled(image, Some(side))?,
+                Scaling::LongerSide(side) if longer_side(image) != side => {
+                    Cow::Owned(bilinear(image, side)?)
+                }
+                Scaling::Never | Scaling::LongerSide(_) => Cow::Borrowed(image),
+            };
+            let payload = Payload::encode(&encoded, self.recipe.format, None)?;
+            Ok((payload, encoded))
+        })?;
+        Ok((self.within(payload)?, encoded))
     }
 
     fn within(&self, payload: Payload) -> Result<Arc<Payload>> {
@@ -59,7 +63,7 @@ pub(crate) enum Staged {
 
 /// Cached steps of one frame: each is computed when it is first needed, and once.
 pub(crate) struct FrameWork<'a> {
-    steps: Steps<'a>,
+    pub(crate) steps: Steps<'a>,
     frame: FrameId,
     key: NoiseKey,
     /// The digest of the file that the plan was made with.
@@ -104,13 +108,13 @@ impl<'a> FrameWork<'a> {
         let steps = self.steps;
         let degraded = self.degraded(condition.degradation.as_ref())?;
         match condition.enhancer {
-            None => steps.payload(degraded).map(Staged::Ready),
+            None => Ok(Staged::Ready(steps.payload(degraded)?.0)),
             Some(_) => Ok(Staged::Degraded(degraded.clone())),
         }
     }
 
     /// The file itself, if it is the very image that would be encoded.
-    fn as_it_is(&mut self, condition: &Condition) -> Result<Option<Arc<Payload>>> {
+    pub(crate) fn as_it_is(&mut self, condition: &Condition) -> Result<Option<Arc<Payload>>> {
         let Recipe {
             format, scaling, ..
         } = *self.steps.recipe;
@@ -163,6 +167,12 @@ impl<'a> FrameWork<'a> {
         once(&mut self.clean, || {
             Err(Error::data(&self.frame, "the frame was not read"))
         })
+    }
+
+    /// Whether the file was decoded.
+    #[cfg(test)]
+    pub(crate) fn is_decoded(&self) -> bool {
+        self.clean.is_some()
     }
 
     /// The frame in one degradation; the last one is kept for the enhancers that follow.

@@ -13,14 +13,14 @@ use tokio::sync::mpsc::Sender;
 use super::frame_work::{FrameWork, Staged, Steps};
 use super::plan::{SourcePlan, TrialGroup};
 use super::source::{Source, SourceFrame};
-use super::thumbnail::Wanted;
+use super::thumbnail::{Wanted, thumbnail};
 use super::timings::Step;
 use super::trial::{Item, PreparedGroup, Stimulus};
 use super::workers::Workers;
 use crate::ask::{ImageLimit, Payload};
 use crate::enhance::Enhancer;
 use crate::error::{Error, Result};
-use crate::types::{Condition, EnhancerName, ImageFacts, Rgb};
+use crate::types::{Condition, EnhancerName, FrameId, ImageFacts, Rgb, Thumbnail};
 
 /// Images from this size on, in bytes, are more than some servers and proxies take.
 const LARGE: usize = 5_000_000;
@@ -175,15 +175,11 @@ impl<'a> ImagePipeline<'a> {
             let conditions: Vec<&Condition> = part.conditions().collect();
             let mut work = self.begin(source, &conditions);
             for TrialGroup { condition, trials } in part.groups {
-                let made = self.group(&mut work, condition.as_ref());
-                let (images, problem) = match made {
-                    Ok(images) => (images, None),
-                    Err(problem) => (Vec::new(), Some(problem.to_string())),
+                let made = self.group(&mut work, condition.as_ref(), source, wanted);
+                let (images, thumbnail, problem) = match made {
+                    Ok((images, thumbnail)) => (images, thumbnail, None),
+                    Err(problem) => (Vec::new(), None, Some(problem.to_string())),
                 };
-                let thumbnail = condition.as_ref().and_then(|condition| {
-                    let image = images.get(images.len() / 2)?;
-                    wanted.of(&source.name, condition, image)
-                });
                 take(PreparedGroup {
                     stimulus: Stimulus { condition, images },
                     trials,
@@ -209,20 +205,58 @@ impl<'a> ImagePipeline<'a> {
         }
     }
 
-    /// The images of a group, in the order shown; none if nothing is shown.
+    /// The images of a group, in the order shown, and a small copy of the one in the middle if it is wanted; none if nothing is shown.
     fn group(
         &mut self,
         work: &mut SourceWork<'_>,
         condition: Option<&Condition>,
-    ) -> Result<Vec<Arc<Payload>>> {
+        source: &Source,
+        wanted: &Wanted,
+    ) -> Result<(Vec<Arc<Payload>>, Option<Thumbnail>)> {
         let Some(condition) = condition else {
-            return Ok(Vec::new());
+            return Ok((Vec::new(), None));
         };
+        let name = &source.name;
+        let wanted = wanted.lacks(name, condition);
         match work {
-            SourceWork::Frame(work) => Ok(vec![self.image(work, condition)?]),
-            SourceWork::Walk(images) => Ok(images.remove(condition).unwrap_or_default()),
+            SourceWork::Frame(work) => {
+                let (image, copy) = self.image_and_copy(work, condition, wanted.then_some(name))?;
+                Ok((vec![image], copy))
+            }
+            SourceWork::Walk(images) => {
+                let images = images.remove(condition).unwrap_or_default();
+                let middle = images.get(images.len() / 2).filter(|_| wanted);
+                let copy = middle.and_then(|middle| small_copy(name, condition, middle, None));
+                Ok((images, copy))
+            }
             SourceWork::Unseen(problem) => Err(Error::data(condition, problem)),
         }
+    }
+
+    /// A frame in a condition, as it is sent, and a small copy of it under this name.
+    fn image_and_copy(
+        &mut self,
+        work: &mut FrameWork<'_>,
+        condition: &Condition,
+        name: Option<&FrameId>,
+    ) -> Result<(Arc<Payload>, Option<Thumbnail>)> {
+        let steps = work.steps;
+        let copy = |image: &Payload, encoded: &Rgb| {
+            let copy = || small_copy(name?, condition, image, Some(encoded));
+            steps.timings.time(Step::Encode, copy)
+        };
+        if let Some(image) = work.as_it_is(condition)? {
+            // The file is decoded for its copy alone.
+            let copy = match name {
+                Some(_) => copy(&image, work.clean()?),
+                None => None,
+            };
+            return Ok((image, copy));
+        }
+        let pixels = self.pixels(work, condition)?;
+        let (image, encoded) = steps.payload(&pixels)?;
+        let copy = copy(&image, &encoded);
+        Ok((image, copy))
     }
 
     /// The images of a source in each of these conditions, in the order shown.
@@ -266,8 +300,8 @@ impl<'a> ImagePipeline<'a> {
         work: &mut FrameWork<'_>,
         condition: &Condition,
     ) -> Result<Arc<Payload>> {
-        let staged = work.stage(condition)?;
-        self.finish(staged, condition)
+        let (image, _) = self.image_and_copy(work, condition, None)?;
+        Ok(image)
     }
 
     /// The pixels of a frame in a condition, in the size of the frame.
@@ -284,14 +318,12 @@ impl<'a> ImagePipeline<'a> {
     }
 
     fn finish(&mut self, staged: Staged, condition: &Condition) -> Result<Arc<Payload>> {
-        match (staged, &condition.enhancer) {
-            (Staged::Ready(payload), _) => Ok(payload),
-            (Staged::Degraded(image), None) => self.steps.payload(&image),
-            (Staged::Degraded(image), Some(name)) => {
-                let image = self.enhanced(&image, name)?;
-                self.steps.payload(&image)
-            }
-        }
+        let image = match (staged, &condition.enhancer) {
+            (Staged::Ready(payload), _) => return Ok(payload),
+            (Staged::Degraded(image), None) => image,
+            (Staged::Degraded(image), Some(name)) => self.enhanced(&image, name)?,
+        };
+        Ok(self.steps.payload(&image)?.0)
     }
 
     fn enhanced(&mut self, image: &Rgb, name: &EnhancerName) -> Result<Rgb> {
@@ -302,6 +334,20 @@ impl<'a> ImagePipeline<'a> {
         let enhance = || enhancer.enhance(image);
         self.steps.timings.time(Step::Enhance, enhance)
     }
+}
+
+/// A small copy of an image. One that cannot be made is said and left out: a picture for the report is worth no failed answer.
+fn small_copy(
+    name: &FrameId,
+    condition: &Condition,
+    image: &Payload,
+    encoded: Option<&Rgb>,
+) -> Option<Thumbnail> {
+    let copy = thumbnail(name, condition, image, encoded);
+    copy.inspect_err(|problem| {
+        tracing::warn!("no small copy of {name} at {condition} is kept: {problem}");
+    })
+    .ok()
 }
 
 /// Says so if images are large and nobody knows whether the endpoint takes them.
@@ -317,3 +363,6 @@ fn warn_of_large(largest: Option<&ImageFacts>, limit: ImageLimit) {
         );
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
 
 use crate::ask::openeqa::blind_answer;
-use crate::score::accuracy::Subject;
 use crate::score::llm_match::{Protocol, shortened};
+use crate::score::subject::Subject;
 use crate::types::{OpenDetail, QuestionId, Record, Step, Via, View};
 
 /// What is known of one answer.

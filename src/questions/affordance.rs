@@ -2,9 +2,10 @@
 
 use serde_json::json;
 
+use super::reason::Reason;
 use super::rules::Activity;
 use super::statistics::Segment;
-use super::survey::{Claim, Reason, Survey, Verdict, falls, yes_no};
+use super::survey::{Claim, Survey, Verdict, falls, yes_no};
 use crate::types::Family;
 
 /// Both answers for every activity.

@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::str::FromStr;
 
-use super::generate::Asked;
 use super::rules::Balance;
+use super::survey::Asked;
 use crate::error::Error;
 use crate::types::{Digest, Family};
 
@@ -61,15 +61,7 @@ pub(super) fn balance(asked: Vec<Asked>, how: Balanced, rule: &Balance) -> Evene
     let mut dropped: BTreeSet<usize> = BTreeSet::new();
     let mut uneven = Vec::new();
     if rule.max_repeat > 0 {
-        let key = |asked: &Asked| {
-            let question = &asked.question;
-            (
-                asked.scene.clone(),
-                question.text.clone(),
-                asked.answer().to_owned(),
-            )
-        };
-        for (_, list) in groups(&asked, &dropped, |asked| Some(key(asked))) {
+        for (_, list) in groups(&asked, &dropped, |asked| Some(asked.said())) {
             dropped.extend(list.into_iter().skip(rule.max_repeat));
         }
     }
@@ -96,30 +88,7 @@ pub(super) fn balance(asked: Vec<Asked>, how: Balanced, rule: &Balance) -> Evene
         }
     }
     if how == Balanced::Full {
-        for (family, share) in [
-            (Family::RoomType, rule.room_type_share_ppm),
-            (Family::Color, rule.color_share_ppm),
-        ] {
-            let answer = |asked: &Asked| {
-                (asked.question.family == family).then(|| asked.answer().to_owned())
-            };
-            let lists = groups(&asked, &dropped, answer);
-            match caps(&lists, share) {
-                Some(most) => {
-                    dropped.extend(
-                        lists
-                            .into_values()
-                            .flat_map(|list| list.into_iter().skip(most)),
-                    );
-                }
-                None if lists.is_empty() => {}
-                None => uneven.push(format!(
-                    "{family}: {} answers cannot be made even to {} % each",
-                    lists.len(),
-                    share / 10_000
-                )),
-            }
-        }
+        uneven = cap_shares(&asked, &mut dropped, rule);
     }
     let families = dropped
         .iter()
@@ -134,6 +103,34 @@ pub(super) fn balance(asked: Vec<Asked>, how: Balanced, rule: &Balance) -> Evene
         dropped: families,
         uneven,
     }
+}
+
+/// Drops rooms and colours that are too large a share of the answers; what cannot be made even, in words.
+fn cap_shares(asked: &[Asked], dropped: &mut BTreeSet<usize>, rule: &Balance) -> Vec<String> {
+    let mut uneven = Vec::new();
+    for (family, share) in [
+        (Family::RoomType, rule.room_type_share_ppm),
+        (Family::Color, rule.color_share_ppm),
+    ] {
+        let answer =
+            |asked: &Asked| (asked.question.family == family).then(|| asked.answer().to_owned());
+        let lists = groups(asked, dropped, answer);
+        match caps(&lists, share) {
+            Some(most) => {
+                let beyond = lists
+                    .into_values()
+                    .flat_map(|list| list.into_iter().skip(most));
+                dropped.extend(beyond);
+            }
+            None if lists.is_empty() => {}
+            None => uneven.push(format!(
+                "{family}: {} answers cannot be made even to {} % each",
+                lists.len(),
+                share / 10_000
+            )),
+        }
+    }
+    uneven
 }
 
 /// The questions that are left by key, each list in the order of its names' digests.

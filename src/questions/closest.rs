@@ -2,9 +2,10 @@
 
 use serde_json::json;
 
+use super::reason::Reason;
 use super::rules::{Flag, GapScope};
 use super::statistics::{Segment, SegmentDepth};
-use super::survey::{Claim, Reason, Survey, Verdict, falls};
+use super::survey::{Claim, Survey, Verdict, falls};
 use crate::types::Family;
 
 /// The one candidate of a frame.
@@ -40,12 +41,7 @@ fn claim(survey: &Survey<'_>) -> Result<Verdict, Reason> {
         GapScope::Classes => rest.iter().find(|(other, _)| other.class != first.0.class),
     };
     let second = second.ok_or(Reason::Few)?;
-    let mut classes: Vec<&str> = Vec::new();
-    for (segment, _) in &objects {
-        if !classes.contains(&segment.class.as_str()) {
-            classes.push(&segment.class);
-        }
-    }
+    let mut classes = classes(&objects);
     if classes.len() < 2 {
         return Err(Reason::Few);
     }
@@ -81,6 +77,17 @@ fn claim(survey: &Survey<'_>) -> Result<Verdict, Reason> {
         },
         &segments,
     ))
+}
+
+/// The classes, nearest first.
+fn classes<'a>(objects: &[Object<'a>]) -> Vec<&'a str> {
+    let mut classes: Vec<&str> = Vec::new();
+    for (segment, _) in objects {
+        if !classes.contains(&segment.class.as_str()) {
+            classes.push(&segment.class);
+        }
+    }
+    classes
 }
 
 /// Whether a segment may be offered.

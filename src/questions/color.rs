@@ -3,9 +3,10 @@
 use serde_json::json;
 
 use super::colors::{Color, Palette};
+use super::reason::Reason;
 use super::rules::{ColorChoices, ColorRule, Flag};
 use super::statistics::{Segment, ppm};
-use super::survey::{Claim, Reason, Survey, Verdict, falls};
+use super::survey::{Claim, Survey, Verdict, falls};
 use crate::types::Family;
 
 /// Every segment of a class whose colour may be asked.
@@ -22,8 +23,8 @@ pub(super) fn candidates(survey: &Survey<'_>, palette: &Palette) -> Vec<Verdict>
 
 fn claim(survey: &Survey<'_>, segment: &Segment, palette: &Palette) -> Result<Verdict, Reason> {
     let rule = &survey.book.color;
-    if let Some(flaw) = survey.statistics.disqualified(segment, survey.book) {
-        return Err(flaw.into());
+    if let Some(reason) = survey.statistics.disqualified(segment, survey.book) {
+        return Err(reason);
     }
     if survey.statistics.area(segment) < rule.area_ppm || segment.core < rule.eroded_px {
         return Err(Reason::Small);

@@ -8,10 +8,11 @@ use super::balance::{Balanced, balance};
 use super::colors::Palette;
 use super::frequency::Frequency;
 use super::pick::Picker;
+use super::reason::Reason;
 use super::room::{RoomSigns, RoomSource, classify};
 use super::rules::{Book, Rules};
 use super::statistics::FrameStatistics;
-use super::survey::{Claim, Fallen, Reason, Survey, Verdict};
+use super::survey::{Asked, Claim, Survey, Verdict};
 use super::{affordance, closest, color, presence, room_type};
 use crate::error::Result;
 use crate::types::{Choices, Digest, Family, FrameId, Labels, Question, QuestionId};
@@ -37,25 +38,6 @@ pub struct Order<'a> {
     pub rejected: BTreeSet<QuestionId>,
 }
 
-/// A question that is asked, with what it is about.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Asked {
-    /// The question.
-    pub question: Question,
-    /// What it is about: a class, an activity, or nothing.
-    pub about: String,
-    /// The scene of its frame.
-    pub scene: String,
-}
-
-impl Asked {
-    /// The true answer.
-    #[must_use]
-    pub fn answer(&self) -> &str {
-        &self.question.choices.texts()[self.question.choices.truth()]
-    }
-}
-
 /// Why a question that holds is not asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Left {
@@ -78,6 +60,27 @@ pub struct Tally {
     pub left: BTreeMap<Left, u64>,
     /// Those that do not hold.
     pub fallen: BTreeMap<Reason, u64>,
+}
+
+impl Tally {
+    /// Those that hold, all counted.
+    fn sift(&mut self, verdicts: Vec<Verdict>) -> Vec<Claim> {
+        let mut claims = Vec::new();
+        for verdict in verdicts {
+            match verdict {
+                Verdict::Holds(claim) => claims.push(claim),
+                Verdict::Falls(fallen) => *self.fallen.entry(fallen.reason).or_insert(0) += 1,
+            }
+        }
+        self.viable += claims.len() as u64;
+        claims
+    }
+
+    fn leave(&mut self, why: Left, count: u64) {
+        if count > 0 {
+            *self.left.entry(why).or_insert(0) += count;
+        }
+    }
 }
 
 /// What came of the frames.
@@ -142,41 +145,30 @@ pub fn generate(
                 frame: &frame.frame,
             },
         };
-        for family in order
-            .families
-            .iter()
-            .filter(|family| Family::PAPER.contains(family))
-        {
+        let families = order.families.iter();
+        for family in families.filter(|family| Family::PAPER.contains(family)) {
             let verdicts = verdicts(family, &survey, order.palette);
             let tally = made.tallies.entry(family.clone()).or_default();
-            let mut claims = Vec::new();
-            for verdict in verdicts {
-                explain(&frame.frame, &verdict);
-                match verdict {
-                    Verdict::Holds(claim) => claims.push(claim),
-                    Verdict::Falls(Fallen { reason, .. }) => {
-                        *tally.fallen.entry(reason).or_insert(0) += 1;
-                    }
-                }
-            }
-            tally.viable += claims.len() as u64;
+            verdicts
+                .iter()
+                .for_each(|verdict| explain(&frame.frame, verdict));
+            let claims = tally.sift(verdicts);
             let spare = claims.len().saturating_sub(1) as u64;
             let Some(claim) = running.choose(claims, &survey) else {
                 continue;
             };
-            leave(tally, Left::NotChosen, spare);
+            tally.leave(Left::NotChosen, spare);
             let asked = ask(claim, frame, order)?;
             if order.rejected.contains(&asked.question.id) {
-                leave(tally, Left::Rejected, 1);
+                tally.leave(Left::Rejected, 1);
             } else {
                 made.asked.push(asked);
             }
         }
     }
-    made.rooms = light
-        .iter()
-        .map(|frame| frame.frame.clone())
-        .zip(rooms.into_iter().map(|(signs, _)| signs))
+    let seen = light.iter().zip(rooms);
+    made.rooms = seen
+        .map(|(frame, (signs, _))| (frame.frame.clone(), signs))
         .collect();
     Ok(finish(made, order))
 }
@@ -189,7 +181,8 @@ fn finish(mut made: Generated, order: &Order<'_>) -> Generated {
         &order.rules.book().balance,
     );
     for family in kept.dropped {
-        leave(made.tallies.entry(family).or_default(), Left::Unbalanced, 1);
+        let tally = made.tallies.entry(family).or_default();
+        tally.leave(Left::Unbalanced, 1);
     }
     for asked in &kept.asked {
         made.tallies
@@ -199,12 +192,6 @@ fn finish(mut made: Generated, order: &Order<'_>) -> Generated {
     }
     (made.asked, made.uneven) = (kept.asked, kept.uneven);
     made
-}
-
-fn leave(tally: &mut Tally, why: Left, count: u64) {
-    if count > 0 {
-        *tally.left.entry(why).or_insert(0) += count;
-    }
 }
 
 /// The room that questions go by.

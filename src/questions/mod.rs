@@ -17,6 +17,7 @@ pub mod generate;
 pub mod observer;
 pub mod pick;
 mod presence;
+pub mod reason;
 pub mod room;
 mod room_type;
 pub mod rules;
@@ -26,4 +27,5 @@ pub mod survey;
 #[cfg(test)]
 mod tests;
 
-pub use generate::{Asked, Generated, Order, generate};
+pub use generate::{Generated, Order, generate};
+pub use survey::Asked;

@@ -4,9 +4,10 @@ use std::collections::BTreeSet;
 
 use serde_json::json;
 
+use super::reason::Reason;
 use super::rules::{Flag, Presence};
-use super::statistics::{Flaw, Segment, ppm};
-use super::survey::{Claim, Reason, Survey, Verdict, falls, yes_no};
+use super::statistics::{Segment, ppm};
+use super::survey::{Claim, Survey, Verdict, falls, yes_no};
 use crate::types::Family;
 
 /// Yes and no for every asked class.
@@ -50,8 +51,8 @@ fn yes(survey: &Survey<'_>, class: &str) -> Result<Verdict, Reason> {
 }
 
 fn flaw(survey: &Survey<'_>, segment: &Segment, rule: &Presence) -> Option<Reason> {
-    if let Some(flaw) = survey.statistics.disqualified(segment, survey.book) {
-        return Some(flaw.into());
+    if let Some(reason) = survey.statistics.disqualified(segment, survey.book) {
+        return Some(reason);
     }
     let area = survey.statistics.area(segment);
     if area < rule.area_ppm {
@@ -132,17 +133,4 @@ fn claim(
         },
         segments,
     )
-}
-
-impl From<Flaw> for Reason {
-    fn from(flaw: Flaw) -> Self {
-        match flaw {
-            Flaw::Elsewhere => Self::Elsewhere,
-            Flaw::Mixed => Self::Mixed,
-            Flaw::Unlike => Self::Unlike,
-            Flaw::Small => Self::Small,
-            Flaw::Thin => Self::Thin,
-            Flaw::Cut => Self::Cut,
-        }
-    }
 }

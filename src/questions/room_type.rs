@@ -2,9 +2,10 @@
 
 use serde_json::json;
 
+use super::reason::Reason;
 use super::rules::Flag;
 use super::statistics::Segment;
-use super::survey::{Claim, Reason, Survey, Verdict, falls};
+use super::survey::{Claim, Survey, Verdict, falls};
 use crate::types::Family;
 
 /// The one candidate of a frame.

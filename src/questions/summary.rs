@@ -4,9 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
-use super::generate::{Asked, Generated, Left, Order, Tally, stated};
+use super::generate::{Generated, Left, Order, Tally, stated};
+use super::reason::Reason;
+use super::rules::Book;
 use super::statistics::FrameStatistics;
-use super::survey::Reason;
+use super::survey::Asked;
 use crate::types::{Digest, Family};
 
 /// The schema of the summary as JSON.
@@ -126,14 +128,13 @@ impl Summary {
         order: &Order<'_>,
         failed: usize,
     ) -> Self {
-        let book = order.rules.book();
         let asked = &made.asked;
         let mut summary = Self {
             schema: SCHEMA,
             dataset: order.dataset.to_owned(),
             rules: order.rules.digest(),
             colors: order.palette.digest(),
-            rules_version: book.version.clone(),
+            rules_version: order.rules.book().version.clone(),
             balance: order.balance.to_string(),
             scenes: frames
                 .iter()
@@ -156,42 +157,24 @@ impl Summary {
             polarity: BTreeMap::new(),
             classes: coverage(frames, asked),
             rooms: rooms(made),
-            room_agreement: [0, 0],
+            room_agreement: room_agreement(frames, made, order.rules.book()),
             gaps: BTreeMap::new(),
             repeats: 0,
             unknown: BTreeMap::new(),
             baselines: baselines(asked),
         };
         let per_frame = count(asked, |asked| asked.question.frame.clone());
-        let signs: BTreeMap<_, _> = made
-            .rooms
-            .iter()
-            .map(|(name, signs)| (name, signs))
-            .collect();
         for frame in frames {
             let questions = per_frame.get(&frame.frame).copied().unwrap_or(0);
             *summary.per_frame.entry(questions).or_insert(0) += 1;
             for (id, pixels) in &frame.unknown {
                 *summary.unknown.entry(*id).or_insert(0) += pixels;
             }
-            let seen = signs
-                .get(&frame.frame)
-                .and_then(|signs| signs.room.clone().ok());
-            if let (Some(seen), Some(stated)) = (seen, stated(frame, book)) {
-                summary.room_agreement[0] += 1;
-                summary.room_agreement[1] += usize::from(seen == stated);
-            }
         }
         for asked in asked {
             summary.take(asked);
         }
-        let same = count(asked, |asked| {
-            (
-                asked.scene.clone(),
-                asked.question.text.clone(),
-                asked.answer().to_owned(),
-            )
-        });
+        let same = count(asked, Asked::said);
         summary.repeats = same.values().map(|count| count - 1).sum();
         summary
     }
@@ -264,6 +247,25 @@ fn coverage(frames: &[FrameStatistics], asked: &[Asked]) -> BTreeMap<String, Cov
         }
     }
     classes
+}
+
+/// Frames whose room is stated and seen, and those of them where both say the same.
+fn room_agreement(frames: &[FrameStatistics], made: &Generated, book: &Book) -> [usize; 2] {
+    let signs: BTreeMap<_, _> = made
+        .rooms
+        .iter()
+        .map(|(name, signs)| (name, signs))
+        .collect();
+    let mut agreement = [0, 0];
+    for frame in frames {
+        let signs = signs.get(&frame.frame);
+        let seen = signs.and_then(|signs| signs.room.as_ref().ok());
+        if let (Some(seen), Some(stated)) = (seen, stated(frame, book)) {
+            agreement[0] += 1;
+            agreement[1] += usize::from(*seen == stated);
+        }
+    }
+    agreement
 }
 
 fn rooms(made: &Generated) -> BTreeMap<String, Room> {

@@ -5,10 +5,11 @@ use serde_json::{Value, json};
 
 use super::frequency::Frequency;
 use super::pick::Picker;
+use super::reason::Reason;
 use super::room::RoomSigns;
 use super::rules::Book;
 use super::statistics::{FrameStatistics, Segment};
-use crate::types::{Family, Labels};
+use crate::types::{Family, Labels, Question};
 
 /// What the rules see of a frame.
 #[derive(Debug, Clone, Copy)]
@@ -54,6 +55,30 @@ impl Claim {
     }
 }
 
+/// A question that is asked, with what it is about.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Asked {
+    /// The question.
+    pub question: Question,
+    /// What it is about: a class, an activity, or nothing.
+    pub about: String,
+    /// The scene of its frame.
+    pub scene: String,
+}
+
+impl Asked {
+    /// The true answer.
+    #[must_use]
+    pub fn answer(&self) -> &str {
+        &self.question.choices.texts()[self.question.choices.truth()]
+    }
+
+    /// Its scene, its words and its answer: two with the same say the same.
+    pub(super) fn said(&self) -> [String; 3] {
+        [&*self.scene, &*self.question.text, self.answer()].map(str::to_owned)
+    }
+}
+
 /// What a rule says of a candidate.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Verdict {
@@ -75,72 +100,6 @@ pub struct Fallen {
     pub answer: Option<String>,
     /// Why not.
     pub reason: Reason,
-}
-
-/// Why a candidate cannot be asked.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Reason {
-    /// The frame has no room.
-    NoRoom,
-    /// Too little of the frame is labelled.
-    Unlabelled,
-    /// Too little is seen: a bare wall is no room.
-    Bare,
-    /// The frame's room is not the one that the answer needs.
-    OtherRoom,
-    /// What makes the answer true is not seen well enough.
-    Unseen,
-    /// What the answer denies, or what would do at a pinch, is seen.
-    Seen,
-    /// Too large a part of the frame has no label, so that anything may hide there.
-    Void,
-    /// A mirror shows what is elsewhere.
-    Mirror,
-    /// The data set has no label for it, so that it may hide under another.
-    Inexpressible,
-    /// Something is seen that may be taken for it.
-    Confusable,
-    /// It is rare in such rooms: the answer would be guessed without looking.
-    Implausible,
-    /// Its segment is in another room.
-    Elsewhere,
-    /// Its segment has several classes.
-    Mixed,
-    /// Its word is not what its class is called.
-    Unlike,
-    /// Its segment is too small.
-    Small,
-    /// Its segment is too thin.
-    Thin,
-    /// Its segment is cut by the frame's border.
-    Cut,
-    /// There are several of its class.
-    NotUnique,
-    /// It is over-exposed.
-    Bright,
-    /// It is crushed to black.
-    Crushed,
-    /// No colour dominates.
-    Motley,
-    /// Its colour has no name that people agree on.
-    Nameless,
-    /// Its colour is none of those offered.
-    NotOffered,
-    /// The frame has no depth.
-    NoDepth,
-    /// The frame's depths are none of a room: its scale is wrong.
-    Scale,
-    /// Fewer than two objects, or objects of one class only.
-    Few,
-    /// The two nearest are too near to each other.
-    Gap,
-    /// The nearest by its median is not the nearest by its near end.
-    Disputed,
-    /// Something that is not offered may be nearer.
-    Rival,
-    /// Something large has no depth.
-    Unmeasured,
 }
 
 impl Survey<'_> {

@@ -1,9 +1,9 @@
 //! The findings as tables of numbers: one CSV file a kind.
 
 use crate::error::{Error, Result};
-use crate::score::accuracy::Subject;
 use crate::score::estimate::Estimate;
 use crate::score::findings::Findings;
+use crate::score::subject::Subject;
 use crate::types::{AxisLevel, FailureKind, Family, Why};
 
 /// All tables beside `summary.csv`, by file name; those without a row are left out.

@@ -3,8 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::subject::light;
-use crate::score::accuracy::{Cell, Subject, Summary};
+use crate::score::accuracy::{Cell, Summary};
 use crate::score::choice::Mode;
+use crate::score::subject::Subject;
 use crate::types::{AxisLevel, EnhancerName, KindReading, View};
 
 /// A model in one variant, raw or enhanced.

@@ -1,6 +1,6 @@
 //! What subjects and numbers are called in words: [`light`], [`family`], [`percent`] and others.
 
-use crate::score::accuracy::Subject;
+use crate::score::subject::Subject;
 use crate::types::{EnhancerName, Family, KindReading};
 
 /// A variant in words, with what mended it.

@@ -1,11 +1,11 @@
 //! How far two models agree: [`Agreement`].
 
-use super::accuracy::Subject;
 use super::bootstrap::Resamples;
 use super::choice::Mode;
 use super::comparison::{Kind, pairs};
 use super::estimate::Estimate;
 use super::grid::{Count, Grid};
+use super::subject::Subject;
 
 /// Two models in one condition, in the strict reading.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,5 +1,11 @@
 //! The cluster bootstrap: [`Resamples`].
 
+use std::convert::Infallible;
+
+use rand::TryRng;
+use rand::rand_core::utils::fill_bytes_via_next_word;
+use rand_distr::{Distribution as _, Uniform};
+
 use super::student::student;
 
 /// How many times the clusters are drawn.
@@ -20,13 +26,13 @@ impl Resamples {
     #[must_use]
     pub fn new(clusters: usize) -> Self {
         let mut times = vec![0_u8; DRAWS * clusters];
-        let mut state = SEED;
-        for draw in times.chunks_mut(clusters.max(1)) {
-            for _ in 0..clusters {
-                // Multiply-shift: uniform below `clusters` but for 2⁻³².
-                let random = u128::from(split_mix(&mut state));
-                let cluster = ((random * clusters as u128) >> 64) as usize;
-                draw[cluster] = draw[cluster].saturating_add(1);
+        if let Ok(any) = Uniform::new(0, clusters as u64) {
+            let mut random = SplitMix(SEED);
+            for draw in times.chunks_mut(clusters) {
+                for cluster in any.sample_iter(&mut random).take(clusters) {
+                    let times = &mut draw[cluster as usize];
+                    *times = times.saturating_add(1);
+                }
             }
         }
         Self { clusters, times }
@@ -77,24 +83,40 @@ impl Resamples {
     }
 }
 
-/// The next number of SplitMix64 (Steele, Lea and Flood 2014, OOPSLA, figure 13).
-fn split_mix(state: &mut u64) -> u64 {
-    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let mut z = *state;
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
+/// The generator SplitMix64 (Steele, Lea and Flood 2014, OOPSLA, figure 13), for a distribution of `rand_distr` to draw from.
+struct SplitMix(u64);
+
+impl TryRng for SplitMix {
+    type Error = Infallible;
+
+    fn try_next_u64(&mut self) -> Result<u64, Infallible> {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        Ok(z ^ (z >> 31))
+    }
+
+    fn try_next_u32(&mut self) -> Result<u32, Infallible> {
+        self.try_next_u64().map(|word| word as u32)
+    }
+
+    fn try_fill_bytes(&mut self, bytes: &mut [u8]) -> Result<(), Infallible> {
+        fill_bytes_via_next_word(bytes, || self.try_next_u64())
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use rand::Rng as _;
+
     use super::*;
 
     #[test]
     fn draws_are_those_of_the_generator() {
         // The first numbers of the reference implementation (Vigna, splitmix64.c) from the seed 1234567.
-        let mut state = 1_234_567;
-        let first = [split_mix(&mut state), split_mix(&mut state)];
+        let mut random = SplitMix(1_234_567);
+        let first = [random.next_u64(), random.next_u64()];
         assert_eq!(
             first,
             [6_457_827_717_110_365_317, 3_203_168_211_198_807_973]

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use super::accuracy::Subject;
 use super::choice::Mode;
 use super::grid::Grid;
 use super::paired::Paired;
 use super::significance::holm;
+use super::subject::Subject;
 use crate::types::{AxisLevel, Family, KindReading, View};
 use rayon::prelude::*;
 

@@ -2,10 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::accuracy::Subject;
 use super::choice::Mode;
 use super::estimate::Estimate;
 use super::grid::{Count, Grid};
+use super::subject::Subject;
 use crate::types::Family;
 
 /// A family with more different answers than this has no table of them.

@@ -1,10 +1,10 @@
 //! Accuracy over darkness as a whole: [`Curve`], with its threshold and area.
 
-use super::accuracy::Subject;
 use super::bootstrap::Resamples;
 use super::choice::Mode;
 use super::estimate::Estimate;
 use super::grid::{Count, Grid, Mark};
+use super::subject::Subject;
 use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
 
 /// The exposure drop at which a model's accuracy is half-way between that in the light and chance.

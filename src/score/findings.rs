@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::accuracy::{Subject, Summary, summarize};
+use super::accuracy::{Summary, summarize};
 use super::agreement::{Agreement, agreements};
 use super::bootstrap::Resamples;
 use super::chance::Offer;
@@ -13,6 +13,7 @@ use super::curve::{Curve, curves};
 use super::flips::{Fall, falls};
 use super::grid::Grid;
 use super::health::{Health, healths};
+use super::subject::Subject;
 use crate::types::{Family, FrameId, Record};
 
 /// All that records say.

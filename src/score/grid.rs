@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use super::accuracy::Subject;
 use super::choice::Mode;
 use super::cluster::Clusters;
+use super::subject::Subject;
 use crate::types::{AnswerReading, Family, Outcome, QuestionId, Record};
 
 /// What came of one item for one subject.

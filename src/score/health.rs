@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use super::accuracy::Subject;
 use super::choice::Mode;
 use super::grid::{Grid, Mark};
+use super::subject::Subject;
 use crate::types::{FailureKind, Record, Why};
 
 /// What became of the trials of one subject.

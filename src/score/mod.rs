@@ -33,3 +33,4 @@ pub mod realism;
 mod record;
 pub mod significance;
 mod student;
+pub mod subject;

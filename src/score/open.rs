@@ -5,10 +5,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::accuracy::Subject;
 use super::estimate::Estimate;
 use super::llm_match::points;
 use super::paired::difference;
+use super::subject::Subject;
 use crate::types::{AxisLevel, View};
 
 /// How many independent right-or-wrong replies a mark may count for: one on a scale of five steps varies less than such a reply

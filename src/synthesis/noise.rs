@@ -68,7 +68,7 @@ pub fn read(adu: &mut Lanes<f32>, scale: f32, shape: &Quantile, offset: f32, wor
 /// Row noise: one number of N(0, σ_r²) for the whole sensor row, that is for both of its planes (Wei et al. 2021).
 #[must_use]
 pub fn row(deviation: f64, stream: Stream, row: usize) -> f32 {
-    (deviation * stream.normal(Site::new(row, 0), 0)) as f32
+    (deviation * stream.at(Site::new(row, 0)).normal()) as f32
 }
 
 /// Quantisation noise: U(−½, ½), the error of rounding to a whole ADU.

@@ -4,7 +4,12 @@
 //! state that threads or order could change. The generator is Philox4x32-10 (Salmon et al., "Parallel random numbers:
 //! as easy as 1, 2, 3", SC 2011), which passes BigCrush on plain counters; its key is taken from a BLAKE3 digest.
 
+use std::convert::Infallible;
 use std::f64::consts::PI;
+
+use rand::TryRng;
+use rand::rand_core::utils::{fill_bytes_via_next_word, next_u64_via_u32};
+use rand_distr::{Distribution as _, Open01};
 
 use super::lanes::{LANES, Lanes};
 use crate::types::degradation::Kind;
@@ -157,34 +162,50 @@ impl Stream {
         field
     }
 
-    /// Two independent numbers, uniform in the open interval (0, 1).
+    /// The words of one site, one after the other, for a distribution of `rand_distr` to draw from.
     #[must_use]
-    pub fn uniforms(self, site: Site, draw: u32) -> [f64; 2] {
-        let [a, b, c, d] = self.words(site, draw);
-        [[a, b], [c, d]].map(|[low, high]| open_unit(u64::from(high) << 32 | u64::from(low)))
+    pub fn at(self, site: Site) -> Words {
+        Words {
+            stream: self,
+            site,
+            next: 0,
+        }
     }
+}
 
-    /// A number uniform in the open interval (0, 1): the first draw at a site.
-    #[must_use]
-    pub fn uniform(self, site: Site) -> f64 {
-        self.uniforms(site, 0)[0]
-    }
+/// The words of one site, draw by draw: what is not drawn for every site of the sensor is drawn from them.
+#[derive(Debug, Clone)]
+pub struct Words {
+    stream: Stream,
+    site: Site,
+    next: u32,
+}
 
-    /// A standard normal number (Box and Muller 1958).
-    #[must_use]
-    pub fn normal(self, site: Site, draw: u32) -> f64 {
-        let [radius, angle] = self.uniforms(site, draw);
+impl Words {
+    /// A standard normal number (Box and Muller 1958), of one draw.
+    pub fn normal(&mut self) -> f64 {
+        let [radius, angle]: [f64; 2] = [Open01.sample(self), Open01.sample(self)];
         (-2.0 * libm::log(radius)).sqrt() * libm::cos(2.0 * PI * angle)
     }
 }
 
-/// Maps a word to the middle of one of 2^52 equal cells of (0, 1).
-///
-/// With 52 bits both u and 1 − u are exact; with 53, half a cell less than 1 would round to 1, where the quantile
-/// functions are infinite.
-fn open_unit(word: u64) -> f64 {
-    const CELL: f64 = 1.0 / (1u64 << 52) as f64;
-    ((word >> 12) as f64 + 0.5) * CELL
+impl TryRng for Words {
+    type Error = Infallible;
+
+    fn try_next_u32(&mut self) -> Result<u32, Infallible> {
+        let words = self.stream.words(self.site, self.next / 4);
+        let word = words[self.next as usize % 4];
+        self.next += 1;
+        Ok(word)
+    }
+
+    fn try_next_u64(&mut self) -> Result<u64, Infallible> {
+        next_u64_via_u32(self)
+    }
+
+    fn try_fill_bytes(&mut self, bytes: &mut [u8]) -> Result<(), Infallible> {
+        fill_bytes_via_next_word(bytes, || self.try_next_u32())
+    }
 }
 
 /// The block function Philox4x32 with ten rounds.
@@ -238,11 +259,20 @@ mod tests {
         }
     }
 
+    /// The middle of one of 2^52 equal cells of (0, 1), in which both u and 1 − u are exact: with 53 bits, half a cell less
+    /// than 1 would round to 1, where the quantile functions are infinite.
     #[test]
-    fn the_unit_interval_is_open_and_symmetric() {
-        let (low, high) = (open_unit(0), open_unit(u64::MAX));
-        assert!(low > 0.0 && high < 1.0);
-        assert_eq!(low.to_bits(), (1.0 - high).to_bits());
+    fn unit_numbers_are_the_middles_of_cells() {
+        let stream = key(5, "frame").stream(Component::Camera);
+        let mut words = stream.at(Site::new(3, 0));
+        for draw in 0..100 {
+            let [a, b, c, d] = stream.words(Site::new(3, 0), draw).map(u64::from);
+            for word in [b << 32 | a, d << 32 | c] {
+                let unit: f64 = Open01.sample(&mut words);
+                let middle = ((word >> 12) as f64 + 0.5) / (1_u64 << 52) as f64;
+                assert_eq!(unit.to_bits(), middle.to_bits());
+            }
+        }
     }
 
     #[test]
@@ -313,7 +343,10 @@ mod tests {
         let n = 400_000;
         for i in 0..n {
             let (row, column) = (i / 1000, i % 1000);
-            let at = |column| (stream.uniform(Site::new(row, column)) * CELLS as f64) as usize;
+            let at = |column| {
+                let unit: f64 = Open01.sample(&mut stream.at(Site::new(row, column)));
+                (unit * CELLS as f64) as usize
+            };
             cells[at(2 * column) * CELLS + at(2 * column + 1)] += 1;
         }
         let expected = f64::from(n as u32) / cells.len() as f64;
@@ -334,7 +367,7 @@ mod tests {
         let n = 400_000;
         let mut moments = [0.0; 4];
         for i in 0..n {
-            let z = stream.normal(Site::new(i, 0), 0);
+            let z = stream.at(Site::new(i, 0)).normal();
             let mut power = 1.0;
             for moment in &mut moments {
                 power *= z;

@@ -17,6 +17,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::{Deserialize, Serialize};
 
 use super::colors::{BINS, Color, NONE};
+use super::reason::Reason;
 use super::rules::{Book, Flag};
 use crate::types::{Digest, FrameId};
 
@@ -203,24 +204,24 @@ impl FrameStatistics {
 
     /// Why a segment is no evidence; `None` where it is.
     #[must_use]
-    pub fn disqualified(&self, segment: &Segment, book: &Book) -> Option<Flaw> {
+    pub fn disqualified(&self, segment: &Segment, book: &Book) -> Option<Reason> {
         let rule = &book.qualified;
         let [left, top, right, bottom] = segment.bbox;
         let side = (right - left).min(bottom - top) as u64;
         let area = self.area(segment);
         let on_border = ppm(segment.rim_on_border, segment.rim);
         if segment.stands == Where::Elsewhere {
-            Some(Flaw::Elsewhere)
+            Some(Reason::Elsewhere)
         } else if segment.mixed(book) {
-            Some(Flaw::Mixed)
+            Some(Reason::Mixed)
         } else if segment.unlike(book) {
-            Some(Flaw::Unlike)
+            Some(Reason::Unlike)
         } else if area < rule.area_ppm {
-            Some(Flaw::Small)
+            Some(Reason::Small)
         } else if ppm(side, self.size[1] as u64) < rule.side_per_height_ppm {
-            Some(Flaw::Thin)
+            Some(Reason::Thin)
         } else if on_border > rule.border_ppm && area < rule.border_area_ppm {
-            Some(Flaw::Cut)
+            Some(Reason::Cut)
         } else {
             None
         }
@@ -243,23 +244,6 @@ impl FrameStatistics {
         let mut tokens = words.map(|word| book.token(word, ""));
         tokens.any(|found| found == token)
     }
-}
-
-/// Why a segment is no evidence.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Flaw {
-    /// In another room, by its word.
-    Elsewhere,
-    /// Of more than one class.
-    Mixed,
-    /// By its word not what its class is called.
-    Unlike,
-    /// Too small.
-    Small,
-    /// Too thin.
-    Thin,
-    /// Cut by the frame's border.
-    Cut,
 }
 
 impl Segment {

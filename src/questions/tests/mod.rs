@@ -16,13 +16,15 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::questions::balance::Balanced;
 use crate::questions::colors::{Color, NONE, Palette};
-use crate::questions::generate::{Asked, Generated, Order, generate};
+use crate::questions::generate::{Generated, Order, generate};
+use crate::questions::reason::Reason;
 use crate::questions::room::{NoRoom, RoomSigns, RoomSource, classify};
 use crate::questions::rules::Rules;
 use crate::questions::statistics::{
     Along, FrameDepth, FrameStatistics, Segment, SegmentDepth, Where, plain_word,
 };
-use crate::questions::survey::{Claim, Reason, Verdict};
+use crate::questions::survey::Asked;
+use crate::questions::survey::{Claim, Verdict};
 use crate::types::{Digest, Family, FrameId, Labels, QuestionId};
 
 /// A frame of the given segments: class, the data set's word, area.

@@ -8,10 +8,10 @@ use std::collections::BTreeSet;
 use super::chart::{Chart, Line, Look, Panel, Shape};
 use super::subject::{family as family_name, light};
 use crate::error::Result;
-use crate::score::accuracy::{CHANCE, Subject};
 use crate::score::choice::Mode;
 use crate::score::estimate::Estimate;
 use crate::score::findings::Findings;
+use crate::score::subject::{CHANCE, Subject};
 use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
 
 /// One figure of a report.

@@ -10,9 +10,9 @@ mod upstream;
 
 use crate::error::Result;
 use crate::report::products::PAGE;
-use crate::score::accuracy::Subject;
 use crate::score::llm_match::Protocol;
 use crate::score::open::{Group, OpenSummary, Outcome};
+use crate::score::subject::Subject;
 use crate::types::manifest::RunManifest;
 use crate::types::{QuestionId, Thumbnail};
 

@@ -11,8 +11,8 @@ use crate::report::figures::Figure;
 use crate::report::page::{STYLE, manifest_facts};
 use crate::report::readable::readable;
 use crate::report::template::filled;
-use crate::score::accuracy::Subject;
 use crate::score::open::{Group, Outcome};
+use crate::score::subject::Subject;
 use crate::types::{AxisLevel, View};
 
 /// The template.

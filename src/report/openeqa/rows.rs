@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::report::subject::{light, percent, points};
-use crate::score::accuracy::Subject;
 use crate::score::open::{Against, Group, OpenCell, OpenSummary};
+use crate::score::subject::Subject;
 use crate::types::{AxisLevel, EnhancerName, KindReading, View};
 
 /// A model in one variant, raw or enhanced.

@@ -9,8 +9,8 @@ use super::rows::Rows;
 use super::{OpenReport, coverage};
 use crate::report::products::PAGE;
 use crate::report::table::plain;
-use crate::score::accuracy::Subject;
 use crate::score::open::{Group, OpenCell};
+use crate::score::subject::Subject;
 use crate::types::AxisLevel;
 use crate::types::manifest::{Counts, Status};
 

@@ -6,8 +6,8 @@ use serde::Serialize;
 
 use super::{OpenReport, Told};
 use crate::error::{Error, Result};
-use crate::score::accuracy::Subject;
 use crate::score::open::Outcome;
+use crate::score::subject::Subject;
 
 /// The folder of these files.
 const FOLDER: &str = "upstream";

@@ -245,7 +245,7 @@ fn code(mark: Mark, mode: Mode) -> u8 {
 }
 
 fn subjects<'a>(grid: &'a Grid<'_>) -> Vec<Subject<'a>> {
-    let subject = |subject: &'a crate::score::accuracy::Subject| Subject {
+    let subject = |subject: &'a crate::score::subject::Subject| Subject {
         name: crate::report::subject::name(subject),
         model: &subject.model,
         condition: subject.condition(),

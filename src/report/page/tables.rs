@@ -6,12 +6,12 @@ use crate::report::ladder::Ladder;
 use crate::report::subject::{
     family as family_name, light, name, p, percent, points, reach, stops,
 };
-use crate::score::accuracy::Subject;
 use crate::score::choice::Mode;
 use crate::score::comparison::{Comparison, Kind};
 use crate::score::curve::Curve;
 use crate::score::estimate::Estimate;
 use crate::score::findings::Findings;
+use crate::score::subject::Subject;
 use crate::types::Why;
 
 #[derive(Serialize)]

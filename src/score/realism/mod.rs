@@ -7,6 +7,7 @@ pub mod ssim;
 
 use residual::Divergence;
 use serde::Serialize;
+pub use ssim::same_size;
 
 use crate::error::{Error, Result};
 use crate::types::Rgb;
@@ -37,22 +38,6 @@ pub struct Compared {
     pub noise: Measured,
     /// PSNR of the sensor branch without noise: its tone, apart from its noise.
     pub clean_psnr: f64,
-}
-
-/// Refuses images of different sizes.
-///
-/// # Errors
-/// With both sizes.
-pub fn same_size(a: &Rgb, b: &Rgb) -> Result<()> {
-    let [a, b] = [a, b].map(|image| (image.width(), image.height()));
-    if a == b {
-        return Ok(());
-    }
-    let problem = format_args!(
-        "{} × {} pixels against {} × {}; a pair is of one size",
-        a.0, a.1, b.0, b.1
-    );
-    Err(Error::data("pair", problem))
 }
 
 /// Peak signal-to-noise ratio in dB, peak 255, over all samples; infinite where the images are the same.

@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use super::same_size;
+use super::ssim::same_size;
 use crate::error::{Error, Result};
 use crate::types::Rgb;
 

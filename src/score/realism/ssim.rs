@@ -2,7 +2,6 @@
 
 use rayon::prelude::*;
 
-use super::same_size;
 use crate::error::{Error, Result};
 use crate::types::Rgb;
 
@@ -12,6 +11,19 @@ const TAPS: usize = 2 * RADIUS + 1;
 
 /// Local means of x, y, x², y² and xy.
 const MOMENTS: usize = 5;
+
+/// Refuses images of different sizes, with both of them.
+pub fn same_size(a: &Rgb, b: &Rgb) -> Result<()> {
+    let [a, b] = [a, b].map(|image| (image.width(), image.height()));
+    if a == b {
+        return Ok(());
+    }
+    let problem = format_args!(
+        "{} × {} pixels against {} × {}; a pair is of one size",
+        a.0, a.1, b.0, b.1
+    );
+    Err(Error::data("pair", problem))
+}
 
 /// Structural similarity (Wang et al. 2004): gaussian window of deviation 1.5 (11 × 11), K1 0.01, K2 0.03, population
 /// covariance, data range 255; the mean over the three channels and the interior, where the window lies within the image.

@@ -6,11 +6,12 @@ use std::sync::Arc;
 
 pub use calibration::{Calibration, Fit, SensorNoise, Step};
 use calibration::{GAINS, RATIOS};
+use rand_distr::{Distribution as _, Open01};
 use serde::ser::SerializeStruct;
 use serde::{Deserialize, Serialize, Serializer};
 
 use super::colour::{self, Matrix};
-use super::random::{Component, NoiseKey, Site, Stream};
+use super::random::{Component, NoiseKey, Site, Stream, Words};
 use crate::error::{Error, Result};
 use crate::types::Digest;
 
@@ -169,10 +170,7 @@ impl CameraState {
         let system_gain = model.gain.unwrap_or(least * libm::exp(octaves));
         let noise = calibration.noise_at(
             system_gain,
-            [
-                draws.normal(Number::ReadScale, 0),
-                draws.normal(Number::RowDeviation, 0),
-            ],
+            [Number::ReadScale, Number::RowDeviation].map(|number| draws.of(number).normal()),
             [Number::ReadShape, Number::Bias].map(|number| draws.uniform(number)),
         );
         let [low, high] = calibration.ratio;
@@ -257,12 +255,12 @@ impl Number {
 struct Draws(Stream);
 
 impl Draws {
-    fn uniform(self, number: Number) -> f64 {
-        self.0.uniform(Site::new(number as usize, 0))
+    fn of(self, number: Number) -> Words {
+        self.0.at(Site::new(number as usize, 0))
     }
 
-    fn normal(self, number: Number, draw: u32) -> f64 {
-        self.0.normal(Site::new(number as usize, 0), draw)
+    fn uniform(self, number: Number) -> f64 {
+        Open01.sample(&mut self.of(number))
     }
 
     fn between(self, number: Number, low: f64, high: f64) -> f64 {
@@ -271,13 +269,12 @@ impl Draws {
 
     /// N(0.8, 0.1), drawn again beyond three deviations: uncut, its inverse, the brightness gain, has no bound.
     fn cut_normal(self, number: Number) -> f64 {
-        let mut draw = 0;
+        let mut words = self.of(number);
         loop {
-            let z = self.normal(number, draw);
+            let z = words.normal();
             if z.abs() <= 3.0 {
                 return 0.8 + 0.1 * z;
             }
-            draw += 1;
         }
     }
 }

@@ -1,0 +1,84 @@
+#![allow(clippy::unwrap_used)]
+
+use std::num::NonZeroU32;
+
+use super::*;
+use crate::ask::Format;
+use crate::config::{CameraOf, Darkened};
+use crate::dataset::Dataset;
+use crate::job::recipe::{Recipe, Scaling};
+use crate::job::timings::Timings;
+use crate::synthesis::Readings;
+
+/// A folder with one frame as a plain PNG file, and the frame as a source.
+fn frame() -> (tempfile::TempDir, Dataset, Source) {
+    let folder = tempfile::tempdir().unwrap();
+    let samples = (0..40 * 60 * 3).map(|i| (i * i % 251) as u8).collect();
+    let pixels = Rgb::new(40, 60, samples).unwrap();
+    let file = Payload::encode(&pixels, Format::Png, None).unwrap().file();
+    std::fs::write(folder.path().join("a.png"), file.unwrap()).unwrap();
+    let dataset = Dataset::of_images(folder.path()).unwrap();
+    let name = dataset.frames().next().unwrap().clone();
+    let source = Source::of_frame(SourceFrame::inspect(&dataset, &name).unwrap());
+    (folder, dataset, source)
+}
+
+/// What is sent and kept of the frame, and whether it was decoded.
+fn sent(
+    condition: &str,
+    (format, max_side): (&str, Option<u32>),
+    wanted: bool,
+) -> (Arc<Payload>, Option<Thumbnail>, bool) {
+    let (_folder, dataset, source) = frame();
+    let max_side = max_side.and_then(NonZeroU32::new);
+    let recipe = Recipe {
+        seed: 0,
+        readings: Readings::default(),
+        format: format.parse().unwrap(),
+        scaling: max_side.map_or(Scaling::Never, Scaling::MaxSide),
+        scaled: Darkened::Native,
+        camera_of: CameraOf::Frame,
+        enhancers: Vec::new(),
+    };
+    let steps = Steps {
+        frames: &dataset,
+        recipe: &recipe,
+        limit: None,
+        timings: &Timings::default(),
+    };
+    let mut pipeline = ImagePipeline {
+        steps,
+        enhancers: Vec::new(),
+    };
+    let mut work = FrameWork::planned(steps, &source, &source.frames[0]);
+    let condition = condition.parse().unwrap();
+    let name = wanted.then_some(&source.name);
+    let (image, copy) = pipeline
+        .image_and_copy(&mut work, &condition, name)
+        .unwrap();
+    (image, copy, work.is_decoded())
+}
+
+#[test]
+fn a_file_that_is_sent_as_it_is_is_decoded_for_a_copy_alone() {
+    let (image, copy, decoded) = sent("L0", ("png", None), false);
+    assert!(copy.is_none() && !decoded);
+    let (folder, ..) = frame();
+    let file = std::fs::read(folder.path().join("a.png")).unwrap();
+    assert_eq!(image.file().unwrap(), file);
+    let (image, copy, decoded) = sent("L0", ("png", None), true);
+    assert!(decoded);
+    assert_eq!(copy.unwrap().image, image.facts().digest);
+}
+
+#[test]
+fn copies_show_what_was_sent() {
+    for condition in ["L0", "L2-ev", "L3-noise"] {
+        for how in [("png", None), ("png", Some(50)), ("jpeg:60", Some(50))] {
+            let (image, copy, _) = sent(condition, how, true);
+            let copy = copy.unwrap();
+            let of_file = thumbnail(&copy.frame, &copy.condition, &image, None).unwrap();
+            assert_eq!(copy, of_file, "{condition} {how:?}");
+        }
+    }
+}
