@@ -80,19 +80,19 @@ impl Light {
 
 /// The readings of `--profile`; one alone with the parts that stand beside it.
 fn readings(said: &SensorArgs) -> Result<Readings> {
-    let names = said.profile.as_deref().unwrap_or("paper");
-    let named = match names {
+    let profile = said.profile.as_deref().unwrap_or("paper");
+    let chosen = match profile {
         "all" => LightReading::ALL.to_vec(),
         list => {
             let names = list
                 .split(',')
                 .map(|name| parsed("--profile", Some(name.trim())));
-            let named: Result<Vec<Option<LightReading>>> = names.collect();
-            named?.into_iter().flatten().collect()
+            let readings: Result<Vec<Option<LightReading>>> = names.collect();
+            readings?.into_iter().flatten().collect()
         }
     };
     let camera = camera(said)?;
-    if let [reading] = named[..] {
+    if let [reading] = chosen[..] {
         return synthesis(said, Synthesis::of(reading, camera)).map(Readings::from);
     }
     let parts = [
@@ -105,7 +105,7 @@ fn readings(said: &SensorArgs) -> Result<Readings> {
         let problem = "beside several profiles it would make them the same; name one profile";
         return Err(Error::usage(flag, problem));
     }
-    Ok(Readings::named(&named, &camera))
+    Ok(Readings::named(&chosen, &camera))
 }
 
 /// A reading with the parts that are said beside it.

@@ -60,7 +60,6 @@ pub struct FrameFiles<'a> {
 
 impl FrameFiles<'_> {
     /// The content of all files, and of what is said about them; not the name.
-    #[must_use]
     ///
     /// # Errors
     /// If a number of the camera is not finite.

@@ -158,7 +158,11 @@ pub(super) fn pairs(grid: &Grid<'_>, kind: Kind) -> Vec<(usize, usize)> {
                     Subject::seeing(&subject.model, AxisLevel::L0, &KindReading::NONE, None);
                 grid.find(&light).into_iter().collect()
             }
-            Kind::Variant => match subject.variant.kind.and_then(|kind| kind.base()) {
+            Kind::Variant => match subject
+                .variant
+                .kind
+                .and_then(crate::types::degradation::Kind::base)
+            {
                 None => Vec::new(),
                 // The same level of the kind that it adds something to, which has no readings.
                 base => one(grid, subject, |other| {
