@@ -189,8 +189,12 @@ const FAMILIES: [(&str, Rule); 38] = [
 ];
 
 /// How many tokens an image of this width and height is to a model, by its family; `None` where that is not known.
-#[must_use]
-pub fn image_tokens(model: &str, detail: Option<Detail>, width: u64, height: u64) -> Option<u64> {
+pub(super) fn image_tokens(
+    model: &str,
+    detail: Option<Detail>,
+    width: u64,
+    height: u64,
+) -> Option<u64> {
     let name = model.rsplit('/').next().unwrap_or(model).to_lowercase();
     let (_, rule) = FAMILIES
         .iter()

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 
 use super::observer;
-use crate::ask::{Endpoint, Model, OpenAi, Parameters, Random, Script};
+use crate::ask::{Endpoint, Model, Parameters, Random, Remote, Script, Wire};
 use crate::config::{Ask, Config, ModelName, Server};
 use crate::dataset::Dataset;
 use crate::error::{Error, Result};
@@ -100,7 +100,8 @@ pub(super) fn speaker(
                 model: name.clone(),
                 ..parameters.clone()
             };
-            Ok(Model::OpenAi(OpenAi::new(Arc::clone(endpoint), parameters)))
+            let model = Remote::open(Arc::clone(endpoint), Wire::Chat, parameters)?;
+            Ok(Model::Remote(model))
         }
         ModelName::Random | ModelName::Observer => Err(Error::usage(
             "--model",
@@ -114,11 +115,8 @@ pub(super) fn adapted<'a>(
     askers: impl IntoIterator<Item = &'a Asker>,
 ) -> impl Iterator<Item = (String, Value)> {
     askers.into_iter().filter_map(|asker| {
-        let Model::OpenAi(model) = &*asker.model else {
-            return None;
-        };
-        let adapted = model.adapted();
-        let name = format!("adapted for {}", model.name());
+        let adapted = asker.model.adapted();
+        let name = format!("adapted for {}", asker.model.name());
         (!adapted.is_empty()).then(|| (name, json!(adapted)))
     })
 }

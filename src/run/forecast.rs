@@ -7,7 +7,7 @@ use super::darkroom::{Darkroom, Desk};
 use super::ledger::{Ledger, image_of, words};
 use super::plan::{Choice, FramePlan, Plan};
 use super::trial::{Item as _, Prompt};
-use crate::ask::{ImageLimit, Model, Payload, Price};
+use crate::ask::{ImageLimit, Payload, Price};
 use crate::config::{Config, Server};
 use crate::error::Result;
 use crate::report::forecast::{Forecast, Line};
@@ -127,10 +127,7 @@ pub(super) fn line(
     [text_tokens, reply]: [f64; 2],
     image_tokens: Option<f64>,
 ) -> Line {
-    let limit = match &*asker.model {
-        Model::OpenAi(model) => model.parameters().max_tokens,
-        Model::Random(_) | Model::Script(_) | Model::Local(_) => None,
-    };
+    let limit = asker.model.max_tokens();
     let reply_tokens = requests as f64 * reply;
     let longest = limit.map(|limit| requests as f64 * f64::from(limit));
     let blind = if asker.view == View::Blind {

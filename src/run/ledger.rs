@@ -2,7 +2,7 @@
 
 use super::askers::Asker;
 use super::trial::{Item, Prompt, Trial};
-use crate::ask::{Model, Parameters, Price, image_tokens};
+use crate::ask::Price;
 use crate::config::Money;
 use crate::error::{Error, Result};
 use crate::types::{ImageFacts, Kept, Usage, Via};
@@ -145,11 +145,7 @@ pub(super) fn image_of(
     width: usize,
     height: usize,
 ) -> Option<f64> {
-    let Model::OpenAi(model) = &*asker.model else {
-        return None;
-    };
-    let Parameters { model, detail, .. } = model.parameters();
     let stated = price.and_then(|price| price.image_tokens);
-    let counted = || image_tokens(model, *detail, width as u64, height as u64);
+    let counted = || asker.model.image_tokens(width as u64, height as u64);
     stated.or_else(counted).map(|tokens| tokens as f64)
 }

@@ -5,7 +5,6 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::file::Files;
-use crate::ask::{Model, batch};
 use crate::config::BatchFiles;
 use crate::error::{Error, Result};
 use crate::run::askers::Asker;
@@ -15,7 +14,7 @@ use crate::store::{BATCH, Store};
 /// The files under way.
 pub(in crate::run) struct Requests<'a, I: Item> {
     askers: &'a [Asker],
-    url: &'a str,
+    url: Option<&'a str>,
     /// Those of each asker.
     files: Vec<Files<I::Record>>,
     pub(in crate::run) store: &'a mut Store<I::Record>,
@@ -40,7 +39,7 @@ impl<'a, I: Item> Requests<'a, I> {
         });
         Ok(Self {
             askers,
-            url: &config.url,
+            url: config.url.as_deref(),
             files: files.collect(),
             store,
         })
@@ -49,13 +48,13 @@ impl<'a, I: Item> Requests<'a, I> {
     /// Adds all requests about one slide.
     pub(in crate::run) fn add(&mut self, slide: &Slide, trials: &[Trial<I>]) -> Result<()> {
         for trial in trials {
-            let Model::OpenAi(model) = &*self.askers[trial.asker].model else {
-                continue;
-            };
+            let model = &self.askers[trial.asker].model;
             let (id, query) = (trial.key.to_string(), trial.item.query());
             let message = trial.prompt.message(&slide.images);
-            let line = batch::write(model, &id, self.url, message, query.choices())
-                .map_err(|e| Error::data(query.id(), e))?;
+            let line = model.batch_line(&id, self.url, message, query.choices());
+            let Some(line) = line.map_err(|e| Error::data(query.id(), e))? else {
+                continue;
+            };
             let blank = I::blank(trial, slide, model.name());
             self.files[trial.asker].add(&line, blank, self.store)?;
         }
