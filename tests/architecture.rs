@@ -5,6 +5,9 @@
 
 #![allow(clippy::unwrap_used)]
 
+#[path = "support/circles.rs"]
+mod circles;
+
 use std::collections::BTreeMap;
 use std::fmt;
 use std::fs;

@@ -192,7 +192,7 @@ fn values_of_another_range_are_told() {
         reading.check(values).err()
     };
     let likely = |values: &[f32], range| match wild(values, range, Certainty::Assumed) {
-        Some(Wild::Beyond { likely, .. }) => Some(likely),
+        Some(OutOfRange::Beyond { likely, .. }) => Some(likely),
         other => {
             assert_eq!(other, None);
             None
@@ -209,5 +209,5 @@ fn values_of_another_range_are_told() {
     assert_eq!(likely(&seldom, Range::Unit), None);
     assert_eq!(wild(&[0.0, 200.0], Range::Unit, Certainty::Known), None);
     let broken = wild(&[0.0, f32::NAN], Range::Unit, Certainty::Known);
-    assert_eq!(broken, Some(Wild::NotNumbers));
+    assert_eq!(broken, Some(OutOfRange::NotNumbers));
 }
