@@ -365,6 +365,13 @@ async fn scripts_and_guesses_answer_without_an_endpoint() {
     assert!(["A", "B"].contains(&reply.text.as_str()));
     assert_eq!(random.name(), "random");
     assert_ne!(random.digest(), Model::Random(Random { seed: 2 }).digest());
+    let endpoint = endpoint_at("http://127.0.0.1:1/v1", None, quick());
+    let remote = Remote::open(endpoint, Wire::Chat, Parameters::new("m".into())).unwrap();
+    let content = Model::Remote(remote).content();
+    assert_eq!(
+        (&content["wire"], &content["model"]),
+        (&json!("chat"), &json!("m"))
+    );
 
     std::fs::write(&path, "{\"question\":\"q1\",\"reply\":\"B\"}").unwrap();
     let script = Model::Script(Script::load(&path).unwrap());

@@ -96,12 +96,8 @@ fn result(line: &Value, wire: Wire) -> Result<Reply, Failure> {
 /// A reply with the letter that a constraint asked for in place of the object around it; as it is where it has none.
 #[must_use]
 pub fn unconstrained(reply: Reply, constrain: Constrain, choices: usize) -> Reply {
-    let letter = match constrain {
-        Constrain::None => None,
-        _ => letter_of(constrain, choices, &reply.text),
-    };
     Reply {
-        text: letter.unwrap_or(reply.text),
+        text: letter_of(constrain, choices, &reply.text).unwrap_or(reply.text),
         ..reply
     }
 }

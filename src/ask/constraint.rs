@@ -16,11 +16,12 @@ pub(super) fn schema(letters: &[char]) -> Value {
     })
 }
 
-/// The letter in a reply that is what a constraint asked for; `None` where the server has not kept to it.
+/// The letter in a reply that is what a constraint asked for; `None` if the server has not kept to it, or if there is none.
 pub(super) fn letter_of(constrain: Constrain, choices: usize, reply: &str) -> Option<String> {
     let object: Option<Value> = match constrain {
+        Constrain::None => return None,
         Constrain::Json => serde_json::from_str(reply).ok(),
-        Constrain::None | Constrain::Choice => None,
+        Constrain::Choice => None,
     };
     let said = match &object {
         Some(object) if object.as_object()?.len() == 1 => object.get(ANSWER)?.as_str()?,

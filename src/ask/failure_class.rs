@@ -1,4 +1,4 @@
-//! What follows from a failure: whether to try again, what it reaches, and the flag that mends it. [`FailureClass::of`].
+//! What follows from a refused request: [`FailureClass`] says whether to send it again, what else would fail, and which flag helps.
 
 use super::complaint::Complaint;
 use super::failure::Reach;
@@ -13,7 +13,7 @@ pub(super) struct FailureClass {
     pub(super) reach: Reach,
     /// Whether the same request may succeed later.
     pub(super) again: bool,
-    /// How to mend it.
+    /// What the user can do.
     pub(super) hint: Option<String>,
     /// The field that it was refused for.
     pub(super) refused: Option<Refused>,

@@ -4,10 +4,10 @@
 
 use std::fmt;
 
-use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use serde::{Deserialize, Deserializer, de};
 
 /// The order of a tensor's dimensions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Layout {
     /// Batch, channels, height, width.
@@ -69,7 +69,7 @@ impl fmt::Display for Layout {
 }
 
 /// The order of channels.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Color {
     /// Red first, as all published models.
@@ -99,7 +99,7 @@ impl fmt::Display for Color {
 }
 
 /// What black and white are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 pub(super) enum Range {
     /// 0 and 1.
     #[serde(rename = "0..1")]
@@ -143,7 +143,7 @@ impl fmt::Display for Range {
 }
 
 /// What stands beside an image whose size is no multiple of the model's.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Pad {
     /// The image mirrored at its last pixel, to the right and below.
@@ -169,7 +169,7 @@ impl fmt::Display for Pad {
 }
 
 /// How a value between two codes becomes one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Rounding {
     /// The nearest, half away from zero.
@@ -217,12 +217,6 @@ impl<'de> Deserialize<'de> for Tile {
                 "tile is {text:?}; \"none\", or \"exact:8\" with the context in pixels expected"
             ))),
         }
-    }
-}
-
-impl Serialize for Tile {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
     }
 }
 

@@ -59,7 +59,12 @@ impl Enhancer {
         runtime: &Runtime,
         threads: Option<NonZeroUsize>,
     ) -> Result<Self> {
-        let stated = file.stated();
+        let none = Sidecar::default();
+        let preset = file.preset.as_ref();
+        let stated = file
+            .sidecar
+            .clone()
+            .over(preset.map_or(&none, |preset| &preset.states));
         let flushed = file.weights.flush_subnormals(&mut file.bytes);
         // ONNX Runtime finds external data only from the model's path.
         let source = if file.weights.external.is_empty() {

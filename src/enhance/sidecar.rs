@@ -6,13 +6,13 @@ use std::io::ErrorKind;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
 use super::convention::{Color, Layout, Pad, Range, Rounding, Tile};
 use crate::error::{Error, Result};
 
 /// The statements of a sidecar; every key may be missing, an unknown key is an error.
-#[derive(Debug, Default, Clone, PartialEq, Deserialize, Serialize)]
+#[derive(Debug, Default, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Sidecar {
     /// The dimensions of the input.
@@ -45,7 +45,7 @@ pub(super) struct Sidecar {
 }
 
 /// An output by its place, counted from 0, or by its name.
-#[derive(Debug, Clone, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(
     untagged,
     expecting = "`output` is an index from 0 or a name in quotes"

@@ -35,6 +35,13 @@ fn whole(image: &Rgb) -> Window {
     }
 }
 
+fn near(a: &Data, b: &Data) -> bool {
+    match (a, b) {
+        (Data::Float32(a), Data::Float32(b)) => a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-4),
+        (a, b) => a == b,
+    }
+}
+
 fn floats(input: &Input) -> &[f32] {
     match &input.data {
         Data::Float32(values) => values,
@@ -96,13 +103,7 @@ fn every_convention_gives_every_byte_back() {
                 assert_eq!(planes.to_rgb(Rounding::Round).unwrap(), image);
                 if element != Element::Float16 {
                     let fed = feeding.planes(&Planes::of(&image));
-                    let near = match (&fed.data, &input.data) {
-                        (Data::Float32(a), Data::Float32(b)) => {
-                            a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-4)
-                        }
-                        (a, b) => a == b,
-                    };
-                    assert!(near && fed.dims == input.dims);
+                    assert!(near(&fed.data, &input.data) && fed.dims == input.dims);
                 }
             }
         }
