@@ -5,6 +5,9 @@
 
 #![allow(clippy::unwrap_used)]
 
+#[path = "support/circles.rs"]
+mod circles;
+
 use std::collections::BTreeMap;
 use std::fmt;
 use std::fs;
@@ -564,7 +567,7 @@ fn breaches_are_found() {
             "`ask` may not use `score` here",
         ),
         (
-            "ask/openai.rs",
+            "ask/remote.rs",
             "use super::super::run;",
             1,
             "`ask` may not use `run` here",
@@ -635,10 +638,10 @@ fn what_is_allowed_passes() {
     for (path, source) in [
         (
             "ask/mod.rs",
-            "use crate::types::Rgb; use crate::{error::Error, ask::openai}; use super::types::Rgb;",
+            "use crate::types::Rgb; use crate::{error::Error, ask::remote}; use super::types::Rgb;",
         ),
-        ("ask/openai.rs", "use super::pace; use super::super::types;"),
-        ("ask/openai.rs", "mod tests { use super::super::run; }"),
+        ("ask/remote.rs", "use super::pace; use super::super::types;"),
+        ("ask/remote.rs", "mod tests { use super::super::run; }"),
         (
             "score/judge.rs",
             "use crate::ask::Model; async fn f() { g().await }",

@@ -9,8 +9,9 @@ use std::time::{Duration, Instant};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use darkqa_eval::ask::{
-    Access, BaseUrl, Call, Constrain, Detail, Endpoint, Format, Message, Model, OpenAi, Parameters,
-    Payload, Prompts, Query, Random, Script, Secret, Sending, Temperature, TokenField,
+    Access, BaseUrl, Call, Constrain, Detail, Endpoint, Format, Message, Model, Parameters,
+    Payload, Prompts, Query, Random, Remote, Script, Secret, Sending, Temperature, TokenField,
+    Wire,
 };
 use darkqa_eval::types::{
     Choices, Digest, FailureKind, Family, Finish, FrameId, Question, QuestionId, Reply, Rgb, View,
@@ -35,9 +36,9 @@ fn endpoint_at(base: &str, key: Option<&str>, sending: Sending) -> Arc<Endpoint>
     Arc::new(Endpoint::open(access, sending).unwrap())
 }
 
-fn model_at(mock: &MockEndpoint, sending: Sending) -> OpenAi {
+fn model_at(mock: &MockEndpoint, sending: Sending) -> Remote {
     let endpoint = endpoint_at(&mock.base_url(), Some(KEY), sending);
-    OpenAi::new(endpoint, Parameters::new("m".into()))
+    Remote::open(endpoint, Wire::Chat, Parameters::new("m".into())).unwrap()
 }
 
 fn image() -> Payload {
@@ -117,7 +118,7 @@ async fn what_is_set_is_sent_and_what_is_not_is_left_out() {
         detail: Some(Detail::High),
         constrain: Constrain::None,
     };
-    let model = OpenAi::new(endpoint.clone(), parameters);
+    let model = Remote::open(endpoint.clone(), Wire::Chat, parameters).unwrap();
     let images = [image(), image()].map(Arc::new);
     let message = Message {
         before: "Look \\\"url\":\"\"",
@@ -130,7 +131,7 @@ async fn what_is_set_is_sent_and_what_is_not_is_left_out() {
         max_tokens: None,
         ..Parameters::new("m".into())
     };
-    let model = OpenAi::new(endpoint, bare);
+    let model = Remote::open(endpoint, Wire::Chat, bare).unwrap();
     model.ask(Message::words("Red?"), 2).await.unwrap();
 
     let requests = mock.requests();
@@ -166,7 +167,7 @@ async fn base_urls_keep_their_path_and_query() {
         ),
     ] {
         let endpoint = endpoint_at(&format!("{root}{base}"), None, quick());
-        let model = OpenAi::new(endpoint, Parameters::new("m".into()));
+        let model = Remote::open(endpoint, Wire::Chat, Parameters::new("m".into())).unwrap();
         model.ask(Message::words("Red?"), 2).await.unwrap();
         assert_eq!(mock.requests().pop().unwrap().line, line);
     }
@@ -183,7 +184,7 @@ async fn a_closed_port_is_a_connection_failure() {
         ..quick()
     };
     let endpoint = endpoint_at(&format!("http://127.0.0.1:{port}/v1"), None, sending);
-    let model = OpenAi::new(endpoint, Parameters::new("m".into()));
+    let model = Remote::open(endpoint, Wire::Chat, Parameters::new("m".into())).unwrap();
     let error = model.ask(Message::words("Red?"), 2).await.unwrap_err();
     assert_eq!(error.failure.kind, FailureKind::Connection);
     assert!(
@@ -220,8 +221,8 @@ async fn a_wait_asked_for_is_kept_by_all() {
             ..quick()
         },
     );
-    let first = OpenAi::new(endpoint.clone(), Parameters::new("m".into()));
-    let second = OpenAi::new(endpoint, Parameters::new("n".into()));
+    let first = Remote::open(endpoint.clone(), Wire::Chat, Parameters::new("m".into())).unwrap();
+    let second = Remote::open(endpoint, Wire::Chat, Parameters::new("n".into())).unwrap();
     let start = Instant::now();
     first.ask(Message::words("Red?"), 2).await.unwrap_err();
     let reply = second.ask(Message::words("Red?"), 2).await.unwrap();
@@ -278,10 +279,12 @@ async fn keys_are_in_no_error_and_no_debug_output() {
         "user us3r with passw0rd and t0ken, aks us3r:passw0rd",
     )]);
     let base = mock.base_url().replace("//", "//us3r:passw0rd@") + "?token=t0ken";
-    let model = OpenAi::new(
+    let model = Remote::open(
         endpoint_at(&base, None, quick()),
+        Wire::Chat,
         Parameters::new("m".into()),
-    );
+    )
+    .unwrap();
     let error = model.ask(Message::words("Red?"), 2).await.unwrap_err();
     let shown = format!("{error:?} {model:?}");
     for secret in ["us3r", "passw0rd", "t0ken"] {
@@ -362,6 +365,13 @@ async fn scripts_and_guesses_answer_without_an_endpoint() {
     assert!(["A", "B"].contains(&reply.text.as_str()));
     assert_eq!(random.name(), "random");
     assert_ne!(random.digest(), Model::Random(Random { seed: 2 }).digest());
+    let endpoint = endpoint_at("http://127.0.0.1:1/v1", None, quick());
+    let remote = Remote::open(endpoint, Wire::Chat, Parameters::new("m".into())).unwrap();
+    let content = Model::Remote(remote).content();
+    assert_eq!(
+        (&content["wire"], &content["model"]),
+        (&json!("chat"), &json!("m"))
+    );
 
     std::fs::write(&path, "{\"question\":\"q1\",\"reply\":\"B\"}").unwrap();
     let script = Model::Script(Script::load(&path).unwrap());

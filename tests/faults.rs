@@ -9,8 +9,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
 use darkqa_eval::ask::{
-    Access, AskError, Endpoint, Format, Message, OpenAi, Parameters, Payload, Reach, Secret,
-    Sending, Temperature,
+    Access, AskError, Endpoint, Format, Message, Parameters, Payload, Reach, Remote, Secret,
+    Sending, Temperature, Wire,
 };
 use darkqa_eval::types::{FailureKind, Finish, Reply, Rgb};
 use serde_json::{Value, json};
@@ -43,7 +43,7 @@ async fn asked_with(answers: Vec<Answer>, sending: Sending, parameters: Paramete
         ..Access::new(mock.base_url().parse().unwrap())
     };
     let endpoint = Arc::new(Endpoint::open(access, sending).unwrap());
-    let model = OpenAi::new(endpoint, parameters);
+    let model = Remote::open(endpoint, Wire::Chat, parameters).unwrap();
     let started = Instant::now();
     let images = [Arc::new(image())];
     let message = Message {

@@ -1,16 +1,16 @@
 //! How an endpoint is reached: [`Access`], its address, key and certificates.
 
-use std::fmt;
+use std::error::Error as _;
 use std::path::Path;
-use std::str::FromStr;
 use std::time::Duration;
 
-use reqwest::header::{AUTHORIZATION, HeaderMap, HeaderName, HeaderValue};
+use reqwest::header::{HeaderMap, HeaderName, HeaderValue};
 use reqwest::{Certificate, Client, redirect};
 
-use super::endpoint::chain;
+use super::key_header::KeyHeader;
 use super::secret::{Scrub, Secret};
 use super::url::BaseUrl;
+use super::wire::Wire;
 use crate::error::{Error, Result};
 
 /// How long a connection may take to come about.
@@ -74,19 +74,14 @@ impl Access {
         Ok(())
     }
 
-    /// The headers of every request.
-    pub(super) fn headers(&self) -> Result<HeaderMap> {
-        let mut headers = HeaderMap::new();
-        if let Some(key) = &self.key {
-            let unfit = |_| Error::usage("key", "no HTTP header can carry it");
-            let (name, text) = match self.key_header.at(&self.base) {
-                KeyHeader::ApiKey => (HeaderName::from_static("api-key"), key.expose().to_owned()),
-                _ => (AUTHORIZATION, format!("Bearer {}", key.expose())),
-            };
-            let mut value = HeaderValue::try_from(text).map_err(unfit)?;
-            value.set_sensitive(true);
-            headers.insert(name, value);
-        }
+    /// The headers of every request on a wire.
+    pub(super) fn headers(&self, wire: Wire) -> Result<HeaderMap> {
+        let form = match self.key_header {
+            KeyHeader::Auto if self.base.is_azure() => KeyHeader::ApiKey,
+            KeyHeader::Auto => KeyHeader::Bearer,
+            named => named,
+        };
+        let mut headers = wire.headers(self.key.as_ref(), form)?;
         for (name, text) in &self.headers {
             let unfit = |_| Error::usage(*name, "no HTTP header can carry it");
             let name = HeaderName::try_from(*name)
@@ -142,52 +137,15 @@ impl Authorities {
     }
 }
 
-/// The header that carries a key.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum KeyHeader {
-    /// `api-key` at Azure, `Authorization` elsewhere.
-    Auto,
-    /// `Authorization: Bearer …`; at Azure for tokens of Microsoft Entra.
-    Bearer,
-    /// `api-key: …`, as Azure and gateways before it want it.
-    ApiKey,
-}
-
-impl KeyHeader {
-    const NAMES: [(Self, &str); 3] = [
-        (Self::Auto, "auto"),
-        (Self::Bearer, "bearer"),
-        (Self::ApiKey, "api-key"),
-    ];
-
-    fn at(self, base: &BaseUrl) -> Self {
-        match self {
-            Self::Auto if base.is_azure() => Self::ApiKey,
-            Self::Auto => Self::Bearer,
-            said => said,
-        }
+/// An error with all that caused it: reqwest's own words alone say only that something failed.
+pub(super) fn chain(error: &reqwest::Error) -> String {
+    let mut words = error.to_string();
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        words = format!("{words}: {error}");
+        cause = error.source();
     }
-}
-
-impl fmt::Display for KeyHeader {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let name = Self::NAMES.iter().find(|(header, _)| header == self);
-        f.pad(name.map_or("", |(_, name)| name))
-    }
-}
-
-impl FromStr for KeyHeader {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self> {
-        let found = Self::NAMES.iter().find(|(_, name)| *name == text);
-        found.map(|(header, _)| *header).ok_or_else(|| {
-            Error::usage(
-                "--key-header",
-                format_args!("{text:?} is none of auto, bearer, api-key"),
-            )
-        })
-    }
+    words
 }
 
 #[cfg(test)]
@@ -221,22 +179,13 @@ mod tests {
                 "sk-0123",
             ),
         ] {
-            let headers = access(base, header).headers().unwrap();
+            let headers = access(base, header).headers(Wire::Chat).unwrap();
             assert_eq!(headers.len(), 1);
             assert_eq!(headers[name], value);
             assert!(headers[name].is_sensitive());
         }
         let bare = Access::new(azure.parse().unwrap());
-        assert!(bare.headers().unwrap().is_empty());
-    }
-
-    #[test]
-    fn names_read_back() {
-        for (header, name) in KeyHeader::NAMES {
-            assert_eq!(name.parse::<KeyHeader>().unwrap(), header);
-            assert_eq!(header.to_string(), name);
-        }
-        assert!("basic".parse::<KeyHeader>().is_err());
+        assert!(bare.headers(Wire::Chat).unwrap().is_empty());
     }
 
     #[test]

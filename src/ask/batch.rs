@@ -1,30 +1,19 @@
-//! The lines of Batch API files: [`write()`] makes one, [`BatchLine`] reads one.
+//! The lines of Batch API files: [`Model::batch_line`](super::Model::batch_line) makes one, [`BatchLine`] reads one.
 
 use serde_json::Value;
 
-use super::Message;
-use super::complaint::Complaint;
-use super::openai::OpenAi;
+use super::complaint::{Complaint, UnreadableReply};
+use super::constraint::letter_of;
 use super::parameters::Constrain;
-use super::request::constrained_letter;
-use super::response::{self, Flaw};
 use super::secret::Scrub;
+use super::wire::Wire;
 use crate::types::{Failure, FailureKind, Reply};
 
 /// One line of an input file: `{"custom_id", "method", "url", "body"}` with a line end, the body as it would be sent alone.
-///
-/// # Errors
-/// Where it cannot be written as JSON.
-pub fn write(
-    model: &OpenAi,
-    id: &str,
-    url: &str,
-    message: Message<'_>,
-    choices: usize,
-) -> Result<Vec<u8>, serde_json::Error> {
+pub(super) fn line(id: &str, url: &str, body: &[u8]) -> Result<Vec<u8>, serde_json::Error> {
     let (id, url) = (serde_json::to_string(id)?, serde_json::to_string(url)?);
     let head = format!("{{\"custom_id\":{id},\"method\":\"POST\",\"url\":{url},\"body\":");
-    Ok([head.as_bytes(), &model.body(message, choices)?, b"}\n"].concat())
+    Ok([head.as_bytes(), body, b"}\n"].concat())
 }
 
 /// One line of an output or error file.
@@ -37,19 +26,19 @@ pub struct BatchLine {
 }
 
 impl BatchLine {
-    /// Reads a line; `None` where it is none of such a file.
+    /// Reads a line about a request on a wire; `None` where it is none of such a file.
     #[must_use]
-    pub fn read(line: &str) -> Option<Self> {
+    pub fn read(line: &str, wire: Wire) -> Option<Self> {
         let line: Value = serde_json::from_str(line).ok()?;
         let id = line.get("custom_id")?.as_str()?.to_owned();
         Some(Self {
             id,
-            result: result(&line),
+            result: result(&line, wire),
         })
     }
 }
 
-fn result(line: &Value) -> Result<Reply, Failure> {
+fn result(line: &Value, wire: Wire) -> Result<Reply, Failure> {
     let response = line.get("response").filter(|response| !response.is_null());
     let status = response.and_then(|response| response.get("status_code")?.as_u64());
     let status = status.and_then(|status| u16::try_from(status).ok());
@@ -84,13 +73,16 @@ fn result(line: &Value) -> Result<Reply, Failure> {
         .map_or_else(|| body.to_string(), str::to_owned);
     match status {
         None | Some(200..300) => {
-            response::read(text.as_bytes(), "application/json").or_else(|flaw| match flaw {
-                Flaw::Said(complaint) => fail(FailureKind::Server, &complaint.message),
-                Flaw::Unreadable(what) => fail(FailureKind::Response, &what),
-            })
+            wire.reply(text.as_bytes(), "application/json")
+                .or_else(|unreadable| match unreadable {
+                    UnreadableReply::Complaint(complaint) => {
+                        fail(FailureKind::Server, &complaint.message)
+                    }
+                    UnreadableReply::Other(what) => fail(FailureKind::Response, &what),
+                })
         }
         Some(code) => {
-            let complaint = Complaint::of_body(&text);
+            let complaint = wire.complaint(text.as_bytes());
             let kind = match code {
                 429 => FailureKind::RateLimit,
                 500.. => FailureKind::Server,
@@ -104,12 +96,8 @@ fn result(line: &Value) -> Result<Reply, Failure> {
 /// A reply with the letter that a constraint asked for in place of the object around it; as it is where it has none.
 #[must_use]
 pub fn unconstrained(reply: Reply, constrain: Constrain, choices: usize) -> Reply {
-    let letter = match constrain {
-        Constrain::None => None,
-        _ => constrained_letter(constrain, choices, &reply.text),
-    };
     Reply {
-        text: letter.unwrap_or(reply.text),
+        text: letter_of(constrain, choices, &reply.text).unwrap_or(reply.text),
         ..reply
     }
 }
@@ -120,7 +108,7 @@ mod tests {
 
     #[test]
     fn lines_of_every_outcome_are_read() {
-        let read = |line: &str| BatchLine::read(line).unwrap();
+        let read = |line: &str| BatchLine::read(line, Wire::Chat).unwrap();
         let answered = read(
             r#"{"id":"batch_req_1","custom_id":"k","response":{"status_code":200,"request_id":"r","body":{"choices":[{"message":{"content":"B"},"finish_reason":"stop"}],"usage":{"prompt_tokens":9}}},"error":null}"#,
         );
@@ -156,7 +144,7 @@ mod tests {
             assert!(failure.message.contains(said), "{}", failure.message);
         }
         for wrong in ["", "{}", r#"{"custom_id":7}"#, "[1]"] {
-            assert_eq!(BatchLine::read(wrong), None, "{wrong}");
+            assert_eq!(BatchLine::read(wrong, Wire::Chat), None, "{wrong}");
         }
     }
 }

@@ -18,17 +18,21 @@ pub(super) struct Complaint {
 }
 
 impl Complaint {
-    /// The error at the top level of a reply, where there is one: `error` as an object or text, or without `error` the flat shapes of
+    /// The error at the top level of a body, if there is one: `error` as an object or text, or without `error` the flat shapes of
     /// vLLM, FastAPI and problem+json.
-    pub(super) fn of(reply: &Value) -> Option<Self> {
-        match reply.get("error") {
-            Some(error) if says_something(error) => Some(Self::of_error(error)),
-            _ if reply.get("choices").is_some() => None,
-            _ => ["message", "detail", "title"]
+    pub(super) fn of(body: &Value) -> Option<Self> {
+        Self::in_error(body).or_else(|| {
+            ["message", "detail", "title"]
                 .iter()
-                .any(|field| reply.get(field).is_some_and(says_something))
-                .then(|| Self::of_error(reply)),
-        }
+                .any(|field| body.get(field).is_some_and(says_something))
+                .then(|| Self::of_error(body))
+        })
+    }
+
+    /// The error in the field `error` alone.
+    pub(super) fn in_error(body: &Value) -> Option<Self> {
+        let error = body.get("error").filter(|error| says_something(error));
+        error.map(Self::of_error)
     }
 
     /// The error that a value named `error` holds.
@@ -85,6 +89,15 @@ impl Complaint {
         let status = self.code.as_ref()?.parse().ok()?;
         (400..600).contains(&status).then_some(status)
     }
+}
+
+/// Why the body of a reply with a status of success holds no answer.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum UnreadableReply {
+    /// The server says that something went wrong.
+    Complaint(Complaint),
+    /// The body is no reply of the wire; what it is instead.
+    Other(String),
 }
 
 /// The title of an HTML page.
@@ -201,7 +214,7 @@ mod tests {
         for fine in [
             r#"{"choices":[],"error":null}"#,
             r#"{"choices":[],"error":""}"#,
-            r#"{"choices":null,"error":{},"message":"x"}"#,
+            r#"{"error":{},"message":""}"#,
             r"{}",
             r"[]",
         ] {

@@ -1,104 +1,48 @@
 //! One server and how it is talked to: [`Endpoint`].
 
-use std::error::Error as _;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, SystemTime};
 
 use backon::{ExponentialBuilder, Retryable as _};
 use reqwest::header::{CONTENT_TYPE, HeaderMap, LOCATION};
-use reqwest::{Client, Response, StatusCode, Url};
 use tokio::sync::watch;
 use tokio::time::{Instant, sleep};
 use tracing::debug;
 
 use super::access::Access;
 use super::body::Parts;
-use super::complaint::Complaint;
-use super::field::Refused;
-use super::pace::{Allowance, Bounds, Gate, Quota, Window, asked_wait};
-use super::response::{self, Flaw};
-use super::secret::Scrub;
+use super::complaint::{Complaint, UnreadableReply};
+use super::connection::{Answer, Connection};
+use super::failure::{AskError, FailedTry, Reach};
+use super::failure_class::FailureClass;
+use super::field::Sent;
+use super::pace::{Allowance, Gate, Window, asked_wait};
+use super::sending::Sending;
 use super::url::BaseUrl;
-use super::verdict::{Sent, Verdict, judge};
-use super::{AskError, Reach, failure};
+use super::wire::Wire;
 use crate::error::Result;
 use crate::types::{Failure, FailureKind, Reply};
-
-/// The most of a reply that is read, unpacked: no completion of a few tokens comes near, and memory is not the server's to
-/// fill.
-const LONGEST_REPLY: usize = 16 << 20;
 
 /// The longest wait of our own making; a server may ask for longer ones.
 const LONGEST_DELAY: Duration = Duration::from_secs(30);
 
-/// How requests are sent and sent again.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Sending {
-    /// The time one try may take, from connecting to the last byte of the reply.
-    pub timeout: Duration,
-    /// How many times a request is sent again after it failed.
-    pub retries: u32,
-    /// The wait before the first retry where the server asks for none; each further one doubles, and each is drawn out at
-    /// random by up to its length.
-    pub first_delay: Duration,
-    /// The longest wait that a server may ask for; beyond it the request is given up at once.
-    pub max_wait: Duration,
-    /// How many requests are on the wire at once.
-    pub concurrency: Bounds,
-    /// What may be sent in a minute.
-    pub quota: Quota,
-}
-
-impl Default for Sending {
-    fn default() -> Self {
-        Self {
-            timeout: Duration::from_mins(2),
-            retries: 5,
-            first_delay: Duration::from_millis(500),
-            max_wait: Duration::from_mins(2),
-            concurrency: Bounds::DEFAULT,
-            quota: Quota::default(),
-        }
-    }
-}
-
-/// An OpenAI-compatible endpoint: its address, key, pooled connections, and the pauses it asked for.
+/// One server: its address, key, pooled connections, and the pauses it asked for.
 #[derive(Debug)]
 pub struct Endpoint {
-    base: BaseUrl,
-    url: Url,
-    headers: HeaderMap,
-    has_key: bool,
-    client: Client,
+    access: Access,
+    connection: Connection,
     sending: Sending,
-    scrub: Scrub,
     gate: Gate,
     window: Window,
     closing: watch::Sender<bool>,
 }
 
-/// One try that brought no reply.
-struct Miss {
-    failure: Failure,
-    reach: Reach,
-    again: bool,
-    /// The wait that the server asked for.
-    wait: Option<Duration>,
-    /// The field that it refused.
-    refused: Option<Refused>,
-}
-
-impl Miss {
-    /// One that may pass.
-    fn passing(failure: Failure) -> Self {
-        Self {
-            failure,
-            reach: Reach::Trial,
-            again: true,
-            wait: None,
-            refused: None,
-        }
-    }
+/// One request, as often as it is sent.
+pub(super) struct Request<'a> {
+    pub(super) wire: Wire,
+    pub(super) headers: &'a HeaderMap,
+    pub(super) body: Parts,
+    pub(super) sent: Sent<'a>,
 }
 
 impl Endpoint {
@@ -110,13 +54,9 @@ impl Endpoint {
         let scrub = access.scrub();
         access.check(&scrub)?;
         Ok(Self {
-            url: access.base.completions(),
-            headers: access.headers()?,
-            has_key: access.key.is_some() || access.base.has_credentials(),
-            client: access.client(sending.timeout, &scrub)?,
-            base: access.base,
+            connection: Connection::new(&access, scrub, sending.timeout)?,
+            access,
             sending,
-            scrub,
             gate: Gate::new(sending.quota),
             window: Window::new(sending.concurrency),
             closing: watch::Sender::new(false),
@@ -132,15 +72,20 @@ impl Endpoint {
     /// The base URL; shown without user, password and query string.
     #[must_use]
     pub fn base(&self) -> &BaseUrl {
-        &self.base
+        &self.access.base
     }
 
     pub(super) fn host(&self) -> &str {
-        self.base.host()
+        self.base().host()
     }
 
     pub(super) fn has_key(&self) -> bool {
-        self.has_key
+        self.access.key.is_some() || self.base().has_credentials()
+    }
+
+    /// The headers of every request on a wire.
+    pub(super) fn headers(&self, wire: Wire) -> Result<HeaderMap> {
+        self.access.headers(wire)
     }
 
     /// Lets no further request go out: those on the wire are finished, those that wait give up at once.
@@ -155,22 +100,20 @@ impl Endpoint {
     }
 
     /// Waits for one's turn; an error where the endpoint is closed first.
-    async fn turn(&self) -> Result<(), Miss> {
+    async fn turn(&self) -> Result<(), FailedTry> {
+        let ended = "the run ended before it was asked";
         tokio::select! {
             biased;
-            () = self.closed() => Err(Miss {
-                failure: failure(FailureKind::Connection, "the run ended before it was asked".to_owned()),
+            () = self.closed() => Err(FailedTry {
                 reach: Reach::Interrupted,
-                again: false,
-                wait: None,
-                refused: None,
+                ..FailedTry::new(FailureKind::Connection, ended.to_owned())
             }),
             () = self.gate.pass() => Ok(()),
         }
     }
 
     /// Sends a request, again where that may help. Nothing is left behind where the future is dropped.
-    pub(super) async fn ask(&self, body: &Parts, sent: Sent<'_>) -> Result<Reply, AskError> {
+    pub(super) async fn ask(&self, request: &Request<'_>) -> Result<Reply, AskError> {
         let attempts = AtomicU32::new(0);
         let backoff = ExponentialBuilder::new()
             .with_jitter()
@@ -181,7 +124,7 @@ impl Endpoint {
         let outcome = (|| async {
             self.turn().await?;
             attempts.fetch_add(1, Ordering::Relaxed);
-            self.send(body.clone(), sent).await
+            self.send(request).await
         })
         .retry(backoff)
         .sleep(move |wait| {
@@ -193,222 +136,170 @@ impl Endpoint {
                 }
             }
         })
-        .when(|miss: &Miss| miss.again)
+        .when(|tried: &FailedTry| tried.again)
         // `None` where the retries are used up.
-        .adjust(|miss, own| own.map(|own| miss.wait.unwrap_or(own)))
-        .notify(|miss, wait| {
-            debug!(endpoint = %self.base, ?wait, problem = miss.failure.message, "trying again");
+        .adjust(|tried, own| own.map(|own| tried.wait.unwrap_or(own)))
+        .notify(|tried, wait| {
+            debug!(endpoint = %self.base(), ?wait, problem = tried.failure.message, "trying again");
         })
         .await;
         let attempts = attempts.into_inner();
         match outcome {
             Ok(reply) => Ok(Reply { attempts, ..reply }),
-            Err(miss) => Err(AskError {
-                failure: miss.failure,
-                attempts,
-                reach: miss.reach,
-                refused: miss.refused,
-            }),
+            Err(tried) => Err(tried.after(attempts)),
         }
     }
 
     /// One try.
-    async fn send(&self, body: Parts, sent: Sent<'_>) -> Result<Reply, Miss> {
+    async fn send(&self, request: &Request<'_>) -> Result<Reply, FailedTry> {
+        let Request { wire, headers, .. } = *request;
         let started = Instant::now();
-        let request = self
-            .client
-            .post(self.url.clone())
-            .headers(self.headers.clone())
-            .header(CONTENT_TYPE, "application/json")
-            .body(reqwest::Body::wrap(body));
-        let response = request
-            .send()
-            .await
-            .map_err(|error| self.broken(error, started))?;
-        let status = response.status();
-        let headers = response.headers().clone();
-        let body = self.receive(response, started).await;
-        let request_id = header(&headers, "x-request-id");
-        let took = started.elapsed();
-        let latency_ms = took.as_millis() as u64;
-        debug!(endpoint = %self.base, %status, latency_ms, request_id = self.scrub.line(request_id), "answered");
-        if !status.is_success() {
-            // A refusal whose words were lost on the way is a refusal all the same.
-            let words = body.unwrap_or_default();
-            if matches!(status.as_u16(), 429 | 503 | 529) {
+        let body = request.body.clone();
+        let posted = self.connection.post(wire.path(), headers, body).await;
+        let answer = posted.inspect_err(|tried| {
+            if tried.failure.kind == FailureKind::Timeout {
                 self.window.overloaded(started);
             }
-            return Err(self.refused(status, &headers, &words, sent));
-        }
-        match response::read(&body?, header(&headers, CONTENT_TYPE.as_str())) {
-            Ok(reply) => {
-                self.window.succeeded(took);
-                let left = Allowance::read(&headers, SystemTime::now());
-                let tokens = reply.usage.and_then(|usage| usage.total());
-                self.gate.ease(tokens, left, self.sending.max_wait);
-                let clean = |text: Option<String>| text.map(|text| self.scrub.reply(text));
-                Ok(Reply {
-                    text: self.scrub.reply(reply.text),
-                    refusal: clean(reply.refusal),
-                    served_model: clean(reply.served_model),
-                    latency_ms,
-                    ..reply
-                })
+        })?;
+        let status = answer.status.as_u16();
+        let (request_id, took) = (self.request_id(&answer), answer.took);
+        debug!(endpoint = %self.base(), status, ?took, request_id, "answered");
+        if !answer.status.is_success() {
+            if asks_for_pause(status) {
+                self.window.overloaded(started);
             }
-            Err(Flaw::Said(complaint)) => {
-                // Without a code of its own it is the server's failure, and may pass.
-                let code = complaint.status().unwrap_or(500);
-                let mut miss = self.complained(code, &complaint, &headers, sent);
-                miss.failure.status = Some(status.as_u16());
-                Err(miss)
+            let mut complaint = wire.complaint(&answer.body);
+            if answer.status.is_redirection() {
+                complaint.message = format!("moved to {}", answer.header(LOCATION.as_str()));
             }
-            Err(Flaw::Unreadable(what)) => Err(Miss::passing(Failure {
-                kind: FailureKind::Response,
-                status: Some(status.as_u16()),
-                message: format!("{} answered with {}", self.base, self.scrub.line(&what)),
-            })),
+            return Err(self.refused(status, &complaint, &answer, request));
         }
-    }
-
-    /// The body of a reply, unpacked where it is compressed, up to a length.
-    async fn receive(&self, mut response: Response, started: Instant) -> Result<Vec<u8>, Miss> {
-        let mut body = Vec::new();
-        while let Some(chunk) = response
-            .chunk()
-            .await
-            .map_err(|error| self.broken(error, started))?
-        {
-            if body.len() + chunk.len() > LONGEST_REPLY {
-                let message = format!("{} answered with more than 16 MiB", self.base);
-                return Err(Miss {
-                    again: false,
-                    ..Miss::passing(failure(FailureKind::Response, message))
-                });
-            }
-            body.extend_from_slice(&chunk);
-        }
-        Ok(body)
-    }
-
-    /// A try without a whole reply.
-    fn broken(&self, error: reqwest::Error, started: Instant) -> Miss {
-        let (kind, message) = if error.is_timeout() {
-            self.window.overloaded(started);
-            let timeout = self.sending.timeout.as_secs_f64();
-            (
-                FailureKind::Timeout,
-                format!(
-                    "{} did not answer within {timeout} s; allow more by --timeout",
-                    self.base
-                ),
-            )
-        } else {
-            let said = self.scrub.line(&chain(&error.without_url()));
-            // An authority that nobody here knows signs with companies and in laboratories.
-            let hint = if said.contains("UnknownIssuer") {
-                "; name the authority that signed it by --ca-file"
-            } else {
-                ""
-            };
-            let message = format!("{}: {said}{hint}", self.base);
-            (FailureKind::Connection, message)
+        let unreadable = match wire.reply(&answer.body, answer.header(CONTENT_TYPE.as_str())) {
+            Ok(reply) => return Ok(self.succeeded(reply, &answer)),
+            Err(unreadable) => unreadable,
         };
-        Miss::passing(failure(kind, message))
+        let mut tried = match unreadable {
+            // Without a code of its own it is the server's failure, and may pass.
+            UnreadableReply::Complaint(complaint) => {
+                let code = complaint.status().unwrap_or(500);
+                self.refused(code, &complaint, &answer, request)
+            }
+            UnreadableReply::Other(what) => {
+                let what = self.connection.scrub.line(&what);
+                let message = format!("{} answered with {what}", self.base());
+                FailedTry {
+                    again: true,
+                    ..FailedTry::new(FailureKind::Response, message)
+                }
+            }
+        };
+        tried.failure.status = Some(status);
+        Err(tried)
     }
 
-    /// A try that the status says failed.
-    fn refused(
-        &self,
-        status: StatusCode,
-        headers: &HeaderMap,
-        body: &[u8],
-        sent: Sent<'_>,
-    ) -> Miss {
-        let mut complaint = Complaint::of_body(&String::from_utf8_lossy(body));
-        if status.is_redirection() {
-            complaint.message = format!("moved to {}", header(headers, LOCATION.as_str()));
+    /// The reply without keys, once its cost and what the server says is left are noted.
+    fn succeeded(&self, reply: Reply, answer: &Answer) -> Reply {
+        self.window.succeeded(answer.took);
+        let left = Allowance::read(&answer.headers, SystemTime::now());
+        let tokens = reply.usage.and_then(|usage| usage.total());
+        self.gate.ease(tokens, left, self.sending.max_wait);
+        let clean = |text: String| self.connection.scrub.reply(text);
+        Reply {
+            text: clean(reply.text),
+            refusal: reply.refusal.map(clean),
+            served_model: reply.served_model.map(clean),
+            latency_ms: answer.took.as_millis() as u64,
+            ..reply
         }
-        self.complained(status.as_u16(), &complaint, headers, sent)
     }
 
-    fn complained(
+    /// A try that the server says failed, with this status.
+    fn refused(
         &self,
         status: u16,
         complaint: &Complaint,
-        headers: &HeaderMap,
-        sent: Sent<'_>,
-    ) -> Miss {
-        let Verdict {
-            kind,
-            mut reach,
-            mut again,
-            hint,
-            refused,
-        } = judge(status, complaint, sent);
-        match header(headers, "x-should-retry") {
-            "true" => again = true,
-            "false" => again = false,
+        answer: &Answer,
+        request: &Request<'_>,
+    ) -> FailedTry {
+        let mut class = FailureClass::of(status, complaint, request.wire, request.sent);
+        match answer.header("x-should-retry") {
+            "true" => class.again = true,
+            "false" => class.again = false,
             _ => {}
         }
-        let wait = asked_wait(headers, SystemTime::now()).filter(|_| again);
-        let mut message = format!("{} answered {status}", self.base);
-        let said = self.scrub.line(&complaint.message);
+        let hint = class.hint.as_deref();
+        let message = self.message(status, complaint, hint, &self.request_id(answer));
+        let wait = asked_wait(&answer.headers, SystemTime::now()).filter(|_| class.again);
+        let mut tried = FailedTry {
+            failure: Failure {
+                kind: class.kind,
+                status: Some(status),
+                message,
+            },
+            reach: class.reach,
+            again: class.again,
+            wait,
+            refused: class.refused,
+        };
+        self.pause(status, &mut tried);
+        tried
+    }
+
+    /// What is said about a refused request.
+    fn message(
+        &self,
+        status: u16,
+        complaint: &Complaint,
+        hint: Option<&str>,
+        request_id: &str,
+    ) -> String {
+        let mut message = format!("{} answered {status}", self.base());
+        let said = self.connection.scrub.line(&complaint.message);
         if !said.is_empty() {
             message = format!("{message}: {said}");
         }
         if let Some(hint) = hint {
             message = format!("{message} ({hint})");
         }
-        let request_id = self.scrub.line(header(headers, "x-request-id"));
         if !request_id.is_empty() {
             message = format!("{message} [request {request_id}]");
         }
-        let is_pause = matches!(status, 429 | 503 | 529);
-        match wait {
-            Some(wait) if wait > self.sending.max_wait => {
-                again = false;
-                if is_pause {
-                    reach = Reach::Endpoint;
+        message
+    }
+
+    /// Lets all requests wait as long as the server asked one to; one that would wait too long is given up.
+    fn pause(&self, status: u16, tried: &mut FailedTry) {
+        let longest = self.sending.max_wait;
+        match tried.wait {
+            Some(wait) if wait > longest => {
+                tried.again = false;
+                if asks_for_pause(status) {
+                    tried.reach = Reach::Endpoint;
                 }
-                message = format!(
-                    "{message} (it asks to wait {:.0} s, beyond --max-wait of {:.0} s)",
+                tried.failure.message = format!(
+                    "{} (it asks to wait {:.0} s, beyond --max-wait of {:.0} s)",
+                    tried.failure.message,
                     wait.as_secs_f64(),
-                    self.sending.max_wait.as_secs_f64()
+                    longest.as_secs_f64()
                 );
             }
             Some(wait) if status == 429 => self.gate.shut(wait),
-            Some(wait) if is_pause => self.gate.hold(wait),
+            Some(wait) if asks_for_pause(status) => self.gate.hold(wait),
             // It does not say how long: all wait as long as the one that was turned away does first.
-            None if is_pause && again => self.gate.hold(self.sending.first_delay),
+            None if asks_for_pause(status) && tried.again => {
+                self.gate.hold(self.sending.first_delay);
+            }
             _ => {}
         }
-        Miss {
-            failure: Failure {
-                kind,
-                status: Some(status),
-                message,
-            },
-            reach,
-            again,
-            wait,
-            refused,
-        }
+    }
+
+    /// The server's name for a request, fit to be shown.
+    fn request_id(&self, answer: &Answer) -> String {
+        self.connection.scrub.line(answer.header("x-request-id"))
     }
 }
 
-/// A header as text, empty where there is none.
-fn header<'a>(headers: &'a HeaderMap, name: &str) -> &'a str {
-    let value = headers.get(name).and_then(|value| value.to_str().ok());
-    value.unwrap_or_default()
-}
-
-/// An error with all that caused it: reqwest's own words alone say only that something failed.
-pub(super) fn chain(error: &reqwest::Error) -> String {
-    let mut words = error.to_string();
-    let mut cause = error.source();
-    while let Some(error) = cause {
-        words = format!("{words}: {error}");
-        cause = error.source();
-    }
-    words
+/// Whether a status means that there is no room for any request now.
+fn asks_for_pause(status: u16) -> bool {
+    matches!(status, 429 | 503 | 529)
 }

@@ -1,8 +1,7 @@
-//! The fields of a request that servers quarrel about: [`fields`].
+//! The fields of a request about which servers differ: [`Field`] is one of them, [`Fields`] are those that are adapted.
 
 use super::complaint::Complaint;
-use super::parameters::{Constrain, TokenField};
-use super::verdict::Sent;
+use super::parameters::{Parameters, Temperature, TokenField};
 
 /// A field that a server does not take and that can be sent otherwise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -11,6 +10,38 @@ pub enum Refused {
     TokenField,
     /// Any temperature but its own.
     Temperature,
+}
+
+/// Which of the fields about which servers differ a request has; found out once for a whole run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Fields {
+    /// The name of the token limit, never `Auto`.
+    pub(super) token_field: TokenField,
+    /// The temperature, where one is sent.
+    pub(super) temperature: Option<f64>,
+}
+
+impl Fields {
+    /// What is tried first at a host.
+    pub(super) fn first(parameters: &Parameters, host: &str) -> Self {
+        Self {
+            token_field: parameters.token_field.at(host),
+            temperature: match parameters.temperature {
+                Temperature::Auto => Some(0.0),
+                Temperature::Server => None,
+                Temperature::Of(value) => Some(value),
+            },
+        }
+    }
+}
+
+/// What a request has in it that a server may complain about.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sent<'a> {
+    pub(super) parameters: &'a Parameters,
+    pub(super) fields: Fields,
+    pub(super) has_image: bool,
+    pub(super) has_key: bool,
 }
 
 /// How servers say that they do not know a field or do not take its value, rather than that it does not fit this request.
@@ -29,71 +60,13 @@ const UNSUPPORTED: [&str; 10] = [
 
 /// A field of a request with what is known of it.
 pub(super) struct Field {
-    name: &'static str,
+    pub(super) name: &'static str,
     /// Whether it was sent; what was not is not to blame.
     pub(super) sent: bool,
     /// How to send it otherwise.
     pub(super) hint: &'static str,
     /// What it is, where the program can send it otherwise.
     pub(super) refused: Option<Refused>,
-}
-
-/// The fields that a server may complain about.
-pub(super) fn fields(sent: Sent<'_>) -> [Field; 7] {
-    let parameters = sent.parameters;
-    let limit = |field| parameters.max_tokens.is_some() && sent.fields.token_field == field;
-    let field = |name, sent, hint| Field {
-        name,
-        sent,
-        hint,
-        refused: None,
-    };
-    [
-        Field {
-            refused: Some(Refused::Temperature),
-            ..field(
-                "temperature",
-                sent.fields.temperature.is_some(),
-                "leave the temperature to the server: --temperature default",
-            )
-        },
-        Field {
-            refused: Some(Refused::TokenField),
-            ..field(
-                "max_tokens",
-                limit(TokenField::MaxTokens),
-                "send the limit otherwise: --token-field max_completion_tokens (or none), or another --max-tokens",
-            )
-        },
-        Field {
-            refused: Some(Refused::TokenField),
-            ..field(
-                "max_completion_tokens",
-                limit(TokenField::MaxCompletionTokens),
-                "send the limit otherwise: --token-field max_tokens (or none), or another --max-tokens",
-            )
-        },
-        field(
-            "reasoning_effort",
-            parameters.reasoning_effort.is_some(),
-            "leave --reasoning-effort out, or give a value the model takes",
-        ),
-        field(
-            "detail",
-            sent.has_image && parameters.detail.is_some(),
-            "leave --detail out, or give a value the server takes",
-        ),
-        field(
-            "response_format",
-            parameters.constrain == Constrain::Json,
-            "leave --constrain out: the server does not take it",
-        ),
-        field(
-            "structured_outputs",
-            parameters.constrain == Constrain::Choice,
-            "leave --constrain out, or try --constrain json",
-        ),
-    ]
 }
 
 impl Field {

@@ -28,19 +28,25 @@ enum Rule {
 
 use Rule::{Area, Crops, Fixed, Merged, Patches, Tiles};
 
+const fn tiles(base: u64, tile: u64) -> Rule {
+    Tiles { base, tile }
+}
+
 const fn patches(most: f64, high: f64, factor: f64) -> Rule {
     Patches { most, high, factor }
 }
 
+const fn area(side: f64, most: f64) -> Rule {
+    Area { side, most }
+}
+
+const fn merged(patch: f64, side: f64) -> Rule {
+    Merged { patch, side }
+}
+
 /// Families by how the name of a model begins; the first that fits holds.
 const FAMILIES: [(&str, Rule); 38] = [
-    (
-        "gpt-4o-mini",
-        Tiles {
-            base: 2833,
-            tile: 5667,
-        },
-    ),
+    ("gpt-4o-mini", tiles(2833, 5667)),
     ("gpt-4.1-mini", patches(1536.0, 1536.0, 1.62)),
     ("gpt-4.1-nano", patches(1536.0, 1536.0, 2.46)),
     ("o4-mini", patches(1536.0, 1536.0, 1.72)),
@@ -54,143 +60,39 @@ const FAMILIES: [(&str, Rule); 38] = [
     ("gpt-5.5", patches(10_000.0, 2500.0, 1.2)),
     ("gpt-5.6", patches(10_000.0, 2500.0, 1.2)),
     ("gpt-6", patches(f64::MAX, 2500.0, 1.2)),
-    (
-        "gpt-5",
-        Tiles {
-            base: 70,
-            tile: 140,
-        },
-    ),
-    (
-        "gpt-4",
-        Tiles {
-            base: 85,
-            tile: 170,
-        },
-    ),
-    (
-        "o1",
-        Tiles {
-            base: 75,
-            tile: 150,
-        },
-    ),
-    (
-        "o3",
-        Tiles {
-            base: 75,
-            tile: 150,
-        },
-    ),
-    (
-        "claude-sonnet-5",
-        Area {
-            side: 2000.0,
-            most: 4000.0,
-        },
-    ),
-    (
-        "claude-opus-5",
-        Area {
-            side: 2000.0,
-            most: 4000.0,
-        },
-    ),
-    (
-        "claude-haiku-5",
-        Area {
-            side: 2000.0,
-            most: 4000.0,
-        },
-    ),
-    (
-        "claude",
-        Area {
-            side: 1568.0,
-            most: 1600.0,
-        },
-    ),
+    ("gpt-5", tiles(70, 140)),
+    ("gpt-4", tiles(85, 170)),
+    ("o1", tiles(75, 150)),
+    ("o3", tiles(75, 150)),
+    ("claude-sonnet-5", area(2000.0, 4000.0)),
+    ("claude-opus-5", area(2000.0, 4000.0)),
+    ("claude-haiku-5", area(2000.0, 4000.0)),
+    ("claude", area(1568.0, 1600.0)),
     ("gemini-3", Fixed(1100)),
     ("gemini-4", Fixed(1100)),
     ("gemini", Crops),
     ("gemma-3", Fixed(256)),
     ("llava-1.5", Fixed(576)),
     ("llava-v1.5", Fixed(576)),
-    (
-        "qwen2-vl",
-        Merged {
-            patch: 28.0,
-            side: f64::MAX,
-        },
-    ),
-    (
-        "qwen2.5-vl",
-        Merged {
-            patch: 28.0,
-            side: f64::MAX,
-        },
-    ),
-    (
-        "qwen3-vl",
-        Merged {
-            patch: 32.0,
-            side: f64::MAX,
-        },
-    ),
-    (
-        "qwen3.",
-        Merged {
-            patch: 32.0,
-            side: f64::MAX,
-        },
-    ),
-    (
-        "pixtral",
-        Merged {
-            patch: 16.0,
-            side: 1024.0,
-        },
-    ),
-    (
-        "mistral-small",
-        Merged {
-            patch: 28.0,
-            side: 1540.0,
-        },
-    ),
-    (
-        "mistral-medium",
-        Merged {
-            patch: 28.0,
-            side: 1540.0,
-        },
-    ),
-    (
-        "mistral-large",
-        Merged {
-            patch: 28.0,
-            side: 1540.0,
-        },
-    ),
-    (
-        "ministral",
-        Merged {
-            patch: 28.0,
-            side: 1540.0,
-        },
-    ),
-    (
-        "kimi",
-        Merged {
-            patch: 28.0,
-            side: f64::MAX,
-        },
-    ),
+    ("qwen2-vl", merged(28.0, f64::MAX)),
+    ("qwen2.5-vl", merged(28.0, f64::MAX)),
+    ("qwen3-vl", merged(32.0, f64::MAX)),
+    ("qwen3.", merged(32.0, f64::MAX)),
+    ("pixtral", merged(16.0, 1024.0)),
+    ("mistral-small", merged(28.0, 1540.0)),
+    ("mistral-medium", merged(28.0, 1540.0)),
+    ("mistral-large", merged(28.0, 1540.0)),
+    ("ministral", merged(28.0, 1540.0)),
+    ("kimi", merged(28.0, f64::MAX)),
 ];
 
 /// How many tokens an image of this width and height is to a model, by its family; `None` where that is not known.
-#[must_use]
-pub fn image_tokens(model: &str, detail: Option<Detail>, width: u64, height: u64) -> Option<u64> {
+pub(super) fn image_tokens(
+    model: &str,
+    detail: Option<Detail>,
+    width: u64,
+    height: u64,
+) -> Option<u64> {
     let name = model.rsplit('/').next().unwrap_or(model).to_lowercase();
     let (_, rule) = FAMILIES
         .iter()

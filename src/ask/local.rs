@@ -2,7 +2,11 @@
 
 use std::fmt;
 
-use super::{AskError, Call, Random, Reach, failure};
+use serde_json::{Value, json};
+
+use super::call::Call;
+use super::failure::AskError;
+use super::random::Random;
 use crate::types::question::letter;
 use crate::types::{Digest, FailureKind, Question, Reply};
 
@@ -40,25 +44,15 @@ impl Local {
         &self.name
     }
 
-    pub(super) fn digest(&self) -> Digest {
-        let prior = self.prior.digest();
-        Digest::of_parts([
-            self.name.as_bytes(),
-            self.digest.as_bytes(),
-            prior.as_bytes(),
-        ])
+    pub(super) fn content(&self) -> Value {
+        json!({"local": self.name, "digest": self.digest, "prior": self.prior.content()})
     }
 
     pub(super) fn answer(&self, question: &Question, call: Call<'_>) -> Result<Reply, AskError> {
         match (self.opinion)(question, &call) {
             Ok(Some(choice)) => Ok(Reply::local(letter(choice).to_string())),
             Ok(None) => Ok(Reply::local(self.prior.answer(question, call))),
-            Err(message) => Err(AskError {
-                failure: failure(FailureKind::Request, message),
-                attempts: 1,
-                reach: Reach::Trial,
-                refused: None,
-            }),
+            Err(message) => Err(AskError::new(FailureKind::Request, message, 1)),
         }
     }
 }

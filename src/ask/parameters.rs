@@ -4,9 +4,9 @@ use std::fmt;
 use std::str::FromStr;
 
 use serde::Serialize;
+use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
-use crate::types::Digest;
 
 /// What a model is called and how it is to speak; what is `None` is left out of the request.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,22 +48,20 @@ impl Parameters {
     /// The token limit where none is set: a letter needs 16, a reasoning model burns hundreds before it.
     pub const MAX_TOKENS: u32 = 1024;
 
-    /// The digest of all that can change a reply. How the limit is called does not; whether it is sent does.
-    pub(super) fn digest(&self) -> Digest {
+    /// All that can change a reply. The name of the token limit's field does not; whether a limit is sent does.
+    pub(super) fn content(&self) -> Value {
         let limit = self
             .max_tokens
             .filter(|_| self.token_field != TokenField::Omit);
-        let words = [
-            Some(self.model.clone()),
-            (self.temperature != Temperature::Server).then(|| self.temperature.to_string()),
-            limit.map(|value| value.to_string()),
-            self.reasoning_effort.clone(),
-            self.detail.map(|detail| detail.to_string()),
-            (self.constrain != Constrain::None).then(|| self.constrain.to_string()),
-        ];
-        let parts = words.map(|word| word.map_or(String::new(), |word| format!("={word}")));
-        let seed = self.seed.map(|seed| format!("seed {seed}"));
-        Digest::of_parts(parts.iter().chain(&seed).map(String::as_bytes))
+        json!({
+            "model": self.model,
+            "temperature": self.temperature.to_string(),
+            "seed": self.seed,
+            "max_tokens": limit,
+            "reasoning_effort": self.reasoning_effort,
+            "detail": self.detail,
+            "constrain": self.constrain.to_string(),
+        })
     }
 }
 
@@ -240,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn the_digest_knows_what_decides_a_reply() {
+    fn the_content_is_what_decides_a_reply() {
         let base = Parameters::new("m".into());
         let mut others = vec![base.clone(); 8];
         others[0].model = "n".into();
@@ -252,12 +250,12 @@ mod tests {
         others[6].temperature = Temperature::Of(0.0);
         others[7].seed = Some(0);
         for other in &others {
-            assert_ne!(other.digest(), base.digest(), "{other:?}");
+            assert_ne!(other.content(), base.content(), "{other:?}");
         }
         let renamed = Parameters {
             token_field: TokenField::MaxTokens,
             ..base.clone()
         };
-        assert_eq!(renamed.digest(), base.digest());
+        assert_eq!(renamed.content(), base.content());
     }
 }

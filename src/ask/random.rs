@@ -1,6 +1,8 @@
 //! The model that guesses: [`Random`].
 
-use super::Call;
+use serde_json::{Value, json};
+
+use super::call::Call;
 use crate::types::question::letter;
 use crate::types::{Digest, Question};
 
@@ -16,8 +18,8 @@ impl Random {
     /// The name in records and tables.
     pub const NAME: &'static str = "random";
 
-    pub(super) fn digest(self) -> Digest {
-        Digest::of_parts([Self::NAME.as_bytes(), &self.seed.to_le_bytes()])
+    pub(super) fn content(self) -> Value {
+        json!({"random": self.seed})
     }
 
     pub(super) fn answer(self, question: &Question, call: Call<'_>) -> String {

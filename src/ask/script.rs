@@ -5,8 +5,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
+use serde_json::{Value, json};
 
-use super::{AskError, Reach, failure};
+use super::failure::AskError;
 use crate::error::{Error, Result};
 use crate::types::{Condition, Digest, FailureKind, QuestionId, Reply};
 
@@ -83,7 +84,7 @@ impl Script {
         Ok(Self {
             name: format!("script:{}", path.display()),
             path: path.to_owned(),
-            digest: Digest::of_parts([b"script".as_slice(), text.as_bytes()]),
+            digest: Digest::of(text.as_bytes()),
             replies,
         })
     }
@@ -94,8 +95,8 @@ impl Script {
         &self.name
     }
 
-    pub(super) fn digest(&self) -> Digest {
-        self.digest
+    pub(super) fn content(&self) -> Value {
+        json!({"script": self.digest})
     }
 
     pub(super) fn answer(
@@ -112,12 +113,7 @@ impl Script {
                 r#"{} has no reply to question {id} and no {{"default": ".."}} line"#,
                 self.path.display()
             );
-            AskError {
-                failure: failure(FailureKind::Request, message),
-                attempts: 1,
-                reach: Reach::Trial,
-                refused: None,
-            }
+            AskError::new(FailureKind::Request, message, 1)
         })
     }
 }
@@ -136,10 +132,8 @@ mod tests {
     fn a_byte_order_mark_is_no_part_of_the_first_line() {
         let line = r#"{"default": "A"}"#;
         let marked = load(&format!("\u{feff}{line}\n")).unwrap();
-        assert_eq!(
-            marked.digest(),
-            load(&format!("{line}\n")).unwrap().digest()
-        );
+        let plain = load(&format!("{line}\n")).unwrap();
+        assert_eq!(marked.content(), plain.content());
     }
 
     #[test]

@@ -8,20 +8,18 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use reqwest::Url;
 
+use super::wire::Wire;
 use crate::error::{Error, Result};
 
-/// The base URL of an OpenAI-compatible endpoint, taken word for word: no `/v1` is added or assumed.
+/// The base URL of an endpoint, taken word for word: no `/v1` is added or assumed.
 #[derive(Clone, PartialEq, Eq)]
 pub struct BaseUrl(Url);
 
 impl BaseUrl {
-    /// The address of chat completions: `/chat/completions` behind the path, the query string kept.
-    pub(super) fn completions(&self) -> Url {
+    /// The address of what lies behind its path, as `chat/completions`; the query string is kept.
+    pub(super) fn join(&self, path: &str) -> Url {
         let mut url = self.0.clone();
-        url.set_path(&format!(
-            "{}{COMPLETIONS}",
-            self.0.path().trim_end_matches('/')
-        ));
+        url.set_path(&format!("{}/{path}", self.0.path().trim_end_matches('/')));
         url
     }
 
@@ -82,8 +80,6 @@ impl BaseUrl {
     }
 }
 
-const COMPLETIONS: &str = "/chat/completions";
-
 /// Where Azure serves models: by resource (`R.openai.azure.com`) and by project.
 const AZURE: [&str; 3] = [
     ".openai.azure.com",
@@ -129,10 +125,13 @@ impl FromStr for BaseUrl {
                 "an address with '#' cannot be used; leave that part off",
             ));
         }
-        if url.path().trim_end_matches('/').ends_with(COMPLETIONS) {
-            return Err(wrong(
-                "leave /chat/completions off the end; it is added to the address",
-            ));
+        for path in Wire::ALL.map(Wire::path) {
+            let before = url.path().trim_end_matches('/').strip_suffix(path);
+            if before.is_some_and(|before| before.ends_with('/')) {
+                return Err(wrong(&format!(
+                    "leave /{path} off the end; it is added to the address"
+                )));
+            }
         }
         let base = Self(url);
         if base.is_azure() && base.0.path().trim_matches('/').is_empty() {
@@ -194,7 +193,7 @@ mod tests {
                 "https://g.example/v1beta/openai/chat/completions",
             ),
         ] {
-            assert_eq!(url(base).completions().as_str(), completions);
+            assert_eq!(url(base).join("chat/completions").as_str(), completions);
         }
         for wrong in [
             "",

@@ -12,9 +12,6 @@ const FILE_BYTES: u64 = 200_000_000;
 /// The most requests of one file there.
 const FILE_REQUESTS: usize = 50_000;
 
-/// The path that each line asks.
-const URL: &str = "/v1/chat/completions";
-
 /// What the input files of a Batch API are like.
 #[derive(Debug)]
 pub struct BatchFiles {
@@ -22,15 +19,14 @@ pub struct BatchFiles {
     pub most_bytes: u64,
     /// The most requests of a file.
     pub most_requests: usize,
-    /// The path that each line asks.
-    pub url: String,
+    /// The path that each line asks; `None` for the one of the model's API.
+    pub url: Option<String>,
 }
 
 impl BatchFiles {
     pub(super) fn resolve(said: BatchFileArgs) -> Result<Self> {
-        let url = said.url.unwrap_or_else(|| URL.to_owned());
-        if !url.starts_with('/') {
-            let problem = format_args!("{url:?}; a path expected, as {URL}");
+        if let Some(url) = said.url.as_deref().filter(|url| !url.starts_with('/')) {
+            let problem = format_args!("{url:?}; a path expected, as /v1/chat/completions");
             return Err(Error::usage("--url", problem));
         }
         Ok(Self {
@@ -38,7 +34,7 @@ impl BatchFiles {
                 .file_size
                 .map_or(FILE_BYTES, |size| size.get().saturating_mul(1_000_000)),
             most_requests: said.file_requests.map_or(FILE_REQUESTS, usize::from),
-            url,
+            url: said.url,
         })
     }
 }

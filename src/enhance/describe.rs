@@ -4,12 +4,13 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use super::convention::Tile;
-use super::feeding::Feeding;
-use super::onnx::MULTIPLES;
+use super::graph::Graph;
 use super::preset::Preset;
-use super::reading::Reading;
 use super::sidecar::Sidecar;
-use super::signature::Signature;
+use super::tiles::MULTIPLES;
+
+/// The source of what the graph itself says.
+const GRAPH: &str = "graph";
 
 /// What is needed beside the convention itself to tell where it comes from.
 #[derive(Debug)]
@@ -33,37 +34,41 @@ impl Lines {
 
 impl Description {
     /// The table as text.
-    pub(super) fn text(
-        &self,
-        path: &Path,
-        signature: &Signature,
-        feeding: &Feeding,
-        reading: &Reading,
-        stated: &Sidecar,
-    ) -> String {
+    pub(super) fn text(&self, path: &Path, graph: &Graph, stated: &Sidecar) -> String {
         let mut lines = Lines(Vec::new());
-        let graph = "graph";
+        self.input(&mut lines, graph, stated);
+        self.output(&mut lines, graph);
+        let why = match stated.tile {
+            Some(_) => self.why(|s| s.tile.is_some(), ""),
+            None => "not said; --tile N tries, and checks every seam".to_owned(),
+        };
+        lines.add("tile", stated.tile.unwrap_or(Tile::None), why);
+        lines.add(
+            "subnormal weights",
+            self.flushed,
+            "set to zero; they change no byte",
+        );
+        written(path, &lines.0)
+    }
+
+    /// How the model is fed.
+    fn input(&self, lines: &mut Lines, graph: &Graph, stated: &Sidecar) {
+        let (signature, feeding) = (&graph.signature, &graph.feeding);
         let side = |size: Option<usize>| size.map_or("any".to_owned(), |size| size.to_string());
-        lines.add("input", &signature.input.port, graph);
+        lines.add("input", &signature.input.port, GRAPH);
         let why = self.why(|s| s.layout_in.is_some(), "graph: where its 3 is");
         lines.add("layout_in", feeding.layout, why);
         let height_width = format!("{} × {}", side(signature.height), side(signature.width));
-        lines.add("height × width", height_width, graph);
+        lines.add("height × width", height_width, GRAPH);
         let usual = "usual; a graph cannot say";
-        lines.add(
-            "color",
-            feeding.color,
-            self.why(|s| s.color.is_some(), usual),
-        );
-        let range_in = self.why(|s| s.range_in.is_some(), "usual for its type");
-        lines.add("range_in", feeding.range, range_in);
+        let why = self.why(|s| s.color.is_some(), usual);
+        lines.add("color", feeding.color, why);
+        let why = self.why(|s| s.range_in.is_some(), "usual for its type");
+        lines.add("range_in", feeding.range, why);
         if stated.mean.is_some() || stated.std.is_some() {
             let said = format!("{:?}, {:?}", feeding.mean, feeding.std);
-            lines.add(
-                "mean, std",
-                said,
-                self.why(|s| s.mean.is_some() || s.std.is_some(), usual),
-            );
+            let why = self.why(|s| s.mean.is_some() || s.std.is_some(), usual);
+            lines.add("mean, std", said, why);
         }
         match stated.multiple {
             Some(multiple) => {
@@ -82,46 +87,27 @@ impl Description {
             let why = self.why(|s| s.extra.contains_key(&extra.port.name), "");
             lines.add(&format!("extra.{}", extra.port.name), extra.value, why);
         }
-        let why = match signature.output.why {
-            "stated" => self.why(|s| s.output.is_some(), graph),
+    }
+
+    /// How it is read.
+    fn output(&self, lines: &mut Lines, graph: &Graph) {
+        let (output, reading) = (&graph.signature.output, &graph.reading);
+        let why = match output.why {
+            "stated" => self.why(|s| s.output.is_some(), GRAPH),
             why => why.to_owned(),
         };
-        lines.add("output", &signature.output.port, why);
-        let layout_out = reading.layout.unwrap_or(reading.likely);
-        let fallback = if reading.layout.is_some() {
-            "graph: where its 3 is"
-        } else {
-            "as the input; what comes decides"
+        lines.add("output", &output.port, why);
+        let fallback = match reading.layout {
+            Some(_) => "graph: where its 3 is",
+            None => "as the input; what comes decides",
         };
-        lines.add(
-            "layout_out",
-            layout_out,
-            self.why(|s| s.layout_out.is_some(), fallback),
-        );
-        let why = self.why(
-            |s| s.range_out.is_some(),
-            "as the input; what comes is checked",
-        );
+        let why = self.why(|s| s.layout_out.is_some(), fallback);
+        lines.add("layout_out", reading.layout.unwrap_or(reading.likely), why);
+        let checked = "as the input; what comes is checked";
+        let why = self.why(|s| s.range_out.is_some(), checked);
         lines.add("range_out", reading.range, why);
-        lines.add(
-            "rounding",
-            reading.rounding,
-            self.why(|s| s.rounding.is_some(), "usual"),
-        );
-        match stated.tile {
-            Some(tile) => lines.add("tile", tile, self.why(|s| s.tile.is_some(), "")),
-            None => lines.add(
-                "tile",
-                Tile::None,
-                "not said; --tile N tries, and checks every seam",
-            ),
-        }
-        lines.add(
-            "subnormal weights",
-            self.flushed,
-            "set to zero; they change no byte",
-        );
-        written(path, &lines.0)
+        let why = self.why(|s| s.rounding.is_some(), "usual");
+        lines.add("rounding", reading.rounding, why);
     }
 
     /// Where a statement comes from.

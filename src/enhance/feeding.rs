@@ -9,6 +9,7 @@ use super::planes::Planes;
 use super::reading::nearest;
 use super::sidecar::Sidecar;
 use super::signature::Signature;
+use super::tiles::Window;
 use crate::types::Rgb;
 
 /// How an image becomes a tensor.
@@ -22,22 +23,6 @@ pub(super) struct Feeding {
     pub(super) mean: [f32; 3],
     pub(super) std: [f32; 3],
     pub(super) pad: Pad,
-}
-
-/// A part of an image: left, top, right, bottom, the latter two exclusive; right and bottom may lie outside of it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Window {
-    pub(super) left: usize,
-    pub(super) top: usize,
-    pub(super) right: usize,
-    pub(super) bottom: usize,
-}
-
-impl Window {
-    /// Height and width.
-    pub(super) fn size(self) -> [usize; 2] {
-        [self.bottom - self.top, self.right - self.left]
-    }
 }
 
 /// A tensor for a model.

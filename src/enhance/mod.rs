@@ -1,4 +1,4 @@
-//! Stage 3, mend: a dark image through the user's own ONNX model on ONNX Runtime's CPU provider.
+//! Stage 3, enhance: a dark image through the user's own ONNX model on ONNX Runtime's CPU provider.
 //!
 //! ```text
 //! RuntimeSearch::open ─► Runtime ─┐
@@ -13,13 +13,16 @@
 
 mod convention;
 mod describe;
+mod enhancer;
 mod feeding;
-pub mod file;
+mod file;
+mod graph;
 mod install;
 mod library;
 mod memory;
-pub mod onnx;
+mod output;
 mod planes;
+mod port;
 mod preset;
 mod protobuf;
 mod reading;
@@ -31,8 +34,8 @@ mod signature;
 mod tiles;
 mod weights;
 
+pub use enhancer::Enhancer;
 pub use file::ModelFile;
-pub use onnx::Enhancer;
 pub use runtime::{Install, Runtime, RuntimeSearch, forbid_telemetry};
 pub use session::Stopper;
 pub use tiles::Tiling;

@@ -5,10 +5,10 @@
 use half::f16;
 
 use super::convention::{Color, Element, Layout, Range, Rounding};
-use super::feeding::Window;
 use super::planes::Planes;
 use super::sidecar::Sidecar;
 use super::signature::Signature;
+use super::tiles::Window;
 
 /// How a tensor becomes an image.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,7 +35,7 @@ pub(super) enum Certainty {
 
 /// What is wrong with the values of an output.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Wild {
+pub(super) enum OutOfRange {
     /// Some are not numbers.
     NotNumbers,
     /// They are of another range than the one that was assumed.
@@ -105,7 +105,7 @@ impl Reading {
         layout: Layout,
         size: [usize; 2],
         part: Window,
-    ) -> Result<Vec<u8>, Wild> {
+    ) -> Result<Vec<u8>, OutOfRange> {
         match samples {
             Samples::Uint8(bytes) => Ok(self.gather(bytes, layout, size, part, |byte| byte)),
             Samples::Float16(values) => {
@@ -132,7 +132,7 @@ impl Reading {
         samples: Samples<'_>,
         layout: Layout,
         [height, width]: [usize; 2],
-    ) -> Result<Planes, Wild> {
+    ) -> Result<Planes, OutOfRange> {
         let values: Vec<f32> = match samples {
             Samples::Uint8(bytes) => bytes.iter().map(|byte| f32::from(*byte)).collect(),
             Samples::Float16(values) => values.iter().map(|value| value.to_f32()).collect(),
@@ -194,7 +194,7 @@ impl Reading {
     /// Refuses what is no number, and what cannot be of the range that was assumed.
     ///
     /// Models that do not clamp overshoot by a little: it takes one sample in 20 beyond all overshooting to tell another range.
-    fn check(&self, values: &[f32]) -> Result<(), Wild> {
+    fn check(&self, values: &[f32]) -> Result<(), OutOfRange> {
         let (mut strange, mut below, mut above) = (0_usize, 0_usize, 0_usize);
         let mut most = f32::NEG_INFINITY;
         for value in values {
@@ -204,7 +204,7 @@ impl Reading {
             above += usize::from(*value > 8.0);
         }
         if strange > 0 {
-            return Err(Wild::NotNumbers);
+            return Err(OutOfRange::NotNumbers);
         }
         let many = values.len() / 20;
         let likely = match (self.certainty, self.range) {
@@ -213,7 +213,7 @@ impl Reading {
             (Certainty::Assumed, Range::Bytes) if most <= 1.5 => Range::Unit,
             _ => return Ok(()),
         };
-        Err(Wild::Beyond {
+        Err(OutOfRange::Beyond {
             least: values.iter().copied().fold(f32::INFINITY, f32::min),
             most,
             likely,

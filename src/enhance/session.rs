@@ -11,8 +11,9 @@ use ort::value::{DynValue, Outlet, Tensor, TensorElementType, ValueType};
 
 use super::convention::Element;
 use super::feeding::{Data, Input};
+use super::port::{Dim, Port};
 use super::reading::Samples;
-use super::signature::{Dim, Extra, Port, Signature};
+use super::signature::{Extra, Signature};
 
 /// How a session is run: which output is wanted, and whether it is to end early.
 pub(super) struct Options(RunOptions<HasSelectedOutputs>);

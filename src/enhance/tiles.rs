@@ -1,4 +1,4 @@
-//! An image in tiles: [`Plan`], and [`Canvas`], on which they come together.
+//! An image in tiles, each of which sees a [`Window`] of it: [`Plan`], and [`Canvas`], on which they come together.
 //!
 //! Each tile is seen with some context and gives its middle ("crop" tiling, as Real-ESRGAN's `tile_pad`): for a model whose
 //! pixels depend on nothing beyond the context that is exact, and no blending hides a seam. Neighbours give a few pixels
@@ -9,8 +9,27 @@ use std::num::NonZeroUsize;
 
 use crate::types::Rgb;
 
+/// What sides are tried as multiples of, where a model fails on an image's own and nobody says better.
+pub(super) const MULTIPLES: [usize; 6] = [1, 4, 8, 12, 16, 32];
+
 /// Pixels beyond a seam that a tile gives too, for the comparison.
 pub(super) const GUARD: usize = 2;
+
+/// A part of an image: left, top, right, bottom, the latter two exclusive; right and bottom may lie outside of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Window {
+    pub(super) left: usize,
+    pub(super) top: usize,
+    pub(super) right: usize,
+    pub(super) bottom: usize,
+}
+
+impl Window {
+    /// Height and width.
+    pub(super) fn size(self) -> [usize; 2] {
+        [self.bottom - self.top, self.right - self.left]
+    }
+}
 
 /// How an image is cut.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -43,16 +62,40 @@ pub(super) struct Span {
     pub(super) to: usize,
 }
 
+impl Window {
+    /// What a tile sees of the image.
+    pub(super) fn seen(row: Span, column: Span) -> Self {
+        Self {
+            left: column.start,
+            top: row.start,
+            right: column.end,
+            bottom: row.end,
+        }
+    }
+
+    /// What is taken of a tile, as a part of what it sees.
+    pub(super) fn taken(row: Span, column: Span) -> Self {
+        Self {
+            left: column.from - column.start,
+            top: row.from - row.start,
+            right: column.to - column.start,
+            bottom: row.to - row.start,
+        }
+    }
+}
+
 /// The tiles of an image.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Plan {
-    pub(super) rows: Vec<Span>,
-    pub(super) columns: Vec<Span>,
+    rows: Vec<Span>,
+    columns: Vec<Span>,
 }
 
 /// How tiles are cut.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Cut {
+    /// Height and width of what they cover.
+    pub(super) area: [usize; 2],
     /// Height and width of a tile, at most.
     pub(super) tile: [usize; 2],
     /// What is seen beyond what is taken.
@@ -62,12 +105,19 @@ pub(super) struct Cut {
 }
 
 impl Plan {
-    /// The tiles of an image of such a height and width; `None` where a tile is not larger than its context.
-    pub(super) fn of([height, width]: [usize; 2], cut: Cut) -> Option<Self> {
+    /// The tiles of an image; `None` where a tile is not larger than its context.
+    pub(super) fn of(cut: Cut) -> Option<Self> {
+        let spans = |side: usize| spans(cut.area[side], cut.tile[side], cut.context, cut.multiple);
         Some(Self {
-            rows: spans(height, cut.tile[0], cut.context, cut.multiple)?,
-            columns: spans(width, cut.tile[1], cut.context, cut.multiple)?,
+            rows: spans(0)?,
+            columns: spans(1)?,
         })
+    }
+
+    /// The tiles row by row, each by its spans along both sides.
+    pub(super) fn tiles(&self) -> impl Iterator<Item = (Span, Span)> {
+        let rows = self.rows.iter();
+        rows.flat_map(|row| self.columns.iter().map(|column| (*row, *column)))
     }
 
     /// How many there are.
@@ -209,22 +259,21 @@ mod tests {
     #[test]
     fn seams_are_compared() {
         let cut = Cut {
+            area: [37, 50],
             tile: [20, 20],
             context: 3,
             multiple: 1,
         };
-        let plan = Plan::of([37, 50], cut).unwrap();
+        let plan = Plan::of(cut).unwrap();
         // What a pixel is, and what a tile that sees its own place makes of it.
         let made = |shift: usize| {
             let mut canvas = Canvas::new([37, 50]);
-            for row in &plan.rows {
-                for column in &plan.columns {
-                    let pixels = (row.from..row.to)
-                        .flat_map(|y| (column.from..column.to).map(move |x| (y, x)));
-                    let byte =
-                        |(y, x): (usize, usize)| [(y * 5 + x * 3 + shift * column.start) as u8; 3];
-                    canvas.put(*row, *column, &pixels.flat_map(byte).collect::<Vec<_>>());
-                }
+            for (row, column) in plan.tiles() {
+                let pixels =
+                    (row.from..row.to).flat_map(|y| (column.from..column.to).map(move |x| (y, x)));
+                let byte =
+                    |(y, x): (usize, usize)| [(y * 5 + x * 3 + shift * column.start) as u8; 3];
+                canvas.put(row, column, &pixels.flat_map(byte).collect::<Vec<_>>());
             }
             canvas.finish()
         };

@@ -2,7 +2,7 @@
 
 use super::models::ModelUnderTest;
 use super::trial::{Item, Prompt, Trial};
-use crate::ask::{Model, Parameters, Price, image_tokens};
+use crate::ask::Price;
 use crate::config::Money;
 use crate::error::{Error, Result};
 use crate::types::{ImageFacts, Record, Usage, Via};
@@ -154,11 +154,7 @@ pub(crate) fn image_of(
     width: usize,
     height: usize,
 ) -> Option<f64> {
-    let Model::OpenAi(model) = &*model.model else {
-        return None;
-    };
-    let Parameters { model, detail, .. } = model.parameters();
     let stated = price.and_then(|price| price.image_tokens);
-    let counted = || image_tokens(model, *detail, width as u64, height as u64);
+    let counted = || model.model.image_tokens(width as u64, height as u64);
     stated.or_else(counted).map(|tokens| tokens as f64)
 }

@@ -10,7 +10,7 @@ use super::image_pipeline::ImagePipeline;
 use super::models::ModelUnderTest;
 use super::plan::Plan;
 use super::trial::Item as _;
-use crate::ask::{Model, Price};
+use crate::ask::Price;
 use crate::config::Server;
 use crate::error::Result;
 use crate::report::forecast::{Forecast, Line};
@@ -175,7 +175,10 @@ impl Tokens {
 /// What is left of one model.
 fn line(model: &ModelUnderTest, price: Option<Price>, tokens: &Tokens, phase: &str) -> Line {
     let requests = tokens.requests as f64;
-    let longest = max_tokens(&model.model).map(|limit| requests * f64::from(limit));
+    let longest = model
+        .model
+        .max_tokens()
+        .map(|limit| requests * f64::from(limit));
     let role = match (phase, model.view) {
         ("marks", _) => " (judge)",
         (_, View::Blind) => " (blind)",
@@ -191,14 +194,6 @@ fn line(model: &ModelUnderTest, price: Option<Price>, tokens: &Tokens, phase: &s
         longest_reply_tokens: longest,
         dollars: dollars(tokens.reply),
         most_dollars: longest.and_then(dollars),
-    }
-}
-
-/// The most tokens of a reply; `None` without a limit.
-fn max_tokens(model: &Model) -> Option<u32> {
-    match model {
-        Model::OpenAi(model) => model.parameters().max_tokens,
-        Model::Random(_) | Model::Script(_) | Model::Local(_) => None,
     }
 }
 

@@ -7,7 +7,6 @@ use serde_json::{Value, json};
 
 use super::models::ModelUnderTest;
 use super::recipe::{Recipe, Scaling};
-use crate::ask::Model;
 use crate::config::{Enhancement, JobSettings};
 use crate::enhance::{self, ModelFile, Tiling};
 use crate::error::{Error, Result};
@@ -88,22 +87,23 @@ pub(crate) fn columns<'a>(
         .collect()
 }
 
-/// What decides the replies of a model besides the question and the images.
+/// What decides the replies of a model besides the question and the images, by flag, and where it is asked.
 fn model(model: &ModelUnderTest) -> Value {
-    let Model::OpenAi(remote) = &*model.model else {
-        return json!({ "answers by": *model.digest });
-    };
-    let parameters = remote.parameters();
-    json!({
-        "--base-url": model.address,
-        "--temperature": parameters.temperature.to_string(),
-        "--max-tokens": parameters.max_tokens,
-        "--token-field": parameters.token_field.to_string(),
-        "--reasoning-effort": parameters.reasoning_effort,
-        "--detail": parameters.detail,
-        "--constrain": parameters.constrain.to_string(),
-        "--sampling-seed": parameters.seed,
-    })
+    let mut content = model.model.content();
+    if let (Some(address), Some(fields)) = (&model.address, content.as_object_mut()) {
+        let own = std::mem::take(fields).into_iter();
+        fields.extend(own.map(|(name, value)| (flag(&name), value)));
+        fields.insert("--base-url".to_owned(), json!(address));
+    }
+    content
+}
+
+/// The flag that sets a parameter.
+fn flag(parameter: &str) -> String {
+    match parameter {
+        "seed" => "--sampling-seed".to_owned(),
+        name => format!("--{}", name.replace('_', "-")),
+    }
 }
 
 /// What decides the pixels that an enhancer makes. Tiles of its own choice give what the whole image does, or all but one sample in

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 
-use crate::ask::{Endpoint, Model, OpenAi, Parameters, Script};
+use crate::ask::{Endpoint, Model, Parameters, Remote, Script, Wire};
 use crate::config::{Ask, ModelName, Server};
 use crate::error::{Error, Result};
 use crate::types::View;
@@ -88,7 +88,8 @@ pub(crate) fn open(
                 model: name.clone(),
                 ..parameters.clone()
             };
-            Ok(Model::OpenAi(OpenAi::new(Arc::clone(endpoint), parameters)))
+            let model = Remote::open(Arc::clone(endpoint), Wire::Chat, parameters)?;
+            Ok(Model::Remote(model))
         }
         ModelName::Random | ModelName::Observer => Err(Error::usage(
             "--model",
@@ -100,11 +101,8 @@ pub(crate) fn open(
 /// How requests had to differ from what was tried first, by model; for the manifest.
 pub(crate) fn adapted(models: &[ModelUnderTest]) -> impl Iterator<Item = (String, Value)> {
     models.iter().filter_map(|one| {
-        let Model::OpenAi(model) = &*one.model else {
-            return None;
-        };
-        let adapted = model.adapted();
-        let name = format!("adapted for {}", model.name());
+        let adapted = one.model.adapted();
+        let name = format!("adapted for {}", one.model.name());
         (!adapted.is_empty()).then(|| (name, json!(adapted)))
     })
 }

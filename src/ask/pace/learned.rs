@@ -1,4 +1,4 @@
-//! The rate that an endpoint takes, learned from what it turns away: [`Learned`].
+//! The rate that an endpoint takes, learned from what it turns away: [`LearnedRate`].
 
 use std::collections::VecDeque;
 
@@ -7,11 +7,11 @@ use tokio::time::{Duration, Instant};
 /// The distance to keep between requests, learned from pauses: guessed at the first, corrected while they come soon, and
 /// measured once requests flowed for a while before one.
 #[derive(Debug)]
-pub(super) struct Learned {
+pub(super) struct LearnedRate {
     /// The distance.
     spacing: Duration,
-    /// How well it is known.
-    knowledge: Knowledge,
+    /// How it became known.
+    source: RateSource,
     /// The distance when the pause began that holds now.
     tried: Duration,
     /// When the last ones passed since the last pause.
@@ -20,17 +20,17 @@ pub(super) struct Learned {
     paused: Option<Instant>,
     /// How many were turned away in it.
     turned_away: usize,
-    /// How many the endpoint took before its first pause: what it holds in store.
-    store: Option<usize>,
-    /// How many passed before the last pause that a longer distance had put off.
-    lasted: usize,
-    /// How many pauses since then have come no later for a longer distance.
-    vain: u32,
+    /// How many the endpoint took before its first pause: the size of its bucket.
+    burst: Option<usize>,
+    /// How many passed before the last pause that a longer spacing had delayed.
+    sent_before_pause: usize,
+    /// How many pauses since then a longer spacing has not delayed.
+    unexplained_pauses: u32,
 }
 
-/// How well the distance is known that an endpoint wants.
+/// How the spacing that an endpoint wants became known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Knowledge {
+enum RateSource {
     Guessed,
     Corrected,
     Measured,
@@ -58,36 +58,37 @@ const MEASURED: Duration = Duration::from_secs(1);
 /// Where nothing is known of the rate, so many at least pass in the length of the pause.
 const PROBES: u32 = 32;
 
-/// So many pauses that no distance puts off are not about the rate: some servers turn requests away at random.
-const VAIN: u32 = 8;
+/// After this many pauses that a longer spacing did not delay, the rate limit is not the cause: some servers reject requests at
+/// random.
+const UNEXPLAINED_PAUSES: u32 = 8;
 
-/// So many of them, and the rate is looked for anew.
-const ANEW: u32 = 48;
+/// After this many of them the rate is learned again.
+const RELEARN_AFTER: u32 = 48;
 
-/// So many passes are remembered.
+/// The maximum number of passes that are remembered.
 const REMEMBERED: usize = 2048;
 
 /// What is known of an endpoint's rate before anything is learned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Beforehand {
+pub(super) enum StatedRate {
     /// Nothing.
     Unknown,
     /// The user has stated it: one that is turned away shows that something else has used it up.
-    Stated,
+    Known,
 }
 
-impl Learned {
+impl LearnedRate {
     pub(super) fn new() -> Self {
         Self {
             spacing: Duration::ZERO,
-            knowledge: Knowledge::Guessed,
+            source: RateSource::Guessed,
             tried: Duration::ZERO,
             passed: VecDeque::new(),
             paused: None,
             turned_away: 0,
-            store: None,
-            lasted: 0,
-            vain: 0,
+            burst: None,
+            sent_before_pause: 0,
+            unexplained_pauses: 0,
         }
     }
 
@@ -100,7 +101,7 @@ impl Learned {
     pub(super) fn pass(&mut self, now: Instant, paused_until: Instant) {
         if let Some(paused) = self.paused.filter(|_| now >= paused_until) {
             if self.counted(paused) < MEASURED {
-                self.store = self.store.max(Some(self.taken()));
+                self.burst = self.burst.max(Some(self.taken()));
             }
             self.paused = None;
             self.passed.clear();
@@ -114,7 +115,7 @@ impl Learned {
 
     /// Notes a success, after which the distance may be a little shorter.
     pub(super) fn ease(&mut self) {
-        let eased = self.spacing.mul_f64(EASING[self.knowledge as usize]);
+        let eased = self.spacing.mul_f64(EASING[self.source as usize]);
         self.spacing = if eased < NEGLIGIBLE {
             Duration::ZERO
         } else {
@@ -123,32 +124,32 @@ impl Learned {
     }
 
     /// Notes that a request was turned away for so long.
-    pub(super) fn turn_away(&mut self, now: Instant, wait: Duration, beforehand: Beforehand) {
+    pub(super) fn turn_away(&mut self, now: Instant, wait: Duration, stated: StatedRate) {
         let paused = *self.paused.get_or_insert(now);
         self.turned_away += 1;
         if self.turned_away == 1 {
             self.tried = self.spacing;
             self.compare();
         }
-        if self.vain >= VAIN {
-            (self.knowledge, self.spacing) = (Knowledge::Guessed, self.tried);
+        if self.unexplained_pauses >= UNEXPLAINED_PAUSES {
+            (self.source, self.spacing) = (RateSource::Guessed, self.tried);
             return;
         }
-        let (knowledge, spacing) = match self.rate(paused) {
+        let (source, spacing) = match self.rate(paused) {
             Some(rate) => (
-                Knowledge::Measured,
+                RateSource::Measured,
                 Duration::from_secs_f64(1.0 / (rate * MARGIN)),
             ),
             // Too fast, if not by much: it was right a moment ago.
-            None if !self.tried.is_zero() => (Knowledge::Corrected, self.tried.mul_f64(SLOWER)),
-            None if beforehand == Beforehand::Stated => (Knowledge::Guessed, Duration::ZERO),
+            None if !self.tried.is_zero() => (RateSource::Corrected, self.tried.mul_f64(SLOWER)),
+            None if stated == StatedRate::Known => (RateSource::Guessed, Duration::ZERO),
             None => {
                 let time = self.counted(paused).saturating_add(wait);
                 let taken = u32::try_from(self.taken()).unwrap_or(u32::MAX);
-                (Knowledge::Guessed, time / PROBES.max(taken))
+                (RateSource::Guessed, time / PROBES.max(taken))
             }
         };
-        (self.knowledge, self.spacing) = (knowledge, spacing.min(WIDEST));
+        (self.source, self.spacing) = (source, spacing.min(WIDEST));
     }
 
     /// Whether the distance kept since the last pause has put this one off: a limit on the rate is met later the slower
@@ -157,10 +158,10 @@ impl Learned {
         let passed = self.passed.len();
         if self.tried.is_zero() {
             // No distance was kept that could have put it off.
-        } else if passed >= 2 * self.lasted {
-            (self.lasted, self.vain) = (passed, 0);
+        } else if passed >= 2 * self.sent_before_pause {
+            (self.sent_before_pause, self.unexplained_pauses) = (passed, 0);
         } else {
-            self.vain = (self.vain + 1) % ANEW;
+            self.unexplained_pauses = (self.unexplained_pauses + 1) % RELEARN_AFTER;
         }
     }
 
@@ -178,10 +179,10 @@ impl Learned {
     /// How many in a second the endpoint takes: it turned one away when, since some moment, more had passed than it held in
     /// store and was filled up with since (a token bucket). That moment is the one that asks for the highest rate.
     fn rate(&self, paused: Instant) -> Option<f64> {
-        let store = self.store? + self.turned_away;
+        let burst = self.burst? + self.turned_away;
         let times = self.passed.iter().enumerate();
         let rates = times.filter_map(|(before, since)| {
-            let flow = (self.passed.len() - before).checked_sub(store)?;
+            let flow = (self.passed.len() - before).checked_sub(burst)?;
             let lasted = paused - *since;
             (flow > 0 && lasted >= MEASURED).then(|| flow as f64 / lasted.as_secs_f64())
         });

@@ -5,8 +5,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use super::adapter::{Adapter, Incoming, Read, Stated, labels, pinhole};
 use super::files::{depth, files, first, folders, png, same_size, segments};
-use super::{Adapter, Incoming, Read, Stated, labels, pinhole};
 use crate::dataset::raw_png::Form;
 use crate::error::{Error, Result};
 use crate::types::{DepthKind, Intrinsics, Labels, Rgb, SegmentName};

@@ -9,8 +9,9 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
+use super::adapter::{Adapter, Incoming, Read, Stated, mpcat40, numbers, pinhole};
 use super::files::{depth, files, folders, last, same_size, segments, text};
-use super::{Adapter, Incoming, Read, Stated, hm3d, mp3d, mpcat40, numbers, pinhole, replica};
+use super::{hm3d, mp3d, replica};
 use crate::error::{Error, Result};
 use crate::types::{DepthKind, Intrinsics, Labels, Rgb, SegmentName};
 

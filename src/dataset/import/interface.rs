@@ -5,8 +5,8 @@ use std::path::Path;
 
 use serde::Deserialize;
 
+use super::adapter::{Adapter, Incoming, Read};
 use super::files::text;
-use super::{Adapter, Incoming, Read};
 use crate::dataset::Dataset;
 use crate::error::{Error, Result};
 use crate::types::{DepthKind, Frame, FrameId, Intrinsics, Labels, Rgb, SegmentName, Segmentation};

@@ -1,6 +1,6 @@
 //! Key frames, uniform in time along a trajectory: [`Every`].
 
-use super::Incoming;
+use super::adapter::Incoming;
 use crate::error::{Error, Result};
 
 /// Which frames of each scene are kept.

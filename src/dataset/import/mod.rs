@@ -4,6 +4,7 @@
 //! is in the interface's units: millimetres, numbers of a label space, segments from 1. The README beside this file shows the
 //! layouts.
 
+mod adapter;
 mod files;
 mod folder;
 mod habitat;
@@ -19,16 +20,15 @@ mod scannet;
 mod sunrgbd;
 mod thor;
 
-use std::collections::BTreeMap;
 use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::str::FromStr;
-
-use ndarray::Array2;
 
 use super::spaces;
 use crate::error::{Error, Result};
-use crate::types::{DepthKind, Intrinsics, Labels, Rgb, SegmentName, Segmentation};
+use crate::types::Labels;
+
+pub use adapter::{Adapter, Incoming, Read, Stated};
 
 /// What lies in the folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -92,93 +92,6 @@ impl FromStr for Kind {
     }
 }
 
-/// What the user says of a data set.
-#[derive(Debug, Clone, Default)]
-pub struct Stated {
-    /// The label space, by name or as a `classes.json`.
-    pub labels: Option<String>,
-    /// The metres in one unit of depth PNG files.
-    pub depth_scale: Option<f64>,
-    /// What depth is measured along.
-    pub depth_kind: Option<DepthKind>,
-    /// The horizontal field of view in degrees.
-    pub hfov: Option<f64>,
-    /// Frames a second, where frames have no time of their own.
-    pub fps: Option<f64>,
-}
-
-/// A frame that can be read.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Incoming {
-    /// Its scene.
-    pub scene: String,
-    /// Its name in the scene.
-    pub frame: String,
-    /// Its time in seconds.
-    pub time: Option<f64>,
-    /// Where its camera stands: the matrix from camera to world, row by row.
-    pub pose: Option<Vec<f64>>,
-    /// How its camera projects, in pixels of its image.
-    pub intrinsics: Option<Intrinsics>,
-    /// The type of its room, where the data set says it.
-    pub room: Option<String>,
-    /// Its image.
-    pub rgb: PathBuf,
-    /// The place of its other files in the adapter's own list.
-    index: usize,
-}
-
-/// The maps of a frame, of its image's size.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Read {
-    /// Depth in millimetres, 0 where there is none.
-    pub depth: Option<Array2<u32>>,
-    /// Numbers of the label space.
-    pub semantic: Option<Array2<u16>>,
-    /// Segments, 0 where there is none.
-    pub segments: Option<Array2<u32>>,
-    /// The type of the room, where the maps say it.
-    pub room: Option<String>,
-}
-
-/// A kind of data set, opened.
-pub trait Adapter: fmt::Debug + Sync {
-    /// Its frames, by scene and name.
-    fn frames(&self) -> &[Incoming];
-
-    /// What its numbers stand for.
-    fn labels(&self) -> &Labels;
-
-    /// What is known of a scene's segments by name.
-    fn names(&self, scene: &str) -> BTreeMap<u32, SegmentName>;
-
-    /// What depth is measured along.
-    fn depth_kind(&self) -> DepthKind;
-
-    /// How the camera of a frame projects, in pixels of its image.
-    fn camera(&self, frame: &Incoming, rgb: &Rgb) -> Option<Intrinsics> {
-        let _ = rgb;
-        frame.intrinsics
-    }
-
-    /// What the segments are.
-    fn segmentation(&self) -> Segmentation {
-        Segmentation::Instances
-    }
-
-    /// Whether it has segments at all, or they are connected pieces of one label.
-    fn has_segments(&self) -> bool;
-
-    /// Words that no table has, with how many things have them.
-    fn unlisted(&self) -> &BTreeMap<String, usize>;
-
-    /// Reads the maps of a frame; `rgb` is its image.
-    ///
-    /// # Errors
-    /// With the file: one that cannot be read, or is of another form or size than it should be.
-    fn read(&self, frame: &Incoming, rgb: &Rgb) -> Result<Read>;
-}
-
 /// Opens a folder.
 ///
 /// # Errors
@@ -210,51 +123,8 @@ pub fn open(kind: Kind, folder: &Path, stated: &Stated) -> Result<Box<dyn Adapte
     Ok(adapter)
 }
 
-/// The label space that the user names: a built-in one, or a file.
-fn labels(stated: &Stated) -> Result<Option<Labels>> {
-    let Some(name) = &stated.labels else {
-        return Ok(None);
-    };
-    if let Some(labels) = spaces::space(name) {
-        return Ok(Some(labels));
-    }
-    let path = Path::new(name);
-    if path.is_file() {
-        return spaces::read(path).map(Some);
-    }
-    let known = spaces::names().join(", ");
-    let problem = format_args!("{name:?} is neither a file none of the built-in spaces: {known}");
-    Err(Error::usage("--labels", problem))
-}
-
 /// A label space as `classes.json`.
 #[must_use]
 pub fn classes(labels: &Labels) -> String {
     spaces::json(labels)
-}
-
-/// mpcat40, which adapters by name write.
-fn mpcat40() -> Labels {
-    spaces::space("mpcat40").unwrap_or_default()
-}
-
-/// The numbers of mpcat40 by class.
-fn numbers(labels: &Labels) -> BTreeMap<String, u16> {
-    labels
-        .labels
-        .iter()
-        .map(|(id, label)| (label.canonical.clone(), *id))
-        .collect()
-}
-
-/// The camera of an image of such a size with such a horizontal field of view and square pixels, whose axis goes through the
-/// middle.
-fn pinhole(width: usize, height: usize, hfov: f64) -> Intrinsics {
-    let focal = width as f64 / 2.0 / libm::tan(hfov.to_radians() / 2.0);
-    Intrinsics {
-        fx: focal,
-        fy: focal,
-        cx: (width as f64 - 1.0) / 2.0,
-        cy: (height as f64 - 1.0) / 2.0,
-    }
 }

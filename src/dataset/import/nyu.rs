@@ -7,8 +7,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use super::adapter::{Adapter, Incoming, Read, Stated, labels};
 use super::folder::{Folder, Offset};
-use super::{Adapter, Incoming, Read, Stated, labels};
 use crate::error::Result;
 use crate::types::{DepthKind, Intrinsics, Labels, Rgb, SegmentName};
 

@@ -11,9 +11,9 @@ use std::path::{Path, PathBuf};
 use ndarray::Array2;
 use serde::Deserialize;
 
+use super::adapter::{Adapter, Incoming, Read, Stated};
 use super::files::{depth, files, first, folders, last, numbers, png, same_size, text};
 use super::names::{UNKNOWN, overridden};
-use super::{Adapter, Incoming, Read, Stated};
 use crate::dataset::raw_png::Form;
 use crate::dataset::spaces::{canonical, space};
 use crate::error::{Error, Result};

@@ -12,10 +12,10 @@ use ndarray::Array2;
 use serde::Deserialize;
 use serde_json::Value;
 
+use super::adapter::{Adapter, Incoming, Read};
 use super::files::{files, folders, last, numbers, png, same_size, text};
 use super::names::{Meaning, UNKNOWN, meaning};
 use super::polygons::{Polygon, draw};
-use super::{Adapter, Incoming, Read};
 use crate::dataset::raw_png::Form;
 use crate::dataset::spaces::canonical;
 use crate::error::{Error, Result};

@@ -8,8 +8,9 @@ use std::path::{Path, PathBuf};
 
 use ndarray::Array2;
 
+use super::adapter::{Adapter, Incoming, Read, Stated, mpcat40, numbers, pinhole};
 use super::files::{depth, files, folders, last, picture, same_size, text};
-use super::{Adapter, Incoming, Read, Stated, mpcat40, names, numbers, pinhole};
+use super::names;
 use crate::error::{Error, Result};
 use crate::types::{DepthKind, Intrinsics, Labels, Rgb, SegmentName};
 

@@ -35,6 +35,13 @@ fn whole(image: &Rgb) -> Window {
     }
 }
 
+fn near(a: &Data, b: &Data) -> bool {
+    match (a, b) {
+        (Data::Float32(a), Data::Float32(b)) => a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-4),
+        (a, b) => a == b,
+    }
+}
+
 fn floats(input: &Input) -> &[f32] {
     match &input.data {
         Data::Float32(values) => values,
@@ -96,13 +103,7 @@ fn every_convention_gives_every_byte_back() {
                 assert_eq!(planes.to_rgb(Rounding::Round).unwrap(), image);
                 if element != Element::Float16 {
                     let fed = feeding.planes(&Planes::of(&image));
-                    let near = match (&fed.data, &input.data) {
-                        (Data::Float32(a), Data::Float32(b)) => {
-                            a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-4)
-                        }
-                        (a, b) => a == b,
-                    };
-                    assert!(near && fed.dims == input.dims);
+                    assert!(near(&fed.data, &input.data) && fed.dims == input.dims);
                 }
             }
         }
@@ -192,7 +193,7 @@ fn values_of_another_range_are_told() {
         reading.check(values).err()
     };
     let likely = |values: &[f32], range| match wild(values, range, Certainty::Assumed) {
-        Some(Wild::Beyond { likely, .. }) => Some(likely),
+        Some(OutOfRange::Beyond { likely, .. }) => Some(likely),
         other => {
             assert_eq!(other, None);
             None
@@ -209,5 +210,5 @@ fn values_of_another_range_are_told() {
     assert_eq!(likely(&seldom, Range::Unit), None);
     assert_eq!(wild(&[0.0, 200.0], Range::Unit, Certainty::Known), None);
     let broken = wild(&[0.0, f32::NAN], Range::Unit, Certainty::Known);
-    assert_eq!(broken, Some(Wild::NotNumbers));
+    assert_eq!(broken, Some(OutOfRange::NotNumbers));
 }

@@ -1,4 +1,6 @@
 use super::*;
+use crate::enhance::port::Dim;
+use crate::enhance::sidecar::OutputChoice;
 
 /// A float32 port; a dimension of 0 is a free one.
 fn port(name: &str, dims: &[usize]) -> Port {

@@ -5,7 +5,6 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::file::Files;
-use crate::ask::{Model, batch};
 use crate::config::BatchFiles;
 use crate::error::{Error, Result};
 use crate::job::models::ModelUnderTest;
@@ -15,7 +14,7 @@ use crate::store::{BATCH, Store};
 /// The files under way.
 pub(crate) struct Requests<'a, I: Item> {
     models: &'a [ModelUnderTest],
-    url: &'a str,
+    url: Option<&'a str>,
     /// Those of each model.
     files: Vec<Files<I::Detail>>,
     store: &'a mut Store<I::Detail>,
@@ -40,7 +39,7 @@ impl<'a, I: Item> Requests<'a, I> {
         });
         Ok(Self {
             models,
-            url: &config.url,
+            url: config.url.as_deref(),
             files: files.collect(),
             store,
         })
@@ -53,13 +52,13 @@ impl<'a, I: Item> Requests<'a, I> {
             self.store.append_thumbnail(thumbnail)?;
         }
         for trial in &group.trials {
-            let Model::OpenAi(model) = &*self.models[trial.model].model else {
-                continue;
-            };
+            let model = &self.models[trial.model].model;
             let (id, query) = (trial.key.to_string(), trial.item.query());
             let message = trial.prompt.message(&stimulus.images);
-            let line = batch::write(model, &id, self.url, message, query.choices())
-                .map_err(|e| Error::data(query.id(), e))?;
+            let line = model.batch_line(&id, self.url, message, query.choices());
+            let Some(line) = line.map_err(|e| Error::data(query.id(), e))? else {
+                continue;
+            };
             let blank = I::blank(trial, stimulus, model.name());
             self.files[trial.model].add(&line, blank, self.store)?;
         }

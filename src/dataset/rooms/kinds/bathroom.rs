@@ -5,7 +5,7 @@ use glam::vec3;
 use super::super::dice::Dice;
 use super::super::furniture::{Set, bath, clutter, storage, textiles, walls};
 use super::super::plan::{Dress, Ground, Plan, WALLS};
-use super::low_stool;
+use super::shared::low_stool;
 
 pub(super) fn furnish(mut dice: Dice) -> Plan {
     let size = vec3(dice.between(2.6, 3.3), 2.5, dice.between(2.8, 3.6));

@@ -6,7 +6,7 @@ use super::super::dice::Dice;
 use super::super::furniture::{Set, at, beds, lamps, seats, storage, walls};
 use super::super::plan::{Dress, Ground, Plan, WALLS, Wall};
 use super::super::scene::kind;
-use super::{SMALL, dresser, low_stool, nightstand, sides};
+use super::shared::{SMALL, dresser, low_stool, nightstand, sides};
 
 pub(super) fn furnish(mut dice: Dice) -> Plan {
     let size = vec3(dice.between(3.6, 4.6), 2.6, dice.between(3.6, 4.6));

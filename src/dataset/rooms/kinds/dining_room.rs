@@ -8,7 +8,7 @@ use super::super::paint::{ALL, Paint};
 use super::super::plan::{Dress, Ground, Plan, WALLS};
 use super::super::scene::kind;
 use super::super::surface::Surface;
-use super::{SMALL, low_stool};
+use super::shared::{SMALL, low_stool};
 
 pub(super) fn furnish(mut dice: Dice) -> Plan {
     let size = vec3(dice.between(4.0, 4.9), 2.65, dice.between(4.0, 4.9));
@@ -31,7 +31,7 @@ pub(super) fn furnish(mut dice: Dice) -> Plan {
             plan.top(&pose, 0.85, &[-0.35, 0.0, 0.35], &SMALL);
         }
     }
-    plan.maybe(0.3, super::dresser);
+    plan.maybe(0.3, super::shared::dresser);
     plan.maybe(0.3, storage::bookshelf);
     if plan.maybe(0.45, walls::fireplace).is_some() {
         plan.sights.push(plan.scene.things.len() - 1);

@@ -10,7 +10,7 @@ use super::super::furniture::{Set, at, clutter, lamps, seats, tables};
 use super::super::paint::{ALL, Paint};
 use super::super::plan::{Dress, Ground, Plan, WALLS, Wall};
 use super::super::scene::kind;
-use super::sides;
+use super::shared::sides;
 
 pub(super) fn furnish(mut dice: Dice) -> Plan {
     let size = vec3(dice.between(3.6, 4.6), 2.6, dice.between(3.4, 4.4));

@@ -6,7 +6,7 @@ use super::super::dice::Dice;
 use super::super::furniture::{Set, lamps, seats, storage, tables, walls};
 use super::super::plan::{Dress, Ground, Plan, WALLS, Wall};
 use super::super::scene::kind;
-use super::{SMALL, low_stool, sides};
+use super::shared::{SMALL, low_stool, sides};
 
 pub(super) fn furnish(mut dice: Dice) -> Plan {
     let size = vec3(dice.between(4.2, 5.4), 2.65, dice.between(4.2, 5.4));
@@ -27,7 +27,7 @@ pub(super) fn furnish(mut dice: Dice) -> Plan {
     plan.maybe(0.45, storage::bookshelf);
     plan.maybe(0.6, lamps::floor_lamp);
     plan.maybe(0.25, low_stool);
-    plan.maybe(0.25, super::dresser);
+    plan.maybe(0.25, super::shared::dresser);
     plan.plant(0.6);
     plan.pictures(3);
     plan.perhaps(0.15, 1.3, |dice| walls::mirror(0.7, 0.9, dice));

@@ -6,7 +6,7 @@ use super::super::dice::Dice;
 use super::super::furniture::{Set, clutter, lamps, seats, storage, tables, walls};
 use super::super::plan::{Dress, Ground, Plan, WALLS, Wall};
 use super::super::scene::kind;
-use super::{SMALL, low_stool, sides};
+use super::shared::{SMALL, low_stool, sides};
 
 pub(super) fn furnish(mut dice: Dice) -> Plan {
     let size = vec3(dice.between(3.4, 4.4), 2.6, dice.between(3.4, 4.4));
@@ -23,7 +23,7 @@ pub(super) fn furnish(mut dice: Dice) -> Plan {
     if plan.maybe(0.8, storage::bookshelf).is_some() {
         plan.sights.push(plan.scene.things.len() - 1);
     }
-    plan.maybe(0.35, super::dresser);
+    plan.maybe(0.35, super::shared::dresser);
     plan.maybe(0.35, |dice| {
         let size = vec3(0.9, 1.1, 0.42);
         storage::cabinet(kind("cabinet", "cabinet"), size, 2, dice)

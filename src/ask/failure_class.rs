@@ -1,30 +1,20 @@
-//! What follows from a failure: whether to try again, what it reaches, and the flag that mends it.
+//! What follows from a refused request: [`FailureClass`] says whether to send it again, what else would fail, and which flag helps.
 
-use super::Reach;
 use super::complaint::Complaint;
-use super::field::{Refused, fields, is_unsupported};
-use super::parameters::Parameters;
-use super::request::Fields;
+use super::failure::Reach;
+use super::field::{Field, Refused, Sent, is_unsupported};
+use super::wire::Wire;
 use crate::types::FailureKind;
 
-/// What the request had in it that a server may complain about.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Sent<'a> {
-    pub(super) parameters: &'a Parameters,
-    pub(super) fields: Fields,
-    pub(super) has_image: bool,
-    pub(super) has_key: bool,
-}
-
 /// What to make of a refused request.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Verdict {
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct FailureClass {
     pub(super) kind: FailureKind,
     pub(super) reach: Reach,
     /// Whether the same request may succeed later.
     pub(super) again: bool,
-    /// How to mend it.
-    pub(super) hint: Option<&'static str>,
+    /// What the user can do.
+    pub(super) hint: Option<String>,
     /// The field that it was refused for.
     pub(super) refused: Option<Refused>,
 }
@@ -76,64 +66,105 @@ const NO_EYES: [&str; 7] = [
     "no endpoints found that support image input",
 ];
 
-/// Judges a refused request by its status and by what the server said of it.
-pub(super) fn judge(status: u16, complaint: &Complaint, sent: Sent<'_>) -> Verdict {
-    let hopeless = |hint| Verdict {
-        kind: FailureKind::Request,
-        reach: Reach::Endpoint,
-        again: false,
-        hint: Some(hint),
-        refused: None,
-    };
-    let again = |kind| Verdict {
-        kind,
-        reach: Reach::Trial,
-        again: true,
-        hint: None,
-        refused: None,
-    };
-    let no_credit = complaint.is_any(&NO_CREDIT)
-        || (matches!(status, 400 | 402 | 403 | 429) && complaint.says_any(&NO_CREDIT_WORDS));
-    match status {
-        _ if no_credit => Verdict {
-            kind: if status == 429 {
-                FailureKind::RateLimit
-            } else {
-                FailureKind::Request
+/// The remedy where there is no money.
+const ADD_CREDIT: &str = "the account has no credit left: add some, then go on with --resume";
+
+impl FailureClass {
+    /// The class of a refused request, by its status and by what the server said about it.
+    pub(super) fn of(status: u16, complaint: &Complaint, wire: Wire, sent: Sent<'_>) -> Self {
+        let no_credit = complaint.is_any(&NO_CREDIT)
+            || (matches!(status, 400 | 402 | 403 | 429) && complaint.says_any(&NO_CREDIT_WORDS));
+        match status {
+            429 if no_credit => Self {
+                kind: FailureKind::RateLimit,
+                ..Self::hopeless(ADD_CREDIT)
             },
-            ..hopeless("the account has no credit left: add some, then go on with --resume")
-        },
-        _ if sent.has_image && complaint.says_any(&NO_EYES) => hopeless(
-            "the model takes no images: choose another --model, or ask it without them by --blind",
-        ),
-        300..400 => hopeless("redirects are not followed: give the final address as --base-url"),
-        401 if !sent.has_key => {
-            hopeless("no key was sent: name one by --api-key-env or --api-key-file")
-        }
-        401 => hopeless("check the key that --api-key-env or --api-key-file names"),
-        400.. if complaint.is_any(&HOPELESS) || complaint.says_any(&HOPELESS_WORDS) => {
-            hopeless("check the key, --model and --base-url")
-        }
-        400..500 if complaint.is_any(&MODERATED) || (status == 403 && moderated(complaint)) => {
-            Verdict {
-                kind: FailureKind::Filtered,
-                ..refused(None)
+            _ if no_credit => Self::hopeless(ADD_CREDIT),
+            _ if sent.has_image && complaint.says_any(&NO_EYES) => Self::hopeless(
+                "the model takes no images: choose another --model, or ask it without them by --blind",
+            ),
+            300..400 => {
+                Self::hopeless("redirects are not followed: give the final address as --base-url")
             }
+            401 if !sent.has_key => {
+                Self::hopeless("no key was sent: name one by --api-key-env or --api-key-file")
+            }
+            401 => Self::hopeless("check the key that --api-key-env or --api-key-file names"),
+            400.. if complaint.is_any(&HOPELESS) || complaint.says_any(&HOPELESS_WORDS) => {
+                Self::hopeless("check the key, --model and --base-url")
+            }
+            400..500 if complaint.is_any(&MODERATED) || (status == 403 && moderated(complaint)) => {
+                Self {
+                    kind: FailureKind::Filtered,
+                    ..Self::refused()
+                }
+            }
+            402 => Self::hopeless(ADD_CREDIT),
+            403 | 407 => Self::hopeless(
+                "the key may not use this model from here: check the key and --model",
+            ),
+            404 | 410 => Self::hopeless("check --base-url (many end with /v1) and --model"),
+            405 => Self::hopeless(&format!(
+                "check --base-url: requests go to its path with /{} behind it",
+                wire.path()
+            )),
+            408 | 425 => Self::passing(FailureKind::Timeout),
+            413 => Self {
+                hint: Some("send smaller images: --max-side, or --image jpeg:95".to_owned()),
+                ..Self::refused()
+            },
+            429 => Self::passing(FailureKind::RateLimit),
+            // 498 and 499 are Groq's and nginx' words for: no room, and: gone away.
+            409 | 498 | 499 | 500.. => Self::passing(FailureKind::Server),
+            _ => Self::of_field(complaint, &wire.fields(sent)),
         }
-        402 => hopeless("the account has no credit left: add some, then go on with --resume"),
-        403 | 407 => {
-            hopeless("the key may not use this model from here: check the key and --model")
+    }
+
+    /// Every other request would fail alike.
+    fn hopeless(hint: &str) -> Self {
+        Self {
+            reach: Reach::Endpoint,
+            hint: Some(hint.to_owned()),
+            ..Self::refused()
         }
-        404 | 410 => hopeless("check --base-url (many end with /v1) and --model"),
-        405 => {
-            hopeless("check --base-url: requests go to its path with /chat/completions behind it")
+    }
+
+    /// The same request may succeed later.
+    fn passing(kind: FailureKind) -> Self {
+        Self {
+            kind,
+            again: true,
+            ..Self::refused()
         }
-        408 | 425 => again(FailureKind::Timeout),
-        413 => refused(Some("send smaller images: --max-side, or --image jpeg:95")),
-        429 => again(FailureKind::RateLimit),
-        // 498 and 499 are Groq's and nginx' words for: no room, and: gone away.
-        409 | 498 | 499 | 500.. => again(FailureKind::Server),
-        _ => parameter(complaint, sent),
+    }
+
+    /// This one request is refused.
+    fn refused() -> Self {
+        Self {
+            kind: FailureKind::Request,
+            reach: Reach::Trial,
+            again: false,
+            hint: None,
+            refused: None,
+        }
+    }
+
+    /// A refused request that may be about one of its fields. If the server names the field, every other request with it
+    /// fails alike; if only its words do, it could be about this one request.
+    fn of_field(complaint: &Complaint, fields: &[Field]) -> Self {
+        let mut sent = fields.iter().filter(|field| field.sent);
+        let (reach, field) = match sent.clone().find(|field| field.is_named(complaint)) {
+            Some(field) => (Reach::Endpoint, field),
+            None => match sent.find(|field| field.is_mentioned(complaint)) {
+                Some(field) => (Reach::Trial, field),
+                None => return Self::refused(),
+            },
+        };
+        Self {
+            reach,
+            refused: field.refused.filter(|_| is_unsupported(complaint)),
+            ..Self::hopeless(field.hint)
+        }
     }
 }
 
@@ -141,39 +172,11 @@ fn moderated(complaint: &Complaint) -> bool {
     complaint.moderated || complaint.says_any(&["moderation", "flagged"])
 }
 
-fn refused(hint: Option<&'static str>) -> Verdict {
-    Verdict {
-        kind: FailureKind::Request,
-        reach: Reach::Trial,
-        again: false,
-        hint,
-        refused: None,
-    }
-}
-
-/// A refused request that may be about one of its fields. Where the server names the field, every other request with it
-/// fails alike; where only its words do, it could be about this one request.
-fn parameter(complaint: &Complaint, sent: Sent<'_>) -> Verdict {
-    let fields = fields(sent);
-    let mut sent_ones = fields.iter().filter(|field| field.sent);
-    let (reach, field) = match sent_ones.clone().find(|field| field.is_named(complaint)) {
-        Some(field) => (Reach::Endpoint, field),
-        None => match sent_ones.find(|field| field.is_mentioned(complaint)) {
-            Some(field) => (Reach::Trial, field),
-            None => return refused(None),
-        },
-    };
-    Verdict {
-        reach,
-        refused: field.refused.filter(|_| is_unsupported(complaint)),
-        ..refused(Some(field.hint))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ask::parameters::TokenField;
+    use crate::ask::field::Fields;
+    use crate::ask::parameters::{Parameters, TokenField};
 
     fn parameters() -> Parameters {
         Parameters {
@@ -182,7 +185,7 @@ mod tests {
         }
     }
 
-    fn judged(status: u16, body: &str) -> Verdict {
+    fn judged(status: u16, body: &str) -> FailureClass {
         let sent = Sent {
             parameters: &parameters(),
             fields: Fields {
@@ -192,19 +195,19 @@ mod tests {
             has_image: true,
             has_key: true,
         };
-        judge(status, &Complaint::of_body(body), sent)
+        FailureClass::of(status, &Complaint::of_body(body), Wire::Chat, sent)
     }
 
     #[test]
     fn statuses_are_told_apart() {
         for status in [301, 302, 307, 401, 402, 403, 404, 405, 407, 410] {
-            let verdict = judged(status, "");
+            let class = judged(status, "");
             assert_eq!(
-                (verdict.reach, verdict.again),
+                (class.reach, class.again),
                 (Reach::Endpoint, false),
                 "{status}"
             );
-            assert!(verdict.hint.is_some(), "{status}");
+            assert!(class.hint.is_some(), "{status}");
         }
         for (status, kind) in [
             (408, FailureKind::Timeout),
@@ -217,18 +220,14 @@ mod tests {
             (529, FailureKind::Server),
             (599, FailureKind::Server),
         ] {
-            let verdict = judged(status, "");
-            assert_eq!(
-                (verdict.reach, verdict.again),
-                (Reach::Trial, true),
-                "{status}"
-            );
-            assert_eq!(verdict.kind, kind);
+            let class = judged(status, "");
+            assert_eq!((class.reach, class.again), (Reach::Trial, true), "{status}");
+            assert_eq!(class.kind, kind);
         }
         for status in [400, 413, 415, 422] {
-            let verdict = judged(status, "");
+            let class = judged(status, "");
             assert_eq!(
-                (verdict.reach, verdict.again),
+                (class.reach, class.again),
                 (Reach::Trial, false),
                 "{status}"
             );
@@ -260,9 +259,9 @@ mod tests {
                 r#"{"object":"error","message":"X is not a multimodal model None","code":400}"#,
             ),
         ] {
-            let verdict = judged(status, body);
+            let class = judged(status, body);
             assert_eq!(
-                (verdict.reach, verdict.again),
+                (class.reach, class.again),
                 (Reach::Endpoint, false),
                 "{body}"
             );
@@ -274,9 +273,9 @@ mod tests {
             r#"{"error":{"code":403,"message":"x","metadata":{"reasons":["violence"]}}}"#;
         let filtered = r#"{"error":{"code":"content_filter","message":"x","innererror":{"code":"ResponsibleAIPolicyViolation"}}}"#;
         for (status, body) in [(403, moderated), (400, filtered)] {
-            let verdict = judged(status, body);
+            let class = judged(status, body);
             assert_eq!(
-                (verdict.reach, verdict.again, verdict.kind),
+                (class.reach, class.again, class.kind),
                 (Reach::Trial, false, FailureKind::Filtered)
             );
         }
@@ -306,9 +305,9 @@ mod tests {
                 "--reasoning-effort",
             ),
         ] {
-            let verdict = judged(400, body);
-            assert_eq!(verdict.reach, reach, "{body}");
-            assert!(verdict.hint.unwrap().contains(flag), "{body}");
+            let class = judged(400, body);
+            assert_eq!(class.reach, reach, "{body}");
+            assert!(class.hint.unwrap().contains(flag), "{body}");
         }
         // What was not sent is not to blame.
         for body in [

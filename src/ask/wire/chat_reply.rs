@@ -1,19 +1,11 @@
-//! What an endpoint says: a chat completion read as leniently as servers are written, [`read`].
+//! Replies of OpenAI's chat completions, read as leniently as servers are written: [`read`].
 
 use serde_json::Value;
 
-use super::complaint::{Complaint, page_title};
-use super::{escapes, stream};
+use super::stream;
+use crate::ask::complaint::{Complaint, UnreadableReply, page_title};
+use crate::ask::escapes;
 use crate::types::{Finish, Reply, Usage};
-
-/// Why a reply with a status of success holds no answer.
-#[derive(Debug, PartialEq, Eq)]
-pub(super) enum Flaw {
-    /// The server says that something went wrong.
-    Said(Complaint),
-    /// It is no chat completion; what it is instead.
-    Unreadable(String),
-}
 
 /// Reads a body; `latency_ms` and `attempts` are left at zero.
 ///
@@ -21,27 +13,32 @@ pub(super) enum Flaw {
 /// do not matter may be missing, null or of another type; hidden reasoning is never looked at. Bytes that are no UTF-8, and
 /// escapes that are no character, become replacement characters: a small model at temperature 0 would say them again however
 /// often it is asked. An event stream that nobody asked for is put together.
-pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, Flaw> {
+pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableReply> {
     let text = String::from_utf8_lossy(body);
     let text = text.trim_start_matches('\u{FEFF}');
     let completion = parsed(text, content_type)?;
-    if let Some(complaint) = Complaint::of(&completion) {
-        return Err(Flaw::Said(complaint));
+    // A completion may have a field "message" of its own.
+    let complaint = match completion.get("choices") {
+        Some(_) => Complaint::in_error(&completion),
+        None => Complaint::of(&completion),
+    };
+    if let Some(complaint) = complaint {
+        return Err(UnreadableReply::Complaint(complaint));
     }
     let choice = choice(&completion)?;
     if let Some(error) = choice.get("error").filter(|error| !error.is_null()) {
-        return Err(Flaw::Said(Complaint::of_error(error)));
+        return Err(UnreadableReply::Complaint(Complaint::of_error(error)));
     }
     let reason = choice.get("finish_reason").and_then(Value::as_str);
     if reason == Some("error") {
-        return Err(flaw(
+        return Err(other(
             "a reply that broke off: its finish_reason is \"error\"",
         ));
     }
     let message = choice
         .get("message")
         .filter(|message| message.is_object())
-        .ok_or_else(|| flaw("a choice without a message"))?;
+        .ok_or_else(|| other("a choice without a message"))?;
     let (text, refused) = content(message.get("content"))?;
     let refusal = message.get("refusal").and_then(Value::as_str);
     Ok(Reply {
@@ -61,14 +58,14 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, Flaw> {
     })
 }
 
-fn flaw(what: &str) -> Flaw {
-    Flaw::Unreadable(what.to_owned())
+fn other(what: &str) -> UnreadableReply {
+    UnreadableReply::Other(what.to_owned())
 }
 
-fn parsed(text: &str, content_type: &str) -> Result<Value, Flaw> {
+fn parsed(text: &str, content_type: &str) -> Result<Value, UnreadableReply> {
     if stream::is_stream(text, content_type) {
         return stream::assemble(text)
-            .ok_or_else(|| flaw("an event stream that holds no whole chat completion"));
+            .ok_or_else(|| other("an event stream that holds no whole chat completion"));
     }
     serde_json::from_str(text).or_else(|error| {
         let mended = escapes::mended(text).and_then(|text| serde_json::from_str(&text).ok());
@@ -77,36 +74,36 @@ fn parsed(text: &str, content_type: &str) -> Result<Value, Flaw> {
 }
 
 /// What a body is that is no JSON.
-fn unreadable(text: &str, content_type: &str, error: &serde_json::Error) -> Flaw {
+fn unreadable(text: &str, content_type: &str, error: &serde_json::Error) -> UnreadableReply {
     if text.trim().is_empty() {
-        return flaw("an empty body");
+        return other("an empty body");
     }
-    Flaw::Unreadable(
+    UnreadableReply::Other(
         page_title(text)
             .unwrap_or_else(|| format!("{content_type:?} that is no whole JSON ({error}): {text}")),
     )
 }
 
 /// The choice with index 0, else the first.
-fn choice(completion: &Value) -> Result<&Value, Flaw> {
+fn choice(completion: &Value) -> Result<&Value, UnreadableReply> {
     let choices = completion
         .get("choices")
         .and_then(Value::as_array)
-        .ok_or_else(|| flaw("JSON without choices"))?;
+        .ok_or_else(|| other("JSON without choices"))?;
     choices
         .iter()
         .find(|choice| choice.get("index").and_then(Value::as_u64) == Some(0))
         .or(choices.first())
-        .ok_or_else(|| flaw("a completion with no choices in it"))
+        .ok_or_else(|| other("a completion with no choices in it"))
 }
 
 /// The words of a message and those of a refusal among its parts.
-fn content(content: Option<&Value>) -> Result<(String, Option<String>), Flaw> {
+fn content(content: Option<&Value>) -> Result<(String, Option<String>), UnreadableReply> {
     let parts = match content {
         None | Some(Value::Null) => return Ok((String::new(), None)),
         Some(Value::String(text)) => return Ok((text.clone(), None)),
         Some(Value::Array(parts)) => parts,
-        Some(_) => return Err(flaw("a message whose content is neither text nor parts")),
+        Some(_) => return Err(other("a message whose content is neither text nor parts")),
     };
     let (mut text, mut refusal) = (String::new(), String::new());
     for part in parts {
@@ -152,7 +149,7 @@ fn usage(usage: Option<&Value>) -> Option<Usage> {
 mod tests {
     use super::*;
 
-    fn json(body: &str) -> Result<Reply, Flaw> {
+    fn json(body: &str) -> Result<Reply, UnreadableReply> {
         read(body.as_bytes(), "application/json")
     }
 
@@ -228,7 +225,7 @@ mod tests {
             r#"{"error":"m"}"#,
             r#"{"choices":[{"error":{"message":"m"},"message":{"content":"B"}}]}"#,
         ] {
-            let Err(Flaw::Said(complaint)) = json(body) else {
+            let Err(UnreadableReply::Complaint(complaint)) = json(body) else {
                 panic!("{body}");
             };
             assert_eq!(complaint.message, "m");
@@ -242,6 +239,11 @@ mod tests {
             ("", "application/json", "empty"),
             ("{\"choices\":[", "application/json", "no whole JSON"),
             ("{\"choices\":null}", "application/json", "without choices"),
+            (
+                "{\"choices\":null,\"message\":\"x\"}",
+                "application/json",
+                "without choices",
+            ),
             ("{\"choices\":[]}", "application/json", "no choices"),
             (
                 "{\"choices\":[null]}",
@@ -259,7 +261,7 @@ mod tests {
             ("<html><title>Welcome</title>", "text/html", "Welcome"),
             (&deep, "application/json", "no whole JSON"),
         ] {
-            let Err(Flaw::Unreadable(what)) = read(body.as_bytes(), content_type) else {
+            let Err(UnreadableReply::Other(what)) = read(body.as_bytes(), content_type) else {
                 panic!("{body}");
             };
             assert!(what.contains(said), "{what}");

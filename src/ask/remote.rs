@@ -1,22 +1,28 @@
-//! The model behind an endpoint: [`OpenAi`].
+//! The model behind an endpoint: [`Remote`].
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use reqwest::header::HeaderMap;
+use serde_json::{Value, json};
 use tracing::warn;
 
-use super::endpoint::Endpoint;
-use super::field::Refused;
+use super::call::Message;
+use super::constraint::letter_of;
+use super::endpoint::{Endpoint, Request};
+use super::failure::AskError;
+use super::field::{Fields, Refused, Sent};
 use super::parameters::{Constrain, Parameters, Temperature, TokenField};
-use super::request::{self, Asked, Fields};
-use super::verdict::Sent;
-use super::{AskError, Message, Reach, failure};
-use crate::types::{Digest, FailureKind, Reply};
+use super::wire::Wire;
+use crate::error::Result;
+use crate::types::{FailureKind, Reply};
 
-/// One model of an OpenAI-compatible endpoint, asked with one set of parameters.
+/// One model of an endpoint, asked by one wire with one set of parameters.
 #[derive(Debug)]
-pub struct OpenAi {
+pub struct Remote {
     endpoint: Arc<Endpoint>,
+    wire: Wire,
+    headers: HeaderMap,
     parameters: Parameters,
     /// The fields that the server takes, as far as is known.
     fields: Mutex<Fields>,
@@ -24,16 +30,20 @@ pub struct OpenAi {
     unconstrained: AtomicBool,
 }
 
-impl OpenAi {
+impl Remote {
     /// The model that `parameters` name; models of one endpoint share its connections and its pauses.
-    #[must_use]
-    pub fn new(endpoint: Arc<Endpoint>, parameters: Parameters) -> Self {
-        Self {
+    ///
+    /// # Errors
+    /// If a header cannot carry what it should.
+    pub fn open(endpoint: Arc<Endpoint>, wire: Wire, parameters: Parameters) -> Result<Self> {
+        Ok(Self {
+            headers: endpoint.headers(wire)?,
             fields: Mutex::new(Fields::first(&parameters, endpoint.host())),
             endpoint,
+            wire,
             parameters,
             unconstrained: AtomicBool::new(false),
-        }
+        })
     }
 
     /// The model, by the endpoint's name.
@@ -69,18 +79,24 @@ impl OpenAi {
         field.into_iter().chain(temperature).collect()
     }
 
-    pub(super) fn digest(&self) -> Digest {
-        self.parameters.digest()
+    /// The wire and all parameters that can change a reply.
+    pub(super) fn content(&self) -> Value {
+        let mut content = self.parameters.content();
+        content["wire"] = json!(self.wire);
+        content
+    }
+
+    /// The path that a line of a Batch API's file asks; `None` if the wire has no batches.
+    pub(super) fn batch_url(&self) -> Option<&'static str> {
+        self.wire.batch_url()
     }
 
     /// Sends the one message of a conversation, which offers so many choices (0 where the answer is open).
     pub async fn ask(&self, message: Message<'_>, choices: usize) -> Result<Reply, AskError> {
-        let asked = Asked { message, choices };
         let mut attempts = 0;
         loop {
             let fields = self.fields();
-            let result = self.ask_with(fields, asked).await;
-            match result {
+            match self.ask_with(fields, message, choices).await {
                 Err(error) if self.adapt(fields, error.refused) => attempts += error.attempts,
                 Err(error) => {
                     let attempts = attempts + error.attempts;
@@ -104,27 +120,35 @@ impl OpenAi {
     /// # Errors
     /// Where it cannot be written as JSON.
     pub fn body(&self, message: Message<'_>, choices: usize) -> Result<Vec<u8>, serde_json::Error> {
-        let asked = Asked { message, choices };
-        request::body(&self.parameters, self.fields(), asked).map(|parts| parts.joined())
+        let (parameters, fields) = (&self.parameters, self.fields());
+        let body = self.wire.body(parameters, fields, message, choices)?;
+        Ok(body.joined())
     }
 
-    async fn ask_with(&self, fields: Fields, asked: Asked<'_>) -> Result<Reply, AskError> {
-        let body = request::body(&self.parameters, fields, asked).map_err(|error| AskError {
-            failure: failure(
-                FailureKind::Request,
-                format!("the request could not be written: {error}"),
-            ),
-            attempts: 0,
-            reach: Reach::Trial,
-            refused: None,
+    async fn ask_with(
+        &self,
+        fields: Fields,
+        message: Message<'_>,
+        choices: usize,
+    ) -> Result<Reply, AskError> {
+        let parameters = &self.parameters;
+        let body = self.wire.body(parameters, fields, message, choices);
+        let body = body.map_err(|error| {
+            let message = format!("the request could not be written: {error}");
+            AskError::new(FailureKind::Request, message, 0)
         })?;
-        let sent = Sent {
-            parameters: &self.parameters,
-            fields,
-            has_image: !asked.message.images.is_empty(),
-            has_key: self.endpoint.has_key(),
+        let request = Request {
+            wire: self.wire,
+            headers: &self.headers,
+            body,
+            sent: Sent {
+                parameters,
+                fields,
+                has_image: !message.images.is_empty(),
+                has_key: self.endpoint.has_key(),
+            },
         };
-        self.endpoint.ask(&body, sent).await
+        self.endpoint.ask(&request).await
     }
 
     fn fields(&self) -> Fields {
@@ -177,7 +201,7 @@ impl OpenAi {
         if constrain == Constrain::None {
             return text;
         }
-        request::constrained_letter(constrain, choices, &text).unwrap_or_else(|| {
+        letter_of(constrain, choices, &text).unwrap_or_else(|| {
             if !self.unconstrained.swap(true, Ordering::Relaxed) {
                 warn!(
                     "{}: a reply is not what --constrain {constrain} asked for; the server may not know it, or the reply was cut \

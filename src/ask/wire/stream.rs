@@ -7,7 +7,7 @@ pub(super) fn is_stream(text: &str, content_type: &str) -> bool {
     content_type.starts_with("text/event-stream") || text.trim_start().starts_with("data:")
 }
 
-/// Puts the pieces of the choice with index 0 together into a completion as [`super::response::read`] knows it; an event
+/// Puts the pieces of the choice with index 0 together into a completion as `chat_reply` knows it; an event
 /// with an error is returned as it is. `None` where the stream is none of a chat completion, or broke off: neither
 /// `[DONE]` nor a reason to finish came.
 pub(super) fn assemble(stream: &str) -> Option<Value> {

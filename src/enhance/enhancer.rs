@@ -2,25 +2,21 @@
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
-
-use ort::session::Session;
 
 use crate::error::{Error, Result};
 use crate::types::{Digest, EnhancerName, Rgb};
 
-use super::convention::{Layout, Pad, Tile};
+use super::convention::{Pad, Tile};
 use super::describe::Description;
-use super::feeding::{Feeding, Input, Window};
 use super::file::ModelFile;
+use super::graph::{Graph, Ran};
 use super::memory::{self, Cost, PROBES};
 use super::planes::Planes;
-use super::reading::{Reading, Samples, Wild};
+use super::reading::OutOfRange;
 use super::runtime::Runtime;
-use super::session::{Options, Source, Stopper, builder, ports, run, said};
+use super::session::{Source, Stopper};
 use super::sidecar::Sidecar;
-use super::signature::Signature;
-use super::tiles::{Canvas, Cut, Plan, Tiling};
+use super::tiles::{Canvas, Cut, MULTIPLES, Plan, Tiling, Window};
 
 /// The sides of tiles where nobody says them, in pixels: measured as fast as the whole image with a twelfth of its memory.
 const TILE: usize = 256;
@@ -28,8 +24,6 @@ const TILE: usize = 256;
 const WHOLE: usize = 1280 * 720;
 /// The context of tiles that are asked for without anybody saying how much is exact.
 const CONTEXT: usize = 32;
-/// What sides are tried as multiples of, where a model fails on an image's own and nobody says better.
-pub(super) const MULTIPLES: [usize; 6] = [1, 4, 8, 12, 16, 32];
 
 /// What is known of the memory that a model needs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,29 +41,12 @@ pub struct Enhancer {
     path: PathBuf,
     name: EnhancerName,
     digest: Digest,
-    signature: Arc<Signature>,
+    graph: Graph,
     stated: Sidecar,
-    feeding: Feeding,
-    reading: Arc<Reading>,
     tiling: Tiling,
     most_side: Option<NonZeroUsize>,
     cost: Estimate,
     description: Description,
-    runtime: Runtime,
-    session: Arc<Mutex<Session>>,
-    options: Arc<Options>,
-}
-
-/// What became of a run.
-enum Ran<T> {
-    /// It gave this.
-    Gave(T),
-    /// It failed, with ONNX Runtime's words.
-    Failed(String),
-    /// It gave a tensor of such dimensions, which is no image of the size it should have.
-    Misshapen(Vec<i64>),
-    /// Its values are none.
-    Wild(Wild),
 }
 
 impl Enhancer {
@@ -82,11 +59,12 @@ impl Enhancer {
         runtime: &Runtime,
         threads: Option<NonZeroUsize>,
     ) -> Result<Self> {
-        let path = file.path.clone();
-        let fault = |problem: String| Error::Enhancer {
-            path: path.clone(),
-            problem,
-        };
+        let none = Sidecar::default();
+        let preset = file.preset.as_ref();
+        let stated = file
+            .sidecar
+            .clone()
+            .over(preset.map_or(&none, |preset| &preset.states));
         let flushed = file.weights.flush_subnormals(&mut file.bytes);
         // ONNX Runtime finds external data only from the model's path.
         let source = if file.weights.external.is_empty() {
@@ -94,45 +72,24 @@ impl Enhancer {
         } else {
             Source::Path(file.path.clone())
         };
-        let environment = runtime.environment().clone();
-        let session = runtime
-            .run(move || builder(&environment, threads).and_then(|builder| source.commit(builder)))?
-            .map_err(|e| fault(format!("ONNX Runtime cannot load it: {}", said(&e))))?;
-        let none = Sidecar::default();
-        let preset = file.preset.as_ref();
-        let stated = file
-            .sidecar
-            .clone()
-            .over(preset.map_or(&none, |preset| &preset.states));
-        let inputs = ports(session.inputs());
-        let signature =
-            Signature::of(&inputs, &ports(session.outputs()), &stated).map_err(fault)?;
-        let (feeding, reading) = (
-            Feeding::of(&signature, &stated),
-            Reading::of(&signature, &stated),
-        );
-        let description = Description {
-            sidecar: file.sidecar,
-            preset: file.preset,
-            flushed,
-        };
-        let options = Options::of(&signature.output.port.name);
-        let options = options.map_err(|e| fault(said(&e)))?;
+        let graph = Graph::load(source, &stated, runtime, threads)?.map_err(|problem| {
+            let path = file.path.clone();
+            Error::Enhancer { path, problem }
+        })?;
         Ok(Self {
             path: file.path,
             name: file.name,
             digest: file.digest,
-            signature: Arc::new(signature),
+            graph,
             stated,
-            feeding,
-            reading: Arc::new(reading),
             tiling: Tiling::Auto,
             most_side: None,
             cost: Estimate::Unknown,
-            description,
-            runtime: runtime.clone(),
-            session: Arc::new(Mutex::new(session)),
-            options: Arc::new(options),
+            description: Description {
+                sidecar: file.sidecar,
+                preset: file.preset,
+                flushed,
+            },
         })
     }
 
@@ -163,19 +120,13 @@ impl Enhancer {
     /// What was found in the graph and beside it, and why it is taken to be so: lines of text.
     #[must_use]
     pub fn describe(&self) -> String {
-        self.description.text(
-            &self.path,
-            &self.signature,
-            &self.feeding,
-            &self.reading,
-            &self.stated,
-        )
+        self.description.text(&self.path, &self.graph, &self.stated)
     }
 
     /// A handle that ends a run from another thread.
     #[must_use]
     pub fn stopper(&self) -> Stopper {
-        Stopper(Arc::clone(&self.options))
+        self.graph.stopper()
     }
 
     /// Enhances an image; the result has the same size.
@@ -192,8 +143,8 @@ impl Enhancer {
             return self.resized(dark, smaller);
         }
         let fixed = [
-            self.signature.height.unwrap_or(size[0]),
-            self.signature.width.unwrap_or(size[1]),
+            self.graph.signature.height.unwrap_or(size[0]),
+            self.graph.signature.width.unwrap_or(size[1]),
         ];
         let cut_exactly = matches!(self.stated.tile, Some(Tile::Exact(_)))
             && fixed.iter().zip(size).all(|(fixed, size)| *fixed <= size);
@@ -202,14 +153,14 @@ impl Enhancer {
         }
         let multiples: &[usize] = match self.stated.multiple {
             Some(multiple) => &[multiple.get()],
-            None if fixed == size && self.signature.takes_any_size() => &MULTIPLES,
+            None if fixed == size && self.graph.signature.takes_any_size() => &MULTIPLES,
             None => &[1],
         };
         self.estimate(dark, fixed)?;
         let mut first = None;
         for multiple in multiples {
-            match self.mended(dark, fixed, *multiple)? {
-                Ok(mended) => return Ok(mended),
+            match self.enhanced(dark, fixed, *multiple)? {
+                Ok(enhanced) => return Ok(enhanced),
                 Err(problem) => drop(first.get_or_insert(problem)),
             }
         }
@@ -220,13 +171,11 @@ impl Enhancer {
     fn estimate(&mut self, dark: &Rgb, fixed: [usize; 2]) -> Result<()> {
         let size = [dark.height(), dark.width()];
         let pixels = size[0] * size[1];
-        let (area, cut, _) = self.cut(
-            size,
-            fixed,
-            self.stated.multiple.map_or(1, NonZeroUsize::get),
-        )?;
-        let probed = size.iter().all(|side| *side >= PROBES[1]) && self.signature.takes_any_size();
-        if pixels <= WHOLE || cut.tile != area || !probed {
+        let multiple = self.stated.multiple.map_or(1, NonZeroUsize::get);
+        let cut = self.cut(size, fixed, multiple)?;
+        let probed =
+            size.iter().all(|side| *side >= PROBES[1]) && self.graph.signature.takes_any_size();
+        if pixels <= WHOLE || cut.tile != cut.area || !probed {
             return Ok(());
         }
         if self.cost == Estimate::Unknown {
@@ -256,8 +205,7 @@ impl Enhancer {
                 right: side,
                 bottom: side,
             };
-            let input = self.feeding.window(dark, window);
-            let ran = self.run(input, window.size(), |_, _| Ok(()))?;
+            let ran = self.graph.probe(dark, window)?;
             let (Ran::Gave(()), Some(bytes)) = (ran, memory::resident()) else {
                 return Ok(None);
             };
@@ -270,7 +218,7 @@ impl Enhancer {
     fn reduced(&self, size: [usize; 2]) -> Option<[usize; 2]> {
         let most = self.most_side.map(NonZeroUsize::get)?;
         let longest = size[0].max(size[1]);
-        if longest <= most || !self.signature.takes_any_size() {
+        if longest <= most || !self.graph.signature.takes_any_size() {
             return None;
         }
         let multiple = self.stated.multiple.map_or(1, NonZeroUsize::get);
@@ -280,45 +228,27 @@ impl Enhancer {
         }))
     }
 
-    /// Enhances an image whose sides are filled up to multiples; a problem that another multiple may mend is given back.
-    fn mended(
+    /// Enhances an image whose sides are filled up to multiples; a problem that another multiple may solve is given back.
+    fn enhanced(
         &self,
         dark: &Rgb,
         fixed: [usize; 2],
         multiple: usize,
     ) -> Result<std::result::Result<Rgb, String>> {
         let size = [dark.height(), dark.width()];
-        let (area, cut, checked) = self.cut(size, fixed, multiple)?;
-        let plan = Plan::of(area, cut).ok_or_else(|| self.too_small(cut))?;
-        let mut canvas = Canvas::new(area);
-        for row in &plan.rows {
-            for column in &plan.columns {
-                let window = Window {
-                    left: column.start,
-                    top: row.start,
-                    right: column.end,
-                    bottom: row.end,
-                };
-                let part = Window {
-                    left: column.from - column.start,
-                    top: row.from - row.start,
-                    right: column.to - column.start,
-                    bottom: row.to - row.start,
-                };
-                let input = self.feeding.window(dark, window);
-                let reading = Arc::clone(&self.reading);
-                let ran = self.run(input, window.size(), move |samples, layout| {
-                    reading.bytes(samples, layout, window.size(), part)
-                })?;
-                match ran {
-                    Ran::Gave(bytes) => canvas.put(*row, *column, &bytes),
-                    Ran::Wild(wild) => return Err(self.wild(wild, dark)),
-                    problem => return Ok(Err(problem.to_string(window.size()))),
-                }
+        let cut = self.cut(size, fixed, multiple)?;
+        let plan = Plan::of(cut).ok_or_else(|| self.too_small(cut))?;
+        let mut canvas = Canvas::new(cut.area);
+        for (row, column) in plan.tiles() {
+            let (seen, taken) = (Window::seen(row, column), Window::taken(row, column));
+            match self.graph.window(dark, seen, taken)? {
+                Ran::Gave(bytes) => canvas.put(row, column, &bytes),
+                Ran::Failed(problem) => return Ok(Err(problem)),
+                Ran::Unusable(values) => return Err(self.unusable(values, dark)),
             }
         }
-        let (mended, seam) = canvas.finish();
-        if checked && !seam.holds() {
+        let (enhanced, seam) = canvas.finish();
+        if !self.crops(size, multiple) && !seam.holds() {
             return Err(self.fault(format!(
                 "is not to be cut: its {} tiles differ by up to {} codes at their seams in {} of {} samples, so that a pixel depends on more than {} pixels around it. Leave --tile out for the whole image, or state more context (tile = \"exact:N\" in MODEL.onnx.toml)",
                 plan.count(),
@@ -328,34 +258,35 @@ impl Enhancer {
                 cut.context
             )));
         }
-        Ok(Ok(if area == size {
-            mended
+        Ok(Ok(if cut.area == size {
+            enhanced
         } else {
-            cropped(&mended, size)
+            cropped(&enhanced, size)
         }))
     }
 
-    /// The area that tiles cover, how they are cut, and whether their seams have to hold.
-    fn cut(
-        &self,
-        size: [usize; 2],
-        fixed: [usize; 2],
-        multiple: usize,
-    ) -> Result<([usize; 2], Cut, bool)> {
-        if self.feeding.pad == Pad::Crop && size.iter().any(|side| side % multiple != 0) {
-            let tile = size.map(|side| side / multiple * multiple);
+    /// Whether an image is seen in parts of multiples that overlap, so that their seams need not hold.
+    fn crops(&self, size: [usize; 2], multiple: usize) -> bool {
+        self.graph.feeding.pad == Pad::Crop && size.iter().any(|side| side % multiple != 0)
+    }
+
+    /// The area that tiles cover, and how they are cut.
+    fn cut(&self, size: [usize; 2], fixed: [usize; 2], multiple: usize) -> Result<Cut> {
+        let down = |side: usize| side / multiple * multiple;
+        if self.crops(size, multiple) {
+            let tile = size.map(down);
             if tile.contains(&0) {
                 return Err(self.fault(format!(
                     "takes images of multiples of {multiple} pixels, and {} × {} is smaller than that",
                     size[1], size[0]
                 )));
             }
-            let cut = Cut {
+            return Ok(Cut {
+                area: size,
                 tile,
                 context: 0,
                 multiple: 1,
-            };
-            return Ok((size, cut, false));
+            });
         }
         let area = size.map(|side| side.next_multiple_of(multiple));
         let stated = match self.stated.tile {
@@ -363,7 +294,7 @@ impl Enhancer {
             _ => None,
         };
         let context = stated.unwrap_or(CONTEXT);
-        let down = |side: usize| (side / multiple * multiple).max(multiple);
+        let square = |side: usize| [down(side).max(multiple); 2];
         let tile = match (self.tiling, stated) {
             _ if fixed != size => fixed,
             (Tiling::Of(asked), _) if self.stated.tile == Some(Tile::None) => {
@@ -375,21 +306,16 @@ impl Enhancer {
                     ),
                 ));
             }
-            (Tiling::Of(asked), _) => [down(asked.get()); 2],
-            (Tiling::Auto, Some(_)) if size[0] * size[1] > WHOLE => {
-                [down(TILE.max(4 * context)); 2]
-            }
+            (Tiling::Of(asked), _) => square(asked.get()),
+            (Tiling::Auto, Some(_)) if size[0] * size[1] > WHOLE => square(TILE.max(4 * context)),
             (Tiling::Auto | Tiling::Whole, _) => area,
         };
-        Ok((
+        Ok(Cut {
             area,
-            Cut {
-                tile,
-                context,
-                multiple,
-            },
-            true,
-        ))
+            tile,
+            context,
+            multiple,
+        })
     }
 
     fn too_small(&self, cut: Cut) -> Error {
@@ -402,46 +328,17 @@ impl Enhancer {
     /// Enhances an image in the size that the model takes.
     fn resized(&self, dark: &Rgb, fixed: [usize; 2]) -> Result<Rgb> {
         let planes = Planes::of(dark).resized(fixed[0], fixed[1]);
-        let input = self.feeding.planes(&planes.map_err(|e| self.fault(e))?);
-        let reading = Arc::clone(&self.reading);
-        let ran = self.run(input, fixed, move |samples, layout| {
-            reading.planes(samples, layout, fixed)
-        })?;
-        let mended = match ran {
+        let planes = planes.map_err(|e| self.fault(e))?;
+        let enhanced = match self.graph.planes(&planes)? {
             Ran::Gave(planes) => planes,
-            Ran::Wild(wild) => return Err(self.wild(wild, dark)),
-            problem => return Err(self.fault(problem.to_string(fixed))),
+            Ran::Failed(problem) => return Err(self.fault(problem)),
+            Ran::Unusable(values) => return Err(self.unusable(values, dark)),
         };
-        let mended = mended.resized(dark.height(), dark.width());
-        let mended = mended.map_err(|e| self.fault(e))?;
-        mended
-            .to_rgb(self.reading.rounding)
+        let enhanced = enhanced.resized(dark.height(), dark.width());
+        let enhanced = enhanced.map_err(|e| self.fault(e))?;
+        enhanced
+            .to_rgb(self.graph.reading.rounding)
             .ok_or_else(|| self.fault("gave no pixels".to_owned()))
-    }
-
-    /// Runs the model, and reads what it gives before another run writes over it.
-    fn run<T: Send + 'static>(
-        &self,
-        input: Input,
-        size: [usize; 2],
-        read: impl FnOnce(Samples<'_>, Layout) -> std::result::Result<T, Wild> + Send + 'static,
-    ) -> Result<Ran<T>> {
-        let (session, options) = (Arc::clone(&self.session), Arc::clone(&self.options));
-        let (signature, reading) = (Arc::clone(&self.signature), Arc::clone(&self.reading));
-        self.runtime.run(move || {
-            let mut session = session.lock().unwrap_or_else(PoisonError::into_inner);
-            let ran = run(
-                &mut session,
-                &options,
-                &signature,
-                input,
-                |dims, samples| match reading.layout(dims, size) {
-                    Some(layout) => read(samples, layout).map_or_else(Ran::Wild, Ran::Gave),
-                    None => Ran::Misshapen(dims.to_vec()),
-                },
-            );
-            ran.unwrap_or_else(|e| Ran::Failed(said(&e)))
-        })
     }
 
     fn fault(&self, problem: String) -> Error {
@@ -451,37 +348,22 @@ impl Enhancer {
         }
     }
 
-    fn wild(&self, wild: Wild, image: &Rgb) -> Error {
-        self.fault(match wild {
-            Wild::NotNumbers => format!(
+    fn unusable(&self, values: OutOfRange, image: &Rgb) -> Error {
+        let range = self.graph.reading.range;
+        self.fault(match values {
+            OutOfRange::NotNumbers => format!(
                 "gave values that are not numbers (NaN) for an image of {} × {}; its weights or a division by zero in it are at fault",
                 image.width(),
                 image.height()
             ),
-            Wild::Beyond {
+            OutOfRange::Beyond {
                 least,
                 most,
                 likely,
             } => format!(
-                "gave values from {least} to {most}, which are not of {} as is usual; where they are of {likely}, say so in MODEL.onnx.toml beside it: `range_out = \"{likely}\"` (or `range_out = \"{}\"` where they are as they should be)",
-                self.reading.range, self.reading.range
+                "gave values from {least} to {most}, which are not of {range} as is usual; where they are of {likely}, say so in MODEL.onnx.toml beside it: `range_out = \"{likely}\"` (or `range_out = \"{range}\"` where they are as they should be)"
             ),
         })
-    }
-}
-
-impl<T> Ran<T> {
-    /// What went wrong with an image of such a size.
-    fn to_string(&self, [height, width]: [usize; 2]) -> String {
-        match self {
-            Self::Failed(words) => format!(
-                "failed on an image of {width} × {height} ({words}); where it takes multiples of some size alone, say it in MODEL.onnx.toml beside it: `multiple = 8`"
-            ),
-            Self::Misshapen(dims) => format!(
-                "gave {dims:?} for an image of {width} × {height}: it does not keep the size of an image; where it takes multiples of some size alone, say it in MODEL.onnx.toml beside it: `multiple = 8`"
-            ),
-            Self::Gave(_) | Self::Wild(_) => String::new(),
-        }
     }
 }
 

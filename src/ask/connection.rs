@@ -1,0 +1,128 @@
+//! The connections to one server: [`Connection::post`] sends one request.
+
+use std::time::Duration;
+
+use reqwest::header::{CONTENT_TYPE, HeaderMap};
+use reqwest::{Client, Response, StatusCode};
+use tokio::time::Instant;
+
+use super::access::{Access, chain};
+use super::body::Parts;
+use super::failure::FailedTry;
+use super::secret::Scrub;
+use super::url::BaseUrl;
+use crate::error::Result;
+use crate::types::FailureKind;
+
+/// The most of a reply that is read, unpacked: no completion of a few tokens comes near, and memory is not the server's to
+/// fill.
+const LONGEST_REPLY: usize = 16 << 20;
+
+/// Pooled connections to a server, and what may not be shown of its words.
+#[derive(Debug)]
+pub(super) struct Connection {
+    pub(super) base: BaseUrl,
+    pub(super) scrub: Scrub,
+    client: Client,
+    timeout: Duration,
+}
+
+/// What came back for one request.
+pub(super) struct Answer {
+    pub(super) status: StatusCode,
+    pub(super) headers: HeaderMap,
+    pub(super) body: Vec<u8>,
+    /// The time from sending to the last byte.
+    pub(super) took: Duration,
+}
+
+impl Answer {
+    /// A header as text, empty if there is none.
+    pub(super) fn header(&self, name: &str) -> &str {
+        let value = self.headers.get(name).and_then(|value| value.to_str().ok());
+        value.unwrap_or_default()
+    }
+}
+
+impl Connection {
+    /// Makes ready to connect; nothing is sent yet.
+    pub(super) fn new(access: &Access, scrub: Scrub, timeout: Duration) -> Result<Self> {
+        Ok(Self {
+            client: access.client(timeout, &scrub)?,
+            base: access.base.clone(),
+            scrub,
+            timeout,
+        })
+    }
+
+    /// Sends a body to a path behind the base URL.
+    pub(super) async fn post(
+        &self,
+        path: &str,
+        headers: &HeaderMap,
+        body: Parts,
+    ) -> Result<Answer, FailedTry> {
+        let started = Instant::now();
+        let request = self
+            .client
+            .post(self.base.join(path))
+            .headers(headers.clone())
+            .header(CONTENT_TYPE, "application/json")
+            .body(reqwest::Body::wrap(body));
+        let response = request.send().await.map_err(|error| self.broken(error))?;
+        let status = response.status();
+        let headers = response.headers().clone();
+        let body = match self.receive(response).await {
+            Err(tried) if status.is_success() => return Err(tried),
+            // A refusal whose words were lost on the way is a refusal all the same.
+            body => body.unwrap_or_default(),
+        };
+        Ok(Answer {
+            status,
+            headers,
+            body,
+            took: started.elapsed(),
+        })
+    }
+
+    /// The body of a reply, unpacked where it is compressed, up to a length.
+    async fn receive(&self, mut response: Response) -> Result<Vec<u8>, FailedTry> {
+        let mut body = Vec::new();
+        while let Some(chunk) = response.chunk().await.map_err(|error| self.broken(error))? {
+            if body.len() + chunk.len() > LONGEST_REPLY {
+                let message = format!("{} answered with more than 16 MiB", self.base);
+                return Err(FailedTry::new(FailureKind::Response, message));
+            }
+            body.extend_from_slice(&chunk);
+        }
+        Ok(body)
+    }
+
+    /// A try without a whole reply.
+    fn broken(&self, error: reqwest::Error) -> FailedTry {
+        let (kind, message) = if error.is_timeout() {
+            let timeout = self.timeout.as_secs_f64();
+            (
+                FailureKind::Timeout,
+                format!(
+                    "{} did not answer within {timeout} s; allow more by --timeout",
+                    self.base
+                ),
+            )
+        } else {
+            let said = self.scrub.line(&chain(&error.without_url()));
+            // Companies and universities often sign their certificates with a private CA.
+            let hint = if said.contains("UnknownIssuer") {
+                "; name the authority that signed it by --ca-file"
+            } else {
+                ""
+            };
+            let message = format!("{}: {said}{hint}", self.base);
+            (FailureKind::Connection, message)
+        };
+        FailedTry {
+            again: true,
+            ..FailedTry::new(kind, message)
+        }
+    }
+}

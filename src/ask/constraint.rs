@@ -1,0 +1,57 @@
+//! A reply that is constrained to one letter: the schema that asks for it, and [`letter_of`] a reply.
+
+use serde_json::{Value, json};
+
+use super::parameters::Constrain;
+use crate::types::question::letter;
+
+/// The field of the object that `--constrain json` asks for.
+pub(super) const ANSWER: &str = "answer";
+
+/// The JSON schema of an object with one of the letters.
+pub(super) fn schema(letters: &[char]) -> Value {
+    json!({
+        "type": "object", "additionalProperties": false, "required": [ANSWER],
+        "properties": {ANSWER: {"type": "string", "enum": letters}},
+    })
+}
+
+/// The letter in a reply that is what a constraint asked for; `None` if the server has not kept to it, or if there is none.
+pub(super) fn letter_of(constrain: Constrain, choices: usize, reply: &str) -> Option<String> {
+    let object: Option<Value> = match constrain {
+        Constrain::None => return None,
+        Constrain::Json => serde_json::from_str(reply).ok(),
+        Constrain::Choice => None,
+    };
+    let said = match &object {
+        Some(object) if object.as_object()?.len() == 1 => object.get(ANSWER)?.as_str()?,
+        Some(_) => return None,
+        None => reply,
+    };
+    let mut letters = (0..choices).map(|index| letter(index).to_string());
+    letters.find(|letter| letter == said.trim())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_constrained_reply_is_the_letter_in_it() {
+        use Constrain::{Choice, Json};
+        for (constrain, reply, letter) in [
+            (Json, "{\"answer\": \"B\"}", Some("B")),
+            (Json, " {\n\"answer\" : \"A\" }\n", Some("A")),
+            (Json, "{\"answer\":\"C\"}", None),
+            (Json, "{\"answer\":\"B", None),
+            (Json, "{\"answer\":\"B\",\"why\":\"x\"}", None),
+            (Json, "The answer is B", None),
+            (Choice, "B", Some("B")),
+            (Choice, " A\n", Some("A")),
+            (Choice, "a", None),
+            (Choice, "B. yes", None),
+        ] {
+            assert_eq!(letter_of(constrain, 2, reply).as_deref(), letter, "{reply}");
+        }
+    }
+}

@@ -1,0 +1,193 @@
+//! Requests of OpenAI's chat completions: the JSON of one, [`body`], and what servers refuse of it, [`fields`].
+
+use std::sync::Arc;
+
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use crate::ask::body::Parts;
+use crate::ask::call::Message;
+use crate::ask::constraint;
+use crate::ask::field::{Field, Fields, Refused, Sent};
+use crate::ask::parameters::{Constrain, Detail, Parameters, TokenField};
+use crate::ask::payload::Payload;
+use crate::types::question::letter;
+
+#[derive(Serialize)]
+struct Request<'a> {
+    model: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    temperature: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    seed: Option<u64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    max_tokens: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    max_completion_tokens: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reasoning_effort: Option<&'a str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    response_format: Option<Value>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    structured_outputs: Option<Value>,
+    messages: [Turn<'a>; 1],
+}
+
+#[derive(Serialize)]
+struct Turn<'a> {
+    role: &'static str,
+    content: Content<'a>,
+}
+
+// Words alone go as a plain string, which text-only servers without a notion of parts take too.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Content<'a> {
+    Words(&'a str),
+    Parts(Vec<Part<'a>>),
+}
+
+#[derive(Serialize)]
+#[serde(tag = "type", rename_all = "snake_case")]
+enum Part<'a> {
+    Text { text: &'a str },
+    ImageUrl { image_url: ImageUrl },
+}
+
+#[derive(Serialize)]
+struct ImageUrl {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    detail: Option<Detail>,
+    url: &'static str,
+}
+
+/// Where an image goes: a field without a value. No question can contain it, whatever it says: within a text every quotation
+/// mark has a backslash before it.
+const PLACE: &str = r#""url":"""#;
+
+/// The body of one request: words, images, and the words behind them.
+pub(super) fn body(
+    parameters: &Parameters,
+    fields: Fields,
+    message: Message<'_>,
+    choices: usize,
+) -> Result<Parts, serde_json::Error> {
+    let limit = |name| parameters.max_tokens.filter(|_| fields.token_field == name);
+    let letters: Vec<char> = (0..choices).map(letter).collect();
+    let constrained =
+        |kind, value: fn(&[char]) -> Value| (parameters.constrain == kind).then(|| value(&letters));
+    let json = serde_json::to_string(&Request {
+        model: &parameters.model,
+        temperature: fields.temperature,
+        seed: parameters.seed,
+        max_tokens: limit(TokenField::MaxTokens),
+        max_completion_tokens: limit(TokenField::MaxCompletionTokens),
+        reasoning_effort: parameters.reasoning_effort.as_deref(),
+        response_format: constrained(Constrain::Json, format),
+        structured_outputs: constrained(Constrain::Choice, |letters| json!({"choice": letters})),
+        messages: [Turn {
+            role: "user",
+            content: content(message, parameters.detail),
+        }],
+    })?;
+    Ok(with_images(json, message.images))
+}
+
+/// A body with the images in their places; their bytes are shared and not copied.
+fn with_images(json: String, images: &[Arc<Payload>]) -> Parts {
+    if images.is_empty() {
+        return Parts::new([json.into()]);
+    }
+    debug_assert_eq!(json.matches(PLACE).count(), images.len());
+    let (open, close) = PLACE.split_at(PLACE.len() - 1);
+    let mut pieces = Vec::with_capacity(2 * images.len() + 1);
+    let mut begin = "";
+    let mut images = images.iter();
+    for words in json.split(PLACE) {
+        match images.next() {
+            Some(image) => {
+                pieces.push([begin, words, open].concat().into());
+                pieces.push(image.data_url());
+            }
+            None => pieces.push([begin, words].concat().into()),
+        }
+        begin = close;
+    }
+    Parts::new(pieces)
+}
+
+/// What a message holds, with a place for each image.
+fn content(message: Message<'_>, detail: Option<Detail>) -> Content<'_> {
+    let Message {
+        before,
+        images,
+        behind,
+    } = message;
+    if images.is_empty() && behind.is_empty() {
+        return Content::Words(before);
+    }
+    let words = |text| Part::Text { text };
+    let image = || Part::ImageUrl {
+        image_url: ImageUrl { detail, url: "" },
+    };
+    let parts = std::iter::once(words(before))
+        .chain(images.iter().map(|_| image()))
+        .chain((!behind.is_empty()).then(|| words(behind)));
+    Content::Parts(parts.collect())
+}
+
+/// An object with one of the letters, as OpenAI's `json_schema` format.
+fn format(letters: &[char]) -> Value {
+    let schema = constraint::schema(letters);
+    json!({"type": "json_schema", "json_schema": {"name": constraint::ANSWER, "strict": true, "schema": schema}})
+}
+
+/// The fields that a server may complain about.
+pub(super) fn fields(sent: Sent<'_>) -> Vec<Field> {
+    let parameters = sent.parameters;
+    let limit = |field| parameters.max_tokens.is_some() && sent.fields.token_field == field;
+    Vec::from([
+        Field {
+            name: "temperature",
+            sent: sent.fields.temperature.is_some(),
+            refused: Some(Refused::Temperature),
+            hint: "leave the temperature to the server: --temperature default",
+        },
+        Field {
+            name: "max_tokens",
+            sent: limit(TokenField::MaxTokens),
+            refused: Some(Refused::TokenField),
+            hint: "send the limit otherwise: --token-field max_completion_tokens (or none), or another --max-tokens",
+        },
+        Field {
+            name: "max_completion_tokens",
+            sent: limit(TokenField::MaxCompletionTokens),
+            refused: Some(Refused::TokenField),
+            hint: "send the limit otherwise: --token-field max_tokens (or none), or another --max-tokens",
+        },
+        Field {
+            name: "reasoning_effort",
+            sent: parameters.reasoning_effort.is_some(),
+            refused: None,
+            hint: "leave --reasoning-effort out, or give a value the model takes",
+        },
+        Field {
+            name: "detail",
+            sent: sent.has_image && parameters.detail.is_some(),
+            refused: None,
+            hint: "leave --detail out, or give a value the server takes",
+        },
+        Field {
+            name: "response_format",
+            sent: parameters.constrain == Constrain::Json,
+            refused: None,
+            hint: "leave --constrain out: the server does not take it",
+        },
+        Field {
+            name: "structured_outputs",
+            sent: parameters.constrain == Constrain::Choice,
+            refused: None,
+            hint: "leave --constrain out, or try --constrain json",
+        },
+    ])
+}

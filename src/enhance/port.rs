@@ -1,0 +1,111 @@
+//! Inputs and outputs of a graph in its own words: [`Port`].
+
+use std::fmt;
+
+use super::convention::{Element, Layout};
+
+/// An input or output of a graph.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Port {
+    /// Its name.
+    pub(super) name: String,
+    /// What its elements are.
+    pub(super) element: Element,
+    /// Its dimensions; empty for a number, and where the graph does not say even how many there are.
+    pub(super) dims: Vec<Dim>,
+}
+
+/// One dimension of a tensor.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Dim {
+    /// A size that the graph fixes.
+    Known(usize),
+    /// Any size, with the graph's name for it, which may be empty.
+    Free(String),
+}
+
+impl Dim {
+    pub(super) fn known(&self) -> Option<usize> {
+        match self {
+            Self::Known(size) => Some(*size),
+            Self::Free(_) => None,
+        }
+    }
+
+    /// Whether the dimension can have this size.
+    pub(super) fn can_be(&self, size: usize) -> bool {
+        self.known().is_none_or(|known| known == size)
+    }
+
+    /// Whether two dimensions can have the same size.
+    fn can_equal(&self, other: &Self) -> bool {
+        other.known().is_none_or(|size| self.can_be(size))
+    }
+}
+
+impl fmt::Display for Dim {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Known(size) => write!(f, "{size}"),
+            Self::Free(name) if name.is_empty() => write!(f, "?"),
+            Self::Free(name) => write!(f, "{name}"),
+        }
+    }
+}
+
+impl fmt::Display for Port {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:?} ({} [", self.name, self.element)?;
+        for (i, dim) in self.dims.iter().enumerate() {
+            let comma = if i == 0 { "" } else { ", " };
+            write!(f, "{comma}{dim}")?;
+        }
+        write!(f, "])")
+    }
+}
+
+impl Port {
+    /// The layout of an image of three channels, where its dimensions say it.
+    pub(super) fn layout(&self) -> Option<Layout> {
+        let mut fitting = Layout::ALL.into_iter().filter(|layout| {
+            self.dims.len() == layout.rank()
+                && self.dims[layout.places()[0]].known() == Some(3)
+                && (layout.rank() == 3 || self.dims[0].can_be(1))
+        });
+        // A size of 3 in two places says nothing.
+        fitting.next().filter(|_| fitting.next().is_none())
+    }
+
+    /// Whether the dimensions leave room for three channels somewhere; a plane of grey, which has a 1 in their place, does not.
+    pub(super) fn may_be_image(&self) -> bool {
+        let last = &self.dims[self.dims.len().saturating_sub(3)..];
+        let grey = last.iter().any(|dim| dim.known() == Some(1));
+        (3..=4).contains(&self.dims.len()) && !grey && last.iter().any(|dim| dim.can_be(3))
+    }
+
+    /// Whether it can be an image of this height and width in a layout. What the graph leaves open can.
+    pub(super) fn can_be_image(&self, layout: Layout, [height, width]: [&Dim; 2]) -> bool {
+        let [channels, rows, columns] = layout.places();
+        let shape = self.dims.is_empty()
+            || self.dims.len() == layout.rank()
+                && self.dims[channels].can_be(3)
+                && self.dims[rows].can_equal(height)
+                && self.dims[columns].can_equal(width)
+                && (layout.rank() == 3 || self.dims[0].can_be(1));
+        shape && !matches!(self.element, Element::Other(_))
+    }
+
+    /// Whether it holds one number.
+    pub(super) fn is_scalar(&self) -> bool {
+        self.dims.iter().all(|dim| dim.known() == Some(1))
+    }
+}
+
+/// Ports in words.
+pub(super) fn list(ports: &[Port]) -> String {
+    if ports.is_empty() {
+        return "none".to_owned();
+    }
+    let ports: Vec<String> = ports.iter().map(Port::to_string).collect();
+    ports.join(", ")
+}
