@@ -88,12 +88,10 @@ impl Payload {
     pub fn encode(image: &Rgb, format: Format, max_side: Option<NonZeroU32>) -> Result<Self> {
         let image = Self::scaled(image, max_side)?;
         let (width, height) = (side(image.width())?, side(image.height())?);
-        let mut file = Vec::new();
+        let (samples, mut file) = (image.samples(), Vec::new());
         match format {
-            Format::Png => write_png(image.samples(), width, height, &mut file)?,
-            Format::Jpeg(quality) => {
-                write_jpeg(image.samples(), width, height, quality, &mut file)?
-            }
+            Format::Png => write_png(samples, width, height, &mut file)?,
+            Format::Jpeg(quality) => write_jpeg(samples, width, height, quality, &mut file)?,
         }
         Ok(Self::of_file(&file, width, height, format))
     }

@@ -59,21 +59,19 @@ fn claim(survey: &Survey<'_>) -> Result<Verdict, Reason> {
         .iter()
         .map(|class| book.name(class).to_owned())
         .collect();
-    let more = json!({
-        "gap_mm": second.1.median - first.1.median,
-        "near_gap_mm": near_gap(&objects, *first),
-        "along": depth.along,
-    });
     let segments: Vec<&Segment> = objects.iter().map(|(segment, _)| *segment).collect();
-    let text = book.closest.text.clone();
     Ok(survey.rests(
         Claim {
             family: Family::Closest,
             about: winner.to_owned(),
-            text,
+            text: book.closest.text.clone(),
             choices,
             truth,
-            evidence: more,
+            evidence: json!({
+                "gap_mm": second.1.median - first.1.median,
+                "near_gap_mm": near_gap(&objects, *first),
+                "along": depth.along,
+            }),
         },
         &segments,
     ))

@@ -149,9 +149,9 @@ pub fn generate(
         for family in families.filter(|family| Family::PAPER.contains(family)) {
             let verdicts = verdicts(family, &survey, order.palette);
             let tally = made.tallies.entry(family.clone()).or_default();
-            verdicts
-                .iter()
-                .for_each(|verdict| explain(&frame.frame, verdict));
+            for verdict in &verdicts {
+                explain(&frame.frame, verdict);
+            }
             let claims = tally.sift(verdicts);
             let spare = claims.len().saturating_sub(1) as u64;
             let Some(claim) = running.choose(claims, &survey) else {
