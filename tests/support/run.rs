@@ -86,6 +86,11 @@ impl Bench {
     }
 }
 
+/// The words of a line.
+pub fn words(line: &str) -> Vec<&str> {
+    line.split_whitespace().collect()
+}
+
 pub fn called(command: &mut Command) -> Called {
     let output = command.output().unwrap();
     Called {

@@ -1,0 +1,505 @@
+//! What a run is known by: which command is refused on its folder and by which field, which may add to it, and what enters the
+//! keys of its trials.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+mod support;
+
+use std::cell::Cell;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+
+use serde_json::{Value, json};
+use support::endpoint::{Answer, MockEndpoint};
+use support::house::House;
+use support::onnx;
+use support::run::{Bench, Called, words};
+
+/// Two frames with three questions, two walks with three, models that mend, and an endpoint that answers everything.
+struct Scene {
+    house: House,
+    endpoint: MockEndpoint,
+    folders: Cell<usize>,
+}
+
+/// The flags of a run, each said once.
+struct Flags {
+    command: &'static str,
+    said: &'static [(&'static str, &'static str)],
+}
+
+const EVALUATION: Flags = Flags {
+    command: "",
+    said: &[
+        ("--data", "frames"),
+        ("--model", "m"),
+        ("--levels", "L0,L3"),
+    ],
+};
+
+const OPEN: Flags = Flags {
+    command: "openeqa",
+    said: &[
+        ("--questions", "questions.json"),
+        ("--frames", "walks"),
+        ("--num-frames", "3"),
+        ("--image-size", "48"),
+        ("--model", "m"),
+        ("--levels", "L0,L3"),
+    ],
+};
+
+/// A picture of its own in every pixel.
+fn picture(shade: u8) -> image::RgbImage {
+    image::RgbImage::from_fn(24, 16, |x, y| {
+        image::Rgb([shade.wrapping_add((x * 9) as u8), (y * 15) as u8, shade])
+    })
+}
+
+/// Frames in a folder, with questions about them.
+fn frames(bench: &Bench, folder: &str, shade: u8) {
+    let lines = [
+        json!({"id": "a1", "frame": "a.png", "family": "presence", "question": "Is there a lamp?", "choices": ["yes", "no"], "answer": "no"}),
+        json!({"id": "b1", "frame": "b.png", "family": "presence", "question": "Is there a bed?", "choices": ["yes", "no"], "answer": "yes"}),
+        json!({"id": "a2", "frame": "a.png", "family": "color", "question": "What color?", "choices": ["red", "blue", "green"], "answer": "blue"}),
+    ];
+    let lines: Vec<String> = lines.iter().map(ToString::to_string).collect();
+    bench.file(&format!("{folder}/questions.jsonl"), lines.join("\n"));
+    for (name, shade) in [("a.png", shade), ("b.png", 150)] {
+        picture(shade)
+            .save(bench.path(&format!("{folder}/{name}")))
+            .unwrap();
+    }
+}
+
+impl Scene {
+    fn new() -> Self {
+        let house = House::new();
+        let bench = &house.0;
+        frames(bench, "frames", 20);
+        frames(bench, "elsewhere/frames", 70);
+        let asked = |path: &str| fs::read_to_string(bench.path(path)).unwrap();
+        bench.file(
+            "other.jsonl",
+            asked("frames/questions.jsonl").replace("a bed", "a cot"),
+        );
+        bench.file(
+            "other.json",
+            asked("questions.json").replace("What colour", "Which colour"),
+        );
+        for name in ["choice.txt", "blind.txt"] {
+            let built_in = format!("{}/prompts/{name}", env!("CARGO_MANIFEST_DIR"));
+            let text = fs::read_to_string(built_in).unwrap();
+            bench.file(&format!("own/{name}"), format!("Look closely.\n{text}"));
+        }
+        onnx::gain(0.5).write(&bench.path(""), "one.onnx");
+        onnx::gamma(0.5).write(&bench.path(""), "two.onnx");
+        Self {
+            house,
+            endpoint: MockEndpoint::start([Answer::text("A")]),
+            folders: Cell::new(0),
+        }
+    }
+
+    /// The name of a folder that is not there.
+    fn fresh(&self) -> String {
+        self.folders.set(self.folders.get() + 1);
+        format!("run-{}", self.folders.get())
+    }
+
+    /// A call with these flags, some of them said otherwise.
+    fn call(&self, flags: &Flags, otherwise: &str, out: &str) -> Called {
+        let otherwise = words(otherwise);
+        let base = self.endpoint.base_url();
+        let mut said = words(flags.command);
+        for &(flag, value) in flags.said.iter().chain(&[("--base-url", &*base)]) {
+            if !otherwise.contains(&flag) {
+                said.extend([flag, value]);
+            }
+        }
+        said.extend(otherwise);
+        said.extend(["--out", out]);
+        self.house.0.call(&said)
+    }
+
+    /// A run that must end well.
+    fn complete(&self, flags: &Flags, otherwise: &str, out: &str) {
+        let called = self.call(flags, otherwise, out);
+        assert_eq!(called.code, Some(0), "{otherwise}: {called:?}");
+    }
+
+    fn kept(&self, out: &str) -> String {
+        let path = format!("{out}/records.jsonl");
+        fs::read_to_string(self.house.0.path(&path)).unwrap()
+    }
+
+    /// The keys of a run in a folder, by question and condition.
+    fn keys_in(&self, out: &str) -> Keys {
+        let mut keys = Keys::new();
+        for line in self.kept(out).lines() {
+            let record: Value = serde_json::from_str(line).unwrap();
+            let text = |field: &str| record[field].as_str().unwrap_or("blind").to_owned();
+            let before = keys.insert((text("condition"), text("question")), text("key"));
+            assert!(before.is_none(), "{record}");
+        }
+        keys
+    }
+
+    /// The keys of a run in a folder of its own.
+    fn keys(&self, flags: &Flags, otherwise: &str) -> Keys {
+        let out = self.fresh();
+        self.complete(flags, otherwise, &out);
+        self.keys_in(&out)
+    }
+
+    /// A command on the folder of a run is refused by this field; nothing is asked, and nothing changes.
+    fn refuses(&self, flags: &Flags, otherwise: &str, out: &str, field: &str) {
+        let (asked, kept) = (self.endpoint.requests().len(), self.kept(out));
+        let called = self.call(flags, otherwise, out);
+        assert_eq!(called.code, Some(2), "{otherwise}: {called:?}");
+        assert!(
+            called.stderr.contains(field),
+            "{otherwise}: {field} expected: {}",
+            called.stderr
+        );
+        assert_eq!(self.endpoint.requests().len(), asked, "{otherwise}");
+        assert_eq!(self.kept(out), kept, "{otherwise}");
+    }
+
+    /// A command on the folder of a run asks so many new trials, and none of those that are there.
+    fn adds(&self, flags: &Flags, otherwise: &str, out: &str, new: usize) {
+        let (asked, kept) = (self.endpoint.requests().len(), self.kept(out));
+        self.complete(flags, otherwise, out);
+        let asked = self.endpoint.requests().len() - asked;
+        assert_eq!(asked, new, "{otherwise}");
+        let now = self.kept(out);
+        assert!(now.starts_with(&kept), "{otherwise}");
+        assert_eq!(
+            now.lines().count() - kept.lines().count(),
+            new,
+            "{otherwise}"
+        );
+        let key = |line: &str| serde_json::from_str::<Value>(line).unwrap()["key"].to_string();
+        let keys: BTreeSet<String> = now.lines().map(key).collect();
+        assert_eq!(keys.len(), now.lines().count(), "{otherwise}");
+    }
+}
+
+/// Keys by condition and question.
+type Keys = BTreeMap<(String, String), String>;
+
+/// The conditions in which keys of two runs differ, and those in which they are the same.
+fn compared(one: &Keys, other: &Keys) -> (BTreeSet<String>, BTreeSet<String>) {
+    let (mut differ, mut same) = (BTreeSet::new(), BTreeSet::new());
+    for (place, key) in one {
+        let side = match other.get(place) {
+            Some(other) if other == key => &mut same,
+            Some(_) => &mut differ,
+            None => continue,
+        };
+        side.insert(place.0.clone());
+    }
+    (differ, same)
+}
+
+fn set(conditions: &str) -> BTreeSet<String> {
+    conditions.split_whitespace().map(str::to_owned).collect()
+}
+
+/// What refuses an evaluation on the folder of another: the field that the message names, and the flag.
+const REFUSED: [(&str, &str); 27] = [
+    ("--data", "--data elsewhere/frames"),
+    ("--questions", "--questions other.jsonl"),
+    ("--shuffle-options", "--shuffle-options"),
+    ("--circular", "--circular"),
+    ("--seed", "--seed 7"),
+    ("--amplify", "--amplify all"),
+    ("--tone", "--tone before-ev"),
+    ("--draws", "--draws fresh"),
+    ("--coupling", "--coupling photon"),
+    ("--camera", "--camera nikon-d850"),
+    ("--gain", "--gain 1.5"),
+    ("--ratio", "--ratio 150"),
+    ("--fixed", "--fixed"),
+    ("--tile", "--tile 64"),
+    ("--tile", "--tile whole"),
+    ("--llie-max-side", "--llie-max-side 8"),
+    ("--image", "--image jpeg:90"),
+    ("--max-side", "--max-side 16"),
+    ("--base-url", "--base-url http://127.0.0.1:9/v1"),
+    ("--prompts", "--prompts own"),
+    ("--temperature", "--temperature 0.5"),
+    ("--max-tokens", "--max-tokens 7"),
+    ("what the models answer by", "--token-field none"),
+    ("--reasoning-effort", "--reasoning-effort low"),
+    ("--detail", "--detail low"),
+    ("--constrain", "--constrain json"),
+    ("--constrain", "--constrain choice"),
+];
+
+/// The same for open questions.
+const OPEN_REFUSED: [(&str, &str); 25] = [
+    ("--questions", "--questions other.json"),
+    ("--num-frames", "--num-frames 2"),
+    ("--image-size", "--image-size 32"),
+    ("--image-size", "--image-size native"),
+    ("--degrade", "--degrade resized"),
+    ("--sensor", "--sensor frame"),
+    ("--seed", "--seed 7"),
+    ("--amplify", "--amplify all"),
+    ("--tone", "--tone before-ev"),
+    ("--draws", "--draws fresh"),
+    ("--coupling", "--coupling photon"),
+    ("--camera", "--camera nikon-d850"),
+    ("--gain", "--gain 1.5"),
+    ("--ratio", "--ratio 150"),
+    ("--fixed", "--fixed"),
+    ("--tile", "--tile 64"),
+    ("--llie-max-side", "--llie-max-side 8"),
+    ("--image", "--image jpeg:90"),
+    ("--base-url", "--base-url http://127.0.0.1:9/v1"),
+    ("--temperature", "--temperature 0.5"),
+    ("--max-tokens", "--max-tokens 7"),
+    ("--max-tokens", "--token-field none"),
+    ("--sampling-seed", "--sampling-seed 5"),
+    ("--reasoning-effort", "--reasoning-effort low"),
+    ("--detail", "--detail low"),
+];
+
+#[test]
+fn every_field_of_an_evaluation_refuses_another_value() {
+    let scene = Scene::new();
+    let enhanced = |otherwise: &str| format!("--limit 1 --llie one.onnx {otherwise}");
+    scene.complete(&EVALUATION, &enhanced(""), "run");
+    for (field, otherwise) in REFUSED {
+        scene.refuses(&EVALUATION, &enhanced(otherwise), "run", field);
+    }
+}
+
+#[test]
+fn every_field_of_open_questions_refuses_another_value() {
+    let scene = Scene::new();
+    let enhanced = |otherwise: &str| format!("--limit 1 --llie one.onnx {otherwise}");
+    scene.complete(&OPEN, &enhanced(""), "run");
+    for (field, otherwise) in OPEN_REFUSED {
+        scene.refuses(&OPEN, &enhanced(otherwise), "run", field);
+    }
+}
+
+/// What comes of one value more.
+#[derive(Clone, Copy, PartialEq)]
+enum Fate {
+    Refused,
+    Added,
+}
+use Fate::{Added, Refused};
+
+/// A value more in a run: its flag, what was said before and what is said then, how many trials are new, and what comes of it.
+type Addition = (&'static str, &'static str, &'static str, usize, Fate);
+
+#[rustfmt::skip]
+const ADDITIONS: [Addition; 11] = [
+    ("--model", "", "--model m --model n", 9, Refused),
+    ("--model", "", "--model n", 9, Refused),
+    ("--blind-model", "", "--blind-model m", 3, Refused),
+    ("--levels", "--levels L0,L3", "--levels L0,L3,L5", 6, Refused),
+    ("--variant", "--variant ev", "--variant both", 3, Refused),
+    ("--llie", "--llie one.onnx", "--llie one.onnx --llie two.onnx", 3, Refused),
+    ("--llie-on", "--llie one.onnx", "--llie one.onnx --llie-on both", 3, Refused),
+    ("--profile", "", "--profile physical", 3, Refused),
+    ("--limit", "--limit 2", "--limit 3", 3, Refused),
+    ("--families", "--families presence", "--families presence,color", 3, Refused),
+    ("--repeats", "", "--repeats 2", 9, Refused),
+];
+
+#[rustfmt::skip]
+const OPEN_ADDITIONS: [Addition; 9] = [
+    ("--model", "", "--model m --model n", 6, Added),
+    ("--model", "", "--model n", 6, Added),
+    ("--blind-model", "", "--blind-model m", 3, Added),
+    ("--levels", "--levels L0,L3", "--levels L0,L3,L5", 3, Added),
+    ("--variant", "--variant noise", "--variant both", 3, Added),
+    ("--llie", "--llie one.onnx", "--llie one.onnx --llie two.onnx", 3, Added),
+    ("--llie-on", "--variant both --llie one.onnx", "--variant both --llie one.onnx --llie-on both", 3, Added),
+    ("--profile", "", "--profile physical", 3, Refused),
+    ("--questions", "--limit 2", "--limit 3", 2, Refused),
+];
+
+/// Adds a value to a run of its own.
+fn add(scene: &Scene, flags: &Flags, (field, before, then, new, fate): Addition) {
+    let out = scene.fresh();
+    scene.complete(flags, before, &out);
+    match fate {
+        Refused => scene.refuses(flags, then, &out, field),
+        Added => scene.adds(flags, then, &out, new),
+    }
+}
+
+#[test]
+fn another_value_of_a_column_is_refused_or_asked_alone() {
+    let scene = Scene::new();
+    for addition in ADDITIONS {
+        add(&scene, &EVALUATION, addition);
+    }
+    for addition in OPEN_ADDITIONS {
+        add(&scene, &OPEN, addition);
+    }
+}
+
+#[test]
+#[ignore = "until values can be added to a run"]
+fn another_value_of_a_column_is_asked_alone() {
+    let scene = Scene::new();
+    for (field, before, then, new, _) in ADDITIONS {
+        add(&scene, &EVALUATION, (field, before, then, new, Added));
+    }
+    for (field, before, then, new, _) in OPEN_ADDITIONS {
+        add(&scene, &OPEN, (field, before, then, new, Added));
+    }
+}
+
+#[test]
+fn the_key_of_a_trial_has_what_decides_its_image() {
+    let scene = Scene::new();
+    let keys = |otherwise: &str| scene.keys(&EVALUATION, otherwise);
+    let enhanced = |otherwise: &str| keys(&format!("--llie one.onnx {otherwise}"));
+    let (raw, first) = (keys(""), enhanced(""));
+    assert_eq!((raw.len(), first.len()), (9, 12));
+    assert_eq!(first, enhanced(""), "the same command again");
+    let all = set("L0 L3-ev L3-noise L3-noise+one");
+    let of_raw = set("L0 L3-ev L3-noise");
+    let noisy = set("L3-noise L3-noise+one");
+    assert_eq!(compared(&raw, &first), (set(""), of_raw.clone()));
+    let other = enhanced("--seed 7");
+    assert_eq!(compared(&first, &other), (noisy.clone(), set("L0 L3-ev")));
+    let other = enhanced("--camera nikon-d850");
+    assert_eq!(compared(&first, &other), (noisy, set("L0 L3-ev")));
+    for sent in ["--max-side 16", "--image jpeg:90"] {
+        assert_eq!(compared(&first, &enhanced(sent)), (all.clone(), set("")));
+    }
+    onnx::gain(0.75).write(&scene.house.0.path(""), "one.onnx");
+    let other = enhanced("");
+    assert_eq!(compared(&first, &other), (set("L3-noise+one"), of_raw));
+}
+
+#[test]
+fn the_key_of_an_answer_has_what_decides_its_images() {
+    let scene = Scene::new();
+    let keys = |otherwise: &str| scene.keys(&OPEN, otherwise);
+    let enhanced = |otherwise: &str| keys(&format!("--llie one.onnx {otherwise}"));
+    let (raw, first) = (keys(""), enhanced(""));
+    assert_eq!((raw.len(), first.len()), (6, 9));
+    assert_eq!(first, enhanced(""), "the same command again");
+    let of_raw = set("L0 L3-noise");
+    assert_eq!(compared(&raw, &first), (set(""), of_raw.clone()));
+    let dark = set("L3-noise L3-noise+one");
+    let differ = |otherwise: &str| compared(&first, &enhanced(otherwise)).0;
+    for sent in [
+        "--image-size 32",
+        "--image-size native",
+        "--num-frames 2",
+        "--image jpeg:90",
+    ] {
+        let all = set("L0 L3-noise L3-noise+one");
+        assert_eq!(differ(sent), all, "{sent}");
+    }
+    for light in ["--degrade resized", "--sensor frame", "--camera nikon-d850"] {
+        assert!(differ(light).is_superset(&dark), "{light}");
+    }
+    assert_eq!(differ("--seed 7"), dark);
+    onnx::gain(0.75).write(&scene.house.0.path(""), "one.onnx");
+    let other = enhanced("");
+    assert_eq!(compared(&first, &other), (set("L3-noise+one"), of_raw));
+}
+
+/// Models with what stands in their sidecars, and what else may stand there for other pixels.
+#[rustfmt::skip]
+const SIDECARS: [(&str, &str, &[&str]); 3] = [
+    ("one.onnx", "", &[
+        "color = \"bgr\"",
+        "range_in = \"-1..1\"",
+        "range_out = \"-1..1\"",
+        "mean = [-0.1, 0, 0]",
+        "std = [2, 1, 1]",
+        "multiple = 16",
+        "multiple = 16\npad = \"zero\"",
+        "multiple = 16\npad = \"replicate\"",
+        "rounding = \"truncate\"",
+    ]),
+    ("outputs.onnx", "output = 0", &["output = 1"]),
+    ("inputs.onnx", "[extra]\nexposure = 0.5", &["[extra]\nexposure = 0.75"]),
+];
+
+#[test]
+fn what_a_sidecar_says_of_pixels_is_another_enhancer() {
+    let scene = Scene::new();
+    let bench = &scene.house.0;
+    onnx::two_outputs().write(&bench.path(""), "outputs.onnx");
+    onnx::two_inputs().write(&bench.path(""), "inputs.onnx");
+    let mut seen = BTreeSet::new();
+    for (model, before, others) in SIDECARS {
+        let sidecar = format!("{model}.toml");
+        let said = format!("--levels L3 --variant noise --limit 1 --llie {model}");
+        bench.file(&sidecar, before);
+        let first = scene.fresh();
+        scene.complete(&EVALUATION, &said, &first);
+        let first_keys = scene.keys_in(&first);
+        seen.extend(first_keys.values().cloned());
+        for other in others {
+            bench.file(&sidecar, other);
+            scene.refuses(&EVALUATION, &said, &first, "--llie");
+            let keys = scene.keys(&EVALUATION, &said);
+            let (differ, same) = compared(&first_keys, &keys);
+            assert_eq!((differ.len(), same), (1, set("L3-noise")), "{other}");
+            for key in keys.into_iter().filter(|(at, _)| at.0 != "L3-noise") {
+                assert!(seen.insert(key.1), "{other}");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_a_preset_says_of_pixels_is_another_enhancer() {
+    let scene = Scene::new();
+    let said = |model: &str| format!("--levels L3 --variant noise --limit 1 --llie {model}");
+    scene.complete(&EVALUATION, &said("one.onnx"), "run");
+    let plain = scene.keys_in("run");
+    let preset = said("ruas-upe:one.onnx");
+    scene.refuses(&EVALUATION, &preset, "run", "--llie");
+    let (differ, same) = compared(&plain, &scene.keys(&EVALUATION, &preset));
+    assert_eq!((differ, same), (set("L3-noise+one"), set("L3-noise")));
+}
+
+/// What a model is taken to be where nothing is said, and what is no statement at all.
+const DEFAULTS: [&str; 8] = [
+    "color = \"rgb\"",
+    "pad = \"reflect\"",
+    "rounding = \"round\"",
+    "multiple = 1",
+    "mean = [0, 0, 0]",
+    "std = [1, 1, 1]",
+    "[extra]",
+    "# By its authors.\n\n",
+];
+
+#[test]
+#[ignore = "until digests are canonical"]
+fn a_default_that_is_written_out_changes_nothing() {
+    let scene = Scene::new();
+    let said = "--levels L3 --limit 1 --llie one.onnx";
+    scene.complete(&EVALUATION, said, "run");
+    for default in DEFAULTS {
+        scene.house.0.file("one.onnx.toml", default);
+        scene.adds(&EVALUATION, said, "run", 0);
+    }
+    // What a preset says may stand beside the model, too.
+    let preset = "--levels L3 --limit 1 --llie darkir:two.onnx";
+    scene.complete(&EVALUATION, preset, "preset");
+    let states = "multiple = 8\npad = \"zero\"\nrounding = \"truncate\"\n";
+    scene.house.0.file("two.onnx.toml", states);
+    scene.adds(&EVALUATION, preset, "preset", 0);
+    let alone = "--levels L3 --limit 1 --llie two.onnx";
+    let states = format!("{states}tile = \"none\"\n");
+    scene.house.0.file("two.onnx.toml", states);
+    scene.adds(&EVALUATION, alone, "preset", 0);
+}
