@@ -45,7 +45,7 @@ impl Signature {
     /// Decides which tensors are what.
     ///
     /// # Errors
-    /// A sentence that says what was found and what mends it; it is to follow the file's name.
+    /// A sentence that says what was found and how to repair it; it is to follow the file's name.
     pub(super) fn of(inputs: &[Port], outputs: &[Port], stated: &Sidecar) -> Result<Self, String> {
         let (image, layout) = image_input(inputs, stated)?;
         let [_, height, width] = layout.places().map(|place| &image.dims[place]);

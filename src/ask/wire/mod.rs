@@ -41,6 +41,7 @@ impl Wire {
     }
 
     /// The path that a line of a Batch API's file asks; `None` if the API has no batches of OpenAI's form.
+    #[expect(clippy::unnecessary_wraps, reason = "other APIs have no such batches")]
     pub(super) fn batch_url(self) -> Option<&'static str> {
         match self {
             Self::Chat => Some("/v1/chat/completions"),
