@@ -1,33 +1,46 @@
-//! Files that a command leaves: whole, or not at all.
+//! Files that are written whole, or not at all: [`write`] and [`write_synced`].
 
-use std::fs;
-use std::io::Write;
-use std::path::{Path, PathBuf};
-
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder as _};
+use std::ffi::OsStr;
+use std::fs::{self, File};
+use std::io::{self, Write as _};
+use std::path::Path;
 
 use crate::error::{Error, Result};
-use crate::types::Rgb;
 
-/// An image as a PNG file, lossless at the lowest effort: 26 times faster than the usual one for 2 % more bytes.
-pub(crate) fn png(image: &Rgb) -> Result<Vec<u8>> {
-    let mut file = Vec::new();
-    let [width, height] = [image.width(), image.height()].map(|side| side as u32);
-    PngEncoder::new_with_quality(&mut file, CompressionType::Fast, FilterType::Adaptive)
-        .write_image(image.samples(), width, height, ExtendedColorType::Rgb8)
-        .map_err(|e| Error::data("image", e))?;
-    Ok(file)
+/// What the name of a file ends in until it is whole.
+const UNFINISHED: &str = ".part";
+
+/// Writes a file that can be made again: a killed process leaves the old one or the new one, a power cut may lose both.
+///
+/// # Errors
+/// If the folder cannot be made, or the file not be written.
+pub(crate) fn write(path: &Path, content: &[u8]) -> Result<()> {
+    whole(path, content, |_| Ok(()))
 }
 
-/// Writes a file whole or not at all.
-pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    let folder = path.parent().unwrap_or(Path::new("."));
-    fs::create_dir_all(folder).map_err(|e| Error::file(folder, "make", e))?;
-    let mut beside = path.as_os_str().to_owned();
-    beside.push(".part");
-    let part = PathBuf::from(beside);
-    let written = fs::File::create(&part).and_then(|mut file| file.write_all(bytes));
-    written.map_err(|e| Error::file(&part, "write", e))?;
-    fs::rename(&part, path).map_err(|e| Error::file(path, "write", e))
+/// Writes a file that is on the disk itself when this returns.
+///
+/// # Errors
+/// If the folder cannot be made, or the file not be written.
+pub(crate) fn write_synced(path: &Path, content: &[u8]) -> Result<()> {
+    whole(path, content, File::sync_all)
+}
+
+/// Whether a file has the name of one that a killed process left unfinished.
+pub(crate) fn is_unfinished(name: &OsStr) -> bool {
+    name.to_string_lossy().ends_with(UNFINISHED)
+}
+
+fn whole(path: &Path, content: &[u8], sync: impl FnOnce(&File) -> io::Result<()>) -> Result<()> {
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder).map_err(|e| Error::file(folder, "create", e))?;
+    }
+    let own = path.file_name().unwrap_or_default().to_string_lossy();
+    let unfinished = path.with_file_name(format!(".{own}{UNFINISHED}"));
+    let written = File::create(&unfinished).and_then(|mut file| {
+        file.write_all(content)?;
+        sync(&file)
+    });
+    written.map_err(|e| Error::file(&unfinished, "write", e))?;
+    fs::rename(&unfinished, path).map_err(|e| Error::file(path, "write", e))
 }

@@ -1,65 +1,81 @@
 //! Measures how well a vision-language model sees in the dark.
 //!
-//! From well-lit indoor frames it makes low-light versions (levels L0–L5, each by exposure drop alone and with the noise
-//! of a sensor), mends them with any enhancement model given as ONNX, asks OpenAI-compatible endpoints multiple-choice
-//! questions about each image, scores the replies by exact match, and compares all of it.
+//! From well-lit indoor frames it makes low-light versions (levels L0–L5 or any exposure drop, each by exposure drop alone and with the
+//! noise of a sensor), enhances them with any low-light model given as ONNX, asks OpenAI-compatible endpoints questions about each
+//! image, scores the replies, and compares all of it.
 //!
 //! # The map
 //!
-//! Data flows one way. Each folder is a stage; the stages do not know each other. What is asked (words) and what is seen
-//! (light) are two corridors that meet only where a question is put to a model.
+//! Data flows one way. Each folder is a stage; the stages do not know each other. What is asked (words) and what is seen (light) meet
+//! only where a question is put to a model.
 //!
 //! ```text
 //!                  ┌──────► questions ─────────────┐            (words: what is asked)
-//!  cli → config → dataset                           ├─► ask → score → store → report
+//!  cli → config → dataset                           ├─► ask → store → score → report
 //!                  └──────► synthesis ──► enhance ──┘            (light: what is seen)
-//!                        run = the conductor; types = the shared vocabulary
+//!   types, error, files = the ground     job = the engine of everything asked     run = one folder or file a command
 //! ```
 //!
 //! - [`types`]: the vocabulary. [`Frame`](types::Frame)s are seen, [`Question`](types::Question)s are asked, a
-//!   [`Condition`](types::Condition) is a degradation with or without an enhancer, a [`Reply`](types::Reply) is what a
-//!   model said, and a [`Record`](types::Record) is what came of one question for one model in one condition; of an open
-//!   question, or of a mark for an answer, its detail is an [`OpenDetail`](types::OpenDetail).
+//!   [`Degradation`](types::Degradation) is what was done to a frame, a [`Condition`](types::Condition) is a degradation with or
+//!   without an enhancer, a [`Reply`](types::Reply) is what a model sent, and a [`Record`](types::Record) is what came of one trial:
+//!   one question to one model in one condition.
 //! - [`dataset`]: a folder, a ready-made set or the built-in rooms → images, their maps and questions.
-//! - [`questions`]: a frame with its maps → questions with one true answer, by rule; pure integers. And the observer: what
-//!   the rules could still answer from given pixels.
-//! - [`synthesis`]: a clean image → the same with less light; pure, given a noise key.
-//! - [`enhance`]: a dark image → a mended one, by the user's ONNX model.
-//! - [`ask`]: a prompt and an image → a reply; the only asynchronous stage.
-//! - [`score`]: a reply → a choice; records → numbers with their intervals.
+//! - [`questions`]: a frame with its maps → questions with one true answer, by rule; pure integers. And the observer: what the rules
+//!   could still answer from given pixels.
+//! - [`synthesis`]: a clean image × a degradation → a degraded one; pure, given a noise key.
+//! - [`enhance`]: a degraded image → an enhanced one, by the user's ONNX model.
+//! - [`ask`]: a prompt and images → a reply; the only asynchronous stage. `ask/wire`: one file an API.
+//! - [`score`]: a reply → a choice or a mark; records → numbers with their intervals.
 //! - [`store`]: `results/<run>/`, append-only and resumable.
 //! - [`report`]: tables, figures and one HTML file, from the records alone; figures of pictures that are handed in.
-//! - [`run`]: the only place that sees every stage, and the only bridge between CPU work and waiting.
+//! - [`job`]: the engine. A `Job` carries out an `Experiment`: it plans, has the one image pipeline make images, asks, keeps, and
+//!   has the experiment score. Questions with choices and open ones differ in their `Experiment` alone.
+//! - [`run`]: the commands; `run/evaluate` and `run/openeqa` are the two experiments.
 //! - [`cli`] is what the user typed; [`config`] is what it means, checked once.
+//!
+//! # Where to add what
+//!
+//! The files that are edited by hand; snapshots of the help, README and CHANGELOG come on top.
+//!
+//! | to add | files |
+//! |---|---|
+//! | a kind of degradation | `types/degradation.rs`, `synthesis/<kind>.rs`, `synthesis/mod.rs`, `synthesis/exposures.rs`, `tests/synthesize.rs`, `results/README.md` |
+//! | an API of endpoints | `ask/wire/<api>.rs`, `ask/wire/mod.rs`, `job/models.rs`, `tests/support/endpoint.rs`, `tests/ask.rs` |
+//! | an experiment | `run/<experiment>/`, its detail in `types/detail.rs` and `score/record.rs`, `job/stored.rs` |
 //!
 //! # What must hold
 //!
-//! - The same inputs and seed give the same bytes, whatever the threads, order or resume: a random draw is a function of
-//!   where it is used, never of when.
+//! - The same inputs and seed give the same bytes, whatever the threads, order, shard or resume: a random draw is a function of where
+//!   it is used, never of when.
 //! - What was paid for is on disk before anything else happens, and is never asked again.
 //! - No reply is guessed at: what cannot be read is counted apart, what failed is not scored.
 //! - A key reaches no log, no file and no message.
+//! - What decides a reply is in the key of its trial; a run's identity holds only what all trials share and no column tells apart.
 //!
 //! # Who may import whom
 //!
-//! `tests/architecture.rs` reads this table and fails on a breach.
+//! `tests/architecture.rs` reads this table and fails on a breach. No file of `run` uses another command's, and no room has a circle of
+//! files but those that `tests/support/circles.rs` lists with a reason.
 //!
 //! | module | may use |
 //! |---|---|
 //! | `error` | nothing |
 //! | `types` | `error` |
-//! | `dataset` | `types`, `error` |
+//! | `files` | `error` |
 //! | `questions` | `types`, `error` |
 //! | `synthesis` | `types`, `error` |
 //! | `enhance` | `types`, `error` |
 //! | `ask` | `types`, `error` |
 //! | `score` | `types`, `error` |
-//! | `store` | `types`, `error` |
+//! | `dataset` | `files`, `types`, `error` |
+//! | `store` | `files`, `types`, `error` |
 //! | `report` | `types`, `error`, `score`, `questions` |
 //! | `cli` | nothing |
 //! | `config` | `types`, `error`, `cli`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score` |
-//! | `run` | `types`, `error`, `config`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `report` |
-//! | `main` | `cli`, `config`, `run`, `enhance`, `types` |
+//! | `job` | `files`, `types`, `error`, `config`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `report` |
+//! | `run` | `job`, `files`, `types`, `error`, `config`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `report` |
+//! | `main` | `cli`, `config`, `job`, `run`, `enhance`, `types` |
 //!
 //! `config` uses the stages for the settings that each of them defines, and for nothing else.
 
@@ -71,7 +87,7 @@ pub mod config;
 pub mod dataset;
 pub mod enhance;
 pub mod error;
-pub mod files;
+mod files;
 pub mod job;
 pub mod questions;
 pub mod report;

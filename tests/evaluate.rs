@@ -456,13 +456,9 @@ fn another_configuration_on_the_same_folder_is_refused() {
     bench.complete(&["--model", "random", "--levels", "L0", "--out", "run"]);
     for (more, field) in [
         (["--seed", "7"], "--seed"),
-        (["--levels", "L1"], "--levels"),
         (["--image", "jpeg:90"], "--image"),
     ] {
-        let mut words = vec!["--model", "random", "--out", "run"];
-        if more[0] != "--levels" {
-            words.extend(["--levels", "L0"]);
-        }
+        let mut words = vec!["--model", "random", "--levels", "L0", "--out", "run"];
         words.extend(more);
         let refused = bench.call(&words);
         assert_eq!(refused.code, Some(2), "{refused:?}");

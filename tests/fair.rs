@@ -51,7 +51,7 @@ fn every_rotation_is_asked_and_an_answer_by_position_averages_out() {
         csv.lines()
             .next()
             .unwrap()
-            .ends_with("value,low,high,always"),
+            .ends_with("value,low,high,always,reading"),
         "{csv}"
     );
     let text = "{\"default\":\"brown\"}";

@@ -6,8 +6,6 @@ mod support;
 
 use std::collections::BTreeSet;
 use std::fs;
-use std::path::Path;
-use std::sync::LazyLock;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -16,7 +14,7 @@ use serde_json::{Value, json};
 
 use support::endpoint::{Answer, MockEndpoint, Request};
 use support::house::{House, flags};
-use support::run::called;
+use support::run::{called, records};
 
 /// Upstream's prompt for an answer with images, up to them.
 const VISION: &str = "You are an intelligent question answering agent. I will ask you questions about an indoor space and you must provide an answer.\n\
@@ -26,25 +24,6 @@ Given a user query, you must output `text` to answer to the question asked by th
 /// What an endpoint was sent.
 fn sent(mock: &MockEndpoint) -> Vec<Value> {
     mock.requests().iter().map(Request::json).collect()
-}
-
-/// What every line of `records.jsonl` must be.
-static SCHEMA: LazyLock<jsonschema::Validator> = LazyLock::new(|| {
-    let schema = serde_json::from_str(include_str!("data/open_record.schema.json")).unwrap();
-    jsonschema::validator_for(&schema).unwrap()
-});
-
-/// The records of a run; each is held to the schema.
-fn records(run: &Path) -> Vec<Value> {
-    let text = fs::read_to_string(run.join("records.jsonl")).unwrap();
-    let lines = text.lines().map(|line| serde_json::from_str(line).unwrap());
-    let records: Vec<Value> = lines.collect();
-    for record in &records {
-        if let Err(breach) = SCHEMA.validate(record) {
-            panic!("{breach} at {}: {record}", breach.instance_path());
-        }
-    }
-    records
 }
 
 /// The words of a request, with a mark for each image.
@@ -250,7 +229,8 @@ fn marks_come_to_upstreams_score() {
         {"question_id": "strange", "answer": "x"},
     ]);
     house.0.file("people.json", people.to_string());
-    let marks = ["5", "5", "3", "1"].map(Answer::text);
+    // Question by question, and of each question in the order of the file.
+    let marks = ["5", "1", "5", "3"].map(Answer::text);
     let judge = MockEndpoint::start(marks);
     let called = house.call(&[
         "--answers",
@@ -580,14 +560,17 @@ fn a_run_goes_on_where_it_was_stopped() {
     let called = house.call(&again);
     assert_eq!(called.code, Some(0), "{called:?}");
     assert_eq!(well.requests().len(), 2);
-    // A run of other questions, and an evaluation, are not mixed up with it.
-    let called = house.call(&[&again[..], &["--limit", "2"]].concat());
-    assert!(
-        called.stderr.contains("another --questions"),
-        "{}",
-        called.stderr
-    );
-    let called = house.0.call(&["report", "run"]);
+    // An evaluation is not mixed up with it.
+    let other = [
+        "--data",
+        "rooms:frames=1",
+        "--model",
+        "random",
+        "--out",
+        "run",
+    ];
+    let called = house.0.call(&other);
+    assert_eq!(called.code, Some(2), "{called:?}");
     assert!(
         called.stderr.contains("darkqa.openeqa/2"),
         "{}",
@@ -631,7 +614,7 @@ fn a_model_that_is_gone_keeps_nobody_elses_answers_from_their_marks() {
 }
 
 #[test]
-fn an_array_is_told_that_each_of_its_tasks_does_everything() {
+fn a_task_of_an_array_asks_about_walks_of_its_own() {
     let house = House::new();
     house.0.file("a.jsonl", "{\"default\": \"an answer\"}");
     let words = flags(&[
@@ -646,17 +629,18 @@ fn an_array_is_told_that_each_of_its_tasks_does_everything() {
     command.envs([
         ("SLURM_ARRAY_TASK_ID", "1"),
         ("SLURM_ARRAY_TASK_MIN", "0"),
-        ("SLURM_ARRAY_TASK_COUNT", "4"),
+        ("SLURM_ARRAY_TASK_COUNT", "2"),
     ]);
     let called = called(&mut command);
     assert_eq!(called.code, Some(0), "{called:?}");
     assert!(
-        called
-            .stderr
-            .contains("task 2 of a Slurm array of 4: openeqa is not spread"),
+        called.stderr.contains("this process does shard 2/2"),
         "{}",
         called.stderr
     );
+    let asked = records(&house.0.path("run/shard-2-of-2"));
+    let asked: Vec<&Value> = asked.iter().map(|record| &record["question"]).collect();
+    assert_eq!(asked, ["q3"]);
 }
 
 #[test]

@@ -464,7 +464,6 @@ fn enhanced_walks_go_on_where_they_were_stopped() {
 // ---- Replies without an answer ----
 
 #[test]
-#[ignore = "until a null or refused reply is no answer"]
 fn a_null_or_refused_reply_is_no_answer() {
     let house = House::new();
     let model = MockEndpoint::start([

@@ -49,7 +49,7 @@ pub use local::{Local, Opinion};
 pub use model::Model;
 pub use pace::{Bounds, Quota};
 pub use parameters::{Constrain, Detail, Parameters, Temperature, TokenField};
-pub use payload::{Format, Payload, Quality};
+pub use payload::{Format, Payload, Quality, png};
 pub use prices::{Price, Prices};
 pub use prompt::Prompts;
 pub use random::Random;

@@ -88,11 +88,10 @@ impl Payload {
     pub fn encode(image: &Rgb, format: Format, max_side: Option<NonZeroU32>) -> Result<Self> {
         let image = Self::scaled(image, max_side)?;
         let (width, height) = (side(image.width())?, side(image.height())?);
-        let (samples, mut file) = (image.samples(), Vec::new());
-        match format {
-            Format::Png => write_png(samples, width, height, &mut file)?,
-            Format::Jpeg(quality) => write_jpeg(samples, width, height, quality, &mut file)?,
-        }
+        let file = match format {
+            Format::Png => png(&image)?,
+            Format::Jpeg(quality) => jpeg(image.samples(), width, height, quality)?,
+        };
         Ok(Self::of_file(&file, width, height, format))
     }
 
@@ -211,31 +210,33 @@ fn fitted(width: u32, height: u32, max_side: Option<NonZeroU32>) -> Option<(u32,
     (longer > most).then(|| (scaled(width), scaled(height)))
 }
 
-/// Lossless at the lowest effort: 26 times faster than the usual effort for files 2 % larger.
-fn write_png(samples: &[u8], width: u32, height: u32, file: &mut Vec<u8>) -> Result<()> {
-    PngEncoder::new_with_quality(file, CompressionType::Fast, RowFilter::Adaptive)
-        .write_image(samples, width, height, ExtendedColorType::Rgb8)
-        .map_err(unfit)
+/// An image as a PNG file, lossless at the lowest effort: 26 times faster than the usual effort for files 2 % larger.
+///
+/// # Errors
+/// If a side is too long for the format.
+pub fn png(image: &Rgb) -> Result<Vec<u8>> {
+    let (width, height) = (side(image.width())?, side(image.height())?);
+    let mut file = Vec::new();
+    PngEncoder::new_with_quality(&mut file, CompressionType::Fast, RowFilter::Adaptive)
+        .write_image(image.samples(), width, height, ExtendedColorType::Rgb8)
+        .map_err(unfit)?;
+    Ok(file)
 }
 
-fn write_jpeg(
-    samples: &[u8],
-    width: u32,
-    height: u32,
-    quality: Quality,
-    file: &mut Vec<u8>,
-) -> Result<()> {
+fn jpeg(samples: &[u8], width: u32, height: u32, quality: Quality) -> Result<Vec<u8>> {
     let (Ok(width), Ok(height)) = (u16::try_from(width), u16::try_from(height)) else {
         return Err(unfit(format_args!(
             "{width} × {height} pixels are too many for a JPEG; set --max-side, or --image png"
         )));
     };
-    let mut encoder = jpeg_encoder::Encoder::new(file, quality.0);
+    let mut file = Vec::new();
+    let mut encoder = jpeg_encoder::Encoder::new(&mut file, quality.0);
     // 4:4:4: colour noise at full resolution, as far as the quality allows.
     encoder.set_sampling_factor(jpeg_encoder::SamplingFactor::R_4_4_4);
     encoder
         .encode(samples, width, height, jpeg_encoder::ColorType::Rgb)
-        .map_err(unfit)
+        .map_err(unfit)?;
+    Ok(file)
 }
 
 #[cfg(test)]

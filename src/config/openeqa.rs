@@ -195,6 +195,8 @@ impl OpenEqa {
             most_pixels: most_pixels(shared.data.max_pixels),
             ..walk
         };
+        // What an evaluation's data would be says nothing of walks.
+        recipe.remove("data");
         recipe.insert(show::WALK.to_owned(), json!(walk));
         let answers = said.answers.iter().map(|text| answers_file(text));
         let answers: Vec<AnswersFile> = answers.collect::<Result<_>>()?;

@@ -8,6 +8,7 @@ use super::experiment::{Expected, Experiment, RecordOf};
 use super::frame_work::FrameWork;
 use super::image_pipeline::ImagePipeline;
 use super::models::ModelUnderTest;
+use super::open_run::limit;
 use super::plan::Plan;
 use super::trial::Item as _;
 use crate::ask::Price;
@@ -86,7 +87,7 @@ pub(crate) fn estimate<E: Experiment>(
     let latencies = stored.iter().filter_map(|record| record.latency_ms);
     let (asking_seconds, pace) = waiting(experiment.server(), latencies, requests as f64, tokens);
     let largest = sample.images.iter().max_by_key(|image| image.bytes);
-    let limit = super::limit(&settings.ask, &settings.images);
+    let limit = limit(&settings.ask, &settings.images);
     let planned: usize = plans.iter().map(|plan| plan.keys.len()).sum();
     let left: usize = plans.iter().map(Plan::left).sum();
     Ok(Forecast {

@@ -10,7 +10,7 @@ use super::recipe::{Recipe, Scaling};
 use crate::config::{Enhancement, JobSettings};
 use crate::enhance::{self, ModelFile, Tiling};
 use crate::error::{Error, Result};
-use crate::synthesis::version;
+use crate::synthesis::{Synthesis, version};
 use crate::types::degradation::Kind;
 use crate::types::{Degradation, Digest, ReadingName};
 
@@ -75,7 +75,7 @@ pub(crate) fn columns<'a>(
     let readings: BTreeSet<&ReadingName> = readings.collect();
     let noise = recipe.readings.iter();
     let noise = noise.filter(|(name, _)| readings.contains(name));
-    let noise = noise.map(|(name, content)| (name.to_string(), json!(content)));
+    let noise = noise.map(|(name, content)| (name.to_string(), reading(content)));
     let columns: [(&str, BTreeMap<String, Value>); 3] = [
         ("model", models.collect()),
         ("enhancer", enhancers.collect()),
@@ -114,6 +114,17 @@ fn enhancer(digest: &Digest, settings: &Enhancement) -> Value {
         "--llie": digest,
         "--tile": tile,
         "--llie-max-side": settings.most_side,
+    })
+}
+
+/// What a light reading is, by flag.
+fn reading(synthesis: &Synthesis) -> Value {
+    json!({
+        "--amplify": synthesis.amplify,
+        "--tone": synthesis.tone,
+        "--draws": synthesis.draws,
+        "--coupling": synthesis.coupling,
+        "--camera, --gain, --ratio or --fixed": synthesis.camera,
     })
 }
 

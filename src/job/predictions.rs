@@ -52,7 +52,7 @@ pub(crate) fn predictions(
         if record.via != Via::File {
             asked.insert(subject.clone());
         }
-        if let Some(&question) = places.get(&record.question) {
+        if let Some(&question) = places.get(&record.question).filter(|_| !record.failed()) {
             let of_subject = answers.entry((question, subject)).or_default();
             of_subject.push(record);
         }
@@ -79,7 +79,7 @@ pub(crate) fn predictions(
 }
 
 fn state(record: Option<&Record<OpenDetail>>, protocol: Protocol) -> (Option<String>, AnswerState) {
-    let Some(record) = record.filter(|record| record.failure.is_none()) else {
+    let Some(record) = record else {
         return (None, AnswerState::Missing);
     };
     let Some(full) = full_answer(record, protocol) else {

@@ -28,7 +28,9 @@ fn import_into<D: Detail>(
     let mut manifest = manifest(&config.run)?;
     let mut store = Store::<D>::open(&config.run, &manifest, Moved::Allowed)?;
     let imported = replies::import(&mut store, &manifest, &config.files)?;
-    manifest.counts = count(manifest.counts.trials, &store.records()?);
+    let records = store.records()?;
+    manifest.counts = count(manifest.counts.trials.max(records.len()), &records);
+    drop(records);
     manifest.status = if manifest.counts.answered == manifest.counts.trials {
         Status::Complete
     } else {

@@ -2,11 +2,12 @@
 
 use std::path::Path;
 
+use crate::ask::png;
 use crate::config::{Enhance, Existing};
 use crate::dataset::inputs::{Entry, Inputs};
 use crate::enhance::{Enhancer, ModelFile};
 use crate::error::{Error, Result};
-use crate::files::{png, write};
+use crate::files::write;
 use crate::job::Outcome;
 use crate::job::enhancers::OpenEnhancers;
 use crate::job::progress::Progress;

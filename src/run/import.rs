@@ -9,13 +9,13 @@ use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
+use crate::ask::png;
 use crate::config::{Existing, Import};
 use crate::dataset::Picture;
 use crate::dataset::frame_folder::{self, Place};
 use crate::dataset::import::keyframes::choose;
 use crate::dataset::import::{Adapter, Incoming, Read, open};
 use crate::error::{Error, Result};
-use crate::files::png;
 use crate::job::Outcome;
 use crate::job::progress::Progress;
 use crate::types::manifest::Status;

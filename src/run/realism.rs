@@ -10,11 +10,12 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
+use crate::ask::png;
 use crate::config::{PairPlace, Realism, Show};
 use crate::dataset::Picture;
 use crate::dataset::pairs::{Pair, Pairs};
 use crate::error::{Error, Result};
-use crate::files::{png, write};
+use crate::files::write;
 use crate::job::Outcome;
 use crate::job::progress::Progress;
 use crate::job::workers::pool;

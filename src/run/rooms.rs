@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
+use crate::ask::png;
 use crate::config::{Existing, MakeRooms};
 use crate::dataset::frame_folder::{self, FRAMES, Place};
 use crate::dataset::rooms::{self, Room};
 use crate::error::{Error, Result};
-use crate::files::png;
 use crate::job::Outcome;
 use crate::job::progress::Progress;
 use crate::job::workers::pool;

@@ -15,6 +15,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
+use crate::files::{self, is_unfinished};
 use crate::types::manifest::{ColumnDifference, RunManifest, differences};
 use crate::types::{
     ChoiceDetail, Detail, QuestionId, Record, RunQuestion, Thumbnail, TrialKey, Via,
@@ -32,8 +33,6 @@ const THUMBNAILS: &str = "thumbnails.jsonl";
 pub const BATCH: &str = "batch";
 /// The trials that were sent in batches.
 const TRIALS: &str = "trials.jsonl";
-/// What the name of a file ends in until it is whole.
-const UNFINISHED: &str = ".part";
 
 /// How often records are forced to the disk itself: what a power cut, not a killed process, may cost.
 const SYNC_EVERY: Duration = Duration::from_secs(2);
@@ -136,7 +135,7 @@ impl<D: Detail> Store<D> {
                 Some(now) if known.is_same(now) => {}
                 Some(_) => {
                     let problem = format!(
-                        "the question {} is another in this run: its words, choices, answer or image were changed; use another --out",
+                        "the question {} is another in this run: other --data or --questions have changed its words, choices, answer or image; use another --out",
                         known.id
                     );
                     let path = self.folder.clone();
@@ -228,18 +227,7 @@ fn write(folder: &Path, name: &str, content: &[u8]) -> Result<()> {
     if fs::read(folder.join(name)).is_ok_and(|there| there == content) {
         return Ok(());
     }
-    let path = folder.join(name);
-    let own = path.file_name().unwrap_or_default().to_string_lossy();
-    let unfinished = path.with_file_name(format!(".{own}{UNFINISHED}"));
-    if let Some(parent) = path.parent() {
-        fs::create_dir_all(parent).map_err(|e| Error::file(parent, "create", e))?;
-    }
-    let written = File::create(&unfinished).and_then(|mut file| {
-        file.write_all(content)?;
-        file.sync_all()
-    });
-    written.map_err(|e| Error::file(&unfinished, "write", e))?;
-    fs::rename(&unfinished, &path).map_err(|e| Error::file(&path, "write", e))
+    files::write_synced(&folder.join(name), content)
 }
 
 fn write_manifest(folder: &Path, manifest: &RunManifest) -> Result<()> {
@@ -408,8 +396,7 @@ fn claim(folder: &Path, manifest: &RunManifest) -> Result<()> {
     fs::create_dir_all(folder).map_err(|e| Error::file(folder, "create", e))?;
     let mut inside = fs::read_dir(folder).map_err(|e| Error::file(folder, "read", e))?;
     // What a process killed in the midst of writing has left is nobody's.
-    let unfinished = |name: &OsStr| name.to_string_lossy().ends_with(UNFINISHED);
-    if inside.any(|entry| entry.is_ok_and(|entry| !unfinished(&entry.file_name()))) {
+    if inside.any(|entry| entry.is_ok_and(|entry| !is_unfinished(&entry.file_name()))) {
         let problem = "the folder is not empty and holds no run; use another --out".to_owned();
         return Err(Error::Run {
             path: folder.to_owned(),
@@ -576,8 +563,8 @@ mod tests {
     fn a_run_goes_on_at_another_address_where_it_is_named() {
         let at = |address: &str| {
             let mut manifest = manifest(0);
-            let address = address.to_owned();
-            manifest.identity.insert(ADDRESS.to_owned(), address.into());
+            let model = [("m".to_owned(), serde_json::json!({ ADDRESS: address }))];
+            manifest.columns.insert("model".to_owned(), model.into());
             manifest
         };
         let base = tempfile::tempdir().unwrap();

@@ -100,21 +100,26 @@ pub fn called(command: &mut Command) -> Called {
     }
 }
 
-/// What every line of `records.jsonl` must be.
-static SCHEMA: LazyLock<jsonschema::Validator> = LazyLock::new(|| {
-    let schema = serde_json::from_str(include_str!("../data/record.schema.json")).unwrap();
-    jsonschema::validator_for(&schema).unwrap()
+/// What every line of `records.jsonl` must be: of questions with choices, and of open ones.
+static SCHEMAS: LazyLock<[jsonschema::Validator; 2]> = LazyLock::new(|| {
+    let schemas = [
+        include_str!("../data/record.schema.json"),
+        include_str!("../data/open_record.schema.json"),
+    ];
+    schemas.map(|text| {
+        let schema = serde_json::from_str(text).unwrap();
+        jsonschema::validator_for(&schema).unwrap()
+    })
 });
 
-/// The records of a run, in the order of the file; each is held to the schema.
+/// The records of a run, in the order of the file; each is held to the schema of its kind.
 pub fn records(run: &Path) -> Vec<Value> {
     let text = fs::read_to_string(run.join("records.jsonl")).unwrap();
-    let records: Vec<Value> = text
-        .lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect();
+    let lines = text.lines().map(|line| serde_json::from_str(line).unwrap());
+    let records: Vec<Value> = lines.collect();
     for record in &records {
-        if let Err(breach) = SCHEMA.validate(record) {
+        let open = record.get("step").is_some();
+        if let Err(breach) = SCHEMAS[usize::from(open)].validate(record) {
             panic!("{breach} at {}: {record}", breach.instance_path());
         }
     }

@@ -6,11 +6,12 @@ use super::requests::{Requests, remote, summary};
 use crate::config::BatchFiles;
 use crate::error::Result;
 use crate::job::experiment::Experiment;
+use crate::job::open_run::{Left, OpenRun, limit, pipeline, wanted};
+use crate::job::outcome::Outcome;
 use crate::job::plan::Plan;
 use crate::job::timings::Timings;
 use crate::job::workers::pool;
-use crate::job::{Left, OpenRun, Outcome, limit, pipeline, wanted};
-use crate::types::manifest::{Counts, Status};
+use crate::types::manifest::Status;
 
 /// Writes the input files of the first phase that has anything left, and notes its trials in the run as sent.
 pub(crate) fn export<E: Experiment>(
@@ -28,12 +29,7 @@ pub(crate) fn export<E: Experiment>(
         let Left { plan, out, .. } = left;
         let trials = plan.keys.len();
         let answered = trials - plan.left() - out;
-        run.manifest.counts = Counts {
-            trials,
-            answered,
-            failed: 0,
-        };
-        run.store.write_manifest(&run.manifest)?;
+        run.note_counts()?;
         let written = write(&mut run, phase, plan, files)?;
         let mut output = summary(&written, answered, out, run.store.folder());
         if !last {

@@ -1,6 +1,7 @@
 //! Questions with choices, asked about each frame: [`evaluate`].
 
 mod choice_order;
+mod experiment;
 mod plan;
 mod record;
 mod setup;

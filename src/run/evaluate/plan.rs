@@ -5,7 +5,6 @@ use std::sync::Arc;
 use super::choice_order::arrange;
 use super::setup::Setup;
 use crate::error::Result;
-use crate::job::experiment::Experiment as _;
 use crate::job::models::ModelUnderTest;
 use crate::job::plan::{SourcePlan, TrialGroup};
 use crate::job::trial::{KeyFacts, Prompt, Trial};
@@ -90,7 +89,7 @@ fn group(
     }
     let image = condition.map(|condition| {
         let source = &setup.sources[source];
-        setup.recipe().stimulus(source, condition)
+        setup.recipe.stimulus(source, condition)
     });
     let image = image.transpose()?;
     let mut trials = Vec::with_capacity(shown.len() * models.len());

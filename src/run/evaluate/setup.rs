@@ -3,36 +3,26 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use serde_json::json;
-
-use super::plan::{ChoiceItem, trials};
 use crate::ask::{Model, Prompts, Random};
-use crate::config::{Config, JobSettings, ModelName, Order, Rotations, Show};
+use crate::config::{Config, ModelName};
 use crate::dataset::Dataset;
 use crate::enhance::ModelFile;
 use crate::error::Result;
 use crate::job::conditions::conditions;
-use crate::job::experiment::Experiment;
-use crate::job::identity::{self, Columns, Identity};
+use crate::job::identity;
 use crate::job::models::{self, ModelUnderTest};
 use crate::job::observer;
-use crate::job::plan::SourcePlan;
 use crate::job::progress::Progress;
 use crate::job::questions::{open_data, select};
 use crate::job::recipe::Recipe;
-use crate::job::report;
 use crate::job::shard::part;
-use crate::job::source::{Frames, Source, first_asked, inspect_all};
-use crate::store::Store;
-use crate::types::manifest::RunManifest;
-use crate::types::{
-    ChoiceDetail, Condition, FrameId, Question, QuestionId, Record, RunQuestion, View,
-};
+use crate::job::source::{Source, first_asked, inspect_all};
+use crate::types::{Condition, FrameId, Question, View};
 
 /// Everything an evaluation is made of, opened and checked; nothing is asked, and nothing written.
 pub(super) struct Setup<'a> {
     pub(super) config: &'a Config,
-    dataset: Arc<Dataset>,
+    pub(super) dataset: Arc<Dataset>,
     pub(super) questions: Vec<Question>,
     pub(super) sources: Vec<Source>,
     /// The place of each frame among the sources.
@@ -40,7 +30,7 @@ pub(super) struct Setup<'a> {
     pub(super) models: Vec<ModelUnderTest>,
     pub(super) prompts: Prompts,
     pub(super) conditions: Vec<Condition>,
-    recipe: Recipe,
+    pub(super) recipe: Recipe,
 }
 
 impl<'a> Setup<'a> {
@@ -83,91 +73,6 @@ impl<'a> Setup<'a> {
             dataset,
         };
         Ok((setup, files))
-    }
-}
-
-impl Experiment for Setup<'_> {
-    type Item = ChoiceItem;
-
-    const PHASES: &'static [&'static str] = &["answers"];
-    const REPLY: &'static str = "a letter";
-
-    fn settings(&self) -> &JobSettings {
-        &self.config.job
-    }
-
-    fn data(&self) -> &str {
-        self.dataset.name()
-    }
-
-    fn models(&self, _: usize) -> &[ModelUnderTest] {
-        &self.models
-    }
-
-    fn sources(&self) -> &[Source] {
-        &self.sources
-    }
-
-    fn frames(&self) -> &dyn Frames {
-        &*self.dataset
-    }
-
-    fn recipe(&self) -> &Recipe {
-        &self.recipe
-    }
-
-    fn questions(&self) -> Vec<RunQuestion> {
-        let all = self.dataset.questions().iter();
-        let places: HashMap<&QuestionId, usize> =
-            all.map(|question| &question.id).zip(0..).collect();
-        let questions = self.questions.iter();
-        questions
-            .map(|question| {
-                let source = &self.sources[self.places[&question.frame]];
-                RunQuestion {
-                    image: source.frames.first().map(|frame| frame.digest),
-                    ..RunQuestion::new(
-                        question,
-                        places[&question.id],
-                        &self.dataset.scene(&question.frame),
-                    )
-                }
-            })
-            .collect()
-    }
-
-    fn identity(&self) -> Identity {
-        let showing = self.config.showing;
-        let shuffled = showing.order != Order::Given;
-        let every = showing.rotations == Rotations::Every;
-        let fields = [
-            Some(("--data", json!(self.dataset.name()))),
-            Some(("--prompts", json!(self.prompts.digest()))),
-            shuffled.then_some(("--shuffle-options", true.into())),
-            every.then_some(("--circular", true.into())),
-        ];
-        let fields = fields.into_iter().flatten();
-        fields
-            .map(|(field, value)| (field.to_owned(), value))
-            .chain(identity::images(&self.recipe))
-            .collect()
-    }
-
-    fn columns(&self) -> Columns {
-        identity::columns(&self.models, &self.recipe, &self.config.job)
-    }
-
-    fn plan(&self, _: usize, _: &[Record]) -> Result<Vec<SourcePlan<ChoiceItem>>> {
-        trials(self)
-    }
-
-    fn report(
-        &self,
-        store: &Store<ChoiceDetail>,
-        manifest: &mut RunManifest,
-        show: Show,
-    ) -> Result<String> {
-        report::choice::write(store, manifest, show)
     }
 }
 

@@ -4,10 +4,10 @@ mod set;
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::ask::png;
 use crate::config::{Existing, Export};
 use crate::dataset::Dataset;
 use crate::error::{Error, Result};
-use crate::files::png;
 use crate::job::Outcome;
 use crate::job::conditions::conditions;
 use crate::job::enhancers::OpenEnhancers;

@@ -4,6 +4,7 @@
 //! levels, answers of people and judges may be added to a run.
 
 mod answers_file;
+mod experiment;
 mod marks;
 mod plan;
 mod questions;

@@ -1,40 +1,23 @@
 //! An evaluation by open questions, opened and checked: [`Setup`].
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
-use std::path::Path;
 use std::sync::Arc;
 
-use serde_json::{Value, json};
-
 use super::answers_file;
-use super::marks::{marks, prompt};
-use super::plan::answers;
 use super::questions::{select, some};
-use super::record::OpenItem;
-use crate::config::{JobSettings, Judge, OpenEqa, OpenTask, Server, Show};
+use crate::config::{Judge, OpenEqa, OpenTask};
 use crate::dataset::openeqa::{self, OpenQuestion};
 use crate::enhance::ModelFile;
 use crate::error::{Error, Result};
-use crate::job::budget::words;
 use crate::job::conditions::conditions;
-use crate::job::experiment::{Expected, Experiment};
-use crate::job::identity::{self, Columns, Identity};
+use crate::job::identity;
 use crate::job::models::{self, ModelUnderTest};
-use crate::job::plan::SourcePlan;
 use crate::job::progress::Progress;
 use crate::job::recipe::Recipe;
-use crate::job::report::open as score;
 use crate::job::shard::part;
-use crate::job::source::{Frames, Source};
-use crate::job::trial::Item as _;
+use crate::job::source::Source;
 use crate::job::walk::WalkFolder;
-use crate::store::Store;
-use crate::types::manifest::RunManifest;
-use crate::types::{Condition, Family, FrameId, OpenDetail, QuestionId, Record, RunQuestion, View};
-
-/// An answer as it may be: as long as one with so many tokens.
-const ANSWER: &str =
-    "There is a small round table with two chairs next to the window of the living room.";
+use crate::types::{Condition, FrameId, OpenDetail, QuestionId, Record, View};
 
 /// Everything an evaluation by open questions is made of, opened and checked; nothing is asked, and nothing written.
 pub(super) struct Setup<'a> {
@@ -42,8 +25,8 @@ pub(super) struct Setup<'a> {
     /// The questions that are asked, in the order of the file.
     pub(super) questions: Vec<Arc<OpenQuestion>>,
     /// The place of each question in the file.
-    file_places: HashMap<QuestionId, usize>,
-    walks: WalkFolder,
+    pub(super) file_places: HashMap<QuestionId, usize>,
+    pub(super) walks: WalkFolder,
     /// The walks, in the order of the questions.
     pub(super) sources: Vec<Source>,
     pub(super) conditions: Vec<Condition>,
@@ -51,7 +34,7 @@ pub(super) struct Setup<'a> {
     pub(super) judge: Option<ModelUnderTest>,
     pub(super) recipe: Recipe,
     /// The answers of files.
-    given: Vec<Record<OpenDetail>>,
+    pub(super) given: Vec<Record<OpenDetail>>,
 }
 
 impl<'a> Setup<'a> {
@@ -126,152 +109,6 @@ impl<'a> Setup<'a> {
             all.extend(answers_file::read(file, &self.questions, variants)?);
         }
         Ok(all)
-    }
-}
-
-impl Experiment for Setup<'_> {
-    type Item = OpenItem;
-
-    const PHASES: &'static [&'static str] = &["answers", "marks"];
-    const REPLY: &'static str = "a sentence or a mark";
-
-    fn settings(&self) -> &JobSettings {
-        &self.config.job
-    }
-
-    fn server(&self) -> Option<&Server> {
-        let judge = self.config.judge.as_ref();
-        let own = self.config.job.ask.server.as_ref();
-        own.or(judge.and_then(|judge| judge.server.as_ref()))
-    }
-
-    fn data(&self) -> &str {
-        let stem = self.config.questions.file_stem().map(Path::new);
-        stem.and_then(Path::to_str).unwrap_or("openeqa")
-    }
-
-    fn models(&self, phase: usize) -> &[ModelUnderTest] {
-        match phase {
-            0 => &self.models,
-            _ => self.judge.as_slice(),
-        }
-    }
-
-    fn sources(&self) -> &[Source] {
-        &self.sources
-    }
-
-    fn frames(&self) -> &dyn Frames {
-        &self.walks
-    }
-
-    fn recipe(&self) -> &Recipe {
-        &self.recipe
-    }
-
-    fn questions(&self) -> Vec<RunQuestion> {
-        let walks: HashMap<&str, &Source> = self
-            .sources
-            .iter()
-            .map(|source| (&*source.name.0, source))
-            .collect();
-        let questions = self.questions.iter().map(|question| {
-            let walk = walks.get(&*question.episode);
-            let walk = walk.filter(|walk| !walk.frames.is_empty());
-            RunQuestion {
-                id: question.id.clone(),
-                place: self.file_places[&question.id],
-                scene: question.episode.clone(),
-                frame: FrameId(question.episode.clone()),
-                family: Family::from(&*question.category),
-                text: question.text.clone(),
-                choices: Vec::new(),
-                answer: question.answer.clone(),
-                extra_answers: question.extra.clone(),
-                evidence: Value::Null,
-                image: walk.map(|walk| walk.digest()),
-            }
-        });
-        questions.collect()
-    }
-
-    fn identity(&self) -> Identity {
-        let walk = &self.config.walk;
-        let fields = [
-            ("--num-frames", json!(walk.frames)),
-            ("--image-size", json!(walk.side)),
-            ("--degrade", json!(walk.darkened)),
-            ("--sensor", json!(walk.camera)),
-        ];
-        let fields = fields.map(|(field, value)| (field.to_owned(), value));
-        fields
-            .into_iter()
-            .chain(identity::images(&self.recipe))
-            .collect()
-    }
-
-    fn columns(&self) -> Columns {
-        let models = self.models.iter().chain(&self.judge);
-        identity::columns(models, &self.recipe, &self.config.job)
-    }
-
-    fn notes(&self) -> Vec<(&'static str, Value)> {
-        let judge = self.judge.as_ref().map(|judge| judge.model.name());
-        let answers: Vec<&str> = self.config.answers.iter().map(|file| &*file.name).collect();
-        vec![
-            (score::JUDGE, json!(judge)),
-            (score::PROTOCOL, json!(self.config.protocol.to_string())),
-            ("--frames", json!(self.config.walk.folder)),
-            ("--answers", json!(answers)),
-        ]
-    }
-
-    fn given(&self) -> &[Record<OpenDetail>] {
-        &self.given
-    }
-
-    fn plan(
-        &self,
-        phase: usize,
-        stored: &[Record<OpenDetail>],
-    ) -> Result<Vec<SourcePlan<OpenItem>>> {
-        Ok(match phase {
-            0 => answers(self)?,
-            _ => marks(self, stored)?,
-        })
-    }
-
-    fn to_come(&self, left: &[SourcePlan<OpenItem>]) -> Vec<Expected> {
-        if self.judge.is_none() {
-            return Vec::new();
-        }
-        let groups = left.iter().flat_map(|part| &part.groups);
-        let trials = groups.flat_map(|group| &group.trials);
-        // Each answer that is still to come may be unlike any other.
-        let marks = trials.filter_map(|trial| match &trial.item {
-            OpenItem::Answer(question) => {
-                let mark = OpenItem::Mark {
-                    question: Arc::clone(question),
-                    answer: ANSWER.into(),
-                };
-                Some(Expected {
-                    model: 0,
-                    words: words(&prompt(question, ANSWER)),
-                    reply: mark.reply_tokens(),
-                })
-            }
-            OpenItem::Mark { .. } => None,
-        });
-        marks.collect()
-    }
-
-    fn report(
-        &self,
-        store: &Store<OpenDetail>,
-        manifest: &mut RunManifest,
-        show: Show,
-    ) -> Result<String> {
-        score::write(store, manifest, show)
     }
 }
 

@@ -8,11 +8,12 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
+use crate::ask::png;
 use crate::config::{Existing, Light, Product, Synthesize};
 use crate::dataset::Picture;
 use crate::dataset::inputs::{Entry, Inputs, stem};
 use crate::error::{Error, Result};
-use crate::files::{png, write};
+use crate::files::write;
 use crate::job::Outcome;
 use crate::job::frame_work::{FrameWork, Steps};
 use crate::job::progress::{Bar, Progress};

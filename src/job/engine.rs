@@ -1,0 +1,131 @@
+//! An experiment carried out: [`Job`].
+
+use std::collections::HashSet;
+use std::path::PathBuf;
+
+use super::batch;
+use super::enhancers::OpenEnhancers;
+use super::estimate;
+use super::experiment::{DetailOf, Experiment, RecordOf};
+use super::folder;
+use super::manifest;
+use super::open_run::{OpenRun, answered, pipeline};
+use super::outcome::Outcome;
+use super::plan::Plan;
+use super::progress::Progress;
+use super::timings::Timings;
+use crate::config::{BatchFiles, Mode, Show};
+use crate::enhance::ModelFile;
+use crate::error::Result;
+use crate::report::forecast::{json, render};
+use crate::store::{self, Store};
+use crate::types::manifest::Status;
+use crate::types::{Detail as _, TrialKey};
+
+/// An experiment that is carried out in a run folder.
+pub(crate) struct Job<'a, E: Experiment> {
+    experiment: &'a E,
+    /// The enhancement models, not yet loaded.
+    files: Vec<ModelFile>,
+    /// Where the run lies, or will.
+    folder: PathBuf,
+    progress: &'a Progress,
+}
+
+impl<'a, E: Experiment> Job<'a, E> {
+    /// Finds the folder of the run; nothing is written.
+    pub(crate) fn new(
+        experiment: &'a E,
+        files: Vec<ModelFile>,
+        progress: &'a Progress,
+    ) -> Result<Self> {
+        Ok(Self {
+            folder: folder::find(experiment)?,
+            experiment,
+            files,
+            progress,
+        })
+    }
+
+    /// Asks what is left, or says what that would take.
+    ///
+    /// # Errors
+    /// If nothing can be asked, or no further trial could succeed; what had arrived by then is kept.
+    pub(crate) fn run(self) -> Result<Outcome> {
+        match self.experiment.settings().mode {
+            Mode::DryRun => self.estimate(),
+            Mode::Run => self.open()?.ask(),
+        }
+    }
+
+    /// Writes what is left to ask as files of a Batch API, and notes their trials in the run as sent.
+    ///
+    /// # Errors
+    /// If a model is built in, an image is larger than the endpoint takes, or a file cannot be written.
+    pub(crate) fn export_batch(self, files: &BatchFiles) -> Result<Outcome> {
+        batch::export::export(self.open()?, files)
+    }
+
+    /// Says what is left to ask and what it would take; sends nothing and leaves no file.
+    fn estimate(self) -> Result<Outcome> {
+        let experiment = self.experiment;
+        let settings = experiment.settings();
+        let stored: Vec<RecordOf<E>> = store::read_records(&self.folder)?;
+        let answered = answered(&stored);
+        let mut plans = Vec::new();
+        for phase in 0..E::PHASES.len() {
+            let mut plan = Plan::new(experiment.plan(phase, &stored)?);
+            plan.leave_out(|key| answered.contains(key));
+            plans.push(plan);
+        }
+        let timings = Timings::default();
+        let enhancers = OpenEnhancers::load(self.files, &settings.enhancement)?;
+        let mut pipeline = pipeline(experiment, enhancers.enhancers, None, &timings);
+        let forecast = estimate::estimate(experiment, &plans, &stored, &mut pipeline)?;
+        Ok(Outcome {
+            status: Status::Complete,
+            output: match settings.output.show {
+                Show::Json => json(&forecast)?,
+                Show::Table => render(&forecast),
+            },
+        })
+    }
+
+    /// Opens the run folder.
+    fn open(self) -> Result<OpenRun<'a, E>> {
+        let Self {
+            experiment,
+            files,
+            folder,
+            progress,
+        } = self;
+        let settings = experiment.settings();
+        let kept = store::read_manifest(&folder, DetailOf::<E>::SCHEMA)?;
+        let complete = kept
+            .as_ref()
+            .is_some_and(|kept| kept.status == Status::Complete);
+        // Opened before the folder is made, so that an enhancer that does not work leaves nothing behind.
+        let enhancers = OpenEnhancers::new(files, &settings.enhancement, complete)?;
+        let manifest = manifest::of(experiment, kept);
+        let mut store = Store::open(&folder, &manifest, folder::moved(&settings.output))?;
+        store.add_questions(experiment.questions())?;
+        let there: HashSet<TrialKey> = if experiment.given().is_empty() {
+            HashSet::new()
+        } else {
+            store.records()?.iter().map(|record| record.key).collect()
+        };
+        for record in experiment.given() {
+            if !there.contains(&record.key) {
+                store.append(record)?;
+            }
+        }
+        Ok(OpenRun {
+            experiment,
+            progress,
+            enhancers,
+            store,
+            manifest,
+            keys: HashSet::new(),
+        })
+    }
+}

@@ -1,0 +1,105 @@
+//! Questions with choices as an [`Experiment`].
+
+use std::collections::HashMap;
+
+use serde_json::json;
+
+use super::plan::{ChoiceItem, trials};
+use super::setup::Setup;
+use crate::config::{JobSettings, Order, Rotations, Show};
+use crate::error::Result;
+use crate::job::experiment::Experiment;
+use crate::job::identity::{self, Columns, Identity};
+use crate::job::models::ModelUnderTest;
+use crate::job::plan::SourcePlan;
+use crate::job::recipe::Recipe;
+use crate::job::report;
+use crate::job::source::{Frames, Source};
+use crate::store::Store;
+use crate::types::manifest::RunManifest;
+use crate::types::{ChoiceDetail, QuestionId, Record, RunQuestion};
+
+impl Experiment for Setup<'_> {
+    type Item = ChoiceItem;
+
+    const PHASES: &'static [&'static str] = &["answers"];
+    const REPLY: &'static str = "a letter";
+
+    fn settings(&self) -> &JobSettings {
+        &self.config.job
+    }
+
+    fn data(&self) -> &str {
+        self.dataset.name()
+    }
+
+    fn models(&self, _: usize) -> &[ModelUnderTest] {
+        &self.models
+    }
+
+    fn sources(&self) -> &[Source] {
+        &self.sources
+    }
+
+    fn frames(&self) -> &dyn Frames {
+        &*self.dataset
+    }
+
+    fn recipe(&self) -> &Recipe {
+        &self.recipe
+    }
+
+    fn questions(&self) -> Vec<RunQuestion> {
+        let all = self.dataset.questions().iter();
+        let places: HashMap<&QuestionId, usize> =
+            all.map(|question| &question.id).zip(0..).collect();
+        let questions = self.questions.iter();
+        questions
+            .map(|question| {
+                let source = &self.sources[self.places[&question.frame]];
+                RunQuestion {
+                    image: source.frames.first().map(|frame| frame.digest),
+                    ..RunQuestion::new(
+                        question,
+                        places[&question.id],
+                        &self.dataset.scene(&question.frame),
+                    )
+                }
+            })
+            .collect()
+    }
+
+    fn identity(&self) -> Identity {
+        let showing = self.config.showing;
+        let shuffled = showing.order != Order::Given;
+        let every = showing.rotations == Rotations::Every;
+        let fields = [
+            Some(("--data", json!(self.dataset.name()))),
+            Some(("--prompts", json!(self.prompts.digest()))),
+            shuffled.then_some(("--shuffle-options", true.into())),
+            every.then_some(("--circular", true.into())),
+        ];
+        let fields = fields.into_iter().flatten();
+        fields
+            .map(|(field, value)| (field.to_owned(), value))
+            .chain(identity::images(&self.recipe))
+            .collect()
+    }
+
+    fn columns(&self) -> Columns {
+        identity::columns(&self.models, &self.recipe, &self.config.job)
+    }
+
+    fn plan(&self, _: usize, _: &[Record]) -> Result<Vec<SourcePlan<ChoiceItem>>> {
+        trials(self)
+    }
+
+    fn report(
+        &self,
+        store: &Store<ChoiceDetail>,
+        manifest: &mut RunManifest,
+        show: Show,
+    ) -> Result<String> {
+        report::choice::write(store, manifest, show)
+    }
+}
