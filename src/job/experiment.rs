@@ -4,14 +4,15 @@ use serde_json::Value;
 
 use super::identity::{Columns, Identity};
 use super::models::ModelUnderTest;
+use super::outcome::Outcome;
 use super::plan::SourcePlan;
 use super::recipe::Recipe;
 use super::source::{Frames, Source};
+use super::stored::StoredRun;
 use super::trial::Item;
 use crate::config::{JobSettings, Server, Show};
 use crate::error::Result;
 use crate::store::Store;
-use crate::types::manifest::RunManifest;
 use crate::types::{Record, RunQuestion};
 
 /// The record of a trial of an experiment.
@@ -92,12 +93,11 @@ pub(crate) trait Experiment: Sync {
         Vec::new()
     }
 
-    /// Scores what a run holds and leaves the report in its folder; what belongs on standard output. The manifest's status may be
-    /// changed before it is written: not all that came may be scored.
+    /// Scores what a run holds, and writes its report and its manifest into its folder. It is incomplete if not all that came is scored.
     fn report(
         &self,
         store: &Store<DetailOf<Self>>,
-        manifest: &mut RunManifest,
+        run: StoredRun<DetailOf<Self>>,
         show: Show,
-    ) -> Result<String>;
+    ) -> Result<Outcome>;
 }

@@ -60,7 +60,7 @@ pub fn merge(config: &Merge) -> Result<Outcome> {
 fn merge_all<D: Detail + PartialEq>(
     config: &Merge,
     folders: &[PathBuf],
-    write: impl FnOnce(&Store<D>, &mut RunManifest, Show) -> Result<String>,
+    write: impl FnOnce(&Store<D>, StoredRun<D>, Show) -> Result<Outcome>,
 ) -> Result<Outcome> {
     let parts: Result<Vec<Part<D>>> = folders.iter().map(|folder| Part::open(folder)).collect();
     let mut parts = parts?;
@@ -75,12 +75,10 @@ fn merge_all<D: Detail + PartialEq>(
         .collect();
     questions.sort_by_key(|question| question.place);
     let (records, thumbnails) = together(parts, &questions)?;
-    manifest.counts = count(manifest.counts.trials, &records);
-    manifest.status = if missing == 0 && manifest.counts.answered == manifest.counts.trials {
-        Status::Complete
-    } else {
-        Status::Incomplete
-    };
+    manifest.count(count(manifest.counts.trials, &records));
+    if missing > 0 {
+        manifest.status = Status::Incomplete;
+    }
     let mut store = Store::<D>::open(&config.out, &manifest, Moved::Refused)?;
     store.write_questions(&questions)?;
     let there: HashMap<TrialKey, Record<D>> = store
@@ -103,11 +101,8 @@ fn merge_all<D: Detail + PartialEq>(
             store.append_thumbnail(&thumbnail)?;
         }
     }
-    let output = write(&store, &mut manifest, config.show)?;
-    Ok(Outcome {
-        status: manifest.status,
-        output,
-    })
+    let run = StoredRun::of(&config.out, manifest)?;
+    write(&store, run, config.show)
 }
 
 /// The folders of shards among those named and directly in them.

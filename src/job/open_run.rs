@@ -12,11 +12,11 @@ use super::experiment::{DetailOf, Experiment, RecordOf};
 use super::folder::now;
 use super::frame_work::Steps;
 use super::image_pipeline::ImagePipeline;
-use super::manifest::count;
 use super::models;
 use super::outcome::Outcome;
 use super::plan::Plan;
 use super::progress::Progress;
+use super::stored::StoredRun;
 use super::thumbnail::Wanted;
 use super::timings::Timings;
 use super::workers::Workers;
@@ -43,7 +43,7 @@ pub(crate) struct OpenRun<'a, E: Experiment> {
 /// What is left of a phase.
 pub(super) struct Left<E: Experiment> {
     pub(super) plan: Plan<E::Item>,
-    stored: Vec<RecordOf<E>>,
+    pub(super) stored: Vec<RecordOf<E>>,
     /// How many trials wait for a batch.
     pub(super) out: usize,
 }
@@ -111,7 +111,6 @@ impl<E: Experiment> OpenRun<'_, E> {
         let settings = experiment.settings();
         let models = experiment.models(phase);
         let budget = Budget::new(&settings.money, models, &stored)?;
-        drop(stored);
         let tally = Tally {
             trials: plan.keys.len(),
             answered: plan.keys.len() - plan.left(),
@@ -122,7 +121,8 @@ impl<E: Experiment> OpenRun<'_, E> {
         } else {
             Vec::new()
         };
-        self.begin(tally)?;
+        self.begin(tally, &stored)?;
+        drop(stored);
         let workers = Workers::start(settings.enhancement.threads)?;
         let timings = Timings::default();
         let limit = limit(&settings.ask, &settings.images);
@@ -152,19 +152,19 @@ impl<E: Experiment> OpenRun<'_, E> {
     }
 
     /// Notes in the manifest how many trials there are, so that a killed run says it.
-    pub(super) fn note_counts(&mut self) -> Result<()> {
+    pub(super) fn note_counts(&mut self, stored: &[RecordOf<E>]) -> Result<()> {
         self.manifest.counts = Counts {
             failed: 0,
-            ..self.counts()?
+            ..self.counts(stored)
         };
         self.store.write_manifest(&self.manifest)
     }
 
     /// Notes how much there is to ask, and says how much of it is there.
-    fn begin(&mut self, tally: Tally) -> Result<()> {
+    fn begin(&mut self, tally: Tally, stored: &[RecordOf<E>]) -> Result<()> {
         let Tally { trials, answered } = tally;
         self.manifest.platform.extend(self.enhancers.version());
-        self.note_counts()?;
+        self.note_counts(stored)?;
         if answered > 0 {
             self.progress.say(&format!(
                 "{}: {answered} of {trials} trials are answered already",
@@ -176,34 +176,38 @@ impl<E: Experiment> OpenRun<'_, E> {
 
     /// How many trials the run has: those planned, and those that were answered under an earlier command. A trial that failed and is
     /// planned no more, because its images are others by now, does not count.
-    fn counts(&self) -> Result<Counts> {
-        let stored = self.store.records()?.into_iter();
-        let own = stored.filter(|record| !record.failed() || self.keys.contains(&record.key));
-        let own: Vec<RecordOf<E>> = own.collect();
-        let answered = own.iter().map(|record| record.key);
-        let keys: HashSet<TrialKey> = self.keys.iter().copied().chain(answered).collect();
-        Ok(count(keys.len(), &own))
+    fn counts(&self, stored: &[RecordOf<E>]) -> Counts {
+        let (mut keys, mut failed) = (self.keys.clone(), 0);
+        for record in stored {
+            if !record.failed() {
+                keys.insert(record.key);
+            } else if keys.contains(&record.key) {
+                failed += 1;
+            }
+        }
+        Counts {
+            trials: keys.len(),
+            answered: stored.iter().filter(|record| !record.failed()).count(),
+            failed,
+        }
     }
 
     /// Scores what the run holds, and leaves the report in its folder.
-    fn finish(mut self, end: EndReason) -> Result<Outcome> {
-        let counts = self.counts()?;
+    fn finish(self, end: EndReason) -> Result<Outcome> {
+        let mut run = StoredRun::of(self.store.folder(), self.manifest.clone())?;
+        let counts = self.counts(&run.records);
         let status = end.status(counts);
-        if (status, counts) != (self.manifest.status, self.manifest.counts) {
-            (self.manifest.status, self.manifest.counts) = (status, counts);
-            self.manifest.updated = now();
+        let manifest = &mut run.manifest;
+        if (status, counts) != (manifest.status, manifest.counts) {
+            (manifest.status, manifest.counts) = (status, counts);
+            manifest.updated = now();
         }
         let show = self.experiment.settings().output.show;
-        let output = self
-            .experiment
-            .report(&self.store, &mut self.manifest, show)?;
-        if let EndReason::Stopped(error) | EndReason::ModelStopped(error) = end {
-            return Err(error);
+        let outcome = self.experiment.report(&self.store, run, show)?;
+        match end {
+            EndReason::Stopped(error) | EndReason::ModelStopped(error) => Err(error),
+            _ => Ok(outcome),
         }
-        Ok(Outcome {
-            status: self.manifest.status,
-            output,
-        })
     }
 }
 

@@ -4,10 +4,9 @@ use crate::config::{BatchImport, Show};
 use crate::error::Result;
 use crate::job::batch::replies;
 use crate::job::report::{choice, open};
-use crate::job::stored::{Asked, manifest};
+use crate::job::stored::{Asked, StoredRun, manifest};
 use crate::job::{Outcome, count};
 use crate::store::{Moved, Store};
-use crate::types::manifest::{RunManifest, Status};
 use crate::types::{ChoiceDetail, Detail, OpenDetail};
 
 /// Imports the replies of output and error files, each of them once, however often a file is given.
@@ -23,25 +22,17 @@ pub fn import(config: &BatchImport) -> Result<Outcome> {
 
 fn import_into<D: Detail>(
     config: &BatchImport,
-    write: impl FnOnce(&Store<D>, &mut RunManifest, Show) -> Result<String>,
+    write: impl FnOnce(&Store<D>, StoredRun<D>, Show) -> Result<Outcome>,
 ) -> Result<Outcome> {
-    let mut manifest = manifest(&config.run)?;
+    let manifest = manifest(&config.run)?;
     let mut store = Store::<D>::open(&config.run, &manifest, Moved::Allowed)?;
     let imported = replies::import(&mut store, &manifest, &config.files)?;
-    let records = store.records()?;
-    manifest.counts = count(manifest.counts.trials.max(records.len()), &records);
-    drop(records);
-    manifest.status = if manifest.counts.answered == manifest.counts.trials {
-        Status::Complete
-    } else {
-        Status::Incomplete
-    };
-    let mut output = write(&store, &mut manifest, config.show)?;
+    let mut run = StoredRun::of(&config.run, manifest)?;
+    let trials = run.manifest.counts.trials.max(run.records.len());
+    run.manifest.count(count(trials, &run.records));
+    let mut outcome = write(&store, run, config.show)?;
     if config.show == Show::Table {
-        output.insert_str(0, &imported);
+        outcome.output.insert_str(0, &imported);
     }
-    Ok(Outcome {
-        status: manifest.status,
-        output,
-    })
+    Ok(outcome)
 }

@@ -4,31 +4,29 @@
 //! arrived, so that a killed run loses nothing. `manifest.json` says what the run is, `questions.jsonl` what it asks, and
 //! `thumbnails.jsonl` has small copies of the images it showed; everything else is made again from these.
 
+mod folder;
 mod lines;
 
 use std::collections::{BTreeSet, HashMap};
-use std::ffi::OsStr;
-use std::fs::{self, File, OpenOptions, TryLockError};
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io::Write;
 use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
-use crate::files::{self, is_unfinished};
-use crate::types::manifest::{ColumnDifference, RunManifest, differences};
+use crate::types::manifest::RunManifest;
 use crate::types::{
     ChoiceDetail, Detail, QuestionId, Record, RunQuestion, Thumbnail, TrialKey, Via,
 };
 
+use folder::{QUESTIONS, RECORDS, THUMBNAILS, agree, claim, write, write_manifest};
 use lines::{append, json_lines, lines, mend};
 
-const MANIFEST: &str = "manifest.json";
-const RECORDS: &str = "records.jsonl";
-/// The questions of a run, with their words and scenes.
-const QUESTIONS: &str = "questions.jsonl";
-/// Small copies of images that were sent.
-const THUMBNAILS: &str = "thumbnails.jsonl";
+pub use folder::{
+    Moved, find, read_manifest, read_questions, read_records, read_thumbnails, schema,
+};
+
 /// The folder of batches in a run.
 pub const BATCH: &str = "batch";
 /// The trials that were sent in batches.
@@ -36,18 +34,6 @@ const TRIALS: &str = "trials.jsonl";
 
 /// How often records are forced to the disk itself: what a power cut, not a killed process, may cost.
 const SYNC_EVERY: Duration = Duration::from_secs(2);
-
-/// Whether a kept run may go on at another address of its endpoint.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Moved {
-    /// It may: the user has named this run as the one to go on with, and says so that it is the same model.
-    Allowed,
-    /// It may not: another server may serve another model by the same name.
-    Refused,
-}
-
-/// The field of a run's identity that holds the address.
-const ADDRESS: &str = "--base-url";
 
 /// An open run folder, held by this process alone.
 #[derive(Debug)]
@@ -168,6 +154,9 @@ impl<D: Detail> Store<D> {
         for record in self.batched()? {
             *out.entry(record.key).or_default() += 1;
         }
+        if out.is_empty() {
+            return Ok(BTreeSet::new());
+        }
         for record in lines::<Record<D>>(&self.folder.join(RECORDS))? {
             if !record.failed() {
                 out.remove(&record.key);
@@ -222,378 +211,5 @@ impl<D: Detail> Store<D> {
     }
 }
 
-/// Writes a file into a folder, whole or not at all; one that already says this is left as it is.
-fn write(folder: &Path, name: &str, content: &[u8]) -> Result<()> {
-    if fs::read(folder.join(name)).is_ok_and(|there| there == content) {
-        return Ok(());
-    }
-    files::write_synced(&folder.join(name), content)
-}
-
-fn write_manifest(folder: &Path, manifest: &RunManifest) -> Result<()> {
-    let unwritten = |e: serde_json::Error| Error::file(folder.join(MANIFEST), "write", e.into());
-    let mut text = serde_json::to_vec_pretty(manifest).map_err(unwritten)?;
-    text.push(b'\n');
-    write(folder, MANIFEST, &text)
-}
-
-/// What a run folder holds: the last record of each trial, in the order of their first; a last line that was cut off while it
-/// was written is passed over.
-pub fn read_records<D: Detail>(folder: &Path) -> Result<Vec<Record<D>>> {
-    let mut latest = HashMap::<TrialKey, usize>::new();
-    let mut records: Vec<Record<D>> = Vec::new();
-    for record in lines::<Record<D>>(&folder.join(RECORDS))? {
-        if let Some(&index) = latest.get(&record.key) {
-            records[index] = record;
-        } else {
-            latest.insert(record.key, records.len());
-            records.push(record);
-        }
-    }
-    Ok(records)
-}
-
-/// The questions of a run; none where it was made by a version that kept none.
-pub fn read_questions(folder: &Path) -> Result<Vec<RunQuestion>> {
-    lines(&folder.join(QUESTIONS))
-}
-
-/// The small copies of images of a run; none where it kept none.
-pub fn read_thumbnails(folder: &Path) -> Result<Vec<Thumbnail>> {
-    lines(&folder.join(THUMBNAILS))
-}
-
-/// The newest run folder in `base` whose name ends in `-<hash>`.
-#[must_use]
-pub fn find(base: &Path, hash: &str) -> Option<PathBuf> {
-    let ending = format!("-{hash}");
-    let folders = fs::read_dir(base).ok()?.flatten().map(|entry| entry.path());
-    folders
-        .filter(|path| {
-            path.file_name()
-                .and_then(OsStr::to_str)
-                .is_some_and(|name| name.ends_with(&ending))
-        })
-        .filter(|path| path.join(MANIFEST).is_file())
-        .max()
-}
-
-/// The schema of the run in a folder; `None` where there is none.
-///
-/// # Errors
-/// Where its manifest cannot be read.
-pub fn schema(folder: &Path) -> Result<Option<String>> {
-    Ok(any_manifest(folder)?.map(|manifest| manifest.schema))
-}
-
-/// The manifest of a run folder; `None` where there is none.
-///
-/// # Errors
-/// Where it cannot be read, or is that of a run with other records than those of `schema`.
-pub fn read_manifest(folder: &Path, schema: &str) -> Result<Option<RunManifest>> {
-    let Some(manifest) = any_manifest(folder)? else {
-        return Ok(None);
-    };
-    if manifest.schema == schema {
-        return Ok(Some(manifest));
-    }
-    let problem = refusal(&manifest.schema, schema, &manifest.version);
-    let path = folder.join(MANIFEST);
-    Err(Error::Run { path, problem })
-}
-
-/// Why a run of one schema is not taken where another is expected.
-fn refusal(found: &str, expected: &str, version: &str) -> String {
-    let parts = |schema: &str| -> Option<(String, u32)> {
-        let (name, number) = schema.rsplit_once('/')?;
-        Some((name.to_owned(), number.parse().ok()?))
-    };
-    // The number is that of the program's version: it rises for runs of all kinds at once.
-    let newest = parts(expected).map_or(0, |(_, number)| number);
-    match parts(found) {
-        Some((name, number)) if KINDS.contains(&&*name) && number < newest => format!(
-            "this run was made by an earlier version of darkqa-eval ({version}, schema {found:?}); run it again with this one"
-        ),
-        Some((name, number)) if KINDS.contains(&&*name) && number == newest => format!(
-            "the run has the schema {found:?}, {expected:?} is expected here; use another folder"
-        ),
-        _ => format!(
-            "the schema {found:?} is not known to this version of darkqa-eval; the run was made by version {version}: read it with that"
-        ),
-    }
-}
-
-/// The kinds of runs, by the names of their schemas.
-const KINDS: [&str; 2] = ["darkqa.run", "darkqa.openeqa"];
-
-fn any_manifest(folder: &Path) -> Result<Option<RunManifest>> {
-    let path = folder.join(MANIFEST);
-    let text = match fs::read(&path) {
-        Ok(text) => text,
-        Err(e)
-            if matches!(
-                e.kind(),
-                std::io::ErrorKind::NotFound | std::io::ErrorKind::NotADirectory
-            ) =>
-        {
-            return Ok(None);
-        }
-        Err(e) => return Err(Error::file(path, "read", e)),
-    };
-    serde_json::from_slice(&text)
-        .map(Some)
-        .map_err(|e| Error::Run {
-            path: path.clone(),
-            problem: format!("not the manifest of a run: {e}"),
-        })
-}
-
-/// Makes sure that a kept run is the one now asked for: the same identity, and every known value of a column what it was.
-fn agree(folder: &Path, kept: &RunManifest, now: &RunManifest, moved: Moved) -> Result<()> {
-    let wrong = |problem: String| {
-        let path = folder.to_owned();
-        Err(Error::Run { path, problem })
-    };
-    if let Some((field, before, after)) = differences(&kept.identity, &now.identity).next() {
-        return wrong(format!(
-            "this run has another {field}: it was {before}, now it is {after}; use another --out, or the same {field}"
-        ));
-    }
-    if kept.shard != now.shard {
-        let [before, after] = [kept, now].map(|run| run.shard.as_deref().unwrap_or("none"));
-        return wrong(format!(
-            "this run has another --shard: it was {before}, now it is {after}; use another --out, or the same --shard"
-        ));
-    }
-    for difference in kept.column_differences(now) {
-        let ColumnDifference {
-            column,
-            value,
-            field,
-            first: before,
-            second: after,
-        } = difference;
-        let address = field == ADDRESS;
-        if address && moved == Moved::Allowed {
-            tracing::warn!("{value} was asked at {before} in this run; it goes on at {after}");
-            continue;
-        }
-        let hint = if address {
-            " (the same model at another address: --resume)"
-        } else {
-            ""
-        };
-        return wrong(format!(
-            "the {column} {value} has another {field} in this run: it was {before}, now it is {after}; use another --out, or the same \
-             {field}{hint}"
-        ));
-    }
-    Ok(())
-}
-
-/// Makes a new folder, or takes an empty one, and marks it as a run before anything else lies in it.
-fn claim(folder: &Path, manifest: &RunManifest) -> Result<()> {
-    fs::create_dir_all(folder).map_err(|e| Error::file(folder, "create", e))?;
-    let mut inside = fs::read_dir(folder).map_err(|e| Error::file(folder, "read", e))?;
-    // What a process killed in the midst of writing has left is nobody's.
-    if inside.any(|entry| entry.is_ok_and(|entry| !is_unfinished(&entry.file_name()))) {
-        let problem = "the folder is not empty and holds no run; use another --out".to_owned();
-        return Err(Error::Run {
-            path: folder.to_owned(),
-            problem,
-        });
-    }
-    write_manifest(folder, manifest)
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use std::collections::BTreeMap;
-
-    use crate::types::manifest::{Counts, Status};
-    use crate::types::{Digest, Family, FrameId, Outcome, QuestionId};
-
-    type Store = super::Store;
-
-    fn manifest(seed: u64) -> RunManifest {
-        RunManifest {
-            schema: ChoiceDetail::SCHEMA.into(),
-            status: Status::Started,
-            version: "0".into(),
-            created: String::new(),
-            updated: String::new(),
-            platform: BTreeMap::new(),
-            identity: BTreeMap::from([("--seed".to_owned(), seed.into())]),
-            settings: BTreeMap::new(),
-            images: BTreeMap::new(),
-            columns: BTreeMap::new(),
-            shard: None,
-            counts: Counts::default(),
-        }
-    }
-
-    fn record(name: &str, outcome: Outcome) -> Record {
-        let detail = ChoiceDetail {
-            frame: FrameId("f".into()),
-            family: Family::Color,
-            choices: vec!["a".into(), "b".into()],
-            truth: 0,
-            repeat: 0,
-            strict: None,
-            lenient: None,
-            outcome,
-            image: None,
-        };
-        let key = Digest::of(name.as_bytes()).into();
-        Record {
-            reply: Some("A\u{2028}\n".into()),
-            attempts: 1,
-            ..Record::blank(key, QuestionId(name.into()), "m", None, detail)
-        }
-    }
-
-    #[test]
-    fn runs_of_other_versions_are_refused_by_what_they_are() {
-        let base = tempfile::tempdir().unwrap();
-        for (schema, says) in [
-            (
-                "darkqa.run/1",
-                "made by an earlier version of darkqa-eval (0",
-            ),
-            ("darkqa.openeqa/1", "run it again"),
-            ("darkqa.openeqa/2", "\"darkqa.run/2\" is expected here"),
-            ("darkqa.run/9", "is not known to this version"),
-            ("something", "is not known to this version"),
-        ] {
-            let manifest = RunManifest {
-                schema: schema.into(),
-                ..manifest(0)
-            };
-            write_manifest(base.path(), &manifest).unwrap();
-            let error = read_manifest(base.path(), ChoiceDetail::SCHEMA).unwrap_err();
-            assert!(error.to_string().contains(says), "{error}");
-        }
-    }
-
-    #[test]
-    fn records_come_back_the_last_of_each_trial() {
-        let base = tempfile::tempdir().unwrap();
-        let folder = base.path().join("run");
-        let mut store = Store::open(&folder, &manifest(0), Moved::Refused).unwrap();
-        assert!(store.records().unwrap().is_empty());
-        for (name, outcome) in [
-            ("a", Outcome::Failed),
-            ("b", Outcome::Right),
-            ("a", Outcome::Wrong),
-        ] {
-            store.append(&record(name, outcome)).unwrap();
-        }
-        drop(store);
-        let kept = Store::open(&folder, &manifest(0), Moved::Refused)
-            .unwrap()
-            .records()
-            .unwrap();
-        assert_eq!(
-            kept,
-            [record("a", Outcome::Wrong), record("b", Outcome::Right)]
-        );
-    }
-
-    #[test]
-    fn a_torn_line_is_cut_and_a_broken_one_is_named() {
-        let base = tempfile::tempdir().unwrap();
-        let mut store = Store::open(base.path(), &manifest(0), Moved::Refused).unwrap();
-        store.append(&record("a", Outcome::Right)).unwrap();
-        store.records.write_all(b"{\"key\":\"12").unwrap();
-        drop(store);
-        let mut store = Store::open(base.path(), &manifest(0), Moved::Refused).unwrap();
-        assert_eq!(store.records().unwrap().len(), 1);
-        store.append(&record("b", Outcome::Right)).unwrap();
-        drop(store);
-        let kept = Store::open(base.path(), &manifest(0), Moved::Refused)
-            .unwrap()
-            .records();
-        assert_eq!(kept.unwrap().len(), 2);
-        let path = base.path().join(RECORDS);
-        let text = fs::read_to_string(&path).unwrap();
-        fs::write(&path, text.replacen("{\"key\"", "{\"kex\"", 1)).unwrap();
-        let store = Store::open(base.path(), &manifest(0), Moved::Refused).unwrap();
-        let error = store.records().unwrap_err().to_string();
-        assert!(
-            error.contains("records.jsonl, line 1: not a record"),
-            "{error}"
-        );
-    }
-
-    #[test]
-    fn another_run_is_refused_by_the_flag_that_differs() {
-        let base = tempfile::tempdir().unwrap();
-        drop(Store::open(base.path(), &manifest(0), Moved::Refused).unwrap());
-        let error = Store::open(base.path(), &manifest(7), Moved::Refused)
-            .unwrap_err()
-            .to_string();
-        assert!(
-            error.contains("another --seed: it was 0, now it is 7"),
-            "{error}"
-        );
-    }
-
-    #[test]
-    fn a_run_is_held_by_one_process_and_a_strange_folder_is_left_alone() {
-        let base = tempfile::tempdir().unwrap();
-        let _held = Store::open(base.path(), &manifest(0), Moved::Refused).unwrap();
-        assert!(
-            Store::open(base.path(), &manifest(0), Moved::Refused)
-                .unwrap_err()
-                .to_string()
-                .contains("another process")
-        );
-        let strange = tempfile::tempdir().unwrap();
-        fs::write(strange.path().join("thesis.tex"), "").unwrap();
-        assert!(
-            Store::open(strange.path(), &manifest(0), Moved::Refused)
-                .unwrap_err()
-                .to_string()
-                .contains("not empty")
-        );
-    }
-
-    #[test]
-    fn a_run_goes_on_at_another_address_where_it_is_named() {
-        let at = |address: &str| {
-            let mut manifest = manifest(0);
-            let model = [("m".to_owned(), serde_json::json!({ ADDRESS: address }))];
-            manifest.columns.insert("model".to_owned(), model.into());
-            manifest
-        };
-        let base = tempfile::tempdir().unwrap();
-        drop(Store::open(base.path(), &at("here"), Moved::Refused).unwrap());
-        assert!(Store::open(base.path(), &at("there"), Moved::Allowed).is_ok());
-        let error = Store::open(base.path(), &at("there"), Moved::Refused).unwrap_err();
-        assert!(error.to_string().contains("--resume"), "{error}");
-    }
-
-    #[test]
-    fn what_a_killed_process_left_unfinished_is_in_nobodys_way() {
-        let base = tempfile::tempdir().unwrap();
-        fs::write(base.path().join(".manifest.json.part"), "{").unwrap();
-        assert!(Store::open(base.path(), &manifest(0), Moved::Refused).is_ok());
-    }
-
-    #[test]
-    fn runs_are_found_by_their_hash() {
-        let base = tempfile::tempdir().unwrap();
-        for name in [
-            "20260101-m-d-0123abcd",
-            "20260102-m-d-0123abcd",
-            "20260103-m-d-99999999",
-        ] {
-            drop(Store::open(&base.path().join(name), &manifest(0), Moved::Refused).unwrap());
-        }
-        fs::create_dir(base.path().join("20260104-m-d-0123abcd")).unwrap();
-        let found = find(base.path(), "0123abcd").unwrap();
-        assert!(found.ends_with("20260102-m-d-0123abcd"));
-        assert_eq!(find(base.path(), "abcdabcd"), None);
-    }
-}
+mod tests;

@@ -78,6 +78,16 @@ pub struct ColumnDifference<'a> {
 }
 
 impl RunManifest {
+    /// Takes note of what became of the trials: the run is complete if all of them have a reply.
+    pub fn count(&mut self, counts: Counts) {
+        self.counts = counts;
+        self.status = if counts.answered == counts.trials {
+            Status::Complete
+        } else {
+            Status::Incomplete
+        };
+    }
+
     /// The values of columns that both hold and that do not stand for the same.
     #[must_use]
     pub fn column_differences<'a>(&'a self, other: &'a Self) -> Vec<ColumnDifference<'a>> {

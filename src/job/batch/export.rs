@@ -26,10 +26,10 @@ pub(crate) fn export<E: Experiment>(
             continue;
         }
         remote(models)?;
+        run.note_counts(&left.stored)?;
         let Left { plan, out, .. } = left;
         let trials = plan.keys.len();
         let answered = trials - plan.left() - out;
-        run.note_counts()?;
         let written = write(&mut run, phase, plan, files)?;
         let mut output = summary(&written, answered, out, run.store.folder());
         if !last {

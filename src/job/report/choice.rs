@@ -5,6 +5,7 @@ use std::path::Path;
 use super::combine::{Combined, combine};
 use crate::config::Show;
 use crate::error::Result;
+use crate::job::outcome::Outcome;
 use crate::job::stored::StoredRun;
 use crate::report::products::{PAGE, products};
 use crate::report::{files, table, verdicts};
@@ -17,12 +18,19 @@ pub(super) fn text(findings: &Findings<'_>, runs: &[(&RunManifest, &Path)]) -> S
     table::render(&findings.summary, runs) + &verdicts::render(findings)
 }
 
-/// Writes the whole report of a run into its folder; what belongs on standard output.
-pub(crate) fn write(store: &Store, manifest: &mut RunManifest, show: Show) -> Result<String> {
-    let mut run = StoredRun::<ChoiceDetail>::of(store.folder(), manifest.clone())?;
+/// Reads the replies of a run again and writes its whole report and its manifest into its folder.
+pub(crate) fn write(
+    store: &Store,
+    mut run: StoredRun<ChoiceDetail>,
+    show: Show,
+) -> Result<Outcome> {
+    let manifest = run.manifest.clone();
     let records = run.records.into_iter().map(Record::reread);
     run.records = records.collect::<Result<_>>()?;
-    in_its_folder(store, manifest, &combine(vec![run])?, show)
+    Ok(Outcome {
+        status: manifest.status,
+        output: in_its_folder(store, &manifest, &combine(vec![run])?, show)?,
+    })
 }
 
 pub(super) fn in_its_folder(

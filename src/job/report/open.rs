@@ -8,13 +8,14 @@ use serde_json::Value;
 use super::join::join;
 use crate::config::Show;
 use crate::error::{Error, Result};
+use crate::job::outcome::Outcome as Ended;
 use crate::job::predictions::{AnswerState, Prediction, predictions};
 use crate::job::stored::{StoredRun, in_order};
 use crate::report::openeqa::{Asked, OpenReport, Told, json as summary_json, products, table};
 use crate::score::llm_match::{Protocol, mark};
 use crate::score::open::{OpenSummary, Outcome, Scored, Topic, open_summary};
 use crate::store::Store;
-use crate::types::manifest::{RunManifest, Status};
+use crate::types::manifest::Status;
 use crate::types::{OpenDetail, QuestionId, Record, RunQuestion, Step};
 
 /// The setting of a run that names who marked the answers.
@@ -162,21 +163,22 @@ pub(crate) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<StoredRun<Open
     })
 }
 
-/// Scores what a run holds and leaves the report in its folder; what belongs on standard output. A run that is complete but for marks
-/// that cannot be read is incomplete.
+/// Scores what a run holds and writes its whole report and its manifest into its folder. A run that is complete but for marks that
+/// cannot be read is incomplete.
 pub(crate) fn write(
     store: &Store<OpenDetail>,
-    manifest: &mut RunManifest,
+    mut run: StoredRun<OpenDetail>,
     show: Show,
-) -> Result<String> {
-    let mut run = StoredRun::of(store.folder(), manifest.clone())?;
-    if manifest.status == Status::Complete && Scores::new(&run)?.unmarked() {
-        manifest.status = Status::Incomplete;
+) -> Result<Ended> {
+    if run.manifest.status == Status::Complete && Scores::new(&run)?.unmarked() {
         run.manifest.status = Status::Incomplete;
     }
     let scores = Scores::new(&run)?;
     scores.write(store)?;
-    scores.shown(show)
+    Ok(Ended {
+        status: run.manifest.status,
+        output: scores.shown(show)?,
+    })
 }
 
 /// The marks of a judge, by question and answer.

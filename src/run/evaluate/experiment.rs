@@ -8,6 +8,7 @@ use super::plan::{ChoiceItem, trials};
 use super::setup::Setup;
 use crate::config::{JobSettings, Order, Rotations, Show};
 use crate::error::Result;
+use crate::job::Outcome;
 use crate::job::experiment::Experiment;
 use crate::job::identity::{self, Columns, Identity};
 use crate::job::models::ModelUnderTest;
@@ -15,8 +16,8 @@ use crate::job::plan::SourcePlan;
 use crate::job::recipe::Recipe;
 use crate::job::report;
 use crate::job::source::{Frames, Source};
+use crate::job::stored::StoredRun;
 use crate::store::Store;
-use crate::types::manifest::RunManifest;
 use crate::types::{ChoiceDetail, QuestionId, Record, RunQuestion};
 
 impl Experiment for Setup<'_> {
@@ -97,9 +98,9 @@ impl Experiment for Setup<'_> {
     fn report(
         &self,
         store: &Store<ChoiceDetail>,
-        manifest: &mut RunManifest,
+        run: StoredRun<ChoiceDetail>,
         show: Show,
-    ) -> Result<String> {
-        report::choice::write(store, manifest, show)
+    ) -> Result<Outcome> {
+        report::choice::write(store, run, show)
     }
 }

@@ -12,6 +12,7 @@ use super::record::OpenItem;
 use super::setup::Setup;
 use crate::config::{JobSettings, Server, Show};
 use crate::error::Result;
+use crate::job::Outcome;
 use crate::job::budget::words;
 use crate::job::experiment::{Expected, Experiment};
 use crate::job::identity::{self, Columns, Identity};
@@ -20,9 +21,9 @@ use crate::job::plan::SourcePlan;
 use crate::job::recipe::Recipe;
 use crate::job::report::open;
 use crate::job::source::{Frames, Source};
+use crate::job::stored::StoredRun;
 use crate::job::trial::Item as _;
 use crate::store::Store;
-use crate::types::manifest::RunManifest;
 use crate::types::{Family, FrameId, OpenDetail, Record, RunQuestion};
 
 /// An answer as it may be: as long as one with so many tokens.
@@ -168,9 +169,9 @@ impl Experiment for Setup<'_> {
     fn report(
         &self,
         store: &Store<OpenDetail>,
-        manifest: &mut RunManifest,
+        run: StoredRun<OpenDetail>,
         show: Show,
-    ) -> Result<String> {
-        open::write(store, manifest, show)
+    ) -> Result<Outcome> {
+        open::write(store, run, show)
     }
 }

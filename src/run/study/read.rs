@@ -83,7 +83,7 @@ pub fn read(config: &StudyRead) -> Result<Outcome> {
         let path = config.run.clone();
         return Err(Error::Run { path, problem });
     }
-    let mut own = of_people(&manifest, config);
+    let own = of_people(&manifest, config);
     let mut store = Store::open(&config.out, &own, Moved::Allowed)?;
     store.write_questions(&questions)?;
     let mut people = People::new(store.records()?);
@@ -94,18 +94,13 @@ pub fn read(config: &StudyRead) -> Result<Outcome> {
         }
     }
     store.sync()?;
-    let records = store.records()?;
-    own.counts = count(records.len(), &records);
-    own.status = Status::Complete;
-    drop(records);
-    let mut output = choice::write(&store, &mut own, config.show)?;
+    let mut run = StoredRun::of(&config.out, own)?;
+    run.manifest.count(count(run.records.len(), &run.records));
+    let mut outcome = choice::write(&store, run, config.show)?;
     if config.show == Show::Table {
-        output.insert_str(0, &told(&tally));
+        outcome.output.insert_str(0, &told(&tally));
     }
-    Ok(Outcome {
-        status: Status::Complete,
-        output,
-    })
+    Ok(outcome)
 }
 
 fn answers(path: &Path) -> Result<Vec<Line>> {

@@ -1,0 +1,219 @@
+//! A run folder: what it holds, and whether it is the one that is asked for.
+
+use std::collections::HashMap;
+use std::ffi::OsStr;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::lines::lines;
+use crate::error::{Error, Result};
+use crate::files::{self, is_unfinished};
+use crate::types::manifest::{ColumnDifference, RunManifest, differences};
+use crate::types::{Detail, Record, RunQuestion, Thumbnail, TrialKey};
+
+const MANIFEST: &str = "manifest.json";
+pub(super) const RECORDS: &str = "records.jsonl";
+/// The questions of a run, with their words and scenes.
+pub(super) const QUESTIONS: &str = "questions.jsonl";
+/// Small copies of images that were sent.
+pub(super) const THUMBNAILS: &str = "thumbnails.jsonl";
+/// Whether a kept run may go on at another address of its endpoint.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Moved {
+    /// It may: the user has named this run as the one to go on with, and says so that it is the same model.
+    Allowed,
+    /// It may not: another server may serve another model by the same name.
+    Refused,
+}
+
+/// The field of a run's identity that holds the address.
+const ADDRESS: &str = "--base-url";
+
+/// Writes a file into a folder, whole or not at all; one that already says this is left as it is.
+pub(super) fn write(folder: &Path, name: &str, content: &[u8]) -> Result<()> {
+    if fs::read(folder.join(name)).is_ok_and(|there| there == content) {
+        return Ok(());
+    }
+    files::write_synced(&folder.join(name), content)
+}
+
+pub(super) fn write_manifest(folder: &Path, manifest: &RunManifest) -> Result<()> {
+    let unwritten = |e: serde_json::Error| Error::file(folder.join(MANIFEST), "write", e.into());
+    let mut text = serde_json::to_vec_pretty(manifest).map_err(unwritten)?;
+    text.push(b'\n');
+    write(folder, MANIFEST, &text)
+}
+
+/// What a run folder holds: the last record of each trial, in the order of their first; a last line that was cut off while it
+/// was written is passed over.
+pub fn read_records<D: Detail>(folder: &Path) -> Result<Vec<Record<D>>> {
+    let mut latest = HashMap::<TrialKey, usize>::new();
+    let mut records: Vec<Record<D>> = Vec::new();
+    for record in lines::<Record<D>>(&folder.join(RECORDS))? {
+        if let Some(&index) = latest.get(&record.key) {
+            records[index] = record;
+        } else {
+            latest.insert(record.key, records.len());
+            records.push(record);
+        }
+    }
+    Ok(records)
+}
+
+/// The questions of a run; none where it was made by a version that kept none.
+pub fn read_questions(folder: &Path) -> Result<Vec<RunQuestion>> {
+    lines(&folder.join(QUESTIONS))
+}
+
+/// The small copies of images of a run; none where it kept none.
+pub fn read_thumbnails(folder: &Path) -> Result<Vec<Thumbnail>> {
+    lines(&folder.join(THUMBNAILS))
+}
+
+/// The newest run folder in `base` whose name ends in `-<hash>`.
+#[must_use]
+pub fn find(base: &Path, hash: &str) -> Option<PathBuf> {
+    let ending = format!("-{hash}");
+    let folders = fs::read_dir(base).ok()?.flatten().map(|entry| entry.path());
+    folders
+        .filter(|path| {
+            path.file_name()
+                .and_then(OsStr::to_str)
+                .is_some_and(|name| name.ends_with(&ending))
+        })
+        .filter(|path| path.join(MANIFEST).is_file())
+        .max()
+}
+
+/// The schema of the run in a folder; `None` where there is none.
+///
+/// # Errors
+/// Where its manifest cannot be read.
+pub fn schema(folder: &Path) -> Result<Option<String>> {
+    Ok(any_manifest(folder)?.map(|manifest| manifest.schema))
+}
+
+/// The manifest of a run folder; `None` where there is none.
+///
+/// # Errors
+/// Where it cannot be read, or is that of a run with other records than those of `schema`.
+pub fn read_manifest(folder: &Path, schema: &str) -> Result<Option<RunManifest>> {
+    let Some(manifest) = any_manifest(folder)? else {
+        return Ok(None);
+    };
+    if manifest.schema == schema {
+        return Ok(Some(manifest));
+    }
+    let problem = refusal(&manifest.schema, schema, &manifest.version);
+    let path = folder.join(MANIFEST);
+    Err(Error::Run { path, problem })
+}
+
+/// Why a run of one schema is not taken where another is expected.
+fn refusal(found: &str, expected: &str, version: &str) -> String {
+    let parts = |schema: &str| -> Option<(String, u32)> {
+        let (name, number) = schema.rsplit_once('/')?;
+        Some((name.to_owned(), number.parse().ok()?))
+    };
+    // The number is that of the program's version: it rises for runs of all kinds at once.
+    let newest = parts(expected).map_or(0, |(_, number)| number);
+    match parts(found) {
+        Some((name, number)) if KINDS.contains(&&*name) && number < newest => format!(
+            "this run was made by an earlier version of darkqa-eval ({version}, schema {found:?}); run it again with this one"
+        ),
+        Some((name, number)) if KINDS.contains(&&*name) && number == newest => format!(
+            "the run has the schema {found:?}, {expected:?} is expected here; use another folder"
+        ),
+        _ => format!(
+            "the schema {found:?} is not known to this version of darkqa-eval; the run was made by version {version}: read it with that"
+        ),
+    }
+}
+
+/// The kinds of runs, by the names of their schemas.
+const KINDS: [&str; 2] = ["darkqa.run", "darkqa.openeqa"];
+
+fn any_manifest(folder: &Path) -> Result<Option<RunManifest>> {
+    let path = folder.join(MANIFEST);
+    let text = match fs::read(&path) {
+        Ok(text) => text,
+        Err(e)
+            if matches!(
+                e.kind(),
+                std::io::ErrorKind::NotFound | std::io::ErrorKind::NotADirectory
+            ) =>
+        {
+            return Ok(None);
+        }
+        Err(e) => return Err(Error::file(path, "read", e)),
+    };
+    serde_json::from_slice(&text)
+        .map(Some)
+        .map_err(|e| Error::Run {
+            path: path.clone(),
+            problem: format!("not the manifest of a run: {e}"),
+        })
+}
+
+/// Makes sure that a kept run is the one now asked for: the same identity, and every known value of a column what it was.
+pub(super) fn agree(
+    folder: &Path,
+    kept: &RunManifest,
+    now: &RunManifest,
+    moved: Moved,
+) -> Result<()> {
+    let wrong = |problem: String| {
+        let path = folder.to_owned();
+        Err(Error::Run { path, problem })
+    };
+    if let Some((field, before, after)) = differences(&kept.identity, &now.identity).next() {
+        return wrong(format!(
+            "this run has another {field}: it was {before}, now it is {after}; use another --out, or the same {field}"
+        ));
+    }
+    if kept.shard != now.shard {
+        let [before, after] = [kept, now].map(|run| run.shard.as_deref().unwrap_or("none"));
+        return wrong(format!(
+            "this run has another --shard: it was {before}, now it is {after}; use another --out, or the same --shard"
+        ));
+    }
+    for difference in kept.column_differences(now) {
+        let ColumnDifference {
+            column,
+            value,
+            field,
+            first: before,
+            second: after,
+        } = difference;
+        let address = field == ADDRESS;
+        if address && moved == Moved::Allowed {
+            tracing::warn!("{value} was asked at {before} in this run; it goes on at {after}");
+            continue;
+        }
+        let hint = if address {
+            " (the same model at another address: --resume)"
+        } else {
+            ""
+        };
+        return wrong(format!(
+            "the {column} {value} has another {field} in this run: it was {before}, now it is {after}; use another --out, or the same \
+             {field}{hint}"
+        ));
+    }
+    Ok(())
+}
+
+/// Makes a new folder, or takes an empty one, and marks it as a run before anything else lies in it.
+pub(super) fn claim(folder: &Path, manifest: &RunManifest) -> Result<()> {
+    fs::create_dir_all(folder).map_err(|e| Error::file(folder, "create", e))?;
+    let mut inside = fs::read_dir(folder).map_err(|e| Error::file(folder, "read", e))?;
+    // What a process killed in the midst of writing has left is nobody's.
+    if inside.any(|entry| entry.is_ok_and(|entry| !is_unfinished(&entry.file_name()))) {
+        let problem = "the folder is not empty and holds no run; use another --out".to_owned();
+        return Err(Error::Run {
+            path: folder.to_owned(),
+            problem,
+        });
+    }
+    write_manifest(folder, manifest)
+}

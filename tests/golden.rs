@@ -1,0 +1,123 @@
+//! Whole runs of both experiments, pinned: a change of what is planned, keyed, made, read or scored that nobody meant shows here.
+//!
+//! `UPDATE=1 cargo test --test golden` prints the digests of this version; a change of them is a change of the schema and stands in
+//! the CHANGELOG.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+mod support;
+
+use std::fs;
+
+use serde_json::Value;
+use support::house::House;
+use support::onnx;
+use support::run::{Bench, records};
+
+/// The digest of all that a run holds but times, addresses and versions of libraries.
+fn digest(bench: &Bench, run: &str) -> String {
+    let folder = bench.path(run);
+    let mut lines: Vec<String> = records(&folder)
+        .into_iter()
+        .map(|mut record| {
+            record["latency_ms"] = Value::Null;
+            record.to_string()
+        })
+        .collect();
+    lines.sort();
+    for file in ["questions.jsonl", "summary.csv", "tables.tex"] {
+        lines.push(fs::read_to_string(folder.join(file)).unwrap());
+    }
+    let manifest = fs::read(folder.join("manifest.json")).unwrap();
+    let manifest: Value = serde_json::from_slice(&manifest).unwrap();
+    lines.extend(["identity", "columns", "counts"].map(|field| manifest[field].to_string()));
+    blake3::hash(lines.join("\n").as_bytes()).to_hex()[..16].to_owned()
+}
+
+fn hold(name: &str, digest: &str, pinned: &str) {
+    if std::env::var_os("UPDATE").is_some() {
+        println!("{name}: {digest}");
+    } else {
+        assert_eq!(digest, pinned, "{name}");
+    }
+}
+
+#[test]
+fn an_evaluation_with_an_enhancer() {
+    let bench = Bench::new();
+    onnx::gain(2.0).write(&bench.path(""), "bright.onnx");
+    bench.complete(&[
+        "--model",
+        "random",
+        "--blind-model",
+        "random",
+        "--data",
+        "rooms:frames=4,size=96x72",
+        "--levels",
+        "L0,L2,L4",
+        "--llie",
+        "bright.onnx",
+        "--llie-on",
+        "both",
+        "--shuffle-options",
+        "--repeats",
+        "2",
+        "--out",
+        "run",
+    ]);
+    hold("evaluation", &digest(&bench, "run"), EVALUATION);
+}
+
+#[test]
+fn an_evaluation_at_a_drop_of_its_own_in_two_readings() {
+    let bench = Bench::new();
+    bench.complete(&[
+        "--model",
+        "observer",
+        "--data",
+        "rooms:frames=4,size=160x120",
+        "--levels",
+        "L0,3.3",
+        "--profile",
+        "paper,physical",
+        "--max-side",
+        "120",
+        "--out",
+        "run",
+    ]);
+    hold("readings", &digest(&bench, "run"), READINGS);
+}
+
+#[test]
+fn open_questions_with_marks_and_an_enhancer() {
+    let house = House::new();
+    onnx::gamma(0.5).write(&house.0.path(""), "bright.onnx");
+    house.0.file(
+        "a.jsonl",
+        "{\"question\": \"q1\", \"condition\": \"L2-noise\", \"reply\": \"grey\"}\n{\"default\": \"an answer\"}",
+    );
+    house.0.file(
+        "j.jsonl",
+        "{\"question\": \"q1\", \"reply\": \"4\"}\n{\"default\": \"2\"}",
+    );
+    let called = house.call(&[
+        "--model",
+        "script:a.jsonl",
+        "--blind-model",
+        "script:a.jsonl",
+        "--judge",
+        "script:j.jsonl",
+        "--llie",
+        "bright.onnx",
+        "--protocol",
+        "tolerant",
+        "--out",
+        "run",
+    ]);
+    assert_eq!(called.code, Some(0), "{called:?}");
+    hold("openeqa", &digest(&house.0, "run"), OPENEQA);
+}
+
+const EVALUATION: &str = "";
+const READINGS: &str = "";
+const OPENEQA: &str = "";
