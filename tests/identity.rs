@@ -331,6 +331,30 @@ fn another_value_of_a_column_is_asked_alone() {
 }
 
 #[test]
+fn a_run_to_which_something_is_added_is_no_longer_complete_until_it_is_asked() {
+    let scene = Scene::new();
+    scene.complete(&EVALUATION, "", "run");
+    let manifest = || -> Value {
+        let path = scene.house.0.path("run/manifest.json");
+        serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+    };
+    assert_eq!(manifest()["status"], "complete");
+    let gone = "--model gone --base-url http://127.0.0.1:9/v1 --retries 0";
+    let called = scene.call(&EVALUATION, gone, "run");
+    assert_eq!(called.code, Some(2), "{called:?}");
+    let now = manifest();
+    assert_eq!(now["status"], "stopped");
+    assert_eq!(now["counts"]["answered"], 9);
+    assert_eq!(now["counts"]["trials"], 18);
+    // Blind models look at no image; what is known of it stays known.
+    let questions = || fs::read_to_string(scene.house.0.path("run/questions.jsonl")).unwrap();
+    let before = questions();
+    scene.complete(&EVALUATION, "--model n --blind", "run");
+    assert_eq!(questions(), before);
+    assert!(before.contains("\"image\""), "{before}");
+}
+
+#[test]
 fn the_key_of_a_trial_has_what_decides_its_image() {
     let scene = Scene::new();
     let keys = |otherwise: &str| scene.keys(&EVALUATION, otherwise);

@@ -60,6 +60,15 @@ pub(crate) fn of<E: Experiment>(experiment: &E, kept: Option<RunManifest>) -> Ru
     }
 }
 
+/// Notes that a run goes on, by this command and this version.
+pub(crate) fn go_on<E: Experiment>(experiment: &E, manifest: &mut RunManifest) {
+    manifest.status = Status::Started;
+    manifest.updated = now();
+    env!("CARGO_PKG_VERSION").clone_into(&mut manifest.version);
+    let settings = identity::settings(experiment.settings());
+    manifest.settings.extend(settings);
+}
+
 /// The flags that decide the images: those said now, and of lists also what was said before.
 fn together(kept: &Recipe, now: Recipe) -> Recipe {
     let mut all = kept.clone();

@@ -12,6 +12,7 @@ use super::experiment::{DetailOf, Experiment, RecordOf};
 use super::folder::now;
 use super::frame_work::Steps;
 use super::image_pipeline::ImagePipeline;
+use super::manifest;
 use super::models;
 use super::outcome::Outcome;
 use super::plan::Plan;
@@ -163,6 +164,7 @@ impl<E: Experiment> OpenRun<'_, E> {
     /// Notes how much there is to ask, and says how much of it is there.
     fn begin(&mut self, tally: Tally, stored: &[RecordOf<E>]) -> Result<()> {
         let Tally { trials, answered } = tally;
+        manifest::go_on(self.experiment, &mut self.manifest);
         self.manifest.platform.extend(self.enhancers.version());
         self.note_counts(stored)?;
         if answered > 0 {

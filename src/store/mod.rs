@@ -108,31 +108,29 @@ impl<D: Detail> Store<D> {
     ///
     /// # Errors
     /// If one that it had is another by now: other words, choices, answer or image.
-    pub fn add_questions(&self, questions: Vec<RunQuestion>) -> Result<()> {
-        let kept = read_questions(&self.folder)?;
-        let places: HashMap<&QuestionId, &RunQuestion> = questions
-            .iter()
-            .map(|question| (&question.id, question))
-            .collect();
-        let mut rest = Vec::new();
-        for known in kept {
-            match places.get(&known.id) {
-                None => rest.push(known),
-                Some(now) if known.is_same(now) => {}
-                Some(_) => {
-                    let problem = format!(
-                        "the question {} is another in this run: other --data or --questions have changed its words, choices, answer or image; use another --out",
-                        known.id
-                    );
-                    let path = self.folder.clone();
-                    return Err(Error::Run { path, problem });
-                }
+    pub fn add_questions(&self, mut questions: Vec<RunQuestion>) -> Result<()> {
+        let ids = questions.iter().map(|question| question.id.clone());
+        let places: HashMap<QuestionId, usize> = ids.zip(0..).collect();
+        for known in read_questions(&self.folder)? {
+            let Some(&place) = places.get(&known.id) else {
+                questions.push(known);
+                continue;
+            };
+            let now = &mut questions[place];
+            if !known.is_same(now) {
+                let problem = format!(
+                    "the question {} is another in this run: other --data or --questions have changed its words, choices, answer or \
+                     image; use another --out",
+                    known.id
+                );
+                let path = self.folder.clone();
+                return Err(Error::Run { path, problem });
             }
+            // Who asks blind models alone has not looked at the image.
+            now.image = now.image.or(known.image);
         }
-        drop(places);
-        let mut all = [questions, rest].concat();
-        all.sort_by_key(|question| question.place);
-        self.write_questions(&all)
+        questions.sort_by_key(|question| question.place);
+        self.write_questions(&questions)
     }
 
     /// Keeps the questions of the run.
