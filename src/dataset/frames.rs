@@ -21,6 +21,7 @@ use std::sync::Arc;
 
 use serde::Deserialize;
 
+use super::lines::{json, json_lines};
 use super::maps::{DepthFile, Maps};
 use super::view::View;
 use super::{Dataset, Source, questions, spaces, stem};
@@ -152,8 +153,7 @@ fn about(folder: &Path) -> Result<About> {
     if !path.exists() {
         return Ok(About::default());
     }
-    let text = fs::read_to_string(&path).map_err(|e| Error::file(&path, "read", e))?;
-    let about: About = serde_json::from_str(&text).map_err(|e| Error::data(path.display(), e))?;
+    let about: About = json(&path)?;
     if about.schema != SCHEMA {
         let problem = format_args!("schema {:?}; {SCHEMA:?} expected", about.schema);
         return Err(Error::data(path.display(), problem));
@@ -167,9 +167,7 @@ fn segment_names(folder: &Path, scene: &str) -> Result<Arc<BTreeMap<u32, Segment
     if !path.exists() {
         return Ok(Arc::default());
     }
-    let text = fs::read_to_string(&path).map_err(|e| Error::file(&path, "read", e))?;
-    let names: BTreeMap<u32, SegmentName> =
-        serde_json::from_str(&text).map_err(|e| Error::data(path.display(), e))?;
+    let names: BTreeMap<u32, SegmentName> = json(&path)?;
     let canonical = spaces::canonical();
     if let Some((id, name)) = names
         .iter()
@@ -218,30 +216,19 @@ pub(super) fn image(path: &Path) -> Result<BTreeMap<FrameId, Source>> {
 }
 
 fn listed(folder: &Path, list: &Path) -> Result<BTreeMap<FrameId, Source>> {
-    let text = fs::read_to_string(list).map_err(|e| Error::file(list, "read", e))?;
     let (about, mut names) = (about(folder)?, Names::new());
     let mut sources = BTreeMap::new();
-    for (i, line) in text
-        .trim_start_matches('\u{feff}')
-        .lines()
-        .enumerate()
-        .filter(|(_, line)| !line.trim().is_empty())
-    {
-        let line: Line =
-            serde_json::from_str(line).map_err(|e| Error::json_line(list, i + 1, &e))?;
+    for (number, line) in json_lines::<Line>(list)? {
         let id = FrameId(format!("{}/{}", line.scene, line.frame));
         if !names.contains_key(&line.scene) {
             names.insert(line.scene.clone(), segment_names(folder, &line.scene)?);
         }
         let source = line
             .source(folder, &about, &names)
-            .map_err(|problem| Error::line(list, i + 1, problem))?;
+            .map_err(|problem| Error::line(list, number, problem))?;
         if sources.insert(id.clone(), source).is_some() {
-            return Err(Error::line(
-                list,
-                i + 1,
-                format_args!("a second frame {:?}", id.0),
-            ));
+            let problem = format_args!("a second frame {:?}", id.0);
+            return Err(Error::line(list, number, problem));
         }
     }
     Ok(sources)

@@ -10,6 +10,7 @@ pub mod frames;
 pub mod import;
 pub(crate) mod inputs;
 mod jpeg;
+mod lines;
 mod maps;
 pub mod multiple_choice;
 mod npy;

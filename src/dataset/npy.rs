@@ -4,56 +4,60 @@
 //! dictionary with `descr`, `fortran_order` and `shape`; then the numbers, row by row. Versions 1 to 3 differ only in
 //! the width of the length and the header's encoding.
 
+use std::sync::LazyLock;
+
+use regex::Regex;
+
 /// What every such file begins with.
 const MAGIC: &[u8] = b"\x93NUMPY";
 
-/// The type of an array's numbers: those of one byte, and the little-endian ones.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Number {
-    F4,
-    F8,
-    I1,
-    I2,
-    I4,
-    I8,
-    U1,
-    U2,
-    U4,
-    U8,
+/// The dictionary before the numbers, its keys in any order. None of its strings that matters here has an escape in it.
+static HEADER: LazyLock<Option<Regex>> = LazyLock::new(|| {
+    let pattern = r#"(?x) ^ \s* \{ (?: \s* ['"] (?:
+            descr ['"] \s* : \s* ['"] (?<descr> [^'"]*) ['"]
+            | fortran_order ['"] \s* : \s* (?<fortran> True | False)
+            | shape ['"] \s* : \s* \( (?<shape> [0-9,\s]*) \)
+        ) \s* ,? )* \s* \} \s* $"#;
+    Regex::new(pattern).ok()
+});
+
+/// How the numbers of a file are read, each from its bytes.
+#[derive(Debug, Clone, Copy)]
+enum Numbers {
+    Floats(fn(&[u8]) -> f64),
+    Integers(fn(&[u8]) -> i128),
 }
 
-impl Number {
-    fn of(descr: &str) -> Option<Self> {
+impl Numbers {
+    /// Those of one byte, and the little-endian ones: the size of one, and how it is read.
+    fn of(descr: &str) -> Option<(usize, Self)> {
         Some(match descr {
-            "<f4" => Self::F4,
-            "<f8" => Self::F8,
-            "|i1" => Self::I1,
-            "<i2" => Self::I2,
-            "<i4" => Self::I4,
-            "<i8" => Self::I8,
-            "|u1" => Self::U1,
-            "<u2" => Self::U2,
-            "<u4" => Self::U4,
-            "<u8" => Self::U8,
+            "<f4" => (4, Self::Floats(|b| f32::from_le_bytes(sized(b)).into())),
+            "<f8" => (8, Self::Floats(|b| f64::from_le_bytes(sized(b)))),
+            "|i1" => (1, Self::Integers(|b| i8::from_le_bytes(sized(b)).into())),
+            "<i2" => (2, Self::Integers(|b| i16::from_le_bytes(sized(b)).into())),
+            "<i4" => (4, Self::Integers(|b| i32::from_le_bytes(sized(b)).into())),
+            "<i8" => (8, Self::Integers(|b| i64::from_le_bytes(sized(b)).into())),
+            "|u1" => (1, Self::Integers(|b| u8::from_le_bytes(sized(b)).into())),
+            "<u2" => (2, Self::Integers(|b| u16::from_le_bytes(sized(b)).into())),
+            "<u4" => (4, Self::Integers(|b| u32::from_le_bytes(sized(b)).into())),
+            "<u8" => (8, Self::Integers(|b| u64::from_le_bytes(sized(b)).into())),
             _ => return None,
         })
     }
+}
 
-    /// The size of one in bytes.
-    fn bytes(self) -> usize {
-        match self {
-            Self::I1 | Self::U1 => 1,
-            Self::I2 | Self::U2 => 2,
-            Self::F4 | Self::I4 | Self::U4 => 4,
-            Self::F8 | Self::I8 | Self::U8 => 8,
-        }
-    }
+/// The bytes of one number; a chunk always has as many as its type.
+fn sized<const N: usize>(chunk: &[u8]) -> [u8; N] {
+    chunk.first_chunk().copied().unwrap_or([0; N])
 }
 
 /// A two-dimensional array in a file's bytes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Npy<'a> {
-    number: Number,
+    numbers: Numbers,
+    /// The size of a number in bytes.
+    width: usize,
     /// Height and width.
     pub(super) size: (usize, usize),
     data: &'a [u8],
@@ -65,83 +69,59 @@ impl<'a> Npy<'a> {
         let rest = bytes
             .strip_prefix(MAGIC)
             .ok_or("not a .npy file: it does not begin as numpy.save begins one")?;
-        let (header, data) = header(rest)?;
-        let Header {
-            descr,
-            fortran_order,
-            shape,
-        } = Header::parse(header).ok_or_else(|| {
-            let header = String::from_utf8_lossy(header);
-            format!(
-                "its header is not that of one .npy array: {:.200}",
-                header.trim_end()
-            )
+        let (header, data) = split(rest)?;
+        let header = String::from_utf8_lossy(header);
+        let (descr, fortran, shape) = fields(&header).ok_or_else(|| {
+            let header = header.trim_end();
+            format!("its header is not that of one .npy array: {header:.200}")
         })?;
-        let number = Number::of(descr).ok_or_else(|| {
+        let (width, numbers) = Numbers::of(descr).ok_or_else(|| {
             format!("its numbers are {descr:?}; little-endian integers or floats of 4 or 8 bytes expected")
         })?;
-        if fortran_order {
+        if fortran == "True" {
             return Err(
                 "it is in Fortran order; save numpy.ascontiguousarray(array) instead".to_owned(),
             );
         }
-        let [height, width] = shape[..] else {
+        let [rows, columns] = shape[..] else {
             return Err(format!("its shape is {shape:?}; [height, width] expected"));
         };
-        let expected = height
-            .checked_mul(width)
-            .and_then(|count| count.checked_mul(number.bytes()));
-        if expected != Some(data.len()) {
+        let count = rows.checked_mul(columns);
+        if count.and_then(|count| count.checked_mul(width)) != Some(data.len()) {
             return Err(format!(
-                "not a whole .npy file: {} bytes follow its header, which do not make {height} × {width} {descr:?}",
+                "not a whole .npy file: {} bytes follow its header, which do not make {rows} × {columns} {descr:?}",
                 data.len()
             ));
         }
         Ok(Self {
-            number,
-            size: (height, width),
+            numbers,
+            width,
+            size: (rows, columns),
             data,
         })
     }
 
     /// The numbers, row by row, where they are floating-point.
     pub(super) fn floats(self) -> Result<impl Iterator<Item = f64>, String> {
-        let read: fn(&[u8]) -> f64 = match self.number {
-            Number::F4 => |bytes| f32::from_le_bytes(sized(bytes)).into(),
-            Number::F8 => |bytes| f64::from_le_bytes(sized(bytes)),
-            _ => {
-                return Err("it holds integers; floats of 4 or 8 bytes expected".to_owned());
+        match self.numbers {
+            Numbers::Floats(read) => Ok(self.data.chunks_exact(self.width).map(read)),
+            Numbers::Integers(_) => {
+                Err("it holds integers; floats of 4 or 8 bytes expected".to_owned())
             }
-        };
-        Ok(self.data.chunks_exact(self.number.bytes()).map(read))
+        }
     }
 
     /// The numbers, row by row, where they are integers.
     pub(super) fn integers(self) -> Result<impl Iterator<Item = i128>, String> {
-        let read: fn(&[u8]) -> i128 = match self.number {
-            Number::I1 => |bytes| i8::from_le_bytes(sized(bytes)).into(),
-            Number::I2 => |bytes| i16::from_le_bytes(sized(bytes)).into(),
-            Number::I4 => |bytes| i32::from_le_bytes(sized(bytes)).into(),
-            Number::I8 => |bytes| i64::from_le_bytes(sized(bytes)).into(),
-            Number::U1 => |bytes| u8::from_le_bytes(sized(bytes)).into(),
-            Number::U2 => |bytes| u16::from_le_bytes(sized(bytes)).into(),
-            Number::U4 => |bytes| u32::from_le_bytes(sized(bytes)).into(),
-            Number::U8 => |bytes| u64::from_le_bytes(sized(bytes)).into(),
-            Number::F4 | Number::F8 => {
-                return Err("it holds floats; integers expected".to_owned());
-            }
-        };
-        Ok(self.data.chunks_exact(self.number.bytes()).map(read))
+        match self.numbers {
+            Numbers::Integers(read) => Ok(self.data.chunks_exact(self.width).map(read)),
+            Numbers::Floats(_) => Err("it holds floats; integers expected".to_owned()),
+        }
     }
 }
 
-/// The bytes of one number; a chunk always has as many as its type.
-fn sized<const N: usize>(chunk: &[u8]) -> [u8; N] {
-    chunk.first_chunk().copied().unwrap_or([0; N])
-}
-
 /// Splits what follows the magic into the header and the data.
-fn header(rest: &[u8]) -> Result<(&[u8], &[u8]), String> {
+fn split(rest: &[u8]) -> Result<(&[u8], &[u8]), String> {
     let cut = || "not a whole .npy file: it ends within its header".to_owned();
     let (&[major, _minor], rest) = rest.split_first_chunk().ok_or_else(cut)?;
     let (length, rest) = match major {
@@ -162,82 +142,13 @@ fn header(rest: &[u8]) -> Result<(&[u8], &[u8]), String> {
     rest.split_at_checked(length).ok_or_else(cut)
 }
 
-/// The dictionary before the numbers.
-#[derive(Debug, PartialEq, Eq)]
-struct Header<'a> {
-    descr: &'a str,
-    fortran_order: bool,
-    shape: Vec<usize>,
-}
-
-impl<'a> Header<'a> {
-    fn parse(header: &'a [u8]) -> Option<Self> {
-        let mut text = Text(str::from_utf8(header).ok()?);
-        let (mut descr, mut fortran_order, mut shape) = (None, None, None);
-        text.sign("{")?;
-        while text.sign("}").is_none() {
-            let key = text.quoted()?;
-            text.sign(":")?;
-            match key {
-                "descr" => descr = Some(text.quoted()?),
-                "fortran_order" => fortran_order = Some(text.boolean()?),
-                "shape" => shape = Some(text.tuple()?),
-                _ => return None,
-            }
-            if text.sign(",").is_none() {
-                text.sign("}")?;
-                break;
-            }
-        }
-        text.0.trim_ascii().is_empty().then_some(())?;
-        Some(Self {
-            descr: descr?,
-            fortran_order: fortran_order?,
-            shape: shape?,
-        })
-    }
-}
-
-/// What is still to be read of a Python literal.
-struct Text<'a>(&'a str);
-
-impl<'a> Text<'a> {
-    /// Takes a sign or word; `None`, and nothing taken, where another stands there.
-    fn sign(&mut self, sign: &str) -> Option<()> {
-        self.0 = self.0.trim_ascii_start().strip_prefix(sign)?;
-        Some(())
-    }
-
-    /// Takes a string. None that matters here has an escape in it.
-    fn quoted(&mut self) -> Option<&'a str> {
-        let text = self.0.trim_ascii_start();
-        let quote = text.chars().next().filter(|c| matches!(c, '\'' | '"'))?;
-        let (inside, rest) = text.get(1..)?.split_once(quote)?;
-        self.0 = rest;
-        Some(inside)
-    }
-
-    fn boolean(&mut self) -> Option<bool> {
-        let truth = self.sign("True").map(|()| true);
-        truth.or_else(|| self.sign("False").map(|()| false))
-    }
-
-    fn tuple(&mut self) -> Option<Vec<usize>> {
-        let mut items = Vec::new();
-        self.sign("(")?;
-        while self.sign(")").is_none() {
-            let text = self.0.trim_ascii_start();
-            let end = text.find(|c: char| !c.is_ascii_digit())?;
-            let (digits, rest) = text.split_at(end);
-            items.push(digits.parse().ok()?);
-            self.0 = rest;
-            if self.sign(",").is_none() {
-                self.sign(")")?;
-                break;
-            }
-        }
-        Some(items)
-    }
+/// What a header says: the type of the numbers, whether columns go first, and the shape.
+fn fields(header: &str) -> Option<(&str, &str, Vec<usize>)> {
+    let found = HEADER.as_ref()?.captures(header)?;
+    let field = |name| Some(found.name(name)?.as_str());
+    let sides = field("shape")?.trim().split_terminator(',');
+    let shape: Option<Vec<usize>> = sides.map(|side| side.trim().parse().ok()).collect();
+    Some((field("descr")?, field("fortran")?, shape?))
 }
 
 #[cfg(test)]

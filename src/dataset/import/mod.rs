@@ -28,7 +28,7 @@ use super::spaces;
 use crate::error::{Error, Result};
 use crate::types::Labels;
 
-pub use adapter::{Adapter, Incoming, Read, Stated};
+pub use adapter::{Adapter, Incoming, Listing, Read, Stated};
 
 /// What lies in the folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -106,7 +106,7 @@ pub fn open(kind: Kind, folder: &Path, stated: &Stated) -> Result<Box<dyn Adapte
     let adapter: Box<dyn Adapter> = match kind {
         Kind::Habitat => Box::new(habitat::Habitat::open(folder, stated)?),
         Kind::Scannet => Box::new(scannet::Scannet::open(folder, stated)?),
-        Kind::Nyu => Box::new(nyu::Nyu::open(folder, stated)?),
+        Kind::Nyu => Box::new(nyu::open(folder, stated)?),
         Kind::Sunrgbd => Box::new(sunrgbd::SunRgbd::open(folder)?),
         Kind::Thor => Box::new(thor::Thor::open(folder, stated)?),
         Kind::Folder if folder.join("frames.jsonl").exists() => {
@@ -114,7 +114,7 @@ pub fn open(kind: Kind, folder: &Path, stated: &Stated) -> Result<Box<dyn Adapte
         }
         Kind::Folder => Box::new(folder::Folder::open(folder, stated)?),
     };
-    if adapter.frames().is_empty() {
+    if adapter.listing().frames.is_empty() {
         let problem = format_args!(
             "no frames of {kind} in this folder; see the layouts in src/dataset/import/README.md"
         );
