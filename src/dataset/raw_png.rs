@@ -3,12 +3,12 @@
 //! A label map says ids, not colours, so a sample is taken as it is stored: a palette is not looked up, and no bits are
 //! spread over a larger range.
 
-use std::fmt;
 use std::io::Cursor;
 
 use png::{BitDepth, ColorType, Decoder, DecodingError, Reader, Transformations};
 
 use super::picture::MOST_PIXELS;
+use crate::types::words::words;
 
 /// What the samples of a PNG file are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,15 +21,7 @@ pub(super) enum Form {
     Palette,
 }
 
-impl fmt::Display for Form {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Grey8 => "8-bit grey",
-            Self::Grey16 => "16-bit grey",
-            Self::Palette => "palette",
-        })
-    }
-}
+words!(Form { Grey8 = "8-bit grey", Grey16 = "16-bit grey", Palette = "palette" });
 
 /// A PNG file of one number a pixel, not yet inflated.
 pub(super) struct RawPng<'a> {

@@ -77,7 +77,7 @@ pub fn import(config: &Import, progress: &Progress) -> Result<Outcome> {
         "name": config.name,
         "label_space": listing.labels.space,
         "depth_kind": listing.depth_kind,
-        "source": config.kind.name(),
+        "source": config.kind.to_string(),
     });
     let lines = made.iter().map(|made| &made.line);
     frame_folder::finish(&config.out, &listing.labels, &about, lines)?;

@@ -576,8 +576,9 @@ mod tests {
     fn a_run_goes_on_at_another_address_where_it_is_named() {
         let at = |address: &str| {
             let mut manifest = manifest(0);
-            let address = address.to_owned();
-            manifest.identity.insert(ADDRESS.to_owned(), address.into());
+            let model = serde_json::json!({ADDRESS: address});
+            let models = BTreeMap::from([("m".to_owned(), model)]);
+            manifest.columns.insert("model".to_owned(), models);
             manifest
         };
         let base = tempfile::tempdir().unwrap();

@@ -14,11 +14,13 @@ pub mod question;
 pub mod record;
 pub mod reply;
 pub mod run_question;
+pub mod severity;
 pub mod trial_key;
+pub(crate) mod words;
 
 pub use axis_level::{AxisLevel, KindReading};
 pub use condition::{Condition, EnhancerName};
-pub use degradation::{Degradation, ReadingName, Severity};
+pub use degradation::{Degradation, ReadingName};
 pub use detail::{
     AnswerReading, ChoiceDetail, Detail, ImageFacts, OpenDetail, Outcome, Step, WalkFacts,
 };
@@ -30,6 +32,7 @@ pub use question::{Answer, Choices, Family, Question, QuestionId, Why};
 pub use record::{Failure, FailureKind, Record, Via, View};
 pub use reply::{Finish, Reply, Usage};
 pub use run_question::{RunQuestion, Thumbnail};
+pub use severity::{Axis, Severity};
 pub use trial_key::TrialKey;
 
 #[cfg(test)]

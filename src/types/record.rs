@@ -205,10 +205,7 @@ pub enum View {
 
 impl fmt::Display for View {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Image => "image",
-            Self::Blind => "blind",
-        })
+        self.serialize(f)
     }
 }
 

@@ -20,13 +20,12 @@ mod scannet;
 mod sunrgbd;
 mod thor;
 
-use std::fmt;
 use std::path::Path;
-use std::str::FromStr;
 
 use super::spaces;
 use crate::error::{Error, Result};
 use crate::types::Labels;
+use crate::types::words::words;
 
 pub use adapter::{Adapter, Incoming, Listing, Read, Stated};
 
@@ -47,50 +46,14 @@ pub enum Kind {
     Folder,
 }
 
-impl Kind {
-    /// All of them.
-    pub const ALL: [Self; 6] = [
-        Self::Habitat,
-        Self::Scannet,
-        Self::Nyu,
-        Self::Sunrgbd,
-        Self::Thor,
-        Self::Folder,
-    ];
-
-    /// The name on the command line.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Habitat => "habitat",
-            Self::Scannet => "scannet",
-            Self::Nyu => "nyu",
-            Self::Sunrgbd => "sunrgbd",
-            Self::Thor => "thor",
-            Self::Folder => "folder",
-        }
-    }
-}
-
-impl fmt::Display for Kind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl FromStr for Kind {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self> {
-        Self::ALL
-            .into_iter()
-            .find(|kind| kind.name() == text)
-            .ok_or_else(|| {
-                let names = Self::ALL.map(Self::name).join(", ");
-                Error::usage("KIND", format_args!("{text:?} is none of {names}"))
-            })
-    }
-}
+words!(Kind by "KIND" {
+    Habitat = "habitat",
+    Scannet = "scannet",
+    Nyu = "nyu",
+    Sunrgbd = "sunrgbd",
+    Thor = "thor",
+    Folder = "folder",
+});
 
 /// Opens a folder.
 ///
