@@ -21,8 +21,8 @@ use std::sync::Arc;
 
 use serde::Deserialize;
 
-use super::lines::{json, json_lines};
 use super::maps::{DepthFile, Maps};
+use super::reading::{entries, is_image, json, json_lines};
 use super::view::View;
 use super::{Dataset, Source, questions, spaces, stem};
 use crate::error::{Error, Result};
@@ -235,21 +235,10 @@ fn listed(folder: &Path, list: &Path) -> Result<BTreeMap<FrameId, Source>> {
 }
 
 fn images(folder: &Path) -> Result<BTreeMap<FrameId, Source>> {
-    let unread = |e| Error::file(folder, "read", e);
     let mut sources = BTreeMap::new();
-    for entry in fs::read_dir(folder).map_err(unread)? {
-        let path = entry.map_err(unread)?.path();
-        let ending = path
-            .extension()
-            .map(|ending| ending.to_string_lossy().to_lowercase());
-        if path.is_file() && matches!(ending.as_deref(), Some("png" | "jpg" | "jpeg")) {
-            let name = path
-                .file_name()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned();
-            sources.insert(FrameId(name), Source::image(path));
-        }
+    for path in entries(folder)?.into_iter().filter(|path| is_image(path)) {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        sources.insert(FrameId(name.into_owned()), Source::image(path));
     }
     if sources.is_empty() {
         return Err(Error::data(

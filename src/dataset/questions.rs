@@ -10,7 +10,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::dialect::translated;
-use super::lines::json_lines;
+use super::reading::json_lines;
 use crate::error::{Error, Result};
 use crate::types::{Choices, Family, FrameId, Question, QuestionId};
 

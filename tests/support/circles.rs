@@ -11,7 +11,7 @@ use std::path::Path;
 use super::{Scope, Token, code_only, rust_files, scopes, tokens};
 
 /// Circles of files that may be, and why. A part of one may be, too. All but the first are to be cut, by what is said beside.
-const CIRCLES: [(&[&str], &str); 13] = [
+const CIRCLES: [(&[&str], &str); 6] = [
     (
         &[
             "score/choice/lenient.rs",
@@ -26,25 +26,12 @@ const CIRCLES: [(&[&str], &str); 13] = [
     ),
     (
         &[
-            "config/asking.rs",
-            "config/light.rs",
-            "config/mod.rs",
-            "config/show.rs",
-        ],
-        "the groups of settings leave config/mod.rs for the rooms that use them",
-    ),
-    (
-        &[
             "dataset/frames.rs",
             "dataset/mod.rs",
             "dataset/multiple_choice.rs",
             "dataset/table.rs",
         ],
         "Dataset, Source and stem leave dataset/mod.rs; what opens a place stays there",
-    ),
-    (
-        &["questions/balance.rs", "questions/generate.rs"],
-        "Asked moves to questions/survey.rs",
     ),
     (
         &["report/figures/mod.rs", "report/figures/thresholds.rs"],
@@ -64,43 +51,6 @@ const CIRCLES: [(&[&str], &str); 13] = [
     (
         &["report/page/items.rs", "report/page/mod.rs"],
         "Shown moves to a file of its own",
-    ),
-    (
-        &[
-            "run/identity.rs",
-            "run/merge.rs",
-            "run/mod.rs",
-            "run/report/merge.rs",
-            "run/report/mod.rs",
-            "run/stage.rs",
-        ],
-        "Verdict, count and RESULTS leave run/mod.rs; SHARD moves to run/identity.rs; Kept leaves run/report/mod.rs",
-    ),
-    (
-        &[
-            "run/openeqa/forecast.rs",
-            "run/openeqa/mod.rs",
-            "run/openeqa/outcome.rs",
-        ],
-        "Run and all_given leave run/openeqa/mod.rs",
-    ),
-    (
-        &["run/plan.rs", "run/record.rs", "run/trial.rs"],
-        "Entry goes, with Record<D>",
-    ),
-    (
-        &[
-            "score/accuracy.rs",
-            "score/chance.rs",
-            "score/estimate.rs",
-            "score/grid.rs",
-            "score/health.rs",
-        ],
-        "Subject moves to score/subject.rs",
-    ),
-    (
-        &["score/realism/mod.rs", "score/realism/residual.rs"],
-        "same_size moves to a file of its own",
     ),
 ];
 

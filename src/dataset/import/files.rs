@@ -1,16 +1,15 @@
 //! Files of a folder by name, and what is read of them.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use ndarray::Array2;
 
-use crate::dataset::lines::{bytes, text};
 use crate::dataset::maps::DepthFile;
 use crate::dataset::npy::Npy;
 use crate::dataset::picture::{MOST_PIXELS, Picture};
 use crate::dataset::raw_png::{Form, RawPng};
+use crate::dataset::reading::{bytes, entries, text};
 use crate::error::{Error, Result};
 use crate::types::Rgb;
 
@@ -43,16 +42,6 @@ pub(super) fn first(folder: &Path, names: &[&str]) -> Option<PathBuf> {
         .iter()
         .map(|name| folder.join(name))
         .find(|path| path.is_dir())
-}
-
-fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
-    let unread = |e| Error::file(folder, "read", e);
-    let entries = fs::read_dir(folder).map_err(unread)?;
-    let mut paths = entries
-        .map(|entry| entry.map(|entry| entry.path()).map_err(unread))
-        .collect::<Result<Vec<PathBuf>>>()?;
-    paths.sort();
-    Ok(paths)
 }
 
 /// An image, decoded.

@@ -12,7 +12,7 @@ use serde::Deserialize;
 use super::adapter::{Adapter, Incoming, Listing, Read, Stated, numbers};
 use super::files::{depth_of, files, folders, last, same_size, segments};
 use super::{hm3d, mp3d, replica};
-use crate::dataset::lines::{json_lines, text};
+use crate::dataset::reading::{json_lines, text};
 use crate::error::{Error, Result};
 use crate::types::{Intrinsics, Rgb, SegmentName};
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::adapter::{Adapter, Incoming, Listing, Read};
-use crate::dataset::lines::json_lines;
+use crate::dataset::reading::json_lines;
 use crate::dataset::{Dataset, Source};
 use crate::error::{Error, Result};
 use crate::types::{DepthKind, Frame, FrameId, Rgb, Segmentation};

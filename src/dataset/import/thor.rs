@@ -11,7 +11,7 @@ use ndarray::Array2;
 use super::adapter::{Adapter, Incoming, Listing, Read, Stated, numbers};
 use super::files::{depth_of, files, folders, last, picture, same_size};
 use super::names;
-use crate::dataset::lines::json;
+use crate::dataset::reading::json;
 use crate::error::{Error, Result};
 use crate::types::{Rgb, SegmentName};
 

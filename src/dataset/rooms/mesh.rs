@@ -171,6 +171,13 @@ impl Mesh {
         self.block(foot - half, foot + half + vec3(0.0, size.y, 0.0), surface);
     }
 
+    /// Two such blocks, as far to the left as to the right.
+    pub(super) fn slabs(&mut self, foot: Vec3, size: Vec3, surface: &Surface) {
+        for x in [-foot.x, foot.x] {
+            self.slab(vec3(x, foot.y, foot.z), size, surface);
+        }
+    }
+
     /// A block whose edges are round: the sum of a block and a ball.
     pub(super) fn soft(&mut self, low: Vec3, high: Vec3, radius: f32, surface: &Surface) {
         let radius = radius.min((high - low).min_element() / 2.0 * 0.999);

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::dataset::lines;
+use crate::dataset::reading;
 use crate::error::{Error, Result};
 use crate::types::{Label, Labels};
 
@@ -90,7 +90,7 @@ struct Class {
 /// # Errors
 /// With the file: broken JSON, another schema, a number twice, a canonical class that mpcat40 has not.
 pub(super) fn read(path: &Path) -> Result<Labels> {
-    let file: File = lines::json(path)?;
+    let file: File = reading::json(path)?;
     file.labels()
         .map_err(|problem| Error::data(path.display(), problem))
 }

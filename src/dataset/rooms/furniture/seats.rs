@@ -39,13 +39,8 @@ pub(in super::super) fn chair_of(
         surface,
     );
     let top = 0.94;
-    for x in [-1.0, 1.0] {
-        mesh.slab(
-            vec3(x * (half - 0.03), seat, 0.03),
-            vec3(0.04, top - seat, 0.04),
-            surface,
-        );
-    }
+    let post = vec3(0.04, top - seat, 0.04);
+    mesh.slabs(vec3(half - 0.03, seat, 0.03), post, surface);
     if style == 0 {
         mesh.cushion(half, [top - 0.12, top], [0.01, 0.05], 0.015, surface);
         for i in -2..=2 {

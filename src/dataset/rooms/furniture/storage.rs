@@ -149,13 +149,8 @@ pub(in super::super) fn bookshelf(dice: &mut Dice) -> Piece {
     let half = width / 2.0;
     let shelves = 5;
     let mut mesh = Mesh::default();
-    for x in [-1.0, 1.0] {
-        mesh.slab(
-            vec3(x * (half - 0.015), 0.0, depth / 2.0),
-            vec3(0.03, height, depth),
-            &surface,
-        );
-    }
+    let side = vec3(0.03, height, depth);
+    mesh.slabs(vec3(half - 0.015, 0.0, depth / 2.0), side, &surface);
     mesh.board(half, [0.0, height], [0.0, 0.015], &surface);
     let rise = (height - 0.06) / shelves as f32;
     for shelf in 0..=shelves {
@@ -217,13 +212,8 @@ pub(in super::super) fn wall_shelf(dice: &mut Dice) -> Piece {
     for y in [0.0, 0.34] {
         mesh.board(half, [y - 0.03, y], [0.0, 0.24], &surface);
     }
-    for x in [-1.0, 1.0] {
-        mesh.slab(
-            vec3(x * (half - 0.012), -0.03, 0.12),
-            vec3(0.024, 0.37, 0.24),
-            &surface,
-        );
-    }
+    let side = vec3(0.024, 0.37, 0.24);
+    mesh.slabs(vec3(half - 0.012, -0.03, 0.12), side, &surface);
     mesh.board(half, [-0.03, 0.34], [0.0, 0.012], &surface);
     books(
         &mut mesh,

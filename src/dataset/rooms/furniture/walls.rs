@@ -163,13 +163,8 @@ pub(in super::super) fn door(dice: &mut Dice) -> Piece {
             );
         }
     }
-    for x in [-1.0, 1.0] {
-        mesh.slab(
-            vec3(x * (half + 0.03), 0.0, 0.02),
-            vec3(0.07, height, 0.05),
-            &rail,
-        );
-    }
+    let side = vec3(0.07, height, 0.05);
+    mesh.slabs(vec3(half + 0.03, 0.0, 0.02), side, &rail);
     mesh.board(
         half + 0.065,
         [height, height + 0.07],

@@ -1,11 +1,31 @@
-//! Text files, and those of one JSON object a line: [`json_lines`].
+//! Folders, text files, and those of one JSON object a line: [`entries`], [`text`], [`json_lines`].
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 
 use crate::error::{Error, Result};
+
+/// What lies in a folder, by name.
+///
+/// # Errors
+/// With the folder.
+pub(super) fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
+    let unread = |e| Error::file(folder, "read", e);
+    let entries = fs::read_dir(folder).map_err(unread)?;
+    let mut paths = entries
+        .map(|entry| entry.map(|entry| entry.path()).map_err(unread))
+        .collect::<Result<Vec<PathBuf>>>()?;
+    paths.sort();
+    Ok(paths)
+}
+
+/// Whether a path is a file that is named as an image.
+pub(super) fn is_image(path: &Path) -> bool {
+    let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
+    path.is_file() && ["png", "jpg", "jpeg"].iter().any(|known| ending == *known)
+}
 
 /// The bytes of a file.
 ///

@@ -1,0 +1,189 @@
+use super::*;
+use std::collections::BTreeMap;
+
+use crate::types::manifest::{Counts, Status};
+use crate::types::{Digest, Family, FrameId, Outcome, QuestionId};
+
+type Store = super::Store;
+
+fn manifest(seed: u64) -> RunManifest {
+    RunManifest {
+        schema: ChoiceDetail::SCHEMA.into(),
+        status: Status::Started,
+        version: "0".into(),
+        created: String::new(),
+        updated: String::new(),
+        platform: BTreeMap::new(),
+        identity: BTreeMap::from([("--seed".to_owned(), seed.into())]),
+        settings: BTreeMap::new(),
+        images: BTreeMap::new(),
+        columns: BTreeMap::new(),
+        shard: None,
+        counts: Counts::default(),
+    }
+}
+
+fn record(name: &str, outcome: Outcome) -> Record {
+    let detail = ChoiceDetail {
+        frame: FrameId("f".into()),
+        family: Family::Color,
+        choices: vec!["a".into(), "b".into()],
+        truth: 0,
+        repeat: 0,
+        strict: None,
+        lenient: None,
+        outcome,
+        image: None,
+    };
+    let key = Digest::of(name.as_bytes()).into();
+    Record {
+        reply: Some("A\u{2028}\n".into()),
+        attempts: 1,
+        ..Record::blank(key, QuestionId(name.into()), "m", None, detail)
+    }
+}
+
+#[test]
+fn runs_of_other_versions_are_refused_by_what_they_are() {
+    let base = tempfile::tempdir().unwrap();
+    for (schema, says) in [
+        (
+            "darkqa.run/1",
+            "made by an earlier version of darkqa-eval (0",
+        ),
+        ("darkqa.openeqa/1", "run it again"),
+        ("darkqa.openeqa/2", "\"darkqa.run/2\" is expected here"),
+        ("darkqa.run/9", "is not known to this version"),
+        ("something", "is not known to this version"),
+    ] {
+        let manifest = RunManifest {
+            schema: schema.into(),
+            ..manifest(0)
+        };
+        write_manifest(base.path(), &manifest).unwrap();
+        let error = read_manifest(base.path(), ChoiceDetail::SCHEMA).unwrap_err();
+        assert!(error.to_string().contains(says), "{error}");
+    }
+}
+
+#[test]
+fn records_come_back_the_last_of_each_trial() {
+    let base = tempfile::tempdir().unwrap();
+    let folder = base.path().join("run");
+    let mut store = Store::open(&folder, &manifest(0), Moved::Refused).unwrap();
+    assert!(store.records().unwrap().is_empty());
+    for (name, outcome) in [
+        ("a", Outcome::Failed),
+        ("b", Outcome::Right),
+        ("a", Outcome::Wrong),
+    ] {
+        store.append(&record(name, outcome)).unwrap();
+    }
+    drop(store);
+    let kept = Store::open(&folder, &manifest(0), Moved::Refused)
+        .unwrap()
+        .records()
+        .unwrap();
+    assert_eq!(
+        kept,
+        [record("a", Outcome::Wrong), record("b", Outcome::Right)]
+    );
+}
+
+#[test]
+fn a_torn_line_is_cut_and_a_broken_one_is_named() {
+    let base = tempfile::tempdir().unwrap();
+    let mut store = Store::open(base.path(), &manifest(0), Moved::Refused).unwrap();
+    store.append(&record("a", Outcome::Right)).unwrap();
+    store.records.write_all(b"{\"key\":\"12").unwrap();
+    drop(store);
+    let mut store = Store::open(base.path(), &manifest(0), Moved::Refused).unwrap();
+    assert_eq!(store.records().unwrap().len(), 1);
+    store.append(&record("b", Outcome::Right)).unwrap();
+    drop(store);
+    let kept = Store::open(base.path(), &manifest(0), Moved::Refused)
+        .unwrap()
+        .records();
+    assert_eq!(kept.unwrap().len(), 2);
+    let path = base.path().join(RECORDS);
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, text.replacen("{\"key\"", "{\"kex\"", 1)).unwrap();
+    let store = Store::open(base.path(), &manifest(0), Moved::Refused).unwrap();
+    let error = store.records().unwrap_err().to_string();
+    assert!(
+        error.contains("records.jsonl, line 1: not a record"),
+        "{error}"
+    );
+}
+
+#[test]
+fn another_run_is_refused_by_the_flag_that_differs() {
+    let base = tempfile::tempdir().unwrap();
+    drop(Store::open(base.path(), &manifest(0), Moved::Refused).unwrap());
+    let error = Store::open(base.path(), &manifest(7), Moved::Refused)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("another --seed: it was 0, now it is 7"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_run_is_held_by_one_process_and_a_strange_folder_is_left_alone() {
+    let base = tempfile::tempdir().unwrap();
+    let _held = Store::open(base.path(), &manifest(0), Moved::Refused).unwrap();
+    assert!(
+        Store::open(base.path(), &manifest(0), Moved::Refused)
+            .unwrap_err()
+            .to_string()
+            .contains("another process")
+    );
+    let strange = tempfile::tempdir().unwrap();
+    fs::write(strange.path().join("thesis.tex"), "").unwrap();
+    assert!(
+        Store::open(strange.path(), &manifest(0), Moved::Refused)
+            .unwrap_err()
+            .to_string()
+            .contains("not empty")
+    );
+}
+
+#[test]
+fn a_run_goes_on_at_another_address_where_it_is_named() {
+    let at = |address: &str| {
+        let mut manifest = manifest(0);
+        let model = serde_json::json!({ADDRESS: address});
+        let models = BTreeMap::from([("m".to_owned(), model)]);
+        manifest.columns.insert("model".to_owned(), models);
+        manifest
+    };
+    let base = tempfile::tempdir().unwrap();
+    drop(Store::open(base.path(), &at("here"), Moved::Refused).unwrap());
+    assert!(Store::open(base.path(), &at("there"), Moved::Allowed).is_ok());
+    let error = Store::open(base.path(), &at("there"), Moved::Refused).unwrap_err();
+    assert!(error.to_string().contains("--resume"), "{error}");
+}
+
+#[test]
+fn what_a_killed_process_left_unfinished_is_in_nobodys_way() {
+    let base = tempfile::tempdir().unwrap();
+    fs::write(base.path().join(".manifest.json.part"), "{").unwrap();
+    assert!(Store::open(base.path(), &manifest(0), Moved::Refused).is_ok());
+}
+
+#[test]
+fn runs_are_found_by_their_hash() {
+    let base = tempfile::tempdir().unwrap();
+    for name in [
+        "20260101-m-d-0123abcd",
+        "20260102-m-d-0123abcd",
+        "20260103-m-d-99999999",
+    ] {
+        drop(Store::open(&base.path().join(name), &manifest(0), Moved::Refused).unwrap());
+    }
+    fs::create_dir(base.path().join("20260104-m-d-0123abcd")).unwrap();
+    let found = find(base.path(), "0123abcd").unwrap();
+    assert!(found.ends_with("20260102-m-d-0123abcd"));
+    assert_eq!(find(base.path(), "abcdabcd"), None);
+}
