@@ -1,9 +1,6 @@
 //! The header that carries a key: [`KeyHeader`].
 
-use std::fmt;
-use std::str::FromStr;
-
-use crate::error::{Error, Result};
+use crate::types::words::words;
 
 /// The header that carries a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -16,34 +13,11 @@ pub enum KeyHeader {
     ApiKey,
 }
 
-impl KeyHeader {
-    const NAMES: [(Self, &str); 3] = [
-        (Self::Auto, "auto"),
-        (Self::Bearer, "bearer"),
-        (Self::ApiKey, "api-key"),
-    ];
-}
-
-impl fmt::Display for KeyHeader {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let name = Self::NAMES.iter().find(|(header, _)| header == self);
-        f.pad(name.map_or("", |(_, name)| name))
-    }
-}
-
-impl FromStr for KeyHeader {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self> {
-        let found = Self::NAMES.iter().find(|(_, name)| *name == text);
-        found.map(|(header, _)| *header).ok_or_else(|| {
-            Error::usage(
-                "--key-header",
-                format_args!("{text:?} is none of auto, bearer, api-key"),
-            )
-        })
-    }
-}
+words!(KeyHeader by "--key-header" {
+    Auto = "auto",
+    Bearer = "bearer",
+    ApiKey = "api-key",
+});
 
 #[cfg(test)]
 mod tests {
@@ -51,9 +25,8 @@ mod tests {
 
     #[test]
     fn names_read_back() {
-        for (header, name) in KeyHeader::NAMES {
-            assert_eq!(name.parse::<KeyHeader>().unwrap(), header);
-            assert_eq!(header.to_string(), name);
+        for name in ["auto", "bearer", "api-key"] {
+            assert_eq!(name.parse::<KeyHeader>().unwrap().to_string(), name);
         }
         assert!("basic".parse::<KeyHeader>().is_err());
     }

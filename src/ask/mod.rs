@@ -7,7 +7,6 @@
 
 mod access;
 pub mod batch;
-pub mod bilinear;
 mod body;
 mod call;
 mod complaint;

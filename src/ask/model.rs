@@ -11,6 +11,7 @@ use super::parameters::Parameters;
 use super::random::Random;
 use super::remote::Remote;
 use super::script::Script;
+use crate::error::Result;
 use crate::types::{Digest, Reply};
 
 /// Something that can be asked.
@@ -50,9 +51,11 @@ impl Model {
     }
 
     /// The digest of [`Model::content`].
-    #[must_use]
-    pub fn digest(&self) -> Digest {
-        Digest::of(self.content().to_string().as_bytes())
+    ///
+    /// # Errors
+    /// If a number in it is not finite.
+    pub fn digest(&self) -> Result<Digest> {
+        Digest::canonical("darkqa.model/2", &self.content())
     }
 
     /// How many questions may be under way at once; `None` where it does not matter.

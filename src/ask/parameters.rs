@@ -7,6 +7,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
+use crate::types::words::words;
 
 /// What a model is called and how it is to speak; what is `None` is left out of the request.
 #[derive(Debug, Clone, PartialEq)]
@@ -117,13 +118,6 @@ pub enum TokenField {
 }
 
 impl TokenField {
-    const NAMES: [(Self, &str); 4] = [
-        (Self::Auto, "auto"),
-        (Self::MaxTokens, "max_tokens"),
-        (Self::MaxCompletionTokens, "max_completion_tokens"),
-        (Self::Omit, "none"),
-    ];
-
     /// The field for an endpoint of this host: never `Auto`.
     pub(super) fn at(self, host: &str) -> Self {
         match self {
@@ -146,14 +140,6 @@ pub enum Detail {
     High,
 }
 
-impl Detail {
-    const NAMES: [(Self, &str); 3] = [
-        (Self::Auto, "auto"),
-        (Self::Low, "low"),
-        (Self::High, "high"),
-    ];
-}
-
 /// What a server lets a model say. Anything but `None` measures something else: what the model would say if it had to
 /// name a letter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -166,41 +152,14 @@ pub enum Constrain {
     Choice,
 }
 
-impl Constrain {
-    const NAMES: [(Self, &str); 3] = [
-        (Self::None, "none"),
-        (Self::Json, "json"),
-        (Self::Choice, "choice"),
-    ];
-}
-
-/// A setting that is one of a few words.
-macro_rules! named {
-    ($kind:ident, $flag:literal) => {
-        impl fmt::Display for $kind {
-            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                let name = Self::NAMES.iter().find(|(value, _)| value == self);
-                f.pad(name.map_or("", |(_, name)| name))
-            }
-        }
-
-        impl FromStr for $kind {
-            type Err = Error;
-
-            fn from_str(text: &str) -> Result<Self> {
-                let found = Self::NAMES.iter().find(|(_, name)| *name == text);
-                found.map(|(value, _)| *value).ok_or_else(|| {
-                    let names = Self::NAMES.map(|(_, name)| name).join(", ");
-                    Error::usage($flag, format_args!("{text:?} is none of {names}"))
-                })
-            }
-        }
-    };
-}
-
-named!(TokenField, "--token-field");
-named!(Detail, "--detail");
-named!(Constrain, "--constrain");
+words!(TokenField by "--token-field" {
+    Auto = "auto",
+    MaxTokens = "max_tokens",
+    MaxCompletionTokens = "max_completion_tokens",
+    Omit = "none",
+});
+words!(Detail by "--detail" { Auto = "auto", Low = "low", High = "high" });
+words!(Constrain by "--constrain" { None = "none", Json = "json", Choice = "choice" });
 
 #[cfg(test)]
 mod tests {
@@ -208,15 +167,14 @@ mod tests {
 
     #[test]
     fn names_read_back() {
-        for (field, name) in TokenField::NAMES {
-            assert_eq!(name.parse::<TokenField>().unwrap(), field);
-            assert_eq!(field.to_string(), name);
+        for name in ["auto", "max_tokens", "max_completion_tokens", "none"] {
+            assert_eq!(name.parse::<TokenField>().unwrap().to_string(), name);
         }
-        for (detail, name) in Detail::NAMES {
-            assert_eq!(name.parse::<Detail>().unwrap(), detail);
+        for name in ["auto", "low", "high"] {
+            assert_eq!(name.parse::<Detail>().unwrap().to_string(), name);
         }
-        for (constrain, name) in Constrain::NAMES {
-            assert_eq!(name.parse::<Constrain>().unwrap(), constrain);
+        for name in ["none", "json", "choice"] {
+            assert_eq!(name.parse::<Constrain>().unwrap().to_string(), name);
         }
         for text in ["auto", "default", "0.5"] {
             assert_eq!(text.parse::<Temperature>().unwrap().to_string(), text);

@@ -61,7 +61,7 @@ impl Import {
             kind,
             source: said.src,
             out: said.out,
-            name: said.name.unwrap_or_else(|| kind.name().to_owned()),
+            name: said.name.unwrap_or_else(|| kind.to_string()),
             stated: Stated {
                 labels: said.labels,
                 depth_scale: above("--depth-scale", said.depth_scale, 1e3)?,

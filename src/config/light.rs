@@ -105,6 +105,14 @@ fn readings(said: &SensorArgs) -> Result<Readings> {
         let problem = "beside several profiles it would make them the same; name one profile";
         return Err(Error::usage(flag, problem));
     }
+    let by_light =
+        |of: &&LightReading| Synthesis::of(**of, camera.clone()).coupling == Coupling::Photon;
+    if said.ratio.is_some()
+        && let Some(reading) = chosen.iter().find(by_light)
+    {
+        let problem = format!("the ratio of {reading} is 2^EV; leave out one of the two");
+        return Err(Error::usage("--ratio", problem));
+    }
     Ok(Readings::named(&chosen, &camera))
 }
 

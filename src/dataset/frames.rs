@@ -22,6 +22,7 @@ use std::sync::Arc;
 use serde::Deserialize;
 
 use super::maps::{DepthFile, Maps};
+use super::reading::{entries, is_image, json, json_lines};
 use super::view::View;
 use super::{Dataset, Source, questions, spaces, stem};
 use crate::error::{Error, Result};
@@ -152,8 +153,7 @@ fn about(folder: &Path) -> Result<About> {
     if !path.exists() {
         return Ok(About::default());
     }
-    let text = fs::read_to_string(&path).map_err(|e| Error::file(&path, "read", e))?;
-    let about: About = serde_json::from_str(&text).map_err(|e| Error::data(path.display(), e))?;
+    let about: About = json(&path)?;
     if about.schema != SCHEMA {
         let problem = format_args!("schema {:?}; {SCHEMA:?} expected", about.schema);
         return Err(Error::data(path.display(), problem));
@@ -167,9 +167,7 @@ fn segment_names(folder: &Path, scene: &str) -> Result<Arc<BTreeMap<u32, Segment
     if !path.exists() {
         return Ok(Arc::default());
     }
-    let text = fs::read_to_string(&path).map_err(|e| Error::file(&path, "read", e))?;
-    let names: BTreeMap<u32, SegmentName> =
-        serde_json::from_str(&text).map_err(|e| Error::data(path.display(), e))?;
+    let names: BTreeMap<u32, SegmentName> = json(&path)?;
     let canonical = spaces::canonical();
     if let Some((id, name)) = names
         .iter()
@@ -218,51 +216,29 @@ pub(super) fn image(path: &Path) -> Result<BTreeMap<FrameId, Source>> {
 }
 
 fn listed(folder: &Path, list: &Path) -> Result<BTreeMap<FrameId, Source>> {
-    let text = fs::read_to_string(list).map_err(|e| Error::file(list, "read", e))?;
     let (about, mut names) = (about(folder)?, Names::new());
     let mut sources = BTreeMap::new();
-    for (i, line) in text
-        .trim_start_matches('\u{feff}')
-        .lines()
-        .enumerate()
-        .filter(|(_, line)| !line.trim().is_empty())
-    {
-        let line: Line =
-            serde_json::from_str(line).map_err(|e| Error::json_line(list, i + 1, &e))?;
+    for (number, line) in json_lines::<Line>(list)? {
         let id = FrameId(format!("{}/{}", line.scene, line.frame));
         if !names.contains_key(&line.scene) {
             names.insert(line.scene.clone(), segment_names(folder, &line.scene)?);
         }
         let source = line
             .source(folder, &about, &names)
-            .map_err(|problem| Error::line(list, i + 1, problem))?;
+            .map_err(|problem| Error::line(list, number, problem))?;
         if sources.insert(id.clone(), source).is_some() {
-            return Err(Error::line(
-                list,
-                i + 1,
-                format_args!("a second frame {:?}", id.0),
-            ));
+            let problem = format_args!("a second frame {:?}", id.0);
+            return Err(Error::line(list, number, problem));
         }
     }
     Ok(sources)
 }
 
 fn images(folder: &Path) -> Result<BTreeMap<FrameId, Source>> {
-    let unread = |e| Error::file(folder, "read", e);
     let mut sources = BTreeMap::new();
-    for entry in fs::read_dir(folder).map_err(unread)? {
-        let path = entry.map_err(unread)?.path();
-        let ending = path
-            .extension()
-            .map(|ending| ending.to_string_lossy().to_lowercase());
-        if path.is_file() && matches!(ending.as_deref(), Some("png" | "jpg" | "jpeg")) {
-            let name = path
-                .file_name()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned();
-            sources.insert(FrameId(name), Source::image(path));
-        }
+    for path in entries(folder)?.into_iter().filter(|path| is_image(path)) {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        sources.insert(FrameId(name.into_owned()), Source::image(path));
     }
     if sources.is_empty() {
         return Err(Error::data(

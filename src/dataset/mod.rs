@@ -18,6 +18,7 @@ pub mod pairs;
 pub mod picture;
 pub mod questions;
 mod raw_png;
+mod reading;
 pub mod rooms;
 pub mod spaces;
 mod table;
@@ -29,7 +30,7 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use crate::error::{Error, Result};
-use crate::types::{Digest, Frame, FrameId, Labels, Question};
+use crate::types::{Frame, FrameId, Labels, Question};
 
 use maps::Maps;
 use picture::MOST_PIXELS;
@@ -324,24 +325,6 @@ impl Dataset {
     /// With the file: an image or a map that cannot be read, a map of another size than the image.
     pub fn frame(&self, frame: &FrameId) -> Result<Frame> {
         self.files(frame)?.decode()
-    }
-
-    /// The content of all questions, evidence left out: what is asked decides a reply, why it is right does not.
-    #[must_use]
-    pub fn questions_digest(&self) -> Digest {
-        let words = self.questions.iter().flat_map(|question| {
-            let choices = question.choices.texts().iter().map(String::as_str);
-            let head = [
-                &question.id.0,
-                &question.frame.0,
-                question.family.name(),
-                &question.text,
-            ];
-            head.into_iter()
-                .chain(choices)
-                .chain([&question.choices.texts()[question.choices.truth()], "\n"])
-        });
-        Digest::of_parts(words.map(str::as_bytes))
     }
 }
 

@@ -2,11 +2,11 @@
 //! After `facebookresearch/open-eqa` at cfa3fce.
 
 use std::collections::BTreeSet;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
+use super::reading::{bytes, entries};
 use crate::error::{Error, Result};
 use crate::types::QuestionId;
 
@@ -44,7 +44,7 @@ impl OpenQuestion {
 /// # Errors
 /// Where it cannot be read or is no such array, is empty, or has two questions of one id.
 pub fn questions(path: &Path) -> Result<Vec<OpenQuestion>> {
-    let text = fs::read(path).map_err(|e| Error::file(path, "read", e))?;
+    let text = bytes(path)?;
     let wrong = |problem: String| Error::data(path.display(), problem);
     let questions: Vec<OpenQuestion> = serde_json::from_slice(&text).map_err(|e| {
         wrong(format!(
@@ -67,15 +67,8 @@ pub fn questions(path: &Path) -> Result<Vec<OpenQuestion>> {
 /// Where the folder is missing or has none.
 pub fn walk(frames: &Path, episode: &str) -> Result<Vec<PathBuf>> {
     let folder = frames.join(episode);
-    let entries = fs::read_dir(&folder).map_err(|e| Error::file(&folder, "read", e))?;
-    let mut paths = Vec::new();
-    for entry in entries {
-        let path = entry.map_err(|e| Error::file(&folder, "read", e))?.path();
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        if name.ends_with("-rgb.png") {
-            paths.push(path);
-        }
-    }
+    let mut paths = entries(&folder)?;
+    paths.retain(|path| path.to_string_lossy().ends_with("-rgb.png"));
     if paths.is_empty() {
         let problem = "no frame in it: files that end in -rgb.png expected";
         return Err(Error::data(folder.display(), problem));
@@ -107,6 +100,8 @@ pub fn sampled(n: usize, k: usize) -> Vec<usize> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]

@@ -1,9 +1,9 @@
 //! Pairs of the same scene in normal and in low light: [`Pairs`].
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::reading::{entries, is_image};
 use crate::error::{Error, Result};
 
 /// The folders that pairs lie in, normal light first: LISU's, LOL's, and plain ones.
@@ -141,24 +141,8 @@ fn role(stem: &str) -> (String, Option<Light>) {
     }
 }
 
-fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
-    let unread = |e| Error::file(folder, "read", e);
-    let entries = fs::read_dir(folder).map_err(unread)?;
-    let mut paths = entries
-        .map(|entry| entry.map(|entry| entry.path()))
-        .collect::<std::io::Result<Vec<_>>>()
-        .map_err(unread)?;
-    paths.sort();
-    Ok(paths)
-}
-
 fn images(paths: Vec<PathBuf>) -> impl Iterator<Item = PathBuf> {
-    paths.into_iter().filter(|path| {
-        let ending = path
-            .extension()
-            .map(|end| end.to_string_lossy().to_lowercase());
-        path.is_file() && matches!(ending.as_deref(), Some("png" | "jpg" | "jpeg"))
-    })
+    paths.into_iter().filter(|path| is_image(path))
 }
 
 fn file_name(path: &Path) -> String {
@@ -177,6 +161,8 @@ fn stem(path: &Path) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     fn folder(files: &[&str]) -> tempfile::TempDir {

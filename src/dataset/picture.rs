@@ -27,19 +27,16 @@ pub enum Picture {
         /// The most pixels it may have: one with more is refused before it is inflated.
         most_pixels: u64,
     },
-    /// Pixels that were never a file.
-    Pixels(Rgb),
     /// A built-in room, drawn where it is needed.
     Drawn(Room),
 }
 
 impl Picture {
-    /// The content: of the file, of the pixels with their size, or all that decides the pixels of a room.
+    /// The content: of the file, or all that decides the pixels of a room.
     #[must_use]
     pub fn digest(&self) -> Digest {
         match self {
             Self::Encoded { bytes, .. } => Digest::of(bytes),
-            Self::Pixels(rgb) => Digest::of_parts([&rgb.width().to_le_bytes()[..], rgb.samples()]),
             Self::Drawn(room) => room.digest(),
         }
     }
@@ -50,7 +47,6 @@ impl Picture {
     /// does not settle it (JPEG files have none, an alpha channel may hide something) the picture is decoded.
     pub fn check(&self) -> Result<(u32, u32)> {
         let (bytes, place, most_pixels) = match self {
-            Self::Pixels(rgb) => return Ok((rgb.width() as u32, rgb.height() as u32)),
             Self::Drawn(room) => return Ok(room.size().map(|side| side as u32).into()),
             Self::Encoded {
                 bytes,
@@ -74,7 +70,6 @@ impl Picture {
     /// orientation is not applied, as by every tool that reads label maps beside the image.
     pub fn decode(&self) -> Result<Rgb> {
         let (bytes, place, most_pixels) = match self {
-            Self::Pixels(rgb) => return Ok(rgb.clone()),
             Self::Drawn(room) => return Ok(room.frame()?.rgb.clone()),
             Self::Encoded {
                 bytes,

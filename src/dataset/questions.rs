@@ -4,13 +4,13 @@
 //! beside the file, in place of `"frame"`. `answer` is the text of the true choice. Lines as other tools write them are
 //! read, too (`dialect.rs`).
 
-use std::fs;
 use std::path::Path;
 
 use serde::Deserialize;
 use serde_json::Value;
 
 use super::dialect::translated;
+use super::reading::json_lines;
 use crate::error::{Error, Result};
 use crate::types::{Choices, Family, FrameId, Question, QuestionId};
 
@@ -53,18 +53,14 @@ pub(super) fn checked(family: Family) -> Result<Family> {
 /// With the file and the line: broken JSON, a missing key, choices that are no choices, an answer not among them,
 /// a family named as the total.
 pub fn read(path: &Path) -> Result<Vec<Question>> {
-    let text = fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))?;
-    let lines = text.trim_start_matches('\u{feff}').lines().enumerate();
+    let lines = json_lines::<Value>(path)?.into_iter();
     lines
-        .filter(|(_, line)| !line.trim().is_empty())
-        .map(|(i, line)| {
-            let value = serde_json::from_str::<Value>(line)
-                .map_err(|e| Error::json_line(path, i + 1, &e))?;
-            let value = translated(value).map_err(|problem| Error::line(path, i + 1, problem))?;
+        .map(|(number, value)| {
+            let value = translated(value).map_err(|problem| Error::line(path, number, problem))?;
             let line = serde_json::from_value::<Line>(value)
-                .map_err(|e| Error::json_line(path, i + 1, &e))?;
+                .map_err(|e| Error::json_line(path, number, &e))?;
             line.into_question()
-                .map_err(|e| e.at(format!("{}, line {}", path.display(), i + 1)))
+                .map_err(|e| e.at(format!("{}, line {number}", path.display())))
         })
         .collect()
 }
@@ -115,6 +111,8 @@ impl Line {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     fn parse(text: &str) -> Result<Vec<Question>> {

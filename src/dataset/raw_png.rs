@@ -3,12 +3,12 @@
 //! A label map says ids, not colours, so a sample is taken as it is stored: a palette is not looked up, and no bits are
 //! spread over a larger range.
 
-use std::fmt;
 use std::io::Cursor;
 
 use png::{BitDepth, ColorType, Decoder, DecodingError, Reader, Transformations};
 
 use super::picture::MOST_PIXELS;
+use crate::types::words::words;
 
 /// What the samples of a PNG file are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,15 +21,7 @@ pub(super) enum Form {
     Palette,
 }
 
-impl fmt::Display for Form {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Grey8 => "8-bit grey",
-            Self::Grey16 => "16-bit grey",
-            Self::Palette => "palette",
-        })
-    }
-}
+words!(Form { Grey8 = "8-bit grey", Grey16 = "16-bit grey", Palette = "palette" });
 
 /// A PNG file of one number a pixel, not yet inflated.
 pub(super) struct RawPng<'a> {
@@ -138,174 +130,4 @@ fn color(color: ColorType) -> &'static str {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
-    use proptest::prelude::*;
-
-    use super::*;
-
-    /// A PNG file of the given packed rows.
-    pub(crate) fn png(
-        (height, width): (u32, u32),
-        color: ColorType,
-        bits: BitDepth,
-        data: &[u8],
-    ) -> Vec<u8> {
-        let mut bytes = Vec::new();
-        let mut encoder = png::Encoder::new(&mut bytes, width, height);
-        encoder.set_color(color);
-        encoder.set_depth(bits);
-        if color == ColorType::Indexed {
-            // Every colour the same: were the palette looked up, no place would be told from another.
-            encoder.set_palette(vec![200; 3 << (bits as u8)]);
-        }
-        let mut writer = encoder.write_header().unwrap();
-        writer.write_image_data(data).unwrap();
-        writer.finish().unwrap();
-        bytes
-    }
-
-    fn read(bytes: &[u8], forms: &[Form]) -> Result<Vec<u16>, String> {
-        RawPng::open(bytes, forms)?.samples(|sample| sample)
-    }
-
-    #[test]
-    fn places_in_a_palette_stay_places() {
-        for (bits, data, expected) in [
-            (
-                BitDepth::Eight,
-                vec![0, 7, 255, 1, 2, 3],
-                [0, 7, 255, 1, 2, 3],
-            ),
-            (
-                BitDepth::Four,
-                vec![0x07, 0xf0, 0x12, 0x30],
-                [0, 7, 15, 1, 2, 3],
-            ),
-            (
-                BitDepth::Two,
-                vec![0b00_01_11_00, 0b01_10_11_00],
-                [0, 1, 3, 1, 2, 3],
-            ),
-            (
-                BitDepth::One,
-                vec![0b0110_0000, 0b1010_0000],
-                [0, 1, 1, 1, 0, 1],
-            ),
-        ] {
-            let bytes = png((2, 3), ColorType::Indexed, bits, &data);
-            assert_eq!(
-                read(&bytes, &[Form::Palette]).unwrap(),
-                expected,
-                "{bits:?}"
-            );
-        }
-    }
-
-    #[test]
-    fn grey_is_read_as_it_is() {
-        let shallow = png((1, 2), ColorType::Grayscale, BitDepth::Eight, &[40, 255]);
-        assert_eq!(read(&shallow, &[Form::Grey8]).unwrap(), [40, 255]);
-        let deep = png(
-            (2, 1),
-            ColorType::Grayscale,
-            BitDepth::Sixteen,
-            &[1, 2, 255, 255],
-        );
-        let opened = RawPng::open(&deep, &[Form::Grey16]).unwrap();
-        assert_eq!(opened.size, (2, 1));
-        assert_eq!(opened.samples(|sample| sample).unwrap(), [258, 65_535]);
-    }
-
-    #[test]
-    fn other_forms_are_refused_by_name() {
-        let (all, deep) = ([Form::Grey8, Form::Grey16, Form::Palette], [Form::Grey16]);
-        for (color, bits, size, forms, says) in [
-            (
-                ColorType::Rgb,
-                BitDepth::Eight,
-                3,
-                &all[..],
-                "an RGB PNG of 8 bits; 8-bit grey or 16-bit grey or palette",
-            ),
-            (
-                ColorType::Rgba,
-                BitDepth::Sixteen,
-                8,
-                &all,
-                "an RGBA PNG of 16 bits",
-            ),
-            (
-                ColorType::GrayscaleAlpha,
-                BitDepth::Eight,
-                2,
-                &all,
-                "a grey-and-alpha PNG",
-            ),
-            (
-                ColorType::Grayscale,
-                BitDepth::Four,
-                1,
-                &all,
-                "a grey PNG of 4 bits",
-            ),
-            (
-                ColorType::Grayscale,
-                BitDepth::Eight,
-                1,
-                &deep,
-                "a grey PNG of 8 bits; 16-bit grey expected",
-            ),
-            (
-                ColorType::Indexed,
-                BitDepth::Eight,
-                1,
-                &deep,
-                "a palette PNG of 8 bits; 16-bit grey expected",
-            ),
-        ] {
-            let problem = read(&png((1, 1), color, bits, &vec![0; size]), forms).unwrap_err();
-            assert!(problem.contains(says), "{problem}");
-        }
-        let problem = read(b"\xff\xd8\xff\xe0", &deep).unwrap_err();
-        assert!(problem.starts_with("not a readable PNG"), "{problem}");
-    }
-
-    #[test]
-    fn a_bomb_is_refused_before_it_is_inflated() {
-        let mut bytes = png((1, 1), ColorType::Grayscale, BitDepth::Sixteen, &[0, 0]);
-        bytes[16..24].copy_from_slice(&[0, 1, 0, 0, 0, 1, 0, 0]);
-        seal(&mut bytes);
-        let problem = read(&bytes, &[Form::Grey16]).unwrap_err();
-        assert!(
-            problem.starts_with("65536 × 65536 pixels are more"),
-            "{problem}"
-        );
-    }
-
-    /// Makes the checksum of the file's header fit its changed content.
-    fn seal(bytes: &mut [u8]) {
-        let sum = crc32(&bytes[12..29]);
-        bytes[29..33].copy_from_slice(&sum.to_be_bytes());
-    }
-
-    fn crc32(bytes: &[u8]) -> u32 {
-        !bytes.iter().fold(u32::MAX, |crc, byte| {
-            (0..8).fold(crc ^ u32::from(*byte), |crc, _| {
-                (crc >> 1) ^ if crc & 1 == 1 { 0xedb8_8320 } else { 0 }
-            })
-        })
-    }
-
-    proptest! {
-        #[test]
-        fn no_bytes_panic(at in 16_usize..90, value in any::<u8>(), end in 33_usize..100) {
-            let mut bytes = png((3, 5), ColorType::Indexed, BitDepth::Two, &[0x1b; 6]);
-            if let Some(byte) = bytes.get_mut(at) {
-                *byte = value;
-            }
-            seal(&mut bytes);
-            bytes.truncate(end);
-            let _ = read(&bytes, &[Form::Grey8, Form::Grey16, Form::Palette]);
-        }
-    }
-}
+pub(super) mod tests;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::Picture;
 use super::maps::MapFiles;
@@ -11,42 +11,23 @@ use crate::error::Result;
 use crate::types::{DepthKind, Digest, Frame, FrameId, Intrinsics, SegmentName, Segmentation};
 
 /// What a data set says of a frame beside its files.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub(super) struct View {
     pub(super) scene: String,
     pub(super) depth_kind: DepthKind,
     pub(super) intrinsics: Option<Intrinsics>,
     pub(super) segmentation: Segmentation,
+    #[serde(serialize_with = "pairs")]
     pub(super) names: Arc<BTreeMap<u32, SegmentName>>,
     pub(super) room: Option<String>,
 }
 
-impl View {
-    /// All of it that says what is seen.
-    fn digest(&self) -> Result<Digest> {
-        Digest::canonical(
-            "darkqa.view/1",
-            &Facts {
-                scene: &self.scene,
-                depth_kind: self.depth_kind,
-                intrinsics: self.intrinsics,
-                segmentation: self.segmentation,
-                names: self.names.iter().collect(),
-                room: self.room.as_deref(),
-            },
-        )
-    }
-}
-
-/// The content of a [`View`].
-#[derive(Serialize)]
-struct Facts<'a> {
-    scene: &'a str,
-    depth_kind: DepthKind,
-    intrinsics: Option<Intrinsics>,
-    segmentation: Segmentation,
-    names: Vec<(&'a u32, &'a SegmentName)>,
-    room: Option<&'a str>,
+/// As pairs: the keys of JSON are texts.
+fn pairs<S: Serializer>(
+    names: &BTreeMap<u32, SegmentName>,
+    serializer: S,
+) -> std::result::Result<S::Ok, S::Error> {
+    serializer.collect_seq(names)
 }
 
 /// The files of a frame as they lie in the data set, undecoded.
@@ -67,7 +48,7 @@ impl FrameFiles<'_> {
         let parts = [
             self.picture.digest(),
             self.maps.digest(),
-            self.view.digest()?,
+            Digest::canonical("darkqa.view/1", self.view)?,
         ];
         Ok(Digest::of_parts(
             parts.iter().map(|part| &part.as_bytes()[..]),

@@ -3,8 +3,11 @@
 //! The words are those of the sidecar, `MODEL.onnx.toml`.
 
 use std::fmt;
+use std::str::FromStr;
 
-use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use serde::{Deserialize, Serialize};
+
+use crate::types::words::{as_text, words};
 
 /// The order of a tensor's dimensions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -57,16 +60,7 @@ impl Layout {
     }
 }
 
-impl fmt::Display for Layout {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Nchw => "NCHW",
-            Self::Nhwc => "NHWC",
-            Self::Chw => "CHW",
-            Self::Hwc => "HWC",
-        })
-    }
-}
+words!(Layout { Nchw = "NCHW", Nhwc = "NHWC", Chw = "CHW", Hwc = "HWC" });
 
 /// The order of channels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -89,14 +83,7 @@ impl Color {
     }
 }
 
-impl fmt::Display for Color {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Rgb => "RGB",
-            Self::Bgr => "BGR",
-        })
-    }
-}
+words!(Color { Rgb = "RGB", Bgr = "BGR" });
 
 /// What black and white are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -134,11 +121,7 @@ impl Range {
 
 impl fmt::Display for Range {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Unit => "0..1",
-            Self::Bytes => "0..255",
-            Self::Signed => "-1..1",
-        })
+        self.serialize(f)
     }
 }
 
@@ -159,12 +142,7 @@ pub(super) enum Pad {
 
 impl fmt::Display for Pad {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Reflect => "reflect",
-            Self::Zero => "zero",
-            Self::Replicate => "replicate",
-            Self::Crop => "crop",
-        })
+        self.serialize(f)
     }
 }
 
@@ -181,10 +159,7 @@ pub(super) enum Rounding {
 
 impl fmt::Display for Rounding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Round => "round",
-            Self::Truncate => "truncate",
-        })
+        self.serialize(f)
     }
 }
 
@@ -206,25 +181,22 @@ impl fmt::Display for Tile {
     }
 }
 
-impl Serialize for Tile {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
-    }
-}
+impl FromStr for Tile {
+    type Err = String;
 
-impl<'de> Deserialize<'de> for Tile {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let text = String::deserialize(deserializer)?;
+    fn from_str(text: &str) -> Result<Self, String> {
         let context = text.strip_prefix("exact:").map(str::parse);
-        match (text.as_str(), context) {
+        match (text, context) {
             ("none", _) => Ok(Self::None),
             (_, Some(Ok(context))) if context <= 4096 => Ok(Self::Exact(context)),
-            _ => Err(de::Error::custom(format_args!(
+            _ => Err(format!(
                 "tile is {text:?}; \"none\", or \"exact:8\" with the context in pixels expected"
-            ))),
+            )),
         }
     }
 }
+
+as_text!(Tile);
 
 /// What the elements of a tensor are.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use crate::error::{Error, Result};
-use crate::types::{Digest, EnhancerName, Rgb};
+use crate::types::{EnhancerName, Rgb};
 
 use super::convention::{Pad, Tile};
 use super::describe::Description;
@@ -40,7 +40,6 @@ enum Estimate {
 pub struct Enhancer {
     path: PathBuf,
     name: EnhancerName,
-    digest: Digest,
     graph: Graph,
     stated: Sidecar,
     tiling: Tiling,
@@ -79,7 +78,6 @@ impl Enhancer {
         Ok(Self {
             path: file.path,
             name: file.name,
-            digest: file.digest,
             graph,
             stated,
             tiling: Tiling::Auto,
@@ -109,12 +107,6 @@ impl Enhancer {
     #[must_use]
     pub fn name(&self) -> &EnhancerName {
         &self.name
-    }
-
-    /// The digest of the model, its sidecar, its external data and its preset; see [`ModelFile::digest`].
-    #[must_use]
-    pub fn digest(&self) -> Digest {
-        self.digest
     }
 
     /// What was found in the graph and beside it, and why it is taken to be so: lines of text.

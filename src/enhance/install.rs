@@ -5,7 +5,6 @@ use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
-use std::sync::atomic::{AtomicU32, Ordering};
 
 use sha2::{Digest as _, Sha256};
 use zip::ZipArchive;
@@ -89,10 +88,15 @@ const PIPS: [&[&str]; 4] = [
 /// # Errors
 /// A sentence that says what failed.
 pub(super) fn install(pin: Pin, folder: &Path) -> Result<PathBuf, String> {
-    let workshop = Workshop::beside(folder)?;
-    download(pin, &workshop.0)?;
-    let wheel = wheel_in(&workshop.0)?;
-    let unpacked = workshop.0.join(pin.file);
+    let beside = folder.parent().unwrap_or(folder);
+    fs::create_dir_all(beside).map_err(|e| at(beside, "cannot be created", &e))?;
+    let workshop = tempfile::Builder::new()
+        .prefix("installing-")
+        .tempdir_in(beside)
+        .map_err(|e| at(beside, "cannot be written", &e))?;
+    download(pin, workshop.path())?;
+    let wheel = wheel_in(workshop.path())?;
+    let unpacked = workshop.path().join(pin.file);
     unpack(&wheel, pin, &unpacked)?;
     let place = folder.join(pin.file);
     fs::create_dir_all(folder).map_err(|e| at(folder, "cannot be created", &e))?;
@@ -101,30 +105,6 @@ pub(super) fn install(pin: Pin, folder: &Path) -> Result<PathBuf, String> {
         Err(_) if place.is_file() => Ok(place),
         Err(error) => Err(at(&place, "cannot be written", &error)),
         Ok(()) => Ok(place),
-    }
-}
-
-/// A folder for the time of an installation.
-struct Workshop(PathBuf);
-
-impl Workshop {
-    fn beside(folder: &Path) -> Result<Self, String> {
-        static COUNT: AtomicU32 = AtomicU32::new(0);
-        let count = COUNT.fetch_add(1, Ordering::Relaxed);
-        let name = format!("installing-{}-{count}", std::process::id());
-        let path = folder.with_file_name(name);
-        // What a process of the same number left behind when it was interrupted.
-        drop(fs::remove_dir_all(&path));
-        fs::create_dir_all(&path).map_err(|e| at(&path, "cannot be created", &e))?;
-        Ok(Self(path))
-    }
-}
-
-impl Drop for Workshop {
-    fn drop(&mut self) {
-        if let Err(error) = fs::remove_dir_all(&self.0) {
-            tracing::debug!("{}: cannot be removed: {error}", self.0.display());
-        }
     }
 }
 
@@ -275,17 +255,6 @@ mod tests {
         assert!(unpack(&path, pin, &target).is_err());
         fs::write(&path, "not a zip").unwrap();
         assert!(unpack(&path, pin, &target).is_err());
-    }
-
-    #[test]
-    fn a_workshop_is_swept_when_it_is_left() {
-        let folder = tempfile::tempdir().unwrap();
-        let workshop = Workshop::beside(&folder.path().join("1.31.1")).unwrap();
-        let path = workshop.0.clone();
-        fs::write(path.join("wheel"), "").unwrap();
-        assert_eq!(path.parent(), Some(folder.path()));
-        drop(workshop);
-        assert!(!path.exists());
     }
 
     #[cfg(unix)]

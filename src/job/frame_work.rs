@@ -3,10 +3,10 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
+use super::bilinear::bilinear;
 use super::recipe::{Recipe, Scaling};
 use super::source::{Frames, Source, SourceFrame};
 use super::timings::{Step, Timings};
-use crate::ask::bilinear::bilinear;
 use crate::ask::{Format, ImageLimit, Payload};
 use crate::config::Darkened;
 use crate::dataset::Picture;

@@ -5,6 +5,7 @@
 //! open ones is in their [`Experiment`]; money, resuming, batches, shards and images are here, once.
 
 pub(crate) mod batch;
+pub mod bilinear;
 pub(crate) mod budget;
 mod circuit_breaker;
 pub(crate) mod conditions;

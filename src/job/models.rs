@@ -24,14 +24,14 @@ pub(crate) struct ModelUnderTest {
 }
 
 impl ModelUnderTest {
-    pub(crate) fn new(model: Model, view: View, server: Option<&Server>) -> Self {
+    pub(crate) fn new(model: Model, view: View, server: Option<&Server>) -> Result<Self> {
         let server = server.filter(|_| model.is_remote());
-        Self {
-            digest: model.digest().to_string().into(),
+        Ok(Self {
+            digest: model.digest()?.to_string().into(),
             address: server.map(|server| server.access.base.to_string()),
             model: Arc::new(model),
             view,
-        }
+        })
     }
 
     /// Where it is asked, for messages.
@@ -62,7 +62,7 @@ pub(crate) fn open_all(
             let problem = format_args!("{name} is named twice");
             return Err(Error::usage("--model", problem));
         }
-        models.push(ModelUnderTest::new(model, view, server));
+        models.push(ModelUnderTest::new(model, view, server)?);
     }
     Ok(models)
 }

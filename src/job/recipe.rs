@@ -4,8 +4,9 @@ use std::num::NonZeroU32;
 
 use serde::Serialize;
 
+use super::bilinear;
 use super::source::{Source, SourceFrame};
-use crate::ask::{Format, Payload, bilinear};
+use crate::ask::{Format, Payload};
 use crate::config::{CameraOf, Darkened, Images, Sensor, Walk};
 use crate::enhance::{self, ModelFile};
 use crate::error::Result;

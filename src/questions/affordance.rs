@@ -12,25 +12,25 @@ use crate::types::Family;
 pub(super) fn candidates(survey: &Survey<'_>) -> Vec<Verdict> {
     let activities = survey.book.activity.iter();
     activities
-        .flat_map(|activity| [(true, yes(survey, activity)), (false, no(survey, activity))])
-        .map(|(yes, verdict)| {
-            verdict.unwrap_or_else(|(reason, about)| {
-                falls(Family::Affordance, &about, Some(yes), reason)
-            })
+        .flat_map(|activity| {
+            let falls = |answer, reason| {
+                falls(Family::Affordance, &activity.activity, Some(answer), reason)
+            };
+            [
+                yes(survey, activity).unwrap_or_else(|reason| falls(true, reason)),
+                no(survey, activity).unwrap_or_else(|reason| falls(false, reason)),
+            ]
         })
         .collect()
 }
 
-type Found = Result<Verdict, (Reason, String)>;
-
 /// Yes: the room is one where it is done, and what it takes is well seen.
-fn yes(survey: &Survey<'_>, activity: &Activity) -> Found {
-    let fall = |reason| Err((reason, activity.activity.clone()));
+fn yes(survey: &Survey<'_>, activity: &Activity) -> Result<Verdict, Reason> {
     let Some(room) = survey.room else {
-        return fall(Reason::NoRoom);
+        return Err(Reason::NoRoom);
     };
     if !activity.rooms.contains(room) {
-        return fall(Reason::OtherRoom);
+        return Err(Reason::OtherRoom);
     }
     let evidence: Vec<&Segment> = survey.statistics.evidence(survey.book).collect();
     let of = |token: &String| {
@@ -45,22 +45,21 @@ fn yes(survey: &Survey<'_>, activity: &Activity) -> Found {
             .collect::<Option<Vec<&Segment>>>()
     });
     let Some(segments) = seen else {
-        return fall(Reason::Unseen);
+        return Err(Reason::Unseen);
     };
     Ok(claim(survey, activity, room, 0, &segments))
 }
 
 /// No: the room is known and no such room, and nothing that it takes, or that would do, has a pixel.
-fn no(survey: &Survey<'_>, activity: &Activity) -> Found {
-    let fall = |reason| Err((reason, activity.activity.clone()));
+fn no(survey: &Survey<'_>, activity: &Activity) -> Result<Verdict, Reason> {
     let Some(room) = survey.room else {
-        return fall(Reason::NoRoom);
+        return Err(Reason::NoRoom);
     };
     if activity.rooms.contains(room) {
-        return fall(Reason::OtherRoom);
+        return Err(Reason::OtherRoom);
     }
     if let Some(reason) = survey.open_world() {
-        return fall(reason);
+        return Err(reason);
     }
     let pinch = activity
         .pinch
@@ -68,24 +67,15 @@ fn no(survey: &Survey<'_>, activity: &Activity) -> Found {
         .filter(|_| survey.book.affordance.strict);
     let tokens: Vec<&String> = activity.enablers.iter().flatten().chain(pinch).collect();
     if !tokens.iter().all(|token| survey.expressible(token)) {
-        return fall(Reason::Inexpressible);
+        return Err(Reason::Inexpressible);
     }
     if tokens
         .iter()
         .any(|token| survey.statistics.shows(token, survey.book))
     {
-        return fall(Reason::Seen);
+        return Err(Reason::Seen);
     }
-    let signs = survey
-        .signs
-        .segments
-        .get(room)
-        .map_or(&[][..], Vec::as_slice);
-    let segments = survey.statistics.segments.iter();
-    let segments: Vec<&Segment> = segments
-        .filter(|segment| signs.contains(&segment.id))
-        .collect();
-    Ok(claim(survey, activity, room, 1, &segments))
+    Ok(claim(survey, activity, room, 1, &survey.signs_of(room)))
 }
 
 fn claim(

@@ -1,12 +1,10 @@
 //! Evening out the answers, so that a model that sees nothing gains nothing by habit: `balance`.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fmt;
-use std::str::FromStr;
 
 use super::rules::Balance;
 use super::survey::Asked;
-use crate::error::Error;
+use crate::types::words::words;
 use crate::types::{Digest, Family};
 
 /// How far the answers are evened out.
@@ -21,31 +19,7 @@ pub enum Balanced {
     Full,
 }
 
-impl FromStr for Balanced {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self, Error> {
-        match text {
-            "none" => Ok(Self::None),
-            "binary" => Ok(Self::Binary),
-            "full" => Ok(Self::Full),
-            _ => Err(Error::usage(
-                "balance",
-                format_args!("{text:?} is none of none, binary, full"),
-            )),
-        }
-    }
-}
-
-impl fmt::Display for Balanced {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::None => "none",
-            Self::Binary => "binary",
-            Self::Full => "full",
-        })
-    }
-}
+words!(Balanced by "balance" { None = "none", Binary = "binary", Full = "full" });
 
 /// What stays, and what does not.
 pub(super) struct Evened {

@@ -33,16 +33,6 @@ pub(super) fn candidates(survey: &Survey<'_>) -> Vec<Verdict> {
     let Some(truth) = rooms.iter().position(|other| other == room) else {
         return fall(Reason::NoRoom);
     };
-    let ids = survey
-        .signs
-        .segments
-        .get(room)
-        .map_or(&[][..], Vec::as_slice);
-    let segments: Vec<&Segment> = statistics
-        .segments
-        .iter()
-        .filter(|segment| ids.contains(&segment.id))
-        .collect();
     let more = json!({ "scores": survey.signs.scores });
     vec![survey.rests(
         Claim {
@@ -53,6 +43,6 @@ pub(super) fn candidates(survey: &Survey<'_>) -> Vec<Verdict> {
             truth,
             evidence: more,
         },
-        &segments,
+        &survey.signs_of(room),
     )]
 }

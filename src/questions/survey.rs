@@ -130,6 +130,15 @@ impl Survey<'_> {
         shown
     }
 
+    /// The segments that speak for a room.
+    pub(super) fn signs_of(&self, room: &str) -> Vec<&Segment> {
+        let signs = self.signs.segments.get(room);
+        let segments = self.statistics.segments.iter();
+        segments
+            .filter(|segment| signs.is_some_and(|signs| signs.contains(&segment.id)))
+            .collect()
+    }
+
     /// What keeps anything from being said to be absent.
     pub(super) fn open_world(&self) -> Option<Reason> {
         let rule = &self.book.closed_world;

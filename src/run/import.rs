@@ -40,7 +40,7 @@ pub fn import(config: &Import, progress: &Progress) -> Result<Outcome> {
         return Err(Error::data(list.display(), problem));
     }
     let adapter = open(config.kind, &config.source, &config.stated)?;
-    let frames = choose(adapter.frames(), config.every, config.stated.fps)?;
+    let frames = choose(&adapter.listing().frames, config.every, config.stated.fps)?;
     let threads = config.threads.map_or(0, std::num::NonZero::get);
     let cores = ThreadPoolBuilder::new().num_threads(threads).build();
     let cores = cores.map_err(|e| Error::usage("--threads", e))?;
@@ -66,18 +66,21 @@ pub fn import(config: &Import, progress: &Progress) -> Result<Outcome> {
     let note = depths(&made)?;
     let mut scenes: Vec<&str> = frames.iter().map(|frame| frame.scene.as_str()).collect();
     scenes.dedup();
+    let listing = adapter.listing();
     for scene in &scenes {
-        frame_folder::names(&config.out, scene, &adapter.names(scene))?;
+        if let Some(names) = listing.names.get(*scene) {
+            frame_folder::names(&config.out, scene, names)?;
+        }
     }
     let about = json!({
         "schema": "darkqa.dataset/1",
         "name": config.name,
-        "label_space": adapter.labels().space,
-        "depth_kind": adapter.depth_kind(),
-        "source": config.kind.name(),
+        "label_space": listing.labels.space,
+        "depth_kind": listing.depth_kind,
+        "source": config.kind.to_string(),
     });
     let lines = made.iter().map(|made| &made.line);
-    frame_folder::finish(&config.out, adapter.labels(), &about, lines)?;
+    frame_folder::finish(&config.out, &listing.labels, &about, lines)?;
     let mut output = format!(
         "{}: {} frames of {} scenes{}\n{note}",
         config.out.display(),
@@ -89,7 +92,7 @@ pub fn import(config: &Import, progress: &Progress) -> Result<Outcome> {
             format!(", {failed} failed")
         }
     );
-    output.push_str(&words(adapter.unlisted()));
+    output.push_str(&words(&listing.unlisted));
     Ok(Outcome {
         status: if failed == 0 {
             Status::Complete
@@ -150,13 +153,13 @@ fn one(config: &Import, adapter: &dyn Adapter, frame: &Incoming) -> Result<Made>
     line.insert("rgb".to_owned(), json!(image));
     let median = depth.as_ref().and_then(median);
     if let Some(depth) = &depth {
-        place.depth(&mut line, depth, adapter.depth_kind())?;
+        place.depth(&mut line, depth, adapter.listing().depth_kind)?;
     }
     if let Some(semantic) = &semantic {
         place.semantic(&mut line, semantic)?;
     }
     if let Some(segments) = &segments {
-        place.segments(&mut line, segments, adapter.segmentation())?;
+        place.segments(&mut line, segments, adapter.listing().segmentation)?;
     }
     for (key, value) in [
         ("t", json!(frame.time)),

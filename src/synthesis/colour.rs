@@ -54,12 +54,6 @@ pub fn rgb_to_camera(weights: [f64; 4]) -> Matrix {
     })
 }
 
-/// A matrix times a colour.
-#[must_use]
-pub fn apply(matrix: &Matrix, colour: [f64; 3]) -> [f64; 3] {
-    matrix.map(|row| row[0] * colour[0] + row[1] * colour[1] + row[2] * colour[2])
-}
-
 /// The inverse, by cofactors. The matrices of [`rgb_to_camera`] are far from singular.
 #[must_use]
 pub fn inverse(matrix: &Matrix) -> Matrix {

@@ -20,7 +20,6 @@ const BAND: usize = 32;
 /// So the levels differ in light alone; each has the distribution that draws of its own would give it.
 #[derive(Debug)]
 pub struct Negative {
-    state: CameraState,
     developer: Developer,
     balanced: Bayer,
     /// The one level that it serves; `None` for all.
@@ -60,7 +59,6 @@ impl Negative {
         let lines = balanced.lines_mut().enumerate();
         lines.for_each(|(row, mut line)| shot.take(clean, row, &mut line));
         Self {
-            state: shot.state,
             developer: shot.developer,
             balanced,
             only: None,
@@ -72,12 +70,6 @@ impl Negative {
     #[must_use]
     pub fn serves(&self, severity: Severity) -> bool {
         self.only.is_none_or(|only| only == severity)
-    }
-
-    /// The camera that took it.
-    #[must_use]
-    pub fn state(&self) -> &CameraState {
-        &self.state
     }
 
     /// The sRGB image at a level.
@@ -131,7 +123,6 @@ pub fn ladder(
 
 /// One press of the shutter: a camera's state with its noise, ready for any row.
 struct Shot {
-    state: CameraState,
     unprocess: Unprocess,
     noise: Noise,
     developer: Developer,
@@ -160,7 +151,6 @@ impl Shot {
             unprocess: Unprocess::new(&state, isa),
             noise: Noise::new(&state, key, amplify, terms, isa),
             developer: Developer::new(&state, tone, isa),
-            state,
         }
     }
 

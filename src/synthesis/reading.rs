@@ -1,13 +1,12 @@
 //! How the paper's noise is understood: [`Synthesis`], its named contents [`LightReading`], and those of a run, [`Readings`].
 
 use std::collections::BTreeMap;
-use std::fmt;
-use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
 use super::camera::CameraModel;
 use crate::error::{Error, Result};
+use crate::types::words::words;
 use crate::types::{Degradation, ReadingName};
 
 /// How the sensor branch is made. The default is the paper to the letter.
@@ -202,36 +201,16 @@ pub enum Coupling {
     Photon,
 }
 
-/// Reads and writes an option's values by their names.
-macro_rules! named {
-    ($option:ident: $($name:literal = $value:ident),+) => {
-        impl fmt::Display for $option {
-            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str(match self { $(Self::$value => $name),+ })
-            }
-        }
-
-        impl FromStr for $option {
-            type Err = Error;
-
-            fn from_str(text: &str) -> Result<Self> {
-                match text {
-                    $($name => Ok(Self::$value),)+
-                    _ => Err(Error::usage(
-                        stringify!($option).to_lowercase(),
-                        format_args!(concat!("{:?} is none of" $(, " ", $name)+), text),
-                    )),
-                }
-            }
-        }
-    };
-}
-
-named!(LightReading: "paper" = Paper, "eld" = Eld, "level" = Level, "physical" = Physical);
-named!(Amplify: "shot-only" = ShotOnly, "all" = All);
-named!(Tone: "none" = None, "before-ev" = BeforeEv, "after-ev" = AfterEv);
-named!(Draws: "shared" = Shared, "fresh" = Fresh);
-named!(Coupling: "independent" = Independent, "photon" = Photon);
+words!(LightReading by "lightreading" {
+    Paper = "paper",
+    Eld = "eld",
+    Level = "level",
+    Physical = "physical",
+});
+words!(Amplify by "amplify" { ShotOnly = "shot-only", All = "all" });
+words!(Tone by "tone" { None = "none", BeforeEv = "before-ev", AfterEv = "after-ev" });
+words!(Draws by "draws" { Shared = "shared", Fresh = "fresh" });
+words!(Coupling by "coupling" { Independent = "independent", Photon = "photon" });
 
 #[cfg(test)]
 mod tests {
@@ -245,7 +224,7 @@ mod tests {
             assert_eq!(serde_json::to_value(tone).unwrap(), name);
         }
         let wrong = "photons".parse::<Coupling>().unwrap_err().to_string();
-        assert!(wrong.contains("independent photon"), "{wrong}");
+        assert!(wrong.contains("independent, photon"), "{wrong}");
     }
 
     #[test]

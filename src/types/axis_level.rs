@@ -2,9 +2,8 @@
 
 use std::fmt;
 
-use serde::{Serialize, Serializer};
-
 use super::degradation::{Axis, Degradation, Kind, ReadingName, Severity};
+use super::words::written_as_text;
 
 /// A place on the axis of a curve: L0, the untouched frame, or a severity; the same for all kinds of one axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -54,12 +53,6 @@ impl fmt::Display for AxisLevel {
             None => f.pad("L0"),
             Some((severity, kind)) => f.pad(&kind.label(severity)),
         }
-    }
-}
-
-impl Serialize for AxisLevel {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
     }
 }
 
@@ -119,8 +112,4 @@ impl fmt::Display for KindReading {
     }
 }
 
-impl Serialize for KindReading {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
-    }
-}
+written_as_text!(AxisLevel, KindReading);

@@ -2,11 +2,12 @@
 
 use std::borrow::Cow;
 use std::fmt;
-use std::num::NonZeroU16;
 use std::str::FromStr;
 
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde::{Deserialize, Deserializer, Serialize};
 
+pub use super::severity::{Axis, Severity};
+use super::words::written_as_text;
 use crate::error::Error;
 
 /// What is in the way of a frame: a kind of degradation at one severity, in one light reading if the kind has readings.
@@ -246,98 +247,7 @@ impl fmt::Display for Kind {
     }
 }
 
-impl Serialize for Kind {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(self.word())
-    }
-}
-
-/// The quantity on the axis of a curve.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Axis {
-    /// What is measured.
-    pub title: &'static str,
-    /// Its unit.
-    pub unit: &'static str,
-}
-
-impl Axis {
-    /// Light that is missing, in exposure values: one EV is a factor of two.
-    pub const LIGHT: Self = Self {
-        title: "exposure drop",
-        unit: "EV",
-    };
-}
-
-/// How strong a degradation is: hundredths of its kind's unit, so that equality and order are exact.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Severity(NonZeroU16);
-
-impl Severity {
-    /// L1: 2 EV.
-    pub const L1: Self = Self::hundredths(200);
-    /// L2: 4 EV.
-    pub const L2: Self = Self::hundredths(400);
-    /// L3: 6 EV.
-    pub const L3: Self = Self::hundredths(600);
-    /// L4: 7.5 EV.
-    pub const L4: Self = Self::hundredths(750);
-    /// L5: 9 EV.
-    pub const L5: Self = Self::hundredths(900);
-    /// The exposure drops of the paper (DarkQA, section III), smallest first.
-    pub const LADDER: [Self; 5] = [Self::L1, Self::L2, Self::L3, Self::L4, Self::L5];
-
-    /// So many hundredths; 0 is taken as 1, for no severity is none.
-    #[must_use]
-    pub const fn hundredths(count: u16) -> Self {
-        match NonZeroU16::new(count) {
-            Some(count) => Self(count),
-            None => Self(NonZeroU16::MIN),
-        }
-    }
-
-    /// The severity in the kind's unit.
-    #[must_use]
-    pub fn value(self) -> f64 {
-        f64::from(self.0.get()) / 100.0
-    }
-}
-
-impl fmt::Display for Severity {
-    /// The shortest decimal.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.value())
-    }
-}
-
-impl Serialize for Severity {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_f64(self.value())
-    }
-}
-
-impl FromStr for Severity {
-    type Err = Error;
-
-    /// Reads a decimal number above 0 with two decimals at most.
-    fn from_str(text: &str) -> Result<Self, Error> {
-        let (whole, part) = text.split_once('.').unwrap_or((text, "0"));
-        let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
-        if !digits(whole) || !digits(part) {
-            let problem = format_args!("{text:?} is no decimal number, as 3.3");
-            return Err(Error::usage("level", problem));
-        }
-        if part.len() > 2 {
-            let problem = format_args!("{text:?} has more than two decimals");
-            return Err(Error::usage("level", problem));
-        }
-        let count = format!("{whole}{part:0<2}").parse::<u16>().ok();
-        count
-            .and_then(NonZeroU16::new)
-            .map(Self)
-            .ok_or_else(|| Error::usage("level", format_args!("{text:?} is 0 or too large")))
-    }
-}
+written_as_text!(Kind);
 
 /// The name of a light reading: letters, digits, `_`, `.` and `-`.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize)]

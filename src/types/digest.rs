@@ -3,9 +3,10 @@
 use std::fmt;
 use std::str::FromStr;
 
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde::Serialize;
 
 use super::canonical::canonical;
+use super::words::as_text;
 use crate::error::Error;
 
 /// A BLAKE3 digest, written as 64 hexadecimal digits.
@@ -43,18 +44,6 @@ impl Digest {
         Self(*hasher.finalize().as_bytes())
     }
 
-    /// The digest of a set of digests, whatever their order: each bit says whether an odd number of them have it. Sets without a
-    /// member in common have one together that follows from their own.
-    pub fn of_set(digests: impl IntoIterator<Item = Self>) -> Self {
-        let mut together = [0; 32];
-        for digest in digests {
-            for (byte, own) in together.iter_mut().zip(digest.0) {
-                *byte ^= own;
-            }
-        }
-        Self(together)
-    }
-
     /// The 32 bytes.
     #[must_use]
     pub fn as_bytes(&self) -> &[u8; 32] {
@@ -84,19 +73,7 @@ impl FromStr for Digest {
     }
 }
 
-impl Serialize for Digest {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
-    }
-}
-
-impl<'de> Deserialize<'de> for Digest {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        String::deserialize(deserializer)?
-            .parse()
-            .map_err(serde::de::Error::custom)
-    }
-}
+as_text!(Digest);
 
 #[cfg(test)]
 mod tests {

@@ -14,23 +14,27 @@ pub mod question;
 pub mod record;
 pub mod reply;
 pub mod run_question;
+pub mod severity;
 pub mod trial_key;
+pub(crate) mod words;
 
 pub use axis_level::{AxisLevel, KindReading};
 pub use condition::{Condition, EnhancerName};
-pub use degradation::{Degradation, ReadingName, Severity};
-pub use detail::{
-    AnswerReading, ChoiceDetail, Detail, ImageFacts, OpenDetail, Outcome, Step, WalkFacts,
-};
+pub use degradation::{Degradation, ReadingName};
+pub use detail::{AnswerReading, ChoiceDetail, ImageFacts, OpenDetail, Outcome, Step, WalkFacts};
 pub use digest::Digest;
 pub use frame::{DepthKind, Frame, FrameId, Intrinsics, Rgb, Segmentation};
 pub use kind_set::KindSet;
 pub use labels::{Label, Labels, SegmentName};
 pub use question::{Answer, Choices, Family, Question, QuestionId, Why};
-pub use record::{Failure, FailureKind, Record, Via, View};
+pub use record::{Detail, Failure, FailureKind, Via, View};
 pub use reply::{Finish, Reply, Usage};
 pub use run_question::{RunQuestion, Thumbnail};
+pub use severity::{Axis, Severity};
 pub use trial_key::TrialKey;
+
+/// The record of a trial, of a question with choices if nothing else is said.
+pub type Record<D = ChoiceDetail> = record::Record<D>;
 
 #[cfg(test)]
 mod tests {

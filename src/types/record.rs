@@ -2,10 +2,10 @@
 
 use std::fmt;
 
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use super::condition::Condition;
-use super::detail::{ChoiceDetail, Detail};
 use super::question::QuestionId;
 use super::reply::{Finish, Reply, Usage};
 use super::trial_key::TrialKey;
@@ -13,7 +13,7 @@ use crate::error::Result;
 
 /// One line of `records.jsonl`: what every trial has, and what its experiment adds.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Record<D = ChoiceDetail> {
+pub struct Record<D> {
     /// What decides the reply, as a digest.
     pub key: TrialKey,
     /// The question.
@@ -47,6 +47,27 @@ pub struct Record<D = ChoiceDetail> {
     /// What the experiment adds.
     #[serde(flatten)]
     pub detail: D,
+}
+
+/// What an experiment adds to a record.
+pub trait Detail: Clone + Serialize + Send {
+    /// A whole line of records, from which it is read in one pass.
+    type Line: DeserializeOwned + Into<Record<Self>>;
+
+    /// The schema of a run with these records.
+    const SCHEMA: &'static str;
+
+    /// Enters what is read from a reply; also when a kept reply is read again.
+    ///
+    /// # Errors
+    /// If the detail does not say what the reply is an answer to.
+    fn read(&mut self, reply: &Reply) -> Result<()>;
+
+    /// The choices in the order shown; none if the answer is open.
+    fn choices(&self) -> &[String];
+
+    /// How many times the same was asked before.
+    fn repeat(&self) -> u32;
 }
 
 impl<'de, D: Detail> Deserialize<'de> for Record<D> {
@@ -205,10 +226,7 @@ pub enum View {
 
 impl fmt::Display for View {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Image => "image",
-            Self::Blind => "blind",
-        })
+        self.serialize(f)
     }
 }
 

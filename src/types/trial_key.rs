@@ -3,9 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
 use super::digest::Digest;
+use super::words::as_text;
 use crate::error::Error;
 
 /// The digest of everything that decides a reply: question and choices as shown, the recipe of the image, prompt, model
@@ -40,19 +39,7 @@ impl FromStr for TrialKey {
     }
 }
 
-impl Serialize for TrialKey {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
-    }
-}
-
-impl<'de> Deserialize<'de> for TrialKey {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        String::deserialize(deserializer)?
-            .parse()
-            .map_err(serde::de::Error::custom)
-    }
-}
+as_text!(TrialKey);
 
 #[cfg(test)]
 mod tests {

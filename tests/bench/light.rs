@@ -6,8 +6,8 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use darkqa_eval::ask::bilinear::bilinear;
 use darkqa_eval::ask::{Format, Payload};
+use darkqa_eval::job::bilinear::bilinear;
 use darkqa_eval::synthesis::exposure::expose_into;
 use darkqa_eval::synthesis::noise::{self, Term};
 use darkqa_eval::synthesis::unprocess::unprocess;

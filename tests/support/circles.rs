@@ -11,7 +11,8 @@ use std::path::Path;
 use super::{Scope, Token, code_only, rust_files, scopes, tokens};
 
 /// Circles of files that may be, and why. A part of one may be, too. All but the first are to be cut, by what is said beside.
-const CIRCLES: [(&[&str], &str); 7] = [
+<<<<<<< HEAD
+const CIRCLES: [(&[&str], &str); 4] = [
     (
         &[
             "score/choice/lenient.rs",
@@ -45,25 +46,6 @@ const CIRCLES: [(&[&str], &str); 7] = [
             "dataset/table.rs",
         ],
         "Dataset, Source and stem leave dataset/mod.rs; what opens a place stays there",
-    ),
-    (
-        &["report/figures/mod.rs", "report/figures/thresholds.rs"],
-        "Figure moves to a file of its own",
-    ),
-    (
-        &[
-            "report/openeqa/figure.rs",
-            "report/openeqa/files.rs",
-            "report/openeqa/latex.rs",
-            "report/openeqa/mod.rs",
-            "report/openeqa/page.rs",
-            "report/openeqa/upstream.rs",
-        ],
-        "OpenReport and Told move to a file of their own",
-    ),
-    (
-        &["report/page/items.rs", "report/page/mod.rs"],
-        "Shown moves to a file of its own",
     ),
 ];
 

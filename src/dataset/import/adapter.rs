@@ -59,36 +59,61 @@ pub struct Read {
     pub room: Option<String>,
 }
 
+/// What is known of a data set without reading its maps.
+#[derive(Debug, Default)]
+pub struct Listing {
+    /// Its frames, by scene and name.
+    pub frames: Vec<Incoming>,
+    /// What its numbers stand for.
+    pub labels: Labels,
+    /// What is known of each scene's segments by name.
+    pub names: BTreeMap<String, BTreeMap<u32, SegmentName>>,
+    /// What depth is measured along.
+    pub depth_kind: DepthKind,
+    /// What the segments are.
+    pub segmentation: Segmentation,
+    /// Words that no table has, with how many things have them.
+    pub unlisted: BTreeMap<String, usize>,
+    /// The horizontal field of view in degrees, of frames whose camera is not known.
+    pub hfov: Option<f64>,
+    /// The camera of images of its own size, where nobody says another.
+    pub(super) sensor: Option<Sensor>,
+}
+
+/// A camera, and the width and height of its images.
+#[derive(Debug)]
+pub(super) struct Sensor {
+    pub(super) size: (usize, usize),
+    pub(super) camera: Intrinsics,
+}
+
+impl Listing {
+    /// A data set whose labels are those of mpcat40, as adapters by name write them.
+    pub(super) fn by_name(stated: &Stated) -> Self {
+        Self {
+            labels: spaces::space("mpcat40").unwrap_or_default(),
+            hfov: stated.hfov,
+            ..Self::default()
+        }
+    }
+}
+
 /// A kind of data set, opened.
 pub trait Adapter: fmt::Debug + Sync {
-    /// Its frames, by scene and name.
-    fn frames(&self) -> &[Incoming];
-
-    /// What its numbers stand for.
-    fn labels(&self) -> &Labels;
-
-    /// What is known of a scene's segments by name.
-    fn names(&self, scene: &str) -> BTreeMap<u32, SegmentName>;
-
-    /// What depth is measured along.
-    fn depth_kind(&self) -> DepthKind;
+    /// What is known of it without reading its maps.
+    fn listing(&self) -> &Listing;
 
     /// How the camera of a frame projects, in pixels of its image.
     fn camera(&self, frame: &Incoming, rgb: &Rgb) -> Option<Intrinsics> {
-        let _ = rgb;
-        frame.intrinsics
+        let (width, height) = (rgb.width(), rgb.height());
+        let Listing { hfov, sensor, .. } = self.listing();
+        let stated = hfov.map(|hfov| pinhole(width, height, hfov));
+        let own = sensor
+            .as_ref()
+            .filter(|sensor| sensor.size == (width, height));
+        let own = own.map(|sensor| sensor.camera);
+        frame.intrinsics.or(stated).or(own)
     }
-
-    /// What the segments are.
-    fn segmentation(&self) -> Segmentation {
-        Segmentation::Instances
-    }
-
-    /// Whether it has segments at all, or they are connected pieces of one label.
-    fn has_segments(&self) -> bool;
-
-    /// Words that no table has, with how many things have them.
-    fn unlisted(&self) -> &BTreeMap<String, usize>;
 
     /// Reads the maps of a frame; `rgb` is its image.
     ///
@@ -114,11 +139,6 @@ pub(super) fn labels(stated: &Stated) -> Result<Option<Labels>> {
     Err(Error::usage("--labels", problem))
 }
 
-/// mpcat40, which adapters by name write.
-pub(super) fn mpcat40() -> Labels {
-    spaces::space("mpcat40").unwrap_or_default()
-}
-
 /// The numbers of mpcat40 by class.
 pub(super) fn numbers(labels: &Labels) -> BTreeMap<String, u16> {
     labels
@@ -130,7 +150,7 @@ pub(super) fn numbers(labels: &Labels) -> BTreeMap<String, u16> {
 
 /// The camera of an image of such a size with such a horizontal field of view and square pixels, whose axis goes through the
 /// middle.
-pub(super) fn pinhole(width: usize, height: usize, hfov: f64) -> Intrinsics {
+fn pinhole(width: usize, height: usize, hfov: f64) -> Intrinsics {
     let focal = width as f64 / 2.0 / libm::tan(hfov.to_radians() / 2.0);
     Intrinsics {
         fx: focal,

@@ -1,7 +1,6 @@
 //! Files of a folder by name, and what is read of them.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use ndarray::Array2;
@@ -10,6 +9,7 @@ use crate::dataset::maps::DepthFile;
 use crate::dataset::npy::Npy;
 use crate::dataset::picture::{MOST_PIXELS, Picture};
 use crate::dataset::raw_png::{Form, RawPng};
+use crate::dataset::reading::{bytes, entries, text};
 use crate::error::{Error, Result};
 use crate::types::Rgb;
 
@@ -44,24 +44,9 @@ pub(super) fn first(folder: &Path, names: &[&str]) -> Option<PathBuf> {
         .find(|path| path.is_dir())
 }
 
-fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
-    let unread = |e| Error::file(folder, "read", e);
-    let entries = fs::read_dir(folder).map_err(unread)?;
-    let mut paths = entries
-        .map(|entry| entry.map(|entry| entry.path()).map_err(unread))
-        .collect::<Result<Vec<PathBuf>>>()?;
-    paths.sort();
-    Ok(paths)
-}
-
-/// The text of a file.
-pub(super) fn text(path: &Path) -> Result<String> {
-    fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))
-}
-
 /// An image, decoded.
 pub(super) fn picture(path: &Path) -> Result<Rgb> {
-    let bytes = fs::read(path).map_err(|e| Error::file(path, "read", e))?;
+    let bytes = bytes(path)?;
     let place = path.display().to_string();
     Picture::Encoded {
         bytes,
@@ -79,7 +64,7 @@ pub(super) fn last(path: &Path) -> String {
 
 /// The numbers of a PNG file of one of these forms.
 pub(super) fn png(path: &Path, forms: &[Form]) -> Result<Array2<u16>> {
-    let bytes = fs::read(path).map_err(|e| Error::file(path, "read", e))?;
+    let bytes = bytes(path)?;
     let read = || {
         let png = RawPng::open(&bytes, forms)?;
         let size = png.size;
@@ -94,7 +79,7 @@ pub(super) fn segments(path: &Path) -> Result<Array2<u32>> {
     if ending.is_some_and(|ending| ending.eq_ignore_ascii_case("png")) {
         return Ok(png(path, &[Form::Grey16])?.mapv(u32::from));
     }
-    let bytes = fs::read(path).map_err(|e| Error::file(path, "read", e))?;
+    let bytes = bytes(path)?;
     let read = || {
         let npy = Npy::parse(&bytes)?;
         let id = |id: i128| {
@@ -115,8 +100,23 @@ pub(super) fn depth(path: &Path, scale: Option<f64>) -> Result<Array2<u32>> {
     let wrong = |problem: String| Error::data(path.display(), problem);
     let file = DepthFile::new(path.to_owned(), scale)
         .map_err(|problem| wrong(problem + " (--depth-scale METRES says it)"))?;
-    let bytes = fs::read(path).map_err(|e| Error::file(path, "read", e))?;
+    let bytes = bytes(path)?;
     file.decode_alone(&bytes).map_err(wrong)
+}
+
+/// Depth in millimetres, of an image's size; the scale is that of files that are not in metres.
+pub(super) fn depth_of(
+    path: Option<&Path>,
+    scale: Option<f64>,
+    rgb: &Rgb,
+) -> Result<Option<Array2<u32>>> {
+    let Some(path) = path else {
+        return Ok(None);
+    };
+    let scale = scale.filter(|_| path.extension().is_some_and(|end| end != "npy"));
+    let depth = depth(path, scale)?;
+    same_size(path, &depth, rgb)?;
+    Ok(Some(depth))
 }
 
 /// Refuses a map of another size than its image.

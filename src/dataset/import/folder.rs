@@ -5,11 +5,11 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::adapter::{Adapter, Incoming, Read, Stated, labels, pinhole};
-use super::files::{depth, files, first, folders, png, same_size, segments};
+use super::adapter::{Adapter, Incoming, Listing, Read, Stated, labels};
+use super::files::{depth_of, files, first, folders, png, same_size, segments};
 use crate::dataset::raw_png::Form;
 use crate::error::{Error, Result};
-use crate::types::{DepthKind, Intrinsics, Labels, Rgb, SegmentName};
+use crate::types::{Labels, Rgb};
 
 /// What the folders are called: images, depth, classes, segments.
 const RGB: [&str; 6] = ["rgb", "image", "images", "color", "img", "RGB"];
@@ -36,15 +36,11 @@ const SEGMENTS: [&str; 6] = [
 /// The frames of a folder.
 #[derive(Debug)]
 pub(super) struct Folder {
-    frames: Vec<Incoming>,
+    pub(super) listing: Listing,
     maps: Vec<Maps>,
-    labels: Labels,
     depth_scale: Option<f64>,
-    depth_kind: DepthKind,
-    hfov: Option<f64>,
     /// How the numbers of the class maps are told from those of the label space.
     offset: Offset,
-    unlisted: BTreeMap<String, usize>,
 }
 
 /// How the numbers of class maps lie.
@@ -84,14 +80,15 @@ impl Folder {
         offset: Offset,
     ) -> Result<Self> {
         let mut set = Self {
-            frames: Vec::new(),
+            listing: Listing {
+                labels,
+                depth_kind: stated.depth_kind.unwrap_or_default(),
+                hfov: stated.hfov,
+                ..Listing::default()
+            },
             maps: Vec::new(),
-            labels,
             depth_scale: stated.depth_scale,
-            depth_kind: stated.depth_kind.unwrap_or_default(),
-            hfov: stated.hfov,
             offset,
-            unlisted: BTreeMap::new(),
         };
         if first(folder, &RGB).is_some() {
             set.add(folder)?;
@@ -126,7 +123,7 @@ impl Folder {
                 classes: classes.remove(&frame),
                 segments: segments.remove(&frame),
             });
-            self.frames.push(Incoming {
+            self.listing.frames.push(Incoming {
                 scene: scene.clone(),
                 frame,
                 time: None,
@@ -152,46 +149,16 @@ impl Folder {
 }
 
 impl Adapter for Folder {
-    fn frames(&self) -> &[Incoming] {
-        &self.frames
-    }
-
-    fn labels(&self) -> &Labels {
-        &self.labels
-    }
-
-    fn names(&self, _scene: &str) -> BTreeMap<u32, SegmentName> {
-        BTreeMap::new()
-    }
-
-    fn depth_kind(&self) -> DepthKind {
-        self.depth_kind
-    }
-
-    fn camera(&self, _frame: &Incoming, rgb: &Rgb) -> Option<Intrinsics> {
-        self.hfov
-            .map(|hfov| pinhole(rgb.width(), rgb.height(), hfov))
-    }
-
-    fn has_segments(&self) -> bool {
-        self.maps.iter().any(|maps| maps.segments.is_some())
-    }
-
-    fn unlisted(&self) -> &BTreeMap<String, usize> {
-        &self.unlisted
+    fn listing(&self) -> &Listing {
+        &self.listing
     }
 
     fn read(&self, frame: &Incoming, rgb: &Rgb) -> Result<Read> {
         let maps = &self.maps[frame.index];
-        let mut read = Read::default();
-        if let Some(path) = &maps.depth {
-            let scale = self
-                .depth_scale
-                .filter(|_| path.extension().is_some_and(|end| end != "npy"));
-            let depth = depth(path, scale)?;
-            same_size(path, &depth, rgb)?;
-            read.depth = Some(depth);
-        }
+        let mut read = Read {
+            depth: depth_of(maps.depth.as_deref(), self.depth_scale, rgb)?,
+            ..Read::default()
+        };
         if let Some(path) = &maps.classes {
             let mut classes = png(path, &[Form::Grey8, Form::Grey16, Form::Palette])?;
             same_size(path, &classes, rgb)?;

@@ -9,11 +9,12 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::adapter::{Adapter, Incoming, Read, Stated, mpcat40, numbers, pinhole};
-use super::files::{depth, files, folders, last, same_size, segments, text};
+use super::adapter::{Adapter, Incoming, Listing, Read, Stated, numbers};
+use super::files::{depth_of, files, folders, last, same_size, segments};
 use super::{hm3d, mp3d, replica};
+use crate::dataset::reading::{json_lines, text};
 use crate::error::{Error, Result};
-use crate::types::{DepthKind, Intrinsics, Labels, Rgb, SegmentName};
+use crate::types::{Intrinsics, Rgb, SegmentName};
 
 /// The part of the named pixels that a region must have for its room to be the frame's, in hundredths.
 const MOST_OF_FRAME: u64 = 60;
@@ -21,26 +22,24 @@ const MOST_OF_FRAME: u64 = 60;
 /// The renders of a folder.
 #[derive(Debug)]
 pub(super) struct Habitat {
-    frames: Vec<Incoming>,
+    listing: Listing,
     /// Depth and semantic map of each.
     maps: Vec<(Option<PathBuf>, PathBuf)>,
     scenes: BTreeMap<String, Scene>,
-    labels: Labels,
     numbers: BTreeMap<String, u16>,
-    unlisted: BTreeMap<String, usize>,
     depth_scale: Option<f64>,
-    depth_kind: DepthKind,
-    hfov: Option<f64>,
 }
 
 /// What a scene's own files say.
 #[derive(Debug, Default)]
 struct Scene {
-    names: BTreeMap<u32, SegmentName>,
     rooms: BTreeMap<i64, &'static str>,
     /// What is added to the numbers of instances: 1 where one of them is 0, which stands for none elsewhere.
     shift: u32,
 }
+
+/// The instances of a scene by number.
+type Names = BTreeMap<u32, SegmentName>;
 
 /// A line of `trajectory.jsonl`.
 #[derive(Deserialize)]
@@ -53,17 +52,16 @@ struct Step {
 
 impl Habitat {
     pub(super) fn open(folder: &Path, stated: &Stated) -> Result<Self> {
-        let labels = mpcat40();
+        let listing = Listing {
+            depth_kind: stated.depth_kind.unwrap_or_default(),
+            ..Listing::by_name(stated)
+        };
         let mut set = Self {
-            frames: Vec::new(),
+            numbers: numbers(&listing.labels),
+            listing,
             maps: Vec::new(),
             scenes: BTreeMap::new(),
-            numbers: numbers(&labels),
-            labels,
-            unlisted: BTreeMap::new(),
             depth_scale: stated.depth_scale,
-            depth_kind: stated.depth_kind.unwrap_or_default(),
-            hfov: stated.hfov,
         };
         for scene in folders(folder)? {
             if scene.join("rgb").is_dir() {
@@ -75,7 +73,7 @@ impl Habitat {
 
     fn add(&mut self, folder: &Path) -> Result<()> {
         let name = last(folder);
-        let scene = self.scene(folder)?;
+        let (scene, names) = self.scene(folder)?;
         let images = files(&folder.join("rgb"), &[".png", ".jpg", ".jpeg"])?;
         let depths = files(&folder.join("depth"), &[".npy", ".png"])?;
         let semantics = files(&folder.join("semantic"), &[".npy", ".png"])?;
@@ -86,7 +84,7 @@ impl Habitat {
                 return Err(Error::data(folder.join("semantic").display(), problem));
             };
             let step = steps.remove(&frame);
-            self.frames.push(Incoming {
+            self.listing.frames.push(Incoming {
                 scene: name.clone(),
                 time: step.as_ref().and_then(|step| step.t),
                 intrinsics: step.as_ref().and_then(|step| step.intrinsics),
@@ -99,12 +97,13 @@ impl Habitat {
             self.maps
                 .push((depths.get(&frame).cloned(), semantic.clone()));
         }
+        self.listing.names.insert(name.clone(), names);
         self.scenes.insert(name, scene);
         Ok(())
     }
 
     /// Reads the one file that names a scene's instances.
-    fn scene(&mut self, folder: &Path) -> Result<Scene> {
+    fn scene(&mut self, folder: &Path) -> Result<(Scene, Names)> {
         let annotations = files(folder, &[".semantic.txt", ".house", "info_semantic.json"])?;
         let Some(path) = annotations.into_values().next() else {
             let problem = "none of *.semantic.txt (HM3D-Sem), *.house (Matterport3D), info_semantic.json (Replica) in this folder: nothing names the instances of its maps";
@@ -114,33 +113,22 @@ impl Habitat {
         let at_line = |(line, problem): (usize, String)| Error::line(&path, line, problem);
         let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
         let (names, rooms) = if ending == "house" {
-            let house = mp3d::parse(&content, &self.labels.expressible).map_err(at_line)?;
+            let house = mp3d::parse(&content, &self.listing.labels.expressible).map_err(at_line)?;
             (house.names, house.rooms)
         } else if ending == "json" {
-            let names = replica::parse(&content, &mut self.unlisted);
-            (
-                names.map_err(|problem| Error::data(path.display(), problem))?,
-                BTreeMap::new(),
-            )
+            let names = replica::parse(&content, &mut self.listing.unlisted);
+            let names = names.map_err(|problem| Error::data(path.display(), problem))?;
+            (names, BTreeMap::new())
         } else {
-            (
-                hm3d::parse(&content, &mut self.unlisted).map_err(at_line)?,
-                BTreeMap::new(),
-            )
+            let names = hm3d::parse(&content, &mut self.listing.unlisted);
+            (names.map_err(at_line)?, BTreeMap::new())
         };
         if names.is_empty() {
             return Err(Error::data(path.display(), "it names no instance"));
         }
         let shift = u32::from(names.contains_key(&0));
-        let names = names
-            .into_iter()
-            .map(|(id, name)| (id + shift, name))
-            .collect();
-        Ok(Scene {
-            names,
-            rooms,
-            shift,
-        })
+        let names = names.into_iter().map(|(id, name)| (id + shift, name));
+        Ok((Scene { rooms, shift }, names.collect()))
     }
 }
 
@@ -149,67 +137,20 @@ fn steps(path: &Path) -> Result<BTreeMap<String, Step>> {
     if !path.exists() {
         return Ok(BTreeMap::new());
     }
-    let content = text(path)?;
-    let lines = content
-        .lines()
-        .enumerate()
-        .filter(|(_, line)| !line.trim().is_empty());
-    let steps = lines.map(|(i, line)| {
-        let step: Step =
-            serde_json::from_str(line).map_err(|e| Error::json_line(path, i + 1, &e))?;
-        Ok((step.frame.clone(), step))
-    });
-    steps.collect()
+    let steps = json_lines::<Step>(path)?.into_iter();
+    Ok(steps.map(|(_, step)| (step.frame.clone(), step)).collect())
 }
 
 impl Adapter for Habitat {
-    fn frames(&self) -> &[Incoming] {
-        &self.frames
-    }
-
-    fn labels(&self) -> &Labels {
-        &self.labels
-    }
-
-    fn names(&self, scene: &str) -> BTreeMap<u32, SegmentName> {
-        self.scenes
-            .get(scene)
-            .map_or_else(BTreeMap::new, |scene| scene.names.clone())
-    }
-
-    fn depth_kind(&self) -> DepthKind {
-        self.depth_kind
-    }
-
-    fn camera(&self, frame: &Incoming, rgb: &Rgb) -> Option<Intrinsics> {
-        let stated = self
-            .hfov
-            .map(|hfov| pinhole(rgb.width(), rgb.height(), hfov));
-        frame.intrinsics.or(stated)
-    }
-
-    fn has_segments(&self) -> bool {
-        true
-    }
-
-    fn unlisted(&self) -> &BTreeMap<String, usize> {
-        &self.unlisted
+    fn listing(&self) -> &Listing {
+        &self.listing
     }
 
     fn read(&self, frame: &Incoming, rgb: &Rgb) -> Result<Read> {
         let (deep, semantic) = &self.maps[frame.index];
         let scene = &self.scenes[&frame.scene];
-        let depth = match deep {
-            Some(path) => {
-                let scale = self
-                    .depth_scale
-                    .filter(|_| path.extension().is_some_and(|end| end != "npy"));
-                let depth = depth(path, scale)?;
-                same_size(path, &depth, rgb)?;
-                Some(depth)
-            }
-            None => None,
-        };
+        let names = &self.listing.names[&frame.scene];
+        let depth = depth_of(deep.as_deref(), self.depth_scale, rgb)?;
         let ids = segments(semantic)?;
         same_size(semantic, &ids, rgb)?;
         let (mut regions, mut named) = (BTreeMap::new(), 0_u64);
@@ -217,9 +158,7 @@ impl Adapter for Habitat {
         let mut segments = ids;
         let classes = segments.mapv(|id| {
             if last != Some(id) {
-                let name = id
-                    .checked_add(scene.shift)
-                    .and_then(|id| scene.names.get(&id));
+                let name = id.checked_add(scene.shift).and_then(|id| names.get(&id));
                 let class = name.and_then(|name| self.numbers.get(&name.canonical));
                 (last, found) = (
                     Some(id),
@@ -237,7 +176,7 @@ impl Adapter for Habitat {
             return Err(Error::data(semantic.display(), problem));
         }
         segments.mapv_inplace(|id| match id.checked_add(scene.shift) {
-            Some(id) if scene.names.contains_key(&id) => id,
+            Some(id) if names.contains_key(&id) => id,
             _ => 0,
         });
         let (region, most) = regions

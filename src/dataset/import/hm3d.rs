@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use super::names::{Meaning, UNKNOWN, meaning};
+use super::names::class_of;
 use crate::types::SegmentName;
 
 /// The first line.
@@ -38,13 +38,8 @@ pub(super) fn parse(
         let region: i64 = region
             .parse()
             .map_err(|_| wrong("a whole number expected as region"))?;
-        let canonical = match meaning(name) {
-            Meaning::Nothing => continue,
-            Meaning::Class(class) => class,
-            Meaning::Unlisted => {
-                *unlisted.entry(name.to_owned()).or_insert(0) += 1;
-                UNKNOWN
-            }
+        let Some(canonical) = class_of(name, name, 1, unlisted) else {
+            continue;
         };
         let segment = SegmentName {
             name: name.to_owned(),

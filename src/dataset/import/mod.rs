@@ -20,15 +20,14 @@ mod scannet;
 mod sunrgbd;
 mod thor;
 
-use std::fmt;
 use std::path::Path;
-use std::str::FromStr;
 
 use super::spaces;
 use crate::error::{Error, Result};
 use crate::types::Labels;
+use crate::types::words::words;
 
-pub use adapter::{Adapter, Incoming, Read, Stated};
+pub use adapter::{Adapter, Incoming, Listing, Read, Stated};
 
 /// What lies in the folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,50 +46,14 @@ pub enum Kind {
     Folder,
 }
 
-impl Kind {
-    /// All of them.
-    pub const ALL: [Self; 6] = [
-        Self::Habitat,
-        Self::Scannet,
-        Self::Nyu,
-        Self::Sunrgbd,
-        Self::Thor,
-        Self::Folder,
-    ];
-
-    /// The name on the command line.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Habitat => "habitat",
-            Self::Scannet => "scannet",
-            Self::Nyu => "nyu",
-            Self::Sunrgbd => "sunrgbd",
-            Self::Thor => "thor",
-            Self::Folder => "folder",
-        }
-    }
-}
-
-impl fmt::Display for Kind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl FromStr for Kind {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self> {
-        Self::ALL
-            .into_iter()
-            .find(|kind| kind.name() == text)
-            .ok_or_else(|| {
-                let names = Self::ALL.map(Self::name).join(", ");
-                Error::usage("KIND", format_args!("{text:?} is none of {names}"))
-            })
-    }
-}
+words!(Kind by "KIND" {
+    Habitat = "habitat",
+    Scannet = "scannet",
+    Nyu = "nyu",
+    Sunrgbd = "sunrgbd",
+    Thor = "thor",
+    Folder = "folder",
+});
 
 /// Opens a folder.
 ///
@@ -106,7 +69,7 @@ pub fn open(kind: Kind, folder: &Path, stated: &Stated) -> Result<Box<dyn Adapte
     let adapter: Box<dyn Adapter> = match kind {
         Kind::Habitat => Box::new(habitat::Habitat::open(folder, stated)?),
         Kind::Scannet => Box::new(scannet::Scannet::open(folder, stated)?),
-        Kind::Nyu => Box::new(nyu::Nyu::open(folder, stated)?),
+        Kind::Nyu => Box::new(nyu::open(folder, stated)?),
         Kind::Sunrgbd => Box::new(sunrgbd::SunRgbd::open(folder)?),
         Kind::Thor => Box::new(thor::Thor::open(folder, stated)?),
         Kind::Folder if folder.join("frames.jsonl").exists() => {
@@ -114,7 +77,7 @@ pub fn open(kind: Kind, folder: &Path, stated: &Stated) -> Result<Box<dyn Adapte
         }
         Kind::Folder => Box::new(folder::Folder::open(folder, stated)?),
     };
-    if adapter.frames().is_empty() {
+    if adapter.listing().frames.is_empty() {
         let problem = format_args!(
             "no frames of {kind} in this folder; see the layouts in src/dataset/import/README.md"
         );

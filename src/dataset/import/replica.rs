@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
-use super::names::{Meaning, UNKNOWN, meaning};
+use super::names::class_of;
 use crate::types::SegmentName;
 
 /// The keys that are used.
@@ -30,16 +30,12 @@ pub(super) fn parse(
         let Ok(id) = u32::try_from(id) else {
             continue;
         };
-        let canonical = match meaning(&class_name.replace('-', " ")) {
-            Meaning::Nothing => continue,
-            Meaning::Class(class) => class,
-            Meaning::Unlisted => {
-                *unlisted.entry(class_name.clone()).or_insert(0) += 1;
-                UNKNOWN
-            }
+        let words = class_name.replace('-', " ");
+        let Some(canonical) = class_of(&words, &class_name, 1, unlisted) else {
+            continue;
         };
         let name = SegmentName {
-            name: class_name.replace('-', " "),
+            name: words,
             canonical: canonical.to_owned(),
             region: None,
         };

@@ -11,13 +11,14 @@ use std::path::{Path, PathBuf};
 use ndarray::Array2;
 use serde::Deserialize;
 
-use super::adapter::{Adapter, Incoming, Read, Stated};
-use super::files::{depth, files, first, folders, last, numbers, png, same_size, text};
+use super::adapter::{Adapter, Incoming, Listing, Read, Stated};
+use super::files::{depth, files, first, folders, last, numbers, png, same_size};
 use super::names::{UNKNOWN, overridden};
 use crate::dataset::raw_png::Form;
+use crate::dataset::reading::{json, text};
 use crate::dataset::spaces::{canonical, space};
 use crate::error::{Error, Result};
-use crate::types::{DepthKind, Intrinsics, Label, Labels, Rgb, SegmentName};
+use crate::types::{Intrinsics, Label, Labels, Rgb};
 
 /// The table of ScanNet's own numbers.
 const TABLE: &str = "scannetv2-labels.combined.tsv";
@@ -29,11 +30,9 @@ const SCALE: f64 = 0.001;
 /// The frames of a folder.
 #[derive(Debug)]
 pub(super) struct Scannet {
-    frames: Vec<Incoming>,
+    listing: Listing,
     maps: Vec<Maps>,
-    labels: Labels,
     depth_scale: f64,
-    unlisted: BTreeMap<String, usize>,
 }
 
 #[derive(Debug)]
@@ -57,11 +56,9 @@ enum Numbering {
 impl Scannet {
     pub(super) fn open(folder: &Path, stated: &Stated) -> Result<Self> {
         let mut set = Self {
-            frames: Vec::new(),
+            listing: Listing::default(),
             maps: Vec::new(),
-            labels: Labels::default(),
             depth_scale: stated.depth_scale.unwrap_or(SCALE),
-            unlisted: BTreeMap::new(),
         };
         let scenes: Vec<PathBuf> = folders(folder)?
             .into_iter()
@@ -73,7 +70,7 @@ impl Scannet {
         } else {
             Numbering::Nyu40
         };
-        set.labels = match numbering {
+        set.listing.labels = match numbering {
             Numbering::Own => table(&folder.join(TABLE))?,
             Numbering::Nyu40 => space("nyu40").unwrap_or_default(),
         };
@@ -132,7 +129,7 @@ impl Scannet {
                 instances: instances.get(&frame).cloned(),
                 depth_camera: deep,
             });
-            self.frames.push(Incoming {
+            self.listing.frames.push(Incoming {
                 scene: name.clone(),
                 time: number.map(|number| f64::from(number) / RATE),
                 pose,
@@ -160,9 +157,7 @@ fn check_overflow(folder: &Path, scene: &str) -> Result<()> {
     if !path.exists() || !folder.join("instance-filt").is_dir() {
         return Ok(());
     }
-    let file: Aggregation =
-        serde_json::from_str(&text(&path)?).map_err(|e| Error::data(path.display(), e))?;
-    let objects = file.seg_groups.len();
+    let objects = json::<Aggregation>(&path)?.seg_groups.len();
     if objects > 255 {
         let problem = format_args!(
             "{objects} objects, but the 8 bits of instance-filt hold 255: their numbers overflow; export them with 16 bits, as frames_25k has them"
@@ -281,28 +276,8 @@ fn at_pixels(depth: &Array2<u32>, rgb: &Rgb, cameras: Option<[Intrinsics; 2]>) -
 }
 
 impl Adapter for Scannet {
-    fn frames(&self) -> &[Incoming] {
-        &self.frames
-    }
-
-    fn labels(&self) -> &Labels {
-        &self.labels
-    }
-
-    fn names(&self, _scene: &str) -> BTreeMap<u32, SegmentName> {
-        BTreeMap::new()
-    }
-
-    fn depth_kind(&self) -> DepthKind {
-        DepthKind::Planar
-    }
-
-    fn has_segments(&self) -> bool {
-        self.maps.iter().any(|maps| maps.instances.is_some())
-    }
-
-    fn unlisted(&self) -> &BTreeMap<String, usize> {
-        &self.unlisted
+    fn listing(&self) -> &Listing {
+        &self.listing
     }
 
     fn read(&self, frame: &Incoming, rgb: &Rgb) -> Result<Read> {

@@ -12,14 +12,15 @@ use ndarray::Array2;
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::adapter::{Adapter, Incoming, Read};
-use super::files::{files, folders, last, numbers, png, same_size, text};
-use super::names::{Meaning, UNKNOWN, meaning};
+use super::adapter::{Adapter, Incoming, Listing, Read};
+use super::files::{files, folders, last, numbers, png, same_size};
+use super::names::class_of;
 use super::polygons::{Polygon, draw};
 use crate::dataset::raw_png::Form;
+use crate::dataset::reading::{json, text};
 use crate::dataset::spaces::canonical;
 use crate::error::{Error, Result};
-use crate::types::{DepthKind, Intrinsics, Label, Labels, Rgb, SegmentName};
+use crate::types::{Intrinsics, Label, Labels, Rgb};
 
 /// What the toolbox takes for the end of the sensor's range, in millimetres.
 const MOST_DEPTH: u32 = 8_000;
@@ -27,11 +28,9 @@ const MOST_DEPTH: u32 = 8_000;
 /// The frames of a folder.
 #[derive(Debug)]
 pub(super) struct SunRgbd {
-    frames: Vec<Incoming>,
+    listing: Listing,
     files: Vec<Files>,
-    labels: Labels,
     numbers: BTreeMap<String, u16>,
-    unlisted: BTreeMap<String, usize>,
 }
 
 #[derive(Debug)]
@@ -68,15 +67,14 @@ struct Object {
 impl SunRgbd {
     pub(super) fn open(folder: &Path) -> Result<Self> {
         let mut set = Self {
-            frames: Vec::new(),
+            listing: Listing::default(),
             files: Vec::new(),
-            labels: Labels::default(),
             numbers: BTreeMap::new(),
-            unlisted: BTreeMap::new(),
         };
         set.walk(folder, &[])?;
         set.name()?;
-        set.frames
+        set.listing
+            .frames
             .sort_by(|a, b| (&a.scene, &a.frame).cmp(&(&b.scene, &b.frame)));
         Ok(set)
     }
@@ -127,7 +125,7 @@ impl SunRgbd {
             depth: depths.into_values().next(),
             annotation,
         });
-        self.frames.push(Incoming {
+        self.listing.frames.push(Incoming {
             scene: if scene.is_empty() {
                 "sunrgbd".to_owned()
             } else {
@@ -148,33 +146,33 @@ impl SunRgbd {
     fn name(&mut self) -> Result<()> {
         let mut words = BTreeMap::new();
         for files in &self.files {
-            for object in read(&files.annotation)?.objects.into_iter().flatten() {
+            for object in json::<Index>(&files.annotation)?
+                .objects
+                .into_iter()
+                .flatten()
+            {
                 *words.entry(word(&object.name)).or_insert(0_usize) += 1;
             }
         }
-        self.labels = Labels {
+        let mut labels = Labels {
             space: "sunrgbd".into(),
             void: [0].into(),
             ..Labels::default()
         };
         for (number, (word, count)) in (1..=u16::MAX).zip(words) {
-            let class = match meaning(&word) {
-                Meaning::Nothing => continue,
-                Meaning::Class(class) => class,
-                Meaning::Unlisted => {
-                    self.unlisted.insert(word.clone(), count);
-                    UNKNOWN
-                }
+            let Some(class) = class_of(&word, &word, count, &mut self.listing.unlisted) else {
+                continue;
             };
             let label = Label {
                 name: word.clone(),
                 canonical: class.to_owned(),
             };
-            self.labels.labels.insert(number, label);
+            labels.labels.insert(number, label);
             self.numbers.insert(word, number);
         }
         // Annotators wrote whatever they saw.
-        self.labels.expressible = canonical().into_iter().collect::<BTreeSet<String>>();
+        labels.expressible = canonical().into_iter().collect::<BTreeSet<String>>();
+        self.listing.labels = labels;
         Ok(())
     }
 }
@@ -185,10 +183,6 @@ fn word(name: &str) -> String {
     name.trim_end_matches(|letter: char| letter.is_ascii_digit() || letter == '_')
         .trim()
         .to_lowercase()
-}
-
-fn read(path: &Path) -> Result<Index> {
-    serde_json::from_str(&text(path)?).map_err(|e| Error::data(path.display(), e))
 }
 
 /// A list of numbers; a single number is one, as the files have it.
@@ -203,28 +197,8 @@ fn list(value: &Value) -> Vec<f64> {
 }
 
 impl Adapter for SunRgbd {
-    fn frames(&self) -> &[Incoming] {
-        &self.frames
-    }
-
-    fn labels(&self) -> &Labels {
-        &self.labels
-    }
-
-    fn names(&self, _scene: &str) -> BTreeMap<u32, SegmentName> {
-        BTreeMap::new()
-    }
-
-    fn depth_kind(&self) -> DepthKind {
-        DepthKind::Planar
-    }
-
-    fn has_segments(&self) -> bool {
-        true
-    }
-
-    fn unlisted(&self) -> &BTreeMap<String, usize> {
-        &self.unlisted
+    fn listing(&self) -> &Listing {
+        &self.listing
     }
 
     fn read(&self, frame: &Incoming, rgb: &Rgb) -> Result<Read> {
@@ -237,7 +211,7 @@ impl Adapter for SunRgbd {
             }
             None => None,
         };
-        let index = read(&files.annotation)?;
+        let index: Index = json(&files.annotation)?;
         let shapes = index
             .frames
             .into_iter()

@@ -8,46 +8,34 @@ use std::path::{Path, PathBuf};
 
 use ndarray::Array2;
 
-use super::adapter::{Adapter, Incoming, Read, Stated, mpcat40, numbers, pinhole};
-use super::files::{depth, files, folders, last, picture, same_size, text};
+use super::adapter::{Adapter, Incoming, Listing, Read, Stated, numbers};
+use super::files::{depth_of, files, folders, last, picture, same_size};
 use super::names;
+use crate::dataset::reading::json;
 use crate::error::{Error, Result};
-use crate::types::{DepthKind, Intrinsics, Labels, Rgb, SegmentName};
+use crate::types::{Rgb, SegmentName};
 
 /// The scenes of a folder.
 #[derive(Debug)]
 pub(super) struct Thor {
-    frames: Vec<Incoming>,
+    listing: Listing,
     /// Depth and instances of each.
     maps: Vec<(Option<PathBuf>, PathBuf)>,
-    scenes: BTreeMap<String, Scene>,
-    labels: Labels,
+    /// The segment of each colour, by scene.
+    colors: BTreeMap<String, BTreeMap<[u8; 3], u32>>,
     numbers: BTreeMap<String, u16>,
-    unlisted: BTreeMap<String, usize>,
     depth_scale: Option<f64>,
-    hfov: Option<f64>,
-}
-
-/// The objects of a scene.
-#[derive(Debug)]
-struct Scene {
-    /// The segment of each colour.
-    colors: BTreeMap<[u8; 3], u32>,
-    names: BTreeMap<u32, SegmentName>,
 }
 
 impl Thor {
     pub(super) fn open(folder: &Path, stated: &Stated) -> Result<Self> {
-        let labels = mpcat40();
+        let listing = Listing::by_name(stated);
         let mut set = Self {
-            frames: Vec::new(),
+            numbers: numbers(&listing.labels),
+            listing,
             maps: Vec::new(),
-            scenes: BTreeMap::new(),
-            numbers: numbers(&labels),
-            labels,
-            unlisted: BTreeMap::new(),
+            colors: BTreeMap::new(),
             depth_scale: stated.depth_scale,
-            hfov: stated.hfov,
         };
         for scene in folders(folder)? {
             if scene.join("instance").is_dir() {
@@ -59,7 +47,7 @@ impl Thor {
 
     fn add(&mut self, folder: &Path) -> Result<()> {
         let name = last(folder);
-        let scene = scene(&folder.join("colors.json"))?;
+        let (colors, names) = scene(&folder.join("colors.json"))?;
         let depths = files(&folder.join("depth"), &[".npy", ".png"])?;
         let instances = files(&folder.join("instance"), &[".png"])?;
         for (frame, rgb) in files(&folder.join("rgb"), &[".png", ".jpg", ".jpeg"])? {
@@ -69,7 +57,7 @@ impl Thor {
             };
             self.maps
                 .push((depths.get(&frame).cloned(), instance.clone()));
-            self.frames.push(Incoming {
+            self.listing.frames.push(Incoming {
                 scene: name.clone(),
                 frame,
                 time: None,
@@ -80,16 +68,16 @@ impl Thor {
                 index: self.maps.len() - 1,
             });
         }
-        self.scenes.insert(name, scene);
+        self.listing.names.insert(name.clone(), names);
+        self.colors.insert(name, colors);
         Ok(())
     }
 }
 
-/// The objects by their colours: segments in the order of the objects' names.
-fn scene(path: &Path) -> Result<Scene> {
-    let wrong = |problem: String| Error::data(path.display(), problem);
-    let file: BTreeMap<String, String> =
-        serde_json::from_str(&text(path)?).map_err(|e| wrong(e.to_string()))?;
+/// The segments of colours, and their names; segments are in the order of the objects' names.
+#[expect(clippy::type_complexity, reason = "two tables of one file")]
+fn scene(path: &Path) -> Result<(BTreeMap<[u8; 3], u32>, BTreeMap<u32, SegmentName>)> {
+    let file: BTreeMap<String, String> = json(path)?;
     let mut objects: BTreeMap<&str, Vec<[u8; 3]>> = BTreeMap::new();
     for (key, object) in &file {
         let parts: Vec<u8> = key
@@ -97,9 +85,10 @@ fn scene(path: &Path) -> Result<Scene> {
             .filter_map(|part| part.parse().ok())
             .collect();
         let color = parts.try_into().map_err(|_| {
-            wrong(format!(
+            let problem = format_args!(
                 "{key:?} is no colour; three numbers expected, as in \"(12, 34, 56)\""
-            ))
+            );
+            Error::data(path.display(), problem)
         })?;
         objects.entry(object).or_default().push(color);
     }
@@ -115,7 +104,7 @@ fn scene(path: &Path) -> Result<Scene> {
         names.insert(id, name);
         colors.extend(of_object.into_iter().map(|color| (color, id)));
     }
-    Ok(Scene { colors, names })
+    Ok((colors, names))
 }
 
 /// The room of one of iTHOR's scenes, by its number.
@@ -135,56 +124,18 @@ fn room(scene: &str) -> Option<&'static str> {
 }
 
 impl Adapter for Thor {
-    fn frames(&self) -> &[Incoming] {
-        &self.frames
-    }
-
-    fn labels(&self) -> &Labels {
-        &self.labels
-    }
-
-    fn names(&self, scene: &str) -> BTreeMap<u32, SegmentName> {
-        self.scenes
-            .get(scene)
-            .map_or_else(BTreeMap::new, |scene| scene.names.clone())
-    }
-
-    fn depth_kind(&self) -> DepthKind {
-        DepthKind::Planar
-    }
-
-    fn camera(&self, _frame: &Incoming, rgb: &Rgb) -> Option<Intrinsics> {
-        self.hfov
-            .map(|hfov| pinhole(rgb.width(), rgb.height(), hfov))
-    }
-
-    fn has_segments(&self) -> bool {
-        true
-    }
-
-    fn unlisted(&self) -> &BTreeMap<String, usize> {
-        &self.unlisted
+    fn listing(&self) -> &Listing {
+        &self.listing
     }
 
     fn read(&self, frame: &Incoming, rgb: &Rgb) -> Result<Read> {
         let (deep, instance) = &self.maps[frame.index];
-        let depth = match deep {
-            Some(path) => {
-                let scale = self
-                    .depth_scale
-                    .filter(|_| path.extension().is_some_and(|end| end != "npy"));
-                let depth = depth(path, scale)?;
-                same_size(path, &depth, rgb)?;
-                Some(depth)
-            }
-            None => None,
-        };
-        let scene = &self.scenes[&frame.scene];
+        let segment_of = &self.colors[&frame.scene];
         let colors = picture(instance)?;
         let (pixels, _) = colors.samples().as_chunks::<3>();
         let ids: Vec<u32> = pixels
             .iter()
-            .map(|color| scene.colors.get(color).copied().unwrap_or(0))
+            .map(|color| segment_of.get(color).copied().unwrap_or(0))
             .collect();
         let segments = Array2::from_shape_vec((colors.height(), colors.width()), ids);
         let segments = segments.map_err(|e| Error::data(instance.display(), e))?;
@@ -194,14 +145,13 @@ impl Adapter for Thor {
                 "no pixel has a colour of colors.json; it must be that of the same scene and run";
             return Err(Error::data(instance.display(), problem));
         }
-        let numbers: BTreeMap<u32, u16> = scene
-            .names
+        let numbers: BTreeMap<u32, u16> = self.listing.names[&frame.scene]
             .iter()
             .map(|(id, name)| (*id, self.numbers.get(&name.canonical).copied().unwrap_or(0)))
             .collect();
         let semantic = segments.mapv(|id| numbers.get(&id).copied().unwrap_or(0));
         Ok(Read {
-            depth,
+            depth: depth_of(deep.as_deref(), self.depth_scale, rgb)?,
             semantic: Some(semantic),
             segments: Some(segments),
             room: None,

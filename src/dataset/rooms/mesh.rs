@@ -147,10 +147,35 @@ impl Mesh {
         }
     }
 
+    /// A block that reaches as far to the left as to the right: half its width, and from where to where it goes up and forwards.
+    pub(super) fn board(&mut self, half: f32, y: [f32; 2], z: [f32; 2], surface: &Surface) {
+        self.block(vec3(-half, y[0], z[0]), vec3(half, y[1], z[1]), surface);
+    }
+
+    /// A [board](Self::board) with round edges.
+    pub(super) fn cushion(
+        &mut self,
+        half: f32,
+        y: [f32; 2],
+        z: [f32; 2],
+        radius: f32,
+        surface: &Surface,
+    ) {
+        let (low, high) = (vec3(-half, y[0], z[0]), vec3(half, y[1], z[1]));
+        self.soft(low, high, radius, surface);
+    }
+
     /// A block by its middle on the floor plan, its bottom and its size.
     pub(super) fn slab(&mut self, foot: Vec3, size: Vec3, surface: &Surface) {
         let half = vec3(size.x / 2.0, 0.0, size.z / 2.0);
         self.block(foot - half, foot + half + vec3(0.0, size.y, 0.0), surface);
+    }
+
+    /// Two such blocks, as far to the left as to the right.
+    pub(super) fn slabs(&mut self, foot: Vec3, size: Vec3, surface: &Surface) {
+        for x in [-foot.x, foot.x] {
+            self.slab(vec3(x, foot.y, foot.z), size, surface);
+        }
     }
 
     /// A block whose edges are round: the sum of a block and a ball.

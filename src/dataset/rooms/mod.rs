@@ -218,13 +218,15 @@ impl Room {
     /// All that decides its pixels.
     #[must_use]
     pub fn digest(&self) -> Digest {
-        let head = format!(
-            "darkqa-eval rooms {VERSION} {} {:?} {}",
-            self.rooms.seed,
-            self.rooms.size,
-            self.id().0
-        );
-        Digest::of(head.as_bytes())
+        let [width, height] = self.rooms.size.map(|side| (side as u64).to_le_bytes());
+        Digest::of_parts([
+            "darkqa.room/2".as_bytes(),
+            &VERSION.to_le_bytes(),
+            &self.rooms.seed.to_le_bytes(),
+            &width,
+            &height,
+            self.id().0.as_bytes(),
+        ])
     }
 
     /// Width and height in pixels.

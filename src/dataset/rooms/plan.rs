@@ -71,6 +71,14 @@ struct Patch {
     up: [f32; 2],
 }
 
+impl Patch {
+    /// The part that reaches as far to both sides of a place along the wall.
+    fn around(wall: Wall, along: f32, reach: f32, up: [f32; 2]) -> Self {
+        let along = [along - reach, along + reach];
+        Self { wall, along, up }
+    }
+}
+
 /// The room while it is furnished.
 pub(super) struct Plan {
     pub(super) scene: Scene,
@@ -245,11 +253,7 @@ impl Plan {
         let pose = at(pose.outward(vec3(0.0, 0.0, 0.016)), pose.angle);
         let area = Self::area(&pose, set.size, 0.0);
         let half = set.size.x / 2.0;
-        let patch = Patch {
-            wall,
-            along: [along - half, along + half],
-            up: [0.0, set.size.y + 0.02],
-        };
+        let patch = Patch::around(wall, along, half, [0.0, set.size.y + 0.02]);
         if !self.free(&area) || !self.open(&patch) {
             return None;
         }
@@ -309,11 +313,7 @@ impl Plan {
         (0..TRIES).find_map(|_| {
             let wall = self.dice.pick(choices);
             let along = self.dice.between(half, self.width(wall) - half);
-            let patch = Patch {
-                wall,
-                along: [along - half, along + half],
-                up: [up + low.y - 0.05, up + high.y + 0.05],
-            };
+            let patch = Patch::around(wall, along, half, [up + low.y - 0.05, up + high.y + 0.05]);
             self.open(&patch).then(|| {
                 self.patches.push(patch);
                 let pose = self.on(wall, along, up);
@@ -355,11 +355,7 @@ impl Plan {
             let half = size.x / 2.0 + 0.1;
             let along = self.dice.between(half, self.width(wall) - half);
             let pose = self.on(wall, along, 0.0);
-            let patch = Patch {
-                wall,
-                along: [along - half, along + half],
-                up: [0.0, size.y + 0.1],
-            };
+            let patch = Patch::around(wall, along, half, [0.0, size.y + 0.1]);
             if self.open(&patch) {
                 self.patches.push(patch);
                 self.keep_free(&pose, vec3(0.9, 0.0, 0.75), 0.0);
@@ -380,11 +376,7 @@ impl Plan {
                 continue;
             }
             let along = self.dice.between(reach + 0.05, span - reach - 0.05);
-            let patch = Patch {
-                wall,
-                along: [along - reach, along + reach],
-                up: [sill - 0.12, 2.3],
-            };
+            let patch = Patch::around(wall, along, reach, [sill - 0.12, 2.3]);
             if !self.open(&patch) {
                 continue;
             }

@@ -1,11 +1,11 @@
 //! Label spaces that data sets share, by name: [`space`]; and a data set's own, `classes.json`: `read`.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use crate::dataset::reading;
 use crate::error::{Error, Result};
 use crate::types::{Label, Labels};
 
@@ -90,8 +90,7 @@ struct Class {
 /// # Errors
 /// With the file: broken JSON, another schema, a number twice, a canonical class that mpcat40 has not.
 pub(super) fn read(path: &Path) -> Result<Labels> {
-    let text = fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))?;
-    let file: File = serde_json::from_str(&text).map_err(|e| Error::data(path.display(), e))?;
+    let file: File = reading::json(path)?;
     file.labels()
         .map_err(|problem| Error::data(path.display(), problem))
 }
@@ -162,6 +161,8 @@ pub(super) fn json(labels: &Labels) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     fn parse(text: &str) -> Result<Labels> {

@@ -95,7 +95,6 @@ impl Watched {
         seen.loose.clear();
         Sight {
             visible: seen.segments.len(),
-            segments: self.statistics.segments.len(),
             seen,
             colors: visible,
         }
@@ -107,8 +106,6 @@ impl Watched {
 pub struct Sight {
     /// How many segments it sees.
     pub visible: usize,
-    /// How many there are.
-    pub segments: usize,
     seen: FrameStatistics,
     /// The colours of each segment that it sees, by number, the first the most.
     colors: BTreeMap<u32, Vec<Color>>,

@@ -116,7 +116,7 @@ fn judge(config: &Judge) -> Result<ModelUnderTest> {
     let server = config.server.as_ref();
     let endpoint = models::endpoint(server)?;
     let model = models::open(&config.model, endpoint.as_ref(), &config.parameters)?;
-    Ok(ModelUnderTest::new(model, View::Blind, server))
+    ModelUnderTest::new(model, View::Blind, server)
 }
 
 /// The walks of the questions in their order.

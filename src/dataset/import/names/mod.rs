@@ -66,6 +66,23 @@ pub(in crate::dataset) fn meaning(word: &str) -> Meaning {
     }
 }
 
+/// The class of a word of a data set, which is counted as `shown` where it stands in no table; `None` where it means nothing.
+pub(super) fn class_of(
+    word: &str,
+    shown: &str,
+    count: usize,
+    unlisted: &mut BTreeMap<String, usize>,
+) -> Option<&'static str> {
+    match meaning(word) {
+        Meaning::Nothing => None,
+        Meaning::Class(class) => Some(class),
+        Meaning::Unlisted => {
+            *unlisted.entry(shown.to_owned()).or_insert(0) += count;
+            Some(UNKNOWN)
+        }
+    }
+}
+
 /// The class that goes before what a data set's own table says of a word.
 pub(super) fn overridden(word: &str) -> Option<&'static str> {
     TABLES[0].get(spelled(word).as_str()).copied()

@@ -60,14 +60,9 @@ pub(in super::super) fn toilet(dice: &mut Dice) -> Piece {
     );
     let points: Vec<Vec<Vec3>> = lid();
     mesh.grid(&points, &white);
-    mesh.soft(vec3(-0.2, 0.36, 0.0), vec3(0.2, 0.76, 0.17), 0.03, &white);
-    mesh.soft(
-        vec3(-0.21, 0.75, -0.005),
-        vec3(0.21, 0.79, 0.18),
-        0.015,
-        &white,
-    );
-    mesh.soft(vec3(-0.12, 0.0, 0.1), vec3(0.12, 0.38, 0.4), 0.05, &white);
+    mesh.cushion(0.2, [0.36, 0.76], [0.0, 0.17], 0.03, &white);
+    mesh.cushion(0.21, [0.75, 0.79], [-0.005, 0.18], 0.015, &white);
+    mesh.cushion(0.12, [0.0, 0.38], [0.1, 0.4], 0.05, &white);
     let steel = Surface::steel();
     mesh.ball(vec3(0.0, 0.795, 0.085), vec3(0.03, 0.01, 0.03), &steel);
     Piece::new(kind("toilet", "toilet"), mesh, name)
@@ -170,7 +165,7 @@ pub(in super::super) fn pedestal_sink(dice: &mut Dice) -> Piece {
         0.82,
         &white,
     );
-    mesh.soft(vec3(-0.29, 0.74, 0.0), vec3(0.29, 0.86, 0.13), 0.03, &white);
+    mesh.cushion(0.29, [0.74, 0.86], [0.0, 0.13], 0.03, &white);
     mesh.rod(vec3(0.0, 0.85, 0.08), vec3(0.0, 0.98, 0.08), 0.016, &steel);
     mesh.rod(vec3(0.0, 0.97, 0.08), vec3(0.0, 0.94, 0.2), 0.013, &steel);
     Piece::new(kind("sink", "sink"), mesh, name)
@@ -262,20 +257,12 @@ pub(in super::super) fn shower(dice: &mut Dice) -> Piece {
     let frosted = Surface::gloss(Paint::nameless([206, 222, 226]));
     let steel = Surface::steel();
     let (width, depth, height) = (0.95, 0.9, 2.05);
+    let half = width / 2.0;
     let mut mesh = Mesh::default();
-    mesh.soft(
-        vec3(-width / 2.0, 0.0, 0.0),
-        vec3(width / 2.0, 0.12, depth),
-        0.03,
-        &white,
-    );
-    mesh.block(
-        vec3(-width / 2.0, 0.1, 0.0),
-        vec3(width / 2.0, height, 0.015),
-        &tiles,
-    );
+    mesh.cushion(half, [0.0, 0.12], [0.0, depth], 0.03, &white);
+    mesh.board(half, [0.1, height], [0.0, 0.015], &tiles);
     let side = if dice.chance(0.5) { -1.0 } else { 1.0 };
-    let x = side * (width / 2.0 - 0.01);
+    let x = side * (half - 0.01);
     mesh.block(
         vec3(x - 0.008, 0.12, 0.0),
         vec3(x + 0.008, height - 0.1, depth - 0.02),
@@ -312,6 +299,6 @@ pub(in super::super) fn toilet_paper() -> Piece {
         0.012,
         &Surface::steel(),
     );
-    mesh.block(vec3(-0.052, -0.13, 0.118), vec3(0.052, 0.0, 0.122), &paper);
+    mesh.board(0.052, [-0.13, 0.0], [0.118, 0.122], &paper);
     Piece::new(kind("toilet paper", "objects"), mesh, "white")
 }

@@ -17,6 +17,7 @@ pub(in super::super) fn bed(dice: &mut Dice) -> Set {
     } else {
         dice.between(0.95, 1.1)
     };
+    let half = width / 2.0;
     let length = 2.05;
     let mut mesh = Mesh::default();
     let wood = Surface::wood(Paint::of(&["brown", "white", "black"], dice), 0);
@@ -24,35 +25,29 @@ pub(in super::super) fn bed(dice: &mut Dice) -> Set {
     let cover = Paint::of(&ALL, dice);
     let blanket = Surface::cloth(cover);
     legs(&mut mesh, vec3(width, 0.2, length), 0.06, 0.07, &wood);
-    mesh.block(
-        vec3(-width / 2.0, 0.16, 0.02),
-        vec3(width / 2.0, 0.3, length),
-        &wood,
-    );
+    mesh.board(half, [0.16, 0.3], [0.02, length], &wood);
     let head = dice.between(0.85, 1.1);
-    mesh.soft(
-        vec3(-width / 2.0 - 0.03, 0.1, 0.0),
-        vec3(width / 2.0 + 0.03, head, 0.07),
-        0.03,
-        &wood,
-    );
-    mesh.soft(
-        vec3(-width / 2.0 + 0.02, 0.28, 0.07),
-        vec3(width / 2.0 - 0.02, 0.5, length - 0.02),
+    mesh.cushion(half + 0.03, [0.1, head], [0.0, 0.07], 0.03, &wood);
+    mesh.cushion(
+        half - 0.02,
+        [0.28, 0.5],
+        [0.07, length - 0.02],
         0.07,
         &sheet,
     );
     // The blanket hangs over both sides and the foot, and is turned back at the head.
     let from = dice.between(0.55, 0.7);
-    mesh.soft(
-        vec3(-width / 2.0 - 0.035, 0.2, from),
-        vec3(width / 2.0 + 0.035, 0.56, length + 0.035),
+    mesh.cushion(
+        half + 0.035,
+        [0.2, 0.56],
+        [from, length + 0.035],
         0.06,
         &blanket,
     );
-    mesh.soft(
-        vec3(-width / 2.0 - 0.03, 0.44, from - 0.16),
-        vec3(width / 2.0 + 0.03, 0.575, from + 0.06),
+    mesh.cushion(
+        half + 0.03,
+        [0.44, 0.575],
+        [from - 0.16, from + 0.06],
         0.05,
         &if dice.chance(0.5) { sheet } else { blanket },
     );

@@ -235,9 +235,10 @@ pub(in super::super) fn basket() -> Piece {
 /// A keyboard.
 pub(in super::super) fn keyboard() -> Piece {
     let mut mesh = Mesh::default();
-    mesh.soft(
-        vec3(-0.2, 0.0, 0.0),
-        vec3(0.2, 0.02, 0.14),
+    mesh.cushion(
+        0.2,
+        [0.0, 0.02],
+        [0.0, 0.14],
         0.006,
         &Surface::plain([52, 52, 56]),
     );

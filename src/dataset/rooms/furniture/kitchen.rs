@@ -63,17 +63,9 @@ pub(in super::super) fn run(width: f32, sink: bool, style: &Style) -> Set {
             mesh.block(from, to, &top);
         }
     } else {
-        mesh.block(
-            vec3(-width / 2.0, low, 0.0),
-            vec3(width / 2.0, high, DEPTH),
-            &top,
-        );
+        mesh.board(width / 2.0, [low, high], [0.0, DEPTH], &top);
     }
-    mesh.block(
-        vec3(-width / 2.0, high, 0.0),
-        vec3(width / 2.0, high + 0.06, 0.02),
-        &top,
-    );
+    mesh.board(width / 2.0, [high, high + 0.06], [0.0, 0.02], &top);
     let counter = Piece::new(kind("kitchen counter", "counter"), mesh, style.counter.name);
     let set = Set::of(base).and(counter, at(Vec3::ZERO, 0.0));
     let set = if sink {
@@ -91,11 +83,7 @@ fn kitchen_sink([half, back, front]: [f32; 3]) -> Piece {
     let steel = Surface::steel();
     let mut mesh = Mesh::default();
     let (deep, high) = (COUNTER - 0.19, COUNTER + 0.004);
-    mesh.block(
-        vec3(-half, deep - 0.01, back),
-        vec3(half, deep, front),
-        &steel,
-    );
+    mesh.board(half, [deep - 0.01, deep], [back, front], &steel);
     for [low, top] in [
         [
             vec3(-half - 0.012, deep, back),
@@ -134,27 +122,17 @@ pub(in super::super) fn stove(style: &Style) -> Piece {
     let glass = Surface::gloss(Paint::nameless([26, 26, 28]));
     let (steel, iron) = (Surface::steel(), Surface::plain([38, 38, 40]));
     let (width, depth) = (0.62, DEPTH);
+    let half = width / 2.0;
     let mut mesh = Mesh::default();
-    mesh.block(
-        vec3(-width / 2.0, 0.06, 0.0),
-        vec3(width / 2.0, COUNTER, depth - 0.02),
+    mesh.board(half, [0.06, COUNTER], [0.0, depth - 0.02], &body);
+    mesh.board(half, [COUNTER, COUNTER + 0.14], [0.0, 0.04], &body);
+    mesh.board(
+        half - 0.015,
+        [0.12, 0.72],
+        [depth - 0.02, depth + 0.005],
         &body,
     );
-    mesh.block(
-        vec3(-width / 2.0, COUNTER, 0.0),
-        vec3(width / 2.0, COUNTER + 0.14, 0.04),
-        &body,
-    );
-    mesh.block(
-        vec3(-width / 2.0 + 0.015, 0.12, depth - 0.02),
-        vec3(width / 2.0 - 0.015, 0.72, depth + 0.005),
-        &body,
-    );
-    mesh.block(
-        vec3(-0.2, 0.28, depth + 0.005),
-        vec3(0.2, 0.58, depth + 0.008),
-        &glass,
-    );
+    mesh.board(0.2, [0.28, 0.58], [depth + 0.005, depth + 0.008], &glass);
     mesh.rod(
         vec3(-0.24, 0.67, depth + 0.04),
         vec3(0.24, 0.67, depth + 0.04),
@@ -178,9 +156,10 @@ pub(in super::super) fn stove(style: &Style) -> Piece {
             &iron,
         );
     }
-    mesh.block(
-        vec3(-width / 2.0 + 0.02, COUNTER, 0.05),
-        vec3(width / 2.0 - 0.02, COUNTER + 0.006, depth - 0.04),
+    mesh.board(
+        half - 0.02,
+        [COUNTER, COUNTER + 0.006],
+        [0.05, depth - 0.04],
         &glass,
     );
     for (x, z) in [(-0.15, 0.18), (0.15, 0.18), (-0.15, 0.43), (0.15, 0.43)] {
@@ -201,26 +180,18 @@ pub(in super::super) fn refrigerator(style: &Style, dice: &mut Dice) -> Piece {
     let body = Surface::gloss(style.appliances);
     let steel = Surface::steel();
     let (width, height, depth) = (0.72, dice.between(1.7, 1.85), 0.68);
+    let half = width / 2.0;
     let split = height * dice.between(0.62, 0.7);
     let mut mesh = Mesh::default();
-    mesh.block(
-        vec3(-width / 2.0, 0.03, 0.0),
-        vec3(width / 2.0, height, depth - 0.05),
-        &body,
-    );
+    mesh.board(half, [0.03, height], [0.0, depth - 0.05], &body);
     for [low, high] in [[0.05, split - 0.006], [split + 0.006, height - 0.005]] {
-        mesh.soft(
-            vec3(-width / 2.0, low, depth - 0.06),
-            vec3(width / 2.0, high, depth),
-            0.015,
-            &body,
-        );
+        mesh.cushion(half, [low, high], [depth - 0.06, depth], 0.015, &body);
         let (from, to) = if low < 0.1 {
             (split - 0.45, split - 0.06)
         } else {
             (split + 0.06, split + 0.3)
         };
-        let x = -width / 2.0 + 0.07;
+        let x = -half + 0.07;
         mesh.rod(
             vec3(x, from, depth + 0.04),
             vec3(x, to, depth + 0.04),
@@ -259,7 +230,7 @@ pub(in super::super) fn microwave(style: &Style) -> Piece {
     let body = Surface::gloss(style.appliances);
     let glass = Surface::gloss(Paint::nameless([28, 28, 30]));
     let mut mesh = Mesh::default();
-    mesh.soft(vec3(-0.25, 0.0, 0.04), vec3(0.25, 0.28, 0.4), 0.015, &body);
+    mesh.cushion(0.25, [0.0, 0.28], [0.04, 0.4], 0.015, &body);
     mesh.block(vec3(-0.22, 0.05, 0.4), vec3(0.1, 0.23, 0.405), &glass);
     for i in 0..3 {
         let y = 0.08 + i as f32 * 0.055;
@@ -272,13 +243,13 @@ pub(in super::super) fn microwave(style: &Style) -> Piece {
 pub(in super::super) fn hood() -> Piece {
     let steel = Surface::steel();
     let mut mesh = Mesh::default();
-    mesh.block(vec3(-0.31, 0.0, 0.0), vec3(0.31, 0.06, 0.46), &steel);
+    mesh.board(0.31, [0.0, 0.06], [0.0, 0.46], &steel);
     let (a, b) = (vec3(0.31, 0.06, 0.46), vec3(0.12, 0.3, 0.26));
     let flip = |v: Vec3| vec3(-v.x, v.y, v.z);
     let wall = |v: Vec3| vec3(v.x, v.y, 0.0);
     mesh.quad([flip(a), a, b, flip(b)], &steel);
     mesh.quad([a, wall(a), wall(b), b], &steel);
     mesh.quad([wall(flip(a)), flip(a), flip(b), wall(flip(b))], &steel);
-    mesh.block(vec3(-0.12, 0.3, 0.0), vec3(0.12, 1.0, 0.26), &steel);
+    mesh.board(0.12, [0.3, 1.0], [0.0, 0.26], &steel);
     Piece::new(kind("range hood", "objects"), mesh, "grey")
 }

@@ -29,28 +29,20 @@ pub(in super::super) fn chair_of(
 ) -> Piece {
     let mut mesh = Mesh::default();
     let (width, depth, seat) = (0.44, 0.44, 0.45);
+    let half = width / 2.0;
     legs(&mut mesh, vec3(width, seat, depth), 0.03, 0.04, surface);
-    mesh.soft(
-        vec3(-width / 2.0, seat - 0.03, 0.0),
-        vec3(width / 2.0, seat + 0.025, depth),
+    mesh.cushion(
+        half,
+        [seat - 0.03, seat + 0.025],
+        [0.0, depth],
         0.02,
         surface,
     );
     let top = 0.94;
-    for x in [-1.0, 1.0] {
-        mesh.slab(
-            vec3(x * (width / 2.0 - 0.03), seat, 0.03),
-            vec3(0.04, top - seat, 0.04),
-            surface,
-        );
-    }
+    let post = vec3(0.04, top - seat, 0.04);
+    mesh.slabs(vec3(half - 0.03, seat, 0.03), post, surface);
     if style == 0 {
-        mesh.soft(
-            vec3(-width / 2.0, top - 0.12, 0.01),
-            vec3(width / 2.0, top, 0.05),
-            0.015,
-            surface,
-        );
+        mesh.cushion(half, [top - 0.12, top], [0.01, 0.05], 0.015, surface);
         for i in -2..=2 {
             let x = i as f32 * 0.075;
             mesh.slab(
@@ -60,12 +52,7 @@ pub(in super::super) fn chair_of(
             );
         }
     } else {
-        mesh.soft(
-            vec3(-width / 2.0, seat + 0.1, 0.01),
-            vec3(width / 2.0, top, 0.055),
-            0.02,
-            surface,
-        );
+        mesh.cushion(half, [seat + 0.1, top], [0.01, 0.055], 0.02, surface);
     }
     Piece::new(name, mesh, paint.name)
 }
@@ -85,18 +72,8 @@ pub(in super::super) fn office_chair(dice: &mut Dice) -> Piece {
         mesh.ball(vec3(end.x, 0.03, end.z), Vec3::splat(0.03), &frame);
     }
     mesh.rod(vec3(0.0, 0.08, 0.3), vec3(0.0, 0.44, 0.3), 0.03, &frame);
-    mesh.soft(
-        vec3(-0.25, 0.43, 0.05),
-        vec3(0.25, 0.53, 0.54),
-        0.045,
-        &cloth,
-    );
-    mesh.soft(
-        vec3(-0.23, 0.6, -0.01),
-        vec3(0.23, 1.12, 0.08),
-        0.04,
-        &cloth,
-    );
+    mesh.cushion(0.25, [0.43, 0.53], [0.05, 0.54], 0.045, &cloth);
+    mesh.cushion(0.23, [0.6, 1.12], [-0.01, 0.08], 0.04, &cloth);
     mesh.slab(vec3(0.0, 0.46, 0.03), vec3(0.08, 0.3, 0.04), &frame);
     for x in [-0.28, 0.28] {
         mesh.slab(vec3(x, 0.5, 0.28), vec3(0.03, 0.2, 0.04), &frame);
@@ -182,23 +159,14 @@ fn upholstered(name: Kind, seats: usize, paint: Paint, dice: &mut Dice) -> Piece
     let seat = dice.between(0.6, 0.68);
     let arm = dice.between(0.14, 0.2);
     let width = seats as f32 * seat + 2.0 * arm;
+    let half = width / 2.0;
     let (depth, back) = (0.9, dice.between(0.8, 0.9));
     let mut mesh = Mesh::default();
     legs(&mut mesh, vec3(width, 0.12, depth), 0.07, 0.05, &foot);
-    mesh.soft(
-        vec3(-width / 2.0, 0.1, 0.02),
-        vec3(width / 2.0, 0.34, depth),
-        0.04,
-        &cloth,
-    );
-    mesh.soft(
-        vec3(-width / 2.0, 0.12, 0.0),
-        vec3(width / 2.0, back, 0.2),
-        0.06,
-        &cloth,
-    );
+    mesh.cushion(half, [0.1, 0.34], [0.02, depth], 0.04, &cloth);
+    mesh.cushion(half, [0.12, back], [0.0, 0.2], 0.06, &cloth);
     for x in [-1.0, 1.0_f32] {
-        let (a, b) = (x * width / 2.0, x * (width / 2.0 - arm));
+        let (a, b) = (x * half, x * (half - arm));
         mesh.soft(
             vec3(a.min(b), 0.1, 0.0),
             vec3(a.max(b), 0.62, depth + 0.01),
@@ -207,7 +175,7 @@ fn upholstered(name: Kind, seats: usize, paint: Paint, dice: &mut Dice) -> Piece
         );
     }
     for i in 0..seats {
-        let left = -width / 2.0 + arm + i as f32 * seat;
+        let left = -half + arm + i as f32 * seat;
         mesh.soft(
             vec3(left + 0.004, 0.32, 0.16),
             vec3(left + seat - 0.004, 0.46, depth + 0.03),

@@ -28,24 +28,22 @@ pub(in super::super) fn chest(
     [rows, columns]: [usize; 2],
     dice: &mut Dice,
 ) -> Piece {
+    let half = size.x / 2.0;
     let paint = Paint::of(&COLORS, dice);
     let surface = finish(paint);
     let knob = Surface::steel();
     let mut mesh = Mesh::default();
-    mesh.block(
-        vec3(-size.x / 2.0, 0.06, 0.0),
-        vec3(size.x / 2.0, size.y - 0.03, size.z - 0.02),
-        &surface,
-    );
-    mesh.block(
-        vec3(-size.x / 2.0 - 0.01, size.y - 0.03, 0.0),
-        vec3(size.x / 2.0 + 0.01, size.y, size.z),
+    mesh.board(half, [0.06, size.y - 0.03], [0.0, size.z - 0.02], &surface);
+    mesh.board(
+        half + 0.01,
+        [size.y - 0.03, size.y],
+        [0.0, size.z],
         &surface,
     );
     for x in [-1.0, 1.0] {
         for z in [0.04, size.z - 0.07] {
             mesh.slab(
-                vec3(x * (size.x / 2.0 - 0.04), 0.0, z),
+                vec3(x * (half - 0.04), 0.0, z),
                 vec3(0.05, 0.07, 0.05),
                 &surface,
             );
@@ -55,7 +53,7 @@ pub(in super::super) fn chest(
     for row in 0..rows {
         for column in 0..columns {
             let low = vec3(
-                -size.x / 2.0 + column as f32 * width + 0.012,
+                -half + column as f32 * width + 0.012,
                 0.07 + row as f32 * height + 0.008,
                 size.z - 0.02,
             );
@@ -82,6 +80,7 @@ pub(in super::super) fn cabinet(name: Kind, size: Vec3, doors: usize, dice: &mut
 
 /// A cabinet in a paint.
 pub(in super::super) fn cabinet_of(name: Kind, size: Vec3, doors: usize, paint: Paint) -> Piece {
+    let half = size.x / 2.0;
     let surface = if paint.name == "brown" {
         Surface::wood(paint, 1)
     } else {
@@ -93,19 +92,11 @@ pub(in super::super) fn cabinet_of(name: Kind, size: Vec3, doors: usize, paint: 
         ..surface.clone()
     };
     let mut mesh = Mesh::default();
-    mesh.block(
-        vec3(-size.x / 2.0 + 0.02, 0.0, 0.0),
-        vec3(size.x / 2.0 - 0.02, 0.08, size.z - 0.06),
-        &shade,
-    );
-    mesh.block(
-        vec3(-size.x / 2.0, 0.07, 0.0),
-        vec3(size.x / 2.0, size.y, size.z - 0.02),
-        &surface,
-    );
+    mesh.board(half - 0.02, [0.0, 0.08], [0.0, size.z - 0.06], &shade);
+    mesh.board(half, [0.07, size.y], [0.0, size.z - 0.02], &surface);
     let width = size.x / doors as f32;
     for door in 0..doors {
-        let left = -size.x / 2.0 + door as f32 * width + 0.006;
+        let left = -half + door as f32 * width + 0.006;
         let (right, low, high) = (left + width - 0.012, 0.085, size.y - 0.01);
         mesh.block(
             vec3(left, low, size.z - 0.02),
@@ -155,32 +146,20 @@ pub(in super::super) fn bookshelf(dice: &mut Dice) -> Piece {
     let paint = Paint::of(&["brown", "white", "black"], dice);
     let surface = Surface::wood(paint, 1);
     let (width, height, depth) = (dice.between(0.8, 1.2), dice.between(1.6, 2.0), 0.3);
+    let half = width / 2.0;
     let shelves = 5;
     let mut mesh = Mesh::default();
-    for x in [-1.0, 1.0] {
-        mesh.slab(
-            vec3(x * (width / 2.0 - 0.015), 0.0, depth / 2.0),
-            vec3(0.03, height, depth),
-            &surface,
-        );
-    }
-    mesh.block(
-        vec3(-width / 2.0, 0.0, 0.0),
-        vec3(width / 2.0, height, 0.015),
-        &surface,
-    );
+    let side = vec3(0.03, height, depth);
+    mesh.slabs(vec3(half - 0.015, 0.0, depth / 2.0), side, &surface);
+    mesh.board(half, [0.0, height], [0.0, 0.015], &surface);
     let rise = (height - 0.06) / shelves as f32;
     for shelf in 0..=shelves {
         let y = 0.04 + shelf as f32 * rise;
-        mesh.block(
-            vec3(-width / 2.0, y - 0.02, 0.0),
-            vec3(width / 2.0, y + 0.005, depth),
-            &surface,
-        );
+        mesh.board(half, [y - 0.02, y + 0.005], [0.0, depth], &surface);
         if shelf < shelves {
             books(
                 &mut mesh,
-                [-width / 2.0 + 0.03, width / 2.0 - 0.03],
+                [-half + 0.03, half - 0.03],
                 y + 0.005,
                 rise,
                 dice,
@@ -228,29 +207,17 @@ pub(in super::super) fn wall_shelf(dice: &mut Dice) -> Piece {
     );
     let surface = finish(paint);
     let width = dice.between(0.9, 1.3);
+    let half = width / 2.0;
     let mut mesh = Mesh::default();
     for y in [0.0, 0.34] {
-        mesh.block(
-            vec3(-width / 2.0, y - 0.03, 0.0),
-            vec3(width / 2.0, y, 0.24),
-            &surface,
-        );
+        mesh.board(half, [y - 0.03, y], [0.0, 0.24], &surface);
     }
-    for x in [-1.0, 1.0] {
-        mesh.slab(
-            vec3(x * (width / 2.0 - 0.012), -0.03, 0.12),
-            vec3(0.024, 0.37, 0.24),
-            &surface,
-        );
-    }
-    mesh.block(
-        vec3(-width / 2.0, -0.03, 0.0),
-        vec3(width / 2.0, 0.34, 0.012),
-        &surface,
-    );
+    let side = vec3(0.024, 0.37, 0.24);
+    mesh.slabs(vec3(half - 0.012, -0.03, 0.12), side, &surface);
+    mesh.board(half, [-0.03, 0.34], [0.0, 0.012], &surface);
     books(
         &mut mesh,
-        [-width / 2.0 + 0.04, -width / 2.0 + 0.04 + width * 0.3],
+        [-half + 0.04, -half + 0.04 + width * 0.3],
         0.0,
         0.3,
         dice,

@@ -27,14 +27,16 @@ pub(in super::super) fn table(name: Kind, size: Vec3, dice: &mut Dice) -> Piece 
     let surface = finish(paint);
     let mut mesh = Mesh::default();
     legs(&mut mesh, size - vec3(0.0, 0.03, 0.0), 0.06, 0.06, &surface);
-    mesh.block(
-        vec3(-size.x / 2.0 + 0.05, size.y - 0.11, 0.05),
-        vec3(size.x / 2.0 - 0.05, size.y - 0.03, size.z - 0.05),
+    mesh.board(
+        size.x / 2.0 - 0.05,
+        [size.y - 0.11, size.y - 0.03],
+        [0.05, size.z - 0.05],
         &surface,
     );
-    mesh.soft(
-        vec3(-size.x / 2.0, size.y - 0.035, 0.0),
-        vec3(size.x / 2.0, size.y, size.z),
+    mesh.cushion(
+        size.x / 2.0,
+        [size.y - 0.035, size.y],
+        [0.0, size.z],
         0.012,
         &surface,
     );
@@ -69,19 +71,15 @@ pub(in super::super) fn desk(dice: &mut Dice) -> Piece {
     let surface = finish(paint);
     let knob = Surface::steel();
     let (width, height, depth) = (dice.between(1.25, 1.55), 0.75, 0.68);
+    let half = width / 2.0;
     let mut mesh = Mesh::default();
-    mesh.soft(
-        vec3(-width / 2.0, height - 0.04, 0.0),
-        vec3(width / 2.0, height, depth),
-        0.01,
-        &surface,
-    );
+    mesh.cushion(half, [height - 0.04, height], [0.0, depth], 0.01, &surface);
     mesh.block(
-        vec3(-width / 2.0 + 0.02, 0.0, 0.02),
-        vec3(-width / 2.0 + 0.05, height - 0.03, depth - 0.03),
+        vec3(-half + 0.02, 0.0, 0.02),
+        vec3(-half + 0.05, height - 0.03, depth - 0.03),
         &surface,
     );
-    let (left, right) = (width / 2.0 - 0.44, width / 2.0 - 0.02);
+    let (left, right) = (half - 0.44, half - 0.02);
     mesh.block(
         vec3(left, 0.04, 0.02),
         vec3(right, height - 0.03, depth - 0.04),
@@ -103,7 +101,7 @@ pub(in super::super) fn desk(dice: &mut Dice) -> Piece {
         );
     }
     mesh.block(
-        vec3(-width / 2.0 + 0.05, 0.35, 0.03),
+        vec3(-half + 0.05, 0.35, 0.03),
         vec3(left, height - 0.04, 0.05),
         &surface,
     );

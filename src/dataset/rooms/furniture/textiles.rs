@@ -51,7 +51,7 @@ pub(in super::super) fn towel(dice: &mut Dice) -> Piece {
         );
     }
     let (a, b) = (width / 2.0, 0.0);
-    mesh.block(vec3(-a, b, 0.045), vec3(a, b + 0.022, 0.095), &cloth);
+    mesh.board(a, [b, b + 0.022], [0.045, 0.095], &cloth);
     let steel = Surface::steel();
     let reach = width / 2.0 + 0.06;
     mesh.rod(
@@ -79,9 +79,10 @@ pub(in super::super) fn rug(width: f32, depth: f32, dice: &mut Dice) -> Piece {
     let border = Surface::plain(dice.pick(&borders)).color;
     let surface = Surface::plain(dice.pick(&tints)).with(Pattern::Rug(vec2(width, depth), border));
     let mut mesh = Mesh::default();
-    mesh.block(
-        vec3(-width / 2.0, 0.0, -depth / 2.0),
-        vec3(width / 2.0, 0.012, depth / 2.0),
+    mesh.board(
+        width / 2.0,
+        [0.0, 0.012],
+        [-depth / 2.0, depth / 2.0],
         &surface,
     );
     Piece::new(kind("rug", "floor"), mesh, "")

@@ -78,14 +78,11 @@ fn panel(name: super::super::scene::Kind, width: f32, foot: bool) -> Piece {
     let mut mesh = Mesh::default();
     let lift = if foot { 0.09 } else { 0.0 };
     let z = if foot { 0.1 } else { 0.0 };
-    mesh.block(
-        vec3(-width / 2.0, lift, z),
-        vec3(width / 2.0, lift + height, z + 0.035),
-        &case,
-    );
-    mesh.block(
-        vec3(-width / 2.0 + 0.015, lift + 0.02, z + 0.035),
-        vec3(width / 2.0 - 0.015, lift + height - 0.015, z + 0.037),
+    mesh.board(width / 2.0, [lift, lift + height], [z, z + 0.035], &case);
+    mesh.board(
+        width / 2.0 - 0.015,
+        [lift + 0.02, lift + height - 0.015],
+        [z + 0.035, z + 0.037],
         &screen,
     );
     if foot {
@@ -97,6 +94,7 @@ fn panel(name: super::super::scene::Kind, width: f32, foot: bool) -> Piece {
 
 /// A window of a size whose sill is at y = 0, with the daylight that comes in.
 pub(in super::super) fn window(width: f32, height: f32, daylight: f32) -> Piece {
+    let half = width / 2.0;
     let white = Surface::plain([240, 240, 238]);
     let view = Surface {
         color: Vec3::ONE,
@@ -106,20 +104,17 @@ pub(in super::super) fn window(width: f32, height: f32, daylight: f32) -> Piece 
     let mut mesh = Mesh::default();
     sheet(&mut mesh, width, height, 0.012, &view);
     frame(&mut mesh, width, height, 0.06, 0.05, &white);
-    mesh.block(vec3(-0.02, 0.0, 0.0), vec3(0.02, height, 0.04), &white);
-    mesh.block(
-        vec3(-width / 2.0, height * 0.55, 0.0),
-        vec3(width / 2.0, height * 0.55 + 0.03, 0.035),
+    mesh.board(0.02, [0.0, height], [0.0, 0.04], &white);
+    mesh.board(
+        half,
+        [height * 0.55, height * 0.55 + 0.03],
+        [0.0, 0.035],
         &white,
     );
-    mesh.block(
-        vec3(-width / 2.0 - 0.1, -0.08, 0.0),
-        vec3(width / 2.0 + 0.1, -0.05, 0.14),
-        &white,
-    );
+    mesh.board(half + 0.1, [-0.08, -0.05], [0.0, 0.14], &white);
     let mut piece = Piece::new(kind("window", "window"), mesh, "");
     piece.light = Some(Light::Panel {
-        corner: vec3(-width / 2.0, 0.0, 0.06),
+        corner: vec3(-half, 0.0, 0.06),
         edges: [vec3(width, 0.0, 0.0), vec3(0.0, height, 0.0)],
         normal: Vec3::Z,
         radiance: vec3(0.97, 1.0, 1.04) * daylight,
@@ -129,23 +124,20 @@ pub(in super::super) fn window(width: f32, height: f32, daylight: f32) -> Piece 
 
 /// Blinds before a window of a size whose sill is at y = 0, let down by a share.
 pub(in super::super) fn blinds(width: f32, height: f32, share: f32, dice: &mut Dice) -> Piece {
+    let half = width / 2.0;
     let paint = Paint::of(&["white", "white", "grey", "brown", "green", "blue"], dice);
     let slat = Surface::paint(paint);
     let mut mesh = Mesh::default();
-    mesh.block(
-        vec3(-width / 2.0, height - 0.02, 0.07),
-        vec3(width / 2.0, height + 0.04, 0.11),
-        &slat,
-    );
+    mesh.board(half, [height - 0.02, height + 0.04], [0.07, 0.11], &slat);
     let count = (height * share / 0.05) as usize;
     for i in 0..count {
         let y = height - 0.03 - i as f32 * 0.05;
         mesh.quad(
             [
-                vec3(-width / 2.0, y - 0.02, 0.102),
-                vec3(width / 2.0, y - 0.02, 0.102),
-                vec3(width / 2.0, y + 0.02, 0.082),
-                vec3(-width / 2.0, y + 0.02, 0.082),
+                vec3(-half, y - 0.02, 0.102),
+                vec3(half, y - 0.02, 0.102),
+                vec3(half, y + 0.02, 0.082),
+                vec3(-half, y + 0.02, 0.082),
             ],
             &slat,
         );
@@ -160,11 +152,8 @@ pub(in super::super) fn door(dice: &mut Dice) -> Piece {
     let rail = Surface::plain([238, 237, 233]);
     let mut mesh = Mesh::default();
     let (width, height) = (0.86, 2.02);
-    mesh.block(
-        vec3(-width / 2.0, 0.0, 0.0),
-        vec3(width / 2.0, height, 0.025),
-        &leaf,
-    );
+    let half = width / 2.0;
+    mesh.board(half, [0.0, height], [0.0, 0.025], &leaf);
     for (low, high) in [(0.18, 0.85), (1.0, 1.86)] {
         for x in [-0.2, 0.2] {
             mesh.block(
@@ -174,19 +163,15 @@ pub(in super::super) fn door(dice: &mut Dice) -> Piece {
             );
         }
     }
-    for x in [-1.0, 1.0] {
-        mesh.slab(
-            vec3(x * (width / 2.0 + 0.03), 0.0, 0.02),
-            vec3(0.07, height, 0.05),
-            &rail,
-        );
-    }
-    mesh.block(
-        vec3(-width / 2.0 - 0.065, height, -0.005),
-        vec3(width / 2.0 + 0.065, height + 0.07, 0.045),
+    let side = vec3(0.07, height, 0.05);
+    mesh.slabs(vec3(half + 0.03, 0.0, 0.02), side, &rail);
+    mesh.board(
+        half + 0.065,
+        [height, height + 0.07],
+        [-0.005, 0.045],
         &rail,
     );
-    let knob = vec3(width / 2.0 - 0.08, 1.0, 0.06);
+    let knob = vec3(half - 0.08, 1.0, 0.06);
     mesh.ball(knob, vec3(0.028, 0.028, 0.02), &Surface::steel());
     mesh.rod(knob - vec3(0.0, 0.0, 0.05), knob, 0.01, &Surface::steel());
     Piece::new(kind("door", "door"), mesh, "")
@@ -210,24 +195,18 @@ pub(in super::super) fn fireplace(dice: &mut Dice) -> Piece {
             &stone,
         );
     }
-    mesh.block(
-        vec3(-open / 2.0, tall, 0.0),
-        vec3(open / 2.0, height, depth),
-        &stone,
-    );
-    mesh.block(
-        vec3(-width / 2.0 - 0.08, height, 0.0),
-        vec3(width / 2.0 + 0.08, height + 0.06, depth + 0.07),
+    mesh.board(open / 2.0, [tall, height], [0.0, depth], &stone);
+    mesh.board(
+        width / 2.0 + 0.08,
+        [height, height + 0.06],
+        [0.0, depth + 0.07],
         &shelf,
     );
-    mesh.block(
-        vec3(-open / 2.0, 0.0, 0.0),
-        vec3(open / 2.0, tall, 0.03),
-        &soot,
-    );
-    mesh.block(
-        vec3(-open / 2.0, 0.0, 0.0),
-        vec3(open / 2.0, 0.02, depth + 0.2),
+    mesh.board(open / 2.0, [0.0, tall], [0.0, 0.03], &soot);
+    mesh.board(
+        open / 2.0,
+        [0.0, 0.02],
+        [0.0, depth + 0.2],
         &Surface::plain([88, 84, 80]),
     );
     for i in 0..4 {

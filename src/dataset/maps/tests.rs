@@ -1,0 +1,176 @@
+use ndarray::array;
+use png::{BitDepth, ColorType};
+use proptest::prelude::*;
+
+use super::super::npy::tests::array as npy_file;
+use super::super::raw_png::tests::png as png_file;
+use super::*;
+
+fn deep(size: (u32, u32), values: &[u16]) -> Vec<u8> {
+    let data: Vec<u8> = values.iter().flat_map(|v| v.to_be_bytes()).collect();
+    png_file(size, ColorType::Grayscale, BitDepth::Sixteen, &data)
+}
+
+fn written(name: &str, bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    fs::write(&path, bytes).unwrap();
+    (folder, path)
+}
+
+fn depth(name: &str, bytes: &[u8], scale: Option<f64>, size: Size) -> Result<Array2<u32>> {
+    let (_folder, path) = written(name, bytes);
+    let maps = Maps {
+        depth: Some(DepthFile::new(path, scale).unwrap()),
+        ..Maps::default()
+    };
+    maps.read()?.depth(size).map(Option::unwrap)
+}
+
+fn semantic(path: &Path, size: Size) -> Result<Array2<u16>> {
+    let maps = Maps {
+        semantic: Some(path.to_owned()),
+        ..Maps::default()
+    };
+    maps.read()?.semantic(size).map(Option::unwrap)
+}
+
+fn segments(path: &Path, size: Size) -> Result<Array2<u32>> {
+    let maps = Maps {
+        segments: Some(path.to_owned()),
+        ..Maps::default()
+    };
+    maps.read()?.segments(size).map(Option::unwrap)
+}
+
+#[test]
+fn depth_is_rounded_half_to_even_and_0_where_there_is_none() {
+    let png = deep((2, 3), &[0, 1, 3, 5, 7, 65_535]);
+    let read = depth("d.png", &png, Some(0.0005), (2, 3)).unwrap();
+    assert_eq!(read, array![[0, 0, 2], [2, 4, 32_768]]);
+    let metres = [
+        0.0005,
+        0.0015,
+        0.0025,
+        1.2344,
+        1000.0,
+        0.0,
+        -0.0,
+        -3.0,
+        f64::NAN,
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+        5e-324,
+    ];
+    let npy = npy_file("<f8", "(3, 4)", &metres.map(f64::to_le_bytes).concat());
+    let read = depth("d.NPY", &npy, None, (3, 4)).unwrap();
+    assert_eq!(
+        read,
+        array![[0, 2, 2, 1234], [1_000_000, 0, 0, 0], [0, 0, 0, 0]]
+    );
+    let npy = npy_file(
+        "<f4",
+        "(1, 2)",
+        &[2.5_f32, f32::NAN].map(f32::to_le_bytes).concat(),
+    );
+    let read = depth("d.npy", &npy, Some(1.0), (1, 2)).unwrap();
+    assert_eq!(read, array![[2500, 0]]);
+}
+
+#[test]
+fn depth_no_room_has_is_refused() {
+    let error = depth("d.png", &deep((1, 1), &[2500]), Some(1.0), (1, 1)).unwrap_err();
+    let error = error.to_string();
+    assert!(error.contains("d.png: a depth of 2500 m"), "{error}");
+    for metres in [1000.001, 5e6, f64::MAX] {
+        let npy = npy_file("<f8", "(1, 1)", &f64::to_le_bytes(metres));
+        assert!(depth("d.npy", &npy, None, (1, 1)).is_err(), "{metres}");
+    }
+}
+
+#[test]
+fn a_scale_must_be_one() {
+    for (name, scale) in [
+        ("d.png", None),
+        ("d.png", Some(0.0)),
+        ("d.png", Some(-0.001)),
+        ("d.png", Some(f64::NAN)),
+        ("d.png", Some(f64::INFINITY)),
+        ("d.npy", Some(0.001)),
+    ] {
+        let problem = DepthFile::new(name.into(), scale).unwrap_err();
+        assert!(problem.starts_with("depth_scale is "), "{problem}");
+    }
+}
+
+#[test]
+fn classes_are_read_in_every_form() {
+    let size = (1, 2);
+    let shallow = |color| png_file(size, color, BitDepth::Eight, &[7, 255]);
+    for (bytes, expected) in [
+        (shallow(ColorType::Grayscale), array![[7, 255]]),
+        (shallow(ColorType::Indexed), array![[7, 255]]),
+        (deep(size, &[7, 40_000]), array![[7, 40_000]]),
+    ] {
+        let (_folder, path) = written("s.png", &bytes);
+        assert_eq!(semantic(&path, (1, 2)).unwrap(), expected);
+    }
+    let colour = png_file((1, 1), ColorType::Rgb, BitDepth::Eight, &[1, 2, 3]);
+    let (_folder, path) = written("s.png", &colour);
+    let error = semantic(&path, (1, 1)).unwrap_err().to_string();
+    assert!(error.contains("s.png: an RGB PNG of 8 bits"), "{error}");
+}
+
+#[test]
+fn segments_are_read_in_every_form() {
+    let (_folder, path) = written("o.png", &deep((1, 2), &[0, 65_535]));
+    assert_eq!(segments(&path, (1, 2)).unwrap(), array![[0, 65_535]]);
+    let ids = [0_i64, 4_294_967_295].map(i64::to_le_bytes).concat();
+    let (_folder, path) = written("o.npy", &npy_file("<i8", "(2, 1)", &ids));
+    assert_eq!(segments(&path, (2, 1)).unwrap(), array![[0], [u32::MAX]]);
+    for id in [-1_i64, 4_294_967_296] {
+        let (_folder, path) = written("o.npy", &npy_file("<i8", "(1, 1)", &id.to_le_bytes()));
+        let error = segments(&path, (1, 1)).unwrap_err().to_string();
+        assert!(error.contains(&format!("o.npy: {id} is no id")), "{error}");
+    }
+}
+
+#[test]
+fn a_map_of_another_size_is_named_with_both_sizes() {
+    let says = "1 × 2 pixels (height × width), but its image has 2 × 1";
+    let (_folder, png) = written("m.png", &deep((1, 2), &[1, 2]));
+    let (_folder, npy) = written("m.npy", &npy_file("|u1", "(1, 2)", &[1, 2]));
+    let units = deep((1, 2), &[1, 2]);
+    for error in [
+        depth("m.png", &units, Some(0.001), (2, 1)).unwrap_err(),
+        semantic(&png, (2, 1)).unwrap_err(),
+        segments(&png, (2, 1)).unwrap_err(),
+        segments(&npy, (2, 1)).unwrap_err(),
+    ] {
+        let error = error.to_string();
+        assert!(error.contains(says) && error.contains("m."), "{error}");
+    }
+}
+
+#[test]
+fn a_cut_map_is_named() {
+    let mut noise = 1_u32;
+    let values: Vec<u16> = std::iter::repeat_with(|| {
+        noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (noise >> 16) as u16
+    })
+    .take(32 * 32)
+    .collect();
+    let bytes = deep((32, 32), &values);
+    let (_folder, path) = written("o.png", &bytes[..bytes.len() / 2]);
+    let error = segments(&path, (32, 32)).unwrap_err().to_string();
+    assert!(error.contains("o.png: not a whole PNG"), "{error}");
+}
+
+proptest! {
+    #[test]
+    fn millimetres_are_the_nearest(depth in -10.0..MOST_DEPTH) {
+        let rounded = f64::from(millimetres(depth, 1.0).unwrap());
+        prop_assert!((rounded - depth.max(0.0)).abs() <= 0.5);
+    }
+}

@@ -1,0 +1,83 @@
+//! Types that are written as words or as text, and read back: [`words`], [`as_text`].
+
+use std::fmt;
+use std::marker::PhantomData;
+use std::str::FromStr;
+
+use serde::de::{Error, Visitor};
+
+/// Gives the values of an enum their words: `Display` writes them and, where a flag is named, `FromStr` reads them.
+macro_rules! words {
+    ($type:ident { $($value:ident = $word:literal),+ $(,)? }) => {
+        impl std::fmt::Display for $type {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.pad(match self { $(Self::$value => $word),+ })
+            }
+        }
+    };
+    ($type:ident by $flag:literal { $($value:ident = $word:literal),+ $(,)? }) => {
+        crate::types::words::words!($type { $($value = $word),+ });
+
+        impl std::str::FromStr for $type {
+            type Err = crate::error::Error;
+
+            fn from_str(text: &str) -> std::result::Result<Self, Self::Err> {
+                match text {
+                    $($word => Ok(Self::$value),)+
+                    _ => {
+                        let words = [$($word),+].join(", ");
+                        Err(crate::error::Error::usage($flag, format_args!("{text:?} is none of {words}")))
+                    }
+                }
+            }
+        }
+    };
+}
+pub(crate) use words;
+
+/// Has types written in files as their `Display` writes them.
+macro_rules! written_as_text {
+    ($($type:ty),+) => {
+        $(impl serde::Serialize for $type {
+            fn serialize<S: serde::Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+                serializer.collect_str(self)
+            }
+        })+
+    };
+}
+pub(crate) use written_as_text;
+
+/// Has types written in files as their `Display` writes them, and read as their `FromStr` reads them.
+macro_rules! as_text {
+    ($($type:ty),+) => {
+        crate::types::words::written_as_text!($($type),+);
+
+        $(impl<'de> serde::Deserialize<'de> for $type {
+            fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
+                deserializer.deserialize_str(crate::types::words::Text::new())
+            }
+        })+
+    };
+}
+pub(crate) use as_text;
+
+/// Reads a text as a type does.
+pub(crate) struct Text<T>(PhantomData<T>);
+
+impl<T> Text<T> {
+    pub(crate) fn new() -> Self {
+        Self(PhantomData)
+    }
+}
+
+impl<T: FromStr<Err: fmt::Display>> Visitor<'_> for Text<T> {
+    type Value = T;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a string")
+    }
+
+    fn visit_str<E: Error>(self, text: &str) -> Result<T, E> {
+        text.parse().map_err(E::custom)
+    }
+}
