@@ -8,6 +8,7 @@ use plotters::coord::Shift;
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
+use serde::Serialize;
 
 use crate::error::{Error, Result};
 use crate::score::estimate::Estimate;
@@ -41,6 +42,25 @@ const PANEL: (i32, i32) = (400, 300);
 const MARGIN: [i32; 4] = [52, 34, 14, 58];
 /// The height of a line of words.
 const ROW: i32 = 20;
+
+/// One figure of a report.
+#[derive(Debug, Clone, Serialize)]
+pub struct Figure {
+    /// Its name in files.
+    pub name: &'static str,
+    /// What it shows.
+    pub caption: String,
+    /// The drawing.
+    pub svg: String,
+}
+
+/// Figures as files.
+pub(super) fn files(figures: Vec<Figure>) -> impl Iterator<Item = (String, Vec<u8>)> {
+    figures.into_iter().map(|figure| {
+        let name = format!("figures/{}.svg", figure.name);
+        (name, figure.svg.into_bytes())
+    })
+}
 
 /// How a line looks: the same number is the same look in every figure of a report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -6,6 +6,12 @@ use serde::Serialize;
 
 use crate::error::{Error, Result};
 
+/// What several pages include.
+const PARTS: [(&str, &str); 2] = [
+    ("figures", include_str!("page/figures.html")),
+    ("tables", include_str!("page/tables.html")),
+];
+
 /// A template with its values; each is escaped as HTML.
 ///
 /// # Errors
@@ -17,6 +23,11 @@ pub(super) fn filled(template: &str, values: impl Serialize) -> Result<String> {
     environment
         .add_template("page", template)
         .map_err(|e| failed(&e))?;
+    for (name, part) in PARTS {
+        environment
+            .add_template(name, part)
+            .map_err(|e| failed(&e))?;
+    }
     let template = environment.get_template("page").map_err(|e| failed(&e))?;
     template.render(Serde(values)).map_err(|e| failed(&e))
 }

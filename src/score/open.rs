@@ -130,6 +130,14 @@ pub struct OpenCell {
     pub score: Option<Estimate>,
 }
 
+impl OpenCell {
+    /// How many answers are scored.
+    #[must_use]
+    pub fn scored(&self) -> usize {
+        self.score.map_or(0, |score| score.n)
+    }
+}
+
 /// What a score is held against.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Against {

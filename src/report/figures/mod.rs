@@ -5,25 +5,14 @@ mod thresholds;
 
 use std::collections::BTreeSet;
 
-use super::chart::{Chart, Line, Look, Panel, Shape};
-use super::subject::{family as family_name, light};
+use super::chart::{Chart, Figure, Line, Look, Panel, Shape};
+use super::words::{family as family_name, light};
 use crate::error::Result;
 use crate::score::choice::Mode;
 use crate::score::estimate::Estimate;
 use crate::score::findings::Findings;
 use crate::score::subject::{CHANCE, Subject};
 use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
-
-/// One figure of a report.
-#[derive(Debug, Clone)]
-pub struct Figure {
-    /// Its name in files.
-    pub name: &'static str,
-    /// What it shows.
-    pub caption: String,
-    /// The drawing.
-    pub svg: String,
-}
 
 /// All figures that the records have something for.
 ///

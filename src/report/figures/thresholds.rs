@@ -3,9 +3,8 @@
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
-use super::super::chart::{Area, GRID, Look, PAPER, path, words};
-use super::super::subject::{light, stops};
-use super::Figure;
+use super::super::chart::{Area, Figure, GRID, Look, PAPER, path, words};
+use super::super::words::{light, stops};
 use crate::error::{Error, Result};
 use crate::score::curve::{Curve, Threshold};
 use crate::score::findings::Findings;

@@ -4,14 +4,16 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
-use super::rows::Rows;
-use super::{OpenReport, Told, coverage};
+use super::coverage::coverage;
+use super::open_report::{OpenReport, Told};
+use super::tables::SECTION;
 use crate::error::Result;
-use crate::report::figures::Figure;
-use crate::report::page::{STYLE, manifest_facts};
+use crate::report::chart::Figure;
+use crate::report::page::{STYLE, manifest_facts, tables};
 use crate::report::readable::readable;
+use crate::report::table::Table;
 use crate::report::template::filled;
-use crate::score::open::{Group, Outcome};
+use crate::score::open::Outcome;
 use crate::score::subject::Subject;
 use crate::types::{AxisLevel, View};
 
@@ -19,29 +21,16 @@ use crate::types::{AxisLevel, View};
 const PAGE: &str = include_str!("page.html");
 
 #[derive(Serialize)]
-struct Page {
+struct Page<'a> {
     title: String,
     alerts: Vec<String>,
     intro: Vec<String>,
-    figures: Vec<Drawing>,
-    tables: Vec<Table>,
+    figures: &'a [Figure],
+    tables: Vec<tables::Shown<'a>>,
     categories: BTreeSet<String>,
     walks: Vec<Walk>,
     facts: Vec<(String, String)>,
     css: &'static str,
-}
-
-#[derive(Serialize)]
-struct Drawing {
-    svg: String,
-    caption: String,
-}
-
-#[derive(Serialize)]
-struct Table {
-    caption: String,
-    head: Vec<String>,
-    rows: Vec<Vec<String>>,
 }
 
 #[derive(Serialize)]
@@ -83,11 +72,11 @@ struct Row {
 ///
 /// # Errors
 /// Where the template cannot be filled.
-pub(super) fn page(report: &OpenReport<'_>, figures: &[Figure]) -> Result<String> {
-    let drawings = figures.iter().map(|figure| Drawing {
-        svg: figure.svg.clone(),
-        caption: figure.caption.clone(),
-    });
+pub(super) fn page(
+    report: &OpenReport<'_>,
+    tables: &[Table],
+    figures: &[Figure],
+) -> Result<String> {
     let asked = report.questions.iter();
     filled(
         PAGE,
@@ -95,8 +84,8 @@ pub(super) fn page(report: &OpenReport<'_>, figures: &[Figure]) -> Result<String
             title: format!("OpenEQA in the dark: {}", report.name),
             alerts: alerts(report),
             intro: intro(report),
-            figures: drawings.collect(),
-            tables: tables(report),
+            figures,
+            tables: tables::shown(tables, SECTION),
             categories: asked.map(|question| question.category.to_owned()).collect(),
             walks: walks(report),
             facts: manifest_facts(report.manifest),
@@ -148,52 +137,6 @@ fn intro(report: &OpenReport<'_>) -> Vec<String> {
         ),
         coverage(report).join("; ") + ".",
     ]
-}
-
-/// All scores, and those by split and category.
-fn tables(report: &OpenReport<'_>) -> Vec<Table> {
-    let rows = Rows::new(report.summary);
-    let levels = || rows.levels.iter().map(ToString::to_string);
-    let head = |first: &[&str]| {
-        let own = first.iter().map(ToString::to_string);
-        own.chain(levels()).collect::<Vec<_>>()
-    };
-    let groups = report.summary.groups();
-    let whole = rows.lines.keys().map(|line| {
-        let at = |level: &AxisLevel| rows.shown(rows.cell(line, *level, &Group::All));
-        let own = [line.model.to_owned(), line.light()];
-        own.into_iter().chain(rows.levels.iter().map(at)).collect()
-    });
-    let blind = rows.blind.iter().map(|subject| {
-        let cell = report.summary.cell(subject, &Group::All);
-        vec![
-            subject.model.clone(),
-            "without images".to_owned(),
-            rows.shown(cell),
-        ]
-    });
-    let mut tables = vec![Table {
-        caption: "Score in % ± half of the 95 % interval (difference from L0)".to_owned(),
-        head: head(&["model", "light"]),
-        rows: whole.chain(blind).collect(),
-    }];
-    let parts: Vec<&&Group> = groups
-        .iter()
-        .filter(|group| ***group != Group::All)
-        .collect();
-    for line in rows.lines.keys().filter(|_| !parts.is_empty()) {
-        let by = parts.iter().map(|group| {
-            let at = |level: &AxisLevel| rows.shown(rows.cell(line, *level, group));
-            let name = std::iter::once(group.name().to_owned());
-            name.chain(rows.levels.iter().map(at)).collect()
-        });
-        tables.push(Table {
-            caption: format!("{}, {}", line.model, line.light()),
-            head: head(&["split or category"]),
-            rows: by.collect(),
-        });
-    }
-    tables
 }
 
 fn walks(report: &OpenReport<'_>) -> Vec<Walk> {

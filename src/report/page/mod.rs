@@ -5,54 +5,34 @@
 
 mod items;
 mod sections;
-mod tables;
+mod shown;
+pub(super) mod tables;
+
+pub use shown::{Run, Shown};
 
 use serde::Serialize;
 
-use super::figures::Figure;
+use super::chart::Figure;
+use super::table::Table;
 use super::template::filled;
 use crate::error::Result;
 use crate::score::findings::Findings;
+use crate::types::Record;
 use crate::types::manifest::{RunManifest, Status};
-use crate::types::{Record, RunQuestion, Thumbnail};
 
 /// The parts of the page.
 const PAGE: &str = include_str!("page.html");
 pub(super) const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
 
-/// A run on the page.
-#[derive(Debug, Clone)]
-pub struct Run<'a> {
-    /// What it is called: its folder.
-    pub name: String,
-    /// Its manifest.
-    pub manifest: &'a RunManifest,
-    /// Its records, for what they took.
-    pub records: &'a [Record],
-    /// What they cost, in words, where that is known.
-    pub cost: Option<String>,
-}
-
-/// What is shown besides the findings.
-#[derive(Debug)]
-pub struct Shown<'a> {
-    /// The runs.
-    pub runs: Vec<Run<'a>>,
-    /// The questions, where they are kept.
-    pub questions: &'a [RunQuestion],
-    /// The small copies of images, where they are kept.
-    pub thumbnails: &'a [Thumbnail],
-}
-
 /// What the template is filled with.
 #[derive(Serialize)]
-struct Page {
+struct Page<'a> {
     title: String,
     /// What must be read before any number.
     alerts: Vec<String>,
     intro: Vec<String>,
-    sections: Vec<sections::Section>,
+    sections: Vec<sections::Section<'a>>,
     runs: Vec<Facts>,
     /// The items, packed.
     data: String,
@@ -73,10 +53,11 @@ struct Facts {
 /// Where a figure cannot be drawn.
 pub fn page<'a>(
     findings: &'a Findings<'a>,
+    tables: &[Table],
     figures: &[Figure],
     shown: &Shown<'a>,
 ) -> Result<String> {
-    let sections = sections::sections(findings, figures, shown.thumbnails);
+    let sections = sections::sections(tables, figures, shown.thumbnails);
     filled(
         PAGE,
         Page {

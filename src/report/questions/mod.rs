@@ -5,11 +5,11 @@ pub mod review;
 
 use std::fmt::Write as _;
 
-use comfy_table::CellAlignment;
-
-use super::table::plain;
+use super::table::Kind::{Count, Text};
+use super::table::{Layout, heads};
+use super::{csv as files, terminal};
 use crate::error::{Error, Result};
-use crate::questions::summary::{Baselines, Summary};
+use crate::questions::summary::{Baselines, Candidates, Summary};
 use crate::types::Family;
 
 /// How many reasons a line of the table names.
@@ -18,69 +18,65 @@ const REASONS: usize = 3;
 /// The table at the end: questions by family with what came of their candidates and what not looking would score.
 #[must_use]
 pub fn table(summary: &Summary) -> String {
-    let mut table = plain();
-    table.set_header([
-        "family",
-        "questions",
-        "chance %",
-        "majority %",
-        "prior %",
-        "candidates that hold",
-        "why others do not",
-    ]);
-    let share = |right: f64, of: &Baselines| {
-        if of.questions == 0 {
-            "–".to_owned()
-        } else {
-            format!("{:.1}", 100.0 * right / of.questions as f64)
-        }
+    let families = Family::PAPER.iter().filter_map(|family| {
+        let candidates = summary.candidates.get(family)?;
+        Some((family.name(), Some(candidates)))
+    });
+    let whole = summary.baselines.get(Family::TOTAL);
+    let rows = families.chain(whole.map(|_| (Family::TOTAL, None)));
+    let share = |family: &str, right: fn(&Baselines) -> f64| {
+        let base = summary
+            .baselines
+            .get(family)
+            .filter(|base| base.questions > 0);
+        base.map_or("–".to_owned(), |base| {
+            format!("{:.1}", 100.0 * right(base) / base.questions as f64)
+        })
     };
-    let none = Baselines::default();
-    for family in Family::PAPER {
-        let Some(candidates) = summary.candidates.get(&family) else {
-            continue;
-        };
-        let base = summary.baselines.get(family.name()).unwrap_or(&none);
-        let mut fallen: Vec<(String, u64)> = candidates
-            .fallen
-            .iter()
-            .map(|(reason, count)| (word(reason), *count))
-            .collect();
-        fallen.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
-        let reasons: Vec<String> = fallen
-            .iter()
-            .take(REASONS)
-            .map(|(reason, count)| format!("{reason} {count}"))
-            .collect();
-        table.add_row([
-            family.to_string(),
-            candidates.asked.to_string(),
-            share(base.chance, base),
-            share(base.majority as f64, base),
-            share(base.prior, base),
-            candidates.viable.to_string(),
-            reasons.join(", "),
-        ]);
-    }
-    if let Some(base) = summary.baselines.get(Family::TOTAL) {
-        table.add_row([
-            Family::TOTAL.to_owned(),
-            summary.questions.to_string(),
-            share(base.chance, base),
-            share(base.majority as f64, base),
-            share(base.prior, base),
-            String::new(),
-            String::new(),
-        ]);
-    }
-    for column in 1..6 {
-        if let Some(column) = table.column_mut(column) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
-    let mut text = format!("{table}\n");
+    let table = Layout::new("questions", rows)
+        .column(Text, heads().terminal(&["family"]), |(family, _)| *family)
+        .column(
+            Count,
+            heads().terminal(&["questions"]),
+            |(_, candidates)| candidates.map_or(summary.questions, |own| own.asked as usize),
+        )
+        .column(Count, heads().terminal(&["chance %"]), |(family, _)| {
+            share(family, |base| base.chance)
+        })
+        .column(Count, heads().terminal(&["majority %"]), |(family, _)| {
+            share(family, |base| base.majority as f64)
+        })
+        .column(Count, heads().terminal(&["prior %"]), |(family, _)| {
+            share(family, |base| base.prior)
+        })
+        .column(
+            Count,
+            heads().terminal(&["candidates that hold"]),
+            |(_, candidates)| candidates.map_or(String::new(), |own| own.viable.to_string()),
+        )
+        .column(
+            Text,
+            heads().terminal(&["why others do not"]),
+            |(_, candidates)| candidates.map_or(String::new(), reasons),
+        )
+        .made();
+    let mut text = terminal::table(&[table]);
     notes(summary, &mut text);
     text
+}
+
+/// Why most of the other candidates do not hold.
+fn reasons(candidates: &Candidates) -> String {
+    let fallen = candidates.fallen.iter();
+    let mut fallen: Vec<(String, u64)> = fallen
+        .map(|(reason, count)| (word(reason), *count))
+        .collect();
+    fallen.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
+    let reasons = fallen.iter().take(REASONS);
+    let reasons: Vec<String> = reasons
+        .map(|(reason, count)| format!("{reason} {count}"))
+        .collect();
+    reasons.join(", ")
 }
 
 /// The lines below the table.
@@ -93,9 +89,8 @@ fn notes(summary: &Summary, text: &mut String) {
         "{} questions about {} frames of {} scenes; prior: the commonest answer to the same words in other scenes",
         summary.questions, summary.frames, summary.scenes
     ));
-    let sum = |count: fn(&crate::questions::summary::Candidates) -> u64| -> u64 {
-        summary.candidates.values().map(count).sum()
-    };
+    let sum =
+        |count: fn(&Candidates) -> u64| -> u64 { summary.candidates.values().map(count).sum() };
     let (unbalanced, rejected) = (sum(|c| c.unbalanced), sum(|c| c.rejected));
     if unbalanced > 0 {
         note(format!(
@@ -151,8 +146,7 @@ pub fn json(summary: &Summary) -> Result<String> {
 /// # Errors
 /// Where it cannot be written as such.
 pub fn csv(summary: &Summary) -> Result<Vec<u8>> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    let mut rows: Vec<[String; 4]> = vec![["table", "row", "column", "count"].map(str::to_owned)];
+    let mut rows: Vec<[String; 4]> = Vec::new();
     let mut row = |table: &str, row: &str, column: &str, count: String| {
         rows.push([table.to_owned(), row.to_owned(), column.to_owned(), count]);
     };
@@ -233,11 +227,13 @@ pub fn csv(summary: &Summary) -> Result<Vec<u8>> {
         row("baselines", family, "majority", base.majority.to_string());
         row("baselines", family, "prior", base.prior.to_string());
     }
-    let failed = |e: csv::Error| Error::data("statistics", e);
-    for row in rows {
-        writer.write_record(row).map_err(failed)?;
-    }
-    writer
-        .into_inner()
-        .map_err(|e| Error::data("statistics", e))
+    let table = Layout::new("statistics", rows)
+        .column(Text, heads().csv(&["table"]), |[table, ..]| table.clone())
+        .column(Text, heads().csv(&["row"]), |[_, row, ..]| row.clone())
+        .column(Text, heads().csv(&["column"]), |[.., column, _]| {
+            column.clone()
+        })
+        .column(Count, heads().csv(&["count"]), |[.., count]| count.clone())
+        .made();
+    files::csv(&[table])
 }

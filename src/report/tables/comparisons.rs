@@ -1,0 +1,187 @@
+//! Every difference with its test, a table a kind of comparison: all families together, and by family.
+
+use super::ENHANCERS;
+use crate::report::table::Kind::{Count, Number, P, Percent, Points, Text, Verdict};
+use crate::report::table::{Cell, Format, Layout, Table, heads};
+use crate::report::words::{family, name};
+use crate::score::comparison::{Comparison, Kind, Verdict as Shown};
+use crate::score::findings::Findings;
+use crate::types::Family;
+
+/// The most rows of a kind in the terminal; all of them are in the file.
+const MOST: usize = 40;
+
+pub(super) fn comparisons(findings: &Findings<'_>) -> Vec<Table> {
+    let mut tables = Vec::new();
+    for kind in Kind::ALL {
+        let all = findings.comparisons.iter().filter(|one| one.kind == kind);
+        let (whole, parts): (Vec<&Comparison>, Vec<&Comparison>) =
+            all.partition(|one| one.family.is_none());
+        let caption = caption(kind);
+        let mut total = table(kind, caption, &whole);
+        total.is_folded = kind != Kind::Enhancer;
+        if !whole.is_empty() {
+            total.heading = heading(kind).map(str::to_owned);
+            if kind == Kind::Enhancer {
+                let caption = "Enhanced against raw, paired by question, in percentage points.";
+                total.latex = Some(caption.to_owned());
+            }
+            shorten(&mut total, kind, &whole);
+        }
+        let mut parts = table(kind, &format!("{caption}, by family"), &parts);
+        parts.is_folded = true;
+        tables.extend([total, parts]);
+    }
+    tables
+}
+
+fn caption(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Level => "Each dark level less L0, raw",
+        Kind::Variant => "Sensor noise less exposure drop alone",
+        Kind::Enhancer => "Enhanced less raw",
+        Kind::Model => "Model less model",
+        Kind::Blind => "With images less without",
+    }
+}
+
+/// The line above the table in the terminal, where what darkness costs is read from the levels.
+fn heading(kind: Kind) -> Option<&'static str> {
+    match kind {
+        Kind::Level => None,
+        Kind::Variant => Some("Sensor noise against exposure drop alone, paired by question"),
+        Kind::Enhancer => Some("Enhanced against raw, paired by question"),
+        Kind::Model => Some("Model against model, paired by question"),
+        Kind::Blind => Some("With images against without, paired by question"),
+    }
+}
+
+/// Leaves out of the terminal what is there too much.
+fn shorten(table: &mut Table, kind: Kind, comparisons: &[&Comparison]) {
+    let mut printed: Vec<usize> = (0..comparisons.len()).collect();
+    if kind == Kind::Blind {
+        // Blind models are held against raw images here; against enhanced ones in the file.
+        printed.retain(|index| comparisons[*index].first.enhancer.is_none());
+        let is_better = |index: &usize| comparisons[*index].verdict == Shown::Better;
+        if !printed.is_empty() && printed.iter().all(is_better) {
+            let line = format!("better in all {} conditions", printed.len());
+            table.notes.push(line);
+            printed.clear();
+        }
+    }
+    if printed.len() > MOST {
+        let more = printed.len() - MOST;
+        let line = format!("{more} more rows are in comparisons.csv");
+        table.notes.push(line);
+        printed.truncate(MOST);
+    }
+    for (index, row) in table.rows.iter_mut().enumerate() {
+        if !printed.contains(&index) {
+            row.hidden_in.push(Format::Terminal);
+        }
+    }
+}
+
+fn table(kind: Kind, caption: &str, comparisons: &[&Comparison]) -> Table {
+    let section = match kind {
+        Kind::Enhancer => ENHANCERS,
+        _ => "comparisons",
+    };
+    let layout = Layout::new("comparisons", comparisons.iter().copied()).page(section, caption);
+    let layout = numbers(whom(layout));
+    layout
+        .column(
+            Verdict,
+            heads().csv(&["verdict"]).terminal(&[""]).page("").latex(""),
+            |one| Cell::Verdict(one.verdict),
+        )
+        .made()
+}
+
+/// What is compared with what.
+fn whom(layout: Layout<&Comparison>) -> Layout<&Comparison> {
+    layout
+        .column(Text, heads().csv(&["kind"]), |one| one.kind.name())
+        .column(Text, heads().csv(&["model"]).latex("Model"), |one| {
+            one.first.model.clone()
+        })
+        .column(
+            Text,
+            heads().csv(&["condition"]).latex("Condition"),
+            |one| one.first.condition(),
+        )
+        .column(Text, heads().csv(&["against_model"]), |one| {
+            one.second.model.clone()
+        })
+        .column(Text, heads().csv(&["against_condition"]), |one| {
+            one.second.condition()
+        })
+        .column(Text, heads().terminal(&[""]), |one| named(one))
+        .column(Text, heads().page("first"), |one| name(&one.first))
+        .column(Text, heads().page("second"), |one| name(&one.second))
+        .column(Text, heads().csv(&["family"]), |one| {
+            one.family.as_ref().map_or(Family::TOTAL, Family::name)
+        })
+        .column(Text, heads().page("family"), |one| {
+            family(one.family.as_ref())
+        })
+}
+
+fn numbers(layout: Layout<&Comparison>) -> Layout<&Comparison> {
+    let difference = heads().csv(&["difference", "low", "high"]);
+    let difference = difference.terminal(&["difference", "95 % interval"]);
+    let difference = difference.page("difference [95 %]");
+    layout
+        .column(Count, heads().csv(&["n"]), |one| one.paired.difference.n)
+        .column(Number, heads().csv(&["first"]), |one| one.paired.first)
+        .column(Percent, heads().csv(&["second"]).latex("Raw"), |one| {
+            one.paired.second
+        })
+        .column(Percent, heads().latex("Enhanced"), |one| one.paired.first)
+        .column(Points, difference.latex("Difference [95\\,\\%]"), |one| {
+            one.paired.difference
+        })
+        .column(Count, heads().latex("Rescued / harmed"), |one| {
+            format!("{} / {}", one.paired.gained, one.paired.lost)
+        })
+        .column(
+            Count,
+            heads()
+                .csv(&["only_first"])
+                .terminal(&["only first"])
+                .page("only first"),
+            |one| one.paired.gained,
+        )
+        .column(
+            Count,
+            heads()
+                .csv(&["only_second"])
+                .terminal(&["only second"])
+                .page("only second"),
+            |one| one.paired.lost,
+        )
+        .column(Count, heads().page("n"), |one| one.paired.difference.n)
+        .column(P, heads().csv(&["p_mcnemar"]).page("p (McNemar)"), |one| {
+            one.paired.mcnemar
+        })
+        .column(P, heads().csv(&["p"]).page("p"), |one| one.paired.p)
+        .column(
+            P,
+            heads()
+                .csv(&["p_holm"])
+                .terminal(&["p (Holm)"])
+                .page("p (Holm)")
+                .latex("$p$ (Holm)"),
+            |one| one.holm,
+        )
+}
+
+/// What is compared, in one cell.
+fn named(one: &Comparison) -> String {
+    let (first, second) = (&one.first, &one.second);
+    match one.kind {
+        Kind::Model => format!("{} – {}, {}", first.model, second.model, first.condition()),
+        _ if first.model == second.model => name(first),
+        _ => format!("{} – {}", name(first), second.model),
+    }
+}

@@ -1,0 +1,51 @@
+//! Every accuracy: `summary.csv` and the rows of `summary.json`.
+
+use crate::report::table::Kind::{Count, Share, Text};
+use crate::report::table::{Cell, Layout, Table, heads};
+use crate::score::accuracy::{Cell as Score, Summary};
+use crate::score::choice::Mode;
+use crate::score::subject::Subject;
+use crate::types::Family;
+
+/// The name of the table.
+pub(in crate::report) const SUMMARY: &str = "summary";
+
+pub(super) fn summary(summary: &Summary) -> Table {
+    let layout = Layout::new(SUMMARY, &summary.cells)
+        .subject(|cell| &cell.subject, |variant| variant.word().to_owned())
+        .column(Text, heads().csv(&["family"]), |cell| {
+            cell.family.as_ref().map_or(Family::TOTAL, Family::name)
+        })
+        .column(Text, heads().csv(&["mode"]), |cell| match cell.mode {
+            Mode::Strict => "strict",
+            Mode::Lenient => "lenient",
+        })
+        .column(Count, heads().csv(&["n"]), |cell| n(cell))
+        .column(Count, heads().csv(&["right"]), |cell| {
+            cell.subject.view.map(|_| cell.right)
+        })
+        .column(Count, heads().csv(&["unparsed"]), |cell| cell.unparsed)
+        .column(Count, heads().csv(&["failed"]), |cell| cell.failed)
+        .column(Share, heads().csv(&["value", "low", "high"]), |cell| {
+            cell.accuracy
+        });
+    let layout = if summary.cells.iter().any(|cell| cell.always.is_some()) {
+        layout.column(Share, heads().csv(&["always"]), |cell| cell.always)
+    } else {
+        layout
+    };
+    layout
+        .column(Text, heads().csv(&["reading"]), |cell| {
+            reading(&cell.subject)
+        })
+        .made()
+}
+
+fn n(cell: &Score) -> usize {
+    cell.accuracy.map_or(0, |accuracy| accuracy.n)
+}
+
+/// The light reading of a subject.
+pub(in crate::report) fn reading(subject: &Subject) -> Cell {
+    Cell::from(subject.variant.reading.as_ref().map(ToString::to_string))
+}

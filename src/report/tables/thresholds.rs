@@ -1,0 +1,76 @@
+//! Darkness thresholds and areas below the curves: all families together, and each.
+
+use crate::report::table::Kind::{Number, Share, Text, Threshold};
+use crate::report::table::{Cell, Layout, Table, heads};
+use crate::report::words::{family, light};
+use crate::score::curve::Curve;
+use crate::score::findings::Findings;
+use crate::types::Family;
+
+pub(super) fn thresholds(findings: &Findings<'_>) -> Vec<Table> {
+    let curves = findings.curves.iter();
+    let (whole, parts): (Vec<&Curve>, Vec<&Curve>) =
+        curves.partition(|curve| curve.family.is_none());
+    let heading = format!(
+        "Darkness threshold in EV (half-way from L0 to chance) and mean accuracy in %, with 95 % intervals by {}",
+        findings.unit
+    );
+    let mut whole = table("Thresholds and areas", &whole);
+    whole.heading = (!whole.rows.is_empty()).then_some(heading);
+    let mut parts = table("Thresholds and areas by family", &parts);
+    parts.is_folded = true;
+    vec![whole, parts]
+}
+
+/// Thresholds are `inf` beyond the darkest level, and empty if the light is not above chance.
+fn table(caption: &str, curves: &[&Curve]) -> Table {
+    let threshold = heads().csv(&["threshold_ev", "low", "high"]);
+    let threshold = threshold.terminal(&["threshold", "interval"]);
+    Layout::new("thresholds", curves)
+        .page("thresholds", caption)
+        .column(
+            Text,
+            heads().csv(&["model"]).terminal(&["model"]).page("model"),
+            |curve| curve.model.clone(),
+        )
+        .column(Text, heads().csv(&["variant"]), |curve| {
+            curve.variant.to_string()
+        })
+        .column(Text, heads().csv(&["enhancer"]), |curve| {
+            curve.enhancer.as_ref().map(ToString::to_string)
+        })
+        .column(Text, heads().terminal(&["light"]).page("light"), |curve| {
+            light(&curve.variant, curve.enhancer.as_ref())
+        })
+        .column(Text, heads().csv(&["family"]), |curve| {
+            curve.family.as_ref().map_or(Family::TOTAL, Family::name)
+        })
+        .column(Text, heads().page("family"), |curve| {
+            family(curve.family.as_ref())
+        })
+        .column(Number, heads().csv(&["darkest_ev"]), |curve| {
+            curve.darkest.value()
+        })
+        .column(
+            Threshold,
+            threshold.page("threshold in EV [95 %]"),
+            |curve| {
+                let darkest = curve.darkest.value();
+                curve
+                    .threshold
+                    .map(|threshold| Cell::Threshold(threshold, darkest))
+            },
+        )
+        .column(
+            Share,
+            heads()
+                .csv(&["area", "area_low", "area_high", "n"])
+                .terminal(&["mean accuracy"])
+                .page("area in % [95 %]"),
+            |curve| curve.area,
+        )
+        .column(Text, heads().page("EV"), |curve| {
+            format!("0–{}", curve.darkest.value())
+        })
+        .made()
+}
