@@ -73,7 +73,7 @@ pub(super) fn csv(parts: &[Table]) -> Result<Vec<u8>> {
     let mut file = ::csv::Writer::from_writer(Vec::new());
     let mut is_begun = false;
     for table in parts {
-        let names = table.columns.iter().flat_map(|column| column.heads.csv);
+        let names = table.columns.iter().flat_map(|column| &column.heads.csv);
         for row in &table.rows {
             if names.clone().next().is_none() {
                 break;

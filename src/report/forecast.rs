@@ -5,7 +5,7 @@ use std::fmt::Write;
 use serde::Serialize;
 
 use super::table::Kind::{Count, Text};
-use super::table::{Layout, heads};
+use super::table::Layout;
 use super::terminal;
 use crate::error::{Error, Result};
 
@@ -79,22 +79,20 @@ pub fn json(forecast: &Forecast) -> Result<String> {
 #[must_use]
 pub fn render(forecast: &Forecast) -> String {
     let table = Layout::new("estimate", &forecast.lines)
-        .column(Text, heads().terminal(&["model"]), |line| {
-            line.model.clone()
-        })
-        .column(Count, heads().terminal(&["requests"]), |line| {
+        .column(Text, "terminal model", |line| line.model.clone())
+        .column(Count, "terminal requests", |line| {
             count(line.requests as f64)
         })
-        .column(Count, heads().terminal(&["text tokens"]), |line| {
+        .column(Count, "terminal text tokens", |line| {
             count(line.text_tokens)
         })
-        .column(Count, heads().terminal(&["image tokens"]), |line| {
+        .column(Count, "terminal image tokens", |line| {
             line.image_tokens.map_or("unknown".to_owned(), count)
         })
-        .column(Count, heads().terminal(&["reply tokens"]), |line| {
+        .column(Count, "terminal reply tokens", |line| {
             between(Some(line.reply_tokens), line.longest_reply_tokens, &count)
         })
-        .column(Count, heads().terminal(&["dollars"]), |line| {
+        .column(Count, "terminal dollars", |line| {
             between(line.dollars, line.most_dollars, &money)
         })
         .made();

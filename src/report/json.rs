@@ -38,7 +38,7 @@ impl Serialize for Named<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(None)?;
         for (column, cell) in self.table.cells(self.row) {
-            let names = column.heads.csv;
+            let names = &column.heads.csv;
             for (name, field) in names.iter().zip(fields(cell, names.len())) {
                 map.serialize_entry(name, &field)?;
             }

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::table::Kind::Text;
-use super::table::{Cell, Format, Kind, Layout, heads};
+use super::table::{Cell, Format, Kind, Layout};
 use super::words::light;
 use crate::score::subject::Subject;
 use crate::types::{AxisLevel, EnhancerName, KindReading, View};
@@ -98,30 +98,25 @@ impl<'a, C> Ladder<'a, C> {
         let floors = floors.map(|&(subject, cell)| Line::Floor(subject, cell));
         let mut layout = Layout::new(name, series.chain(floors))
             .hide(Format::Terminal, |line| matches!(line, Line::Floor(..)))
-            .column(Text, heads().page("model").terminal(&["model"]), |line| {
+            .column(Text, "page model | terminal model", |line| {
                 line.model().to_owned()
             })
-            .column(
-                Text,
-                heads().page("light").terminal(&["light"]),
-                Line::light,
-            )
-            .column(Text, heads().latex("Model"), Line::label)
-            .column(Text, heads().latex("Light"), |line| match line {
+            .column(Text, "page light | terminal light", Line::light)
+            .column(Text, "latex Model", Line::label)
+            .column(Text, "latex Light", |line| match line {
                 Line::Series(series, _) => Cell::from(series.light()),
                 Line::Floor(..) => Cell::Blank,
             });
         for (place, level) in self.levels.iter().enumerate() {
-            let name = level.to_string();
-            let names = heads().page(&name).terminal(&[&name]).latex(&name);
-            layout = layout.column(Kind::Accuracy, names, |line| match line {
+            let names = format!("page {level} | terminal {level} | latex {level}");
+            layout = layout.column(Kind::Accuracy, &*names, |line| match line {
                 Line::Series(_, steps) => steps.get(level).map_or(Cell::Absent, |c| cell(c)),
                 Line::Floor(_, floor) if place == 0 => cell(floor),
                 Line::Floor(..) => Cell::Blank,
             });
         }
         if self.levels.is_empty() {
-            layout = layout.column(Kind::Accuracy, heads().page(""), |line| match line {
+            layout = layout.column(Kind::Accuracy, "page", |line| match line {
                 Line::Floor(_, floor) => cell(floor),
                 Line::Series(..) => Cell::Blank,
             });

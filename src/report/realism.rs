@@ -6,7 +6,7 @@ use super::csv::csv;
 use super::histogram::{Line, histogram};
 use super::sheet::{self, CropRow};
 use super::table::Kind::{Count, Number, Text};
-use super::table::{Layout, heads};
+use super::table::Layout;
 use super::terminal;
 use crate::error::{Error, Result};
 use crate::score::realism::mean::Mean;
@@ -144,21 +144,15 @@ impl Summary {
             ("with sensor noise", &self.noise),
         ];
         let mut layout = Layout::new("realism", ways)
-            .column(Text, heads().terminal(&[""]), |(name, _)| *name)
-            .column(Text, heads().terminal(&["PSNR dB"]), |(_, row)| {
-                shown(&row.psnr, 2)
-            })
-            .column(Text, heads().terminal(&["SSIM"]), |(_, row)| {
-                shown(&row.ssim, 4)
-            })
-            .column(Text, heads().terminal(&["D_KL"]), |(_, row)| {
-                shown(&row.kl, 3)
-            })
-            .column(Text, heads().terminal(&["bins empty"]), |(_, row)| {
+            .column(Text, "terminal", |(name, _)| *name)
+            .column(Text, "terminal PSNR dB", |(_, row)| shown(&row.psnr, 2))
+            .column(Text, "terminal SSIM", |(_, row)| shown(&row.ssim, 4))
+            .column(Text, "terminal D_KL", |(_, row)| shown(&row.kl, 3))
+            .column(Text, "terminal bins empty", |(_, row)| {
                 shown(&row.empty_bins, 1)
             });
         if self.kl_other_rule.is_some() {
-            let name = heads().terminal(&["D_KL (other rule)"]);
+            let name = "terminal D_KL (other rule)";
             layout = layout.column(Text, name, |(_, row)| shown(&row.kl_other, 3));
         }
         let table = terminal::table(&[layout.made()]);
@@ -215,25 +209,15 @@ pub fn pairs(compared: &[&Compared]) -> Result<Vec<u8>> {
         [("ev", &pair.exposure), ("noise", &pair.noise)].map(|(way, made)| (*pair, way, made))
     });
     let table = Layout::new("pairs", rows)
-        .column(Text, heads().csv(&["pair"]), |(pair, _, _)| {
-            pair.pair.clone()
-        })
-        .column(Text, heads().csv(&["drop"]), |(pair, _, _)| {
-            pair.drop.to_string()
-        })
-        .column(Text, heads().csv(&["variant"]), |(_, way, _)| *way)
-        .column(Number, heads().csv(&["psnr"]), |(_, _, made)| made.psnr)
-        .column(Number, heads().csv(&["ssim"]), |(_, _, made)| made.ssim)
-        .column(Number, heads().csv(&["kl"]), |(_, _, made)| made.kl.nats)
-        .column(Number, heads().csv(&["kl_other"]), |(_, _, made)| {
-            made.kl_other.nats
-        })
-        .column(Count, heads().csv(&["empty_bins"]), |(_, _, made)| {
-            made.kl.empty
-        })
-        .column(Number, heads().csv(&["clean_psnr"]), |(pair, _, _)| {
-            pair.clean_psnr
-        })
+        .column(Text, "csv pair", |(pair, _, _)| pair.pair.clone())
+        .column(Text, "csv drop", |(pair, _, _)| pair.drop.to_string())
+        .column(Text, "csv variant", |(_, way, _)| *way)
+        .column(Number, "csv psnr", |(_, _, made)| made.psnr)
+        .column(Number, "csv ssim", |(_, _, made)| made.ssim)
+        .column(Number, "csv kl", |(_, _, made)| made.kl.nats)
+        .column(Number, "csv kl_other", |(_, _, made)| made.kl_other.nats)
+        .column(Count, "csv empty_bins", |(_, _, made)| made.kl.empty)
+        .column(Number, "csv clean_psnr", |(pair, _, _)| pair.clean_psnr)
         .made();
     csv(&[table])
 }
@@ -242,24 +226,12 @@ pub fn pairs(compared: &[&Compared]) -> Result<Vec<u8>> {
 pub fn by_code(residuals: &[Residuals; 2]) -> Result<Vec<u8>> {
     let [real, noise] = residuals;
     let table = Layout::new("residuals", real.by_code().zip(noise.by_code()))
-        .column(Text, heads().csv(&["code"]), |((code, _, _), _)| {
-            code.to_string()
-        })
-        .column(Text, heads().csv(&["n"]), |((_, n, _), _)| n.to_string())
-        .column(Number, heads().csv(&["real_mean"]), |((_, _, real), _)| {
-            real[0]
-        })
-        .column(Number, heads().csv(&["real_std"]), |((_, _, real), _)| {
-            real[1]
-        })
-        .column(
-            Number,
-            heads().csv(&["noise_mean"]),
-            |(_, (_, _, noise))| noise[0],
-        )
-        .column(Number, heads().csv(&["noise_std"]), |(_, (_, _, noise))| {
-            noise[1]
-        })
+        .column(Text, "csv code", |((code, _, _), _)| code.to_string())
+        .column(Text, "csv n", |((_, n, _), _)| n.to_string())
+        .column(Number, "csv real_mean", |((_, _, real), _)| real[0])
+        .column(Number, "csv real_std", |((_, _, real), _)| real[1])
+        .column(Number, "csv noise_mean", |(_, (_, _, noise))| noise[0])
+        .column(Number, "csv noise_std", |(_, (_, _, noise))| noise[1])
         .made();
     csv(&[table])
 }

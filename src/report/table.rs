@@ -61,7 +61,7 @@ pub struct Column {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Heads {
     /// In CSV and JSON. Of several names an estimate fills the first with its value, then the ends of its interval, then n.
-    pub csv: &'static [&'static str],
+    pub csv: Vec<String>,
     /// In the terminal. Of two names a difference fills the first with its value and the second with its interval.
     pub terminal: Vec<String>,
     /// On the page.
@@ -130,34 +130,24 @@ pub enum Cell {
     Verdict(Verdict),
 }
 
-impl From<&str> for Cell {
-    fn from(text: &str) -> Self {
-        Self::Text(text.to_owned())
-    }
+/// Makes a cell of what a variant holds.
+macro_rules! cell_from {
+    ($($type:ty => $variant:ident,)*) => {$(
+        impl From<$type> for Cell {
+            fn from(value: $type) -> Self {
+                Self::$variant(value.into())
+            }
+        }
+    )*};
 }
 
-impl From<String> for Cell {
-    fn from(text: String) -> Self {
-        Self::Text(text)
-    }
-}
-
-impl From<usize> for Cell {
-    fn from(count: usize) -> Self {
-        Self::Count(count)
-    }
-}
-
-impl From<f64> for Cell {
-    fn from(number: f64) -> Self {
-        Self::Number(number)
-    }
-}
-
-impl From<Estimate> for Cell {
-    fn from(estimate: Estimate) -> Self {
-        Self::Estimate(estimate)
-    }
+cell_from! {
+    &str => Text,
+    String => Text,
+    usize => Count,
+    f64 => Number,
+    Estimate => Estimate,
+    Verdict => Verdict,
 }
 
 impl<C: Into<Self>> From<Option<C>> for Cell {
@@ -166,39 +156,22 @@ impl<C: Into<Self>> From<Option<C>> for Cell {
     }
 }
 
-/// A column without a name yet.
-pub(super) fn heads() -> Heads {
-    Heads::default()
-}
-
-impl Heads {
-    /// Names it in CSV and JSON.
-    pub(super) fn csv(self, csv: &'static [&'static str]) -> Self {
-        Self { csv, ..self }
-    }
-
-    /// Names it in the terminal.
-    pub(super) fn terminal(self, names: &[&str]) -> Self {
-        Self {
-            terminal: names.iter().map(ToString::to_string).collect(),
-            ..self
+/// Names by format, as `csv low high | terminal difference, 95 % interval | page difference [95 %]`: those of CSV are parted
+/// by a space, those of the terminal by a comma.
+impl From<&str> for Heads {
+    fn from(names: &str) -> Self {
+        let mut heads = Self::default();
+        for part in names.split(" | ") {
+            let (format, name) = part.split_once(' ').unwrap_or((part, ""));
+            let parted = |by: &str| name.split(by).map(str::to_owned).collect();
+            match format {
+                "csv" => heads.csv = parted(" "),
+                "terminal" => heads.terminal = parted(", "),
+                "page" => heads.page = Some(name.to_owned()),
+                _ => heads.latex = Some(name.to_owned()),
+            }
         }
-    }
-
-    /// Names it on the page.
-    pub(super) fn page(self, name: &str) -> Self {
-        Self {
-            page: Some(name.to_owned()),
-            ..self
-        }
-    }
-
-    /// Names it in LaTeX.
-    pub(super) fn latex(self, name: &str) -> Self {
-        Self {
-            latex: Some(name.to_owned()),
-            ..self
-        }
+        heads
     }
 }
 
@@ -236,12 +209,13 @@ impl<T> Layout<T> {
     pub(super) fn column<C: Into<Cell>>(
         mut self,
         kind: Kind,
-        heads: Heads,
+        heads: impl Into<Heads>,
         cell: impl Fn(&T) -> C,
     ) -> Self {
         for (row, item) in self.table.rows.iter_mut().zip(&self.items) {
             row.cells.push(cell(item).into());
         }
+        let heads = heads.into();
         self.table.columns.push(Column { kind, heads });
         self
     }

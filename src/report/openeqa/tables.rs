@@ -4,7 +4,7 @@ use super::open_report::OpenReport;
 use crate::report::ladder::{Ladder, Line, Series, Steps};
 use crate::report::latex::escaped;
 use crate::report::table::Kind::{Accuracy, Count, Points, Share, Text};
-use crate::report::table::{Cell, Kind, Layout, Table, heads};
+use crate::report::table::{Cell, Kind, Layout, Table};
 use crate::report::tables::{SUMMARY, reading};
 use crate::report::terminal::texts;
 use crate::score::estimate::Estimate;
@@ -52,32 +52,24 @@ fn summary(summary: &OpenSummary) -> Table {
         let change = summary.change(&cell.subject, against, &cell.group)?;
         Some(change.difference)
     };
-    let drop = heads().csv(&["drop", "drop_low", "drop_high", "drop_n"]);
+    let drop = "csv drop drop_low drop_high drop_n";
     Layout::new(SUMMARY, &summary.cells)
         .subject(|cell| &cell.subject, |variant| variant.word().to_owned())
-        .column(Text, heads().csv(&["by"]), |cell| cell.group.kind())
-        .column(Text, heads().csv(&["group"]), |cell| {
-            cell.group.name().to_owned()
-        })
-        .column(Count, heads().csv(&["due"]), |cell| cell.due)
-        .column(Count, heads().csv(&["n"]), |cell| cell.scored())
-        .column(Count, heads().csv(&["missing"]), |cell| cell.missing)
-        .column(Count, heads().csv(&["unjudged"]), |cell| cell.unjudged)
-        .column(Count, heads().csv(&["unmarked"]), |cell| cell.unmarked)
-        .column(Count, heads().csv(&["null"]), |cell| cell.null)
-        .column(Count, heads().csv(&["cut"]), |cell| cell.cut)
-        .column(Share, heads().csv(&["value", "low", "high"]), |cell| {
-            cell.score
-        })
+        .column(Text, "csv by", |cell| cell.group.kind())
+        .column(Text, "csv group", |cell| cell.group.name().to_owned())
+        .column(Count, "csv due", |cell| cell.due)
+        .column(Count, "csv n", |cell| cell.scored())
+        .column(Count, "csv missing", |cell| cell.missing)
+        .column(Count, "csv unjudged", |cell| cell.unjudged)
+        .column(Count, "csv unmarked", |cell| cell.unmarked)
+        .column(Count, "csv null", |cell| cell.null)
+        .column(Count, "csv cut", |cell| cell.cut)
+        .column(Share, "csv value low high", |cell| cell.score)
         .column(Points, drop, |cell| change(cell, Against::Lit))
-        .column(
-            Points,
-            heads().csv(&["gain", "gain_low", "gain_high"]),
-            |cell| change(cell, Against::Raw),
-        )
-        .column(Text, heads().csv(&["reading"]), |cell| {
-            reading(&cell.subject)
+        .column(Points, "csv gain gain_low gain_high", |cell| {
+            change(cell, Against::Raw)
         })
+        .column(Text, "csv reading", |cell| reading(&cell.subject))
         .made()
 }
 
@@ -93,7 +85,7 @@ fn levels(report: &OpenReport<'_>) -> Table {
             SECTION,
             "Score in % ± half of the 95 % interval (difference from L0)",
         )
-        .column(Count, heads().terminal(&["scored"]), |line| {
+        .column(Count, "terminal scored", |line| {
             format!(
                 "{} of {}",
                 sum(line, OpenCell::scored),
@@ -145,22 +137,19 @@ fn by_group(
     let light = series.light();
     let mut layout = Layout::new("groups", rows)
         .page(SECTION, &format!("{}, {light}", series.model))
-        .column(Text, heads().terminal(&["model"]), |(place, _)| {
+        .column(Text, "terminal model", |(place, _)| {
             once(*place, series.model)
         })
-        .column(Text, heads().terminal(&["light"]), |(place, _)| {
-            once(*place, &light)
-        })
+        .column(Text, "terminal light", |(place, _)| once(*place, &light))
         .column(
             Text,
-            heads().terminal(&["of"]).page("split or category"),
+            "terminal of | page split or category",
             |(_, (group, _))| group.name().to_owned(),
         );
     for level in &whole.levels {
-        let name = level.to_string();
         layout = layout.column(
             Accuracy,
-            heads().terminal(&[&name]).page(&name),
+            &*format!("terminal {level} | page {level}"),
             |(_, (_, ladder))| {
                 let steps: Option<&Steps<'_, OpenCell>> = ladder.series.get(series);
                 let cell = steps.and_then(|steps| steps.get(level));
@@ -169,16 +158,12 @@ fn by_group(
         );
     }
     if !whole.floors.is_empty() {
-        layout = layout.column(
-            Accuracy,
-            heads().terminal(&["blind"]),
-            |(_, (_, ladder))| {
-                let is_same = |(subject, _): &&(&Subject, &OpenCell)| subject.model == series.model;
-                let mut floors = ladder.floors.iter();
-                let own = floors.find(is_same).or(ladder.floors.first());
-                own.map_or(Cell::Absent, |(_, cell)| score(summary, cell))
-            },
-        );
+        layout = layout.column(Accuracy, "terminal blind", |(_, (_, ladder))| {
+            let is_same = |(subject, _): &&(&Subject, &OpenCell)| subject.model == series.model;
+            let mut floors = ladder.floors.iter();
+            let own = floors.find(is_same).or(ladder.floors.first());
+            own.map_or(Cell::Absent, |(_, cell)| score(summary, cell))
+        });
     }
     let mut table = layout.made();
     table.heading = Some(String::new());

@@ -6,7 +6,7 @@ pub mod review;
 use std::fmt::Write as _;
 
 use super::table::Kind::{Count, Text};
-use super::table::{Layout, heads};
+use super::table::Layout;
 use super::{csv as files, terminal};
 use crate::error::{Error, Result};
 use crate::questions::summary::{Baselines, Candidates, Summary};
@@ -34,31 +34,25 @@ pub fn table(summary: &Summary) -> String {
         })
     };
     let table = Layout::new("questions", rows)
-        .column(Text, heads().terminal(&["family"]), |(family, _)| *family)
-        .column(
-            Count,
-            heads().terminal(&["questions"]),
-            |(_, candidates)| candidates.map_or(summary.questions, |own| own.asked as usize),
-        )
-        .column(Count, heads().terminal(&["chance %"]), |(family, _)| {
+        .column(Text, "terminal family", |(family, _)| *family)
+        .column(Count, "terminal questions", |(_, candidates)| {
+            candidates.map_or(summary.questions, |own| own.asked as usize)
+        })
+        .column(Count, "terminal chance %", |(family, _)| {
             share(family, |base| base.chance)
         })
-        .column(Count, heads().terminal(&["majority %"]), |(family, _)| {
+        .column(Count, "terminal majority %", |(family, _)| {
             share(family, |base| base.majority as f64)
         })
-        .column(Count, heads().terminal(&["prior %"]), |(family, _)| {
+        .column(Count, "terminal prior %", |(family, _)| {
             share(family, |base| base.prior)
         })
-        .column(
-            Count,
-            heads().terminal(&["candidates that hold"]),
-            |(_, candidates)| candidates.map_or(String::new(), |own| own.viable.to_string()),
-        )
-        .column(
-            Text,
-            heads().terminal(&["why others do not"]),
-            |(_, candidates)| candidates.map_or(String::new(), reasons),
-        )
+        .column(Count, "terminal candidates that hold", |(_, candidates)| {
+            candidates.map_or(String::new(), |own| own.viable.to_string())
+        })
+        .column(Text, "terminal why others do not", |(_, candidates)| {
+            candidates.map_or(String::new(), reasons)
+        })
         .made();
     let mut text = terminal::table(&[table]);
     notes(summary, &mut text);
@@ -228,12 +222,10 @@ pub fn csv(summary: &Summary) -> Result<Vec<u8>> {
         row("baselines", family, "prior", base.prior.to_string());
     }
     let table = Layout::new("statistics", rows)
-        .column(Text, heads().csv(&["table"]), |[table, ..]| table.clone())
-        .column(Text, heads().csv(&["row"]), |[_, row, ..]| row.clone())
-        .column(Text, heads().csv(&["column"]), |[.., column, _]| {
-            column.clone()
-        })
-        .column(Count, heads().csv(&["count"]), |[.., count]| count.clone())
+        .column(Text, "csv table", |[table, ..]| table.clone())
+        .column(Text, "csv row", |[_, row, ..]| row.clone())
+        .column(Text, "csv column", |[.., column, _]| column.clone())
+        .column(Count, "csv count", |[.., count]| count.clone())
         .made();
     files::csv(&[table])
 }

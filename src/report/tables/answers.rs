@@ -1,7 +1,7 @@
 //! What models answer: false positives and negatives, collapse, and answers given against true ones.
 
 use crate::report::table::Kind::{Count, Number, Percent, Share, Text};
-use crate::report::table::{Layout, Table, heads};
+use crate::report::table::{Layout, Table};
 use crate::report::words::family;
 use crate::score::confusion::{Confusion, Hallucination};
 use crate::score::findings::Findings;
@@ -17,20 +17,16 @@ pub(super) fn answers(findings: &Findings<'_>) -> Vec<Table> {
 fn hallucination(rates: &[Hallucination]) -> Table {
     Layout::new("hallucination", rates)
         .subject(|rates| &rates.subject, ToString::to_string)
-        .column(
-            Share,
-            heads().csv(&["false_positive", "fp_low", "fp_high"]),
-            |rates| rates.false_positive,
-        )
-        .column(Count, heads().csv(&["fp_n"]), |rates| {
+        .column(Share, "csv false_positive fp_low fp_high", |rates| {
+            rates.false_positive
+        })
+        .column(Count, "csv fp_n", |rates| {
             rates.false_positive.map_or(0, |rate| rate.n)
         })
-        .column(
-            Share,
-            heads().csv(&["false_negative", "fn_low", "fn_high"]),
-            |rates| rates.false_negative,
-        )
-        .column(Count, heads().csv(&["fn_n"]), |rates| {
+        .column(Share, "csv false_negative fn_low fn_high", |rates| {
+            rates.false_negative
+        })
+        .column(Count, "csv fn_n", |rates| {
             rates.false_negative.map_or(0, |rate| rate.n)
         })
         .made()
@@ -45,38 +41,26 @@ fn collapse(confusions: &[Confusion]) -> Table {
             "The answer given most often, and how often it is true",
         )
         .subject(|(one, _)| &one.subject, ToString::to_string)
-        .column(Text, heads().csv(&["family"]), |(one, _)| {
-            one.family.name().to_owned()
-        })
-        .column(Text, heads().page("family"), |(one, _)| {
+        .column(Text, "csv family", |(one, _)| one.family.name().to_owned())
+        .column(Text, "page family", |(one, _)| {
             family(Some(&one.family)).to_owned()
         })
-        .column(
-            Text,
-            heads().csv(&["top_answer"]).page("given most often"),
-            |(_, c)| c.top.clone(),
-        )
-        .column(
-            Percent,
-            heads().csv(&["top_share"]).page("given in %"),
-            |(_, c)| c.share,
-        )
-        .column(
-            Percent,
-            heads().csv(&["true_share"]).page("true in %"),
-            |(_, c)| c.truth,
-        )
+        .column(Text, "csv top_answer | page given most often", |(_, c)| {
+            c.top.clone()
+        })
+        .column(Percent, "csv top_share | page given in %", |(_, c)| c.share)
+        .column(Percent, "csv true_share | page true in %", |(_, c)| c.truth)
         .column(
             Number,
-            heads().csv(&["entropy_bits"]).page("entropy in bits"),
+            "csv entropy_bits | page entropy in bits",
             |(_, c)| c.entropy,
         )
         .column(
             Number,
-            heads().csv(&["true_entropy_bits"]).page("of the truth"),
+            "csv true_entropy_bits | page of the truth",
             |(_, c)| c.true_entropy,
         )
-        .column(Count, heads().csv(&["n"]).page("n"), |(_, c)| c.n)
+        .column(Count, "csv n | page n", |(_, c)| c.n)
         .made()
 }
 
@@ -93,15 +77,13 @@ fn confusion(confusions: &[Confusion]) -> Table {
     let there = cells.filter(|(_, (_, _, count))| *count > 0);
     Layout::new("confusion", there)
         .subject(|(one, _)| &one.subject, ToString::to_string)
-        .column(Text, heads().csv(&["family"]), |(one, _)| {
-            one.family.name().to_owned()
-        })
-        .column(Text, heads().csv(&["truth"]), |(one, (truth, _, _))| {
+        .column(Text, "csv family", |(one, _)| one.family.name().to_owned())
+        .column(Text, "csv truth", |(one, (truth, _, _))| {
             one.labels[*truth].clone()
         })
-        .column(Text, heads().csv(&["given"]), |(one, (_, given, _))| {
+        .column(Text, "csv given", |(one, (_, given, _))| {
             one.labels.get(*given).cloned()
         })
-        .column(Count, heads().csv(&["count"]), |(_, (_, _, count))| *count)
+        .column(Count, "csv count", |(_, (_, _, count))| *count)
         .made()
 }

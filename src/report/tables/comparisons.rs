@@ -2,7 +2,7 @@
 
 use super::ENHANCERS;
 use crate::report::table::Kind::{Count, Number, P, Percent, Points, Text, Verdict};
-use crate::report::table::{Cell, Format, Layout, Table, heads};
+use crate::report::table::{Format, Layout, Table};
 use crate::report::words::{family, name};
 use crate::score::comparison::{Comparison, Kind, Verdict as Shown};
 use crate::score::findings::Findings;
@@ -90,88 +90,63 @@ fn table(kind: Kind, caption: &str, comparisons: &[&Comparison]) -> Table {
     let layout = Layout::new("comparisons", comparisons.iter().copied()).page(section, caption);
     let layout = numbers(whom(layout));
     layout
-        .column(
-            Verdict,
-            heads().csv(&["verdict"]).terminal(&[""]).page("").latex(""),
-            |one| Cell::Verdict(one.verdict),
-        )
+        .column(Verdict, "csv verdict | terminal | page | latex", |one| {
+            one.verdict
+        })
         .made()
 }
 
 /// What is compared with what.
 fn whom(layout: Layout<&Comparison>) -> Layout<&Comparison> {
     layout
-        .column(Text, heads().csv(&["kind"]), |one| one.kind.name())
-        .column(Text, heads().csv(&["model"]).latex("Model"), |one| {
+        .column(Text, "csv kind", |one| one.kind.name())
+        .column(Text, "csv model | latex Model", |one| {
             one.first.model.clone()
         })
-        .column(
-            Text,
-            heads().csv(&["condition"]).latex("Condition"),
-            |one| one.first.condition(),
-        )
-        .column(Text, heads().csv(&["against_model"]), |one| {
-            one.second.model.clone()
+        .column(Text, "csv condition | latex Condition", |one| {
+            one.first.condition()
         })
-        .column(Text, heads().csv(&["against_condition"]), |one| {
-            one.second.condition()
-        })
-        .column(Text, heads().terminal(&[""]), |one| named(one))
-        .column(Text, heads().page("first"), |one| name(&one.first))
-        .column(Text, heads().page("second"), |one| name(&one.second))
-        .column(Text, heads().csv(&["family"]), |one| {
+        .column(Text, "csv against_model", |one| one.second.model.clone())
+        .column(Text, "csv against_condition", |one| one.second.condition())
+        .column(Text, "terminal", |one| named(one))
+        .column(Text, "page first", |one| name(&one.first))
+        .column(Text, "page second", |one| name(&one.second))
+        .column(Text, "csv family", |one| {
             one.family.as_ref().map_or(Family::TOTAL, Family::name)
         })
-        .column(Text, heads().page("family"), |one| {
-            family(one.family.as_ref())
-        })
+        .column(Text, "page family", |one| family(one.family.as_ref()))
 }
 
 fn numbers(layout: Layout<&Comparison>) -> Layout<&Comparison> {
-    let difference = heads().csv(&["difference", "low", "high"]);
-    let difference = difference.terminal(&["difference", "95 % interval"]);
-    let difference = difference.page("difference [95 %]");
+    let difference = "csv difference low high | terminal difference, 95 % interval | page difference [95 %] \
+                      | latex Difference [95\\,\\%]";
     layout
-        .column(Count, heads().csv(&["n"]), |one| one.paired.difference.n)
-        .column(Number, heads().csv(&["first"]), |one| one.paired.first)
-        .column(Percent, heads().csv(&["second"]).latex("Raw"), |one| {
-            one.paired.second
-        })
-        .column(Percent, heads().latex("Enhanced"), |one| one.paired.first)
-        .column(Points, difference.latex("Difference [95\\,\\%]"), |one| {
-            one.paired.difference
-        })
-        .column(Count, heads().latex("Rescued / harmed"), |one| {
+        .column(Count, "csv n", |one| one.paired.difference.n)
+        .column(Number, "csv first", |one| one.paired.first)
+        .column(Percent, "csv second | latex Raw", |one| one.paired.second)
+        .column(Percent, "latex Enhanced", |one| one.paired.first)
+        .column(Points, difference, |one| one.paired.difference)
+        .column(Count, "latex Rescued / harmed", |one| {
             format!("{} / {}", one.paired.gained, one.paired.lost)
         })
         .column(
             Count,
-            heads()
-                .csv(&["only_first"])
-                .terminal(&["only first"])
-                .page("only first"),
+            "csv only_first | terminal only first | page only first",
             |one| one.paired.gained,
         )
         .column(
             Count,
-            heads()
-                .csv(&["only_second"])
-                .terminal(&["only second"])
-                .page("only second"),
+            "csv only_second | terminal only second | page only second",
             |one| one.paired.lost,
         )
-        .column(Count, heads().page("n"), |one| one.paired.difference.n)
-        .column(P, heads().csv(&["p_mcnemar"]).page("p (McNemar)"), |one| {
+        .column(Count, "page n", |one| one.paired.difference.n)
+        .column(P, "csv p_mcnemar | page p (McNemar)", |one| {
             one.paired.mcnemar
         })
-        .column(P, heads().csv(&["p"]).page("p"), |one| one.paired.p)
+        .column(P, "csv p | page p", |one| one.paired.p)
         .column(
             P,
-            heads()
-                .csv(&["p_holm"])
-                .terminal(&["p (Holm)"])
-                .page("p (Holm)")
-                .latex("$p$ (Holm)"),
+            "csv p_holm | terminal p (Holm) | page p (Holm) | latex $p$ (Holm)",
             |one| one.holm,
         )
 }

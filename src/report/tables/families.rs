@@ -2,7 +2,7 @@
 
 use crate::report::latex::escaped;
 use crate::report::table::Kind::{Percent, Text};
-use crate::report::table::{Cell, Layout, Table, heads};
+use crate::report::table::{Cell, Heads, Layout, Table};
 use crate::report::words::family as family_name;
 use crate::score::choice::Mode;
 use crate::score::findings::Findings;
@@ -14,21 +14,20 @@ pub(super) fn families(findings: &Findings<'_>) -> Table {
     // The last row is chance.
     let mut layout = Layout::new("families", subjects.chain([None]))
         .page("families", "Accuracy in % by family")
-        .column(Text, heads().page("model").latex("Model"), |subject| {
+        .column(Text, "page model | latex Model", |subject| {
             subject
                 .map_or("chance", |subject| &subject.model)
                 .to_owned()
         })
-        .column(
-            Text,
-            heads().page("condition").latex("Condition"),
-            |subject| subject.map_or(String::new(), Subject::condition),
-        );
+        .column(Text, "page condition | latex Condition", |subject| {
+            subject.map_or(String::new(), Subject::condition)
+        });
     for family in findings.grid.groups() {
         let name = family_name(family);
-        let names = match family {
-            None => heads().page(name),
-            Some(_) => heads().page(name).latex(&escaped(name)),
+        let names = Heads {
+            page: Some(name.to_owned()),
+            latex: family.map(|_| escaped(name)),
+            ..Heads::default()
         };
         layout = layout.column(Percent, names, |subject| share(findings, *subject, family));
     }

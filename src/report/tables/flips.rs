@@ -1,7 +1,7 @@
 //! A row an item and curve: the level at which it is first not answered rightly; empty if it never fails.
 
 use crate::report::table::Kind::{Count, Text};
-use crate::report::table::{Layout, Table, heads};
+use crate::report::table::{Layout, Table};
 use crate::score::findings::Findings;
 
 pub(super) fn flips(findings: &Findings<'_>) -> Table {
@@ -11,28 +11,24 @@ pub(super) fn flips(findings: &Findings<'_>) -> Table {
         items.map(move |(item, first)| (fall, item.record, *first))
     });
     Layout::new("flips", rows)
-        .column(Text, heads().csv(&["question"]), |(_, record, _)| {
+        .column(Text, "csv question", |(_, record, _)| {
             record.question.to_string()
         })
-        .column(Text, heads().csv(&["frame"]), |(_, record, _)| {
+        .column(Text, "csv frame", |(_, record, _)| {
             record.detail.frame.to_string()
         })
-        .column(Text, heads().csv(&["family"]), |(_, record, _)| {
+        .column(Text, "csv family", |(_, record, _)| {
             record.detail.family.to_string()
         })
-        .column(Count, heads().csv(&["repeat"]), |(_, record, _)| {
+        .column(Count, "csv repeat", |(_, record, _)| {
             record.detail.repeat as usize
         })
-        .column(Text, heads().csv(&["model"]), |(fall, _, _)| {
-            fall.model.clone()
-        })
-        .column(Text, heads().csv(&["variant"]), |(fall, _, _)| {
-            fall.variant.to_string()
-        })
-        .column(Text, heads().csv(&["enhancer"]), |(fall, _, _)| {
+        .column(Text, "csv model", |(fall, _, _)| fall.model.clone())
+        .column(Text, "csv variant", |(fall, _, _)| fall.variant.to_string())
+        .column(Text, "csv enhancer", |(fall, _, _)| {
             fall.enhancer.as_ref().map(ToString::to_string)
         })
-        .column(Text, heads().csv(&["first_failing"]), |(_, _, first)| {
+        .column(Text, "csv first_failing", |(_, _, first)| {
             first.map(|level| level.to_string())
         })
         .made()

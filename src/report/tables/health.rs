@@ -1,34 +1,34 @@
 //! What became of the trials of each subject, besides right and wrong.
 
 use crate::report::table::Kind::{Count, Failures};
-use crate::report::table::{Layout, Table, heads};
+use crate::report::table::{Layout, Table};
 use crate::report::words::percent;
 use crate::score::health::Health;
 use crate::types::{FailureKind, Why};
 
 /// The columns of reasons for which replies could not be read.
-const UNREAD: [&[&str]; Why::ALL.len()] = [
-    &["empty"],
-    &["refused"],
-    &["truncated"],
-    &["filtered"],
-    &["ambiguous"],
-    &["out_of_range"],
-    &["contradiction"],
-    &["negated"],
-    &["no_choice"],
+const UNREAD: [&str; Why::ALL.len()] = [
+    "empty",
+    "refused",
+    "truncated",
+    "filtered",
+    "ambiguous",
+    "out_of_range",
+    "contradiction",
+    "negated",
+    "no_choice",
 ];
 
 /// The columns of reasons for which no reply came.
-const FAILED: [&[&str]; FailureKind::ALL.len()] = [
-    &["failed_connection"],
-    &["failed_timeout"],
-    &["failed_rate_limit"],
-    &["failed_server"],
-    &["failed_request"],
-    &["failed_filtered"],
-    &["failed_response"],
-    &["failed_image"],
+const FAILED: [&str; FailureKind::ALL.len()] = [
+    "failed_connection",
+    "failed_timeout",
+    "failed_rate_limit",
+    "failed_server",
+    "failed_request",
+    "failed_filtered",
+    "failed_response",
+    "failed_image",
 ];
 
 /// Reasons that are not the form of an answer.
@@ -38,38 +38,34 @@ pub(super) fn health(health: &[Health]) -> Table {
     let mut layout = Layout::new("health", health)
         .page("health", "Replies and failures by subject")
         .subject(|health| &health.subject, ToString::to_string)
-        .column(Count, heads().csv(&["replies"]).page("replies"), |health| {
-            health.replies
-        })
-        .column(Count, heads().csv(&["read"]), |health| health.read)
-        .column(Count, heads().csv(&["lenient_only"]), |health| {
-            health.lenient_only
-        })
-        .column(Count, heads().page("read"), |health| {
-            share(health, health.read)
-        })
-        .column(Count, heads().page("lenient alone"), |health| {
+        .column(Count, "csv replies | page replies", |health| health.replies)
+        .column(Count, "csv read", |health| health.read)
+        .column(Count, "csv lenient_only", |health| health.lenient_only)
+        .column(Count, "page read", |health| share(health, health.read))
+        .column(Count, "page lenient alone", |health| {
             share(health, health.lenient_only)
         })
-        .column(Count, heads().page("other form"), |health| {
+        .column(Count, "page other form", |health| {
             // A foreign record may give a reason beside a choice.
             (health.replies - health.read).saturating_sub(health.unread_for(&OTHER))
         })
-        .column(Count, heads().page("refused or filtered"), |health| {
+        .column(Count, "page refused or filtered", |health| {
             health.unread_for(&[Why::Refused, Why::Filtered])
         })
-        .column(Count, heads().page("truncated"), |health| {
+        .column(Count, "page truncated", |health| {
             health.unread_for(&[Why::Truncated])
         })
-        .column(Count, heads().page("empty"), |health| {
+        .column(Count, "page empty", |health| {
             health.unread_for(&[Why::Empty])
         })
-        .column(Failures, heads().page("failed"), |health| health.failures());
+        .column(Failures, "page failed", |health| health.failures());
     for (why, name) in Why::ALL.into_iter().zip(UNREAD) {
-        layout = layout.column(Count, heads().csv(name), |health| health.unread_for(&[why]));
+        layout = layout.column(Count, &*format!("csv {name}"), |health| {
+            health.unread_for(&[why])
+        });
     }
     for (kind, name) in FailureKind::ALL.into_iter().zip(FAILED) {
-        layout = layout.column(Count, heads().csv(name), |health| {
+        layout = layout.column(Count, &*format!("csv {name}"), |health| {
             health.failed.get(&kind).copied().unwrap_or(0)
         });
     }

@@ -2,7 +2,7 @@
 
 use crate::report::ladder::{Ladder, Line};
 use crate::report::table::Kind::Count;
-use crate::report::table::{Cell, Format, Kind, Row, Table, heads};
+use crate::report::table::{Cell, Format, Kind, Row, Table};
 use crate::report::terminal::{differing, texts};
 use crate::report::words::percent;
 use crate::score::accuracy::{Cell as Score, Summary};
@@ -23,14 +23,14 @@ pub(super) fn levels(findings: &Findings<'_>) -> Table {
             "accuracy",
             "Accuracy in % by level, with half of the 95 % interval",
         )
-        .column(Count, heads().terminal(&["n"]), |line| replies(line))
-        .column(Count, heads().terminal(&["unparsed"]), |line| {
+        .column(Count, "terminal n", |line| replies(line))
+        .column(Count, "terminal unparsed", |line| {
             let lenient = line.steps().filter_map(|cell| lenient(summary, cell));
             let lenient = lenient.map(|cell| cell.unparsed).sum::<usize>().to_string();
             let strict = counts(line, |cell| cell.unparsed).to_string();
             format!("{strict}{}", differing(&strict, &lenient))
         })
-        .column(Count, heads().terminal(&["failed"]), |line| {
+        .column(Count, "terminal failed", |line| {
             counts(line, |cell| cell.failed)
         })
         .made();

@@ -12,7 +12,7 @@ mod summary;
 mod thresholds;
 
 use super::table::Kind::Text;
-use super::table::{Cell, Layout, Table, heads};
+use super::table::{Cell, Layout, Table};
 use super::words::name;
 use crate::score::findings::Findings;
 use crate::score::subject::Subject;
@@ -111,19 +111,17 @@ impl<T> Layout<T> {
         variant: impl Fn(&KindReading) -> String,
     ) -> Self {
         let said = |text: Option<String>| Cell::from(text);
-        self.column(Text, heads().csv(&["model"]), |row| of(row).model.clone())
-            .column(Text, heads().csv(&["view"]), |row| {
+        self.column(Text, "csv model", |row| of(row).model.clone())
+            .column(Text, "csv view", |row| {
                 said(of(row).view.map(|view| view.to_string()))
             })
-            .column(Text, heads().csv(&["level"]), |row| {
+            .column(Text, "csv level", |row| {
                 said(of(row).level.map(|level| level.to_string()))
             })
-            .column(Text, heads().csv(&["variant"]), |row| {
-                variant(&of(row).variant)
-            })
-            .column(Text, heads().csv(&["enhancer"]), |row| {
+            .column(Text, "csv variant", |row| variant(&of(row).variant))
+            .column(Text, "csv enhancer", |row| {
                 said(of(row).enhancer.as_ref().map(ToString::to_string))
             })
-            .column(Text, heads().page("subject"), |row| name(of(row)))
+            .column(Text, "page subject", |row| name(of(row)))
     }
 }

@@ -1,7 +1,7 @@
 //! The accuracy of every subject with its interval and counts.
 
 use crate::report::table::Kind::{Count, Percent, Share, Text};
-use crate::report::table::{Cell, Layout, Table, heads};
+use crate::report::table::{Cell, Layout, Table};
 use crate::score::accuracy::Summary;
 use crate::score::choice::Mode;
 
@@ -11,29 +11,23 @@ pub(super) fn subjects(summary: &Summary) -> Table {
             "accuracy",
             "Accuracy of every subject, all families together",
         )
-        .column(Text, heads().page("model"), |cell| {
-            cell.subject.model.clone()
+        .column(Text, "page model", |cell| cell.subject.model.clone())
+        .column(Text, "page condition", |cell| match cell.subject.view {
+            None => "guessing".to_owned(),
+            Some(_) => cell.subject.condition(),
         })
-        .column(Text, heads().page("condition"), |cell| {
-            match cell.subject.view {
-                None => "guessing".to_owned(),
-                Some(_) => cell.subject.condition(),
-            }
-        })
-        .column(Share, heads().page("accuracy in % [95 %]"), |cell| {
+        .column(Share, "page accuracy in % [95 %]", |cell| {
             match (cell.subject.view, cell.accuracy) {
                 (None, Some(chance)) => Cell::Guess(chance),
                 (_, accuracy) => Cell::from(accuracy),
             }
         })
-        .column(Percent, heads().page("lenient"), |cell| {
+        .column(Percent, "page lenient", |cell| {
             summary.cell(&cell.subject, None, Mode::Lenient)?.accuracy
         })
-        .column(Count, heads().page("n"), |cell| {
-            cell.accuracy.map_or(0, |e| e.n)
-        })
-        .column(Count, heads().page("not readable"), |cell| cell.unparsed)
-        .column(Count, heads().page("failed"), |cell| cell.failed)
+        .column(Count, "page n", |cell| cell.accuracy.map_or(0, |e| e.n))
+        .column(Count, "page not readable", |cell| cell.unparsed)
+        .column(Count, "page failed", |cell| cell.failed)
         .made();
     table.is_folded = true;
     table

@@ -1,7 +1,7 @@
 //! Every accuracy: `summary.csv` and the rows of `summary.json`.
 
 use crate::report::table::Kind::{Count, Share, Text};
-use crate::report::table::{Cell, Layout, Table, heads};
+use crate::report::table::{Cell, Layout, Table};
 use crate::score::accuracy::{Cell as Score, Summary};
 use crate::score::choice::Mode;
 use crate::score::subject::Subject;
@@ -13,31 +13,27 @@ pub(in crate::report) const SUMMARY: &str = "summary";
 pub(super) fn summary(summary: &Summary) -> Table {
     let layout = Layout::new(SUMMARY, &summary.cells)
         .subject(|cell| &cell.subject, |variant| variant.word().to_owned())
-        .column(Text, heads().csv(&["family"]), |cell| {
+        .column(Text, "csv family", |cell| {
             cell.family.as_ref().map_or(Family::TOTAL, Family::name)
         })
-        .column(Text, heads().csv(&["mode"]), |cell| match cell.mode {
+        .column(Text, "csv mode", |cell| match cell.mode {
             Mode::Strict => "strict",
             Mode::Lenient => "lenient",
         })
-        .column(Count, heads().csv(&["n"]), |cell| n(cell))
-        .column(Count, heads().csv(&["right"]), |cell| {
+        .column(Count, "csv n", |cell| n(cell))
+        .column(Count, "csv right", |cell| {
             cell.subject.view.map(|_| cell.right)
         })
-        .column(Count, heads().csv(&["unparsed"]), |cell| cell.unparsed)
-        .column(Count, heads().csv(&["failed"]), |cell| cell.failed)
-        .column(Share, heads().csv(&["value", "low", "high"]), |cell| {
-            cell.accuracy
-        });
+        .column(Count, "csv unparsed", |cell| cell.unparsed)
+        .column(Count, "csv failed", |cell| cell.failed)
+        .column(Share, "csv value low high", |cell| cell.accuracy);
     let layout = if summary.cells.iter().any(|cell| cell.always.is_some()) {
-        layout.column(Share, heads().csv(&["always"]), |cell| cell.always)
+        layout.column(Share, "csv always", |cell| cell.always)
     } else {
         layout
     };
     layout
-        .column(Text, heads().csv(&["reading"]), |cell| {
-            reading(&cell.subject)
-        })
+        .column(Text, "csv reading", |cell| reading(&cell.subject))
         .made()
 }
 

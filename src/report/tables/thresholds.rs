@@ -1,7 +1,7 @@
 //! Darkness thresholds and areas below the curves: all families together, and each.
 
 use crate::report::table::Kind::{Number, Share, Text, Threshold};
-use crate::report::table::{Cell, Layout, Table, heads};
+use crate::report::table::{Cell, Layout, Table};
 use crate::report::words::{family, light};
 use crate::score::curve::Curve;
 use crate::score::findings::Findings;
@@ -24,36 +24,34 @@ pub(super) fn thresholds(findings: &Findings<'_>) -> Vec<Table> {
 
 /// Thresholds are `inf` beyond the darkest level, and empty if the light is not above chance.
 fn table(caption: &str, curves: &[&Curve]) -> Table {
-    let threshold = heads().csv(&["threshold_ev", "low", "high"]);
-    let threshold = threshold.terminal(&["threshold", "interval"]);
     Layout::new("thresholds", curves)
         .page("thresholds", caption)
         .column(
             Text,
-            heads().csv(&["model"]).terminal(&["model"]).page("model"),
+            "csv model | terminal model | page model",
             |curve| curve.model.clone(),
         )
-        .column(Text, heads().csv(&["variant"]), |curve| {
+        .column(Text, "csv variant", |curve| {
             curve.variant.to_string()
         })
-        .column(Text, heads().csv(&["enhancer"]), |curve| {
+        .column(Text, "csv enhancer", |curve| {
             curve.enhancer.as_ref().map(ToString::to_string)
         })
-        .column(Text, heads().terminal(&["light"]).page("light"), |curve| {
+        .column(Text, "terminal light | page light", |curve| {
             light(&curve.variant, curve.enhancer.as_ref())
         })
-        .column(Text, heads().csv(&["family"]), |curve| {
+        .column(Text, "csv family", |curve| {
             curve.family.as_ref().map_or(Family::TOTAL, Family::name)
         })
-        .column(Text, heads().page("family"), |curve| {
+        .column(Text, "page family", |curve| {
             family(curve.family.as_ref())
         })
-        .column(Number, heads().csv(&["darkest_ev"]), |curve| {
+        .column(Number, "csv darkest_ev", |curve| {
             curve.darkest.value()
         })
         .column(
             Threshold,
-            threshold.page("threshold in EV [95 %]"),
+            "csv threshold_ev low high | terminal threshold, interval | page threshold in EV [95 %]",
             |curve| {
                 let darkest = curve.darkest.value();
                 curve
@@ -63,13 +61,10 @@ fn table(caption: &str, curves: &[&Curve]) -> Table {
         )
         .column(
             Share,
-            heads()
-                .csv(&["area", "area_low", "area_high", "n"])
-                .terminal(&["mean accuracy"])
-                .page("area in % [95 %]"),
+            "csv area area_low area_high n | terminal mean accuracy | page area in % [95 %]",
             |curve| curve.area,
         )
-        .column(Text, heads().page("EV"), |curve| {
+        .column(Text, "page EV", |curve| {
             format!("0–{}", curve.darkest.value())
         })
         .made()
