@@ -10,7 +10,7 @@ pub(super) mod tables;
 
 pub use shown::{Run, Shown};
 
-use serde::Serialize;
+use serde_json::{Value, json};
 
 use super::chart::Figure;
 use super::table::Table;
@@ -25,28 +25,6 @@ const PAGE: &str = include_str!("page.html");
 pub(super) const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
 
-/// What the template is filled with.
-#[derive(Serialize)]
-struct Page<'a> {
-    title: String,
-    /// What must be read before any number.
-    alerts: Vec<String>,
-    intro: Vec<String>,
-    sections: Vec<sections::Section<'a>>,
-    runs: Vec<Facts>,
-    /// The items, packed.
-    data: String,
-    css: &'static str,
-    script: &'static str,
-}
-
-/// A run's facts, as rows of names and values.
-#[derive(Serialize)]
-struct Facts {
-    name: String,
-    rows: Vec<(String, String)>,
-}
-
 /// The page.
 ///
 /// # Errors
@@ -57,19 +35,18 @@ pub fn page<'a>(
     figures: &[Figure],
     shown: &Shown<'a>,
 ) -> Result<String> {
-    let sections = sections::sections(tables, figures, shown.thumbnails);
     filled(
         PAGE,
-        Page {
-            title: title(shown),
-            alerts: alerts(shown),
-            intro: intro(findings),
-            sections,
-            runs: shown.runs.iter().map(facts).collect(),
-            data: items::packed(findings, shown)?,
-            css: STYLE,
-            script: SCRIPT,
-        },
+        json!({
+            "title": title(shown),
+            "alerts": alerts(shown),
+            "intro": intro(findings),
+            "sections": sections::sections(tables, figures, shown.thumbnails),
+            "runs": shown.runs.iter().map(facts).collect::<Vec<_>>(),
+            "data": items::packed(findings, shown)?,
+            "css": STYLE,
+            "script": SCRIPT,
+        }),
     )
 }
 
@@ -114,17 +91,14 @@ fn intro(findings: &Findings<'_>) -> Vec<String> {
     )]
 }
 
-fn facts(run: &Run<'_>) -> Facts {
+fn facts(run: &Run<'_>) -> Value {
     let manifest = run.manifest;
     let fact = |name: &str, value: String| (name.to_owned(), value);
     let mut rows = about(manifest);
     rows.extend(spent(run.records));
     rows.extend(run.cost.iter().map(|cost| fact("cost", cost.clone())));
     rows.extend(settings(manifest));
-    Facts {
-        name: run.name.clone(),
-        rows,
-    }
+    json!({"name": run.name, "rows": rows})
 }
 
 /// What a manifest says, as rows of names and values.

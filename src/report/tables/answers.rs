@@ -2,7 +2,6 @@
 
 use crate::report::table::Kind::{Count, Number, Percent, Share, Text};
 use crate::report::table::{Layout, Table};
-use crate::report::words::family;
 use crate::score::confusion::{Confusion, Hallucination};
 use crate::score::findings::Findings;
 
@@ -41,10 +40,7 @@ fn collapse(confusions: &[Confusion]) -> Table {
             "The answer given most often, and how often it is true",
         )
         .subject(|(one, _)| &one.subject, ToString::to_string)
-        .column(Text, "csv family", |(one, _)| one.family.name().to_owned())
-        .column(Text, "page family", |(one, _)| {
-            family(Some(&one.family)).to_owned()
-        })
+        .family(|(one, _)| Some(&one.family))
         .column(Text, "csv top_answer | page given most often", |(_, c)| {
             c.top.clone()
         })
@@ -77,7 +73,7 @@ fn confusion(confusions: &[Confusion]) -> Table {
     let there = cells.filter(|(_, (_, _, count))| *count > 0);
     Layout::new("confusion", there)
         .subject(|(one, _)| &one.subject, ToString::to_string)
-        .column(Text, "csv family", |(one, _)| one.family.name().to_owned())
+        .family(|(one, _)| Some(&one.family))
         .column(Text, "csv truth", |(one, (truth, _, _))| {
             one.labels[*truth].clone()
         })

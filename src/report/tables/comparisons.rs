@@ -3,10 +3,9 @@
 use super::ENHANCERS;
 use crate::report::table::Kind::{Count, Number, P, Percent, Points, Text, Verdict};
 use crate::report::table::{Format, Layout, Table};
-use crate::report::words::{family, name};
+use crate::report::words::name;
 use crate::score::comparison::{Comparison, Kind, Verdict as Shown};
 use crate::score::findings::Findings;
-use crate::types::Family;
 
 /// The most rows of a kind in the terminal; all of them are in the file.
 const MOST: usize = 40;
@@ -17,11 +16,11 @@ pub(super) fn comparisons(findings: &Findings<'_>) -> Vec<Table> {
         let all = findings.comparisons.iter().filter(|one| one.kind == kind);
         let (whole, parts): (Vec<&Comparison>, Vec<&Comparison>) =
             all.partition(|one| one.family.is_none());
-        let caption = caption(kind);
+        let (caption, heading) = titles(kind);
         let mut total = table(kind, caption, &whole);
         total.is_folded = kind != Kind::Enhancer;
         if !whole.is_empty() {
-            total.heading = heading(kind).map(str::to_owned);
+            total.heading = heading.map(str::to_owned);
             if kind == Kind::Enhancer {
                 let caption = "Enhanced against raw, paired by question, in percentage points.";
                 total.latex = Some(caption.to_owned());
@@ -35,24 +34,26 @@ pub(super) fn comparisons(findings: &Findings<'_>) -> Vec<Table> {
     tables
 }
 
-fn caption(kind: Kind) -> &'static str {
+/// The caption on the page, and the line above the table in the terminal, where what darkness costs is read from the levels.
+fn titles(kind: Kind) -> (&'static str, Option<&'static str>) {
     match kind {
-        Kind::Level => "Each dark level less L0, raw",
-        Kind::Variant => "Sensor noise less exposure drop alone",
-        Kind::Enhancer => "Enhanced less raw",
-        Kind::Model => "Model less model",
-        Kind::Blind => "With images less without",
-    }
-}
-
-/// The line above the table in the terminal, where what darkness costs is read from the levels.
-fn heading(kind: Kind) -> Option<&'static str> {
-    match kind {
-        Kind::Level => None,
-        Kind::Variant => Some("Sensor noise against exposure drop alone, paired by question"),
-        Kind::Enhancer => Some("Enhanced against raw, paired by question"),
-        Kind::Model => Some("Model against model, paired by question"),
-        Kind::Blind => Some("With images against without, paired by question"),
+        Kind::Level => ("Each dark level less L0, raw", None),
+        Kind::Variant => (
+            "Sensor noise less exposure drop alone",
+            Some("Sensor noise against exposure drop alone, paired by question"),
+        ),
+        Kind::Enhancer => (
+            "Enhanced less raw",
+            Some("Enhanced against raw, paired by question"),
+        ),
+        Kind::Model => (
+            "Model less model",
+            Some("Model against model, paired by question"),
+        ),
+        Kind::Blind => (
+            "With images less without",
+            Some("With images against without, paired by question"),
+        ),
     }
 }
 
@@ -111,10 +112,7 @@ fn whom(layout: Layout<&Comparison>) -> Layout<&Comparison> {
         .column(Text, "terminal", |one| named(one))
         .column(Text, "page first", |one| name(&one.first))
         .column(Text, "page second", |one| name(&one.second))
-        .column(Text, "csv family", |one| {
-            one.family.as_ref().map_or(Family::TOTAL, Family::name)
-        })
-        .column(Text, "page family", |one| family(one.family.as_ref()))
+        .family(|one| one.family.as_ref())
 }
 
 fn numbers(layout: Layout<&Comparison>) -> Layout<&Comparison> {

@@ -17,17 +17,11 @@ pub(super) fn flips(findings: &Findings<'_>) -> Table {
         .column(Text, "csv frame", |(_, record, _)| {
             record.detail.frame.to_string()
         })
-        .column(Text, "csv family", |(_, record, _)| {
-            record.detail.family.to_string()
-        })
+        .family(|(_, record, _)| Some(&record.detail.family))
         .column(Count, "csv repeat", |(_, record, _)| {
             record.detail.repeat as usize
         })
-        .column(Text, "csv model", |(fall, _, _)| fall.model.clone())
-        .column(Text, "csv variant", |(fall, _, _)| fall.variant.to_string())
-        .column(Text, "csv enhancer", |(fall, _, _)| {
-            fall.enhancer.as_ref().map(ToString::to_string)
-        })
+        .line(|(fall, _, _)| (&fall.model, &fall.variant, fall.enhancer.as_ref()))
         .column(Text, "csv first_failing", |(_, _, first)| {
             first.map(|level| level.to_string())
         })

@@ -13,10 +13,10 @@ mod thresholds;
 
 use super::table::Kind::Text;
 use super::table::{Cell, Layout, Table};
-use super::words::name;
+use super::words::{family, name};
 use crate::score::findings::Findings;
 use crate::score::subject::Subject;
-use crate::types::KindReading;
+use crate::types::{EnhancerName, Family, KindReading};
 
 pub(super) use summary::{SUMMARY, reading};
 
@@ -123,5 +123,24 @@ impl<T> Layout<T> {
                 said(of(row).enhancer.as_ref().map(ToString::to_string))
             })
             .column(Text, "page subject", |row| name(of(row)))
+    }
+
+    /// The columns that say which line over the levels a row is about: its model, variant and enhancer.
+    fn line(self, of: impl Fn(&T) -> (&str, &KindReading, Option<&EnhancerName>)) -> Self {
+        self.column(Text, "csv model | terminal model | page model", |row| {
+            of(row).0.to_owned()
+        })
+        .column(Text, "csv variant", |row| of(row).1.to_string())
+        .column(Text, "csv enhancer", |row| {
+            of(row).2.map(ToString::to_string)
+        })
+    }
+
+    /// The columns of the family; `None` is all of them together.
+    fn family(self, of: impl Fn(&T) -> Option<&Family>) -> Self {
+        self.column(Text, "csv family", |row| {
+            of(row).map_or(Family::TOTAL, Family::name).to_owned()
+        })
+        .column(Text, "page family", |row| family(of(row)).to_owned())
     }
 }

@@ -5,7 +5,6 @@ use crate::report::table::{Cell, Layout, Table};
 use crate::score::accuracy::{Cell as Score, Summary};
 use crate::score::choice::Mode;
 use crate::score::subject::Subject;
-use crate::types::Family;
 
 /// The name of the table.
 pub(in crate::report) const SUMMARY: &str = "summary";
@@ -13,9 +12,7 @@ pub(in crate::report) const SUMMARY: &str = "summary";
 pub(super) fn summary(summary: &Summary) -> Table {
     let layout = Layout::new(SUMMARY, &summary.cells)
         .subject(|cell| &cell.subject, |variant| variant.word().to_owned())
-        .column(Text, "csv family", |cell| {
-            cell.family.as_ref().map_or(Family::TOTAL, Family::name)
-        })
+        .family(|cell| cell.family.as_ref())
         .column(Text, "csv mode", |cell| match cell.mode {
             Mode::Strict => "strict",
             Mode::Lenient => "lenient",

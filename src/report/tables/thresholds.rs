@@ -2,10 +2,9 @@
 
 use crate::report::table::Kind::{Number, Share, Text, Threshold};
 use crate::report::table::{Cell, Layout, Table};
-use crate::report::words::{family, light};
+use crate::report::words::light;
 use crate::score::curve::Curve;
 use crate::score::findings::Findings;
-use crate::types::Family;
 
 pub(super) fn thresholds(findings: &Findings<'_>) -> Vec<Table> {
     let curves = findings.curves.iter();
@@ -26,26 +25,11 @@ pub(super) fn thresholds(findings: &Findings<'_>) -> Vec<Table> {
 fn table(caption: &str, curves: &[&Curve]) -> Table {
     Layout::new("thresholds", curves)
         .page("thresholds", caption)
-        .column(
-            Text,
-            "csv model | terminal model | page model",
-            |curve| curve.model.clone(),
-        )
-        .column(Text, "csv variant", |curve| {
-            curve.variant.to_string()
-        })
-        .column(Text, "csv enhancer", |curve| {
-            curve.enhancer.as_ref().map(ToString::to_string)
-        })
+        .line(|curve| (&curve.model, &curve.variant, curve.enhancer.as_ref()))
         .column(Text, "terminal light | page light", |curve| {
             light(&curve.variant, curve.enhancer.as_ref())
         })
-        .column(Text, "csv family", |curve| {
-            curve.family.as_ref().map_or(Family::TOTAL, Family::name)
-        })
-        .column(Text, "page family", |curve| {
-            family(curve.family.as_ref())
-        })
+        .family(|curve| curve.family.as_ref())
         .column(Number, "csv darkest_ev", |curve| {
             curve.darkest.value()
         })
