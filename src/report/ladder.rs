@@ -90,7 +90,7 @@ impl<'a, C> Ladder<'a, C> {
     pub(super) fn layout(
         &'a self,
         name: &'static str,
-        cell: impl Fn(&C) -> Cell,
+        cell: impl Fn(Option<&C>) -> Cell,
     ) -> Layout<Line<'a, C>> {
         let series = self.series.iter();
         let series = series.map(|(series, steps)| Line::Series(series, steps));
@@ -110,14 +110,14 @@ impl<'a, C> Ladder<'a, C> {
         for (place, level) in self.levels.iter().enumerate() {
             let names = format!("page {level} | terminal {level} | latex {level}");
             layout = layout.column(Kind::Accuracy, &*names, |line| match line {
-                Line::Series(_, steps) => steps.get(level).map_or(Cell::Absent, |c| cell(c)),
-                Line::Floor(_, floor) if place == 0 => cell(floor),
+                Line::Series(_, steps) => cell(steps.get(level).copied()),
+                Line::Floor(_, floor) if place == 0 => cell(Some(floor)),
                 Line::Floor(..) => Cell::Blank,
             });
         }
         if self.levels.is_empty() {
             layout = layout.column(Kind::Accuracy, "page", |line| match line {
-                Line::Floor(_, floor) => cell(floor),
+                Line::Floor(_, floor) => cell(Some(floor)),
                 Line::Series(..) => Cell::Blank,
             });
         }

@@ -41,7 +41,10 @@ pub(super) fn ladder<'a>(summary: &'a OpenSummary, group: &Group) -> Ladder<'a, 
 }
 
 /// A score, and what it differs by from the lit frames; of the unrounded means.
-fn score(summary: &OpenSummary, cell: &OpenCell) -> Cell {
+fn score(summary: &OpenSummary, cell: Option<&OpenCell>) -> Cell {
+    let Some(cell) = cell else {
+        return Cell::Absent;
+    };
     let change = summary.change(&cell.subject, Against::Lit, &cell.group);
     let change = change.map(|change| change.difference.value);
     Cell::from(cell.score.map(|score| Cell::Changed(score, change)))
@@ -106,7 +109,7 @@ fn levels(report: &OpenReport<'_>) -> Table {
     ));
     let floors = ladder.floors.iter();
     let notes = floors.map(|(subject, cell)| {
-        let shown = texts(Kind::Accuracy, &score(summary, cell)).concat();
+        let shown = texts(Kind::Accuracy, &score(summary, Some(cell))).concat();
         let (scored, due) = (cell.scored(), cell.due);
         let of = if scored == due {
             String::new()
@@ -153,7 +156,7 @@ fn by_group(
             |(_, (_, ladder))| {
                 let steps: Option<&Steps<'_, OpenCell>> = ladder.series.get(series);
                 let cell = steps.and_then(|steps| steps.get(level));
-                cell.map_or(Cell::Absent, |cell| score(summary, cell))
+                score(summary, cell.copied())
             },
         );
     }
@@ -162,7 +165,7 @@ fn by_group(
             let is_same = |(subject, _): &&(&Subject, &OpenCell)| subject.model == series.model;
             let mut floors = ladder.floors.iter();
             let own = floors.find(is_same).or(ladder.floors.first());
-            own.map_or(Cell::Absent, |(_, cell)| score(summary, cell))
+            score(summary, own.map(|(_, cell)| *cell))
         });
     }
     let mut table = layout.made();

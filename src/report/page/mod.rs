@@ -93,7 +93,6 @@ fn intro(findings: &Findings<'_>) -> Vec<String> {
 
 fn facts(run: &Run<'_>) -> Value {
     let manifest = run.manifest;
-    let fact = |name: &str, value: String| (name.to_owned(), value);
     let mut rows = about(manifest);
     rows.extend(spent(run.records));
     rows.extend(run.cost.iter().map(|cost| fact("cost", cost.clone())));
@@ -104,6 +103,10 @@ fn facts(run: &Run<'_>) -> Value {
 /// What a manifest says, as rows of names and values.
 pub(super) fn manifest_facts(manifest: &RunManifest) -> Vec<(String, String)> {
     [about(manifest), settings(manifest)].concat()
+}
+
+fn fact(name: &str, value: impl ToString) -> (String, String) {
+    (name.to_owned(), value.to_string())
 }
 
 fn settings(manifest: &RunManifest) -> Vec<(String, String)> {
@@ -123,7 +126,6 @@ fn settings(manifest: &RunManifest) -> Vec<(String, String)> {
 }
 
 fn about(manifest: &RunManifest) -> Vec<(String, String)> {
-    let fact = |name: &str, value: String| (name.to_owned(), value);
     vec![
         fact("status", manifest.status.to_string()),
         fact("made by", format!("darkqa-eval {}", manifest.version)),
@@ -162,13 +164,12 @@ fn spent(records: &[Record]) -> Vec<(String, String)> {
             .get((last * share).round() as usize)
             .map_or("–".to_owned(), |ms| format!("{ms} ms"))
     };
-    let row = |name: &str, value: String| (name.to_owned(), value);
     vec![
-        row(
+        fact(
             "requests",
             format!("{requests} for {} trials", records.len()),
         ),
-        row(
+        fact(
             "tokens",
             format!(
                 "{} of prompts, {} of replies",
@@ -176,12 +177,12 @@ fn spent(records: &[Record]) -> Vec<(String, String)> {
                 tokens(|usage| usage.completion_tokens)
             ),
         ),
-        row("image bytes", format!("{bytes}")),
-        row(
+        fact("image bytes", format!("{bytes}")),
+        fact(
             "latency",
             format!("median {}, 95 % within {}", at(0.5), at(0.95)),
         ),
-        row(
+        fact(
             "served as",
             served.into_iter().collect::<Vec<_>>().join(", "),
         ),

@@ -3,7 +3,7 @@
 pub mod figure;
 pub mod review;
 
-use std::fmt::Write as _;
+use std::fmt::{Display, Write as _};
 
 use super::table::Kind::{Count, Text};
 use super::table::Layout;
@@ -141,8 +141,8 @@ pub fn json(summary: &Summary) -> Result<String> {
 /// Where it cannot be written as such.
 pub fn csv(summary: &Summary) -> Result<Vec<u8>> {
     let mut rows: Vec<[String; 4]> = Vec::new();
-    let mut row = |table: &str, row: &str, column: &str, count: String| {
-        rows.push([table.to_owned(), row.to_owned(), column.to_owned(), count]);
+    let mut row = |table: &str, row: &dyn Display, column: &str, count: &dyn Display| {
+        rows.push([table, &row.to_string(), column, &count.to_string()].map(str::to_owned));
     };
     for (what, count) in [
         ("scenes", summary.scenes),
@@ -152,74 +152,57 @@ pub fn csv(summary: &Summary) -> Result<Vec<u8>> {
         ("questions", summary.questions),
         ("repeats", summary.repeats),
     ] {
-        row("all", what, "", count.to_string());
+        row("all", &what, "", &count);
     }
     for (family, candidates) in &summary.candidates {
-        for (column, count) in [
-            ("viable", candidates.viable),
-            ("asked", candidates.asked),
-            ("not_chosen", candidates.not_chosen),
-            ("rejected", candidates.rejected),
-            ("unbalanced", candidates.unbalanced),
-        ] {
-            row("candidates", family.name(), column, count.to_string());
-        }
+        let name = family.name();
+        row("candidates", &name, "viable", &candidates.viable);
+        row("candidates", &name, "asked", &candidates.asked);
+        row("candidates", &name, "not_chosen", &candidates.not_chosen);
+        row("candidates", &name, "rejected", &candidates.rejected);
+        row("candidates", &name, "unbalanced", &candidates.unbalanced);
         for (reason, count) in &candidates.fallen {
-            row("fallen", family.name(), &word(reason), count.to_string());
+            row("fallen", &name, &word(reason), count);
         }
     }
     for (questions, frames) in &summary.per_frame {
-        row(
-            "per_frame",
-            &questions.to_string(),
-            "frames",
-            frames.to_string(),
-        );
+        row("per_frame", questions, "frames", frames);
     }
     for (family, answers) in &summary.answers {
         for (answer, count) in answers {
-            row("answers", family.name(), answer, count.to_string());
+            row("answers", &family.name(), answer, count);
         }
     }
     for (words, count) in &summary.texts {
-        row("texts", words, "", count.to_string());
+        row("texts", words, "", count);
     }
     for (choices, count) in &summary.choices {
-        row(
-            "choices",
-            &choices.to_string(),
-            "questions",
-            count.to_string(),
-        );
+        row("choices", choices, "questions", count);
     }
     for (family, subjects) in &summary.polarity {
         for (about, [yes, no]) in subjects {
-            row(family.name(), about, "yes", yes.to_string());
-            row(family.name(), about, "no", no.to_string());
+            row(family.name(), about, "yes", yes);
+            row(family.name(), about, "no", no);
         }
     }
     for (class, coverage) in &summary.classes {
-        for (column, count) in [
-            ("pixels", coverage.pixels),
-            ("segments", coverage.segments),
-            ("frames", coverage.frames),
-            ("questions", coverage.questions),
-        ] {
-            row("classes", class, column, count.to_string());
-        }
+        row("classes", class, "pixels", &coverage.pixels);
+        row("classes", class, "segments", &coverage.segments);
+        row("classes", class, "frames", &coverage.frames);
+        row("classes", class, "questions", &coverage.questions);
     }
     for (room, counts) in &summary.rooms {
-        row("rooms", room, "frames", counts.frames.to_string());
-        row("rooms", room, "questions", counts.questions.to_string());
+        row("rooms", room, "frames", &counts.frames);
+        row("rooms", room, "questions", &counts.questions);
     }
     for (gap, count) in &summary.gaps {
-        row("gaps_mm", &gap.to_string(), "questions", count.to_string());
+        row("gaps_mm", gap, "questions", count);
     }
     for (family, base) in &summary.baselines {
-        row("baselines", family, "questions", base.questions.to_string());
-        row("baselines", family, "chance", base.chance.to_string());
-        row("baselines", family, "majority", base.majority.to_string());
-        row("baselines", family, "prior", base.prior.to_string());
+        row("baselines", family, "questions", &base.questions);
+        row("baselines", family, "chance", &base.chance);
+        row("baselines", family, "majority", &base.majority);
+        row("baselines", family, "prior", &base.prior);
     }
     let table = Layout::new("statistics", rows)
         .column(Text, "csv table", |[table, ..]| table.clone())

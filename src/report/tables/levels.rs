@@ -18,7 +18,9 @@ pub(super) fn levels(findings: &Findings<'_>) -> Table {
         line.steps().map(count).sum()
     };
     let mut table = ladder
-        .layout("levels", |cell| accuracy(summary, cell))
+        .layout("levels", |cell| {
+            cell.map_or(Cell::Blank, |cell| accuracy(summary, cell))
+        })
         .page(
             "accuracy",
             "Accuracy in % by level, with half of the 95 % interval",
