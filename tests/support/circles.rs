@@ -11,7 +11,7 @@ use std::path::Path;
 use super::{Scope, Token, code_only, rust_files, scopes, tokens};
 
 /// Circles of files that may be, and why. A part of one may be, too. All but the first are to be cut, by what is said beside.
-const CIRCLES: [(&[&str], &str); 13] = [
+const CIRCLES: [(&[&str], &str); 8] = [
     (
         &[
             "score/choice/lenient.rs",
@@ -47,25 +47,6 @@ const CIRCLES: [(&[&str], &str); 13] = [
         "Asked moves to questions/survey.rs",
     ),
     (
-        &["report/figures/mod.rs", "report/figures/thresholds.rs"],
-        "Figure moves to a file of its own",
-    ),
-    (
-        &[
-            "report/openeqa/figure.rs",
-            "report/openeqa/files.rs",
-            "report/openeqa/latex.rs",
-            "report/openeqa/mod.rs",
-            "report/openeqa/page.rs",
-            "report/openeqa/upstream.rs",
-        ],
-        "OpenReport and Told move to a file of their own",
-    ),
-    (
-        &["report/page/items.rs", "report/page/mod.rs"],
-        "Shown moves to a file of its own",
-    ),
-    (
         &[
             "run/identity.rs",
             "run/merge.rs",
@@ -87,20 +68,6 @@ const CIRCLES: [(&[&str], &str); 13] = [
     (
         &["run/plan.rs", "run/record.rs", "run/trial.rs"],
         "Entry goes, with Record<D>",
-    ),
-    (
-        &[
-            "score/accuracy.rs",
-            "score/chance.rs",
-            "score/estimate.rs",
-            "score/grid.rs",
-            "score/health.rs",
-        ],
-        "Subject moves to score/subject.rs",
-    ),
-    (
-        &["score/realism/mod.rs", "score/realism/residual.rs"],
-        "same_size moves to a file of its own",
     ),
 ];
 

@@ -1,6 +1,6 @@
 //! Every difference with its test, a table a kind of comparison: all families together, and by family.
 
-use super::ENHANCERS;
+use super::sections::ENHANCERS;
 use crate::report::table::Kind::{Count, Number, P, Percent, Points, Text, Verdict};
 use crate::report::table::{Format, Layout, Table};
 use crate::report::words::name;
