@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use serde::ser::{SerializeMap, SerializeSeq};
 use serde::{Serialize, Serializer};
 
 use super::csv::fields;
@@ -22,11 +21,7 @@ struct Document<'a, H> {
 }
 
 fn rows<S: Serializer>(table: &Table, serializer: S) -> Result<S::Ok, S::Error> {
-    let mut rows = serializer.serialize_seq(Some(table.rows.len()))?;
-    for row in &table.rows {
-        rows.serialize_element(&Named { table, row })?;
-    }
-    rows.end()
+    serializer.collect_seq(table.rows.iter().map(|row| Named { table, row }))
 }
 
 struct Named<'a> {
@@ -36,14 +31,11 @@ struct Named<'a> {
 
 impl Serialize for Named<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(None)?;
-        for (column, cell) in self.table.cells(self.row) {
+        let cells = self.table.cells(self.row);
+        serializer.collect_map(cells.flat_map(|(column, cell)| {
             let names = &column.heads.csv;
-            for (name, field) in names.iter().zip(fields(cell, names.len())) {
-                map.serialize_entry(name, &field)?;
-            }
-        }
-        map.end()
+            names.iter().zip(fields(cell, names.len()))
+        }))
     }
 }
 

@@ -159,6 +159,11 @@ impl<C> Line<'_, C> {
         }
     }
 
+    /// A count over all levels of a series.
+    pub(super) fn sum(&self, count: impl Fn(&C) -> usize) -> usize {
+        self.steps().map(count).sum()
+    }
+
     /// The numbers of a series.
     pub(super) fn steps(&self) -> impl Iterator<Item = &C> + Clone {
         let steps = match self {

@@ -251,3 +251,32 @@ impl Table {
         self.columns.iter().zip(&row.cells)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_column_has_a_name_in_each_format() {
+        let heads =
+            Heads::from("csv d low high | terminal difference, 95 % interval | page | latex $d$");
+        assert_eq!(heads.csv, ["d", "low", "high"]);
+        assert_eq!(heads.terminal, ["difference", "95 % interval"]);
+        assert_eq!(heads.page.as_deref(), Some(""));
+        assert_eq!(heads.latex.as_deref(), Some("$d$"));
+        assert_eq!(Heads::from("csv n").page, None);
+    }
+
+    #[test]
+    fn cells_stand_below_their_columns_and_rows_can_be_left_out() {
+        let table = Layout::new("t", [1_usize, 2])
+            .column(Kind::Count, "csv n", |n| *n)
+            .column(Kind::Text, "page word", |n| (*n == 1).then_some("one"))
+            .hide(Format::Page, |n| *n == 2)
+            .made();
+        assert_eq!(table.rows[0].cells, [Cell::Count(1), Cell::from("one")]);
+        assert_eq!(table.rows[1].cells, [Cell::Count(2), Cell::Missing]);
+        assert_eq!(table.rows_in(Format::Page).count(), 1);
+        assert_eq!(table.rows_in(Format::Terminal).count(), 2);
+    }
+}

@@ -1,7 +1,7 @@
 //! The tables of a run of open questions: [`tables`].
 
 use super::open_report::OpenReport;
-use crate::report::ladder::{Ladder, Line, Series, Steps};
+use crate::report::ladder::{Ladder, Series, Steps};
 use crate::report::latex::escaped;
 use crate::report::table::Kind::{Accuracy, Count, Points, Share, Text};
 use crate::report::table::{Cell, Kind, Layout, Table};
@@ -79,9 +79,6 @@ fn summary(summary: &OpenSummary) -> Table {
 fn levels(report: &OpenReport<'_>) -> Table {
     let summary = report.summary;
     let ladder = ladder(summary, &Group::All);
-    let sum = |line: &Line<'_, OpenCell>, count: fn(&OpenCell) -> usize| -> usize {
-        line.steps().map(count).sum()
-    };
     let mut table = ladder
         .layout("levels", |cell| score(summary, cell))
         .page(
@@ -91,8 +88,8 @@ fn levels(report: &OpenReport<'_>) -> Table {
         .column(Count, "terminal scored", |line| {
             format!(
                 "{} of {}",
-                sum(line, OpenCell::scored),
-                sum(line, |cell| cell.due)
+                line.sum(OpenCell::scored),
+                line.sum(|cell| cell.due)
             )
         })
         .made();

@@ -14,9 +14,6 @@ pub(super) fn levels(findings: &Findings<'_>) -> Table {
     let summary = &findings.summary;
     let strict = summary.of(None, Mode::Strict);
     let ladder = Ladder::new(strict.map(|cell| (&cell.subject, cell)));
-    let counts = |line: &Line<'_, Score>, count: fn(&Score) -> usize| -> usize {
-        line.steps().map(count).sum()
-    };
     let mut table = ladder
         .layout("levels", |cell| {
             cell.map_or(Cell::Blank, |cell| accuracy(summary, cell))
@@ -27,13 +24,13 @@ pub(super) fn levels(findings: &Findings<'_>) -> Table {
         )
         .column(Count, "terminal n", |line| replies(line))
         .column(Count, "terminal unparsed", |line| {
-            let lenient = line.steps().filter_map(|cell| lenient(summary, cell));
-            let lenient = lenient.map(|cell| cell.unparsed).sum::<usize>().to_string();
-            let strict = counts(line, |cell| cell.unparsed).to_string();
+            let strict = line.sum(|cell| cell.unparsed).to_string();
+            let lenient = |cell: &Score| lenient(summary, cell).map_or(0, |cell| cell.unparsed);
+            let lenient = line.sum(lenient).to_string();
             format!("{strict}{}", differing(&strict, &lenient))
         })
         .column(Count, "terminal failed", |line| {
-            counts(line, |cell| cell.failed)
+            line.sum(|cell| cell.failed)
         })
         .made();
     add_always(&mut table, &ladder);
@@ -69,15 +66,11 @@ fn accuracy(summary: &Summary, cell: &Score) -> Cell {
 
 /// How many replies stand behind the numbers of a series, from the least to the most.
 fn replies(line: &Line<'_, Score>) -> String {
-    let replies = line.steps().map(n);
+    let replies = line.steps().map(Score::replies);
     match (replies.clone().min(), replies.max()) {
         (Some(least), Some(most)) if least != most => format!("{least}–{most}"),
         (least, _) => least.unwrap_or(0).to_string(),
     }
-}
-
-fn n(cell: &Score) -> usize {
-    cell.accuracy.map_or(0, |share| share.n)
 }
 
 /// The share of questions that were answered rightly every time.
@@ -142,7 +135,7 @@ fn floor(summary: &Summary, cell: &Score) -> String {
     format!(
         "{} without images: {accuracy}, n {}{}, unparsed {unparsed}{}, failed {}",
         cell.subject.model,
-        n(cell),
+        cell.replies(),
         always.unwrap_or_default(),
         lenient.unwrap_or_default(),
         cell.failed

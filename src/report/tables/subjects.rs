@@ -25,7 +25,7 @@ pub(super) fn subjects(summary: &Summary) -> Table {
         .column(Percent, "page lenient", |cell| {
             summary.cell(&cell.subject, None, Mode::Lenient)?.accuracy
         })
-        .column(Count, "page n", |cell| cell.accuracy.map_or(0, |e| e.n))
+        .column(Count, "page n", |cell| cell.replies())
         .column(Count, "page not readable", |cell| cell.unparsed)
         .column(Count, "page failed", |cell| cell.failed)
         .made();

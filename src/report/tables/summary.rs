@@ -2,7 +2,7 @@
 
 use crate::report::table::Kind::{Count, Share, Text};
 use crate::report::table::{Cell, Layout, Table};
-use crate::score::accuracy::{Cell as Score, Summary};
+use crate::score::accuracy::Summary;
 use crate::score::choice::Mode;
 use crate::score::subject::Subject;
 
@@ -17,7 +17,7 @@ pub(super) fn summary(summary: &Summary) -> Table {
             Mode::Strict => "strict",
             Mode::Lenient => "lenient",
         })
-        .column(Count, "csv n", |cell| n(cell))
+        .column(Count, "csv n", |cell| cell.replies())
         .column(Count, "csv right", |cell| {
             cell.subject.view.map(|_| cell.right)
         })
@@ -32,10 +32,6 @@ pub(super) fn summary(summary: &Summary) -> Table {
     layout
         .column(Text, "csv reading", |cell| reading(&cell.subject))
         .made()
-}
-
-fn n(cell: &Score) -> usize {
-    cell.accuracy.map_or(0, |accuracy| accuracy.n)
 }
 
 /// The light reading of a subject.
