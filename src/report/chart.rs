@@ -8,6 +8,7 @@ use plotters::coord::Shift;
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
+use serde::Serialize;
 
 use crate::error::{Error, Result};
 use crate::score::estimate::Estimate;
@@ -41,6 +42,25 @@ const PANEL: (i32, i32) = (400, 300);
 const MARGIN: [i32; 4] = [52, 34, 14, 58];
 /// The height of a line of words.
 const ROW: i32 = 20;
+
+/// One figure of a report.
+#[derive(Debug, Clone, Serialize)]
+pub struct Figure {
+    /// Its name in files.
+    pub name: &'static str,
+    /// What it shows.
+    pub caption: String,
+    /// The drawing.
+    pub svg: String,
+}
+
+/// Figures as files.
+pub(super) fn files(figures: Vec<Figure>) -> impl Iterator<Item = (String, Vec<u8>)> {
+    figures.into_iter().map(|figure| {
+        let name = format!("figures/{}.svg", figure.name);
+        (name, figure.svg.into_bytes())
+    })
+}
 
 /// How a line looks: the same number is the same look in every figure of a report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -166,22 +186,10 @@ impl Chart {
             if matches!(line.shape, Shape::Curve(_)) {
                 mark(root, line.look, (x + 17, y))?;
             }
-            words(
-                root,
-                &line.name,
-                (x + 42, y),
-                13,
-                (HPos::Left, VPos::Center),
-            )?;
+            words(root, &line.name, (x + 42, y), 13, LEFT)?;
         }
         let last = legend.last().map_or(top, |(_, (_, y))| top + y + ROW);
-        words(
-            root,
-            &self.note,
-            (12, last + 12),
-            12,
-            (HPos::Left, VPos::Center),
-        )?;
+        words(root, &self.note, (12, last + 12), 12, LEFT)?;
         root.present().map_err(failed)
     }
 }
@@ -189,6 +197,11 @@ impl Chart {
 fn flat(shape: &Shape) -> bool {
     matches!(shape, Shape::Flat(_))
 }
+
+/// Words to the right of their place, to the left of it, and below it.
+pub(super) const LEFT: (HPos, VPos) = (HPos::Left, VPos::Center);
+pub(super) const RIGHT: (HPos, VPos) = (HPos::Right, VPos::Center);
+pub(super) const BELOW: (HPos, VPos) = (HPos::Center, VPos::Top);
 
 /// Where a panel's axes are.
 struct Frame {
@@ -246,13 +259,7 @@ impl Frame {
             let y = self.y(share);
             path(root, &[(self.left, y), (right, y)], GRID.stroke_width(1))?;
             let label = (step * 20).to_string();
-            words(
-                root,
-                &label,
-                (self.left - 6, y),
-                12,
-                (HPos::Right, VPos::Center),
-            )?;
+            words(root, &label, (self.left - 6, y), 12, RIGHT)?;
         }
         let bottom = self.top + self.height;
         path(
@@ -264,29 +271,11 @@ impl Frame {
             let x = self.x(*level);
             path(root, &[(x, bottom), (x, bottom + 4)], INK.stroke_width(1))?;
             let drop = level.value();
-            words(
-                root,
-                &level.to_string(),
-                (x, bottom + 7),
-                12,
-                (HPos::Center, VPos::Top),
-            )?;
-            words(
-                root,
-                &drop.to_string(),
-                (x, bottom + 22),
-                11,
-                (HPos::Center, VPos::Top),
-            )?;
+            words(root, &level.to_string(), (x, bottom + 7), 12, BELOW)?;
+            words(root, &drop.to_string(), (x, bottom + 22), 11, BELOW)?;
         }
         let middle = self.left + self.width / 2;
-        words(
-            root,
-            &self.axis_title(),
-            (middle, bottom + 38),
-            12,
-            (HPos::Center, VPos::Top),
-        )?;
+        words(root, &self.axis_title(), (middle, bottom + 38), 12, BELOW)?;
         words(
             root,
             &panel.title,
@@ -294,7 +283,7 @@ impl Frame {
             14,
             (HPos::Left, VPos::Top),
         )?;
-        let turned = style(12, (HPos::Center, VPos::Top)).transform(FontTransform::Rotate270);
+        let turned = style(12, BELOW).transform(FontTransform::Rotate270);
         let place = (self.left - 48, self.top + self.height / 2);
         root.draw(&Text::new(measure.to_owned(), place, turned))
             .map_err(|e| e.to_string())

@@ -2,10 +2,11 @@
 
 use std::fmt::Write;
 
-use comfy_table::CellAlignment;
 use serde::Serialize;
 
-use super::table::plain;
+use super::table::Kind::{Count, Text};
+use super::table::Layout;
+use super::terminal;
 use crate::error::{Error, Result};
 
 /// What is left to ask of one model.
@@ -77,31 +78,25 @@ pub fn json(forecast: &Forecast) -> Result<String> {
 /// The forecast for people.
 #[must_use]
 pub fn render(forecast: &Forecast) -> String {
-    let mut table = plain();
-    table.set_header([
-        "model",
-        "requests",
-        "text tokens",
-        "image tokens",
-        "reply tokens",
-        "dollars",
-    ]);
-    for line in &forecast.lines {
-        let images = line.image_tokens.map_or("unknown".to_owned(), count);
-        let replies = between(Some(line.reply_tokens), line.longest_reply_tokens, &count);
-        let dollars = between(line.dollars, line.most_dollars, &money);
-        table.add_row([
-            line.model.clone(),
-            count(line.requests as f64),
-            count(line.text_tokens),
-            images,
-            replies,
-            dollars,
-        ]);
-    }
-    for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
+    let table = Layout::new("estimate", &forecast.lines)
+        .column(Text, "terminal model", |line| line.model.clone())
+        .column(Count, "terminal requests", |line| {
+            count(line.requests as f64)
+        })
+        .column(Count, "terminal text tokens", |line| {
+            count(line.text_tokens)
+        })
+        .column(Count, "terminal image tokens", |line| {
+            line.image_tokens.map_or("unknown".to_owned(), count)
+        })
+        .column(Count, "terminal reply tokens", |line| {
+            between(Some(line.reply_tokens), line.longest_reply_tokens, &count)
+        })
+        .column(Count, "terminal dollars", |line| {
+            between(line.dollars, line.most_dollars, &money)
+        })
+        .made();
+    let table = terminal::table(&[table]);
     let Forecast {
         trials,
         answered,
@@ -121,7 +116,7 @@ pub fn render(forecast: &Forecast) -> String {
     if forecast.lines.is_empty() {
         return text + ".\n";
     }
-    let _ = writeln!(text, ".\n{table}");
+    let _ = write!(text, ".\n{table}");
     let _ = writeln!(
         text,
         "dollars: from {} a reply to every reply as long as --max-tokens allows; {prices}; by the Batch API {:.0} % of it",

@@ -1,22 +1,21 @@
-//! The main tables for a paper, as LaTeX with booktabs: [`tables`].
+//! Tables for a paper, as LaTeX with booktabs: [`tables`].
 
 use std::fmt::Write;
 
-use super::ladder::Ladder;
-use super::subject::{family as family_name, p, percent, points};
-use crate::score::accuracy::Cell;
-use crate::score::choice::Mode;
-use crate::score::comparison::{Kind, Verdict};
-use crate::score::findings::Findings;
+use super::table::{Cell, Column, Format, Kind, Table};
+use super::words::{percent, points, words};
+use crate::score::comparison::Verdict;
+use crate::score::estimate::Estimate;
 
-/// The tables: accuracy by level, accuracy by family with what is below blind marked, enhanced against raw.
+/// All tables that have a caption for it.
 #[must_use]
-pub fn tables(findings: &Findings<'_>) -> String {
-    let mut text =
-        String::from("% Tables of darkqa-eval; \\usepackage{booktabs} in the preamble.\n");
-    text += &accuracy(findings);
-    text += &families(findings);
-    text += &enhancers(findings).unwrap_or_default();
+pub(super) fn tables(head: &str, tables: &[Table]) -> String {
+    let mut text = format!("% {head} of darkqa-eval; \\usepackage{{booktabs}} in the preamble.\n");
+    for one in tables {
+        if let Some(caption) = &one.latex {
+            text += &table(caption, one);
+        }
+    }
     text
 }
 
@@ -42,156 +41,53 @@ pub(super) fn escaped(text: &str) -> String {
     escaped
 }
 
-pub(super) fn table(caption: &str, columns: &str, head: &[String], rows: &[Vec<String>]) -> String {
-    let line = |cells: &[String]| format!("    {} \\\\\n", cells.join(" & "));
+fn table(caption: &str, table: &Table) -> String {
+    let named = |column: &&Column| column.heads.latex.is_some();
+    let columns = table.columns.iter().filter(named);
+    let sides = columns.clone().map(|column| match column.kind {
+        Kind::Text | Kind::Verdict => 'l',
+        _ => 'r',
+    });
+    let heads = columns.filter_map(|column| column.heads.latex.clone());
+    let line = |cells: Vec<String>| format!("    {} \\\\\n", cells.join(" & "));
     let mut text = String::from("\n\\begin{table}\n  \\centering\n");
     let _ = writeln!(text, "  \\caption{{{caption}}}");
-    let _ = writeln!(text, "  \\begin{{tabular}}{{{columns}}}\n    \\toprule");
-    text += &line(head);
+    let sides: String = sides.collect();
+    let _ = writeln!(text, "  \\begin{{tabular}}{{{sides}}}\n    \\toprule");
+    text += &line(heads.collect());
     text += "    \\midrule\n";
-    for row in rows {
-        text += &line(row);
+    for row in table.rows_in(Format::Latex) {
+        let cells = table.cells(row).filter(|(column, _)| named(column));
+        text += &line(
+            cells
+                .map(|(column, cell)| shown(column.kind, cell))
+                .collect(),
+        );
     }
     text + "    \\bottomrule\n  \\end{tabular}\n\\end{table}\n"
 }
 
-/// Accuracy with half of its interval.
-fn shown(cell: Option<&Cell>) -> String {
-    cell.and_then(|cell| cell.accuracy).map_or_else(
-        || "--".to_owned(),
-        |a| {
-            format!(
-                "{} {{\\scriptsize$\\pm${}}}",
-                percent(a.value),
-                percent((a.high - a.low) / 2.0)
-            )
-        },
-    )
+/// A share with half of its interval.
+fn half(share: Estimate) -> String {
+    let half = percent((share.high - share.low) / 2.0);
+    format!("{} {{\\scriptsize$\\pm${half}}}", percent(share.value))
 }
 
-/// A row a model, variant and enhancer; a column a level.
-fn accuracy(findings: &Findings<'_>) -> String {
-    let Ladder {
-        levels,
-        series,
-        floors,
-    } = Ladder::new(&findings.summary);
-    let rows = series.iter().map(|(series, cells)| {
-        let at = levels.iter().map(|level| {
-            let cell = cells.get(level);
-            cell.map_or(String::new(), |cell| shown(Some(cell)))
-        });
-        let name = [escaped(series.model), escaped(&series.light())];
-        name.into_iter().chain(at).collect()
-    });
-    let mut rows: Vec<Vec<String>> = rows.collect();
-    for cell in floors {
-        let name = match cell.subject.view {
-            Some(_) => format!("{} without images", cell.subject.model),
-            None => "chance".to_owned(),
-        };
-        let mut row = vec![escaped(&name), String::new(), shown(Some(cell))];
-        row.resize(levels.len() + 2, String::new());
-        rows.push(row);
+fn shown(kind: Kind, cell: &Cell) -> String {
+    match (kind, cell) {
+        (_, Cell::Absent | Cell::Missing) => "--".to_owned(),
+        (_, Cell::Below(share)) => format!("\\underline{{{}}}", half(*share)),
+        (Kind::Accuracy | Kind::Percent, Cell::Estimate(share))
+        | (_, Cell::Guess(share) | Cell::Strict(share, _)) => half(*share),
+        (_, Cell::Changed(share, None)) => percent(share.value),
+        (_, Cell::Changed(share, Some(change))) => {
+            let change = escaped(&points(*change));
+            format!("{} {{\\scriptsize({change})}}", percent(share.value))
+        }
+        (_, Cell::Verdict(Verdict::Better)) => "helps".to_owned(),
+        (_, Cell::Verdict(Verdict::Worse)) => "harms".to_owned(),
+        _ => escaped(&words(kind, cell)),
     }
-    let head: Vec<String> = ["Model", "Light"]
-        .map(str::to_owned)
-        .into_iter()
-        .chain(levels.iter().map(ToString::to_string))
-        .collect();
-    let caption = format!(
-        "Accuracy in \\% (strict reading) with half of the 95\\,\\% interval by {}; {} items.",
-        findings.unit,
-        findings.grid.items.len()
-    );
-    table(
-        &caption,
-        &format!("ll{}", "r".repeat(levels.len())),
-        &head,
-        &rows,
-    )
-}
-
-/// A row a subject with images and without; a column a family. What is below a model without images is underlined.
-fn families(findings: &Findings<'_>) -> String {
-    let families = findings.grid.families();
-    let rows = findings.grid.subjects.iter().map(|subject| {
-        let cells = families.iter().map(|family| {
-            let summary = &findings.summary;
-            let cell = shown(summary.cell(subject, Some(family), Mode::Strict));
-            if findings.below_blind(subject, Some(family)) {
-                format!("\\underline{{{cell}}}")
-            } else {
-                cell
-            }
-        });
-        let name = [escaped(&subject.model), escaped(&subject.condition())];
-        name.into_iter().chain(cells).collect()
-    });
-    let mut rows: Vec<Vec<String>> = rows.collect();
-    let chance = families.iter().map(|family| {
-        let mut cells = findings.summary.of(Some(family), Mode::Strict);
-        let cell = cells.find(|cell| cell.subject.view.is_none());
-        let share = cell.and_then(|cell| cell.accuracy);
-        share.map_or("--".to_owned(), |share| percent(share.value))
-    });
-    let name = ["chance".to_owned(), String::new()];
-    rows.push(name.into_iter().chain(chance).collect());
-    let names = families
-        .iter()
-        .map(|family| escaped(family_name(Some(family))));
-    let head: Vec<String> = ["Model".to_owned(), "Condition".to_owned()]
-        .into_iter()
-        .chain(names)
-        .collect();
-    let caption = "Accuracy in \\% by family. Underlined: below a model without images (its own, where it was asked so).";
-    table(
-        caption,
-        &format!("ll{}", "r".repeat(families.len())),
-        &head,
-        &rows,
-    )
-}
-
-fn enhancers(findings: &Findings<'_>) -> Option<String> {
-    let all = findings.comparisons.iter();
-    let rows = all.filter(|one| one.kind == Kind::Enhancer && one.family.is_none());
-    let rows = rows.map(|one| {
-        let (paired, difference) = (&one.paired, one.paired.difference);
-        vec![
-            escaped(&one.first.model),
-            escaped(&one.first.condition()),
-            percent(paired.second),
-            percent(paired.first),
-            escaped(&format!(
-                "{} [{}, {}]",
-                points(difference.value),
-                points(difference.low),
-                points(difference.high)
-            )),
-            format!("{} / {}", paired.gained, paired.lost),
-            escaped(&p(one.holm)),
-            match one.verdict {
-                Verdict::Better => "helps",
-                Verdict::Worse => "harms",
-                Verdict::Tied => "tied",
-            }
-            .to_owned(),
-        ]
-    });
-    let rows: Vec<Vec<String>> = rows.collect();
-    let head = [
-        "Model",
-        "Condition",
-        "Raw",
-        "Enhanced",
-        "Difference [95\\,\\%]",
-        "Rescued / harmed",
-        "$p$ (Holm)",
-        "",
-    ];
-    let caption = "Enhanced against raw, paired by question, in percentage points.";
-    (!rows.is_empty()).then(|| table(caption, "llrrrrrl", &head.map(str::to_owned), &rows))
 }
 
 #[cfg(test)]

@@ -1,13 +1,13 @@
 //! Stage 7, SHOW: from the records alone; and [`sheet`], figures of pictures that are handed in.
 
 pub mod chart;
-pub mod csv;
+mod csv;
 pub mod figures;
-pub mod files;
 pub mod forecast;
 pub mod histogram;
+pub mod json;
 mod ladder;
-pub mod latex;
+mod latex;
 pub mod openeqa;
 pub mod page;
 pub mod products;
@@ -18,7 +18,8 @@ mod samples;
 mod script;
 pub mod sheet;
 pub mod study;
-pub mod subject;
 pub mod table;
+pub mod tables;
 mod template;
-pub mod verdicts;
+pub mod terminal;
+mod words;

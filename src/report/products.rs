@@ -3,34 +3,24 @@
 use super::figures::figures;
 use super::page::{Shown, page};
 use super::samples::{figure, samples};
-use super::{csv, files, latex};
+use super::table::Table;
+use super::{chart, csv, latex};
 use crate::error::Result;
 use crate::score::findings::Findings;
 
 /// The files of a report by name: the numbers as CSV, the main tables as LaTeX, the figures as SVG, and the page.
 ///
 /// # Errors
-/// Where one cannot be made.
+/// If one cannot be made.
 pub fn products<'a>(
     findings: &'a Findings<'a>,
+    tables: &[Table],
     shown: &Shown<'a>,
 ) -> Result<Vec<(String, Vec<u8>)>> {
     let figures = figures(findings)?;
-    let page = page(findings, &figures, shown)?;
-    let mut files = vec![("summary.csv".to_owned(), files::csv(&findings.summary)?)];
-    let tables = csv::tables(findings)?.into_iter();
-    files.extend(tables.map(|(name, table)| (name.to_owned(), table)));
-    files.push((
-        "tables.tex".to_owned(),
-        latex::tables(findings).into_bytes(),
-    ));
-    let drawn = figures.into_iter();
-    files.extend(drawn.map(|figure| {
-        (
-            format!("figures/{}.svg", figure.name),
-            figure.svg.into_bytes(),
-        )
-    }));
+    let page = page(findings, tables, &figures, shown)?;
+    let mut files = numbers(tables, "Tables")?;
+    files.extend(chart::files(figures));
     if let Some(samples) = samples(shown.thumbnails) {
         files.push((
             "figures/samples.svg".to_owned(),
@@ -38,6 +28,14 @@ pub fn products<'a>(
         ));
     }
     files.push((PAGE.to_owned(), page.into_bytes()));
+    Ok(files)
+}
+
+/// The tables as CSV and LaTeX.
+pub(super) fn numbers(tables: &[Table], head: &str) -> Result<Vec<(String, Vec<u8>)>> {
+    let mut files = csv::files(tables)?;
+    let tables = latex::tables(head, tables);
+    files.push(("tables.tex".to_owned(), tables.into_bytes()));
     Ok(files)
 }
 

@@ -2,10 +2,12 @@
 
 use serde::Serialize;
 
-use super::csv::table_of;
+use super::csv::csv;
 use super::histogram::{Line, histogram};
 use super::sheet::{self, CropRow};
-use super::table::plain;
+use super::table::Kind::{Count, Number, Text};
+use super::table::Layout;
+use super::terminal;
 use crate::error::{Error, Result};
 use crate::score::realism::mean::Mean;
 use crate::score::realism::residual::{Bins, Empty, Residuals};
@@ -100,17 +102,6 @@ impl Row {
             empty_bins: mean(|m| m.kl.empty as f64)?,
         })
     }
-
-    fn cells(&self, name: &str) -> [String; 6] {
-        [
-            name.to_owned(),
-            shown(&self.psnr, 2),
-            shown(&self.ssim, 4),
-            shown(&self.kl, 3),
-            shown(&self.empty_bins, 1),
-            shown(&self.kl_other, 3),
-        ]
-    }
 }
 
 impl Summary {
@@ -148,25 +139,28 @@ impl Summary {
     /// The paper's table, with intervals, and with the rules of its numbers below it.
     #[must_use]
     pub fn table(&self) -> String {
-        // The last column is the other rule's, where there is one.
-        let columns = if self.kl_other_rule.is_some() { 6 } else { 5 };
-        let header = [
-            "",
-            "PSNR dB",
-            "SSIM",
-            "D_KL",
-            "bins empty",
-            "D_KL (other rule)",
+        let ways = [
+            ("exposure drop alone", &self.exposure),
+            ("with sensor noise", &self.noise),
         ];
-        let mut table = plain();
-        table.set_header(&header[..columns]);
-        table.add_row(&self.exposure.cells("exposure drop alone")[..columns]);
-        table.add_row(&self.noise.cells("with sensor noise")[..columns]);
+        let mut layout = Layout::new("realism", ways)
+            .column(Text, "terminal", |(name, _)| *name)
+            .column(Text, "terminal PSNR dB", |(_, row)| shown(&row.psnr, 2))
+            .column(Text, "terminal SSIM", |(_, row)| shown(&row.ssim, 4))
+            .column(Text, "terminal D_KL", |(_, row)| shown(&row.kl, 3))
+            .column(Text, "terminal bins empty", |(_, row)| {
+                shown(&row.empty_bins, 1)
+            });
+        if self.kl_other_rule.is_some() {
+            let name = "terminal D_KL (other rule)";
+            layout = layout.column(Text, name, |(_, row)| shown(&row.kl_other, 3));
+        }
+        let table = terminal::table(&[layout.made()]);
         let title = format!(
             "Synthetic against real low light, {} pairs: mean ± half of the 95 % interval (Student's t)",
             self.pairs
         );
-        [title, table.to_string(), self.notes().join("\n")].join("\n") + "\n"
+        format!("{title}\n{table}{}\n", self.notes().join("\n"))
     }
 
     /// What stands below the table: the rules of its numbers, and each pair.
@@ -211,57 +205,35 @@ fn shown(mean: &Mean, digits: usize) -> String {
 
 /// A row a pair and way of making it.
 pub fn pairs(compared: &[&Compared]) -> Result<Vec<u8>> {
-    let header = [
-        "pair",
-        "drop",
-        "variant",
-        "psnr",
-        "ssim",
-        "kl",
-        "kl_other",
-        "empty_bins",
-        "clean_psnr",
-    ];
     let rows = compared.iter().flat_map(|pair| {
-        [("ev", &pair.exposure), ("noise", &pair.noise)].map(|(variant, measured)| {
-            vec![
-                pair.pair.clone(),
-                pair.drop.to_string(),
-                variant.to_owned(),
-                measured.psnr.to_string(),
-                measured.ssim.to_string(),
-                measured.kl.nats.to_string(),
-                measured.kl_other.nats.to_string(),
-                measured.kl.empty.to_string(),
-                pair.clean_psnr.to_string(),
-            ]
-        })
+        [("ev", &pair.exposure), ("noise", &pair.noise)].map(|(way, made)| (*pair, way, made))
     });
-    table_of(&header, rows)
+    let table = Layout::new("pairs", rows)
+        .column(Text, "csv pair", |(pair, _, _)| pair.pair.clone())
+        .column(Text, "csv drop", |(pair, _, _)| pair.drop.to_string())
+        .column(Text, "csv variant", |(_, way, _)| *way)
+        .column(Number, "csv psnr", |(_, _, made)| made.psnr)
+        .column(Number, "csv ssim", |(_, _, made)| made.ssim)
+        .column(Number, "csv kl", |(_, _, made)| made.kl.nats)
+        .column(Number, "csv kl_other", |(_, _, made)| made.kl_other.nats)
+        .column(Count, "csv empty_bins", |(_, _, made)| made.kl.empty)
+        .column(Number, "csv clean_psnr", |(pair, _, _)| pair.clean_psnr)
+        .made();
+    csv(&[table])
 }
 
 /// The spread of real and synthetic residuals by clean code.
 pub fn by_code(residuals: &[Residuals; 2]) -> Result<Vec<u8>> {
-    let header = [
-        "code",
-        "n",
-        "real_mean",
-        "real_std",
-        "noise_mean",
-        "noise_std",
-    ];
     let [real, noise] = residuals;
-    let rows = real
-        .by_code()
-        .zip(noise.by_code())
-        .map(|((code, n, real), (_, _, noise))| {
-            let numbers = real.into_iter().chain(noise).map(|x| x.to_string());
-            [code.to_string(), n.to_string()]
-                .into_iter()
-                .chain(numbers)
-                .collect()
-        });
-    table_of(&header, rows)
+    let table = Layout::new("residuals", real.by_code().zip(noise.by_code()))
+        .column(Text, "csv code", |((code, _, _), _)| code.to_string())
+        .column(Text, "csv n", |((_, n, _), _)| n.to_string())
+        .column(Number, "csv real_mean", |((_, _, real), _)| real[0])
+        .column(Number, "csv real_std", |((_, _, real), _)| real[1])
+        .column(Number, "csv noise_mean", |(_, (_, _, noise))| noise[0])
+        .column(Number, "csv noise_std", |(_, (_, _, noise))| noise[1])
+        .made();
+    csv(&[table])
 }
 
 /// Both residual histograms.

@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-use super::subject::light;
+use super::words::light;
 use crate::types::degradation::Axis;
 use crate::types::{AxisLevel, Condition, EnhancerName, FrameId, KindReading, Thumbnail};
 

@@ -1,213 +1,282 @@
-//! The table at the end of a run.
+//! One table of a report: [`Table`], its [`Column`]s and [`Cell`]s. It holds numbers; how they look is the work of what
+//! writes it: `csv`, `json`, `latex`, `page` and `terminal`.
 
-use std::fmt::Write;
-use std::path::Path;
+use crate::score::comparison::Verdict;
+use crate::score::curve::Threshold;
+use crate::score::estimate::Estimate;
 
-use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
-use comfy_table::{CellAlignment, LineStyle, Table};
-
-use super::ladder::{Ladder, Series};
-use super::subject::percent;
-use crate::score::accuracy::{Cell, Summary};
-use crate::score::choice::Mode;
-use crate::types::manifest::{Counts, RunManifest, Status};
-use crate::types::{AxisLevel, Why};
-
-/// The lenient figure in brackets where it is not the strict one.
-fn differing(strict: &str, lenient: &str) -> String {
-    if strict == lenient {
-        String::new()
-    } else {
-        format!(" ({lenient})")
-    }
+/// A table. What it has no title for, it does not stand in.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table {
+    /// The name of its CSV file without the ending. Tables of one name are parts of one file.
+    pub name: &'static str,
+    /// The section of the page in which it stands.
+    pub section: &'static str,
+    /// The caption on the page.
+    pub caption: String,
+    /// Whether the page shows it on request only. Long tables always are so.
+    pub is_folded: bool,
+    /// The line above it in the terminal; empty for none. Tables of one name and heading are printed as one.
+    pub heading: Option<String>,
+    /// Lines below it in the terminal.
+    pub notes: Vec<String>,
+    /// The caption in LaTeX, as LaTeX.
+    pub latex: Option<String>,
+    /// The columns.
+    pub columns: Vec<Column>,
+    /// The rows.
+    pub rows: Vec<Row>,
 }
 
-/// The strict and the lenient cell of one subject, all families together.
-#[derive(Debug, Clone, Copy)]
-struct Pair<'a> {
-    strict: &'a Cell,
-    lenient: &'a Cell,
+/// A row.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Row {
+    /// A cell for each column.
+    pub cells: Vec<Cell>,
+    /// What leaves it out.
+    pub hidden_in: Vec<Format>,
 }
 
-impl<'a> Pair<'a> {
-    fn of(summary: &'a Summary, strict: &'a Cell) -> Option<Self> {
-        let lenient = summary.cell(&strict.subject, strict.family.as_ref(), Mode::Lenient)?;
-        Some(Self { strict, lenient })
-    }
+/// What a row can be left out of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// The table at the end of a run.
+    Terminal,
+    /// The HTML page.
+    Page,
+    /// `tables.tex`.
+    Latex,
+}
 
-    fn accuracy(self) -> String {
-        match (self.strict.accuracy, self.lenient.accuracy) {
-            (Some(strict), Some(lenient)) => {
-                let half = percent((strict.high - strict.low) / 2.0);
-                let (strict, lenient) = (percent(strict.value), percent(lenient.value));
-                format!("{strict} ±{half}{}", differing(&strict, &lenient))
+/// A column: what it holds, and its name in each format.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    /// What it holds.
+    pub kind: Kind,
+    /// Its names.
+    pub heads: Heads,
+}
+
+/// The names of a column. A format for which it has none leaves it out.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Heads {
+    /// In CSV and JSON. Of several names an estimate fills the first with its value, then the ends of its interval, then n.
+    pub csv: Vec<String>,
+    /// In the terminal. Of two names a difference fills the first with its value and the second with its interval.
+    pub terminal: Vec<String>,
+    /// On the page.
+    pub page: Option<String>,
+    /// In LaTeX, as LaTeX.
+    pub latex: Option<String>,
+}
+
+/// What a column holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Words.
+    Text,
+    /// A number of things.
+    Count,
+    /// A number of things that should not be.
+    Failures,
+    /// A plain number; two digits where it is shown to people.
+    Number,
+    /// A share in percent.
+    Percent,
+    /// A share in percent with its interval.
+    Share,
+    /// A share in percent with half of its interval.
+    Accuracy,
+    /// A difference of shares in percentage points with its interval.
+    Points,
+    /// A number with its interval, two digits.
+    Ratio,
+    /// A darkness threshold in EV with its interval.
+    Threshold,
+    /// A p-value.
+    P,
+    /// What a comparison shows.
+    Verdict,
+}
+
+/// What stands in a cell.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Cell {
+    /// Nothing belongs here.
+    Blank,
+    /// What the cell is about was not asked.
+    Absent,
+    /// There is no number: nothing came that can be counted.
+    Missing,
+    /// Words.
+    Text(String),
+    /// A number of things.
+    Count(usize),
+    /// A plain number.
+    Number(f64),
+    /// A number with its interval.
+    Estimate(Estimate),
+    /// One that is below that of a model without images.
+    Below(Estimate),
+    /// What guessing comes to.
+    Guess(Estimate),
+    /// One in the strict reading, and its value in the lenient one.
+    Strict(Estimate, f64),
+    /// One and by how much it differs from that on the lit frames, if that is known.
+    Changed(Estimate, Option<f64>),
+    /// A threshold, and the drop of the darkest level.
+    Threshold(Threshold, f64),
+    /// What a comparison shows.
+    Verdict(Verdict),
+}
+
+/// Makes a cell of what a variant holds.
+macro_rules! cell_from {
+    ($($type:ty => $variant:ident,)*) => {$(
+        impl From<$type> for Cell {
+            fn from(value: $type) -> Self {
+                Self::$variant(value.into())
             }
-            _ => "–".to_owned(),
         }
-    }
+    )*};
+}
 
-    /// The share of questions that were answered rightly every time.
-    fn always(self) -> Option<String> {
-        Some(percent(self.strict.always?.value))
-    }
+cell_from! {
+    &str => Text,
+    String => Text,
+    usize => Count,
+    f64 => Number,
+    Estimate => Estimate,
+    Verdict => Verdict,
+}
 
-    fn replies(self) -> usize {
-        self.strict.accuracy.map_or(0, |share| share.n)
+impl<C: Into<Self>> From<Option<C>> for Cell {
+    fn from(cell: Option<C>) -> Self {
+        cell.map_or(Self::Missing, C::into)
     }
 }
 
-/// Renders a summary: how far each run has come where it is not complete, accuracy by level, variant and enhancer, the
-/// blind and chance lines, and the runs' folders.
-#[must_use]
-pub fn render(summary: &Summary, runs: &[(&RunManifest, &Path)]) -> String {
-    let ladder = Ladder::new(summary);
-    let mut text = String::new();
-    for (run, folder) in runs {
-        if run.status == Status::Complete {
-            continue;
-        }
-        let Counts {
-            trials,
-            answered,
-            failed,
-        } = run.counts;
-        if runs.len() > 1 {
-            let _ = write!(text, "{}: ", folder.display());
-        }
-        let _ = writeln!(
-            text,
-            "{}: {answered} of {trials} trials answered, {failed} failed",
-            run.status
-        );
-    }
-    text.push_str(
-        "Accuracy in %: strict ± half of the 95 % interval (lenient where it differs); n replies at each level\n",
-    );
-    if !ladder.series.is_empty() {
-        let _ = writeln!(text, "{}", levels(summary, &ladder));
-    }
-    let floors = ladder.floors.iter();
-    let (chance, blind): (Vec<&Cell>, Vec<&Cell>) =
-        floors.partition(|cell| cell.subject.view.is_none());
-    let blind = blind.into_iter();
-    for pair in blind.filter_map(|strict| Pair::of(summary, strict)) {
-        let Cell {
-            unparsed,
-            failed,
-            subject,
-            ..
-        } = pair.strict;
-        let (accuracy, replies) = (pair.accuracy(), pair.replies());
-        let lenient = differing(&unparsed.to_string(), &pair.lenient.unparsed.to_string());
-        let _ = write!(
-            text,
-            "{} without images: {accuracy}, n {replies}",
-            subject.model
-        );
-        if let Some(always) = pair.always() {
-            let _ = write!(text, ", right every time {always}");
-        }
-        let _ = writeln!(text, ", unparsed {unparsed}{lenient}, failed {failed}");
-    }
-    let mut all = summary.of(None, Mode::Strict);
-    let repeated = all.any(|cell| cell.always.is_some());
-    for chance in chance.into_iter().filter_map(|cell| cell.accuracy) {
-        let _ = writeln!(
-            text,
-            "chance: {:.2} over {} {}",
-            100.0 * chance.value,
-            chance.n,
-            if repeated {
-                "orders of choices"
-            } else {
-                "questions"
+/// Names by format, as `csv low high | terminal difference, 95 % interval | page difference [95 %]`: those of CSV are parted
+/// by a space, those of the terminal by a comma.
+impl From<&str> for Heads {
+    fn from(names: &str) -> Self {
+        let mut heads = Self::default();
+        for part in names.split(" | ") {
+            let (format, name) = part.split_once(' ').unwrap_or((part, ""));
+            let parted = |by: &str| name.split(by).map(str::to_owned).collect();
+            match format {
+                "csv" => heads.csv = parted(" "),
+                "terminal" => heads.terminal = parted(", "),
+                "page" => heads.page = Some(name.to_owned()),
+                _ => heads.latex = Some(name.to_owned()),
             }
-        );
-    }
-    let _ = write!(text, "{}", unread(summary));
-    for (_, folder) in runs {
-        let _ = writeln!(text, "run: {}", folder.display());
-    }
-    text
-}
-
-/// Why replies could not be read, where that is not the model's own way of answering.
-fn unread(summary: &Summary) -> String {
-    let count = |why| summary.unread.get(&why).copied().unwrap_or(0);
-    let told: Vec<String> = [
-        (
-            count(Why::Truncated),
-            "cut at the token limit (--max-tokens)",
-        ),
-        (count(Why::Refused), "refused"),
-        (count(Why::Filtered), "withheld by a filter"),
-        (count(Why::Empty), "empty"),
-    ]
-    .into_iter()
-    .filter(|(count, _)| *count > 0)
-    .map(|(count, what)| format!("{count} {what}"))
-    .collect();
-    if told.is_empty() {
-        String::new()
-    } else {
-        format!("of the unparsed replies {}\n", told.join(", "))
-    }
-}
-
-/// An empty table in the style of all of them.
-pub(super) fn plain() -> Table {
-    let mut table = Table::new();
-    table.load_style(UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none()));
-    table
-}
-
-fn levels(summary: &Summary, ladder: &Ladder<'_>) -> Table {
-    let names = ladder.levels.iter().map(ToString::to_string);
-    let head = ["model", "light"]
-        .map(str::to_owned)
-        .into_iter()
-        .chain(names)
-        .chain(["n", "unparsed", "failed"].map(str::to_owned));
-    let mut table = plain();
-    table.set_header(head);
-    for (series, cells) in &ladder.series {
-        let pair = |level: &AxisLevel| Pair::of(summary, cells.get(level).copied()?);
-        let pairs: Vec<Option<Pair<'_>>> = ladder.levels.iter().map(pair).collect();
-        table.add_row(row(series, &pairs));
-        if cells.values().any(|cell| cell.always.is_some()) {
-            let always = pairs
-                .iter()
-                .map(|pair| pair.and_then(Pair::always).unwrap_or_default());
-            let label = [String::new(), "  right every time".to_owned()];
-            table.add_row(label.into_iter().chain(always));
         }
+        heads
     }
-    for column in table.column_iter_mut().skip(2) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    table
 }
 
-fn row(series: &Series<'_>, pairs: &[Option<Pair<'_>>]) -> Vec<String> {
-    let accuracies = pairs
-        .iter()
-        .map(|pair| pair.map_or(String::new(), Pair::accuracy));
-    let pairs: Vec<&Pair<'_>> = pairs.iter().flatten().collect();
-    let sum = |count: fn(&Pair<'_>) -> usize| pairs.iter().map(|pair| count(pair)).sum::<usize>();
-    let replies = pairs.iter().map(|pair| pair.replies());
-    let n = match (replies.clone().min(), replies.max()) {
-        (Some(least), Some(most)) if least != most => format!("{least}–{most}"),
-        (least, _) => least.unwrap_or(0).to_string(),
-    };
-    let (strict, lenient) = (
-        sum(|pair| pair.strict.unparsed).to_string(),
-        sum(|pair| pair.lenient.unparsed).to_string(),
-    );
-    let unparsed = format!("{strict}{}", differing(&strict, &lenient));
-    let counts = [n, unparsed, sum(|pair| pair.strict.failed).to_string()];
-    [series.model.to_owned(), series.light()]
-        .into_iter()
-        .chain(accuracies)
-        .chain(counts)
-        .collect()
+/// A table in the making: columns are added one by one, and each makes its cells from the items, one a row.
+pub(super) struct Layout<T> {
+    table: Table,
+    items: Vec<T>,
+}
+
+impl<T> Layout<T> {
+    pub(super) fn new(name: &'static str, items: impl IntoIterator<Item = T>) -> Self {
+        let items: Vec<T> = items.into_iter().collect();
+        let table = Table {
+            name,
+            section: "",
+            caption: String::new(),
+            is_folded: false,
+            heading: None,
+            notes: Vec::new(),
+            latex: None,
+            columns: Vec::new(),
+            rows: vec![Row::default(); items.len()],
+        };
+        Self { table, items }
+    }
+
+    /// Puts it in a section of the page.
+    pub(super) fn page(mut self, section: &'static str, caption: &str) -> Self {
+        self.table.section = section;
+        caption.clone_into(&mut self.table.caption);
+        self
+    }
+
+    /// Adds a column.
+    pub(super) fn column<C: Into<Cell>>(
+        mut self,
+        kind: Kind,
+        heads: impl Into<Heads>,
+        cell: impl Fn(&T) -> C,
+    ) -> Self {
+        for (row, item) in self.table.rows.iter_mut().zip(&self.items) {
+            row.cells.push(cell(item).into());
+        }
+        let heads = heads.into();
+        self.table.columns.push(Column { kind, heads });
+        self
+    }
+
+    /// Leaves rows out of a format.
+    pub(super) fn hide(mut self, format: Format, is_hidden: impl Fn(&T) -> bool) -> Self {
+        for (row, item) in self.table.rows.iter_mut().zip(&self.items) {
+            if is_hidden(item) {
+                row.hidden_in.push(format);
+            }
+        }
+        self
+    }
+
+    /// The table with all its columns.
+    pub(super) fn made(self) -> Table {
+        self.table
+    }
+}
+
+impl Table {
+    /// The rows of a format.
+    pub(super) fn rows_in(&self, format: Format) -> impl Iterator<Item = &Row> {
+        let rows = self.rows.iter();
+        rows.filter(move |row| !row.hidden_in.contains(&format))
+    }
+
+    /// The cells of a row with their columns.
+    pub(super) fn cells<'t>(
+        &'t self,
+        row: &'t Row,
+    ) -> impl Iterator<Item = (&'t Column, &'t Cell)> {
+        self.columns.iter().zip(&row.cells)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_column_has_a_name_in_each_format() {
+        let heads =
+            Heads::from("csv d low high | terminal difference, 95 % interval | page | latex $d$");
+        assert_eq!(heads.csv, ["d", "low", "high"]);
+        assert_eq!(heads.terminal, ["difference", "95 % interval"]);
+        assert_eq!(heads.page.as_deref(), Some(""));
+        assert_eq!(heads.latex.as_deref(), Some("$d$"));
+        assert_eq!(Heads::from("csv n").page, None);
+    }
+
+    #[test]
+    fn cells_stand_below_their_columns_and_rows_can_be_left_out() {
+        let table = Layout::new("t", [1_usize, 2])
+            .column(Kind::Count, "csv n", |n| *n)
+            .column(Kind::Text, "page word", |n| (*n == 1).then_some("one"))
+            .hide(Format::Page, |n| *n == 2)
+            .made();
+        assert_eq!(table.rows[0].cells, [Cell::Count(1), Cell::from("one")]);
+        assert_eq!(table.rows[1].cells, [Cell::Count(2), Cell::Missing]);
+        assert_eq!(table.rows_in(Format::Page).count(), 1);
+        assert_eq!(table.rows_in(Format::Terminal).count(), 2);
+    }
 }

@@ -6,16 +6,27 @@ use serde::Serialize;
 
 use crate::error::{Error, Result};
 
+/// What several pages have in common, by the place that it takes.
+const PARTS: [(&str, &str); 2] = [
+    ("<!-- figures -->", include_str!("page/figures.html")),
+    ("<!-- tables -->", include_str!("page/tables.html")),
+];
+
 /// A template with its values; each is escaped as HTML.
 ///
 /// # Errors
 /// Where the template cannot be filled.
 pub(super) fn filled(template: &str, values: impl Serialize) -> Result<String> {
     let failed = |e: &dyn std::fmt::Display| Error::data("report.html", e);
+    let whole = PARTS
+        .iter()
+        .fold(template.to_owned(), |text, (place, part)| {
+            text.replace(place, part)
+        });
     let mut environment = Environment::new();
     environment.set_auto_escape_callback(|_| AutoEscape::Html);
     environment
-        .add_template("page", template)
+        .add_template("page", &whole)
         .map_err(|e| failed(&e))?;
     let template = environment.get_template("page").map_err(|e| failed(&e))?;
     template.render(Serde(values)).map_err(|e| failed(&e))

@@ -35,6 +35,14 @@ pub struct Cell {
     pub always: Option<Estimate>,
 }
 
+impl Cell {
+    /// How many replies stand behind the accuracy.
+    #[must_use]
+    pub fn replies(&self) -> usize {
+        self.accuracy.map_or(0, |accuracy| accuracy.n)
+    }
+}
+
 /// All cells of a run, ordered by subject, family and reading.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {

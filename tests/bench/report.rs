@@ -17,6 +17,7 @@ use std::hint::black_box;
 use criterion::{Criterion, criterion_group, criterion_main};
 use darkqa_eval::report::page::Shown;
 use darkqa_eval::report::products::products;
+use darkqa_eval::report::tables::tables;
 use darkqa_eval::score::findings::Findings;
 use darkqa_eval::types::degradation::Kind;
 use darkqa_eval::types::{Condition, Degradation, Digest, Family, Record, Severity};
@@ -63,7 +64,7 @@ fn bench(c: &mut Criterion) {
         thumbnails: &[],
     };
     group.bench_function("make the report", |b| {
-        b.iter(|| black_box(products(&findings, &shown).unwrap()));
+        b.iter(|| black_box(products(&findings, &tables(&findings), &shown).unwrap()));
     });
     group.finish();
 }

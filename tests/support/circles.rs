@@ -11,7 +11,6 @@ use std::path::Path;
 use super::{Scope, Token, code_only, rust_files, scopes, tokens};
 
 /// Circles of files that may be, and why. A part of one may be, too. All but the first are to be cut, by what is said beside.
-<<<<<<< HEAD
 const CIRCLES: [(&[&str], &str); 4] = [
     (
         &[

@@ -1,22 +1,17 @@
 //! What runs of questions with choices hold, from their records alone.
 
-use std::path::Path;
-
 use super::combine::{Combined, combine};
 use crate::config::Show;
 use crate::error::Result;
 use crate::job::outcome::Outcome;
 use crate::job::stored::StoredRun;
+use crate::report::json::{Runs, summary};
 use crate::report::products::{PAGE, products};
-use crate::report::{files, table, verdicts};
-use crate::score::findings::Findings;
+use crate::report::tables::tables;
+use crate::report::terminal::evaluation;
 use crate::store::Store;
 use crate::types::manifest::RunManifest;
 use crate::types::{ChoiceDetail, Record};
-
-pub(super) fn text(findings: &Findings<'_>, runs: &[(&RunManifest, &Path)]) -> String {
-    table::render(&findings.summary, runs) + &verdicts::render(findings)
-}
 
 /// Reads the replies of a run again and writes its whole report and its manifest into its folder.
 pub(crate) fn write(
@@ -40,17 +35,19 @@ pub(super) fn in_its_folder(
     show: Show,
 ) -> Result<String> {
     let (folder, findings) = (store.folder(), combined.findings());
-    for (name, content) in products(&findings, &combined.shown())? {
+    let tables = tables(&findings);
+    for (name, content) in products(&findings, &tables, &combined.shown())? {
         store.write(&name, &content)?;
     }
-    let json = files::json(&findings.summary, manifest, None)?;
-    store.write("summary.json", json.as_bytes())?;
+    let unread = &findings.summary.unread;
+    let json = |folder| summary(&tables, unread, Runs::One(manifest, folder));
+    store.write("summary.json", json(None)?.as_bytes())?;
     store.write_manifest(manifest)?;
     Ok(match show {
-        Show::Json => files::json(&findings.summary, manifest, Some(folder))?,
+        Show::Json => json(Some(folder))?,
         Show::Table => {
             let report = folder.join(PAGE);
-            text(&findings, &[(manifest, folder)]) + &format!("report: {}\n", report.display())
+            evaluation(&tables, &[(manifest, folder)]) + &format!("report: {}\n", report.display())
         }
     })
 }

@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::job::outcome::Outcome as Ended;
 use crate::job::predictions::{AnswerState, Prediction, predictions};
 use crate::job::stored::{StoredRun, in_order};
-use crate::report::openeqa::{Asked, OpenReport, Told, json as summary_json, products, table};
+use crate::report::openeqa::{Asked, OpenReport, Told, products, render, summary_json, tables};
 use crate::score::llm_match::{Protocol, mark};
 use crate::score::open::{OpenSummary, Outcome, Scored, Topic, open_summary};
 use crate::store::Store;
@@ -90,15 +90,15 @@ impl<'a> Scores<'a> {
 
     /// The files of the report by name.
     pub(crate) fn products(&self) -> Result<Vec<(String, Vec<u8>)>> {
-        self.with_report(products)
+        self.with_report(|report| products(report, &tables(report)))
     }
 
     /// What belongs on standard output.
     pub(crate) fn shown(&self, show: Show) -> Result<String> {
         let folder = &self.run.folder;
         self.with_report(|report| match show {
-            Show::Table => Ok(table::render(report, folder)),
-            Show::Json => summary_json(report, Some(folder)),
+            Show::Table => Ok(render(report, &tables(report), folder)),
+            Show::Json => summary_json(report, &tables(report), Some(folder)),
         })
     }
 
@@ -107,7 +107,7 @@ impl<'a> Scores<'a> {
         for (name, content) in self.products()? {
             store.write(&name, &content)?;
         }
-        let json = self.with_report(|report| summary_json(report, None))?;
+        let json = self.with_report(|report| summary_json(report, &tables(report), None))?;
         store.write("summary.json", json.as_bytes())?;
         store.write_manifest(&self.run.manifest)
     }

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use super::choice::{in_its_folder, text};
+use super::choice::in_its_folder;
 use super::combine::{Combined, combine};
 use super::open;
 use crate::config::{Readings, Report, Show};
@@ -11,8 +11,10 @@ use crate::error::{Error, Result};
 use crate::files;
 use crate::job::stored::{AnyRun, StoredRun};
 use crate::job::{Outcome, count};
-use crate::report::files::json_of_several;
+use crate::report::json::{Runs, summary};
 use crate::report::products::{PAGE, products};
+use crate::report::tables::tables;
+use crate::report::terminal::evaluation;
 use crate::store::{Moved, Store};
 use crate::types::manifest::Status;
 use crate::types::{ChoiceDetail, OpenDetail};
@@ -82,13 +84,13 @@ fn of_choices(config: &Report, mut runs: Vec<StoredRun<ChoiceDetail>>) -> Result
 /// Shows several runs as one, and writes the report where it is wanted.
 fn compare(combined: &Combined, config: &Report) -> Result<String> {
     let findings = combined.findings();
-    let places = combined.places();
+    let (tables, places) = (tables(&findings), combined.places());
     let shown = match config.show {
-        Show::Json => json_of_several(&findings.summary, &places)?,
-        Show::Table => text(&findings, &places),
+        Show::Json => summary(&tables, &findings.summary.unread, Runs::Several(&places))?,
+        Show::Table => evaluation(&tables, &places),
     };
     let made = match config.out {
-        Some(_) => products(&findings, &combined.shown())?,
+        Some(_) => products(&findings, &tables, &combined.shown())?,
         None => Vec::new(),
     };
     elsewhere(config, shown, made)

@@ -1,7 +1,7 @@
 //! What models say when they no longer see: hallucination and collapse.
 
 use super::super::chart::{Chart, Line, Panel, Shape};
-use super::super::subject::{family as family_name, light};
+use super::super::words::{family as family_name, light};
 use super::{GROUND, Overview};
 use crate::score::confusion::{Confusion, Hallucination};
 use crate::score::estimate::Estimate;

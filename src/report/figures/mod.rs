@@ -5,25 +5,14 @@ mod thresholds;
 
 use std::collections::BTreeSet;
 
-use super::chart::{Chart, Line, Look, Panel, Shape};
-use super::subject::{family as family_name, light};
+use super::chart::{Chart, Figure, Line, Look, Panel, Shape};
+use super::words::{family as family_name, light};
 use crate::error::Result;
 use crate::score::choice::Mode;
 use crate::score::estimate::Estimate;
 use crate::score::findings::Findings;
 use crate::score::subject::{CHANCE, Subject};
 use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
-
-/// One figure of a report.
-#[derive(Debug, Clone)]
-pub struct Figure {
-    /// Its name in files.
-    pub name: &'static str,
-    /// What it shows.
-    pub caption: String,
-    /// The drawing.
-    pub svg: String,
-}
 
 /// All figures that the records have something for.
 ///
@@ -85,23 +74,26 @@ impl<'a> Overview<'a> {
         }
     }
 
-    /// The accuracy of a model over the levels, in one variant, raw or enhanced; L0 is the untouched frame.
+    /// Some number of a model over the levels, in one variant, raw or enhanced; L0 is the untouched frame.
     fn points(
         &self,
         model: &str,
         variant: &KindReading,
         enhancer: Option<&EnhancerName>,
-        family: Option<&Family>,
+        mut number: impl FnMut(&Subject) -> Option<Estimate>,
     ) -> Vec<(AxisLevel, Estimate)> {
-        let summary = &self.findings.summary;
-        let at = |level: AxisLevel| {
+        let levels = self.levels.iter();
+        let points = levels.filter_map(|&level| {
             let subject = Subject::seeing(model, level, variant, enhancer);
-            Some((
-                level,
-                summary.cell(&subject, family, Mode::Strict)?.accuracy?,
-            ))
-        };
-        self.levels.iter().copied().filter_map(at).collect()
+            Some((level, number(&subject)?))
+        });
+        points.collect()
+    }
+
+    /// The accuracy of a subject on a family.
+    fn share(&self, subject: &Subject, family: Option<&Family>) -> Option<Estimate> {
+        let cell = self.findings.summary.cell(subject, family, Mode::Strict)?;
+        cell.accuracy
     }
 
     /// The blind lines, each in the look of its model, and chance.
@@ -159,26 +151,18 @@ impl<'a> Overview<'a> {
         variant: &KindReading,
         mut number: impl FnMut(&Subject) -> Option<Estimate>,
     ) -> Vec<Line> {
-        let line = |model: &&str| {
-            let points = self.levels.iter().filter_map(|&level| {
-                let subject = Subject::seeing(model, level, variant, None);
-                Some((level, number(&subject)?))
-            });
-            Line {
-                name: (*model).to_owned(),
-                look: self.look(model),
-                shape: Shape::Curve(points.collect()),
-            }
-        };
-        self.models.iter().map(line).collect()
+        let models = self.models.iter();
+        let lines = models.map(|model| Line {
+            name: (*model).to_owned(),
+            look: self.look(model),
+            shape: Shape::Curve(self.points(model, variant, None, &mut number)),
+        });
+        lines.collect()
     }
 
     /// The lines of the accuracy of all models, with what they are held against.
     fn accuracies(&self, variant: &KindReading, family: Option<&Family>) -> Vec<Line> {
-        let summary = &self.findings.summary;
-        let mut lines = self.lines(variant, |subject| {
-            summary.cell(subject, family, Mode::Strict)?.accuracy
-        });
+        let mut lines = self.lines(variant, |subject| self.share(subject, family));
         lines.extend(self.floors(family));
         lines
     }
@@ -218,7 +202,7 @@ impl<'a> Overview<'a> {
         let line = |(index, variant): (usize, &KindReading)| {
             let curves = models.iter();
             let curves: Vec<Vec<(AxisLevel, Estimate)>> = curves
-                .map(|model| self.points(model, variant, None, None))
+                .map(|model| self.points(model, variant, None, |subject| self.share(subject, None)))
                 .collect();
             Line {
                 name: light(variant, None),
@@ -253,7 +237,9 @@ impl<'a> Overview<'a> {
         for variant in self.variants_there() {
             for model in &self.models {
                 let line = |(index, enhancer): (usize, Option<&EnhancerName>)| {
-                    let points = self.points(model, &variant, enhancer, None);
+                    let points = self.points(model, &variant, enhancer, |subject| {
+                        self.share(subject, None)
+                    });
                     // L0 alone is no line of an enhancer's.
                     (points.len() > 1).then(|| Line {
                         name: enhancer.map_or("raw".to_owned(), ToString::to_string),

@@ -1,11 +1,9 @@
 //! The darkness thresholds side by side.
 
 use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, VPos};
 
-use super::super::chart::{Area, GRID, Look, PAPER, path, words};
-use super::super::subject::{light, stops};
-use super::Figure;
+use super::super::chart::{Area, BELOW, Figure, GRID, LEFT, Look, PAPER, RIGHT, path, words};
+use super::super::words::{light, stops};
 use crate::error::{Error, Result};
 use crate::score::curve::{Curve, Threshold};
 use crate::score::findings::Findings;
@@ -60,20 +58,13 @@ fn draw(root: &Area<'_>, rows: &[(&Curve, Threshold)], unit: &str) -> Result<(),
     for tick in 0..=9 {
         let at = x(f64::from(tick));
         path(root, &[(at, 8), (at, bottom)], GRID.stroke_width(1))?;
-        let below = (HPos::Center, VPos::Top);
-        words(root, &tick.to_string(), (at, bottom + 6), 13, below)?;
+        words(root, &tick.to_string(), (at, bottom + 6), 13, BELOW)?;
     }
     for (row, (curve, threshold)) in (0..).zip(rows) {
         let y = 12 + row * ROW + ROW / 2;
         let light = light(&curve.variant, curve.enhancer.as_ref());
         let name = format!("{}, {light}", curve.model);
-        words(
-            root,
-            &name,
-            (NAMES - 14, y),
-            13,
-            (HPos::Right, VPos::Center),
-        )?;
+        words(root, &name, (NAMES - 14, y), 13, RIGHT)?;
         let ends = [(x(threshold.low), y), (x(threshold.high), y)];
         path(root, &ends, dot.stroke_width(2))?;
         if threshold.high.is_infinite() {
@@ -93,10 +84,10 @@ fn draw(root: &Area<'_>, rows: &[(&Curve, Threshold)], unit: &str) -> Result<(),
             stops(threshold.high, darkest)
         );
         let place = (NAMES + AXIS + 16, y);
-        words(root, &number, place, 13, (HPos::Left, VPos::Center))?;
+        words(root, &number, place, 13, LEFT)?;
     }
     let below = format!("darkness threshold in EV, with 95 % interval by {unit}");
     let place = (NAMES + AXIS / 2, bottom + 30);
-    words(root, &below, place, 13, (HPos::Center, VPos::Top))?;
+    words(root, &below, place, 13, BELOW)?;
     root.present().map_err(failed)
 }

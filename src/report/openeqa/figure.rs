@@ -1,25 +1,20 @@
 //! Scores over darkness: [`figures`].
 
-use super::OpenReport;
-use super::rows::Rows;
+use super::open_report::OpenReport;
+use super::tables::ladder;
 use crate::error::Result;
-use crate::report::chart::{Chart, Line, Look, Panel, Shape};
-use crate::report::figures::Figure;
+use crate::report::chart::{Chart, Figure, Line, Look, Panel, Shape};
 use crate::score::open::Group;
 
 /// The scores by level, all questions together, and by category where there are several.
 pub(super) fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {
-    let rows = Rows::new(report.summary);
-    if rows.levels.len() < 2 {
+    let whole = ladder(report.summary, &Group::All);
+    if whole.levels.len() < 2 {
         return Ok(Vec::new());
     }
-    let groups = report.summary.groups();
-    let categories = groups
-        .iter()
-        .filter(|group| matches!(group, Group::Category(_)));
-    let categories: Vec<Panel> = categories
-        .map(|group| panel(report, &rows, group))
-        .collect();
+    let groups = report.summary.groups().into_iter();
+    let categories = groups.filter(|group| matches!(group, Group::Category(_)));
+    let categories: Vec<Panel> = categories.map(|group| panel(report, group)).collect();
     let note = format!(
         "bands are 95 % intervals by {} ({} clusters)",
         report.summary.unit, report.summary.clusters
@@ -28,7 +23,7 @@ pub(super) fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {
         (
             "scores",
             "Score by level. Broken lines: without images.",
-            vec![panel(report, &rows, &Group::All)],
+            vec![panel(report, &Group::All)],
             1,
         ),
         ("categories", "Score by category.", categories, 3),
@@ -53,30 +48,27 @@ pub(super) fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {
     Ok(figures)
 }
 
-fn panel(report: &OpenReport<'_>, rows: &Rows<'_>, group: &Group) -> Panel {
-    let lines = rows.lines.keys().enumerate().map(|(place, line)| {
-        let points = rows
-            .levels
-            .iter()
-            .filter_map(|level| Some((*level, rows.cell(line, *level, group)?.score?)));
+fn panel(report: &OpenReport<'_>, group: &Group) -> Panel {
+    let ladder = ladder(report.summary, group);
+    let seeing = ladder.series.len();
+    let lines = ladder.series.iter().enumerate();
+    let lines = lines.map(|(place, (series, steps))| {
+        let steps = steps.iter();
+        let points = steps.filter_map(|(level, cell)| Some((*level, cell.score?)));
         Line {
-            name: format!("{}, {}", line.model, line.light()),
+            name: format!("{}, {}", series.model, series.light()),
             look: Look(place),
             shape: Shape::Curve(points.collect()),
         }
     });
-    let blind = rows
-        .blind
-        .iter()
-        .enumerate()
-        .filter_map(|(place, subject)| {
-            let score = report.summary.cell(subject, group)?.score?;
-            Some(Line {
-                name: format!("{} without images", subject.model),
-                look: Look(rows.lines.len() + place),
-                shape: Shape::Flat(score.value),
-            })
-        });
+    let blind = ladder.floors.iter().enumerate();
+    let blind = blind.filter_map(|(place, (subject, cell))| {
+        Some(Line {
+            name: format!("{} without images", subject.model),
+            look: Look(seeing + place),
+            shape: Shape::Flat(cell.score?.value),
+        })
+    });
     let n = report.questions.len();
     let title = match group {
         Group::All => format!("all, n {n}"),

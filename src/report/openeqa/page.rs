@@ -2,106 +2,47 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use serde::Serialize;
+use serde_json::{Value, json};
 
-use super::rows::Rows;
-use super::{OpenReport, Told, coverage};
+use super::coverage::coverage;
+use super::open_report::{OpenReport, Told};
+use super::tables::SECTION;
 use crate::error::Result;
-use crate::report::figures::Figure;
-use crate::report::page::{STYLE, manifest_facts};
+use crate::report::chart::Figure;
+use crate::report::page::{STYLE, manifest_facts, tables};
 use crate::report::readable::readable;
+use crate::report::table::Table;
 use crate::report::template::filled;
-use crate::score::open::{Group, Outcome};
+use crate::score::open::Outcome;
 use crate::score::subject::Subject;
 use crate::types::{AxisLevel, View};
 
 /// The template.
 const PAGE: &str = include_str!("page.html");
 
-#[derive(Serialize)]
-struct Page {
-    title: String,
-    alerts: Vec<String>,
-    intro: Vec<String>,
-    figures: Vec<Drawing>,
-    tables: Vec<Table>,
-    categories: BTreeSet<String>,
-    walks: Vec<Walk>,
-    facts: Vec<(String, String)>,
-    css: &'static str,
-}
-
-#[derive(Serialize)]
-struct Drawing {
-    svg: String,
-    caption: String,
-}
-
-#[derive(Serialize)]
-struct Table {
-    caption: String,
-    head: Vec<String>,
-    rows: Vec<Vec<String>>,
-}
-
-#[derive(Serialize)]
-struct Walk {
-    name: String,
-    images: Vec<Image>,
-    items: Vec<Item>,
-}
-
-#[derive(Serialize)]
-struct Image {
-    url: String,
-    caption: String,
-}
-
-#[derive(Serialize)]
-struct Item {
-    id: String,
-    text: String,
-    answer: String,
-    extra: String,
-    category: String,
-    /// The marks of models that see, in words.
-    marks: Vec<String>,
-    /// Whether some model's mark at its darkest is below that on the lit frames.
-    lost: bool,
-    rows: Vec<Row>,
-}
-
-#[derive(Serialize)]
-struct Row {
-    model: String,
-    shown: String,
-    mark: String,
-    answer: String,
-}
-
 /// The page.
 ///
 /// # Errors
 /// Where the template cannot be filled.
-pub(super) fn page(report: &OpenReport<'_>, figures: &[Figure]) -> Result<String> {
-    let drawings = figures.iter().map(|figure| Drawing {
-        svg: figure.svg.clone(),
-        caption: figure.caption.clone(),
-    });
-    let asked = report.questions.iter();
+pub(super) fn page(
+    report: &OpenReport<'_>,
+    tables: &[Table],
+    figures: &[Figure],
+) -> Result<String> {
+    let categories = report.questions.iter().map(|question| question.category);
     filled(
         PAGE,
-        Page {
-            title: format!("OpenEQA in the dark: {}", report.name),
-            alerts: alerts(report),
-            intro: intro(report),
-            figures: drawings.collect(),
-            tables: tables(report),
-            categories: asked.map(|question| question.category.to_owned()).collect(),
-            walks: walks(report),
-            facts: manifest_facts(report.manifest),
-            css: STYLE,
-        },
+        json!({
+            "title": format!("OpenEQA in the dark: {}", report.name),
+            "alerts": alerts(report),
+            "intro": intro(report),
+            "figures": figures,
+            "tables": tables::shown(tables, SECTION),
+            "categories": categories.collect::<BTreeSet<_>>(),
+            "walks": walks(report),
+            "facts": manifest_facts(report.manifest),
+            "css": STYLE,
+        }),
     )
 }
 
@@ -150,118 +91,71 @@ fn intro(report: &OpenReport<'_>) -> Vec<String> {
     ]
 }
 
-/// All scores, and those by split and category.
-fn tables(report: &OpenReport<'_>) -> Vec<Table> {
-    let rows = Rows::new(report.summary);
-    let levels = || rows.levels.iter().map(ToString::to_string);
-    let head = |first: &[&str]| {
-        let own = first.iter().map(ToString::to_string);
-        own.chain(levels()).collect::<Vec<_>>()
-    };
-    let groups = report.summary.groups();
-    let whole = rows.lines.keys().map(|line| {
-        let at = |level: &AxisLevel| rows.shown(rows.cell(line, *level, &Group::All));
-        let own = [line.model.to_owned(), line.light()];
-        own.into_iter().chain(rows.levels.iter().map(at)).collect()
-    });
-    let blind = rows.blind.iter().map(|subject| {
-        let cell = report.summary.cell(subject, &Group::All);
-        vec![
-            subject.model.clone(),
-            "without images".to_owned(),
-            rows.shown(cell),
-        ]
-    });
-    let mut tables = vec![Table {
-        caption: "Score in % ± half of the 95 % interval (difference from L0)".to_owned(),
-        head: head(&["model", "light"]),
-        rows: whole.chain(blind).collect(),
-    }];
-    let parts: Vec<&&Group> = groups
-        .iter()
-        .filter(|group| ***group != Group::All)
-        .collect();
-    for line in rows.lines.keys().filter(|_| !parts.is_empty()) {
-        let by = parts.iter().map(|group| {
-            let at = |level: &AxisLevel| rows.shown(rows.cell(line, *level, group));
-            let name = std::iter::once(group.name().to_owned());
-            name.chain(rows.levels.iter().map(at)).collect()
-        });
-        tables.push(Table {
-            caption: format!("{}, {}", line.model, line.light()),
-            head: head(&["split or category"]),
-            rows: by.collect(),
-        });
-    }
-    tables
-}
-
-fn walks(report: &OpenReport<'_>) -> Vec<Walk> {
+/// The walks in the order of their questions, each with its images and questions.
+fn walks(report: &OpenReport<'_>) -> Vec<Value> {
     let mut told = BTreeMap::<usize, Vec<&Told>>::new();
     for one in report.answers {
         told.entry(one.question).or_default().push(one);
     }
-    let mut walks: Vec<Walk> = Vec::new();
+    let mut walks: Vec<(&str, Vec<Value>)> = Vec::new();
     let mut places = BTreeMap::new();
     for (index, question) in report.questions.iter().enumerate() {
         let place = *places.entry(question.episode).or_insert_with(|| {
-            walks.push(Walk {
-                name: question.episode.to_owned(),
-                images: images(report, question.episode),
-                items: Vec::new(),
-            });
+            walks.push((question.episode, Vec::new()));
             walks.len() - 1
         });
         let own = told.remove(&index).unwrap_or_default();
-        walks[place].items.push(Item {
-            id: question.id.0.clone(),
-            text: readable(question.text),
-            answer: readable(question.answer),
-            extra: question
-                .extra
-                .map_or(String::new(), |extra| readable(&extra.join("; "))),
-            category: question.category.to_owned(),
-            marks: marks(&own),
-            lost: lost(&own),
-            rows: own.into_iter().map(row).collect(),
-        });
+        let extra = question.extra.map(|extra| readable(&extra.join("; ")));
+        walks[place].1.push(json!({
+            "id": question.id,
+            "text": readable(question.text),
+            "answer": readable(question.answer),
+            "extra": extra,
+            "category": question.category,
+            // The marks of models that see, in words.
+            "marks": marks(&own),
+            // Whether some model's mark at its darkest is below that on the lit frames.
+            "lost": lost(&own),
+            "rows": own.into_iter().map(row).collect::<Vec<_>>(),
+        }));
     }
-    walks
+    let walks = walks
+        .into_iter()
+        .map(|(name, items)| json!({"name": name, "images": images(report, name), "items": items}));
+    walks.collect()
 }
 
-fn images(report: &OpenReport<'_>, episode: &str) -> Vec<Image> {
+fn images(report: &OpenReport<'_>, episode: &str) -> Vec<Value> {
     let own = report.thumbnails.iter();
     let mut own: Vec<_> = own
         .filter(|thumbnail| thumbnail.frame.0 == episode)
         .collect();
     own.sort_by_key(|thumbnail| &thumbnail.condition);
-    let image = |thumbnail: &&crate::types::Thumbnail| Image {
-        url: thumbnail.small.clone(),
-        caption: format!(
+    let image = |thumbnail: &&crate::types::Thumbnail| {
+        let caption = format!(
             "{}, the frame in the middle of the walk",
             thumbnail.condition
-        ),
+        );
+        json!({"url": thumbnail.small, "caption": caption})
     };
     own.iter().map(image).collect()
 }
 
-fn row(told: &Told) -> Row {
-    Row {
-        model: told.subject.model.clone(),
-        shown: told.subject.condition(),
-        mark: match told.outcome {
-            Outcome::Marked(mark) => mark.to_string(),
-            Outcome::Null => "0 (no answer)".to_owned(),
-            Outcome::Unmarked => "none in the judge's reply".to_owned(),
-            Outcome::Unjudged => "not judged".to_owned(),
-            Outcome::Missing => "–".to_owned(),
-        },
-        answer: match (&told.answer, told.outcome) {
-            (Some(answer), _) => readable(answer),
-            (None, Outcome::Missing) => "not answered".to_owned(),
-            (None, _) => "none".to_owned(),
-        },
-    }
+fn row(told: &Told) -> Value {
+    let mark = match told.outcome {
+        Outcome::Marked(mark) => mark.to_string(),
+        Outcome::Null => "0 (no answer)".to_owned(),
+        Outcome::Unmarked => "none in the judge's reply".to_owned(),
+        Outcome::Unjudged => "not judged".to_owned(),
+        Outcome::Missing => "–".to_owned(),
+    };
+    let answer = match (&told.answer, told.outcome) {
+        (Some(answer), _) => readable(answer),
+        (None, Outcome::Missing) => "not answered".to_owned(),
+        (None, _) => "none".to_owned(),
+    };
+    let subject = &told.subject;
+    json!({"model": subject.model, "shown": subject.condition(), "mark": mark, "answer": answer})
 }
 
 /// `gpt-4o L0 5 · L2-noise 4`, a text for each model that sees.

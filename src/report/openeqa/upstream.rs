@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::{OpenReport, Told};
+use super::open_report::{OpenReport, Told};
 use crate::error::{Error, Result};
 use crate::score::open::Outcome;
 use crate::score::subject::Subject;

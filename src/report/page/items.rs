@@ -10,7 +10,7 @@ use flate2::write::GzEncoder;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::Shown;
+use super::shown::Shown;
 use crate::error::{Error, Result};
 use crate::score::choice::Mode;
 use crate::score::findings::Findings;
@@ -246,12 +246,12 @@ fn code(mark: Mark, mode: Mode) -> u8 {
 
 fn subjects<'a>(grid: &'a Grid<'_>) -> Vec<Subject<'a>> {
     let subject = |subject: &'a crate::score::subject::Subject| Subject {
-        name: crate::report::subject::name(subject),
+        name: crate::report::words::name(subject),
         model: &subject.model,
         condition: subject.condition(),
         light: match subject.view {
             Some(View::Blind) => "blind".to_owned(),
-            _ => crate::report::subject::light(&subject.variant, subject.enhancer.as_ref()),
+            _ => crate::report::words::light(&subject.variant, subject.enhancer.as_ref()),
         },
         level: subject.level,
         variant: subject.variant.to_string(),

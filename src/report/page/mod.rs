@@ -5,67 +5,25 @@
 
 mod items;
 mod sections;
-mod tables;
+mod shown;
+pub(super) mod tables;
 
-use serde::Serialize;
+pub use shown::{Run, Shown};
 
-use super::figures::Figure;
+use serde_json::{Value, json};
+
+use super::chart::Figure;
+use super::table::Table;
 use super::template::filled;
 use crate::error::Result;
 use crate::score::findings::Findings;
+use crate::types::Record;
 use crate::types::manifest::{RunManifest, Status};
-use crate::types::{Record, RunQuestion, Thumbnail};
 
 /// The parts of the page.
 const PAGE: &str = include_str!("page.html");
 pub(super) const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
-
-/// A run on the page.
-#[derive(Debug, Clone)]
-pub struct Run<'a> {
-    /// What it is called: its folder.
-    pub name: String,
-    /// Its manifest.
-    pub manifest: &'a RunManifest,
-    /// Its records, for what they took.
-    pub records: &'a [Record],
-    /// What they cost, in words, where that is known.
-    pub cost: Option<String>,
-}
-
-/// What is shown besides the findings.
-#[derive(Debug)]
-pub struct Shown<'a> {
-    /// The runs.
-    pub runs: Vec<Run<'a>>,
-    /// The questions, where they are kept.
-    pub questions: &'a [RunQuestion],
-    /// The small copies of images, where they are kept.
-    pub thumbnails: &'a [Thumbnail],
-}
-
-/// What the template is filled with.
-#[derive(Serialize)]
-struct Page {
-    title: String,
-    /// What must be read before any number.
-    alerts: Vec<String>,
-    intro: Vec<String>,
-    sections: Vec<sections::Section>,
-    runs: Vec<Facts>,
-    /// The items, packed.
-    data: String,
-    css: &'static str,
-    script: &'static str,
-}
-
-/// A run's facts, as rows of names and values.
-#[derive(Serialize)]
-struct Facts {
-    name: String,
-    rows: Vec<(String, String)>,
-}
 
 /// The page.
 ///
@@ -73,22 +31,22 @@ struct Facts {
 /// Where a figure cannot be drawn.
 pub fn page<'a>(
     findings: &'a Findings<'a>,
+    tables: &[Table],
     figures: &[Figure],
     shown: &Shown<'a>,
 ) -> Result<String> {
-    let sections = sections::sections(findings, figures, shown.thumbnails);
     filled(
         PAGE,
-        Page {
-            title: title(shown),
-            alerts: alerts(shown),
-            intro: intro(findings),
-            sections,
-            runs: shown.runs.iter().map(facts).collect(),
-            data: items::packed(findings, shown)?,
-            css: STYLE,
-            script: SCRIPT,
-        },
+        json!({
+            "title": title(shown),
+            "alerts": alerts(shown),
+            "intro": intro(findings),
+            "sections": sections::sections(tables, figures, shown.thumbnails),
+            "runs": shown.runs.iter().map(facts).collect::<Vec<_>>(),
+            "data": items::packed(findings, shown)?,
+            "css": STYLE,
+            "script": SCRIPT,
+        }),
     )
 }
 
@@ -133,22 +91,22 @@ fn intro(findings: &Findings<'_>) -> Vec<String> {
     )]
 }
 
-fn facts(run: &Run<'_>) -> Facts {
+fn facts(run: &Run<'_>) -> Value {
     let manifest = run.manifest;
-    let fact = |name: &str, value: String| (name.to_owned(), value);
     let mut rows = about(manifest);
     rows.extend(spent(run.records));
     rows.extend(run.cost.iter().map(|cost| fact("cost", cost.clone())));
     rows.extend(settings(manifest));
-    Facts {
-        name: run.name.clone(),
-        rows,
-    }
+    json!({"name": run.name, "rows": rows})
 }
 
 /// What a manifest says, as rows of names and values.
 pub(super) fn manifest_facts(manifest: &RunManifest) -> Vec<(String, String)> {
     [about(manifest), settings(manifest)].concat()
+}
+
+fn fact(name: &str, value: impl ToString) -> (String, String) {
+    (name.to_owned(), value.to_string())
 }
 
 fn settings(manifest: &RunManifest) -> Vec<(String, String)> {
@@ -168,7 +126,6 @@ fn settings(manifest: &RunManifest) -> Vec<(String, String)> {
 }
 
 fn about(manifest: &RunManifest) -> Vec<(String, String)> {
-    let fact = |name: &str, value: String| (name.to_owned(), value);
     vec![
         fact("status", manifest.status.to_string()),
         fact("made by", format!("darkqa-eval {}", manifest.version)),
@@ -207,13 +164,12 @@ fn spent(records: &[Record]) -> Vec<(String, String)> {
             .get((last * share).round() as usize)
             .map_or("–".to_owned(), |ms| format!("{ms} ms"))
     };
-    let row = |name: &str, value: String| (name.to_owned(), value);
     vec![
-        row(
+        fact(
             "requests",
             format!("{requests} for {} trials", records.len()),
         ),
-        row(
+        fact(
             "tokens",
             format!(
                 "{} of prompts, {} of replies",
@@ -221,12 +177,12 @@ fn spent(records: &[Record]) -> Vec<(String, String)> {
                 tokens(|usage| usage.completion_tokens)
             ),
         ),
-        row("image bytes", format!("{bytes}")),
-        row(
+        fact("image bytes", format!("{bytes}")),
+        fact(
             "latency",
             format!("median {}, 95 % within {}", at(0.5), at(0.95)),
         ),
-        row(
+        fact(
             "served as",
             served.into_iter().collect::<Vec<_>>().join(", "),
         ),

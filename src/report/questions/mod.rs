@@ -3,13 +3,13 @@
 pub mod figure;
 pub mod review;
 
-use std::fmt::Write as _;
+use std::fmt::{Display, Write as _};
 
-use comfy_table::CellAlignment;
-
-use super::table::plain;
+use super::table::Kind::{Count, Text};
+use super::table::Layout;
+use super::{csv as files, terminal};
 use crate::error::{Error, Result};
-use crate::questions::summary::{Baselines, Summary};
+use crate::questions::summary::{Baselines, Candidates, Summary};
 use crate::types::Family;
 
 /// How many reasons a line of the table names.
@@ -18,69 +18,59 @@ const REASONS: usize = 3;
 /// The table at the end: questions by family with what came of their candidates and what not looking would score.
 #[must_use]
 pub fn table(summary: &Summary) -> String {
-    let mut table = plain();
-    table.set_header([
-        "family",
-        "questions",
-        "chance %",
-        "majority %",
-        "prior %",
-        "candidates that hold",
-        "why others do not",
-    ]);
-    let share = |right: f64, of: &Baselines| {
-        if of.questions == 0 {
-            "–".to_owned()
-        } else {
-            format!("{:.1}", 100.0 * right / of.questions as f64)
-        }
+    let families = Family::PAPER.iter().filter_map(|family| {
+        let candidates = summary.candidates.get(family)?;
+        Some((family.name(), Some(candidates)))
+    });
+    let whole = summary.baselines.get(Family::TOTAL);
+    let rows = families.chain(whole.map(|_| (Family::TOTAL, None)));
+    let share = |family: &str, right: fn(&Baselines) -> f64| {
+        let base = summary
+            .baselines
+            .get(family)
+            .filter(|base| base.questions > 0);
+        base.map_or("–".to_owned(), |base| {
+            format!("{:.1}", 100.0 * right(base) / base.questions as f64)
+        })
     };
-    let none = Baselines::default();
-    for family in Family::PAPER {
-        let Some(candidates) = summary.candidates.get(&family) else {
-            continue;
-        };
-        let base = summary.baselines.get(family.name()).unwrap_or(&none);
-        let mut fallen: Vec<(String, u64)> = candidates
-            .fallen
-            .iter()
-            .map(|(reason, count)| (word(reason), *count))
-            .collect();
-        fallen.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
-        let reasons: Vec<String> = fallen
-            .iter()
-            .take(REASONS)
-            .map(|(reason, count)| format!("{reason} {count}"))
-            .collect();
-        table.add_row([
-            family.to_string(),
-            candidates.asked.to_string(),
-            share(base.chance, base),
-            share(base.majority as f64, base),
-            share(base.prior, base),
-            candidates.viable.to_string(),
-            reasons.join(", "),
-        ]);
-    }
-    if let Some(base) = summary.baselines.get(Family::TOTAL) {
-        table.add_row([
-            Family::TOTAL.to_owned(),
-            summary.questions.to_string(),
-            share(base.chance, base),
-            share(base.majority as f64, base),
-            share(base.prior, base),
-            String::new(),
-            String::new(),
-        ]);
-    }
-    for column in 1..6 {
-        if let Some(column) = table.column_mut(column) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
-    let mut text = format!("{table}\n");
+    let table = Layout::new("questions", rows)
+        .column(Text, "terminal family", |(family, _)| *family)
+        .column(Count, "terminal questions", |(_, candidates)| {
+            candidates.map_or(summary.questions, |own| own.asked as usize)
+        })
+        .column(Count, "terminal chance %", |(family, _)| {
+            share(family, |base| base.chance)
+        })
+        .column(Count, "terminal majority %", |(family, _)| {
+            share(family, |base| base.majority as f64)
+        })
+        .column(Count, "terminal prior %", |(family, _)| {
+            share(family, |base| base.prior)
+        })
+        .column(Count, "terminal candidates that hold", |(_, candidates)| {
+            candidates.map_or(String::new(), |own| own.viable.to_string())
+        })
+        .column(Text, "terminal why others do not", |(_, candidates)| {
+            candidates.map_or(String::new(), reasons)
+        })
+        .made();
+    let mut text = terminal::table(&[table]);
     notes(summary, &mut text);
     text
+}
+
+/// Why most of the other candidates do not hold.
+fn reasons(candidates: &Candidates) -> String {
+    let fallen = candidates.fallen.iter();
+    let mut fallen: Vec<(String, u64)> = fallen
+        .map(|(reason, count)| (word(reason), *count))
+        .collect();
+    fallen.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
+    let reasons = fallen.iter().take(REASONS);
+    let reasons: Vec<String> = reasons
+        .map(|(reason, count)| format!("{reason} {count}"))
+        .collect();
+    reasons.join(", ")
 }
 
 /// The lines below the table.
@@ -93,9 +83,8 @@ fn notes(summary: &Summary, text: &mut String) {
         "{} questions about {} frames of {} scenes; prior: the commonest answer to the same words in other scenes",
         summary.questions, summary.frames, summary.scenes
     ));
-    let sum = |count: fn(&crate::questions::summary::Candidates) -> u64| -> u64 {
-        summary.candidates.values().map(count).sum()
-    };
+    let sum =
+        |count: fn(&Candidates) -> u64| -> u64 { summary.candidates.values().map(count).sum() };
     let (unbalanced, rejected) = (sum(|c| c.unbalanced), sum(|c| c.rejected));
     if unbalanced > 0 {
         note(format!(
@@ -151,10 +140,9 @@ pub fn json(summary: &Summary) -> Result<String> {
 /// # Errors
 /// Where it cannot be written as such.
 pub fn csv(summary: &Summary) -> Result<Vec<u8>> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    let mut rows: Vec<[String; 4]> = vec![["table", "row", "column", "count"].map(str::to_owned)];
-    let mut row = |table: &str, row: &str, column: &str, count: String| {
-        rows.push([table.to_owned(), row.to_owned(), column.to_owned(), count]);
+    let mut rows: Vec<[String; 4]> = Vec::new();
+    let mut row = |table: &str, row: &dyn Display, column: &str, count: &dyn Display| {
+        rows.push([table, &row.to_string(), column, &count.to_string()].map(str::to_owned));
     };
     for (what, count) in [
         ("scenes", summary.scenes),
@@ -164,80 +152,63 @@ pub fn csv(summary: &Summary) -> Result<Vec<u8>> {
         ("questions", summary.questions),
         ("repeats", summary.repeats),
     ] {
-        row("all", what, "", count.to_string());
+        row("all", &what, "", &count);
     }
     for (family, candidates) in &summary.candidates {
-        for (column, count) in [
-            ("viable", candidates.viable),
-            ("asked", candidates.asked),
-            ("not_chosen", candidates.not_chosen),
-            ("rejected", candidates.rejected),
-            ("unbalanced", candidates.unbalanced),
-        ] {
-            row("candidates", family.name(), column, count.to_string());
-        }
+        let name = family.name();
+        row("candidates", &name, "viable", &candidates.viable);
+        row("candidates", &name, "asked", &candidates.asked);
+        row("candidates", &name, "not_chosen", &candidates.not_chosen);
+        row("candidates", &name, "rejected", &candidates.rejected);
+        row("candidates", &name, "unbalanced", &candidates.unbalanced);
         for (reason, count) in &candidates.fallen {
-            row("fallen", family.name(), &word(reason), count.to_string());
+            row("fallen", &name, &word(reason), count);
         }
     }
     for (questions, frames) in &summary.per_frame {
-        row(
-            "per_frame",
-            &questions.to_string(),
-            "frames",
-            frames.to_string(),
-        );
+        row("per_frame", questions, "frames", frames);
     }
     for (family, answers) in &summary.answers {
         for (answer, count) in answers {
-            row("answers", family.name(), answer, count.to_string());
+            row("answers", &family.name(), answer, count);
         }
     }
     for (words, count) in &summary.texts {
-        row("texts", words, "", count.to_string());
+        row("texts", words, "", count);
     }
     for (choices, count) in &summary.choices {
-        row(
-            "choices",
-            &choices.to_string(),
-            "questions",
-            count.to_string(),
-        );
+        row("choices", choices, "questions", count);
     }
     for (family, subjects) in &summary.polarity {
         for (about, [yes, no]) in subjects {
-            row(family.name(), about, "yes", yes.to_string());
-            row(family.name(), about, "no", no.to_string());
+            row(family.name(), about, "yes", yes);
+            row(family.name(), about, "no", no);
         }
     }
     for (class, coverage) in &summary.classes {
-        for (column, count) in [
-            ("pixels", coverage.pixels),
-            ("segments", coverage.segments),
-            ("frames", coverage.frames),
-            ("questions", coverage.questions),
-        ] {
-            row("classes", class, column, count.to_string());
-        }
+        row("classes", class, "pixels", &coverage.pixels);
+        row("classes", class, "segments", &coverage.segments);
+        row("classes", class, "frames", &coverage.frames);
+        row("classes", class, "questions", &coverage.questions);
     }
     for (room, counts) in &summary.rooms {
-        row("rooms", room, "frames", counts.frames.to_string());
-        row("rooms", room, "questions", counts.questions.to_string());
+        row("rooms", room, "frames", &counts.frames);
+        row("rooms", room, "questions", &counts.questions);
     }
     for (gap, count) in &summary.gaps {
-        row("gaps_mm", &gap.to_string(), "questions", count.to_string());
+        row("gaps_mm", gap, "questions", count);
     }
     for (family, base) in &summary.baselines {
-        row("baselines", family, "questions", base.questions.to_string());
-        row("baselines", family, "chance", base.chance.to_string());
-        row("baselines", family, "majority", base.majority.to_string());
-        row("baselines", family, "prior", base.prior.to_string());
+        row("baselines", family, "questions", &base.questions);
+        row("baselines", family, "chance", &base.chance);
+        row("baselines", family, "majority", &base.majority);
+        row("baselines", family, "prior", &base.prior);
     }
-    let failed = |e: csv::Error| Error::data("statistics", e);
-    for row in rows {
-        writer.write_record(row).map_err(failed)?;
-    }
-    writer
-        .into_inner()
-        .map_err(|e| Error::data("statistics", e))
+    let table = Layout::new("statistics", rows)
+        .column(Text, "csv table", |[table, ..]| table.clone())
+        .column(Text, "csv row", |[_, row, ..]| row.clone())
+        .column(Text, "csv column", |[.., column, _]| column.clone())
+        .column(Count, "csv count", |[.., count]| count.clone())
+        .made();
+    files::csv(&[table])
 }

@@ -1,0 +1,99 @@
+//! `summary.json`: what the run is, and the rows of `summary.csv`: [`document`].
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::{Serialize, Serializer};
+
+use super::csv::fields;
+use super::table::{Row, Table};
+use crate::error::{Error, Result};
+use crate::types::Why;
+use crate::types::manifest::RunManifest;
+
+/// A head with the rows of a table, each under the names of its columns.
+#[derive(Serialize)]
+struct Document<'a, H> {
+    #[serde(flatten)]
+    head: H,
+    #[serde(serialize_with = "rows")]
+    rows: &'a Table,
+}
+
+fn rows<S: Serializer>(table: &Table, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(table.rows.iter().map(|row| Named { table, row }))
+}
+
+struct Named<'a> {
+    table: &'a Table,
+    row: &'a Row,
+}
+
+impl Serialize for Named<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let cells = self.table.cells(self.row);
+        serializer.collect_map(cells.flat_map(|(column, cell)| {
+            let names = &column.heads.csv;
+            names.iter().zip(fields(cell, names.len()))
+        }))
+    }
+}
+
+/// A head and a table as one document.
+///
+/// # Errors
+/// If it cannot be written.
+pub(super) fn document(head: impl Serialize, rows: &Table) -> Result<String> {
+    serde_json::to_string_pretty(&Document { head, rows })
+        .map(|text| text + "\n")
+        .map_err(|e| Error::data("summary.json", e))
+}
+
+/// What stands above the rows of an evaluation.
+#[derive(Serialize)]
+struct Head<'a> {
+    schema: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    folder: Option<&'a Path>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    run: Option<&'a RunManifest>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    runs: Vec<Compared<'a>>,
+    unread: &'a BTreeMap<Why, usize>,
+}
+
+/// A run among several.
+#[derive(Serialize)]
+struct Compared<'a> {
+    folder: &'a Path,
+    run: &'a RunManifest,
+}
+
+/// What a document is about.
+#[derive(Debug, Clone, Copy)]
+pub enum Runs<'a> {
+    /// A run, with its folder if the document is not itself in there.
+    One(&'a RunManifest, Option<&'a Path>),
+    /// Several, each with its folder.
+    Several(&'a [(&'a RunManifest, &'a Path)]),
+}
+
+/// The summary of runs as JSON; `unread` counts why replies could not be read.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn summary(tables: &[Table], unread: &BTreeMap<Why, usize>, runs: Runs<'_>) -> Result<String> {
+    let (run, folder, runs) = match runs {
+        Runs::One(run, folder) => (Some(run), folder, [].as_slice()),
+        Runs::Several(runs) => (None, None, runs),
+    };
+    let runs = runs.iter().map(|&(run, folder)| Compared { folder, run });
+    let head = Head {
+        schema: "darkqa.summary/1",
+        folder,
+        run,
+        runs: runs.collect(),
+        unread,
+    };
+    document(head, &tables[0])
+}

@@ -1,0 +1,58 @@
+//! What a run of open questions says: [`OpenReport`].
+
+use crate::score::llm_match::Protocol;
+use crate::score::open::{OpenSummary, Outcome};
+use crate::score::subject::Subject;
+use crate::types::manifest::RunManifest;
+use crate::types::{QuestionId, Thumbnail};
+
+/// Everything that a run of open questions says.
+#[derive(Debug, Clone, Copy)]
+pub struct OpenReport<'a> {
+    /// The scores.
+    pub summary: &'a OpenSummary,
+    /// The run.
+    pub manifest: &'a RunManifest,
+    /// Who marked the answers; `None` for nobody.
+    pub judge: Option<&'a str>,
+    /// How they were judged.
+    pub protocol: Protocol,
+    /// What the run is called: its folder.
+    pub name: &'a str,
+    /// The questions in the order of their file.
+    pub questions: &'a [Asked<'a>],
+    /// The answers, each to one of the questions.
+    pub answers: &'a [Told],
+    /// The small copies of images, by walk and condition.
+    pub thumbnails: &'a [Thumbnail],
+}
+
+/// An open question.
+#[derive(Debug, Clone, Copy)]
+pub struct Asked<'a> {
+    /// Its name.
+    pub id: &'a QuestionId,
+    /// The question in words.
+    pub text: &'a str,
+    /// The true answer.
+    pub answer: &'a str,
+    /// Other answers that are right, too.
+    pub extra: Option<&'a [String]>,
+    /// Its category.
+    pub category: &'a str,
+    /// Its walk.
+    pub episode: &'a str,
+}
+
+/// One answer.
+#[derive(Debug, Clone)]
+pub struct Told {
+    /// Whose.
+    pub subject: Subject,
+    /// The question's place.
+    pub question: usize,
+    /// In its own words; `None` where there is none.
+    pub answer: Option<String>,
+    /// What came of it.
+    pub outcome: Outcome,
+}

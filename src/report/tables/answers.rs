@@ -1,0 +1,85 @@
+//! What models answer: false positives and negatives, collapse, and answers given against true ones.
+
+use crate::report::table::Kind::{Count, Number, Percent, Share, Text};
+use crate::report::table::{Layout, Table};
+use crate::score::confusion::{Confusion, Hallucination};
+use crate::score::findings::Findings;
+
+pub(super) fn answers(findings: &Findings<'_>) -> Vec<Table> {
+    vec![
+        hallucination(&findings.hallucinations),
+        collapse(&findings.confusions),
+        confusion(&findings.confusions),
+    ]
+}
+
+fn hallucination(rates: &[Hallucination]) -> Table {
+    Layout::new("hallucination", rates)
+        .subject(|rates| &rates.subject, ToString::to_string)
+        .column(Share, "csv false_positive fp_low fp_high", |rates| {
+            rates.false_positive
+        })
+        .column(Count, "csv fp_n", |rates| {
+            rates.false_positive.map_or(0, |rate| rate.n)
+        })
+        .column(Share, "csv false_negative fn_low fn_high", |rates| {
+            rates.false_negative
+        })
+        .column(Count, "csv fn_n", |rates| {
+            rates.false_negative.map_or(0, |rate| rate.n)
+        })
+        .made()
+}
+
+fn collapse(confusions: &[Confusion]) -> Table {
+    let collapsed = confusions.iter();
+    let collapsed = collapsed.filter_map(|one| Some((one, one.collapse()?)));
+    Layout::new("collapse", collapsed)
+        .page(
+            "answers",
+            "The answer given most often, and how often it is true",
+        )
+        .subject(|(one, _)| &one.subject, ToString::to_string)
+        .family(|(one, _)| Some(&one.family))
+        .column(Text, "csv top_answer | page given most often", |(_, c)| {
+            c.top.clone()
+        })
+        .column(Percent, "csv top_share | page given in %", |(_, c)| c.share)
+        .column(Percent, "csv true_share | page true in %", |(_, c)| c.truth)
+        .column(
+            Number,
+            "csv entropy_bits | page entropy in bits",
+            |(_, c)| c.entropy,
+        )
+        .column(
+            Number,
+            "csv true_entropy_bits | page of the truth",
+            |(_, c)| c.true_entropy,
+        )
+        .column(Count, "csv n | page n", |(_, c)| c.n)
+        .made()
+}
+
+/// A row for each true answer and each answer given to it; the given one is empty if none could be read.
+fn confusion(confusions: &[Confusion]) -> Table {
+    let cells = confusions.iter().flat_map(|one| {
+        let rows = one.counts.iter().enumerate();
+        let cells = rows.flat_map(|(truth, row)| {
+            let given = row.iter().enumerate();
+            given.map(move |(given, count)| (truth, given, *count))
+        });
+        cells.map(move |cell| (one, cell))
+    });
+    let there = cells.filter(|(_, (_, _, count))| *count > 0);
+    Layout::new("confusion", there)
+        .subject(|(one, _)| &one.subject, ToString::to_string)
+        .family(|(one, _)| Some(&one.family))
+        .column(Text, "csv truth", |(one, (truth, _, _))| {
+            one.labels[*truth].clone()
+        })
+        .column(Text, "csv given", |(one, (_, given, _))| {
+            one.labels.get(*given).cloned()
+        })
+        .column(Count, "csv count", |(_, (_, _, count))| *count)
+        .made()
+}

@@ -1,0 +1,55 @@
+//! Accuracy by family: a row a subject, with images and without, and what is below a model without images marked.
+
+use crate::report::latex::escaped;
+use crate::report::table::Kind::{Percent, Text};
+use crate::report::table::{Cell, Heads, Layout, Table};
+use crate::report::words::family as family_name;
+use crate::score::choice::Mode;
+use crate::score::findings::Findings;
+use crate::score::subject::Subject;
+use crate::types::Family;
+
+pub(super) fn families(findings: &Findings<'_>) -> Table {
+    let subjects = findings.grid.subjects.iter().map(Some);
+    // The last row is chance.
+    let mut layout = Layout::new("families", subjects.chain([None]))
+        .page("families", "Accuracy in % by family")
+        .column(Text, "page model | latex Model", |subject| {
+            subject
+                .map_or("chance", |subject| &subject.model)
+                .to_owned()
+        })
+        .column(Text, "page condition | latex Condition", |subject| {
+            subject.map_or(String::new(), Subject::condition)
+        });
+    for family in findings.grid.groups() {
+        let name = family_name(family);
+        let names = Heads {
+            page: Some(name.to_owned()),
+            latex: family.map(|_| escaped(name)),
+            ..Heads::default()
+        };
+        layout = layout.column(Percent, names, |subject| share(findings, *subject, family));
+    }
+    let mut table = layout.made();
+    table.latex = Some(
+        "Accuracy in \\% by family. Underlined: below a model without images (its own, where it was asked so)."
+            .to_owned(),
+    );
+    table
+}
+
+fn share(findings: &Findings<'_>, subject: Option<&Subject>, family: Option<&Family>) -> Cell {
+    let mut cells = findings.summary.of(family, Mode::Strict);
+    let cell = cells.find(|cell| match subject {
+        Some(subject) => cell.subject == *subject,
+        None => cell.subject.view.is_none(),
+    });
+    let below = subject.is_some_and(|subject| findings.below_blind(subject, family));
+    match cell.and_then(|cell| cell.accuracy) {
+        None => Cell::Missing,
+        Some(chance) if subject.is_none() => Cell::Number(chance.value),
+        Some(share) if below => Cell::Below(share),
+        Some(share) => Cell::Estimate(share),
+    }
+}

@@ -1,0 +1,78 @@
+//! What became of the trials of each subject, besides right and wrong.
+
+use crate::report::table::Kind::{Count, Failures};
+use crate::report::table::{Layout, Table};
+use crate::report::words::percent;
+use crate::score::health::Health;
+use crate::types::{FailureKind, Why};
+
+/// The columns of reasons for which replies could not be read.
+const UNREAD: [&str; Why::ALL.len()] = [
+    "empty",
+    "refused",
+    "truncated",
+    "filtered",
+    "ambiguous",
+    "out_of_range",
+    "contradiction",
+    "negated",
+    "no_choice",
+];
+
+/// The columns of reasons for which no reply came.
+const FAILED: [&str; FailureKind::ALL.len()] = [
+    "failed_connection",
+    "failed_timeout",
+    "failed_rate_limit",
+    "failed_server",
+    "failed_request",
+    "failed_filtered",
+    "failed_response",
+    "failed_image",
+];
+
+/// Reasons that are not the form of an answer.
+const OTHER: [Why; 4] = [Why::Refused, Why::Filtered, Why::Truncated, Why::Empty];
+
+pub(super) fn health(health: &[Health]) -> Table {
+    let mut layout = Layout::new("health", health)
+        .page("health", "Replies and failures by subject")
+        .subject(|health| &health.subject, ToString::to_string)
+        .column(Count, "csv replies | page replies", |health| health.replies)
+        .column(Count, "csv read", |health| health.read)
+        .column(Count, "csv lenient_only", |health| health.lenient_only)
+        .column(Count, "page read", |health| share(health, health.read))
+        .column(Count, "page lenient alone", |health| {
+            share(health, health.lenient_only)
+        })
+        .column(Count, "page other form", |health| {
+            // A foreign record may give a reason beside a choice.
+            (health.replies - health.read).saturating_sub(health.unread_for(&OTHER))
+        })
+        .column(Count, "page refused or filtered", |health| {
+            health.unread_for(&[Why::Refused, Why::Filtered])
+        })
+        .column(Count, "page truncated", |health| {
+            health.unread_for(&[Why::Truncated])
+        })
+        .column(Count, "page empty", |health| {
+            health.unread_for(&[Why::Empty])
+        })
+        .column(Failures, "page failed", |health| health.failures());
+    for (why, name) in Why::ALL.into_iter().zip(UNREAD) {
+        layout = layout.column(Count, &*format!("csv {name}"), |health| {
+            health.unread_for(&[why])
+        });
+    }
+    for (kind, name) in FailureKind::ALL.into_iter().zip(FAILED) {
+        layout = layout.column(Count, &*format!("csv {name}"), |health| {
+            health.failed.get(&kind).copied().unwrap_or(0)
+        });
+    }
+    layout.made()
+}
+
+fn share(health: &Health, count: usize) -> String {
+    let of = health.replies.max(1) as f64;
+    format!("{count} ({} %)", percent(count as f64 / of))
+}

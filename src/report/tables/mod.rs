@@ -1,0 +1,83 @@
+//! The tables of an evaluation, one file a subject matter: [`tables`].
+
+mod agreement;
+mod answers;
+mod comparisons;
+mod families;
+mod flips;
+mod health;
+mod levels;
+mod sections;
+mod subjects;
+mod summary;
+mod thresholds;
+
+use super::table::Kind::Text;
+use super::table::{Cell, Layout, Table};
+use super::words::{family, name};
+use crate::score::findings::Findings;
+use crate::score::subject::Subject;
+use crate::types::{EnhancerName, Family, KindReading};
+
+pub(super) use sections::{ENHANCERS, SECTIONS};
+pub(super) use summary::{SUMMARY, reading};
+
+/// Every table of an evaluation; the first is the summary.
+#[must_use]
+pub fn tables(findings: &Findings<'_>) -> Vec<Table> {
+    [
+        vec![summary::summary(&findings.summary)],
+        vec![levels::levels(findings)],
+        vec![subjects::subjects(&findings.summary)],
+        thresholds::thresholds(findings),
+        vec![families::families(findings)],
+        comparisons::comparisons(findings),
+        answers::answers(findings),
+        vec![flips::flips(findings)],
+        vec![agreement::agreement(&findings.agreements)],
+        vec![health::health(&findings.health)],
+    ]
+    .concat()
+}
+
+impl<T> Layout<T> {
+    /// The columns that say whom a row is about.
+    pub(in crate::report) fn subject(
+        self,
+        of: impl Fn(&T) -> &Subject,
+        variant: impl Fn(&KindReading) -> String,
+    ) -> Self {
+        let said = |text: Option<String>| Cell::from(text);
+        self.column(Text, "csv model", |row| of(row).model.clone())
+            .column(Text, "csv view", |row| {
+                said(of(row).view.map(|view| view.to_string()))
+            })
+            .column(Text, "csv level", |row| {
+                said(of(row).level.map(|level| level.to_string()))
+            })
+            .column(Text, "csv variant", |row| variant(&of(row).variant))
+            .column(Text, "csv enhancer", |row| {
+                said(of(row).enhancer.as_ref().map(ToString::to_string))
+            })
+            .column(Text, "page subject", |row| name(of(row)))
+    }
+
+    /// The columns that say which line over the levels a row is about: its model, variant and enhancer.
+    fn line(self, of: impl Fn(&T) -> (&str, &KindReading, Option<&EnhancerName>)) -> Self {
+        self.column(Text, "csv model | terminal model | page model", |row| {
+            of(row).0.to_owned()
+        })
+        .column(Text, "csv variant", |row| of(row).1.to_string())
+        .column(Text, "csv enhancer", |row| {
+            of(row).2.map(ToString::to_string)
+        })
+    }
+
+    /// The columns of the family; `None` is all of them together.
+    fn family(self, of: impl Fn(&T) -> Option<&Family>) -> Self {
+        self.column(Text, "csv family", |row| {
+            of(row).map_or(Family::TOTAL, Family::name).to_owned()
+        })
+        .column(Text, "page family", |row| family(of(row)).to_owned())
+    }
+}

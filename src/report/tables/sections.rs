@@ -1,0 +1,66 @@
+//! The sections of the page of an evaluation: [`SECTIONS`].
+
+/// A section of the page: its name in links, its title, what is said above it, and its figures.
+pub(in crate::report) type Section = (
+    &'static str,
+    &'static str,
+    &'static str,
+    &'static [&'static str],
+);
+
+/// The sections of the page in order.
+pub(in crate::report) const SECTIONS: [Section; 8] = [
+    (
+        "accuracy",
+        "Accuracy in the dark",
+        "",
+        &["accuracy", "variants"],
+    ),
+    (
+        "thresholds",
+        "Darkness threshold",
+        "The exposure drop at which a model has lost half of what it knows in the light: one number a model. The area is the \
+         mean accuracy from L0 to the darkest level, over EV.",
+        &["thresholds"],
+    ),
+    (
+        "families",
+        "Families of questions",
+        "Underlined: below a model without images (its own, where it was asked so), where pictures in the dark do more harm than none.",
+        &["families"],
+    ),
+    (
+        ENHANCERS,
+        "Enhancement",
+        "Enhanced less raw, in percentage points. Rescued: wrong raw, right enhanced; harmed: the other way round.",
+        &["enhancers"],
+    ),
+    (
+        "answers",
+        "Hallucination and collapse",
+        "What is said when nothing is seen: objects that are not there, and one answer to everything.",
+        &["hallucination", "collapse"],
+    ),
+    (
+        "comparisons",
+        "Comparisons",
+        "Each paired by item, in percentage points.",
+        &[],
+    ),
+    (
+        "agreement",
+        "Agreement between models",
+        "The share of items with the same answer, and Cohen’s κ of being right (0: they err independently).",
+        &[],
+    ),
+    (
+        "health",
+        "Parse health",
+        "What became of the trials besides right and wrong, by the strict reading. Replies that cannot be read count as wrong; \
+         failed trials do not count.",
+        &[],
+    ),
+];
+
+/// The section with pictures of the frames.
+pub(in crate::report) const ENHANCERS: &str = "enhancers";

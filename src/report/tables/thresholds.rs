@@ -1,0 +1,55 @@
+//! Darkness thresholds and areas below the curves: all families together, and each.
+
+use crate::report::table::Kind::{Number, Share, Text, Threshold};
+use crate::report::table::{Cell, Layout, Table};
+use crate::report::words::light;
+use crate::score::curve::Curve;
+use crate::score::findings::Findings;
+
+pub(super) fn thresholds(findings: &Findings<'_>) -> Vec<Table> {
+    let curves = findings.curves.iter();
+    let (whole, parts): (Vec<&Curve>, Vec<&Curve>) =
+        curves.partition(|curve| curve.family.is_none());
+    let heading = format!(
+        "Darkness threshold in EV (half-way from L0 to chance) and mean accuracy in %, with 95 % intervals by {}",
+        findings.unit
+    );
+    let mut whole = table("Thresholds and areas", &whole);
+    whole.heading = (!whole.rows.is_empty()).then_some(heading);
+    let mut parts = table("Thresholds and areas by family", &parts);
+    parts.is_folded = true;
+    vec![whole, parts]
+}
+
+/// Thresholds are `inf` beyond the darkest level, and empty if the light is not above chance.
+fn table(caption: &str, curves: &[&Curve]) -> Table {
+    Layout::new("thresholds", curves)
+        .page("thresholds", caption)
+        .line(|curve| (&curve.model, &curve.variant, curve.enhancer.as_ref()))
+        .column(Text, "terminal light | page light", |curve| {
+            light(&curve.variant, curve.enhancer.as_ref())
+        })
+        .family(|curve| curve.family.as_ref())
+        .column(Number, "csv darkest_ev", |curve| {
+            curve.darkest.value()
+        })
+        .column(
+            Threshold,
+            "csv threshold_ev low high | terminal threshold, interval | page threshold in EV [95 %]",
+            |curve| {
+                let darkest = curve.darkest.value();
+                curve
+                    .threshold
+                    .map(|threshold| Cell::Threshold(threshold, darkest))
+            },
+        )
+        .column(
+            Share,
+            "csv area area_low area_high n | terminal mean accuracy | page area in % [95 %]",
+            |curve| curve.area,
+        )
+        .column(Text, "page EV", |curve| {
+            format!("0–{}", curve.darkest.value())
+        })
+        .made()
+}

@@ -1,0 +1,122 @@
+//! Tables in the terminal: [`render`].
+
+use std::fmt::Write;
+use std::path::Path;
+
+use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
+use comfy_table::{CellAlignment, LineStyle};
+
+use super::table::{Cell, Column, Format, Kind, Table};
+use super::words::{half, percent, points, reach, stops, words};
+use crate::types::manifest::{Counts, RunManifest, Status};
+
+/// The lenient figure in brackets if it is not the strict one.
+pub(super) fn differing(strict: &str, lenient: &str) -> String {
+    if strict == lenient {
+        String::new()
+    } else {
+        format!(" ({lenient})")
+    }
+}
+
+/// A cell in the words of the terminal, one for each name of its column.
+pub(super) fn texts(kind: Kind, cell: &Cell) -> Vec<String> {
+    match (kind, cell) {
+        (Kind::Points, Cell::Estimate(e)) => {
+            let interval = format!("{} to {}", points(e.low), points(e.high));
+            vec![points(e.value), interval]
+        }
+        (Kind::Threshold, Cell::Threshold(t, darkest)) => {
+            vec![stops(t.value, *darkest), reach(t.low, t.high, *darkest)]
+        }
+        (Kind::Threshold, Cell::Missing) => vec!["–".to_owned(), words(kind, cell)],
+        (Kind::Share, Cell::Estimate(share)) => vec![half(*share)],
+        (_, Cell::Strict(strict, lenient)) => {
+            let lenient = differing(&percent(strict.value), &percent(*lenient));
+            vec![half(*strict) + &lenient]
+        }
+        _ => vec![words(kind, cell)],
+    }
+}
+
+/// All tables that have a heading, each with it and with its notes.
+#[must_use]
+pub(super) fn render(tables: &[Table]) -> String {
+    let mut text = String::new();
+    let key = |table: &Table| (table.name, table.heading.clone());
+    for parts in tables.chunk_by(|table, next| key(table) == key(next)) {
+        let Some(heading) = &parts[0].heading else {
+            continue;
+        };
+        if !heading.is_empty() {
+            let _ = writeln!(text, "{heading}");
+        }
+        text += &table(parts);
+        for note in parts.iter().flat_map(|table| &table.notes) {
+            let _ = writeln!(text, "{note}");
+        }
+    }
+    text
+}
+
+/// Tables of the same columns as one; nothing without a row.
+#[must_use]
+pub(super) fn table(parts: &[Table]) -> String {
+    let mut drawn = comfy_table::Table::new();
+    drawn.load_style(UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none()));
+    let columns = parts.iter().take(1).flat_map(|table| &table.columns);
+    let names = columns.clone().flat_map(|column| &column.heads.terminal);
+    drawn.set_header(names);
+    for table in parts {
+        for row in table.rows_in(Format::Terminal) {
+            let cells = table.cells(row);
+            let cells = cells.filter(|(column, _)| !column.heads.terminal.is_empty());
+            drawn.add_row(cells.flat_map(|(column, cell)| texts(column.kind, cell)));
+        }
+    }
+    if drawn.row_count() == 0 {
+        return String::new();
+    }
+    let kinds = columns.flat_map(|Column { kind, heads }| vec![kind; heads.terminal.len()]);
+    for (column, kind) in drawn.column_iter_mut().zip(kinds) {
+        if matches!(
+            kind,
+            Kind::Count | Kind::Accuracy | Kind::Points | Kind::P | Kind::Percent
+        ) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    format!("{drawn}\n")
+}
+
+/// What stands at the end of an evaluation: how far each run has come if it is not complete, the tables, the runs' folders.
+#[must_use]
+pub fn evaluation(tables: &[Table], runs: &[(&RunManifest, &Path)]) -> String {
+    let mut text = String::new();
+    for (run, folder) in runs {
+        if runs.len() > 1 && run.status != Status::Complete {
+            let _ = write!(text, "{}: ", folder.display());
+        }
+        text += &progress(run, "trials answered");
+    }
+    let folders = runs.iter();
+    let folders: String = folders
+        .map(|(_, folder)| format!("run: {}\n", folder.display()))
+        .collect();
+    let first = tables.iter().position(|table| table.heading.is_some());
+    let (levels, rest) = tables.split_at(first.map_or(0, |first| first + 1));
+    text + &render(levels) + &folders + &render(rest)
+}
+
+/// How far a run has come if it is not complete.
+pub(super) fn progress(run: &RunManifest, what: &str) -> String {
+    let Counts {
+        trials,
+        answered,
+        failed,
+    } = run.counts;
+    match run.status {
+        Status::Complete => String::new(),
+        status => format!("{status}: {answered} of {trials} {what}, {failed} failed\n"),
+    }
+}

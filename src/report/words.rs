@@ -1,0 +1,119 @@
+//! Names and numbers in words: [`light`], [`family`], [`percent`] and others, and [`words`] of any cell.
+
+use super::table::{Cell, Kind};
+use crate::score::estimate::Estimate;
+use crate::score::subject::Subject;
+use crate::types::{EnhancerName, Family, KindReading};
+
+/// A variant in words, with what mended it.
+pub(super) fn light(variant: &KindReading, enhancer: Option<&EnhancerName>) -> String {
+    let variant = variant.title();
+    match enhancer {
+        None => variant,
+        Some(name) => format!("{variant} + {name}"),
+    }
+}
+
+/// A family in words: the paper's five by their names, others as they are.
+pub(super) fn family(family: Option<&Family>) -> &str {
+    match family {
+        None => "all families",
+        Some(Family::RoomType) => "room type",
+        Some(Family::Affordance) => "room affordance",
+        Some(Family::Presence) => "object recognition",
+        Some(Family::Color) => "object colour",
+        Some(Family::Closest) => "closest object",
+        Some(Family::Other(name)) => name,
+    }
+}
+
+/// A subject in words: its model and what it was shown.
+pub(super) fn name(subject: &Subject) -> String {
+    format!("{} {}", subject.model, subject.condition())
+}
+
+/// A share in percent, with one digit.
+pub(super) fn percent(share: f64) -> String {
+    format!("{:.1}", 100.0 * share)
+}
+
+/// A difference of shares in percentage points, with its sign.
+pub(super) fn points(difference: f64) -> String {
+    let text = format!("{:+.1}", 100.0 * difference);
+    match &*text {
+        "+0.0" | "-0.0" => "0.0".to_owned(),
+        _ => text.replace('-', "−"),
+    }
+}
+
+/// A p-value: three digits, or that it is below them.
+pub(super) fn p(value: f64) -> String {
+    if value < 0.001 {
+        "< 0.001".to_owned()
+    } else {
+        format!("{value:.3}")
+    }
+}
+
+/// An interval of exposure drops in EV; one that lies beyond the darkest level as a whole is none.
+pub(super) fn reach(low: f64, high: f64, darkest: f64) -> String {
+    if low.is_infinite() {
+        "–".to_owned()
+    } else {
+        format!("{} to {}", stops(low, darkest), stops(high, darkest))
+    }
+}
+
+/// An exposure drop in EV; beyond the darkest level that was asked it is more than that.
+pub(super) fn stops(value: f64, darkest: f64) -> String {
+    if value.is_infinite() {
+        format!("> {darkest}")
+    } else {
+        format!("{value:.1}")
+    }
+}
+
+/// A share in percent with half of its interval.
+pub(super) fn half(share: Estimate) -> String {
+    let half = percent((share.high - share.low) / 2.0);
+    format!("{} ±{half}", percent(share.value))
+}
+
+/// A cell as people read it.
+pub(super) fn words(kind: Kind, cell: &Cell) -> String {
+    match cell {
+        Cell::Blank | Cell::Absent => String::new(),
+        Cell::Missing if kind == Kind::Threshold => "not above chance at L0".to_owned(),
+        Cell::Missing => "–".to_owned(),
+        Cell::Text(text) => text.clone(),
+        Cell::Count(count) => count.to_string(),
+        Cell::Number(value) => number(kind, *value),
+        Cell::Guess(share) => number(Kind::Number, 100.0 * share.value),
+        Cell::Estimate(number) | Cell::Below(number) => estimate(kind, *number),
+        Cell::Strict(share, _) | Cell::Changed(share, None) => half(*share),
+        Cell::Changed(share, Some(change)) => format!("{} ({})", half(*share), points(*change)),
+        Cell::Threshold(threshold, darkest) => {
+            let reach = reach(threshold.low, threshold.high, *darkest);
+            format!("{} [{reach}]", stops(threshold.value, *darkest))
+        }
+        Cell::Verdict(verdict) => verdict.word().to_owned(),
+    }
+}
+
+fn number(kind: Kind, number: f64) -> String {
+    match kind {
+        Kind::P => p(number),
+        Kind::Percent | Kind::Share | Kind::Accuracy => percent(number),
+        Kind::Points => points(number),
+        _ => format!("{number:.2}"),
+    }
+}
+
+fn estimate(kind: Kind, estimate: Estimate) -> String {
+    let [value, low, high] = [estimate.value, estimate.low, estimate.high].map(|x| number(kind, x));
+    match kind {
+        Kind::Percent => value,
+        Kind::Accuracy => half(estimate),
+        _ => format!("{value} [{low}, {high}]"),
+    }
+}

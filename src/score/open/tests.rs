@@ -1,0 +1,79 @@
+//! Tests of the scores of open answers.
+
+use super::*;
+
+fn topic(episode: usize, category: &str) -> Topic {
+    Topic {
+        episode: format!("hm3d-v0/{episode:03}"),
+        category: category.into(),
+        split: "hm3d-v0".into(),
+    }
+}
+
+fn scored(level: &str, question: usize, outcome: Outcome) -> Scored {
+    Scored {
+        subject: Subject::shown("m", Some(&level.parse().unwrap())),
+        question,
+        outcome,
+        cut: false,
+    }
+}
+
+#[test]
+fn marks_become_upstreams_score() {
+    use Outcome::{Marked, Missing, Null, Unmarked};
+    let topics: Vec<Topic> = (0..7).map(|i| topic(0, ["a", "b"][i % 2])).collect();
+    let outcomes = [
+        Marked(5),
+        Marked(5),
+        Marked(3),
+        Marked(1),
+        Null,
+        Missing,
+        Unmarked,
+    ];
+    let answers = outcomes.into_iter().enumerate();
+    let answers: Vec<Scored> = answers
+        .map(|(i, outcome)| scored("L0", i, outcome))
+        .collect();
+    let summary = open_summary(&answers, &topics);
+    let all = summary.cell(&answers[0].subject, &Group::All).unwrap();
+    let score = all.score.unwrap();
+    assert!((score.value - 0.5).abs() < 1e-12 && score.n == 5);
+    assert!(score.low < 0.5 && score.high > 0.5);
+    assert_eq!((all.due, all.null, all.missing, all.unmarked), (7, 1, 1, 1));
+    assert_eq!((summary.unit, summary.clusters), ("question", 7));
+    let names: Vec<&str> = summary.groups().iter().map(|group| group.name()).collect();
+    assert_eq!(names, ["all", "a", "b"]);
+}
+
+#[test]
+fn drops_are_of_unrounded_means_on_shared_questions() {
+    use Outcome::{Marked, Missing};
+    let topics: Vec<Topic> = (0..6).map(|i| topic(i / 2, "a")).collect();
+    let marks = |level: &str, marks: [i64; 6]| -> Vec<Scored> {
+        let outcome = |mark| if mark == 0 { Missing } else { Marked(mark) };
+        let marks = marks.into_iter().enumerate();
+        marks
+            .map(|(i, mark)| scored(level, i, outcome(mark)))
+            .collect()
+    };
+    let answers = [
+        marks("L0", [5, 4, 5, 4, 0, 5]),
+        marks("L2-noise", [4, 4, 3, 1, 1, 5]),
+        marks("L2-noise+ruas", [5, 4, 5, 1, 1, 5]),
+    ]
+    .concat();
+    let summary = open_summary(&answers, &topics);
+    let dark = Subject::shown("m", Some(&"L2-noise".parse().unwrap()));
+    let drop = summary.change(&dark, Against::Lit, &Group::All).unwrap();
+    // (0.25 + 0 + 0.5 + 0.75 + 0) / 5, the fifth question being unanswered at L0.
+    assert!((drop.difference.value + 0.3).abs() < 1e-12 && drop.difference.n == 5);
+    assert!(drop.difference.low < -0.3 && drop.difference.high > -0.3);
+    let mended = Subject::shown("m", Some(&"L2-noise+ruas".parse().unwrap()));
+    let gain = summary.change(&mended, Against::Raw, &Group::All).unwrap();
+    assert!((gain.difference.value - 0.125).abs() < 1e-12);
+    assert!(summary.change(&mended, Against::Lit, &Group::All).is_some());
+    assert_eq!(summary.changes.len(), 3);
+    assert_eq!((summary.unit, summary.clusters), ("episode", 3));
+}
