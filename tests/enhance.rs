@@ -446,7 +446,7 @@ fn a_graph_that_the_runtime_refuses_is_an_error() {
 }
 
 #[test]
-fn name_and_digest_are_those_of_the_file() {
+fn the_name_is_that_of_the_file() {
     let (folder, enhancer) = loaded(&onnx::identity());
     let file = ModelFile::read(&folder.path().join("model.onnx")).unwrap();
     assert_eq!(enhancer.name().as_str(), "model");

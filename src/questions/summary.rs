@@ -217,12 +217,23 @@ impl Candidates {
     }
 }
 
-fn count<K: Ord>(asked: &[Asked], key: impl Fn(&Asked) -> K) -> BTreeMap<K, usize> {
+fn count<'a, K: Ord>(
+    asked: impl IntoIterator<Item = &'a Asked>,
+    key: impl Fn(&'a Asked) -> K,
+) -> BTreeMap<K, usize> {
     let mut counts = BTreeMap::new();
     for asked in asked {
         *counts.entry(key(asked)).or_insert(0) += 1;
     }
     counts
+}
+
+/// The right answers to expect of guesses, by how many choices there are.
+fn chance(sizes: &BTreeMap<usize, usize>) -> f64 {
+    let right = sizes
+        .iter()
+        .map(|(size, count)| *count as f64 / *size as f64);
+    right.sum()
 }
 
 fn coverage(frames: &[FrameStatistics], asked: &[Asked]) -> BTreeMap<String, Coverage> {
@@ -281,37 +292,21 @@ fn rooms(made: &Generated) -> BTreeMap<String, Room> {
 }
 
 fn baselines(asked: &[Asked]) -> BTreeMap<String, Baselines> {
-    let by_answer = |family: &Family| {
-        let of_family = asked
-            .iter()
-            .filter(|asked| asked.question.family == *family);
-        let mut answers: BTreeMap<&str, usize> = BTreeMap::new();
-        for asked in of_family {
-            *answers.entry(asked.answer()).or_insert(0) += 1;
-        }
-        answers
-    };
+    let mut families: BTreeMap<&Family, Vec<&Asked>> = BTreeMap::new();
+    for asked in asked {
+        families
+            .entry(&asked.question.family)
+            .or_default()
+            .push(asked);
+    }
     let mut all: BTreeMap<String, Baselines> = BTreeMap::new();
-    let families: BTreeSet<&Family> = asked.iter().map(|asked| &asked.question.family).collect();
     let mut total = Baselines::default();
-    for family in families {
-        let answers = by_answer(family);
-        let list: Vec<&Asked> = asked
-            .iter()
-            .filter(|asked| asked.question.family == *family)
-            .collect();
-        let sizes = list
-            .iter()
-            .fold(BTreeMap::<usize, usize>::new(), |mut sizes, asked| {
-                *sizes.entry(asked.question.choices.len()).or_insert(0) += 1;
-                sizes
-            });
+    for (family, list) in families {
+        let answers = count(list.iter().copied(), Asked::answer);
+        let sizes = count(list.iter().copied(), |asked| asked.question.choices.len());
         let baselines = Baselines {
             questions: list.len(),
-            chance: sizes
-                .iter()
-                .map(|(size, count)| *count as f64 / *size as f64)
-                .sum(),
+            chance: chance(&sizes),
             majority: answers.values().copied().max().unwrap_or(0),
             prior: prior(&list),
         };
@@ -357,9 +352,5 @@ fn prior(list: &[&Asked]) -> f64 {
             None => *guesses.entry(asked.question.choices.len()).or_insert(0) += 1,
         }
     }
-    right as f64
-        + guesses
-            .iter()
-            .map(|(size, count)| *count as f64 / *size as f64)
-            .sum::<f64>()
+    right as f64 + chance(&guesses)
 }
