@@ -65,7 +65,7 @@ impl<'a, C> Ladder<'a, C> {
     }
 
     /// Each series begins with the lit frames of its model, which are a series of their own only if there is no other.
-    pub(super) fn from_lit(mut self) -> Self {
+    pub(super) fn with_lit(mut self) -> Self {
         let is_lit = |series: &Series<'_>| series.variant.kind.is_none();
         let (lit, mut dark): (BTreeMap<_, _>, BTreeMap<_, _>) = self
             .series

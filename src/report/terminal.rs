@@ -99,13 +99,13 @@ pub fn evaluation(tables: &[Table], runs: &[(&RunManifest, &Path)]) -> String {
         }
         text += &progress(run, "trials answered");
     }
-    let folders = runs.iter();
-    let folders: String = folders
-        .map(|(_, folder)| format!("run: {}\n", folder.display()))
-        .collect();
     let first = tables.iter().position(|table| table.heading.is_some());
     let (levels, rest) = tables.split_at(first.map_or(0, |first| first + 1));
-    text + &render(levels) + &folders + &render(rest)
+    text += &render(levels);
+    for (_, folder) in runs {
+        let _ = writeln!(text, "run: {}", folder.display());
+    }
+    text + &render(rest)
 }
 
 /// How far a run has come if it is not complete.

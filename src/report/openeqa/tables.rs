@@ -37,7 +37,7 @@ pub fn tables(report: &OpenReport<'_>) -> Vec<Table> {
 /// The scores of a group over the levels.
 pub(super) fn ladder<'a>(summary: &'a OpenSummary, group: &Group) -> Ladder<'a, OpenCell> {
     let cells = summary.cells.iter().filter(|cell| cell.group == *group);
-    Ladder::new(cells.map(|cell| (&cell.subject, cell))).from_lit()
+    Ladder::new(cells.map(|cell| (&cell.subject, cell))).with_lit()
 }
 
 /// A score, and what it differs by from the lit frames; of the unrounded means.

@@ -105,8 +105,8 @@ pub(super) fn manifest_facts(manifest: &RunManifest) -> Vec<(String, String)> {
     [about(manifest), settings(manifest)].concat()
 }
 
-fn fact(name: &str, value: impl ToString) -> (String, String) {
-    (name.to_owned(), value.to_string())
+fn fact(name: &str, value: impl Into<String>) -> (String, String) {
+    (name.to_owned(), value.into())
 }
 
 fn settings(manifest: &RunManifest) -> Vec<(String, String)> {
