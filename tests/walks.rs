@@ -224,7 +224,7 @@ fn a_killed_run_goes_on_and_asks_nothing_twice() {
             .count()
     };
     while there() < 8 {
-        assert!(started.elapsed() < Duration::from_secs(60), "nothing came");
+        assert!(started.elapsed() < Duration::from_mins(1), "nothing came");
         std::thread::sleep(Duration::from_millis(5));
     }
     let killed = Command::new("kill")

@@ -179,7 +179,7 @@ impl OpenEqa {
     pub fn resolve(said: OpenEqaArgs) -> Result<Self> {
         let judge = JudgeArgs::of(&said);
         let walk = Walk::resolve(&said)?;
-        let shared = merge(EvaluateArgs {
+        let merged = merge(EvaluateArgs {
             light: said.light,
             sensor: said.sensors,
             enhancement: said.enhancement,
@@ -189,10 +189,10 @@ impl OpenEqa {
             scale: said.scale,
             ..EvaluateArgs::default()
         })?;
-        refuse(&shared.model, &shared.sending)?;
-        let mut recipe = show::recipe(&shared)?;
+        refuse(&merged.model, &merged.sending)?;
+        let mut recipe = show::recipe(&merged)?;
         let walk = Walk {
-            most_pixels: most_pixels(shared.data.max_pixels),
+            most_pixels: most_pixels(merged.data.max_pixels),
             ..walk
         };
         // What an evaluation's data would be says nothing of walks.
@@ -205,28 +205,28 @@ impl OpenEqa {
             (None, true) => OpenTask::Batch(BatchFiles::resolve(said.files)?),
             (None, false) => OpenTask::Run,
         };
-        let shard = Shard::said(shared.scale.shard.as_deref(), |name| {
+        let shard = Shard::said(merged.scale.shard.as_deref(), |name| {
             std::env::var(name).ok()
         })?;
-        let nobody = shared.model.model.is_empty() && shared.model.blind_model.is_empty();
+        let nobody = merged.model.model.is_empty() && merged.model.blind_model.is_empty();
         if nobody && answers.is_empty() && !matches!(task, OpenTask::Study(_)) {
-            return Err(nameless(&shared.output));
+            return Err(nameless(&merged.output));
         }
         let light = LightArgs {
-            levels: shared.light.levels.or_else(|| Some(LEVELS.to_owned())),
-            variant: shared.light.variant.or_else(|| Some(VARIANT.to_owned())),
+            levels: merged.light.levels.or_else(|| Some(LEVELS.to_owned())),
+            variant: merged.light.variant.or_else(|| Some(VARIANT.to_owned())),
         };
         let seed = sampling_seed(said.sampling_seed.as_deref())?;
-        let judge = judge.resolve(&shared.model, &shared.sending, seed, shard)?;
+        let judge = judge.resolve(&merged.model, &merged.sending, seed, shard)?;
         let model = ModelArgs {
-            temperature: shared
+            temperature: merged
                 .model
                 .temperature
                 .or_else(|| Some(TEMPERATURE.to_owned())),
-            max_tokens: shared.model.max_tokens.or(Some(ANSWER_TOKENS)),
-            ..shared.model
+            max_tokens: merged.model.max_tokens.or(Some(ANSWER_TOKENS)),
+            ..merged.model
         };
-        let mut ask = ask(model, &shared.sending, shard)?;
+        let mut ask = ask(model, &merged.sending, shard)?;
         ask.parameters.seed = seed;
         ask.models
             .iter()
@@ -246,16 +246,16 @@ impl OpenEqa {
             protocol: parsed("--protocol", said.protocol.as_deref())?.unwrap_or(Protocol::Upstream),
             task,
             job: JobSettings {
-                light: Light::resolve(&light, &shared.sensor)?,
-                enhancement: enhancement(shared.enhancement)?,
+                light: Light::resolve(&light, &merged.sensor)?,
+                enhancement: enhancement(merged.enhancement)?,
                 ask,
-                images: images(&shared.sending)?,
-                pace: pace(&shared.sending)?,
-                money: Money::said(&shared.sending, shard)?,
-                mode: Mode::said(shared.sending.dry_run),
+                images: images(&merged.sending)?,
+                pace: pace(&merged.sending)?,
+                money: Money::said(&merged.sending, shard)?,
+                mode: Mode::said(merged.sending.dry_run),
                 shard,
-                show_timings: shared.scale.timings,
-                output: output(shared.output),
+                show_timings: merged.scale.timings,
+                output: output(merged.output),
                 recipe,
             },
         })

@@ -1,7 +1,7 @@
 //! In which conditions frames are shown: [`conditions`].
 
 use crate::config::Light;
-use crate::types::{Condition, Digest, EnhancerName, KindSet};
+use crate::types::{Condition, Degradation, Digest, EnhancerName, KindSet};
 
 /// Every condition in which a frame is shown: raw first, each enhancer after, level by level, so that a frame is developed once for
 /// all that use it.
@@ -12,7 +12,7 @@ pub(crate) fn conditions(
 ) -> Vec<Condition> {
     let mut all = Vec::new();
     for degradation in light.degradations() {
-        let kind = degradation.as_ref().map(|how| how.kind());
+        let kind = degradation.as_ref().map(Degradation::kind);
         let raw = Condition::raw(degradation);
         let enhanced = |(name, _): &(EnhancerName, Digest)| Condition {
             enhancer: Some(name.clone()),

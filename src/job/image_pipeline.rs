@@ -155,7 +155,8 @@ impl<'a> ImagePipeline<'a> {
         let timings = self.steps.timings;
         // The error is that nobody waits for a group any more.
         let _ = self.one_by_one(sources, plan, wanted, |group| {
-            timings.time(Step::Waiting, || out.blocking_send(group))
+            let send = || out.blocking_send(group).is_ok();
+            timings.time(Step::Waiting, send).then_some(()).ok_or(())
         });
     }
 

@@ -146,8 +146,12 @@ impl<E: Experiment> OpenRun<'_, E> {
         })?;
         if settings.show_timings {
             let threads = workers.each.len();
-            self.progress
-                .note(&timings.told(started.elapsed(), threads));
+            let line = timings.told(started.elapsed(), threads);
+            let line = match E::PHASES {
+                [_] => line,
+                phases => format!("{}: {line}", phases[phase]),
+            };
+            self.progress.note(&line);
         }
         Ok(end)
     }

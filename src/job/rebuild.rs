@@ -62,16 +62,13 @@ impl ImageRebuilder {
         };
         let files = identity::enhancers(models)?;
         let recipe = Recipe::new(&pictures.sensor, &pictures.images, &files);
-        let (place, recipe) = match pictures.walk {
-            Some(walk) => {
-                let recipe = recipe.of_walks(&walk);
-                (Images::Walks(WalkFolder::new(&walk), walk), recipe)
-            }
-            None => {
-                let frames = frames(&pictures.data.place)?;
-                let frames = frames.with_most_pixels(pictures.data.most_pixels);
-                (Images::Frames(frames), recipe)
-            }
+        let (place, recipe) = if let Some(walk) = pictures.walk {
+            let recipe = recipe.of_walks(&walk);
+            (Images::Walks(WalkFolder::new(&walk), walk), recipe)
+        } else {
+            let frames = frames(&pictures.data.place)?;
+            let frames = frames.with_most_pixels(pictures.data.most_pixels);
+            (Images::Frames(frames), recipe)
         };
         Ok(Self {
             place,

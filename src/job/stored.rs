@@ -53,11 +53,11 @@ pub(crate) fn in_order<D: Detail>(
     let ids = questions.iter().map(|question| &question.id);
     let places: HashMap<&QuestionId, usize> = ids.zip(0..).collect();
     let place = |record: &Record<D>| places.get(&record.question).copied();
-    let mut placed: Vec<(Option<usize>, Record<D>)> = records
+    let mut ordered: Vec<(Option<usize>, Record<D>)> = records
         .into_iter()
         .map(|record| (place(&record), record))
         .collect();
-    placed.sort_by(|(place, record), (other_place, other)| {
+    ordered.sort_by(|(place, record), (other_place, other)| {
         let asked = |record: &Record<D>| (record.detail.repeat(), record.key);
         (place, &record.condition, &record.model, asked(record)).cmp(&(
             other_place,
@@ -66,7 +66,7 @@ pub(crate) fn in_order<D: Detail>(
             asked(other),
         ))
     });
-    placed.into_iter().map(|(_, record)| record).collect()
+    ordered.into_iter().map(|(_, record)| record).collect()
 }
 
 /// What a run in this folder is called: the folder's own name.

@@ -124,8 +124,7 @@ fn compare(config: &Realism, pair: &Pair, shown: bool) -> Result<Work> {
     let state = synthesis.state_by(&key, f64::from(drop));
     let take = |terms: &[Term]| {
         let (amplify, tone) = (synthesis.amplify, synthesis.tone);
-        Negative::taken(&normal, &key, state.clone(), amplify, tone, terms)
-            .develop_by(f64::from(drop))
+        Negative::taken(&normal, &key, &state, amplify, tone, terms).develop_by(f64::from(drop))
     };
     let (noise, clean) = (take(&Term::ALL), take(&[]));
     let residuals = [&real, &noise, &exposure].map(|image| Residuals::of(image, &exposure));

@@ -44,7 +44,7 @@ impl Negative {
     pub fn taken(
         clean: &Rgb,
         key: &NoiseKey,
-        state: CameraState,
+        state: &CameraState,
         amplify: Amplify,
         tone: Tone,
         terms: &[Term],
@@ -136,21 +136,21 @@ impl Shot {
             Draws::Fresh => key.at(severity),
         };
         let Synthesis { amplify, tone, .. } = *synthesis;
-        Self::with(&key, state, amplify, tone, &Term::ALL, isa)
+        Self::with(&key, &state, amplify, tone, &Term::ALL, isa)
     }
 
     fn with(
         key: &NoiseKey,
-        state: CameraState,
+        state: &CameraState,
         amplify: Amplify,
         tone: Tone,
         terms: &[Term],
         isa: Isa,
     ) -> Self {
         Self {
-            unprocess: Unprocess::new(&state, isa),
-            noise: Noise::new(&state, key, amplify, terms, isa),
-            developer: Developer::new(&state, tone, isa),
+            unprocess: Unprocess::new(state, isa),
+            noise: Noise::new(state, key, amplify, terms, isa),
+            developer: Developer::new(state, tone, isa),
         }
     }
 
@@ -259,7 +259,7 @@ mod tests {
             };
             for (amplify, tone) in choices {
                 let develop = |isa: &Isa| {
-                    let shot = Shot::with(&key, state.clone(), amplify, tone, &Term::ALL, *isa);
+                    let shot = Shot::with(&key, &state, amplify, tone, &Term::ALL, *isa);
                     let mut dark = Severity::LADDER.map(|_| Rgb::black(40, 150));
                     shot.develop(&clean, &Severity::LADDER, &mut dark);
                     dark

@@ -154,7 +154,7 @@ fn seed_and_frame_enter() {
         let negative = Negative::taken(
             &clean,
             &key(seed, frame),
-            median(),
+            &median(),
             Amplify::ShotOnly,
             Tone::None,
             &Term::ALL,
@@ -202,7 +202,7 @@ fn flat_greys_have_their_figures() {
         let negative = Negative::taken(
             &clean,
             &key(4, "flat"),
-            median(),
+            &median(),
             Amplify::ShotOnly,
             Tone::None,
             &Term::ALL,
@@ -220,7 +220,7 @@ fn noise_shrinks_with_the_light() {
     let negative = Negative::taken(
         &flat(128, 256),
         &key(5, "a"),
-        median(),
+        &median(),
         Amplify::ShotOnly,
         Tone::None,
         &Term::ALL,
@@ -244,7 +244,8 @@ fn without_noise_a_mid_grey_and_white_are_the_exposure_branchs() {
             if code == 255 && state.rgb_gain < 1.0 {
                 continue;
             }
-            let negative = Negative::taken(&clean, &key, state, Amplify::ShotOnly, Tone::None, &[]);
+            let negative =
+                Negative::taken(&clean, &key, &state, Amplify::ShotOnly, Tone::None, &[]);
             for level in Severity::LADDER {
                 assert_eq!(
                     negative.develop(level),
@@ -265,7 +266,7 @@ fn a_grey_ramp_returns_from_the_sensor() {
         let state = CameraState::draw(&key(seed, "a"), &CameraModel::default());
         let tone = Tone::BeforeEv;
         let key = key(seed, "a");
-        let negative = Negative::taken(&clean, &key, state, Amplify::ShotOnly, tone, &[]);
+        let negative = Negative::taken(&clean, &key, &state, Amplify::ShotOnly, tone, &[]);
         let back = negative.develop_by(0.0);
         for (column, codes) in back.samples().chunks(3).enumerate() {
             for code in codes {
@@ -283,7 +284,7 @@ fn a_grey_ramp_returns_from_the_sensor() {
 fn the_tone_curve_stands_where_it_is_told_to() {
     let clean = flat(100, 4);
     let develop = |tone| {
-        let negative = Negative::taken(&clean, &key(1, "a"), median(), Amplify::All, tone, &[]);
+        let negative = Negative::taken(&clean, &key(1, "a"), &median(), Amplify::All, tone, &[]);
         negative.develop(Severity::L1)
     };
     assert_eq!(develop(Tone::BeforeEv), expose(&clean, Severity::L1));

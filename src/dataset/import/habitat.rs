@@ -153,7 +153,7 @@ impl Adapter for Habitat {
         let depth = depth_of(deep.as_deref(), self.depth_scale, rgb)?;
         let ids = segments(semantic)?;
         same_size(semantic, &ids, rgb)?;
-        let (mut regions, mut named) = (BTreeMap::new(), 0_u64);
+        let (mut regions, mut with_region) = (BTreeMap::new(), 0_u64);
         let (mut last, mut found) = (None, (0, None));
         let mut segments = ids;
         let classes = segments.mapv(|id| {
@@ -166,12 +166,12 @@ impl Adapter for Habitat {
                 );
             }
             if found.0 != 0 {
-                named += 1;
+                with_region += 1;
                 *regions.entry(found.1).or_insert(0_u64) += 1;
             }
             found.0
         });
-        if named == 0 {
+        if with_region == 0 {
             let problem = "no pixel has the number of an instance that the scene names; habitat-sim renders 0 everywhere where the scene was opened without its *.scene_dataset_config.json";
             return Err(Error::data(semantic.display(), problem));
         }
@@ -184,7 +184,7 @@ impl Adapter for Habitat {
             .max_by_key(|(_, count)| *count)
             .unwrap_or((None, 0));
         let room = region.and_then(|region| scene.rooms.get(&region));
-        let room = room.filter(|_| most * 100 >= named * MOST_OF_FRAME);
+        let room = room.filter(|_| most * 100 >= with_region * MOST_OF_FRAME);
         Ok(Read {
             depth,
             semantic: Some(classes),
