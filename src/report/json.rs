@@ -1,4 +1,4 @@
-//! `summary.json`: what the run is, and the rows of `summary.csv`: [`document`].
+//! `summary.json`: what the run is, and the rows of `summary.csv`: `document`.
 
 use std::collections::BTreeMap;
 use std::path::Path;

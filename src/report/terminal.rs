@@ -1,4 +1,4 @@
-//! Tables in the terminal: [`render`].
+//! Tables in the terminal: `render`.
 
 use std::fmt::Write;
 use std::path::Path;

@@ -58,7 +58,7 @@ fn ladder(c: &mut Criterion) {
                 &paper,
                 &Severity::LADDER,
                 &mut dark,
-            )
+            );
         });
     });
     let fresh = Synthesis {
@@ -73,7 +73,7 @@ fn ladder(c: &mut Criterion) {
                 &fresh,
                 &Severity::LADDER,
                 &mut dark,
-            )
+            );
         });
     });
     group.bench_function("noise, negative", |b| {
