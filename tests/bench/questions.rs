@@ -139,7 +139,7 @@ fn stage(c: &mut Criterion) {
     group.bench_function("files to statistics", |b| {
         b.iter(|| {
             let files = dataset.files(black_box(name)).unwrap();
-            let key = files.digest();
+            let key = files.digest().unwrap();
             measure(&files.decode().unwrap(), &labels, &rules, &palette, key).unwrap()
         });
     });
