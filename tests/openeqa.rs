@@ -614,6 +614,35 @@ fn a_model_that_is_gone_keeps_nobody_elses_answers_from_their_marks() {
 }
 
 #[test]
+fn the_only_frame_of_a_walk_is_shown_as_often_as_frames_are_asked_for() {
+    let house = House::new();
+    fs::remove_file(house.0.path("walks/scannet-v0/001-b/00001-rgb.png")).unwrap();
+    let mock = MockEndpoint::start([Answer::text("an answer")]);
+    let called = house.call(&[
+        "--model",
+        "m",
+        "--base-url",
+        &mock.base_url(),
+        "--levels",
+        "L0,L2",
+        "--splits",
+        "scannet-v0",
+        "--out",
+        "run",
+    ]);
+    assert_eq!(called.code, Some(0), "{called:?}");
+    for request in sent(&mock) {
+        let parts = request["messages"][0]["content"].as_array().unwrap();
+        let images = parts.iter().filter(|part| part["type"] == "image_url");
+        assert_eq!(
+            images.count(),
+            3,
+            "as upstream samples one frame three times"
+        );
+    }
+}
+
+#[test]
 fn a_task_of_an_array_asks_about_walks_of_its_own() {
     let house = House::new();
     house.0.file("a.jsonl", "{\"default\": \"an answer\"}");

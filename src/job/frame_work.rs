@@ -12,7 +12,7 @@ use crate::config::Darkened;
 use crate::dataset::Picture;
 use crate::error::{Error, Result};
 use crate::synthesis::{Exposures, NoiseKey};
-use crate::types::{Condition, Degradation, Digest, FrameId, Rgb};
+use crate::types::{Condition, Degradation, Digest, EnhancerName, FrameId, Rgb};
 
 /// What every image is made with.
 #[derive(Clone, Copy)]
@@ -57,8 +57,8 @@ fn longer_side(image: &Rgb) -> usize {
 pub(crate) enum Staged {
     /// As it is sent.
     Ready(Arc<Payload>),
-    /// Still to be enhanced.
-    Degraded(Rgb),
+    /// Still to be enhanced, and by what.
+    ToEnhance(Rgb, EnhancerName),
 }
 
 /// Cached steps of one frame: each is computed when it is first needed, and once.
@@ -107,9 +107,9 @@ impl<'a> FrameWork<'a> {
         }
         let steps = self.steps;
         let degraded = self.degraded(condition.degradation.as_ref())?;
-        match condition.enhancer {
+        match &condition.enhancer {
             None => Ok(Staged::Ready(steps.payload(degraded)?.0)),
-            Some(_) => Ok(Staged::Degraded(degraded.clone())),
+            Some(name) => Ok(Staged::ToEnhance(degraded.clone(), name.clone())),
         }
     }
 

@@ -194,7 +194,10 @@ impl<'a> ImagePipeline<'a> {
 
     fn begin(&mut self, source: &Source, conditions: &[&Condition]) -> SourceWork<'a> {
         match &source.frames[..] {
-            [frame] => SourceWork::Frame(Box::new(FrameWork::planned(self.steps, source, frame))),
+            // A walk may show its only frame several times.
+            [frame] if source.order.len() == 1 => {
+                SourceWork::Frame(Box::new(FrameWork::planned(self.steps, source, frame)))
+            }
             _ if conditions.is_empty() => SourceWork::Walk(BTreeMap::new()),
             _ => match self.images(source, conditions) {
                 Ok(images) => {
@@ -282,9 +285,8 @@ impl<'a> ImagePipeline<'a> {
                 staged.collect::<Result<Vec<Staged>>>()
             });
             for staged in staged.collect::<Result<Vec<_>>>()? {
-                for ((staged, condition), made) in staged.into_iter().zip(conditions).zip(&mut made)
-                {
-                    made.push(self.finish(staged, condition)?);
+                for (staged, made) in staged.into_iter().zip(&mut made) {
+                    made.push(self.finish(staged)?);
                 }
             }
         }
@@ -318,13 +320,14 @@ impl<'a> ImagePipeline<'a> {
         }
     }
 
-    fn finish(&mut self, staged: Staged, condition: &Condition) -> Result<Arc<Payload>> {
-        let image = match (staged, &condition.enhancer) {
-            (Staged::Ready(payload), _) => return Ok(payload),
-            (Staged::Degraded(image), None) => image,
-            (Staged::Degraded(image), Some(name)) => self.enhanced(&image, name)?,
-        };
-        Ok(self.steps.payload(&image)?.0)
+    fn finish(&mut self, staged: Staged) -> Result<Arc<Payload>> {
+        match staged {
+            Staged::Ready(payload) => Ok(payload),
+            Staged::ToEnhance(image, name) => {
+                let image = self.enhanced(&image, &name)?;
+                Ok(self.steps.payload(&image)?.0)
+            }
+        }
     }
 
     fn enhanced(&mut self, image: &Rgb, name: &EnhancerName) -> Result<Rgb> {
