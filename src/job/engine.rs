@@ -105,7 +105,11 @@ impl<'a, E: Experiment> Job<'a, E> {
             .as_ref()
             .is_some_and(|kept| kept.status == Status::Complete);
         // Opened before the folder is made, so that an enhancer that does not work leaves nothing behind.
-        let enhancers = OpenEnhancers::new(files, &settings.enhancement, complete)?;
+        let enhancers = if complete {
+            OpenEnhancers::later(files, &settings.enhancement)
+        } else {
+            OpenEnhancers::load(files, &settings.enhancement)?
+        };
         let manifest = manifest::of(experiment, kept);
         let mut store = Store::open(&folder, &manifest, folder::moved(&settings.output))?;
         store.add_questions(experiment.questions())?;

@@ -13,21 +13,14 @@ pub(crate) struct OpenEnhancers<'a> {
 }
 
 impl<'a> OpenEnhancers<'a> {
-    /// The models in these files, loaded at once unless they may not be needed at all.
-    pub(crate) fn new(
-        files: Vec<ModelFile>,
-        settings: &'a Enhancement,
-        perhaps_unneeded: bool,
-    ) -> Result<Self> {
-        if perhaps_unneeded {
-            return Ok(Self {
-                settings: Some(settings),
-                files,
-                enhancers: Vec::new(),
-                version: None,
-            });
+    /// The models in these files, loaded when they are taken.
+    pub(crate) fn later(files: Vec<ModelFile>, settings: &'a Enhancement) -> Self {
+        Self {
+            settings: Some(settings),
+            files,
+            enhancers: Vec::new(),
+            version: None,
         }
-        Self::load(files, settings)
     }
 
     /// The models in these files, loaded.

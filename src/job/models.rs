@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::ask::{Endpoint, Model, Parameters, Remote, Script, Wire};
 use crate::config::{Ask, ModelName, Server};
 use crate::error::{Error, Result};
-use crate::types::View;
+use crate::types::{Condition, View};
 
 /// What messages call the place of models that are built in.
 const BUILT_IN: &str = "built-in models";
@@ -65,6 +65,16 @@ pub(crate) fn open_all(
         models.push(ModelUnderTest::new(model, view, server)?);
     }
     Ok(models)
+}
+
+/// The models that are asked in a condition, or without images, each with its place among all.
+pub(crate) fn asked_in<'a>(
+    models: &'a [ModelUnderTest],
+    condition: Option<&Condition>,
+) -> Vec<(usize, &'a ModelUnderTest)> {
+    let view = condition.map_or(View::Blind, |_| View::Image);
+    let all = models.iter().enumerate();
+    all.filter(|(_, model)| model.view == view).collect()
 }
 
 /// The endpoint, ready to be talked to.

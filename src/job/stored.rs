@@ -122,6 +122,22 @@ impl AnyRun {
     }
 }
 
+impl StoredRun<ChoiceDetail> {
+    /// Reads a run of questions with choices.
+    ///
+    /// # Errors
+    /// If it holds none; a run of open questions is refused with what to do `instead`.
+    pub(crate) fn of_choices(folder: &Path, instead: &str) -> Result<Self> {
+        match AnyRun::open(folder)? {
+            AnyRun::Choice(run) => Ok(run),
+            AnyRun::Open(run) => Err(Error::Run {
+                path: run.folder,
+                problem: format!("the run asked open questions: {instead}"),
+            }),
+        }
+    }
+}
+
 /// The manifest of the run in a folder, whatever was asked in it.
 ///
 /// # Errors

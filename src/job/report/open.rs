@@ -24,17 +24,17 @@ pub(crate) const JUDGE: &str = "--judge";
 pub(crate) const PROTOCOL: &str = "--protocol";
 
 /// The scores of a run.
-pub(crate) struct Scores<'a> {
-    run: &'a StoredRun<OpenDetail>,
+pub(crate) struct Scores {
+    pub(crate) run: StoredRun<OpenDetail>,
     judge: Option<String>,
     protocol: Protocol,
     summary: OpenSummary,
     answers: Vec<Told>,
 }
 
-impl<'a> Scores<'a> {
+impl Scores {
     /// Scores what a run holds by the marks of the judge that it names.
-    pub(crate) fn new(run: &'a StoredRun<OpenDetail>) -> Result<Self> {
+    pub(crate) fn new(run: StoredRun<OpenDetail>) -> Result<Self> {
         let setting = |name| run.manifest.settings.get(name).and_then(Value::as_str);
         let judge = setting(JUDGE).map(str::to_owned);
         let protocol = setting(PROTOCOL).map_or(Ok(Protocol::Upstream), str::parse)?;
@@ -167,16 +167,16 @@ pub(crate) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<StoredRun<Open
 /// cannot be read is incomplete.
 pub(crate) fn write(
     store: &Store<OpenDetail>,
-    mut run: StoredRun<OpenDetail>,
+    run: StoredRun<OpenDetail>,
     show: Show,
 ) -> Result<Ended> {
-    if run.manifest.status == Status::Complete && Scores::new(&run)?.unmarked() {
-        run.manifest.status = Status::Incomplete;
+    let mut scores = Scores::new(run)?;
+    if scores.run.manifest.status == Status::Complete && scores.unmarked() {
+        scores.run.manifest.status = Status::Incomplete;
     }
-    let scores = Scores::new(&run)?;
     scores.write(store)?;
     Ok(Ended {
-        status: run.manifest.status,
+        status: scores.run.manifest.status,
         output: scores.shown(show)?,
     })
 }

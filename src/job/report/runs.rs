@@ -118,8 +118,8 @@ fn of_open(config: &Report, runs: Vec<StoredRun<OpenDetail>>) -> Result<String> 
         return Err(no_records(run.folder.clone()));
     }
     let alone = runs.len() == 1;
-    let run = open::combine(runs)?;
-    let scores = open::Scores::new(&run)?;
+    let scores = open::Scores::new(open::combine(runs)?)?;
+    let run = &scores.run;
     if alone && config.out.is_none() {
         match Store::open(&run.folder, &run.manifest, Moved::Allowed) {
             Ok(store) => {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::choice_order::arrange;
 use super::setup::Setup;
 use crate::error::Result;
-use crate::job::models::ModelUnderTest;
+use crate::job::models::{ModelUnderTest, asked_in};
 use crate::job::plan::{SourcePlan, TrialGroup};
 use crate::job::trial::{KeyFacts, Prompt, Trial};
 use crate::types::{Condition, Digest, Question, View};
@@ -81,9 +81,7 @@ fn group(
     shown: &[Shown],
 ) -> Result<Option<TrialGroup<ChoiceItem>>> {
     let view = condition.map_or(View::Blind, |_| View::Image);
-    let models = setup.models.iter().enumerate();
-    let models: Vec<(usize, &ModelUnderTest)> =
-        models.filter(|(_, model)| model.view == view).collect();
+    let models = asked_in(&setup.models, condition);
     if models.is_empty() {
         return Ok(None);
     }

@@ -8,7 +8,7 @@ use super::setup::Setup;
 use crate::ask::openeqa::{blind, vision};
 use crate::dataset::openeqa::OpenQuestion;
 use crate::error::Result;
-use crate::job::models::ModelUnderTest;
+use crate::job::models::asked_in;
 use crate::job::plan::{SourcePlan, TrialGroup};
 use crate::job::trial::{KeyFacts, Prompt, Trial};
 use crate::types::{Condition, Digest, View};
@@ -42,9 +42,7 @@ fn group(
     questions: &[&Arc<OpenQuestion>],
 ) -> Result<Option<TrialGroup<OpenItem>>> {
     let view = condition.map_or(View::Blind, |_| View::Image);
-    let models = setup.models.iter().enumerate();
-    let models: Vec<(usize, &ModelUnderTest)> =
-        models.filter(|(_, model)| model.view == view).collect();
+    let models = asked_in(&setup.models, condition);
     if models.is_empty() {
         return Ok(None);
     }

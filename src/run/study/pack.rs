@@ -8,7 +8,7 @@ use crate::files::write;
 use crate::job::Outcome;
 use crate::job::progress::Progress;
 use crate::job::rebuild::ImageRebuilder;
-use crate::job::stored::{AnyRun, StoredRun};
+use crate::job::stored::StoredRun;
 use crate::report::study::{Asked, Shot, page};
 use crate::types::manifest::Status;
 use crate::types::{Condition, Digest, FrameId, QuestionId, Record, RunQuestion};
@@ -23,16 +23,7 @@ pub fn pack(config: StudyPack, progress: &Progress) -> Result<Outcome> {
         records,
         questions: listed,
         ..
-    } = match AnyRun::open(&config.run)? {
-        AnyRun::Choice(run) => run,
-        AnyRun::Open(run) => {
-            let problem = "the run asked open questions: openeqa --study DIR makes their page";
-            return Err(Error::Run {
-                path: run.folder,
-                problem: problem.to_owned(),
-            });
-        }
-    };
+    } = StoredRun::of_choices(&config.run, "openeqa --study DIR makes their page")?;
     let wrong = |problem: String| {
         let path = config.run.clone();
         Error::Run { path, problem }

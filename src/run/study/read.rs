@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use crate::config::{Show, StudyRead};
 use crate::error::{Error, Result};
 use crate::job::report::choice;
-use crate::job::stored::{AnyRun, StoredRun};
+use crate::job::stored::StoredRun;
 
 use crate::job::{Outcome, count, now};
 use crate::store::{Moved, Store};
@@ -48,16 +48,10 @@ pub fn read(config: &StudyRead) -> Result<Outcome> {
         records,
         questions,
         ..
-    } = match AnyRun::open(&config.run)? {
-        AnyRun::Choice(run) => run,
-        AnyRun::Open(run) => {
-            let problem = "the run asked open questions: openeqa --answers NAME=FILE reads what people answered";
-            return Err(Error::Run {
-                path: run.folder,
-                problem: problem.to_owned(),
-            });
-        }
-    };
+    } = StoredRun::of_choices(
+        &config.run,
+        "openeqa --answers NAME=FILE reads what people answered",
+    )?;
     let asked = asked(records);
     let mut tally = Tally::default();
     let mut lines = Vec::new();
