@@ -21,6 +21,9 @@ pub enum Error {
         /// What was expected, and how to mend it.
         problem: String,
     },
+    /// Words that no command takes, as the parser of the command line says it.
+    #[error("{0}")]
+    CommandLine(String),
     /// A file or folder that could not be read or written.
     #[error("{}: cannot {action}: {source}", path.display())]
     File {

@@ -11,7 +11,7 @@
 //!
 //! ```text
 //!                  ┌──────► questions ─────────────┐            (words: what is asked)
-//!  cli → config → dataset                           ├─► ask → store → score → report
+//!               dataset                             ├─► ask → store → score → report
 //!                  └──────► synthesis ──► enhance ──┘            (light: what is seen)
 //!   types, error, files = the ground     job = the engine of everything asked     run = one folder or file a command
 //! ```
@@ -32,7 +32,8 @@
 //! - [`job`]: the engine. A `Job` carries out an `Experiment`: it plans, has the one image pipeline make images, asks, keeps, and
 //!   has the experiment score. Questions with choices and open ones differ in their `Experiment` alone.
 //! - [`run`]: the commands; `run/evaluate` and `run/openeqa` are the two experiments.
-//! - [`cli`] is what the user typed; [`config`] is what it means, checked once.
+//! - [`cli`]: the commands. A flag is a field of a structure in the room that uses it, in that room's own types; the environment and
+//!   a file of flags are turned into words, and all words are parsed once.
 //!
 //! # Where to add what
 //!
@@ -40,6 +41,7 @@
 //!
 //! | to add | files |
 //! |---|---|
+//! | a flag | the structure of its group, where it acts, the test of what it does |
 //! | a kind of degradation | `types/degradation.rs`, `synthesis/<kind>.rs`, `synthesis/mod.rs`, `synthesis/exposures.rs`, `tests/synthesize.rs`, `results/README.md` |
 //! | an API of endpoints | `ask/wire/<api>.rs`, `ask/wire/mod.rs`, `job/models.rs`, `tests/support/endpoint.rs`, `tests/ask.rs` |
 //! | an experiment | `run/<experiment>/`, its detail in `types/detail.rs` and `score/record.rs`, `job/stored.rs` |
@@ -71,19 +73,15 @@
 //! | `dataset` | `files`, `types`, `error` |
 //! | `store` | `files`, `types`, `error` |
 //! | `report` | `types`, `error`, `score`, `questions` |
-//! | `cli` | nothing |
-//! | `config` | `types`, `error`, `cli`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score` |
-//! | `job` | `files`, `types`, `error`, `config`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `report` |
-//! | `run` | `job`, `files`, `types`, `error`, `config`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `report` |
-//! | `main` | `cli`, `config`, `job`, `run`, `enhance`, `types` |
-//!
-//! `config` uses the stages for the settings that each of them defines, and for nothing else.
+//! | `job` | `files`, `types`, `error`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `report` |
+//! | `run` | `job`, `files`, `types`, `error`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `report` |
+//! | `cli` | `run`, `job`, `types`, `error` |
+//! | `main` | `cli`, `enhance` |
 
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 
 pub mod ask;
 pub mod cli;
-pub mod config;
 pub mod dataset;
 pub mod enhance;
 pub mod error;

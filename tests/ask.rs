@@ -3,6 +3,7 @@
 
 mod support;
 
+use std::num::NonZeroU32;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -112,7 +113,7 @@ async fn what_is_set_is_sent_and_what_is_not_is_left_out() {
         model: "m".into(),
         temperature: Temperature::Server,
         seed: Some(1234),
-        max_tokens: Some(16),
+        max_tokens: NonZeroU32::new(16).unwrap(),
         token_field: TokenField::MaxCompletionTokens,
         reasoning_effort: Some("low".into()),
         detail: Some(Detail::High),
@@ -128,7 +129,7 @@ async fn what_is_set_is_sent_and_what_is_not_is_left_out() {
     model.ask(message, 2).await.unwrap();
     let bare = Parameters {
         temperature: Temperature::Server,
-        max_tokens: None,
+        token_field: TokenField::Omit,
         ..Parameters::new("m".into())
     };
     let model = Remote::open(endpoint, Wire::Chat, bare).unwrap();

@@ -196,5 +196,10 @@ fn broken_files_are_named() {
         .chain(&["--file-size", "1", "--url", "v1"])
         .copied()
         .collect();
-    assert!(bench.call(&small).stderr.contains("--url: "));
+    assert!(
+        bench
+            .call(&small)
+            .stderr
+            .contains("for '--url <PATH>': a path expected")
+    );
 }

@@ -311,16 +311,17 @@ fn a_file_of_flags_has_lists_and_names_its_mistakes() {
 }
 
 #[test]
-fn a_variable_that_sets_nothing_is_named() {
+fn a_variable_that_sets_nothing_is_refused() {
     let bench = Bench::new();
     let run = called(bench.command(&SHORT).env("DARKQA_LEVEL", "L0"));
-    assert_eq!(run.code, Some(0), "{run:?}");
-    let lines: Vec<&str> = run.stderr.lines().collect();
-    assert_eq!(lines.len(), 1, "{lines:?}");
-    assert!(
-        lines[0].contains("DARKQA_LEVEL: ") && lines[0].contains("--level"),
-        "{lines:?}"
+    assert_eq!(run.code, Some(2), "{run:?}");
+    assert_eq!(
+        run.stderr,
+        "error: DARKQA_LEVEL: no flag of this name; did you mean DARKQA_LEVELS?\n"
     );
+    // A variable that another command knows is none of this one's business.
+    let run = called(bench.command(&SHORT).env("DARKQA_BALANCE", "none"));
+    assert_eq!(run.code, Some(0), "{run:?}");
 }
 
 #[test]

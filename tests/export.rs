@@ -185,7 +185,9 @@ fn nothing_is_written_over_unasked() {
     let assert = run(data.path(), "parquet", out.path(), &flags).code(2);
     let said = String::from_utf8(assert.get_output().stderr.clone()).unwrap();
     assert!(
-        said.contains("KIND: \"parquet\" is none of vlmevalkit, imagefolder, llava"),
+        said.contains(
+            "invalid value 'parquet' for '<KIND>' [possible values: vlmevalkit, imagefolder, llava"
+        ),
         "{said}"
     );
 }

@@ -500,7 +500,7 @@ fn broken_folders_are_named() {
     assert!(
         scene
             .refused("lego", &[])
-            .contains("KIND: \"lego\" is none of habitat, scannet")
+            .contains("invalid value 'lego' for '<KIND>' [possible values: habitat, scannet")
     );
     assert!(
         scene

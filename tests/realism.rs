@@ -145,7 +145,7 @@ fn a_broken_pair_does_not_stop_the_others() {
         (&["realism", "pairs", "--ev", "99"], "--ev"),
         (
             &["realism", "pairs", "--kl-bins", "two"],
-            "--kl-bins: \"two\" is none of fu, kousha",
+            "'--kl-bins <KL_BINS>' [possible values: fu, kousha]",
         ),
         (&["realism"], "PAIRS"),
     ] {

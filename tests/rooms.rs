@@ -316,7 +316,7 @@ fn settings_that_make_no_sense_are_named() {
         let refused = bench.call(&["--model", "random", "--data", data]);
         assert_eq!(refused.code, Some(2), "{refused:?}");
         assert!(
-            refused.stderr.starts_with("error: --data: ") && refused.stderr.contains(says),
+            refused.stderr.contains("--data") && refused.stderr.contains(says),
             "{refused:?}"
         );
     }
@@ -336,5 +336,8 @@ fn settings_that_make_no_sense_are_named() {
         "{refused:?}"
     );
     let refused = bench.call(&["rooms", "--out", "x", "--size", "big"]);
-    assert!(refused.stderr.starts_with("error: --size: "), "{refused:?}");
+    assert!(
+        refused.stderr.contains("--size") && refused.stderr.contains("WIDTHxHEIGHT of 32"),
+        "{refused:?}"
+    );
 }

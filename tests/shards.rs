@@ -139,7 +139,7 @@ fn missing_double_and_foreign_parts_are_named() {
     };
     refused(
         &["parts", "--out", "m"],
-        "1 shards are missing: 2/3; --partial",
+        "1 shard is missing: 2/3; --partial",
     );
     assert!(!bench.path("m").exists());
     let partial = bench.call(&["merge", "parts", "--out", "m", "--partial"]);
@@ -243,7 +243,7 @@ fn the_job_of_kubernetes_says_flags_that_there_are() {
     assert!(flags.len() > 4);
     let words = std::iter::once("darkqa-eval".to_owned()).chain(flags);
     let said = Cli::try_parse_from(words).unwrap().evaluate;
-    let shard = said.scale.shard.unwrap();
+    let shard = said.job.scale.shard.unwrap();
     let parts = shard.strip_prefix("auto/").unwrap();
     for field in ["completions", "parallelism"] {
         assert!(text.contains(&format!("\n  {field}: {parts}\n")), "{field}");

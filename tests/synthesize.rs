@@ -199,7 +199,7 @@ fn what_makes_no_sense_is_one_line() {
         (&["frames/a.png", "--camera", "my.toml"], "my.toml"),
         (
             &["frames/a.png", "--sheet", "all"],
-            "--sheet: \"all\" is none of levels, noise",
+            "'--sheet <SHEET>' [possible values: levels, noise]",
         ),
         (&["frames/a.png", "--from", "my.toml"], "my.toml"),
         (

@@ -1,11 +1,14 @@
 //! The header that carries a key: [`KeyHeader`].
 
-use crate::types::words::words;
+use clap::ValueEnum;
+
+use crate::types::flag::flag_words;
 
 /// The header that carries a key.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum KeyHeader {
     /// `api-key` at Azure, `Authorization` elsewhere.
+    #[default]
     Auto,
     /// `Authorization: Bearer …`; at Azure for tokens of Microsoft Entra.
     Bearer,
@@ -13,21 +16,4 @@ pub enum KeyHeader {
     ApiKey,
 }
 
-words!(KeyHeader by "--key-header" {
-    Auto = "auto",
-    Bearer = "bearer",
-    ApiKey = "api-key",
-});
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_read_back() {
-        for name in ["auto", "bearer", "api-key"] {
-            assert_eq!(name.parse::<KeyHeader>().unwrap().to_string(), name);
-        }
-        assert!("basic".parse::<KeyHeader>().is_err());
-    }
-}
+flag_words!(KeyHeader);

@@ -98,7 +98,7 @@ impl Model {
     /// The maximum number of tokens of a reply, if it has one.
     #[must_use]
     pub fn max_tokens(&self) -> Option<u32> {
-        self.remote()?.parameters().max_tokens
+        Some(self.remote()?.parameters().max_tokens.get())
     }
 
     /// One line of a Batch API's input file, with a line end; `None` if the model cannot be asked in a batch. `url` is the path

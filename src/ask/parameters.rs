@@ -1,36 +1,57 @@
 //! How a model is to speak: [`Parameters`].
 
 use std::fmt;
+use std::num::NonZeroU32;
 use std::str::FromStr;
 
+use clap::{Args, ValueEnum};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::error::{Error, Result};
-use crate::types::words::words;
+use crate::types::flag::flag_words;
+use crate::types::words::written_as_text;
 
 /// What a model is called and how it is to speak; what is `None` is left out of the request.
-#[derive(Debug, Clone, PartialEq)]
+///
+/// As it is written in JSON it holds all that can change a reply, and decides the key of each trial: a field that is not said is not
+/// written, so that a new one changes no key of before.
+#[derive(Debug, Clone, PartialEq, Args, Serialize)]
+#[command(next_help_heading = "Model")]
 pub struct Parameters {
     /// The model, by the endpoint's name.
+    #[arg(skip)]
     pub model: String,
-    /// The sampling temperature.
+    /// Sampling temperature; default for the server's own; auto for 0, or the server's own where the model refuses any other
+    #[arg(long, value_name = "T|auto|default", default_value_t = Temperature::Auto)]
     pub temperature: Temperature,
-    /// What the server's sampling starts from, where it takes that: with a temperature above 0 replies are then more alike.
-    pub seed: Option<u64>,
-    /// The most tokens a reply may have. Reasoning models spend it on hidden reasoning first.
-    pub max_tokens: Option<u32>,
-    /// The field in which that limit is sent.
+    /// The most tokens of a reply, hidden reasoning included
+    ///
+    /// A letter needs 16; a reasoning model burns hundreds before it.
+    #[arg(long, value_name = "N", default_value_t = Self::MAX_TOKENS)]
+    pub max_tokens: NonZeroU32,
+    /// The field that carries that limit; auto is max_completion_tokens at OpenAI itself, max_tokens elsewhere, and the other one
+    /// where the server asks for it
+    #[arg(long, value_name = "FIELD", value_enum, default_value_t = TokenField::Auto)]
+    #[serde(skip)]
     pub token_field: TokenField,
-    /// How hard a reasoning model is to think, in the endpoint's words.
+    /// How long a reasoning model thinks, in the server's words (none, minimal, low, medium, high …); default: not sent
+    #[arg(long, value_name = "EFFORT")]
     pub reasoning_effort: Option<String>,
-    /// In what resolution the image is to be looked at.
+    /// How closely the server looks at images; default: not sent
+    #[arg(long, value_name = "DETAIL", value_enum)]
     pub detail: Option<Detail>,
+    /// What the server's sampling starts from, where it takes that: with a temperature above 0 replies are then more alike.
+    #[arg(skip)]
+    pub seed: Option<u64>,
     /// What the server lets the model say.
+    #[arg(skip)]
     pub constrain: Constrain,
 }
 
 impl Parameters {
+    /// The token limit where none is set.
+    pub const MAX_TOKENS: NonZeroU32 = NonZeroU32::new(1024).unwrap();
+
     /// The smallest request every server takes: the model at temperature 0 with room for a reasoned reply.
     #[must_use]
     pub fn new(model: String) -> Self {
@@ -38,7 +59,7 @@ impl Parameters {
             model,
             temperature: Temperature::Auto,
             seed: None,
-            max_tokens: Some(Self::MAX_TOKENS),
+            max_tokens: Self::MAX_TOKENS,
             token_field: TokenField::Auto,
             reasoning_effort: None,
             detail: None,
@@ -46,23 +67,16 @@ impl Parameters {
         }
     }
 
-    /// The token limit where none is set: a letter needs 16, a reasoning model burns hundreds before it.
-    pub const MAX_TOKENS: u32 = 1024;
+    /// The token limit that is sent; `None` for none.
+    pub(super) fn limit(&self) -> Option<u32> {
+        (self.token_field != TokenField::Omit).then_some(self.max_tokens.get())
+    }
 
     /// All that can change a reply. The name of the token limit's field does not; whether a limit is sent does.
     pub(super) fn content(&self) -> Value {
-        let limit = self
-            .max_tokens
-            .filter(|_| self.token_field != TokenField::Omit);
-        json!({
-            "model": self.model,
-            "temperature": self.temperature.to_string(),
-            "seed": self.seed,
-            "max_tokens": limit,
-            "reasoning_effort": self.reasoning_effort,
-            "detail": self.detail,
-            "constrain": self.constrain.to_string(),
-        })
+        let mut content = json!(self);
+        content["max_tokens"] = self.limit().into();
+        content
     }
 }
 
@@ -89,31 +103,30 @@ impl fmt::Display for Temperature {
 }
 
 impl FromStr for Temperature {
-    type Err = Error;
+    type Err = String;
 
-    fn from_str(text: &str) -> Result<Self> {
+    fn from_str(text: &str) -> Result<Self, String> {
         match (text, text.parse::<f64>()) {
             ("auto", _) => Ok(Self::Auto),
             ("default", _) => Ok(Self::Server),
             (_, Ok(value)) if value.is_finite() && value >= 0.0 => Ok(Self::Of(value)),
-            _ => Err(Error::usage(
-                "--temperature",
-                format_args!("{text:?} is neither a number from 0 on nor auto or default"),
-            )),
+            _ => Err("a number from 0 on, auto or default expected".to_owned()),
         }
     }
 }
 
 /// The field in which a token limit is sent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[value(rename_all = "snake_case")]
 pub enum TokenField {
-    /// `max_completion_tokens` at OpenAI itself, `max_tokens` elsewhere; the other one where the server asks for it.
+    /// max_completion_tokens at OpenAI itself, max_tokens elsewhere; the other one where the server asks for it
     Auto,
-    /// `max_tokens`: what every other server understands.
+    /// What every other server understands
     MaxTokens,
-    /// `max_completion_tokens`: what reasoning models of OpenAI demand.
+    /// What reasoning models of OpenAI demand
     MaxCompletionTokens,
-    /// None: no limit is sent.
+    /// No limit is sent
+    #[value(name = "none")]
     Omit,
 }
 
@@ -129,37 +142,33 @@ impl TokenField {
 }
 
 /// In what resolution a server is to look at an image.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Detail {
-    /// As the server thinks best.
+    /// As the server thinks best
     Auto,
-    /// Small: what little can be seen in the dark is lost.
+    /// Small: what little can be seen in the dark is lost
     Low,
-    /// Large.
+    /// Large
     High,
 }
 
 /// What a server lets a model say. Anything but `None` measures something else: what the model would say if it had to
 /// name a letter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
 pub enum Constrain {
-    /// Whatever it likes.
+    /// Whatever it likes
+    #[default]
     None,
-    /// A JSON object with the letter of a choice, by `response_format` (OpenAI, vLLM, SGLang, llama.cpp, Ollama, Gemini).
+    /// A JSON object with the letter of a choice, by response_format (OpenAI, vLLM, SGLang, llama.cpp, Ollama, Gemini)
     Json,
-    /// The letter of a choice alone, by `structured_outputs` (vLLM from 0.12).
+    /// The letter of a choice alone, by structured_outputs (vLLM from 0.12)
     Choice,
 }
 
-words!(TokenField by "--token-field" {
-    Auto = "auto",
-    MaxTokens = "max_tokens",
-    MaxCompletionTokens = "max_completion_tokens",
-    Omit = "none",
-});
-words!(Detail by "--detail" { Auto = "auto", Low = "low", High = "high" });
-words!(Constrain by "--constrain" { None = "none", Json = "json", Choice = "choice" });
+written_as_text!(Temperature);
+flag_words!(TokenField, Detail, Constrain);
 
 #[cfg(test)]
 mod tests {
@@ -168,13 +177,8 @@ mod tests {
     #[test]
     fn names_read_back() {
         for name in ["auto", "max_tokens", "max_completion_tokens", "none"] {
-            assert_eq!(name.parse::<TokenField>().unwrap().to_string(), name);
-        }
-        for name in ["auto", "low", "high"] {
-            assert_eq!(name.parse::<Detail>().unwrap().to_string(), name);
-        }
-        for name in ["none", "json", "choice"] {
-            assert_eq!(name.parse::<Constrain>().unwrap().to_string(), name);
+            let field = TokenField::from_str(name, false).unwrap();
+            assert_eq!(field.to_string(), name);
         }
         for text in ["auto", "default", "0.5"] {
             assert_eq!(text.parse::<Temperature>().unwrap().to_string(), text);
@@ -182,9 +186,6 @@ mod tests {
         for wrong in ["-1", "NaN", "inf", "", "hot"] {
             assert!(wrong.parse::<Temperature>().is_err(), "{wrong}");
         }
-        let wrong = "max".parse::<TokenField>().unwrap_err().to_string();
-        assert!(wrong.ends_with("none of auto, max_tokens, max_completion_tokens, none"));
-        assert!("ultra".parse::<Detail>().is_err());
     }
 
     #[test]

@@ -8,6 +8,7 @@ use std::str::FromStr;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use bytes::Bytes;
+use clap::Args;
 use image::codecs::png::{CompressionType, FilterType as RowFilter, PngEncoder};
 use image::{ExtendedColorType, ImageBuffer, ImageEncoder as _, imageops};
 
@@ -27,6 +28,15 @@ pub enum Format {
 /// The quality of a JPEG, 1 to 100.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Quality(u8);
+
+/// How images are sent.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Sending")]
+pub struct ImageArgs {
+    /// How images are sent: png (lossless) or jpeg:QUALITY
+    #[arg(long, value_name = "FORMAT", default_value_t = Format::Png)]
+    pub image: Format,
+}
 
 impl Quality {
     /// Checks a quality; `None` outside 1 to 100.
@@ -55,9 +65,9 @@ impl fmt::Display for Format {
 }
 
 impl FromStr for Format {
-    type Err = Error;
+    type Err = String;
 
-    fn from_str(text: &str) -> Result<Self> {
+    fn from_str(text: &str) -> Result<Self, String> {
         if text == "png" {
             return Ok(Self::Png);
         }
@@ -65,10 +75,7 @@ impl FromStr for Format {
             .and_then(|quality| Quality::new(quality.parse().ok()?))
             .map(Self::Jpeg)
             .ok_or_else(|| {
-                Error::usage(
-                    "--image",
-                    format_args!("{text:?} is neither png nor jpeg:QUALITY with a quality from 1 to 100, as in jpeg:95"),
-                )
+                "png, or jpeg:QUALITY with a quality from 1 to 100, as jpeg:95, expected".to_owned()
             })
     }
 }

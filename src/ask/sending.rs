@@ -2,35 +2,53 @@
 
 use std::time::Duration;
 
+use clap::Args;
+
 use super::pace::{Bounds, Quota};
+use crate::types::flag::{positive, seconds};
 
 /// How requests are sent and sent again.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Args)]
+#[command(next_help_heading = "Sending")]
 pub struct Sending {
-    /// The time one try may take, from connecting to the last byte of the reply.
+    /// Requests in flight at once: N, fewer where the server is overloaded; MIN-MAX, from MIN up as far as replies come no
+    /// slower; or auto, from 8 up to 32, down to 1
+    #[arg(long, value_name = "N|MIN-MAX|auto", default_value = "auto")]
+    pub concurrency: Bounds,
+    /// What may be sent in a minute.
+    #[command(flatten)]
+    pub quota: Quota,
+    /// Seconds until a try is given up, reply included
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "120")]
     pub timeout: Duration,
-    /// How many times a request is sent again after it failed.
+    /// Further tries after a failure that may pass
+    #[arg(long, value_name = "N", default_value_t = 5)]
     pub retries: u32,
     /// The wait before the first retry where the server asks for none; each further one doubles, and each is drawn out at
     /// random by up to its length.
+    #[arg(skip = FIRST_DELAY)]
     pub first_delay: Duration,
-    /// The longest wait that a server may ask for; beyond it the request is given up at once.
+    /// The longest wait, in seconds, that a server may ask for; beyond it the request is given up
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "120")]
     pub max_wait: Duration,
-    /// How many requests are on the wire at once.
-    pub concurrency: Bounds,
-    /// What may be sent in a minute.
-    pub quota: Quota,
+    /// The largest image file that is sent, in MB; default: what is known of the endpoint, else 20
+    #[arg(long, value_name = "MB", value_parser = positive)]
+    pub max_image: Option<f64>,
 }
+
+/// The wait before the first retry; chosen.
+const FIRST_DELAY: Duration = Duration::from_millis(500);
 
 impl Default for Sending {
     fn default() -> Self {
         Self {
-            timeout: Duration::from_mins(2),
-            retries: 5,
-            first_delay: Duration::from_millis(500),
-            max_wait: Duration::from_mins(2),
             concurrency: Bounds::DEFAULT,
             quota: Quota::default(),
+            timeout: Duration::from_mins(2),
+            retries: 5,
+            first_delay: FIRST_DELAY,
+            max_wait: Duration::from_mins(2),
+            max_image: None,
         }
     }
 }

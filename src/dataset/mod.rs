@@ -20,6 +20,7 @@ pub mod questions;
 mod raw_png;
 mod reading;
 pub mod rooms;
+mod settings;
 pub mod spaces;
 mod table;
 mod view;
@@ -36,6 +37,7 @@ use maps::Maps;
 use picture::MOST_PIXELS;
 pub use picture::Picture;
 pub use rooms::Rooms;
+pub use settings::{DataArgs, PixelLimit, SelectionArgs, place};
 pub use view::FrameFiles;
 use view::View;
 

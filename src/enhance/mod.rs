@@ -29,6 +29,7 @@ mod reading;
 pub mod runtime;
 mod search;
 mod session;
+mod settings;
 mod sidecar;
 mod signature;
 mod tiles;
@@ -38,6 +39,7 @@ pub use enhancer::Enhancer;
 pub use file::ModelFile;
 pub use runtime::{Install, Runtime, RuntimeSearch, forbid_telemetry};
 pub use session::Stopper;
+pub use settings::{EnhancerArgs, RuntimeArgs, SizeArgs};
 pub use tiles::Tiling;
 
 /// The version of the way to and from a model: raised whenever a pixel changes, so that no result of an older one is taken

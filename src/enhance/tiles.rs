@@ -6,6 +6,7 @@
 
 use std::fmt;
 use std::num::NonZeroUsize;
+use std::str::FromStr;
 
 use crate::types::Rgb;
 
@@ -49,6 +50,21 @@ impl fmt::Display for Tiling {
             Self::Auto => f.write_str("auto"),
             Self::Of(side) => side.fmt(f),
             Self::Whole => f.write_str("whole"),
+        }
+    }
+}
+
+impl FromStr for Tiling {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            "whole" => Ok(Self::Whole),
+            side => {
+                let side = side.parse().map(Self::Of);
+                side.map_err(|_| "a side in pixels, whole or auto expected".to_owned())
+            }
         }
     }
 }

@@ -1,9 +1,9 @@
 //! What a run costs: [`Budget`].
 
 use super::models::ModelUnderTest;
+use super::money::Money;
 use super::trial::{Item, Prompt, Trial};
 use crate::ask::Price;
-use crate::config::Money;
 use crate::error::{Error, Result};
 use crate::types::{ImageFacts, Record, Usage, Via};
 

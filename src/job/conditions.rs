@@ -1,6 +1,6 @@
 //! In which conditions frames are shown: [`conditions`].
 
-use crate::config::Light;
+use crate::synthesis::Light;
 use crate::types::{Condition, Degradation, Digest, EnhancerName, KindSet};
 
 /// Every condition in which a frame is shown: raw first, each enhancer after, level by level, so that a frame is developed once for

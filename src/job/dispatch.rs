@@ -13,11 +13,11 @@ use super::circuit_breaker::{CircuitBreaker, EndReason};
 use super::interrupt::Interrupt;
 use super::models::ModelUnderTest;
 use super::progress::{Bar, Progress};
+use super::settings::JobSettings;
 use super::timings::{Step, Timings};
 use super::trial::{Item, PreparedGroup, Stimulus, Trial};
 use super::workers::unstarted;
 use crate::ask::{AskError, Call, Reach};
-use crate::config::Pace;
 use crate::enhance::Stopper;
 use crate::error::Result;
 use crate::store::Store;
@@ -30,7 +30,7 @@ const GROUPS_AHEAD: usize = 2;
 pub(crate) struct Dispatcher<'a> {
     pub(crate) models: &'a [ModelUnderTest],
     pub(crate) progress: &'a Progress,
-    pub(crate) pace: &'a Pace,
+    pub(crate) settings: &'a JobSettings,
     pub(crate) timings: &'a Timings,
 }
 
@@ -88,14 +88,14 @@ impl Dispatcher<'_> {
     fn width(&self) -> usize {
         let widths = self.models.iter().filter_map(|model| model.model.width());
         // Models of one endpoint share its window.
-        widths.max().unwrap_or(self.pace.concurrency.most())
+        widths.max().unwrap_or(self.settings.concurrency.most())
     }
 
     fn breaker(&self) -> CircuitBreaker {
         CircuitBreaker::new(
             self.models,
-            self.pace.concurrency.most(),
-            self.pace.max_failures,
+            self.settings.concurrency.most(),
+            self.settings.money.max_failures,
         )
     }
 }

@@ -3,18 +3,17 @@
 use std::collections::HashSet;
 use std::path::PathBuf;
 
-use super::batch;
+use super::batch::{self, BatchFiles};
 use super::enhancers::OpenEnhancers;
 use super::estimate;
 use super::experiment::{DetailOf, Experiment, RecordOf};
 use super::folder;
 use super::manifest;
 use super::open_run::{OpenRun, answered, pipeline};
-use super::outcome::Outcome;
+use super::outcome::{Outcome, Show};
 use super::plan::Plan;
 use super::progress::Progress;
 use super::timings::Timings;
-use crate::config::{BatchFiles, Mode, Show};
 use crate::enhance::ModelFile;
 use crate::error::Result;
 use crate::report::forecast::{json, render};
@@ -52,9 +51,10 @@ impl<'a, E: Experiment> Job<'a, E> {
     /// # Errors
     /// If nothing can be asked, or no further trial could succeed; what had arrived by then is kept.
     pub(crate) fn run(self) -> Result<Outcome> {
-        match self.experiment.settings().mode {
-            Mode::DryRun => self.estimate(),
-            Mode::Run => self.open()?.ask(),
+        if self.experiment.settings().money.dry_run {
+            self.estimate()
+        } else {
+            self.open()?.ask()
         }
     }
 
@@ -79,12 +79,12 @@ impl<'a, E: Experiment> Job<'a, E> {
             plans.push(plan);
         }
         let timings = Timings::default();
-        let enhancers = OpenEnhancers::load(self.files, &settings.enhancement)?;
+        let enhancers = OpenEnhancers::load(self.files, &settings.loading)?;
         let mut pipeline = pipeline(experiment, enhancers.enhancers, None, &timings);
         let forecast = estimate::estimate(experiment, &plans, &stored, &mut pipeline)?;
         Ok(Outcome {
             status: Status::Complete,
-            output: match settings.output.show {
+            output: match settings.show {
                 Show::Json => json(&forecast)?,
                 Show::Table => render(&forecast),
             },
@@ -106,12 +106,12 @@ impl<'a, E: Experiment> Job<'a, E> {
             .is_some_and(|kept| kept.status == Status::Complete);
         // Opened before the folder is made, so that an enhancer that does not work leaves nothing behind.
         let enhancers = if complete {
-            OpenEnhancers::later(files, &settings.enhancement)
+            OpenEnhancers::later(files, &settings.loading)
         } else {
-            OpenEnhancers::load(files, &settings.enhancement)?
+            OpenEnhancers::load(files, &settings.loading)?
         };
         let manifest = manifest::of(experiment, kept);
-        let mut store = Store::open(&folder, &manifest, folder::moved(&settings.output))?;
+        let mut store = Store::open(&folder, &manifest, folder::moved(&settings.place))?;
         store.add_questions(experiment.questions())?;
         let there: HashSet<TrialKey> = if experiment.given().is_empty() {
             HashSet::new()

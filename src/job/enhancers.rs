@@ -1,12 +1,28 @@
 //! The enhancement models of a command: [`OpenEnhancers`], loaded when they are needed.
 
-use crate::config::Enhancement;
-use crate::enhance::{Enhancer, ModelFile};
+use clap::Args;
+
+use super::workers::ThreadArgs;
+use crate::enhance::{Enhancer, ModelFile, RuntimeArgs, SizeArgs};
 use crate::error::Result;
+
+/// How enhancement models are run.
+#[derive(Debug, Clone, Default, Args)]
+pub struct Loading {
+    /// In which size.
+    #[command(flatten)]
+    pub size: SizeArgs,
+    /// By which ONNX Runtime.
+    #[command(flatten)]
+    pub runtime: RuntimeArgs,
+    /// On how many threads.
+    #[command(flatten)]
+    pub threads: ThreadArgs,
+}
 
 /// Enhancement models, and ONNX Runtime if there are any.
 pub(crate) struct OpenEnhancers<'a> {
-    settings: Option<&'a Enhancement>,
+    settings: Option<&'a Loading>,
     files: Vec<ModelFile>,
     pub(crate) enhancers: Vec<Enhancer>,
     version: Option<String>,
@@ -14,7 +30,7 @@ pub(crate) struct OpenEnhancers<'a> {
 
 impl<'a> OpenEnhancers<'a> {
     /// The models in these files, loaded when they are taken.
-    pub(crate) fn later(files: Vec<ModelFile>, settings: &'a Enhancement) -> Self {
+    pub(crate) fn later(files: Vec<ModelFile>, settings: &'a Loading) -> Self {
         Self {
             settings: Some(settings),
             files,
@@ -27,7 +43,7 @@ impl<'a> OpenEnhancers<'a> {
     ///
     /// # Errors
     /// If ONNX Runtime is not there, or a file is no model that it runs.
-    pub(crate) fn load(files: Vec<ModelFile>, settings: &'a Enhancement) -> Result<Self> {
+    pub(crate) fn load(files: Vec<ModelFile>, settings: &'a Loading) -> Result<Self> {
         let mut opened = Self {
             settings: None,
             files: Vec::new(),
@@ -37,11 +53,11 @@ impl<'a> OpenEnhancers<'a> {
         if files.is_empty() {
             return Ok(opened);
         }
-        let runtime = settings.runtime.open()?;
+        let runtime = settings.runtime.search().open()?;
         for file in files {
-            let enhancer = Enhancer::open(file, &runtime, settings.threads)?
-                .with_tiling(settings.tiling)
-                .with_most_side(settings.most_side);
+            let enhancer = Enhancer::open(file, &runtime, settings.threads.threads)?
+                .with_tiling(settings.size.tile)
+                .with_most_side(settings.size.llie_max_side);
             opened.enhancers.push(enhancer);
         }
         opened.version = Some(runtime.version().to_owned());

@@ -12,7 +12,7 @@ use super::open_run::limit;
 use super::plan::Plan;
 use super::trial::Item as _;
 use crate::ask::Price;
-use crate::config::Server;
+use crate::ask::Server;
 use crate::error::Result;
 use crate::report::forecast::{Forecast, Line};
 use crate::types::{Condition, ImageFacts, View};
@@ -87,7 +87,7 @@ pub(crate) fn estimate<E: Experiment>(
     let latencies = stored.iter().filter_map(|record| record.latency_ms);
     let (asking_seconds, pace) = waiting(experiment.server(), latencies, requests as f64, tokens);
     let largest = sample.images.iter().max_by_key(|image| image.bytes);
-    let limit = limit(&settings.ask, &settings.images);
+    let limit = limit(settings);
     let planned: usize = plans.iter().map(|plan| plan.keys.len()).sum();
     let left: usize = plans.iter().map(Plan::left).sum();
     Ok(Forecast {

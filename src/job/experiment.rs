@@ -4,13 +4,14 @@ use serde_json::Value;
 
 use super::identity::{Columns, Identity};
 use super::models::ModelUnderTest;
-use super::outcome::Outcome;
+use super::outcome::{Outcome, Show};
 use super::plan::SourcePlan;
 use super::recipe::Recipe;
+use super::settings::JobSettings;
 use super::source::{Frames, Source};
 use super::stored::StoredRun;
 use super::trial::Item;
-use crate::config::{JobSettings, Server, Show};
+use crate::ask::Server;
 use crate::error::Result;
 use crate::store::Store;
 use crate::types::{Record, RunQuestion};

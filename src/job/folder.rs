@@ -6,9 +6,10 @@ use jiff::Timestamp;
 use serde_json::json;
 
 use super::experiment::{DetailOf, Experiment};
+use super::models::{Ask, ModelName};
 use super::observer;
 use super::plan::Plan;
-use crate::config::{Ask, ModelName, Output, RunPlace};
+use super::settings::RunPlace;
 use crate::error::{Error, Result};
 use crate::store::{self, Moved};
 use crate::types::{Detail as _, Digest};
@@ -19,7 +20,7 @@ const RESULTS: &str = "results";
 /// The folder of a run: the one named, else the newest of the same identity and plan, else a new one.
 pub(crate) fn find<E: Experiment>(experiment: &E) -> Result<PathBuf> {
     let settings = experiment.settings();
-    match settings.output.place.of(settings.shard) {
+    match settings.place.of(settings.shard) {
         RunPlace::Named(path) => Ok(path),
         RunPlace::Resume(path) => match store::read_manifest(&path, DetailOf::<E>::SCHEMA)? {
             Some(_) => Ok(path),
@@ -72,8 +73,8 @@ fn label(ask: &Ask) -> String {
 }
 
 /// Whether the run may lie at another address than before: only if it is named as the one to go on with.
-pub(crate) fn moved(output: &Output) -> Moved {
-    match output.place {
+pub(crate) fn moved(place: &RunPlace) -> Moved {
+    match place {
         RunPlace::Resume(_) => Moved::Allowed,
         RunPlace::Named(_) | RunPlace::Automatic => Moved::Refused,
     }

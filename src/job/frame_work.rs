@@ -4,11 +4,12 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::bilinear::bilinear;
-use super::recipe::{Recipe, Scaling};
+use super::recipe::Recipe;
+use super::scaling::Scaling;
 use super::source::{Frames, Source, SourceFrame};
 use super::timings::{Step, Timings};
+use super::walk::Darkened;
 use crate::ask::{Format, ImageLimit, Payload};
-use crate::config::Darkened;
 use crate::dataset::Picture;
 use crate::error::{Error, Result};
 use crate::synthesis::{Exposures, NoiseKey};

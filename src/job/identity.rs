@@ -6,9 +6,10 @@ use std::path::PathBuf;
 use serde_json::{Value, json};
 
 use super::models::ModelUnderTest;
-use super::recipe::{Recipe, Scaling};
-use crate::config::{Enhancement, JobSettings};
-use crate::enhance::{self, ModelFile, Tiling};
+use super::recipe::Recipe;
+use super::scaling::Scaling;
+use super::settings::JobSettings;
+use crate::enhance::{self, ModelFile, SizeArgs, Tiling};
 use crate::error::{Error, Result};
 use crate::synthesis::{Synthesis, version};
 use crate::types::degradation::Kind;
@@ -64,7 +65,7 @@ pub(crate) fn columns<'a>(
     let models = models.map(|one| (one.model.name().to_owned(), model(one)));
     let enhancers = recipe.enhancers.iter();
     let enhancers = enhancers.map(|(name, digest)| {
-        let content = enhancer(digest, &settings.enhancement);
+        let content = enhancer(digest, &settings.loading.size);
         (name.as_str().to_owned(), content)
     });
     let degradations = settings.light.degradations();
@@ -108,12 +109,12 @@ fn flag(parameter: &str) -> String {
 
 /// What decides the pixels that an enhancer makes. Tiles of its own choice give what the whole image does, or all but one sample in
 /// a thousand of it.
-fn enhancer(digest: &Digest, settings: &Enhancement) -> Value {
-    let tile = (settings.tiling != Tiling::Auto).then(|| settings.tiling.to_string());
+fn enhancer(digest: &Digest, size: &SizeArgs) -> Value {
+    let tile = (size.tile != Tiling::Auto).then(|| size.tile.to_string());
     json!({
         "--llie": digest,
         "--tile": tile,
-        "--llie-max-side": settings.most_side,
+        "--llie-max-side": size.llie_max_side,
     })
 }
 
@@ -131,9 +132,9 @@ fn reading(synthesis: &Synthesis) -> Value {
 /// What does not decide a reply, but may explain how a run went.
 pub(crate) fn settings(job: &JobSettings) -> BTreeMap<String, Value> {
     let mut settings = vec![
-        ("--concurrency", json!(job.pace.concurrency.to_string())),
-        ("--max-failures", json!(job.pace.max_failures)),
-        ("--threads", json!(job.enhancement.threads)),
+        ("--concurrency", json!(job.concurrency.to_string())),
+        ("--max-failures", json!(job.money.max_failures)),
+        ("--threads", json!(job.loading.threads.threads)),
     ];
     if let Some(server) = &job.ask.server {
         let sending = server.sending;

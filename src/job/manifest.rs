@@ -7,7 +7,7 @@ use serde_json::Value;
 use super::experiment::{DetailOf, Experiment};
 use super::folder::now;
 use super::identity;
-use crate::config::Recipe;
+use super::picture_words::PictureWords;
 use crate::types::manifest::{Counts, RunManifest, Status};
 use crate::types::{Detail as _, Record};
 
@@ -36,7 +36,7 @@ pub(crate) fn of<E: Experiment>(experiment: &E, kept: Option<RunManifest>) -> Ru
         columns,
         shard: job.shard.is_part().then(|| job.shard.to_string()),
         settings,
-        images: job.recipe.clone(),
+        images: job.pictures.clone(),
         counts: Counts::default(),
     };
     let Some(mut kept) = kept else {
@@ -70,7 +70,7 @@ pub(crate) fn go_on<E: Experiment>(experiment: &E, manifest: &mut RunManifest) {
 }
 
 /// The flags that decide the images: those said now, and of lists also what was said before.
-fn together(kept: &Recipe, now: Recipe) -> Recipe {
+fn together(kept: &PictureWords, now: PictureWords) -> PictureWords {
     let mut all = kept.clone();
     for (flag, value) in now {
         let value = match (all.remove(&flag), value) {

@@ -4,15 +4,34 @@ use std::collections::{BTreeSet, HashMap};
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use clap::Args;
+
 use super::report::{choice, open};
+use super::shard::Shard;
 use super::stored::{Asked, StoredRun, in_order};
 use super::thumbnail::Wanted;
-use super::{Outcome, count};
-use crate::config::{Merge, Missing, Shard, Show};
+use super::{Outcome, Show, count};
 use crate::error::{Error, Result};
 use crate::store::{self, Moved, Store};
 use crate::types::manifest::{RunManifest, Status, differences};
 use crate::types::{ChoiceDetail, Detail, OpenDetail, Record, RunQuestion, Thumbnail, TrialKey};
+
+/// The flags of `merge`.
+#[derive(Debug, Args)]
+pub struct MergeArgs {
+    /// The folders of the shards, or a folder that holds them
+    #[arg(value_name = "RUN", required = true)]
+    pub runs: Vec<PathBuf>,
+    /// The folder of the whole run
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Merge what there is where shards are missing, to look at it
+    #[arg(long)]
+    pub partial: bool,
+    /// Print the summary as JSON instead of a table
+    #[arg(long)]
+    pub json: bool,
+}
 
 /// A shard as it lies in its folder.
 struct Part<D> {
@@ -39,8 +58,8 @@ impl<D: Detail> Part<D> {
 ///
 /// # Errors
 /// If a folder holds no shard, two hold one, one is of another run, or some are missing and that is refused.
-pub fn merge(config: &Merge) -> Result<Outcome> {
-    let folders = folders(&config.runs)?;
+pub fn merge(args: &MergeArgs) -> Result<Outcome> {
+    let folders = folders(&args.runs)?;
     let kinds: Result<Vec<Asked>> = folders.iter().map(|folder| Asked::of(folder)).collect();
     let kinds = kinds?;
     if let Some(other) = kinds.iter().position(|kind| *kind != kinds[0]) {
@@ -52,13 +71,13 @@ pub fn merge(config: &Merge) -> Result<Outcome> {
         return Err(Error::Run { path, problem });
     }
     match kinds.first() {
-        Some(Asked::Open) => merge_all::<OpenDetail>(config, &folders, open::write),
-        _ => merge_all::<ChoiceDetail>(config, &folders, choice::write),
+        Some(Asked::Open) => merge_all::<OpenDetail>(args, &folders, open::write),
+        _ => merge_all::<ChoiceDetail>(args, &folders, choice::write),
     }
 }
 
 fn merge_all<D: Detail + PartialEq>(
-    config: &Merge,
+    args: &MergeArgs,
     folders: &[PathBuf],
     write: impl FnOnce(&Store<D>, StoredRun<D>, Show) -> Result<Outcome>,
 ) -> Result<Outcome> {
@@ -66,7 +85,7 @@ fn merge_all<D: Detail + PartialEq>(
     let mut parts = parts?;
     parts.sort_by_key(|part| part.shard);
     agree(&parts)?;
-    let missing = missing(&parts, config.missing)?;
+    let missing = missing(&parts, args.partial)?;
     unfinished(&parts);
     let mut manifest = whole(&parts)?;
     let mut questions: Vec<RunQuestion> = parts
@@ -79,7 +98,7 @@ fn merge_all<D: Detail + PartialEq>(
     if missing > 0 {
         manifest.status = Status::Incomplete;
     }
-    let mut store = Store::<D>::open(&config.out, &manifest, Moved::Refused)?;
+    let mut store = Store::<D>::open(&args.out, &manifest, Moved::Refused)?;
     store.write_questions(&questions)?;
     let there: HashMap<TrialKey, Record<D>> = store
         .records()?
@@ -92,7 +111,7 @@ fn merge_all<D: Detail + PartialEq>(
         }
     }
     store.sync()?;
-    let drawn: BTreeSet<_> = store::read_thumbnails(&config.out)?
+    let drawn: BTreeSet<_> = store::read_thumbnails(&args.out)?
         .into_iter()
         .map(|thumbnail| (thumbnail.frame, thumbnail.condition))
         .collect();
@@ -101,8 +120,8 @@ fn merge_all<D: Detail + PartialEq>(
             store.append_thumbnail(&thumbnail)?;
         }
     }
-    let run = StoredRun::of(&config.out, manifest)?;
-    write(&store, run, config.show)
+    let run = StoredRun::of(&args.out, manifest)?;
+    write(&store, run, Show::of(args.json))
 }
 
 /// The folders of shards among those named and directly in them.
@@ -174,8 +193,8 @@ fn agree<D>(parts: &[Part<D>]) -> Result<()> {
     }
 }
 
-/// How many shards are missing; an error that names them, where that is refused.
-fn missing<D>(parts: &[Part<D>], refused: Missing) -> Result<usize> {
+/// How many shards are missing; an error that names them unless a partial merge is asked for.
+fn missing<D>(parts: &[Part<D>], partial: bool) -> Result<usize> {
     let Some(first) = parts.first() else {
         return Ok(0);
     };
@@ -185,8 +204,13 @@ fn missing<D>(parts: &[Part<D>], refused: Missing) -> Result<usize> {
     if absent.is_empty() {
         return Ok(0);
     }
-    let told = format!("{} shards are missing: {}", absent.len(), absent.join(", "));
-    if refused == Missing::Refused {
+    let verb = if absent.len() == 1 { " is" } else { "s are" };
+    let told = format!(
+        "{} shard{verb} missing: {}",
+        absent.len(),
+        absent.join(", ")
+    );
+    if !partial {
         return Err(Error::Run {
             path: first.run.folder.clone(),
             problem: format!("{told}; --partial merges what there is"),

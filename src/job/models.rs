@@ -1,13 +1,135 @@
-//! The models of a run, opened: [`ModelUnderTest`].
+//! The models of a run, as flags name them ([`ModelArgs`], [`Ask`]), and opened ([`ModelUnderTest`]).
 
+use std::path::PathBuf;
+use std::str::FromStr;
 use std::sync::Arc;
 
+use clap::Args;
 use serde_json::{Value, json};
+use strsim::damerau_levenshtein;
 
-use crate::ask::{Endpoint, Model, Parameters, Remote, Script, Wire};
-use crate::config::{Ask, ModelName, Server};
+use crate::ask::{AccessArgs, Endpoint, Model, Parameters, Remote, Script, Sending, Server, Wire};
 use crate::error::{Error, Result};
 use crate::types::{Condition, View};
+
+/// Who is asked.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Model")]
+pub struct ModelArgs {
+    /// The model to ask, by its name at the endpoint; repeatable; built in: observer (frames with maps), random, script:FILE;
+    /// default: none, one must be named
+    #[arg(long, value_name = "NAME")]
+    pub model: Vec<ModelName>,
+    /// Show the models no image: words alone
+    #[arg(long)]
+    pub blind: bool,
+    /// Add a text-only baseline by this model; repeatable; default: none
+    #[arg(long, value_name = "NAME")]
+    pub blind_model: Vec<ModelName>,
+}
+
+impl ModelArgs {
+    /// Whether no model is named.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.model.is_empty() && self.blind_model.is_empty()
+    }
+}
+
+/// The name of a model.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ModelName {
+    /// The built-in one that guesses.
+    Random,
+    /// The built-in one that looks at what the pixels still hold.
+    Observer,
+    /// The built-in one that answers out of a file.
+    Script(PathBuf),
+    /// One at the endpoint.
+    Remote(String),
+}
+
+/// The built-in models that need no file.
+const BUILT_IN_NAMES: [&str; 2] = ["random", "observer"];
+
+impl ModelName {
+    /// Makes sure that a model can answer an open question.
+    ///
+    /// # Errors
+    /// If it can only choose.
+    pub(crate) fn answers_in_words(&self) -> Result<()> {
+        let name = match self {
+            Self::Random => "random",
+            Self::Observer => "observer",
+            Self::Script(_) | Self::Remote(_) => return Ok(()),
+        };
+        let problem = format_args!("{name} can only choose, and these questions are open");
+        Err(Error::usage("--model", problem))
+    }
+}
+
+impl FromStr for ModelName {
+    type Err = String;
+
+    /// Reads a name; one that is nearly a built-in model's is refused, for it would go to somebody's API.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let text = text.trim();
+        let near = |name: &&&str| damerau_levenshtein(name, &text.to_lowercase()) <= 2;
+        match text {
+            "" => Err("the name of a model is empty".to_owned()),
+            "random" => Ok(Self::Random),
+            "observer" => Ok(Self::Observer),
+            "script" => Err("script:FILE expected, a file of replies".to_owned()),
+            name => match (
+                name.strip_prefix("script:"),
+                BUILT_IN_NAMES.iter().find(near),
+            ) {
+                (Some(path), _) => Ok(Self::Script(path.into())),
+                (None, Some(built_in)) => {
+                    Err(format!("did you mean the built-in model {built_in}?"))
+                }
+                (None, None) => Ok(Self::Remote(name.to_owned())),
+            },
+        }
+    }
+}
+
+/// Who is asked, where, and with what key.
+#[derive(Debug)]
+pub struct Ask {
+    /// The models.
+    pub models: Vec<ModelName>,
+    /// Whether they see the images.
+    pub view: View,
+    /// The models of the text-only baseline.
+    pub blind_models: Vec<ModelName>,
+    /// The endpoint; `None` if all models are built in.
+    pub server: Option<Server>,
+    /// How a model is to speak; its name is set for each.
+    pub parameters: Parameters,
+}
+
+impl Ask {
+    /// Reads the key, if a model needs one.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with the flag that cannot be used.
+    pub(super) fn resolve(
+        args: ModelArgs,
+        parameters: Parameters,
+        access: &AccessArgs,
+        sending: Sending,
+    ) -> Result<Self> {
+        let mut all = args.model.iter().chain(&args.blind_model);
+        let remote = all.any(|name| matches!(name, ModelName::Remote(_)));
+        Ok(Self {
+            view: if args.blind { View::Blind } else { View::Image },
+            server: remote.then(|| access.server(sending)).transpose()?,
+            models: args.model,
+            blind_models: args.blind_model,
+            parameters,
+        })
+    }
+}
 
 /// What messages call the place of models that are built in.
 const BUILT_IN: &str = "built-in models";

@@ -17,12 +17,12 @@ use super::models;
 use super::outcome::Outcome;
 use super::plan::Plan;
 use super::progress::Progress;
+use super::settings::JobSettings;
 use super::stored::StoredRun;
 use super::thumbnail::Wanted;
 use super::timings::Timings;
 use super::workers::Workers;
 use crate::ask::ImageLimit;
-use crate::config::{Ask, Images};
 use crate::enhance::Enhancer;
 use crate::error::Result;
 use crate::report::forecast::money;
@@ -124,9 +124,9 @@ impl<E: Experiment> OpenRun<'_, E> {
         };
         self.begin(tally, &stored)?;
         drop(stored);
-        let workers = Workers::start(settings.enhancement.threads)?;
+        let workers = Workers::start(settings.loading.threads.threads)?;
         let timings = Timings::default();
-        let limit = limit(&settings.ask, &settings.images);
+        let limit = limit(settings);
         let stoppers = enhancers.iter().map(Enhancer::stopper).collect();
         let mut pipeline = pipeline(experiment, enhancers, limit, &timings);
         workers
@@ -135,7 +135,7 @@ impl<E: Experiment> OpenRun<'_, E> {
         let dispatcher = Dispatcher {
             models,
             progress: self.progress,
-            pace: &settings.pace,
+            settings,
             timings: &timings,
         };
         let wanted = wanted(experiment, self.store.folder())?;
@@ -208,7 +208,7 @@ impl<E: Experiment> OpenRun<'_, E> {
             (manifest.status, manifest.counts) = (status, counts);
             manifest.updated = now();
         }
-        let show = self.experiment.settings().output.show;
+        let show = self.experiment.settings().show;
         let outcome = self.experiment.report(&self.store, run, show)?;
         match end {
             EndReason::Stopped(error) | EndReason::ModelStopped(error) => Err(error),
@@ -236,10 +236,10 @@ pub(crate) fn pipeline<'a, E: Experiment>(
 }
 
 /// The largest image that the endpoint takes; `None` if all models are built in.
-pub(crate) fn limit(ask: &Ask, images: &Images) -> Option<ImageLimit> {
-    let server = ask.server.as_ref()?;
+pub(crate) fn limit(settings: &JobSettings) -> Option<ImageLimit> {
+    let server = settings.ask.server.as_ref()?;
     let known = || ImageLimit::of(&server.access.base);
-    Some(images.largest.map_or_else(known, ImageLimit::stated))
+    Some(settings.max_image.map_or_else(known, ImageLimit::stated))
 }
 
 /// The small copies of images that a run has yet to keep.

@@ -10,3 +10,20 @@ pub struct Outcome {
     /// What belongs on standard output.
     pub output: String,
 }
+
+/// What standard output gets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Show {
+    /// A table.
+    Table,
+    /// The summary as JSON.
+    Json,
+}
+
+impl Show {
+    /// What the switch `--json` asks for.
+    #[must_use]
+    pub fn of(json: bool) -> Self {
+        if json { Self::Json } else { Self::Table }
+    }
+}

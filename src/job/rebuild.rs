@@ -1,21 +1,44 @@
 //! The images of a run, made again: [`ImageRebuilder`].
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use super::enhancers::OpenEnhancers;
+use clap::Args;
+
+use super::enhancers::{Loading, OpenEnhancers};
 use super::frame_work::Steps;
 use super::identity;
 use super::image_pipeline::ImagePipeline;
+use super::picture_words::Pictures;
 use super::recipe::Recipe;
 use super::source::{Frames, Source, SourceFrame};
 use super::timings::Timings;
-use super::walk::WalkFolder;
-use crate::config::{Again, Walk};
-use crate::dataset::{Dataset, Place};
-use crate::enhance::Enhancer;
+use super::walk::{Walk, WalkFolder};
+use super::workers::ThreadArgs;
+use crate::dataset::{Dataset, Place, place};
+use crate::enhance::{Enhancer, RuntimeArgs};
 use crate::error::{Error, Result};
+use crate::synthesis::Sensor;
 use crate::types::manifest::RunManifest;
 use crate::types::{Condition, Digest, FrameId};
+
+/// Where the data and the enhancers of a run lie by now, and how they are run.
+///
+/// The variables are `DARKQA_MOVED_DATA` and `DARKQA_MOVED_LLIE`: what `DARKQA_DATA` says of new runs says nothing of this one.
+#[derive(Debug, Clone, Args)]
+pub struct RebuildArgs {
+    /// The data, if they lie elsewhere by now; default: where they were
+    #[arg(id = "moved_data", long = "data", value_name = "DIR|FILE|rooms:…")]
+    pub data: Option<PathBuf>,
+    /// The enhancement models, if they lie elsewhere by now; repeatable; default: where they were
+    #[arg(id = "moved_llie", long = "llie", value_name = "FILE")]
+    pub llie: Vec<PathBuf>,
+    /// By which ONNX Runtime.
+    #[command(flatten)]
+    pub runtime: RuntimeArgs,
+    /// On how many threads.
+    #[command(flatten)]
+    pub threads: ThreadArgs,
+}
 
 /// What makes the images of a run again, as its manifest says that they were made.
 pub(crate) struct ImageRebuilder {
@@ -41,39 +64,46 @@ pub(crate) struct RebuiltImage {
 impl ImageRebuilder {
     /// Opens the data, and the enhancers of these conditions.
     pub(crate) fn open(
-        again: Again,
+        args: RebuildArgs,
         manifest: &RunManifest,
         folder: &Path,
         conditions: &[Condition],
     ) -> Result<Self> {
-        if manifest.images.is_empty() {
-            let problem = "the run does not say how its images were made".to_owned();
+        let wrong = |problem: String| {
             let path = folder.to_owned();
-            return Err(Error::Run { path, problem });
-        }
-        let pictures = again.pictures(&manifest.images)?;
-        let enhanced = conditions
-            .iter()
-            .any(|condition| condition.enhancer.is_some());
-        let models = if enhanced {
-            &*pictures.enhancement.models
-        } else {
-            &[]
+            Error::Run { path, problem }
         };
+        if manifest.images.is_empty() {
+            return Err(wrong(
+                "the run does not say how its images were made".to_owned(),
+            ));
+        }
+        let pictures = Pictures::read(&manifest.images).map_err(wrong)?;
+        let pictures = moved(pictures, &args).map_err(wrong)?;
+        let mut conditions = conditions.iter();
+        let enhanced = conditions.any(|condition| condition.enhancer.is_some());
+        let models = if enhanced { &*pictures.llie } else { &[] };
         let files = identity::enhancers(models)?;
-        let recipe = Recipe::new(&pictures.sensor, &pictures.images, &files);
+        let sensor = Sensor::resolve(&pictures.sensor)?;
+        let recipe = Recipe::new(&sensor, pictures.images.image, pictures.max_side, &files);
         let (place, recipe) = if let Some(walk) = pictures.walk {
             let recipe = recipe.of_walks(&walk);
-            (Images::Walks(WalkFolder::new(&walk), walk), recipe)
+            let folder = WalkFolder::new(&walk, pictures.limit);
+            (Images::Walks(folder, walk), recipe)
         } else {
-            let frames = frames(&pictures.data.place)?;
-            let frames = frames.with_most_pixels(pictures.data.most_pixels);
+            let frames = frames(&pictures.data.data)?;
+            let frames = frames.with_most_pixels(pictures.limit.max_pixels.get());
             (Images::Frames(frames), recipe)
+        };
+        let loading = Loading {
+            size: pictures.size,
+            runtime: args.runtime,
+            threads: args.threads,
         };
         Ok(Self {
             place,
             recipe,
-            enhancers: OpenEnhancers::load(files, &pictures.enhancement)?.take()?,
+            enhancers: OpenEnhancers::load(files, &loading)?.take()?,
         })
     }
 
@@ -116,6 +146,20 @@ impl ImageRebuilder {
             Images::Walks(folder, walk) => folder.source(&name.0, walk),
         }
     }
+}
+
+/// The same images, made of what lies elsewhere by now. The folder of walks is data, too.
+fn moved(mut pictures: Pictures, args: &RebuildArgs) -> Result<Pictures, String> {
+    if let Some(data) = &args.data {
+        match &mut pictures.walk {
+            Some(walk) => walk.folder.clone_from(data),
+            None => pictures.data.data = place(&data.to_string_lossy())?,
+        }
+    }
+    if !args.llie.is_empty() {
+        pictures.llie.clone_from(&args.llie);
+    }
+    Ok(pictures)
 }
 
 fn rebuilt(image: &crate::ask::Payload) -> Result<RebuiltImage> {

@@ -4,44 +4,15 @@ use std::num::NonZeroU32;
 
 use serde::Serialize;
 
-use super::bilinear;
+use super::scaling::Scaling;
 use super::source::{Source, SourceFrame};
-use crate::ask::{Format, Payload};
-use crate::config::{CameraOf, Darkened, Images, Sensor, Walk};
+use super::walk::{CameraOf, Darkened, Walk};
+use crate::ask::Format;
 use crate::enhance::{self, ModelFile};
 use crate::error::Result;
-use crate::synthesis::{self, NoiseKey, Readings, Synthesis};
+use crate::synthesis::{self, NoiseKey, Readings, Sensor, Synthesis};
 use crate::types::degradation::Kind;
 use crate::types::{Condition, Digest, EnhancerName, FrameId, Severity};
-
-/// In what size an image is sent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub(crate) enum Scaling {
-    /// In its own.
-    Never,
-    /// Made smaller if a side is longer than this, in pixels.
-    MaxSide(NonZeroU32),
-    /// Made larger or smaller, until its longer side has this length in pixels.
-    LongerSide(usize),
-}
-
-impl Scaling {
-    /// The width and height in which an image of this size is sent.
-    pub(crate) fn of(self, (width, height): (u32, u32)) -> (usize, usize) {
-        match self {
-            Self::Never => (width as usize, height as usize),
-            Self::MaxSide(side) => {
-                let (width, height) = Payload::fitted(width, height, Some(side));
-                (width as usize, height as usize)
-            }
-            Self::LongerSide(side) => {
-                let [height, width] = bilinear::size(height as usize, width as usize, side);
-                (width, height)
-            }
-        }
-    }
-}
 
 /// Everything but the frame and the condition that decides an image.
 #[derive(Debug)]
@@ -58,10 +29,15 @@ pub(crate) struct Recipe {
 }
 
 impl Recipe {
-    pub(crate) fn new(sensor: &Sensor, images: &Images, files: &[ModelFile]) -> Self {
+    pub(crate) fn new(
+        sensor: &Sensor,
+        format: Format,
+        max_side: Option<NonZeroU32>,
+        files: &[ModelFile],
+    ) -> Self {
         Self {
-            format: images.format,
-            scaling: images.max_side.map_or(Scaling::Never, Scaling::MaxSide),
+            format,
+            scaling: max_side.map_or(Scaling::Never, Scaling::MaxSide),
             ..Self::lossless(sensor, files)
         }
     }
@@ -85,7 +61,7 @@ impl Recipe {
     /// The recipe for frames of walks.
     pub(crate) fn of_walks(self, walk: &Walk) -> Self {
         Self {
-            scaling: walk.side.map_or(Scaling::Never, Scaling::LongerSide),
+            scaling: walk.side,
             scaled: walk.darkened,
             camera_of: walk.camera,
             ..self

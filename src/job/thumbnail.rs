@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::num::NonZeroU32;
 
 use crate::ask::{Format, Payload};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::types::{Condition, Digest, FrameId, Rgb, Thumbnail};
 
 /// Copies of so many frames are kept, so that a report stays small whatever the run's size.
@@ -68,7 +68,9 @@ pub(crate) fn thumbnail(
             .map_or(0.0, |how| how.kind().relight(how.severity())),
         Some(_) => 0.0,
     };
-    let jpeg: Format = FORMAT.parse()?;
+    let jpeg: Format = FORMAT
+        .parse()
+        .map_err(|e| Error::data("the format of small copies", e))?;
     let url = |image: &Rgb| -> Result<String> {
         let url = Payload::encode(image, jpeg, None)?.data_url();
         Ok(String::from_utf8_lossy(&url).into_owned())

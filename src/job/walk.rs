@@ -1,18 +1,74 @@
-//! Walks through houses as what is shown: [`WalkFolder`].
+//! Walks through houses as what is shown: [`WalkFolder`], and how they are shown: [`Walk`].
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
+use clap::{Args, ValueEnum};
 use rayon::prelude::*;
+use serde::Serialize;
 
 use super::progress::Progress;
+use super::scaling::Scaling;
 use super::source::{Frames, Source, SourceFrame};
-use crate::config::Walk;
-use crate::dataset::Picture;
 use crate::dataset::openeqa::{sampled, walk};
+use crate::dataset::{Picture, PixelLimit};
 use crate::error::{Error, Result};
 use crate::types::FrameId;
+
+/// How a walk is shown.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "OpenEQA")]
+pub struct Walk {
+    /// The folder of walks: the frames of a question lie in DIR/EPISODE_HISTORY/*-rgb.png
+    #[arg(id = "frames", long, value_name = "DIR")]
+    pub folder: PathBuf,
+    /// How many frames of a walk are shown, spread evenly over it: 50 as upstream shows GPT-4V (Claude 3: 20, Gemini: 15)
+    #[arg(id = "num-frames", long, value_name = "K", default_value = "50")]
+    pub frames: NonZeroUsize,
+    /// The longer side of the frames as sent, in pixels, or native; scaled as upstream does (OpenCV, bilinear)
+    #[arg(id = "image-size", long, value_name = "PIXELS|native", value_parser = longer_side, default_value = "512")]
+    pub side: Scaling,
+    /// Where light is taken
+    #[arg(id = "degrade", long, value_enum, default_value_t = Darkened::Native)]
+    pub darkened: Darkened,
+    /// Which frames one state of the camera takes
+    #[arg(id = "sensor", long, value_enum, default_value_t = CameraOf::Episode)]
+    pub camera: CameraOf,
+}
+
+/// Where light is taken from a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Darkened {
+    /// Before the frames are scaled, as a camera would
+    Native,
+    /// After it, where the scaling averages no noise away
+    Resized,
+}
+
+/// What one state of the camera takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum CameraOf {
+    /// All frames of a walk: one camera recorded it
+    Episode,
+    /// Each frame
+    Frame,
+}
+
+/// The longest side that a frame is scaled to, in pixels; chosen.
+const LONGEST: usize = 65_536;
+
+/// Reads `512` or `native`.
+fn longer_side(text: &str) -> Result<Scaling, String> {
+    match (text, text.parse()) {
+        ("native", _) => Ok(Scaling::Never),
+        (_, Ok(side)) if (1..=LONGEST).contains(&side) => Ok(Scaling::LongerSide(side)),
+        _ => Err("a side in pixels or native expected".to_owned()),
+    }
+}
 
 /// A folder of walks, each a folder of frames. A frame's name is the walk's and its own.
 #[derive(Debug)]
@@ -34,10 +90,10 @@ impl Frames for WalkFolder {
 }
 
 impl WalkFolder {
-    pub(crate) fn new(config: &Walk) -> Self {
+    pub(crate) fn new(config: &Walk, limit: PixelLimit) -> Self {
         Self {
             folder: config.folder.clone(),
-            most_pixels: config.most_pixels,
+            most_pixels: limit.max_pixels.get(),
         }
     }
 
@@ -67,7 +123,7 @@ impl WalkFolder {
     /// If its folder is missing, has no frame, or one of them is broken.
     pub(crate) fn source(&self, name: &str, config: &Walk) -> Result<Source> {
         let paths = walk(&self.folder, name)?;
-        let shown = sampled(paths.len(), config.frames);
+        let shown = sampled(paths.len(), config.frames.get());
         let mut places = BTreeMap::new();
         for index in &shown {
             let next = places.len();

@@ -2,9 +2,19 @@
 
 use std::num::NonZeroUsize;
 
+use clap::Args;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::error::{Error, Result};
+use crate::types::flag::threads;
+
+/// How many threads make images.
+#[derive(Debug, Clone, Copy, Default, Args)]
+pub struct ThreadArgs {
+    /// Threads of synthesis, enhancement and reading, 1024 at most; default: all cores
+    #[arg(long, value_name = "N", value_parser = threads, help_heading = "Scale")]
+    pub threads: Option<NonZeroUsize>,
+}
 
 /// The same threads twice: all of them for one source, and each for a source of its own.
 pub(crate) struct Workers {

@@ -2,13 +2,15 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use clap::ValueEnum;
+
 use super::rules::Balance;
 use super::survey::Asked;
-use crate::types::words::words;
+use crate::types::flag::flag_words;
 use crate::types::{Digest, Family};
 
 /// How far the answers are evened out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum Balanced {
     /// Not at all: Algorithm 1 to the letter.
     None,
@@ -19,7 +21,7 @@ pub enum Balanced {
     Full,
 }
 
-words!(Balanced by "balance" { None = "none", Binary = "binary", Full = "full" });
+flag_words!(Balanced);
 
 /// What stays, and what does not.
 pub(super) struct Evened {

@@ -33,7 +33,7 @@ pub enum NoRoom {
 }
 
 /// Who says what room it is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
 pub enum RoomSource {
     /// What is seen of it, as in the paper.
     #[default]

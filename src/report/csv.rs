@@ -33,24 +33,27 @@ fn plain<S: Serializer>(number: &f64, serializer: S) -> Result<S::Ok, S::Error> 
 
 /// The fields of a cell, as many as its column has names.
 pub(super) fn fields(cell: &Cell, names: usize) -> impl Iterator<Item = Field<'_>> {
-    let fields = match cell {
-        Cell::Blank | Cell::Absent | Cell::Missing => Vec::new(),
-        Cell::Text(text) => vec![Field::Text(text)],
-        Cell::Count(count) => vec![Field::Count(*count)],
-        Cell::Number(number) => vec![Field::Number(*number)],
-        Cell::Verdict(verdict) => vec![Field::Text(verdict.word())],
-        Cell::Threshold(t, _) => [t.value, t.low, t.high].map(Field::Number).to_vec(),
+    let mut fields = [Field::None; 4];
+    match cell {
+        Cell::Blank | Cell::Absent | Cell::Missing => {}
+        Cell::Text(text) => fields[0] = Field::Text(text),
+        Cell::Count(count) => fields[0] = Field::Count(*count),
+        Cell::Number(number) => fields[0] = Field::Number(*number),
+        Cell::Verdict(verdict) => fields[0] = Field::Text(verdict.word()),
+        Cell::Threshold(t, _) => {
+            fields = [t.value, t.low, t.high, 0.0].map(Field::Number);
+            fields[3] = Field::None;
+        }
         Cell::Estimate(e)
         | Cell::Below(e)
         | Cell::Guess(e)
         | Cell::Strict(e, _)
         | Cell::Changed(e, _) => {
-            let [value, low, high] = [e.value, e.low, e.high].map(Field::Number);
-            vec![value, low, high, Field::Count(e.n)]
+            fields = [e.value, e.low, e.high, 0.0].map(Field::Number);
+            fields[3] = Field::Count(e.n);
         }
-    };
-    let rest = std::iter::repeat(Field::None);
-    fields.into_iter().chain(rest).take(names)
+    }
+    fields.into_iter().take(names)
 }
 
 /// Every table with columns for it, by file name; tables of one name are one file, and one without a row is none.

@@ -37,6 +37,16 @@ pub struct Row {
     pub hidden_in: Vec<Format>,
 }
 
+impl Row {
+    /// A row with room for the cells of any table.
+    fn wide() -> Self {
+        Self {
+            cells: Vec::with_capacity(12),
+            hidden_in: Vec::new(),
+        }
+    }
+}
+
 /// What a row can be left out of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
@@ -193,7 +203,7 @@ impl<T> Layout<T> {
             notes: Vec::new(),
             latex: None,
             columns: Vec::new(),
-            rows: vec![Row::default(); items.len()],
+            rows: items.iter().map(|_| Row::wide()).collect(),
         };
         Self { table, items }
     }

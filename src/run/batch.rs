@@ -1,37 +1,55 @@
 //! `batch import`: the output of a Batch API, as records.
 
-use crate::config::{BatchImport, Show};
+use std::path::PathBuf;
+
+use clap::Args;
+
 use crate::error::Result;
 use crate::job::batch::replies;
 use crate::job::report::{choice, open};
 use crate::job::stored::{Asked, StoredRun, manifest};
-use crate::job::{Outcome, count};
+use crate::job::{Outcome, Show, count};
 use crate::store::{Moved, Store};
 use crate::types::{ChoiceDetail, Detail, OpenDetail};
+
+/// The flags of `batch import`.
+#[derive(Debug, Args)]
+pub struct BatchImportArgs {
+    /// The folder of the run that the batch was exported from
+    #[arg(value_name = "RUN")]
+    pub run: PathBuf,
+    /// The output files and error files of the Batch API, in any order
+    #[arg(value_name = "FILE", required = true)]
+    pub files: Vec<PathBuf>,
+    /// Print the summary as JSON instead of a table
+    #[arg(long)]
+    pub json: bool,
+}
 
 /// Imports the replies of output and error files, each of them once, however often a file is given.
 ///
 /// # Errors
 /// If the folder holds no run or no batch, or a line is not one of such a file: those before it are kept.
-pub fn import(config: &BatchImport) -> Result<Outcome> {
-    match Asked::of(&config.run)? {
-        Asked::Choice => import_into::<ChoiceDetail>(config, choice::write),
-        Asked::Open => import_into::<OpenDetail>(config, open::write),
+pub fn import(args: &BatchImportArgs) -> Result<Outcome> {
+    match Asked::of(&args.run)? {
+        Asked::Choice => import_into::<ChoiceDetail>(args, choice::write),
+        Asked::Open => import_into::<OpenDetail>(args, open::write),
     }
 }
 
 fn import_into<D: Detail>(
-    config: &BatchImport,
+    args: &BatchImportArgs,
     write: impl FnOnce(&Store<D>, StoredRun<D>, Show) -> Result<Outcome>,
 ) -> Result<Outcome> {
-    let manifest = manifest(&config.run)?;
-    let mut store = Store::<D>::open(&config.run, &manifest, Moved::Allowed)?;
-    let imported = replies::import(&mut store, &manifest, &config.files)?;
-    let mut run = StoredRun::of(&config.run, manifest)?;
+    let manifest = manifest(&args.run)?;
+    let mut store = Store::<D>::open(&args.run, &manifest, Moved::Allowed)?;
+    let imported = replies::import(&mut store, &manifest, &args.files)?;
+    let mut run = StoredRun::of(&args.run, manifest)?;
     let trials = run.manifest.counts.trials.max(run.records.len());
     run.manifest.count(count(trials, &run.records));
-    let mut outcome = write(&store, run, config.show)?;
-    if config.show == Show::Table {
+    let show = Show::of(args.json);
+    let mut outcome = write(&store, run, show)?;
+    if show == Show::Table {
         outcome.output.insert_str(0, &imported);
     }
     Ok(outcome)

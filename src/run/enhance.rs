@@ -1,17 +1,46 @@
 //! `enhance`: images as a model mends them, or what is known of the model.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
 
 use crate::ask::png;
-use crate::config::{Enhance, Existing};
+use crate::dataset::PixelLimit;
 use crate::dataset::inputs::{Entry, Inputs};
 use crate::enhance::{Enhancer, ModelFile};
 use crate::error::{Error, Result};
 use crate::files::write;
 use crate::job::Outcome;
-use crate::job::enhancers::OpenEnhancers;
+use crate::job::enhancers::{Loading, OpenEnhancers};
 use crate::job::progress::Progress;
 use crate::types::manifest::Status;
+
+/// The flags of `enhance`.
+#[derive(Debug, Args)]
+pub struct EnhanceArgs {
+    /// The model as ONNX, or PRESET:FILE (zero-dce, zero-dce++, ruas-lol, ruas-upe, retinexformer, darkir, sci, iat,
+    /// pairlie, enlightengan)
+    #[arg(value_name = "MODEL")]
+    pub model: PathBuf,
+    /// Images (PNG, JPEG) and folders of frames
+    #[arg(value_name = "INPUT", required_unless_present = "describe")]
+    pub inputs: Vec<PathBuf>,
+    /// Where the enhanced images go, as PNG under their own names; default: nowhere, with --describe
+    #[arg(long, value_name = "DIR", required_unless_present = "describe")]
+    pub out: Option<PathBuf>,
+    /// Tell how the model is fed and read, and what says so; enhances nothing
+    #[arg(long, conflicts_with_all = ["inputs", "out"])]
+    pub describe: bool,
+    /// How the model is run.
+    #[command(flatten)]
+    pub loading: Loading,
+    /// Make images again that are there already
+    #[arg(long, help_heading = "Output")]
+    pub force: bool,
+    /// How large an image may be.
+    #[command(flatten)]
+    pub limit: PixelLimit,
+}
 
 /// Makes the images, or describes the model.
 ///
@@ -19,26 +48,23 @@ use crate::types::manifest::Status;
 ///
 /// # Errors
 /// Where nothing can be made: no such model or input, two images of one name, no folder to write to.
-pub fn enhance(config: &Enhance, progress: &Progress) -> Result<Outcome> {
-    let files = config.enhancement.models.iter();
-    let files = files
-        .map(|path| ModelFile::read(path))
-        .collect::<Result<Vec<_>>>()?;
-    let enhancers = OpenEnhancers::load(files, &config.enhancement)?.take()?;
+pub fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
+    let files = vec![ModelFile::read(&args.model)?];
+    let enhancers = OpenEnhancers::load(files, &args.loading)?.take()?;
     let [mut enhancer] = <[Enhancer; 1]>::try_from(enhancers)
         .map_err(|_| Error::usage("MODEL", "one model expected"))?;
-    let Some(out) = &config.out else {
+    let Some(out) = &args.out else {
         return Ok(Outcome {
             status: Status::Complete,
             output: enhancer.describe(),
         });
     };
-    let images = Inputs::open(&config.inputs, config.most_pixels)?;
+    let images = Inputs::open(&args.inputs, args.limit.max_pixels.get())?;
     let bar = progress.bar("images", images.entries.len());
     let (mut made, mut kept, mut failed) = (0, 0, 0);
     for entry in &images.entries {
         let path = out.join(format!("{}.png", entry.stem));
-        if path.exists() && config.existing == Existing::Kept {
+        if path.exists() && !args.force {
             kept += 1;
         } else {
             match one(&mut enhancer, &images, entry, &path) {

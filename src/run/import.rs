@@ -2,22 +2,22 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Component, Path};
+use std::path::{Component, Path, PathBuf};
 
+use clap::Args;
 use ndarray::Array2;
-use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
 use crate::ask::png;
-use crate::config::{Existing, Import};
-use crate::dataset::Picture;
 use crate::dataset::frame_folder::{self, Place};
-use crate::dataset::import::keyframes::choose;
-use crate::dataset::import::{Adapter, Incoming, Read, open};
+use crate::dataset::import::keyframes::{KeyFrameArgs, choose};
+use crate::dataset::import::{Adapter, Incoming, Kind, Read, Stated, open};
+use crate::dataset::{Picture, PixelLimit};
 use crate::error::{Error, Result};
 use crate::job::Outcome;
 use crate::job::progress::Progress;
+use crate::job::workers::{ThreadArgs, pool};
 use crate::types::manifest::Status;
 
 /// The median depths of a frame of a room, in millimetres: outside of them its scale is wrong, or it looks at a wall.
@@ -26,28 +26,62 @@ const ROOM: std::ops::RangeInclusive<u32> = 300..=15_000;
 /// How many words without a class are named.
 const NAMED: usize = 12;
 
+/// The flags of `import`.
+#[derive(Debug, Args)]
+pub struct ImportArgs {
+    /// What lies in --src
+    #[arg(value_name = "KIND", value_enum)]
+    pub kind: Kind,
+    /// The data set, laid out as src/dataset/import/README.md shows
+    #[arg(long, value_name = "DIR")]
+    pub src: PathBuf,
+    /// Where the frames go, in the common interface
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// The name the data set gives itself; questions are named by it; default: the kind
+    #[arg(long, value_name = "NAME")]
+    pub name: Option<String>,
+    /// What is said of its maps.
+    #[command(flatten)]
+    pub stated: Stated,
+    /// Which frames are taken.
+    #[command(flatten)]
+    pub key_frames: KeyFrameArgs,
+    /// Write into a folder that holds frames already
+    #[arg(long, help_heading = "Output")]
+    pub force: bool,
+    /// How large an image may be.
+    #[command(flatten)]
+    pub limit: PixelLimit,
+    /// On how many threads.
+    #[command(flatten)]
+    pub threads: ThreadArgs,
+}
+
 /// Imports the frames.
 ///
 /// What cannot be read of one frame is said, counted, and does not stop the others.
 ///
 /// # Errors
 /// Where there are no frames, the folder holds others already, most depths are none of a room, or nothing could be read.
-pub fn import(config: &Import, progress: &Progress) -> Result<Outcome> {
-    let list = config.out.join("frames.jsonl");
-    if config.existing == Existing::Kept && list.exists() {
+pub fn import(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
+    let list = args.out.join("frames.jsonl");
+    if !args.force && list.exists() {
         let problem =
             "frames are there already; --force writes over them, another --out keeps both";
         return Err(Error::data(list.display(), problem));
     }
-    let adapter = open(config.kind, &config.source, &config.stated)?;
-    let frames = choose(&adapter.listing().frames, config.every, config.stated.fps)?;
-    let threads = config.threads.map_or(0, std::num::NonZero::get);
-    let cores = ThreadPoolBuilder::new().num_threads(threads).build();
-    let cores = cores.map_err(|e| Error::usage("--threads", e))?;
+    let adapter = open(args.kind, &args.src, &args.stated)?;
+    let frames = choose(
+        &adapter.listing().frames,
+        args.key_frames.kept(),
+        args.key_frames.fps,
+    )?;
+    let cores = pool(args.threads.threads)?;
     let bar = progress.bar("frames", frames.len());
     let made: Vec<Option<Made>> = cores.install(|| {
         let frames = frames.par_iter().map(|frame| {
-            let made = one(config, &*adapter, frame);
+            let made = one(args, &*adapter, frame);
             bar.inc();
             made.map_err(|e| tracing::error!("{}/{}: {e}", frame.scene, frame.frame))
                 .ok()
@@ -59,7 +93,7 @@ pub fn import(config: &Import, progress: &Progress) -> Result<Outcome> {
     let made: Vec<Made> = made.into_iter().flatten().collect();
     if made.is_empty() {
         return Err(Error::data(
-            config.source.display(),
+            args.src.display(),
             "none of its frames could be read",
         ));
     }
@@ -69,21 +103,21 @@ pub fn import(config: &Import, progress: &Progress) -> Result<Outcome> {
     let listing = adapter.listing();
     for scene in &scenes {
         if let Some(names) = listing.names.get(*scene) {
-            frame_folder::names(&config.out, scene, names)?;
+            frame_folder::names(&args.out, scene, names)?;
         }
     }
     let about = json!({
         "schema": "darkqa.dataset/1",
-        "name": config.name,
+        "name": args.name.as_deref().unwrap_or(&args.kind.to_string()),
         "label_space": listing.labels.space,
         "depth_kind": listing.depth_kind,
-        "source": config.kind.to_string(),
+        "source": args.kind.to_string(),
     });
     let lines = made.iter().map(|made| &made.line);
-    frame_folder::finish(&config.out, &listing.labels, &about, lines)?;
+    frame_folder::finish(&args.out, &listing.labels, &about, lines)?;
     let mut output = format!(
         "{}: {} frames of {} scenes{}\n{note}",
-        config.out.display(),
+        args.out.display(),
         made.len(),
         scenes.len(),
         if failed == 0 {
@@ -111,7 +145,7 @@ struct Made {
     depth: Option<u32>,
 }
 
-fn one(config: &Import, adapter: &dyn Adapter, frame: &Incoming) -> Result<Made> {
+fn one(args: &ImportArgs, adapter: &dyn Adapter, frame: &Incoming) -> Result<Made> {
     for name in [&frame.scene, &frame.frame] {
         let mut parts = Path::new(name).components();
         if name.is_empty() || !parts.all(|part| matches!(part, Component::Normal(_))) {
@@ -123,7 +157,7 @@ fn one(config: &Import, adapter: &dyn Adapter, frame: &Incoming) -> Result<Made>
     let picture = Picture::Encoded {
         bytes,
         place: frame.rgb.display().to_string(),
-        most_pixels: config.most_pixels,
+        most_pixels: args.limit.max_pixels.get(),
     };
     let rgb = picture.decode()?;
     let Read {
@@ -133,7 +167,7 @@ fn one(config: &Import, adapter: &dyn Adapter, frame: &Incoming) -> Result<Made>
         room,
     } = adapter.read(frame, &rgb)?;
     let place = Place {
-        out: &config.out,
+        out: &args.out,
         scene: &frame.scene,
         frame: &frame.frame,
     };

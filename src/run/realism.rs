@@ -6,31 +6,85 @@
 //! exposure drop itself are 0 everywhere, so that its divergence says how empty bins are counted, and no more.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use clap::Args;
 use rayon::prelude::*;
 
 use crate::ask::png;
-use crate::config::{PairPlace, Realism, Show};
-use crate::dataset::Picture;
 use crate::dataset::pairs::{Pair, Pairs};
+use crate::dataset::{Picture, PixelLimit};
 use crate::error::{Error, Result};
 use crate::files::write;
-use crate::job::Outcome;
 use crate::job::progress::Progress;
-use crate::job::workers::pool;
+use crate::job::workers::{ThreadArgs, pool};
+use crate::job::{Outcome, Show};
 use crate::report;
 use crate::report::realism::{Rules, Source, Summary};
-use crate::score::realism::residual::{Residuals, divergence};
+use crate::score::realism::residual::{Bins, Empty, Residuals, divergence};
 use crate::score::realism::ssim::ssim;
 use crate::score::realism::{Compared, Measured, exposure_drop, psnr, same_size};
 use crate::synthesis::noise::Term;
-use crate::synthesis::{Negative, NoiseKey, expose_by};
+use crate::synthesis::{Negative, NoiseKey, Sensor, SensorArgs, expose_by};
 use crate::types::manifest::Status;
 use crate::types::{FrameId, Rgb};
 
 /// The most pairs whose crops are shown.
 const MOST_CROPS: usize = 8;
+
+/// The exposure drops that can be asked for, in EV.
+const DROPS: [f32; 2] = [-20.0, 20.0];
+
+/// The flags of `realism`.
+#[derive(Debug, Args)]
+pub struct RealismArgs {
+    /// A folder of pairs: normal/ and low/, high/ and low/, val_rgb_h/ and val_rgb_l/, or files like normal1.png and
+    /// low1.png
+    #[arg(
+        value_name = "PAIRS",
+        required_unless_present = "normal",
+        conflicts_with = "normal"
+    )]
+    pub pairs: Option<PathBuf>,
+    /// The images in normal light, if they lie elsewhere; default: in PAIRS
+    #[arg(long, value_name = "DIR", requires = "low")]
+    pub normal: Option<PathBuf>,
+    /// The images in low light, of the same names; default: in PAIRS
+    #[arg(long, value_name = "DIR", requires = "normal")]
+    pub low: Option<PathBuf>,
+    /// The exposure drop of every pair in EV, -20 to 20; default: estimated for each from its mean light
+    #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = drop_ev)]
+    pub ev: Option<f32>,
+    /// The bins of the residuals' divergence
+    #[arg(long, value_enum, default_value_t)]
+    pub kl_bins: Bins,
+    /// What is done about empty bins of fu; both are shown
+    #[arg(long, value_enum, default_value_t)]
+    pub kl_empty: Empty,
+    /// The sensor and its noise.
+    #[command(flatten)]
+    pub sensor: SensorArgs,
+    /// Where the numbers by pair, the summary and the figures go; default: nowhere
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    pub out: Option<PathBuf>,
+    /// Print the summary as JSON instead of a table
+    #[arg(long, help_heading = "Output")]
+    pub json: bool,
+    /// How large an image may be.
+    #[command(flatten)]
+    pub limit: PixelLimit,
+    /// On how many threads.
+    #[command(flatten)]
+    pub threads: ThreadArgs,
+}
+
+/// Reads an exposure drop.
+fn drop_ev(text: &str) -> Result<f32, String> {
+    let [least, most] = DROPS;
+    let ev = text.parse().ok();
+    let ev = ev.filter(|ev| (least..=most).contains(ev));
+    ev.ok_or_else(|| format!("a number from {least} to {most} expected"))
+}
 
 /// A pair that was compared, with what the figures need.
 struct Work {
@@ -47,20 +101,21 @@ struct Work {
 ///
 /// # Errors
 /// Where there is no pair, none can be compared, or a file cannot be written.
-pub fn realism(config: &Realism, progress: &Progress) -> Result<Outcome> {
-    let Pairs { pairs, unmatched } = match &config.pairs {
-        PairPlace::Together(folder) => Pairs::open(folder)?,
-        PairPlace::Apart { normal, low } => Pairs::of_folders(normal, low)?,
+pub fn realism(args: &RealismArgs, progress: &Progress) -> Result<Outcome> {
+    let Pairs { pairs, unmatched } = match (&args.pairs, &args.normal, &args.low) {
+        (None, Some(normal), Some(low)) => Pairs::of_folders(normal, low)?,
+        (folder, ..) => Pairs::open(folder.as_deref().unwrap_or(Path::new(".")))?,
     };
+    let sensor = Sensor::resolve(&args.sensor)?;
     for path in &unmatched {
         tracing::warn!("{}: no partner in the other light", path.display());
     }
-    let cores = pool(config.threads)?;
+    let cores = pool(args.threads.threads)?;
     let bar = progress.bar("pairs", pairs.len());
     let results: Vec<Option<Work>> = cores.install(|| {
         let pairs = pairs.par_iter().enumerate();
         let compared = pairs.map(|(index, pair)| {
-            let work = compare(config, pair, index < MOST_CROPS);
+            let work = compare(args, &sensor, pair, index < MOST_CROPS);
             bar.inc();
             work.map_err(|e| tracing::error!("{}: {e}", pair.name)).ok()
         });
@@ -74,17 +129,17 @@ pub fn realism(config: &Realism, progress: &Progress) -> Result<Outcome> {
     let failed = pairs.len() - works.len();
     let compared: Vec<&Compared> = works.iter().map(|work| &work.compared).collect();
     let rules = Rules {
-        bins: config.bins,
-        empty: config.empty,
+        bins: args.kl_bins,
+        empty: args.kl_empty,
     };
     let source = Source {
-        seed: config.sensor.seed,
-        synthesis: serde_json::json!(config.sensor.readings.only()?),
+        seed: sensor.seed,
+        synthesis: serde_json::json!(sensor.readings.only()?),
         unmatched: unmatched.len(),
         failed,
     };
     let summary = Summary::new(rules, source, &compared)?;
-    if let Some(out) = &config.out {
+    if let Some(out) = &args.out {
         files(out, &works, &summary)?;
     }
     Ok(Outcome {
@@ -93,18 +148,18 @@ pub fn realism(config: &Realism, progress: &Progress) -> Result<Outcome> {
         } else {
             Status::Incomplete
         },
-        output: match config.show {
+        output: match Show::of(args.json) {
             Show::Table => summary.table(),
             Show::Json => summary.json(),
         },
     })
 }
 
-fn compare(config: &Realism, pair: &Pair, shown: bool) -> Result<Work> {
+fn compare(args: &RealismArgs, sensor: &Sensor, pair: &Pair, shown: bool) -> Result<Work> {
     let decoded = |path: &Path| {
         let bytes = fs::read(path).map_err(|e| Error::file(path, "read", e))?;
         let place = path.display().to_string();
-        let most_pixels = config.most_pixels;
+        let most_pixels = args.limit.max_pixels.get();
         Picture::Encoded {
             bytes,
             place,
@@ -114,13 +169,13 @@ fn compare(config: &Realism, pair: &Pair, shown: bool) -> Result<Work> {
     };
     let (normal, real) = (decoded(&pair.normal)?, decoded(&pair.low)?);
     same_size(&normal, &real)?;
-    let drop = match config.drop {
+    let drop = match args.ev {
         Some(drop) => drop,
         None => exposure_drop(&normal, &real)?,
     };
     let exposure = expose_by(&normal, f64::from(drop));
-    let synthesis = config.sensor.readings.only()?;
-    let key = NoiseKey::new(config.sensor.seed, &FrameId(pair.name.clone()));
+    let synthesis = sensor.readings.only()?;
+    let key = NoiseKey::new(sensor.seed, &FrameId(pair.name.clone()));
     let state = synthesis.state_by(&key, f64::from(drop));
     let take = |terms: &[Term]| {
         let (amplify, tone) = (synthesis.amplify, synthesis.tone);
@@ -130,13 +185,13 @@ fn compare(config: &Realism, pair: &Pair, shown: bool) -> Result<Work> {
     let residuals = [&real, &noise, &exposure].map(|image| Residuals::of(image, &exposure));
     let [of_real, of_noise, of_exposure] = residuals;
     let (of_real, of_noise, of_exposure) = (of_real?, of_noise?, of_exposure?);
-    let other = config.empty.other();
+    let other = args.kl_empty.other();
     let measured = |image: &Rgb, residuals: &Residuals| -> Result<Measured> {
         Ok(Measured {
             psnr: psnr(&real, image)?,
             ssim: ssim(&real, image)?,
-            kl: divergence(&of_real, residuals, config.bins, config.empty),
-            kl_other: divergence(&of_real, residuals, config.bins, other),
+            kl: divergence(&of_real, residuals, args.kl_bins, args.kl_empty),
+            kl_other: divergence(&of_real, residuals, args.kl_bins, other),
         })
     };
     Ok(Work {

@@ -1,34 +1,52 @@
 //! `rooms`: the built-in rooms as files.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
+use clap::Args;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
 use crate::ask::png;
-use crate::config::{Existing, MakeRooms};
 use crate::dataset::frame_folder::{self, FRAMES, Place};
-use crate::dataset::rooms::{self, Room};
+use crate::dataset::rooms::{self, Room, Rooms};
 use crate::error::{Error, Result};
 use crate::job::Outcome;
 use crate::job::progress::Progress;
-use crate::job::workers::pool;
+use crate::job::workers::{ThreadArgs, pool};
 use crate::types::manifest::Status;
 use crate::types::{FrameId, Labels};
+
+/// The flags of `rooms`.
+#[derive(Debug, Args)]
+pub struct RoomsArgs {
+    /// Where the frames go, in the common interface
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Which rooms.
+    #[command(flatten)]
+    pub rooms: Rooms,
+    /// Write into a folder that holds frames already
+    #[arg(long)]
+    pub force: bool,
+    /// On how many threads.
+    #[command(flatten)]
+    pub threads: ThreadArgs,
+}
 
 /// Writes the rooms in the common interface. So many frames as there are threads stand in memory at once.
 ///
 /// # Errors
 /// Where the folder holds frames already, or a file cannot be written.
-pub fn rooms(config: &MakeRooms, progress: &Progress) -> Result<Outcome> {
-    let list = config.out.join(FRAMES);
-    if config.existing == Existing::Kept && list.exists() {
+pub fn rooms(args: &RoomsArgs, progress: &Progress) -> Result<Outcome> {
+    let list = args.out.join(FRAMES);
+    if !args.force && list.exists() {
         let problem =
             "frames are there already; --force writes over them, another --out keeps both";
         return Err(Error::data(list.display(), problem));
     }
-    let cores = pool(config.threads)?;
-    let rooms: BTreeMap<FrameId, Room> = config.rooms.all().collect();
+    let cores = pool(args.threads.threads)?;
+    let rooms: BTreeMap<FrameId, Room> = args.rooms.all().collect();
     let bar = progress.bar("rooms", rooms.len());
     let lines: Vec<Map<String, Value>> = cores.install(|| {
         let lines = rooms
@@ -36,7 +54,7 @@ pub fn rooms(config: &MakeRooms, progress: &Progress) -> Result<Outcome> {
             .collect::<Vec<_>>()
             .into_par_iter()
             .map(|room| {
-                let line = one(config, room);
+                let line = one(args, room);
                 bar.inc();
                 line
             });
@@ -45,22 +63,22 @@ pub fn rooms(config: &MakeRooms, progress: &Progress) -> Result<Outcome> {
     drop(bar);
     let about = json!({
         "schema": "darkqa.dataset/1",
-        "name": config.rooms.title(),
+        "name": args.rooms.title(),
         "label_space": "mpcat40",
-        "source": format!("darkqa-eval rooms {} {}", rooms::VERSION, config.rooms),
+        "source": format!("darkqa-eval rooms {} {}", rooms::VERSION, args.rooms),
     });
     let labels: Labels = rooms::labels();
-    frame_folder::finish(&config.out, &labels, &about, lines.iter())?;
+    frame_folder::finish(&args.out, &labels, &about, lines.iter())?;
     Ok(Outcome {
         status: Status::Complete,
-        output: format!("{}: {} frames\n", config.out.display(), lines.len()),
+        output: format!("{}: {} frames\n", args.out.display(), lines.len()),
     })
 }
 
-fn one(config: &MakeRooms, room: &Room) -> Result<Map<String, Value>> {
+fn one(args: &RoomsArgs, room: &Room) -> Result<Map<String, Value>> {
     let frame = room.frame()?;
     let place = Place {
-        out: &config.out,
+        out: &args.out,
         scene: &frame.scene,
         frame: room.view(),
     };
@@ -79,6 +97,6 @@ fn one(config: &MakeRooms, room: &Room) -> Result<Map<String, Value>> {
     line.insert("intrinsics".to_owned(), json!(frame.intrinsics));
     line.insert("pose".to_owned(), json!(room.pose()));
     line.insert("room_gt".to_owned(), json!(frame.room));
-    frame_folder::names(&config.out, &frame.scene, &frame.names)?;
+    frame_folder::names(&args.out, &frame.scene, &frame.names)?;
     Ok(line)
 }

@@ -2,17 +2,39 @@
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
+use std::path::PathBuf;
 
-use crate::config::ShowItem;
+use clap::Args;
+
 use crate::dataset::inputs::stem;
 use crate::error::{Error, Result};
 use crate::files::write;
 use crate::job::Outcome;
-use crate::job::rebuild::{ImageRebuilder, RebuiltImage};
+use crate::job::rebuild::{ImageRebuilder, RebuildArgs, RebuiltImage};
 use crate::job::stored::AnyRun;
 use crate::types::manifest::{RunManifest, Status};
 use crate::types::question::letter;
 use crate::types::{self, Condition, Digest, FrameId, OpenDetail, Record, RunQuestion};
+
+/// The flags of `show`.
+#[derive(Debug, Args)]
+pub struct ShowArgs {
+    /// The folder of a run
+    #[arg(value_name = "RUN")]
+    pub run: PathBuf,
+    /// The id of a question
+    #[arg(value_name = "ITEM")]
+    pub item: String,
+    /// Only these conditions, as L3-noise+zerodce; repeatable; default: all that it was asked in
+    #[arg(long, value_name = "CONDITION")]
+    pub condition: Vec<Condition>,
+    /// Where the images go; default: shown in the folder of the run
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Where everything lies by now.
+    #[command(flatten)]
+    pub rebuild: RebuildArgs,
+}
 
 /// What one model made of the item.
 struct Answer {
@@ -35,9 +57,9 @@ struct Item {
 ///
 /// # Errors
 /// If the run or the item is not there, or its data or enhancers are not where they were.
-pub fn show(config: ShowItem) -> Result<Outcome> {
-    let folder = config.run.clone();
-    let name = config.item.split('#').next().unwrap_or_default();
+pub fn show(args: ShowArgs) -> Result<Outcome> {
+    let folder = args.run.clone();
+    let name = args.item.split('#').next().unwrap_or_default();
     let (manifest, item) = read(AnyRun::open(&folder)?, name);
     let Some(item) = item else {
         let problem = format!(
@@ -48,9 +70,9 @@ pub fn show(config: ShowItem) -> Result<Outcome> {
             problem,
         });
     };
-    let conditions = conditions(&item.answers, &config)?;
-    let out = config.out.clone().unwrap_or_else(|| folder.join("shown"));
-    let mut rebuilder = ImageRebuilder::open(config.again, &manifest, &folder, &conditions)?;
+    let conditions = conditions(&item.answers, &args)?;
+    let out = args.out.clone().unwrap_or_else(|| folder.join("shown"));
+    let mut rebuilder = ImageRebuilder::open(args.rebuild, &manifest, &folder, &conditions)?;
     let images = rebuilder.images(&item.source, &conditions)?;
     let mut text = item.text;
     let mut all_same = true;
@@ -194,14 +216,14 @@ fn reply(reply: Option<&str>, failure: Option<&types::Failure>) -> String {
 }
 
 /// The conditions that the item was shown in, or those of them that are wanted.
-fn conditions(answers: &[Answer], config: &ShowItem) -> Result<Vec<Condition>> {
-    let wanted = &config.conditions;
+fn conditions(answers: &[Answer], args: &ShowArgs) -> Result<Vec<Condition>> {
+    let wanted = &args.condition;
     let there = answers.iter().filter_map(|answer| answer.condition.clone());
     let there: BTreeSet<Condition> = there.collect();
     if there.is_empty() {
         let problem =
             "the item was asked without images alone: there is nothing to show".to_owned();
-        let path = config.run.clone();
+        let path = args.run.clone();
         return Err(Error::Run { path, problem });
     }
     if wanted.is_empty() {

@@ -1,13 +1,12 @@
 //! LLM-Match, OpenEQA's score of open answers by a judging model (Majumdar et al. 2024, CVPR, section 4): what is done to an
 //! answer before, how a mark is read, and what marks come to. After `facebookresearch/open-eqa` at cfa3fce.
 
-use std::fmt;
-use std::str::FromStr;
+use clap::ValueEnum;
 
-use crate::error::Error;
+use crate::types::flag::flag_words;
 
 /// How answers are judged and a judge's reply is read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Protocol {
     /// Answers [`shortened`], marks read as by upstream's `parse_score`, character for character.
     Upstream,
@@ -15,29 +14,7 @@ pub enum Protocol {
     Tolerant,
 }
 
-impl fmt::Display for Protocol {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Upstream => "upstream",
-            Self::Tolerant => "tolerant",
-        })
-    }
-}
-
-impl FromStr for Protocol {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self, Error> {
-        match text {
-            "upstream" => Ok(Self::Upstream),
-            "tolerant" => Ok(Self::Tolerant),
-            _ => Err(Error::usage(
-                "--protocol",
-                format_args!("{text:?} is neither upstream nor tolerant"),
-            )),
-        }
-    }
-}
+flag_words!(Protocol);
 
 /// An answer as it is judged: what follows its last full stop is cut off, where something does (`evaluate-predictions.py`).
 ///

@@ -36,6 +36,7 @@ pub mod poisson;
 pub mod quantile;
 pub mod random;
 mod reading;
+mod settings;
 pub mod unprocess;
 
 pub use camera::{Calibration, CameraModel, CameraState, Sampling};
@@ -44,6 +45,7 @@ pub use exposures::{Exposures, is_random, version};
 pub use negative::{Negative, ladder};
 pub use random::NoiseKey;
 pub use reading::{Amplify, Coupling, Draws, LightReading, Readings, Synthesis, Tone};
+pub use settings::{Light, LightArgs, Sensor, SensorArgs};
 
 use crate::types::{Degradation, Rgb};
 

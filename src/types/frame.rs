@@ -128,7 +128,7 @@ pub struct Frame {
 }
 
 /// What a depth is measured along.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "snake_case")]
 pub enum DepthKind {
     /// The optical axis: z.

@@ -4,7 +4,6 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::degradation::Kind;
-use crate::error::Error;
 
 /// A set of kinds that is not empty.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,17 +47,17 @@ impl fmt::Display for KindSet {
 }
 
 impl FromStr for KindSet {
-    type Err = Error;
+    type Err = String;
 
-    fn from_str(text: &str) -> Result<Self, Error> {
+    fn from_str(text: &str) -> Result<Self, String> {
         if text == "both" {
             return Ok(Self::BOTH);
         }
         let kinds = text.split(',').map(|word| {
             let words = Kind::ALL.map(Kind::word).join(", ");
-            Kind::of_word(word).map(Self::only).ok_or_else(|| {
-                Error::usage("variant", format_args!("{word:?} is none of {words}, both"))
-            })
+            Kind::of_word(word)
+                .map(Self::only)
+                .ok_or_else(|| format!("{word:?} is not one of {words}, both"))
         });
         kinds
             .reduce(|all, one| Ok(Self(all?.0 | one?.0)))
@@ -80,7 +79,7 @@ mod tests {
         ] {
             assert_eq!(text.parse::<KindSet>().unwrap().to_string(), written);
         }
-        let wrong = "raw".parse::<KindSet>().unwrap_err().to_string();
-        assert!(wrong.contains("none of ev, noise, both"), "{wrong}");
+        let wrong = "raw".parse::<KindSet>().unwrap_err();
+        assert!(wrong.contains("one of ev, noise, both"), "{wrong}");
     }
 }

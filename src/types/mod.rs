@@ -6,6 +6,7 @@ pub mod condition;
 pub mod degradation;
 pub mod detail;
 pub mod digest;
+pub mod flag;
 pub mod frame;
 pub mod kind_set;
 pub mod labels;

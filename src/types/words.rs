@@ -6,29 +6,12 @@ use std::str::FromStr;
 
 use serde::de::{Error, Visitor};
 
-/// Gives the values of an enum their words: `Display` writes them and, where a flag is named, `FromStr` reads them.
+/// Gives the values of an enum their words, which `Display` writes.
 macro_rules! words {
     ($type:ident { $($value:ident = $word:literal),+ $(,)? }) => {
         impl std::fmt::Display for $type {
             fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
                 f.pad(match self { $(Self::$value => $word),+ })
-            }
-        }
-    };
-    ($type:ident by $flag:literal { $($value:ident = $word:literal),+ $(,)? }) => {
-        crate::types::words::words!($type { $($value = $word),+ });
-
-        impl std::str::FromStr for $type {
-            type Err = crate::error::Error;
-
-            fn from_str(text: &str) -> std::result::Result<Self, Self::Err> {
-                match text {
-                    $($word => Ok(Self::$value),)+
-                    _ => {
-                        let words = [$($word),+].join(", ");
-                        Err(crate::error::Error::usage($flag, format_args!("{text:?} is none of {words}")))
-                    }
-                }
             }
         }
     };

@@ -11,7 +11,7 @@ use std::path::Path;
 use super::{Scope, Token, code_only, rust_files, scopes, tokens};
 
 /// Circles of files that may be, and why. A part of one may be, too. All but the first are to be cut, by what is said beside.
-const CIRCLES: [(&[&str], &str); 4] = [
+const CIRCLES: [(&[&str], &str); 2] = [
     (
         &[
             "score/choice/lenient.rs",
@@ -19,23 +19,6 @@ const CIRCLES: [(&[&str], &str); 4] = [
             "score/choice/written.rs",
         ],
         "to stay: a reply within a reply is read by the reader that found it",
-    ),
-    (
-        &["cli/batch.rs", "cli/mod.rs", "cli/openeqa.rs"],
-        "the groups of flags leave cli/mod.rs for the rooms that use them",
-    ),
-    (
-        &[
-            "config/asking.rs",
-            "config/batch.rs",
-            "config/light.rs",
-            "config/merge.rs",
-            "config/mod.rs",
-            "config/money.rs",
-            "config/openeqa.rs",
-            "config/show.rs",
-        ],
-        "the groups of settings leave config/mod.rs for the rooms that use them",
     ),
     (
         &[

@@ -4,17 +4,21 @@ use std::num::NonZeroU32;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use clap::Args;
 use tokio::time::{Instant, sleep_until};
 
 use super::allowance::{Allowance, Asks};
 use super::learned::{LearnedRate, StatedRate, WIDEST};
 
 /// What the user allows in a minute; `None` for any number.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Args)]
+#[command(next_help_heading = "Sending")]
 pub struct Quota {
-    /// Requests.
+    /// The most requests in a minute; default: as many as the server takes
+    #[arg(id = "rpm", long, value_name = "N")]
     pub requests: Option<NonZeroU32>,
-    /// Tokens, of prompts and replies together.
+    /// The most tokens in a minute, of prompts and replies; default: as many as the server takes
+    #[arg(id = "tpm", long, value_name = "N")]
     pub tokens: Option<NonZeroU32>,
 }
 

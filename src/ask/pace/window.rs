@@ -7,8 +7,6 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tokio::time::{Duration, Instant};
 
-use crate::error::{Error, Result};
-
 /// The least and the most requests at once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Bounds {
@@ -43,10 +41,13 @@ impl fmt::Display for Bounds {
 }
 
 impl FromStr for Bounds {
-    type Err = Error;
+    type Err = String;
 
-    /// Reads `32` (from there down to 1 and back) or `4-64` (from 4 up to 64, never below 4).
-    fn from_str(text: &str) -> Result<Self> {
+    /// Reads `32` (from there down to 1 and back), `4-64` (from 4 up to 64, never below 4) or `auto`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "auto" {
+            return Ok(Self::DEFAULT);
+        }
         let (first, most) = text.split_once('-').unwrap_or((text, text));
         let range = text.contains('-');
         match (first.trim().parse::<NonZeroUsize>(), most.trim().parse()) {
@@ -55,12 +56,7 @@ impl FromStr for Bounds {
                 first,
                 most,
             }),
-            _ => Err(Error::usage(
-                "--concurrency",
-                format_args!(
-                    "{text:?} is neither a number of requests from 1 on nor a range like 4-64"
-                ),
-            )),
+            _ => Err("a number of requests from 1 on, or a range like 4-64, expected".to_owned()),
         }
     }
 }

@@ -72,7 +72,7 @@ pub(super) fn body(
     message: Message<'_>,
     choices: usize,
 ) -> Result<Parts, serde_json::Error> {
-    let limit = |name| parameters.max_tokens.filter(|_| fields.token_field == name);
+    let limit = |name| parameters.limit().filter(|_| fields.token_field == name);
     let letters: Vec<char> = (0..choices).map(letter).collect();
     let constrained =
         |kind, value: fn(&[char]) -> Value| (parameters.constrain == kind).then(|| value(&letters));
@@ -145,7 +145,7 @@ fn format(letters: &[char]) -> Value {
 /// The fields that a server may complain about.
 pub(super) fn fields(sent: Sent<'_>) -> Vec<Field> {
     let parameters = sent.parameters;
-    let limit = |field| parameters.max_tokens.is_some() && sent.fields.token_field == field;
+    let limit = |field| sent.fields.token_field == field;
     Vec::from([
         Field {
             name: "temperature",

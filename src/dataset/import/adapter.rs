@@ -4,25 +4,38 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use clap::Args;
 use ndarray::Array2;
 
 use crate::dataset::spaces;
 use crate::error::{Error, Result};
+use crate::types::flag::positive;
 use crate::types::{DepthKind, Intrinsics, Labels, Rgb, SegmentName, Segmentation};
 
-/// What the user says of a data set.
-#[derive(Debug, Clone, Default)]
+/// What the user says of a data set's maps and its camera.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Maps")]
 pub struct Stated {
-    /// The label space, by name or as a `classes.json`.
+    /// The label space of the class maps: nyu40, nyu40-1 (from 0, 255 for void; kind nyu), nyu13, mpcat40, ade150, or a
+    /// classes.json; default: what the kind has
+    #[arg(long, value_name = "NAME|FILE")]
     pub labels: Option<String>,
-    /// The metres in one unit of depth PNG files.
+    /// The metres in one unit of depth PNG files: 0.001 for millimetres, 0.0002 for 1/5000 m; .npy files are in metres; default:
+    /// what the kind has
+    #[arg(long, value_name = "METRES", value_parser = positive)]
     pub depth_scale: Option<f64>,
-    /// What depth is measured along.
+    /// What depth is measured along; default: planar
+    #[arg(long, value_enum)]
     pub depth_kind: Option<DepthKind>,
-    /// The horizontal field of view in degrees.
+    /// The horizontal field of view in degrees, where the data set does not say how its camera projects; default: not known
+    #[arg(long, value_name = "DEGREES", value_parser = degrees)]
     pub hfov: Option<f64>,
-    /// Frames a second, where frames have no time of their own.
-    pub fps: Option<f64>,
+}
+
+/// Reads a field of view.
+fn degrees(text: &str) -> Result<f64, String> {
+    let degrees = positive(text).ok().filter(|degrees| *degrees < 180.0);
+    degrees.ok_or_else(|| "a number above 0 and below 180 expected".to_owned())
 }
 
 /// A frame that can be read.

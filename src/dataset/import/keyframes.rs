@@ -1,7 +1,39 @@
 //! Key frames, uniform in time along a trajectory: [`Every`].
 
+use std::num::NonZeroUsize;
+
+use clap::Args;
+
 use super::adapter::Incoming;
 use crate::error::{Error, Result};
+use crate::types::flag::positive;
+
+/// Which frames of each scene are taken.
+#[derive(Debug, Clone, Copy, Default, Args)]
+#[command(next_help_heading = "Key frames")]
+pub struct KeyFrameArgs {
+    /// One frame every N seconds of a scene (DarkQA: 2); default: every frame
+    #[arg(long, value_name = "SECONDS", value_parser = positive, conflicts_with = "count")]
+    pub every: Option<f64>,
+    /// This many frames of each scene, evenly spread; default: every frame
+    #[arg(long, value_name = "N")]
+    pub count: Option<NonZeroUsize>,
+    /// Frames a second, where frames have no time of their own; default: not known
+    #[arg(long, value_name = "N", value_parser = positive)]
+    pub fps: Option<f64>,
+}
+
+impl KeyFrameArgs {
+    /// Which frames are kept.
+    #[must_use]
+    pub fn kept(&self) -> Every {
+        match (self.every, self.count) {
+            (Some(seconds), _) => Every::Seconds(seconds),
+            (None, Some(count)) => Every::Count(count.get()),
+            (None, None) => Every::Frame,
+        }
+    }
+}
 
 /// Which frames of each scene are kept.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -25,12 +25,12 @@ use std::path::Path;
 use super::spaces;
 use crate::error::{Error, Result};
 use crate::types::Labels;
-use crate::types::words::words;
+use crate::types::flag::flag_words;
 
 pub use adapter::{Adapter, Incoming, Listing, Read, Stated};
 
 /// What lies in the folder.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Kind {
     /// Renders of habitat-sim: HM3D-Sem, Matterport3D, Replica.
     Habitat,
@@ -46,14 +46,7 @@ pub enum Kind {
     Folder,
 }
 
-words!(Kind by "KIND" {
-    Habitat = "habitat",
-    Scannet = "scannet",
-    Nyu = "nyu",
-    Sunrgbd = "sunrgbd",
-    Thor = "thor",
-    Folder = "folder",
-});
+flag_words!(Kind);
 
 /// Opens a folder.
 ///

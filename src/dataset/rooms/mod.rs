@@ -26,6 +26,7 @@ use std::fmt;
 use std::str::FromStr;
 use std::sync::{Arc, LazyLock};
 
+use clap::Args;
 use ndarray::Array2;
 
 use self::album::Album;
@@ -44,13 +45,16 @@ pub const VERSION: u32 = 1;
 const SPACE: &str = "mpcat40";
 
 /// Which rooms are made: `frames=48,seed=7,size=1280x720`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Args)]
 pub struct Rooms {
-    /// How many frames.
+    /// This many frames, two of each room
+    #[arg(long, value_name = "N", value_parser = frames, default_value = "48")]
     pub frames: usize,
-    /// What decides them.
+    /// What decides the rooms
+    #[arg(long, value_name = "N", default_value_t = 7)]
     pub seed: u64,
-    /// Width and height in pixels.
+    /// Width and height in pixels
+    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size, default_value = "640x480")]
     pub size: [usize; 2],
 }
 
@@ -115,50 +119,50 @@ pub struct Known {
 }
 
 impl FromStr for Rooms {
-    type Err = Error;
+    type Err = String;
 
-    fn from_str(text: &str) -> Result<Self> {
+    fn from_str(text: &str) -> Result<Self, String> {
         let mut rooms = Self::default();
         for part in text.split(',').filter(|part| !part.is_empty()) {
             let (key, value) = part.split_once('=').unwrap_or((part, ""));
-            rooms.set(key.trim(), value.trim())?;
+            let wrong = |expected: String| format!("{key}={value}: {expected}");
+            match (key.trim(), value.trim()) {
+                ("frames", value) => rooms.frames = frames(value).map_err(wrong)?,
+                ("seed", value) => {
+                    let seed = value.parse();
+                    rooms.seed = seed.map_err(|_| wrong("a whole number expected".to_owned()))?;
+                }
+                ("size", value) => rooms.size = size(value).map_err(wrong)?,
+                _ => {
+                    return Err(wrong(
+                        "frames=N, seed=N or size=WIDTHxHEIGHT expected".to_owned(),
+                    ));
+                }
+            }
         }
         Ok(rooms)
     }
 }
 
-impl Rooms {
-    /// Sets what `frames`, `seed` or `size` names.
-    ///
-    /// # Errors
-    /// Where the key is none of them, or the value is none for it.
-    pub fn set(&mut self, key: &str, value: &str) -> Result<()> {
-        let wrong = |expected: &str| {
-            let problem = format!("{key}={value}: {expected} expected");
-            Error::usage("rooms", problem)
-        };
-        match key {
-            "frames" => {
-                let frames = value.parse().ok();
-                let frames = frames.filter(|frames| (1..=MOST).contains(frames));
-                self.frames = frames.ok_or_else(|| wrong("a number from 1 to 1000000"))?;
-            }
-            "seed" => self.seed = value.parse().map_err(|_| wrong("a whole number"))?,
-            "size" => {
-                let pixels = |text: &str| {
-                    let pixels = text.parse().ok();
-                    pixels.filter(|pixels| (32..=LONGEST).contains(pixels))
-                };
-                let sides = value.split_once('x');
-                let sides =
-                    sides.and_then(|(width, height)| Some([pixels(width)?, pixels(height)?]));
-                self.size = sides.ok_or_else(|| wrong("WIDTHxHEIGHT of 32 to 8192 pixels"))?;
-            }
-            _ => return Err(wrong("frames=N, seed=N or size=WIDTHxHEIGHT")),
-        }
-        Ok(())
-    }
+/// Reads a number of frames.
+fn frames(text: &str) -> Result<usize, String> {
+    let frames = text.parse().ok();
+    let frames = frames.filter(|frames| (1..=MOST).contains(frames));
+    frames.ok_or_else(|| format!("a number from 1 to {MOST} expected"))
+}
 
+/// Reads a width and a height in pixels.
+fn size(text: &str) -> Result<[usize; 2], String> {
+    let pixels = |text: &str| {
+        let pixels = text.parse().ok();
+        pixels.filter(|pixels| (32..=LONGEST).contains(pixels))
+    };
+    let sides = text.split_once('x');
+    let sides = sides.and_then(|(width, height)| Some([pixels(width)?, pixels(height)?]));
+    sides.ok_or_else(|| format!("WIDTHxHEIGHT of 32 to {LONGEST} pixels expected"))
+}
+
+impl Rooms {
     /// The name of the data set: rooms of one seed are one.
     #[must_use]
     pub fn title(&self) -> String {

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
+use super::BatchFiles;
 use super::requests::{Requests, remote, summary};
-use crate::config::BatchFiles;
 use crate::error::Result;
 use crate::job::experiment::Experiment;
 use crate::job::open_run::{Left, OpenRun, limit, pipeline, wanted};
@@ -54,14 +54,14 @@ fn write<E: Experiment>(
     files: &BatchFiles,
 ) -> Result<Vec<(PathBuf, usize)>> {
     let (experiment, settings) = (run.experiment, run.experiment.settings());
-    let workers = pool(settings.enhancement.threads)?;
+    let workers = pool(settings.loading.threads.threads)?;
     let timings = Timings::default();
     let enhancers = if plan.conditions().is_empty() {
         Vec::new()
     } else {
         run.enhancers.take()?
     };
-    let limit = limit(&settings.ask, &settings.images);
+    let limit = limit(settings);
     let mut pipeline = pipeline(experiment, enhancers, limit, &timings);
     let wanted = wanted(experiment, run.store.folder())?;
     let sources = experiment.sources();

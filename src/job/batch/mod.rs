@@ -8,3 +8,28 @@ pub(super) mod export;
 mod file;
 pub(crate) mod replies;
 mod requests;
+
+use std::num::{NonZeroU64, NonZeroUsize};
+
+use clap::Args;
+
+/// What the input files of a Batch API are like; the limits are those of OpenAI and Azure.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Batch")]
+pub struct BatchFiles {
+    /// The most bytes of a file, in MB
+    #[arg(long, value_name = "MB", default_value = "200")]
+    pub file_size: NonZeroU64,
+    /// The most requests of a file
+    #[arg(long, value_name = "N", default_value = "50000")]
+    pub file_requests: NonZeroUsize,
+    /// The path that each line asks; default: that of the model's API, /v1/chat/completions
+    #[arg(long, value_name = "PATH", value_parser = path)]
+    pub url: Option<String>,
+}
+
+/// Reads the path of a URL.
+fn path(text: &str) -> Result<String, String> {
+    let path = text.starts_with('/').then(|| text.to_owned());
+    path.ok_or_else(|| "a path expected, as /v1/chat/completions".to_owned())
+}

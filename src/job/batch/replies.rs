@@ -10,6 +10,7 @@ use crate::ask::batch::{BatchLine, unconstrained};
 use crate::ask::{Constrain, Wire};
 use crate::error::{Error, Result};
 use crate::store::Store;
+use crate::types::flag::read_word;
 use crate::types::manifest::RunManifest;
 use crate::types::{Detail, Record, Reply, TrialKey};
 
@@ -106,7 +107,7 @@ fn take<D: Detail>(
 fn constrain(manifest: &RunManifest, model: &str) -> Result<Constrain> {
     let models = manifest.columns.get("model");
     let said = models.and_then(|models| models.get(model)?.get("--constrain")?.as_str());
-    said.map_or(Ok(Constrain::None), str::parse)
+    said.map_or(Ok(Constrain::None), read_word)
 }
 
 fn summary(tally: &Tally, out: usize) -> String {

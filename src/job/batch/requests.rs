@@ -4,8 +4,8 @@ use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::BatchFiles;
 use super::file::Files;
-use crate::config::BatchFiles;
 use crate::error::{Error, Result};
 use crate::job::models::ModelUnderTest;
 use crate::job::trial::{Item, PreparedGroup};
@@ -32,10 +32,11 @@ impl<'a, I: Item> Requests<'a, I> {
     ) -> Result<Self> {
         let folder = store.folder().join(BATCH);
         fs::create_dir_all(&folder).map_err(|e| Error::file(&folder, "create", e))?;
+        let bytes = config.file_size.get().saturating_mul(1_000_000);
         let files = models.iter().enumerate().map(|(i, model)| {
             // Two models may have names that make one file name, and one model may be asked with images and without.
             let stem = format!("{}-{}", i + 1, model.model.name());
-            Files::new(&folder, &stem, config.most_bytes, config.most_requests)
+            Files::new(&folder, &stem, bytes, config.file_requests.get())
         });
         Ok(Self {
             models,

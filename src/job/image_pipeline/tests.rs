@@ -4,10 +4,11 @@ use std::num::NonZeroU32;
 
 use super::*;
 use crate::ask::Format;
-use crate::config::{CameraOf, Darkened};
 use crate::dataset::Dataset;
-use crate::job::recipe::{Recipe, Scaling};
+use crate::job::recipe::Recipe;
+use crate::job::scaling::Scaling;
 use crate::job::timings::Timings;
+use crate::job::walk::{CameraOf, Darkened};
 use crate::synthesis::Readings;
 
 /// A folder with one frame as a plain PNG file, and the frame as a source.

@@ -1,9 +1,9 @@
 //! What runs of questions with choices hold, from their records alone.
 
 use super::combine::{Combined, combine};
-use crate::config::Show;
 use crate::error::Result;
 use crate::job::outcome::Outcome;
+use crate::job::outcome::Show;
 use crate::job::stored::StoredRun;
 use crate::report::json::{Runs, summary};
 use crate::report::products::{PAGE, products};

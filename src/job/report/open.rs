@@ -6,15 +6,16 @@ use std::path::PathBuf;
 use serde_json::Value;
 
 use super::join::join;
-use crate::config::Show;
 use crate::error::{Error, Result};
 use crate::job::outcome::Outcome as Ended;
+use crate::job::outcome::Show;
 use crate::job::predictions::{AnswerState, Prediction, predictions};
 use crate::job::stored::{StoredRun, in_order};
 use crate::report::openeqa::{Asked, OpenReport, Told, products, render, summary_json, tables};
 use crate::score::llm_match::{Protocol, mark};
 use crate::score::open::{OpenSummary, Outcome, Scored, Topic, open_summary};
 use crate::store::Store;
+use crate::types::flag::read_word;
 use crate::types::manifest::Status;
 use crate::types::{OpenDetail, QuestionId, Record, RunQuestion, Step};
 
@@ -37,7 +38,7 @@ impl Scores {
     pub(crate) fn new(run: StoredRun<OpenDetail>) -> Result<Self> {
         let setting = |name| run.manifest.settings.get(name).and_then(Value::as_str);
         let judge = setting(JUDGE).map(str::to_owned);
-        let protocol = setting(PROTOCOL).map_or(Ok(Protocol::Upstream), str::parse)?;
+        let protocol = setting(PROTOCOL).map_or(Ok(Protocol::Upstream), read_word)?;
         let ids: Vec<&QuestionId> = run.questions.iter().map(|question| &question.id).collect();
         let predicted = predictions(&run.records, &ids, protocol);
         let marks = marks(&run.records, judge.as_deref());

@@ -3,14 +3,15 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
+use clap::Args;
+
 use super::choice::in_its_folder;
 use super::combine::{Combined, combine};
 use super::open;
-use crate::config::{Readings, Report, Show};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::job::stored::{AnyRun, StoredRun};
-use crate::job::{Outcome, count};
+use crate::job::{Outcome, Show, count};
 use crate::report::json::{Runs, summary};
 use crate::report::products::{PAGE, products};
 use crate::report::tables::tables;
@@ -19,21 +20,45 @@ use crate::store::{Moved, Store};
 use crate::types::manifest::Status;
 use crate::types::{ChoiceDetail, OpenDetail};
 
+/// The flags of `report`.
+#[derive(Debug, Args)]
+pub struct ReportArgs {
+    /// Folders of runs
+    #[arg(value_name = "RUN", required = true)]
+    pub runs: Vec<PathBuf>,
+    /// Read all kept replies again by the rules of this version; asks nothing, and keeps the readings that changed
+    #[arg(long)]
+    pub rescore: bool,
+    /// Where the report goes: report.html, tables as CSV and LaTeX, figures as SVG; default: the folder of the run where it
+    /// is one, else nowhere
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Print the summary as JSON instead of a table
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl ReportArgs {
+    fn show(&self) -> Show {
+        Show::of(self.json)
+    }
+}
+
 /// Shows a run, or compares several of one kind; if readings are made again, those that changed are kept with their run.
 ///
 /// # Errors
 /// If a folder holds no run, a record is broken, or the runs asked different questions.
-pub fn report(config: &Report) -> Result<Outcome> {
+pub fn report(args: &ReportArgs) -> Result<Outcome> {
     let (mut choice, mut open) = (Vec::new(), Vec::new());
-    for folder in &config.runs {
+    for folder in &args.runs {
         match AnyRun::open(folder)? {
             AnyRun::Choice(run) => choice.push(run),
             AnyRun::Open(run) => open.push(run),
         }
     }
     let output = match (choice.is_empty(), open.is_empty()) {
-        (_, true) => of_choices(config, choice)?,
-        (true, false) => of_open(config, open)?,
+        (_, true) => of_choices(args, choice)?,
+        (true, false) => of_open(args, open)?,
         (false, false) => {
             return Err(Error::usage(
                 "RUN",
@@ -47,13 +72,13 @@ pub fn report(config: &Report) -> Result<Outcome> {
     })
 }
 
-fn of_choices(config: &Report, mut runs: Vec<StoredRun<ChoiceDetail>>) -> Result<String> {
+fn of_choices(args: &ReportArgs, mut runs: Vec<StoredRun<ChoiceDetail>>) -> Result<String> {
     let mut output = String::new();
     for run in &mut runs {
         if run.records.is_empty() {
             return Err(no_records(run.folder.clone()));
         }
-        if config.readings == Readings::Anew {
+        if args.rescore {
             let changed = reread(run)?;
             let records = run.records.len();
             let _ = writeln!(
@@ -63,43 +88,43 @@ fn of_choices(config: &Report, mut runs: Vec<StoredRun<ChoiceDetail>>) -> Result
             run.manifest.counts = count(run.manifest.counts.trials, &run.records);
         }
     }
-    if config.show == Show::Json {
+    if args.show() == Show::Json {
         output.clear();
     }
     let combined = combine(runs)?;
-    output += &match (&*combined.runs, &config.out) {
+    output += &match (&*combined.runs, &args.out) {
         ([run], None) => match Store::open(&run.folder, &run.manifest, Moved::Allowed) {
-            Ok(store) => in_its_folder(&store, &run.manifest, &combined, config.show)?,
+            Ok(store) => in_its_folder(&store, &run.manifest, &combined, args.show())?,
             // A run under way, or in a folder that cannot be written to, is shown all the same.
             Err(held) => {
                 tracing::warn!("the report is not written: {held}");
-                compare(&combined, config)?
+                compare(&combined, args)?
             }
         },
-        _ => compare(&combined, config)?,
+        _ => compare(&combined, args)?,
     };
     Ok(output)
 }
 
 /// Shows several runs as one, and writes the report where it is wanted.
-fn compare(combined: &Combined, config: &Report) -> Result<String> {
+fn compare(combined: &Combined, args: &ReportArgs) -> Result<String> {
     let findings = combined.findings();
     let (tables, places) = (tables(&findings), combined.places());
-    let shown = match config.show {
+    let shown = match args.show() {
         Show::Json => summary(&tables, &findings.summary.unread, Runs::Several(&places))?,
         Show::Table => evaluation(&tables, &places),
     };
-    let made = match config.out {
+    let made = match args.out {
         Some(_) => products(&findings, &tables, &combined.shown())?,
         None => Vec::new(),
     };
-    elsewhere(config, shown, made)
+    elsewhere(args, shown, made)
 }
 
 /// Writes a report into `--out`, or says that this would.
-fn elsewhere(config: &Report, mut text: String, made: Vec<(String, Vec<u8>)>) -> Result<String> {
-    let Some(out) = &config.out else {
-        if config.show == Show::Table {
+fn elsewhere(args: &ReportArgs, mut text: String, made: Vec<(String, Vec<u8>)>) -> Result<String> {
+    let Some(out) = &args.out else {
+        if args.show() == Show::Table {
             text += "report: --out DIR writes it\n";
         }
         return Ok(text);
@@ -107,33 +132,33 @@ fn elsewhere(config: &Report, mut text: String, made: Vec<(String, Vec<u8>)>) ->
     for (name, content) in made {
         files::write(&out.join(name), &content)?;
     }
-    if config.show == Show::Table {
+    if args.show() == Show::Table {
         let _ = writeln!(text, "report: {}", out.join(PAGE).display());
     }
     Ok(text)
 }
 
-fn of_open(config: &Report, runs: Vec<StoredRun<OpenDetail>>) -> Result<String> {
+fn of_open(args: &ReportArgs, runs: Vec<StoredRun<OpenDetail>>) -> Result<String> {
     if let Some(run) = runs.iter().find(|run| run.records.is_empty()) {
         return Err(no_records(run.folder.clone()));
     }
     let alone = runs.len() == 1;
     let scores = open::Scores::new(open::combine(runs)?)?;
     let run = &scores.run;
-    if alone && config.out.is_none() {
+    if alone && args.out.is_none() {
         match Store::open(&run.folder, &run.manifest, Moved::Allowed) {
             Ok(store) => {
                 scores.write(&store)?;
-                return scores.shown(config.show);
+                return scores.shown(args.show());
             }
             Err(held) => tracing::warn!("the report is not written: {held}"),
         }
     }
-    let made = match config.out {
+    let made = match args.out {
         Some(_) => scores.products()?,
         None => Vec::new(),
     };
-    elsewhere(config, scores.shown(config.show)?, made)
+    elsewhere(args, scores.shown(args.show())?, made)
 }
 
 /// Reads all kept replies again and keeps the readings that changed; how many did.

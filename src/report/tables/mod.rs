@@ -37,7 +37,9 @@ pub fn tables(findings: &Findings<'_>) -> Vec<Table> {
         vec![agreement::agreement(&findings.agreements)],
         vec![health::health(&findings.health)],
     ]
-    .concat()
+    .into_iter()
+    .flatten()
+    .collect()
 }
 
 impl<T> Layout<T> {

@@ -1,8 +1,26 @@
-//! In which orders the choices of a question are shown: [`arrange`].
+//! In which orders the choices of a question are shown: [`ChoiceOrder`], [`arrange`].
 
-use crate::config::{Order, Rotations, Showing};
+use std::num::NonZeroU32;
+
+use clap::Args;
+
 use crate::error::Result;
 use crate::types::{Choices, Digest, Question};
+
+/// In which orders the choices of a question are shown, and how often it is asked in each.
+#[derive(Debug, Clone, Copy, Args)]
+#[command(next_help_heading = "Data")]
+pub struct ChoiceOrder {
+    /// Show the choices of each question in an order drawn from --seed, the same in every condition
+    #[arg(long)]
+    pub shuffle_options: bool,
+    /// Ask each question once for every rotation of its choices: what a model answers by position averages out
+    #[arg(long)]
+    pub circular: bool,
+    /// Ask everything N times
+    #[arg(long, value_name = "N", default_value_t = NonZeroU32::MIN)]
+    pub repeats: NonZeroU32,
+}
 
 /// A question as it is shown once.
 #[derive(Debug)]
@@ -19,10 +37,14 @@ pub(super) struct Arranged {
 ///
 /// The choices of a record are those shown, so its readings need no mapping back; two orders have two keys, because the
 /// choices enter them.
-pub(super) fn arrange(question: &Question, showing: Showing) -> Result<Vec<Arranged>> {
+pub(super) fn arrange(
+    question: &Question,
+    showing: ChoiceOrder,
+    seed: u64,
+) -> Result<Vec<Arranged>> {
     let choices = &question.choices;
     let mut order: Vec<usize> = (0..choices.len()).collect();
-    if let Order::Shuffled(seed) = showing.order {
+    if showing.shuffle_options {
         // Sorted by a digest each: a random order that other questions do not move.
         order.sort_by_cached_key(|&index| {
             let text = choices.texts()[index].as_bytes();
@@ -35,10 +57,7 @@ pub(super) fn arrange(question: &Question, showing: Showing) -> Result<Vec<Arran
             *Digest::of_parts(parts).as_bytes()
         });
     }
-    let rotations = match showing.rotations {
-        Rotations::One => 1,
-        Rotations::Every => choices.len(),
-    };
+    let rotations = if showing.circular { choices.len() } else { 1 };
     let mut arranged = Vec::new();
     for repeat in 0..showing.repeats.get() {
         for rotation in 0..rotations {
@@ -62,7 +81,6 @@ pub(super) fn arrange(question: &Question, showing: Showing) -> Result<Vec<Arran
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeMap;
-    use std::num::NonZeroU32;
 
     use super::*;
     use crate::types::{Family, FrameId, QuestionId};
@@ -79,13 +97,13 @@ mod tests {
         }
     }
 
-    fn shown(id: usize, order: Order, rotations: Rotations, repeats: u32) -> Vec<(String, u32)> {
-        let showing = Showing {
-            order,
-            rotations,
+    fn shown(id: usize, shuffled: bool, circular: bool, repeats: u32) -> Vec<(String, u32)> {
+        let showing = ChoiceOrder {
+            shuffle_options: shuffled,
+            circular,
             repeats: NonZeroU32::new(repeats).unwrap(),
         };
-        let arranged = arrange(&question(id), showing).unwrap();
+        let arranged = arrange(&question(id), showing, 7).unwrap();
         let shown = arranged.iter().map(|arranged| {
             let choices = &arranged.question.choices;
             assert_eq!(choices.texts()[choices.truth()], "b");
@@ -97,9 +115,9 @@ mod tests {
     #[test]
     fn every_rotation_is_shown_as_often_as_wanted() {
         let said = |text: &str, repeat| (text.to_owned(), repeat);
-        assert_eq!(shown(0, Order::Given, Rotations::One, 1), [said("abc", 0)]);
+        assert_eq!(shown(0, false, false, 1), [said("abc", 0)]);
         assert_eq!(
-            shown(0, Order::Given, Rotations::Every, 2),
+            shown(0, false, true, 2),
             [
                 said("abc", 0),
                 said("bca", 0),
@@ -115,8 +133,8 @@ mod tests {
     fn shuffled_orders_are_all_as_frequent_and_stay() {
         let mut counts = BTreeMap::<String, usize>::new();
         for id in 0..6000 {
-            let order = shown(id, Order::Shuffled(7), Rotations::One, 1);
-            assert_eq!(order, shown(id, Order::Shuffled(7), Rotations::One, 1));
+            let order = shown(id, true, false, 1);
+            assert_eq!(order, shown(id, true, false, 1));
             *counts.entry(order[0].0.clone()).or_default() += 1;
         }
         assert_eq!(counts.len(), 6);

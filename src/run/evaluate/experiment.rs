@@ -6,17 +6,17 @@ use serde_json::json;
 
 use super::plan::{ChoiceItem, trials};
 use super::setup::Setup;
-use crate::config::{JobSettings, Order, Rotations, Show};
 use crate::error::Result;
-use crate::job::Outcome;
 use crate::job::experiment::Experiment;
 use crate::job::identity::{self, Columns, Identity};
 use crate::job::models::ModelUnderTest;
 use crate::job::plan::SourcePlan;
 use crate::job::recipe::Recipe;
 use crate::job::report;
+use crate::job::settings::JobSettings;
 use crate::job::source::{Frames, Source};
 use crate::job::stored::StoredRun;
+use crate::job::{Outcome, Show};
 use crate::store::Store;
 use crate::types::{ChoiceDetail, QuestionId, Record, RunQuestion};
 
@@ -71,14 +71,14 @@ impl Experiment for Setup<'_> {
     }
 
     fn identity(&self) -> Identity {
-        let showing = self.config.showing;
-        let shuffled = showing.order != Order::Given;
-        let every = showing.rotations == Rotations::Every;
+        let order = self.config.order;
         let fields = [
             Some(("--data", json!(self.dataset.name()))),
-            Some(("--prompts", json!(self.prompts.digest()))),
-            shuffled.then_some(("--shuffle-options", true.into())),
-            every.then_some(("--circular", true.into())),
+            Some(("--prompts", json!(self.config.prompts.digest()))),
+            order
+                .shuffle_options
+                .then_some(("--shuffle-options", true.into())),
+            order.circular.then_some(("--circular", true.into())),
         ];
         let fields = fields.into_iter().flatten();
         fields

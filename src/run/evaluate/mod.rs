@@ -4,21 +4,24 @@ mod choice_order;
 mod experiment;
 mod plan;
 mod record;
+mod settings;
 mod setup;
 
-use crate::config::{BatchFiles, Config};
 use crate::error::Result;
+use crate::job::batch::BatchFiles;
 use crate::job::progress::Progress;
 use crate::job::{Job, Outcome};
 
+pub use settings::EvaluateArgs;
 use setup::Setup;
 
 /// Runs an evaluation, or goes on with it; a dry run says what that would take.
 ///
 /// # Errors
 /// If nothing can be asked, or no further trial could succeed; what had arrived by then is kept.
-pub fn evaluate(config: &Config, progress: &Progress) -> Result<Outcome> {
-    let (setup, files) = Setup::open(config, progress)?;
+pub fn evaluate(args: EvaluateArgs, progress: &Progress) -> Result<Outcome> {
+    let config = args.resolve()?;
+    let (setup, files) = Setup::open(&config, progress)?;
     Job::new(&setup, files, progress)?.run()
 }
 
@@ -26,7 +29,12 @@ pub fn evaluate(config: &Config, progress: &Progress) -> Result<Outcome> {
 ///
 /// # Errors
 /// If a model is built in, an image is larger than the endpoint takes, or a file cannot be written.
-pub fn export_batch(config: &Config, files: &BatchFiles, progress: &Progress) -> Result<Outcome> {
-    let (setup, models) = Setup::open(config, progress)?;
+pub fn export_batch(
+    args: EvaluateArgs,
+    files: &BatchFiles,
+    progress: &Progress,
+) -> Result<Outcome> {
+    let config = args.resolve()?;
+    let (setup, models) = Setup::open(&config, progress)?;
     Job::new(&setup, models, progress)?.export_batch(files)
 }

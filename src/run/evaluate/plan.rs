@@ -52,9 +52,9 @@ fn groups(
 ) -> Result<Vec<TrialGroup<ChoiceItem>>> {
     let mut shown = Vec::new();
     for question in questions {
-        for arranged in arrange(question, setup.config.showing)? {
+        for arranged in arrange(question, setup.config.order, setup.recipe.seed)? {
             let prompt = |view| {
-                let words = setup.prompts.render(view, &arranged.question)?;
+                let words = setup.config.prompts.render(view, &arranged.question)?;
                 Ok(Prompt::of(words.into()))
             };
             shown.push(Shown {

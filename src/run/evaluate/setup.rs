@@ -3,14 +3,14 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use crate::ask::{Model, Prompts, Random};
-use crate::config::{Config, ModelName};
+use super::settings::Evaluation;
+use crate::ask::{Model, Random};
 use crate::dataset::Dataset;
 use crate::enhance::ModelFile;
 use crate::error::Result;
 use crate::job::conditions::conditions;
 use crate::job::identity;
-use crate::job::models::{self, ModelUnderTest};
+use crate::job::models::{self, ModelName, ModelUnderTest};
 use crate::job::observer;
 use crate::job::progress::Progress;
 use crate::job::questions::{open_data, select};
@@ -21,34 +21,39 @@ use crate::types::{Condition, FrameId, Question, View};
 
 /// Everything an evaluation is made of, opened and checked; nothing is asked, and nothing written.
 pub(super) struct Setup<'a> {
-    pub(super) config: &'a Config,
+    pub(super) config: &'a Evaluation,
     pub(super) dataset: Arc<Dataset>,
     pub(super) questions: Vec<Question>,
     pub(super) sources: Vec<Source>,
     /// The place of each frame among the sources.
     pub(super) places: HashMap<FrameId, usize>,
     pub(super) models: Vec<ModelUnderTest>,
-    pub(super) prompts: Prompts,
     pub(super) conditions: Vec<Condition>,
     pub(super) recipe: Recipe,
 }
 
 impl<'a> Setup<'a> {
     /// Opens the data and the models; the enhancement models are read and not yet loaded.
-    pub(super) fn open(config: &'a Config, progress: &Progress) -> Result<(Self, Vec<ModelFile>)> {
+    pub(super) fn open(
+        config: &'a Evaluation,
+        progress: &Progress,
+    ) -> Result<(Self, Vec<ModelFile>)> {
         let job = &config.job;
-        let dataset = Arc::new(open_data(&config.data, progress)?);
-        let questions = part(select(&dataset, &config.data)?, job.shard, |question| {
-            question.frame.0.clone()
-        })?;
+        let dataset = Arc::new(open_data(
+            &config.data.data,
+            &config.selection,
+            config.limit,
+            progress,
+        )?);
+        let questions = part(
+            select(&dataset, &config.selection)?,
+            job.shard,
+            |question| question.frame.0.clone(),
+        )?;
         let models = open_models(config, &dataset, &questions)?;
         // If every model is blind, no image is read and no enhancer is opened.
         let seeing = models.iter().any(|model| model.view == View::Image);
-        let enhancers = if seeing {
-            &*job.enhancement.models
-        } else {
-            &[]
-        };
+        let enhancers = if seeing { &*job.enhancers.llie } else { &[] };
         let files = identity::enhancers(enhancers)?;
         let sources = if seeing {
             inspect_all(&dataset, &questions, progress)?
@@ -58,16 +63,14 @@ impl<'a> Setup<'a> {
                 .map(|question| Source::unseen(question.frame.clone()))
                 .collect()
         };
-        let recipe = Recipe::new(&job.light.sensor, &job.images, &files);
-        let prompts = job.ask.prompts.as_deref();
+        let recipe = Recipe::new(&job.light.sensor, job.format, job.max_side, &files);
         let names = sources.iter().map(|source| source.name.clone());
         let setup = Self {
             config,
             places: names.zip(0..).collect(),
             sources,
             models,
-            prompts: prompts.map_or_else(Prompts::built_in, Prompts::load)?,
-            conditions: conditions(&job.light, job.enhancement.on, &recipe.enhancers),
+            conditions: conditions(&job.light, job.enhancers.llie_on, &recipe.enhancers),
             recipe,
             questions,
             dataset,
@@ -78,7 +81,7 @@ impl<'a> Setup<'a> {
 
 /// Opens all models; nothing is sent.
 fn open_models(
-    config: &Config,
+    config: &Evaluation,
     dataset: &Arc<Dataset>,
     questions: &[Question],
 ) -> Result<Vec<ModelUnderTest>> {
@@ -87,7 +90,7 @@ fn open_models(
     };
     models::open_all(&config.job.ask, |name| match name {
         ModelName::Observer => {
-            let place = &config.data.place;
+            let place = &config.data.data;
             observer::open(dataset, place, questions, prior).map(Model::Local)
         }
         _ => Ok(Model::Random(prior)),

@@ -3,14 +3,17 @@
 mod set;
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+
+use clap::Args;
 
 use crate::ask::png;
-use crate::config::{Existing, Export};
-use crate::dataset::Dataset;
+use crate::dataset::{self, Dataset, PixelLimit, Place, SelectionArgs};
+use crate::enhance::EnhancerArgs;
 use crate::error::{Error, Result};
 use crate::job::Outcome;
 use crate::job::conditions::conditions;
-use crate::job::enhancers::OpenEnhancers;
+use crate::job::enhancers::{Loading, OpenEnhancers};
 use crate::job::frame_work::{FrameWork, Steps};
 use crate::job::identity;
 use crate::job::image_pipeline::ImagePipeline;
@@ -20,24 +23,61 @@ use crate::job::recipe::Recipe;
 use crate::job::source::{Source, inspect_all};
 use crate::job::timings::Timings;
 use crate::job::workers::pool;
+use crate::synthesis::{Light, LightArgs, SensorArgs};
 use crate::types::manifest::Status;
 use crate::types::{Condition, FrameId, Question};
 
-use set::Set;
+use set::{Form, Set};
+
+/// The flags of `export`.
+#[derive(Debug, Args)]
+pub struct ExportArgs {
+    /// The form
+    #[arg(value_name = "KIND", value_enum)]
+    pub kind: Form,
+    /// A folder of frames, or a ready-made set (.tsv, .jsonl)
+    #[arg(value_name = "DATA", value_parser = dataset::place)]
+    pub data: Place,
+    /// Where the sets go, one for each condition
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Which questions.
+    #[command(flatten)]
+    pub selection: SelectionArgs,
+    /// How large an image may be.
+    #[command(flatten)]
+    pub limit: PixelLimit,
+    /// Light.
+    #[command(flatten)]
+    pub light: LightArgs,
+    /// Light, as a sensor sees it.
+    #[command(flatten)]
+    pub sensor: SensorArgs,
+    /// Which images are enhanced, and by what.
+    #[command(flatten)]
+    pub enhancers: EnhancerArgs,
+    /// How enhancers are run.
+    #[command(flatten)]
+    pub loading: Loading,
+    /// Write over sets that are there already
+    #[arg(long, help_heading = "Output")]
+    pub force: bool,
+}
 
 /// Writes the sets.
 ///
 /// # Errors
 /// Where the data cannot be read, a set is there already, or a file cannot be written.
-pub fn export(config: &Export, progress: &Progress) -> Result<Outcome> {
-    let dataset = open_data(&config.data, progress)?;
-    let questions = select(&dataset, &config.data)?;
-    let files = identity::enhancers(&config.enhancement.models)?;
-    let recipe = Recipe::lossless(&config.light.sensor, &files);
-    let conditions = conditions(&config.light, config.enhancement.on, &recipe.enhancers);
-    let workers = pool(config.enhancement.threads)?;
+pub fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> {
+    let dataset = open_data(&args.data, &args.selection, args.limit, progress)?;
+    let questions = select(&dataset, &args.selection)?;
+    let files = identity::enhancers(&args.enhancers.llie)?;
+    let light = Light::resolve(args.light.clone(), &args.sensor)?;
+    let recipe = Recipe::lossless(&light.sensor, &files);
+    let conditions = conditions(&light, args.enhancers.llie_on, &recipe.enhancers);
+    let workers = pool(args.loading.threads.threads)?;
     let sources = workers.install(|| inspect_all(&dataset, &questions, progress))?;
-    let mut sets = open_sets(config, &dataset, &conditions, &questions)?;
+    let mut sets = open_sets(args, &dataset, &conditions, &questions)?;
     let mut pipeline = ImagePipeline {
         steps: Steps {
             frames: &dataset,
@@ -45,7 +85,7 @@ pub fn export(config: &Export, progress: &Progress) -> Result<Outcome> {
             limit: None,
             timings: &Timings::default(),
         },
-        enhancers: OpenEnhancers::load(files, &config.enhancement)?.take()?,
+        enhancers: OpenEnhancers::load(files, &args.loading)?.take()?,
     };
     let frames: BTreeMap<&FrameId, &Source> = sources
         .iter()
@@ -89,25 +129,17 @@ pub fn export(config: &Export, progress: &Progress) -> Result<Outcome> {
 }
 
 fn open_sets(
-    config: &Export,
+    args: &ExportArgs,
     dataset: &Dataset,
     conditions: &[Condition],
     questions: &[Question],
 ) -> Result<Vec<Set>> {
     let sets: Vec<Set> = conditions
         .iter()
-        .map(|condition| {
-            Set::new(
-                config.form,
-                &config.out,
-                dataset.name(),
-                condition,
-                questions,
-            )
-        })
+        .map(|condition| Set::new(args.kind, &args.out, dataset.name(), condition, questions))
         .collect();
     let taken = sets.iter().find(|set| set.path().exists());
-    match taken.filter(|_| config.existing == Existing::Kept) {
+    match taken.filter(|_| !args.force) {
         Some(set) => Err(Error::data(
             set.path().display(),
             "there already; --force writes over it, another --out keeps both",

@@ -5,13 +5,25 @@ use std::path::{Path, PathBuf};
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
+use clap::ValueEnum;
 use serde_json::{Value, json};
 
-use crate::config::Form;
 use crate::error::{Error, Result};
 use crate::files::write;
 use crate::types::question::letter;
 use crate::types::{Choices, Condition, Question};
+
+/// The form of a ready-made set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[value(rename_all = "lowercase")]
+pub enum Form {
+    /// A .tsv with the images in it, as VLMEvalKit reads it
+    VlmEvalKit,
+    /// metadata.jsonl beside the images, as Hugging Face and lmms-eval load it
+    ImageFolder,
+    /// questions.jsonl beside the images, as LLaVA reads it
+    Llava,
+}
 
 /// What LLaVA's questions end with.
 const LLAVA: &str = "Answer with the option's letter from the given choices directly.";

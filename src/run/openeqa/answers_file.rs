@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use super::questions::some;
 use super::record::detail;
-use crate::config::AnswersFile;
+use super::settings::AnswersFile;
 use crate::dataset::openeqa::OpenQuestion;
 use crate::error::{Error, Result};
 use crate::types::degradation::Kind;

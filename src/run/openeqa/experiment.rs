@@ -10,9 +10,8 @@ use super::marks::{marks, prompt};
 use super::plan::answers;
 use super::record::OpenItem;
 use super::setup::Setup;
-use crate::config::{JobSettings, Server, Show};
+use crate::ask::Server;
 use crate::error::Result;
-use crate::job::Outcome;
 use crate::job::budget::words;
 use crate::job::experiment::{Expected, Experiment};
 use crate::job::identity::{self, Columns, Identity};
@@ -20,9 +19,11 @@ use crate::job::models::ModelUnderTest;
 use crate::job::plan::SourcePlan;
 use crate::job::recipe::Recipe;
 use crate::job::report::open;
+use crate::job::settings::JobSettings;
 use crate::job::source::{Frames, Source};
 use crate::job::stored::StoredRun;
 use crate::job::trial::Item as _;
+use crate::job::{Outcome, Show};
 use crate::store::Store;
 use crate::types::{Family, FrameId, OpenDetail, Record, RunQuestion};
 
@@ -100,7 +101,6 @@ impl Experiment for Setup<'_> {
         let walk = &self.config.walk;
         let fields = [
             ("--num-frames", json!(walk.frames)),
-            ("--image-size", json!(walk.side)),
             ("--degrade", json!(walk.darkened)),
             ("--sensor", json!(walk.camera)),
         ];

@@ -5,26 +5,30 @@
 
 mod answers_file;
 mod experiment;
+mod judge;
 mod marks;
 mod plan;
 mod questions;
 mod record;
+mod settings;
 mod setup;
 mod study;
 
-use crate::config::{OpenEqa, OpenTask};
 use crate::error::Result;
 use crate::job::progress::Progress;
 use crate::job::{Job, Outcome};
 
+pub use settings::OpenEqaArgs;
+use settings::OpenTask;
 use setup::Setup;
 
 /// Carries out what is to be done.
 ///
 /// # Errors
 /// If nothing can be asked, or no further trial could succeed; what had arrived by then is kept.
-pub fn openeqa(config: &OpenEqa, progress: &Progress) -> Result<Outcome> {
-    let (setup, files) = Setup::open(config, progress)?;
+pub fn openeqa(args: OpenEqaArgs, progress: &Progress) -> Result<Outcome> {
+    let config = args.resolve()?;
+    let (setup, files) = Setup::open(&config, progress)?;
     match &config.task {
         OpenTask::Run => Job::new(&setup, files, progress)?.run(),
         OpenTask::Batch(batch) => Job::new(&setup, files, progress)?.export_batch(batch),

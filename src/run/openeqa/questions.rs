@@ -2,14 +2,39 @@
 
 use std::collections::BTreeSet;
 use std::fs;
-use std::path::Path;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
 
-use crate::config::Chosen;
+use clap::Args;
+
 use crate::dataset::openeqa::OpenQuestion;
 use crate::error::{Error, Result};
 
+/// Which questions of a file are asked.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "OpenEQA")]
+pub struct ChosenArgs {
+    /// Only questions of these splits, as hm3d-v0,scannet-v0; default: all
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = trimmed)]
+    pub splits: Vec<String>,
+    /// Only questions of these categories, as "object localization,world knowledge"; default: all
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = trimmed)]
+    pub categories: Vec<String>,
+    /// Only the questions whose ids stand in this file, a JSON array, as open-eqa-v0-184-questions.json; default: all
+    #[arg(long, value_name = "FILE")]
+    pub subset: Option<PathBuf>,
+    /// Only the first N questions; default: all
+    #[arg(long, value_name = "N")]
+    pub limit: Option<NonZeroUsize>,
+}
+
+#[expect(clippy::unnecessary_wraps, reason = "the form of a value parser")]
+fn trimmed(name: &str) -> Result<String, std::convert::Infallible> {
+    Ok(name.trim().to_owned())
+}
+
 /// The questions that are asked.
-pub(super) fn select(all: Vec<OpenQuestion>, chosen: &Chosen) -> Result<Vec<OpenQuestion>> {
+pub(super) fn select(all: Vec<OpenQuestion>, chosen: &ChosenArgs) -> Result<Vec<OpenQuestion>> {
     let subset = chosen.subset.as_deref().map(ids).transpose()?;
     if let (Some(subset), Some(path)) = (&subset, &chosen.subset) {
         let known: BTreeSet<&str> = all.iter().map(|question| &*question.id.0).collect();
@@ -30,15 +55,12 @@ pub(super) fn select(all: Vec<OpenQuestion>, chosen: &Chosen) -> Result<Vec<Open
     }
     among(
         "--splits",
-        chosen.splits.as_deref(),
+        &chosen.splits,
         all.iter().map(OpenQuestion::split),
     )?;
     let categories = all.iter().map(|question| &*question.category);
-    among("--categories", chosen.categories.as_deref(), categories)?;
-    let has = |list: &Option<Vec<String>>, name: &str| {
-        list.as_ref()
-            .is_none_or(|list| list.iter().any(|one| one == name))
-    };
+    among("--categories", &chosen.categories, categories)?;
+    let has = |list: &[String], name: &str| list.is_empty() || list.iter().any(|one| one == name);
     let questions = all.into_iter().filter(|question| {
         has(&chosen.splits, question.split())
             && has(&chosen.categories, &question.category)
@@ -58,13 +80,9 @@ pub(super) fn select(all: Vec<OpenQuestion>, chosen: &Chosen) -> Result<Vec<Open
 }
 
 /// Makes sure that what is chosen is there.
-fn among<'a>(
-    flag: &str,
-    chosen: Option<&[String]>,
-    there: impl Iterator<Item = &'a str>,
-) -> Result<()> {
+fn among<'a>(flag: &str, chosen: &[String], there: impl Iterator<Item = &'a str>) -> Result<()> {
     let there: BTreeSet<&str> = there.collect();
-    let mut wanted = chosen.unwrap_or_default().iter();
+    let mut wanted = chosen.iter();
     match wanted.find(|name| !there.contains(&***name)) {
         None => Ok(()),
         Some(missing) => {

@@ -4,8 +4,9 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
 
 use super::answers_file;
+use super::judge::Judge;
 use super::questions::{select, some};
-use crate::config::{Judge, OpenEqa, OpenTask};
+use super::settings::{OpenEqa, OpenTask};
 use crate::dataset::openeqa::{self, OpenQuestion};
 use crate::enhance::ModelFile;
 use crate::error::{Error, Result};
@@ -54,19 +55,16 @@ impl<'a> Setup<'a> {
         // If nobody sees a frame, none is read and no enhancer is opened.
         let study = matches!(config.task, OpenTask::Study(_));
         let seeing = study || models.iter().any(|model| model.view == View::Image);
-        let enhancers = if seeing {
-            &*job.enhancement.models
-        } else {
-            &[]
-        };
+        let enhancers = if seeing { &*job.enhancers.llie } else { &[] };
         let files = identity::enhancers(enhancers)?;
-        let recipe = Recipe::new(&job.light.sensor, &job.images, &files).of_walks(&config.walk);
-        let walks = WalkFolder::new(&config.walk);
+        let recipe = Recipe::new(&job.light.sensor, job.format, None, &files);
+        let recipe = recipe.of_walks(&config.walk);
+        let walks = WalkFolder::new(&config.walk, config.limit);
         let names = names(&questions);
         let (sources, conditions) = if seeing {
             let sources = walks.inspect(&names, &config.walk, progress);
             warn_of_unseen(&sources, &questions)?;
-            let on = job.enhancement.on;
+            let on = job.enhancers.llie_on;
             (sources, conditions(&job.light, on, &recipe.enhancers))
         } else {
             let unseen = |name| Source::unseen(FrameId(name));

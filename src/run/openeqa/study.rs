@@ -29,11 +29,11 @@ pub(super) fn pack(
     progress: &Progress,
 ) -> Result<Outcome> {
     let settings = setup.settings();
-    let mut enhancers = OpenEnhancers::load(files, &settings.enhancement)?;
-    let limit = limit(&settings.ask, &settings.images);
+    let mut enhancers = OpenEnhancers::load(files, &settings.loading)?;
+    let limit = limit(settings);
     let timings = Timings::default();
     let mut pipeline = pipeline(setup, enhancers.take()?, limit, &timings);
-    let workers = pool(settings.enhancement.threads)?;
+    let workers = pool(settings.loading.threads.threads)?;
     let conditions: Vec<&Condition> = setup.conditions.iter().collect();
     let bar = progress.bar("walks", setup.sources.len());
     let (mut asked, mut images, mut walks) = (Vec::new(), 0, 0);

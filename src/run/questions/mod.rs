@@ -3,20 +3,26 @@
 mod checked;
 mod kept;
 
+use std::collections::BTreeSet;
+use std::fs;
 use std::path::{Path, PathBuf};
 
-use rayon::ThreadPoolBuilder;
+use clap::Args;
 use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::config::{Questions, Show, Strangers};
-use crate::dataset::Dataset;
+use crate::dataset::{Dataset, PixelLimit};
 use crate::error::{Error, Result};
 use crate::files::write;
-use crate::job::Outcome;
 use crate::job::progress::Progress;
+use crate::job::workers::{ThreadArgs, pool};
+use crate::job::{Outcome, Show};
+use crate::questions::balance::Balanced;
+use crate::questions::colors::Palette;
 use crate::questions::reason::Reason;
+use crate::questions::room::RoomSource;
+use crate::questions::rules::Rules;
 use crate::questions::statistics::{self, FrameStatistics, measure, strangers};
 use crate::questions::summary::Summary;
 use crate::questions::survey::Verdict as Candidate;
@@ -27,42 +33,145 @@ use crate::types::{Digest, Family, FrameId, Labels, QuestionId};
 
 use kept::Kept;
 
+/// The flags of `questions`.
+#[derive(Debug, Args)]
+pub struct QuestionsArgs {
+    /// A folder of frames with their maps (frames.jsonl, classes.json), as import makes it
+    #[arg(value_name = "DATA")]
+    pub data: PathBuf,
+    /// Where the questions go (.jsonl); what was measured of the frames is kept beside it
+    #[arg(long, value_name = "FILE", value_parser = file)]
+    pub out: PathBuf,
+    /// The rulebook; default: the one built in (src/questions/rules.toml)
+    #[arg(long, value_name = "FILE", help_heading = "Rules")]
+    pub rules: Option<PathBuf>,
+    /// The names of colours, a table like src/questions/colors.txt; default: the one built in
+    #[arg(long, value_name = "FILE", help_heading = "Rules")]
+    pub colors: Option<PathBuf>,
+    /// Only these families: room_type, affordance, presence, color, closest; default: all
+    #[arg(long, value_name = "LIST", help_heading = "Rules", value_delimiter = ',', value_parser = family)]
+    pub families: Vec<Family>,
+    /// How the answers are evened out
+    #[arg(long, value_enum, default_value_t, help_heading = "Rules")]
+    pub balance: Balanced,
+    /// What says which room it is
+    #[arg(long, value_enum, default_value_t, help_heading = "Rules")]
+    pub room: RoomSource,
+    /// Refuse numbers of a semantic map that classes.json does not have, instead of counting them as unlabelled
+    #[arg(long, help_heading = "Rules")]
+    pub strict: bool,
+    /// Write what became of every candidate, a line each; default: not written
+    #[arg(long, value_name = "FILE", help_heading = "Checking")]
+    pub candidates: Option<PathBuf>,
+    /// Write the statistics of frames, questions and answers: JSON, CSV and a figure; default: not written
+    #[arg(long, value_name = "DIR", help_heading = "Checking")]
+    pub stats: Option<PathBuf>,
+    /// Write a page on which a person accepts or rejects each question; default: not written
+    #[arg(long, value_name = "FILE.html", help_heading = "Checking")]
+    pub review: Option<PathBuf>,
+    /// Leave out what a person has rejected on such a page; repeatable; default: nothing
+    #[arg(long, value_name = "FILE", help_heading = "Checking")]
+    pub verdicts: Vec<PathBuf>,
+    /// Print the statistics as JSON instead of a table
+    #[arg(long, help_heading = "Output")]
+    pub json: bool,
+    /// How large an image may be.
+    #[command(flatten)]
+    pub limit: PixelLimit,
+    /// On how many threads.
+    #[command(flatten)]
+    pub threads: ThreadArgs,
+}
+
+/// Reads the path of a file that questions go to.
+fn file(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    let fit = path.file_stem().is_some() && !path.is_dir();
+    fit.then_some(path)
+        .ok_or_else(|| "a file expected, as questions.jsonl".to_owned())
+}
+
+/// Reads a family of questions that are made by rule.
+fn family(name: &str) -> Result<Family, String> {
+    match Family::from(name.trim()) {
+        Family::Other(_) => {
+            Err("one of room_type, affordance, presence, color, closest expected".to_owned())
+        }
+        family => Ok(family),
+    }
+}
+
+/// The flags with the tables that they name.
+struct Making<'a> {
+    args: &'a QuestionsArgs,
+    rules: Rules,
+    palette: Palette,
+}
+
+impl<'a> Making<'a> {
+    fn read(args: &'a QuestionsArgs) -> Result<Self> {
+        let rules = read(args.rules.as_deref(), Rules::parse)?;
+        let palette = read(args.colors.as_deref(), Palette::parse)?;
+        Ok(Self {
+            args,
+            rules: rules.map_or_else(Rules::built_in, Ok)?,
+            palette: palette.map_or_else(Palette::built_in, Ok)?,
+        })
+    }
+}
+
+fn read<T>(path: Option<&Path>, parse: fn(&str) -> Result<T>) -> Result<Option<T>> {
+    let Some(path) = path else {
+        return Ok(None);
+    };
+    let text = fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))?;
+    parse(&text)
+        .map(Some)
+        .map_err(|e| e.at(path.display().to_string()))
+}
+
 /// Makes the questions.
 ///
 /// What cannot be measured of one frame is said, counted, and does not stop the others.
 ///
 /// # Errors
 /// Where there are no frames, no classes, or a file cannot be written.
-pub fn questions(config: &Questions, progress: &Progress) -> Result<Outcome> {
-    let dataset = Dataset::of_frames(&config.data)?.with_most_pixels(config.most_pixels);
+pub fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Outcome> {
+    let making = &Making::read(args)?;
+    let dataset = Dataset::of_frames(&args.data)?;
+    let dataset = dataset.with_most_pixels(args.limit.max_pixels.get());
     let labels = dataset.labels().ok_or_else(|| {
         let problem = "no classes.json in this folder, which says what the numbers of its maps stand for; `darkqa-eval import` writes one";
-        Error::data(config.data.display(), problem)
+        Error::data(args.data.display(), problem)
     })?;
-    let (frames, failed) = measured(config, &dataset, labels, progress)?;
+    let (frames, failed) = measured(making, &dataset, labels, progress)?;
     let order = Order {
         dataset: dataset.title(),
         labels,
-        rules: &config.rules,
-        palette: &config.palette,
-        families: config.families.clone(),
-        room_source: config.room,
-        balance: config.balance,
-        rejected: checked::rejected(&config.verdicts)?,
+        rules: &making.rules,
+        palette: &making.palette,
+        families: if args.families.is_empty() {
+            Family::PAPER.into_iter().collect()
+        } else {
+            args.families.iter().cloned().collect::<BTreeSet<_>>()
+        },
+        room_source: args.room,
+        balance: args.balance,
+        rejected: checked::rejected(&args.verdicts)?,
     };
     let mut candidates = Vec::new();
     let made = generate(&frames, &order, |frame, candidate| {
-        if config.candidates.is_some() {
+        if args.candidates.is_some() {
             candidates.push(told(frame, candidate));
         }
     })?;
-    write(&config.out, &lines(made.asked.iter().map(Line::of))?)?;
-    if let Some(path) = &config.candidates {
+    write(&args.out, &lines(made.asked.iter().map(Line::of))?)?;
+    if let Some(path) = &args.candidates {
         write(path, &lines(candidates)?)?;
     }
     let summary = Summary::new(&frames, &made, &order, failed);
     let json = report::questions::json(&summary)?;
-    if let Some(folder) = &config.stats {
+    if let Some(folder) = &args.stats {
         write(&folder.join("statistics.json"), json.as_bytes())?;
         write(
             &folder.join("statistics.csv"),
@@ -71,36 +180,36 @@ pub fn questions(config: &Questions, progress: &Progress) -> Result<Outcome> {
         let figure = report::questions::figure::figure(&summary)?;
         write(&folder.join("statistics.svg"), figure.as_bytes())?;
     }
-    if let Some(page) = &config.review {
+    if let Some(page) = &args.review {
         checked::review(page, &dataset, &frames, &made.asked)?;
     }
-    warn(&made, config);
+    warn(&made, making);
     Ok(Outcome {
         status: if failed == 0 {
             Status::Complete
         } else {
             Status::Incomplete
         },
-        output: match config.show {
+        output: match Show::of(args.json) {
             Show::Json => json,
             Show::Table => format!(
                 "{}{}\n",
                 report::questions::table(&summary),
-                config.out.display()
+                args.out.display()
             ),
         },
     })
 }
 
 /// Says what is not wrong, but likely not meant.
-fn warn(made: &Generated, config: &Questions) {
+fn warn(made: &Generated, making: &Making<'_>) {
     for uneven in &made.uneven {
         tracing::warn!("{uneven}");
     }
     let closest = made.tallies.get(&Family::Closest);
     let scale = closest.and_then(|tally| tally.fallen.get(&Reason::Scale));
     if let Some(frames) = scale {
-        let measure = &config.rules.book().measure;
+        let measure = &making.rules.book().measure;
         tracing::warn!(
             "{frames} frames have a median depth outside {}–{} mm, which no room has, and are asked nothing of depth; is their depth_scale right?",
             measure.least_median_depth_mm,
@@ -117,21 +226,19 @@ fn beside(out: &Path, what: &str) -> PathBuf {
 
 /// Measures the frames that were not measured before, and counts those that cannot be.
 fn measured(
-    config: &Questions,
+    making: &Making<'_>,
     dataset: &Dataset,
     labels: &Labels,
     progress: &Progress,
 ) -> Result<(Vec<FrameStatistics>, usize)> {
-    let kept = Kept::open(&beside(&config.out, "statistics.jsonl"))?;
-    let threads = config.threads.map_or(0, std::num::NonZero::get);
-    let cores = ThreadPoolBuilder::new().num_threads(threads).build();
-    let cores = cores.map_err(|e| Error::usage("--threads", e))?;
+    let kept = Kept::open(&beside(&making.args.out, "statistics.jsonl"))?;
+    let cores = pool(making.args.threads.threads)?;
     let names: Vec<&FrameId> = dataset.frames().collect();
     let bar = progress.bar("frames", names.len());
-    let context = context(config, labels);
+    let context = context(making, labels);
     let results: Vec<Option<FrameStatistics>> = cores.install(|| {
         let frames = names.par_iter().map(|name| {
-            let found = one(config, dataset, labels, &kept, context, name);
+            let found = one(making, dataset, labels, &kept, context, name);
             bar.inc();
             found.map_err(|e| tracing::error!("{e}")).ok()
         });
@@ -142,7 +249,7 @@ fn measured(
     let frames: Vec<FrameStatistics> = results.into_iter().flatten().collect();
     if frames.is_empty() {
         return Err(Error::data(
-            config.data.display(),
+            making.args.data.display(),
             "none of its frames could be measured",
         ));
     }
@@ -151,11 +258,11 @@ fn measured(
 }
 
 /// All that decides what is measured, but for the frame.
-fn context(config: &Questions, labels: &Labels) -> Digest {
+fn context(making: &Making<'_>, labels: &Labels) -> Digest {
     let version = statistics::VERSION.to_le_bytes();
     let parts = [
-        config.rules.measure_digest(),
-        config.palette.digest(),
+        making.rules.measure_digest(),
+        making.palette.digest(),
         labels.digest(),
     ];
     Digest::of_parts(
@@ -166,7 +273,7 @@ fn context(config: &Questions, labels: &Labels) -> Digest {
 }
 
 fn one(
-    config: &Questions,
+    making: &Making<'_>,
     dataset: &Dataset,
     labels: &Labels,
     kept: &Kept,
@@ -181,12 +288,12 @@ fn one(
         found
     } else {
         let frame = files.decode()?;
-        let found = measure(&frame, labels, &config.rules, &config.palette, key)?;
+        let found = measure(&frame, labels, &making.rules, &making.palette, key)?;
         kept.add(&found)?;
         found
     };
     let unknown = strangers(&found);
-    if config.strangers == Strangers::Refused && !unknown.is_empty() {
+    if making.args.strict && !unknown.is_empty() {
         let problem = format_args!(
             "its semantic map has the numbers {unknown:?}, which classes.json has not"
         );

@@ -20,11 +20,11 @@ use axum::extract::{DefaultBodyLimit, State};
 use axum::http::StatusCode;
 use axum::response::{IntoResponse as _, Response};
 use axum::routing::{get, post};
+use clap::Args;
 use tokio::runtime;
 
 use crate::ask::{Call, Message, Model, Query, Random};
-use crate::config::Serve;
-use crate::dataset::Dataset;
+use crate::dataset::{self, Dataset, Place};
 use crate::error::{Error, Result};
 use crate::job::Outcome;
 use crate::job::interrupt::Interrupt;
@@ -41,6 +41,20 @@ use request::Asked;
 /// The largest request that is read, in bytes.
 const LARGEST: usize = 64 << 20;
 
+/// The flags of `serve`.
+#[derive(Debug, Args)]
+pub struct ServeArgs {
+    /// The frames that the observer knows: rooms:frames=N,seed=N,size=WIDTHxHEIGHT, or a folder of frames with maps
+    #[arg(long, value_name = "DIR|rooms:…", value_parser = dataset::place, default_value_t)]
+    pub data: Place,
+    /// The port on 127.0.0.1, 0 for any that is free
+    #[arg(long, value_name = "N", default_value_t = 8089)]
+    pub port: u16,
+    /// What decides the guesses
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+}
+
 /// What requests are answered with.
 struct Desk {
     likenesses: Likenesses,
@@ -52,13 +66,13 @@ struct Desk {
 ///
 /// # Errors
 /// Where the frames cannot be read, or the port is taken.
-pub fn serve(config: &Serve, progress: &Progress) -> Result<Outcome> {
-    let dataset = Arc::new(Dataset::open_unasked(&config.place)?);
-    let prior = Random { seed: config.seed };
+pub fn serve(args: &ServeArgs, progress: &Progress) -> Result<Outcome> {
+    let dataset = Arc::new(Dataset::open_unasked(&args.data)?);
+    let prior = Random { seed: args.seed };
     let models = [
         (
             "darkqa-observer",
-            Model::Local(observer::open(&dataset, &config.place, &[], prior)?),
+            Model::Local(observer::open(&dataset, &args.data, &[], prior)?),
         ),
         ("darkqa-random", Model::Random(prior)),
     ];
@@ -68,15 +82,15 @@ pub fn serve(config: &Serve, progress: &Progress) -> Result<Outcome> {
         .enable_all()
         .build()
         .map_err(|e| Error::usage("serve", e))?;
-    runtime.block_on(listen(config, desk, progress))?;
+    runtime.block_on(listen(args, desk, progress))?;
     Ok(Outcome {
         status: Status::Complete,
         output: String::new(),
     })
 }
 
-async fn listen(config: &Serve, desk: Arc<Desk>, progress: &Progress) -> Result<()> {
-    let address = SocketAddr::from((Ipv4Addr::LOCALHOST, config.port));
+async fn listen(args: &ServeArgs, desk: Arc<Desk>, progress: &Progress) -> Result<()> {
+    let address = SocketAddr::from((Ipv4Addr::LOCALHOST, args.port));
     let taken = |e| {
         let problem = format!(
             "{address} cannot be listened at: {e}; --port N takes another, 0 any that is free"

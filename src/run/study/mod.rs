@@ -3,5 +3,5 @@
 mod pack;
 mod read;
 
-pub use pack::pack;
-pub use read::read;
+pub use pack::{PackArgs, pack};
+pub use read::{ReadArgs, read};

@@ -1,41 +1,64 @@
 //! `study pack`: a page on which people answer what the models were asked.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
 
-use crate::config::StudyPack;
+use clap::Args;
+
 use crate::error::{Error, Result};
 use crate::files::write;
 use crate::job::Outcome;
 use crate::job::progress::Progress;
-use crate::job::rebuild::ImageRebuilder;
+use crate::job::rebuild::{ImageRebuilder, RebuildArgs};
 use crate::job::stored::StoredRun;
 use crate::report::study::{Asked, Shot, page};
 use crate::types::manifest::Status;
 use crate::types::{Condition, Digest, FrameId, QuestionId, Record, RunQuestion};
 
+/// The flags of `study pack`.
+#[derive(Debug, Args)]
+pub struct PackArgs {
+    /// The folder of a run
+    #[arg(value_name = "RUN")]
+    pub run: PathBuf,
+    /// Where the page and its images go
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Ask about N questions, drawn by their names; default: all
+    #[arg(long, value_name = "N")]
+    pub items: Option<NonZeroUsize>,
+    /// Only these conditions, as L3-noise+zerodce; repeatable; default: all of the run
+    #[arg(long, value_name = "CONDITION")]
+    pub condition: Vec<Condition>,
+    /// Where everything lies by now.
+    #[command(flatten)]
+    pub rebuild: RebuildArgs,
+}
+
 /// Makes the page and its images, each the very file that the models were sent.
 ///
 /// # Errors
 /// Where the run kept no questions, or its data or enhancers are not where they were.
-pub fn pack(config: StudyPack, progress: &Progress) -> Result<Outcome> {
+pub fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
     let StoredRun {
         manifest,
         records,
         questions: listed,
         ..
-    } = StoredRun::of_choices(&config.run, "openeqa --study DIR makes their page")?;
+    } = StoredRun::of_choices(&args.run, "openeqa --study DIR makes their page")?;
     let wrong = |problem: String| {
-        let path = config.run.clone();
+        let path = args.run.clone();
         Error::Run { path, problem }
     };
-    let conditions = conditions(&records, &config.conditions)?;
+    let conditions = conditions(&records, &args.condition)?;
     if listed.is_empty() || conditions.is_empty() {
         return Err(wrong(
             "no questions about images are kept in this run".to_owned(),
         ));
     }
     let shown = first_order(&records);
-    let chosen = chosen(listed, config.items.map_or(usize::MAX, usize::from));
+    let chosen = chosen(listed, args.items.map_or(usize::MAX, usize::from));
     let mut frames = BTreeMap::<FrameId, Vec<RunQuestion>>::new();
     for question in chosen {
         frames
@@ -44,7 +67,7 @@ pub fn pack(config: StudyPack, progress: &Progress) -> Result<Outcome> {
             .push(question);
     }
     let sent = sent(&records);
-    let mut rebuilder = ImageRebuilder::open(config.again, &manifest, &config.run, &conditions)?;
+    let mut rebuilder = ImageRebuilder::open(args.rebuild, &manifest, &args.run, &conditions)?;
     let bar = progress.bar("images", frames.len() * conditions.len());
     let (mut asked, mut images) = (Vec::new(), 0);
     for (number, (frame, questions)) in frames.into_iter().enumerate() {
@@ -62,7 +85,7 @@ pub fn pack(config: StudyPack, progress: &Progress) -> Result<Outcome> {
             // The name says nothing of the level.
             let name = Digest::of_parts([frame.0.as_bytes(), condition.to_string().as_bytes()]);
             let name = format!("images/{}.{}", &name.to_string()[..16], made.ending);
-            write(&config.out.join(&name), &made.file)?;
+            write(&args.out.join(&name), &made.file)?;
             shots.push(Shot {
                 condition: condition.to_string(),
                 images: vec![name],
@@ -79,7 +102,7 @@ pub fn pack(config: StudyPack, progress: &Progress) -> Result<Outcome> {
         }));
     }
     drop(bar);
-    let path = config.out.join("study.html");
+    let path = args.out.join("study.html");
     write(&path, page(&asked)?.as_bytes())?;
     Ok(Outcome {
         status: Status::Complete,

@@ -3,20 +3,41 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt::Write;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use clap::Args;
+use clap::builder::NonEmptyStringValueParser;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use crate::config::{Show, StudyRead};
 use crate::error::{Error, Result};
 use crate::job::report::choice;
 use crate::job::stored::StoredRun;
 
-use crate::job::{Outcome, count, now};
+use crate::job::{Outcome, Show, count, now};
 use crate::store::{Moved, Store};
 use crate::types::manifest::{Counts, RunManifest, Status};
 use crate::types::{ChoiceDetail, Condition, Detail, Digest, QuestionId, Record, Reply, TrialKey};
+
+/// The flags of `study read`.
+#[derive(Debug, Args)]
+pub struct ReadArgs {
+    /// The folder of the run whose questions were answered
+    #[arg(value_name = "RUN")]
+    pub run: PathBuf,
+    /// Files of answers, as the page saves them: lines of {"question", "condition", "person", "answer"}
+    #[arg(value_name = "FILE", required = true)]
+    pub files: Vec<PathBuf>,
+    /// The folder of the people's run
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// What the people are called among the models
+    #[arg(long, value_name = "NAME", default_value = "human", value_parser = NonEmptyStringValueParser::new())]
+    pub name: String,
+    /// Print the summary as JSON instead of a table
+    #[arg(long)]
+    pub json: bool,
+}
 
 /// A line of a file of answers.
 #[derive(Debug, Deserialize)]
@@ -42,20 +63,20 @@ struct Tally {
 ///
 /// # Errors
 /// Where the folder holds no run or a line is no answer; or nothing in the files was asked in the run.
-pub fn read(config: &StudyRead) -> Result<Outcome> {
+pub fn read(args: &ReadArgs) -> Result<Outcome> {
     let StoredRun {
         manifest,
         records,
         questions,
         ..
     } = StoredRun::of_choices(
-        &config.run,
+        &args.run,
         "openeqa --answers NAME=FILE reads what people answered",
     )?;
     let asked = asked(records);
     let mut tally = Tally::default();
     let mut lines = Vec::new();
-    for path in &config.files {
+    for path in &args.files {
         lines.extend(answers(path)?);
     }
     // Before the folder is made, so that files of another study leave nothing behind.
@@ -74,24 +95,24 @@ pub fn read(config: &StudyRead) -> Result<Outcome> {
     if known.is_empty() {
         let problem =
             "no answer in the files is to a question and condition of this run".to_owned();
-        let path = config.run.clone();
+        let path = args.run.clone();
         return Err(Error::Run { path, problem });
     }
-    let own = of_people(&manifest, config);
-    let mut store = Store::open(&config.out, &own, Moved::Allowed)?;
+    let own = of_people(&manifest, args);
+    let mut store = Store::open(&args.out, &own, Moved::Allowed)?;
     store.write_questions(&questions)?;
     let mut people = People::new(store.records()?);
     for (asked, line) in known {
         tally.answers += 1;
-        if let Some(record) = people.record(asked, &line, &config.name)? {
+        if let Some(record) = people.record(asked, &line, &args.name)? {
             store.append(&record)?;
         }
     }
     store.sync()?;
-    let mut run = StoredRun::of(&config.out, own)?;
+    let mut run = StoredRun::of(&args.out, own)?;
     run.manifest.count(count(run.records.len(), &run.records));
-    let mut outcome = choice::write(&store, run, config.show)?;
-    if config.show == Show::Table {
+    let mut outcome = choice::write(&store, run, Show::of(args.json))?;
+    if Show::of(args.json) == Show::Table {
         outcome.output.insert_str(0, &told(&tally));
     }
     Ok(outcome)
@@ -127,9 +148,9 @@ fn asked(records: Vec<Record>) -> HashMap<(QuestionId, Condition), Record> {
 }
 
 /// The manifest of the people's run: the images are those of the run that they were asked about.
-fn of_people(run: &RunManifest, config: &StudyRead) -> RunManifest {
+fn of_people(run: &RunManifest, args: &ReadArgs) -> RunManifest {
     let identity = [
-        ("--model", json!([config.name])),
+        ("--model", json!([args.name])),
         ("people asked about", json!(run.identity)),
     ];
     RunManifest {

@@ -4,14 +4,14 @@ mod sheet;
 mod sidecar;
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use clap::{Args, ValueEnum};
 use rayon::prelude::*;
 
 use crate::ask::png;
-use crate::config::{Existing, Light, Product, Synthesize};
-use crate::dataset::Picture;
 use crate::dataset::inputs::{Entry, Inputs, stem};
+use crate::dataset::{Picture, PixelLimit};
 use crate::error::{Error, Result};
 use crate::files::write;
 use crate::job::Outcome;
@@ -20,11 +20,59 @@ use crate::job::progress::{Bar, Progress};
 use crate::job::recipe::Recipe;
 use crate::job::source::Frames;
 use crate::job::timings::Timings;
-use crate::job::workers::pool;
-use crate::synthesis::NoiseKey;
+use crate::job::workers::{ThreadArgs, pool};
+use crate::synthesis::{Light, LightArgs, NoiseKey, SensorArgs};
 use crate::types::manifest::Status;
 use crate::types::{Condition, Degradation, FrameId, Rgb};
 use sidecar::Sidecar;
+
+/// The flags of `synthesize`.
+#[derive(Debug, Args)]
+pub struct SynthesizeArgs {
+    /// Images, folders of images, or folders of frames (frames.jsonl)
+    #[arg(required = true, value_name = "INPUT")]
+    pub inputs: Vec<PathBuf>,
+    /// Where the images go, each with a JSON file that holds all that made it
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Light.
+    #[command(flatten)]
+    pub light: LightArgs,
+    /// Light, as a sensor sees it.
+    #[command(flatten)]
+    pub sensor: SensorArgs,
+    /// Make again the image that this JSON file stands beside, from the one INPUT that it was made from; default: make images of
+    /// all levels
+    #[arg(long, value_name = "FILE", help_heading = "Synthesis")]
+    pub from: Option<PathBuf>,
+    /// One figure per input instead; default: images
+    #[arg(long, value_enum, help_heading = "Synthesis", conflicts_with = "from")]
+    pub sheet: Option<Sheet>,
+    /// Make again what is there already
+    #[arg(long, help_heading = "Synthesis")]
+    pub force: bool,
+    /// How large an image may be.
+    #[command(flatten)]
+    pub limit: PixelLimit,
+    /// On how many threads.
+    #[command(flatten)]
+    pub threads: ThreadArgs,
+}
+
+/// A figure of one frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Sheet {
+    /// Both variants by level, with amplified crops
+    Levels,
+    /// Each term of the noise alone
+    Noise,
+}
+
+/// The flags, and the light that they say.
+struct Making<'a> {
+    args: &'a SynthesizeArgs,
+    light: Light,
+}
 
 /// Makes the images that the command asks for.
 ///
@@ -32,19 +80,23 @@ use sidecar::Sidecar;
 ///
 /// # Errors
 /// Where nothing can be made: no such input, two frames of one name, no folder to write to.
-pub fn synthesize(config: &Synthesize, progress: &Progress) -> Result<Outcome> {
-    let frames = Inputs::open(&config.inputs, config.most_pixels)?;
-    let cores = pool(config.threads)?;
-    fs::create_dir_all(&config.out).map_err(|e| Error::file(&config.out, "make", e))?;
-    if let Product::Replay(file) = &config.product {
-        return cores.install(|| replay(config, &frames, file));
+pub fn synthesize(args: &SynthesizeArgs, progress: &Progress) -> Result<Outcome> {
+    let making = &Making {
+        args,
+        light: Light::resolve(args.light.clone(), &args.sensor)?,
+    };
+    let frames = Inputs::open(&args.inputs, args.limit.max_pixels.get())?;
+    let cores = pool(args.threads.threads)?;
+    fs::create_dir_all(&args.out).map_err(|e| Error::file(&args.out, "make", e))?;
+    if let Some(file) = &args.from {
+        return cores.install(|| replay(args, &frames, file));
     }
-    let files = files(config);
+    let files = files(making);
     let bar = progress.bar("images", frames.entries.len() * files.len());
     let made: Vec<Tally> = cores.install(|| {
         let entries = frames.entries.par_iter();
         entries
-            .map(|entry| one(config, &frames, entry, &files, &bar))
+            .map(|entry| one(making, &frames, entry, &files, &bar))
             .collect()
     });
     drop(bar);
@@ -53,7 +105,7 @@ pub fn synthesize(config: &Synthesize, progress: &Progress) -> Result<Outcome> {
         kept: sum.kept + tally.kept,
         failed: sum.failed + tally.failed,
     });
-    Ok(total.verdict(config, frames.entries.len()))
+    Ok(total.outcome(&args.out, frames.entries.len()))
 }
 
 /// What became of the images.
@@ -65,7 +117,7 @@ struct Tally {
 }
 
 impl Tally {
-    fn verdict(self, config: &Synthesize, frames: usize) -> Outcome {
+    fn outcome(self, out: &Path, frames: usize) -> Outcome {
         let Self { made, kept, failed } = self;
         let kept = match kept {
             0 => String::new(),
@@ -83,7 +135,7 @@ impl Tally {
             },
             output: format!(
                 "{}: {made} made of {frames} frames{kept}{lost}\n",
-                config.out.display()
+                out.display()
             ),
         }
     }
@@ -93,27 +145,23 @@ impl Tally {
 #[derive(Debug, Clone)]
 enum File {
     Image(Option<Degradation>),
-    LevelSheet,
-    NoiseSheet,
+    Sheet(Sheet),
 }
 
 /// The files of each frame.
-fn files(config: &Synthesize) -> Vec<File> {
-    match config.product {
-        Product::LevelSheet => vec![File::LevelSheet],
-        Product::NoiseSheet => vec![File::NoiseSheet],
-        Product::Images | Product::Replay(_) => {
-            let degradations = config.light.degradations().into_iter();
-            degradations.map(File::Image).collect()
-        }
+fn files(making: &Making<'_>) -> Vec<File> {
+    if let Some(sheet) = making.args.sheet {
+        return vec![File::Sheet(sheet)];
     }
+    let degradations = making.light.degradations().into_iter();
+    degradations.map(File::Image).collect()
 }
 
 /// Makes all images of one frame.
-fn one(config: &Synthesize, frames: &Inputs, entry: &Entry, files: &[File], bar: &Bar) -> Tally {
+fn one(making: &Making<'_>, frames: &Inputs, entry: &Entry, files: &[File], bar: &Bar) -> Tally {
     let mut tally = Tally::default();
     let frames = OneFrame { frames, entry };
-    let recipe = Recipe::lossless(&config.light.sensor, &[]);
+    let recipe = Recipe::lossless(&making.light.sensor, &[]);
     let timings = Timings::default();
     let steps = Steps {
         frames: &frames,
@@ -122,7 +170,7 @@ fn one(config: &Synthesize, frames: &Inputs, entry: &Entry, files: &[File], bar:
         timings: &timings,
     };
     let mut work = Work {
-        config,
+        making,
         entry,
         frame: FrameWork::of(steps, entry.id.clone()),
     };
@@ -134,8 +182,8 @@ fn one(config: &Synthesize, frames: &Inputs, entry: &Entry, files: &[File], bar:
     for file in files {
         let made = match file {
             File::Image(degradation) => work.image(degradation.as_ref()),
-            File::LevelSheet => work.sheet("levels", sheet::levels),
-            File::NoiseSheet => work.sheet("noise", sheet::terms),
+            File::Sheet(Sheet::Levels) => work.sheet("levels", sheet::levels),
+            File::Sheet(Sheet::Noise) => work.sheet("noise", sheet::terms),
         };
         match made {
             Ok(Made::New) => tally.made += 1,
@@ -164,7 +212,7 @@ impl Frames for OneFrame<'_> {
 
 /// One frame being worked on.
 struct Work<'a> {
-    config: &'a Synthesize,
+    making: &'a Making<'a>,
     entry: &'a Entry,
     frame: FrameWork<'a>,
 }
@@ -177,14 +225,15 @@ enum Made {
 
 impl Work<'_> {
     fn image(&mut self, how: Option<&Degradation>) -> Result<Made> {
-        let light = &self.config.light;
+        let light = &self.making.light;
         let key = NoiseKey::new(light.sensor.seed, &self.entry.id);
         let condition = Condition::raw(how.cloned());
         let name = format!("{}_{condition}", self.entry.stem);
         let picture = self.frame.picture()?;
         let sidecar = Sidecar::new(&self.entry.id, picture, how, light, &key)?;
-        let [image, json] = [".png", ".json"].map(|end| self.config.out.join(name.clone() + end));
-        if self.config.existing == Existing::Kept && image.exists() && json.exists() {
+        let [image, json] =
+            [".png", ".json"].map(|end| self.making.args.out.join(name.clone() + end));
+        if !self.making.args.force && image.exists() && json.exists() {
             if sidecar.is_at(&json)? {
                 return Ok(Made::Kept);
             }
@@ -203,20 +252,21 @@ impl Work<'_> {
         draw: fn(&Rgb, &FrameId, &Light) -> Result<Rgb>,
     ) -> Result<Made> {
         let path = self
-            .config
+            .making
+            .args
             .out
             .join(format!("{}_{kind}.png", self.entry.stem));
-        if self.config.existing == Existing::Kept && path.exists() {
+        if !self.making.args.force && path.exists() {
             return Ok(Made::Kept);
         }
-        let figure = draw(self.frame.clean()?, &self.entry.id, &self.config.light)?;
+        let figure = draw(self.frame.clean()?, &self.entry.id, &self.making.light)?;
         write(&path, &png(&figure)?)?;
         Ok(Made::New)
     }
 }
 
 /// Makes the one image again that a file tells of.
-fn replay(config: &Synthesize, frames: &Inputs, file: &Path) -> Result<Outcome> {
+fn replay(args: &SynthesizeArgs, frames: &Inputs, file: &Path) -> Result<Outcome> {
     let sidecar = Sidecar::read(file)?;
     let [entry] = &frames.entries[..] else {
         let problem = format_args!(
@@ -227,8 +277,8 @@ fn replay(config: &Synthesize, frames: &Inputs, file: &Path) -> Result<Outcome> 
     };
     let picture = frames.picture(entry)?;
     let dark = sidecar.replay(&picture, file)?;
-    let path = config.out.join(sidecar.name(&stem(&sidecar.frame())?));
-    if config.existing == Existing::Kept && path.exists() {
+    let path = args.out.join(sidecar.name(&stem(&sidecar.frame())?));
+    if !args.force && path.exists() {
         let problem = "there already; --force makes it again";
         return Err(Error::data(path.display(), problem));
     }
@@ -237,5 +287,5 @@ fn replay(config: &Synthesize, frames: &Inputs, file: &Path) -> Result<Outcome> 
         made: 1,
         ..Tally::default()
     };
-    Ok(made.verdict(config, 1))
+    Ok(made.outcome(&args.out, 1))
 }

@@ -2,9 +2,9 @@
 
 use ndarray::Array2;
 
-use crate::config::Light;
 use crate::error::Result;
 use crate::report::sheet::{self, LevelColumn, Signal};
+use crate::synthesis::Light;
 use crate::synthesis::bayer::Bayer;
 use crate::synthesis::noise::{self, Term};
 use crate::synthesis::unprocess::unprocess;

@@ -6,9 +6,9 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::config::Light;
 use crate::dataset::Picture;
 use crate::error::{Error, Result};
+use crate::synthesis::Light;
 use crate::synthesis::noise::Term;
 use crate::synthesis::{
     self, Amplify, CameraState, Coupling, Draws, Negative, NoiseKey, Synthesis, Tone, degrade,

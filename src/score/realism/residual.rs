@@ -2,12 +2,12 @@
 //! ones ([`divergence`]).
 
 use std::fmt;
-use std::str::FromStr;
 
+use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
 use super::ssim::same_size;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::types::Rgb;
 
 /// Differences of two 8-bit codes: −255 to 255.
@@ -94,7 +94,7 @@ impl Residuals {
 }
 
 /// The bins of a residual histogram.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Bins {
     /// Residuals in [0, 1] units, 64 bins from −0.1 to 0.1 and one beyond either end, as the code of Fu et al. 2023 has it.
@@ -105,7 +105,7 @@ pub enum Bins {
 }
 
 /// What is done about empty bins.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Empty {
     /// 10⁻⁸ is added to the share of each bin, and the shares are made to sum to 1 again.
@@ -215,36 +215,6 @@ fn shares(counts: &[u64], added: Added) -> Vec<f64> {
         Added::Count | Added::Share => raised.iter().sum(),
     };
     raised.iter().map(|share| share / sum).collect()
-}
-
-impl FromStr for Bins {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self> {
-        match text {
-            "fu" => Ok(Self::Fu),
-            "kousha" => Ok(Self::Kousha),
-            _ => Err(Error::usage(
-                "bins",
-                format_args!("{text:?} is none of fu, kousha"),
-            )),
-        }
-    }
-}
-
-impl FromStr for Empty {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self> {
-        match text {
-            "eps" => Ok(Self::Eps),
-            "drop" => Ok(Self::Drop),
-            _ => Err(Error::usage(
-                "rule",
-                format_args!("{text:?} is none of eps, drop"),
-            )),
-        }
-    }
 }
 
 impl fmt::Display for Bins {

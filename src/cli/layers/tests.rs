@@ -1,0 +1,309 @@
+use clap::CommandFactory as _;
+
+use super::*;
+use crate::cli::Cli;
+
+/// What the words, the variables and the file `c.toml` with this text say together.
+fn parsed(words: &[&str], variables: &[(&str, &str)], file: &str) -> Result<ArgMatches, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("c.toml");
+    fs::write(&path, file).unwrap();
+    let mut words: Vec<OsString> = words.iter().map(OsString::from).collect();
+    words.insert(0, "darkqa-eval".into());
+    if !file.is_empty() {
+        words.extend(["--config".into(), path.into()]);
+    }
+    let variable = |name: &str| {
+        let mut variables = variables.iter();
+        let found = variables.find(|(known, _)| *known == name);
+        found.map(|(_, value)| value.into())
+    };
+    parse(Cli::command(), words, variable).map_err(|problem| match problem {
+        Problem::Error(error) => error.to_string(),
+        Problem::Help(help) => help.to_string(),
+    })
+}
+
+/// The values of a flag of the command that is called.
+fn values(matches: &ArgMatches, id: &str) -> Vec<String> {
+    let values = own(matches).get_raw(id).into_iter().flatten();
+    values.map(|value| value.to_string_lossy().into()).collect()
+}
+
+/// All commands with the words that call them, nested ones included.
+fn commands(command: &Command, path: &[String]) -> Vec<(Vec<String>, Command)> {
+    let mut all = vec![(path.to_vec(), command.clone())];
+    for inner in command.get_subcommands() {
+        if inner.get_name() != "help" {
+            let path = [path, &[inner.get_name().to_owned()]].concat();
+            all.extend(commands(inner, &path));
+        }
+    }
+    all
+}
+
+/// A value that a flag takes, and that is not its default.
+fn sample(arg: &Arg) -> String {
+    let possible = arg.get_possible_values();
+    if let Some(last) = possible.last() {
+        return last.get_name().to_owned();
+    }
+    let text = match arg.get_id().as_str() {
+        "levels" => "L3",
+        "variant" | "llie_on" => "ev",
+        "temperature" | "judge_temperature" => "0.7",
+        "concurrency" => "4",
+        "image" => "jpeg:90",
+        "tile" => "whole",
+        "size" => "64x48",
+        "answers" => "people=answers.json",
+        "condition" => "L3-noise",
+        "url" => "/v1/responses",
+        "families" => "color",
+        "data" | "model" | "judge" => "abc",
+        _ => match arg.get_value_names() {
+            Some([name])
+                if [
+                    "N", "SECONDS", "PIXELS", "MB", "DOLLARS", "EV", "K", "R", "METRES", "DEGREES",
+                ]
+                .contains(&name.as_str()) =>
+            {
+                "3"
+            }
+            Some([name]) if name == "PIXELS|native" || name == "N|none" => "3",
+            _ => "abc",
+        },
+    };
+    text.to_owned()
+}
+
+/// The words that a command cannot do without, but for one flag.
+fn required(command: &Command, but: &Arg) -> Vec<String> {
+    let mut words = Vec::new();
+    for arg in command.get_arguments() {
+        let conflicts = hides(command, but, arg);
+        let needed = arg.is_required_set() || arg.get_id() == "inputs" || arg.get_id() == "pairs";
+        if conflicts || !needed && arg.get_id() != "out" {
+            continue;
+        }
+        if let Some(flag) = arg.get_long() {
+            words.push(format!("--{flag}={}", sample(arg)));
+        } else {
+            words.push(sample(arg));
+        }
+    }
+    words
+}
+
+#[test]
+fn every_flag_is_said_by_word_variable_and_file_alike() {
+    let mut all = Cli::command();
+    all.build();
+    let (mut wrong, mut count) = (Vec::new(), 0);
+    for (path, command) in commands(&all, &[]) {
+        if command.has_subcommands() && !path.is_empty() {
+            continue;
+        }
+        for arg in of_flags(&command) {
+            count += 1;
+            let id = arg.get_id().as_str();
+            let flag = arg.get_long().unwrap();
+            let switch = !arg.get_action().takes_values();
+            let value = if switch {
+                "true".to_owned()
+            } else {
+                sample(arg)
+            };
+            // What the flag needs beside it.
+            let mut words = [&path[..], &required(&command, arg)].concat();
+            match id {
+                "normal" => words.push("--low=abc".to_owned()),
+                "low" => {
+                    words.retain(|word| word != "abc");
+                    words.push("--normal=abc".to_owned());
+                }
+                _ => {}
+            }
+            let words: Vec<&str> = words.iter().map(String::as_str).collect();
+            let word = if switch {
+                format!("--{flag}")
+            } else {
+                format!("--{flag}={value}")
+            };
+            let (variable, key) = (name_of(&key(arg)), key(arg));
+            let table = match &path[..] {
+                [] => String::new(),
+                path => format!("[{}]\n", path.join(".")),
+            };
+            let typed = parsed(&[&words[..], &[&word]].concat(), &[], "");
+            let set = parsed(&words, &[(&variable, &value)], "");
+            let top = parsed(&words, &[], &format!("{key} = {value:?}"));
+            let filed = parsed(&words, &[], &format!("{table}{key} = {value:?}"));
+            for (how, matches) in [
+                ("word", typed),
+                ("variable", set),
+                ("file", top),
+                ("table", filed),
+            ] {
+                let found = matches.map(|matches| values(&matches, id));
+                let expected = vec![value.clone()];
+                if found.as_ref() != Ok(&expected) {
+                    wrong.push(format!(
+                        "{path:?} {flag} by {how}: {found:?} for {expected:?}"
+                    ));
+                }
+            }
+        }
+    }
+    assert!(count > 150, "{count}");
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn every_flag_says_what_it_is_if_nobody_says_it() {
+    let mut all = Cli::command();
+    all.build();
+    for (path, command) in commands(&all, &[]) {
+        for arg in command.get_arguments() {
+            let help = arg.get_long_help().or(arg.get_help());
+            let help = help.map(ToString::to_string).unwrap_or_default();
+            let said = !arg.get_action().takes_values()
+                || arg.get_long().is_none()
+                || arg.is_required_set()
+                || !arg.get_default_values().is_empty()
+                || help.contains("default: ");
+            assert!(said, "{path:?} {}: no default is said", arg.get_id());
+        }
+    }
+}
+
+#[test]
+fn words_go_before_variables_before_the_file() {
+    let variables = [
+        ("DARKQA_SEED", "2"),
+        ("DARKQA_GAIN", "0.5"),
+        ("DARKQA_MODEL", "a,b"),
+        ("DARKQA_BLIND", "true"),
+    ];
+    let file = "seed = 3\ngain = 1\nratio = 150\nmodel = [\"c\"]\nquiet = false\nfamilies = [\"x\", \"y\"]\n";
+    let matches = parsed(&["--seed", "1"], &variables, file).unwrap();
+    for (id, expected) in [
+        ("seed", &["1"][..]),
+        ("gain", &["0.5"]),
+        ("ratio", &["150"]),
+        ("model", &["a", "b"]),
+        ("families", &["x", "y"]),
+    ] {
+        assert_eq!(values(&matches, id), expected, "{id}");
+    }
+    assert!(matches.get_flag("blind") && !matches.get_flag("quiet"));
+}
+
+#[test]
+fn a_table_of_a_command_goes_before_the_top_and_says_nothing_to_others() {
+    let file = "seed = 3\n[synthesize]\nseed = 4\nsheet = \"noise\"\n[batch.export]\nseed = 5\n";
+    let words = ["synthesize", "in", "--out", "out"];
+    let matches = parsed(&words, &[], file).unwrap();
+    assert_eq!(values(&matches, "seed"), ["4"]);
+    assert_eq!(values(&matches, "sheet"), ["noise"]);
+    assert_eq!(values(&parsed(&[], &[], file).unwrap(), "seed"), ["3"]);
+    let matches = parsed(&["batch", "export"], &[], file).unwrap();
+    assert_eq!(values(&matches, "seed"), ["5"]);
+}
+
+#[test]
+fn the_first_to_speak_of_a_switch_decides() {
+    for (variable, file, expected) in [
+        ("false", "allow-http = true", false),
+        ("", "allow-http = false", false),
+        ("true", "allow-http = false", true),
+        ("", "allow-http = true", true),
+        ("", "", false),
+    ] {
+        let matches = parsed(&[], &[("DARKQA_ALLOW_HTTP", variable)], file).unwrap();
+        assert_eq!(
+            matches.get_flag("allow_http"),
+            expected,
+            "{variable} {file}"
+        );
+    }
+}
+
+#[test]
+fn a_flag_hides_what_it_conflicts_with_below() {
+    let file = "resume = \"old\"\napi-key-env = \"KEY\"";
+    let words = ["--out", "new"];
+    let matches = parsed(&words, &[("DARKQA_API_KEY_FILE", "key")], file).unwrap();
+    assert_eq!(values(&matches, "out"), ["new"]);
+    assert_eq!(values(&matches, "api_key_file"), ["key"]);
+    assert!(values(&matches, "resume").is_empty());
+    assert!(values(&matches, "api_key_env").is_empty());
+}
+
+#[test]
+fn what_cannot_be_used_names_where_it_is_said_and_what_may_be_meant() {
+    let wrong = |words: &[&str], variables: &[(&str, &str)], file: &str| {
+        parsed(words, variables, file).unwrap_err()
+    };
+    let error = wrong(&[], &[("DARKQA_RETRIES", "many")], "");
+    assert!(
+        error.starts_with("DARKQA_RETRIES: invalid value 'many'"),
+        "{error}"
+    );
+    for (words, file, says) in [
+        (
+            &[][..],
+            "sed = 1",
+            "c.toml, sed: there is no flag --sed here; did you mean --seed?",
+        ),
+        (
+            &[],
+            "retries = \"many\"",
+            "c.toml, retries: invalid value 'many'",
+        ),
+        (&[], "blind = 3", "c.toml, blind: true or false"),
+        (
+            &[],
+            "[synthesise]\nseed = 1",
+            "there is no command synthesise; did you mean synthesize?",
+        ),
+        (
+            &["synthesize", "a", "--out=b"],
+            "model = \"m\"",
+            "model: there is no flag --model here",
+        ),
+        (
+            &["synthesize", "a", "--out=b"],
+            "[synthesize]\nsheet = \"nose\"",
+            "c.toml, synthesize.sheet: invalid value 'nose'",
+        ),
+        (
+            &["--modle", "m"],
+            "",
+            "a similar argument exists: '--model'",
+        ),
+        (&["synthesise"], "", "synthesize"),
+        (
+            &["--profile", "papre"],
+            "",
+            "a similar value exists: 'paper'",
+        ),
+        (
+            &["--model", "rndom"],
+            "",
+            "did you mean the built-in model random?",
+        ),
+    ] {
+        let error = wrong(words, &[], file);
+        assert!(error.contains(says), "{says}: {error}");
+        assert_eq!(error.lines().count(), 1, "{error}");
+    }
+}
+
+#[test]
+fn words_after_two_dashes_stay_where_they_are() {
+    let words = ["synthesize", "--out=o", "--", "--odd-name.png"];
+    let matches = parsed(&words, &[("DARKQA_SEED", "9")], "").unwrap();
+    assert_eq!(values(&matches, "inputs"), ["--odd-name.png"]);
+    assert_eq!(values(&matches, "seed"), ["9"]);
+}

@@ -1,0 +1,75 @@
+//! What flags say of data: [`DataArgs`], [`SelectionArgs`], [`PixelLimit`].
+
+use std::convert::Infallible;
+use std::fmt;
+use std::num::{NonZeroU64, NonZeroUsize};
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::picture::MOST_PIXELS;
+use super::{Place, Rooms};
+use crate::types::Family;
+
+/// Where the data are.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Data")]
+pub struct DataArgs {
+    /// A folder of frames, a ready-made set (.tsv, .jsonl), or built-in rooms, rooms:frames=N,seed=N,size=WIDTHxHEIGHT
+    #[arg(long, value_name = "DIR|FILE|rooms:…", value_parser = place, default_value_t)]
+    pub data: Place,
+}
+
+/// Which questions about them are asked.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Data")]
+pub struct SelectionArgs {
+    /// The questions about a folder of frames; default: questions.jsonl in it, else made by rule from its maps
+    #[arg(long, value_name = "FILE")]
+    pub questions: Option<PathBuf>,
+    /// Only the first N questions; default: all
+    #[arg(long, value_name = "N")]
+    pub limit: Option<NonZeroUsize>,
+    /// Only these question families (or categories of a ready-made set), separated by commas; default: all
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = family)]
+    pub families: Vec<Family>,
+}
+
+/// How large an image may be.
+#[derive(Debug, Clone, Copy, Args)]
+#[command(next_help_heading = "Data")]
+pub struct PixelLimit {
+    /// The most pixels an image may have before it is refused undecoded
+    #[arg(long, value_name = "N", default_value_t = NonZeroU64::new(MOST_PIXELS).unwrap_or(NonZeroU64::MIN))]
+    pub max_pixels: NonZeroU64,
+}
+
+/// Reads a path, `rooms` or `rooms:frames=48,seed=7,size=1280x720`; a file or folder named rooms goes before the built-in ones.
+pub fn place(text: &str) -> Result<Place, String> {
+    let path = PathBuf::from(text);
+    match text.strip_prefix("rooms:") {
+        Some(rooms) => rooms.parse().map(Place::Rooms),
+        None if text == "rooms" && !path.exists() => Ok(Place::Rooms(Rooms::default())),
+        None => Ok(Place::Path(path)),
+    }
+}
+
+#[expect(clippy::unnecessary_wraps, reason = "the form of a value parser")]
+fn family(name: &str) -> Result<Family, Infallible> {
+    Ok(Family::from(name.trim()))
+}
+
+impl Default for Place {
+    fn default() -> Self {
+        Self::Rooms(Rooms::default())
+    }
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Rooms(rooms) => write!(f, "rooms:{rooms}"),
+            Self::Path(path) => path.display().fmt(f),
+        }
+    }
+}

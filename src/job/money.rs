@@ -1,0 +1,60 @@
+//! What a run may cost: [`Money`].
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::shard::Shard;
+use crate::ask::Prices;
+use crate::error::Result;
+use crate::types::flag::positive;
+
+/// When to stop.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Sending")]
+pub struct MoneyArgs {
+    /// Stop when this many trials have failed; default: never
+    #[arg(long, value_name = "N")]
+    pub max_failures: Option<NonZeroUsize>,
+    /// Stop before the run has cost more than this; the same command with more goes on; default: never
+    #[arg(long, value_name = "DOLLARS", value_parser = positive)]
+    pub max_cost: Option<f64>,
+    /// A TOML file of prices in place of the built-in table; default: the built-in table
+    #[arg(long, value_name = "FILE")]
+    pub prices: Option<PathBuf>,
+    /// Send nothing: print requests, tokens, dollars, hours and bytes
+    #[arg(long)]
+    pub dry_run: bool,
+}
+
+/// What a run may cost, and whether it is carried out.
+#[derive(Debug)]
+pub struct Money {
+    /// What models cost.
+    pub prices: Prices,
+    /// The most that this part of a run may cost, in dollars.
+    pub most: Option<f64>,
+    /// This many failed trials end the run.
+    pub max_failures: Option<usize>,
+    /// Whether to say what it would take, and send nothing.
+    pub dry_run: bool,
+}
+
+impl Money {
+    /// Reads the prices.
+    ///
+    /// # Errors
+    /// If the file of prices cannot be used.
+    pub(super) fn resolve(args: &MoneyArgs, shard: Shard) -> Result<Self> {
+        Ok(Self {
+            prices: match &args.prices {
+                Some(path) => Prices::load(path)?,
+                None => Prices::built_in()?,
+            },
+            most: args.max_cost.map(|most| shard.part_of(most)),
+            max_failures: args.max_failures.map(NonZeroUsize::get),
+            dry_run: args.dry_run,
+        })
+    }
+}

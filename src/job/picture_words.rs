@@ -1,0 +1,96 @@
+//! The flags that decide the images of a run, as they were said: a manifest keeps them, and they are read again ([`Pictures`]).
+
+use std::collections::BTreeMap;
+use std::num::NonZeroU32;
+use std::path::PathBuf;
+
+use clap::parser::ValueSource;
+use clap::{ArgAction, ArgMatches, CommandFactory as _, Parser};
+use serde_json::Value;
+
+use super::walk::Walk;
+use crate::ask::ImageArgs;
+use crate::dataset::{DataArgs, PixelLimit};
+use crate::enhance::SizeArgs;
+use crate::error::{Error, Result};
+use crate::synthesis::SensorArgs;
+
+/// Flags by their long names: a text, a list of texts, or `true` for a switch.
+pub type PictureWords = BTreeMap<String, Value>;
+
+/// All flags that decide images.
+#[derive(Debug, Parser)]
+#[command(no_binary_name = true, disable_help_flag = true, mut_arg("frames", |arg| arg.required(false)))]
+pub(crate) struct Pictures {
+    #[command(flatten)]
+    pub(crate) data: DataArgs,
+    #[command(flatten)]
+    pub(crate) limit: PixelLimit,
+    #[command(flatten)]
+    pub(crate) sensor: SensorArgs,
+    #[arg(long)]
+    pub(crate) llie: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(crate) size: SizeArgs,
+    #[command(flatten)]
+    pub(crate) images: ImageArgs,
+    #[arg(long)]
+    pub(crate) max_side: Option<NonZeroU32>,
+    #[command(flatten)]
+    pub(crate) walk: Option<Walk>,
+}
+
+impl Pictures {
+    /// Reads the flags of a manifest.
+    pub(crate) fn read(words: &PictureWords) -> Result<Self, String> {
+        let text = |value: &Value| {
+            let text = value.as_str();
+            text.map_or_else(|| value.to_string(), str::to_owned)
+        };
+        let flags = words.iter().flat_map(|(flag, value)| match value {
+            Value::Bool(true) => vec![format!("--{flag}")],
+            Value::Array(list) => {
+                let texts = list.iter().map(text);
+                texts.map(|text| format!("--{flag}={text}")).collect()
+            }
+            value => vec![format!("--{flag}={}", text(value))],
+        });
+        Self::try_parse_from(flags)
+            .map_err(|e| format!("the flags of its images mean nothing to this version: {e}"))
+    }
+}
+
+/// What was said of images in a call; of flags that take several values also the default, since a later call may add to them.
+///
+/// # Errors
+/// If a value is no text that a manifest can hold.
+pub fn said(matches: &ArgMatches) -> Result<PictureWords> {
+    let flags = Pictures::command();
+    let mut words = PictureWords::new();
+    for argument in flags.get_arguments() {
+        let id = argument.get_id().as_str();
+        let (flag, action) = (argument.get_long().unwrap_or(id), argument.get_action());
+        let several = matches!(action, ArgAction::Append);
+        let source = match matches.try_contains_id(id) {
+            Ok(true) => matches.value_source(id),
+            _ => None,
+        };
+        if source != Some(ValueSource::CommandLine) && !(several && source.is_some()) {
+            continue;
+        }
+        let texts = matches.get_raw(id).into_iter().flatten();
+        let texts: Option<Vec<Value>> = texts.map(|text| Some(text.to_str()?.into())).collect();
+        let mut texts = texts.ok_or_else(|| {
+            let problem = "cannot be kept in the manifest: it is no Unicode";
+            Error::usage(format!("--{flag}"), problem)
+        })?;
+        let value = match texts.pop() {
+            _ if !action.takes_values() => Value::Bool(true),
+            Some(last) if several => Value::Array([texts, vec![last]].concat()),
+            Some(last) => last,
+            None => continue,
+        };
+        words.insert(flag.to_owned(), value);
+    }
+    Ok(words)
+}

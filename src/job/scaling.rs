@@ -1,0 +1,37 @@
+//! In what size images are sent: [`Scaling`].
+
+use std::num::NonZeroU32;
+
+use serde::Serialize;
+
+use super::bilinear;
+use crate::ask::Payload;
+
+/// In what size an image is sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Scaling {
+    /// In its own.
+    Never,
+    /// Made smaller if a side is longer than this, in pixels.
+    MaxSide(NonZeroU32),
+    /// Made larger or smaller, until its longer side has this length in pixels.
+    LongerSide(usize),
+}
+
+impl Scaling {
+    /// The width and height in which an image of this size is sent.
+    pub(crate) fn of(self, (width, height): (u32, u32)) -> (usize, usize) {
+        match self {
+            Self::Never => (width as usize, height as usize),
+            Self::MaxSide(side) => {
+                let (width, height) = Payload::fitted(width, height, Some(side));
+                (width as usize, height as usize)
+            }
+            Self::LongerSide(side) => {
+                let [height, width] = bilinear::size(height as usize, width as usize, side);
+                (width, height)
+            }
+        }
+    }
+}

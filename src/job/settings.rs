@@ -1,0 +1,213 @@
+//! The settings that every experiment has: as flags say them ([`JobArgs`]), and as they are used ([`JobSettings`]).
+
+use std::num::NonZeroU32;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::enhancers::Loading;
+use super::models::{Ask, ModelArgs};
+use super::money::{Money, MoneyArgs};
+use super::outcome::Show;
+use super::picture_words::PictureWords;
+use super::shard::Shard;
+use crate::ask::{AccessArgs, Bounds, Constrain, Format, ImageArgs, Parameters, Sending};
+use crate::enhance::EnhancerArgs;
+use crate::error::{Error, Result};
+use crate::synthesis::{Light, LightArgs, SensorArgs};
+
+/// The flags that every experiment has.
+#[derive(Debug, Args)]
+pub struct JobArgs {
+    /// Light.
+    #[command(flatten)]
+    pub light: LightArgs,
+    /// Light, as a sensor sees it.
+    #[command(flatten)]
+    pub sensor: SensorArgs,
+    /// Which images are enhanced, and by what.
+    #[command(flatten)]
+    pub enhancers: EnhancerArgs,
+    /// How enhancers are run.
+    #[command(flatten)]
+    pub loading: Loading,
+    /// Who is asked.
+    #[command(flatten)]
+    pub models: ModelArgs,
+    /// How the models are to speak.
+    #[command(flatten)]
+    pub parameters: Parameters,
+    /// Where they are asked.
+    #[command(flatten)]
+    pub access: AccessArgs,
+    /// How requests are sent.
+    #[command(flatten)]
+    pub sending: Sending,
+    /// How images are sent.
+    #[command(flatten)]
+    pub images: ImageArgs,
+    /// What it may cost.
+    #[command(flatten)]
+    pub money: MoneyArgs,
+    /// How it is spread over processes.
+    #[command(flatten)]
+    pub scale: ScaleArgs,
+    /// What is left behind.
+    #[command(flatten)]
+    pub output: OutputArgs,
+    /// The flags that decide the images, as they were said.
+    #[arg(skip)]
+    pub pictures: PictureWords,
+}
+
+/// How a job is spread over processes.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Scale")]
+pub struct ScaleArgs {
+    /// Do one of N parts, by frames or walks: I/N; auto/N or auto as the batch system says (Slurm arrays, indexed Kubernetes jobs);
+    /// none for everything. --rpm, --tpm and --max-cost are for all parts together; default: auto in a Slurm array, else none
+    #[arg(long, value_name = "I/N|auto/N|auto|none")]
+    pub shard: Option<String>,
+    /// Say at the end where the time went, what binds and what would help
+    #[arg(long)]
+    pub timings: bool,
+}
+
+/// What is left behind.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Output")]
+pub struct OutputArgs {
+    /// The run folder; default: results/TIME-MODEL-DATA-HASH, found again by the same command
+    #[arg(long, value_name = "DIR", conflicts_with = "resume")]
+    pub out: Option<PathBuf>,
+    /// Go on with the run in this folder; takes the same flags as the run had; default: none
+    #[arg(long, value_name = "DIR")]
+    pub resume: Option<PathBuf>,
+    /// Print the summary as JSON instead of a table
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// The settings that every experiment has, validated. Files, environment and keys are read when they are made, and nowhere later.
+#[derive(Debug)]
+pub struct JobSettings {
+    /// What is done to frames.
+    pub light: Light,
+    /// Which images are enhanced, and by what.
+    pub enhancers: EnhancerArgs,
+    /// How enhancers are run.
+    pub loading: Loading,
+    /// Who is asked.
+    pub ask: Ask,
+    /// The file format of images.
+    pub format: Format,
+    /// The longest side of an image as sent, in pixels; `None` for as it is.
+    pub max_side: Option<NonZeroU32>,
+    /// The largest file of an image in bytes; `None` for what is known of the endpoint.
+    pub max_image: Option<usize>,
+    /// How many requests are in flight at once.
+    pub concurrency: Bounds,
+    /// What it may cost.
+    pub money: Money,
+    /// Which part of the whole this is.
+    pub shard: Shard,
+    /// Print at the end how long each step took.
+    pub show_timings: bool,
+    /// Where the run is kept.
+    pub place: RunPlace,
+    /// What standard output gets.
+    pub show: Show,
+    /// The flags that decide the images, as they were said.
+    pub pictures: PictureWords,
+}
+
+/// What one experiment has of the settings of models and others have not.
+#[derive(Debug, Default)]
+pub struct OfExperiment {
+    /// What the server lets the model say.
+    pub constrain: Constrain,
+    /// What the server's sampling starts from.
+    pub sampling_seed: Option<u64>,
+    /// The longest side of an image as sent, in pixels.
+    pub max_side: Option<NonZeroU32>,
+}
+
+impl JobArgs {
+    /// The error for a call that names no model.
+    pub(crate) fn nameless(&self) -> Error {
+        let remedy = if self.output.resume.is_some() {
+            "--resume takes the same flags as the run had, the model's name among them"
+        } else {
+            "a model's name at the endpoint, or observer or random to try without one"
+        };
+        Error::usage("--model", format_args!("no model is named: {remedy}"))
+    }
+
+    /// Looks at the files and variables that the flags name.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with the flag that cannot be used.
+    pub fn resolve(self, own: &OfExperiment) -> Result<JobSettings> {
+        let shard = Shard::resolve(self.scale.shard.as_deref(), |name| std::env::var(name).ok())?;
+        let sending = Sending {
+            quota: shard.quota(self.sending.quota),
+            ..self.sending
+        };
+        let parameters = Parameters {
+            constrain: own.constrain,
+            seed: own.sampling_seed,
+            ..self.parameters
+        };
+        Ok(JobSettings {
+            light: Light::resolve(self.light, &self.sensor)?,
+            ask: Ask::resolve(self.models, parameters, &self.access, sending)?,
+            enhancers: self.enhancers,
+            loading: self.loading,
+            format: self.images.image,
+            max_side: own.max_side,
+            max_image: sending
+                .max_image
+                .map(|megabytes| (megabytes * 1e6) as usize),
+            concurrency: sending.concurrency,
+            money: Money::resolve(&self.money, shard)?,
+            shard,
+            show_timings: self.scale.timings,
+            show: Show::of(self.output.json),
+            place: RunPlace::from(self.output),
+            pictures: self.pictures,
+        })
+    }
+}
+
+/// Where the run is kept.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum RunPlace {
+    /// The folder of the same command, else a new one.
+    Automatic,
+    /// This folder.
+    Named(PathBuf),
+    /// This folder, which must hold a run.
+    Resume(PathBuf),
+}
+
+impl From<OutputArgs> for RunPlace {
+    fn from(args: OutputArgs) -> Self {
+        match (args.out, args.resume) {
+            (Some(path), _) => Self::Named(path),
+            (None, Some(path)) => Self::Resume(path),
+            (None, None) => Self::Automatic,
+        }
+    }
+}
+
+impl RunPlace {
+    /// Where a part of a run is kept: in a folder of its own within that of the whole.
+    #[must_use]
+    pub fn of(&self, shard: Shard) -> Self {
+        match self {
+            Self::Named(path) if shard.is_part() => Self::Named(path.join(shard.folder())),
+            Self::Resume(path) if shard.is_part() => Self::Resume(path.join(shard.folder())),
+            place => place.clone(),
+        }
+    }
+}

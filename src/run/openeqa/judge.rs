@@ -1,0 +1,88 @@
+//! Who marks the answers, as flags say it ([`JudgeArgs`]), and with the endpoint and its key ([`Judge`]).
+
+use std::num::NonZeroU32;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::ask::{AccessArgs, KeyHeader, Parameters, Server, Temperature};
+use crate::error::Result;
+use crate::job::models::ModelName;
+use crate::job::settings::JobArgs;
+use crate::score::llm_match::Protocol;
+
+/// Who marks the answers.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Judge")]
+pub struct JudgeArgs {
+    /// The model that marks the answers; default: none, answers are gathered and not marked
+    #[arg(long, value_name = "NAME")]
+    pub judge: Option<ModelName>,
+    /// How answers are judged and marks read
+    #[arg(long, value_enum, default_value_t = Protocol::Upstream)]
+    pub protocol: Protocol,
+    /// The judge's endpoint; default: that of the models
+    #[arg(long, value_name = "URL")]
+    pub judge_base_url: Option<String>,
+    /// The variable that holds the key of the judge's endpoint, or none; default: OPENAI_API_KEY, or without
+    /// --judge-base-url that of the models
+    #[arg(long, value_name = "NAME|none", conflicts_with = "judge_api_key_file")]
+    pub judge_api_key_env: Option<String>,
+    /// A file that holds the key of the judge's endpoint; default: none, a variable holds it
+    #[arg(long, value_name = "FILE")]
+    pub judge_api_key_file: Option<PathBuf>,
+    /// The judge's sampling temperature
+    #[arg(long, value_name = "T|auto|default", default_value = "0.2")]
+    pub judge_temperature: Temperature,
+    /// The most tokens of a judge's reply
+    #[arg(long, value_name = "N", default_value = "32")]
+    pub judge_max_tokens: NonZeroU32,
+}
+
+/// Who marks the answers.
+#[derive(Debug)]
+pub(super) struct Judge {
+    pub(super) model: ModelName,
+    /// Its endpoint; `None` if it is built in.
+    pub(super) server: Option<Server>,
+    /// How it is to speak; its name is set.
+    pub(super) parameters: Parameters,
+}
+
+impl JudgeArgs {
+    /// Reads the key of the judge's endpoint. The key of one endpoint is never sent to another.
+    pub(super) fn resolve(self, job: &JobArgs, seed: Option<u64>) -> Result<Option<Judge>> {
+        let Some(model) = self.judge else {
+            return Ok(None);
+        };
+        let in_words = |e: crate::error::Error| e.at("the judge");
+        model.answers_in_words().map_err(in_words)?;
+        let of_models = &job.access;
+        let mut access = of_models.clone();
+        let own = self.judge_base_url.is_some()
+            || self.judge_api_key_env.is_some()
+            || self.judge_api_key_file.is_some();
+        if own {
+            access = AccessArgs {
+                base_url: self.judge_base_url.or(access.base_url),
+                api_key_env: self.judge_api_key_env,
+                api_key_file: self.judge_api_key_file,
+                key_header: KeyHeader::Auto,
+                ..access
+            };
+        }
+        let remote = matches!(model, ModelName::Remote(_));
+        let server = remote.then(|| access.server(job.sending)).transpose();
+        Ok(Some(Judge {
+            model,
+            server: server.map_err(in_words)?,
+            parameters: Parameters {
+                temperature: self.judge_temperature,
+                max_tokens: self.judge_max_tokens,
+                token_field: job.parameters.token_field,
+                seed,
+                ..Parameters::new(String::new())
+            },
+        }))
+    }
+}
