@@ -41,7 +41,7 @@
 //!
 //! | to add | files |
 //! |---|---|
-//! | a flag | the structure of its group, where it acts, the test of what it does |
+//! | a flag | the structure of its group, where it acts, the test of what it does; where it may be idle, `cli/no_effect.rs` |
 //! | a kind of degradation | `types/degradation.rs`, `synthesis/<kind>.rs`, `synthesis/mod.rs`, `synthesis/exposures.rs`, `tests/synthesize.rs`, `results/README.md` |
 //! | an API of endpoints | `ask/wire/<api>.rs`, `ask/wire/mod.rs`, `job/models.rs`, `tests/support/endpoint.rs`, `tests/ask.rs` |
 //! | an experiment | `run/<experiment>/`, its detail in `types/detail.rs` and `score/record.rs`, `job/stored.rs` |
@@ -75,7 +75,7 @@
 //! | `report` | `types`, `error`, `score`, `questions` |
 //! | `job` | `files`, `types`, `error`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `report` |
 //! | `run` | `job`, `files`, `types`, `error`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `report` |
-//! | `cli` | `run`, `job`, `types`, `error` |
+//! | `cli` | `run`, `job`, `ask`, `enhance`, `score`, `synthesis`, `types`, `error` |
 //! | `main` | `cli`, `enhance` |
 
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]

@@ -115,9 +115,59 @@ fn wrong_words_name_their_flag() {
         ),
         (&["--model", "random", "--prompts", "nowhere"], &["nowhere"]),
         (&["--model", "script:nowhere.jsonl"], &["nowhere.jsonl"]),
+        // Found before the rooms are drawn, which would take hours.
+        (
+            &[
+                "--model",
+                "random",
+                "--data",
+                "rooms:frames=100000",
+                "--llie",
+                "nowhere.onnx",
+            ],
+            &["nowhere.onnx"],
+        ),
     ] {
         refused(&bench, call, words);
     }
+}
+
+#[test]
+fn completions_and_manual_come_from_the_flags() {
+    let bench = Bench::new();
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let script = bench.complete(&["completions", shell]);
+        assert!(script.contains("llie-max-side"), "{shell}");
+    }
+    bench.complete(&["man", "pages"]);
+    let page =
+        |name: &str| std::fs::read_to_string(bench.path(&format!("pages/{name}.1"))).unwrap();
+    assert!(page("darkqa-eval").contains("llie\\-max\\-side"));
+    assert!(page("darkqa-eval-openeqa").contains("judge\\-base\\-url"));
+    assert!(page("darkqa-eval-batch-export").contains("file\\-size"));
+}
+
+#[test]
+fn a_dry_run_needs_no_key() {
+    let bench = Bench::with_questions(3);
+    let words = ["--data", "set.jsonl", "--model", "gpt-4o", "--dry-run"];
+    let run = bench.complete(&words);
+    assert!(run.starts_with("Nothing was sent. 33 of 33"), "{run}");
+    // A file that is not there is not looked for, either.
+    bench.complete(&[&words[..], &["--api-key-file", "nowhere"]].concat());
+}
+
+#[test]
+fn what_changes_nothing_is_said() {
+    let bench = Bench::with_questions(3);
+    let words = ["--data", "set.jsonl", "--model", "random", "--blind"];
+    let quiet = bench.call(&words);
+    assert_eq!((quiet.code, &*quiet.stderr), (Some(0), ""));
+    let run = bench.call(&[&words[..], &["--levels", "L3", "--llie", "no.onnx"]].concat());
+    assert_eq!(
+        run.stderr.trim(),
+        "WARN --levels, --llie: no effect: no model is shown an image"
+    );
 }
 
 #[test]

@@ -18,6 +18,9 @@ const BASE_URL: &str = "https://api.openai.com/v1";
 /// Where Azure's own clients look for a key.
 const AZURE_KEY: &str = "AZURE_OPENAI_API_KEY";
 
+/// The name of no variable: the endpoint takes no key.
+const NO_KEY: &str = "none";
+
 /// The address of an endpoint and its key.
 ///
 /// The address stays a text until it is used: the command line would show one that cannot be read, and it may hold a password.
@@ -55,6 +58,16 @@ pub struct Server {
 }
 
 impl AccessArgs {
+    /// The same endpoint without a key.
+    #[must_use]
+    pub fn without_key(&self) -> Self {
+        Self {
+            api_key_env: Some(NO_KEY.to_owned()),
+            api_key_file: None,
+            ..self.clone()
+        }
+    }
+
     /// Reads the key and the certificates.
     ///
     /// # Errors
@@ -86,7 +99,7 @@ impl AccessArgs {
             None if azure() => AZURE_KEY,
             None => "OPENAI_API_KEY",
         };
-        if name == "none" {
+        if name == NO_KEY {
             return Ok(None);
         }
         match set(name) {

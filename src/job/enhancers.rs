@@ -1,10 +1,12 @@
 //! The enhancement models of a command: [`OpenEnhancers`], loaded when they are needed.
 
+use std::path::PathBuf;
+
 use clap::Args;
 
 use super::workers::ThreadArgs;
 use crate::enhance::{Enhancer, ModelFile, RuntimeArgs, SizeArgs};
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 /// How enhancement models are run.
 #[derive(Debug, Clone, Default, Args)]
@@ -18,6 +20,23 @@ pub struct Loading {
     /// On how many threads.
     #[command(flatten)]
     pub threads: ThreadArgs,
+}
+
+/// The enhancement models' files, each under a name of its own.
+pub(crate) fn read(models: &[PathBuf]) -> Result<Vec<ModelFile>> {
+    let mut enhancers: Vec<ModelFile> = Vec::new();
+    for path in models {
+        let file = ModelFile::read(path)?;
+        if enhancers.iter().any(|other| other.name() == file.name()) {
+            let problem = format_args!(
+                "two models are named {}; rename one of the files",
+                file.name()
+            );
+            return Err(Error::usage("--llie", problem));
+        }
+        enhancers.push(file);
+    }
+    Ok(enhancers)
 }
 
 /// Enhancement models, and ONNX Runtime if there are any.

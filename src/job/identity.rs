@@ -1,7 +1,6 @@
 //! What a run is: what all its trials share ([`Identity`]), and what each value of a column stands for ([`Columns`]).
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
@@ -9,8 +8,7 @@ use super::models::ModelUnderTest;
 use super::recipe::Recipe;
 use super::scaling::Scaling;
 use super::settings::JobSettings;
-use crate::enhance::{self, ModelFile, SizeArgs, Tiling};
-use crate::error::{Error, Result};
+use crate::enhance::{self, SizeArgs, Tiling};
 use crate::synthesis::{Synthesis, version};
 use crate::types::degradation::Kind;
 use crate::types::{Degradation, Digest, ReadingName};
@@ -20,23 +18,6 @@ pub(crate) type Identity = BTreeMap<String, Value>;
 
 /// What each value of a column of the tables stands for: by column, by value.
 pub(crate) type Columns = BTreeMap<String, BTreeMap<String, Value>>;
-
-/// The enhancement models' files, each under a name of its own.
-pub(crate) fn enhancers(models: &[PathBuf]) -> Result<Vec<ModelFile>> {
-    let mut enhancers: Vec<ModelFile> = Vec::new();
-    for path in models {
-        let file = ModelFile::read(path)?;
-        if enhancers.iter().any(|other| other.name() == file.name()) {
-            let problem = format_args!(
-                "two models are named {}; rename one of the files",
-                file.name()
-            );
-            return Err(Error::usage("--llie", problem));
-        }
-        enhancers.push(file);
-    }
-    Ok(enhancers)
-}
 
 /// What all trials share whose images are made by this recipe.
 pub(crate) fn images(recipe: &Recipe) -> impl Iterator<Item = (String, Value)> {

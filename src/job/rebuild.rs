@@ -4,9 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::enhancers::{Loading, OpenEnhancers};
+use super::enhancers::{self, Loading, OpenEnhancers};
 use super::frame_work::Steps;
-use super::identity;
 use super::image_pipeline::ImagePipeline;
 use super::picture_words::Pictures;
 use super::recipe::Recipe;
@@ -83,7 +82,7 @@ impl ImageRebuilder {
         let mut conditions = conditions.iter();
         let enhanced = conditions.any(|condition| condition.enhancer.is_some());
         let models = if enhanced { &*pictures.llie } else { &[] };
-        let files = identity::enhancers(models)?;
+        let files = enhancers::read(models)?;
         let sensor = Sensor::resolve(&pictures.sensor)?;
         let recipe = Recipe::new(&sensor, pictures.images.image, pictures.max_side, &files);
         let (place, recipe) = if let Some(walk) = pictures.walk {

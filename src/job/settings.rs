@@ -5,16 +5,17 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::enhancers::Loading;
+use super::enhancers::{self, Loading};
 use super::models::{Ask, ModelArgs};
 use super::money::{Money, MoneyArgs};
 use super::outcome::Show;
 use super::picture_words::PictureWords;
 use super::shard::Shard;
 use crate::ask::{AccessArgs, Bounds, Constrain, Format, ImageArgs, Parameters, Sending};
-use crate::enhance::EnhancerArgs;
+use crate::enhance::{EnhancerArgs, ModelFile};
 use crate::error::{Error, Result};
 use crate::synthesis::{Light, LightArgs, SensorArgs};
+use crate::types::View;
 
 /// The flags that every experiment has.
 #[derive(Debug, Args)]
@@ -132,13 +133,35 @@ pub struct OfExperiment {
     pub max_side: Option<NonZeroU32>,
 }
 
+impl JobSettings {
+    /// Whether a model of the run is shown images.
+    pub(crate) fn shows_images(&self) -> bool {
+        self.ask.view == View::Image && !self.ask.models.is_empty()
+    }
+
+    /// The enhancement models' files, read, and ONNX Runtime found: before anything that takes time. A run that is there already may
+    /// need no runtime any more.
+    pub(crate) fn enhancers(&self) -> Result<Vec<ModelFile>> {
+        let files = enhancers::read(&self.enhancers.llie)?;
+        let is_there = match &self.place {
+            RunPlace::Automatic => false,
+            RunPlace::Named(path) | RunPlace::Resume(path) => path.exists(),
+        };
+        if !files.is_empty() && !is_there {
+            self.loading.runtime.search().open()?;
+        }
+        Ok(files)
+    }
+}
+
 impl JobArgs {
     /// The error for a call that names no model.
     pub(crate) fn nameless(&self) -> Error {
         let remedy = if self.output.resume.is_some() {
             "--resume takes the same flags as the run had, the model's name among them"
         } else {
-            "a model's name at the endpoint, or observer or random to try without one"
+            "a model's name at the endpoint, or observer or random to try without one; it would be asked about 48 built-in rooms from \
+             L0 to L5, and --help lists what can be set"
         };
         Error::usage("--model", format_args!("no model is named: {remedy}"))
     }
@@ -158,9 +181,15 @@ impl JobArgs {
             seed: own.sampling_seed,
             ..self.parameters
         };
+        // A dry run sends nothing, so it needs no key.
+        let access = if self.money.dry_run {
+            self.access.without_key()
+        } else {
+            self.access
+        };
         Ok(JobSettings {
             light: Light::resolve(self.light, &self.sensor)?,
-            ask: Ask::resolve(self.models, parameters, &self.access, sending)?,
+            ask: Ask::resolve(self.models, parameters, &access, sending)?,
             enhancers: self.enhancers,
             loading: self.loading,
             format: self.images.image,

@@ -11,7 +11,8 @@ use crate::job::outcome::Outcome as Ended;
 use crate::job::outcome::Show;
 use crate::job::predictions::{AnswerState, Prediction, predictions};
 use crate::job::stored::{StoredRun, in_order};
-use crate::report::openeqa::{Asked, OpenReport, Told, products, render, summary_json, tables};
+use crate::report::openeqa::{OpenReport, Told, products, render, summary_json, tables};
+use crate::report::table::Table;
 use crate::score::llm_match::{Protocol, mark};
 use crate::score::open::{OpenSummary, Outcome, Scored, Topic, open_summary};
 use crate::store::Store;
@@ -74,43 +75,50 @@ impl Scores {
         answers.any(|answer| answer.outcome == Outcome::Unmarked)
     }
 
-    /// Acts on what is said of the run.
-    fn with_report<T>(&self, act: impl FnOnce(&OpenReport<'_>) -> Result<T>) -> Result<T> {
-        let asked: Vec<Asked<'_>> = self.run.questions.iter().map(asked).collect();
-        act(&OpenReport {
+    fn report(&self) -> OpenReport<'_> {
+        OpenReport {
             summary: &self.summary,
             manifest: &self.run.manifest,
             judge: self.judge.as_deref(),
             protocol: self.protocol,
-            name: &self.run.name(),
-            questions: &asked,
+            name: self.run.name(),
+            questions: &self.run.questions,
             answers: &self.answers,
             thumbnails: &self.run.thumbnails,
-        })
+        }
     }
 
     /// The files of the report by name.
     pub(crate) fn products(&self) -> Result<Vec<(String, Vec<u8>)>> {
-        self.with_report(|report| products(report, &tables(report)))
+        let report = self.report();
+        products(&report, &tables(&report))
     }
 
     /// What belongs on standard output.
     pub(crate) fn shown(&self, show: Show) -> Result<String> {
-        let folder = &self.run.folder;
-        self.with_report(|report| match show {
-            Show::Table => Ok(render(report, &tables(report), folder)),
-            Show::Json => summary_json(report, &tables(report), Some(folder)),
-        })
+        let report = self.report();
+        self.show(&report, &tables(&report), show)
     }
 
-    /// Writes the report and the manifest into the run's folder.
-    pub(crate) fn write(&self, store: &Store<OpenDetail>) -> Result<()> {
-        for (name, content) in self.products()? {
+    fn show(&self, report: &OpenReport<'_>, tables: &[Table], show: Show) -> Result<String> {
+        let folder = &self.run.folder;
+        match show {
+            Show::Table => Ok(render(report, tables, folder)),
+            Show::Json => summary_json(report, tables, Some(folder)),
+        }
+    }
+
+    /// Writes the report and the manifest into the run's folder; what belongs on standard output.
+    pub(crate) fn write(&self, store: &Store<OpenDetail>, show: Show) -> Result<String> {
+        let report = self.report();
+        let tables = tables(&report);
+        for (name, content) in products(&report, &tables)? {
             store.write(&name, &content)?;
         }
-        let json = self.with_report(|report| summary_json(report, &tables(report), None))?;
+        let json = summary_json(&report, &tables, None)?;
         store.write("summary.json", json.as_bytes())?;
-        store.write_manifest(&self.run.manifest)
+        store.write_manifest(&self.run.manifest)?;
+        self.show(&report, &tables, show)
     }
 }
 
@@ -175,10 +183,9 @@ pub(crate) fn write(
     if scores.run.manifest.status == Status::Complete && scores.unmarked() {
         scores.run.manifest.status = Status::Incomplete;
     }
-    scores.write(store)?;
     Ok(Ended {
         status: scores.run.manifest.status,
-        output: scores.shown(show)?,
+        output: scores.write(store, show)?,
     })
 }
 
@@ -213,17 +220,6 @@ fn outcome(
     // Read again: alike in every table, also if an earlier version has kept it.
     let reply = record.reply.as_deref().unwrap_or_default();
     mark(reply, protocol).map_or(Outcome::Unmarked, Outcome::Marked)
-}
-
-fn asked(question: &RunQuestion) -> Asked<'_> {
-    Asked {
-        id: &question.id,
-        text: &question.text,
-        answer: &question.answer,
-        extra: question.extra_answers.as_deref(),
-        category: question.family.name(),
-        episode: &question.frame.0,
-    }
 }
 
 fn topic(question: &RunQuestion) -> Topic {

@@ -147,10 +147,7 @@ fn of_open(args: &ReportArgs, runs: Vec<StoredRun<OpenDetail>>) -> Result<String
     let run = &scores.run;
     if alone && args.out.is_none() {
         match Store::open(&run.folder, &run.manifest, Moved::Allowed) {
-            Ok(store) => {
-                scores.write(&store)?;
-                return scores.shown(args.show());
-            }
+            Ok(store) => return scores.write(&store, args.show()),
             Err(held) => tracing::warn!("the report is not written: {held}"),
         }
     }

@@ -75,7 +75,7 @@ fn panel(report: &OpenReport<'_>, group: &Group) -> Panel {
         part => {
             let own = report.questions.iter();
             let own = own
-                .filter(|question| question.category == part.name())
+                .filter(|question| question.family.name() == part.name())
                 .count();
             format!("{}, n {own}", part.name())
         }

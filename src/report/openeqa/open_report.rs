@@ -4,10 +4,10 @@ use crate::score::llm_match::Protocol;
 use crate::score::open::{OpenSummary, Outcome};
 use crate::score::subject::Subject;
 use crate::types::manifest::RunManifest;
-use crate::types::{QuestionId, Thumbnail};
+use crate::types::{RunQuestion, Thumbnail};
 
 /// Everything that a run of open questions says.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct OpenReport<'a> {
     /// The scores.
     pub summary: &'a OpenSummary,
@@ -18,30 +18,13 @@ pub struct OpenReport<'a> {
     /// How they were judged.
     pub protocol: Protocol,
     /// What the run is called: its folder.
-    pub name: &'a str,
+    pub name: String,
     /// The questions in the order of their file.
-    pub questions: &'a [Asked<'a>],
+    pub questions: &'a [RunQuestion],
     /// The answers, each to one of the questions.
     pub answers: &'a [Told],
     /// The small copies of images, by walk and condition.
     pub thumbnails: &'a [Thumbnail],
-}
-
-/// An open question.
-#[derive(Debug, Clone, Copy)]
-pub struct Asked<'a> {
-    /// Its name.
-    pub id: &'a QuestionId,
-    /// The question in words.
-    pub text: &'a str,
-    /// The true answer.
-    pub answer: &'a str,
-    /// Other answers that are right, too.
-    pub extra: Option<&'a [String]>,
-    /// Its category.
-    pub category: &'a str,
-    /// Its walk.
-    pub episode: &'a str,
 }
 
 /// One answer.

@@ -29,7 +29,10 @@ pub(super) fn page(
     tables: &[Table],
     figures: &[Figure],
 ) -> Result<String> {
-    let categories = report.questions.iter().map(|question| question.category);
+    let categories = report
+        .questions
+        .iter()
+        .map(|question| question.family.name());
     filled(
         PAGE,
         json!({
@@ -80,7 +83,7 @@ fn intro(report: &OpenReport<'_>) -> Vec<String> {
             report
                 .questions
                 .iter()
-                .map(|q| q.episode)
+                .map(|question| &question.frame)
                 .collect::<BTreeSet<_>>()
                 .len(),
             report.protocol,
@@ -100,18 +103,20 @@ fn walks(report: &OpenReport<'_>) -> Vec<Value> {
     let mut walks: Vec<(&str, Vec<Value>)> = Vec::new();
     let mut places = BTreeMap::new();
     for (index, question) in report.questions.iter().enumerate() {
-        let place = *places.entry(question.episode).or_insert_with(|| {
-            walks.push((question.episode, Vec::new()));
+        let episode = &*question.frame.0;
+        let place = *places.entry(episode).or_insert_with(|| {
+            walks.push((episode, Vec::new()));
             walks.len() - 1
         });
         let own = told.remove(&index).unwrap_or_default();
-        let extra = question.extra.map(|extra| readable(&extra.join("; ")));
+        let extra = question.extra_answers.as_ref();
+        let extra = extra.map(|extra| readable(&extra.join("; ")));
         walks[place].1.push(json!({
             "id": question.id,
-            "text": readable(question.text),
-            "answer": readable(question.answer),
+            "text": readable(&question.text),
+            "answer": readable(&question.answer),
             "extra": extra,
-            "category": question.category,
+            "category": question.family.name(),
             // The marks of models that see, in words.
             "marks": marks(&own),
             // Whether some model's mark at its darkest is below that on the lit frames.

@@ -10,6 +10,7 @@ pub(super) mod tables;
 
 pub use shown::{Run, Shown};
 
+use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::chart::Figure;
@@ -25,6 +26,21 @@ const PAGE: &str = include_str!("page.html");
 pub(super) const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
 
+/// What the template is filled with. It is no JSON on the way: the cells of a large run are a hundred thousand.
+#[derive(Serialize)]
+struct Page<'a> {
+    title: String,
+    /// What must be read before any number.
+    alerts: Vec<String>,
+    intro: Vec<String>,
+    sections: Vec<sections::Section<'a>>,
+    runs: Vec<Value>,
+    /// The items, packed.
+    data: String,
+    css: &'static str,
+    script: &'static str,
+}
+
 /// The page.
 ///
 /// # Errors
@@ -37,16 +53,16 @@ pub fn page<'a>(
 ) -> Result<String> {
     filled(
         PAGE,
-        json!({
-            "title": title(shown),
-            "alerts": alerts(shown),
-            "intro": intro(findings),
-            "sections": sections::sections(tables, figures, shown.thumbnails),
-            "runs": shown.runs.iter().map(facts).collect::<Vec<_>>(),
-            "data": items::packed(findings, shown)?,
-            "css": STYLE,
-            "script": SCRIPT,
-        }),
+        Page {
+            title: title(shown),
+            alerts: alerts(shown),
+            intro: intro(findings),
+            sections: sections::sections(tables, figures, shown.thumbnails),
+            runs: shown.runs.iter().map(facts).collect(),
+            data: items::packed(findings, shown)?,
+            css: STYLE,
+            script: SCRIPT,
+        },
     )
 }
 

@@ -1,28 +1,44 @@
 //! The sections of the page before the items: [`sections`].
 
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use super::tables;
 use crate::report::chart::Figure;
-use crate::report::samples::samples;
+use crate::report::samples::{Samples, samples};
 use crate::report::table::Table;
 use crate::report::tables::{ENHANCERS, SECTIONS};
 use crate::types::Thumbnail;
 
+/// A section as the template reads it.
+#[derive(Serialize)]
+pub(super) struct Section<'a> {
+    id: &'static str,
+    title: &'static str,
+    note: &'static str,
+    figures: Vec<&'a Figure>,
+    samples: Option<Samples>,
+    tables: Vec<tables::Shown<'a>>,
+}
+
 /// All sections that the records have something for.
-pub(super) fn sections(
-    tables: &[Table],
-    figures: &[Figure],
+pub(super) fn sections<'a>(
+    tables: &'a [Table],
+    figures: &'a [Figure],
     thumbnails: &[Thumbnail],
-) -> Vec<Value> {
+) -> Vec<Section<'a>> {
     let sections = SECTIONS.iter().filter_map(|&(id, title, note, drawn)| {
         let figures = figures.iter().filter(|figure| drawn.contains(&figure.name));
         let figures: Vec<&Figure> = figures.collect();
         let samples = samples(thumbnails).filter(|_| id == ENHANCERS);
         let tables = tables::shown(tables, id);
         let is_there = !tables.is_empty() || !figures.is_empty() || samples.is_some();
-        is_there.then(|| {
-            json!({"id": id, "title": title, "note": note, "figures": figures, "samples": samples, "tables": tables})
+        is_there.then_some(Section {
+            id,
+            title,
+            note,
+            figures,
+            samples,
+            tables,
         })
     });
     sections.collect()

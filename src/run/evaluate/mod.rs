@@ -12,7 +12,7 @@ use crate::job::batch::BatchFiles;
 use crate::job::progress::Progress;
 use crate::job::{Job, Outcome};
 
-pub use settings::EvaluateArgs;
+pub use settings::{EvaluateArgs, ShrinkArgs};
 use setup::Setup;
 
 /// Runs an evaluation, or goes on with it; a dry run says what that would take.

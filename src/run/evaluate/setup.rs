@@ -9,7 +9,6 @@ use crate::dataset::Dataset;
 use crate::enhance::ModelFile;
 use crate::error::Result;
 use crate::job::conditions::conditions;
-use crate::job::identity;
 use crate::job::models::{self, ModelName, ModelUnderTest};
 use crate::job::observer;
 use crate::job::progress::Progress;
@@ -17,7 +16,7 @@ use crate::job::questions::{open_data, select};
 use crate::job::recipe::Recipe;
 use crate::job::shard::part;
 use crate::job::source::{Source, first_asked, inspect_all};
-use crate::types::{Condition, FrameId, Question, View};
+use crate::types::{Condition, FrameId, Question};
 
 /// Everything an evaluation is made of, opened and checked; nothing is asked, and nothing written.
 pub(super) struct Setup<'a> {
@@ -39,22 +38,15 @@ impl<'a> Setup<'a> {
         progress: &Progress,
     ) -> Result<(Self, Vec<ModelFile>)> {
         let job = &config.job;
-        let dataset = Arc::new(open_data(
-            &config.data.data,
-            &config.selection,
-            config.limit,
-            progress,
-        )?);
-        let questions = part(
-            select(&dataset, &config.selection)?,
-            job.shard,
-            |question| question.frame.0.clone(),
-        )?;
-        let models = open_models(config, &dataset, &questions)?;
         // If every model is blind, no image is read and no enhancer is opened.
-        let seeing = models.iter().any(|model| model.view == View::Image);
-        let enhancers = if seeing { &*job.enhancers.llie } else { &[] };
-        let files = identity::enhancers(enhancers)?;
+        let seeing = job.shows_images();
+        let files = if seeing { job.enhancers()? } else { Vec::new() };
+        let dataset = &config.data.data;
+        let dataset = open_data(dataset, &config.selection, config.limit, progress)?;
+        let dataset = Arc::new(dataset);
+        let questions = select(&dataset, &config.selection)?;
+        let questions = part(questions, job.shard, |question| question.frame.0.clone())?;
+        let models = open_models(config, &dataset, &questions)?;
         let sources = if seeing {
             inspect_all(&dataset, &questions, progress)?
         } else {

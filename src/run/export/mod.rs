@@ -13,9 +13,8 @@ use crate::enhance::EnhancerArgs;
 use crate::error::{Error, Result};
 use crate::job::Outcome;
 use crate::job::conditions::conditions;
-use crate::job::enhancers::{Loading, OpenEnhancers};
+use crate::job::enhancers::{self, Loading, OpenEnhancers};
 use crate::job::frame_work::{FrameWork, Steps};
-use crate::job::identity;
 use crate::job::image_pipeline::ImagePipeline;
 use crate::job::progress::Progress;
 use crate::job::questions::{open_data, select};
@@ -71,7 +70,7 @@ pub struct ExportArgs {
 pub fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> {
     let dataset = open_data(&args.data, &args.selection, args.limit, progress)?;
     let questions = select(&dataset, &args.selection)?;
-    let files = identity::enhancers(&args.enhancers.llie)?;
+    let files = enhancers::read(&args.enhancers.llie)?;
     let light = Light::resolve(args.light.clone(), &args.sensor)?;
     let recipe = Recipe::lossless(&light.sensor, &files);
     let conditions = conditions(&light, args.enhancers.llie_on, &recipe.enhancers);

@@ -71,6 +71,9 @@ impl JudgeArgs {
                 ..access
             };
         }
+        if job.money.dry_run {
+            access = access.without_key();
+        }
         let remote = matches!(model, ModelName::Remote(_));
         let server = remote.then(|| access.server(job.sending)).transpose();
         Ok(Some(Judge {

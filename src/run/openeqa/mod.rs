@@ -18,6 +18,7 @@ use crate::error::Result;
 use crate::job::progress::Progress;
 use crate::job::{Job, Outcome};
 
+pub use judge::JudgeArgs;
 pub use settings::OpenEqaArgs;
 use settings::OpenTask;
 use setup::Setup;

@@ -11,7 +11,6 @@ use crate::dataset::openeqa::{self, OpenQuestion};
 use crate::enhance::ModelFile;
 use crate::error::{Error, Result};
 use crate::job::conditions::conditions;
-use crate::job::identity;
 use crate::job::models::{self, ModelUnderTest};
 use crate::job::progress::Progress;
 use crate::job::recipe::Recipe;
@@ -53,10 +52,8 @@ impl<'a> Setup<'a> {
         })?;
         let judge = config.judge.as_ref().map(judge).transpose()?;
         // If nobody sees a frame, none is read and no enhancer is opened.
-        let study = matches!(config.task, OpenTask::Study(_));
-        let seeing = study || models.iter().any(|model| model.view == View::Image);
-        let enhancers = if seeing { &*job.enhancers.llie } else { &[] };
-        let files = identity::enhancers(enhancers)?;
+        let seeing = matches!(config.task, OpenTask::Study(_)) || job.shows_images();
+        let files = if seeing { job.enhancers()? } else { Vec::new() };
         let recipe = Recipe::new(&job.light.sensor, job.format, None, &files);
         let recipe = recipe.of_walks(&config.walk);
         let walks = WalkFolder::new(&config.walk, config.limit);

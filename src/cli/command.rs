@@ -1,0 +1,150 @@
+//! What can be called, and with which flags: [`Cli`].
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+use clap_complete::Shell;
+
+use crate::job::batch::BatchFiles;
+use crate::job::merge::MergeArgs;
+use crate::job::report::ReportArgs;
+use crate::run::batch::BatchImportArgs;
+use crate::run::enhance::EnhanceArgs;
+use crate::run::evaluate::EvaluateArgs;
+use crate::run::export::ExportArgs;
+use crate::run::import::ImportArgs;
+use crate::run::openeqa::OpenEqaArgs;
+use crate::run::questions::QuestionsArgs;
+use crate::run::realism::RealismArgs;
+use crate::run::rooms::RoomsArgs;
+use crate::run::serve::ServeArgs;
+use crate::run::show::ShowArgs;
+use crate::run::study;
+use crate::run::synthesize::SynthesizeArgs;
+
+/// What the program is called.
+pub(super) const NAME: &str = "darkqa-eval";
+
+const AFTER_HELP: &str = "\
+Precedence: flag, then environment (DARKQA_CONCURRENCY=16 for --concurrency 16), then --config FILE, then default.
+OPENAI_BASE_URL, OPENAI_API_KEY and ORT_DYLIB_PATH are defaults: whatever names another goes before them.
+Exit codes: 0 everything scored; 1 finished with failures; 2 usage, configuration or a fatal error; 130 interrupted,
+or stopped by --max-cost.
+Results go to standard output, progress and logs to standard error (RUST_LOG=darkqa_eval=debug shows more).";
+
+/// Measures how well a vision-language model sees in the dark.
+///
+/// Makes low-light versions of indoor images (levels L0–L5: 0, 2, 4, 6, 7.5, 9 EV darker; by exposure drop alone and
+/// with sensor noise), enhances them with any enhancement model given as ONNX, asks OpenAI-compatible endpoints
+/// multiple-choice questions about each image, and scores the replies by exact match.
+///
+/// The same command run again goes on where it stopped: what was answered is never asked again.
+#[derive(Debug, Parser)]
+#[command(
+    name = NAME, version, about, long_about, max_term_width = 110, after_help = AFTER_HELP,
+    args_conflicts_with_subcommands = true
+)]
+pub struct Cli {
+    /// Anything but an evaluation.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+    /// What to evaluate, and how.
+    #[command(flatten)]
+    pub evaluate: EvaluateArgs,
+    /// What every command has.
+    #[command(flatten)]
+    pub common: CommonArgs,
+}
+
+/// What every command has.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Output")]
+pub struct CommonArgs {
+    /// No progress
+    #[arg(long, global = true)]
+    pub quiet: bool,
+    /// A TOML file of flags by their long names; those of one command alone stand in a table of its name; default:
+    /// DARKQA_CONFIG, else none
+    #[arg(long, global = true, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+}
+
+/// What can be done besides evaluating.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Write the low-light versions of images, as an evaluation would send them
+    Synthesize(Box<SynthesizeArgs>),
+    /// Hold the synthesis against real pairs of images in normal and low light
+    Realism(Box<RealismArgs>),
+    /// Make multiple-choice questions about frames, by rule, from their depth, class and segment maps
+    Questions(Box<QuestionsArgs>),
+    /// Take over frames of another data set into the common interface
+    Import(Box<ImportArgs>),
+    /// Write ready-made sets for other tools, one for each condition, with its images
+    Export(Box<ExportArgs>),
+    /// Write the built-in rooms as frames with depth, class and segment maps
+    Rooms(RoomsArgs),
+    /// Enhance images by an ONNX model, as an evaluation would; or tell how it is fed and read
+    Enhance(Box<EnhanceArgs>),
+    /// Ask through a Batch API, at half the price: write its input files, take over its output files
+    #[command(subcommand)]
+    Batch(BatchCommand),
+    /// Ask OpenEQA's open questions about walks through dark houses, the answers marked by a judge (LLM-Match)
+    ///
+    /// The frames of each walk are darkened, scaled and sent with upstream's prompts, byte for byte; so are the answers to the
+    /// judge. The same answer to the same question is judged once. What was answered or marked is never asked again.
+    #[command(name = "openeqa", mut_args(OpenEqaArgs::own))]
+    OpenEqa(Box<OpenEqaArgs>),
+    /// Answer as the built-in models do behind an OpenAI-compatible endpoint on this machine, for trying clients without keys
+    Serve(ServeArgs),
+    /// Show what runs hold, from their records alone: tables, figures and one HTML file; several runs are compared
+    Report(ReportArgs),
+    /// Put the shards of an evaluation together as the one run that they are
+    Merge(MergeArgs),
+    /// Make the images that one question was asked with again, bit for bit, and prove it by their digests
+    Show(ShowArgs),
+    /// Let people answer what the models were asked: write a page for them, take their answers over as a model's
+    #[command(subcommand)]
+    Study(StudyCommand),
+    /// Print the completions of a shell, to be put where it looks for them
+    Completions {
+        /// The shell
+        #[arg(value_enum)]
+        shell: Shell,
+    },
+    /// Write the manual, a page a command
+    Man {
+        /// Where the pages go
+        #[arg(value_name = "DIR")]
+        folder: PathBuf,
+    },
+}
+
+/// What can be done with batches.
+#[derive(Debug, Subcommand)]
+pub enum BatchCommand {
+    /// Write what an evaluation has left to ask as files of a Batch API; takes the flags of the evaluation
+    Export(Box<BatchExportArgs>),
+    /// Take the replies of a Batch API over into a run
+    Import(BatchImportArgs),
+}
+
+/// The flags of `batch export`.
+#[derive(Debug, Args)]
+pub struct BatchExportArgs {
+    /// The evaluation.
+    #[command(flatten)]
+    pub evaluate: EvaluateArgs,
+    /// Its files.
+    #[command(flatten)]
+    pub files: BatchFiles,
+}
+
+/// What can be done with people's answers.
+#[derive(Debug, Subcommand)]
+pub enum StudyCommand {
+    /// Write a page on which people answer the questions of a run about the very images that its models were sent
+    Pack(study::PackArgs),
+    /// Take people's answers over as a run of a model of their own, to be compared by report
+    Read(study::ReadArgs),
+}

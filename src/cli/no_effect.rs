@@ -1,0 +1,332 @@
+//! What is said in a call and can change nothing: [`without_effect`].
+
+use std::collections::BTreeSet;
+
+use clap::parser::ValueSource;
+use clap::{ArgMatches, Args, Command as Clap};
+
+use super::command::{BatchCommand, Cli, Command};
+use super::layers;
+use crate::ask::{AccessArgs, ImageArgs, Parameters, Sending};
+use crate::enhance::{EnhancerArgs, RuntimeArgs, SizeArgs};
+use crate::job::batch::BatchFiles;
+use crate::job::models::ModelName;
+use crate::job::settings::JobArgs;
+use crate::run::evaluate::{EvaluateArgs, ShrinkArgs};
+use crate::run::openeqa::{JudgeArgs, OpenEqaArgs};
+use crate::score::realism::residual::Bins;
+use crate::synthesis::{LightArgs, SensorArgs};
+use crate::types::KindSet;
+use crate::types::degradation::Kind;
+
+/// A line for each reason why flags of the call change nothing.
+pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
+    let mut idle = Idle::new(layers::own(matches));
+    match &cli.command {
+        None => idle.evaluation(&cli.evaluate),
+        Some(Command::Batch(BatchCommand::Export(args))) => idle.evaluation(&args.evaluate),
+        Some(Command::OpenEqa(args)) => idle.open(args),
+        Some(Command::Synthesize(args)) => {
+            if args.from.is_some() {
+                let why = "--from makes an image as its own file says";
+                idle.because(why, &[light(), sensor()].concat());
+            }
+            if args.sheet.is_some() {
+                idle.because(
+                    "a sheet shows what it shows of both variants",
+                    &["variant".into()],
+                );
+            }
+            idle.light(&args.light);
+        }
+        Some(Command::Export(args)) => {
+            idle.light(&args.light);
+            idle.enhancement(&args.light, &args.enhancers);
+        }
+        Some(Command::Realism(args)) if args.kl_bins == Bins::Kousha => {
+            let why = "the bins of kousha have one count added to each";
+            idle.because(why, &["kl_empty".into()]);
+        }
+        Some(Command::Enhance(args)) if args.describe => {
+            let others = ["force".into(), "max_pixels".into()];
+            let why = "--describe enhances nothing";
+            idle.because(why, &[ids::<SizeArgs>(), others.to_vec()].concat());
+        }
+        _ => {}
+    }
+    idle.lines
+}
+
+/// The fields of a group of flags.
+fn ids<A: Args>() -> Vec<String> {
+    let command = A::augment_args(Clap::new(""));
+    let ids = command.get_arguments().map(|arg| arg.get_id().to_string());
+    ids.collect()
+}
+
+fn light() -> Vec<String> {
+    ids::<LightArgs>()
+}
+
+/// What decides noise alone: the seed decides guesses and orders, too.
+fn sensor() -> Vec<String> {
+    let mut ids = ids::<SensorArgs>();
+    ids.retain(|id| id != "seed");
+    ids
+}
+
+fn enhancement() -> Vec<String> {
+    [
+        ids::<EnhancerArgs>(),
+        ids::<SizeArgs>(),
+        ids::<RuntimeArgs>(),
+    ]
+    .concat()
+}
+
+/// What was said, and what of it turned out to change nothing.
+struct Idle {
+    said: BTreeSet<String>,
+    lines: Vec<String>,
+}
+
+impl Idle {
+    fn new(matches: &ArgMatches) -> Self {
+        let ids = matches.ids().map(ToString::to_string);
+        let typed = |id: &String| {
+            let is_flag = matches.try_contains_id(id).unwrap_or(false);
+            is_flag && matches.value_source(id) == Some(ValueSource::CommandLine)
+        };
+        Self {
+            said: ids.filter(typed).collect(),
+            lines: Vec::new(),
+        }
+    }
+
+    /// Notes those of these flags that were said; each is noted for the first reason alone.
+    fn because(&mut self, why: &str, flags: &[String]) {
+        let idle: Vec<String> = flags
+            .iter()
+            .filter(|id| self.said.remove(*id))
+            .map(|id| format!("--{}", id.replace('_', "-")))
+            .collect();
+        if !idle.is_empty() {
+            self.lines
+                .push(format!("{}: no effect: {why}", idle.join(", ")));
+        }
+    }
+
+    fn evaluation(&mut self, args: &EvaluateArgs) {
+        let constrain = ["constrain".to_owned()];
+        self.job(&args.job, &ids::<ShrinkArgs>(), &constrain, None);
+    }
+
+    fn open(&mut self, args: &OpenEqaArgs) {
+        if args.study.is_some() {
+            let asking = [
+                ids::<AccessArgs>(),
+                ids::<Parameters>(),
+                ids::<Sending>(),
+                ids::<JudgeArgs>(),
+            ];
+            self.because("--study asks no model", &asking.concat());
+        }
+        if args.judge.judge.is_none() {
+            self.because("no judge is named", &ids::<JudgeArgs>());
+        }
+        if !args.batch {
+            self.because("--batch alone writes such files", &ids::<BatchFiles>());
+        }
+        if args.study.is_none() {
+            self.job(&args.job, &[], &[], args.judge.judge.as_ref());
+        }
+    }
+
+    /// What every experiment has: `images` are further flags of images, `replies` further ones of what is asked of servers.
+    fn job(
+        &mut self,
+        args: &JobArgs,
+        images: &[String],
+        replies: &[String],
+        judge: Option<&ModelName>,
+    ) {
+        let models = &args.models;
+        if models.blind || models.model.is_empty() {
+            let shown = [
+                light(),
+                sensor(),
+                enhancement(),
+                ids::<ImageArgs>(),
+                images.to_vec(),
+            ];
+            let shown = [shown.concat(), vec!["detail".into(), "max_image".into()]].concat();
+            self.because("no model is shown an image", &shown);
+        }
+        self.light(&args.light);
+        self.enhancement(&args.light, &args.enhancers);
+        let mut names = models.model.iter().chain(&models.blind_model).chain(judge);
+        if !names.any(|name| matches!(name, ModelName::Remote(_))) {
+            let sent = [
+                ids::<AccessArgs>(),
+                ids::<Parameters>(),
+                ids::<Sending>(),
+                replies.to_vec(),
+            ];
+            let paid = ["max_cost".into(), "prices".into()];
+            self.because(
+                "all models are built in",
+                &[sent.concat(), paid.to_vec()].concat(),
+            );
+        }
+        if args.money.dry_run {
+            self.because(
+                "--dry-run sends nothing",
+                &["timings".into(), "max_failures".into()],
+            );
+        }
+    }
+
+    /// What is idle as levels and variants are.
+    fn light(&mut self, args: &LightArgs) {
+        let kinds: Vec<Kind> = args.variant.kinds().collect();
+        if args.levels.0.iter().all(|level| level.severity().is_none()) {
+            let idle = [sensor(), enhancement(), vec!["variant".into()]].concat();
+            self.because("L0 alone is untouched", &idle);
+        } else if !kinds.iter().any(|kind| kind.has_readings()) {
+            self.because("no variant has noise", &sensor());
+        }
+    }
+
+    /// What is idle as enhancers are.
+    fn enhancement(&mut self, light: &LightArgs, args: &EnhancerArgs) {
+        if args.llie.is_empty() {
+            self.because("no --llie is named", &enhancement());
+        } else if !share(light.variant, args.llie_on) {
+            let why = "--llie-on names no variant of --variant";
+            self.because(why, &enhancement());
+        }
+    }
+}
+
+fn share(one: KindSet, other: KindSet) -> bool {
+    one.kinds().any(|kind| other.includes(kind))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ffi::OsString;
+
+    use clap::{CommandFactory as _, FromArgMatches as _};
+
+    use super::*;
+
+    fn lines(words: &str) -> Vec<String> {
+        let words = std::iter::once("darkqa-eval").chain(words.split(' '));
+        let words: Vec<OsString> = words.map(OsString::from).collect();
+        let matches = Cli::command().try_get_matches_from(words).unwrap();
+        without_effect(&Cli::from_arg_matches(&matches).unwrap(), &matches)
+    }
+
+    #[test]
+    fn what_changes_nothing_is_said() {
+        for (words, idle) in [
+            (
+                "--model m --blind --llie f.onnx --levels L3",
+                "--levels, --llie: no effect: no model is shown an image",
+            ),
+            (
+                "--blind-model m --max-side 9 --image jpeg:9 --detail low",
+                "--image, --max-side, --detail: no effect: no model is shown",
+            ),
+            (
+                "--model m --llie f.onnx --levels L0",
+                "--llie: no effect: L0 alone is untouched",
+            ),
+            (
+                "--model m --levels L0 --variant ev --ratio 9 --fixed",
+                "--ratio, --fixed, --variant: no effect: L0 alone",
+            ),
+            (
+                "--model m --variant ev --profile eld",
+                "--profile: no effect: no variant has noise",
+            ),
+            (
+                "--model m --tile whole --offline",
+                "--tile, --offline: no effect: no --llie is named",
+            ),
+            (
+                "--model m --llie f.onnx --variant ev",
+                "--llie: no effect: --llie-on names no variant of --variant",
+            ),
+            (
+                "--model random --temperature 0 --rpm 9 --max-cost 1",
+                "--temperature, --rpm, --max-cost: no effect: all models are built in",
+            ),
+            (
+                "--model random --constrain json",
+                "--constrain: no effect: all models are built in",
+            ),
+            (
+                "--model m --dry-run --timings",
+                "--timings: no effect: --dry-run sends nothing",
+            ),
+            (
+                "openeqa --questions q --frames f --model m --judge-temperature 1",
+                "--judge-temperature: no effect: no judge is named",
+            ),
+            (
+                "openeqa --questions q --frames f --model m --url /v1",
+                "--url: no effect: --batch alone",
+            ),
+            (
+                "openeqa --questions q --frames f --study s --rpm 9",
+                "--rpm: no effect: --study asks no model",
+            ),
+            (
+                "openeqa --questions q --frames f --model m --levels L0 --gain 1",
+                "--gain: no effect: L0 alone",
+            ),
+            (
+                "synthesize a --out b --from c --levels L3 --camera x",
+                "--levels, --camera: no effect: --from",
+            ),
+            (
+                "synthesize a --out b --sheet noise --variant ev",
+                "--variant: no effect: a sheet",
+            ),
+            (
+                "synthesize a --out b --levels L0 --tone none",
+                "--tone: no effect: L0 alone",
+            ),
+            (
+                "export llava a --out b --llie-on ev",
+                "--llie-on: no effect: no --llie",
+            ),
+            (
+                "realism a --kl-bins kousha --kl-empty drop",
+                "--kl-empty: no effect: the bins of kousha",
+            ),
+            (
+                "enhance m --describe --force",
+                "--force: no effect: --describe",
+            ),
+        ] {
+            let lines = lines(words);
+            assert_eq!(lines.len(), 1, "{words}: {lines:?}");
+            assert!(lines[0].starts_with(idle), "{words}: {lines:?}");
+        }
+        for words in [
+            "--model m",
+            "--model m --llie f.onnx --tile whole --profile eld --image jpeg:90 --rpm 9",
+            "--model m --blind --seed 3 --temperature 1",
+            "--model random --seed 3 --shuffle-options",
+            "openeqa --questions q --frames f --model script:a --judge j --judge-temperature 1 --rpm 9",
+            "synthesize a --out b --sheet levels --profile eld",
+            "export llava a --out b --llie f.onnx --llie-on both",
+            "realism a --kl-empty drop",
+            "enhance m a --out b --tile whole",
+        ] {
+            assert_eq!(lines(words), [""; 0], "{words}");
+        }
+    }
+}
