@@ -20,7 +20,10 @@
 //!   [`Degradation`](types::Degradation) is what was done to a frame, a [`Condition`](types::Condition) is a degradation with or
 //!   without an enhancer, a [`Reply`](types::Reply) is what a model sent, and a [`Record`](types::Record) is what came of one trial:
 //!   one question to one model in one condition.
+//! - [`labels`]: the label spaces NYU40, mpcat40, ADE150 and NYU13.
+//! - [`rooms`]: the built-in rooms, drawn by a seed with all their maps.
 //! - [`dataset`]: a folder, a ready-made set or the built-in rooms → images, their maps and questions.
+//! - [`import`]: other data sets → frames, one file a kind.
 //! - [`questions`]: a frame with its maps → questions with one true answer, by rule; pure integers. And the observer: what the rules
 //!   could still answer from given pixels.
 //! - [`synthesis`]: a clean image × a degradation → a degraded one; pure, given a noise key.
@@ -42,6 +45,7 @@
 //! | to add | files |
 //! |---|---|
 //! | a flag | the structure of its group, where it acts, the test of what it does; where it may be idle, `cli/no_effect.rs` |
+//! | a format to import | `import/<kind>.rs`, `import/mod.rs`, `import/README.md`, `tests/import.rs` |
 //! | a kind of degradation | `types/degradation.rs`, `synthesis/<kind>.rs`, `synthesis/mod.rs`, `synthesis/exposures.rs`, `tests/synthesize.rs`, `results/README.md` |
 //! | an API of endpoints | `ask/wire/<api>.rs`, `ask/wire/mod.rs`, `job/models.rs`, `tests/support/endpoint.rs`, `tests/ask.rs` |
 //! | an experiment | `run/<experiment>/`, its detail in `types/detail.rs` and `score/record.rs`, `job/stored.rs` |
@@ -70,11 +74,14 @@
 //! | `enhance` | `types`, `error` |
 //! | `ask` | `types`, `error` |
 //! | `score` | `types`, `error` |
-//! | `dataset` | `files`, `types`, `error` |
+//! | `labels` | `files`, `types`, `error` |
+//! | `rooms` | `labels`, `types`, `error` |
+//! | `dataset` | `rooms`, `labels`, `files`, `types`, `error` |
+//! | `import` | `dataset`, `labels`, `files`, `types`, `error` |
 //! | `store` | `files`, `types`, `error` |
 //! | `report` | `types`, `error`, `score`, `questions` |
-//! | `job` | `files`, `types`, `error`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `report` |
-//! | `run` | `job`, `files`, `types`, `error`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `report` |
+//! | `job` | `files`, `types`, `error`, `rooms`, `labels`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `report` |
+//! | `run` | `job`, `files`, `types`, `error`, `rooms`, `labels`, `import`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `report` |
 //! | `cli` | `run`, `job`, `ask`, `enhance`, `score`, `synthesis`, `types`, `error` |
 //! | `main` | `cli`, `enhance` |
 
@@ -86,9 +93,12 @@ pub mod dataset;
 pub mod enhance;
 pub mod error;
 mod files;
+pub mod import;
 pub mod job;
+pub mod labels;
 pub mod questions;
 pub mod report;
+pub mod rooms;
 pub mod run;
 pub mod score;
 pub mod store;

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 /// Libraries and the rooms (modules or files, as paths in `src/`) that they keep to; test code is free.
 const ROOMS: [(&str, &[&str]); 12] = [
     ("axum", &["run/serve"]),
-    ("glam", &["dataset/rooms"]),
+    ("glam", &["rooms"]),
     ("plotters", &["report"]),
     ("noto_sans_mono_bitmap", &["report/sheet"]),
     ("comfy_table", &["report"]),

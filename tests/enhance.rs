@@ -6,8 +6,8 @@ mod support;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-use darkqa_eval::dataset::Rooms;
 use darkqa_eval::enhance::{Enhancer, Install, ModelFile, Runtime, RuntimeSearch, Tiling};
+use darkqa_eval::rooms::Rooms;
 use darkqa_eval::synthesis::{Negative, NoiseKey, Synthesis, expose};
 use darkqa_eval::types::{Rgb, Severity};
 use support::onnx::Size::{Known, Named};

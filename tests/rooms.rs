@@ -6,14 +6,15 @@ mod support;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use darkqa_eval::dataset::rooms::{Known, Room, Truth, VERSION, labels};
-use darkqa_eval::dataset::{Dataset, Place, Rooms};
+use darkqa_eval::dataset::{Dataset, Place};
 use darkqa_eval::questions::balance::Balanced;
 use darkqa_eval::questions::colors::Palette;
 use darkqa_eval::questions::room::RoomSource;
 use darkqa_eval::questions::rules::{Flag, Rules};
 use darkqa_eval::questions::statistics::measure;
 use darkqa_eval::questions::{Asked, Generated, Order, generate};
+use darkqa_eval::rooms::Rooms;
+use darkqa_eval::rooms::{Known, Room, Truth, VERSION, labels};
 use darkqa_eval::types::{Digest, Family, Frame, FrameId};
 use rayon::prelude::*;
 use support::run::{Bench, records};
@@ -238,7 +239,7 @@ fn a_seed_gives_the_same_bytes_everywhere() {
     let made = all(1);
     assert_eq!(made, all(3));
     // Another number of frames leaves them as they are; another seed or version does not. Where this digest changes,
-    // `dataset::rooms::VERSION` must, and with it `results/reference` and the digest of every picture of a room.
+    // `rooms::VERSION` must, and with it `results/reference` and the digest of every picture of a room.
     assert_eq!(pixels(Rooms { frames: 4, ..rooms }, 3), made[3]);
     assert_ne!(pixels(Rooms { seed: 8, ..rooms }, 3), made[3]);
     let digests: Vec<[u8; 32]> = made.iter().map(|digest| *digest.as_bytes()).collect();

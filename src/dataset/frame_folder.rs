@@ -8,9 +8,9 @@ use image::{ExtendedColorType, ImageEncoder as _};
 use ndarray::Array2;
 use serde_json::{Map, Value, json};
 
-use crate::dataset::import::classes;
 use crate::error::{Error, Result};
 use crate::files::write;
+use crate::labels;
 use crate::types::{DepthKind, Labels, Rgb, SegmentName, Segmentation};
 
 /// The list of the frames.
@@ -111,7 +111,7 @@ pub(crate) fn finish<'a>(
     about: &Value,
     lines: impl Iterator<Item = &'a Line>,
 ) -> Result<()> {
-    write(&out.join("classes.json"), classes(labels).as_bytes())?;
+    write(&out.join("classes.json"), labels::json(labels).as_bytes())?;
     write(&out.join("dataset.json"), format!("{about:#}\n").as_bytes())?;
     let mut list = String::new();
     for line in lines {

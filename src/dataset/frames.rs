@@ -7,7 +7,7 @@
 //!   `over`, the segments, which `over_source` calls `renderer` or `connected_components` (objects) or `superpixel`
 //!   (parts). It may also say `depth_kind` (`planar` or `euclid`), `intrinsics` (`{"fx", "fy", "cx", "cy"}`), `room_gt`,
 //!   `t` (seconds) and `pose`.
-//! - `classes.json`: what the numbers of `sem` stand for ([`spaces`]).
+//! - `classes.json`: what the numbers of `sem` stand for ([`labels`]).
 //! - `dataset.json`: `{"schema": "darkqa.dataset/1", "name", "depth_kind"}`, both of which may be missing.
 //! - `scenes/<scene>/segments.json`: what is known of segments by name, `{"7": {"name", "canonical", "region"}}`.
 //!
@@ -22,10 +22,11 @@ use std::sync::Arc;
 use serde::Deserialize;
 
 use super::maps::{DepthFile, Maps};
-use super::reading::{entries, is_image, json, json_lines};
 use super::view::View;
-use super::{Dataset, Source, questions, spaces, stem};
+use super::{Dataset, Source, questions, stem};
 use crate::error::{Error, Result};
+use crate::files::reading::{entries, is_image, json, json_lines};
+use crate::labels;
 use crate::types::{DepthKind, FrameId, Intrinsics, Labels, SegmentName, Segmentation};
 
 /// The file that lists the frames of the common interface.
@@ -144,7 +145,7 @@ pub(super) fn frames(folder: &Path) -> Result<Dataset> {
 /// What the numbers of a folder stand for, where it says so.
 pub(super) fn labels(folder: &Path) -> Result<Option<Labels>> {
     let classes = folder.join(CLASSES);
-    let there = classes.exists().then(|| spaces::read(&classes));
+    let there = classes.exists().then(|| labels::read(&classes));
     there.transpose()
 }
 
@@ -168,7 +169,7 @@ fn segment_names(folder: &Path, scene: &str) -> Result<Arc<BTreeMap<u32, Segment
         return Ok(Arc::default());
     }
     let names: BTreeMap<u32, SegmentName> = json(&path)?;
-    let canonical = spaces::canonical();
+    let canonical = labels::canonical();
     if let Some((id, name)) = names
         .iter()
         .find(|(_, name)| !canonical.contains(&name.canonical))

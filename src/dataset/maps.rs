@@ -19,18 +19,18 @@ const MOST_DEPTH: f64 = 1e6;
 
 /// The map files of a frame, each of which may be missing.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Maps {
+pub(crate) struct Maps {
     /// Depth.
-    pub(super) depth: Option<DepthFile>,
+    pub(crate) depth: Option<DepthFile>,
     /// The class of each pixel: a PNG file, 8-bit grey, 16-bit grey or with a palette whose places are the ids.
-    pub(super) semantic: Option<PathBuf>,
+    pub(crate) semantic: Option<PathBuf>,
     /// The segment of each pixel, 0 for none: a 16-bit grey PNG file, or a `.npy` file of integers.
-    pub(super) segments: Option<PathBuf>,
+    pub(crate) segments: Option<PathBuf>,
 }
 
 /// A file of depth.
 #[derive(Debug, Clone)]
-pub(super) enum DepthFile {
+pub(crate) enum DepthFile {
     /// A 16-bit grey PNG file, 0 where there is no depth.
     Png {
         /// Where it is.
@@ -44,7 +44,7 @@ pub(super) enum DepthFile {
 
 impl DepthFile {
     /// The file at `path` with the `depth_scale` of its frame.
-    pub(super) fn new(path: PathBuf, scale: Option<f64>) -> Result<Self, String> {
+    pub(crate) fn new(path: PathBuf, scale: Option<f64>) -> Result<Self, String> {
         match (is_npy(&path), scale) {
             (true, None | Some(1.0)) => Ok(Self::Npy(path)),
             (true, Some(scale)) => Err(format!(
@@ -70,7 +70,7 @@ impl DepthFile {
     }
 
     /// Depth of the file's own size.
-    pub(super) fn decode_alone(&self, bytes: &[u8]) -> Result<Array2<u32>, String> {
+    pub(crate) fn decode_alone(&self, bytes: &[u8]) -> Result<Array2<u32>, String> {
         let size = match self {
             Self::Png { .. } => RawPng::open(bytes, &[Form::Grey16])?.size,
             Self::Npy(_) => Npy::parse(bytes)?.size,
@@ -104,7 +104,7 @@ impl DepthFile {
 
 impl Maps {
     /// No maps at all.
-    pub(super) const NONE: Self = Self {
+    pub(crate) const NONE: Self = Self {
         depth: None,
         semantic: None,
         segments: None,
@@ -114,7 +114,7 @@ impl Maps {
     ///
     /// # Errors
     /// With the file that cannot be read.
-    pub(super) fn read(&self) -> Result<MapFiles<'_>> {
+    pub(crate) fn read(&self) -> Result<MapFiles<'_>> {
         let read = |path| fs::read(path).map_err(|e| Error::file(path, "read", e));
         let depth = self.depth.as_ref().map(DepthFile::path);
         Ok(MapFiles {
@@ -128,7 +128,7 @@ impl Maps {
 
 /// The bytes of a frame's map files.
 #[derive(Debug)]
-pub(super) struct MapFiles<'a> {
+pub(crate) struct MapFiles<'a> {
     maps: &'a Maps,
     depth: Option<Vec<u8>>,
     semantic: Option<Vec<u8>>,
@@ -137,7 +137,7 @@ pub(super) struct MapFiles<'a> {
 
 impl MapFiles<'_> {
     /// The content of the maps: of the files, and the unit of depth.
-    pub(super) fn digest(&self) -> Digest {
+    pub(crate) fn digest(&self) -> Digest {
         let unit = match &self.maps.depth {
             Some(DepthFile::Png { scale, .. }) => scale.to_string(),
             Some(DepthFile::Npy(_)) => "m".to_owned(),
@@ -159,7 +159,7 @@ impl MapFiles<'_> {
     /// # Errors
     /// As for the other maps, with the file: one of another form or another size than the image, or with a value that
     /// cannot be.
-    pub(super) fn depth(&self, size: Size) -> Result<Option<Array2<u32>>> {
+    pub(crate) fn depth(&self, size: Size) -> Result<Option<Array2<u32>>> {
         let Some((file, bytes)) = self.maps.depth.as_ref().zip(self.depth.as_ref()) else {
             return Ok(None);
         };
@@ -167,7 +167,7 @@ impl MapFiles<'_> {
     }
 
     /// The class of each pixel.
-    pub(super) fn semantic(&self, size: Size) -> Result<Option<Array2<u16>>> {
+    pub(crate) fn semantic(&self, size: Size) -> Result<Option<Array2<u16>>> {
         let Some((path, bytes)) = self.maps.semantic.as_ref().zip(self.semantic.as_ref()) else {
             return Ok(None);
         };
@@ -175,7 +175,7 @@ impl MapFiles<'_> {
     }
 
     /// The segment of each pixel.
-    pub(super) fn segments(&self, size: Size) -> Result<Option<Array2<u32>>> {
+    pub(crate) fn segments(&self, size: Size) -> Result<Option<Array2<u32>>> {
         let Some((path, bytes)) = self.maps.segments.as_ref().zip(self.segments.as_ref()) else {
             return Ok(None);
         };

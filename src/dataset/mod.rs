@@ -7,21 +7,17 @@ mod beside;
 mod dialect;
 pub(crate) mod frame_folder;
 pub mod frames;
-pub mod import;
 pub(crate) mod inputs;
 mod jpeg;
-mod maps;
+pub(crate) mod maps;
 pub mod multiple_choice;
-mod npy;
+pub(crate) mod npy;
 pub mod openeqa;
 pub mod pairs;
 pub mod picture;
 pub mod questions;
-mod raw_png;
-mod reading;
-pub mod rooms;
+pub(crate) mod raw_png;
 mod settings;
-pub mod spaces;
 mod table;
 mod view;
 
@@ -31,12 +27,12 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use crate::error::{Error, Result};
+use crate::rooms::{self, Rooms};
 use crate::types::{Frame, FrameId, Labels, Question};
 
 use maps::Maps;
 use picture::MOST_PIXELS;
 pub use picture::Picture;
-pub use rooms::Rooms;
 pub use settings::{DataArgs, PixelLimit, SelectionArgs, place};
 pub use view::FrameFiles;
 use view::View;
@@ -52,7 +48,7 @@ pub enum Place {
 
 /// Where one image is, with its maps.
 #[derive(Debug, Clone)]
-enum Source {
+pub(crate) enum Source {
     /// An image file, and the map files beside it.
     File {
         rgb: PathBuf,
@@ -82,7 +78,7 @@ pub struct Dataset {
     name: String,
     /// The name that the data set gives itself; empty where it gives none.
     title: String,
-    sources: BTreeMap<FrameId, Source>,
+    pub(crate) sources: BTreeMap<FrameId, Source>,
     questions: Vec<Question>,
     labels: Option<Labels>,
     most_pixels: u64,

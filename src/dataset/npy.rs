@@ -54,18 +54,18 @@ fn sized<const N: usize>(chunk: &[u8]) -> [u8; N] {
 
 /// A two-dimensional array in a file's bytes.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Npy<'a> {
+pub(crate) struct Npy<'a> {
     numbers: Numbers,
     /// The size of a number in bytes.
     width: usize,
     /// Height and width.
-    pub(super) size: (usize, usize),
+    pub(crate) size: (usize, usize),
     data: &'a [u8],
 }
 
 impl<'a> Npy<'a> {
     /// Reads the header and checks that the numbers are all there.
-    pub(super) fn parse(bytes: &'a [u8]) -> Result<Self, String> {
+    pub(crate) fn parse(bytes: &'a [u8]) -> Result<Self, String> {
         let rest = bytes
             .strip_prefix(MAGIC)
             .ok_or("not a .npy file: it does not begin as numpy.save begins one")?;
@@ -102,7 +102,7 @@ impl<'a> Npy<'a> {
     }
 
     /// The numbers, row by row, where they are floating-point.
-    pub(super) fn floats(self) -> Result<impl Iterator<Item = f64>, String> {
+    pub(crate) fn floats(self) -> Result<impl Iterator<Item = f64>, String> {
         match self.numbers {
             Numbers::Floats(read) => Ok(self.data.chunks_exact(self.width).map(read)),
             Numbers::Integers(_) => {
@@ -112,7 +112,7 @@ impl<'a> Npy<'a> {
     }
 
     /// The numbers, row by row, where they are integers.
-    pub(super) fn integers(self) -> Result<impl Iterator<Item = i128>, String> {
+    pub(crate) fn integers(self) -> Result<impl Iterator<Item = i128>, String> {
         match self.numbers {
             Numbers::Integers(read) => Ok(self.data.chunks_exact(self.width).map(read)),
             Numbers::Floats(_) => Err("it holds floats; integers expected".to_owned()),
@@ -152,4 +152,4 @@ fn fields(header: &str) -> Option<(&str, &str, Vec<usize>)> {
 }
 
 #[cfg(test)]
-pub(super) mod tests;
+pub(crate) mod tests;

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::reading::{bytes, entries};
 use crate::error::{Error, Result};
+use crate::files::reading::{bytes, entries};
 use crate::types::QuestionId;
 
 /// An open question about a walk.

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::reading::{entries, is_image};
 use crate::error::{Error, Result};
+use crate::files::reading::{entries, is_image};
 
 /// The folders that pairs lie in, normal light first: LISU's, LOL's, and plain ones.
 const FOLDERS: [[&str; 2]; 3] = [

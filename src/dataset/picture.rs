@@ -5,8 +5,8 @@ use std::io::Cursor;
 use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 
 use super::jpeg::Outline;
-use super::rooms::Room;
 use crate::error::{Error, Result};
+use crate::rooms::Room;
 use crate::types::{Digest, Rgb};
 
 /// What every PNG file begins with.

@@ -10,8 +10,8 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::dialect::translated;
-use super::reading::json_lines;
 use crate::error::{Error, Result};
+use crate::files::reading::json_lines;
 use crate::types::{Choices, Family, FrameId, Question, QuestionId};
 
 #[derive(Debug, Deserialize)]

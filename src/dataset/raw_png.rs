@@ -12,7 +12,7 @@ use crate::types::words::words;
 
 /// What the samples of a PNG file are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Form {
+pub(crate) enum Form {
     /// Grey of 8 bits.
     Grey8,
     /// Grey of 16 bits.
@@ -24,15 +24,15 @@ pub(super) enum Form {
 words!(Form { Grey8 = "8-bit grey", Grey16 = "16-bit grey", Palette = "palette" });
 
 /// A PNG file of one number a pixel, not yet inflated.
-pub(super) struct RawPng<'a> {
+pub(crate) struct RawPng<'a> {
     reader: Reader<Cursor<&'a [u8]>>,
     /// Height and width.
-    pub(super) size: (usize, usize),
+    pub(crate) size: (usize, usize),
 }
 
 impl<'a> RawPng<'a> {
     /// Reads the header; a file of another form than `forms` or of too many pixels is refused.
-    pub(super) fn open(bytes: &'a [u8], forms: &[Form]) -> Result<Self, String> {
+    pub(crate) fn open(bytes: &'a [u8], forms: &[Form]) -> Result<Self, String> {
         let mut decoder = Decoder::new(Cursor::new(bytes));
         decoder.set_transformations(Transformations::IDENTITY);
         decoder.set_ignore_text_chunk(true);
@@ -64,7 +64,7 @@ impl<'a> RawPng<'a> {
     }
 
     /// The samples, row by row, each as `of` makes it.
-    pub(super) fn samples<T: Clone>(mut self, of: impl Fn(u16) -> T) -> Result<Vec<T>, String> {
+    pub(crate) fn samples<T: Clone>(mut self, of: impl Fn(u16) -> T) -> Result<Vec<T>, String> {
         let not_whole = |e: DecodingError| format!("not a whole PNG: {e}");
         let bits = self.reader.info().bit_depth;
         let (height, width) = self.size;
@@ -130,4 +130,4 @@ fn color(color: ColorType) -> &'static str {
 }
 
 #[cfg(test)]
-pub(super) mod tests;
+pub(crate) mod tests;

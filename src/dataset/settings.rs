@@ -7,8 +7,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::Place;
 use super::picture::MOST_PIXELS;
-use super::{Place, Rooms};
+use crate::rooms::Rooms;
 use crate::types::Family;
 
 /// Where the data are.

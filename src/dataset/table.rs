@@ -189,7 +189,7 @@ pub(super) fn read(path: &Path) -> Result<(BTreeMap<FrameId, Source>, Vec<Questi
 
 /// The place of an image in a table: read when it is needed, so that a table of gigabytes is never held.
 #[derive(Debug, Clone)]
-pub(super) struct Cell {
+pub(crate) struct Cell {
     file: PathBuf,
     position: Position,
     column: usize,

@@ -12,14 +12,14 @@ use crate::types::{DepthKind, Digest, Frame, FrameId, Intrinsics, SegmentName, S
 
 /// What a data set says of a frame beside its files.
 #[derive(Debug, Clone, Default, Serialize)]
-pub(super) struct View {
-    pub(super) scene: String,
-    pub(super) depth_kind: DepthKind,
-    pub(super) intrinsics: Option<Intrinsics>,
-    pub(super) segmentation: Segmentation,
+pub(crate) struct View {
+    pub(crate) scene: String,
+    pub(crate) depth_kind: DepthKind,
+    pub(crate) intrinsics: Option<Intrinsics>,
+    pub(crate) segmentation: Segmentation,
     #[serde(serialize_with = "pairs")]
-    pub(super) names: Arc<BTreeMap<u32, SegmentName>>,
-    pub(super) room: Option<String>,
+    pub(crate) names: Arc<BTreeMap<u32, SegmentName>>,
+    pub(crate) room: Option<String>,
 }
 
 /// As pairs: the keys of JSON are texts.
@@ -33,10 +33,10 @@ fn pairs<S: Serializer>(
 /// The files of a frame as they lie in the data set, undecoded.
 #[derive(Debug)]
 pub struct FrameFiles<'a> {
-    pub(super) id: &'a FrameId,
-    pub(super) picture: Picture,
-    pub(super) maps: MapFiles<'a>,
-    pub(super) view: &'a View,
+    pub(crate) id: &'a FrameId,
+    pub(crate) picture: Picture,
+    pub(crate) maps: MapFiles<'a>,
+    pub(crate) view: &'a View,
 }
 
 impl FrameFiles<'_> {

@@ -11,10 +11,10 @@ use serde_json::{Map, Value, json};
 
 use crate::ask::png;
 use crate::dataset::frame_folder::{self, Place};
-use crate::dataset::import::keyframes::{KeyFrameArgs, choose};
-use crate::dataset::import::{Adapter, Incoming, Kind, Read, Stated, open};
 use crate::dataset::{Picture, PixelLimit};
 use crate::error::{Error, Result};
+use crate::import::keyframes::{KeyFrameArgs, choose};
+use crate::import::{Adapter, Incoming, Kind, Read, Stated, open};
 use crate::job::Outcome;
 use crate::job::progress::Progress;
 use crate::job::workers::{ThreadArgs, pool};
@@ -32,7 +32,7 @@ pub struct ImportArgs {
     /// What lies in --src
     #[arg(value_name = "KIND", value_enum)]
     pub kind: Kind,
-    /// The data set, laid out as src/dataset/import/README.md shows
+    /// The data set, laid out as src/import/README.md shows
     #[arg(long, value_name = "DIR")]
     pub src: PathBuf,
     /// Where the frames go, in the common interface

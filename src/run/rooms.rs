@@ -9,11 +9,11 @@ use serde_json::{Map, Value, json};
 
 use crate::ask::png;
 use crate::dataset::frame_folder::{self, FRAMES, Place};
-use crate::dataset::rooms::{self, Room, Rooms};
 use crate::error::{Error, Result};
 use crate::job::Outcome;
 use crate::job::progress::Progress;
 use crate::job::workers::{ThreadArgs, pool};
+use crate::rooms::{self, Room, Rooms};
 use crate::types::manifest::Status;
 use crate::types::{FrameId, Labels};
 

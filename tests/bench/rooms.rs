@@ -7,11 +7,11 @@
 use std::hint::black_box;
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
-use darkqa_eval::dataset::Rooms;
-use darkqa_eval::dataset::rooms::{Room, labels};
 use darkqa_eval::questions::colors::Palette;
 use darkqa_eval::questions::observer::Watched;
 use darkqa_eval::questions::rules::Rules;
+use darkqa_eval::rooms::Rooms;
+use darkqa_eval::rooms::{Room, labels};
 
 const ROOMS: Rooms = Rooms {
     frames: 12,

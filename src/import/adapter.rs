@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use ndarray::Array2;
 
-use crate::dataset::spaces;
 use crate::error::{Error, Result};
+use crate::labels;
 use crate::types::flag::positive;
 use crate::types::{DepthKind, Intrinsics, Labels, Rgb, SegmentName, Segmentation};
 
@@ -104,7 +104,7 @@ impl Listing {
     /// A data set whose labels are those of mpcat40, as adapters by name write them.
     pub(super) fn by_name(stated: &Stated) -> Self {
         Self {
-            labels: spaces::space("mpcat40").unwrap_or_default(),
+            labels: labels::space("mpcat40").unwrap_or_default(),
             hfov: stated.hfov,
             ..Self::default()
         }
@@ -140,14 +140,14 @@ pub(super) fn labels(stated: &Stated) -> Result<Option<Labels>> {
     let Some(name) = &stated.labels else {
         return Ok(None);
     };
-    if let Some(labels) = spaces::space(name) {
+    if let Some(labels) = labels::space(name) {
         return Ok(Some(labels));
     }
     let path = Path::new(name);
     if path.is_file() {
-        return spaces::read(path).map(Some);
+        return labels::read(path).map(Some);
     }
-    let known = spaces::names().join(", ");
+    let known = labels::names().join(", ");
     let problem = format_args!("{name:?} is neither a file none of the built-in spaces: {known}");
     Err(Error::usage("--labels", problem))
 }

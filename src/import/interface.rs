@@ -5,9 +5,9 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::adapter::{Adapter, Incoming, Listing, Read};
-use crate::dataset::reading::json_lines;
 use crate::dataset::{Dataset, Source};
 use crate::error::{Error, Result};
+use crate::files::reading::json_lines;
 use crate::types::{DepthKind, Frame, FrameId, Rgb, Segmentation};
 
 /// The frames of a folder.

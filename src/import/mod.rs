@@ -12,7 +12,6 @@ mod hm3d;
 mod interface;
 pub mod keyframes;
 mod mp3d;
-pub(in crate::dataset) mod names;
 mod nyu;
 mod polygons;
 mod replica;
@@ -22,9 +21,7 @@ mod thor;
 
 use std::path::Path;
 
-use super::spaces;
 use crate::error::{Error, Result};
-use crate::types::Labels;
 use crate::types::flag::flag_words;
 
 pub use adapter::{Adapter, Incoming, Listing, Read, Stated};
@@ -72,15 +69,9 @@ pub fn open(kind: Kind, folder: &Path, stated: &Stated) -> Result<Box<dyn Adapte
     };
     if adapter.listing().frames.is_empty() {
         let problem = format_args!(
-            "no frames of {kind} in this folder; see the layouts in src/dataset/import/README.md"
+            "no frames of {kind} in this folder; see the layouts in src/import/README.md"
         );
         return Err(Error::data(folder.display(), problem));
     }
     Ok(adapter)
-}
-
-/// A label space as `classes.json`.
-#[must_use]
-pub fn classes(labels: &Labels) -> String {
-    spaces::json(labels)
 }

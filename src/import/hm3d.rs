@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use super::names::class_of;
+use crate::labels::names::class_of;
 use crate::types::SegmentName;
 
 /// The first line.

@@ -34,8 +34,8 @@ use self::dice::Dice;
 use self::kinds::RoomKind;
 use self::plan::Plan;
 use self::viewpoint::Height;
-use super::spaces;
 use crate::error::{Error, Result};
+use crate::labels;
 use crate::types::{DepthKind, Digest, Frame, FrameId, Labels, SegmentName, Segmentation};
 
 /// What the rooms are made by. Any change of a pixel or a name is another version.
@@ -186,7 +186,7 @@ impl Rooms {
 /// What the numbers of the rooms' maps stand for.
 #[must_use]
 pub fn labels() -> Labels {
-    spaces::space(SPACE).unwrap_or_default()
+    labels::space(SPACE).unwrap_or_default()
 }
 
 impl Room {
@@ -343,7 +343,7 @@ fn number(class: &str) -> u16 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dataset::import::names::{Meaning, meaning};
+    use crate::labels::names::{Meaning, meaning};
 
     #[test]
     fn words_have_the_classes_that_they_have_in_other_data_sets() {

@@ -11,7 +11,7 @@ const OVERRIDES: &str = include_str!("overrides.tsv");
 const THOR: &str = include_str!("thor.tsv");
 
 /// The class of what no table has.
-pub(super) const UNKNOWN: &str = "misc";
+pub(crate) const UNKNOWN: &str = "misc";
 
 type Table = BTreeMap<&'static str, &'static str>;
 
@@ -24,7 +24,7 @@ static TABLES: LazyLock<[Table; 3]> = LazyLock::new(|| [OVERRIDES, HM3D, THOR].m
 
 /// What a word means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::dataset) enum Meaning {
+pub(crate) enum Meaning {
     /// A class of mpcat40.
     Class(&'static str),
     /// Nothing: the data set itself does not know.
@@ -40,7 +40,7 @@ fn spelled(word: &str) -> String {
 }
 
 /// What a word of a data set means; the suffixes `/otherroom` and `/outside` say where, not what.
-pub(in crate::dataset) fn meaning(word: &str) -> Meaning {
+pub(crate) fn meaning(word: &str) -> Meaning {
     let word = spelled(word);
     let bare = [
         "/otherroom",
@@ -67,7 +67,7 @@ pub(in crate::dataset) fn meaning(word: &str) -> Meaning {
 }
 
 /// The class of a word of a data set, which is counted as `shown` where it stands in no table; `None` where it means nothing.
-pub(super) fn class_of(
+pub(crate) fn class_of(
     word: &str,
     shown: &str,
     count: usize,
@@ -84,12 +84,12 @@ pub(super) fn class_of(
 }
 
 /// The class that goes before what a data set's own table says of a word.
-pub(super) fn overridden(word: &str) -> Option<&'static str> {
+pub(crate) fn overridden(word: &str) -> Option<&'static str> {
     TABLES[0].get(spelled(word).as_str()).copied()
 }
 
 /// A type of AI2-THOR (`CoffeeTable`) in words (`coffee table`), with its class.
-pub(super) fn thor(kind: &str) -> (String, &'static str) {
+pub(crate) fn thor(kind: &str) -> (String, &'static str) {
     let mut words = String::new();
     let mut before = ' ';
     for letter in kind.chars() {
@@ -111,8 +111,8 @@ pub(super) fn thor(kind: &str) -> (String, &'static str) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::spaces::canonical;
     use super::*;
+    use crate::labels::canonical;
 
     #[test]
     fn every_line_is_a_word_and_a_class() {

@@ -14,12 +14,12 @@ use serde_json::Value;
 
 use super::adapter::{Adapter, Incoming, Listing, Read};
 use super::files::{files, folders, last, numbers, png, same_size};
-use super::names::class_of;
 use super::polygons::{Polygon, draw};
 use crate::dataset::raw_png::Form;
-use crate::dataset::reading::{json, text};
-use crate::dataset::spaces::canonical;
 use crate::error::{Error, Result};
+use crate::files::reading::{json, text};
+use crate::labels::canonical;
+use crate::labels::names::class_of;
 use crate::types::{Intrinsics, Label, Labels, Rgb};
 
 /// What the toolbox takes for the end of the sensor's range, in millimetres.

@@ -1,4 +1,6 @@
-//! Files that are written whole, or not at all: [`write`] and [`write_synced`].
+//! Files that are written whole, or not at all: [`write`] and [`write_synced`]; and what reading them has in common: [`reading`].
+
+pub(crate) mod reading;
 
 use std::ffi::OsStr;
 use std::fs::{self, File};

@@ -64,7 +64,7 @@ impl Folder {
         let known = folder.join("classes.json");
         let labels = match labels(stated)? {
             Some(labels) => labels,
-            None if known.is_file() => crate::dataset::spaces::read(&known)?,
+            None if known.is_file() => crate::labels::read(&known)?,
             None => {
                 let problem = "which label space the numbers of its class maps belong to must be said: nyu40, nyu13, mpcat40, ade150, or a classes.json";
                 return Err(Error::usage("--labels", problem));

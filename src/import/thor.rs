@@ -10,9 +10,9 @@ use ndarray::Array2;
 
 use super::adapter::{Adapter, Incoming, Listing, Read, Stated, numbers};
 use super::files::{depth_of, files, folders, last, picture, same_size};
-use super::names;
-use crate::dataset::reading::json;
 use crate::error::{Error, Result};
+use crate::files::reading::json;
+use crate::labels::names;
 use crate::types::{Rgb, SegmentName};
 
 /// The scenes of a folder.

@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 ///
 /// # Errors
 /// With the folder.
-pub(super) fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
+pub(crate) fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
     let unread = |e| Error::file(folder, "read", e);
     let entries = fs::read_dir(folder).map_err(unread)?;
     let mut paths = entries
@@ -22,7 +22,7 @@ pub(super) fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
 }
 
 /// Whether a path is a file that is named as an image.
-pub(super) fn is_image(path: &Path) -> bool {
+pub(crate) fn is_image(path: &Path) -> bool {
     let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
     path.is_file() && ["png", "jpg", "jpeg"].iter().any(|known| ending == *known)
 }
@@ -31,7 +31,7 @@ pub(super) fn is_image(path: &Path) -> bool {
 ///
 /// # Errors
 /// With the file.
-pub(super) fn bytes(path: &Path) -> Result<Vec<u8>> {
+pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>> {
     fs::read(path).map_err(|e| Error::file(path, "read", e))
 }
 
@@ -39,7 +39,7 @@ pub(super) fn bytes(path: &Path) -> Result<Vec<u8>> {
 ///
 /// # Errors
 /// With the file.
-pub(super) fn text(path: &Path) -> Result<String> {
+pub(crate) fn text(path: &Path) -> Result<String> {
     fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))
 }
 
@@ -47,7 +47,7 @@ pub(super) fn text(path: &Path) -> Result<String> {
 ///
 /// # Errors
 /// With the file.
-pub(super) fn json<T: DeserializeOwned>(path: &Path) -> Result<T> {
+pub(crate) fn json<T: DeserializeOwned>(path: &Path) -> Result<T> {
     serde_json::from_str(&text(path)?).map_err(|e| Error::data(path.display(), e))
 }
 
@@ -55,7 +55,7 @@ pub(super) fn json<T: DeserializeOwned>(path: &Path) -> Result<T> {
 ///
 /// # Errors
 /// With the file and the line.
-pub(super) fn json_lines<T: DeserializeOwned>(path: &Path) -> Result<Vec<(usize, T)>> {
+pub(crate) fn json_lines<T: DeserializeOwned>(path: &Path) -> Result<Vec<(usize, T)>> {
     let text = text(path)?;
     let lines = (1..).zip(text.trim_start_matches('\u{feff}').lines());
     lines

@@ -5,7 +5,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::names::{UNKNOWN, overridden};
+use crate::labels::names::{UNKNOWN, overridden};
 use crate::types::SegmentName;
 
 /// What a scene says.
@@ -97,7 +97,7 @@ pub(super) fn parse(text: &str, classes: &BTreeSet<String>) -> Result<House, (us
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dataset::spaces::canonical;
+    use crate::labels::canonical;
 
     #[test]
     fn objects_have_categories_and_regions() {

@@ -1,12 +1,14 @@
 //! Label spaces that data sets share, by name: [`space`]; and a data set's own, `classes.json`: `read`.
 
+pub(crate) mod names;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::dataset::reading;
 use crate::error::{Error, Result};
+use crate::files::reading;
 use crate::types::{Label, Labels};
 
 /// The schema of `classes.json`.

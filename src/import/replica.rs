@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
-use super::names::class_of;
+use crate::labels::names::class_of;
 use crate::types::SegmentName;
 
 /// The keys that are used.

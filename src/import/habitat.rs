@@ -12,8 +12,8 @@ use serde::Deserialize;
 use super::adapter::{Adapter, Incoming, Listing, Read, Stated, numbers};
 use super::files::{depth_of, files, folders, last, same_size, segments};
 use super::{hm3d, mp3d, replica};
-use crate::dataset::reading::{json_lines, text};
 use crate::error::{Error, Result};
+use crate::files::reading::{json_lines, text};
 use crate::types::{Intrinsics, Rgb, SegmentName};
 
 /// The part of the named pixels that a region must have for its room to be the frame's, in hundredths.

@@ -9,8 +9,8 @@ use crate::dataset::maps::DepthFile;
 use crate::dataset::npy::Npy;
 use crate::dataset::picture::{MOST_PIXELS, Picture};
 use crate::dataset::raw_png::{Form, RawPng};
-use crate::dataset::reading::{bytes, entries, text};
 use crate::error::{Error, Result};
+use crate::files::reading::{bytes, entries, text};
 use crate::types::Rgb;
 
 /// The folders in a folder, by name.

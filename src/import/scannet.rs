@@ -13,11 +13,11 @@ use serde::Deserialize;
 
 use super::adapter::{Adapter, Incoming, Listing, Read, Stated};
 use super::files::{depth, files, first, folders, last, numbers, png, same_size};
-use super::names::{UNKNOWN, overridden};
 use crate::dataset::raw_png::Form;
-use crate::dataset::reading::{json, text};
-use crate::dataset::spaces::{canonical, space};
 use crate::error::{Error, Result};
+use crate::files::reading::{json, text};
+use crate::labels::names::{UNKNOWN, overridden};
+use crate::labels::{canonical, space};
 use crate::types::{Intrinsics, Label, Labels, Rgb};
 
 /// The table of ScanNet's own numbers.
