@@ -66,6 +66,8 @@ fn the_page_works_in_a_browser() {
     browser.window(1400, 900, "light");
     browser.go(&url);
     browser.wait("document.documentElement?.dataset.ready === 'true'");
+    // Without a link the page opens at its top.
+    assert_eq!(browser.evaluate("window.scrollY"), 0);
     browser.shot("light.png", true);
     filters(&mut browser);
     slider(&mut browser);
@@ -198,6 +200,7 @@ fn deep_link(browser: &mut Browser, url: &str) {
     ));
     browser.wait("document.documentElement?.dataset.ready === 'true'");
     assert_eq!(count(browser), "1 of 40 items");
+    assert_eq!(browser.evaluate("window.scrollY > 0"), true);
     let title = browser.evaluate("document.querySelector('#r-title').textContent");
     assert_eq!(title, format!("Reply of {SAID} at L5-noise"));
     let reading = browser.evaluate("document.querySelector('#r-reading').textContent");

@@ -167,11 +167,4 @@ fn fail(problem: &str) -> ExitCode {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_command_line_is_sound() {
-        Cli::command().help_expected(true).debug_assert();
-    }
-}
+mod tests;

@@ -355,8 +355,10 @@ const start = async () => {
   });
   for (const id of ["c-model", "c-condition", "c-family"]) $(id)?.addEventListener("change", confusion);
   if ($("confusion")) confusion();
-  if (data.subjects.length && !follow()) refresh();
-  if (said().item) $("items").scrollIntoView();
+  // The page opens at its top, unless the address names an item; showing the first item writes its name there.
+  const linked = data.subjects.length && follow();
+  if (data.subjects.length && !linked) refresh();
+  if (linked) $("items").scrollIntoView();
   addEventListener("hashchange", () => { if (said().item && location.hash !== link()) { follow(); $("items").scrollIntoView(); } });
   document.documentElement.dataset.ready = "true";
 };
