@@ -341,10 +341,13 @@ fn said_where(error: &clap::Error, origins: &BTreeMap<String, String>) -> Error 
 pub(super) fn one_line(error: &clap::Error) -> String {
     let text = error.render().to_string();
     let lines = text.lines().map(str::trim);
-    let wanted = lines.filter(|line| {
-        !line.is_empty() && !line.starts_with("Usage:") && !line.starts_with("For more information")
-    });
-    let line = wanted.collect::<Vec<_>>().join(" ");
+    let wanted = lines.take_while(|line| !line.starts_with("Usage:"));
+    let wanted =
+        wanted.filter(|line| !line.is_empty() && !line.starts_with("For more information"));
+    let line = wanted
+        .collect::<Vec<_>>()
+        .join(" ")
+        .replace(" tip: ", "; tip: ");
     line.trim_start_matches("error: ").to_owned()
 }
 

@@ -280,9 +280,13 @@ fn what_cannot_be_used_names_where_it_is_said_and_what_may_be_meant() {
         (
             &["--modle", "m"],
             "",
-            "a similar argument exists: '--model'",
+            "found; tip: a similar argument exists: '--model'",
         ),
-        (&["synthesise"], "", "synthesize"),
+        (
+            &["synthesise"],
+            "",
+            "tip: a similar subcommand exists: 'synthesize'",
+        ),
         (
             &["--profile", "papre"],
             "",
@@ -297,6 +301,7 @@ fn what_cannot_be_used_names_where_it_is_said_and_what_may_be_meant() {
         let error = wrong(words, &[], file);
         assert!(error.contains(says), "{says}: {error}");
         assert_eq!(error.lines().count(), 1, "{error}");
+        assert!(!error.contains("COMMAND"), "{error}");
     }
 }
 
