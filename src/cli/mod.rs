@@ -1,7 +1,7 @@
 //! The command line: what can be called, and with which flags.
 //!
 //! The flags of a command stand in a structure beside the command; several share groups of flags, each in the room that uses it. The
-//! environment and a `--config` file are turned into words before they are parsed (see [`layers`]), so every value is read by one parser.
+//! environment and a `--config` file are turned into words before they are parsed (see `cli/layers.rs`), so every value is read by one parser.
 
 mod command;
 mod layers;

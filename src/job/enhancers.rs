@@ -1,4 +1,4 @@
-//! The enhancement models of a command: [`OpenEnhancers`], loaded when they are needed.
+//! The enhancement models of a command: `OpenEnhancers`, loaded when they are needed.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! The models of a run, as flags name them ([`ModelArgs`], [`Ask`]), and opened ([`ModelUnderTest`]).
+//! The models of a run, as flags name them ([`ModelArgs`], [`Ask`]), and opened (`ModelUnderTest`).
 
 use std::path::PathBuf;
 use std::str::FromStr;

@@ -1,4 +1,4 @@
-//! The flags that decide the images of a run, as they were said: a manifest keeps them, and they are read again ([`Pictures`]).
+//! The flags that decide the images of a run, as they were said: a manifest keeps them, and they are read again (`Pictures`).
 
 use std::collections::BTreeMap;
 use std::num::NonZeroU32;

@@ -1,4 +1,4 @@
-//! The images of a run, made again: [`ImageRebuilder`].
+//! The images of a run, made again: `ImageRebuilder`.
 
 use std::path::{Path, PathBuf};
 

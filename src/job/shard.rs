@@ -1,4 +1,4 @@
-//! Which part of a job a process does: [`Shard`], and the questions of it: [`part`].
+//! Which part of a job a process does: [`Shard`], and the questions of it: `part`.
 
 use std::collections::HashMap;
 use std::fmt;

@@ -1,4 +1,4 @@
-//! Walks through houses as what is shown: [`WalkFolder`], and how they are shown: [`Walk`].
+//! Walks through houses as what is shown: `WalkFolder`, and how they are shown: [`Walk`].
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,4 +1,4 @@
-//! The threads that images are made on: [`Workers`].
+//! The threads that images are made on: `Workers`.
 
 use std::num::NonZeroUsize;
 

@@ -1,4 +1,4 @@
-//! Values of flags that are numbers or words: parsers with their limits, and [`flag_words`].
+//! Values of flags that are numbers or words: parsers with their limits, and `flag_words`.
 //!
 //! An error says what is expected and not of which flag: the command line adds the name.
 
