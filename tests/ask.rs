@@ -112,6 +112,7 @@ async fn what_is_set_is_sent_and_what_is_not_is_left_out() {
     let parameters = Parameters {
         model: "m".into(),
         temperature: Temperature::Server,
+        top_p: Some(0.25),
         seed: Some(1234),
         max_tokens: NonZeroU32::new(16).unwrap(),
         token_field: TokenField::MaxCompletionTokens,
@@ -144,8 +145,9 @@ async fn what_is_set_is_sent_and_what_is_not_is_left_out() {
     );
     assert_eq!(body["max_completion_tokens"], 16);
     assert_eq!(body["reasoning_effort"], "low");
+    assert_eq!(body["top_p"], 0.25);
     assert_eq!(body["seed"], 1234);
-    assert_eq!(body.as_object().unwrap().len(), 5);
+    assert_eq!(body.as_object().unwrap().len(), 6);
     let parts = body["messages"][0]["content"].as_array().unwrap();
     assert_eq!(parts.len(), 4);
     assert_eq!(parts[0]["text"], message.before);

@@ -207,7 +207,7 @@ fn set(conditions: &str) -> BTreeSet<String> {
 }
 
 /// What refuses an evaluation on the folder of another: the field that the message names, and the flag.
-const REFUSED: [(&str, &str); 23] = [
+const REFUSED: [(&str, &str); 24] = [
     ("--data", "--data elsewhere/frames"),
     ("--questions", "--questions other.jsonl"),
     ("--shuffle-options", "--shuffle-options"),
@@ -228,13 +228,14 @@ const REFUSED: [(&str, &str); 23] = [
     ("--max-tokens", "--max-tokens 7"),
     ("--max-tokens", "--token-field none"),
     ("--reasoning-effort", "--reasoning-effort low"),
+    ("--top-p", "--top-p 0.9"),
     ("--detail", "--detail low"),
     ("--constrain", "--constrain json"),
     ("--constrain", "--constrain choice"),
 ];
 
 /// The same for open questions.
-const OPEN_REFUSED: [(&str, &str); 21] = [
+const OPEN_REFUSED: [(&str, &str); 22] = [
     ("--questions", "--questions other.json"),
     ("--num-frames", "--num-frames 2"),
     ("--image-size", "--image-size 32"),
@@ -255,6 +256,7 @@ const OPEN_REFUSED: [(&str, &str); 21] = [
     ("--max-tokens", "--token-field none"),
     ("--sampling-seed", "--sampling-seed 5"),
     ("--reasoning-effort", "--reasoning-effort low"),
+    ("--top-p", "--top-p 0.9"),
     ("--detail", "--detail low"),
 ];
 

@@ -24,6 +24,10 @@ pub struct Parameters {
     /// Sampling temperature; default for the server's own; auto for 0, or the server's own where the model refuses any other
     #[arg(long, value_name = "T|auto|default", default_value_t = Temperature::Auto)]
     pub temperature: Temperature,
+    /// Draw only from the likeliest tokens that together have this probability; default: not sent
+    #[arg(long, value_name = "P", value_parser = share)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub top_p: Option<f64>,
     /// The most tokens of a reply, hidden reasoning included
     ///
     /// A letter needs 16; a reasoning model burns hundreds before it.
@@ -58,6 +62,7 @@ impl Parameters {
         Self {
             model,
             temperature: Temperature::Auto,
+            top_p: None,
             seed: None,
             max_tokens: Self::MAX_TOKENS,
             token_field: TokenField::Auto,
@@ -78,6 +83,13 @@ impl Parameters {
         content["max_tokens"] = self.limit().into();
         content
     }
+}
+
+/// Reads a probability above 0.
+fn share(text: &str) -> Result<f64, String> {
+    let share = text.parse().ok();
+    let share = share.filter(|share| 0.0 < *share && *share <= 1.0);
+    share.ok_or_else(|| "a number above 0 and up to 1 expected".to_owned())
 }
 
 /// The sampling temperature of a request.

@@ -19,6 +19,8 @@ struct Request<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     temperature: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    top_p: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     seed: Option<u64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     max_tokens: Option<u32>,
@@ -79,6 +81,7 @@ pub(super) fn body(
     let json = serde_json::to_string(&Request {
         model: &parameters.model,
         temperature: fields.temperature,
+        top_p: parameters.top_p,
         seed: parameters.seed,
         max_tokens: limit(TokenField::MaxTokens),
         max_completion_tokens: limit(TokenField::MaxCompletionTokens),
@@ -152,6 +155,12 @@ pub(super) fn fields(sent: Sent<'_>) -> Vec<Field> {
             sent: sent.fields.temperature.is_some(),
             refused: Some(Refused::Temperature),
             hint: "leave the temperature to the server: --temperature default",
+        },
+        Field {
+            name: "top_p",
+            sent: parameters.top_p.is_some(),
+            refused: None,
+            hint: "leave --top-p out: the model takes no other than its own",
         },
         Field {
             name: "max_tokens",

@@ -60,6 +60,7 @@ fn sample(arg: &Arg) -> String {
         "condition" => "L3-noise",
         "url" => "/v1/responses",
         "families" => "color",
+        "top_p" => "0.9",
         "data" | "model" | "judge" => "abc",
         _ => match arg.get_value_names() {
             Some([name])
