@@ -10,10 +10,11 @@
 //! only where a question is put to a model.
 //!
 //! ```text
-//!                  ┌──────► questions ─────────────┐            (words: what is asked)
-//!               dataset                             ├─► ask → store → score → report
-//!                  └──────► synthesis ──► enhance ──┘            (light: what is seen)
-//!   types, error, files = the ground     job = the engine of everything asked     run = one folder or file a command
+//!                            ┌──────► questions ─────────────┐            (words: what is asked)
+//! labels ► rooms ► dataset ──┤                               ├─► ask → store → score → report
+//!             import ──┘     └──────► synthesis ──► enhance ─┘            (light: what is seen)
+//!
+//! types, error, files = the ground     job = the engine of everything asked     run = one folder or file a command     cli = words → calls
 //! ```
 //!
 //! - [`types`]: the vocabulary. [`Frame`](types::Frame)s are seen, [`Question`](types::Question)s are asked, a
@@ -82,7 +83,7 @@
 //! | `report` | `types`, `error`, `score`, `questions` |
 //! | `job` | `files`, `types`, `error`, `rooms`, `labels`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `report` |
 //! | `run` | `job`, `files`, `types`, `error`, `rooms`, `labels`, `import`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `report` |
-//! | `cli` | `run`, `job`, `ask`, `enhance`, `score`, `synthesis`, `types`, `error` |
+//! | `cli` | `run`, `job`, `files`, `rooms`, `ask`, `enhance`, `score`, `synthesis`, `types`, `error` |
 //! | `main` | `cli`, `enhance` |
 
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]

@@ -6,7 +6,6 @@
 
 use std::collections::BTreeMap;
 use std::ffi::{OsStr, OsString};
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
@@ -15,6 +14,7 @@ use clap::{Arg, ArgAction, ArgMatches, Command};
 use toml::{Table, Value};
 
 use crate::error::{Error, Result};
+use crate::files::reading;
 
 /// What every variable of the environment begins with.
 const PREFIX: &str = "DARKQA_";
@@ -202,7 +202,7 @@ fn of_file(
     command: &Command,
     called: &[String],
 ) -> Result<BTreeMap<String, Said>> {
-    let text = fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))?;
+    let text = reading::text(path)?;
     let table: Table = text.parse().map_err(|e| broken(path, &text, &e))?;
     let mut said = BTreeMap::new();
     take(&mut said, path, &table, all, (command, called), &[])?;

@@ -29,7 +29,7 @@ pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
         Some(Command::Synthesize(args)) => {
             if args.from.is_some() {
                 let why = "--from makes an image as its own file says";
-                idle.because(why, &[light(), sensor()].concat());
+                idle.because(why, &light());
             }
             if args.sheet.is_some() {
                 idle.because(
@@ -64,13 +64,17 @@ fn ids<A: Args>() -> Vec<String> {
     ids.collect()
 }
 
+/// What decides degraded images alone: the seed decides guesses and orders, too.
 fn light() -> Vec<String> {
-    ids::<LightArgs>()
+    without_seed(ids::<LightArgs>())
 }
 
-/// What decides noise alone: the seed decides guesses and orders, too.
+/// What decides noise alone.
 fn sensor() -> Vec<String> {
-    let mut ids = ids::<SensorArgs>();
+    without_seed(ids::<SensorArgs>())
+}
+
+fn without_seed(mut ids: Vec<String>) -> Vec<String> {
     ids.retain(|id| id != "seed");
     ids
 }
@@ -152,13 +156,7 @@ impl Idle {
     ) {
         let models = &args.models;
         if models.blind || models.model.is_empty() {
-            let shown = [
-                light(),
-                sensor(),
-                enhancement(),
-                ids::<ImageArgs>(),
-                images.to_vec(),
-            ];
+            let shown = [light(), enhancement(), ids::<ImageArgs>(), images.to_vec()];
             let shown = [shown.concat(), vec!["detail".into(), "max_image".into()]].concat();
             self.because("no model is shown an image", &shown);
         }

@@ -14,7 +14,7 @@ use super::shard::Shard;
 use crate::ask::{AccessArgs, Bounds, Constrain, Format, ImageArgs, Parameters, Sending};
 use crate::enhance::{EnhancerArgs, ModelFile};
 use crate::error::{Error, Result};
-use crate::synthesis::{Light, LightArgs, SensorArgs};
+use crate::synthesis::{Light, LightArgs};
 use crate::types::View;
 
 /// The flags that every experiment has.
@@ -23,9 +23,6 @@ pub struct JobArgs {
     /// Light.
     #[command(flatten)]
     pub light: LightArgs,
-    /// Light, as a sensor sees it.
-    #[command(flatten)]
-    pub sensor: SensorArgs,
     /// Which images are enhanced, and by what.
     #[command(flatten)]
     pub enhancers: EnhancerArgs,
@@ -188,7 +185,7 @@ impl JobArgs {
             self.access
         };
         Ok(JobSettings {
-            light: Light::resolve(self.light, &self.sensor)?,
+            light: Light::resolve(&self.light)?,
             ask: Ask::resolve(self.models, parameters, &access, sending)?,
             enhancers: self.enhancers,
             loading: self.loading,

@@ -22,6 +22,9 @@ pub struct LightArgs {
     /// Which of the paired variants: ev (exposure drop alone), noise (with sensor noise), both
     #[arg(long, value_name = "ev|noise|both", default_value_t = KindSet::BOTH)]
     pub variant: KindSet,
+    /// The sensor and its noise.
+    #[command(flatten)]
+    pub sensor: SensorArgs,
 }
 
 /// The sensor and its noise.
@@ -131,11 +134,11 @@ impl Light {
     ///
     /// # Errors
     /// [`Error::Usage`] with the flag that cannot be used.
-    pub fn resolve(light: LightArgs, sensor: &SensorArgs) -> Result<Self> {
+    pub fn resolve(args: &LightArgs) -> Result<Self> {
         Ok(Self {
-            levels: light.levels.0,
-            variants: light.variant,
-            sensor: Sensor::resolve(sensor)?,
+            levels: args.levels.0.clone(),
+            variants: args.variant,
+            sensor: Sensor::resolve(&args.sensor)?,
         })
     }
 

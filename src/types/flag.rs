@@ -8,6 +8,8 @@ use std::time::Duration;
 
 use clap::ValueEnum;
 
+use crate::error::{self, Error};
+
 /// The maximum of `--threads`: more than any machine has use for, fewer than stop one.
 const MAX_THREADS: usize = 1024;
 
@@ -54,14 +56,14 @@ pub(crate) fn write_word(value: &impl ValueEnum, f: &mut fmt::Formatter<'_>) -> 
 ///
 /// # Errors
 /// If it is no such word.
-pub(crate) fn read_word<T: ValueEnum>(word: &str) -> crate::error::Result<T> {
+pub(crate) fn read_word<T: ValueEnum>(word: &str) -> error::Result<T> {
     T::from_str(word, false).map_err(|_| {
         let values = T::value_variants().iter();
         let words: Vec<String> = values
             .filter_map(|value| Some(value.to_possible_value()?.get_name().to_owned()))
             .collect();
         let problem = format_args!("it is not one of {}", words.join(", "));
-        crate::error::Error::data(format_args!("{word:?}"), problem)
+        Error::data(format_args!("{word:?}"), problem)
     })
 }
 

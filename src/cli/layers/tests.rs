@@ -1,3 +1,5 @@
+use std::fs;
+
 use clap::CommandFactory as _;
 
 use super::*;
@@ -176,6 +178,24 @@ fn every_flag_says_what_it_is_if_nobody_says_it() {
             assert!(said, "{path:?} {}: no default is said", arg.get_id());
         }
     }
+}
+
+#[test]
+fn what_no_words_say_is_the_default_of_the_group() {
+    fn unsaid<A: clap::Args + std::fmt::Debug>() -> String {
+        let command = A::augment_args(Command::new("group"));
+        let matches = command.try_get_matches_from(["group"]).unwrap();
+        format!("{:?}", A::from_arg_matches(&matches).unwrap())
+    }
+    let sending = format!("{:?}", crate::ask::Sending::default());
+    assert_eq!(unsaid::<crate::ask::Sending>(), sending);
+    let rooms = format!("{:?}", crate::rooms::Rooms::default());
+    assert_eq!(unsaid::<crate::rooms::Rooms>(), rooms);
+    let parameters = crate::ask::Parameters::new(String::new());
+    assert_eq!(
+        unsaid::<crate::ask::Parameters>(),
+        format!("{parameters:?}")
+    );
 }
 
 #[test]

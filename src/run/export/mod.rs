@@ -22,7 +22,7 @@ use crate::job::recipe::Recipe;
 use crate::job::source::{Source, inspect_all};
 use crate::job::timings::Timings;
 use crate::job::workers::pool;
-use crate::synthesis::{Light, LightArgs, SensorArgs};
+use crate::synthesis::{Light, LightArgs};
 use crate::types::manifest::Status;
 use crate::types::{Condition, FrameId, Question};
 
@@ -49,9 +49,6 @@ pub struct ExportArgs {
     /// Light.
     #[command(flatten)]
     pub light: LightArgs,
-    /// Light, as a sensor sees it.
-    #[command(flatten)]
-    pub sensor: SensorArgs,
     /// Which images are enhanced, and by what.
     #[command(flatten)]
     pub enhancers: EnhancerArgs,
@@ -71,7 +68,7 @@ pub fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> {
     let dataset = open_data(&args.data, &args.selection, args.limit, progress)?;
     let questions = select(&dataset, &args.selection)?;
     let files = enhancers::read(&args.enhancers.llie)?;
-    let light = Light::resolve(args.light.clone(), &args.sensor)?;
+    let light = Light::resolve(&args.light)?;
     let recipe = Recipe::lossless(&light.sensor, &files);
     let conditions = conditions(&light, args.enhancers.llie_on, &recipe.enhancers);
     let workers = pool(args.loading.threads.threads)?;

@@ -1,14 +1,13 @@
 //! The human check: its page, and what people said on it.
 
 use std::collections::BTreeSet;
-use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 use serde::Deserialize;
 
 use crate::dataset::Dataset;
 use crate::error::{Error, Result};
-use crate::files::write;
+use crate::files::{reading, write};
 use crate::questions::Asked;
 use crate::questions::statistics::FrameStatistics;
 use crate::report::questions::review::{Item, page};
@@ -35,7 +34,7 @@ enum Word {
 pub(super) fn rejected(files: &[PathBuf]) -> Result<BTreeSet<QuestionId>> {
     let mut rejected = BTreeSet::new();
     for path in files {
-        let text = fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))?;
+        let text = reading::text(path)?;
         let lines = text.trim_start_matches('\u{feff}').lines().enumerate();
         for (i, line) in lines.filter(|(_, line)| !line.trim().is_empty()) {
             let said: Said =
@@ -102,6 +101,8 @@ fn escaped(name: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]

@@ -4,7 +4,6 @@ mod checked;
 mod kept;
 
 use std::collections::BTreeSet;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -14,7 +13,7 @@ use serde_json::{Value, json};
 
 use crate::dataset::{Dataset, PixelLimit};
 use crate::error::{Error, Result};
-use crate::files::write;
+use crate::files::{reading, write};
 use crate::job::progress::Progress;
 use crate::job::workers::{ThreadArgs, pool};
 use crate::job::{Outcome, Show};
@@ -124,7 +123,7 @@ fn read<T>(path: Option<&Path>, parse: fn(&str) -> Result<T>) -> Result<Option<T
     let Some(path) = path else {
         return Ok(None);
     };
-    let text = fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))?;
+    let text = reading::text(path)?;
     parse(&text)
         .map(Some)
         .map_err(|e| e.at(path.display().to_string()))

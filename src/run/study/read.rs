@@ -2,7 +2,6 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt::Write;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -11,6 +10,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
+use crate::files::reading;
 use crate::job::report::choice;
 use crate::job::stored::StoredRun;
 
@@ -119,7 +119,7 @@ pub fn read(args: &ReadArgs) -> Result<Outcome> {
 }
 
 fn answers(path: &Path) -> Result<Vec<Line>> {
-    let text = fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))?;
+    let text = reading::text(path)?;
     let lines = text.trim_start_matches('\u{feff}').lines().enumerate();
     lines
         .filter(|(_, line)| !line.trim().is_empty())

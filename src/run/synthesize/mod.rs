@@ -21,7 +21,7 @@ use crate::job::recipe::Recipe;
 use crate::job::source::Frames;
 use crate::job::timings::Timings;
 use crate::job::workers::{ThreadArgs, pool};
-use crate::synthesis::{Light, LightArgs, NoiseKey, SensorArgs};
+use crate::synthesis::{Light, LightArgs, NoiseKey};
 use crate::types::manifest::Status;
 use crate::types::{Condition, Degradation, FrameId, Rgb};
 use sidecar::Sidecar;
@@ -38,9 +38,6 @@ pub struct SynthesizeArgs {
     /// Light.
     #[command(flatten)]
     pub light: LightArgs,
-    /// Light, as a sensor sees it.
-    #[command(flatten)]
-    pub sensor: SensorArgs,
     /// Make again the image that this JSON file stands beside, from the one INPUT that it was made from; default: make images of
     /// all levels
     #[arg(long, value_name = "FILE", help_heading = "Synthesis")]
@@ -83,7 +80,7 @@ struct Making<'a> {
 pub fn synthesize(args: &SynthesizeArgs, progress: &Progress) -> Result<Outcome> {
     let making = &Making {
         args,
-        light: Light::resolve(args.light.clone(), &args.sensor)?,
+        light: Light::resolve(&args.light)?,
     };
     let frames = Inputs::open(&args.inputs, args.limit.max_pixels.get())?;
     let cores = pool(args.threads.threads)?;

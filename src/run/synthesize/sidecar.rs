@@ -1,6 +1,5 @@
 //! The file beside an image that holds all that made it: [`Sidecar`].
 
-use std::fs;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -8,6 +7,7 @@ use serde_json::Value;
 
 use crate::dataset::Picture;
 use crate::error::{Error, Result};
+use crate::files::reading;
 use crate::synthesis::Light;
 use crate::synthesis::noise::Term;
 use crate::synthesis::{
@@ -86,7 +86,7 @@ impl Sidecar {
     }
 
     pub(super) fn read(path: &Path) -> Result<Self> {
-        let text = fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))?;
+        let text = reading::text(path)?;
         let read: Self = serde_json::from_str(&text)
             .map_err(|e| Error::data(path.display(), format_args!("tells of no image: {e}")))?;
         if read.schema != SCHEMA {
