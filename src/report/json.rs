@@ -8,7 +8,7 @@ use serde::{Serialize, Serializer};
 use super::csv::fields;
 use super::table::{Row, Table};
 use crate::error::{Error, Result};
-use crate::types::Why;
+use crate::types::UnreadReason;
 use crate::types::manifest::RunManifest;
 
 /// A head with the rows of a table, each under the names of its columns.
@@ -59,7 +59,7 @@ struct Head<'a> {
     run: Option<&'a RunManifest>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     runs: Vec<Compared<'a>>,
-    unread: &'a BTreeMap<Why, usize>,
+    unread: &'a BTreeMap<UnreadReason, usize>,
 }
 
 /// A run among several.
@@ -82,7 +82,11 @@ pub enum Runs<'a> {
 ///
 /// # Errors
 /// If it cannot be written.
-pub fn summary(tables: &[Table], unread: &BTreeMap<Why, usize>, runs: Runs<'_>) -> Result<String> {
+pub fn summary(
+    tables: &[Table],
+    unread: &BTreeMap<UnreadReason, usize>,
+    runs: Runs<'_>,
+) -> Result<String> {
     let (run, folder, runs) = match runs {
         Runs::One(run, folder) => (Some(run), folder, [].as_slice()),
         Runs::Several(runs) => (None, None, runs),

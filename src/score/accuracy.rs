@@ -10,7 +10,7 @@ use super::estimate::Estimate;
 use super::grid::{Count, Grid, Mark};
 use super::health::Health;
 use super::subject::{CHANCE, Subject};
-use crate::types::{Family, KindReading, QuestionId, Why};
+use crate::types::{Family, KindReading, QuestionId, UnreadReason};
 
 /// The accuracy of one subject on one family, in one reading.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -48,8 +48,8 @@ impl Cell {
 pub struct Summary {
     /// The cells.
     pub cells: Vec<Cell>,
-    /// Why replies were unparsed in the strict reading, and how many.
-    pub unread: BTreeMap<Why, usize>,
+    /// UnreadReason replies were unparsed in the strict reading, and how many.
+    pub unread: BTreeMap<UnreadReason, usize>,
 }
 
 impl Summary {
@@ -96,8 +96,8 @@ pub fn summarize(
     }
 }
 
-/// Why replies could not be read, in the strict reading.
-fn unread(health: &[Health]) -> BTreeMap<Why, usize> {
+/// UnreadReason replies could not be read, in the strict reading.
+fn unread(health: &[Health]) -> BTreeMap<UnreadReason, usize> {
     let mut unread = BTreeMap::new();
     for (why, count) in health.iter().flat_map(|health| &health.unread) {
         *unread.entry(*why).or_default() += count;

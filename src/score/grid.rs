@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use super::choice::Mode;
 use super::cluster::Clusters;
 use super::subject::Subject;
-use crate::types::{AnswerReading, Family, Outcome, QuestionId, Record};
+use crate::types::{AnswerReading, Family, QuestionId, Record, TrialOutcome};
 
 /// What came of one item for one subject.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -217,7 +217,7 @@ fn mark(record: &Record) -> Mark {
         Some(index.min(usize::from(u8::MAX)) as u8)
     };
     match (record.detail.outcome, record.detail.strict) {
-        (Outcome::Failed, _) | (_, None) => Mark::Failed,
+        (TrialOutcome::Failed, _) | (_, None) => Mark::Failed,
         (_, Some(strict)) => Mark::Read {
             strict: chosen(strict),
             lenient: record.detail.lenient.and_then(chosen),

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::choice::Mode;
 use super::grid::{Grid, Mark};
 use super::subject::Subject;
-use crate::types::{FailureKind, Record, Why};
+use crate::types::{FailureKind, Record, UnreadReason};
 
 /// What became of the trials of one subject.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,9 +18,9 @@ pub struct Health {
     pub read: usize,
     /// Replies in which only the lenient reading found one.
     pub lenient_only: usize,
-    /// Why the strict reading found none, and how often.
-    pub unread: BTreeMap<Why, usize>,
-    /// Why no reply came, and how often.
+    /// UnreadReason the strict reading found none, and how often.
+    pub unread: BTreeMap<UnreadReason, usize>,
+    /// UnreadReason no reply came, and how often.
     pub failed: BTreeMap<FailureKind, usize>,
 }
 
@@ -49,7 +49,7 @@ impl Health {
 
     /// How often a reply could not be read for one of these reasons.
     #[must_use]
-    pub fn unread_for(&self, reasons: &[Why]) -> usize {
+    pub fn unread_for(&self, reasons: &[UnreadReason]) -> usize {
         let count = |why| self.unread.get(why).copied().unwrap_or(0);
         reasons.iter().map(count).sum()
     }

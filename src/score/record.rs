@@ -4,7 +4,7 @@ use super::choice::readings;
 use super::llm_match::{Protocol, mark};
 use crate::error::Result;
 use crate::types::detail::{ChoiceLine, OpenLine};
-use crate::types::{Answer, ChoiceDetail, Choices, Detail, OpenDetail, Outcome, Reply, Step};
+use crate::types::{Answer, ChoiceDetail, Choices, Detail, OpenDetail, Reply, Step, TrialOutcome};
 
 impl Detail for ChoiceDetail {
     type Line = ChoiceLine;
@@ -16,9 +16,9 @@ impl Detail for ChoiceDetail {
         let choices = Choices::new(self.choices.clone(), self.truth)?;
         let (strict, lenient) = readings(reply, &choices);
         self.outcome = match strict {
-            Answer::Chosen(index) if index == choices.truth() => Outcome::Right,
-            Answer::Chosen(_) => Outcome::Wrong,
-            Answer::Unparsed(_) => Outcome::Unparsed,
+            Answer::Chosen(index) if index == choices.truth() => TrialOutcome::Right,
+            Answer::Chosen(_) => TrialOutcome::Wrong,
+            Answer::Unparsed(_) => TrialOutcome::Unparsed,
         };
         self.strict = Some(strict.into());
         self.lenient = Some(lenient.into());

@@ -3,7 +3,7 @@ use std::collections::BTreeMap;
 use std::fs;
 
 use crate::types::manifest::{Counts, Status};
-use crate::types::{Digest, Family, FrameId, Outcome, QuestionId};
+use crate::types::{Digest, Family, FrameId, QuestionId, TrialOutcome};
 
 type Store = super::Store;
 
@@ -24,7 +24,7 @@ fn manifest(seed: u64) -> RunManifest {
     }
 }
 
-fn record(name: &str, outcome: Outcome) -> Record {
+fn record(name: &str, outcome: TrialOutcome) -> Record {
     let detail = ChoiceDetail {
         frame: FrameId("f".into()),
         family: Family::Color,
@@ -74,9 +74,9 @@ fn records_come_back_the_last_of_each_trial() {
     let mut store = Store::open(&folder, &manifest(0), Moved::Refused).unwrap();
     assert!(store.records().unwrap().is_empty());
     for (name, outcome) in [
-        ("a", Outcome::Failed),
-        ("b", Outcome::Right),
-        ("a", Outcome::Wrong),
+        ("a", TrialOutcome::Failed),
+        ("b", TrialOutcome::Right),
+        ("a", TrialOutcome::Wrong),
     ] {
         store.append(&record(name, outcome)).unwrap();
     }
@@ -87,7 +87,10 @@ fn records_come_back_the_last_of_each_trial() {
         .unwrap();
     assert_eq!(
         kept,
-        [record("a", Outcome::Wrong), record("b", Outcome::Right)]
+        [
+            record("a", TrialOutcome::Wrong),
+            record("b", TrialOutcome::Right)
+        ]
     );
 }
 
@@ -95,12 +98,12 @@ fn records_come_back_the_last_of_each_trial() {
 fn a_torn_line_is_cut_and_a_broken_one_is_named() {
     let base = tempfile::tempdir().unwrap();
     let mut store = Store::open(base.path(), &manifest(0), Moved::Refused).unwrap();
-    store.append(&record("a", Outcome::Right)).unwrap();
+    store.append(&record("a", TrialOutcome::Right)).unwrap();
     store.records.write_all(b"{\"key\":\"12").unwrap();
     drop(store);
     let mut store = Store::open(base.path(), &manifest(0), Moved::Refused).unwrap();
     assert_eq!(store.records().unwrap().len(), 1);
-    store.append(&record("b", Outcome::Right)).unwrap();
+    store.append(&record("b", TrialOutcome::Right)).unwrap();
     drop(store);
     let kept = Store::open(base.path(), &manifest(0), Moved::Refused)
         .unwrap()

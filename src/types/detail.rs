@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::condition::Condition;
 use super::digest::Digest;
 use super::frame::FrameId;
-use super::question::{Answer, Family, QuestionId, Why};
+use super::question::{Answer, Family, QuestionId, UnreadReason};
 use super::record::{Failure, Record, Via, View};
 use super::reply::{Finish, Usage};
 use super::trial_key::TrialKey;
@@ -84,7 +84,7 @@ details! {
         /// The lenient reading of the reply; `None` where it failed.
         lenient: Option<AnswerReading>,
         /// How the trial ended.
-        outcome: Outcome,
+        outcome: TrialOutcome,
         /// The image as it was sent.
         image: Option<ImageFacts>,
     }
@@ -148,7 +148,7 @@ pub struct WalkFacts {
 /// How a trial ended, by the strict reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Outcome {
+pub enum TrialOutcome {
     /// The true choice.
     Right,
     /// Another choice.
@@ -164,8 +164,8 @@ pub enum Outcome {
 pub struct AnswerReading {
     /// The index of the choice.
     pub chosen: Option<usize>,
-    /// Why there is none.
-    pub why: Option<Why>,
+    /// UnreadReason there is none.
+    pub why: Option<UnreadReason>,
 }
 
 impl From<Answer> for AnswerReading {

@@ -22,12 +22,14 @@ pub(crate) mod words;
 pub use axis_level::{AxisLevel, KindReading};
 pub use condition::{Condition, EnhancerName};
 pub use degradation::{Degradation, ReadingName};
-pub use detail::{AnswerReading, ChoiceDetail, ImageFacts, OpenDetail, Outcome, Step, WalkFacts};
+pub use detail::{
+    AnswerReading, ChoiceDetail, ImageFacts, OpenDetail, Step, TrialOutcome, WalkFacts,
+};
 pub use digest::Digest;
 pub use frame::{DepthKind, Frame, FrameId, Intrinsics, Rgb, Segmentation};
 pub use kind_set::KindSet;
 pub use labels::{Label, Labels, SegmentName};
-pub use question::{Answer, Choices, Family, Question, QuestionId, Why};
+pub use question::{Answer, Choices, Family, Question, QuestionId, UnreadReason};
 pub use record::{Detail, Failure, FailureKind, Via, View};
 pub use reply::{Finish, Reply, Usage};
 pub use run_question::{RunQuestion, Thumbnail};

@@ -189,13 +189,13 @@ pub enum Answer {
     /// One choice, by its index.
     Chosen(usize),
     /// No choice; never guessed.
-    Unparsed(Why),
+    Unparsed(UnreadReason),
 }
 
-/// Why no choice could be read from a reply.
+/// UnreadReason no choice could be read from a reply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Why {
+pub enum UnreadReason {
     /// Nothing was said.
     Empty,
     /// The model declined.
@@ -216,7 +216,7 @@ pub enum Why {
     NoChoice,
 }
 
-impl Why {
+impl UnreadReason {
     /// All of them.
     pub const ALL: [Self; 9] = [
         Self::Empty,

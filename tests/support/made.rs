@@ -1,7 +1,8 @@
 //! Records whose truth is known, as a run would have kept them.
 
 use darkqa_eval::types::{
-    AnswerReading, ChoiceDetail, Condition, Digest, Family, FrameId, Outcome, QuestionId, Record,
+    AnswerReading, ChoiceDetail, Condition, Digest, Family, FrameId, QuestionId, Record,
+    TrialOutcome,
 };
 
 /// What a model made of one question in one condition: the first of three choices is true.
@@ -24,9 +25,9 @@ pub fn record(
         strict: Some(chosen),
         lenient: Some(chosen),
         outcome: if right {
-            Outcome::Right
+            TrialOutcome::Right
         } else {
-            Outcome::Wrong
+            TrialOutcome::Wrong
         },
         image: None,
     };

@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::score::choice::Mode;
 use crate::score::findings::Findings;
 use crate::score::grid::{Grid, Mark};
-use crate::types::{AxisLevel, FrameId, QuestionId, RunQuestion, Thumbnail, View, Why};
+use crate::types::{AxisLevel, FrameId, QuestionId, RunQuestion, Thumbnail, UnreadReason, View};
 
 /// The codes of marks beside the indices of choices.
 const UNREAD: u8 = 26;
@@ -265,7 +265,7 @@ fn subjects<'a>(grid: &'a Grid<'_>) -> Vec<Subject<'a>> {
 
 /// The reasons for which replies are unread, with none first, and the place of each mark's.
 fn reasons(grid: &Grid<'_>) -> (Vec<Value>, Vec<Vec<usize>>) {
-    let mut reasons: Distinct<Option<Why>> = Distinct::new();
+    let mut reasons: Distinct<Option<UnreadReason>> = Distinct::new();
     reasons.place(None);
     let mut places = Vec::new();
     for subject in 0..grid.subjects.len() {

@@ -4,10 +4,10 @@ use crate::report::table::Kind::{Count, Failures};
 use crate::report::table::{Layout, Table};
 use crate::report::words::percent;
 use crate::score::health::Health;
-use crate::types::{FailureKind, Why};
+use crate::types::{FailureKind, UnreadReason};
 
 /// The columns of reasons for which replies could not be read.
-const UNREAD: [&str; Why::ALL.len()] = [
+const UNREAD: [&str; UnreadReason::ALL.len()] = [
     "empty",
     "refused",
     "truncated",
@@ -32,7 +32,12 @@ const FAILED: [&str; FailureKind::ALL.len()] = [
 ];
 
 /// Reasons that are not the form of an answer.
-const OTHER: [Why; 4] = [Why::Refused, Why::Filtered, Why::Truncated, Why::Empty];
+const OTHER: [UnreadReason; 4] = [
+    UnreadReason::Refused,
+    UnreadReason::Filtered,
+    UnreadReason::Truncated,
+    UnreadReason::Empty,
+];
 
 pub(super) fn health(health: &[Health]) -> Table {
     let mut layout = Layout::new("health", health)
@@ -50,16 +55,16 @@ pub(super) fn health(health: &[Health]) -> Table {
             (health.replies - health.read).saturating_sub(health.unread_for(&OTHER))
         })
         .column(Count, "page refused or filtered", |health| {
-            health.unread_for(&[Why::Refused, Why::Filtered])
+            health.unread_for(&[UnreadReason::Refused, UnreadReason::Filtered])
         })
         .column(Count, "page truncated", |health| {
-            health.unread_for(&[Why::Truncated])
+            health.unread_for(&[UnreadReason::Truncated])
         })
         .column(Count, "page empty", |health| {
-            health.unread_for(&[Why::Empty])
+            health.unread_for(&[UnreadReason::Empty])
         })
         .column(Failures, "page failed", |health| health.failures());
-    for (why, name) in Why::ALL.into_iter().zip(UNREAD) {
+    for (why, name) in UnreadReason::ALL.into_iter().zip(UNREAD) {
         layout = layout.column(Count, &*format!("csv {name}"), |health| {
             health.unread_for(&[why])
         });

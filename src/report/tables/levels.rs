@@ -8,7 +8,7 @@ use crate::report::words::percent;
 use crate::score::accuracy::{Cell as Score, Summary};
 use crate::score::choice::Mode;
 use crate::score::findings::Findings;
-use crate::types::Why;
+use crate::types::UnreadReason;
 
 pub(super) fn levels(findings: &Findings<'_>) -> Table {
     let summary = &findings.summary;
@@ -142,13 +142,16 @@ fn floor(summary: &Summary, cell: &Score) -> String {
     )
 }
 
-/// Why replies could not be read, if that is not the model's own way of answering.
+/// UnreadReason replies could not be read, if that is not the model's own way of answering.
 fn unread(summary: &Summary) -> Option<String> {
     let reasons = [
-        (Why::Truncated, "cut at the token limit (--max-tokens)"),
-        (Why::Refused, "refused"),
-        (Why::Filtered, "withheld by a filter"),
-        (Why::Empty, "empty"),
+        (
+            UnreadReason::Truncated,
+            "cut at the token limit (--max-tokens)",
+        ),
+        (UnreadReason::Refused, "refused"),
+        (UnreadReason::Filtered, "withheld by a filter"),
+        (UnreadReason::Empty, "empty"),
     ];
     let counts = reasons.iter().filter_map(|(why, what)| {
         let count = summary.unread.get(why).filter(|count| **count > 0)?;

@@ -3,7 +3,7 @@
 use super::plan::ChoiceItem;
 use crate::ask::Query;
 use crate::job::trial::{Item, Stimulus, Trial};
-use crate::types::{ChoiceDetail, Outcome, Record};
+use crate::types::{ChoiceDetail, Record, TrialOutcome};
 
 impl Item for ChoiceItem {
     type Detail = ChoiceDetail;
@@ -36,7 +36,7 @@ impl Item for ChoiceItem {
             repeat: trial.item.repeat,
             strict: None,
             lenient: None,
-            outcome: Outcome::Failed,
+            outcome: TrialOutcome::Failed,
             image: image.map(|image| image.facts().clone()),
         };
         let condition = stimulus.condition.clone();

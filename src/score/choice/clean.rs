@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use regex::Regex;
 use unicode_normalization::UnicodeNormalization;
 
-use crate::types::question::Why;
+use crate::types::question::UnreadReason;
 
 /// Marks that end a stretch of reasoning: those of DeepSeek, Qwen and many others, Magistral, Kimi, Cohere, Seed,
 /// and the final channel of the harmony format (also as it reads where a server drops its special tokens).
@@ -61,14 +61,14 @@ static NEXT_TURN: LazyLock<Regex> = LazyLock::new(|| {
 /// What follows the last mark that ends reasoning, trimmed.
 ///
 /// # Errors
-/// Why nothing is left to read.
-pub(super) fn spoken(reply: &str) -> Result<&str, Why> {
+/// UnreadReason nothing is left to read.
+pub(super) fn spoken(reply: &str) -> Result<&str, UnreadReason> {
     let (mut text, mark) = match END.find_iter(reply).last() {
         Some(mark) => (&reply[mark.end()..], mark.as_str()),
         None => (reply, ""),
     };
     if BEGIN.is_match(text) {
-        return Err(Why::Truncated);
+        return Err(UnreadReason::Truncated);
     }
     if mark.ends_with("<|message|>")
         && let Some(close) = HARMONY_CLOSE.find(text)
@@ -76,7 +76,7 @@ pub(super) fn spoken(reply: &str) -> Result<&str, Why> {
         text = &text[..close.start()];
     }
     match text.trim_matches(is_blank) {
-        "" => Err(Why::Empty),
+        "" => Err(UnreadReason::Empty),
         text => Ok(text),
     }
 }

@@ -8,7 +8,7 @@ use super::stated::{alternative, stated};
 use super::strict;
 use super::view::{Offered, View};
 use super::written::{boxed, json};
-use crate::types::question::{Answer, Choices, Why};
+use crate::types::question::{Answer, Choices, UnreadReason};
 
 /// Reads a reply, reasoning left out already.
 pub(super) fn read(text: &str, choices: &Choices) -> Answer {
@@ -17,7 +17,9 @@ pub(super) fn read(text: &str, choices: &Choices) -> Answer {
     // A model that runs on and asks itself the next question has answered ours before.
     let first = clean::before_next_turn(&tidy).map(|before| levels(before, &offered));
     match first {
-        None | Some(Answer::Unparsed(Why::NoChoice | Why::Refused)) => levels(&tidy, &offered),
+        None | Some(Answer::Unparsed(UnreadReason::NoChoice | UnreadReason::Refused)) => {
+            levels(&tidy, &offered)
+        }
         Some(answer) => answer,
     }
 }
@@ -56,8 +58,8 @@ fn contradiction(view: &View<'_>) -> Option<Answer> {
         (text.choice != letter.choice).then_some(letter.choice)
     });
     let why = match wrong.next()? {
-        Some(_) => Why::Contradiction,
-        None => Why::OutOfRange,
+        Some(_) => UnreadReason::Contradiction,
+        None => UnreadReason::OutOfRange,
     };
     Some(Answer::Unparsed(why))
 }
@@ -98,7 +100,7 @@ fn yes_or_no(view: &View<'_>) -> Option<Answer> {
             .any(|name| name.choice == Some(other) && name.grip > Grip::Loose)
     };
     Some(if named(&view.texts) || named(&view.letters) {
-        Answer::Unparsed(Why::Ambiguous)
+        Answer::Unparsed(UnreadReason::Ambiguous)
     } else {
         Answer::Chosen(said)
     })
@@ -120,7 +122,7 @@ fn letters(view: &View<'_>) -> Option<Answer> {
         .filter(|letter| letter.grip > Grip::Loose);
     let first = held.clone().max_by_key(|letter| letter.grip)?;
     let Some(index) = first.choice else {
-        return Some(Answer::Unparsed(Why::OutOfRange));
+        return Some(Answer::Unparsed(UnreadReason::OutOfRange));
     };
     let another = |name: &Name| name.choice != Some(index);
     let contradicts = |letter: &Name| {
@@ -138,13 +140,13 @@ fn letters(view: &View<'_>) -> Option<Answer> {
             .chain(&view.texts)
             .any(|name| alternative(view, name))
     {
-        Why::Ambiguous
+        UnreadReason::Ambiguous
     } else if held.clone().any(|letter| view.denies(letter)) {
         return Some(negated(view));
     } else if held.clone().any(contradicts)
         || (first.grip < Grip::Firm && only_text && another(&view.texts[0]))
     {
-        Why::Contradiction
+        UnreadReason::Contradiction
     } else {
         return Some(Answer::Chosen(index));
     };
@@ -156,7 +158,7 @@ fn texts(view: &View<'_>) -> Option<Answer> {
     let first = view.texts.first()?.choice?;
     let another = |name: &Name| name.choice != Some(first);
     if view.texts.iter().any(another) || view.letters.iter().any(another) {
-        return Some(Answer::Unparsed(Why::Ambiguous));
+        return Some(Answer::Unparsed(UnreadReason::Ambiguous));
     }
     if view.texts.iter().any(|name| view.denies(name)) {
         return Some(negated(view));
@@ -164,20 +166,20 @@ fn texts(view: &View<'_>) -> Option<Answer> {
     Some(Answer::Chosen(first))
 }
 
-/// Why a choice that is named only beside a "not" was not read.
+/// UnreadReason a choice that is named only beside a "not" was not read.
 fn negated(view: &View<'_>) -> Answer {
     Answer::Unparsed(if declines(view.folded) {
-        Why::Refused
+        UnreadReason::Refused
     } else {
-        Why::Negated
+        UnreadReason::Negated
     })
 }
 
-/// Why nothing at all was read.
+/// UnreadReason nothing at all was read.
 fn nothing(view: &View<'_>) -> Answer {
     Answer::Unparsed(if declines(view.folded) {
-        Why::Refused
+        UnreadReason::Refused
     } else {
-        Why::NoChoice
+        UnreadReason::NoChoice
     })
 }

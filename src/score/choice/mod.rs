@@ -23,7 +23,7 @@ mod written;
 
 use serde::Serialize;
 
-use crate::types::question::{Answer, Choices, Why};
+use crate::types::question::{Answer, Choices, UnreadReason};
 use crate::types::reply::{Finish, Reply};
 
 /// How much of a reply may stand around the answer.
@@ -44,15 +44,15 @@ impl Mode {
 /// The choice that a reply makes; its index is that of the order shown.
 ///
 /// Whatever stands in a closed reasoning block is left out; a block that is opened and never closed leaves nothing to
-/// read and is [`Why::Truncated`].
+/// read and is [`UnreadReason::Truncated`].
 ///
 /// ```
 /// use darkqa_eval::score::choice::{Mode, read};
-/// use darkqa_eval::types::{Answer, Choices, Why};
+/// use darkqa_eval::types::{Answer, Choices, UnreadReason};
 ///
 /// let choices = Choices::new(vec!["kitchen".into(), "bedroom".into()], 0)?;
 /// assert_eq!(read("(B) bedroom", &choices, Mode::Strict), Answer::Chosen(1));
-/// assert_eq!(read("Answer: **B**", &choices, Mode::Strict), Answer::Unparsed(Why::NoChoice));
+/// assert_eq!(read("Answer: **B**", &choices, Mode::Strict), Answer::Unparsed(UnreadReason::NoChoice));
 /// assert_eq!(read("Answer: **B**", &choices, Mode::Lenient), Answer::Chosen(1));
 /// # Ok::<(), darkqa_eval::error::Error>(())
 /// ```
@@ -66,7 +66,7 @@ pub fn read(reply: &str, choices: &Choices, mode: Mode) -> Answer {
         return answer;
     }
     match (mode, lenient::read(text, choices)) {
-        (Mode::Strict, Answer::Chosen(_)) => Answer::Unparsed(Why::NoChoice),
+        (Mode::Strict, Answer::Chosen(_)) => Answer::Unparsed(UnreadReason::NoChoice),
         (_, answer) => answer,
     }
 }
@@ -83,9 +83,9 @@ pub fn readings(reply: &Reply, choices: &Choices) -> (Answer, Answer) {
         return (strict, strict);
     }
     let why = match &reply.finish {
-        _ if reply.refusal.is_some() => Why::Refused,
-        Finish::Filter => Why::Filtered,
-        Finish::Length => Why::Truncated,
+        _ if reply.refusal.is_some() => UnreadReason::Refused,
+        Finish::Filter => UnreadReason::Filtered,
+        Finish::Length => UnreadReason::Truncated,
         Finish::Stop | Finish::Other(_) | Finish::Unknown => {
             return (strict, read(&reply.text, choices, Mode::Lenient));
         }

@@ -11,7 +11,7 @@ use super::markers::{self, Kind, Lead, Marker};
 use super::names::{Grip, Name, index_of, joins};
 use super::plain::fold;
 use super::view::View;
-use crate::types::question::{Answer, Why};
+use crate::types::question::{Answer, UnreadReason};
 
 /// One announcement.
 #[derive(Debug, Clone, Copy)]
@@ -54,8 +54,12 @@ pub(super) fn stated(view: &View<'_>) -> Option<Answer> {
 
 /// The last that was said to be the answer, unless it was taken back.
 fn last(sayings: &[Saying]) -> Option<Answer> {
-    let readable =
-        |answer: Answer| !matches!(answer, Answer::Unparsed(Why::NoChoice | Why::Refused));
+    let readable = |answer: Answer| {
+        !matches!(
+            answer,
+            Answer::Unparsed(UnreadReason::NoChoice | UnreadReason::Refused)
+        )
+    };
     let said = |saying: &Saying| match saying.what {
         What::Is(answer) => Some((saying.at, answer)),
         What::IsNot(_) => None,
@@ -71,7 +75,7 @@ fn last(sayings: &[Saying]) -> Option<Answer> {
             && matches!((saying.what, answer), (What::IsNot(a), Answer::Chosen(b)) if a == b)
     };
     Some(if sayings.iter().any(back) {
-        Answer::Unparsed(Why::Negated)
+        Answer::Unparsed(UnreadReason::Negated)
     } else {
         answer
     })
@@ -85,7 +89,7 @@ fn only(sayings: &[Saying], beside: &[Name]) -> Option<Answer> {
             What::Is(Answer::Chosen(index)) if chosen.is_none_or(|other| other == index) => {
                 chosen = Some(index);
             }
-            What::Is(Answer::Chosen(_)) => return Some(Answer::Unparsed(Why::Ambiguous)),
+            What::Is(Answer::Chosen(_)) => return Some(Answer::Unparsed(UnreadReason::Ambiguous)),
             What::Is(unparsed) => return Some(unparsed),
             What::IsNot(_) => {}
         }
@@ -93,14 +97,16 @@ fn only(sayings: &[Saying], beside: &[Name]) -> Option<Answer> {
     let chosen = chosen?;
     for saying in sayings {
         match saying.what {
-            What::IsNot(index) if index == chosen => return Some(Answer::Unparsed(Why::Negated)),
-            What::IsNot(_) => return Some(Answer::Unparsed(Why::Ambiguous)),
+            What::IsNot(index) if index == chosen => {
+                return Some(Answer::Unparsed(UnreadReason::Negated));
+            }
+            What::IsNot(_) => return Some(Answer::Unparsed(UnreadReason::Ambiguous)),
             What::Is(_) => {}
         }
     }
     let other = |name: &Name| name.choice != Some(chosen);
     Some(if beside.iter().any(other) {
-        Answer::Unparsed(Why::Ambiguous)
+        Answer::Unparsed(UnreadReason::Ambiguous)
     } else {
         Answer::Chosen(chosen)
     })
@@ -138,7 +144,7 @@ fn rest_of(view: &View<'_>, rest: &str) -> Option<Answer> {
     let [line, rest] =
         [line, rest].map(|text| lenient::spoken(&View::new(text, &fold(text), view.offered)));
     Some(match line {
-        Answer::Unparsed(Why::NoChoice) => rest,
+        Answer::Unparsed(UnreadReason::NoChoice) => rest,
         line => line,
     })
 }
@@ -157,13 +163,13 @@ fn announced(view: &View<'_>, lead: &Lead) -> Option<(Name, Answer)> {
         return None;
     }
     let Some(index) = name.choice else {
-        return Some((name, Answer::Unparsed(Why::OutOfRange)));
+        return Some((name, Answer::Unparsed(UnreadReason::OutOfRange)));
     };
     let contradicts = |text: Name| text.choice != Some(index);
     let answer = if name.grip == Grip::Firm && view.labelled_text(&name).is_some_and(contradicts) {
-        Answer::Unparsed(Why::Contradiction)
+        Answer::Unparsed(UnreadReason::Contradiction)
     } else if alternative(view, &name) {
-        Answer::Unparsed(Why::Ambiguous)
+        Answer::Unparsed(UnreadReason::Ambiguous)
     } else {
         Answer::Chosen(index)
     };
@@ -245,7 +251,7 @@ fn praised<'a>(view: &'a View<'_>) -> impl Iterator<Item = Saying> + 'a {
             kind: Kind::Answer,
             what: What::Is(match name.choice {
                 Some(index) => Answer::Chosen(index),
-                None => Answer::Unparsed(Why::OutOfRange),
+                None => Answer::Unparsed(UnreadReason::OutOfRange),
             }),
         })
 }

@@ -1,7 +1,7 @@
 //! The exact forms: a choice's text, its letter, or its letter with its text.
 
 use super::names::index_of;
-use crate::types::question::{Answer, Why};
+use crate::types::question::{Answer, UnreadReason};
 
 /// Reads a reply that is one of the exact forms, whole; `None` where it is none.
 ///
@@ -14,9 +14,9 @@ pub(super) fn read(text: &str, choices: &[String]) -> Option<Answer> {
         let named = position(rest, choices);
         match (index, named) {
             _ if !rest.is_empty() && named.is_none() => None,
-            (None, _) => Some(Answer::Unparsed(Why::OutOfRange)),
+            (None, _) => Some(Answer::Unparsed(UnreadReason::OutOfRange)),
             (Some(index), Some(named)) if index != named => {
-                Some(Answer::Unparsed(Why::Contradiction))
+                Some(Answer::Unparsed(UnreadReason::Contradiction))
             }
             (Some(index), _) => Some(Answer::Chosen(index)),
         }
@@ -24,7 +24,7 @@ pub(super) fn read(text: &str, choices: &[String]) -> Option<Answer> {
     match (by_text, by_letter) {
         // Only where choices are themselves letters can a reply be one choice's text and another's letter.
         (Some(text), Some(Answer::Chosen(letter))) if text != letter => {
-            Some(Answer::Unparsed(Why::Ambiguous))
+            Some(Answer::Unparsed(UnreadReason::Ambiguous))
         }
         (Some(text), _) => Some(Answer::Chosen(text)),
         (None, by_letter) => by_letter,

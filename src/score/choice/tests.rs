@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use serde::Deserialize;
 
 use super::{Mode, read, readings};
-use crate::types::question::{Answer, Choices, Why};
+use crate::types::question::{Answer, Choices, UnreadReason};
 use crate::types::reply::{Finish, Reply};
 
 /// One line of the table: the set of choices, the reply, and what each mode reads.
@@ -22,7 +22,7 @@ struct Case {
 #[serde(untagged)]
 enum Reading {
     Chosen(usize),
-    Unparsed(Why),
+    Unparsed(UnreadReason),
 }
 
 impl From<Reading> for Answer {
@@ -92,32 +92,38 @@ fn how_a_reply_ended_is_regarded() {
         ..Reply::local(text.to_owned())
     };
     let both = |answer: Answer| (answer, answer);
-    let unparsed = |why: Why| both(Answer::Unparsed(why));
+    let unparsed = |why: UnreadReason| both(Answer::Unparsed(why));
     for (reply, want) in [
         (reply("B", Finish::Stop, None), both(Answer::Chosen(1))),
         (
             reply("It is B.", Finish::Stop, None),
-            (Answer::Unparsed(Why::NoChoice), Answer::Chosen(1)),
+            (Answer::Unparsed(UnreadReason::NoChoice), Answer::Chosen(1)),
         ),
-        (reply("", Finish::Stop, None), unparsed(Why::Empty)),
+        (reply("", Finish::Stop, None), unparsed(UnreadReason::Empty)),
         (
             reply("", Finish::Stop, Some("I cannot.")),
-            unparsed(Why::Refused),
+            unparsed(UnreadReason::Refused),
         ),
         (
             reply("Option B", Finish::Stop, Some("I cannot.")),
-            unparsed(Why::Refused),
+            unparsed(UnreadReason::Refused),
         ),
-        (reply("", Finish::Filter, None), unparsed(Why::Filtered)),
-        (reply("", Finish::Length, None), unparsed(Why::Truncated)),
+        (
+            reply("", Finish::Filter, None),
+            unparsed(UnreadReason::Filtered),
+        ),
+        (
+            reply("", Finish::Length, None),
+            unparsed(UnreadReason::Truncated),
+        ),
         (reply("B", Finish::Length, None), both(Answer::Chosen(1))),
         (
             reply("The answer is B", Finish::Length, None),
-            unparsed(Why::Truncated),
+            unparsed(UnreadReason::Truncated),
         ),
         (
             reply("", Finish::Other("x".into()), None),
-            unparsed(Why::Empty),
+            unparsed(UnreadReason::Empty),
         ),
     ] {
         assert_eq!(readings(&reply, &rooms), want, "{reply:?}");

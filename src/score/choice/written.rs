@@ -9,7 +9,7 @@ use super::clean::compiled;
 use super::lenient;
 use super::plain::{fold, plain};
 use super::view::{Offered, View};
-use crate::types::question::{Answer, Why};
+use crate::types::question::{Answer, UnreadReason};
 
 /// Keys whose value is the answer, without case, spaces and punctuation.
 const KEYS: [&str; 24] = [
@@ -85,7 +85,7 @@ fn key_form(key: &str) -> String {
 
 /// The answer that a JSON value gives. A number is a choice's text, never its position.
 fn value_answer(value: &Value, offered: &Offered) -> Answer {
-    let nothing = Answer::Unparsed(Why::NoChoice);
+    let nothing = Answer::Unparsed(UnreadReason::NoChoice);
     match value {
         Value::String(text) => text_answer(text, offered),
         Value::Number(number) => text_answer(&number.to_string(), offered),
@@ -154,7 +154,7 @@ fn agreed(answers: &[Answer]) -> Option<Answer> {
     let mute = |answer: &&Answer| {
         !matches!(
             answer,
-            Answer::Unparsed(Why::NoChoice | Why::Empty | Why::Refused)
+            Answer::Unparsed(UnreadReason::NoChoice | UnreadReason::Empty | UnreadReason::Refused)
         )
     };
     let mut voices = answers.iter().filter(mute);
@@ -163,6 +163,6 @@ fn agreed(answers: &[Answer]) -> Option<Answer> {
     Some(if same {
         first
     } else {
-        Answer::Unparsed(Why::Ambiguous)
+        Answer::Unparsed(UnreadReason::Ambiguous)
     })
 }
