@@ -10,9 +10,9 @@ use std::time::{Duration, Instant};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use darkqa_eval::ask::{
-    Access, BaseUrl, Call, Constrain, Detail, Endpoint, Format, Message, Model, Parameters,
-    Payload, Prompts, Query, Random, Remote, Script, Secret, Sending, Temperature, TokenField,
-    Wire,
+    Access, BaseUrl, Call, Constrain, Endpoint, ImageDetail, Message, Model, Parameters, Payload,
+    PayloadFormat, Prompts, Query, Random, Remote, Script, Secret, Sending, Temperature,
+    TokenField, Wire,
 };
 use darkqa_eval::types::{
     Choices, Digest, FailureKind, Family, Finish, FrameId, Question, QuestionId, Reply, Rgb, View,
@@ -44,7 +44,7 @@ fn model_at(mock: &MockEndpoint, sending: Sending) -> Remote {
 
 fn image() -> Payload {
     let samples = (0..6 * 4 * 3).map(|i| i * 3).collect();
-    Payload::encode(&Rgb::new(4, 6, samples).unwrap(), Format::Png, None).unwrap()
+    Payload::encode(&Rgb::new(4, 6, samples).unwrap(), PayloadFormat::Png, None).unwrap()
 }
 
 fn question(id: &str, text: &str) -> Question {
@@ -117,7 +117,7 @@ async fn what_is_set_is_sent_and_what_is_not_is_left_out() {
         max_tokens: NonZeroU32::new(16).unwrap(),
         token_field: TokenField::MaxCompletionTokens,
         reasoning_effort: Some("low".into()),
-        detail: Some(Detail::High),
+        detail: Some(ImageDetail::High),
         constrain: Constrain::None,
     };
     let model = Remote::open(endpoint.clone(), Wire::Chat, parameters).unwrap();

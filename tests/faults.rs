@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
 use darkqa_eval::ask::{
-    Access, AskError, Endpoint, Format, Message, Parameters, Payload, Reach, Remote, Secret,
+    Access, AskError, Endpoint, Message, Parameters, Payload, PayloadFormat, Reach, Remote, Secret,
     Sending, Temperature, Wire,
 };
 use darkqa_eval::types::{FailureKind, Finish, Reply, Rgb};
@@ -26,7 +26,7 @@ fn sending() -> Sending {
 
 fn image() -> Payload {
     let samples = (0..6 * 4 * 3).map(|i| i * 3).collect();
-    Payload::encode(&Rgb::new(4, 6, samples).unwrap(), Format::Png, None).unwrap()
+    Payload::encode(&Rgb::new(4, 6, samples).unwrap(), PayloadFormat::Png, None).unwrap()
 }
 
 struct Asked {

@@ -28,7 +28,7 @@ pub(super) struct Connection {
 }
 
 /// What came back for one request.
-pub(super) struct Answer {
+pub(super) struct HttpReply {
     pub(super) status: StatusCode,
     pub(super) headers: HeaderMap,
     pub(super) body: Vec<u8>,
@@ -36,7 +36,7 @@ pub(super) struct Answer {
     pub(super) took: Duration,
 }
 
-impl Answer {
+impl HttpReply {
     /// A header as text, empty if there is none.
     pub(super) fn header(&self, name: &str) -> &str {
         let value = self.headers.get(name).and_then(|value| value.to_str().ok());
@@ -61,7 +61,7 @@ impl Connection {
         path: &str,
         headers: &HeaderMap,
         body: Parts,
-    ) -> Result<Answer, FailedTry> {
+    ) -> Result<HttpReply, FailedTry> {
         let started = Instant::now();
         let request = self
             .client
@@ -77,7 +77,7 @@ impl Connection {
             // A refusal whose words were lost on the way is a refusal all the same.
             body => body.unwrap_or_default(),
         };
-        Ok(Answer {
+        Ok(HttpReply {
             status,
             headers,
             body,

@@ -12,10 +12,10 @@ use tracing::debug;
 use super::access::Access;
 use super::body::Parts;
 use super::complaint::{Complaint, UnreadableReply};
-use super::connection::{Answer, Connection};
+use super::connection::{Connection, HttpReply};
 use super::failure::{AskError, FailedTry, Reach};
 use super::failure_class::FailureClass;
-use super::field::Sent;
+use super::field::SentFields;
 use super::pace::{Allowance, Gate, Window, asked_wait};
 use super::sending::Sending;
 use super::url::BaseUrl;
@@ -42,7 +42,7 @@ pub(super) struct Request<'a> {
     pub(super) wire: Wire,
     pub(super) headers: &'a HeaderMap,
     pub(super) body: Parts,
-    pub(super) sent: Sent<'a>,
+    pub(super) sent: SentFields<'a>,
 }
 
 impl Endpoint {
@@ -198,7 +198,7 @@ impl Endpoint {
     }
 
     /// The reply without keys, once its cost and what the server says is left are noted.
-    fn succeeded(&self, reply: Reply, answer: &Answer) -> Reply {
+    fn succeeded(&self, reply: Reply, answer: &HttpReply) -> Reply {
         self.window.succeeded(answer.took);
         let left = Allowance::read(&answer.headers, SystemTime::now());
         let tokens = reply.usage.and_then(|usage| usage.total());
@@ -218,7 +218,7 @@ impl Endpoint {
         &self,
         status: u16,
         complaint: &Complaint,
-        answer: &Answer,
+        answer: &HttpReply,
         request: &Request<'_>,
     ) -> FailedTry {
         let mut class = FailureClass::of(status, complaint, request.wire, request.sent);
@@ -294,7 +294,7 @@ impl Endpoint {
     }
 
     /// The server's name for a request, fit to be shown.
-    fn request_id(&self, answer: &Answer) -> String {
+    fn request_id(&self, answer: &HttpReply) -> String {
         self.connection.scrub.line(answer.header("x-request-id"))
     }
 }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::field::Refused;
+use super::field::AdaptableField;
 use crate::types::{Failure, FailureKind};
 
 /// How far a failure reaches.
@@ -27,7 +27,7 @@ pub struct AskError {
     /// Whether it is worth asking anything else.
     pub reach: Reach,
     /// The field that the server does not take, where it is one that can be sent otherwise.
-    pub refused: Option<Refused>,
+    pub refused: Option<AdaptableField>,
 }
 
 impl AskError {
@@ -46,7 +46,7 @@ pub(super) struct FailedTry {
     /// The wait that the server asked for.
     pub(super) wait: Option<Duration>,
     /// The field that it refused.
-    pub(super) refused: Option<Refused>,
+    pub(super) refused: Option<AdaptableField>,
 }
 
 impl FailedTry {

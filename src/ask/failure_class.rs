@@ -2,7 +2,7 @@
 
 use super::complaint::Complaint;
 use super::failure::Reach;
-use super::field::{Field, Refused, Sent, is_unsupported};
+use super::field::{AdaptableField, RequestField, SentFields, is_unsupported};
 use super::wire::Wire;
 use crate::types::FailureKind;
 
@@ -16,7 +16,7 @@ pub(super) struct FailureClass {
     /// What the user can do.
     pub(super) hint: Option<String>,
     /// The field that it was refused for.
-    pub(super) refused: Option<Refused>,
+    pub(super) refused: Option<AdaptableField>,
 }
 
 /// Codes and types that mean: no money. They come with 429 as well, where waiting does not help.
@@ -71,7 +71,7 @@ const ADD_CREDIT: &str = "the account has no credit left: add some, then go on w
 
 impl FailureClass {
     /// The class of a refused request, by its status and by what the server said about it.
-    pub(super) fn of(status: u16, complaint: &Complaint, wire: Wire, sent: Sent<'_>) -> Self {
+    pub(super) fn of(status: u16, complaint: &Complaint, wire: Wire, sent: SentFields<'_>) -> Self {
         let no_credit = complaint.is_any(&NO_CREDIT)
             || (matches!(status, 400 | 402 | 403 | 429) && complaint.says_any(&NO_CREDIT_WORDS));
         match status {
@@ -151,7 +151,7 @@ impl FailureClass {
 
     /// A refused request that may be about one of its fields. If the server names the field, every other request with it
     /// fails alike; if only its words do, it could be about this one request.
-    fn of_field(complaint: &Complaint, fields: &[Field]) -> Self {
+    fn of_field(complaint: &Complaint, fields: &[RequestField]) -> Self {
         let mut sent = fields.iter().filter(|field| field.sent);
         let (reach, field) = match sent.clone().find(|field| field.is_named(complaint)) {
             Some(field) => (Reach::Endpoint, field),
@@ -175,7 +175,7 @@ fn moderated(complaint: &Complaint) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ask::field::Fields;
+    use crate::ask::field::RequestFields;
     use crate::ask::parameters::{Parameters, TokenField};
 
     fn parameters() -> Parameters {
@@ -186,9 +186,9 @@ mod tests {
     }
 
     fn judged(status: u16, body: &str) -> FailureClass {
-        let sent = Sent {
+        let sent = SentFields {
             parameters: &parameters(),
-            fields: Fields {
+            fields: RequestFields {
                 token_field: TokenField::MaxTokens,
                 temperature: Some(0.0),
             },
@@ -323,15 +323,15 @@ mod tests {
         for (body, refused) in [
             (
                 r#"{"error":{"param":"max_tokens","code":"unsupported_parameter","message":"x"}}"#,
-                Some(Refused::TokenField),
+                Some(AdaptableField::TokenField),
             ),
             (
                 r#"{"error":{"message":"Unsupported: 'max_tokens'. Use 'max_completion_tokens' instead."}}"#,
-                Some(Refused::TokenField),
+                Some(AdaptableField::TokenField),
             ),
             (
                 r#"{"error":{"param":"temperature","code":"unsupported_value","message":"only 1"}}"#,
-                Some(Refused::Temperature),
+                Some(AdaptableField::Temperature),
             ),
             (
                 r#"{"error":{"param":"max_tokens","message":"max_tokens is too large: 1024"}}"#,

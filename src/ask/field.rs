@@ -1,11 +1,11 @@
-//! The fields of a request about which servers differ: [`Field`] is one of them, [`Fields`] are those that are adapted.
+//! The fields of a request about which servers differ: [`RequestField`] is one of them, [`RequestFields`] are those that are adapted.
 
 use super::complaint::Complaint;
 use super::parameters::{Parameters, Temperature, TokenField};
 
 /// A field that a server does not take and that can be sent otherwise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Refused {
+pub enum AdaptableField {
     /// The token limit, by this name.
     TokenField,
     /// Any temperature but its own.
@@ -14,14 +14,14 @@ pub enum Refused {
 
 /// Which of the fields about which servers differ a request has; found out once for a whole run.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Fields {
+pub(super) struct RequestFields {
     /// The name of the token limit, never `Auto`.
     pub(super) token_field: TokenField,
     /// The temperature, where one is sent.
     pub(super) temperature: Option<f64>,
 }
 
-impl Fields {
+impl RequestFields {
     /// What is tried first at a host.
     pub(super) fn first(parameters: &Parameters, host: &str) -> Self {
         Self {
@@ -37,9 +37,9 @@ impl Fields {
 
 /// What a request has in it that a server may complain about.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Sent<'a> {
+pub(super) struct SentFields<'a> {
     pub(super) parameters: &'a Parameters,
-    pub(super) fields: Fields,
+    pub(super) fields: RequestFields,
     pub(super) has_image: bool,
     pub(super) has_key: bool,
 }
@@ -59,17 +59,17 @@ const UNSUPPORTED: [&str; 10] = [
 ];
 
 /// A field of a request with what is known of it.
-pub(super) struct Field {
+pub(super) struct RequestField {
     pub(super) name: &'static str,
     /// Whether it was sent; what was not is not to blame.
     pub(super) sent: bool,
     /// How to send it otherwise.
     pub(super) hint: &'static str,
     /// What it is, where the program can send it otherwise.
-    pub(super) refused: Option<Refused>,
+    pub(super) refused: Option<AdaptableField>,
 }
 
-impl Field {
+impl RequestField {
     /// Whether the server names it as what is wrong.
     pub(super) fn is_named(&self, complaint: &Complaint) -> bool {
         let param = complaint.param.as_deref();

@@ -2,7 +2,7 @@
 //!
 //! Only for estimates before anything is sent; what a reply was charged for is told by the server.
 
-use super::parameters::Detail;
+use super::parameters::ImageDetail;
 
 /// How a family of models counts.
 #[derive(Debug, Clone, Copy)]
@@ -89,7 +89,7 @@ const FAMILIES: [(&str, Rule); 38] = [
 /// How many tokens an image of this width and height is to a model, by its family; `None` where that is not known.
 pub(super) fn image_tokens(
     model: &str,
-    detail: Option<Detail>,
+    detail: Option<ImageDetail>,
     width: u64,
     height: u64,
 ) -> Option<u64> {
@@ -101,11 +101,11 @@ pub(super) fn image_tokens(
 }
 
 impl Rule {
-    fn count(self, detail: Option<Detail>, width: f64, height: f64) -> u64 {
+    fn count(self, detail: Option<ImageDetail>, width: f64, height: f64) -> u64 {
         let (longer, shorter) = (width.max(height), width.min(height));
         let count = match self {
             Fixed(tokens) => return tokens,
-            Tiles { base, .. } if detail == Some(Detail::Low) => return base,
+            Tiles { base, .. } if detail == Some(ImageDetail::Low) => return base,
             Tiles { base, tile } => {
                 let scale = (2048.0 / longer).min(1.0);
                 let scale = scale * (768.0 / (shorter * scale)).min(1.0);
@@ -113,7 +113,7 @@ impl Rule {
                 return base + tile * (tiles(width) * tiles(height)) as u64;
             }
             Patches { most, high, factor } => {
-                let most = if detail == Some(Detail::High) {
+                let most = if detail == Some(ImageDetail::High) {
                     high
                 } else {
                     most
@@ -160,12 +160,12 @@ mod tests {
 
     #[test]
     fn published_counts_come_out() {
-        let high = Some(Detail::High);
+        let high = Some(ImageDetail::High);
         for (model, detail, width, height, tokens) in [
             // platform.openai.com/docs/guides/images-vision
             ("gpt-4o", high, 1024, 1024, 765),
             ("gpt-4o", high, 2048, 4096, 1105),
-            ("gpt-4o", Some(Detail::Low), 4096, 8192, 85),
+            ("gpt-4o", Some(ImageDetail::Low), 4096, 8192, 85),
             ("o4-mini", None, 1024, 1024, 1762),
             ("gpt-4.1-mini", None, 1024, 1024, 1659),
             // community.openai.com/t/1262691, without the words: 128 × 64

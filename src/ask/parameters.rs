@@ -43,7 +43,7 @@ pub struct Parameters {
     pub reasoning_effort: Option<String>,
     /// How closely the server looks at images; default: not sent
     #[arg(long, value_name = "DETAIL", value_enum)]
-    pub detail: Option<Detail>,
+    pub detail: Option<ImageDetail>,
     /// What the server's sampling starts from, where it takes that: with a temperature above 0 replies are then more alike.
     #[arg(skip)]
     pub seed: Option<u64>,
@@ -156,7 +156,7 @@ impl TokenField {
 /// In what resolution a server is to look at an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
-pub enum Detail {
+pub enum ImageDetail {
     /// As the server thinks best
     Auto,
     /// Small: what little can be seen in the dark is lost
@@ -180,7 +180,7 @@ pub enum Constrain {
 }
 
 written_as_text!(Temperature);
-flag_words!(TokenField, Detail, Constrain);
+flag_words!(TokenField, ImageDetail, Constrain);
 
 #[cfg(test)]
 mod tests {
@@ -216,7 +216,7 @@ mod tests {
         others[1].temperature = Temperature::Server;
         others[2].token_field = TokenField::Omit;
         others[3].reasoning_effort = Some(String::new());
-        others[4].detail = Some(Detail::High);
+        others[4].detail = Some(ImageDetail::High);
         others[5].constrain = Constrain::Json;
         others[6].temperature = Temperature::Of(0.0);
         others[7].seed = Some(0);

@@ -1,4 +1,4 @@
-//! An image as it is sent: [`Payload`], in a [`Format`].
+//! An image as it is sent: [`Payload`], in a [`PayloadFormat`].
 
 use std::borrow::Cow;
 use std::fmt;
@@ -18,7 +18,7 @@ use crate::types::{Digest, ImageFacts, Rgb};
 
 /// The file format in which images are sent. PNG and JPEG alone: servers refuse others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Format {
+pub enum PayloadFormat {
     /// Lossless: the model sees the very pixels that were made.
     Png,
     /// Smaller, without subsampling of colour, but noise in the dark is what it throws away first.
@@ -34,8 +34,8 @@ pub struct Quality(u8);
 #[command(next_help_heading = "Sending")]
 pub struct ImageArgs {
     /// How images are sent: png (lossless) or jpeg:QUALITY
-    #[arg(long, value_name = "FORMAT", default_value_t = Format::Png)]
-    pub image: Format,
+    #[arg(long, value_name = "FORMAT", default_value_t = PayloadFormat::Png)]
+    pub image: PayloadFormat,
 }
 
 impl Quality {
@@ -46,7 +46,7 @@ impl Quality {
     }
 }
 
-impl Format {
+impl PayloadFormat {
     fn name(self) -> &'static str {
         match self {
             Self::Png => "png",
@@ -55,7 +55,7 @@ impl Format {
     }
 }
 
-impl fmt::Display for Format {
+impl fmt::Display for PayloadFormat {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Png => f.write_str("png"),
@@ -64,7 +64,7 @@ impl fmt::Display for Format {
     }
 }
 
-impl FromStr for Format {
+impl FromStr for PayloadFormat {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -92,12 +92,16 @@ impl Payload {
     ///
     /// # Errors
     /// Where the image is larger than the format allows.
-    pub fn encode(image: &Rgb, format: Format, max_side: Option<NonZeroU32>) -> Result<Self> {
+    pub fn encode(
+        image: &Rgb,
+        format: PayloadFormat,
+        max_side: Option<NonZeroU32>,
+    ) -> Result<Self> {
         let image = Self::scaled(image, max_side)?;
         let (width, height) = (side(image.width())?, side(image.height())?);
         let file = match format {
-            Format::Png => png(&image)?,
-            Format::Jpeg(quality) => jpeg(image.samples(), width, height, quality)?,
+            PayloadFormat::Png => png(&image)?,
+            PayloadFormat::Jpeg(quality) => jpeg(image.samples(), width, height, quality)?,
         };
         Ok(Self::of_file(&file, width, height, format))
     }
@@ -129,7 +133,7 @@ impl Payload {
         if fitted(width, height, max_side).is_some() {
             return None;
         }
-        Some(Self::of_file(file, width, height, Format::Png))
+        Some(Self::of_file(file, width, height, PayloadFormat::Png))
     }
 
     /// The width and height in which an image of this size is sent: as it is, or made to fit `max_side`.
@@ -168,7 +172,9 @@ impl Payload {
     /// As [`Self::decode`], without decoding where those that were encoded are at hand and the format loses nothing.
     pub(crate) fn seen<'a>(&self, encoded: Option<&'a Rgb>) -> Result<Cow<'a, Rgb>> {
         match encoded {
-            Some(pixels) if self.facts.format == Format::Png.name() => Ok(Cow::Borrowed(pixels)),
+            Some(pixels) if self.facts.format == PayloadFormat::Png.name() => {
+                Ok(Cow::Borrowed(pixels))
+            }
             _ => self.decode().map(Cow::Owned),
         }
     }
@@ -179,7 +185,7 @@ impl Payload {
         self.data_url.clone()
     }
 
-    fn of_file(file: &[u8], width: u32, height: u32, format: Format) -> Self {
+    fn of_file(file: &[u8], width: u32, height: u32, format: PayloadFormat) -> Self {
         let mut url = format!("data:image/{};base64,", format.name());
         url.reserve_exact(file.len().div_ceil(3) * 4);
         STANDARD.encode_string(file, &mut url);
@@ -268,19 +274,19 @@ mod tests {
     #[test]
     fn formats_read_back() {
         for text in ["png", "jpeg:1", "jpeg:95", "jpeg:100"] {
-            assert_eq!(text.parse::<Format>().unwrap().to_string(), text);
+            assert_eq!(text.parse::<PayloadFormat>().unwrap().to_string(), text);
         }
         for wrong in [
             "", "PNG", "jpeg", "jpeg:", "jpeg:0", "jpeg:101", "jpeg:-1", "webp",
         ] {
-            assert!(wrong.parse::<Format>().is_err(), "{wrong}");
+            assert!(wrong.parse::<PayloadFormat>().is_err(), "{wrong}");
         }
     }
 
     #[test]
     fn png_is_lossless_and_its_facts_are_true() {
         let image = noise(5, 7);
-        let payload = Payload::encode(&image, Format::Png, None).unwrap();
+        let payload = Payload::encode(&image, PayloadFormat::Png, None).unwrap();
         let file = file(&payload);
         let read = image::load_from_memory_with_format(&file, image::ImageFormat::Png).unwrap();
         assert_eq!(read.to_rgb8().as_raw(), image.samples());
@@ -293,7 +299,7 @@ mod tests {
     fn jpeg_keeps_colour_at_full_resolution() {
         let red_and_blue: Vec<u8> = [[255, 0, 0], [0, 0, 255]].repeat(128).concat();
         let image = Rgb::new(16, 16, red_and_blue).unwrap();
-        let format = Format::Jpeg(Quality::new(100).unwrap());
+        let format = PayloadFormat::Jpeg(Quality::new(100).unwrap());
         let payload = Payload::encode(&image, format, None).unwrap();
         let read =
             image::load_from_memory_with_format(&file(&payload), image::ImageFormat::Jpeg).unwrap();
@@ -306,12 +312,13 @@ mod tests {
     fn images_shrink_to_the_side_and_never_grow() {
         let image = noise(30, 60);
         for (most, expected) in [(60, (60, 30)), (100, (60, 30)), (20, (20, 10)), (1, (1, 1))] {
-            let payload = Payload::encode(&image, Format::Png, NonZeroU32::new(most)).unwrap();
+            let payload =
+                Payload::encode(&image, PayloadFormat::Png, NonZeroU32::new(most)).unwrap();
             let facts = payload.facts();
             assert_eq!((facts.width, facts.height), expected);
         }
         let grey = Rgb::new(40, 40, vec![128; 4800]).unwrap();
-        let payload = Payload::encode(&grey, Format::Png, NonZeroU32::new(13)).unwrap();
+        let payload = Payload::encode(&grey, PayloadFormat::Png, NonZeroU32::new(13)).unwrap();
         let read = image::load_from_memory(&file(&payload)).unwrap().to_rgb8();
         assert!(read.as_raw().iter().all(|sample| *sample == 128));
     }
@@ -327,7 +334,7 @@ mod tests {
     #[test]
     fn plain_files_are_sent_as_they_are() {
         let image = noise(8, 9);
-        let encoded = Payload::encode(&image, Format::Png, None).unwrap();
+        let encoded = Payload::encode(&image, PayloadFormat::Png, None).unwrap();
         let bytes = file(&encoded);
         let plain = Payload::of_plain_png(&bytes, None).unwrap();
         assert_eq!(plain.facts(), encoded.facts());

@@ -11,7 +11,7 @@ use super::call::Message;
 use super::constraint::letter_of;
 use super::endpoint::{Endpoint, Request};
 use super::failure::AskError;
-use super::field::{Fields, Refused, Sent};
+use super::field::{AdaptableField, RequestFields, SentFields};
 use super::parameters::{Constrain, Parameters, Temperature, TokenField};
 use super::wire::Wire;
 use crate::error::Result;
@@ -25,7 +25,7 @@ pub struct Remote {
     headers: HeaderMap,
     parameters: Parameters,
     /// The fields that the server takes, as far as is known.
-    fields: Mutex<Fields>,
+    fields: Mutex<RequestFields>,
     /// Whether a reply has come that no constraint was put on.
     unconstrained: AtomicBool,
 }
@@ -38,7 +38,7 @@ impl Remote {
     pub fn open(endpoint: Arc<Endpoint>, wire: Wire, parameters: Parameters) -> Result<Self> {
         Ok(Self {
             headers: endpoint.headers(wire)?,
-            fields: Mutex::new(Fields::first(&parameters, endpoint.host())),
+            fields: Mutex::new(RequestFields::first(&parameters, endpoint.host())),
             endpoint,
             wire,
             parameters,
@@ -69,7 +69,7 @@ impl Remote {
     #[must_use]
     pub fn adapted(&self) -> Vec<String> {
         let (first, now) = (
-            Fields::first(&self.parameters, self.endpoint.host()),
+            RequestFields::first(&self.parameters, self.endpoint.host()),
             self.fields(),
         );
         let field = (now.token_field != first.token_field)
@@ -127,7 +127,7 @@ impl Remote {
 
     async fn ask_with(
         &self,
-        fields: Fields,
+        fields: RequestFields,
         message: Message<'_>,
         choices: usize,
     ) -> Result<Reply, AskError> {
@@ -141,7 +141,7 @@ impl Remote {
             wire: self.wire,
             headers: &self.headers,
             body,
-            sent: Sent {
+            sent: SentFields {
                 parameters,
                 fields,
                 has_image: !message.images.is_empty(),
@@ -151,21 +151,21 @@ impl Remote {
         self.endpoint.ask(&request).await
     }
 
-    fn fields(&self) -> Fields {
+    fn fields(&self) -> RequestFields {
         *self.fields.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Changes the field that a request with `sent` was refused for, where that is left to the program; whether it is worth
     /// asking again.
-    fn adapt(&self, sent: Fields, refused: Option<Refused>) -> bool {
-        let first = Fields::first(&self.parameters, self.endpoint.host());
+    fn adapt(&self, sent: RequestFields, refused: Option<AdaptableField>) -> bool {
+        let first = RequestFields::first(&self.parameters, self.endpoint.host());
         let mut now = self.fields.lock().unwrap_or_else(PoisonError::into_inner);
         if *now != sent {
             // Another request has found out in the meanwhile.
             return refused.is_some();
         }
         match refused {
-            Some(Refused::TokenField)
+            Some(AdaptableField::TokenField)
                 if self.parameters.token_field == TokenField::Auto
                     && sent.token_field == first.token_field =>
             {
@@ -180,7 +180,7 @@ impl Remote {
                 );
                 true
             }
-            Some(Refused::Temperature)
+            Some(AdaptableField::Temperature)
                 if self.parameters.temperature == Temperature::Auto
                     && sent.temperature.is_some() =>
             {

@@ -9,7 +9,7 @@ use super::scaling::Scaling;
 use super::source::{Frames, Source, SourceFrame};
 use super::timings::{Step, Timings};
 use super::walk::Darkened;
-use crate::ask::{Format, ImageLimit, Payload};
+use crate::ask::{ImageLimit, Payload, PayloadFormat};
 use crate::dataset::Picture;
 use crate::error::{Error, Result};
 use crate::synthesis::{Exposures, NoiseKey};
@@ -124,7 +124,7 @@ impl<'a> FrameWork<'a> {
             Scaling::MaxSide(side) => Some(side),
             Scaling::LongerSide(_) => return Ok(None),
         };
-        if *condition != Condition::L0 || format != Format::Png {
+        if *condition != Condition::L0 || format != PayloadFormat::Png {
             return Ok(None);
         }
         let Picture::Encoded { bytes, .. } = self.picture()? else {

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::scaling::Scaling;
 use super::source::{Source, SourceFrame};
 use super::walk::{CameraOf, Darkened, Walk};
-use crate::ask::Format;
+use crate::ask::PayloadFormat;
 use crate::enhance::{self, ModelFile};
 use crate::error::Result;
 use crate::synthesis::{self, NoiseKey, Readings, Sensor, Synthesis};
@@ -19,7 +19,7 @@ use crate::types::{Condition, Digest, EnhancerName, FrameId, Severity};
 pub(crate) struct Recipe {
     pub(crate) seed: u64,
     pub(crate) readings: Readings,
-    pub(crate) format: Format,
+    pub(crate) format: PayloadFormat,
     pub(crate) scaling: Scaling,
     /// Whether light is reduced before or after scaling.
     pub(crate) scaled: Darkened,
@@ -31,7 +31,7 @@ pub(crate) struct Recipe {
 impl Recipe {
     pub(crate) fn new(
         sensor: &Sensor,
-        format: Format,
+        format: PayloadFormat,
         max_side: Option<NonZeroU32>,
         files: &[ModelFile],
     ) -> Self {
@@ -48,7 +48,7 @@ impl Recipe {
         Self {
             seed: sensor.seed,
             readings: sensor.readings.clone(),
-            format: Format::Png,
+            format: PayloadFormat::Png,
             scaling: Scaling::Never,
             scaled: Darkened::Native,
             camera_of: CameraOf::Frame,

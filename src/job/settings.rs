@@ -11,7 +11,7 @@ use super::money::{Money, MoneyArgs};
 use super::outcome::Show;
 use super::picture_words::PictureWords;
 use super::shard::Shard;
-use crate::ask::{AccessArgs, Bounds, Constrain, Format, ImageArgs, Parameters, Sending};
+use crate::ask::{AccessArgs, Bounds, Constrain, ImageArgs, Parameters, PayloadFormat, Sending};
 use crate::enhance::{EnhancerArgs, ModelFile};
 use crate::error::{Error, Result};
 use crate::synthesis::{Light, LightArgs};
@@ -98,7 +98,7 @@ pub struct JobSettings {
     /// Who is asked.
     pub ask: Ask,
     /// The file format of images.
-    pub format: Format,
+    pub format: PayloadFormat,
     /// The longest side of an image as sent, in pixels; `None` for as it is.
     pub max_side: Option<NonZeroU32>,
     /// The largest file of an image in bytes; `None` for what is known of the endpoint.

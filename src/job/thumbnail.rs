@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::num::NonZeroU32;
 
-use crate::ask::{Format, Payload};
+use crate::ask::{Payload, PayloadFormat};
 use crate::error::{Error, Result};
 use crate::types::{Condition, Digest, FrameId, Rgb, Thumbnail};
 
@@ -68,7 +68,7 @@ pub(crate) fn thumbnail(
             .map_or(0.0, |how| how.kind().relight(how.severity())),
         Some(_) => 0.0,
     };
-    let jpeg: Format = FORMAT
+    let jpeg: PayloadFormat = FORMAT
         .parse()
         .map_err(|e| Error::data("the format of small copies", e))?;
     let url = |image: &Rgb| -> Result<String> {

@@ -6,7 +6,7 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use darkqa_eval::ask::{Format, Payload};
+use darkqa_eval::ask::{Payload, PayloadFormat};
 use darkqa_eval::job::bilinear::bilinear;
 use darkqa_eval::synthesis::exposure::expose_into;
 use darkqa_eval::synthesis::noise::{self, Term};
@@ -124,13 +124,19 @@ fn request(c: &mut Criterion) {
     group.bench_function("noise L3", |b| b.iter(noisy));
     let dark = noisy();
     group.bench_function("noise L3 to PNG body", |b| {
-        b.iter(|| Payload::encode(black_box(&dark), Format::Png, None));
+        b.iter(|| Payload::encode(black_box(&dark), PayloadFormat::Png, None));
     });
     group.bench_function("frame to request, exposure L3", |b| {
-        b.iter(|| Payload::encode(&expose(black_box(&clean), Severity::L3), Format::Png, None));
+        b.iter(|| {
+            Payload::encode(
+                &expose(black_box(&clean), Severity::L3),
+                PayloadFormat::Png,
+                None,
+            )
+        });
     });
     group.bench_function("frame to request, noise L3", |b| {
-        b.iter(|| Payload::encode(&noisy(), Format::Png, None));
+        b.iter(|| Payload::encode(&noisy(), PayloadFormat::Png, None));
     });
     group.finish();
 }
@@ -146,7 +152,7 @@ fn walk(c: &mut Criterion) {
     group.bench_function("noise L4, scaled to 512, to PNG body", |b| {
         b.iter(|| {
             let dark = Negative::new(&clean, &key, &paper, Severity::L4).develop(Severity::L4);
-            Payload::encode(&bilinear(&dark, 512)?, Format::Png, None)
+            Payload::encode(&bilinear(&dark, 512)?, PayloadFormat::Png, None)
         });
     });
     group.finish();

@@ -7,7 +7,7 @@ use reqwest::header::HeaderMap;
 
 /// What is left of one limit, and how long it takes until all of it is there again.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Left {
+struct Remainder {
     limit: Option<f64>,
     remaining: f64,
     reset: Duration,
@@ -16,8 +16,8 @@ struct Left {
 /// What is left of the limits on requests and on tokens.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(in crate::ask) struct Allowance {
-    requests: Option<Left>,
-    tokens: Option<Left>,
+    requests: Option<Remainder>,
+    tokens: Option<Remainder>,
 }
 
 /// What an allowance asks for.
@@ -40,7 +40,7 @@ impl Allowance {
         let left = |name: &dyn Fn(&str) -> String| {
             let number = |field| text(&name(field))?.parse::<f64>().ok();
             let remaining = number("remaining").filter(|n| n.is_finite())?;
-            Some(Left {
+            Some(Remainder {
                 limit: number("limit").filter(|n| n.is_finite() && *n > 0.0),
                 remaining: remaining.max(0.0),
                 reset: duration(text(&name("reset"))?, now)?,
@@ -70,7 +70,7 @@ impl Allowance {
     }
 }
 
-impl Left {
+impl Remainder {
     /// Above half of the limit nothing; below, the rest is spread over the time until all is there again. Where the limit
     /// fills up all the time (OpenAI), that is the rate of filling at half and less below it, so half is where it settles;
     /// where it is filled at once when a minute is over, the rest lasts for the rest of the minute. Neither runs dry.

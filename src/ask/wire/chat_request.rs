@@ -8,13 +8,13 @@ use serde_json::{Value, json};
 use crate::ask::body::Parts;
 use crate::ask::call::Message;
 use crate::ask::constraint;
-use crate::ask::field::{Field, Fields, Refused, Sent};
-use crate::ask::parameters::{Constrain, Detail, Parameters, TokenField};
+use crate::ask::field::{AdaptableField, RequestField, RequestFields, SentFields};
+use crate::ask::parameters::{Constrain, ImageDetail, Parameters, TokenField};
 use crate::ask::payload::Payload;
 use crate::types::question::letter;
 
 #[derive(Serialize)]
-struct Request<'a> {
+struct ChatRequest<'a> {
     model: &'a str,
     #[serde(skip_serializing_if = "Option::is_none")]
     temperature: Option<f64>,
@@ -59,7 +59,7 @@ enum Part<'a> {
 #[derive(Serialize)]
 struct ImageUrl {
     #[serde(skip_serializing_if = "Option::is_none")]
-    detail: Option<Detail>,
+    detail: Option<ImageDetail>,
     url: &'static str,
 }
 
@@ -70,7 +70,7 @@ const PLACE: &str = r#""url":"""#;
 /// The body of one request: words, images, and the words behind them.
 pub(super) fn body(
     parameters: &Parameters,
-    fields: Fields,
+    fields: RequestFields,
     message: Message<'_>,
     choices: usize,
 ) -> Result<Parts, serde_json::Error> {
@@ -78,7 +78,7 @@ pub(super) fn body(
     let letters: Vec<char> = (0..choices).map(letter).collect();
     let constrained =
         |kind, value: fn(&[char]) -> Value| (parameters.constrain == kind).then(|| value(&letters));
-    let json = serde_json::to_string(&Request {
+    let json = serde_json::to_string(&ChatRequest {
         model: &parameters.model,
         temperature: fields.temperature,
         top_p: parameters.top_p,
@@ -120,7 +120,7 @@ fn with_images(json: String, images: &[Arc<Payload>]) -> Parts {
 }
 
 /// What a message holds, with a place for each image.
-fn content(message: Message<'_>, detail: Option<Detail>) -> Content<'_> {
+fn content(message: Message<'_>, detail: Option<ImageDetail>) -> Content<'_> {
     let Message {
         before,
         images,
@@ -146,53 +146,53 @@ fn format(letters: &[char]) -> Value {
 }
 
 /// The fields that a server may complain about.
-pub(super) fn fields(sent: Sent<'_>) -> Vec<Field> {
+pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField> {
     let parameters = sent.parameters;
     let limit = |field| sent.fields.token_field == field;
     Vec::from([
-        Field {
+        RequestField {
             name: "temperature",
             sent: sent.fields.temperature.is_some(),
-            refused: Some(Refused::Temperature),
+            refused: Some(AdaptableField::Temperature),
             hint: "leave the temperature to the server: --temperature default",
         },
-        Field {
+        RequestField {
             name: "top_p",
             sent: parameters.top_p.is_some(),
             refused: None,
             hint: "leave --top-p out: the model takes no other than its own",
         },
-        Field {
+        RequestField {
             name: "max_tokens",
             sent: limit(TokenField::MaxTokens),
-            refused: Some(Refused::TokenField),
+            refused: Some(AdaptableField::TokenField),
             hint: "send the limit otherwise: --token-field max_completion_tokens (or none), or another --max-tokens",
         },
-        Field {
+        RequestField {
             name: "max_completion_tokens",
             sent: limit(TokenField::MaxCompletionTokens),
-            refused: Some(Refused::TokenField),
+            refused: Some(AdaptableField::TokenField),
             hint: "send the limit otherwise: --token-field max_tokens (or none), or another --max-tokens",
         },
-        Field {
+        RequestField {
             name: "reasoning_effort",
             sent: parameters.reasoning_effort.is_some(),
             refused: None,
             hint: "leave --reasoning-effort out, or give a value the model takes",
         },
-        Field {
+        RequestField {
             name: "detail",
             sent: sent.has_image && parameters.detail.is_some(),
             refused: None,
             hint: "leave --detail out, or give a value the server takes",
         },
-        Field {
+        RequestField {
             name: "response_format",
             sent: parameters.constrain == Constrain::Json,
             refused: None,
             hint: "leave --constrain out: the server does not take it",
         },
-        Field {
+        RequestField {
             name: "structured_outputs",
             sent: parameters.constrain == Constrain::Choice,
             refused: None,

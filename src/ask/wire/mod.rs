@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::body::Parts;
 use super::call::Message;
 use super::complaint::{Complaint, UnreadableReply};
-use super::field::{Field, Fields, Sent};
+use super::field::{RequestField, RequestFields, SentFields};
 use super::key_header::KeyHeader;
 use super::parameters::Parameters;
 use super::secret::Secret;
@@ -59,7 +59,7 @@ impl Wire {
     pub(super) fn body(
         self,
         parameters: &Parameters,
-        fields: Fields,
+        fields: RequestFields,
         message: Message<'_>,
         choices: usize,
     ) -> Result<Parts, serde_json::Error> {
@@ -69,7 +69,7 @@ impl Wire {
     }
 
     /// The fields of a request about which a server may complain.
-    pub(super) fn fields(self, sent: Sent<'_>) -> Vec<Field> {
+    pub(super) fn fields(self, sent: SentFields<'_>) -> Vec<RequestField> {
         match self {
             Self::Chat => chat_request::fields(sent),
         }

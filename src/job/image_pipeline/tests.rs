@@ -3,7 +3,7 @@
 use std::num::NonZeroU32;
 
 use super::*;
-use crate::ask::Format;
+use crate::ask::PayloadFormat;
 use crate::dataset::Dataset;
 use crate::job::recipe::Recipe;
 use crate::job::scaling::Scaling;
@@ -16,7 +16,9 @@ fn frame() -> (tempfile::TempDir, Dataset, Source) {
     let folder = tempfile::tempdir().unwrap();
     let samples = (0..40 * 60 * 3).map(|i| (i * i % 251) as u8).collect();
     let pixels = Rgb::new(40, 60, samples).unwrap();
-    let file = Payload::encode(&pixels, Format::Png, None).unwrap().file();
+    let file = Payload::encode(&pixels, PayloadFormat::Png, None)
+        .unwrap()
+        .file();
     std::fs::write(folder.path().join("a.png"), file.unwrap()).unwrap();
     let dataset = Dataset::of_images(folder.path()).unwrap();
     let name = dataset.frames().next().unwrap().clone();

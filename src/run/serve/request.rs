@@ -8,7 +8,7 @@ use base64::engine::general_purpose::STANDARD;
 use serde::Deserialize;
 
 use super::completion::{Fault, Form};
-use crate::ask::{Format, Payload};
+use crate::ask::{Payload, PayloadFormat};
 use crate::dataset::Picture;
 use crate::dataset::picture::MOST_PIXELS;
 use crate::types::Rgb;
@@ -118,6 +118,7 @@ fn pixels(url: &str) -> Result<(Rgb, Arc<Payload>), Fault> {
         most_pixels: MOST_PIXELS,
     };
     let rgb = picture.decode().map_err(|e| wrong(e.to_string()))?;
-    let payload = Payload::encode(&rgb, Format::Png, None).map_err(|e| wrong(e.to_string()))?;
+    let payload =
+        Payload::encode(&rgb, PayloadFormat::Png, None).map_err(|e| wrong(e.to_string()))?;
     Ok((rgb, Arc::new(payload)))
 }
