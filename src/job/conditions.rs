@@ -1,12 +1,12 @@
 //! In which conditions frames are shown: [`conditions`].
 
-use crate::synthesis::Light;
+use crate::synthesis::LightSettings;
 use crate::types::{Condition, Degradation, Digest, EnhancerName, KindSet};
 
 /// Every condition in which a frame is shown: raw first, each enhancer after, level by level, so that a frame is developed once for
 /// all that use it.
 pub(crate) fn conditions(
-    light: &Light,
+    light: &LightSettings,
     on: KindSet,
     enhancers: &[(EnhancerName, Digest)],
 ) -> Vec<Condition> {

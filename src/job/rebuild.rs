@@ -16,7 +16,7 @@ use super::workers::ThreadArgs;
 use crate::dataset::{Dataset, Place, place};
 use crate::enhance::{Enhancer, RuntimeArgs};
 use crate::error::{Error, Result};
-use crate::synthesis::Sensor;
+use crate::synthesis::SensorSettings;
 use crate::types::manifest::RunManifest;
 use crate::types::{Condition, Digest, FrameId};
 
@@ -83,7 +83,7 @@ impl ImageRebuilder {
         let enhanced = conditions.any(|condition| condition.enhancer.is_some());
         let models = if enhanced { &*pictures.llie } else { &[] };
         let files = enhancers::read(models)?;
-        let sensor = Sensor::resolve(&pictures.sensor)?;
+        let sensor = SensorSettings::resolve(&pictures.sensor)?;
         let recipe = Recipe::new(&sensor, pictures.images.image, pictures.max_side, &files);
         let (place, recipe) = if let Some(walk) = pictures.walk {
             let recipe = recipe.of_walks(&walk);

@@ -10,7 +10,7 @@ use super::walk::{CameraOf, Darkened, Walk};
 use crate::ask::PayloadFormat;
 use crate::enhance::{self, ModelFile};
 use crate::error::Result;
-use crate::synthesis::{self, NoiseKey, Readings, Sensor, Synthesis};
+use crate::synthesis::{self, NoiseKey, Readings, SensorSettings, Synthesis};
 use crate::types::degradation::Kind;
 use crate::types::{Condition, Digest, EnhancerName, FrameId, Severity};
 
@@ -30,7 +30,7 @@ pub(crate) struct Recipe {
 
 impl Recipe {
     pub(crate) fn new(
-        sensor: &Sensor,
+        sensor: &SensorSettings,
         format: PayloadFormat,
         max_side: Option<NonZeroU32>,
         files: &[ModelFile],
@@ -43,7 +43,7 @@ impl Recipe {
     }
 
     /// The recipe for images of every pixel, each in its own size.
-    pub(crate) fn lossless(sensor: &Sensor, files: &[ModelFile]) -> Self {
+    pub(crate) fn lossless(sensor: &SensorSettings, files: &[ModelFile]) -> Self {
         let enhancers = files.iter();
         Self {
             seed: sensor.seed,

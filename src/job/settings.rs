@@ -14,13 +14,13 @@ use super::shard::Shard;
 use crate::ask::{AccessArgs, Bounds, Constrain, ImageArgs, Parameters, PayloadFormat, Sending};
 use crate::enhance::{EnhancerArgs, ModelFile};
 use crate::error::{Error, Result};
-use crate::synthesis::{Light, LightArgs};
+use crate::synthesis::{LightArgs, LightSettings};
 use crate::types::View;
 
 /// The flags that every experiment has.
 #[derive(Debug, Args)]
 pub struct JobArgs {
-    /// Light.
+    /// LightSettings.
     #[command(flatten)]
     pub light: LightArgs,
     /// Which images are enhanced, and by what.
@@ -90,7 +90,7 @@ pub struct OutputArgs {
 #[derive(Debug)]
 pub struct JobSettings {
     /// What is done to frames.
-    pub light: Light,
+    pub light: LightSettings,
     /// Which images are enhanced, and by what.
     pub enhancers: EnhancerArgs,
     /// How enhancers are run.
@@ -185,7 +185,7 @@ impl JobArgs {
             self.access
         };
         Ok(JobSettings {
-            light: Light::resolve(&self.light)?,
+            light: LightSettings::resolve(&self.light)?,
             ask: Ask::resolve(self.models, parameters, &access, sending)?,
             enhancers: self.enhancers,
             loading: self.loading,

@@ -25,7 +25,7 @@ use crate::score::realism::residual::{Bins, Empty, Residuals, divergence};
 use crate::score::realism::ssim::ssim;
 use crate::score::realism::{Compared, Measured, exposure_drop, psnr, same_size};
 use crate::synthesis::noise::Term;
-use crate::synthesis::{Negative, NoiseKey, Sensor, SensorArgs, expose_by};
+use crate::synthesis::{Negative, NoiseKey, SensorArgs, SensorSettings, expose_by};
 use crate::types::manifest::Status;
 use crate::types::{FrameId, Rgb};
 
@@ -106,7 +106,7 @@ pub fn realism(args: &RealismArgs, progress: &Progress) -> Result<Outcome> {
         (None, Some(normal), Some(low)) => Pairs::of_folders(normal, low)?,
         (folder, ..) => Pairs::open(folder.as_deref().unwrap_or(Path::new(".")))?,
     };
-    let sensor = Sensor::resolve(&args.sensor)?;
+    let sensor = SensorSettings::resolve(&args.sensor)?;
     for path in &unmatched {
         tracing::warn!("{}: no partner in the other light", path.display());
     }
@@ -155,7 +155,7 @@ pub fn realism(args: &RealismArgs, progress: &Progress) -> Result<Outcome> {
     })
 }
 
-fn compare(args: &RealismArgs, sensor: &Sensor, pair: &Pair, shown: bool) -> Result<Work> {
+fn compare(args: &RealismArgs, sensor: &SensorSettings, pair: &Pair, shown: bool) -> Result<Work> {
     let decoded = |path: &Path| {
         let bytes = fs::read(path).map_err(|e| Error::file(path, "read", e))?;
         let place = path.display().to_string();

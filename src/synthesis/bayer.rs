@@ -87,16 +87,16 @@ impl Bayer {
     }
 
     /// All rows, to be changed in parallel.
-    pub fn lines_mut(&mut self) -> impl IndexedParallelIterator<Item = Line<'_>> {
+    pub fn lines_mut(&mut self) -> impl IndexedParallelIterator<Item = RawRow<'_>> {
         let width = self.width;
         let lines = self.samples.par_chunks_mut(2 * stride(width));
-        lines.map(move |samples| Line { width, samples })
+        lines.map(move |samples| RawRow { width, samples })
     }
 
     /// A row, to be changed.
-    pub(super) fn line_mut(&mut self, row: usize) -> Line<'_> {
+    pub(super) fn line_mut(&mut self, row: usize) -> RawRow<'_> {
         let (width, size) = (self.width, 2 * stride(self.width));
-        Line {
+        RawRow {
             width,
             samples: &mut self.samples[row * size..][..size],
         }
@@ -118,12 +118,12 @@ pub(super) struct Sites<'a> {
 
 /// One row of a RAW image, to be changed.
 #[derive(Debug)]
-pub struct Line<'a> {
+pub struct RawRow<'a> {
     width: usize,
     samples: &'a mut [f32],
 }
 
-impl Line<'_> {
+impl RawRow<'_> {
     /// The plane of the even columns and that of the odd ones, in whole lanes: what lies beyond the width is never seen.
     pub fn planes(&mut self) -> [&mut [Lanes<f32>]; 2] {
         let (even, odd) = self.samples.split_at_mut(stride(self.width));

@@ -6,7 +6,7 @@
 
 use std::sync::LazyLock;
 
-use super::bayer::{self, Bayer, Line, Plane, Sites};
+use super::bayer::{self, Bayer, Plane, RawRow, Sites};
 use super::camera::CameraState;
 use super::curve;
 use super::lanes::{Isa, Kernel, LANES, Lanes};
@@ -45,10 +45,10 @@ impl Developer {
     }
 
     /// White balance and brightness gains on a sensor row, clipped to [0, 1].
-    pub(super) fn balance(&self, row: usize, line: &mut Line<'_>) {
+    pub(super) fn balance(&self, row: usize, line: &mut RawRow<'_>) {
         for (parity, samples) in line.planes().into_iter().enumerate() {
             let gain = self.gains[Plane::at(row, parity) as usize];
-            self.isa.run(Balance { gain, samples });
+            self.isa.run(WhiteBalance { gain, samples });
         }
     }
 
@@ -83,12 +83,12 @@ impl Developer {
     }
 }
 
-struct Balance<'a> {
+struct WhiteBalance<'a> {
     gain: f32,
     samples: &'a mut [Lanes<f32>],
 }
 
-impl Kernel for Balance<'_> {
+impl Kernel for WhiteBalance<'_> {
     #[inline(always)]
     fn run(self) {
         for sample in self.samples.as_flattened_mut() {

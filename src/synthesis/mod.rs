@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! Exposure   sRGB ─ gamma ─ × 2^−ΔEV ─ gamma⁻¹ ─ 8 bit                            a table of 256 codes
-//! Sensor     sRGB ─ unprocess ─ RAW ─ shot, read, row, quantisation ─ balance ─┐
+//! SensorSettings     sRGB ─ unprocess ─ RAW ─ shot, read, row, quantisation ─ balance ─┐
 //!                                                     a Negative, drawn once ◄─┘
 //!            Negative ─ demosaic ─ camera → sRGB ─ × 2^−ΔEV ─ gamma⁻¹ ─ 8 bit     for each level
 //! ```
@@ -45,7 +45,7 @@ pub use exposures::{Exposures, is_random, version};
 pub use negative::{Negative, ladder};
 pub use random::NoiseKey;
 pub use reading::{Amplify, Coupling, Draws, LightReading, Readings, Synthesis, Tone};
-pub use settings::{Light, LightArgs, Sensor, SensorArgs};
+pub use settings::{LightArgs, LightSettings, SensorArgs, SensorSettings};
 
 use crate::types::{Degradation, Rgb};
 

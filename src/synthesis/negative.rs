@@ -32,7 +32,7 @@ impl Negative {
     /// Takes `clean` for a level, with camera and noise drawn from the key.
     #[must_use]
     pub fn new(clean: &Rgb, key: &NoiseKey, synthesis: &Synthesis, severity: Severity) -> Self {
-        let shot = Shot::new(key, synthesis, severity, Isa::best());
+        let shot = Capture::new(key, synthesis, severity, Isa::best());
         Self {
             only: (!synthesis.shares_negative()).then_some(severity),
             ..Self::of(clean, shot)
@@ -50,10 +50,10 @@ impl Negative {
         terms: &[Term],
     ) -> Self {
         let isa = Isa::best();
-        Self::of(clean, Shot::with(key, state, amplify, tone, terms, isa))
+        Self::of(clean, Capture::with(key, state, amplify, tone, terms, isa))
     }
 
-    fn of(clean: &Rgb, shot: Shot) -> Self {
+    fn of(clean: &Rgb, shot: Capture) -> Self {
         let (height, width) = (clean.height(), clean.width());
         let mut balanced = Bayer::covering(height, width);
         let lines = balanced.lines_mut().enumerate();
@@ -111,24 +111,24 @@ pub fn ladder(
     let isa = Isa::best();
     if synthesis.shares_negative() {
         if let Some(level) = levels.first() {
-            Shot::new(key, synthesis, *level, isa).develop(clean, levels, dark);
+            Capture::new(key, synthesis, *level, isa).develop(clean, levels, dark);
         }
     } else {
         for (level, dark) in levels.iter().zip(dark) {
-            let shot = Shot::new(key, synthesis, *level, isa);
+            let shot = Capture::new(key, synthesis, *level, isa);
             shot.develop(clean, &[*level], std::slice::from_mut(dark));
         }
     }
 }
 
 /// One press of the shutter: a camera's state with its noise, ready for any row.
-struct Shot {
+struct Capture {
     unprocess: Unprocess,
     noise: Noise,
     developer: Developer,
 }
 
-impl Shot {
+impl Capture {
     fn new(key: &NoiseKey, synthesis: &Synthesis, severity: Severity, isa: Isa) -> Self {
         let state = synthesis.state(key, severity);
         let key = match synthesis.draws {
@@ -155,7 +155,7 @@ impl Shot {
     }
 
     /// A sensor row, noisy and balanced.
-    fn take(&self, clean: &Rgb, row: usize, line: &mut super::bayer::Line<'_>) {
+    fn take(&self, clean: &Rgb, row: usize, line: &mut super::bayer::RawRow<'_>) {
         self.unprocess.act(clean, row, line);
         self.noise.act(row, line);
         self.developer.balance(row, line);
@@ -259,7 +259,7 @@ mod tests {
             };
             for (amplify, tone) in choices {
                 let develop = |isa: &Isa| {
-                    let shot = Shot::with(&key, &state, amplify, tone, &Term::ALL, *isa);
+                    let shot = Capture::with(&key, &state, amplify, tone, &Term::ALL, *isa);
                     let mut dark = Severity::LADDER.map(|_| Rgb::black(40, 150));
                     shot.develop(&clean, &Severity::LADDER, &mut dark);
                     dark

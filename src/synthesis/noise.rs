@@ -9,7 +9,7 @@
 
 use rayon::prelude::*;
 
-use super::bayer::{Bayer, Line, Plane};
+use super::bayer::{Bayer, Plane, RawRow};
 use super::camera::CameraState;
 use super::lanes::{Isa, Kernel, LANES, Lanes};
 use super::poisson;
@@ -121,13 +121,13 @@ impl Noise {
             bias: state.bias.map(|offset| offset as f32),
             row: has(Term::Row).then(|| (state.row_deviation, key.stream(Component::Row))),
             quantisation: has(Term::Quantisation),
-            field: key.stream(Component::Field),
+            field: key.stream(Component::RandomField),
             isa,
         }
     }
 
     /// Acts on a sensor row.
-    pub(super) fn act(&self, at: usize, line: &mut Line<'_>) {
+    pub(super) fn act(&self, at: usize, line: &mut RawRow<'_>) {
         let row_offset = match self.row {
             Some((deviation, stream)) => row(deviation, stream, at),
             None => 0.0,

@@ -65,7 +65,7 @@ impl NoiseKey {
     pub fn stream(&self, component: Component) -> Stream {
         let of = match component {
             Component::Camera => self.camera,
-            Component::Row | Component::Field => self.noise,
+            Component::Row | Component::RandomField => self.noise,
         };
         let digest = Digest::of_parts([of.as_bytes(), component.name().as_bytes()]);
         let [low, high] = [0, 4].map(|at| {
@@ -84,8 +84,8 @@ pub enum Component {
     Camera,
     /// Row noise.
     Row,
-    /// What each site draws for itself: see [`Field`].
-    Field,
+    /// What each site draws for itself: see [`RandomField`].
+    RandomField,
 }
 
 impl Component {
@@ -94,14 +94,14 @@ impl Component {
         match self {
             Self::Camera => "camera",
             Self::Row => "row",
-            Self::Field => "field",
+            Self::RandomField => "field",
         }
     }
 }
 
 /// The 32 random bits that sites of one sensor row have for each use, by lane.
 #[derive(Debug, Clone)]
-pub struct Field {
+pub struct RandomField {
     /// Shot noise: two words.
     pub shot: [Lanes<u32>; 2],
     /// Read noise.
@@ -144,8 +144,8 @@ impl Stream {
     /// The words of [`LANES`] sites of a row: `first` and every other column from there, the sites of one Bayer plane.
     #[inline(always)]
     #[must_use]
-    pub fn field(self, first: Site) -> Field {
-        let mut field = Field {
+    pub fn field(self, first: Site) -> RandomField {
+        let mut field = RandomField {
             shot: [[0; LANES]; 2],
             read: [0; LANES],
             quantisation: [0; LANES],
@@ -164,8 +164,8 @@ impl Stream {
 
     /// The words of one site, one after the other, for a distribution of `rand_distr` to draw from.
     #[must_use]
-    pub fn at(self, site: Site) -> Words {
-        Words {
+    pub fn at(self, site: Site) -> SiteWords {
+        SiteWords {
             stream: self,
             site,
             next: 0,
@@ -175,13 +175,13 @@ impl Stream {
 
 /// The words of one site, draw by draw: what is not drawn for every site of the sensor is drawn from them.
 #[derive(Debug, Clone)]
-pub struct Words {
+pub struct SiteWords {
     stream: Stream,
     site: Site,
     next: u32,
 }
 
-impl Words {
+impl SiteWords {
     /// A standard normal number (Box and Muller 1958), of one draw.
     pub fn normal(&mut self) -> f64 {
         let [radius, angle]: [f64; 2] = [Open01.sample(self), Open01.sample(self)];
@@ -189,7 +189,7 @@ impl Words {
     }
 }
 
-impl TryRng for Words {
+impl TryRng for SiteWords {
     type Error = Infallible;
 
     fn try_next_u32(&mut self) -> Result<u32, Infallible> {
@@ -277,10 +277,10 @@ mod tests {
 
     #[test]
     fn seed_frame_and_component_each_name_another_stream() {
-        let first = key(7, "a").stream(Component::Field);
-        assert_eq!(first, key(7, "a").stream(Component::Field));
-        assert_ne!(first, key(8, "a").stream(Component::Field));
-        assert_ne!(first, key(7, "b").stream(Component::Field));
+        let first = key(7, "a").stream(Component::RandomField);
+        assert_eq!(first, key(7, "a").stream(Component::RandomField));
+        assert_ne!(first, key(8, "a").stream(Component::RandomField));
+        assert_ne!(first, key(7, "b").stream(Component::RandomField));
         assert_ne!(first, key(7, "a").stream(Component::Row));
     }
 
@@ -288,7 +288,7 @@ mod tests {
     /// row or draw (5 sigma).
     #[test]
     fn bits_are_even_and_neighbours_unrelated() {
-        let stream = key(1, "frame").stream(Component::Field);
+        let stream = key(1, "frame").stream(Component::RandomField);
         let (rows, columns) = (256, 512);
         let mut ones = [[0u32; 32]; 4];
         let mut flips = [0u64; 6];
@@ -325,7 +325,7 @@ mod tests {
 
     #[test]
     fn lanes_are_the_sites_of_a_plane() {
-        let stream = key(4, "frame").stream(Component::Field);
+        let stream = key(4, "frame").stream(Component::RandomField);
         let field = stream.field(Site::new(7, 129));
         for lane in [0, 1, LANES - 1] {
             let words = stream.words(Site::new(7, 129 + 2 * lane), 0);
@@ -338,7 +338,7 @@ mod tests {
     #[test]
     fn pairs_of_neighbours_fill_the_square_evenly() {
         const CELLS: usize = 64;
-        let stream = key(2, "frame").stream(Component::Field);
+        let stream = key(2, "frame").stream(Component::RandomField);
         let mut cells = vec![0u32; CELLS * CELLS];
         let n = 400_000;
         for i in 0..n {

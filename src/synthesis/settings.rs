@@ -1,4 +1,4 @@
-//! How dark it gets and how noise is made, as flags say it ([`LightArgs`], [`SensorArgs`]), and as it is used ([`Light`], [`Sensor`]).
+//! How dark it gets and how noise is made, as flags say it ([`LightArgs`], [`SensorArgs`]), and as it is used ([`LightSettings`], [`SensorSettings`]).
 
 use std::fs;
 use std::path::Path;
@@ -14,7 +14,7 @@ use crate::types::{AxisLevel, Degradation, KindSet, ReadingName, Severity};
 
 /// The levels and kinds of degradation.
 #[derive(Debug, Clone, Args)]
-#[command(next_help_heading = "Light")]
+#[command(next_help_heading = "LightSettings")]
 pub struct LightArgs {
     /// Levels, as L0-L5 or L0,L3, and exposure drops in EV up to 16, as L0,3.3
     #[arg(long, value_name = "LEVELS", default_value = "L0-L5")]
@@ -29,12 +29,12 @@ pub struct LightArgs {
 
 /// The sensor and its noise.
 #[derive(Debug, Clone, Args)]
-#[command(next_help_heading = "Light")]
+#[command(next_help_heading = "LightSettings")]
 pub struct SensorArgs {
     /// The seed of all random draws
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// Light readings, how the paper's noise is understood, one or several as paper,eld; flags beside one go before its parts and
+    /// LightSettings readings, how the paper's noise is understood, one or several as paper,eld; flags beside one go before its parts and
     /// make it custom
     ///
     /// Conditions with noise carry the reading's name, as L3-noise@physical; that of paper is bare, L3-noise.
@@ -82,7 +82,7 @@ pub struct SensorArgs {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Levels(pub Vec<AxisLevel>);
 
-/// Light readings by name.
+/// LightSettings readings by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Profile {
     /// DarkQA to the letter
@@ -111,25 +111,25 @@ impl Profile {
 
 /// What is done to frames.
 #[derive(Debug)]
-pub struct Light {
+pub struct LightSettings {
     /// The levels, lightest first, none twice.
     pub levels: Vec<AxisLevel>,
     /// The kinds of degradation at all levels but L0.
     pub variants: KindSet,
     /// What takes the noisy images.
-    pub sensor: Sensor,
+    pub sensor: SensorSettings,
 }
 
 /// What takes the noisy images.
 #[derive(Debug)]
-pub struct Sensor {
+pub struct SensorSettings {
     /// The seed of all random draws.
     pub seed: u64,
     /// The light readings of the sensor branch.
     pub readings: Readings,
 }
 
-impl Light {
+impl LightSettings {
     /// Reads the camera's file, if one is named.
     ///
     /// # Errors
@@ -138,7 +138,7 @@ impl Light {
         Ok(Self {
             levels: args.levels.0.clone(),
             variants: args.variant,
-            sensor: Sensor::resolve(&args.sensor)?,
+            sensor: SensorSettings::resolve(&args.sensor)?,
         })
     }
 
@@ -168,7 +168,7 @@ impl Light {
     }
 }
 
-impl Sensor {
+impl SensorSettings {
     /// Reads the camera's file, if one is named.
     ///
     /// # Errors
@@ -351,12 +351,12 @@ mod tests {
     }
 
     /// The sensor that these words say.
-    fn sensor(words: &[&str]) -> Result<Sensor> {
+    fn sensor(words: &[&str]) -> Result<SensorSettings> {
         let command = SensorArgs::augment_args(clap::Command::new("sensor"));
         let words = std::iter::once("sensor").chain(words.iter().copied());
         let matches = command.try_get_matches_from(words);
         let matches = matches.map_err(|e| Error::usage("words", e))?;
-        Sensor::resolve(&SensorArgs::from_arg_matches(&matches).unwrap())
+        SensorSettings::resolve(&SensorArgs::from_arg_matches(&matches).unwrap())
     }
 
     #[test]

@@ -9,7 +9,7 @@ use super::lanes::{LANES, Lanes};
 use super::noise;
 use super::poisson;
 use super::quantile::{Quantile, tukey_lambda};
-use super::random::{Component, Field, NoiseKey, Site, Stream};
+use super::random::{Component, NoiseKey, RandomField, Site, Stream};
 use crate::types::FrameId;
 
 const TEN_MILLION: usize = 10_000_000;
@@ -23,8 +23,8 @@ fn stream(component: Component) -> Stream {
 }
 
 /// What `tally` makes of `n` draws (rounded up to whole lanes), a thousand lanes at a time, summed.
-fn over(n: usize, bins: usize, tally: impl Fn(&Field, &mut [u64]) + Sync) -> Vec<u64> {
-    let field = stream(Component::Field);
+fn over(n: usize, bins: usize, tally: impl Fn(&RandomField, &mut [u64]) + Sync) -> Vec<u64> {
+    let field = stream(Component::RandomField);
     let rows = n.div_ceil(1000 * LANES);
     let row = |row: usize| {
         let mut counts = vec![0; bins];
@@ -130,9 +130,9 @@ fn a_billion_draws_of_shot_noise_are_poissons() {
 }
 
 /// Random numbers for another sampler.
-struct Words(Stream, usize);
+struct OtherSampler(Stream, usize);
 
-impl rand::TryRng for Words {
+impl rand::TryRng for OtherSampler {
     type Error = std::convert::Infallible;
 
     fn try_next_u32(&mut self) -> Result<u32, Self::Error> {
@@ -174,7 +174,7 @@ fn an_independent_sampler_agrees() {
         let mut theirs = vec![0; ours.len()];
         let poisson = rand_distr::Poisson::new(f64::from(mean)).unwrap();
         for number in poisson
-            .sample_iter(Words(stream(Component::Camera), 0))
+            .sample_iter(OtherSampler(stream(Component::Camera), 0))
             .take(n)
         {
             theirs[number as usize] += 1;
@@ -273,7 +273,7 @@ fn read_noise_has_its_spread_and_its_offset() {
         (-3.0 / 70.0, 1.5647, 3.0637, 1.967),
         (-8.0 / 70.0, 4.0297, 9.0730, 4.510),
     ];
-    let field = stream(Component::Field);
+    let field = stream(Component::RandomField);
     for (shape, scale, deviation, kurtosis) in cases {
         let table = Quantile::tukey_lambda(shape);
         let batches = TEN_MILLION / LANES;
@@ -329,7 +329,7 @@ fn row_noise_is_normal_and_unrelated_between_rows() {
         counts
     };
     let ours = counts(&mut rows.iter().take(1_000_000).copied());
-    let words = Words(self::stream(Component::Camera), 0);
+    let words = OtherSampler(self::stream(Component::Camera), 0);
     let theirs = counts(
         &mut rand_distr::StandardNormal
             .sample_iter(words)
@@ -360,7 +360,7 @@ fn quantisation_noise_is_uniform_within_half_a_step() {
 fn terms_of_one_site_are_unrelated() {
     let state = median();
     let table = Quantile::tukey_lambda(state.read_shape);
-    let field = stream(Component::Field);
+    let field = stream(Component::RandomField);
     let mut products = [0.0; 3];
     let mut squares = [0.0; 3];
     let batches = 1_000_000 / LANES;

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use rayon::prelude::*;
 
-use super::bayer::{Bayer, Line, Plane};
+use super::bayer::{Bayer, Plane, RawRow};
 use super::camera::CameraState;
 use super::curve;
 use super::lanes::{Isa, Kernel, LANES, Lanes};
@@ -69,7 +69,7 @@ impl Unprocess {
     }
 
     /// Fills a sensor row from the pixels of `clean`.
-    pub(super) fn act(&self, clean: &Rgb, row: usize, line: &mut Line<'_>) {
+    pub(super) fn act(&self, clean: &Rgb, row: usize, line: &mut RawRow<'_>) {
         let width = clean.width();
         let pixels = clean.samples()[row.min(clean.height() - 1) * width * 3..]
             .as_chunks::<3>()

@@ -22,7 +22,7 @@ use crate::job::recipe::Recipe;
 use crate::job::source::{Source, inspect_all};
 use crate::job::timings::Timings;
 use crate::job::workers::pool;
-use crate::synthesis::{Light, LightArgs};
+use crate::synthesis::{LightArgs, LightSettings};
 use crate::types::manifest::Status;
 use crate::types::{Condition, FrameId, Question};
 
@@ -46,7 +46,7 @@ pub struct ExportArgs {
     /// How large an image may be.
     #[command(flatten)]
     pub limit: PixelLimit,
-    /// Light.
+    /// LightSettings.
     #[command(flatten)]
     pub light: LightArgs,
     /// Which images are enhanced, and by what.
@@ -68,7 +68,7 @@ pub fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> {
     let dataset = open_data(&args.data, &args.selection, args.limit, progress)?;
     let questions = select(&dataset, &args.selection)?;
     let files = enhancers::read(&args.enhancers.llie)?;
-    let light = Light::resolve(&args.light)?;
+    let light = LightSettings::resolve(&args.light)?;
     let recipe = Recipe::lossless(&light.sensor, &files);
     let conditions = conditions(&light, args.enhancers.llie_on, &recipe.enhancers);
     let workers = pool(args.loading.threads.threads)?;

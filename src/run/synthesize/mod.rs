@@ -21,7 +21,7 @@ use crate::job::recipe::Recipe;
 use crate::job::source::Frames;
 use crate::job::timings::Timings;
 use crate::job::workers::{ThreadArgs, pool};
-use crate::synthesis::{Light, LightArgs, NoiseKey};
+use crate::synthesis::{LightArgs, LightSettings, NoiseKey};
 use crate::types::manifest::Status;
 use crate::types::{Condition, Degradation, FrameId, Rgb};
 use sidecar::Sidecar;
@@ -35,7 +35,7 @@ pub struct SynthesizeArgs {
     /// Where the images go, each with a JSON file that holds all that made it
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Light.
+    /// LightSettings.
     #[command(flatten)]
     pub light: LightArgs,
     /// Make again the image that this JSON file stands beside, from the one INPUT that it was made from; default: make images of
@@ -68,7 +68,7 @@ pub enum Sheet {
 /// The flags, and the light that they say.
 struct Making<'a> {
     args: &'a SynthesizeArgs,
-    light: Light,
+    light: LightSettings,
 }
 
 /// Makes the images that the command asks for.
@@ -80,7 +80,7 @@ struct Making<'a> {
 pub fn synthesize(args: &SynthesizeArgs, progress: &Progress) -> Result<Outcome> {
     let making = &Making {
         args,
-        light: Light::resolve(&args.light)?,
+        light: LightSettings::resolve(&args.light)?,
     };
     let frames = Inputs::open(&args.inputs, args.limit.max_pixels.get())?;
     let cores = pool(args.threads.threads)?;
@@ -246,7 +246,7 @@ impl Work<'_> {
     fn sheet(
         &mut self,
         kind: &str,
-        draw: fn(&Rgb, &FrameId, &Light) -> Result<Rgb>,
+        draw: fn(&Rgb, &FrameId, &LightSettings) -> Result<Rgb>,
     ) -> Result<Made> {
         let path = self
             .making

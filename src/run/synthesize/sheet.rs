@@ -4,20 +4,20 @@ use ndarray::Array2;
 
 use crate::error::Result;
 use crate::report::sheet::{self, LevelColumn, Signal};
-use crate::synthesis::Light;
+use crate::synthesis::LightSettings;
 use crate::synthesis::bayer::Bayer;
 use crate::synthesis::noise::{self, Term};
 use crate::synthesis::unprocess::unprocess;
 use crate::synthesis::{Draws, NoiseKey, expose, ladder};
 use crate::types::{AxisLevel, FrameId, Rgb, Severity};
 
-fn severities(light: &Light) -> Vec<Severity> {
+fn severities(light: &LightSettings) -> Vec<Severity> {
     let levels = light.levels.iter();
     levels.filter_map(|level| level.severity()).collect()
 }
 
 /// Both variants of a frame by level.
-pub(super) fn levels(clean: &Rgb, frame: &FrameId, light: &Light) -> Result<Rgb> {
+pub(super) fn levels(clean: &Rgb, frame: &FrameId, light: &LightSettings) -> Result<Rgb> {
     let severities = severities(light);
     let key = NoiseKey::new(light.sensor.seed, frame);
     let mut noisy: Vec<Rgb> = severities
@@ -39,7 +39,7 @@ pub(super) fn levels(clean: &Rgb, frame: &FrameId, light: &Light) -> Result<Rgb>
 }
 
 /// The terms of a frame's noise, at the darkest level that is asked for (which matters where levels share no negative).
-pub(super) fn terms(clean: &Rgb, frame: &FrameId, light: &Light) -> Result<Rgb> {
+pub(super) fn terms(clean: &Rgb, frame: &FrameId, light: &LightSettings) -> Result<Rgb> {
     let level = severities(light).pop().unwrap_or(Severity::L5);
     let (synthesis, frame) = (
         light.sensor.readings.only()?,

@@ -8,7 +8,7 @@ use serde_json::Value;
 use crate::dataset::Picture;
 use crate::error::{Error, Result};
 use crate::files::reading;
-use crate::synthesis::Light;
+use crate::synthesis::LightSettings;
 use crate::synthesis::noise::Term;
 use crate::synthesis::{
     self, Amplify, CameraState, Coupling, Draws, Negative, NoiseKey, Synthesis, Tone, degrade,
@@ -57,7 +57,7 @@ impl Sidecar {
         frame: &FrameId,
         picture: &Picture,
         how: Option<&Degradation>,
-        light: &Light,
+        light: &LightSettings,
         key: &NoiseKey,
     ) -> Result<Self> {
         let synthesis = light.sensor.readings.of(how)?;

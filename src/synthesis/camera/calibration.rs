@@ -31,18 +31,18 @@ pub struct Calibration {
     /// K at the first step; each further step doubles it.
     pub first_gain: f64,
     /// Scale σ_TL of the read noise, in ADU.
-    pub read_scale: Fit,
+    pub read_scale: LogFit,
     /// Standard deviation σ_r of the row noise, in ADU.
-    pub row_deviation: Fit,
+    pub row_deviation: LogFit,
     /// What was measured at each gain.
     #[serde(rename = "step")]
-    pub steps: Vec<Step>,
+    pub steps: Vec<GainStep>,
 }
 
 /// ln σ = slope · ln K + intercept + deviation · z, with z standard normal.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Fit {
+pub struct LogFit {
     /// The slope.
     pub slope: f64,
     /// ln σ at K = 1.
@@ -54,7 +54,7 @@ pub struct Fit {
 /// The measurements at one gain: one of each is drawn.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Step {
+pub struct GainStep {
     /// Shapes λ of the read noise's Tukey-λ distribution.
     pub shape: Vec<f64>,
     /// Offsets of the planes in ADU, in the calibration's order R, G1, B, G2.
@@ -187,7 +187,7 @@ pub(super) const GAINS: [f64; 2] = [0.01, 100.0];
 /// The amplification ratios r that may be.
 pub(super) const RATIOS: [f64; 2] = [1.0, 10000.0];
 
-impl Fit {
+impl LogFit {
     fn at(&self, gain: f64, z: f64) -> f64 {
         libm::exp(self.slope * libm::log(gain) + self.intercept + self.deviation * z)
     }

@@ -4,14 +4,14 @@ mod calibration;
 
 use std::sync::Arc;
 
-pub use calibration::{Calibration, Fit, SensorNoise, Step};
+pub use calibration::{Calibration, GainStep, LogFit, SensorNoise};
 use calibration::{GAINS, RATIOS};
 use rand_distr::{Distribution as _, Open01};
 use serde::ser::SerializeStruct;
 use serde::{Deserialize, Serialize, Serializer};
 
 use super::colour::{self, Matrix};
-use super::random::{Component, NoiseKey, Site, Stream, Words};
+use super::random::{Component, NoiseKey, Site, SiteWords, Stream};
 use crate::error::{Error, Result};
 use crate::types::Digest;
 
@@ -154,7 +154,7 @@ pub struct CameraState {
 }
 
 impl CameraState {
-    /// Draws the camera of the frame that `key` belongs to.
+    /// CameraStream the camera of the frame that `key` belongs to.
     ///
     /// Matrix and gains follow Brooks et al. 2019, the sensor's noise Wei et al. 2021, K and r DarkQA.
     #[must_use]
@@ -162,26 +162,27 @@ impl CameraState {
         if model.sampling == Sampling::Fixed {
             return Self::median(model);
         }
-        let draws = Draws(key.stream(Component::Camera));
-        let weights = Number::WEIGHTS.map(|number| draws.uniform(number));
+        let draws = CameraStream(key.stream(Component::Camera));
+        let weights = StateNumber::WEIGHTS.map(|number| draws.uniform(number));
         let calibration = &model.calibration;
         let [least, most] = calibration.gain;
-        let octaves = draws.uniform(Number::Gain) * libm::log(most / least);
+        let octaves = draws.uniform(StateNumber::Gain) * libm::log(most / least);
         let system_gain = model.gain.unwrap_or(least * libm::exp(octaves));
         let noise = calibration.noise_at(
             system_gain,
-            [Number::ReadScale, Number::RowDeviation].map(|number| draws.of(number).normal()),
-            [Number::ReadShape, Number::Bias].map(|number| draws.uniform(number)),
+            [StateNumber::ReadScale, StateNumber::RowDeviation]
+                .map(|number| draws.of(number).normal()),
+            [StateNumber::ReadShape, StateNumber::Bias].map(|number| draws.uniform(number)),
         );
         let [low, high] = calibration.ratio;
         Self {
-            rgb_gain: 1.0 / draws.cut_normal(Number::RgbGain),
-            red_gain: draws.between(Number::RedGain, 1.9, 2.4),
-            blue_gain: draws.between(Number::BlueGain, 1.5, 1.9),
+            rgb_gain: 1.0 / draws.cut_normal(StateNumber::RgbGain),
+            red_gain: draws.between(StateNumber::RedGain, 1.9, 2.4),
+            blue_gain: draws.between(StateNumber::BlueGain, 1.5, 1.9),
             system_gain,
             ratio: model
                 .ratio
-                .unwrap_or_else(|| draws.between(Number::Ratio, low, high)),
+                .unwrap_or_else(|| draws.between(StateNumber::Ratio, low, high)),
             ..Self::of(weights, &noise, calibration)
         }
     }
@@ -225,7 +226,7 @@ impl CameraState {
 
 /// The numbers of a state, each with its own place in the camera's stream: none depends on how many others are drawn.
 #[derive(Debug, Clone, Copy)]
-enum Number {
+enum StateNumber {
     FirstWeight,
     SecondWeight,
     ThirdWeight,
@@ -241,7 +242,7 @@ enum Number {
     Bias,
 }
 
-impl Number {
+impl StateNumber {
     const WEIGHTS: [Self; 4] = [
         Self::FirstWeight,
         Self::SecondWeight,
@@ -252,23 +253,23 @@ impl Number {
 
 /// The camera's stream, addressed by what is drawn.
 #[derive(Debug, Clone, Copy)]
-struct Draws(Stream);
+struct CameraStream(Stream);
 
-impl Draws {
-    fn of(self, number: Number) -> Words {
+impl CameraStream {
+    fn of(self, number: StateNumber) -> SiteWords {
         self.0.at(Site::new(number as usize, 0))
     }
 
-    fn uniform(self, number: Number) -> f64 {
+    fn uniform(self, number: StateNumber) -> f64 {
         Open01.sample(&mut self.of(number))
     }
 
-    fn between(self, number: Number, low: f64, high: f64) -> f64 {
+    fn between(self, number: StateNumber, low: f64, high: f64) -> f64 {
         low + self.uniform(number) * (high - low)
     }
 
     /// N(0.8, 0.1), drawn again beyond three deviations: uncut, its inverse, the brightness gain, has no bound.
-    fn cut_normal(self, number: Number) -> f64 {
+    fn cut_normal(self, number: StateNumber) -> f64 {
         let mut words = self.of(number);
         loop {
             let z = words.normal();
