@@ -1,4 +1,4 @@
-//! How a model is fed and read, where its graph cannot say: [`Layout`], [`Color`], [`Range`], [`Pad`], [`Tile`], [`Rounding`].
+//! How a model is fed and read, where its graph cannot say: [`TensorLayout`], [`ChannelOrder`], [`ValueRange`], [`Padding`], [`Tile`], [`Rounding`].
 //!
 //! The words are those of the sidecar, `MODEL.onnx.toml`.
 
@@ -12,7 +12,7 @@ use crate::types::words::{as_text, words};
 /// The order of a tensor's dimensions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub(super) enum Layout {
+pub(super) enum TensorLayout {
     /// Batch, channels, height, width.
     Nchw,
     /// Batch, height, width, channels.
@@ -23,7 +23,7 @@ pub(super) enum Layout {
     Hwc,
 }
 
-impl Layout {
+impl TensorLayout {
     pub(super) const ALL: [Self; 4] = [Self::Nchw, Self::Nhwc, Self::Chw, Self::Hwc];
 
     /// Whether a channel is a plane of its own.
@@ -60,12 +60,12 @@ impl Layout {
     }
 }
 
-words!(Layout { Nchw = "NCHW", Nhwc = "NHWC", Chw = "CHW", Hwc = "HWC" });
+words!(TensorLayout { Nchw = "NCHW", Nhwc = "NHWC", Chw = "CHW", Hwc = "HWC" });
 
 /// The order of channels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub(super) enum Color {
+pub(super) enum ChannelOrder {
     /// Red first, as all published models.
     #[default]
     Rgb,
@@ -73,7 +73,7 @@ pub(super) enum Color {
     Bgr,
 }
 
-impl Color {
+impl ChannelOrder {
     /// The channel of an RGB image that is the model's `channel`.
     pub(super) fn of(self, channel: usize) -> usize {
         match self {
@@ -83,11 +83,11 @@ impl Color {
     }
 }
 
-words!(Color { Rgb = "RGB", Bgr = "BGR" });
+words!(ChannelOrder { Rgb = "RGB", Bgr = "BGR" });
 
 /// What black and white are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) enum Range {
+pub(super) enum ValueRange {
     /// 0 and 1.
     #[serde(rename = "0..1")]
     Unit,
@@ -99,7 +99,7 @@ pub(super) enum Range {
     Signed,
 }
 
-impl Range {
+impl ValueRange {
     /// A code of 0..255 in this range; dividing as the models' own scripts do.
     pub(super) fn of_code(self, code: f32) -> f32 {
         match self {
@@ -119,7 +119,7 @@ impl Range {
     }
 }
 
-impl fmt::Display for Range {
+impl fmt::Display for ValueRange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.serialize(f)
     }
@@ -128,7 +128,7 @@ impl fmt::Display for Range {
 /// What stands beside an image whose size is no multiple of the model's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub(super) enum Pad {
+pub(super) enum Padding {
     /// The image mirrored at its last pixel, to the right and below.
     #[default]
     Reflect,
@@ -140,7 +140,7 @@ pub(super) enum Pad {
     Crop,
 }
 
-impl fmt::Display for Pad {
+impl fmt::Display for Padding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.serialize(f)
     }
@@ -200,7 +200,7 @@ as_text!(Tile);
 
 /// What the elements of a tensor are.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Element {
+pub(super) enum ElementType {
     /// 32-bit floats.
     Float32,
     /// 16-bit floats.
@@ -211,17 +211,17 @@ pub(super) enum Element {
     Other(String),
 }
 
-impl Element {
+impl ElementType {
     /// The range that goes with a type.
-    pub(super) fn usual_range(&self) -> Range {
+    pub(super) fn usual_range(&self) -> ValueRange {
         match self {
-            Self::Uint8 => Range::Bytes,
-            _ => Range::Unit,
+            Self::Uint8 => ValueRange::Bytes,
+            _ => ValueRange::Unit,
         }
     }
 }
 
-impl fmt::Display for Element {
+impl fmt::Display for ElementType {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Float32 => "float32",

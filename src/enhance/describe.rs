@@ -6,7 +6,7 @@ use std::path::Path;
 use super::convention::Tile;
 use super::graph::Graph;
 use super::preset::Preset;
-use super::sidecar::Sidecar;
+use super::sidecar::ModelSidecar;
 use super::tiles::MULTIPLES;
 
 /// The source of what the graph itself says.
@@ -16,7 +16,7 @@ const GRAPH: &str = "graph";
 #[derive(Debug)]
 pub(super) struct Description {
     /// What the sidecar states.
-    pub(super) sidecar: Sidecar,
+    pub(super) sidecar: ModelSidecar,
     /// What a preset states.
     pub(super) preset: Option<Preset>,
     /// Weights that were set to zero.
@@ -34,7 +34,7 @@ impl Lines {
 
 impl Description {
     /// The table as text.
-    pub(super) fn text(&self, path: &Path, graph: &Graph, stated: &Sidecar) -> String {
+    pub(super) fn text(&self, path: &Path, graph: &Graph, stated: &ModelSidecar) -> String {
         let mut lines = Lines(Vec::new());
         self.input(&mut lines, graph, stated);
         self.output(&mut lines, graph);
@@ -52,7 +52,7 @@ impl Description {
     }
 
     /// How the model is fed.
-    fn input(&self, lines: &mut Lines, graph: &Graph, stated: &Sidecar) {
+    fn input(&self, lines: &mut Lines, graph: &Graph, stated: &ModelSidecar) {
         let (signature, feeding) = (&graph.signature, &graph.feeding);
         let side = |size: Option<usize>| size.map_or("any".to_owned(), |size| size.to_string());
         lines.add("input", &signature.input.port, GRAPH);
@@ -111,7 +111,7 @@ impl Description {
     }
 
     /// Where a statement comes from.
-    fn why(&self, states: impl Fn(&Sidecar) -> bool, otherwise: &str) -> String {
+    fn why(&self, states: impl Fn(&ModelSidecar) -> bool, otherwise: &str) -> String {
         match &self.preset {
             _ if states(&self.sidecar) => "sidecar".to_owned(),
             Some(preset) if states(&preset.states) => format!("preset {}", preset.name),

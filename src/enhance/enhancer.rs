@@ -6,17 +6,17 @@ use std::path::PathBuf;
 use crate::error::{Error, Result};
 use crate::types::{EnhancerName, Rgb};
 
-use super::convention::{Pad, Tile};
+use super::convention::{Padding, Tile};
 use super::describe::Description;
 use super::file::ModelFile;
-use super::graph::{Graph, Ran};
-use super::memory::{self, Cost, PROBES};
+use super::graph::{Graph, RunResult};
+use super::memory::{self, MemoryCost, PROBES};
 use super::planes::Planes;
 use super::reading::OutOfRange;
 use super::runtime::Runtime;
-use super::session::{Source, Stopper};
-use super::sidecar::Sidecar;
-use super::tiles::{Canvas, Cut, MULTIPLES, Plan, Tiling, Window};
+use super::session::{GraphSource, Stopper};
+use super::sidecar::ModelSidecar;
+use super::tiles::{Cutting, MULTIPLES, TilePlan, TileWindow, TiledImage, Tiling};
 
 /// The sides of tiles where nobody says them, in pixels: measured as fast as the whole image with a twelfth of its memory.
 const TILE: usize = 256;
@@ -27,13 +27,13 @@ const CONTEXT: usize = 32;
 
 /// What is known of the memory that a model needs.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Estimate {
+enum MemoryEstimate {
     /// Nothing yet.
     Unknown,
     /// It cannot be told.
     Untold,
     /// So much a pixel.
-    Of(Cost),
+    Of(MemoryCost),
 }
 
 /// An enhancement model, loaded and ready.
@@ -41,10 +41,10 @@ pub struct Enhancer {
     path: PathBuf,
     name: EnhancerName,
     graph: Graph,
-    stated: Sidecar,
+    stated: ModelSidecar,
     tiling: Tiling,
     most_side: Option<NonZeroUsize>,
-    cost: Estimate,
+    cost: MemoryEstimate,
     description: Description,
 }
 
@@ -58,7 +58,7 @@ impl Enhancer {
         runtime: &Runtime,
         threads: Option<NonZeroUsize>,
     ) -> Result<Self> {
-        let none = Sidecar::default();
+        let none = ModelSidecar::default();
         let preset = file.preset.as_ref();
         let stated = file
             .sidecar
@@ -67,9 +67,9 @@ impl Enhancer {
         let flushed = file.weights.flush_subnormals(&mut file.bytes);
         // ONNX Runtime finds external data only from the model's path.
         let source = if file.weights.external.is_empty() {
-            Source::Memory(file.bytes)
+            GraphSource::Memory(file.bytes)
         } else {
-            Source::Path(file.path.clone())
+            GraphSource::Path(file.path.clone())
         };
         let graph = Graph::load(source, &stated, runtime, threads)?.map_err(|problem| {
             let path = file.path.clone();
@@ -82,7 +82,7 @@ impl Enhancer {
             stated,
             tiling: Tiling::Auto,
             most_side: None,
-            cost: Estimate::Unknown,
+            cost: MemoryEstimate::Unknown,
             description: Description {
                 sidecar: file.sidecar,
                 preset: file.preset,
@@ -170,10 +170,12 @@ impl Enhancer {
         if pixels <= WHOLE || cut.tile != cut.area || !probed {
             return Ok(());
         }
-        if self.cost == Estimate::Unknown {
-            self.cost = self.probed(dark)?.map_or(Estimate::Untold, Estimate::Of);
+        if self.cost == MemoryEstimate::Unknown {
+            self.cost = self
+                .probed(dark)?
+                .map_or(MemoryEstimate::Untold, MemoryEstimate::Of);
         }
-        let Estimate::Of(cost) = self.cost else {
+        let MemoryEstimate::Of(cost) = self.cost else {
             return Ok(());
         };
         let Some(available) = memory::available() else {
@@ -188,22 +190,22 @@ impl Enhancer {
     }
 
     /// What small parts of an image need; `None` where that tells nothing.
-    fn probed(&self, dark: &Rgb) -> Result<Option<Cost>> {
+    fn probed(&self, dark: &Rgb) -> Result<Option<MemoryCost>> {
         let mut resident = [0; 2];
         for (side, resident) in PROBES.into_iter().zip(&mut resident) {
-            let window = Window {
+            let window = TileWindow {
                 left: 0,
                 top: 0,
                 right: side,
                 bottom: side,
             };
             let ran = self.graph.probe(dark, window)?;
-            let (Ran::Gave(()), Some(bytes)) = (ran, memory::resident()) else {
+            let (RunResult::Gave(()), Some(bytes)) = (ran, memory::resident()) else {
                 return Ok(None);
             };
             *resident = bytes;
         }
-        Ok(Cost::of(resident))
+        Ok(MemoryCost::of(resident))
     }
 
     /// The size in which an image is enhanced that is too large for its own: of the same shape, and of the model's multiple.
@@ -229,14 +231,17 @@ impl Enhancer {
     ) -> Result<std::result::Result<Rgb, String>> {
         let size = [dark.height(), dark.width()];
         let cut = self.cut(size, fixed, multiple)?;
-        let plan = Plan::of(cut).ok_or_else(|| self.too_small(cut))?;
-        let mut canvas = Canvas::new(cut.area);
+        let plan = TilePlan::of(cut).ok_or_else(|| self.too_small(cut))?;
+        let mut canvas = TiledImage::new(cut.area);
         for (row, column) in plan.tiles() {
-            let (seen, taken) = (Window::seen(row, column), Window::taken(row, column));
+            let (seen, taken) = (
+                TileWindow::seen(row, column),
+                TileWindow::taken(row, column),
+            );
             match self.graph.window(dark, seen, taken)? {
-                Ran::Gave(bytes) => canvas.put(row, column, &bytes),
-                Ran::Failed(problem) => return Ok(Err(problem)),
-                Ran::Unusable(values) => return Err(self.unusable(values, dark)),
+                RunResult::Gave(bytes) => canvas.put(row, column, &bytes),
+                RunResult::Failed(problem) => return Ok(Err(problem)),
+                RunResult::Unusable(values) => return Err(self.unusable(values, dark)),
             }
         }
         let (enhanced, seam) = canvas.finish();
@@ -259,11 +264,11 @@ impl Enhancer {
 
     /// Whether an image is seen in parts of multiples that overlap, so that their seams need not hold.
     fn crops(&self, size: [usize; 2], multiple: usize) -> bool {
-        self.graph.feeding.pad == Pad::Crop && size.iter().any(|side| side % multiple != 0)
+        self.graph.feeding.pad == Padding::Crop && size.iter().any(|side| side % multiple != 0)
     }
 
     /// The area that tiles cover, and how they are cut.
-    fn cut(&self, size: [usize; 2], fixed: [usize; 2], multiple: usize) -> Result<Cut> {
+    fn cut(&self, size: [usize; 2], fixed: [usize; 2], multiple: usize) -> Result<Cutting> {
         let down = |side: usize| side / multiple * multiple;
         if self.crops(size, multiple) {
             let tile = size.map(down);
@@ -273,7 +278,7 @@ impl Enhancer {
                     size[1], size[0]
                 )));
             }
-            return Ok(Cut {
+            return Ok(Cutting {
                 area: size,
                 tile,
                 context: 0,
@@ -302,7 +307,7 @@ impl Enhancer {
             (Tiling::Auto, Some(_)) if size[0] * size[1] > WHOLE => square(TILE.max(4 * context)),
             (Tiling::Auto | Tiling::Whole, _) => area,
         };
-        Ok(Cut {
+        Ok(Cutting {
             area,
             tile,
             context,
@@ -310,7 +315,7 @@ impl Enhancer {
         })
     }
 
-    fn too_small(&self, cut: Cut) -> Error {
+    fn too_small(&self, cut: Cutting) -> Error {
         self.fault(format!(
             "cannot be cut into tiles of {} × {} pixels: with {} pixels of context on each side nothing is left of them; --tile N says larger ones",
             cut.tile[1], cut.tile[0], cut.context
@@ -322,9 +327,9 @@ impl Enhancer {
         let planes = Planes::of(dark).resized(fixed[0], fixed[1]);
         let planes = planes.map_err(|e| self.fault(e))?;
         let enhanced = match self.graph.planes(&planes)? {
-            Ran::Gave(planes) => planes,
-            Ran::Failed(problem) => return Err(self.fault(problem)),
-            Ran::Unusable(values) => return Err(self.unusable(values, dark)),
+            RunResult::Gave(planes) => planes,
+            RunResult::Failed(problem) => return Err(self.fault(problem)),
+            RunResult::Unusable(values) => return Err(self.unusable(values, dark)),
         };
         let enhanced = enhanced.resized(dark.height(), dark.width());
         let enhanced = enhanced.map_err(|e| self.fault(e))?;

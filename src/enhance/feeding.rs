@@ -4,51 +4,51 @@
 
 use half::f16;
 
-use super::convention::{Color, Element, Layout, Pad, Range};
+use super::convention::{ChannelOrder, ElementType, Padding, TensorLayout, ValueRange};
 use super::planes::Planes;
 use super::reading::nearest;
-use super::sidecar::Sidecar;
+use super::sidecar::ModelSidecar;
 use super::signature::Signature;
-use super::tiles::Window;
+use super::tiles::TileWindow;
 use crate::types::Rgb;
 
 /// How an image becomes a tensor.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Feeding {
-    pub(super) layout: Layout,
-    pub(super) element: Element,
-    pub(super) color: Color,
-    pub(super) range: Range,
+    pub(super) layout: TensorLayout,
+    pub(super) element: ElementType,
+    pub(super) color: ChannelOrder,
+    pub(super) range: ValueRange,
     /// Taken from each channel, then divided by, in the model's order.
     pub(super) mean: [f32; 3],
     pub(super) std: [f32; 3],
-    pub(super) pad: Pad,
+    pub(super) pad: Padding,
 }
 
 /// A tensor for a model.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Input {
     pub(super) dims: Vec<usize>,
-    pub(super) data: Data,
+    pub(super) data: TensorData,
 }
 
 /// The elements of a tensor.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Data {
+pub(super) enum TensorData {
     Float32(Vec<f32>),
     Float16(Vec<f16>),
     Uint8(Vec<u8>),
 }
 
 /// The source of a pixel beyond the end of a side, or `None` for black.
-fn source(at: usize, side: usize, pad: Pad) -> Option<usize> {
+fn source(at: usize, side: usize, pad: Padding) -> Option<usize> {
     if at < side {
         return Some(at);
     }
     match pad {
-        Pad::Zero => None,
-        Pad::Replicate | Pad::Crop => Some(side - 1),
-        Pad::Reflect => {
+        Padding::Zero => None,
+        Padding::Replicate | Padding::Crop => Some(side - 1),
+        Padding::Reflect => {
             // Mirrored at the last pixel and, where the image is smaller than what is missing, at the first again.
             let period = (2 * (side - 1)).max(1);
             let within = at % period;
@@ -59,7 +59,7 @@ fn source(at: usize, side: usize, pad: Pad) -> Option<usize> {
 
 impl Feeding {
     /// What graph and statements say.
-    pub(super) fn of(signature: &Signature, stated: &Sidecar) -> Self {
+    pub(super) fn of(signature: &Signature, stated: &ModelSidecar) -> Self {
         let element = signature.input.port.element.clone();
         Self {
             layout: signature.input.layout,
@@ -73,7 +73,7 @@ impl Feeding {
     }
 
     /// A window of an image, padded where it goes beyond.
-    pub(super) fn window(&self, image: &Rgb, window: Window) -> Input {
+    pub(super) fn window(&self, image: &Rgb, window: TileWindow) -> Input {
         let sources = |from: usize, to: usize, side: usize| -> Vec<Option<usize>> {
             (from..to).map(|at| source(at, side, self.pad)).collect()
         };
@@ -96,30 +96,30 @@ impl Feeding {
                 })
         };
         let order = if self.layout.is_planar() {
-            Order::Planar
+            SampleOrder::Planar
         } else {
-            Order::Packed
+            SampleOrder::Packed
         };
         let size = window.size();
         match self.element {
-            Element::Uint8 => {
+            ElementType::Uint8 => {
                 let mut data = vec![0; 3 * size[0] * size[1]];
                 fill(&mut data, order, &rows, size[1], row_of, |_, byte| byte);
-                self.tensor(size, Data::Uint8(data))
+                self.tensor(size, TensorData::Uint8(data))
             }
-            Element::Float16 => {
+            ElementType::Float16 => {
                 let table = self.table().map(|values| values.map(f16::from_f32));
                 let mut data = vec![f16::ZERO; 3 * size[0] * size[1]];
                 let value = |channel: usize, byte: u8| table[channel][usize::from(byte)];
                 fill(&mut data, order, &rows, size[1], row_of, value);
-                self.tensor(size, Data::Float16(data))
+                self.tensor(size, TensorData::Float16(data))
             }
             _ => {
                 let table = self.table();
                 let mut data = vec![0.0; 3 * size[0] * size[1]];
                 let value = |channel: usize, byte: u8| table[channel][usize::from(byte)];
                 fill(&mut data, order, &rows, size[1], row_of, value);
-                self.tensor(size, Data::Float32(data))
+                self.tensor(size, TensorData::Float32(data))
             }
         }
     }
@@ -143,20 +143,24 @@ impl Feeding {
         let values = order.into_iter();
         let float = |(channel, unit): (usize, f32)| {
             let value = match self.range {
-                Range::Unit => unit,
-                Range::Bytes | Range::Signed => self.range.of_code(unit * 255.0),
+                ValueRange::Unit => unit,
+                ValueRange::Bytes | ValueRange::Signed => self.range.of_code(unit * 255.0),
             };
             (value - self.mean[channel]) / self.std[channel]
         };
         let data = match self.element {
-            Element::Uint8 => Data::Uint8(values.map(|(_, unit)| nearest(unit * 255.0)).collect()),
-            Element::Float16 => Data::Float16(values.map(float).map(f16::from_f32).collect()),
-            _ => Data::Float32(values.map(float).collect()),
+            ElementType::Uint8 => {
+                TensorData::Uint8(values.map(|(_, unit)| nearest(unit * 255.0)).collect())
+            }
+            ElementType::Float16 => {
+                TensorData::Float16(values.map(float).map(f16::from_f32).collect())
+            }
+            _ => TensorData::Float32(values.map(float).collect()),
         };
         self.tensor([height, width], data)
     }
 
-    fn tensor(&self, size: [usize; 2], data: Data) -> Input {
+    fn tensor(&self, size: [usize; 2], data: TensorData) -> Input {
         Input {
             dims: self.layout.dims(size),
             data,
@@ -176,7 +180,7 @@ impl Feeding {
 
 /// The order of samples.
 #[derive(Clone, Copy)]
-enum Order {
+enum SampleOrder {
     Planar,
     Packed,
 }
@@ -184,14 +188,14 @@ enum Order {
 /// Fills a tensor row by row.
 fn fill<T, I: Iterator<Item = u8>>(
     data: &mut [T],
-    order: Order,
+    order: SampleOrder,
     rows: &[Option<usize>],
     width: usize,
     row_of: impl Fn(Option<usize>, usize) -> I,
     value: impl Fn(usize, u8) -> T,
 ) {
     match order {
-        Order::Planar => {
+        SampleOrder::Planar => {
             for (channel, plane) in data.chunks_exact_mut(rows.len() * width).enumerate() {
                 for (row, line) in rows.iter().zip(plane.chunks_exact_mut(width)) {
                     for (sample, byte) in line.iter_mut().zip(row_of(*row, channel)) {
@@ -200,7 +204,7 @@ fn fill<T, I: Iterator<Item = u8>>(
                 }
             }
         }
-        Order::Packed => {
+        SampleOrder::Packed => {
             for (row, line) in rows.iter().zip(data.chunks_exact_mut(3 * width)) {
                 for channel in 0..3 {
                     let samples = line.iter_mut().skip(channel).step_by(3);

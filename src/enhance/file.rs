@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::types::{Digest, EnhancerName};
 
 use super::preset::Preset;
-use super::sidecar::{self, Sidecar};
+use super::sidecar::{self, ModelSidecar};
 use super::weights::Weights;
 
 /// An ONNX file with its sidecar, read and checked as far as that goes without ONNX Runtime.
@@ -21,7 +21,7 @@ pub struct ModelFile {
     pub(super) bytes: Vec<u8>,
     pub(super) weights: Weights,
     /// What the sidecar states.
-    pub(super) sidecar: Sidecar,
+    pub(super) sidecar: ModelSidecar,
     /// What a preset states beside it.
     pub(super) preset: Option<Preset>,
 }
@@ -41,7 +41,7 @@ impl ModelFile {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         let name = EnhancerName::new(&stem)?;
         let text = sidecar::text_for(path)?;
-        let sidecar = Sidecar::parse(path, &text)?;
+        let sidecar = ModelSidecar::parse(path, &text)?;
         Ok(Self {
             path: path.to_owned(),
             name,
@@ -68,11 +68,11 @@ impl ModelFile {
 
 /// What decides an enhanced image beside the dark one.
 #[derive(Serialize)]
-struct Facts<'a> {
+struct EnhancementFacts<'a> {
     file: Digest,
     /// External data by where the model says that it lies.
     external: BTreeMap<&'a str, Digest>,
-    convention: Sidecar,
+    convention: ModelSidecar,
 }
 
 /// The digest of a model's content, its external data and the convention that sidecar and preset state together; each file
@@ -80,7 +80,7 @@ struct Facts<'a> {
 fn digest(
     path: &Path,
     bytes: &[u8],
-    sidecar: &Sidecar,
+    sidecar: &ModelSidecar,
     weights: &Weights,
     preset: Option<&Preset>,
 ) -> Result<Digest> {
@@ -95,7 +95,7 @@ fn digest(
         None => sidecar,
         Some(preset) => sidecar.over(&preset.states),
     };
-    let facts = Facts {
+    let facts = EnhancementFacts {
         file: Digest::of(bytes),
         external,
         convention: convention.resolved(),

@@ -5,15 +5,15 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use ort::session::Session;
 
-use super::convention::Layout;
+use super::convention::TensorLayout;
 use super::feeding::{Feeding, Input};
 use super::planes::Planes;
-use super::reading::{OutOfRange, Reading, Samples};
+use super::reading::{OutOfRange, OutputReading, TensorSamples};
 use super::runtime::Runtime;
-use super::session::{Options, Source, Stopper, builder, ports, run, said};
-use super::sidecar::Sidecar;
+use super::session::{GraphSource, SessionOptions, Stopper, builder, ports, run, said};
+use super::sidecar::ModelSidecar;
 use super::signature::Signature;
-use super::tiles::Window;
+use super::tiles::TileWindow;
 use crate::error::Result;
 use crate::types::Rgb;
 
@@ -21,14 +21,14 @@ use crate::types::Rgb;
 pub(super) struct Graph {
     pub(super) signature: Arc<Signature>,
     pub(super) feeding: Feeding,
-    pub(super) reading: Arc<Reading>,
+    pub(super) reading: Arc<OutputReading>,
     runtime: Runtime,
     session: Arc<Mutex<Session>>,
-    options: Arc<Options>,
+    options: Arc<SessionOptions>,
 }
 
 /// What became of a run.
-pub(super) enum Ran<T> {
+pub(super) enum RunResult<T> {
     /// It gave this.
     Gave(T),
     /// It failed on an image of this size; what is wrong, to follow the file's name.
@@ -43,8 +43,8 @@ impl Graph {
     /// # Errors
     /// The inner one says what is wrong with the model, to follow the file's name.
     pub(super) fn load(
-        source: Source,
-        stated: &Sidecar,
+        source: GraphSource,
+        stated: &ModelSidecar,
         runtime: &Runtime,
         threads: Option<NonZeroUsize>,
     ) -> Result<std::result::Result<Self, String>> {
@@ -59,15 +59,15 @@ impl Graph {
 
     fn new(
         session: Session,
-        stated: &Sidecar,
+        stated: &ModelSidecar,
         runtime: &Runtime,
     ) -> std::result::Result<Self, String> {
         let (inputs, outputs) = (ports(session.inputs()), ports(session.outputs()));
         let signature = Signature::of(&inputs, &outputs, stated)?;
-        let options = Options::of(&signature.output.port.name).map_err(|e| said(&e))?;
+        let options = SessionOptions::of(&signature.output.port.name).map_err(|e| said(&e))?;
         Ok(Self {
             feeding: Feeding::of(&signature, stated),
-            reading: Arc::new(Reading::of(&signature, stated)),
+            reading: Arc::new(OutputReading::of(&signature, stated)),
             signature: Arc::new(signature),
             runtime: runtime.clone(),
             session: Arc::new(Mutex::new(session)),
@@ -81,7 +81,12 @@ impl Graph {
     }
 
     /// Runs on a window of an image, and gives the bytes of a part of the window.
-    pub(super) fn window(&self, image: &Rgb, window: Window, part: Window) -> Result<Ran<Vec<u8>>> {
+    pub(super) fn window(
+        &self,
+        image: &Rgb,
+        window: TileWindow,
+        part: TileWindow,
+    ) -> Result<RunResult<Vec<u8>>> {
         let (input, size) = (self.feeding.window(image, window), window.size());
         let reading = Arc::clone(&self.reading);
         self.run(input, size, move |samples, layout| {
@@ -90,13 +95,13 @@ impl Graph {
     }
 
     /// Runs on a window of an image without a look at what it gives.
-    pub(super) fn probe(&self, image: &Rgb, window: Window) -> Result<Ran<()>> {
+    pub(super) fn probe(&self, image: &Rgb, window: TileWindow) -> Result<RunResult<()>> {
         let input = self.feeding.window(image, window);
         self.run(input, window.size(), |_, _| Ok(()))
     }
 
     /// Runs on a whole image of floats.
-    pub(super) fn planes(&self, planes: &Planes) -> Result<Ran<Planes>> {
+    pub(super) fn planes(&self, planes: &Planes) -> Result<RunResult<Planes>> {
         let (input, size) = (self.feeding.planes(planes), [planes.height, planes.width]);
         let reading = Arc::clone(&self.reading);
         self.run(input, size, move |samples, layout| {
@@ -109,8 +114,10 @@ impl Graph {
         &self,
         input: Input,
         size: [usize; 2],
-        read: impl FnOnce(Samples<'_>, Layout) -> std::result::Result<T, OutOfRange> + Send + 'static,
-    ) -> Result<Ran<T>> {
+        read: impl FnOnce(TensorSamples<'_>, TensorLayout) -> std::result::Result<T, OutOfRange>
+        + Send
+        + 'static,
+    ) -> Result<RunResult<T>> {
         let (session, options) = (Arc::clone(&self.session), Arc::clone(&self.options));
         let (signature, reading) = (Arc::clone(&self.signature), Arc::clone(&self.reading));
         let [height, width] = size;
@@ -122,15 +129,15 @@ impl Graph {
                 &signature,
                 input,
                 |dims, samples| match reading.layout(dims, size) {
-                    Some(layout) => read(samples, layout).map_or_else(Ran::Unusable, Ran::Gave),
-                    None => Ran::Failed(format!(
+                    Some(layout) => read(samples, layout).map_or_else(RunResult::Unusable, RunResult::Gave),
+                    None => RunResult::Failed(format!(
                         "gave {dims:?} for an image of {width} × {height}: it does not keep the size of an image; where it takes multiples of some size alone, say it in MODEL.onnx.toml beside it: `multiple = 8`"
                     )),
                 },
             );
             ran.unwrap_or_else(|e| {
                 let words = said(&e);
-                Ran::Failed(format!(
+                RunResult::Failed(format!(
                     "failed on an image of {width} × {height} ({words}); where it takes multiples of some size alone, say it in MODEL.onnx.toml beside it: `multiple = 8`"
                 ))
             })

@@ -1,4 +1,4 @@
-//! What a whole image will cost in memory, before it is spent: [`Cost`].
+//! What a whole image will cost in memory, before it is spent: [`MemoryCost`].
 //!
 //! ONNX Runtime does not say what a graph needs. So two small parts of the image go through first, and what the process grew by
 //! between them tells the bytes of a pixel. Where the system does not tell (anything but Linux), nothing is estimated.
@@ -10,9 +10,9 @@ pub(super) const PROBES: [usize; 2] = [128, 256];
 
 /// What a model needs for a pixel, in bytes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Cost(f64);
+pub(super) struct MemoryCost(f64);
 
-impl Cost {
+impl MemoryCost {
     /// From what was resident after each of the parts; `None` where that tells nothing.
     pub(super) fn of(resident: [u64; 2]) -> Option<Self> {
         let grown = resident[1]
@@ -74,10 +74,10 @@ mod tests {
 
     #[test]
     fn what_grew_tells_the_cost() {
-        assert_eq!(Cost::of([5, 5]), None);
-        assert_eq!(Cost::of([7, 5]), None);
+        assert_eq!(MemoryCost::of([5, 5]), None);
+        assert_eq!(MemoryCost::of([7, 5]), None);
         // 800 bytes a pixel.
-        let cost = Cost::of([1_000, 1_000 + 800 * 3 * 128 * 128]).unwrap();
+        let cost = MemoryCost::of([1_000, 1_000 + 800 * 3 * 128 * 128]).unwrap();
         assert_eq!(cost.fits(1_000_000, 800_000_001), Ok(()));
         let [needed, available] = cost.fits(1_000_000, 500_000_000).unwrap_err();
         assert!((needed - 0.8).abs() < 1e-9 && (available - 0.5).abs() < 1e-9);

@@ -1,6 +1,6 @@
 //! Which output of a graph is the enhanced image: [`Output::choose`].
 
-use super::convention::Layout;
+use super::convention::TensorLayout;
 use super::port::{Dim, Port, list};
 use super::sidecar::OutputChoice;
 
@@ -22,7 +22,7 @@ pub(super) struct Output {
     /// The graph's words for it.
     pub(super) port: Port,
     /// The order of its dimensions; `None` where only a run shows it.
-    pub(super) layout: Option<Layout>,
+    pub(super) layout: Option<TensorLayout>,
     /// Why it is this one.
     pub(super) why: &'static str,
 }

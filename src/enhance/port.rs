@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::convention::{Element, Layout};
+use super::convention::{ElementType, TensorLayout};
 
 /// An input or output of a graph.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -10,7 +10,7 @@ pub(super) struct Port {
     /// Its name.
     pub(super) name: String,
     /// What its elements are.
-    pub(super) element: Element,
+    pub(super) element: ElementType,
     /// Its dimensions; empty for a number, and where the graph does not say even how many there are.
     pub(super) dims: Vec<Dim>,
 }
@@ -66,8 +66,8 @@ impl fmt::Display for Port {
 
 impl Port {
     /// The layout of an image of three channels, where its dimensions say it.
-    pub(super) fn layout(&self) -> Option<Layout> {
-        let mut fitting = Layout::ALL.into_iter().filter(|layout| {
+    pub(super) fn layout(&self) -> Option<TensorLayout> {
+        let mut fitting = TensorLayout::ALL.into_iter().filter(|layout| {
             self.dims.len() == layout.rank()
                 && self.dims[layout.places()[0]].known() == Some(3)
                 && (layout.rank() == 3 || self.dims[0].can_be(1))
@@ -84,7 +84,7 @@ impl Port {
     }
 
     /// Whether it can be an image of this height and width in a layout. What the graph leaves open can.
-    pub(super) fn can_be_image(&self, layout: Layout, [height, width]: [&Dim; 2]) -> bool {
+    pub(super) fn can_be_image(&self, layout: TensorLayout, [height, width]: [&Dim; 2]) -> bool {
         let [channels, rows, columns] = layout.places();
         let shape = self.dims.is_empty()
             || self.dims.len() == layout.rank()
@@ -92,7 +92,7 @@ impl Port {
                 && self.dims[rows].can_equal(height)
                 && self.dims[columns].can_equal(width)
                 && (layout.rank() == 3 || self.dims[0].can_be(1));
-        shape && !matches!(self.element, Element::Other(_))
+        shape && !matches!(self.element, ElementType::Other(_))
     }
 
     /// Whether it holds one number.

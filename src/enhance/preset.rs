@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::sidecar::Sidecar;
+use super::sidecar::ModelSidecar;
 use crate::error::{Error, Result};
 
 /// All presets.
@@ -15,7 +15,7 @@ pub(super) struct Preset {
     /// Its name, as `zero-dce`.
     pub(super) name: String,
     /// What it states.
-    pub(super) states: Sidecar,
+    pub(super) states: ModelSidecar,
 }
 
 impl Preset {
@@ -32,7 +32,7 @@ impl Preset {
         if name.len() < 2 || name.contains(['/', '\\', '.']) {
             return Ok((None, said.to_owned()));
         }
-        let mut all: BTreeMap<String, Sidecar> =
+        let mut all: BTreeMap<String, ModelSidecar> =
             toml::from_str(PRESETS).map_err(|e| Error::data("presets.toml", e))?;
         // The authors write it with two plus signs.
         let known = name.replace("++", "-pp");

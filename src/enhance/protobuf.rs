@@ -10,7 +10,7 @@ pub(super) struct Malformed;
 
 /// The value of a field; ranges are byte positions in the whole buffer.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Value {
+pub(super) enum FieldValue {
     /// An integer.
     Varint(u64),
     /// Four bytes, little-endian.
@@ -22,24 +22,24 @@ pub(super) enum Value {
 }
 
 /// The fields, in order, of the message that fills `within` of `buffer`; ends after the first error.
-pub(super) fn fields(buffer: &[u8], within: Range<usize>) -> Fields<'_> {
+pub(super) fn fields(buffer: &[u8], within: Range<usize>) -> FieldsOf<'_> {
     let message = buffer.get(..within.end).unwrap_or_default();
-    Fields {
+    FieldsOf {
         message,
         at: within.start,
     }
 }
 
 /// See [`fields`].
-pub(super) struct Fields<'a> {
+pub(super) struct FieldsOf<'a> {
     /// The buffer up to the end of the message.
     message: &'a [u8],
     /// Where the next field begins.
     at: usize,
 }
 
-impl Iterator for Fields<'_> {
-    type Item = Result<(u64, Value), Malformed>;
+impl Iterator for FieldsOf<'_> {
+    type Item = Result<(u64, FieldValue), Malformed>;
 
     fn next(&mut self) -> Option<Self::Item> {
         if self.at >= self.message.len() {
@@ -53,17 +53,17 @@ impl Iterator for Fields<'_> {
     }
 }
 
-impl Fields<'_> {
-    fn field(&mut self) -> Option<(u64, Value)> {
+impl FieldsOf<'_> {
+    fn field(&mut self) -> Option<(u64, FieldValue)> {
         let key = self.varint()?;
         let value = match key & 7 {
-            0 => Value::Varint(self.varint()?),
-            1 => Value::Fixed64(self.take(8)?),
+            0 => FieldValue::Varint(self.varint()?),
+            1 => FieldValue::Fixed64(self.take(8)?),
             2 => {
                 let length = usize::try_from(self.varint()?).ok()?;
-                Value::Bytes(self.take(length)?)
+                FieldValue::Bytes(self.take(length)?)
             }
-            5 => Value::Fixed32(self.take(4)?),
+            5 => FieldValue::Fixed32(self.take(4)?),
             _ => return None,
         };
         // Field numbers begin at 1.
@@ -96,7 +96,7 @@ impl Fields<'_> {
 mod tests {
     use super::*;
 
-    fn read(bytes: &[u8]) -> Result<Vec<(u64, Value)>, Malformed> {
+    fn read(bytes: &[u8]) -> Result<Vec<(u64, FieldValue)>, Malformed> {
         fields(bytes, 0..bytes.len()).collect()
     }
 
@@ -109,10 +109,10 @@ mod tests {
             0x21, 0, 0, 0, 0, 0, 0, 0, 0, // field 4: eight bytes
         ];
         let expected = vec![
-            (1, Value::Varint(150)),
-            (2, Value::Bytes(5..7)),
-            (3, Value::Fixed32(8..12)),
-            (4, Value::Fixed64(13..21)),
+            (1, FieldValue::Varint(150)),
+            (2, FieldValue::Bytes(5..7)),
+            (3, FieldValue::Fixed32(8..12)),
+            (4, FieldValue::Fixed64(13..21)),
         ];
         assert_eq!(read(&bytes), Ok(expected));
     }

@@ -1,24 +1,24 @@
-//! From the tensor that a model gives to an image of bytes: [`Reading`].
+//! From the tensor that a model gives to an image of bytes: [`OutputReading`].
 //!
 //! One pass of clamping and rounding, after one that looks for what cannot be.
 
 use half::f16;
 
-use super::convention::{Color, Element, Layout, Range, Rounding};
+use super::convention::{ChannelOrder, ElementType, Rounding, TensorLayout, ValueRange};
 use super::planes::Planes;
-use super::sidecar::Sidecar;
+use super::sidecar::ModelSidecar;
 use super::signature::Signature;
-use super::tiles::Window;
+use super::tiles::TileWindow;
 
 /// How a tensor becomes an image.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Reading {
+pub(super) struct OutputReading {
     /// `None` where only a run shows it.
-    pub(super) layout: Option<Layout>,
+    pub(super) layout: Option<TensorLayout>,
     /// The layout that is taken where two fit.
-    pub(super) likely: Layout,
-    pub(super) color: Color,
-    pub(super) range: Range,
+    pub(super) likely: TensorLayout,
+    pub(super) color: ChannelOrder,
+    pub(super) range: ValueRange,
     /// Whether somebody said the range; else it is checked against what comes.
     pub(super) certainty: Certainty,
     pub(super) rounding: Rounding,
@@ -45,25 +45,25 @@ pub(super) enum OutOfRange {
         /// The largest.
         most: f32,
         /// The range that they look like.
-        likely: Range,
+        likely: ValueRange,
     },
 }
 
 /// A view of the elements of an output.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Samples<'a> {
+pub(super) enum TensorSamples<'a> {
     Float32(&'a [f32]),
     Float16(&'a [f16]),
     Uint8(&'a [u8]),
 }
 
-impl Reading {
+impl OutputReading {
     /// What graph and statements say.
-    pub(super) fn of(signature: &Signature, stated: &Sidecar) -> Self {
+    pub(super) fn of(signature: &Signature, stated: &ModelSidecar) -> Self {
         let output = &signature.output;
         let (range, certainty) = match (stated.range_out, &output.port.element) {
             (Some(range), _) => (range, Certainty::Known),
-            (None, Element::Uint8) => (Range::Bytes, Certainty::Known),
+            (None, ElementType::Uint8) => (ValueRange::Bytes, Certainty::Known),
             // What is not said of the output is as in the input.
             (None, _) => (
                 stated
@@ -83,8 +83,8 @@ impl Reading {
     }
 
     /// The layout of an output of such dimensions for an image of such a size; `None` where it is no such image.
-    pub(super) fn layout(&self, dims: &[i64], size: [usize; 2]) -> Option<Layout> {
-        let fits = |layout: &Layout| {
+    pub(super) fn layout(&self, dims: &[i64], size: [usize; 2]) -> Option<TensorLayout> {
+        let fits = |layout: &TensorLayout| {
             let wanted = layout.dims(size);
             wanted.len() == dims.len()
                 && wanted
@@ -94,25 +94,27 @@ impl Reading {
         };
         match self.layout {
             Some(layout) => Some(layout).filter(fits),
-            None => std::iter::once(self.likely).chain(Layout::ALL).find(fits),
+            None => std::iter::once(self.likely)
+                .chain(TensorLayout::ALL)
+                .find(fits),
         }
     }
 
     /// The bytes of a part of an output, red, green and blue of each pixel; `size` is that of the whole output.
     pub(super) fn bytes(
         &self,
-        samples: Samples<'_>,
-        layout: Layout,
+        samples: TensorSamples<'_>,
+        layout: TensorLayout,
         size: [usize; 2],
-        part: Window,
+        part: TileWindow,
     ) -> Result<Vec<u8>, OutOfRange> {
         match samples {
-            Samples::Uint8(bytes) => Ok(self.gather(bytes, layout, size, part, |byte| byte)),
-            Samples::Float16(values) => {
+            TensorSamples::Uint8(bytes) => Ok(self.gather(bytes, layout, size, part, |byte| byte)),
+            TensorSamples::Float16(values) => {
                 let values: Vec<f32> = values.iter().map(|value| value.to_f32()).collect();
-                self.bytes(Samples::Float32(&values), layout, size, part)
+                self.bytes(TensorSamples::Float32(&values), layout, size, part)
             }
-            Samples::Float32(values) => {
+            TensorSamples::Float32(values) => {
                 self.check(values)?;
                 let (range, rounding) = (self.range, self.rounding);
                 Ok(self.gather(values, layout, size, part, |value| {
@@ -129,14 +131,14 @@ impl Reading {
     /// The whole output as floats of 0..1.
     pub(super) fn planes(
         &self,
-        samples: Samples<'_>,
-        layout: Layout,
+        samples: TensorSamples<'_>,
+        layout: TensorLayout,
         [height, width]: [usize; 2],
     ) -> Result<Planes, OutOfRange> {
         let values: Vec<f32> = match samples {
-            Samples::Uint8(bytes) => bytes.iter().map(|byte| f32::from(*byte)).collect(),
-            Samples::Float16(values) => values.iter().map(|value| value.to_f32()).collect(),
-            Samples::Float32(values) => values.to_vec(),
+            TensorSamples::Uint8(bytes) => bytes.iter().map(|byte| f32::from(*byte)).collect(),
+            TensorSamples::Float16(values) => values.iter().map(|value| value.to_f32()).collect(),
+            TensorSamples::Float32(values) => values.to_vec(),
         };
         self.check(&values)?;
         let at = |channel: usize, pixel: usize| {
@@ -147,8 +149,8 @@ impl Reading {
                 values[3 * pixel + channel]
             };
             match self.range {
-                Range::Unit => value,
-                Range::Bytes | Range::Signed => self.range.code(value) / 255.0,
+                ValueRange::Unit => value,
+                ValueRange::Bytes | ValueRange::Signed => self.range.code(value) / 255.0,
             }
         };
         let channels = 0..3;
@@ -163,9 +165,9 @@ impl Reading {
     fn gather<T: Copy>(
         &self,
         samples: &[T],
-        layout: Layout,
+        layout: TensorLayout,
         [height, width]: [usize; 2],
-        part: Window,
+        part: TileWindow,
         byte: impl Fn(T) -> u8,
     ) -> Vec<u8> {
         let mut out = vec![0; 3 * part.size()[0] * part.size()[1]];
@@ -208,9 +210,9 @@ impl Reading {
         }
         let many = values.len() / 20;
         let likely = match (self.certainty, self.range) {
-            (Certainty::Assumed, Range::Unit) if above > many => Range::Bytes,
-            (Certainty::Assumed, Range::Unit) if below > many => Range::Signed,
-            (Certainty::Assumed, Range::Bytes) if most <= 1.5 => Range::Unit,
+            (Certainty::Assumed, ValueRange::Unit) if above > many => ValueRange::Bytes,
+            (Certainty::Assumed, ValueRange::Unit) if below > many => ValueRange::Signed,
+            (Certainty::Assumed, ValueRange::Bytes) if most <= 1.5 => ValueRange::Unit,
             _ => return Ok(()),
         };
         Err(OutOfRange::Beyond {

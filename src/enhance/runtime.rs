@@ -39,9 +39,9 @@ pub struct RuntimeSearch {
 
 /// ONNX Runtime, open. Clones are the same one.
 #[derive(Clone)]
-pub struct Runtime(Arc<Open>);
+pub struct Runtime(Arc<OpenRuntime>);
 
-struct Open {
+struct OpenRuntime {
     path: PathBuf,
     version: String,
     environment: Environment,
@@ -196,7 +196,7 @@ impl Runtime {
         environment.set_log_level(LogLevel::Warning);
         let jobs = start_thread().map_err(|e| fault(&e))?;
         tracing::debug!("ONNX Runtime {version} from {}", path.display());
-        Ok(Self(Arc::new(Open {
+        Ok(Self(Arc::new(OpenRuntime {
             path,
             version,
             environment,

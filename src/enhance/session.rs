@@ -9,16 +9,16 @@ use ort::session::builder::{GraphOptimizationLevel, SessionBuilder};
 use ort::session::{HasSelectedOutputs, OutputSelector, RunOptions, Session, SessionInputValue};
 use ort::value::{DynValue, Outlet, Tensor, TensorElementType, ValueType};
 
-use super::convention::Element;
-use super::feeding::{Data, Input};
+use super::convention::ElementType;
+use super::feeding::{Input, TensorData};
 use super::port::{Dim, Port};
-use super::reading::Samples;
-use super::signature::{Extra, Signature};
+use super::reading::TensorSamples;
+use super::signature::{NumberInput, Signature};
 
 /// How a session is run: which output is wanted, and whether it is to end early.
-pub(super) struct Options(RunOptions<HasSelectedOutputs>);
+pub(super) struct SessionOptions(RunOptions<HasSelectedOutputs>);
 
-impl Options {
+impl SessionOptions {
     /// Those of a run that gives one output.
     pub(super) fn of(output: &str) -> ort::Result<Self> {
         let selected = OutputSelector::no_default().with(output);
@@ -27,14 +27,14 @@ impl Options {
 }
 
 // SAFETY: `ort` withholds `Sync` because a selected output may hold a preallocated tensor, which two runs would write at
-// once. None is ever preallocated here (`Options::of` selects by name alone), runs are held apart by the session's
+// once. None is ever preallocated here (`SessionOptions::of` selects by name alone), runs are held apart by the session's
 // mutex, and the one call made beside a run is `terminate`, which ONNX Runtime documents for use from another thread.
 #[expect(unsafe_code, reason = "a run can be ended in no other way")]
-unsafe impl Sync for Options {}
+unsafe impl Sync for SessionOptions {}
 
 /// Ends the run of an enhancer from another thread.
 #[derive(Clone)]
-pub struct Stopper(pub(super) Arc<Options>);
+pub struct Stopper(pub(super) Arc<SessionOptions>);
 
 impl Stopper {
     /// Ends the image that is being made, with an error, and every later one.
@@ -55,10 +55,10 @@ pub(super) fn said(error: &ort::Error) -> String {
 /// Runs a session on an image, and reads the output before another run writes over it.
 pub(super) fn run<T>(
     session: &mut Session,
-    options: &Options,
+    options: &SessionOptions,
     signature: &Signature,
     input: Input,
-    read: impl FnOnce(&[i64], Samples<'_>) -> T,
+    read: impl FnOnce(&[i64], TensorSamples<'_>) -> T,
 ) -> ort::Result<T> {
     let mut inputs: Vec<(&str, SessionInputValue<'_>)> = Vec::new();
     inputs.push((&signature.input.port.name, tensor(input)?.into()));
@@ -68,17 +68,17 @@ pub(super) fn run<T>(
     let outputs = session.run_with_options(inputs, &options.0)?;
     let output = &outputs[signature.output.port.name.as_str()];
     match signature.output.port.element {
-        Element::Uint8 => {
+        ElementType::Uint8 => {
             let (dims, samples) = output.try_extract_tensor::<u8>()?;
-            Ok(read(dims, Samples::Uint8(samples)))
+            Ok(read(dims, TensorSamples::Uint8(samples)))
         }
-        Element::Float16 => {
+        ElementType::Float16 => {
             let (dims, samples) = output.try_extract_tensor::<half::f16>()?;
-            Ok(read(dims, Samples::Float16(samples)))
+            Ok(read(dims, TensorSamples::Float16(samples)))
         }
         _ => {
             let (dims, samples) = output.try_extract_tensor::<f32>()?;
-            Ok(read(dims, Samples::Float32(samples)))
+            Ok(read(dims, TensorSamples::Float32(samples)))
         }
     }
 }
@@ -86,16 +86,16 @@ pub(super) fn run<T>(
 fn tensor(input: Input) -> ort::Result<DynValue> {
     let Input { dims, data } = input;
     Ok(match data {
-        Data::Float32(values) => Tensor::from_array((dims, values))?.into_dyn(),
-        Data::Float16(values) => Tensor::from_array((dims, values))?.into_dyn(),
-        Data::Uint8(values) => Tensor::from_array((dims, values))?.into_dyn(),
+        TensorData::Float32(values) => Tensor::from_array((dims, values))?.into_dyn(),
+        TensorData::Float16(values) => Tensor::from_array((dims, values))?.into_dyn(),
+        TensorData::Uint8(values) => Tensor::from_array((dims, values))?.into_dyn(),
     })
 }
 
-fn number(extra: &Extra) -> ort::Result<DynValue> {
+fn number(extra: &NumberInput) -> ort::Result<DynValue> {
     let dims = vec![1_usize; extra.port.dims.len()];
     Ok(match extra.port.element {
-        Element::Float16 => {
+        ElementType::Float16 => {
             Tensor::from_array((dims, vec![half::f16::from_f32(extra.value)]))?.into_dyn()
         }
         _ => Tensor::from_array((dims, vec![extra.value]))?.into_dyn(),
@@ -103,12 +103,12 @@ fn number(extra: &Extra) -> ort::Result<DynValue> {
 }
 
 /// Where a session gets its graph from.
-pub(super) enum Source {
+pub(super) enum GraphSource {
     Memory(Vec<u8>),
     Path(PathBuf),
 }
 
-impl Source {
+impl GraphSource {
     pub(super) fn commit(self, mut builder: SessionBuilder) -> ort::Result<Session> {
         match self {
             Self::Memory(bytes) => builder.commit_from_memory(&bytes),
@@ -149,10 +149,10 @@ fn port(outlet: &Outlet) -> Port {
             dimension_symbols,
         } => {
             let element = match ty {
-                TensorElementType::Float32 => Element::Float32,
-                TensorElementType::Float16 => Element::Float16,
-                TensorElementType::Uint8 => Element::Uint8,
-                other => Element::Other(other.to_string()),
+                TensorElementType::Float32 => ElementType::Float32,
+                TensorElementType::Float16 => ElementType::Float16,
+                TensorElementType::Uint8 => ElementType::Uint8,
+                other => ElementType::Other(other.to_string()),
             };
             let dims = shape
                 .iter()
@@ -162,7 +162,7 @@ fn port(outlet: &Outlet) -> Port {
                 });
             (element, dims.collect())
         }
-        other => (Element::Other(other.to_string()), Vec::new()),
+        other => (ElementType::Other(other.to_string()), Vec::new()),
     };
     Port {
         name: outlet.name().to_owned(),

@@ -1,4 +1,4 @@
-//! What is stated about a model, by a user beside it, in `MODEL.onnx.toml`, or by a preset: [`Sidecar`].
+//! What is stated about a model, by a user beside it, in `MODEL.onnx.toml`, or by a preset: [`ModelSidecar`].
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -8,23 +8,23 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::convention::{Color, Layout, Pad, Range, Rounding, Tile};
+use super::convention::{ChannelOrder, Padding, Rounding, TensorLayout, Tile, ValueRange};
 use crate::error::{Error, Result};
 
 /// The statements of a sidecar; every key may be missing, an unknown key is an error.
 #[derive(Debug, Default, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Sidecar {
+pub(super) struct ModelSidecar {
     /// The dimensions of the input.
-    pub(super) layout_in: Option<Layout>,
+    pub(super) layout_in: Option<TensorLayout>,
     /// Those of the output.
-    pub(super) layout_out: Option<Layout>,
+    pub(super) layout_out: Option<TensorLayout>,
     /// The order of channels, of both.
-    pub(super) color: Option<Color>,
+    pub(super) color: Option<ChannelOrder>,
     /// What black and white are in the input.
-    pub(super) range_in: Option<Range>,
+    pub(super) range_in: Option<ValueRange>,
     /// What they are in the output.
-    pub(super) range_out: Option<Range>,
+    pub(super) range_out: Option<ValueRange>,
     /// Taken from each channel of the input, in its order and range.
     pub(super) mean: Option<[f32; 3]>,
     /// What each channel is then divided by.
@@ -32,7 +32,7 @@ pub(super) struct Sidecar {
     /// Of what the height and the width must be multiples.
     pub(super) multiple: Option<NonZeroUsize>,
     /// What fills an image up to a multiple.
-    pub(super) pad: Option<Pad>,
+    pub(super) pad: Option<Padding>,
     /// Which output is the enhanced image.
     pub(super) output: Option<OutputChoice>,
     /// Whether tiles are exact.
@@ -83,7 +83,7 @@ pub(super) fn text_for(model: &Path) -> Result<String> {
     }
 }
 
-impl Sidecar {
+impl ModelSidecar {
     /// Reads the text of the sidecar of `model`.
     ///
     /// # Errors
@@ -115,11 +115,11 @@ impl Sidecar {
             stated.filter(|stated| stated != usual)
         }
         Self {
-            color: unless(self.color, &Color::default()),
+            color: unless(self.color, &ChannelOrder::default()),
             mean: unless(self.mean, &[0.0; 3]),
             std: unless(self.std, &[1.0; 3]),
             multiple: unless(self.multiple, &NonZeroUsize::MIN),
-            pad: unless(self.pad, &Pad::default()),
+            pad: unless(self.pad, &Padding::default()),
             rounding: unless(self.rounding, &Rounding::default()),
             ..self
         }
@@ -169,15 +169,15 @@ mod tests {
             [extra]
             exposure = 0.5
         "#;
-        let read = Sidecar::parse(Path::new("m.onnx"), text).unwrap();
-        assert_eq!(read.layout_in, Some(Layout::Nhwc));
+        let read = ModelSidecar::parse(Path::new("m.onnx"), text).unwrap();
+        assert_eq!(read.layout_in, Some(TensorLayout::Nhwc));
         assert_eq!(read.tile, Some(Tile::Exact(12)));
         assert_eq!(read.extra, [("exposure".to_owned(), 0.5)].into());
         assert_eq!(read.output, Some(OutputChoice::Name("enhanced".into())));
-        assert_eq!(Sidecar::default().over(&read), read);
-        let own = Sidecar {
+        assert_eq!(ModelSidecar::default().over(&read), read);
+        let own = ModelSidecar {
             multiple: NonZeroUsize::new(4),
-            ..Sidecar::default()
+            ..ModelSidecar::default()
         };
         assert_eq!(own.over(&read).multiple, NonZeroUsize::new(4));
     }
@@ -196,7 +196,7 @@ mod tests {
             ("tile = \"exact\"", "exact:8"),
             ("[extra]\ngamma = nan", "extra.gamma"),
         ] {
-            let message = Sidecar::parse(model, text).unwrap_err().to_string();
+            let message = ModelSidecar::parse(model, text).unwrap_err().to_string();
             assert!(message.starts_with("a/model.onnx.toml: "), "{message}");
             assert!(message.contains(part), "{message}");
         }

@@ -3,38 +3,38 @@
 //! A graph says element types, ranks and the sizes it knows. What it cannot say (value range, colour order) a sidecar or a
 //! preset states; else it is taken to be the convention of the published models: RGB, 0..1.
 
-use super::convention::{Element, Layout};
+use super::convention::{ElementType, TensorLayout};
 use super::output::Output;
 use super::port::{Port, list};
-use super::sidecar::Sidecar;
+use super::sidecar::ModelSidecar;
 
 /// How a graph is to be fed and read.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Signature {
     /// The input that is the dark image.
-    pub(super) input: Image,
+    pub(super) input: ImageInput,
     /// The height in pixels that the input has to have; `None` for any.
     pub(super) height: Option<usize>,
     /// The width in pixels that the input has to have; `None` for any.
     pub(super) width: Option<usize>,
     /// Further inputs of one number each.
-    pub(super) extras: Vec<Extra>,
+    pub(super) extras: Vec<NumberInput>,
     /// The output that is the enhanced image; its layout where the graph or the sidecar says it.
     pub(super) output: Output,
 }
 
 /// An input that is an image.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Image {
+pub(super) struct ImageInput {
     /// The graph's words for it.
     pub(super) port: Port,
     /// The order of its dimensions.
-    pub(super) layout: Layout,
+    pub(super) layout: TensorLayout,
 }
 
 /// An input of one number.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Extra {
+pub(super) struct NumberInput {
     /// The graph's words for it.
     pub(super) port: Port,
     /// Its value.
@@ -46,7 +46,11 @@ impl Signature {
     ///
     /// # Errors
     /// A sentence that says what was found and how to repair it; it is to follow the file's name.
-    pub(super) fn of(inputs: &[Port], outputs: &[Port], stated: &Sidecar) -> Result<Self, String> {
+    pub(super) fn of(
+        inputs: &[Port],
+        outputs: &[Port],
+        stated: &ModelSidecar,
+    ) -> Result<Self, String> {
         let (image, layout) = image_input(inputs, stated)?;
         let [_, height, width] = layout.places().map(|place| &image.dims[place]);
         let extras = inputs.iter().filter(|port| port.name != image.name);
@@ -73,7 +77,7 @@ impl Signature {
             width: width.known(),
             extras,
             output,
-            input: Image {
+            input: ImageInput {
                 port: image.clone(),
                 layout,
             },
@@ -87,8 +91,11 @@ impl Signature {
 }
 
 /// The input that is the image, and its layout.
-fn image_input<'a>(inputs: &'a [Port], stated: &Sidecar) -> Result<(&'a Port, Layout), String> {
-    let numbers = |port: &Port| matches!(port.element, Element::Other(_));
+fn image_input<'a>(
+    inputs: &'a [Port],
+    stated: &ModelSidecar,
+) -> Result<(&'a Port, TensorLayout), String> {
+    let numbers = |port: &Port| matches!(port.element, ElementType::Other(_));
     let images: Vec<&Port> = inputs.iter().filter(|port| !port.is_scalar()).collect();
     let image = match images.as_slice() {
         [image] => *image,
@@ -142,8 +149,8 @@ fn image_input<'a>(inputs: &'a [Port], stated: &Sidecar) -> Result<(&'a Port, La
 }
 
 /// The value of an input of one number.
-fn extra(port: &Port, stated: &Sidecar) -> Result<Extra, String> {
-    if !matches!(port.element, Element::Float32 | Element::Float16) {
+fn extra(port: &Port, stated: &ModelSidecar) -> Result<NumberInput, String> {
+    if !matches!(port.element, ElementType::Float32 | ElementType::Float16) {
         return Err(format!(
             "takes {port} beside the image; one float is supported: export it with a value inside the graph"
         ));
@@ -154,7 +161,7 @@ fn extra(port: &Port, stated: &Sidecar) -> Result<Extra, String> {
             quoted(&port.name)
         )
     })?;
-    Ok(Extra {
+    Ok(NumberInput {
         port: port.clone(),
         value: *value,
     })

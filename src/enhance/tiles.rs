@@ -1,4 +1,4 @@
-//! An image in tiles, each of which sees a [`Window`] of it: [`Plan`], and [`Canvas`], on which they come together.
+//! An image in tiles, each of which sees a [`TileWindow`] of it: [`TilePlan`], and [`TiledImage`], on which they come together.
 //!
 //! Each tile is seen with some context and gives its middle ("crop" tiling, as Real-ESRGAN's `tile_pad`): for a model whose
 //! pixels depend on nothing beyond the context that is exact, and no blending hides a seam. Neighbours give a few pixels
@@ -18,14 +18,14 @@ pub(super) const GUARD: usize = 2;
 
 /// A part of an image: left, top, right, bottom, the latter two exclusive; right and bottom may lie outside of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Window {
+pub(super) struct TileWindow {
     pub(super) left: usize,
     pub(super) top: usize,
     pub(super) right: usize,
     pub(super) bottom: usize,
 }
 
-impl Window {
+impl TileWindow {
     /// Height and width.
     pub(super) fn size(self) -> [usize; 2] {
         [self.bottom - self.top, self.right - self.left]
@@ -71,16 +71,16 @@ impl FromStr for Tiling {
 
 /// A tile along one side: what is seen, and what of it is taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Span {
+pub(super) struct TileSpan {
     pub(super) start: usize,
     pub(super) end: usize,
     pub(super) from: usize,
     pub(super) to: usize,
 }
 
-impl Window {
+impl TileWindow {
     /// What a tile sees of the image.
-    pub(super) fn seen(row: Span, column: Span) -> Self {
+    pub(super) fn seen(row: TileSpan, column: TileSpan) -> Self {
         Self {
             left: column.start,
             top: row.start,
@@ -90,7 +90,7 @@ impl Window {
     }
 
     /// What is taken of a tile, as a part of what it sees.
-    pub(super) fn taken(row: Span, column: Span) -> Self {
+    pub(super) fn taken(row: TileSpan, column: TileSpan) -> Self {
         Self {
             left: column.from - column.start,
             top: row.from - row.start,
@@ -102,14 +102,14 @@ impl Window {
 
 /// The tiles of an image.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Plan {
-    rows: Vec<Span>,
-    columns: Vec<Span>,
+pub(super) struct TilePlan {
+    rows: Vec<TileSpan>,
+    columns: Vec<TileSpan>,
 }
 
 /// How tiles are cut.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Cut {
+pub(super) struct Cutting {
     /// Height and width of what they cover.
     pub(super) area: [usize; 2],
     /// Height and width of a tile, at most.
@@ -120,9 +120,9 @@ pub(super) struct Cut {
     pub(super) multiple: usize,
 }
 
-impl Plan {
+impl TilePlan {
     /// The tiles of an image; `None` where a tile is not larger than its context.
-    pub(super) fn of(cut: Cut) -> Option<Self> {
+    pub(super) fn of(cut: Cutting) -> Option<Self> {
         let spans = |side: usize| spans(cut.area[side], cut.tile[side], cut.context, cut.multiple);
         Some(Self {
             rows: spans(0)?,
@@ -131,7 +131,7 @@ impl Plan {
     }
 
     /// The tiles row by row, each by its spans along both sides.
-    pub(super) fn tiles(&self) -> impl Iterator<Item = (Span, Span)> {
+    pub(super) fn tiles(&self) -> impl Iterator<Item = (TileSpan, TileSpan)> {
         let rows = self.rows.iter();
         rows.flat_map(|row| self.columns.iter().map(|column| (*row, *column)))
     }
@@ -144,7 +144,7 @@ impl Plan {
 
 /// The tiles along one side: all of one length and within the image, so that the border of a tile is that of the image, with
 /// whatever the model makes of it, or lies beyond the context.
-fn spans(length: usize, tile: usize, context: usize, multiple: usize) -> Option<Vec<Span>> {
+fn spans(length: usize, tile: usize, context: usize, multiple: usize) -> Option<Vec<TileSpan>> {
     let tile = tile.min(length);
     let step = tile.checked_sub(2 * (context + GUARD));
     let step = step.map_or(0, |step| step / multiple * multiple);
@@ -155,7 +155,7 @@ fn spans(length: usize, tile: usize, context: usize, multiple: usize) -> Option<
     let mut start = 0;
     loop {
         let end = start + tile;
-        spans.push(Span {
+        spans.push(TileSpan {
             start,
             end,
             from: if start == 0 { 0 } else { start + context },
@@ -169,7 +169,7 @@ fn spans(length: usize, tile: usize, context: usize, multiple: usize) -> Option<
 }
 
 /// The image as tile by tile makes it.
-pub(super) struct Canvas {
+pub(super) struct TiledImage {
     rgb: Rgb,
     /// The end of what the row of tiles above has given.
     above: usize,
@@ -197,7 +197,7 @@ impl Seam {
     }
 }
 
-impl Canvas {
+impl TiledImage {
     pub(super) fn new([height, width]: [usize; 2]) -> Self {
         Self {
             rgb: Rgb::black(height, width),
@@ -208,7 +208,7 @@ impl Canvas {
     }
 
     /// Puts what a tile gave into its place, beside what is there already; tiles come row by row.
-    pub(super) fn put(&mut self, row: Span, column: Span, bytes: &[u8]) {
+    pub(super) fn put(&mut self, row: TileSpan, column: TileSpan, bytes: &[u8]) {
         let width = self.rgb.width();
         if column.from == 0 {
             self.left = 0;
@@ -274,16 +274,16 @@ mod tests {
 
     #[test]
     fn seams_are_compared() {
-        let cut = Cut {
+        let cut = Cutting {
             area: [37, 50],
             tile: [20, 20],
             context: 3,
             multiple: 1,
         };
-        let plan = Plan::of(cut).unwrap();
+        let plan = TilePlan::of(cut).unwrap();
         // What a pixel is, and what a tile that sees its own place makes of it.
         let made = |shift: usize| {
-            let mut canvas = Canvas::new([37, 50]);
+            let mut canvas = TiledImage::new([37, 50]);
             for (row, column) in plan.tiles() {
                 let pixels =
                     (row.from..row.to).flat_map(|y| (column.from..column.to).map(move |x| (y, x)));

@@ -12,7 +12,7 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use super::protobuf::{Malformed, Value, fields};
+use super::protobuf::{FieldValue, Malformed, fields};
 
 /// Where the 32-bit floats of a model lie, and which other files hold weights.
 #[derive(Debug, Default, PartialEq, Eq)]
@@ -25,7 +25,7 @@ pub(super) struct Weights {
 
 /// The messages of an ONNX file that have weights in them.
 #[derive(Clone, Copy)]
-enum Message {
+enum OnnxMessage {
     Model,
     Graph,
     Function,
@@ -35,7 +35,7 @@ enum Message {
     Tensor,
 }
 
-impl Message {
+impl OnnxMessage {
     /// The message in a field of this one; `None` where no weights can be.
     fn in_field(self, number: u64) -> Option<Self> {
         match (self, number) {
@@ -61,15 +61,15 @@ impl Weights {
         let mut weights = Self::default();
         let mut has_graph = false;
         // A stack in place of recursion: no nesting, however deep, can overflow it.
-        let mut open = vec![(Message::Model, 0..model.len())];
+        let mut open = vec![(OnnxMessage::Model, 0..model.len())];
         while let Some((message, range)) = open.pop() {
-            if let Message::Tensor = message {
+            if let OnnxMessage::Tensor = message {
                 weights.add_tensor(model, range)?;
                 continue;
             }
-            has_graph |= matches!(message, Message::Graph);
+            has_graph |= matches!(message, OnnxMessage::Graph);
             for field in fields(model, range) {
-                if let (number, Value::Bytes(bytes)) = field?
+                if let (number, FieldValue::Bytes(bytes)) = field?
                     && let Some(inner) = message.in_field(number)
                 {
                     open.push((inner, bytes));
@@ -91,11 +91,13 @@ impl Weights {
         let (mut floats, mut names) = (Vec::new(), Vec::new());
         for field in fields(model, range) {
             match field? {
-                (2, Value::Varint(value)) => data_type = value,
-                (14, Value::Varint(value)) => location = value,
+                (2, FieldValue::Varint(value)) => data_type = value,
+                (14, FieldValue::Varint(value)) => location = value,
                 // float_data, packed or one by one; raw_data
-                (4 | 9, Value::Bytes(bytes)) | (4, Value::Fixed32(bytes)) => floats.push(bytes),
-                (13, Value::Bytes(entry)) => names.extend(location_in(model, entry)?),
+                (4 | 9, FieldValue::Bytes(bytes)) | (4, FieldValue::Fixed32(bytes)) => {
+                    floats.push(bytes)
+                }
+                (13, FieldValue::Bytes(entry)) => names.extend(location_in(model, entry)?),
                 _ => {}
             }
         }
@@ -132,8 +134,8 @@ fn location_in(model: &[u8], entry: Range<usize>) -> Result<Option<String>, Malf
     let (mut key, mut value) = (None, None);
     for field in fields(model, entry) {
         match field? {
-            (1, Value::Bytes(bytes)) => key = model.get(bytes),
-            (2, Value::Bytes(bytes)) => value = model.get(bytes),
+            (1, FieldValue::Bytes(bytes)) => key = model.get(bytes),
+            (2, FieldValue::Bytes(bytes)) => value = model.get(bytes),
             _ => {}
         }
     }

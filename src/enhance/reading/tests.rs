@@ -1,22 +1,22 @@
 use super::*;
-use crate::enhance::convention::Pad;
-use crate::enhance::feeding::{Data, Feeding, Input};
+use crate::enhance::convention::Padding;
+use crate::enhance::feeding::{Feeding, Input, TensorData};
 use crate::types::Rgb;
 
 const FEEDING: Feeding = Feeding {
-    layout: Layout::Nchw,
-    element: Element::Float32,
-    color: Color::Rgb,
-    range: Range::Unit,
+    layout: TensorLayout::Nchw,
+    element: ElementType::Float32,
+    color: ChannelOrder::Rgb,
+    range: ValueRange::Unit,
     mean: [0.0; 3],
     std: [1.0; 3],
-    pad: Pad::Reflect,
+    pad: Padding::Reflect,
 };
-const READING: Reading = Reading {
+const READING: OutputReading = OutputReading {
     layout: None,
-    likely: Layout::Nchw,
-    color: Color::Rgb,
-    range: Range::Unit,
+    likely: TensorLayout::Nchw,
+    color: ChannelOrder::Rgb,
+    range: ValueRange::Unit,
     certainty: Certainty::Known,
     rounding: Rounding::Round,
 };
@@ -26,8 +26,8 @@ fn image(height: usize, width: usize) -> Rgb {
     Rgb::new(height, width, samples.collect()).unwrap()
 }
 
-fn whole(image: &Rgb) -> Window {
-    Window {
+fn whole(image: &Rgb) -> TileWindow {
+    TileWindow {
         left: 0,
         top: 0,
         right: image.width(),
@@ -35,16 +35,18 @@ fn whole(image: &Rgb) -> Window {
     }
 }
 
-fn near(a: &Data, b: &Data) -> bool {
+fn near(a: &TensorData, b: &TensorData) -> bool {
     match (a, b) {
-        (Data::Float32(a), Data::Float32(b)) => a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-4),
+        (TensorData::Float32(a), TensorData::Float32(b)) => {
+            a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-4)
+        }
         (a, b) => a == b,
     }
 }
 
 fn floats(input: &Input) -> &[f32] {
     match &input.data {
-        Data::Float32(values) => values,
+        TensorData::Float32(values) => values,
         other => panic!("{other:?}"),
     }
 }
@@ -52,15 +54,15 @@ fn floats(input: &Input) -> &[f32] {
 #[test]
 fn every_convention_gives_every_byte_back() {
     let image = image(11, 24);
-    for layout in Layout::ALL {
+    for layout in TensorLayout::ALL {
         for (element, range) in [
-            (Element::Float32, Range::Unit),
-            (Element::Float32, Range::Bytes),
-            (Element::Float32, Range::Signed),
-            (Element::Float16, Range::Unit),
-            (Element::Uint8, Range::Bytes),
+            (ElementType::Float32, ValueRange::Unit),
+            (ElementType::Float32, ValueRange::Bytes),
+            (ElementType::Float32, ValueRange::Signed),
+            (ElementType::Float16, ValueRange::Unit),
+            (ElementType::Uint8, ValueRange::Bytes),
         ] {
-            for color in [Color::Rgb, Color::Bgr] {
+            for color in [ChannelOrder::Rgb, ChannelOrder::Bgr] {
                 let feeding = Feeding {
                     layout,
                     element: element.clone(),
@@ -69,16 +71,16 @@ fn every_convention_gives_every_byte_back() {
                     ..FEEDING
                 };
                 let input = feeding.window(&image, whole(&image));
-                let reading = Reading {
+                let reading = OutputReading {
                     likely: layout,
                     color,
                     range,
                     ..READING
                 };
                 let samples = match &input.data {
-                    Data::Float32(values) => Samples::Float32(values),
-                    Data::Float16(values) => Samples::Float16(values),
-                    Data::Uint8(values) => Samples::Uint8(values),
+                    TensorData::Float32(values) => TensorSamples::Float32(values),
+                    TensorData::Float16(values) => TensorSamples::Float16(values),
+                    TensorData::Uint8(values) => TensorSamples::Uint8(values),
                 };
                 let dims: Vec<i64> = input
                     .dims
@@ -90,7 +92,7 @@ fn every_convention_gives_every_byte_back() {
                     .bytes(samples, layout, [11, 24], whole(&image))
                     .unwrap();
                 assert_eq!(bytes, image.samples(), "{layout} {element} {range} {color}");
-                let part = Window {
+                let part = TileWindow {
                     left: 3,
                     top: 2,
                     right: 7,
@@ -101,7 +103,7 @@ fn every_convention_gives_every_byte_back() {
                 // The way by floats, for models of a fixed size, feeds and reads the same.
                 let planes = reading.planes(samples, layout, [11, 24]).unwrap();
                 assert_eq!(planes.to_rgb(Rounding::Round).unwrap(), image);
-                if element != Element::Float16 {
+                if element != ElementType::Float16 {
                     let fed = feeding.planes(&Planes::of(&image));
                     assert!(near(&fed.data, &input.data) && fed.dims == input.dims);
                 }
@@ -121,7 +123,7 @@ fn mean_and_deviation_are_the_models_channels() {
     let input = feeding.window(&image, whole(&image));
     assert_eq!(floats(&input), [1.0, -1.0, 2.0]);
     let blue_first = Feeding {
-        color: Color::Bgr,
+        color: ChannelOrder::Bgr,
         ..feeding
     };
     let input = blue_first.window(&image, whole(&image));
@@ -131,23 +133,23 @@ fn mean_and_deviation_are_the_models_channels() {
 #[test]
 fn what_is_missing_is_padded() {
     let image = Rgb::new(1, 3, vec![1, 1, 1, 2, 2, 2, 3, 3, 3]).unwrap();
-    let wide = Window {
+    let wide = TileWindow {
         right: 8,
         bottom: 2,
         ..whole(&image)
     };
     for (pad, row, below) in [
-        (Pad::Reflect, [1, 2, 3, 2, 1, 2, 3, 2], 1),
-        (Pad::Replicate, [1, 2, 3, 3, 3, 3, 3, 3], 1),
-        (Pad::Zero, [1, 2, 3, 0, 0, 0, 0, 0], 0),
+        (Padding::Reflect, [1, 2, 3, 2, 1, 2, 3, 2], 1),
+        (Padding::Replicate, [1, 2, 3, 3, 3, 3, 3, 3], 1),
+        (Padding::Zero, [1, 2, 3, 0, 0, 0, 0, 0], 0),
     ] {
         let feeding = Feeding {
             pad,
-            element: Element::Uint8,
-            range: Range::Bytes,
+            element: ElementType::Uint8,
+            range: ValueRange::Bytes,
             ..FEEDING
         };
-        let Data::Uint8(bytes) = feeding.window(&image, wide).data else {
+        let TensorData::Uint8(bytes) = feeding.window(&image, wide).data else {
             panic!("no bytes");
         };
         assert_eq!(bytes[..8], row, "{pad}");
@@ -158,19 +160,21 @@ fn what_is_missing_is_padded() {
 #[test]
 fn samples_are_held_in_range_and_rounded() {
     let values = [-0.1, 1.1, 0.5, f32::INFINITY, 1.4 / 255.0, 1.6 / 255.0];
-    let part = Window {
+    let part = TileWindow {
         left: 0,
         top: 0,
         right: 2,
         bottom: 1,
     };
     let bytes = |rounding| {
-        let reading = Reading {
+        let reading = OutputReading {
             rounding,
             ..READING
         };
-        let samples = Samples::Float32(&values);
-        reading.bytes(samples, Layout::Nchw, [1, 2], part).unwrap()
+        let samples = TensorSamples::Float32(&values);
+        reading
+            .bytes(samples, TensorLayout::Nchw, [1, 2], part)
+            .unwrap()
     };
     // 0.5 · 255 = 127.5
     assert_eq!(bytes(Rounding::Round), [0, 128, 1, 255, 255, 2]);
@@ -185,7 +189,7 @@ fn samples_are_held_in_range_and_rounded() {
 #[test]
 fn values_of_another_range_are_told() {
     let wild = |values: &[f32], range, certainty| {
-        let reading = Reading {
+        let reading = OutputReading {
             range,
             certainty,
             ..READING
@@ -199,16 +203,28 @@ fn values_of_another_range_are_told() {
             None
         }
     };
-    assert_eq!(likely(&[0.0, 200.0], Range::Unit), Some(Range::Bytes));
-    assert_eq!(likely(&[-0.9, 0.3], Range::Unit), Some(Range::Signed));
-    assert_eq!(likely(&[0.0, 0.9], Range::Bytes), Some(Range::Unit));
+    assert_eq!(
+        likely(&[0.0, 200.0], ValueRange::Unit),
+        Some(ValueRange::Bytes)
+    );
+    assert_eq!(
+        likely(&[-0.9, 0.3], ValueRange::Unit),
+        Some(ValueRange::Signed)
+    );
+    assert_eq!(
+        likely(&[0.0, 0.9], ValueRange::Bytes),
+        Some(ValueRange::Unit)
+    );
     // A model that does not clamp overshoots by little, or seldom by much.
-    assert_eq!(likely(&[-0.1, 1.4], Range::Unit), None);
+    assert_eq!(likely(&[-0.1, 1.4], ValueRange::Unit), None);
     let mut seldom = vec![0.5; 1000];
     seldom[0] = -3.0;
     seldom[1] = 40.0;
-    assert_eq!(likely(&seldom, Range::Unit), None);
-    assert_eq!(wild(&[0.0, 200.0], Range::Unit, Certainty::Known), None);
-    let broken = wild(&[0.0, f32::NAN], Range::Unit, Certainty::Known);
+    assert_eq!(likely(&seldom, ValueRange::Unit), None);
+    assert_eq!(
+        wild(&[0.0, 200.0], ValueRange::Unit, Certainty::Known),
+        None
+    );
+    let broken = wild(&[0.0, f32::NAN], ValueRange::Unit, Certainty::Known);
     assert_eq!(broken, Some(OutOfRange::NotNumbers));
 }

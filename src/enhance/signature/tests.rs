@@ -10,7 +10,7 @@ fn port(name: &str, dims: &[usize]) -> Port {
     };
     Port {
         name: name.into(),
-        element: Element::Float32,
+        element: ElementType::Float32,
         dims: dims.iter().map(dim).collect(),
     }
 }
@@ -24,7 +24,7 @@ fn curves(name: &str) -> Port {
 }
 
 fn of(inputs: &[Port], outputs: &[Port]) -> Result<Signature, String> {
-    Signature::of(inputs, outputs, &Sidecar::default())
+    Signature::of(inputs, outputs, &ModelSidecar::default())
 }
 
 fn choose(outputs: &[Port]) -> Result<String, String> {
@@ -95,9 +95,9 @@ fn what_could_ruin_pixels_is_left_to_the_user() {
 fn a_stated_output_is_taken_where_it_can_be_an_image() {
     let outputs = [image("1"), image("2"), curves("3")];
     let stated = |outputs: &[Port], choice: OutputChoice| {
-        let sidecar = Sidecar {
+        let sidecar = ModelSidecar {
             output: Some(choice),
-            ..Sidecar::default()
+            ..ModelSidecar::default()
         };
         let found = Signature::of(&[image("input")], outputs, &sidecar);
         found.map(|signature| signature.output.port.name)
@@ -139,12 +139,16 @@ fn fixed_sizes_are_read_and_have_to_agree() {
 #[test]
 fn layouts_and_elements_are_read() {
     for (dims, layout) in [
-        (&[1, 3, 0, 0][..], Layout::Nchw),
-        (&[0, 0, 0, 3], Layout::Nhwc),
-        (&[3, 0, 0], Layout::Chw),
-        (&[48, 64, 3], Layout::Hwc),
+        (&[1, 3, 0, 0][..], TensorLayout::Nchw),
+        (&[0, 0, 0, 3], TensorLayout::Nhwc),
+        (&[3, 0, 0], TensorLayout::Chw),
+        (&[48, 64, 3], TensorLayout::Hwc),
     ] {
-        for element in [Element::Float32, Element::Float16, Element::Uint8] {
+        for element in [
+            ElementType::Float32,
+            ElementType::Float16,
+            ElementType::Uint8,
+        ] {
             let input = Port {
                 element,
                 ..port("x", dims)
@@ -154,7 +158,7 @@ fn layouts_and_elements_are_read() {
         }
     }
     let out = of(&[image("x")], &[port("y", &[0, 0, 3])]).unwrap();
-    assert_eq!(out.output.layout, Some(Layout::Hwc));
+    assert_eq!(out.output.layout, Some(TensorLayout::Hwc));
 }
 
 #[test]
@@ -162,13 +166,13 @@ fn what_the_graph_leaves_open_is_stated() {
     let open = [port("x", &[0, 0, 0, 0])];
     let message = of(&open, &[image("y")]).unwrap_err();
     assert!(message.contains("layout_in = \"nchw\""), "{message}");
-    let stated = |layout| Sidecar {
+    let stated = |layout| ModelSidecar {
         layout_in: Some(layout),
-        ..Sidecar::default()
+        ..ModelSidecar::default()
     };
-    let found = Signature::of(&open, &[image("y")], &stated(Layout::Nhwc)).unwrap();
-    assert_eq!(found.input.layout, Layout::Nhwc);
-    for layout in [Layout::Chw, Layout::Nhwc] {
+    let found = Signature::of(&open, &[image("y")], &stated(TensorLayout::Nhwc)).unwrap();
+    assert_eq!(found.input.layout, TensorLayout::Nhwc);
+    for layout in [TensorLayout::Chw, TensorLayout::Nhwc] {
         assert!(Signature::of(&[image("x")], &[image("y")], &stated(layout)).is_err());
     }
 }
@@ -178,15 +182,15 @@ fn further_numbers_need_values() {
     let inputs = [image("x"), port("exposure", &[1])];
     let message = of(&inputs, &[image("y")]).unwrap_err();
     assert!(message.contains("exposure = 0.5"), "{message}");
-    let sidecar = |name: &str| Sidecar {
+    let sidecar = |name: &str| ModelSidecar {
         extra: [(name.to_owned(), 0.25)].into(),
-        ..Sidecar::default()
+        ..ModelSidecar::default()
     };
     let found = Signature::of(&inputs, &[image("y")], &sidecar("exposure")).unwrap();
     assert_eq!(found.extras[0].value.to_bits(), 0.25_f32.to_bits());
     assert!(Signature::of(&inputs, &[image("y")], &sidecar("gamma")).is_err());
     let whole = Port {
-        element: Element::Other("int64".into()),
+        element: ElementType::Other("int64".into()),
         ..port("n", &[])
     };
     let message = of(&[image("x"), whole], &[image("y")]).unwrap_err();
@@ -196,7 +200,7 @@ fn further_numbers_need_values() {
 #[test]
 fn other_conventions_are_refused_by_name() {
     let double = Port {
-        element: Element::Other("float64".into()),
+        element: ElementType::Other("float64".into()),
         ..image("double")
     };
     let cases = [
