@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 use assert_cmd::Command;
-use darkqa_eval::dataset::{Dataset, Place};
+use darkqa_eval::dataset::{DataPlace, Dataset};
 use darkqa_eval::synthesis::expose;
 use darkqa_eval::types::{Question, Rgb, Severity};
 use image::{Rgb as Pixel, RgbImage};
@@ -68,7 +68,7 @@ fn pixels(set: &Dataset, text: &str) -> Rgb {
 #[test]
 fn every_form_is_read_back() {
     let data = data();
-    let original = Dataset::open(&Place::Path(data.path().to_owned()), None).unwrap();
+    let original = Dataset::open(&DataPlace::Path(data.path().to_owned()), None).unwrap();
     let name = original.name().to_owned();
     for (kind, file) in [
         ("vlmevalkit", format!("{name}_CONDITION.tsv")),
@@ -86,7 +86,7 @@ fn every_form_is_read_back() {
         .success();
         for (condition, degraded) in [("L0", false), ("L2-ev", true)] {
             let path = out.path().join(file.replace("CONDITION", condition));
-            let set = Dataset::open(&Place::Path(path.clone()), None).unwrap();
+            let set = Dataset::open(&DataPlace::Path(path.clone()), None).unwrap();
             assert_eq!(words(&set), words(&original), "{}", path.display());
             for question in original.questions() {
                 let clean = original.picture(&question.frame).unwrap().decode().unwrap();

@@ -6,7 +6,7 @@ mod support;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use darkqa_eval::dataset::{Dataset, Place};
+use darkqa_eval::dataset::{DataPlace, Dataset};
 use darkqa_eval::questions::balance::Balanced;
 use darkqa_eval::questions::colors::Palette;
 use darkqa_eval::questions::room::RoomSource;
@@ -261,7 +261,7 @@ fn rooms_on_disk_are_those_in_the_program() {
         size: [160, 120],
         ..Rooms::default()
     };
-    let built_in = Dataset::open_unasked(&Place::Rooms(rooms)).unwrap();
+    let built_in = Dataset::open_unasked(&DataPlace::Rooms(rooms)).unwrap();
     assert_eq!(folder.labels(), built_in.labels());
     assert_eq!(folder.title(), built_in.title());
     let mut count = 0;

@@ -1,4 +1,4 @@
-//! The images beside a ready-made set: [`Beside`].
+//! The images beside a ready-made set: [`SiblingFiles`].
 //!
 //! A frame is named by the path of its image, spelled in one way whatever way the set spells it: relative to the set's
 //! folder, with `/`, without `.` and without `..` that leads back. An absolute path into that folder becomes relative;
@@ -9,13 +9,13 @@ use std::path::{self, Component, Path, PathBuf};
 use crate::types::FrameId;
 
 /// The folder of a set, in which its paths begin.
-pub(super) struct Beside<'a> {
+pub(super) struct SiblingFiles<'a> {
     folder: &'a Path,
     /// The same, absolute, without `.` and `..`.
     absolute: PathBuf,
 }
 
-impl<'a> Beside<'a> {
+impl<'a> SiblingFiles<'a> {
     pub(super) fn of(set: &'a Path) -> Self {
         let folder = set.parent().unwrap_or(Path::new(""));
         let absolute = path::absolute(set).unwrap_or_else(|_| set.to_owned());

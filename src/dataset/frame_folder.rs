@@ -1,4 +1,4 @@
-//! Frames written into a folder of the common interface, as [`crate::dataset::frames`] reads it: [`Place`].
+//! Frames written into a folder of the common interface, as [`crate::dataset::frames`] reads it: [`FramePaths`].
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -18,18 +18,18 @@ pub(crate) const FRAMES: &str = "frames.jsonl";
 
 /// Where the files of one frame go.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Place<'a> {
+pub(crate) struct FramePaths<'a> {
     pub(crate) out: &'a Path,
     pub(crate) scene: &'a str,
     pub(crate) frame: &'a str,
 }
 
 /// A line of the list.
-type Line = Map<String, Value>;
+type ListLine = Map<String, Value>;
 
-impl Place<'_> {
+impl FramePaths<'_> {
     /// What begins the line of the frame.
-    pub(crate) fn line(&self, rgb: &Rgb) -> Line {
+    pub(crate) fn line(&self, rgb: &Rgb) -> ListLine {
         let facts = [
             ("scene", json!(self.scene)),
             ("frame", json!(self.frame)),
@@ -52,7 +52,7 @@ impl Place<'_> {
     /// Writes its depth: millimetres as 16-bit PNG.
     pub(crate) fn depth(
         &self,
-        line: &mut Line,
+        line: &mut ListLine,
         depth: &Array2<u32>,
         kind: DepthKind,
     ) -> Result<()> {
@@ -65,7 +65,7 @@ impl Place<'_> {
     }
 
     /// Writes its classes.
-    pub(crate) fn semantic(&self, line: &mut Line, semantic: &Array2<u16>) -> Result<()> {
+    pub(crate) fn semantic(&self, line: &mut ListLine, semantic: &Array2<u16>) -> Result<()> {
         let path = self.write("sem", "png", &grey(semantic)?)?;
         line.insert("sem".to_owned(), json!(path));
         Ok(())
@@ -74,7 +74,7 @@ impl Place<'_> {
     /// Writes its segments: as 16-bit PNG, or as `.npy` where there are too many.
     pub(crate) fn segments(
         &self,
-        line: &mut Line,
+        line: &mut ListLine,
         segments: &Array2<u32>,
         segmentation: Segmentation,
     ) -> Result<()> {
@@ -109,7 +109,7 @@ pub(crate) fn finish<'a>(
     out: &Path,
     labels: &Labels,
     about: &Value,
-    lines: impl Iterator<Item = &'a Line>,
+    lines: impl Iterator<Item = &'a ListLine>,
 ) -> Result<()> {
     write(&out.join("classes.json"), labels::json(labels).as_bytes())?;
     write(&out.join("dataset.json"), format!("{about:#}\n").as_bytes())?;

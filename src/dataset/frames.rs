@@ -21,9 +21,9 @@ use std::sync::Arc;
 
 use serde::Deserialize;
 
-use super::maps::{DepthFile, Maps};
-use super::view::View;
-use super::{Dataset, Source, questions, stem};
+use super::maps::{DepthFile, MapPaths};
+use super::view::FrameFacts;
+use super::{Dataset, ImageSource, questions, stem};
 use crate::error::{Error, Result};
 use crate::files::reading::{entries, is_image, json, json_lines};
 use crate::labels;
@@ -45,18 +45,18 @@ const SEGMENTS: &str = "segments.json";
 
 /// `dataset.json`, as far as it is used.
 #[derive(Debug, Default, Deserialize)]
-struct About {
+struct DataSetInfo {
     schema: String,
     name: Option<String>,
     depth_kind: Option<DepthKind>,
 }
 
 /// The segments of the scenes by name, each scene's read once.
-type Names = BTreeMap<String, Arc<BTreeMap<u32, SegmentName>>>;
+type SceneNames = BTreeMap<String, Arc<BTreeMap<u32, SegmentName>>>;
 
 /// The keys of a line of `frames.jsonl` that are used.
 #[derive(Debug, Deserialize)]
-struct Line {
+struct FrameLine {
     scene: String,
     frame: String,
     rgb: PathBuf,
@@ -64,7 +64,7 @@ struct Line {
     depth_scale: Option<f64>,
     sem: Option<PathBuf>,
     over: Option<PathBuf>,
-    over_source: Option<OverSource>,
+    over_source: Option<SegmentSource>,
     depth_kind: Option<DepthKind>,
     intrinsics: Option<Intrinsics>,
     room_gt: Option<String>,
@@ -73,15 +73,20 @@ struct Line {
 /// Where a map of segments comes from.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(rename_all = "snake_case")]
-enum OverSource {
+enum SegmentSource {
     Renderer,
     ConnectedComponents,
     Superpixel,
 }
 
-impl Line {
+impl FrameLine {
     /// The files of the frame, all of which exist, and what its line says of them.
-    fn source(self, folder: &Path, about: &About, names: &Names) -> Result<Source, String> {
+    fn source(
+        self,
+        folder: &Path,
+        about: &DataSetInfo,
+        names: &SceneNames,
+    ) -> Result<ImageSource, String> {
         let existing = |file: PathBuf| {
             let path = folder.join(file);
             if path.is_file() {
@@ -92,7 +97,7 @@ impl Line {
         };
         let rgb = existing(self.rgb)?;
         let depth = self.depth.map(existing).transpose()?;
-        let maps = Maps {
+        let maps = MapPaths {
             depth: depth
                 .map(|path| DepthFile::new(path, self.depth_scale))
                 .transpose()?,
@@ -107,12 +112,12 @@ impl Line {
                 "a focal length of {focal} pixels; fx and fy above 0 expected"
             ));
         }
-        let view = View {
+        let view = FrameFacts {
             depth_kind: self.depth_kind.or(about.depth_kind).unwrap_or_default(),
             intrinsics: self.intrinsics,
             segmentation: match self.over_source {
-                Some(OverSource::Superpixel) => Segmentation::Parts,
-                Some(OverSource::Renderer | OverSource::ConnectedComponents) | None => {
+                Some(SegmentSource::Superpixel) => Segmentation::Parts,
+                Some(SegmentSource::Renderer | SegmentSource::ConnectedComponents) | None => {
                     Segmentation::Instances
                 }
             },
@@ -120,7 +125,7 @@ impl Line {
             room: self.room_gt,
             scene: self.scene,
         };
-        Ok(Source::File { rgb, maps, view })
+        Ok(ImageSource::File { rgb, maps, view })
     }
 }
 
@@ -149,12 +154,12 @@ pub(super) fn labels(folder: &Path) -> Result<Option<Labels>> {
     there.transpose()
 }
 
-fn about(folder: &Path) -> Result<About> {
+fn about(folder: &Path) -> Result<DataSetInfo> {
     let path = folder.join(DATASET);
     if !path.exists() {
-        return Ok(About::default());
+        return Ok(DataSetInfo::default());
     }
-    let about: About = json(&path)?;
+    let about: DataSetInfo = json(&path)?;
     if about.schema != SCHEMA {
         let problem = format_args!("schema {:?}; {SCHEMA:?} expected", about.schema);
         return Err(Error::data(path.display(), problem));
@@ -199,7 +204,7 @@ pub(super) fn open(folder: &Path, questions: Option<&Path>) -> Result<Dataset> {
 }
 
 /// The frames of a folder: those that its list names, else its images.
-pub(super) fn sources(folder: &Path) -> Result<BTreeMap<FrameId, Source>> {
+pub(super) fn sources(folder: &Path) -> Result<BTreeMap<FrameId, ImageSource>> {
     let list = folder.join(FRAMES);
     if list.exists() {
         listed(folder, &list)
@@ -209,17 +214,17 @@ pub(super) fn sources(folder: &Path) -> Result<BTreeMap<FrameId, Source>> {
 }
 
 /// One image file, named as it would be in its folder.
-pub(super) fn image(path: &Path) -> Result<BTreeMap<FrameId, Source>> {
+pub(super) fn image(path: &Path) -> Result<BTreeMap<FrameId, ImageSource>> {
     fs::metadata(path).map_err(|e| Error::file(path, "read", e))?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let id = FrameId(name.into_owned());
-    Ok([(id, Source::image(path.to_owned()))].into())
+    Ok([(id, ImageSource::image(path.to_owned()))].into())
 }
 
-fn listed(folder: &Path, list: &Path) -> Result<BTreeMap<FrameId, Source>> {
-    let (about, mut names) = (about(folder)?, Names::new());
+fn listed(folder: &Path, list: &Path) -> Result<BTreeMap<FrameId, ImageSource>> {
+    let (about, mut names) = (about(folder)?, SceneNames::new());
     let mut sources = BTreeMap::new();
-    for (number, line) in json_lines::<Line>(list)? {
+    for (number, line) in json_lines::<FrameLine>(list)? {
         let id = FrameId(format!("{}/{}", line.scene, line.frame));
         if !names.contains_key(&line.scene) {
             names.insert(line.scene.clone(), segment_names(folder, &line.scene)?);
@@ -235,11 +240,11 @@ fn listed(folder: &Path, list: &Path) -> Result<BTreeMap<FrameId, Source>> {
     Ok(sources)
 }
 
-fn images(folder: &Path) -> Result<BTreeMap<FrameId, Source>> {
+fn images(folder: &Path) -> Result<BTreeMap<FrameId, ImageSource>> {
     let mut sources = BTreeMap::new();
     for path in entries(folder)?.into_iter().filter(|path| is_image(path)) {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        sources.insert(FrameId(name.into_owned()), Source::image(path));
+        sources.insert(FrameId(name.into_owned()), ImageSource::image(path));
     }
     if sources.is_empty() {
         return Err(Error::data(

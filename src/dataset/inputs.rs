@@ -10,11 +10,11 @@ use crate::types::FrameId;
 /// The frames of all inputs.
 pub(crate) struct Inputs {
     sets: Vec<Dataset>,
-    pub(crate) entries: Vec<Entry>,
+    pub(crate) entries: Vec<InputFrame>,
 }
 
 /// One frame, and what its files are called.
-pub(crate) struct Entry {
+pub(crate) struct InputFrame {
     set: usize,
     pub(crate) id: FrameId,
     /// The path below the output folder, without the ending.
@@ -44,13 +44,13 @@ impl Inputs {
                     return Err(Error::usage("INPUT", problem));
                 }
                 let id = id.clone();
-                entries.push(Entry { set, id, stem });
+                entries.push(InputFrame { set, id, stem });
             }
         }
         Ok(Self { sets, entries })
     }
 
-    pub(crate) fn picture(&self, entry: &Entry) -> Result<Picture> {
+    pub(crate) fn picture(&self, entry: &InputFrame) -> Result<Picture> {
         self.sets[entry.set].picture(&entry.id)
     }
 }

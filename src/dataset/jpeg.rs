@@ -1,18 +1,18 @@
-//! What the markers of a JPEG file say of it: [`Outline`].
+//! What the markers of a JPEG file say of it: [`JpegOutline`].
 //!
 //! The decoder turns four inks into RGB without a word, and fills what a cut file lacks with grey; both would be asked
 //! about as if they were the image.
 
 /// What stands in a JPEG file beside the coded samples (ITU-T T.81, annex B).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct Outline {
+pub(super) struct JpegOutline {
     /// The components of a pixel: 1 for grey, 3 for colour, 4 for CMYK or YCCK; `None` without a frame header.
     pub(super) components: Option<u8>,
     /// Whether the end marker (EOI) is there.
     pub(super) ends: bool,
 }
 
-impl Outline {
+impl JpegOutline {
     /// Walks from marker to marker; a file that breaks off is walked as far as it goes.
     pub(super) fn of(file: &[u8]) -> Self {
         let mut outline = Self::default();
@@ -76,8 +76,8 @@ mod tests {
         grey[11] = 1;
         let file = [&grey[..2], &inner[..], &grey[2..], &TAIL].concat();
         assert_eq!(
-            Outline::of(&file),
-            Outline {
+            JpegOutline::of(&file),
+            JpegOutline {
                 components: Some(1),
                 ends: true
             }
@@ -85,8 +85,8 @@ mod tests {
         for length in 0..file.len() {
             let components = (length >= file.len() - TAIL.len()).then_some(1);
             assert_eq!(
-                Outline::of(&file[..length]),
-                Outline {
+                JpegOutline::of(&file[..length]),
+                JpegOutline {
                     components,
                     ends: false
                 },
@@ -99,7 +99,7 @@ mod tests {
     fn broken_lengths_end_the_walk() {
         for length in [[0, 0], [0, 1], [0xFF, 0xFF]] {
             let file = [&[0xFF, 0xD8, 0xFF, 0xC0][..], &length, &TAIL].concat();
-            assert_eq!(Outline::of(&file), Outline::default());
+            assert_eq!(JpegOutline::of(&file), JpegOutline::default());
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The maps that lie beside an image: [`Maps`].
+//! The maps that lie beside an image: [`MapPaths`].
 //!
 //! A map has one number for each pixel of its image and its very size: it is never scaled to fit, for between two ids
 //! there is no third.
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use ndarray::Array2;
 
 use super::npy::Npy;
-use super::raw_png::{Form, RawPng};
+use super::raw_png::{RawPng, SampleForm};
 use crate::error::{Error, Result};
 use crate::types::Digest;
 
@@ -19,7 +19,7 @@ const MOST_DEPTH: f64 = 1e6;
 
 /// The map files of a frame, each of which may be missing.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Maps {
+pub(crate) struct MapPaths {
     /// Depth.
     pub(crate) depth: Option<DepthFile>,
     /// The class of each pixel: a PNG file, 8-bit grey, 16-bit grey or with a palette whose places are the ids.
@@ -72,7 +72,7 @@ impl DepthFile {
     /// Depth of the file's own size.
     pub(crate) fn decode_alone(&self, bytes: &[u8]) -> Result<Array2<u32>, String> {
         let size = match self {
-            Self::Png { .. } => RawPng::open(bytes, &[Form::Grey16])?.size,
+            Self::Png { .. } => RawPng::open(bytes, &[SampleForm::Grey16])?.size,
             Self::Npy(_) => Npy::parse(bytes)?.size,
         };
         self.decode(bytes, size)
@@ -85,11 +85,11 @@ impl DepthFile {
                 let unit = scale * 1_000.0;
                 let table = (0..=u16::MAX).map(|units| millimetres(units.into(), unit));
                 let table: Vec<u32> = table.map(|depth| depth.unwrap_or(u32::MAX)).collect();
-                let depths = png(bytes, &[Form::Grey16], size, |units| {
+                let depths = png(bytes, &[SampleForm::Grey16], size, |units| {
                     table[usize::from(units)]
                 })?;
                 if let Some(at) = depths.iter().position(|depth| *depth == u32::MAX) {
-                    let units = png(bytes, &[Form::Grey16], size, |units| units)?[at];
+                    let units = png(bytes, &[SampleForm::Grey16], size, |units| units)?[at];
                     millimetres(units.into(), unit)?;
                 }
                 Array2::from_shape_vec(size, depths).map_err(|e| e.to_string())
@@ -102,7 +102,7 @@ impl DepthFile {
     }
 }
 
-impl Maps {
+impl MapPaths {
     /// No maps at all.
     pub(crate) const NONE: Self = Self {
         depth: None,
@@ -129,7 +129,7 @@ impl Maps {
 /// The bytes of a frame's map files.
 #[derive(Debug)]
 pub(crate) struct MapFiles<'a> {
-    maps: &'a Maps,
+    maps: &'a MapPaths,
     depth: Option<Vec<u8>>,
     semantic: Option<Vec<u8>>,
     segments: Option<Vec<u8>>,
@@ -187,7 +187,7 @@ impl MapFiles<'_> {
 type Size = (usize, usize);
 
 fn semantic(bytes: &[u8], size: Size) -> Result<Array2<u16>, String> {
-    let forms = [Form::Grey8, Form::Grey16, Form::Palette];
+    let forms = [SampleForm::Grey8, SampleForm::Grey16, SampleForm::Palette];
     let ids = png(bytes, &forms, size, |id| id)?;
     Array2::from_shape_vec(size, ids).map_err(|e| e.to_string())
 }
@@ -197,7 +197,7 @@ fn segments(bytes: &[u8], size: Size, as_npy: bool) -> Result<Array2<u32>, Strin
         return grid(size, npy(bytes, size)?.integers()?.map(segment));
     }
     // 8 bits hold 255 segments, and a wider id is cut to them without a trace.
-    let ids = png(bytes, &[Form::Grey16], size, u32::from)?;
+    let ids = png(bytes, &[SampleForm::Grey16], size, u32::from)?;
     Array2::from_shape_vec(size, ids).map_err(|e| e.to_string())
 }
 
@@ -239,7 +239,7 @@ fn of<T>(path: &Path, read: Result<T, String>) -> Result<T> {
 
 fn png<T: Clone>(
     bytes: &[u8],
-    forms: &[Form],
+    forms: &[SampleForm],
     size: Size,
     of: impl Fn(u16) -> T,
 ) -> Result<Vec<T>, String> {

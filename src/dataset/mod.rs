@@ -30,16 +30,16 @@ use crate::error::{Error, Result};
 use crate::rooms::{self, Rooms};
 use crate::types::{Frame, FrameId, Labels, Question};
 
-use maps::Maps;
+use maps::MapPaths;
 use picture::MOST_PIXELS;
 pub use picture::Picture;
 pub use settings::{DataArgs, PixelLimit, SelectionArgs, place};
+use view::FrameFacts;
 pub use view::FrameFiles;
-use view::View;
 
 /// Where the data are.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Place {
+pub enum DataPlace {
     /// The built-in rooms.
     Rooms(Rooms),
     /// A folder or file of the user's.
@@ -48,26 +48,26 @@ pub enum Place {
 
 /// Where one image is, with its maps.
 #[derive(Debug, Clone)]
-pub(crate) enum Source {
+pub(crate) enum ImageSource {
     /// An image file, and the map files beside it.
     File {
         rgb: PathBuf,
-        maps: Maps,
-        view: View,
+        maps: MapPaths,
+        view: FrameFacts,
     },
     /// A base64 cell of a table: the row's place in the file.
-    Cell(table::Cell),
+    Cell(table::ImageCell),
     /// A built-in room.
     Room(rooms::Room),
 }
 
-impl Source {
+impl ImageSource {
     /// An image file that has no maps.
     fn image(rgb: PathBuf) -> Self {
         Self::File {
             rgb,
-            maps: Maps::default(),
-            view: View::default(),
+            maps: MapPaths::default(),
+            view: FrameFacts::default(),
         }
     }
 }
@@ -78,14 +78,18 @@ pub struct Dataset {
     name: String,
     /// The name that the data set gives itself; empty where it gives none.
     title: String,
-    pub(crate) sources: BTreeMap<FrameId, Source>,
+    pub(crate) sources: BTreeMap<FrameId, ImageSource>,
     questions: Vec<Question>,
     labels: Option<Labels>,
     most_pixels: u64,
 }
 
 impl Dataset {
-    fn new(name: String, sources: BTreeMap<FrameId, Source>, questions: Vec<Question>) -> Self {
+    fn new(
+        name: String,
+        sources: BTreeMap<FrameId, ImageSource>,
+        questions: Vec<Question>,
+    ) -> Self {
         Self {
             name,
             title: String::new(),
@@ -100,10 +104,10 @@ impl Dataset {
     ///
     /// # Errors
     /// Where the place is no folder of frames.
-    pub fn open_unasked(place: &Place) -> Result<Self> {
+    pub fn open_unasked(place: &DataPlace) -> Result<Self> {
         match place {
-            Place::Rooms(rooms) => Ok(Self::of_rooms(*rooms)),
-            Place::Path(folder) => Self::of_frames(folder),
+            DataPlace::Rooms(rooms) => Ok(Self::of_rooms(*rooms)),
+            DataPlace::Path(folder) => Self::of_frames(folder),
         }
     }
 
@@ -111,7 +115,7 @@ impl Dataset {
     fn of_rooms(rooms: Rooms) -> Self {
         let sources = rooms
             .all()
-            .map(|(id, room)| (id, Source::Room(room)))
+            .map(|(id, room)| (id, ImageSource::Room(room)))
             .collect();
         Self {
             title: rooms.title(),
@@ -170,11 +174,11 @@ impl Dataset {
     ///
     /// # Errors
     /// With the file that cannot be read.
-    pub fn labels_at(place: &Place) -> Result<Option<Labels>> {
+    pub fn labels_at(place: &DataPlace) -> Result<Option<Labels>> {
         match place {
-            Place::Rooms(_) => Ok(Some(rooms::labels())),
-            Place::Path(path) if path.is_dir() => frames::labels(path),
-            Place::Path(_) => Ok(None),
+            DataPlace::Rooms(_) => Ok(Some(rooms::labels())),
+            DataPlace::Path(path) if path.is_dir() => frames::labels(path),
+            DataPlace::Path(_) => Ok(None),
         }
     }
 
@@ -202,9 +206,9 @@ impl Dataset {
     #[must_use]
     pub fn scene(&self, id: &FrameId) -> String {
         match self.sources.get(id) {
-            Some(Source::File { view, .. }) => view.scene.clone(),
-            Some(Source::Room(room)) => room.scene(),
-            Some(Source::Cell(_)) | None => String::new(),
+            Some(ImageSource::File { view, .. }) => view.scene.clone(),
+            Some(ImageSource::Room(room)) => room.scene(),
+            Some(ImageSource::Cell(_)) | None => String::new(),
         }
     }
 
@@ -213,24 +217,24 @@ impl Dataset {
     /// No image is read. Every question is checked: its choices, its answer among them, its frame among the images. The
     /// built-in rooms and a folder of frames with maps but without questions have none yet: they are made by rule, from what
     /// [`Self::labels`] says of the maps, and given by [`Self::with_questions`].
-    pub fn open(place: &Place, questions: Option<&Path>) -> Result<Self> {
+    pub fn open(place: &DataPlace, questions: Option<&Path>) -> Result<Self> {
         let dataset = match place {
-            Place::Rooms(rooms) => {
+            DataPlace::Rooms(rooms) => {
                 let rooms = Self::of_rooms(*rooms);
                 match questions {
                     Some(file) => rooms.asked(questions::read(file)?, file)?,
                     None => rooms,
                 }
             }
-            Place::Path(path) if multiple_choice::is_image_folder(path) => {
+            DataPlace::Path(path) if multiple_choice::is_image_folder(path) => {
                 refuse(
                     questions,
                     "a folder with metadata.jsonl brings its own questions",
                 )?;
                 multiple_choice::open_image_folder(path)?
             }
-            Place::Path(path) if path.is_dir() => frames::open(path, questions)?,
-            Place::Path(path) => {
+            DataPlace::Path(path) if path.is_dir() => frames::open(path, questions)?,
+            DataPlace::Path(path) => {
                 refuse(questions, "a ready-made set brings its own questions")?;
                 multiple_choice::open(path)?
             }
@@ -273,15 +277,15 @@ impl Dataset {
     /// The image of a frame as it lies in the data set, not decoded.
     pub fn picture(&self, frame: &FrameId) -> Result<Picture> {
         match self.sources.get(frame) {
-            Some(Source::File { rgb: path, .. }) => fs::read(path)
+            Some(ImageSource::File { rgb: path, .. }) => fs::read(path)
                 .map(|bytes| Picture::Encoded {
                     bytes,
                     place: path.display().to_string(),
                     most_pixels: self.most_pixels,
                 })
                 .map_err(|e| Error::file(path, "read", e)),
-            Some(Source::Cell(cell)) => cell.picture(self.most_pixels),
-            Some(Source::Room(room)) => Ok(Picture::Drawn(room.clone())),
+            Some(ImageSource::Cell(cell)) => cell.picture(self.most_pixels),
+            Some(ImageSource::Room(room)) => Ok(Picture::Drawn(room.clone())),
             None => Err(Error::data(
                 &self.name,
                 format_args!("no frame {:?} in it", frame.0),
@@ -293,8 +297,8 @@ impl Dataset {
     #[must_use]
     pub fn image_file(&self, frame: &FrameId) -> Option<&Path> {
         match self.sources.get(frame)? {
-            Source::File { rgb, .. } => Some(rgb),
-            Source::Cell(_) | Source::Room(_) => None,
+            ImageSource::File { rgb, .. } => Some(rgb),
+            ImageSource::Cell(_) | ImageSource::Room(_) => None,
         }
     }
 
@@ -303,10 +307,10 @@ impl Dataset {
     /// # Errors
     /// With the file that cannot be read.
     pub fn files<'a>(&'a self, frame: &'a FrameId) -> Result<FrameFiles<'a>> {
-        const NONE: &Maps = &Maps::NONE;
-        static UNKNOWN: LazyLock<View> = LazyLock::new(View::default);
+        const NONE: &MapPaths = &MapPaths::NONE;
+        static UNKNOWN: LazyLock<FrameFacts> = LazyLock::new(FrameFacts::default);
         let (maps, view) = match self.sources.get(frame) {
-            Some(Source::File { maps, view, .. }) => (maps, view),
+            Some(ImageSource::File { maps, view, .. }) => (maps, view),
             _ => (NONE, &*UNKNOWN),
         };
         Ok(FrameFiles {

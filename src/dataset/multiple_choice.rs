@@ -7,8 +7,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::beside::Beside;
-use super::{Dataset, Source, questions, stem, table};
+use super::beside::SiblingFiles;
+use super::{Dataset, ImageSource, questions, stem, table};
 use crate::error::{Error, Result};
 use crate::types::{FrameId, Question};
 
@@ -47,9 +47,9 @@ pub(super) fn open(path: &Path) -> Result<Dataset> {
     Ok(Dataset::new(stem(path), sources, questions))
 }
 
-fn jsonl(path: &Path) -> Result<(BTreeMap<FrameId, Source>, Vec<Question>)> {
+fn jsonl(path: &Path) -> Result<(BTreeMap<FrameId, ImageSource>, Vec<Question>)> {
     let mut questions = questions::read(path)?;
-    let beside = Beside::of(path);
+    let beside = SiblingFiles::of(path);
     let mut sources = BTreeMap::new();
     for question in &mut questions {
         let (frame, file) = beside.image(&question.frame.0).map_err(|problem| {
@@ -59,7 +59,7 @@ fn jsonl(path: &Path) -> Result<(BTreeMap<FrameId, Source>, Vec<Question>)> {
             )
         })?;
         question.frame = frame.clone();
-        sources.insert(frame, Source::image(file));
+        sources.insert(frame, ImageSource::image(file));
     }
     Ok((sources, questions))
 }

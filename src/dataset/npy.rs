@@ -23,12 +23,12 @@ static HEADER: LazyLock<Option<Regex>> = LazyLock::new(|| {
 
 /// How the numbers of a file are read, each from its bytes.
 #[derive(Debug, Clone, Copy)]
-enum Numbers {
+enum NumberForm {
     Floats(fn(&[u8]) -> f64),
     Integers(fn(&[u8]) -> i128),
 }
 
-impl Numbers {
+impl NumberForm {
     /// Those of one byte, and the little-endian ones: the size of one, and how it is read.
     fn of(descr: &str) -> Option<(usize, Self)> {
         Some(match descr {
@@ -55,7 +55,7 @@ fn sized<const N: usize>(chunk: &[u8]) -> [u8; N] {
 /// A two-dimensional array in a file's bytes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Npy<'a> {
-    numbers: Numbers,
+    numbers: NumberForm,
     /// The size of a number in bytes.
     width: usize,
     /// Height and width.
@@ -75,7 +75,7 @@ impl<'a> Npy<'a> {
             let header = header.trim_end();
             format!("its header is not that of one .npy array: {header:.200}")
         })?;
-        let (width, numbers) = Numbers::of(descr).ok_or_else(|| {
+        let (width, numbers) = NumberForm::of(descr).ok_or_else(|| {
             format!("its numbers are {descr:?}; little-endian integers or floats of 4 or 8 bytes expected")
         })?;
         if fortran == "True" {
@@ -104,8 +104,8 @@ impl<'a> Npy<'a> {
     /// The numbers, row by row, where they are floating-point.
     pub(crate) fn floats(self) -> Result<impl Iterator<Item = f64>, String> {
         match self.numbers {
-            Numbers::Floats(read) => Ok(self.data.chunks_exact(self.width).map(read)),
-            Numbers::Integers(_) => {
+            NumberForm::Floats(read) => Ok(self.data.chunks_exact(self.width).map(read)),
+            NumberForm::Integers(_) => {
                 Err("it holds integers; floats of 4 or 8 bytes expected".to_owned())
             }
         }
@@ -114,8 +114,8 @@ impl<'a> Npy<'a> {
     /// The numbers, row by row, where they are integers.
     pub(crate) fn integers(self) -> Result<impl Iterator<Item = i128>, String> {
         match self.numbers {
-            Numbers::Integers(read) => Ok(self.data.chunks_exact(self.width).map(read)),
-            Numbers::Floats(_) => Err("it holds floats; integers expected".to_owned()),
+            NumberForm::Integers(read) => Ok(self.data.chunks_exact(self.width).map(read)),
+            NumberForm::Floats(_) => Err("it holds floats; integers expected".to_owned()),
         }
     }
 }

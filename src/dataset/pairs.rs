@@ -35,7 +35,7 @@ pub struct Pairs {
 
 /// Which of a pair's images a name is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Light {
+enum PairSide {
     Normal,
     Low,
 }
@@ -119,11 +119,11 @@ fn add(side: &mut BTreeMap<String, PathBuf>, name: String, path: &Path) -> Resul
 
 /// A name without the words at its ends that say which light it is of, and that light; what begins as one and ends as the
 /// other is of the light that it begins with.
-fn role(stem: &str) -> (String, Option<Light>) {
-    const WORDS: [(&str, Light); 3] = [
-        ("normal", Light::Normal),
-        ("high", Light::Normal),
-        ("low", Light::Low),
+fn role(stem: &str) -> (String, Option<PairSide>) {
+    const WORDS: [(&str, PairSide); 3] = [
+        ("normal", PairSide::Normal),
+        ("high", PairSide::Normal),
+        ("low", PairSide::Low),
     ];
     let bare = |rest: &str| rest.trim_matches(['_', '-', '.', ' ']).to_owned();
     let lower = stem.to_ascii_lowercase();

@@ -4,7 +4,7 @@ use std::io::Cursor;
 
 use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 
-use super::jpeg::Outline;
+use super::jpeg::JpegOutline;
 use crate::error::{Error, Result};
 use crate::rooms::Room;
 use crate::types::{Digest, Rgb};
@@ -116,7 +116,7 @@ fn decoder<'a>(bytes: &'a [u8], place: &str, most_pixels: u64) -> Result<impl Im
             "{width} × {height} pixels are more than the {most_pixels} that are read; shrink it first, or raise --max-pixels"
         )));
     }
-    if !bytes.starts_with(PNG) && Outline::of(bytes).components == Some(4) {
+    if !bytes.starts_with(PNG) && JpegOutline::of(bytes).components == Some(4) {
         return Err(wrong(
             "a CMYK image (four components: CMYK or YCCK); convert it to RGB first".to_owned(),
         ));
@@ -128,7 +128,7 @@ fn decoder<'a>(bytes: &'a [u8], place: &str, most_pixels: u64) -> Result<impl Im
 fn whole(file: &[u8], place: &str) -> Result<()> {
     let fault = match file.strip_prefix(PNG) {
         Some(chunks) => png_fault(chunks),
-        None if Outline::of(file).ends => None,
+        None if JpegOutline::of(file).ends => None,
         None => Some(CUT),
     };
     let problem = match fault {

@@ -15,7 +15,7 @@ use crate::files::reading::json_lines;
 use crate::types::{Choices, Family, FrameId, Question, QuestionId};
 
 #[derive(Debug, Deserialize)]
-struct Line {
+struct QuestionLine {
     id: Value,
     #[serde(alias = "image")]
     frame: String,
@@ -57,7 +57,7 @@ pub fn read(path: &Path) -> Result<Vec<Question>> {
     lines
         .map(|(number, value)| {
             let value = translated(value).map_err(|problem| Error::line(path, number, problem))?;
-            let line = serde_json::from_value::<Line>(value)
+            let line = serde_json::from_value::<QuestionLine>(value)
                 .map_err(|e| Error::json_line(path, number, &e))?;
             line.into_question()
                 .map_err(|e| e.at(format!("{}, line {number}", path.display())))
@@ -65,7 +65,7 @@ pub fn read(path: &Path) -> Result<Vec<Question>> {
         .collect()
 }
 
-impl Line {
+impl QuestionLine {
     fn into_question(self) -> Result<Question> {
         let id = match self.id {
             Value::String(id) if !id.is_empty() => id,

@@ -12,7 +12,7 @@ use crate::types::words::words;
 
 /// What the samples of a PNG file are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Form {
+pub(crate) enum SampleForm {
     /// Grey of 8 bits.
     Grey8,
     /// Grey of 16 bits.
@@ -21,7 +21,7 @@ pub(crate) enum Form {
     Palette,
 }
 
-words!(Form { Grey8 = "8-bit grey", Grey16 = "16-bit grey", Palette = "palette" });
+words!(SampleForm { Grey8 = "8-bit grey", Grey16 = "16-bit grey", Palette = "palette" });
 
 /// A PNG file of one number a pixel, not yet inflated.
 pub(crate) struct RawPng<'a> {
@@ -32,12 +32,12 @@ pub(crate) struct RawPng<'a> {
 
 impl<'a> RawPng<'a> {
     /// Reads the header; a file of another form than `forms` or of too many pixels is refused.
-    pub(crate) fn open(bytes: &'a [u8], forms: &[Form]) -> Result<Self, String> {
+    pub(crate) fn open(bytes: &'a [u8], forms: &[SampleForm]) -> Result<Self, String> {
         let mut decoder = Decoder::new(Cursor::new(bytes));
         decoder.set_transformations(Transformations::IDENTITY);
         decoder.set_ignore_text_chunk(true);
         decoder.set_ignore_iccp_chunk(true);
-        let expected = forms.iter().map(Form::to_string).collect::<Vec<_>>();
+        let expected = forms.iter().map(SampleForm::to_string).collect::<Vec<_>>();
         let expected = expected.join(" or ");
         let reader = decoder
             .read_info()
@@ -110,11 +110,11 @@ fn sample(row: &[u8], x: usize, bits: BitDepth) -> u16 {
 ///
 /// Grey of fewer than 8 bits has none: such a file may as well be one of 8 bits that an optimiser packed, where 1 stands
 /// for 255, 85 or 17.
-fn form(color: ColorType, bits: BitDepth) -> Option<Form> {
+fn form(color: ColorType, bits: BitDepth) -> Option<SampleForm> {
     match (color, bits) {
-        (ColorType::Grayscale, BitDepth::Eight) => Some(Form::Grey8),
-        (ColorType::Grayscale, BitDepth::Sixteen) => Some(Form::Grey16),
-        (ColorType::Indexed, _) => Some(Form::Palette),
+        (ColorType::Grayscale, BitDepth::Eight) => Some(SampleForm::Grey8),
+        (ColorType::Grayscale, BitDepth::Sixteen) => Some(SampleForm::Grey16),
+        (ColorType::Indexed, _) => Some(SampleForm::Palette),
         _ => None,
     }
 }

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::Place;
+use super::DataPlace;
 use super::picture::MOST_PIXELS;
 use crate::rooms::Rooms;
 use crate::types::Family;
@@ -18,7 +18,7 @@ use crate::types::Family;
 pub struct DataArgs {
     /// A folder of frames, a ready-made set (.tsv, .jsonl), or built-in rooms, rooms:frames=N,seed=N,size=WIDTHxHEIGHT
     #[arg(long, value_name = "DIR|FILE|rooms:…", value_parser = place, default_value_t)]
-    pub data: Place,
+    pub data: DataPlace,
 }
 
 /// Which questions about them are asked.
@@ -46,12 +46,12 @@ pub struct PixelLimit {
 }
 
 /// Reads a path, `rooms` or `rooms:frames=48,seed=7,size=1280x720`; a file or folder named rooms goes before the built-in ones.
-pub fn place(text: &str) -> Result<Place, String> {
+pub fn place(text: &str) -> Result<DataPlace, String> {
     let path = PathBuf::from(text);
     match text.strip_prefix("rooms:") {
-        Some(rooms) => rooms.parse().map(Place::Rooms),
-        None if text == "rooms" && !path.exists() => Ok(Place::Rooms(Rooms::default())),
-        None => Ok(Place::Path(path)),
+        Some(rooms) => rooms.parse().map(DataPlace::Rooms),
+        None if text == "rooms" && !path.exists() => Ok(DataPlace::Rooms(Rooms::default())),
+        None => Ok(DataPlace::Path(path)),
     }
 }
 
@@ -60,13 +60,13 @@ fn family(name: &str) -> Result<Family, Infallible> {
     Ok(Family::from(name.trim()))
 }
 
-impl Default for Place {
+impl Default for DataPlace {
     fn default() -> Self {
         Self::Rooms(Rooms::default())
     }
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for DataPlace {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Rooms(rooms) => write!(f, "rooms:{rooms}"),

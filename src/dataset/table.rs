@@ -12,8 +12,8 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use csv::{ByteRecord, Position, Reader, ReaderBuilder, StringRecord};
 
-use super::beside::Beside;
-use super::{Picture, Source, questions};
+use super::beside::SiblingFiles;
+use super::{ImageSource, Picture, questions};
 use crate::error::{Error, Result};
 use crate::types::question::letter;
 use crate::types::{Choices, Family, FrameId, Question, QuestionId};
@@ -22,7 +22,7 @@ use crate::types::{Choices, Family, FrameId, Question, QuestionId};
 const LONGEST_INDEX: usize = 64;
 
 /// The columns of a table by what they hold.
-struct Columns {
+struct TableColumns {
     index: usize,
     question: usize,
     answer: usize,
@@ -37,7 +37,7 @@ enum ImageColumn {
     Base64(usize),
 }
 
-impl Columns {
+impl TableColumns {
     fn of(header: &StringRecord) -> Result<Self, String> {
         let find = |name: &str| header.iter().position(|column| column.trim() == name);
         let need = |name: &str| find(name).ok_or_else(|| format!("the column {name:?} is missing"));
@@ -127,18 +127,18 @@ fn reader(path: &Path) -> Result<Reader<File>> {
 }
 
 /// Reads the table: its images and its questions.
-pub(super) fn read(path: &Path) -> Result<(BTreeMap<FrameId, Source>, Vec<Question>)> {
+pub(super) fn read(path: &Path) -> Result<(BTreeMap<FrameId, ImageSource>, Vec<Question>)> {
     let mut reader = reader(path)?;
     let header = reader
         .headers()
         .map_err(|e| Error::data(path.display(), e))?;
-    let columns = Columns::of(header).map_err(|problem| {
+    let columns = TableColumns::of(header).map_err(|problem| {
         Error::data(
             path.display(),
             format_args!("not a VLMEvalKit table: {problem}"),
         )
     })?;
-    let beside = Beside::of(path);
+    let beside = SiblingFiles::of(path);
     let (mut sources, mut questions) = (BTreeMap::new(), Vec::new());
     let mut row = StringRecord::new();
     while reader
@@ -154,7 +154,7 @@ pub(super) fn read(path: &Path) -> Result<(BTreeMap<FrameId, Source>, Vec<Questi
                 let (frame, file) = beside
                     .image(image)
                     .map_err(|problem| Error::data(&place, problem))?;
-                sources.insert(frame.clone(), Source::image(file));
+                sources.insert(frame.clone(), ImageSource::image(file));
                 frame
             }
             ImageColumn::Base64(column) => match filled(&row, column, "image").map_err(at)? {
@@ -162,12 +162,12 @@ pub(super) fn read(path: &Path) -> Result<(BTreeMap<FrameId, Source>, Vec<Questi
                 _ => {
                     let index = filled(&row, columns.index, "index").map_err(at)?;
                     let frame = FrameId(index.to_owned());
-                    let cell = Cell {
+                    let cell = ImageCell {
                         file: path.to_owned(),
                         position: position.clone(),
                         column,
                     };
-                    sources.insert(frame.clone(), Source::Cell(cell));
+                    sources.insert(frame.clone(), ImageSource::Cell(cell));
                     frame
                 }
             },
@@ -189,13 +189,13 @@ pub(super) fn read(path: &Path) -> Result<(BTreeMap<FrameId, Source>, Vec<Questi
 
 /// The place of an image in a table: read when it is needed, so that a table of gigabytes is never held.
 #[derive(Debug, Clone)]
-pub(crate) struct Cell {
+pub(crate) struct ImageCell {
     file: PathBuf,
     position: Position,
     column: usize,
 }
 
-impl Cell {
+impl ImageCell {
     pub(super) fn picture(&self, most_pixels: u64) -> Result<Picture> {
         let place = format!("{}, line {}", self.file.display(), self.position.line());
         let mut reader = reader(&self.file)?;

@@ -1,4 +1,4 @@
-//! What a data set says of a frame beside its files: [`View`]; and the files' bytes: [`FrameFiles`].
+//! What a data set says of a frame beside its files: [`FrameFacts`]; and the files' bytes: [`FrameFiles`].
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use crate::types::{DepthKind, Digest, Frame, FrameId, Intrinsics, SegmentName, S
 
 /// What a data set says of a frame beside its files.
 #[derive(Debug, Clone, Default, Serialize)]
-pub(crate) struct View {
+pub(crate) struct FrameFacts {
     pub(crate) scene: String,
     pub(crate) depth_kind: DepthKind,
     pub(crate) intrinsics: Option<Intrinsics>,
@@ -36,7 +36,7 @@ pub struct FrameFiles<'a> {
     pub(crate) id: &'a FrameId,
     pub(crate) picture: Picture,
     pub(crate) maps: MapFiles<'a>,
-    pub(crate) view: &'a View,
+    pub(crate) view: &'a FrameFacts,
 }
 
 impl FrameFiles<'_> {

@@ -15,7 +15,7 @@ use crate::types::{DepthKind, Intrinsics, Labels, Rgb, SegmentName, Segmentation
 /// What the user says of a data set's maps and its camera.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Maps")]
-pub struct Stated {
+pub struct StatedArgs {
     /// The label space of the class maps: nyu40, nyu40-1 (from 0, 255 for void; kind nyu), nyu13, mpcat40, ade150, or a
     /// classes.json; default: what the kind has
     #[arg(long, value_name = "NAME|FILE")]
@@ -40,7 +40,7 @@ fn degrees(text: &str) -> Result<f64, String> {
 
 /// A frame that can be read.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Incoming {
+pub struct ListedFrame {
     /// Its scene.
     pub scene: String,
     /// Its name in the scene.
@@ -61,7 +61,7 @@ pub struct Incoming {
 
 /// The maps of a frame, of its image's size.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Read {
+pub struct FrameMaps {
     /// Depth in millimetres, 0 where there is none.
     pub depth: Option<Array2<u32>>,
     /// Numbers of the label space.
@@ -76,7 +76,7 @@ pub struct Read {
 #[derive(Debug, Default)]
 pub struct Listing {
     /// Its frames, by scene and name.
-    pub frames: Vec<Incoming>,
+    pub frames: Vec<ListedFrame>,
     /// What its numbers stand for.
     pub labels: Labels,
     /// What is known of each scene's segments by name.
@@ -90,19 +90,19 @@ pub struct Listing {
     /// The horizontal field of view in degrees, of frames whose camera is not known.
     pub hfov: Option<f64>,
     /// The camera of images of its own size, where nobody says another.
-    pub(super) sensor: Option<Sensor>,
+    pub(super) sensor: Option<SizedCamera>,
 }
 
 /// A camera, and the width and height of its images.
 #[derive(Debug)]
-pub(super) struct Sensor {
+pub(super) struct SizedCamera {
     pub(super) size: (usize, usize),
     pub(super) camera: Intrinsics,
 }
 
 impl Listing {
     /// A data set whose labels are those of mpcat40, as adapters by name write them.
-    pub(super) fn by_name(stated: &Stated) -> Self {
+    pub(super) fn by_name(stated: &StatedArgs) -> Self {
         Self {
             labels: labels::space("mpcat40").unwrap_or_default(),
             hfov: stated.hfov,
@@ -117,7 +117,7 @@ pub trait Adapter: fmt::Debug + Sync {
     fn listing(&self) -> &Listing;
 
     /// How the camera of a frame projects, in pixels of its image.
-    fn camera(&self, frame: &Incoming, rgb: &Rgb) -> Option<Intrinsics> {
+    fn camera(&self, frame: &ListedFrame, rgb: &Rgb) -> Option<Intrinsics> {
         let (width, height) = (rgb.width(), rgb.height());
         let Listing { hfov, sensor, .. } = self.listing();
         let stated = hfov.map(|hfov| pinhole(width, height, hfov));
@@ -132,11 +132,11 @@ pub trait Adapter: fmt::Debug + Sync {
     ///
     /// # Errors
     /// With the file: one that cannot be read, or is of another form or size than it should be.
-    fn read(&self, frame: &Incoming, rgb: &Rgb) -> Result<Read>;
+    fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps>;
 }
 
 /// The label space that the user names: a built-in one, or a file.
-pub(super) fn labels(stated: &Stated) -> Result<Option<Labels>> {
+pub(super) fn labels(stated: &StatedArgs) -> Result<Option<Labels>> {
     let Some(name) = &stated.labels else {
         return Ok(None);
     };

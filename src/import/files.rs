@@ -8,7 +8,7 @@ use ndarray::Array2;
 use crate::dataset::maps::DepthFile;
 use crate::dataset::npy::Npy;
 use crate::dataset::picture::{MOST_PIXELS, Picture};
-use crate::dataset::raw_png::{Form, RawPng};
+use crate::dataset::raw_png::{RawPng, SampleForm};
 use crate::error::{Error, Result};
 use crate::files::reading::{bytes, entries, text};
 use crate::types::Rgb;
@@ -63,7 +63,7 @@ pub(super) fn last(path: &Path) -> String {
 }
 
 /// The numbers of a PNG file of one of these forms.
-pub(super) fn png(path: &Path, forms: &[Form]) -> Result<Array2<u16>> {
+pub(super) fn png(path: &Path, forms: &[SampleForm]) -> Result<Array2<u16>> {
     let bytes = bytes(path)?;
     let read = || {
         let png = RawPng::open(&bytes, forms)?;
@@ -77,7 +77,7 @@ pub(super) fn png(path: &Path, forms: &[Form]) -> Result<Array2<u16>> {
 pub(super) fn segments(path: &Path) -> Result<Array2<u32>> {
     let ending = path.extension();
     if ending.is_some_and(|ending| ending.eq_ignore_ascii_case("png")) {
-        return Ok(png(path, &[Form::Grey16])?.mapv(u32::from));
+        return Ok(png(path, &[SampleForm::Grey16])?.mapv(u32::from));
     }
     let bytes = bytes(path)?;
     let read = || {

@@ -5,9 +5,9 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::adapter::{Adapter, Incoming, Listing, Read, Stated, labels};
+use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, StatedArgs, labels};
 use super::files::{depth_of, files, first, folders, png, same_size, segments};
-use crate::dataset::raw_png::Form;
+use crate::dataset::raw_png::SampleForm;
 use crate::error::{Error, Result};
 use crate::types::{Labels, Rgb};
 
@@ -37,15 +37,15 @@ const SEGMENTS: [&str; 6] = [
 #[derive(Debug)]
 pub(super) struct Folder {
     pub(super) listing: Listing,
-    maps: Vec<Maps>,
+    maps: Vec<FolderMaps>,
     depth_scale: Option<f64>,
     /// How the numbers of the class maps are told from those of the label space.
-    offset: Offset,
+    offset: NumberOffset,
 }
 
 /// How the numbers of class maps lie.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Offset {
+pub(super) enum NumberOffset {
     /// As in the label space.
     None,
     /// One less, with 255 for void.
@@ -53,14 +53,14 @@ pub(super) enum Offset {
 }
 
 #[derive(Debug)]
-struct Maps {
+struct FolderMaps {
     depth: Option<PathBuf>,
     classes: Option<PathBuf>,
     segments: Option<PathBuf>,
 }
 
 impl Folder {
-    pub(super) fn open(folder: &Path, stated: &Stated) -> Result<Self> {
+    pub(super) fn open(folder: &Path, stated: &StatedArgs) -> Result<Self> {
         let known = folder.join("classes.json");
         let labels = match labels(stated)? {
             Some(labels) => labels,
@@ -70,14 +70,14 @@ impl Folder {
                 return Err(Error::usage("--labels", problem));
             }
         };
-        Self::of(folder, stated, labels, Offset::None)
+        Self::of(folder, stated, labels, NumberOffset::None)
     }
 
     pub(super) fn of(
         folder: &Path,
-        stated: &Stated,
+        stated: &StatedArgs,
         labels: Labels,
-        offset: Offset,
+        offset: NumberOffset,
     ) -> Result<Self> {
         let mut set = Self {
             listing: Listing {
@@ -118,12 +118,12 @@ impl Folder {
         let mut classes = in_any(&CLASSES, &[".png"])?;
         let mut segments = in_any(&SEGMENTS, &[".npy", ".png"])?;
         for (frame, rgb) in images {
-            self.maps.push(Maps {
+            self.maps.push(FolderMaps {
                 depth: depths.remove(&frame),
                 classes: classes.remove(&frame),
                 segments: segments.remove(&frame),
             });
-            self.listing.frames.push(Incoming {
+            self.listing.frames.push(ListedFrame {
                 scene: scene.clone(),
                 frame,
                 time: None,
@@ -153,16 +153,19 @@ impl Adapter for Folder {
         &self.listing
     }
 
-    fn read(&self, frame: &Incoming, rgb: &Rgb) -> Result<Read> {
+    fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {
         let maps = &self.maps[frame.index];
-        let mut read = Read {
+        let mut read = FrameMaps {
             depth: depth_of(maps.depth.as_deref(), self.depth_scale, rgb)?,
-            ..Read::default()
+            ..FrameMaps::default()
         };
         if let Some(path) = &maps.classes {
-            let mut classes = png(path, &[Form::Grey8, Form::Grey16, Form::Palette])?;
+            let mut classes = png(
+                path,
+                &[SampleForm::Grey8, SampleForm::Grey16, SampleForm::Palette],
+            )?;
             same_size(path, &classes, rgb)?;
-            if self.offset == Offset::One {
+            if self.offset == NumberOffset::One {
                 classes.mapv_inplace(|id| if id == 255 { 0 } else { id + 1 });
             }
             read.semantic = Some(classes);

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::adapter::{Adapter, Incoming, Listing, Read, Stated, numbers};
+use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, StatedArgs, numbers};
 use super::files::{depth_of, files, folders, last, same_size, segments};
 use super::{hm3d, mp3d, replica};
 use crate::error::{Error, Result};
@@ -25,25 +25,25 @@ pub(super) struct Habitat {
     listing: Listing,
     /// Depth and semantic map of each.
     maps: Vec<(Option<PathBuf>, PathBuf)>,
-    scenes: BTreeMap<String, Scene>,
+    scenes: BTreeMap<String, SceneFiles>,
     numbers: BTreeMap<String, u16>,
     depth_scale: Option<f64>,
 }
 
 /// What a scene's own files say.
 #[derive(Debug, Default)]
-struct Scene {
+struct SceneFiles {
     rooms: BTreeMap<i64, &'static str>,
     /// What is added to the numbers of instances: 1 where one of them is 0, which stands for none elsewhere.
     shift: u32,
 }
 
 /// The instances of a scene by number.
-type Names = BTreeMap<u32, SegmentName>;
+type InstanceNames = BTreeMap<u32, SegmentName>;
 
 /// A line of `trajectory.jsonl`.
 #[derive(Deserialize)]
-struct Step {
+struct TrajectoryStep {
     frame: String,
     t: Option<f64>,
     pose: Option<Vec<f64>>,
@@ -51,7 +51,7 @@ struct Step {
 }
 
 impl Habitat {
-    pub(super) fn open(folder: &Path, stated: &Stated) -> Result<Self> {
+    pub(super) fn open(folder: &Path, stated: &StatedArgs) -> Result<Self> {
         let listing = Listing {
             depth_kind: stated.depth_kind.unwrap_or_default(),
             ..Listing::by_name(stated)
@@ -84,7 +84,7 @@ impl Habitat {
                 return Err(Error::data(folder.join("semantic").display(), problem));
             };
             let step = steps.remove(&frame);
-            self.listing.frames.push(Incoming {
+            self.listing.frames.push(ListedFrame {
                 scene: name.clone(),
                 time: step.as_ref().and_then(|step| step.t),
                 intrinsics: step.as_ref().and_then(|step| step.intrinsics),
@@ -103,7 +103,7 @@ impl Habitat {
     }
 
     /// Reads the one file that names a scene's instances.
-    fn scene(&mut self, folder: &Path) -> Result<(Scene, Names)> {
+    fn scene(&mut self, folder: &Path) -> Result<(SceneFiles, InstanceNames)> {
         let annotations = files(folder, &[".semantic.txt", ".house", "info_semantic.json"])?;
         let Some(path) = annotations.into_values().next() else {
             let problem = "none of *.semantic.txt (HM3D-Sem), *.house (Matterport3D), info_semantic.json (Replica) in this folder: nothing names the instances of its maps";
@@ -128,16 +128,16 @@ impl Habitat {
         }
         let shift = u32::from(names.contains_key(&0));
         let names = names.into_iter().map(|(id, name)| (id + shift, name));
-        Ok((Scene { rooms, shift }, names.collect()))
+        Ok((SceneFiles { rooms, shift }, names.collect()))
     }
 }
 
 /// The steps of a trajectory by frame; none where there is no such file.
-fn steps(path: &Path) -> Result<BTreeMap<String, Step>> {
+fn steps(path: &Path) -> Result<BTreeMap<String, TrajectoryStep>> {
     if !path.exists() {
         return Ok(BTreeMap::new());
     }
-    let steps = json_lines::<Step>(path)?.into_iter();
+    let steps = json_lines::<TrajectoryStep>(path)?.into_iter();
     Ok(steps.map(|(_, step)| (step.frame.clone(), step)).collect())
 }
 
@@ -146,7 +146,7 @@ impl Adapter for Habitat {
         &self.listing
     }
 
-    fn read(&self, frame: &Incoming, rgb: &Rgb) -> Result<Read> {
+    fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {
         let (deep, semantic) = &self.maps[frame.index];
         let scene = &self.scenes[&frame.scene];
         let names = &self.listing.names[&frame.scene];
@@ -185,7 +185,7 @@ impl Adapter for Habitat {
             .unwrap_or((None, 0));
         let room = region.and_then(|region| scene.rooms.get(&region));
         let room = room.filter(|_| most * 100 >= with_region * MOST_OF_FRAME);
-        Ok(Read {
+        Ok(FrameMaps {
             depth,
             semantic: Some(classes),
             segments: Some(segments),

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use super::adapter::{Adapter, Incoming, Listing, Read};
-use crate::dataset::{Dataset, Source};
+use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing};
+use crate::dataset::{Dataset, ImageSource};
 use crate::error::{Error, Result};
 use crate::files::reading::json_lines;
 use crate::types::{DepthKind, Frame, FrameId, Rgb, Segmentation};
@@ -19,7 +19,7 @@ pub(super) struct Interface {
 
 /// What is read of a line of `frames.jsonl` beyond what the data set itself reads.
 #[derive(Deserialize)]
-struct Line {
+struct InterfaceLine {
     scene: String,
     frame: String,
     t: Option<f64>,
@@ -36,7 +36,7 @@ impl Interface {
                 "no classes.json in this folder",
             ));
         };
-        let lines = json_lines::<Line>(&folder.join("frames.jsonl"))?;
+        let lines = json_lines::<InterfaceLine>(&folder.join("frames.jsonl"))?;
         let depth_kind = lines.iter().find_map(|(_, line)| line.depth_kind);
         let mut listing = Listing {
             labels,
@@ -45,7 +45,7 @@ impl Interface {
         };
         for (index, (_, line)) in lines.into_iter().enumerate() {
             let id = FrameId(format!("{}/{}", line.scene, line.frame));
-            let Some(Source::File { rgb, view, .. }) = dataset.sources.get(&id) else {
+            let Some(ImageSource::File { rgb, view, .. }) = dataset.sources.get(&id) else {
                 continue;
             };
             if view.segmentation == Segmentation::Parts {
@@ -55,7 +55,7 @@ impl Interface {
                 .names
                 .entry(line.scene.clone())
                 .or_insert_with(|| view.names.as_ref().clone());
-            listing.frames.push(Incoming {
+            listing.frames.push(ListedFrame {
                 rgb: rgb.clone(),
                 scene: line.scene,
                 frame: line.frame,
@@ -78,7 +78,7 @@ impl Adapter for Interface {
         &self.listing
     }
 
-    fn read(&self, frame: &Incoming, _rgb: &Rgb) -> Result<Read> {
+    fn read(&self, frame: &ListedFrame, _rgb: &Rgb) -> Result<FrameMaps> {
         let Frame {
             depth,
             semantic,
@@ -87,7 +87,7 @@ impl Adapter for Interface {
         } = self
             .dataset
             .frame(&FrameId(format!("{}/{}", frame.scene, frame.frame)))?;
-        Ok(Read {
+        Ok(FrameMaps {
             depth,
             semantic,
             segments,

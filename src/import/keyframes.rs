@@ -1,10 +1,10 @@
-//! Key frames, uniform in time along a trajectory: [`Every`].
+//! Key frames, uniform in time along a trajectory: [`KeyFrames`].
 
 use std::num::NonZeroUsize;
 
 use clap::Args;
 
-use super::adapter::Incoming;
+use super::adapter::ListedFrame;
 use crate::error::{Error, Result};
 use crate::types::flag::positive;
 
@@ -26,18 +26,18 @@ pub struct KeyFrameArgs {
 impl KeyFrameArgs {
     /// Which frames are kept.
     #[must_use]
-    pub fn kept(&self) -> Every {
+    pub fn kept(&self) -> KeyFrames {
         match (self.every, self.count) {
-            (Some(seconds), _) => Every::Seconds(seconds),
-            (None, Some(count)) => Every::Count(count.get()),
-            (None, None) => Every::Frame,
+            (Some(seconds), _) => KeyFrames::Seconds(seconds),
+            (None, Some(count)) => KeyFrames::Count(count.get()),
+            (None, None) => KeyFrames::Frame,
         }
     }
 }
 
 /// Which frames of each scene are kept.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Every {
+pub enum KeyFrames {
     /// All.
     Frame,
     /// One for each so many seconds, counted from the scene's first (DarkQA: 2).
@@ -53,10 +53,14 @@ pub enum Every {
 ///
 /// # Errors
 /// Where frames have no time and one is needed.
-pub fn choose(frames: &[Incoming], every: Every, fps: Option<f64>) -> Result<Vec<Incoming>> {
+pub fn choose(
+    frames: &[ListedFrame],
+    every: KeyFrames,
+    fps: Option<f64>,
+) -> Result<Vec<ListedFrame>> {
     let mut chosen = Vec::new();
     for scene in frames.chunk_by(|a, b| a.scene == b.scene) {
-        let mut timed: Vec<Incoming> = scene.to_vec();
+        let mut timed: Vec<ListedFrame> = scene.to_vec();
         if let Some(fps) = fps.filter(|_| scene.iter().all(|frame| frame.time.is_none())) {
             for (i, frame) in timed.iter_mut().enumerate() {
                 frame.time = Some(i as f64 / fps);
@@ -68,9 +72,9 @@ pub fn choose(frames: &[Incoming], every: Every, fps: Option<f64>) -> Result<Vec
                 .unwrap_or(std::cmp::Ordering::Equal)
         });
         match every {
-            Every::Frame => {}
-            Every::Count(count) => timed = spread(timed, count),
-            Every::Seconds(seconds) => timed = seldom(timed, seconds)?,
+            KeyFrames::Frame => {}
+            KeyFrames::Count(count) => timed = spread(timed, count),
+            KeyFrames::Seconds(seconds) => timed = seldom(timed, seconds)?,
         }
         chosen.extend(timed);
     }
@@ -78,7 +82,7 @@ pub fn choose(frames: &[Incoming], every: Every, fps: Option<f64>) -> Result<Vec
     Ok(chosen)
 }
 
-fn spread(frames: Vec<Incoming>, count: usize) -> Vec<Incoming> {
+fn spread(frames: Vec<ListedFrame>, count: usize) -> Vec<ListedFrame> {
     let (last, gaps) = (frames.len() - 1, count.saturating_sub(1));
     let mut places: Vec<usize> = (0..count)
         .map(|k| match gaps {
@@ -87,15 +91,15 @@ fn spread(frames: Vec<Incoming>, count: usize) -> Vec<Incoming> {
         })
         .collect();
     places.dedup();
-    let mut frames: Vec<Option<Incoming>> = frames.into_iter().map(Some).collect();
+    let mut frames: Vec<Option<ListedFrame>> = frames.into_iter().map(Some).collect();
     places
         .into_iter()
         .filter_map(|place| frames.get_mut(place)?.take())
         .collect()
 }
 
-fn seldom(frames: Vec<Incoming>, seconds: f64) -> Result<Vec<Incoming>> {
-    let untimed = |frame: &Incoming| {
+fn seldom(frames: Vec<ListedFrame>, seconds: f64) -> Result<Vec<ListedFrame>> {
+    let untimed = |frame: &ListedFrame| {
         let problem = format_args!(
             "the frame {}/{} has no time; --fps says how many there are in a second, --count N needs no time",
             frame.scene, frame.frame
@@ -122,8 +126,8 @@ fn seldom(frames: Vec<Incoming>, seconds: f64) -> Result<Vec<Incoming>> {
 mod tests {
     use super::*;
 
-    fn frame(scene: &str, number: usize, time: Option<f64>) -> Incoming {
-        Incoming {
+    fn frame(scene: &str, number: usize, time: Option<f64>) -> ListedFrame {
+        ListedFrame {
             scene: scene.into(),
             frame: format!("{number:03}"),
             time,
@@ -135,35 +139,35 @@ mod tests {
         }
     }
 
-    fn names(frames: &[Incoming]) -> Vec<&str> {
+    fn names(frames: &[ListedFrame]) -> Vec<&str> {
         frames.iter().map(|frame| frame.frame.as_str()).collect()
     }
 
     #[test]
     fn one_frame_for_each_step_of_time() {
         let times = [100.0, 100.5, 101.9, 102.0, 102.1, 107.0, 107.5, 108.0];
-        let frames: Vec<Incoming> = (0..)
+        let frames: Vec<ListedFrame> = (0..)
             .zip(times)
             .map(|(i, time)| frame("a", i, Some(time)))
             .collect();
-        let chosen = choose(&frames, Every::Seconds(2.0), None).unwrap();
+        let chosen = choose(&frames, KeyFrames::Seconds(2.0), None).unwrap();
         // 0, 2, then 7 for both 4 and 6, then 8.
         assert_eq!(names(&chosen), ["000", "003", "005", "007"]);
         let mut reversed = frames.clone();
         reversed.reverse();
         assert_eq!(
-            choose(&reversed, Every::Seconds(2.0), None).unwrap(),
+            choose(&reversed, KeyFrames::Seconds(2.0), None).unwrap(),
             chosen
         );
-        assert_eq!(choose(&frames, Every::Frame, None).unwrap().len(), 8);
+        assert_eq!(choose(&frames, KeyFrames::Frame, None).unwrap().len(), 8);
     }
 
     #[test]
     fn frames_a_second_give_a_time() {
-        let frames: Vec<Incoming> = (0..61).map(|i| frame("a", i, None)).collect();
-        let chosen = choose(&frames, Every::Seconds(2.0), Some(10.0)).unwrap();
+        let frames: Vec<ListedFrame> = (0..61).map(|i| frame("a", i, None)).collect();
+        let chosen = choose(&frames, KeyFrames::Seconds(2.0), Some(10.0)).unwrap();
         assert_eq!(names(&chosen), ["000", "020", "040", "060"]);
-        let error = choose(&frames, Every::Seconds(2.0), None)
+        let error = choose(&frames, KeyFrames::Seconds(2.0), None)
             .unwrap_err()
             .to_string();
         assert!(
@@ -174,12 +178,12 @@ mod tests {
 
     #[test]
     fn a_count_is_spread_evenly_in_each_scene() {
-        let mut frames: Vec<Incoming> = (0..10).map(|i| frame("a", i, None)).collect();
+        let mut frames: Vec<ListedFrame> = (0..10).map(|i| frame("a", i, None)).collect();
         frames.extend((0..2).map(|i| frame("b", i, None)));
-        let chosen = choose(&frames, Every::Count(4), None).unwrap();
+        let chosen = choose(&frames, KeyFrames::Count(4), None).unwrap();
         assert_eq!(names(&chosen), ["000", "003", "006", "009", "000", "001"]);
         assert_eq!(
-            names(&choose(&frames, Every::Count(1), None).unwrap()),
+            names(&choose(&frames, KeyFrames::Count(1), None).unwrap()),
             ["000", "000"]
         );
     }

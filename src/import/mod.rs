@@ -24,11 +24,11 @@ use std::path::Path;
 use crate::error::{Error, Result};
 use crate::types::flag::flag_words;
 
-pub use adapter::{Adapter, Incoming, Listing, Read, Stated};
+pub use adapter::{Adapter, FrameMaps, ListedFrame, Listing, StatedArgs};
 
 /// What lies in the folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum Kind {
+pub enum DataSetKind {
     /// Renders of habitat-sim: HM3D-Sem, Matterport3D, Replica.
     Habitat,
     /// Frames of ScanNet, extracted.
@@ -43,13 +43,13 @@ pub enum Kind {
     Folder,
 }
 
-flag_words!(Kind);
+flag_words!(DataSetKind);
 
 /// Opens a folder.
 ///
 /// # Errors
 /// With the file or folder that is missing or not laid out as it should be, or the flag that must be said.
-pub fn open(kind: Kind, folder: &Path, stated: &Stated) -> Result<Box<dyn Adapter>> {
+pub fn open(kind: DataSetKind, folder: &Path, stated: &StatedArgs) -> Result<Box<dyn Adapter>> {
     if !folder.is_dir() {
         return Err(Error::usage(
             "--src",
@@ -57,15 +57,15 @@ pub fn open(kind: Kind, folder: &Path, stated: &Stated) -> Result<Box<dyn Adapte
         ));
     }
     let adapter: Box<dyn Adapter> = match kind {
-        Kind::Habitat => Box::new(habitat::Habitat::open(folder, stated)?),
-        Kind::Scannet => Box::new(scannet::Scannet::open(folder, stated)?),
-        Kind::Nyu => Box::new(nyu::open(folder, stated)?),
-        Kind::Sunrgbd => Box::new(sunrgbd::SunRgbd::open(folder)?),
-        Kind::Thor => Box::new(thor::Thor::open(folder, stated)?),
-        Kind::Folder if folder.join("frames.jsonl").exists() => {
+        DataSetKind::Habitat => Box::new(habitat::Habitat::open(folder, stated)?),
+        DataSetKind::Scannet => Box::new(scannet::Scannet::open(folder, stated)?),
+        DataSetKind::Nyu => Box::new(nyu::open(folder, stated)?),
+        DataSetKind::Sunrgbd => Box::new(sunrgbd::SunRgbd::open(folder)?),
+        DataSetKind::Thor => Box::new(thor::Thor::open(folder, stated)?),
+        DataSetKind::Folder if folder.join("frames.jsonl").exists() => {
             Box::new(interface::Interface::open(folder)?)
         }
-        Kind::Folder => Box::new(folder::Folder::open(folder, stated)?),
+        DataSetKind::Folder => Box::new(folder::Folder::open(folder, stated)?),
     };
     if adapter.listing().frames.is_empty() {
         let problem = format_args!(

@@ -6,13 +6,13 @@
 
 use std::path::Path;
 
-use super::adapter::{Sensor, Stated, labels};
-use super::folder::{Folder, Offset};
+use super::adapter::{SizedCamera, StatedArgs, labels};
+use super::folder::{Folder, NumberOffset};
 use crate::error::Result;
 use crate::types::Intrinsics;
 
 /// The Kinect's colour camera (NYU Depth v2 toolbox, `camera_params.m`).
-const KINECT: Sensor = Sensor {
+const KINECT: SizedCamera = SizedCamera {
     size: (640, 480),
     camera: Intrinsics {
         fx: 518.857_901,
@@ -23,13 +23,13 @@ const KINECT: Sensor = Sensor {
 };
 
 /// The frames of a folder.
-pub(super) fn open(folder: &Path, stated: &Stated) -> Result<Folder> {
+pub(super) fn open(folder: &Path, stated: &StatedArgs) -> Result<Folder> {
     let (name, offset) = match stated.labels.as_deref() {
-        None => ("nyu40", Offset::None),
-        Some("nyu40-1") => ("nyu40", Offset::One),
-        Some(name) => (name, Offset::None),
+        None => ("nyu40", NumberOffset::None),
+        Some("nyu40-1") => ("nyu40", NumberOffset::One),
+        Some(name) => (name, NumberOffset::None),
     };
-    let said = Stated {
+    let said = StatedArgs {
         labels: Some(name.to_owned()),
         ..stated.clone()
     };

@@ -9,12 +9,12 @@ use crate::types::SegmentName;
 
 /// The keys that are used.
 #[derive(Deserialize)]
-struct File {
-    objects: Vec<Object>,
+struct SemanticInfo {
+    objects: Vec<ReplicaObject>,
 }
 
 #[derive(Deserialize)]
-struct Object {
+struct ReplicaObject {
     id: i64,
     class_name: String,
 }
@@ -24,9 +24,9 @@ pub(super) fn parse(
     text: &str,
     unlisted: &mut BTreeMap<String, usize>,
 ) -> Result<BTreeMap<u32, SegmentName>, String> {
-    let file: File = serde_json::from_str(text).map_err(|e| e.to_string())?;
+    let file: SemanticInfo = serde_json::from_str(text).map_err(|e| e.to_string())?;
     let mut names = BTreeMap::new();
-    for Object { id, class_name } in file.objects {
+    for ReplicaObject { id, class_name } in file.objects {
         let Ok(id) = u32::try_from(id) else {
             continue;
         };

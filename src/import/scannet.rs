@@ -11,9 +11,9 @@ use std::path::{Path, PathBuf};
 use ndarray::Array2;
 use serde::Deserialize;
 
-use super::adapter::{Adapter, Incoming, Listing, Read, Stated};
+use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, StatedArgs};
 use super::files::{depth, files, first, folders, last, numbers, png, same_size};
-use crate::dataset::raw_png::Form;
+use crate::dataset::raw_png::SampleForm;
 use crate::error::{Error, Result};
 use crate::files::reading::{json, text};
 use crate::labels::names::{UNKNOWN, overridden};
@@ -31,12 +31,12 @@ const SCALE: f64 = 0.001;
 #[derive(Debug)]
 pub(super) struct Scannet {
     listing: Listing,
-    maps: Vec<Maps>,
+    maps: Vec<ScannetMaps>,
     depth_scale: f64,
 }
 
 #[derive(Debug)]
-struct Maps {
+struct ScannetMaps {
     depth: Option<PathBuf>,
     labels: PathBuf,
     instances: Option<PathBuf>,
@@ -54,7 +54,7 @@ enum Numbering {
 }
 
 impl Scannet {
-    pub(super) fn open(folder: &Path, stated: &Stated) -> Result<Self> {
+    pub(super) fn open(folder: &Path, stated: &StatedArgs) -> Result<Self> {
         let mut set = Self {
             listing: Listing::default(),
             maps: Vec::new(),
@@ -123,13 +123,13 @@ impl Scannet {
                 return Err(Error::data(folder.display(), problem));
             };
             let number: Option<u32> = frame.parse().ok();
-            self.maps.push(Maps {
+            self.maps.push(ScannetMaps {
                 depth: depths.get(&frame).cloned(),
                 labels: label.clone(),
                 instances: instances.get(&frame).cloned(),
                 depth_camera: deep,
             });
-            self.listing.frames.push(Incoming {
+            self.listing.frames.push(ListedFrame {
                 scene: name.clone(),
                 time: number.map(|number| f64::from(number) / RATE),
                 pose,
@@ -280,13 +280,13 @@ impl Adapter for Scannet {
         &self.listing
     }
 
-    fn read(&self, frame: &Incoming, rgb: &Rgb) -> Result<Read> {
+    fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {
         let maps = &self.maps[frame.index];
-        let labels = png(&maps.labels, &[Form::Grey8, Form::Grey16])?;
+        let labels = png(&maps.labels, &[SampleForm::Grey8, SampleForm::Grey16])?;
         same_size(&maps.labels, &labels, rgb)?;
         let segments = match &maps.instances {
             Some(path) => {
-                let instances = png(path, &[Form::Grey8, Form::Grey16])?;
+                let instances = png(path, &[SampleForm::Grey8, SampleForm::Grey16])?;
                 same_size(path, &instances, rgb)?;
                 // One number for each label and instance: where 8 bits overflowed unseen, two things of different labels
                 // stay two.
@@ -328,7 +328,7 @@ impl Adapter for Scannet {
             }
             None => None,
         };
-        Ok(Read {
+        Ok(FrameMaps {
             depth,
             semantic: Some(labels),
             segments,

@@ -12,10 +12,10 @@ use ndarray::Array2;
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::adapter::{Adapter, Incoming, Listing, Read};
+use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing};
 use super::files::{files, folders, last, numbers, png, same_size};
 use super::polygons::{Polygon, draw};
-use crate::dataset::raw_png::Form;
+use crate::dataset::raw_png::SampleForm;
 use crate::error::{Error, Result};
 use crate::files::reading::{json, text};
 use crate::labels::canonical;
@@ -29,12 +29,12 @@ const MOST_DEPTH: u32 = 8_000;
 #[derive(Debug)]
 pub(super) struct SunRgbd {
     listing: Listing,
-    files: Vec<Files>,
+    files: Vec<SunRgbdFiles>,
     numbers: BTreeMap<String, u16>,
 }
 
 #[derive(Debug)]
-struct Files {
+struct SunRgbdFiles {
     depth: Option<PathBuf>,
     annotation: PathBuf,
 }
@@ -42,12 +42,12 @@ struct Files {
 /// `index.json`, as far as it is used.
 #[derive(Deserialize)]
 struct Index {
-    frames: Vec<View>,
-    objects: Vec<Option<Object>>,
+    frames: Vec<SunRgbdFrame>,
+    objects: Vec<Option<SunRgbdObject>>,
 }
 
 #[derive(Deserialize)]
-struct View {
+struct SunRgbdFrame {
     #[serde(default)]
     polygon: Vec<Shape>,
 }
@@ -60,7 +60,7 @@ struct Shape {
 }
 
 #[derive(Deserialize)]
-struct Object {
+struct SunRgbdObject {
     name: String,
 }
 
@@ -121,11 +121,11 @@ impl SunRgbd {
             || ("frame".to_owned(), String::new()),
             |(frame, scene)| (frame.clone(), scene.join("-")),
         );
-        self.files.push(Files {
+        self.files.push(SunRgbdFiles {
             depth: depths.into_values().next(),
             annotation,
         });
-        self.listing.frames.push(Incoming {
+        self.listing.frames.push(ListedFrame {
             scene: if scene.is_empty() {
                 "sunrgbd".to_owned()
             } else {
@@ -201,11 +201,11 @@ impl Adapter for SunRgbd {
         &self.listing
     }
 
-    fn read(&self, frame: &Incoming, rgb: &Rgb) -> Result<Read> {
+    fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {
         let files = &self.files[frame.index];
         let depth = match &files.depth {
             Some(path) => {
-                let rotated = png(path, &[Form::Grey16])?;
+                let rotated = png(path, &[SampleForm::Grey16])?;
                 same_size(path, &rotated, rgb)?;
                 Some(rotated.mapv(|value| u32::from(value.rotate_right(3)).min(MOST_DEPTH)))
             }
@@ -230,7 +230,7 @@ impl Adapter for SunRgbd {
             })
             .collect();
         let map: Array2<(u16, u32)> = draw(&polygons, [rgb.width(), rgb.height()]);
-        Ok(Read {
+        Ok(FrameMaps {
             depth,
             semantic: Some(map.mapv(|(number, _)| number)),
             segments: Some(map.mapv(|(_, object)| object)),

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use ndarray::Array2;
 
-use super::adapter::{Adapter, Incoming, Listing, Read, Stated, numbers};
+use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, StatedArgs, numbers};
 use super::files::{depth_of, files, folders, last, picture, same_size};
 use crate::error::{Error, Result};
 use crate::files::reading::json;
@@ -28,7 +28,7 @@ pub(super) struct Thor {
 }
 
 impl Thor {
-    pub(super) fn open(folder: &Path, stated: &Stated) -> Result<Self> {
+    pub(super) fn open(folder: &Path, stated: &StatedArgs) -> Result<Self> {
         let listing = Listing::by_name(stated);
         let mut set = Self {
             numbers: numbers(&listing.labels),
@@ -57,7 +57,7 @@ impl Thor {
             };
             self.maps
                 .push((depths.get(&frame).cloned(), instance.clone()));
-            self.listing.frames.push(Incoming {
+            self.listing.frames.push(ListedFrame {
                 scene: name.clone(),
                 frame,
                 time: None,
@@ -128,7 +128,7 @@ impl Adapter for Thor {
         &self.listing
     }
 
-    fn read(&self, frame: &Incoming, rgb: &Rgb) -> Result<Read> {
+    fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {
         let (deep, instance) = &self.maps[frame.index];
         let segment_of = &self.colors[&frame.scene];
         let colors = picture(instance)?;
@@ -150,7 +150,7 @@ impl Adapter for Thor {
             .map(|(id, name)| (*id, self.numbers.get(&name.canonical).copied().unwrap_or(0)))
             .collect();
         let semantic = segments.mapv(|id| numbers.get(&id).copied().unwrap_or(0));
-        Ok(Read {
+        Ok(FrameMaps {
             depth: depth_of(deep.as_deref(), self.depth_scale, rgb)?,
             semantic: Some(semantic),
             segments: Some(segments),

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use crate::ask::{Call, Local, Random};
-use crate::dataset::{Dataset, Place};
+use crate::dataset::{DataPlace, Dataset};
 use crate::error::{Error, Result};
 use crate::questions::colors::Palette;
 use crate::questions::observer::{Sight, VERSION, Watched, understood};
@@ -84,7 +84,7 @@ impl Eye {
 /// Where the frames have no maps, or a question is none of the rulebook's.
 pub(crate) fn open(
     dataset: &Arc<Dataset>,
-    place: &Place,
+    place: &DataPlace,
     questions: &[Question],
     prior: Random,
 ) -> Result<Local> {

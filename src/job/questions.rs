@@ -4,13 +4,13 @@ use std::collections::BTreeSet;
 
 use super::progress::Progress;
 use super::questions_by_rule::by_rule;
-use crate::dataset::{Dataset, PixelLimit, Place, SelectionArgs};
+use crate::dataset::{DataPlace, Dataset, PixelLimit, SelectionArgs};
 use crate::error::{Error, Result};
 use crate::types::{Family, Question};
 
 /// Opens the data; where they come without questions, they are made by rule.
 pub(crate) fn open_data(
-    place: &Place,
+    place: &DataPlace,
     selection: &SelectionArgs,
     limit: PixelLimit,
     progress: &Progress,

@@ -13,7 +13,7 @@ use super::source::{Frames, Source, SourceFrame};
 use super::timings::Timings;
 use super::walk::{Walk, WalkFolder};
 use super::workers::ThreadArgs;
-use crate::dataset::{Dataset, Place, place};
+use crate::dataset::{DataPlace, Dataset, place};
 use crate::enhance::{Enhancer, RuntimeArgs};
 use crate::error::{Error, Result};
 use crate::synthesis::SensorSettings;
@@ -171,10 +171,10 @@ fn rebuilt(image: &crate::ask::Payload) -> Result<RebuiltImage> {
 }
 
 /// The frames at a place; questions that come with them are ignored.
-fn frames(place: &Place) -> Result<Dataset> {
+fn frames(place: &DataPlace) -> Result<Dataset> {
     match place {
-        Place::Path(path) if path.join("frames.jsonl").is_file() => Dataset::of_frames(path),
-        Place::Path(_) => Dataset::open(place, None),
-        Place::Rooms(_) => Dataset::open_unasked(place),
+        DataPlace::Path(path) if path.join("frames.jsonl").is_file() => Dataset::of_frames(path),
+        DataPlace::Path(_) => Dataset::open(place, None),
+        DataPlace::Rooms(_) => Dataset::open_unasked(place),
     }
 }

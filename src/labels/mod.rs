@@ -62,19 +62,19 @@ pub fn canonical() -> BTreeSet<String> {
 
 /// `classes.json`.
 #[derive(Debug, Serialize, Deserialize)]
-struct File {
+struct ClassesFile {
     schema: String,
     space: String,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     void_id: Option<u16>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     void_ids: Vec<u16>,
-    classes: Vec<Class>,
+    classes: Vec<ClassEntry>,
 }
 
 /// One class of `classes.json`.
 #[derive(Debug, Serialize, Deserialize)]
-struct Class {
+struct ClassEntry {
     id: u16,
     name: String,
     canonical: String,
@@ -92,12 +92,12 @@ struct Class {
 /// # Errors
 /// With the file: broken JSON, another schema, a number twice, a canonical class that mpcat40 has not.
 pub(super) fn read(path: &Path) -> Result<Labels> {
-    let file: File = reading::json(path)?;
+    let file: ClassesFile = reading::json(path)?;
     file.labels()
         .map_err(|problem| Error::data(path.display(), problem))
 }
 
-impl File {
+impl ClassesFile {
     fn labels(self) -> Result<Labels, String> {
         if self.schema != SCHEMA {
             return Err(format!("schema {:?}; {SCHEMA:?} expected", self.schema));
@@ -110,7 +110,7 @@ impl File {
         };
         let stated = self.classes.iter().any(|class| class.expressible.is_some());
         for class in self.classes {
-            let Class {
+            let ClassEntry {
                 id,
                 name,
                 canonical,
@@ -144,13 +144,13 @@ impl File {
 
 /// A label space as `classes.json`.
 pub(super) fn json(labels: &Labels) -> String {
-    let classes = labels.labels.iter().map(|(&id, label)| Class {
+    let classes = labels.labels.iter().map(|(&id, label)| ClassEntry {
         id,
         name: label.name.clone(),
         canonical: label.canonical.clone(),
         expressible: Some(labels.expressible.contains(&label.canonical)),
     });
-    let file = File {
+    let file = ClassesFile {
         schema: SCHEMA.to_owned(),
         space: labels.space.clone(),
         void_id: None,

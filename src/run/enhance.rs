@@ -6,7 +6,7 @@ use clap::Args;
 
 use crate::ask::png;
 use crate::dataset::PixelLimit;
-use crate::dataset::inputs::{Entry, Inputs};
+use crate::dataset::inputs::{InputFrame, Inputs};
 use crate::enhance::{Enhancer, ModelFile};
 use crate::error::{Error, Result};
 use crate::files::write;
@@ -98,7 +98,7 @@ pub fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
     })
 }
 
-fn one(enhancer: &mut Enhancer, images: &Inputs, entry: &Entry, path: &Path) -> Result<()> {
+fn one(enhancer: &mut Enhancer, images: &Inputs, entry: &InputFrame, path: &Path) -> Result<()> {
     let mended = enhancer.enhance(&images.picture(entry)?.decode()?);
     let named = |e| Error::data(format_args!("image {:?}", entry.id.0), e);
     write(path, &png(&mended.map_err(named)?)?)

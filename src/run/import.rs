@@ -10,11 +10,11 @@ use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
 use crate::ask::png;
-use crate::dataset::frame_folder::{self, Place};
+use crate::dataset::frame_folder::{self, FramePaths};
 use crate::dataset::{Picture, PixelLimit};
 use crate::error::{Error, Result};
 use crate::import::keyframes::{KeyFrameArgs, choose};
-use crate::import::{Adapter, Incoming, Kind, Read, Stated, open};
+use crate::import::{Adapter, DataSetKind, FrameMaps, ListedFrame, StatedArgs, open};
 use crate::job::Outcome;
 use crate::job::progress::Progress;
 use crate::job::workers::{ThreadArgs, pool};
@@ -31,7 +31,7 @@ const NAMED: usize = 12;
 pub struct ImportArgs {
     /// What lies in --src
     #[arg(value_name = "KIND", value_enum)]
-    pub kind: Kind,
+    pub kind: DataSetKind,
     /// The data set, laid out as src/import/README.md shows
     #[arg(long, value_name = "DIR")]
     pub src: PathBuf,
@@ -43,7 +43,7 @@ pub struct ImportArgs {
     pub name: Option<String>,
     /// What is said of its maps.
     #[command(flatten)]
-    pub stated: Stated,
+    pub stated: StatedArgs,
     /// Which frames are taken.
     #[command(flatten)]
     pub key_frames: KeyFrameArgs,
@@ -145,7 +145,7 @@ struct Made {
     depth: Option<u32>,
 }
 
-fn one(args: &ImportArgs, adapter: &dyn Adapter, frame: &Incoming) -> Result<Made> {
+fn one(args: &ImportArgs, adapter: &dyn Adapter, frame: &ListedFrame) -> Result<Made> {
     for name in [&frame.scene, &frame.frame] {
         let mut parts = Path::new(name).components();
         if name.is_empty() || !parts.all(|part| matches!(part, Component::Normal(_))) {
@@ -160,13 +160,13 @@ fn one(args: &ImportArgs, adapter: &dyn Adapter, frame: &Incoming) -> Result<Mad
         most_pixels: args.limit.max_pixels.get(),
     };
     let rgb = picture.decode()?;
-    let Read {
+    let FrameMaps {
         depth,
         semantic,
         segments,
         room,
     } = adapter.read(frame, &rgb)?;
-    let place = Place {
+    let place = FramePaths {
         out: &args.out,
         scene: &frame.scene,
         frame: &frame.frame,

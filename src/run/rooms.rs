@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
 use crate::ask::png;
-use crate::dataset::frame_folder::{self, FRAMES, Place};
+use crate::dataset::frame_folder::{self, FRAMES, FramePaths};
 use crate::error::{Error, Result};
 use crate::job::Outcome;
 use crate::job::progress::Progress;
@@ -77,7 +77,7 @@ pub fn rooms(args: &RoomsArgs, progress: &Progress) -> Result<Outcome> {
 
 fn one(args: &RoomsArgs, room: &Room) -> Result<Map<String, Value>> {
     let frame = room.frame()?;
-    let place = Place {
+    let place = FramePaths {
         out: &args.out,
         scene: &frame.scene,
         frame: room.view(),

@@ -20,25 +20,25 @@ fn written(name: &str, bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
 
 fn depth(name: &str, bytes: &[u8], scale: Option<f64>, size: Size) -> Result<Array2<u32>> {
     let (_folder, path) = written(name, bytes);
-    let maps = Maps {
+    let maps = MapPaths {
         depth: Some(DepthFile::new(path, scale).unwrap()),
-        ..Maps::default()
+        ..MapPaths::default()
     };
     maps.read()?.depth(size).map(Option::unwrap)
 }
 
 fn semantic(path: &Path, size: Size) -> Result<Array2<u16>> {
-    let maps = Maps {
+    let maps = MapPaths {
         semantic: Some(path.to_owned()),
-        ..Maps::default()
+        ..MapPaths::default()
     };
     maps.read()?.semantic(size).map(Option::unwrap)
 }
 
 fn segments(path: &Path, size: Size) -> Result<Array2<u32>> {
-    let maps = Maps {
+    let maps = MapPaths {
         segments: Some(path.to_owned()),
-        ..Maps::default()
+        ..MapPaths::default()
     };
     maps.read()?.segments(size).map(Option::unwrap)
 }

@@ -23,7 +23,7 @@ pub(crate) fn png(
     bytes
 }
 
-fn read(bytes: &[u8], forms: &[Form]) -> Result<Vec<u16>, String> {
+fn read(bytes: &[u8], forms: &[SampleForm]) -> Result<Vec<u16>, String> {
     RawPng::open(bytes, forms)?.samples(|sample| sample)
 }
 
@@ -53,7 +53,7 @@ fn places_in_a_palette_stay_places() {
     ] {
         let bytes = png((2, 3), ColorType::Indexed, bits, &data);
         assert_eq!(
-            read(&bytes, &[Form::Palette]).unwrap(),
+            read(&bytes, &[SampleForm::Palette]).unwrap(),
             expected,
             "{bits:?}"
         );
@@ -63,21 +63,24 @@ fn places_in_a_palette_stay_places() {
 #[test]
 fn grey_is_read_as_it_is() {
     let shallow = png((1, 2), ColorType::Grayscale, BitDepth::Eight, &[40, 255]);
-    assert_eq!(read(&shallow, &[Form::Grey8]).unwrap(), [40, 255]);
+    assert_eq!(read(&shallow, &[SampleForm::Grey8]).unwrap(), [40, 255]);
     let deep = png(
         (2, 1),
         ColorType::Grayscale,
         BitDepth::Sixteen,
         &[1, 2, 255, 255],
     );
-    let opened = RawPng::open(&deep, &[Form::Grey16]).unwrap();
+    let opened = RawPng::open(&deep, &[SampleForm::Grey16]).unwrap();
     assert_eq!(opened.size, (2, 1));
     assert_eq!(opened.samples(|sample| sample).unwrap(), [258, 65_535]);
 }
 
 #[test]
 fn other_forms_are_refused_by_name() {
-    let (all, deep) = ([Form::Grey8, Form::Grey16, Form::Palette], [Form::Grey16]);
+    let (all, deep) = (
+        [SampleForm::Grey8, SampleForm::Grey16, SampleForm::Palette],
+        [SampleForm::Grey16],
+    );
     for (color, bits, size, forms, says) in [
         (
             ColorType::Rgb,
@@ -134,7 +137,7 @@ fn a_bomb_is_refused_before_it_is_inflated() {
     let mut bytes = png((1, 1), ColorType::Grayscale, BitDepth::Sixteen, &[0, 0]);
     bytes[16..24].copy_from_slice(&[0, 1, 0, 0, 0, 1, 0, 0]);
     seal(&mut bytes);
-    let problem = read(&bytes, &[Form::Grey16]).unwrap_err();
+    let problem = read(&bytes, &[SampleForm::Grey16]).unwrap_err();
     assert!(
         problem.starts_with("65536 × 65536 pixels are more"),
         "{problem}"
@@ -164,6 +167,6 @@ proptest! {
         }
         seal(&mut bytes);
         bytes.truncate(end);
-        let _ = read(&bytes, &[Form::Grey8, Form::Grey16, Form::Palette]);
+        let _ = read(&bytes, &[SampleForm::Grey8, SampleForm::Grey16, SampleForm::Palette]);
     }
 }

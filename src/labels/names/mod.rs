@@ -13,14 +13,14 @@ const THOR: &str = include_str!("thor.tsv");
 /// The class of what no table has.
 pub(crate) const UNKNOWN: &str = "misc";
 
-type Table = BTreeMap<&'static str, &'static str>;
+type NameTable = BTreeMap<&'static str, &'static str>;
 
-fn table(text: &'static str) -> Table {
+fn table(text: &'static str) -> NameTable {
     let lines = text.lines().filter(|line| !line.starts_with('#'));
     lines.filter_map(|line| line.split_once('\t')).collect()
 }
 
-static TABLES: LazyLock<[Table; 3]> = LazyLock::new(|| [OVERRIDES, HM3D, THOR].map(table));
+static TABLES: LazyLock<[NameTable; 3]> = LazyLock::new(|| [OVERRIDES, HM3D, THOR].map(table));
 
 /// What a word means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::ask::png;
-use crate::dataset::{self, Dataset, PixelLimit, Place, SelectionArgs};
+use crate::dataset::{self, DataPlace, Dataset, PixelLimit, SelectionArgs};
 use crate::enhance::EnhancerArgs;
 use crate::error::{Error, Result};
 use crate::job::Outcome;
@@ -36,7 +36,7 @@ pub struct ExportArgs {
     pub kind: Form,
     /// A folder of frames, or a ready-made set (.tsv, .jsonl)
     #[arg(value_name = "DATA", value_parser = dataset::place)]
-    pub data: Place,
+    pub data: DataPlace,
     /// Where the sets go, one for each condition
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,

@@ -24,7 +24,7 @@ use clap::Args;
 use tokio::runtime;
 
 use crate::ask::{Call, Message, Model, Query, Random};
-use crate::dataset::{self, Dataset, Place};
+use crate::dataset::{self, DataPlace, Dataset};
 use crate::error::{Error, Result};
 use crate::job::Outcome;
 use crate::job::interrupt::Interrupt;
@@ -46,7 +46,7 @@ const LARGEST: usize = 64 << 20;
 pub struct ServeArgs {
     /// The frames that the observer knows: rooms:frames=N,seed=N,size=WIDTHxHEIGHT, or a folder of frames with maps
     #[arg(long, value_name = "DIR|rooms:…", value_parser = dataset::place, default_value_t)]
-    pub data: Place,
+    pub data: DataPlace,
     /// The port on 127.0.0.1, 0 for any that is free
     #[arg(long, value_name = "N", default_value_t = 8089)]
     pub port: u16,

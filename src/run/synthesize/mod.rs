@@ -10,7 +10,7 @@ use clap::{Args, ValueEnum};
 use rayon::prelude::*;
 
 use crate::ask::png;
-use crate::dataset::inputs::{Entry, Inputs, stem};
+use crate::dataset::inputs::{InputFrame, Inputs, stem};
 use crate::dataset::{Picture, PixelLimit};
 use crate::error::{Error, Result};
 use crate::files::write;
@@ -155,7 +155,13 @@ fn files(making: &Making<'_>) -> Vec<File> {
 }
 
 /// Makes all images of one frame.
-fn one(making: &Making<'_>, frames: &Inputs, entry: &Entry, files: &[File], bar: &Bar) -> Tally {
+fn one(
+    making: &Making<'_>,
+    frames: &Inputs,
+    entry: &InputFrame,
+    files: &[File],
+    bar: &Bar,
+) -> Tally {
     let mut tally = Tally::default();
     let frames = OneFrame { frames, entry };
     let recipe = Recipe::lossless(&making.light.sensor, &[]);
@@ -198,7 +204,7 @@ fn one(making: &Making<'_>, frames: &Inputs, entry: &Entry, files: &[File], bar:
 /// One frame of the inputs, whose name may be that of a frame of another input.
 struct OneFrame<'a> {
     frames: &'a Inputs,
-    entry: &'a Entry,
+    entry: &'a InputFrame,
 }
 
 impl Frames for OneFrame<'_> {
@@ -210,7 +216,7 @@ impl Frames for OneFrame<'_> {
 /// One frame being worked on.
 struct Work<'a> {
     making: &'a Making<'a>,
-    entry: &'a Entry,
+    entry: &'a InputFrame,
     frame: FrameWork<'a>,
 }
 
