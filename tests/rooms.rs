@@ -7,21 +7,21 @@ mod support;
 use std::collections::{BTreeMap, BTreeSet};
 
 use darkqa_eval::dataset::{DataPlace, Dataset};
-use darkqa_eval::questions::balance::Balanced;
+use darkqa_eval::questions::balance::BalanceMode;
 use darkqa_eval::questions::colors::Palette;
 use darkqa_eval::questions::room::RoomSource;
-use darkqa_eval::questions::rules::{Flag, Rules};
+use darkqa_eval::questions::rules::{ClassFlag, Rules};
 use darkqa_eval::questions::statistics::measure;
-use darkqa_eval::questions::{Asked, Generated, Order, generate};
+use darkqa_eval::questions::{Generated, GeneratedQuestion, QuestionRequest, generate};
 use darkqa_eval::rooms::Rooms;
-use darkqa_eval::rooms::{Known, Room, Truth, VERSION, labels};
+use darkqa_eval::rooms::{Room, RoomTruth, ThingTruth, VERSION, labels};
 use darkqa_eval::types::{Digest, Family, Frame, FrameId};
 use rayon::prelude::*;
 use support::run::{Bench, records};
 
 /// What is seen of a frame by number, and what its generator knows of it.
 struct Seen {
-    truth: Truth,
+    truth: RoomTruth,
     pixels: BTreeMap<u32, usize>,
 }
 
@@ -38,7 +38,7 @@ impl Seen {
     }
 
     /// The things of a class that are in view.
-    fn of_class(&self, class: &str) -> Vec<&Known> {
+    fn of_class(&self, class: &str) -> Vec<&ThingTruth> {
         let things = self.pixels.keys().filter_map(|number| {
             let place = (*number as usize).checked_sub(1)?;
             self.truth.things.get(place)
@@ -62,14 +62,14 @@ fn asked(rooms: Rooms) -> (Generated, BTreeMap<FrameId, Seen>) {
         (statistics, (id.clone(), Seen::of(room, &frame)))
     });
     let (statistics, seen): (Vec<_>, BTreeMap<FrameId, Seen>) = measured.unzip();
-    let order = Order {
+    let order = QuestionRequest {
         dataset: "rooms",
         labels: &labels,
         rules: &rules,
         palette: &palette,
         families: Family::PAPER.into_iter().collect(),
         room_source: RoomSource::Signature,
-        balance: Balanced::default(),
+        balance: BalanceMode::default(),
         rejected: BTreeSet::new(),
     };
     (generate(&statistics, &order, |_, _| {}).unwrap(), seen)
@@ -90,7 +90,7 @@ const DONE_IN: [(&str, &[&str]); 10] = [
 ];
 
 /// What is wrong with an answer, by what the generator knows.
-fn wrong(asked: &Asked, seen: &Seen) -> Option<String> {
+fn wrong(asked: &GeneratedQuestion, seen: &Seen) -> Option<String> {
     let (answer, about) = (asked.answer(), asked.about.as_str());
     let truth = match &asked.question.family {
         Family::RoomType => seen.truth.room.to_owned(),
@@ -188,7 +188,7 @@ fn the_questions_are_right_and_even() {
     // Every class that is asked about is there in at least ten frames.
     let rules = Rules::built_in().unwrap();
     let classes = rules.book().class.iter();
-    for (class, _) in classes.filter(|(_, class)| class.flags.contains(&Flag::Asked)) {
+    for (class, _) in classes.filter(|(_, class)| class.flags.contains(&ClassFlag::Asked)) {
         let frames = seen
             .values()
             .filter(|seen| !seen.of_class(class).is_empty());

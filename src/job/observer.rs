@@ -7,7 +7,7 @@ use crate::ask::{Call, Local, Random};
 use crate::dataset::{DataPlace, Dataset};
 use crate::error::{Error, Result};
 use crate::questions::colors::Palette;
-use crate::questions::observer::{Sight, VERSION, Watched, understood};
+use crate::questions::observer::{Observation, ObservedFrame, VERSION, understood};
 use crate::questions::rules::Rules;
 use crate::types::{Digest, FrameId, Labels, Question};
 
@@ -50,15 +50,15 @@ struct Eye {
     labels: Labels,
     rules: Rules,
     palette: Palette,
-    frames: Shelf<FrameId, Result<Arc<Watched>, String>>,
-    sights: Shelf<(FrameId, Digest), Result<Arc<Sight>, String>>,
+    frames: Shelf<FrameId, Result<Arc<ObservedFrame>, String>>,
+    sights: Shelf<(FrameId, Digest), Result<Arc<Observation>, String>>,
 }
 
 impl Eye {
-    fn watched(&self, frame: &FrameId) -> Result<Arc<Watched>, String> {
+    fn watched(&self, frame: &FrameId) -> Result<Arc<ObservedFrame>, String> {
         self.frames.get(frame.clone(), || {
             let seen = self.dataset.frame(frame).map_err(|e| e.to_string())?;
-            Watched::new(&seen, &self.labels, &self.rules, &self.palette)
+            ObservedFrame::new(&seen, &self.labels, &self.rules, &self.palette)
                 .map(Arc::new)
                 .map_err(|e| e.to_string())
         })

@@ -7,12 +7,12 @@ use rayon::prelude::*;
 use super::progress::Progress;
 use crate::dataset::Dataset;
 use crate::error::{Error, Result};
-use crate::questions::balance::Balanced;
+use crate::questions::balance::BalanceMode;
 use crate::questions::colors::Palette;
 use crate::questions::room::RoomSource;
 use crate::questions::rules::Rules;
 use crate::questions::statistics::{FrameStatistics, measure};
-use crate::questions::{Order, generate};
+use crate::questions::{QuestionRequest, generate};
 use crate::types::{Digest, Family, FrameId, Question};
 
 /// Makes the questions, as `questions` without flags does.
@@ -38,14 +38,14 @@ pub(crate) fn by_rule(dataset: &Dataset, progress: &Progress) -> Result<Vec<Ques
     });
     let frames: Vec<FrameStatistics> = frames.collect::<Result<_>>()?;
     drop(bar);
-    let order = Order {
+    let order = QuestionRequest {
         dataset: dataset.title(),
         labels,
         rules: &rules,
         palette: &palette,
         families: Family::PAPER.into_iter().collect(),
         room_source: RoomSource::default(),
-        balance: Balanced::default(),
+        balance: BalanceMode::default(),
         rejected: BTreeSet::new(),
     };
     let made = generate(&frames, &order, |_, _| {})?;

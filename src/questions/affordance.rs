@@ -3,13 +3,13 @@
 use serde_json::json;
 
 use super::reason::Reason;
-use super::rules::Activity;
+use super::rules::ActivityRule;
 use super::statistics::Segment;
-use super::survey::{Claim, Survey, Verdict, falls, yes_no};
+use super::survey::{Candidate, RuleContext, RuleResult, falls, yes_no};
 use crate::types::Family;
 
 /// Both answers for every activity.
-pub(super) fn candidates(survey: &Survey<'_>) -> Vec<Verdict> {
+pub(super) fn candidates(survey: &RuleContext<'_>) -> Vec<RuleResult> {
     let activities = survey.book.activity.iter();
     activities
         .flat_map(|activity| {
@@ -25,7 +25,7 @@ pub(super) fn candidates(survey: &Survey<'_>) -> Vec<Verdict> {
 }
 
 /// Yes: the room is one where it is done, and what it takes is well seen.
-fn yes(survey: &Survey<'_>, activity: &Activity) -> Result<Verdict, Reason> {
+fn yes(survey: &RuleContext<'_>, activity: &ActivityRule) -> Result<RuleResult, Reason> {
     let Some(room) = survey.room else {
         return Err(Reason::NoRoom);
     };
@@ -51,7 +51,7 @@ fn yes(survey: &Survey<'_>, activity: &Activity) -> Result<Verdict, Reason> {
 }
 
 /// No: the room is known and no such room, and nothing that it takes, or that would do, has a pixel.
-fn no(survey: &Survey<'_>, activity: &Activity) -> Result<Verdict, Reason> {
+fn no(survey: &RuleContext<'_>, activity: &ActivityRule) -> Result<RuleResult, Reason> {
     let Some(room) = survey.room else {
         return Err(Reason::NoRoom);
     };
@@ -79,12 +79,12 @@ fn no(survey: &Survey<'_>, activity: &Activity) -> Result<Verdict, Reason> {
 }
 
 fn claim(
-    survey: &Survey<'_>,
-    activity: &Activity,
+    survey: &RuleContext<'_>,
+    activity: &ActivityRule,
     room: &str,
     truth: usize,
     segments: &[&Segment],
-) -> Verdict {
+) -> RuleResult {
     let text = survey
         .book
         .affordance
@@ -96,7 +96,7 @@ fn claim(
         "suitable": activity.rooms,
     });
     survey.rests(
-        Claim {
+        Candidate {
             family: Family::Affordance,
             about: activity.activity.clone(),
             text,

@@ -4,14 +4,14 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use clap::ValueEnum;
 
-use super::rules::Balance;
-use super::survey::Asked;
+use super::rules::BalanceRule;
+use super::survey::GeneratedQuestion;
 use crate::types::flag::flag_words;
 use crate::types::{Digest, Family};
 
 /// How far the answers are evened out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-pub enum Balanced {
+pub enum BalanceMode {
     /// Not at all: Algorithm 1 to the letter.
     None,
     /// As many yes as no of each class and activity, but for one.
@@ -21,11 +21,11 @@ pub enum Balanced {
     Full,
 }
 
-flag_words!(Balanced);
+flag_words!(BalanceMode);
 
 /// What stays, and what does not.
-pub(super) struct Evened {
-    pub(super) asked: Vec<Asked>,
+pub(super) struct BalancedSet {
+    pub(super) asked: Vec<GeneratedQuestion>,
     /// The family of each question that was dropped.
     pub(super) dropped: Vec<Family>,
     /// Answers that stayed too frequent.
@@ -33,7 +33,11 @@ pub(super) struct Evened {
 }
 
 /// Drops questions until the answers are even. Which of several go is decided by the digest of their names.
-pub(super) fn balance(asked: Vec<Asked>, how: Balanced, rule: &Balance) -> Evened {
+pub(super) fn balance(
+    asked: Vec<GeneratedQuestion>,
+    how: BalanceMode,
+    rule: &BalanceRule,
+) -> BalancedSet {
     let mut dropped: BTreeSet<usize> = BTreeSet::new();
     let mut uneven = Vec::new();
     if rule.max_repeat > 0 {
@@ -49,8 +53,8 @@ pub(super) fn balance(asked: Vec<Asked>, how: Balanced, rule: &Balance) -> Evene
             }
         }
     }
-    if how != Balanced::None {
-        let binary = |asked: &Asked| {
+    if how != BalanceMode::None {
+        let binary = |asked: &GeneratedQuestion| {
             let family = &asked.question.family;
             matches!(family, Family::Affordance | Family::Presence)
                 .then(|| (family.clone(), asked.about.clone()))
@@ -63,7 +67,7 @@ pub(super) fn balance(asked: Vec<Asked>, how: Balanced, rule: &Balance) -> Evene
             dropped.extend(no.into_iter().skip(most));
         }
     }
-    if how == Balanced::Full {
+    if how == BalanceMode::Full {
         uneven = cap_shares(&asked, &mut dropped, rule);
     }
     let families = dropped
@@ -74,7 +78,7 @@ pub(super) fn balance(asked: Vec<Asked>, how: Balanced, rule: &Balance) -> Evene
         .into_iter()
         .enumerate()
         .filter(|(i, _)| !dropped.contains(i));
-    Evened {
+    BalancedSet {
         asked: kept.map(|(_, asked)| asked).collect(),
         dropped: families,
         uneven,
@@ -82,14 +86,19 @@ pub(super) fn balance(asked: Vec<Asked>, how: Balanced, rule: &Balance) -> Evene
 }
 
 /// Drops rooms and colours that are too large a share of the answers; what cannot be made even, in words.
-fn cap_shares(asked: &[Asked], dropped: &mut BTreeSet<usize>, rule: &Balance) -> Vec<String> {
+fn cap_shares(
+    asked: &[GeneratedQuestion],
+    dropped: &mut BTreeSet<usize>,
+    rule: &BalanceRule,
+) -> Vec<String> {
     let mut uneven = Vec::new();
     for (family, share) in [
         (Family::RoomType, rule.room_type_share_ppm),
         (Family::Color, rule.color_share_ppm),
     ] {
-        let answer =
-            |asked: &Asked| (asked.question.family == family).then(|| asked.answer().to_owned());
+        let answer = |asked: &GeneratedQuestion| {
+            (asked.question.family == family).then(|| asked.answer().to_owned())
+        };
         let lists = groups(asked, dropped, answer);
         match caps(&lists, share) {
             Some(most) => {
@@ -111,9 +120,9 @@ fn cap_shares(asked: &[Asked], dropped: &mut BTreeSet<usize>, rule: &Balance) ->
 
 /// The questions that are left by key, each list in the order of its names' digests.
 fn groups<K: Ord>(
-    asked: &[Asked],
+    asked: &[GeneratedQuestion],
     dropped: &BTreeSet<usize>,
-    key: impl Fn(&Asked) -> Option<K>,
+    key: impl Fn(&GeneratedQuestion) -> Option<K>,
 ) -> BTreeMap<K, Vec<usize>> {
     let mut groups: BTreeMap<K, Vec<usize>> = BTreeMap::new();
     for (i, asked) in asked.iter().enumerate() {
@@ -141,7 +150,7 @@ fn caps(lists: &BTreeMap<String, Vec<usize>>, share_ppm: u64) -> Option<usize> {
 
 /// Whether a question occurs in enough scenes, with answers that differ enough: their entropy over that of the answers that are
 /// possible (EmbodiedQA, `entropy_based_filtering.py`).
-fn varied(asked: &[Asked], list: &[usize], rule: &Balance) -> bool {
+fn varied(asked: &[GeneratedQuestion], list: &[usize], rule: &BalanceRule) -> bool {
     let scenes: BTreeSet<&str> = list.iter().map(|i| asked[*i].scene.as_str()).collect();
     if scenes.len() < rule.least_scenes {
         return false;
@@ -171,7 +180,7 @@ mod tests {
     use super::*;
     use crate::types::{Choices, FrameId, Question, QuestionId};
 
-    fn asked(number: usize, family: Family, about: &str, answer: usize) -> Asked {
+    fn asked(number: usize, family: Family, about: &str, answer: usize) -> GeneratedQuestion {
         let texts = ["yes", "no", "perhaps"].map(str::to_owned).to_vec();
         let question = Question {
             id: QuestionId(format!("q{number}")),
@@ -181,14 +190,14 @@ mod tests {
             choices: Choices::new(texts, answer).unwrap(),
             evidence: Value::Null,
         };
-        Asked {
+        GeneratedQuestion {
             question,
             about: about.to_owned(),
             scene: format!("s{}", number % 5),
         }
     }
 
-    fn rule() -> Balance {
+    fn rule() -> BalanceRule {
         super::super::rules::Rules::built_in()
             .unwrap()
             .book()
@@ -196,7 +205,7 @@ mod tests {
             .clone()
     }
 
-    fn count(kept: &[Asked], about: &str, answer: &str) -> usize {
+    fn count(kept: &[GeneratedQuestion], about: &str, answer: &str) -> usize {
         kept.iter()
             .filter(|asked| asked.about == about && asked.answer() == answer)
             .count()
@@ -209,7 +218,7 @@ mod tests {
             let beds = (9..12).map(|i| asked(i, family.clone(), "bed", 1));
             chairs.chain(beds).collect::<Vec<_>>()
         };
-        let kept = balance(list(&Family::Presence), Balanced::Binary, &rule());
+        let kept = balance(list(&Family::Presence), BalanceMode::Binary, &rule());
         assert_eq!(
             (
                 count(&kept.asked, "chair", "yes"),
@@ -220,12 +229,12 @@ mod tests {
         assert_eq!((kept.asked.len(), kept.dropped.len()), (6, 6));
         let mut reversed = list(&Family::Presence);
         reversed.reverse();
-        let mut other = balance(reversed, Balanced::Binary, &rule()).asked;
+        let mut other = balance(reversed, BalanceMode::Binary, &rule()).asked;
         other.reverse();
         assert_eq!(other, kept.asked);
         for (family, how) in [
-            (Family::Presence, Balanced::None),
-            (Family::Color, Balanced::Binary),
+            (Family::Presence, BalanceMode::None),
+            (Family::Color, BalanceMode::Binary),
         ] {
             assert_eq!(balance(list(&family), how, &rule()).asked.len(), 12);
         }
@@ -234,44 +243,49 @@ mod tests {
     #[test]
     fn no_colour_is_more_than_its_share() {
         let counts = [40, 10, 10];
-        let list: Vec<Asked> = counts
+        let list: Vec<GeneratedQuestion> = counts
             .iter()
             .enumerate()
             .flat_map(|(answer, count)| {
                 (0..*count).map(move |i| asked(answer * 100 + i, Family::Color, "sofa", answer))
             })
             .collect();
-        let half = Balance {
+        let half = BalanceRule {
             color_share_ppm: 500_000,
             ..rule()
         };
-        let kept = balance(list.clone(), Balanced::Full, &half);
+        let kept = balance(list.clone(), BalanceMode::Full, &half);
         assert_eq!(
             (count(&kept.asked, "sofa", "yes"), kept.asked.len()),
             (20, 40)
         );
-        let fifth = balance(list, Balanced::Full, &rule());
+        let fifth = balance(list, BalanceMode::Full, &rule());
         assert_eq!((fifth.asked.len(), fifth.uneven.len()), (60, 1));
     }
 
     #[test]
     fn repeats_and_habits_go() {
-        let list: Vec<Asked> = (0..30)
+        let list: Vec<GeneratedQuestion> = (0..30)
             .map(|i| asked(i, Family::Color, "sofa", usize::from(i < 3)))
             .collect();
-        let most = Balance {
+        let most = BalanceRule {
             max_repeat: 2,
             ..rule()
         };
         // Five scenes; three of the thirty answers are "no", each in its own scene.
-        assert_eq!(balance(list.clone(), Balanced::None, &most).asked.len(), 13);
+        assert_eq!(
+            balance(list.clone(), BalanceMode::None, &most).asked.len(),
+            13
+        );
         for (ppm, kept) in [(200_000, 30), (500_000, 0)] {
-            let varied = Balance {
+            let varied = BalanceRule {
                 least_entropy_ppm: ppm,
                 ..rule()
             };
             assert_eq!(
-                balance(list.clone(), Balanced::None, &varied).asked.len(),
+                balance(list.clone(), BalanceMode::None, &varied)
+                    .asked
+                    .len(),
                 kept,
                 "{ppm}"
             );

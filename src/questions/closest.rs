@@ -3,20 +3,20 @@
 use serde_json::json;
 
 use super::reason::Reason;
-use super::rules::{Flag, GapScope};
+use super::rules::{ClassFlag, GapScope};
 use super::statistics::{Segment, SegmentDepth};
-use super::survey::{Claim, Survey, Verdict, falls};
+use super::survey::{Candidate, RuleContext, RuleResult, falls};
 use crate::types::Family;
 
 /// The one candidate of a frame.
-pub(super) fn candidates(survey: &Survey<'_>) -> Vec<Verdict> {
+pub(super) fn candidates(survey: &RuleContext<'_>) -> Vec<RuleResult> {
     let verdict = claim(survey);
     vec![verdict.unwrap_or_else(|reason| falls(Family::Closest, "", None, reason))]
 }
 
-type Object<'a> = (&'a Segment, SegmentDepth);
+type NearObject<'a> = (&'a Segment, SegmentDepth);
 
-fn claim(survey: &Survey<'_>) -> Result<Verdict, Reason> {
+fn claim(survey: &RuleContext<'_>) -> Result<RuleResult, Reason> {
     let (book, statistics) = (survey.book, survey.statistics);
     let depth = statistics.depth.as_ref().ok_or(Reason::NoDepth)?;
     let measure = &book.measure;
@@ -27,7 +27,7 @@ fn claim(survey: &Survey<'_>) -> Result<Verdict, Reason> {
     if statistics.lower_void * 1_000_000 > book.closest.lower_void_ppm * lower {
         return Err(Reason::Void);
     }
-    let mut objects: Vec<Object<'_>> = statistics
+    let mut objects: Vec<NearObject<'_>> = statistics
         .evidence(book)
         .filter(|segment| eligible(survey, segment))
         .filter_map(|segment| Some((segment, segment.measured(book)?)))
@@ -61,7 +61,7 @@ fn claim(survey: &Survey<'_>) -> Result<Verdict, Reason> {
         .collect();
     let segments: Vec<&Segment> = objects.iter().map(|(segment, _)| *segment).collect();
     Ok(survey.rests(
-        Claim {
+        Candidate {
             family: Family::Closest,
             about: winner.to_owned(),
             text: book.closest.text.clone(),
@@ -78,7 +78,7 @@ fn claim(survey: &Survey<'_>) -> Result<Verdict, Reason> {
 }
 
 /// The classes, nearest first.
-fn classes<'a>(objects: &[Object<'a>]) -> Vec<&'a str> {
+fn classes<'a>(objects: &[NearObject<'a>]) -> Vec<&'a str> {
     let mut classes: Vec<&str> = Vec::new();
     for (segment, _) in objects {
         if !classes.contains(&segment.class.as_str()) {
@@ -89,16 +89,16 @@ fn classes<'a>(objects: &[Object<'a>]) -> Vec<&'a str> {
 }
 
 /// Whether a segment may be offered.
-fn eligible(survey: &Survey<'_>, segment: &Segment) -> bool {
+fn eligible(survey: &RuleContext<'_>, segment: &Segment) -> bool {
     let book = survey.book;
-    book.is(&segment.class, Flag::Asked)
-        && !book.is(&segment.class, Flag::Structural)
+    book.is(&segment.class, ClassFlag::Asked)
+        && !book.is(&segment.class, ClassFlag::Structural)
         && !segment.flat(book)
         && survey.statistics.area(segment) >= book.closest.area_ppm
 }
 
 /// How much nearer the near end of the first is than that of any other that competes with it.
-fn near_gap(objects: &[Object<'_>], first: Object<'_>) -> Option<u32> {
+fn near_gap(objects: &[NearObject<'_>], first: NearObject<'_>) -> Option<u32> {
     let others = objects
         .iter()
         .filter(|(segment, _)| segment.id != first.0.id);
@@ -108,10 +108,10 @@ fn near_gap(objects: &[Object<'_>], first: Object<'_>) -> Option<u32> {
 
 /// The first must be clearly nearer than the second, and nobody's near end nearer than its own.
 fn apart(
-    survey: &Survey<'_>,
-    objects: &[Object<'_>],
-    first: Object<'_>,
-    second: Object<'_>,
+    survey: &RuleContext<'_>,
+    objects: &[NearObject<'_>],
+    first: NearObject<'_>,
+    second: NearObject<'_>,
 ) -> Result<(), Reason> {
     let rule = &survey.book.closest;
     let (near, far) = (u64::from(first.1.median), u64::from(second.1.median));
@@ -119,10 +119,10 @@ fn apart(
     if gap < rule.gap_mm.into() || gap * 1_000_000 < near * rule.gap_ppm {
         return Err(Reason::Gap);
     }
-    let competes = |other: &&Object<'_>| {
+    let competes = |other: &&NearObject<'_>| {
         rule.gap_scope == GapScope::Instances || other.0.class != first.0.class
     };
-    let others: Vec<Object<'_>> = objects.iter().filter(competes).copied().collect();
+    let others: Vec<NearObject<'_>> = objects.iter().filter(competes).copied().collect();
     match near_gap(&others, first) {
         None => Err(Reason::Disputed),
         Some(gap) if gap < rule.near_gap_mm => Err(Reason::Gap),
@@ -132,13 +132,14 @@ fn apart(
 
 /// Nothing that is not offered may be nearer than the second, nor reach nearer than the first.
 fn rivals(
-    survey: &Survey<'_>,
-    objects: &[Object<'_>],
+    survey: &RuleContext<'_>,
+    objects: &[NearObject<'_>],
     nearest: u32,
     second: u32,
 ) -> Result<(), Reason> {
     let (book, statistics) = (survey.book, survey.statistics);
-    let harmless = |class: &str| book.is(class, Flag::Structural) || book.is(class, Flag::Flat);
+    let harmless =
+        |class: &str| book.is(class, ClassFlag::Structural) || book.is(class, ClassFlag::Flat);
     for segment in &statistics.segments {
         // What has several classes may be anything.
         let background = (harmless(&segment.class) || segment.flat(book)) && !segment.mixed(book);

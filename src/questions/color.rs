@@ -4,15 +4,15 @@ use serde_json::json;
 
 use super::colors::{Color, Palette};
 use super::reason::Reason;
-use super::rules::{ColorChoices, ColorRule, Flag};
+use super::rules::{ClassFlag, ColorChoices, ColorRule};
 use super::statistics::{Segment, ppm};
-use super::survey::{Claim, Survey, Verdict, falls};
+use super::survey::{Candidate, RuleContext, RuleResult, falls};
 use crate::types::Family;
 
 /// Every segment of a class whose colour may be asked.
-pub(super) fn candidates(survey: &Survey<'_>, palette: &Palette) -> Vec<Verdict> {
+pub(super) fn candidates(survey: &RuleContext<'_>, palette: &Palette) -> Vec<RuleResult> {
     let segments = survey.statistics.segments.iter();
-    let colored = segments.filter(|segment| survey.book.is(&segment.class, Flag::Color));
+    let colored = segments.filter(|segment| survey.book.is(&segment.class, ClassFlag::Color));
     colored
         .map(|segment| {
             let verdict = claim(survey, segment, palette);
@@ -21,7 +21,11 @@ pub(super) fn candidates(survey: &Survey<'_>, palette: &Palette) -> Vec<Verdict>
         .collect()
 }
 
-fn claim(survey: &Survey<'_>, segment: &Segment, palette: &Palette) -> Result<Verdict, Reason> {
+fn claim(
+    survey: &RuleContext<'_>,
+    segment: &Segment,
+    palette: &Palette,
+) -> Result<RuleResult, Reason> {
     let rule = &survey.book.color;
     if let Some(reason) = survey.statistics.disqualified(segment, survey.book) {
         return Err(reason);
@@ -47,7 +51,7 @@ fn claim(survey: &Survey<'_>, segment: &Segment, palette: &Palette) -> Result<Ve
         .text
         .replace("{object}", survey.book.name(&segment.class));
     Ok(survey.rests(
-        Claim {
+        Candidate {
             family: Family::Color,
             about: segment.class.clone(),
             text,
@@ -61,7 +65,7 @@ fn claim(survey: &Survey<'_>, segment: &Segment, palette: &Palette) -> Result<Ve
 
 /// Whether a segment is the only one of its class that a person would see; pixels of the class outside of all segments are
 /// another one.
-fn alone(survey: &Survey<'_>, segment: &Segment) -> bool {
+fn alone(survey: &RuleContext<'_>, segment: &Segment) -> bool {
     let (statistics, least) = (survey.statistics, survey.book.color.lone_ppm);
     let others = statistics.segments.iter().filter(|other| {
         other.class == segment.class && other.id != segment.id && statistics.area(other) >= least
@@ -92,7 +96,7 @@ fn named(segment: &Segment, rule: &ColorRule, palette: &Palette) -> Result<Color
 }
 
 /// The colours that are offered, and which of them is true.
-fn offered(survey: &Survey<'_>, truth: Color) -> Option<(Vec<String>, usize)> {
+fn offered(survey: &RuleContext<'_>, truth: Color) -> Option<(Vec<String>, usize)> {
     let rule = &survey.book.color;
     let mut colors = match rule.candidates {
         ColorChoices::All11 => Color::ALL.to_vec(),

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::rules::{Book, Flag};
+use super::rules::{ClassFlag, RuleBook};
 use super::statistics::FrameStatistics;
 
 /// In how many frames each asked class is well seen, by room and scene.
@@ -14,11 +14,11 @@ pub struct Frequency {
 
 impl Frequency {
     /// Counts a frame.
-    pub fn add(&mut self, statistics: &FrameStatistics, room: Option<&str>, book: &Book) {
+    pub fn add(&mut self, statistics: &FrameStatistics, room: Option<&str>, book: &RuleBook) {
         let evidence = statistics.evidence(book);
         let classes: BTreeSet<&str> = evidence
             .map(|segment| segment.class.as_str())
-            .filter(|class| book.is(class, Flag::Asked))
+            .filter(|class| book.is(class, ClassFlag::Asked))
             .collect();
         for room in [Some(""), room].into_iter().flatten() {
             let scenes = self.counts.entry(room.to_owned()).or_default();

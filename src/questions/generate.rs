@@ -4,22 +4,22 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Value, json};
 
-use super::balance::{Balanced, balance};
+use super::balance::{BalanceMode, balance};
 use super::colors::Palette;
 use super::frequency::Frequency;
 use super::pick::Picker;
 use super::reason::Reason;
 use super::room::{RoomSigns, RoomSource, classify};
-use super::rules::{Book, Rules};
+use super::rules::{RuleBook, Rules};
 use super::statistics::FrameStatistics;
-use super::survey::{Asked, Claim, Survey, Verdict};
+use super::survey::{Candidate, GeneratedQuestion, RuleContext, RuleResult};
 use super::{affordance, closest, color, presence, room_type};
 use crate::error::Result;
 use crate::types::{Choices, Digest, Family, FrameId, Labels, Question, QuestionId};
 
 /// What is asked for.
 #[derive(Debug, Clone)]
-pub struct Order<'a> {
+pub struct QuestionRequest<'a> {
     /// The data set's name.
     pub dataset: &'a str,
     /// What its numbers stand for.
@@ -33,14 +33,14 @@ pub struct Order<'a> {
     /// Who says what room a frame shows.
     pub room_source: RoomSource,
     /// How the answers are evened out.
-    pub balance: Balanced,
+    pub balance: BalanceMode,
     /// The questions that a person has rejected.
     pub rejected: BTreeSet<QuestionId>,
 }
 
 /// Why a question that holds is not asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Left {
+pub enum OmissionReason {
     /// Another one of its family is asked of the frame.
     NotChosen,
     /// A person has rejected it.
@@ -51,32 +51,32 @@ pub enum Left {
 
 /// What became of all candidates of a family.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Tally {
+pub struct FamilyCounts {
     /// Those that hold.
     pub viable: u64,
     /// Those that are asked.
     pub asked: u64,
     /// Those that hold and are not asked.
-    pub left: BTreeMap<Left, u64>,
+    pub left: BTreeMap<OmissionReason, u64>,
     /// Those that do not hold.
     pub fallen: BTreeMap<Reason, u64>,
 }
 
-impl Tally {
+impl FamilyCounts {
     /// Those that hold, all counted.
-    fn sift(&mut self, verdicts: Vec<Verdict>) -> Vec<Claim> {
+    fn sift(&mut self, verdicts: Vec<RuleResult>) -> Vec<Candidate> {
         let mut claims = Vec::new();
         for verdict in verdicts {
             match verdict {
-                Verdict::Holds(claim) => claims.push(claim),
-                Verdict::Falls(fallen) => *self.fallen.entry(fallen.reason).or_insert(0) += 1,
+                RuleResult::Holds(claim) => claims.push(claim),
+                RuleResult::Falls(fallen) => *self.fallen.entry(fallen.reason).or_insert(0) += 1,
             }
         }
         self.viable += claims.len() as u64;
         claims
     }
 
-    fn leave(&mut self, why: Left, count: u64) {
+    fn leave(&mut self, why: OmissionReason, count: u64) {
         if count > 0 {
             *self.left.entry(why).or_insert(0) += count;
         }
@@ -87,9 +87,9 @@ impl Tally {
 #[derive(Debug, Default)]
 pub struct Generated {
     /// The questions, by scene, frame and family.
-    pub asked: Vec<Asked>,
+    pub asked: Vec<GeneratedQuestion>,
     /// What became of the candidates, by family.
-    pub tallies: BTreeMap<Family, Tally>,
+    pub tallies: BTreeMap<Family, FamilyCounts>,
     /// What each frame says of its room, in the order of the frames.
     pub rooms: Vec<(FrameId, RoomSigns)>,
     /// Frames that are too dark to ask anything about.
@@ -107,8 +107,8 @@ pub struct Generated {
 /// Where a rulebook makes choices that are none, as two of one name.
 pub fn generate(
     frames: &[FrameStatistics],
-    order: &Order<'_>,
-    mut explain: impl FnMut(&FrameId, &Verdict),
+    order: &QuestionRequest<'_>,
+    mut explain: impl FnMut(&FrameId, &RuleResult),
 ) -> Result<Generated> {
     let book = order.rules.book();
     let mut frames: Vec<&FrameStatistics> = frames.iter().collect();
@@ -130,9 +130,9 @@ pub fn generate(
         })
         .collect();
 
-    let mut running = Running::default();
+    let mut running = AnswerCounts::default();
     for (frame, (signs, room)) in light.iter().zip(&rooms) {
-        let survey = Survey {
+        let survey = RuleContext {
             book,
             labels: order.labels,
             statistics: frame,
@@ -157,10 +157,10 @@ pub fn generate(
             let Some(claim) = running.choose(claims, &survey) else {
                 continue;
             };
-            tally.leave(Left::NotChosen, spare);
+            tally.leave(OmissionReason::NotChosen, spare);
             let asked = ask(claim, frame, order)?;
             if order.rejected.contains(&asked.question.id) {
-                tally.leave(Left::Rejected, 1);
+                tally.leave(OmissionReason::Rejected, 1);
             } else {
                 made.asked.push(asked);
             }
@@ -174,7 +174,7 @@ pub fn generate(
 }
 
 /// Evens out the answers, and counts.
-fn finish(mut made: Generated, order: &Order<'_>) -> Generated {
+fn finish(mut made: Generated, order: &QuestionRequest<'_>) -> Generated {
     let kept = balance(
         std::mem::take(&mut made.asked),
         order.balance,
@@ -182,7 +182,7 @@ fn finish(mut made: Generated, order: &Order<'_>) -> Generated {
     );
     for family in kept.dropped {
         let tally = made.tallies.entry(family).or_default();
-        tally.leave(Left::Unbalanced, 1);
+        tally.leave(OmissionReason::Unbalanced, 1);
     }
     for asked in &kept.asked {
         made.tallies
@@ -199,7 +199,7 @@ fn room(
     frame: &FrameStatistics,
     signs: &RoomSigns,
     source: RoomSource,
-    book: &Book,
+    book: &RuleBook,
 ) -> Option<String> {
     match source {
         RoomSource::Signature => signs.room.clone().ok(),
@@ -209,7 +209,7 @@ fn room(
 
 /// The room that a person has stated, where questions ask about such a room.
 #[must_use]
-pub fn stated(frame: &FrameStatistics, book: &Book) -> Option<String> {
+pub fn stated(frame: &FrameStatistics, book: &RuleBook) -> Option<String> {
     let stated = frame
         .room
         .as_deref()?
@@ -222,7 +222,7 @@ pub fn stated(frame: &FrameStatistics, book: &Book) -> Option<String> {
         .cloned()
 }
 
-fn verdicts(family: &Family, survey: &Survey<'_>, palette: &Palette) -> Vec<Verdict> {
+fn verdicts(family: &Family, survey: &RuleContext<'_>, palette: &Palette) -> Vec<RuleResult> {
     match family {
         Family::RoomType => room_type::candidates(survey),
         Family::Affordance => affordance::candidates(survey),
@@ -235,14 +235,14 @@ fn verdicts(family: &Family, survey: &Survey<'_>, palette: &Palette) -> Vec<Verd
 
 /// How often each answer has been chosen so far, by family and subject.
 #[derive(Default)]
-struct Running(BTreeMap<(Family, String), [u64; 2]>);
+struct AnswerCounts(BTreeMap<(Family, String), [u64; 2]>);
 
-impl Running {
+impl AnswerCounts {
     /// Chooses one of a family's claims.
     ///
     /// Of yes and no, the side is picked where both can be had. Of the claims of one side, the one whose subject lacks that
     /// side most, then the one whose subject was asked about least, then the one that is picked.
-    fn choose(&mut self, claims: Vec<Claim>, survey: &Survey<'_>) -> Option<Claim> {
+    fn choose(&mut self, claims: Vec<Candidate>, survey: &RuleContext<'_>) -> Option<Candidate> {
         let family = claims.first()?.family.clone();
         let binary = matches!(family, Family::Affordance | Family::Presence);
         if !binary {
@@ -250,10 +250,10 @@ impl Running {
             return claims.into_iter().nth(chosen);
         }
         let side = survey.picker.pick(family.name(), "polarity", 2);
-        let (wanted, others): (Vec<Claim>, Vec<Claim>) =
+        let (wanted, others): (Vec<Candidate>, Vec<Candidate>) =
             claims.into_iter().partition(|claim| claim.truth == side);
         let side = if wanted.is_empty() { others } else { wanted };
-        let rank = |claim: &Claim| {
+        let rank = |claim: &Candidate| {
             let counts = self.0.get(&(family.clone(), claim.about.clone()));
             let counts = counts.copied().unwrap_or_default();
             let (own, other) = (counts[claim.truth], counts[1 - claim.truth]);
@@ -268,7 +268,11 @@ impl Running {
 }
 
 /// A claim as a question.
-fn ask(claim: Claim, frame: &FrameStatistics, order: &Order<'_>) -> Result<Asked> {
+fn ask(
+    claim: Candidate,
+    frame: &FrameStatistics,
+    order: &QuestionRequest<'_>,
+) -> Result<GeneratedQuestion> {
     let id = id(&claim, frame, order.dataset);
     let mut evidence = claim.evidence;
     let rules = json!({
@@ -290,7 +294,7 @@ fn ask(claim: Claim, frame: &FrameStatistics, order: &Order<'_>) -> Result<Asked
         choices,
         evidence: Value::clone(&evidence),
     };
-    Ok(Asked {
+    Ok(GeneratedQuestion {
         question,
         about: claim.about,
         scene: frame.scene.clone(),
@@ -299,7 +303,7 @@ fn ask(claim: Claim, frame: &FrameStatistics, order: &Order<'_>) -> Result<Asked
 
 /// The name of a question: its family, and the content of all that is asked, so that another place in the file, other evidence
 /// or another rulebook that asks the same changes nothing.
-fn id(claim: &Claim, frame: &FrameStatistics, dataset: &str) -> QuestionId {
+fn id(claim: &Candidate, frame: &FrameStatistics, dataset: &str) -> QuestionId {
     let head = [
         dataset,
         &frame.scene,

@@ -27,5 +27,5 @@ pub mod survey;
 #[cfg(test)]
 mod tests;
 
-pub use generate::{Generated, Order, generate};
-pub use survey::Asked;
+pub use generate::{Generated, QuestionRequest, generate};
+pub use survey::GeneratedQuestion;

@@ -5,13 +5,13 @@ use std::collections::BTreeSet;
 use serde_json::json;
 
 use super::reason::Reason;
-use super::rules::{Flag, Presence};
+use super::rules::{ClassFlag, PresenceRule};
 use super::statistics::{Segment, ppm};
-use super::survey::{Claim, Survey, Verdict, falls, yes_no};
+use super::survey::{Candidate, RuleContext, RuleResult, falls, yes_no};
 use crate::types::Family;
 
 /// Yes and no for every asked class.
-pub(super) fn candidates(survey: &Survey<'_>) -> Vec<Verdict> {
+pub(super) fn candidates(survey: &RuleContext<'_>) -> Vec<RuleResult> {
     let rule = &survey.book.presence;
     let expected = survey.room.and_then(|room| {
         survey
@@ -19,7 +19,7 @@ pub(super) fn candidates(survey: &Survey<'_>) -> Vec<Verdict> {
             .expected(room, &survey.statistics.scene, rule.frequent)
     });
     let classes = survey.book.class.iter();
-    let asked = classes.filter(|(_, class)| class.flags.contains(&Flag::Asked));
+    let asked = classes.filter(|(_, class)| class.flags.contains(&ClassFlag::Asked));
     asked
         .map(|(class, _)| {
             let present = survey.statistics.of_class(class) > 0;
@@ -34,7 +34,7 @@ pub(super) fn candidates(survey: &Survey<'_>) -> Vec<Verdict> {
 }
 
 /// Yes: the best segment of the class is large, pure and whole.
-fn yes(survey: &Survey<'_>, class: &str) -> Result<Verdict, Reason> {
+fn yes(survey: &RuleContext<'_>, class: &str) -> Result<RuleResult, Reason> {
     let rule = &survey.book.presence;
     let segments = survey.statistics.segments.iter();
     let mut segments: Vec<&Segment> = segments.filter(|segment| segment.class == class).collect();
@@ -50,7 +50,7 @@ fn yes(survey: &Survey<'_>, class: &str) -> Result<Verdict, Reason> {
     }
 }
 
-fn flaw(survey: &Survey<'_>, segment: &Segment, rule: &Presence) -> Option<Reason> {
+fn flaw(survey: &RuleContext<'_>, segment: &Segment, rule: &PresenceRule) -> Option<Reason> {
     if let Some(reason) = survey.statistics.disqualified(segment, survey.book) {
         return Some(reason);
     }
@@ -71,10 +71,10 @@ fn flaw(survey: &Survey<'_>, segment: &Segment, rule: &Presence) -> Option<Reaso
 /// No: not a pixel of the class or of what may be taken for it, in a frame where that says something, of a thing that might
 /// well be there.
 fn no(
-    survey: &Survey<'_>,
+    survey: &RuleContext<'_>,
     class: &str,
     expected: Option<&BTreeSet<String>>,
-) -> Result<Verdict, Reason> {
+) -> Result<RuleResult, Reason> {
     if !survey.labels.expressible.contains(class) {
         return Err(Reason::Inexpressible);
     }
@@ -113,17 +113,17 @@ fn no(
 }
 
 fn claim(
-    survey: &Survey<'_>,
+    survey: &RuleContext<'_>,
     class: &str,
     truth: usize,
     segments: &[&Segment],
     more: serde_json::Value,
-) -> Verdict {
+) -> RuleResult {
     let book = survey.book;
     let text = book.presence.text.replace("{article}", book.article(class));
     let text = text.replace("{object}", book.name(class));
     survey.rests(
-        Claim {
+        Candidate {
             family: Family::Presence,
             about: class.to_owned(),
             text,

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::rules::{Book, Clue, Contest, Sign};
+use super::rules::{Clue, Contest, RuleBook, Sign};
 use super::statistics::{FrameStatistics, Segment};
 
 /// What a frame says of its room.
@@ -48,7 +48,7 @@ pub enum RoomSource {
 /// that contend, one wins by one of the rulebook's contests, or where the other is small and far behind: a room seen through
 /// a door.
 #[must_use]
-pub fn classify(statistics: &FrameStatistics, book: &Book) -> RoomSigns {
+pub fn classify(statistics: &FrameStatistics, book: &RuleBook) -> RoomSigns {
     let signs = Signs::of(statistics, book);
     let mut scores = BTreeMap::new();
     let mut segments: BTreeMap<String, Vec<u32>> = BTreeMap::new();
@@ -78,12 +78,12 @@ pub fn classify(statistics: &FrameStatistics, book: &Book) -> RoomSigns {
 /// What is seen, by token.
 struct Signs<'a> {
     statistics: &'a FrameStatistics,
-    book: &'a Book,
+    book: &'a RuleBook,
     tokens: BTreeMap<&'a str, Vec<&'a Segment>>,
 }
 
 impl<'a> Signs<'a> {
-    fn of(statistics: &'a FrameStatistics, book: &'a Book) -> Self {
+    fn of(statistics: &'a FrameStatistics, book: &'a RuleBook) -> Self {
         let mut tokens: BTreeMap<&str, Vec<&Segment>> = BTreeMap::new();
         for segment in statistics.evidence(book) {
             tokens.entry(segment.token(book)).or_default().push(segment);

@@ -3,13 +3,13 @@
 use serde_json::json;
 
 use super::reason::Reason;
-use super::rules::Flag;
+use super::rules::ClassFlag;
 use super::statistics::Segment;
-use super::survey::{Claim, Survey, Verdict, falls};
+use super::survey::{Candidate, RuleContext, RuleResult, falls};
 use crate::types::Family;
 
 /// The one candidate of a frame.
-pub(super) fn candidates(survey: &Survey<'_>) -> Vec<Verdict> {
+pub(super) fn candidates(survey: &RuleContext<'_>) -> Vec<RuleResult> {
     let (book, statistics) = (survey.book, survey.statistics);
     let rule = &book.room_type;
     let fall = |reason| vec![falls(Family::RoomType, "", None, reason)];
@@ -21,7 +21,7 @@ pub(super) fn candidates(survey: &Survey<'_>) -> Vec<Verdict> {
     }
     let asked: Vec<&Segment> = statistics
         .evidence(book)
-        .filter(|segment| book.is(&segment.class, Flag::Asked))
+        .filter(|segment| book.is(&segment.class, ClassFlag::Asked))
         .collect();
     let large = asked
         .iter()
@@ -35,7 +35,7 @@ pub(super) fn candidates(survey: &Survey<'_>) -> Vec<Verdict> {
     };
     let more = json!({ "scores": survey.signs.scores });
     vec![survey.rests(
-        Claim {
+        Candidate {
             family: Family::RoomType,
             about: String::new(),
             text: rule.text.clone(),

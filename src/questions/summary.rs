@@ -1,14 +1,14 @@
-//! What a set of questions is like, as the paper's figure of its statistics and more: [`Summary`].
+//! What a set of questions is like, as the paper's figure of its statistics and more: [`QuestionSummary`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
-use super::generate::{Generated, Left, Order, Tally, stated};
+use super::generate::{FamilyCounts, Generated, OmissionReason, QuestionRequest, stated};
 use super::reason::Reason;
-use super::rules::Book;
+use super::rules::RuleBook;
 use super::statistics::FrameStatistics;
-use super::survey::Asked;
+use super::survey::GeneratedQuestion;
 use crate::types::{Digest, Family};
 
 /// The schema of the summary as JSON.
@@ -16,7 +16,7 @@ const SCHEMA: &str = "darkqa.questions/1";
 
 /// What a set of questions is like. Shares are pairs of counts.
 #[derive(Debug, Serialize)]
-pub struct Summary {
+pub struct QuestionSummary {
     schema: &'static str,
     /// The data set's name for itself.
     pub dataset: String,
@@ -39,7 +39,7 @@ pub struct Summary {
     /// All questions.
     pub questions: usize,
     /// What became of the candidates, by family.
-    pub candidates: BTreeMap<Family, Candidates>,
+    pub candidates: BTreeMap<Family, CandidateCounts>,
     /// Frames by how many questions are asked of them.
     pub per_frame: BTreeMap<usize, usize>,
     /// Questions by family and answer.
@@ -51,9 +51,9 @@ pub struct Summary {
     /// Yes and no by what is asked about, of the families that are answered so.
     pub polarity: BTreeMap<Family, BTreeMap<String, [usize; 2]>>,
     /// What of each class there is.
-    pub classes: BTreeMap<String, Coverage>,
+    pub classes: BTreeMap<String, ClassCoverage>,
     /// Frames and questions about rooms by room.
-    pub rooms: BTreeMap<String, Room>,
+    pub rooms: BTreeMap<String, RoomCoverage>,
     /// Frames whose room is stated and seen, and those of them where both say the same.
     pub room_agreement: [usize; 2],
     /// Gaps between the two nearest objects, by 250 mm.
@@ -68,7 +68,7 @@ pub struct Summary {
 
 /// What became of the candidates of a family.
 #[derive(Debug, Default, Serialize)]
-pub struct Candidates {
+pub struct CandidateCounts {
     /// Those that hold.
     pub viable: u64,
     /// Those that are asked.
@@ -85,7 +85,7 @@ pub struct Candidates {
 
 /// What of a class there is.
 #[derive(Debug, Default, Serialize)]
-pub struct Coverage {
+pub struct ClassCoverage {
     /// Pixels.
     pub pixels: u64,
     /// Segments that are not tiny.
@@ -98,7 +98,7 @@ pub struct Coverage {
 
 /// What of a room there is.
 #[derive(Debug, Default, Serialize)]
-pub struct Room {
+pub struct RoomCoverage {
     /// Frames that show it.
     pub frames: usize,
     /// Questions whose answer it is.
@@ -119,13 +119,13 @@ pub struct Baselines {
     pub prior: f64,
 }
 
-impl Summary {
+impl QuestionSummary {
     /// What came of the frames; `failed` of them could not be measured.
     #[must_use]
     pub fn new(
         frames: &[FrameStatistics],
         made: &Generated,
-        order: &Order<'_>,
+        order: &QuestionRequest<'_>,
         failed: usize,
     ) -> Self {
         let asked = &made.asked;
@@ -148,7 +148,7 @@ impl Summary {
             candidates: made
                 .tallies
                 .iter()
-                .map(|(family, tally)| (family.clone(), Candidates::of(tally)))
+                .map(|(family, tally)| (family.clone(), CandidateCounts::of(tally)))
                 .collect(),
             per_frame: BTreeMap::new(),
             answers: BTreeMap::new(),
@@ -174,12 +174,12 @@ impl Summary {
         for asked in asked {
             summary.take(asked);
         }
-        let same = count(asked, Asked::said);
+        let same = count(asked, GeneratedQuestion::said);
         summary.repeats = same.values().map(|count| count - 1).sum();
         summary
     }
 
-    fn take(&mut self, asked: &Asked) {
+    fn take(&mut self, asked: &GeneratedQuestion) {
         let question = &asked.question;
         let answers = self.answers.entry(question.family.clone()).or_default();
         *answers.entry(asked.answer().to_owned()).or_insert(0) += 1;
@@ -203,23 +203,23 @@ impl Summary {
     }
 }
 
-impl Candidates {
-    fn of(tally: &Tally) -> Self {
+impl CandidateCounts {
+    fn of(tally: &FamilyCounts) -> Self {
         let left = |why| tally.left.get(&why).copied().unwrap_or(0);
         Self {
             viable: tally.viable,
             asked: tally.asked,
-            not_chosen: left(Left::NotChosen),
-            rejected: left(Left::Rejected),
-            unbalanced: left(Left::Unbalanced),
+            not_chosen: left(OmissionReason::NotChosen),
+            rejected: left(OmissionReason::Rejected),
+            unbalanced: left(OmissionReason::Unbalanced),
             fallen: tally.fallen.clone(),
         }
     }
 }
 
 fn count<'a, K: Ord>(
-    asked: impl IntoIterator<Item = &'a Asked>,
-    key: impl Fn(&'a Asked) -> K,
+    asked: impl IntoIterator<Item = &'a GeneratedQuestion>,
+    key: impl Fn(&'a GeneratedQuestion) -> K,
 ) -> BTreeMap<K, usize> {
     let mut counts = BTreeMap::new();
     for asked in asked {
@@ -236,8 +236,11 @@ fn chance(sizes: &BTreeMap<usize, usize>) -> f64 {
     right.sum()
 }
 
-fn coverage(frames: &[FrameStatistics], asked: &[Asked]) -> BTreeMap<String, Coverage> {
-    let mut classes: BTreeMap<String, Coverage> = BTreeMap::new();
+fn coverage(
+    frames: &[FrameStatistics],
+    asked: &[GeneratedQuestion],
+) -> BTreeMap<String, ClassCoverage> {
+    let mut classes: BTreeMap<String, ClassCoverage> = BTreeMap::new();
     for frame in frames {
         for (class, pixels) in &frame.classes {
             let coverage = classes.entry(class.clone()).or_default();
@@ -261,7 +264,7 @@ fn coverage(frames: &[FrameStatistics], asked: &[Asked]) -> BTreeMap<String, Cov
 }
 
 /// Frames whose room is stated and seen, and those of them where both say the same.
-fn room_agreement(frames: &[FrameStatistics], made: &Generated, book: &Book) -> [usize; 2] {
+fn room_agreement(frames: &[FrameStatistics], made: &Generated, book: &RuleBook) -> [usize; 2] {
     let signs: BTreeMap<_, _> = made
         .rooms
         .iter()
@@ -279,8 +282,8 @@ fn room_agreement(frames: &[FrameStatistics], made: &Generated, book: &Book) -> 
     agreement
 }
 
-fn rooms(made: &Generated) -> BTreeMap<String, Room> {
-    let mut rooms: BTreeMap<String, Room> = BTreeMap::new();
+fn rooms(made: &Generated) -> BTreeMap<String, RoomCoverage> {
+    let mut rooms: BTreeMap<String, RoomCoverage> = BTreeMap::new();
     for room in made
         .rooms
         .iter()
@@ -291,8 +294,8 @@ fn rooms(made: &Generated) -> BTreeMap<String, Room> {
     rooms
 }
 
-fn baselines(asked: &[Asked]) -> BTreeMap<String, Baselines> {
-    let mut families: BTreeMap<&Family, Vec<&Asked>> = BTreeMap::new();
+fn baselines(asked: &[GeneratedQuestion]) -> BTreeMap<String, Baselines> {
+    let mut families: BTreeMap<&Family, Vec<&GeneratedQuestion>> = BTreeMap::new();
     for asked in asked {
         families
             .entry(&asked.question.family)
@@ -302,7 +305,7 @@ fn baselines(asked: &[Asked]) -> BTreeMap<String, Baselines> {
     let mut all: BTreeMap<String, Baselines> = BTreeMap::new();
     let mut total = Baselines::default();
     for (family, list) in families {
-        let answers = count(list.iter().copied(), Asked::answer);
+        let answers = count(list.iter().copied(), GeneratedQuestion::answer);
         let sizes = count(list.iter().copied(), |asked| asked.question.choices.len());
         let baselines = Baselines {
             questions: list.len(),
@@ -321,7 +324,7 @@ fn baselines(asked: &[Asked]) -> BTreeMap<String, Baselines> {
 }
 
 /// How many questions the commonest answer in other scenes gets right: to the same words, else of the family, else a guess.
-fn prior(list: &[&Asked]) -> f64 {
+fn prior(list: &[&GeneratedQuestion]) -> f64 {
     // By words, then by answer: how many in each scene. No words are those of all.
     let mut seen: BTreeMap<&str, BTreeMap<&str, BTreeMap<&str, usize>>> = BTreeMap::new();
     for asked in list {

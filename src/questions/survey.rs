@@ -1,4 +1,4 @@
-//! All that the rules see of a frame, [`Survey`]; and what they say of it, [`Verdict`].
+//! All that the rules see of a frame, [`RuleContext`]; and what they say of it, [`RuleResult`].
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -7,15 +7,15 @@ use super::frequency::Frequency;
 use super::pick::Picker;
 use super::reason::Reason;
 use super::room::RoomSigns;
-use super::rules::Book;
+use super::rules::RuleBook;
 use super::statistics::{FrameStatistics, Segment};
 use crate::types::{Family, Labels, Question};
 
 /// What the rules see of a frame.
 #[derive(Debug, Clone, Copy)]
-pub struct Survey<'a> {
+pub struct RuleContext<'a> {
     /// The rulebook.
-    pub book: &'a Book,
+    pub book: &'a RuleBook,
     /// The label space.
     pub labels: &'a Labels,
     /// What was measured.
@@ -32,7 +32,7 @@ pub struct Survey<'a> {
 
 /// A question that may be asked of a frame, with its one true answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Claim {
+pub struct Candidate {
     /// Its kind.
     pub family: Family,
     /// What it is about: a class, an activity, or nothing.
@@ -47,7 +47,7 @@ pub struct Claim {
     pub evidence: Value,
 }
 
-impl Claim {
+impl Candidate {
     /// The true answer.
     #[must_use]
     pub fn answer(&self) -> &str {
@@ -57,7 +57,7 @@ impl Claim {
 
 /// A question that is asked, with what it is about.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Asked {
+pub struct GeneratedQuestion {
     /// The question.
     pub question: Question,
     /// What it is about: a class, an activity, or nothing.
@@ -66,7 +66,7 @@ pub struct Asked {
     pub scene: String,
 }
 
-impl Asked {
+impl GeneratedQuestion {
     /// The true answer.
     #[must_use]
     pub fn answer(&self) -> &str {
@@ -81,16 +81,16 @@ impl Asked {
 
 /// What a rule says of a candidate.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Verdict {
+pub enum RuleResult {
     /// It can be asked.
-    Holds(Claim),
+    Holds(Candidate),
     /// It cannot.
-    Falls(Fallen),
+    Falls(Rejection),
 }
 
 /// A candidate that cannot be asked.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Fallen {
+pub struct Rejection {
     /// The family it was of.
     pub family: Family,
     /// What it would have been about.
@@ -102,14 +102,14 @@ pub struct Fallen {
     pub reason: Reason,
 }
 
-impl Survey<'_> {
+impl RuleContext<'_> {
     /// A claim that rests on these segments.
-    pub(super) fn rests(&self, mut claim: Claim, segments: &[&Segment]) -> Verdict {
+    pub(super) fn rests(&self, mut claim: Candidate, segments: &[&Segment]) -> RuleResult {
         let list: Vec<Value> = segments.iter().map(|segment| self.show(segment)).collect();
         if let Some(evidence) = claim.evidence.as_object_mut() {
             evidence.insert("segments".to_owned(), json!(list));
         }
-        Verdict::Holds(claim)
+        RuleResult::Holds(claim)
     }
 
     /// What of a segment a person needs to check it.
@@ -159,8 +159,13 @@ impl Survey<'_> {
 }
 
 /// A candidate that cannot be asked.
-pub(super) fn falls(family: Family, about: &str, answer: Option<bool>, reason: Reason) -> Verdict {
-    Verdict::Falls(Fallen {
+pub(super) fn falls(
+    family: Family,
+    about: &str,
+    answer: Option<bool>,
+    reason: Reason,
+) -> RuleResult {
+    RuleResult::Falls(Rejection {
         family,
         about: about.to_owned(),
         answer: answer.map(|yes| YES_NO[usize::from(!yes)].to_owned()),

@@ -1,4 +1,4 @@
-//! The rooms that were drawn last, as far as memory is meant for them: [`Album`].
+//! The rooms that were drawn last, as far as memory is meant for them: [`FrameCache`].
 //!
 //! A room is drawn where its image is needed and again where its maps are; the second time it is taken from here. The album
 //! is bounded in bytes, so that any number of rooms never stands in memory together.
@@ -17,9 +17,9 @@ const PIXEL: usize = 13;
 
 /// Frames that were drawn last, by their places among all.
 #[derive(Debug, Default)]
-pub(super) struct Album(Mutex<VecDeque<(usize, Arc<Frame>)>>);
+pub(super) struct FrameCache(Mutex<VecDeque<(usize, Arc<Frame>)>>);
 
-impl Album {
+impl FrameCache {
     /// The frame at a place; drawn where it is not kept.
     pub(super) fn frame(
         &self,

@@ -63,7 +63,7 @@ const FEW: usize = 4;
 /// Places at which a node may be cut.
 const BINS: usize = 12;
 
-struct Item {
+struct BuildItem {
     leaf: Leaf,
     low: Vec3,
     high: Vec3,
@@ -73,11 +73,11 @@ struct Item {
 impl Bvh {
     /// The tree over triangles, each with whether light passes it.
     pub(super) fn new(faces: impl Iterator<Item = ([Vec3; 3], bool)>) -> Self {
-        let mut items: Vec<Item> = faces
+        let mut items: Vec<BuildItem> = faces
             .enumerate()
             .map(|(face, ([a, b, c], clear))| {
                 let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-                Item {
+                BuildItem {
                     leaf: Leaf {
                         corner: a,
                         edges: [b - a, c - a],
@@ -98,7 +98,7 @@ impl Bvh {
         tree
     }
 
-    fn build(&mut self, items: &mut [Item]) {
+    fn build(&mut self, items: &mut [BuildItem]) {
         let (low, high) = bounds(items);
         let place = self.nodes.len();
         self.nodes.push(Node {
@@ -221,7 +221,7 @@ impl Leaf {
     }
 }
 
-fn bounds(items: &[Item]) -> (Vec3, Vec3) {
+fn bounds(items: &[BuildItem]) -> (Vec3, Vec3) {
     items.iter().fold(
         (Vec3::splat(f32::MAX), Vec3::splat(f32::MIN)),
         |(low, high), item| (low.min(item.low), high.max(item.high)),
@@ -235,13 +235,13 @@ fn area(low: Vec3, high: Vec3) -> f32 {
 
 /// Parts items where rays will have the least to do (the surface area heuristic in bins; Wald, 2007): the axis, and how many
 /// come first.
-fn cut(items: &mut [Item]) -> (usize, usize) {
+fn cut(items: &mut [BuildItem]) -> (usize, usize) {
     let (low, high) = items.iter().fold(
         (Vec3::splat(f32::MAX), Vec3::splat(f32::MIN)),
         |(low, high), item| (low.min(item.middle), high.max(item.middle)),
     );
     let size = high - low;
-    let bin = |item: &Item, axis: usize| {
+    let bin = |item: &BuildItem, axis: usize| {
         let share = (item.middle[axis] - low[axis]) / size[axis];
         ((share * BINS as f32) as usize).min(BINS - 1)
     };

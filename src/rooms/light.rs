@@ -1,6 +1,6 @@
 //! How much light reaches a place: [`Lighting`].
 //!
-//! Light comes from the lamps and windows, each sampled with a shadow ray, and from what they light: rays over the half-space
+//! LightSource comes from the lamps and windows, each sampled with a shadow ray, and from what they light: rays over the half-space
 //! (as likely as their cosine) bring back what they meet, lit by one light in turn, plus what is left after many bounces, a
 //! constant. It is one bounce by sampling and the rest by a mean: soft shadows, dark corners and colours that bleed are there,
 //! caustics are not.
@@ -9,7 +9,7 @@ use glam::{Vec3, vec3};
 
 use super::bvh::{Bvh, Ray};
 use super::mesh::turn;
-use super::scene::{Light, Scene};
+use super::scene::{LightSource, Scene};
 use super::spot::Spot;
 use super::surface::hash;
 
@@ -33,12 +33,12 @@ pub(super) struct Lighting<'a> {
 
 /// Which stratum a sample is in, and what jitters it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Sample {
+pub(super) struct LightSample {
     pub(super) stratum: usize,
     pub(super) place: [i32; 2],
 }
 
-impl Sample {
+impl LightSample {
     /// Two numbers from 0 to 1 in the stratum, for one use.
     fn pair(self, purpose: usize) -> [f32; 2] {
         // Each use meets the strata in an order of its own (5 and 11 have no common factor with 16).
@@ -55,7 +55,7 @@ impl Sample {
 
 impl Lighting<'_> {
     /// The light that reaches a place: straight from lamps and windows, and by way of other things.
-    pub(super) fn reaching(&self, spot: &Spot, sample: Sample) -> [Vec3; 2] {
+    pub(super) fn reaching(&self, spot: &Spot, sample: LightSample) -> [Vec3; 2] {
         let gathered: Vec3 = (0..GATHERED).map(|i| self.gathered(spot, sample, i)).sum();
         [
             self.direct(spot.at, spot.normal, sample),
@@ -64,7 +64,7 @@ impl Lighting<'_> {
     }
 
     /// The light that lamps and windows alone bring to a place.
-    pub(super) fn direct(&self, at: Vec3, normal: Vec3, sample: Sample) -> Vec3 {
+    pub(super) fn direct(&self, at: Vec3, normal: Vec3, sample: LightSample) -> Vec3 {
         let lights = self.scene.lights.iter().enumerate();
         lights
             .map(|(i, light)| self.from(light, at, normal, sample.pair(i)))
@@ -72,7 +72,7 @@ impl Lighting<'_> {
     }
 
     /// What one ray over the half-space brings back.
-    fn gathered(&self, spot: &Spot, sample: Sample, which: usize) -> Vec3 {
+    fn gathered(&self, spot: &Spot, sample: LightSample, which: usize) -> Vec3 {
         let [u, v] = sample.pair(12 + which);
         let around = turn(std::f32::consts::TAU * u);
         let (out, up) = (v.sqrt(), (1.0 - v).max(0.0).sqrt());
@@ -102,10 +102,10 @@ impl Lighting<'_> {
     }
 
     /// The light that one light brings to a place.
-    fn from(&self, light: &Light, at: Vec3, normal: Vec3, [u, v]: [f32; 2]) -> Vec3 {
+    fn from(&self, light: &LightSource, at: Vec3, normal: Vec3, [u, v]: [f32; 2]) -> Vec3 {
         let start = at + normal * OFF;
         let (target, strength) = match *light {
-            Light::Panel {
+            LightSource::Panel {
                 corner,
                 edges: [a, b],
                 normal: facing,
@@ -121,7 +121,7 @@ impl Lighting<'_> {
                     radiance * (shines * area / (std::f32::consts::PI * square)),
                 )
             }
-            Light::Bulb {
+            LightSource::Bulb {
                 middle,
                 radius,
                 radiance,

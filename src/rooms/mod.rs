@@ -29,10 +29,10 @@ use std::sync::{Arc, LazyLock};
 use clap::Args;
 use ndarray::Array2;
 
-use self::album::Album;
+use self::album::FrameCache;
 use self::dice::Dice;
 use self::kinds::RoomKind;
-use self::plan::Plan;
+use self::plan::FloorPlan;
 use self::viewpoint::Height;
 use crate::error::{Error, Result};
 use crate::labels;
@@ -89,16 +89,16 @@ impl fmt::Display for Rooms {
 pub struct Room {
     rooms: Rooms,
     index: usize,
-    album: Arc<Album>,
+    album: Arc<FrameCache>,
 }
 
 /// What the generator knows of a frame: the truth that questions can be held to.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Truth {
+pub struct RoomTruth {
     /// The kind of the room.
     pub room: &'static str,
     /// Everything in the room; the number of a segment is its place, from 1.
-    pub things: Vec<Known>,
+    pub things: Vec<ThingTruth>,
 }
 
 /// Places on a thing are looked at so near to each other, in metres.
@@ -106,7 +106,7 @@ const REACH: f32 = 0.06;
 
 /// What the generator knows of a thing.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Known {
+pub struct ThingTruth {
     /// Its own word.
     pub word: &'static str,
     /// Its class in mpcat40.
@@ -171,7 +171,7 @@ impl Rooms {
 
     /// Their frames.
     pub fn all(self) -> impl Iterator<Item = (FrameId, Room)> {
-        let album = Arc::new(Album::default());
+        let album = Arc::new(FrameCache::default());
         (0..self.frames).map(move |index| {
             let room = Room {
                 rooms: self,
@@ -239,13 +239,13 @@ impl Room {
         self.rooms.size
     }
 
-    fn plan(&self) -> Plan {
+    fn plan(&self) -> FloorPlan {
         let scene = self.scene();
         self.kind()
             .furnish(Dice::new(self.rooms.seed, &[&scene, "furniture"]))
     }
 
-    fn camera(&self, plan: &Plan) -> camera::Camera {
+    fn camera(&self, plan: &FloorPlan) -> camera::Camera {
         let scene = self.scene();
         let mut dice = Dice::new(self.rooms.seed, &[&scene, self.view(), "camera"]);
         viewpoint::camera(plan, self.height(), self.rooms.size, &mut dice)
@@ -253,7 +253,7 @@ impl Room {
 
     /// What the generator knows of it.
     #[must_use]
-    pub fn truth(&self) -> Truth {
+    pub fn truth(&self) -> RoomTruth {
         let plan = self.plan();
         let camera = self.camera(&plan);
         let mut near = vec![f32::MAX; plan.scene.things.len()];
@@ -263,10 +263,10 @@ impl Room {
             near[*owner] = nearest.fold(near[*owner], f32::min);
         }
         let things = plan.scene.things.iter().zip(near);
-        Truth {
+        RoomTruth {
             room: self.kind().name(),
             things: things
-                .map(|(thing, near)| Known {
+                .map(|(thing, near)| ThingTruth {
                     word: thing.kind.word,
                     class: thing.kind.class,
                     color: thing.color,
@@ -384,7 +384,7 @@ mod tests {
         let all: Vec<Room> = rooms.all().map(|(_, room)| room).collect();
         let first = all[0].frame().unwrap();
         assert!(Arc::ptr_eq(&first, &all[0].frame().unwrap()));
-        let album = Album::default();
+        let album = FrameCache::default();
         let big = Frame {
             rgb: crate::types::Rgb::black(2000, 3000),
             ..first.as_ref().clone()

@@ -1,11 +1,11 @@
-//! The floor plan of a room: four walls, and what stands and hangs where: [`Plan`].
+//! The floor plan of a room: four walls, and what stands and hangs where: [`FloorPlan`].
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
 use glam::{Vec3, vec3};
 
 use super::dice::Dice;
-use super::furniture::{Set, at, textiles, walls};
+use super::furniture::{FurnitureSet, at, textiles, walls};
 use super::mesh::Mesh;
 use super::paint::rgb;
 use super::scene::{Piece, Pose, Scene, kind};
@@ -46,7 +46,7 @@ impl Wall {
 
 /// What a room's floor is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Ground {
+pub(super) enum Flooring {
     Wood,
     Tiles,
     Carpet,
@@ -54,9 +54,9 @@ pub(super) enum Ground {
 
 /// A rectangle of the floor: the smallest x and z, and the largest.
 #[derive(Debug, Clone, Copy)]
-struct Area([f32; 4]);
+struct FloorArea([f32; 4]);
 
-impl Area {
+impl FloorArea {
     fn meets(&self, other: &Self, margin: f32) -> bool {
         let [a, b] = [self.0, other.0];
         a[0] < b[2] + margin && b[0] < a[2] + margin && a[1] < b[3] + margin && b[1] < a[3] + margin
@@ -65,13 +65,13 @@ impl Area {
 
 /// A rectangle of a wall: along it, then up.
 #[derive(Debug, Clone, Copy)]
-struct Patch {
+struct WallPatch {
     wall: Wall,
     along: [f32; 2],
     up: [f32; 2],
 }
 
-impl Patch {
+impl WallPatch {
     /// The part that reaches as far to both sides of a place along the wall.
     fn around(wall: Wall, along: f32, reach: f32, up: [f32; 2]) -> Self {
         let along = [along - reach, along + reach];
@@ -80,23 +80,23 @@ impl Patch {
 }
 
 /// The room while it is furnished.
-pub(super) struct Plan {
+pub(super) struct FloorPlan {
     pub(super) scene: Scene,
     /// Width, height and depth.
     pub(super) size: Vec3,
     pub(super) dice: Dice,
     /// What is worth looking at.
     pub(super) sights: Vec<usize>,
-    areas: Vec<Area>,
-    patches: Vec<Patch>,
+    areas: Vec<FloorArea>,
+    patches: Vec<WallPatch>,
 }
 
 /// Places are tried so often before a piece is left out.
 const TRIES: usize = 60;
 
-impl Plan {
+impl FloorPlan {
     /// An empty room of a size.
-    pub(super) fn new(size: Vec3, ground: Ground, tiled: bool, mut dice: Dice) -> Self {
+    pub(super) fn new(size: Vec3, ground: Flooring, tiled: bool, mut dice: Dice) -> Self {
         let tint = dice.pick(&[
             [238, 236, 230],
             [232, 228, 216],
@@ -145,10 +145,10 @@ impl Plan {
         plan
     }
 
-    fn ground(&mut self, ground: Ground) {
+    fn ground(&mut self, ground: Flooring) {
         let dice = &mut self.dice;
         let surface = match ground {
-            Ground::Wood => {
+            Flooring::Wood => {
                 let tints = [
                     [176, 128, 84],
                     [142, 98, 62],
@@ -157,12 +157,12 @@ impl Plan {
                 ];
                 Surface::plain(dice.pick(&tints)).with(Pattern::Boards(0.13))
             }
-            Ground::Tiles => {
+            Flooring::Tiles => {
                 let tints = [[206, 202, 194], [174, 176, 178], [196, 184, 168]];
                 let joint = rgb([150, 146, 140]);
                 Surface::plain(dice.pick(&tints)).with(Pattern::Tiles(0.33, joint))
             }
-            Ground::Carpet => {
+            Flooring::Carpet => {
                 let tints = [[188, 178, 164], [160, 162, 170], [172, 158, 146]];
                 Surface::plain(dice.pick(&tints)).with(Pattern::Pile)
             }
@@ -210,7 +210,7 @@ impl Plan {
         self.put(piece, at(base.outward(place), base.angle + angle))
     }
 
-    fn all(&mut self, set: Set, pose: &Pose) -> usize {
+    fn all(&mut self, set: FurnitureSet, pose: &Pose) -> usize {
         let first = self.scene.things.len();
         for (piece, own) in set.pieces {
             self.beside(pose, piece, own.at, own.angle);
@@ -218,18 +218,18 @@ impl Plan {
         first
     }
 
-    fn area(pose: &Pose, size: Vec3, from: f32) -> Area {
+    fn area(pose: &Pose, size: Vec3, from: f32) -> FloorArea {
         let corners = [
             vec3(-size.x / 2.0, 0.0, from),
             vec3(size.x / 2.0, 0.0, from + size.z),
         ]
         .map(|corner| pose.outward(corner));
         let (low, high) = (corners[0].min(corners[1]), corners[0].max(corners[1]));
-        Area([low.x, low.z, high.x, high.z])
+        FloorArea([low.x, low.z, high.x, high.z])
     }
 
-    fn free(&self, area: &Area) -> bool {
-        let Area([left, back, right, front]) = *area;
+    fn free(&self, area: &FloorArea) -> bool {
+        let FloorArea([left, back, right, front]) = *area;
         left > 0.0
             && back > 0.0
             && right < self.size.x
@@ -237,7 +237,7 @@ impl Plan {
             && !self.areas.iter().any(|other| other.meets(area, 0.04))
     }
 
-    fn open(&self, patch: &Patch) -> bool {
+    fn open(&self, patch: &WallPatch) -> bool {
         !self.patches.iter().any(|other| {
             other.wall == patch.wall
                 && other.along[0] < patch.along[1]
@@ -248,12 +248,12 @@ impl Plan {
     }
 
     /// Stands a set at a wall, so far along it, where nothing is in its way; its pose.
-    pub(super) fn stand_at(&mut self, set: Set, wall: Wall, along: f32) -> Option<Pose> {
+    pub(super) fn stand_at(&mut self, set: FurnitureSet, wall: Wall, along: f32) -> Option<Pose> {
         let pose = self.on(wall, along, 0.0);
         let pose = at(pose.outward(vec3(0.0, 0.0, 0.016)), pose.angle);
         let area = Self::area(&pose, set.size, 0.0);
         let half = set.size.x / 2.0;
-        let patch = Patch::around(wall, along, half, [0.0, set.size.y + 0.02]);
+        let patch = WallPatch::around(wall, along, half, [0.0, set.size.y + 0.02]);
         if !self.free(&area) || !self.open(&patch) {
             return None;
         }
@@ -264,7 +264,7 @@ impl Plan {
     }
 
     /// Stands a set somewhere at one of these walls; `None` where there is no room for it.
-    pub(super) fn stand(&mut self, set: &Set, choices: &[Wall]) -> Option<Pose> {
+    pub(super) fn stand(&mut self, set: &FurnitureSet, choices: &[Wall]) -> Option<Pose> {
         (0..TRIES).find_map(|_| {
             let wall = self.dice.pick(choices);
             let half = set.size.x / 2.0 + 0.03;
@@ -274,7 +274,7 @@ impl Plan {
     }
 
     /// Stands a set in the corner of a wall.
-    pub(super) fn corner(&mut self, set: &Set, choices: &[Wall]) -> Option<Pose> {
+    pub(super) fn corner(&mut self, set: &FurnitureSet, choices: &[Wall]) -> Option<Pose> {
         (0..TRIES).find_map(|_| {
             let wall = self.dice.pick(choices);
             let half = set.size.x / 2.0 + 0.04;
@@ -288,7 +288,7 @@ impl Plan {
     }
 
     /// Stands a set in the open, its middle at a place; its pose.
-    pub(super) fn amid(&mut self, set: Set, place: Vec3, angle: f32) -> Option<Pose> {
+    pub(super) fn amid(&mut self, set: FurnitureSet, place: Vec3, angle: f32) -> Option<Pose> {
         let back = at(place, angle).outward(vec3(0.0, 0.0, -set.size.z / 2.0));
         let pose = at(back, angle);
         let area = Self::area(&pose, set.size, 0.0);
@@ -313,7 +313,8 @@ impl Plan {
         (0..TRIES).find_map(|_| {
             let wall = self.dice.pick(choices);
             let along = self.dice.between(half, self.width(wall) - half);
-            let patch = Patch::around(wall, along, half, [up + low.y - 0.05, up + high.y + 0.05]);
+            let patch =
+                WallPatch::around(wall, along, half, [up + low.y - 0.05, up + high.y + 0.05]);
             self.open(&patch).then(|| {
                 self.patches.push(patch);
                 let pose = self.on(wall, along, up);
@@ -336,7 +337,7 @@ impl Plan {
                 Wall::East => pose.at.z,
                 Wall::West => self.size.z - pose.at.z,
             };
-            self.patches.push(Patch {
+            self.patches.push(WallPatch {
                 wall,
                 along: [along + low.x, along + high.x],
                 up: [up + low.y, up + high.y],
@@ -347,15 +348,15 @@ impl Plan {
 
     /// Cuts a door into one of these walls.
     pub(super) fn door(&mut self, choices: &[Wall]) {
-        let door = Set::of(walls::door(&mut self.dice));
+        let door = FurnitureSet::of(walls::door(&mut self.dice));
         let size = door.size + vec3(0.05, 0.0, 0.0);
-        let set = Set { size, ..door };
+        let set = FurnitureSet { size, ..door };
         for _ in 0..TRIES {
             let wall = self.dice.pick(choices);
             let half = size.x / 2.0 + 0.1;
             let along = self.dice.between(half, self.width(wall) - half);
             let pose = self.on(wall, along, 0.0);
-            let patch = Patch::around(wall, along, half, [0.0, size.y + 0.1]);
+            let patch = WallPatch::around(wall, along, half, [0.0, size.y + 0.1]);
             if self.open(&patch) {
                 self.patches.push(patch);
                 self.keep_free(&pose, vec3(0.9, 0.0, 0.75), 0.0);
@@ -366,17 +367,28 @@ impl Plan {
     }
 
     /// A window in one of these walls, with what hangs before it.
-    pub(super) fn window(&mut self, choices: &[Wall], width: f32, sill: f32, dress: Dress) {
+    pub(super) fn window(
+        &mut self,
+        choices: &[Wall],
+        width: f32,
+        sill: f32,
+        dress: WindowDressing,
+    ) {
         let height = 2.2 - sill;
         for _ in 0..TRIES {
             let wall = self.dice.pick(choices);
-            let reach = width / 2.0 + if dress == Dress::Curtains { 0.62 } else { 0.15 };
+            let reach = width / 2.0
+                + if dress == WindowDressing::Curtains {
+                    0.62
+                } else {
+                    0.15
+                };
             let span = self.width(wall);
             if span < 2.0 * reach + 0.1 {
                 continue;
             }
             let along = self.dice.between(reach + 0.05, span - reach - 0.05);
-            let patch = Patch::around(wall, along, reach, [sill - 0.12, 2.3]);
+            let patch = WallPatch::around(wall, along, reach, [sill - 0.12, 2.3]);
             if !self.open(&patch) {
                 continue;
             }
@@ -385,13 +397,13 @@ impl Plan {
             let daylight = self.dice.between(10.0, 14.0);
             self.put(walls::window(width, height, daylight), pose);
             match dress {
-                Dress::Bare => {}
-                Dress::Blinds => {
+                WindowDressing::Bare => {}
+                WindowDressing::Blinds => {
                     let share = self.dice.between(0.3, 0.75);
                     let piece = walls::blinds(width, height, share, &mut self.dice);
                     self.put(piece, pose);
                 }
-                Dress::Curtains => {
+                WindowDressing::Curtains => {
                     let drop = if self.dice.chance(0.7) {
                         2.26
                     } else {
@@ -414,7 +426,7 @@ impl Plan {
 
     /// Whether a person or a robot could be at a place of the floor.
     pub(super) fn walkable(&self, place: Vec3, margin: f32) -> bool {
-        let point = Area([place.x, place.z, place.x, place.z]);
+        let point = FloorArea([place.x, place.z, place.x, place.z]);
         let inside = |value: f32, end: f32| (margin..=end - margin).contains(&value);
         inside(place.x, self.size.x)
             && inside(place.z, self.size.z)
@@ -424,7 +436,7 @@ impl Plan {
 
 /// What hangs before a window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Dress {
+pub(super) enum WindowDressing {
     Bare,
     Blinds,
     Curtains,

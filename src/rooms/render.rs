@@ -1,6 +1,6 @@
 //! A view of a room: its image and its maps, [`render`].
 //!
-//! Every pixel is traced once, those at edges four times more. Light is slow to change: it is sampled at every other pixel of
+//! Every pixel is traced once, those at edges four times more. LightGrid is slow to change: it is sampled at every other pixel of
 //! every other row, by neighbours in turn, smoothed between places of one plane, and spread from there; a place that has no
 //! neighbour of its kind is lit by samples of its own.
 
@@ -11,14 +11,14 @@ use rayon::prelude::*;
 
 use super::bvh::{Bvh, Ray};
 use super::camera::Camera;
-use super::light::{Lighting, STRATA, Sample, brightness};
+use super::light::{LightSample, Lighting, STRATA, brightness};
 use super::scene::Scene;
 use super::spot::{Gloss, Spot, reflected};
 use crate::types::Rgb;
 
 /// What is seen of a room.
 #[derive(Debug)]
-pub(super) struct View {
+pub(super) struct RenderedView {
     pub(super) rgb: Rgb,
     /// Millimetres along the optical axis.
     pub(super) depth: Vec<u32>,
@@ -38,7 +38,7 @@ const WITHIN: [[f32; 2]; 4] = [
 const EDGE: f32 = 0.06;
 
 /// Renders a view.
-pub(super) fn render(scene: &Scene, camera: &Camera) -> View {
+pub(super) fn render(scene: &Scene, camera: &Camera) -> RenderedView {
     let tree = scene.tree();
     let [width, height] = camera.size;
     let spots: Vec<Option<Spot>> = (0..width * height)
@@ -50,7 +50,7 @@ pub(super) fn render(scene: &Scene, camera: &Camera) -> View {
         })
         .collect();
     let lighting = lighting(scene, &tree, &spots);
-    let light = Light::new(&lighting, &spots, camera.size);
+    let light = LightGrid::new(&lighting, &spots, camera.size);
     let plain: Vec<Vec3> = spots
         .par_iter()
         .enumerate()
@@ -89,7 +89,7 @@ pub(super) fn render(scene: &Scene, camera: &Camera) -> View {
             (spot.far * ray.along.dot(axis) * 1000.0 + 0.5) as u32
         })
     });
-    View {
+    RenderedView {
         depth: depth.collect(),
         things: spots
             .iter()
@@ -123,7 +123,7 @@ fn lighting<'a>(scene: &'a Scene, tree: &'a Bvh, spots: &[Option<Spot>]) -> Ligh
     let (mut direct, mut given, mut count) = (Vec3::ZERO, Vec3::ZERO, 0.0);
     for (i, spot) in spots.iter().step_by(step).flatten().enumerate() {
         if spot.glow == Vec3::ZERO {
-            let sample = Sample {
+            let sample = LightSample {
                 stratum: i % (STRATA * STRATA),
                 place: [i as i32, -1],
             };
@@ -144,7 +144,7 @@ fn lighting<'a>(scene: &'a Scene, tree: &'a Bvh, spots: &[Option<Spot>]) -> Ligh
 }
 
 /// The light at every other pixel of every other row.
-struct Light<'a> {
+struct LightGrid<'a> {
     lighting: &'a Lighting<'a>,
     grid: [usize; 2],
     places: Vec<Option<Spot>>,
@@ -155,7 +155,7 @@ struct Light<'a> {
 /// How far apart the neighbours are that are smoothed over, one pass after the other.
 const PASSES: [&[usize]; 2] = [&[1, 2, 1], &[1, 2, 4, 8, 2]];
 
-impl<'a> Light<'a> {
+impl<'a> LightGrid<'a> {
     fn new(lighting: &'a Lighting<'a>, spots: &[Option<Spot>], size: [usize; 2]) -> Self {
         let grid = size.map(|side| side.div_ceil(2));
         let places: Vec<Option<Spot>> = (0..grid[0] * grid[1])
@@ -166,7 +166,7 @@ impl<'a> Light<'a> {
             .enumerate()
             .map(|(i, spot)| {
                 let [x, y] = [i % grid[0], i / grid[0]];
-                let sample = Sample {
+                let sample = LightSample {
                     stratum: (x % STRATA) + (y % STRATA) * STRATA,
                     place: [x as i32, y as i32],
                 };
@@ -240,7 +240,7 @@ impl<'a> Light<'a> {
             return sum / weights;
         }
         let samples = (0..STRATA * STRATA).map(|stratum| {
-            let sample = Sample {
+            let sample = LightSample {
                 stratum,
                 place: [(x * 8.0) as i32, (y * 8.0) as i32],
             };

@@ -4,11 +4,11 @@ use glam::{Vec3, vec3};
 
 use super::bvh::Bvh;
 use super::mesh::{Mesh, turn};
-use super::surface::{Finish, Surface};
+use super::surface::{Surface, SurfaceFinish};
 
 /// What a thing is called.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Kind {
+pub(super) struct ThingKind {
     /// Its own word, as `coffee table`.
     pub(super) word: &'static str,
     /// Its class in mpcat40.
@@ -16,21 +16,21 @@ pub(super) struct Kind {
 }
 
 /// A kind by its word and class.
-pub(super) const fn kind(word: &'static str, class: &'static str) -> Kind {
-    Kind { word, class }
+pub(super) const fn kind(word: &'static str, class: &'static str) -> ThingKind {
+    ThingKind { word, class }
 }
 
 /// A piece before it has a place: its kind, its shape, and the name of the colour that most of it has; empty where there is none.
 #[derive(Debug, Clone)]
 pub(super) struct Piece {
-    pub(super) kind: Kind,
+    pub(super) kind: ThingKind,
     pub(super) mesh: Mesh,
     pub(super) color: &'static str,
-    pub(super) light: Option<Light>,
+    pub(super) light: Option<LightSource>,
 }
 
 impl Piece {
-    pub(super) fn new(kind: Kind, mesh: Mesh, color: &'static str) -> Self {
+    pub(super) fn new(kind: ThingKind, mesh: Mesh, color: &'static str) -> Self {
         Self {
             kind,
             mesh,
@@ -78,14 +78,14 @@ impl Pose {
 /// A piece in its place.
 #[derive(Debug, Clone)]
 pub(super) struct Thing {
-    pub(super) kind: Kind,
+    pub(super) kind: ThingKind,
     pub(super) color: &'static str,
     pub(super) pose: Pose,
 }
 
 /// What lights the room.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Light {
+pub(super) enum LightSource {
     /// A flat light, as the daylight in a window: a corner, its two edges, where it shines, and how bright it is by channel.
     Panel {
         corner: Vec3,
@@ -101,7 +101,7 @@ pub(super) enum Light {
     },
 }
 
-impl Light {
+impl LightSource {
     /// The light of a piece, in its place.
     fn placed(self, pose: &Pose) -> Self {
         match self {
@@ -137,7 +137,7 @@ impl Light {
 pub(super) struct Scene {
     /// The things; the number of the segment of each is its place, from 1.
     pub(super) things: Vec<Thing>,
-    pub(super) lights: Vec<Light>,
+    pub(super) lights: Vec<LightSource>,
     /// The shape of all of them.
     pub(super) mesh: Mesh,
     /// The thing that each face belongs to.
@@ -166,7 +166,10 @@ impl Scene {
     /// The tree of its faces.
     pub(super) fn tree(&self) -> Bvh {
         Bvh::new(self.mesh.faces.iter().map(|face| {
-            let clear = matches!(self.mesh.surfaces[face.surface].finish, Finish::Glow(_));
+            let clear = matches!(
+                self.mesh.surfaces[face.surface].finish,
+                SurfaceFinish::Glow(_)
+            );
             (face.corners.map(|corner| corner.at), clear)
         }))
     }

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::bvh::{Bvh, Hit, Ray};
 use super::scene::Scene;
-use super::surface::Finish;
+use super::surface::SurfaceFinish;
 
 /// What is known of the place where a ray meets a thing.
 #[derive(Debug, Clone, Copy)]
@@ -47,7 +47,7 @@ impl Spot {
     pub(super) fn seen(scene: &Scene, tree: &Bvh, ray: &Ray) -> Option<Self> {
         let hit = tree.first(ray, FAR)?;
         let spot = Self::of(scene, ray, hit);
-        if scene.surface(hit.face).finish != Finish::Mirror {
+        if scene.surface(hit.face).finish != SurfaceFinish::Mirror {
             return Some(spot);
         }
         let along = reflected(ray.along, spot.normal);
@@ -76,8 +76,10 @@ impl Spot {
         let pose = &scene.things[thing].pose;
         let color = surface.color_at(pose.inward(at), pose.unturned(normal));
         let (color, glow) = match surface.finish {
-            Finish::Glow(strength) => (color, color * strength),
-            Finish::Matte | Finish::Glossy | Finish::Mirror => (color, Vec3::ZERO),
+            SurfaceFinish::Glow(strength) => (color, color * strength),
+            SurfaceFinish::Matte | SurfaceFinish::Glossy | SurfaceFinish::Mirror => {
+                (color, Vec3::ZERO)
+            }
         };
         Self {
             at,
@@ -87,7 +89,7 @@ impl Spot {
             thing,
             shown: thing,
             far: hit.far,
-            glossy: if surface.finish == Finish::Glossy {
+            glossy: if surface.finish == SurfaceFinish::Glossy {
                 Gloss::Shiny
             } else {
                 Gloss::Dull

@@ -10,7 +10,7 @@ pub(super) struct Surface {
     /// How much light it gives back, in linear light by channel, where the pattern changes nothing.
     pub(super) color: Vec3,
     pub(super) pattern: Pattern,
-    pub(super) finish: Finish,
+    pub(super) finish: SurfaceFinish,
 }
 
 /// How the colour goes over a thing.
@@ -43,7 +43,7 @@ pub(super) enum Pattern {
 
 /// How a face gives light back.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Finish {
+pub(super) enum SurfaceFinish {
     /// Alike to all sides.
     Matte,
     /// With a highlight.
@@ -55,7 +55,7 @@ pub(super) enum Finish {
 }
 
 impl Surface {
-    fn new(color: Vec3, pattern: Pattern, finish: Finish) -> Self {
+    fn new(color: Vec3, pattern: Pattern, finish: SurfaceFinish) -> Self {
         Self {
             color,
             pattern,
@@ -65,27 +65,27 @@ impl Surface {
 
     /// Plain paint.
     pub(super) fn paint(paint: Paint) -> Self {
-        Self::new(paint.color, Pattern::Plain, Finish::Matte)
+        Self::new(paint.color, Pattern::Plain, SurfaceFinish::Matte)
     }
 
     /// Lacquer, ceramic or plastic.
     pub(super) fn gloss(paint: Paint) -> Self {
-        Self::new(paint.color, Pattern::Plain, Finish::Glossy)
+        Self::new(paint.color, Pattern::Plain, SurfaceFinish::Glossy)
     }
 
     /// Cloth.
     pub(super) fn cloth(paint: Paint) -> Self {
-        Self::new(paint.color, Pattern::Cloth, Finish::Matte)
+        Self::new(paint.color, Pattern::Cloth, SurfaceFinish::Matte)
     }
 
     /// A colour by its sRGB codes.
     pub(super) fn plain(codes: [u8; 3]) -> Self {
-        Self::new(rgb(codes), Pattern::Plain, Finish::Matte)
+        Self::new(rgb(codes), Pattern::Plain, SurfaceFinish::Matte)
     }
 
     /// Bright metal.
     pub(super) fn steel() -> Self {
-        Self::new(rgb([176, 178, 182]), Pattern::Plain, Finish::Glossy)
+        Self::new(rgb([176, 178, 182]), Pattern::Plain, SurfaceFinish::Glossy)
     }
 
     pub(super) fn with(&self, pattern: Pattern) -> Self {
@@ -95,7 +95,7 @@ impl Surface {
         }
     }
 
-    pub(super) fn finished(&self, finish: Finish) -> Self {
+    pub(super) fn finished(&self, finish: SurfaceFinish) -> Self {
         Self {
             finish,
             ..self.clone()
@@ -104,7 +104,7 @@ impl Surface {
 
     /// Wood with its grain along an axis, in the colour of a paint.
     pub(super) fn wood(paint: Paint, axis: usize) -> Self {
-        Self::new(paint.color, Pattern::Grain(axis), Finish::Matte)
+        Self::new(paint.color, Pattern::Grain(axis), SurfaceFinish::Matte)
     }
 
     /// The colour at a place on the thing, whose face looks in a direction there.

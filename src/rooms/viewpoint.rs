@@ -4,7 +4,7 @@ use glam::{Vec3, vec3};
 
 use super::camera::Camera;
 use super::dice::Dice;
-use super::plan::Plan;
+use super::plan::FloorPlan;
 use super::render::glimpse;
 
 /// How high a camera is.
@@ -38,7 +38,12 @@ const PLACES: usize = 36;
 const GLIMPSE: [usize; 2] = [64, 40];
 
 /// The camera of a view.
-pub(super) fn camera(plan: &Plan, height: Height, size: [usize; 2], dice: &mut Dice) -> Camera {
+pub(super) fn camera(
+    plan: &FloorPlan,
+    height: Height,
+    size: [usize; 2],
+    dice: &mut Dice,
+) -> Camera {
     let tree = plan.scene.tree();
     let up = height.metres(dice);
     let mut best: Option<(f32, Camera)> = None;
@@ -72,7 +77,7 @@ pub(super) fn camera(plan: &Plan, height: Height, size: [usize; 2], dice: &mut D
 }
 
 /// The place of something worth looking at.
-fn sight(plan: &Plan, dice: &mut Dice) -> Vec3 {
+fn sight(plan: &FloorPlan, dice: &mut Dice) -> Vec3 {
     let known: Vec<usize> = plan
         .sights
         .iter()
@@ -87,7 +92,7 @@ fn sight(plan: &Plan, dice: &mut Dice) -> Vec3 {
 }
 
 /// How good a view is: many things, none of them too large, and what is worth looking at among them.
-fn score(plan: &Plan, seen: &[u32]) -> f32 {
+fn score(plan: &FloorPlan, seen: &[u32]) -> f32 {
     let mut counts = vec![0_usize; plan.scene.things.len() + 1];
     let mut cut = vec![0_usize; counts.len()];
     let [width, height] = GLIMPSE;

@@ -8,7 +8,7 @@ use std::hint::black_box;
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use darkqa_eval::questions::colors::Palette;
-use darkqa_eval::questions::observer::Watched;
+use darkqa_eval::questions::observer::ObservedFrame;
 use darkqa_eval::questions::rules::Rules;
 use darkqa_eval::rooms::Rooms;
 use darkqa_eval::rooms::{Room, labels};
@@ -40,7 +40,7 @@ fn bench(c: &mut Criterion) {
     });
     let frame = rooms()[0].frame().unwrap();
     let (rules, palette) = (Rules::built_in().unwrap(), Palette::built_in().unwrap());
-    let watched = Watched::new(&frame, &labels(), &rules, &palette).unwrap();
+    let watched = ObservedFrame::new(&frame, &labels(), &rules, &palette).unwrap();
     group.bench_function("look at an image", |b| {
         b.iter(|| black_box(watched.look(&frame.rgb, &palette)));
     });

@@ -1,9 +1,9 @@
-//! Which masks of an image stand out of its noise: [`Look`].
+//! Which masks of an image stand out of its noise: [`MaskContrasts`].
 //!
 //! The image is cut into square cells. Where two masks meet in one, the means of their pixels there are compared: close to
 //! the border between them, so that light which changes over the room plays no part. The squares of these differences, each
 //! over its own uncertainty, are added up over all cells of a border, for the sign of a contrast changes along it as patterns
-//! and light do. Noise alone makes one of each on average; what is more than that is contrast. Rose's criterion says that a
+//! and light do. PixelNoise alone makes one of each on average; what is more than that is contrast. Rose's criterion says that a
 //! signal is seen where it is at least five times its uncertainty (Rose, "The sensitivity performance of the human eye on an
 //! absolute scale", J. Opt. Soc. Am. 38:196, 1948; Burgess, "The Rose model, revisited", J. Opt. Soc. Am. A 16:633, 1999);
 //! here, that the excess is five times the deviation of the sum, or that the differences, added up with their signs, are five
@@ -12,7 +12,7 @@
 //!
 //! The uncertainty is that of noise, not of patterns, and comes from the image itself: how unlike the halves of cells within one
 //! mask are, of cells about as bright, in the smoother half of them (towards the lower envelope; Liu, Freeman, Szeliski and Kang,
-//! "Noise estimation from a single image", CVPR 2006); the noise that rows share, from how unlike neighbouring rows of the
+//! "PixelNoise estimation from a single image", CVPR 2006); the noise that rows share, from how unlike neighbouring rows of the
 //! whole image are; and the rounding to whole codes.
 
 use std::collections::BTreeMap;
@@ -74,14 +74,14 @@ pub(super) fn mean_light(image: &Rgb) -> f64 {
 
 /// The pixels of one mask in one cell.
 #[derive(Debug, Clone, Copy, Default)]
-struct Patch {
+struct MaskPatch {
     mask: u32,
     count: u32,
     sums: [u64; 3],
     linear: [u64; 3],
 }
 
-impl Patch {
+impl MaskPatch {
     fn take(&mut self, pixel: [u8; 3]) {
         self.count += 1;
         for (channel, code) in pixel.into_iter().enumerate() {
@@ -98,7 +98,7 @@ impl Patch {
 
 /// Two masks in one cell.
 #[derive(Debug, Clone, Copy)]
-struct Meeting {
+struct MaskBorder {
     row: usize,
     /// The mean of both, which tells how much noise there is.
     light: [f64; 3],
@@ -109,9 +109,9 @@ struct Meeting {
 
 /// How much noise pixels have by how bright they are, for one channel: a variance for each step of brightness.
 #[derive(Debug, Clone, Default)]
-struct Noise(BTreeMap<u32, f64>);
+struct PixelNoise(BTreeMap<u32, f64>);
 
-impl Noise {
+impl PixelNoise {
     /// The step of a code: half an octave, for noise goes with light.
     fn step(light: f64) -> u32 {
         (2.0 * libm::log2(light + 1.0)) as u32
@@ -146,30 +146,30 @@ impl Noise {
 
 /// What is seen of the masks of an image.
 #[derive(Debug)]
-pub struct Look {
-    borders: BTreeMap<(u32, u32), Vec<Meeting>>,
+pub struct MaskContrasts {
+    borders: BTreeMap<(u32, u32), Vec<MaskBorder>>,
     shades: BTreeMap<u32, Shades>,
     /// Brightness and variance of the cells within one mask, by channel; then what they tell.
     smooth: [Vec<(f64, f64)>; 3],
-    noise: [Noise; 3],
+    noise: [PixelNoise; 3],
     row_noise: f64,
     side: usize,
 }
 
 /// The pixels of a cell: by mask, and by quarter.
 #[derive(Debug, Clone, Default)]
-struct Cell {
-    patches: Vec<Patch>,
-    quarters: [Patch; 4],
+struct GridCell {
+    patches: Vec<MaskPatch>,
+    quarters: [MaskPatch; 4],
 }
 
-impl Cell {
+impl GridCell {
     fn take(&mut self, mask: u32, quarter: usize, pixel: [u8; 3]) {
         let place = self.patches.iter().position(|patch| patch.mask == mask);
         let place = place.unwrap_or_else(|| {
-            self.patches.push(Patch {
+            self.patches.push(MaskPatch {
                 mask,
-                ..Patch::default()
+                ..MaskPatch::default()
             });
             self.patches.len() - 1
         });
@@ -178,7 +178,7 @@ impl Cell {
     }
 }
 
-impl Look {
+impl MaskContrasts {
     /// Looks at an image through masks of a width and height; colours are named after a gain of linear light.
     pub(super) fn at(
         image: &Rgb,
@@ -201,7 +201,7 @@ impl Look {
         let columns: Vec<usize> = (0..wide)
             .map(|x| (2 * x + 1) * width / (2 * wide))
             .collect();
-        let mut cells: Vec<Cell> = vec![Cell::default(); wide.div_ceil(side)];
+        let mut cells: Vec<GridCell> = vec![GridCell::default(); wide.div_ceil(side)];
         let (pixels, _) = image.samples().as_chunks::<3>();
         for (y, row) in pixels.chunks_exact(wide).enumerate() {
             let from = (2 * y + 1) * height / (2 * high) * width;
@@ -213,16 +213,16 @@ impl Look {
             if (y + 1) % side == 0 || y + 1 == high {
                 for cell in &mut cells {
                     look.take(y / side, cell, gain, palette);
-                    *cell = Cell::default();
+                    *cell = GridCell::default();
                 }
             }
         }
-        look.noise = [0, 1, 2].map(|channel| Noise::of(&look.smooth[channel]));
+        look.noise = [0, 1, 2].map(|channel| PixelNoise::of(&look.smooth[channel]));
         look
     }
 
     /// Takes note of one cell.
-    fn take(&mut self, row: usize, cell: &Cell, gain: f64, palette: &Palette) {
+    fn take(&mut self, row: usize, cell: &GridCell, gain: f64, palette: &Palette) {
         let whole = (self.side * self.side) as u32;
         if let [patch] = &cell.patches[..]
             && patch.count == whole
@@ -240,7 +240,7 @@ impl Look {
             let others = cell.patches[i + 1..].iter();
             for b in others.filter(|b| a.count.min(b.count) >= least) {
                 let (a, b) = if a.mask < b.mask { (a, b) } else { (b, a) };
-                let meeting = Meeting {
+                let meeting = MaskBorder {
                     row,
                     light: [0, 1, 2].map(|i| f64::midpoint(a.mean(i), b.mean(i))),
                     difference: [0, 1, 2].map(|i| a.mean(i) - b.mean(i)),
@@ -256,7 +256,7 @@ impl Look {
 
     /// Takes note of how unlike the halves of a cell within one mask are, across and down: what is compared at borders, where
     /// there is none; as a variance of pixels.
-    fn smoothness(&mut self, patch: &Patch, quarters: &[Patch; 4]) {
+    fn smoothness(&mut self, patch: &MaskPatch, quarters: &[MaskPatch; 4]) {
         let pixels = f64::from(patch.count) / 4.0;
         for channel in 0..3 {
             let [a, b, c, d] = [0, 1, 2, 3].map(|i| quarters[i].mean(channel));
@@ -268,7 +268,7 @@ impl Look {
 
     /// How far the contrast along a border is above what noise makes, over the deviation of that; in the channel where it is
     /// largest.
-    fn signal(&self, border: &[Meeting]) -> f64 {
+    fn signal(&self, border: &[MaskBorder]) -> f64 {
         let mut rows: Vec<usize> = border.iter().map(|meeting| meeting.row).collect();
         rows.dedup();
         let (cells, rows) = (border.len() as f64, rows.len() as f64);
@@ -329,7 +329,7 @@ struct Shades {
 }
 
 impl Shades {
-    fn take(&mut self, patch: &Patch, gain: f64, palette: &Palette) {
+    fn take(&mut self, patch: &MaskPatch, gain: f64, palette: &Palette) {
         let code = |sum: u64| {
             let linear = sum as f64 / f64::from(patch.count) / 65_535.0 * gain;
             let value = if linear <= 0.0031308 {

@@ -1,4 +1,4 @@
-//! An observer who knows where to look: what could still be answered from given pixels, [`Watched`] and [`Sight`].
+//! An observer who knows where to look: what could still be answered from given pixels, [`ObservedFrame`] and [`Observation`].
 //!
 //! The observer has a frame's masks and depth, and of its image only the pixels that it is sent. It finds out anew which
 //! segments stand out of the noise ([`contrast`]) and what colour each has, and answers by the rulebook over what it sees.
@@ -26,14 +26,14 @@ use std::collections::BTreeMap;
 
 use super::colors::{Color, Palette};
 use super::room::classify;
-use super::rules::{Flag, Rules};
-use super::statistics::scene::Scene;
+use super::rules::{ClassFlag, Rules};
+use super::statistics::scene::SceneMaps;
 use super::statistics::{FrameStatistics, Segment, measure};
 use crate::error::Result;
 use crate::types::{Digest, Frame, Labels, Question, Rgb};
 
-use contrast::{Look, mean_light};
-use wording::About;
+use contrast::{MaskContrasts, mean_light};
+use wording::QuestionTopic;
 pub use wording::understood;
 
 /// What the observer does, and how: a change of it is another observer.
@@ -41,7 +41,7 @@ pub const VERSION: u32 = 1;
 
 /// A frame as the observer knows it: where everything is, and nothing of how it looks but its mean light.
 #[derive(Debug)]
-pub struct Watched {
+pub struct ObservedFrame {
     size: [usize; 2],
     /// The mask of each pixel, from 1; 0 for none.
     masks: Vec<u32>,
@@ -53,7 +53,7 @@ pub struct Watched {
     light: f64,
 }
 
-impl Watched {
+impl ObservedFrame {
     /// Takes note of a frame.
     ///
     /// # Errors
@@ -61,7 +61,7 @@ impl Watched {
     pub fn new(frame: &Frame, labels: &Labels, rules: &Rules, palette: &Palette) -> Result<Self> {
         let key = Digest::of(frame.id.0.as_bytes());
         let statistics = measure(frame, labels, rules, palette, key)?;
-        let scene = Scene::of(frame, labels)?;
+        let scene = SceneMaps::of(frame, labels)?;
         Ok(Self {
             size: scene.size,
             light: mean_light(&frame.rgb),
@@ -73,9 +73,9 @@ impl Watched {
 
     /// Looks at an image of the frame, whatever was done to it. One of another size is looked at through the same masks.
     #[must_use]
-    pub fn look(&self, image: &Rgb, palette: &Palette) -> Sight {
+    pub fn look(&self, image: &Rgb, palette: &Palette) -> Observation {
         let gain = self.light / mean_light(image).max(f64::MIN_POSITIVE);
-        let look = Look::at(image, &self.masks, self.size, gain, palette);
+        let look = MaskContrasts::at(image, &self.masks, self.size, gain, palette);
         let number = |mask: usize| mask.checked_sub(1).and_then(|i| self.numbers.get(i));
         let visible: BTreeMap<u32, Vec<Color>> = look
             .visible()
@@ -93,7 +93,7 @@ impl Watched {
         }
         (seen.classes, seen.words) = (classes, words);
         seen.loose.clear();
-        Sight {
+        Observation {
             visible: seen.segments.len(),
             seen,
             colors: visible,
@@ -103,7 +103,7 @@ impl Watched {
 
 /// What the observer sees of a frame in one image.
 #[derive(Debug, Clone)]
-pub struct Sight {
+pub struct Observation {
     /// How many segments it sees.
     pub visible: usize,
     seen: FrameStatistics,
@@ -111,17 +111,17 @@ pub struct Sight {
     colors: BTreeMap<u32, Vec<Color>>,
 }
 
-impl Sight {
+impl Observation {
     /// The answer to a question, as an index of its choices; `None` where nothing that is seen bears on it, or where the
     /// question is none of the rulebook's (see [`understood`]).
     #[must_use]
     pub fn answer(&self, question: &Question, rules: &Rules) -> Option<usize> {
-        let answer = match About::of(question, rules.book())? {
-            About::Room => self.room(rules),
-            About::Activity(activity) => self.suits(activity, rules),
-            About::Presence(class) => self.there(&class),
-            About::Color(class) => self.color(&class, question),
-            About::Closest => self.closest(question, rules),
+        let answer = match QuestionTopic::of(question, rules.book())? {
+            QuestionTopic::Room => self.room(rules),
+            QuestionTopic::Activity(activity) => self.suits(activity, rules),
+            QuestionTopic::Presence(class) => self.there(&class),
+            QuestionTopic::Color(class) => self.color(&class, question),
+            QuestionTopic::Closest => self.closest(question, rules),
         }?;
         question
             .choices
@@ -182,7 +182,7 @@ impl Sight {
         let book = rules.book();
         let offered = |segment: &&Segment| {
             let name = book.name(&segment.class);
-            book.is(&segment.class, Flag::Asked)
+            book.is(&segment.class, ClassFlag::Asked)
                 && question.choices.texts().iter().any(|text| text == name)
         };
         let segments = self.seen.segments.iter().filter(offered);

@@ -1,11 +1,11 @@
-//! What a question of the rulebook is about, by its words alone: [`About`].
+//! What a question of the rulebook is about, by its words alone: [`QuestionTopic`].
 
-use crate::questions::rules::{Book, Rules};
+use crate::questions::rules::{RuleBook, Rules};
 use crate::types::Question;
 
 /// What a question is about.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum About {
+pub(super) enum QuestionTopic {
     /// The type of the room.
     Room,
     /// Whether the room suits an activity, by its place in the rulebook.
@@ -18,9 +18,9 @@ pub(super) enum About {
     Closest,
 }
 
-impl About {
+impl QuestionTopic {
     /// Reads a question by the rulebook's own words; the evidence, which holds the answer, is not looked at.
-    pub(super) fn of(question: &Question, book: &Book) -> Option<Self> {
+    pub(super) fn of(question: &Question, book: &RuleBook) -> Option<Self> {
         let text = question.text.trim();
         if text == book.room_type.text {
             return Some(Self::Room);
@@ -55,5 +55,5 @@ impl About {
 /// Whether a question is one of the rulebook's, so that the observer can answer it.
 #[must_use]
 pub fn understood(question: &Question, rules: &Rules) -> bool {
-    About::of(question, rules.book()).is_some()
+    QuestionTopic::of(question, rules.book()).is_some()
 }

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use super::{Book, SCHEMA};
+use super::{RuleBook, SCHEMA};
 use crate::types::Choices;
 
-impl Book {
+impl RuleBook {
     /// Says what does not.
     pub(super) fn check(&self) -> Result<(), String> {
         if self.schema != SCHEMA {

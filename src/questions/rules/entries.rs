@@ -11,7 +11,7 @@ use crate::questions::colors::Color;
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[expect(missing_docs, reason = "rules.toml says what each entry is")]
-pub struct Measure {
+pub struct MeasureRule {
     pub border_px: usize,
     pub erosion_per_height: usize,
     pub most_depth_mm: u32,
@@ -31,7 +31,7 @@ pub struct Measure {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[expect(missing_docs, reason = "rules.toml says what each entry is")]
-pub struct Qualified {
+pub struct EvidenceRule {
     pub area_ppm: u64,
     pub side_per_height_ppm: u64,
     pub border_ppm: u64,
@@ -41,7 +41,7 @@ pub struct Qualified {
 /// What a class is like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Flag {
+pub enum ClassFlag {
     /// Part of the building.
     Structural,
     /// On a surface: never the closest object.
@@ -57,7 +57,7 @@ pub enum Flag {
 /// One canonical class.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Class {
+pub struct ClassRule {
     /// What it is called in a question; the class itself where it is not said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
@@ -65,13 +65,13 @@ pub struct Class {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub article: Option<String>,
     /// What it is like.
-    pub flags: BTreeSet<Flag>,
+    pub flags: BTreeSet<ClassFlag>,
 }
 
 /// What words add to classes.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Names {
+pub struct WordRules {
     /// Flat whatever their class.
     pub flat: BTreeSet<String>,
     /// Words that a class does not cover in plain speech.
@@ -93,7 +93,7 @@ pub struct Confusable {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[expect(missing_docs, reason = "rules.toml says what each entry is")]
-pub struct Room {
+pub struct RoomRule {
     pub least_score: u32,
     pub least_lead: u32,
     pub order: Vec<String>,
@@ -102,7 +102,7 @@ pub struct Room {
 /// What a segment says of its room, by its word.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Token {
+pub struct TokenRule {
     /// The token.
     pub token: String,
     /// The words it stands for.
@@ -196,7 +196,7 @@ pub struct ClosedWorld {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[expect(missing_docs, reason = "rules.toml says what each entry is")]
-pub struct RoomType {
+pub struct RoomTypeRule {
     pub text: String,
     pub labelled_ppm: u64,
     pub least_asked: usize,
@@ -207,7 +207,7 @@ pub struct RoomType {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[expect(missing_docs, reason = "rules.toml says what each entry is")]
-pub struct Affordance {
+pub struct AffordanceRule {
     pub text: String,
     pub strict: bool,
 }
@@ -215,7 +215,7 @@ pub struct Affordance {
 /// What a room may be suitable for.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Activity {
+pub struct ActivityRule {
     /// In words that follow "I want to".
     pub activity: String,
     /// The rooms where it is done.
@@ -230,7 +230,7 @@ pub struct Activity {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[expect(missing_docs, reason = "rules.toml says what each entry is")]
-pub struct Presence {
+pub struct PresenceRule {
     pub text: String,
     pub area_ppm: u64,
     pub purity_ppm: u64,
@@ -274,7 +274,7 @@ pub enum ColorChoices {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[expect(missing_docs, reason = "rules.toml says what each entry is")]
-pub struct Closest {
+pub struct ClosestRule {
     pub text: String,
     pub area_ppm: u64,
     pub gap_mm: u32,
@@ -301,7 +301,7 @@ pub enum GapScope {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[expect(missing_docs, reason = "rules.toml says what each entry is")]
-pub struct Balance {
+pub struct BalanceRule {
     pub max_repeat: usize,
     pub least_entropy_ppm: u64,
     pub least_scenes: usize,

@@ -23,7 +23,7 @@ const SCHEMA: &str = "darkqa.rules/1";
 /// A whole rulebook.
 #[derive(Debug, Clone)]
 pub struct Rules {
-    book: Book,
+    book: RuleBook,
     digest: Digest,
     measure_digest: Digest,
 }
@@ -31,26 +31,26 @@ pub struct Rules {
 /// The file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Book {
+pub struct RuleBook {
     schema: String,
     /// The version of the rules, in words.
     pub version: String,
     /// Of every choice between candidates that are equally good.
     pub seed: u64,
     /// What is measured of a frame.
-    pub measure: Measure,
+    pub measure: MeasureRule,
     /// What makes a segment evidence.
-    pub qualified: Qualified,
+    pub qualified: EvidenceRule,
     /// The canonical classes.
-    pub class: BTreeMap<String, Class>,
+    pub class: BTreeMap<String, ClassRule>,
     /// What words add to classes.
-    pub names: Names,
+    pub names: WordRules,
     /// Groups of which one hides the absence of another.
     pub confusable: Vec<Confusable>,
     /// When a room has a type.
-    pub room: Room,
+    pub room: RoomRule,
     /// What a segment says of its room, by its word; the first that fits.
-    pub token: Vec<Token>,
+    pub token: Vec<TokenRule>,
     /// What speaks for a room.
     pub clue: Vec<Clue>,
     /// Which of two rooms wins.
@@ -60,19 +60,19 @@ pub struct Book {
     /// What must hold before anything is said to be absent.
     pub closed_world: ClosedWorld,
     /// "What type of room is this?"
-    pub room_type: RoomType,
+    pub room_type: RoomTypeRule,
     /// "Is this room suitable for this?"
-    pub affordance: Affordance,
+    pub affordance: AffordanceRule,
     /// What a room may be suitable for.
-    pub activity: Vec<Activity>,
+    pub activity: Vec<ActivityRule>,
     /// "Is there a chair in the image?"
-    pub presence: Presence,
+    pub presence: PresenceRule,
     /// "What color is the chair in the image?"
     pub color: ColorRule,
     /// "Which object is closest to the camera?"
-    pub closest: Closest,
+    pub closest: ClosestRule,
     /// How the answers are evened out.
-    pub balance: Balance,
+    pub balance: BalanceRule,
 }
 
 impl Rules {
@@ -90,7 +90,7 @@ impl Rules {
     /// [`Error::Data`] where it is no TOML of this schema, or names a class, room or token that it has not.
     pub fn parse(text: &str) -> Result<Self> {
         let wrong = |problem: String| Error::data("rules", problem);
-        let book: Book = toml::from_str(text).map_err(|e| {
+        let book: RuleBook = toml::from_str(text).map_err(|e| {
             let before = e.span().and_then(|span| text.get(..span.start));
             let line = before.unwrap_or_default().matches('\n').count() + 1;
             wrong(format!("line {line}: {}", e.message().replace('\n', ", ")))
@@ -109,7 +109,7 @@ impl Rules {
 
     /// What the rulebook says.
     #[must_use]
-    pub fn book(&self) -> &Book {
+    pub fn book(&self) -> &RuleBook {
         &self.book
     }
 
@@ -126,10 +126,10 @@ impl Rules {
     }
 }
 
-impl Book {
+impl RuleBook {
     /// Whether a class is of this kind.
     #[must_use]
-    pub fn is(&self, class: &str, flag: Flag) -> bool {
+    pub fn is(&self, class: &str, flag: ClassFlag) -> bool {
         let class = self.class.get(class);
         class.is_some_and(|class| class.flags.contains(&flag))
     }
@@ -156,7 +156,7 @@ impl Book {
     /// The token of a segment by its word and class.
     #[must_use]
     pub fn token<'a>(&'a self, name: &str, class: &'a str) -> &'a str {
-        let fits = |token: &&Token| {
+        let fits = |token: &&TokenRule| {
             let named = token.names.contains(name)
                 || token
                     .starts
@@ -181,7 +181,7 @@ mod tests {
         let asked = book
             .class
             .values()
-            .filter(|class| class.flags.contains(&Flag::Asked));
+            .filter(|class| class.flags.contains(&ClassFlag::Asked));
         assert_eq!((asked.count(), book.class.len()), (23, 40));
         assert_eq!(
             (book.room.order.len(), book.color.neighbours.len()),

@@ -3,7 +3,7 @@
 use super::rim::runs;
 
 /// A run of one label in a row.
-struct Run {
+struct LabelRun {
     left: usize,
     right: usize,
     label: u32,
@@ -17,11 +17,11 @@ pub(super) fn components<T: Copy + PartialEq>(
     of: impl Fn(T) -> u32,
 ) -> Vec<u32> {
     let mut parents: Vec<u32> = Vec::new();
-    let mut rows: Vec<Vec<(Run, u32)>> = Vec::with_capacity(height);
+    let mut rows: Vec<Vec<(LabelRun, u32)>> = Vec::with_capacity(height);
     for y in 0..height {
         let row = &labels[y * width..][..width];
-        let mut found: Vec<(Run, u32)> = Vec::new();
-        let above: &[(Run, u32)] = rows.last().map_or(&[], |above| above);
+        let mut found: Vec<(LabelRun, u32)> = Vec::new();
+        let above: &[(LabelRun, u32)] = rows.last().map_or(&[], |above| above);
         // Runs of both rows come from left to right: whatever ends before this one begins is passed for good.
         let mut first = 0;
         for (left, right) in runs(row) {
@@ -49,7 +49,7 @@ pub(super) fn components<T: Copy + PartialEq>(
                 parents.push(parents.len() as u32);
                 parents.len() as u32 - 1
             });
-            found.push((Run { left, right, label }, node));
+            found.push((LabelRun { left, right, label }, node));
         }
         rows.push(found);
     }
@@ -72,7 +72,11 @@ fn root(parents: &mut [u32], mut node: u32) -> u32 {
     node
 }
 
-fn number(rows: &[Vec<(Run, u32)>], parents: &mut [u32], [width, height]: [usize; 2]) -> Vec<u32> {
+fn number(
+    rows: &[Vec<(LabelRun, u32)>],
+    parents: &mut [u32],
+    [width, height]: [usize; 2],
+) -> Vec<u32> {
     let mut numbers = vec![0; parents.len()];
     let mut next = 1;
     let mut pieces = vec![0; width * height];

@@ -1,14 +1,14 @@
-//! What a mask's pixels show: their colour and their depth, [`Core`]; and what is measured of all pixels.
+//! What a mask's pixels show: their colour and their depth, [`MaskCore`]; and what is measured of all pixels.
 
 use ndarray::{CowArray, Ix2};
 
-use super::{Along, FrameDepth, Segment, SegmentDepth};
+use super::{DepthAxis, FrameDepth, Segment, SegmentDepth};
 use crate::questions::colors::{BINS, Palette};
-use crate::questions::rules::Measure;
+use crate::questions::rules::MeasureRule;
 use crate::types::{DepthKind, Frame, Intrinsics};
 
 /// Depth and colour of the pixels of a mask.
-pub(super) struct Core {
+pub(super) struct MaskCore {
     pub(super) count: u64,
     colors: [u64; BINS],
     channels: [[u32; 256]; 3],
@@ -17,7 +17,7 @@ pub(super) struct Core {
     depths: Option<Vec<u32>>,
 }
 
-impl Core {
+impl MaskCore {
     /// Nothing yet, of a mask of so many pixels.
     pub(super) fn of(area: u64, frame: &Frame) -> Self {
         Self {
@@ -86,17 +86,17 @@ fn quantile(counts: &[u32; 256], count: u64, percent: u64) -> u8 {
 }
 
 /// The image and its depth, as a mask's pixels see them.
-pub(super) struct Light<'a> {
+pub(super) struct PixelLight<'a> {
     frame: &'a Frame,
-    rule: &'a Measure,
+    rule: &'a MeasureRule,
     palette: &'a Palette,
     depth: Option<CowArray<'a, u32, Ix2>>,
     /// The squares of the slopes of rays by column and by row.
     slopes: Option<[Vec<f64>; 2]>,
 }
 
-impl<'a> Light<'a> {
-    pub(super) fn of(frame: &'a Frame, rule: &'a Measure, palette: &'a Palette) -> Self {
+impl<'a> PixelLight<'a> {
+    pub(super) fn of(frame: &'a Frame, rule: &'a MeasureRule, palette: &'a Palette) -> Self {
         let slopes = rays(frame).map(|camera| {
             let square = |length: usize, focal: f64, center: f64| -> Vec<f64> {
                 (0..length)
@@ -119,7 +119,7 @@ impl<'a> Light<'a> {
     }
 
     /// Adds a run of a row to a mask.
-    pub(super) fn fall(&self, core: &mut Core, y: usize, left: usize, right: usize) {
+    pub(super) fn fall(&self, core: &mut MaskCore, y: usize, left: usize, right: usize) {
         let start = y * self.frame.rgb.width();
         let samples = &self.frame.rgb.samples()[(start + left) * 3..(start + right) * 3];
         core.count += (right - left) as u64;
@@ -178,8 +178,8 @@ pub(super) fn frame_depth(frame: &Frame) -> Option<FrameDepth> {
         holes,
         median: median.map_or(0, |median| median as u32 + 1),
         along: match (frame.depth_kind, rays(frame)) {
-            (DepthKind::Euclid, _) | (_, Some(_)) => Along::Ray,
-            (DepthKind::Planar, None) => Along::Axis,
+            (DepthKind::Euclid, _) | (_, Some(_)) => DepthAxis::Ray,
+            (DepthKind::Planar, None) => DepthAxis::Axis,
         },
     })
 }

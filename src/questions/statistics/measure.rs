@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use super::FrameStatistics;
 use super::light::{frame_depth, luma};
-use super::scene::Scene;
-use super::shape::Shapes;
+use super::scene::SceneMaps;
+use super::shape::MaskShapes;
 use crate::error::Result;
 use crate::questions::colors::Palette;
 use crate::questions::rules::Rules;
@@ -27,9 +27,9 @@ pub fn measure(
     key: Digest,
 ) -> Result<FrameStatistics> {
     let rule = &rules.book().measure;
-    let scene = Scene::of(frame, labels)?;
+    let scene = SceneMaps::of(frame, labels)?;
     let size = scene.size;
-    let shapes = Shapes::of(&scene, rule);
+    let shapes = MaskShapes::of(&scene, rule);
     let (void, effective_void, lower_void) = scene.void(&shapes.joint, rule);
     let mut cores = shapes.cores(frame, &scene, rule, palette);
     let (mut classes, mut loose, mut words) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());

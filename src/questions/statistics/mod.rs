@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 
 use super::colors::{BINS, Color, NONE};
 use super::reason::Reason;
-use super::rules::{Book, Flag};
+use super::rules::{ClassFlag, RuleBook};
 use crate::types::{Digest, FrameId};
 
 pub use measure::measure;
@@ -72,13 +72,13 @@ pub struct FrameDepth {
     /// The median of the others in millimetres, as they lie in the map; 65,535 stands for that or more.
     pub median: u32,
     /// Whether segments' depths are distances along rays; along the axis, where the camera is unknown.
-    pub along: Along,
+    pub along: DepthAxis,
 }
 
 /// What the depths of segments are measured along.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Along {
+pub enum DepthAxis {
     /// The ray through the pixel.
     Ray,
     /// The optical axis.
@@ -96,8 +96,8 @@ pub struct Segment {
     /// The data set's own word for it, in lower case.
     pub word: String,
     /// Whether the word says that it is in another room or outside.
-    #[serde(default, skip_serializing_if = "Where::is_here")]
-    pub stands: Where,
+    #[serde(default, skip_serializing_if = "SegmentPlace::is_here")]
+    pub stands: SegmentPlace,
     /// The region of the scene, where that is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub region: Option<i64>,
@@ -142,10 +142,10 @@ pub struct SegmentDepth {
     pub p90: u32,
 }
 
-/// Where a segment stands, by its word.
+/// SegmentPlace a segment stands, by its word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Where {
+pub enum SegmentPlace {
     /// In the room.
     #[default]
     Here,
@@ -153,7 +153,7 @@ pub enum Where {
     Elsewhere,
 }
 
-impl Where {
+impl SegmentPlace {
     #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde's way to call it")]
     fn is_here(&self) -> bool {
         *self == Self::Here
@@ -198,19 +198,19 @@ impl FrameStatistics {
 
     /// Whether a segment is large, pure and whole enough to be evidence.
     #[must_use]
-    pub fn qualified(&self, segment: &Segment, book: &Book) -> bool {
+    pub fn qualified(&self, segment: &Segment, book: &RuleBook) -> bool {
         self.disqualified(segment, book).is_none()
     }
 
     /// Why a segment is no evidence; `None` where it is.
     #[must_use]
-    pub fn disqualified(&self, segment: &Segment, book: &Book) -> Option<Reason> {
+    pub fn disqualified(&self, segment: &Segment, book: &RuleBook) -> Option<Reason> {
         let rule = &book.qualified;
         let [left, top, right, bottom] = segment.bbox;
         let side = (right - left).min(bottom - top) as u64;
         let area = self.area(segment);
         let on_border = ppm(segment.rim_on_border, segment.rim);
-        if segment.stands == Where::Elsewhere {
+        if segment.stands == SegmentPlace::Elsewhere {
             Some(Reason::Elsewhere)
         } else if segment.mixed(book) {
             Some(Reason::Mixed)
@@ -228,14 +228,14 @@ impl FrameStatistics {
     }
 
     /// The segments that are evidence.
-    pub fn evidence<'a>(&'a self, book: &'a Book) -> impl Iterator<Item = &'a Segment> {
+    pub fn evidence<'a>(&'a self, book: &'a RuleBook) -> impl Iterator<Item = &'a Segment> {
         let segments = self.segments.iter();
         segments.filter(|segment| self.qualified(segment, book))
     }
 
     /// Whether any pixel of a token is in the picture, the smallest segments' too.
     #[must_use]
-    pub fn shows(&self, token: &str, book: &Book) -> bool {
+    pub fn shows(&self, token: &str, book: &RuleBook) -> bool {
         if book.class.contains_key(token) && self.of_class(token) > 0 {
             return true;
         }
@@ -249,32 +249,32 @@ impl FrameStatistics {
 impl Segment {
     /// Whether too much of it is of other classes.
     #[must_use]
-    pub fn mixed(&self, book: &Book) -> bool {
+    pub fn mixed(&self, book: &RuleBook) -> bool {
         ppm(self.pure, self.area) < book.measure.purity_ppm
     }
 
     /// Whether its class does not cover it in plain words.
     #[must_use]
-    pub fn unlike(&self, book: &Book) -> bool {
+    pub fn unlike(&self, book: &RuleBook) -> bool {
         let words = book.names.unlike.get(&self.class);
         words.is_some_and(|words| words.contains(&self.word))
     }
 
     /// Its token.
     #[must_use]
-    pub fn token<'a>(&'a self, book: &'a Book) -> &'a str {
+    pub fn token<'a>(&'a self, book: &'a RuleBook) -> &'a str {
         book.token(&self.word, &self.class)
     }
 
     /// Whether it lies on a surface.
     #[must_use]
-    pub fn flat(&self, book: &Book) -> bool {
-        book.is(&self.class, Flag::Flat) || book.names.flat.contains(&self.word)
+    pub fn flat(&self, book: &RuleBook) -> bool {
+        book.is(&self.class, ClassFlag::Flat) || book.names.flat.contains(&self.word)
     }
 
     /// Its depth, where enough of it has one.
     #[must_use]
-    pub fn measured(&self, book: &Book) -> Option<SegmentDepth> {
+    pub fn measured(&self, book: &RuleBook) -> Option<SegmentDepth> {
         self.depth.filter(|depth| {
             depth.valid >= book.measure.valid_depth_px
                 && ppm(depth.valid, self.core) >= book.measure.valid_depth_ppm
@@ -302,9 +302,9 @@ impl Segment {
 /// A data set's word in its one spelling, and where it says that the thing stands: lower case, single spaces, without the
 /// suffixes `/otherroom` and `/outside` of HM3D-Sem.
 #[must_use]
-pub fn plain_word(word: &str) -> (String, Where) {
+pub fn plain_word(word: &str) -> (String, SegmentPlace) {
     let lower = word.to_lowercase();
-    let mut stands = Where::Here;
+    let mut stands = SegmentPlace::Here;
     let mut rest = lower.trim();
     while let Some(before) = [
         "/otherroom",
@@ -316,7 +316,7 @@ pub fn plain_word(word: &str) -> (String, Where) {
     .iter()
     .find_map(|suffix| rest.strip_suffix(suffix))
     {
-        (rest, stands) = (before.trim_end(), Where::Elsewhere);
+        (rest, stands) = (before.trim_end(), SegmentPlace::Elsewhere);
     }
     let words: Vec<&str> = rest.split_whitespace().collect();
     (words.join(" "), stands)

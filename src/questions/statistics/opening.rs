@@ -36,10 +36,10 @@ pub(super) fn opened(set: &mut [bool], [width, height]: [usize; 2], radius: usiz
     }
     // Then along the columns: how far it is to the last centre above, then to the next below.
     set.fill(false);
-    for rows in [Rows::Down, Rows::Up] {
+    for rows in [RowRange::Down, RowRange::Up] {
         let mut since = vec![radius + 1; width];
         for i in 0..height {
-            let y = if rows == Rows::Down {
+            let y = if rows == RowRange::Down {
                 i
             } else {
                 height - 1 - i
@@ -57,7 +57,7 @@ pub(super) fn opened(set: &mut [bool], [width, height]: [usize; 2], radius: usiz
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Rows {
+enum RowRange {
     Down,
     Up,
 }

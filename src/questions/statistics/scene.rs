@@ -1,4 +1,4 @@
-//! The maps of a frame, as numbers: [`Scene`].
+//! The maps of a frame, as numbers: [`SceneMaps`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,14 +8,14 @@ use super::components::components;
 use super::opening::opened;
 use super::rim::runs;
 use crate::error::{Error, Result};
-use crate::questions::rules::Measure;
+use crate::questions::rules::MeasureRule;
 use crate::types::{Frame, Labels, Segmentation};
 
 /// A number of the semantic map that stands for nothing.
 const VOID: u32 = u32::MAX;
 
 /// What says the label of a pixel.
-enum Kinds<'a> {
+enum LabelSource<'a> {
     /// A semantic map.
     OfPixels(CowArray<'a, u16, Ix2>),
     /// The names of segments: the label of each mask, [`VOID`] for none, that of no mask first.
@@ -23,10 +23,10 @@ enum Kinds<'a> {
 }
 
 /// The maps of a frame, as numbers.
-pub(in crate::questions) struct Scene<'a> {
+pub(in crate::questions) struct SceneMaps<'a> {
     pub(in crate::questions) size: [usize; 2],
     labels: &'a Labels,
-    kinds: Kinds<'a>,
+    kinds: LabelSource<'a>,
     /// The mask of each pixel, from 1; 0 for none.
     pub(in crate::questions) masks: Vec<u32>,
     /// The number of each mask in the map.
@@ -40,13 +40,13 @@ pub(in crate::questions) struct Scene<'a> {
 /// Where the numbers of classes begin that a segment has by its name alone.
 const NAMED: u32 = 1 << 16;
 
-impl<'a> Scene<'a> {
+impl<'a> SceneMaps<'a> {
     pub(in crate::questions) fn of(frame: &'a Frame, labels: &'a Labels) -> Result<Self> {
         let size = [frame.rgb.width(), frame.rgb.height()];
         let mut scene = Self {
             size,
             labels,
-            kinds: Kinds::OfMasks(Vec::new()),
+            kinds: LabelSource::OfMasks(Vec::new()),
             masks: Vec::new(),
             numbers: Vec::new(),
             parts: Vec::new(),
@@ -57,7 +57,7 @@ impl<'a> Scene<'a> {
         }
         match &frame.semantic {
             Some(semantic) => {
-                scene.kinds = Kinds::OfPixels(semantic.as_standard_layout());
+                scene.kinds = LabelSource::OfPixels(semantic.as_standard_layout());
             }
             None if frame.segments.is_some() && !frame.names.is_empty() => scene.by_name(frame),
             None => {
@@ -102,7 +102,7 @@ impl<'a> Scene<'a> {
                 *classes.entry(&name.canonical).or_insert(next)
             })
         });
-        self.kinds = Kinds::OfMasks(std::iter::once(VOID).chain(named).collect());
+        self.kinds = LabelSource::OfMasks(std::iter::once(VOID).chain(named).collect());
         self.named = classes
             .into_iter()
             .map(|(name, id)| (id, name.to_owned()))
@@ -111,7 +111,7 @@ impl<'a> Scene<'a> {
 
     /// Cuts the classes into connected pieces.
     fn cut(&mut self) {
-        let Kinds::OfPixels(ids) = &self.kinds else {
+        let LabelSource::OfPixels(ids) = &self.kinds else {
             return;
         };
         let label = |id| self.label(id).wrapping_add(1);
@@ -121,7 +121,7 @@ impl<'a> Scene<'a> {
 
     /// Merges the parts of objects: neighbours whose commonest label is the same.
     fn merge(&mut self) {
-        let mut joint = Joint::new();
+        let mut joint = JointCounts::new();
         self.each_run(|left, right, mask, id| {
             *joint.entry((mask, id)).or_insert(0) += (right - left) as u64;
         });
@@ -182,8 +182,8 @@ impl<'a> Scene<'a> {
         for (left, right) in runs(masks) {
             let (from, to, mask) = (start + left, start + right, masks[left]);
             match &self.kinds {
-                Kinds::OfMasks(labels) => visit(from, to, mask, labels[mask as usize]),
-                Kinds::OfPixels(ids) => {
+                LabelSource::OfMasks(labels) => visit(from, to, mask, labels[mask as usize]),
+                LabelSource::OfPixels(ids) => {
                     let ids = &plain(ids)[from..to];
                     for (left, right) in runs(ids) {
                         visit(from + left, from + right, mask, self.label(ids[left]));
@@ -214,7 +214,7 @@ impl<'a> Scene<'a> {
     }
 
     /// Pixels of numbers that the label space has not.
-    pub(super) fn unknown(&self, joint: &Joint) -> BTreeMap<u16, u64> {
+    pub(super) fn unknown(&self, joint: &JointCounts) -> BTreeMap<u16, u64> {
         let mut unknown = BTreeMap::new();
         for (&(_, id), count) in joint {
             if let Ok(id) = u16::try_from(id)
@@ -227,7 +227,7 @@ impl<'a> Scene<'a> {
     }
 
     /// Pixels without a class, those that survive an opening, and those of them in the lower half.
-    pub(super) fn void(&self, joint: &Joint, rule: &Measure) -> (u64, u64, u64) {
+    pub(super) fn void(&self, joint: &JointCounts, rule: &MeasureRule) -> (u64, u64, u64) {
         let [width, height] = self.size;
         let all = joint
             .iter()
@@ -245,7 +245,7 @@ impl<'a> Scene<'a> {
 }
 
 /// Pixels by mask and label.
-pub(super) type Joint = BTreeMap<(u32, u32), u64>;
+pub(super) type JointCounts = BTreeMap<(u32, u32), u64>;
 
 /// The numbers of a map, row by row.
 fn plain<'a, T>(map: &'a CowArray<'_, T, Ix2>) -> &'a [T] {

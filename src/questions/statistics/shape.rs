@@ -1,25 +1,25 @@
-//! What is measured of masks: [`Shapes`].
+//! What is measured of masks: [`MaskShapes`].
 
 use std::collections::BTreeMap;
 
-use super::light::{Core, Light};
+use super::light::{MaskCore, PixelLight};
 use super::rim::{cores, runs};
-use super::scene::{Joint, Scene, rounded};
+use super::scene::{JointCounts, SceneMaps, rounded};
 use super::{Segment, plain_word, ppm};
 use crate::questions::colors::{BINS, Palette};
-use crate::questions::rules::Measure;
+use crate::questions::rules::MeasureRule;
 use crate::types::{Frame, Segmentation};
 
 /// What is measured of the mask alone.
 #[derive(Clone)]
-pub(super) struct Shape {
+pub(super) struct MaskShape {
     area: u64,
     bbox: [usize; 4],
     rim: u64,
     rim_on_border: u64,
 }
 
-impl Shape {
+impl MaskShape {
     const NONE: Self = Self {
         area: 0,
         bbox: [usize::MAX, usize::MAX, 0, 0],
@@ -65,19 +65,19 @@ fn rim(
 }
 
 /// All masks.
-pub(super) struct Shapes {
-    pub(super) list: Vec<Shape>,
+pub(super) struct MaskShapes {
+    pub(super) list: Vec<MaskShape>,
     /// Pixels by mask and label.
-    pub(super) joint: Joint,
+    pub(super) joint: JointCounts,
 }
 
-impl Shapes {
+impl MaskShapes {
     /// Measures all masks.
-    pub(super) fn of(scene: &Scene<'_>, rule: &Measure) -> Self {
+    pub(super) fn of(scene: &SceneMaps<'_>, rule: &MeasureRule) -> Self {
         let [width, height] = scene.size;
         let mut shapes = Self {
-            list: vec![Shape::NONE; scene.numbers.len()],
-            joint: Joint::new(),
+            list: vec![MaskShape::NONE; scene.numbers.len()],
+            joint: JointCounts::new(),
         };
         for y in 0..height {
             scene.each_run_of(y, &mut |left, right, mask, id| {
@@ -114,9 +114,9 @@ impl Shapes {
     pub(super) fn segment(
         &self,
         frame: &Frame,
-        scene: &Scene<'_>,
+        scene: &SceneMaps<'_>,
         mask: u32,
-        shape: &Shape,
+        shape: &MaskShape,
     ) -> Option<Segment> {
         let labels = self.joint.range((mask, 0)..=(mask, u32::MAX));
         let mut classes: BTreeMap<&str, u64> = BTreeMap::new();
@@ -166,18 +166,18 @@ impl Shapes {
     pub(super) fn cores(
         &self,
         frame: &Frame,
-        scene: &Scene<'_>,
-        rule: &Measure,
+        scene: &SceneMaps<'_>,
+        rule: &MeasureRule,
         palette: &Palette,
-    ) -> Vec<Option<Core>> {
+    ) -> Vec<Option<MaskCore>> {
         let pixels = scene.masks.len() as u64;
-        let large = |shape: &Shape| ppm(shape.area, pixels) >= rule.detail_ppm;
-        let mut found: Vec<Option<Core>> = self
+        let large = |shape: &MaskShape| ppm(shape.area, pixels) >= rule.detail_ppm;
+        let mut found: Vec<Option<MaskCore>> = self
             .list
             .iter()
-            .map(|shape| large(shape).then(|| Core::of(shape.area, frame)))
+            .map(|shape| large(shape).then(|| MaskCore::of(shape.area, frame)))
             .collect();
-        let light = Light::of(frame, rule, palette);
+        let light = PixelLight::of(frame, rule, palette);
         let radius = rounded(scene.size[1], rule.erosion_per_height);
         cores(&scene.masks, scene.size, radius, |y, left, right, mask| {
             if let Some(core) = &mut found[mask as usize - 1] {

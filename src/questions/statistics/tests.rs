@@ -167,7 +167,7 @@ fn names_of_segments_go_before_the_words_of_labels() {
     let chair = &found.segments[0];
     assert_eq!(
         (chair.word.as_str(), chair.stands, chair.region),
-        ("office chair", Where::Elsewhere, Some(3))
+        ("office chair", SegmentPlace::Elsewhere, Some(3))
     );
     assert_eq!(found.segments[1].word, "wall");
     // Without a semantic map, the names' classes are all there are.
@@ -219,7 +219,7 @@ fn parts_of_one_class_are_merged() {
 fn depth_is_along_the_ray_where_the_camera_is_known() {
     let mut frame = frame(3, 1, vec![4, 4, 4]);
     frame.depth = Some(map(3, 1, &[1000_u32, 1000, 0]));
-    assert_eq!(measured(&frame).depth.unwrap().along, Along::Axis);
+    assert_eq!(measured(&frame).depth.unwrap().along, DepthAxis::Axis);
     frame.intrinsics = Some(Intrinsics {
         fx: 1.0,
         fy: 1.0,
@@ -236,7 +236,7 @@ fn depth_is_along_the_ray_where_the_camera_is_known() {
     let whole = found.depth.unwrap();
     assert_eq!(
         (whole.holes, whole.median, whole.along),
-        (1, 1000, Along::Ray)
+        (1, 1000, DepthAxis::Ray)
     );
     frame.depth_kind = DepthKind::Euclid;
     let found = measured(&frame);
@@ -245,7 +245,7 @@ fn depth_is_along_the_ray_where_the_camera_is_known() {
             found.segments[0].depth.unwrap().p90,
             found.depth.unwrap().along
         ),
-        (1000, Along::Ray)
+        (1000, DepthAxis::Ray)
     );
     frame.depth = Some(map(3, 1, &[15_000_u32, 15_001, 0]));
     assert_eq!(measured(&frame).segments[0].depth.unwrap().valid, 1);
@@ -325,10 +325,13 @@ fn void_counts_where_it_is_more_than_a_margin() {
 #[test]
 fn words_have_one_spelling() {
     for (word, expected) in [
-        ("  Kitchen   Cabinet ", ("kitchen cabinet", Where::Here)),
-        ("bed/otherroom", ("bed", Where::Elsewhere)),
-        ("bed /outside", ("bed", Where::Elsewhere)),
-        ("", ("", Where::Here)),
+        (
+            "  Kitchen   Cabinet ",
+            ("kitchen cabinet", SegmentPlace::Here),
+        ),
+        ("bed/otherroom", ("bed", SegmentPlace::Elsewhere)),
+        ("bed /outside", ("bed", SegmentPlace::Elsewhere)),
+        ("", ("", SegmentPlace::Here)),
     ] {
         assert_eq!(plain_word(word), (expected.0.to_owned(), expected.1));
     }

@@ -129,19 +129,19 @@ fn what_cannot_be_labelled_is_not_denied() {
     assert!(said.candidates.len() > 10);
     let bathroom = frame(&[("toilet", "toilet", 60_000)]);
     let palette = Palette::built_in().unwrap();
-    let order = Order {
+    let order = QuestionRequest {
         dataset: "",
         labels: &labels,
         rules: &rules,
         palette: &palette,
         families: Family::PAPER.into_iter().collect(),
         room_source: RoomSource::Signature,
-        balance: Balanced::None,
+        balance: BalanceMode::None,
         rejected: BTreeSet::new(),
     };
     let mut reasons = BTreeSet::new();
     generate(&[bathroom], &order, |_, verdict| {
-        if let Verdict::Falls(fallen) = verdict
+        if let RuleResult::Falls(fallen) = verdict
             && fallen.answer.as_deref() == Some("no")
             && ["sleep", "relax on a sofa", "sofa"].contains(&fallen.about.as_str())
         {

@@ -14,17 +14,17 @@ mod whole;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::questions::balance::Balanced;
+use crate::questions::balance::BalanceMode;
 use crate::questions::colors::{Color, NONE, Palette};
-use crate::questions::generate::{Generated, Order, generate};
+use crate::questions::generate::{Generated, QuestionRequest, generate};
 use crate::questions::reason::Reason;
 use crate::questions::room::{NoRoom, RoomSigns, RoomSource, classify};
 use crate::questions::rules::Rules;
 use crate::questions::statistics::{
-    Along, FrameDepth, FrameStatistics, Segment, SegmentDepth, Where, plain_word,
+    DepthAxis, FrameDepth, FrameStatistics, Segment, SegmentDepth, SegmentPlace, plain_word,
 };
-use crate::questions::survey::Asked;
-use crate::questions::survey::{Claim, Verdict};
+use crate::questions::survey::GeneratedQuestion;
+use crate::questions::survey::{Candidate, RuleResult};
 use crate::types::{Digest, Family, FrameId, Labels, QuestionId};
 
 /// A frame of the given segments: class, the data set's word, area.
@@ -45,7 +45,7 @@ pub(crate) fn frame(segments: &[(&str, &str, u64)]) -> FrameStatistics {
         depth: Some(FrameDepth {
             holes: 0,
             median: 3000,
-            along: Along::Ray,
+            along: DepthAxis::Ray,
         }),
         segments: Vec::new(),
         room: None,
@@ -98,21 +98,25 @@ pub(crate) fn labels() -> Labels {
 }
 
 /// What the rules say of frames, and every candidate of the first.
-struct Said {
+struct RuleResults {
     made: Generated,
-    candidates: Vec<Verdict>,
+    candidates: Vec<RuleResult>,
 }
 
-fn say(frames: &[FrameStatistics], change: impl FnOnce(&mut Order<'_>), rules: &Rules) -> Said {
+fn say(
+    frames: &[FrameStatistics],
+    change: impl FnOnce(&mut QuestionRequest<'_>),
+    rules: &Rules,
+) -> RuleResults {
     let (labels, palette) = (labels(), Palette::built_in().unwrap());
-    let mut order = Order {
+    let mut order = QuestionRequest {
         dataset: "test",
         labels: &labels,
         rules,
         palette: &palette,
         families: Family::PAPER.into_iter().collect(),
         room_source: RoomSource::Signature,
-        balance: Balanced::None,
+        balance: BalanceMode::None,
         rejected: BTreeSet::new(),
     };
     change(&mut order);
@@ -122,7 +126,7 @@ fn say(frames: &[FrameStatistics], change: impl FnOnce(&mut Order<'_>), rules: &
             candidates.push(verdict.clone());
         }
     });
-    Said {
+    RuleResults {
         made: made.unwrap(),
         candidates,
     }
@@ -134,7 +138,7 @@ fn candidate(
     family: &Family,
     about: &str,
     answer: &str,
-) -> Result<Claim, Reason> {
+) -> Result<Candidate, Reason> {
     candidate_by(frame, family, about, answer, &Rules::built_in().unwrap())
 }
 
@@ -144,19 +148,19 @@ fn candidate_by(
     about: &str,
     answer: &str,
     rules: &Rules,
-) -> Result<Claim, Reason> {
+) -> Result<Candidate, Reason> {
     let said = say(std::slice::from_ref(frame), |_| {}, rules);
-    let mut found: Vec<Result<Claim, Reason>> = Vec::new();
+    let mut found: Vec<Result<Candidate, Reason>> = Vec::new();
     for verdict in said.candidates {
         match verdict {
-            Verdict::Holds(claim) => {
+            RuleResult::Holds(claim) => {
                 let same = claim.about == about || about.is_empty();
                 let answered = answer.is_empty() || claim.answer() == answer;
                 if claim.family == *family && same && answered {
                     found.push(Ok(claim));
                 }
             }
-            Verdict::Falls(fallen) => {
+            RuleResult::Falls(fallen) => {
                 let other = fallen.answer.as_deref().unwrap_or(answer);
                 let answered = answer.is_empty() || other == answer;
                 if fallen.family == *family && fallen.about == about && answered {

@@ -38,7 +38,10 @@ fn yes_needs_one_good_segment() {
         ),
         (|c| c.bbox = [0, 0, 20, 900], None),
         (|c| c.bbox = [0, 0, 19, 900], Some(Reason::Thin)),
-        (|c| c.stands = Where::Elsewhere, Some(Reason::Elsewhere)),
+        (
+            |c| c.stands = SegmentPlace::Elsewhere,
+            Some(Reason::Elsewhere),
+        ),
     ] {
         assert_eq!(check(change), expected);
     }
@@ -83,11 +86,11 @@ fn no_needs_that_nothing_like_it_is_seen() {
     );
     let rules = Rules::built_in().unwrap();
     for group in &rules.book().confusable {
-        for class in group
-            .classes
-            .iter()
-            .filter(|class| rules.book().is(class, crate::questions::rules::Flag::Asked))
-        {
+        for class in group.classes.iter().filter(|class| {
+            rules
+                .book()
+                .is(class, crate::questions::rules::ClassFlag::Asked)
+        }) {
             for other in group.classes.iter().filter(|other| *other != class) {
                 let seen = frame(&[("wall", "wall", 500_000), (other, "", 1)]);
                 assert_eq!(
@@ -150,12 +153,14 @@ fn no_is_asked_of_what_is_common_in_such_rooms_elsewhere() {
     let said = say(&[frame(&BEDROOM), other], |_| {}, &rules);
     let reason = |class: &str| {
         said.candidates.iter().find_map(|verdict| match verdict {
-            Verdict::Falls(fallen)
+            RuleResult::Falls(fallen)
                 if fallen.family == Family::Presence && fallen.about == class =>
             {
                 Some(Some(fallen.reason))
             }
-            Verdict::Holds(claim) if claim.family == Family::Presence && claim.about == class => {
+            RuleResult::Holds(claim)
+                if claim.family == Family::Presence && claim.about == class =>
+            {
                 Some(None)
             }
             _ => None,

@@ -37,7 +37,7 @@ fn order_changes_nothing_and_names_are_of_content() {
     shuffled.reverse();
     shuffled.swap(3, 40);
     let made = |frames: &[FrameStatistics]| {
-        say(frames, |order| order.balance = Balanced::Full, &rules).made
+        say(frames, |order| order.balance = BalanceMode::Full, &rules).made
     };
     let (one, other) = (made(&frames), made(&shuffled));
     assert_eq!(one.asked, other.asked);
@@ -45,7 +45,7 @@ fn order_changes_nothing_and_names_are_of_content() {
     let names: BTreeSet<&QuestionId> = one.asked.iter().map(|asked| &asked.question.id).collect();
     assert_eq!(names.len(), one.asked.len());
     let wider = crate::questions::tests::rules("gap_mm = 300", "gap_mm = 301");
-    let same = say(&frames, |order| order.balance = Balanced::Full, &wider).made;
+    let same = say(&frames, |order| order.balance = BalanceMode::Full, &wider).made;
     let ids = |made: &Generated| {
         made.asked
             .iter()
@@ -58,10 +58,11 @@ fn order_changes_nothing_and_names_are_of_content() {
 #[test]
 fn yes_and_no_are_nearly_even_before_anything_is_dropped() {
     let rules = Rules::built_in().unwrap();
-    let made = say(&many(), |order| order.balance = Balanced::Binary, &rules).made;
+    let made = say(&many(), |order| order.balance = BalanceMode::Binary, &rules).made;
     let mut counts: BTreeMap<(&Family, &str), [i64; 2]> = BTreeMap::new();
-    let binary =
-        |asked: &&Asked| matches!(asked.question.family, Family::Affordance | Family::Presence);
+    let binary = |asked: &&GeneratedQuestion| {
+        matches!(asked.question.family, Family::Affordance | Family::Presence)
+    };
     for asked in made.asked.iter().filter(binary) {
         counts
             .entry((&asked.question.family, &asked.about))
@@ -154,7 +155,7 @@ proptest! {
                 made
             })
             .collect();
-        for balance in [Balanced::None, Balanced::Binary, Balanced::Full] {
+        for balance in [BalanceMode::None, BalanceMode::Binary, BalanceMode::Full] {
             let made = say(&frames, |order| order.balance = balance, &rules).made;
             let mut seen = BTreeSet::new();
             for asked in &made.asked {

@@ -6,7 +6,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use crate::error::{Error, Result};
-use crate::questions::summary::Summary;
+use crate::questions::summary::QuestionSummary;
 use crate::types::Family;
 
 /// The most bars of a panel.
@@ -54,7 +54,7 @@ impl Panel {
 ///
 /// # Errors
 /// Where the figure cannot be drawn.
-pub fn figure(summary: &Summary) -> Result<String> {
+pub fn figure(summary: &QuestionSummary) -> Result<String> {
     let panels = panels(summary);
     // Two columns, each panel in the shorter one.
     let mut columns: [(i32, Vec<(i32, &Panel)>); 2] = [(0, Vec::new()), (0, Vec::new())];
@@ -79,8 +79,8 @@ pub fn figure(summary: &Summary) -> Result<String> {
     Ok(svg)
 }
 
-fn panels(summary: &Summary) -> Vec<Panel> {
-    let classes = |title: &str, count: fn(&crate::questions::summary::Coverage) -> u64| {
+fn panels(summary: &QuestionSummary) -> Vec<Panel> {
+    let classes = |title: &str, count: fn(&crate::questions::summary::ClassCoverage) -> u64| {
         let counts = summary
             .classes
             .iter()

@@ -9,7 +9,7 @@ use super::table::Kind::{Count, Text};
 use super::table::Layout;
 use super::{csv as files, terminal};
 use crate::error::{Error, Result};
-use crate::questions::summary::{Baselines, Candidates, Summary};
+use crate::questions::summary::{Baselines, CandidateCounts, QuestionSummary};
 use crate::types::Family;
 
 /// How many reasons a line of the table names.
@@ -17,7 +17,7 @@ const REASONS: usize = 3;
 
 /// The table at the end: questions by family with what came of their candidates and what not looking would score.
 #[must_use]
-pub fn table(summary: &Summary) -> String {
+pub fn table(summary: &QuestionSummary) -> String {
     let families = Family::PAPER.iter().filter_map(|family| {
         let candidates = summary.candidates.get(family)?;
         Some((family.name(), Some(candidates)))
@@ -60,7 +60,7 @@ pub fn table(summary: &Summary) -> String {
 }
 
 /// Why most of the other candidates do not hold.
-fn reasons(candidates: &Candidates) -> String {
+fn reasons(candidates: &CandidateCounts) -> String {
     let fallen = candidates.fallen.iter();
     let mut fallen: Vec<(String, u64)> = fallen
         .map(|(reason, count)| (word(reason), *count))
@@ -74,7 +74,7 @@ fn reasons(candidates: &Candidates) -> String {
 }
 
 /// The lines below the table.
-fn notes(summary: &Summary, text: &mut String) {
+fn notes(summary: &QuestionSummary, text: &mut String) {
     let mut note = |line: String| {
         // Writing to a text cannot fail.
         let _ = writeln!(text, "{line}");
@@ -83,8 +83,9 @@ fn notes(summary: &Summary, text: &mut String) {
         "{} questions about {} frames of {} scenes; prior: the commonest answer to the same words in other scenes",
         summary.questions, summary.frames, summary.scenes
     ));
-    let sum =
-        |count: fn(&Candidates) -> u64| -> u64 { summary.candidates.values().map(count).sum() };
+    let sum = |count: fn(&CandidateCounts) -> u64| -> u64 {
+        summary.candidates.values().map(count).sum()
+    };
     let (unbalanced, rejected) = (sum(|c| c.unbalanced), sum(|c| c.rejected));
     if unbalanced > 0 {
         note(format!(
@@ -130,7 +131,7 @@ fn word<T: serde::Serialize>(value: &T) -> String {
 ///
 /// # Errors
 /// Where it cannot be written as such.
-pub fn json(summary: &Summary) -> Result<String> {
+pub fn json(summary: &QuestionSummary) -> Result<String> {
     let text = serde_json::to_string_pretty(summary).map_err(|e| Error::data("statistics", e))?;
     Ok(text + "\n")
 }
@@ -139,7 +140,7 @@ pub fn json(summary: &Summary) -> Result<String> {
 ///
 /// # Errors
 /// Where it cannot be written as such.
-pub fn csv(summary: &Summary) -> Result<Vec<u8>> {
+pub fn csv(summary: &QuestionSummary) -> Result<Vec<u8>> {
     let mut rows: Vec<[String; 4]> = Vec::new();
     let mut row = |table: &str, row: &dyn Display, column: &str, count: &dyn Display| {
         rows.push([table, &row.to_string(), column, &count.to_string()].map(str::to_owned));

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::error::Result;
-use crate::questions::Asked;
+use crate::questions::GeneratedQuestion;
 use crate::report::script::embedded;
 use crate::types::Digest;
 
@@ -31,7 +31,7 @@ pub struct Item<'a> {
 impl<'a> Item<'a> {
     /// A question about an image at this place, of this size.
     #[must_use]
-    pub fn new(asked: &'a Asked, image: String, size: [usize; 2]) -> Self {
+    pub fn new(asked: &'a GeneratedQuestion, image: String, size: [usize; 2]) -> Self {
         let question = &asked.question;
         Self {
             id: &question.id.0,
@@ -83,7 +83,7 @@ mod tests {
             choices: Choices::new(choices, 0).unwrap(),
             evidence: json!({ "segments": [] }),
         };
-        let asked = Asked {
+        let asked = GeneratedQuestion {
             question,
             about: String::new(),
             scene: String::new(),

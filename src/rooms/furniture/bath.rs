@@ -8,7 +8,7 @@ use super::super::paint::Paint;
 use super::super::scene::{Piece, kind};
 use super::super::surface::{Pattern, Surface};
 use super::storage::cabinet_of;
-use super::{Set, at};
+use super::{FurnitureSet, at};
 
 fn ceramic(dice: &mut Dice) -> (Surface, &'static str) {
     let names = [
@@ -85,7 +85,7 @@ fn lid() -> Vec<Vec<Vec3>> {
 }
 
 /// A sink on a cabinet, with its tap.
-pub(in super::super) fn vanity(dice: &mut Dice) -> Set {
+pub(in super::super) fn vanity(dice: &mut Dice) -> FurnitureSet {
     let width = dice.between(0.65, 0.95);
     let names = ["white", "brown", "grey", "blue", "green", "black"];
     let paint = Paint::of(&names, dice);
@@ -95,7 +95,7 @@ pub(in super::super) fn vanity(dice: &mut Dice) -> Set {
         2,
         paint,
     );
-    Set::of(base).and(basin(width, dice), at(vec3(0.0, 0.74, 0.0), 0.0))
+    FurnitureSet::of(base).and(basin(width, dice), at(vec3(0.0, 0.74, 0.0), 0.0))
 }
 
 /// A basin of a width, on what stands below it.

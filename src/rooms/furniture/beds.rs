@@ -7,10 +7,10 @@ use super::super::mesh::Mesh;
 use super::super::paint::{ALL, Paint};
 use super::super::scene::{Piece, kind};
 use super::super::surface::{Pattern, Surface};
-use super::{Set, at, legs};
+use super::{FurnitureSet, at, legs};
 
 /// A bed with its blanket, and one or two pillows.
-pub(in super::super) fn bed(dice: &mut Dice) -> Set {
+pub(in super::super) fn bed(dice: &mut Dice) -> FurnitureSet {
     let double = dice.chance(0.6);
     let width = if double {
         dice.between(1.45, 1.7)
@@ -51,7 +51,7 @@ pub(in super::super) fn bed(dice: &mut Dice) -> Set {
         0.05,
         &if dice.chance(0.5) { sheet } else { blanket },
     );
-    let mut set = Set::of(Piece::new(kind("bed", "bed"), mesh, cover.name));
+    let mut set = FurnitureSet::of(Piece::new(kind("bed", "bed"), mesh, cover.name));
     set.size = vec3(width + 0.1, head, length + 0.04);
     let paint = Paint::of(&["white", "white", "grey", "pink", "yellow", "blue"], dice);
     let count = if double { 2 } else { 1 };

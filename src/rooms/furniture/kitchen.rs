@@ -8,7 +8,7 @@ use super::super::paint::Paint;
 use super::super::scene::{Piece, kind};
 use super::super::surface::{Pattern, Surface};
 use super::storage::cabinet_of;
-use super::{Set, at};
+use super::{FurnitureSet, at};
 
 /// The height of counters.
 pub(in super::super) const COUNTER: f32 = 0.9;
@@ -37,7 +37,7 @@ impl Style {
 }
 
 /// Cabinets below a counter, with a sink in it where that is wished for.
-pub(in super::super) fn run(width: f32, sink: bool, style: &Style) -> Set {
+pub(in super::super) fn run(width: f32, sink: bool, style: &Style) -> FurnitureSet {
     let doors = ((width / 0.5) as usize).max(1);
     let base = cabinet_of(
         kind("kitchen cabinet", "cabinet"),
@@ -67,13 +67,13 @@ pub(in super::super) fn run(width: f32, sink: bool, style: &Style) -> Set {
     }
     mesh.board(width / 2.0, [high, high + 0.06], [0.0, 0.02], &top);
     let counter = Piece::new(kind("kitchen counter", "counter"), mesh, style.counter.name);
-    let set = Set::of(base).and(counter, at(Vec3::ZERO, 0.0));
+    let set = FurnitureSet::of(base).and(counter, at(Vec3::ZERO, 0.0));
     let set = if sink {
         set.and(kitchen_sink(hole), at(Vec3::ZERO, 0.0))
     } else {
         set
     };
-    Set {
+    FurnitureSet {
         size: vec3(width, COUNTER, DEPTH),
         ..set
     }

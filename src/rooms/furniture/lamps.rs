@@ -5,8 +5,8 @@ use glam::{Vec3, vec3};
 use super::super::dice::Dice;
 use super::super::mesh::Mesh;
 use super::super::paint::{Paint, rgb};
-use super::super::scene::{Light, Piece, kind};
-use super::super::surface::{Finish, Pattern, Surface};
+use super::super::scene::{LightSource, Piece, kind};
+use super::super::surface::{Pattern, Surface, SurfaceFinish};
 
 /// Warm light, as a white-balanced camera sees it beside daylight.
 const WARM: Vec3 = Vec3::new(1.0, 0.94, 0.85);
@@ -15,12 +15,12 @@ fn shade() -> Surface {
     Surface {
         color: rgb([255, 238, 206]),
         pattern: Pattern::Plain,
-        finish: Finish::Glow(1.3),
+        finish: SurfaceFinish::Glow(1.3),
     }
 }
 
-fn bulb(middle: Vec3, radius: f32, strength: f32) -> Light {
-    Light::Bulb {
+fn bulb(middle: Vec3, radius: f32, strength: f32) -> LightSource {
+    LightSource::Bulb {
         middle,
         radius,
         radiance: WARM * strength,

@@ -1,4 +1,4 @@
-//! Parametric furniture: each function makes one piece, or a [`Set`] of pieces that belong together.
+//! Parametric furniture: each function makes one piece, or a [`FurnitureSet`] of pieces that belong together.
 
 pub(super) mod bath;
 pub(super) mod beds;
@@ -19,13 +19,13 @@ use super::surface::Surface;
 
 /// Pieces that stand together, each with its place among them; the whole stands like one piece.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Set {
+pub(super) struct FurnitureSet {
     pub(super) pieces: Vec<(Piece, Pose)>,
     /// Width, height and depth.
     pub(super) size: Vec3,
 }
 
-impl Set {
+impl FurnitureSet {
     /// One piece alone, its size taken from its shape.
     pub(super) fn of(piece: Piece) -> Self {
         let [low, high] = piece.mesh.bounds();

@@ -5,13 +5,13 @@ use glam::{Vec3, vec3};
 use super::super::dice::Dice;
 use super::super::mesh::{Mesh, turn};
 use super::super::paint::{ALL, Paint};
-use super::super::scene::{Kind, Piece, kind};
+use super::super::scene::{Piece, ThingKind, kind};
 use super::super::surface::Surface;
 use super::beds::cushion;
-use super::{Set, at, legs};
+use super::{FurnitureSet, at, legs};
 
 /// A chair with four legs and a back.
-pub(in super::super) fn chair(name: Kind, paint: Paint, dice: &mut Dice) -> Piece {
+pub(in super::super) fn chair(name: ThingKind, paint: Paint, dice: &mut Dice) -> Piece {
     let surface = if dice.chance(0.5) {
         Surface::wood(paint, 1)
     } else {
@@ -22,7 +22,7 @@ pub(in super::super) fn chair(name: Kind, paint: Paint, dice: &mut Dice) -> Piec
 
 /// A chair in one of two styles: a back of slats, or a whole one.
 pub(in super::super) fn chair_of(
-    name: Kind,
+    name: ThingKind,
     paint: Paint,
     surface: &Surface,
     style: usize,
@@ -127,9 +127,9 @@ pub(in super::super) fn stool(height: f32, dice: &mut Dice) -> Piece {
 }
 
 /// A sofa for so many, with cushions.
-pub(in super::super) fn sofa(seats: usize, dice: &mut Dice) -> Set {
+pub(in super::super) fn sofa(seats: usize, dice: &mut Dice) -> FurnitureSet {
     let paint = Paint::of(&ALL, dice);
-    let set = Set::of(upholstered(kind("sofa", "sofa"), seats, paint, dice));
+    let set = FurnitureSet::of(upholstered(kind("sofa", "sofa"), seats, paint, dice));
     let mut set = set;
     let width = set.size.x;
     for x in [-1.0, 1.0] {
@@ -153,7 +153,7 @@ pub(in super::super) fn armchair(dice: &mut Dice) -> Piece {
     upholstered(kind("armchair", "chair"), 1, paint, dice)
 }
 
-fn upholstered(name: Kind, seats: usize, paint: Paint, dice: &mut Dice) -> Piece {
+fn upholstered(name: ThingKind, seats: usize, paint: Paint, dice: &mut Dice) -> Piece {
     let cloth = Surface::cloth(paint);
     let foot = Surface::plain([64, 44, 30]);
     let seat = dice.between(0.6, 0.68);

@@ -5,8 +5,8 @@ use glam::{Vec3, vec3};
 use super::super::dice::Dice;
 use super::super::mesh::Mesh;
 use super::super::paint::{ALL, Paint, rgb};
-use super::super::scene::{Kind, Piece, kind};
-use super::super::surface::{Finish, Pattern, Surface};
+use super::super::scene::{Piece, ThingKind, kind};
+use super::super::surface::{Pattern, Surface, SurfaceFinish};
 
 /// The colours that storage comes in.
 const COLORS: [&str; 10] = [
@@ -73,13 +73,23 @@ pub(in super::super) fn chest(
 }
 
 /// A cabinet with so many doors side by side.
-pub(in super::super) fn cabinet(name: Kind, size: Vec3, doors: usize, dice: &mut Dice) -> Piece {
+pub(in super::super) fn cabinet(
+    name: ThingKind,
+    size: Vec3,
+    doors: usize,
+    dice: &mut Dice,
+) -> Piece {
     let paint = Paint::of(&COLORS, dice);
     cabinet_of(name, size, doors, paint)
 }
 
 /// A cabinet in a paint.
-pub(in super::super) fn cabinet_of(name: Kind, size: Vec3, doors: usize, paint: Paint) -> Piece {
+pub(in super::super) fn cabinet_of(
+    name: ThingKind,
+    size: Vec3,
+    doors: usize,
+    paint: Paint,
+) -> Piece {
     let half = size.x / 2.0;
     let surface = if paint.name == "brown" {
         Surface::wood(paint, 1)
@@ -188,7 +198,7 @@ fn books(mesh: &mut Mesh, [from, to]: [f32; 2], y: f32, rise: f32, dice: &mut Di
         let dull = Surface {
             color: paint.color * 0.7 + rgb([120, 110, 100]) * 0.2,
             pattern: Pattern::Plain,
-            finish: Finish::Matte,
+            finish: SurfaceFinish::Matte,
         };
         mesh.block(
             vec3(x, y, 0.04),

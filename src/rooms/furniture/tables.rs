@@ -5,7 +5,7 @@ use glam::{Vec3, vec3};
 use super::super::dice::Dice;
 use super::super::mesh::Mesh;
 use super::super::paint::Paint;
-use super::super::scene::{Kind, Piece, kind};
+use super::super::scene::{Piece, ThingKind, kind};
 use super::super::surface::Surface;
 use super::legs;
 
@@ -22,7 +22,7 @@ fn finish(paint: Paint) -> Surface {
 }
 
 /// A table of a size, with four legs.
-pub(in super::super) fn table(name: Kind, size: Vec3, dice: &mut Dice) -> Piece {
+pub(in super::super) fn table(name: ThingKind, size: Vec3, dice: &mut Dice) -> Piece {
     let paint = Paint::of(&COLORS, dice);
     let surface = finish(paint);
     let mut mesh = Mesh::default();
@@ -44,7 +44,7 @@ pub(in super::super) fn table(name: Kind, size: Vec3, dice: &mut Dice) -> Piece 
 }
 
 /// A round table on one foot.
-pub(in super::super) fn round(name: Kind, radius: f32, height: f32, dice: &mut Dice) -> Piece {
+pub(in super::super) fn round(name: ThingKind, radius: f32, height: f32, dice: &mut Dice) -> Piece {
     let paint = Paint::of(&COLORS, dice);
     let surface = finish(paint);
     let mut mesh = Mesh::default();

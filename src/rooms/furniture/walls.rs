@@ -5,8 +5,8 @@ use glam::{Vec3, vec2, vec3};
 use super::super::dice::Dice;
 use super::super::mesh::Mesh;
 use super::super::paint::{Paint, rgb};
-use super::super::scene::{Light, Piece, kind};
-use super::super::surface::{Finish, Pattern, Surface};
+use super::super::scene::{LightSource, Piece, kind};
+use super::super::surface::{Pattern, Surface, SurfaceFinish};
 
 /// Four bars around a rectangle whose lower edge is at y = 0.
 fn frame(mesh: &mut Mesh, width: f32, height: f32, bar: f32, thick: f32, surface: &Surface) {
@@ -52,7 +52,7 @@ pub(in super::super) fn picture(dice: &mut Dice) -> Piece {
 /// A mirror of a size in its frame.
 pub(in super::super) fn mirror(width: f32, height: f32, dice: &mut Dice) -> Piece {
     let rim = Surface::gloss(Paint::of(&["black", "brown", "grey", "white"], dice));
-    let glass = Surface::plain([255, 255, 255]).finished(Finish::Mirror);
+    let glass = Surface::plain([255, 255, 255]).finished(SurfaceFinish::Mirror);
     let mut mesh = Mesh::default();
     frame(&mut mesh, width, height, 0.025, 0.03, &rim);
     sheet(&mut mesh, width, height, 0.015, &glass);
@@ -69,12 +69,12 @@ pub(in super::super) fn monitor(width: f32) -> Piece {
     panel(kind("monitor", "tv_monitor"), width, true)
 }
 
-fn panel(name: super::super::scene::Kind, width: f32, foot: bool) -> Piece {
+fn panel(name: super::super::scene::ThingKind, width: f32, foot: bool) -> Piece {
     let height = width * 0.58;
     let case = Surface::gloss(Paint::nameless([24, 24, 26]));
     let screen = Surface::plain([34, 40, 52])
         .with(Pattern::Screen(vec2(width, height)))
-        .finished(Finish::Glossy);
+        .finished(SurfaceFinish::Glossy);
     let mut mesh = Mesh::default();
     let lift = if foot { 0.09 } else { 0.0 };
     let z = if foot { 0.1 } else { 0.0 };
@@ -99,7 +99,7 @@ pub(in super::super) fn window(width: f32, height: f32, daylight: f32) -> Piece 
     let view = Surface {
         color: Vec3::ONE,
         pattern: Pattern::Outdoors(height),
-        finish: Finish::Glow(1.15),
+        finish: SurfaceFinish::Glow(1.15),
     };
     let mut mesh = Mesh::default();
     sheet(&mut mesh, width, height, 0.012, &view);
@@ -113,7 +113,7 @@ pub(in super::super) fn window(width: f32, height: f32, daylight: f32) -> Piece 
     );
     mesh.board(half + 0.1, [-0.08, -0.05], [0.0, 0.14], &white);
     let mut piece = Piece::new(kind("window", "window"), mesh, "");
-    piece.light = Some(Light::Panel {
+    piece.light = Some(LightSource::Panel {
         corner: vec3(-half, 0.0, 0.06),
         edges: [vec3(width, 0.0, 0.0), vec3(0.0, height, 0.0)],
         normal: Vec3::Z,
@@ -221,7 +221,7 @@ pub(in super::super) fn fireplace(dice: &mut Dice) -> Piece {
     let flame = Surface {
         color: rgb([255, 168, 60]),
         pattern: Pattern::Plain,
-        finish: Finish::Glow(0.9),
+        finish: SurfaceFinish::Glow(0.9),
     };
     for (x, tall) in [
         (-0.14, 0.2),
@@ -243,7 +243,7 @@ pub(in super::super) fn fireplace(dice: &mut Dice) -> Piece {
         );
     }
     let mut piece = Piece::new(kind("fireplace", "fireplace"), mesh, "");
-    piece.light = Some(Light::Bulb {
+    piece.light = Some(LightSource::Bulb {
         middle: vec3(0.0, 0.3, 0.3),
         radius: 0.1,
         radiance: vec3(1.0, 0.6, 0.3) * 5.0,

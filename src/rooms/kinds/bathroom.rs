@@ -3,29 +3,29 @@
 use glam::vec3;
 
 use super::super::dice::Dice;
-use super::super::furniture::{Set, bath, clutter, storage, textiles, walls};
-use super::super::plan::{Dress, Ground, Plan, WALLS};
+use super::super::furniture::{FurnitureSet, bath, clutter, storage, textiles, walls};
+use super::super::plan::{FloorPlan, Flooring, WALLS, WindowDressing};
 use super::shared::low_stool;
 
-pub(super) fn furnish(mut dice: Dice) -> Plan {
+pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
     let size = vec3(dice.between(2.6, 3.3), 2.5, dice.between(2.8, 3.6));
-    let mut plan = Plan::new(size, Ground::Tiles, true, dice);
+    let mut plan = FloorPlan::new(size, Flooring::Tiles, true, dice);
     let door = plan.dice.pick(&WALLS);
     plan.door(&[door]);
     let tub = plan.dice.chance(0.65);
     if tub {
         plan.sight();
-        let set = Set::of(bath::bathtub(&mut plan.dice));
+        let set = FurnitureSet::of(bath::bathtub(&mut plan.dice));
         plan.corner(&set, &WALLS);
     }
     if !tub || plan.dice.chance(0.5) {
         plan.sight();
-        let set = Set::of(bath::shower(&mut plan.dice));
+        let set = FurnitureSet::of(bath::shower(&mut plan.dice));
         plan.corner(&set, &WALLS);
     }
     if plan.dice.chance(0.92) {
         plan.sight();
-        let set = Set::of(bath::toilet(&mut plan.dice));
+        let set = FurnitureSet::of(bath::toilet(&mut plan.dice));
         if let Some(pose) = plan.stand(&set, &WALLS) {
             plan.beside(&pose, bath::toilet_paper(), vec3(0.42, 0.72, -0.01), 0.0);
         }
@@ -34,7 +34,7 @@ pub(super) fn furnish(mut dice: Dice) -> Plan {
         let set = if plan.dice.chance(0.7) {
             bath::vanity(&mut plan.dice)
         } else {
-            Set::of(bath::pedestal_sink(&mut plan.dice))
+            FurnitureSet::of(bath::pedestal_sink(&mut plan.dice))
         };
         plan.sight();
         if let Some(pose) = plan.stand(&set, &WALLS)
@@ -45,9 +45,11 @@ pub(super) fn furnish(mut dice: Dice) -> Plan {
             plan.above(&pose, piece, 1.22);
         }
     }
-    let dress = plan
-        .dice
-        .pick(&[Dress::Blinds, Dress::Bare, Dress::Curtains]);
+    let dress = plan.dice.pick(&[
+        WindowDressing::Blinds,
+        WindowDressing::Bare,
+        WindowDressing::Curtains,
+    ]);
     plan.window(&WALLS, 0.75, 1.25, dress);
     for _ in 0..2 {
         plan.perhaps(0.7, 1.35, textiles::towel);

@@ -3,23 +3,23 @@
 use glam::vec3;
 
 use super::super::dice::Dice;
-use super::super::furniture::{Set, at, beds, lamps, seats, storage, walls};
-use super::super::plan::{Dress, Ground, Plan, WALLS, Wall};
+use super::super::furniture::{FurnitureSet, at, beds, lamps, seats, storage, walls};
+use super::super::plan::{FloorPlan, Flooring, WALLS, Wall, WindowDressing};
 use super::super::scene::kind;
 use super::shared::{SMALL, dresser, low_stool, nightstand, sides};
 
-pub(super) fn furnish(mut dice: Dice) -> Plan {
+pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
     let size = vec3(dice.between(3.6, 4.6), 2.6, dice.between(3.6, 4.6));
-    let ground = dice.pick(&[Ground::Wood, Ground::Carpet]);
-    let mut plan = Plan::new(size, ground, false, dice);
+    let ground = dice.pick(&[Flooring::Wood, Flooring::Carpet]);
+    let mut plan = FloorPlan::new(size, ground, false, dice);
     let wall = plan.dice.pick(&WALLS);
     bed(&mut plan, wall);
     plan.door(&[wall.opposite()]);
     let width = plan.dice.between(1.1, 1.5);
     let dress = if plan.dice.chance(0.75) {
-        Dress::Curtains
+        WindowDressing::Curtains
     } else {
-        Dress::Blinds
+        WindowDressing::Blinds
     };
     plan.window(&sides(wall), width, 0.85, dress);
     if let Some(pose) = plan.maybe(0.6, dresser) {
@@ -55,7 +55,7 @@ pub(super) fn furnish(mut dice: Dice) -> Plan {
 }
 
 /// A bed with what stands beside it.
-fn bed(plan: &mut Plan, wall: Wall) {
+fn bed(plan: &mut FloorPlan, wall: Wall) {
     let set = beds::bed(&mut plan.dice);
     let span = plan.width(wall);
     let along = span / 2.0 + plan.dice.between(-0.3, 0.3);
@@ -69,7 +69,7 @@ fn bed(plan: &mut Plan, wall: Wall) {
     for side in [-1.0, 1.0] {
         if plan.dice.chance(0.75) {
             let stand = nightstand(&mut plan.dice);
-            let set = Set::of(stand);
+            let set = FurnitureSet::of(stand);
             let top = set.size.y;
             let place = along + side * (size.x / 2.0 + set.size.x / 2.0 + 0.06);
             if let Some(pose) = plan.stand_at(set, wall, place) {

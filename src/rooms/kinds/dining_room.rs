@@ -3,30 +3,30 @@
 use glam::{Vec3, vec3};
 
 use super::super::dice::Dice;
-use super::super::furniture::{Set, at, clutter, lamps, seats, storage, tables, walls};
+use super::super::furniture::{FurnitureSet, at, clutter, lamps, seats, storage, tables, walls};
 use super::super::paint::{ALL, Paint};
-use super::super::plan::{Dress, Ground, Plan, WALLS};
+use super::super::plan::{FloorPlan, Flooring, WALLS, WindowDressing};
 use super::super::scene::kind;
 use super::super::surface::Surface;
 use super::shared::{SMALL, low_stool};
 
-pub(super) fn furnish(mut dice: Dice) -> Plan {
+pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
     let size = vec3(dice.between(4.0, 4.9), 2.65, dice.between(4.0, 4.9));
-    let ground = dice.pick(&[Ground::Wood, Ground::Wood, Ground::Tiles]);
-    let mut plan = Plan::new(size, ground, false, dice);
+    let ground = dice.pick(&[Flooring::Wood, Flooring::Wood, Flooring::Tiles]);
+    let mut plan = FloorPlan::new(size, ground, false, dice);
     table(&mut plan);
     plan.door(&WALLS);
     let width = plan.dice.between(1.2, 1.8);
     let dress = if plan.dice.chance(0.7) {
-        Dress::Curtains
+        WindowDressing::Curtains
     } else {
-        Dress::Bare
+        WindowDressing::Bare
     };
     plan.window(&WALLS, width, 0.75, dress);
     if plan.dice.chance(0.65) {
         let (width, name) = (plan.dice.between(1.2, 1.6), kind("cabinet", "cabinet"));
         let piece = storage::cabinet(name, vec3(width, 0.85, 0.45), 3, &mut plan.dice);
-        if let Some(pose) = plan.stand(&Set::of(piece), &WALLS) {
+        if let Some(pose) = plan.stand(&FurnitureSet::of(piece), &WALLS) {
             plan.sights.push(plan.scene.things.len() - 1);
             plan.top(&pose, 0.85, &[-0.35, 0.0, 0.35], &SMALL);
         }
@@ -45,7 +45,7 @@ pub(super) fn furnish(mut dice: Dice) -> Plan {
 }
 
 /// The table, its chairs, and the lamp above.
-fn table(plan: &mut Plan) {
+fn table(plan: &mut FloorPlan) {
     let name = kind("dining table", "table");
     let middle = vec3(plan.size.x / 2.0, 0.0, plan.size.z / 2.0)
         + vec3(
@@ -93,7 +93,7 @@ fn table(plan: &mut Plan) {
     } else {
         Surface::paint(paint)
     };
-    let seat = |plan: &mut Plan, place: Vec3, turned: f32| {
+    let seat = |plan: &mut FloorPlan, place: Vec3, turned: f32| {
         plan.sight();
         let piece = seats::chair_of(kind("dining chair", "chair"), paint, &surface, style);
         plan.beside(&around, piece, place, turned);

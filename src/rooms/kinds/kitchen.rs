@@ -6,24 +6,26 @@ use super::super::dice::Dice;
 use super::super::furniture::kitchen::{
     COUNTER, Style, hood, microwave, refrigerator, run, stove, upper,
 };
-use super::super::furniture::{Set, at, clutter, lamps, seats, tables};
+use super::super::furniture::{FurnitureSet, at, clutter, lamps, seats, tables};
 use super::super::paint::{ALL, Paint};
-use super::super::plan::{Dress, Ground, Plan, WALLS, Wall};
+use super::super::plan::{FloorPlan, Flooring, WALLS, Wall, WindowDressing};
 use super::super::scene::kind;
 use super::shared::sides;
 
-pub(super) fn furnish(mut dice: Dice) -> Plan {
+pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
     let size = vec3(dice.between(3.6, 4.6), 2.6, dice.between(3.4, 4.4));
-    let ground = dice.pick(&[Ground::Tiles, Ground::Tiles, Ground::Wood]);
-    let mut plan = Plan::new(size, ground, false, dice);
+    let ground = dice.pick(&[Flooring::Tiles, Flooring::Tiles, Flooring::Wood]);
+    let mut plan = FloorPlan::new(size, ground, false, dice);
     let wall = plan.dice.pick(&WALLS);
     let style = Style::new(&mut plan.dice);
     row(&mut plan, wall, &style);
     let [left, right] = sides(wall);
     plan.door(&[wall.opposite()]);
-    let dress = plan
-        .dice
-        .pick(&[Dress::Bare, Dress::Blinds, Dress::Curtains]);
+    let dress = plan.dice.pick(&[
+        WindowDressing::Bare,
+        WindowDressing::Blinds,
+        WindowDressing::Curtains,
+    ]);
     plan.window(&[left, right, wall.opposite()], 1.2, 1.05, dress);
     eating(&mut plan, wall);
     plan.plant(0.3);
@@ -33,7 +35,7 @@ pub(super) fn furnish(mut dice: Dice) -> Plan {
 }
 
 /// Refrigerator, counters, stove and sink along a wall.
-fn row(plan: &mut Plan, wall: Wall, style: &Style) {
+fn row(plan: &mut FloorPlan, wall: Wall, style: &Style) {
     let span = plan.width(wall);
     let fridge = plan.dice.chance(0.8);
     let taken = if fridge { 0.78 } else { 0.0 };
@@ -48,7 +50,7 @@ fn row(plan: &mut Plan, wall: Wall, style: &Style) {
     };
     if fridge {
         plan.sight();
-        let set = Set::of(refrigerator(style, &mut plan.dice));
+        let set = FurnitureSet::of(refrigerator(style, &mut plan.dice));
         plan.stand_at(set, wall, next(0.74));
     }
     if let Some(pose) = plan.stand_at(run(first - 0.05, false, style), wall, next(first - 0.05)) {
@@ -60,7 +62,7 @@ fn row(plan: &mut Plan, wall: Wall, style: &Style) {
         plan.above(&pose, upper(first - 0.05, style), 1.48);
     }
     plan.sight();
-    if let Some(pose) = plan.stand_at(Set::of(stove(style)), wall, next(0.63)) {
+    if let Some(pose) = plan.stand_at(FurnitureSet::of(stove(style)), wall, next(0.63)) {
         plan.above(&pose, hood(), 1.6);
     }
     plan.sight();
@@ -77,7 +79,7 @@ fn row(plan: &mut Plan, wall: Wall, style: &Style) {
 }
 
 /// A table with what one sits on.
-fn eating(plan: &mut Plan, wall: Wall) {
+fn eating(plan: &mut FloorPlan, wall: Wall) {
     if plan.dice.chance(0.3) {
         return;
     }
@@ -86,7 +88,7 @@ fn eating(plan: &mut Plan, wall: Wall) {
     let far = plan.dice.between(2.2, 2.5);
     let place = before.outward(vec3(side, 0.0, far));
     let table = tables::round(kind("table", "table"), 0.42, 0.75, &mut plan.dice);
-    let Some(pose) = plan.amid(Set::of(table), place, 0.0) else {
+    let Some(pose) = plan.amid(FurnitureSet::of(table), place, 0.0) else {
         return;
     };
     plan.sights.push(plan.scene.things.len() - 1);
@@ -103,7 +105,7 @@ fn eating(plan: &mut Plan, wall: Wall) {
         };
         // Each faces the table: its front is z, which a turn about y takes to (sin, cos).
         let back = vec3(place.x, 0.0, place.z) - vec3(out.y, 0.0, out.x) * 0.85;
-        let set = Set::of(piece);
+        let set = FurnitureSet::of(piece);
         plan.amid(set, back + vec3(out.y, 0.0, out.x) * 0.2, angle);
     }
     if plan.dice.chance(0.5) {

@@ -3,15 +3,15 @@
 use glam::vec3;
 
 use super::super::dice::Dice;
-use super::super::furniture::{Set, lamps, seats, storage, tables, walls};
-use super::super::plan::{Dress, Ground, Plan, WALLS, Wall};
+use super::super::furniture::{FurnitureSet, lamps, seats, storage, tables, walls};
+use super::super::plan::{FloorPlan, Flooring, WALLS, Wall, WindowDressing};
 use super::super::scene::kind;
 use super::shared::{SMALL, low_stool, sides};
 
-pub(super) fn furnish(mut dice: Dice) -> Plan {
+pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
     let size = vec3(dice.between(4.2, 5.4), 2.65, dice.between(4.2, 5.4));
-    let ground = dice.pick(&[Ground::Wood, Ground::Wood, Ground::Carpet]);
-    let mut plan = Plan::new(size, ground, false, dice);
+    let ground = dice.pick(&[Flooring::Wood, Flooring::Wood, Flooring::Carpet]);
+    let mut plan = FloorPlan::new(size, ground, false, dice);
     let wall = plan.dice.pick(&WALLS);
     group(&mut plan, wall);
     let facing = wall.opposite();
@@ -19,9 +19,9 @@ pub(super) fn furnish(mut dice: Dice) -> Plan {
     plan.door(&[sides(wall)[0], facing]);
     let width = plan.dice.between(1.3, 1.9);
     let dress = if plan.dice.chance(0.75) {
-        Dress::Curtains
+        WindowDressing::Curtains
     } else {
-        Dress::Bare
+        WindowDressing::Bare
     };
     plan.window(&sides(wall), width, 0.7, dress);
     plan.maybe(0.45, storage::bookshelf);
@@ -36,7 +36,7 @@ pub(super) fn furnish(mut dice: Dice) -> Plan {
 }
 
 /// A sofa, a table before it, an armchair beside it.
-fn group(plan: &mut Plan, wall: Wall) {
+fn group(plan: &mut FloorPlan, wall: Wall) {
     let seats = 2 + plan.dice.below(2);
     let set = seats::sofa(seats, &mut plan.dice);
     let size = set.size;
@@ -58,7 +58,7 @@ fn group(plan: &mut Plan, wall: Wall) {
         } else {
             tables::table(name, vec3(1.0, 0.42, 0.55), &mut plan.dice)
         };
-        let piece = Set::of(piece);
+        let piece = FurnitureSet::of(piece);
         plan.sights.push(plan.scene.things.len());
         if let Some(pose) = plan.amid(piece, before, pose.angle) {
             plan.top(&pose, 0.42, &[-0.15, 0.2], &SMALL);
@@ -67,11 +67,11 @@ fn group(plan: &mut Plan, wall: Wall) {
     if plan.dice.chance(0.55) {
         let hand = if plan.dice.chance(0.5) { -1.0 } else { 1.0 };
         let place = pose.outward(vec3(hand * (size.x / 2.0 + 0.3), 0.0, 1.75));
-        let piece = Set::of(seats::armchair(&mut plan.dice));
+        let piece = FurnitureSet::of(seats::armchair(&mut plan.dice));
         plan.amid(piece, place, pose.angle - hand * 1.9);
     }
     if plan.dice.chance(0.5) {
-        let piece = Set::of(tables::round(
+        let piece = FurnitureSet::of(tables::round(
             kind("side table", "table"),
             0.24,
             0.5,
@@ -86,11 +86,11 @@ fn group(plan: &mut Plan, wall: Wall) {
 }
 
 /// What the sofa looks at: a television or a fireplace.
-fn before(plan: &mut Plan, wall: Wall) {
+fn before(plan: &mut FloorPlan, wall: Wall) {
     let along = plan.width(wall) / 2.0 + plan.dice.between(-0.3, 0.3);
     plan.sight();
     if plan.dice.chance(0.5) {
-        let piece = Set::of(walls::fireplace(&mut plan.dice));
+        let piece = FurnitureSet::of(walls::fireplace(&mut plan.dice));
         if let Some(pose) = plan.stand_at(piece, wall, along) {
             if plan.dice.chance(0.5) {
                 let piece = walls::mirror(0.8, 0.6, &mut plan.dice);
@@ -108,7 +108,7 @@ fn before(plan: &mut Plan, wall: Wall) {
         3,
         &mut plan.dice,
     );
-    if let Some(pose) = plan.stand_at(Set::of(cabinet), wall, along) {
+    if let Some(pose) = plan.stand_at(FurnitureSet::of(cabinet), wall, along) {
         let screen = plan.dice.between(1.0, 1.25);
         let tv = walls::television(screen, true);
         let top = plan.beside(&pose, tv, vec3(0.0, 0.5, 0.06), 0.0);

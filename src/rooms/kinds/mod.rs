@@ -9,7 +9,7 @@ mod office;
 mod shared;
 
 use super::dice::Dice;
-use super::plan::Plan;
+use super::plan::FloorPlan;
 
 /// A kind of room.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,7 +46,7 @@ impl RoomKind {
     }
 
     /// A furnished room of this kind.
-    pub(super) fn furnish(self, dice: Dice) -> Plan {
+    pub(super) fn furnish(self, dice: Dice) -> FloorPlan {
         match self {
             Self::Bedroom => bedroom::furnish(dice),
             Self::Bathroom => bathroom::furnish(dice),

@@ -3,22 +3,24 @@
 use glam::vec3;
 
 use super::super::dice::Dice;
-use super::super::furniture::{Set, clutter, lamps, seats, storage, tables, walls};
-use super::super::plan::{Dress, Ground, Plan, WALLS, Wall};
+use super::super::furniture::{FurnitureSet, clutter, lamps, seats, storage, tables, walls};
+use super::super::plan::{FloorPlan, Flooring, WALLS, Wall, WindowDressing};
 use super::super::scene::kind;
 use super::shared::{SMALL, low_stool, sides};
 
-pub(super) fn furnish(mut dice: Dice) -> Plan {
+pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
     let size = vec3(dice.between(3.4, 4.4), 2.6, dice.between(3.4, 4.4));
-    let ground = dice.pick(&[Ground::Carpet, Ground::Wood]);
-    let mut plan = Plan::new(size, ground, false, dice);
+    let ground = dice.pick(&[Flooring::Carpet, Flooring::Wood]);
+    let mut plan = FloorPlan::new(size, ground, false, dice);
     let wall = plan.dice.pick(&WALLS);
     desk(&mut plan, wall);
     plan.door(&[wall.opposite()]);
     let width = plan.dice.between(1.1, 1.6);
-    let dress = plan
-        .dice
-        .pick(&[Dress::Blinds, Dress::Curtains, Dress::Bare]);
+    let dress = plan.dice.pick(&[
+        WindowDressing::Blinds,
+        WindowDressing::Curtains,
+        WindowDressing::Bare,
+    ]);
     plan.window(&sides(wall), width, 0.9, dress);
     if plan.maybe(0.8, storage::bookshelf).is_some() {
         plan.sights.push(plan.scene.things.len() - 1);
@@ -39,8 +41,8 @@ pub(super) fn furnish(mut dice: Dice) -> Plan {
 }
 
 /// A desk with its chair and what stands on it.
-fn desk(plan: &mut Plan, wall: Wall) {
-    let set = Set::of(tables::desk(&mut plan.dice));
+fn desk(plan: &mut FloorPlan, wall: Wall) {
+    let set = FurnitureSet::of(tables::desk(&mut plan.dice));
     let size = set.size;
     let along = plan.width(wall) / 2.0 + plan.dice.between(-0.5, 0.5);
     plan.sight();
@@ -64,7 +66,7 @@ fn desk(plan: &mut Plan, wall: Wall) {
     let turned = pose.angle + std::f32::consts::PI + plan.dice.between(-0.6, 0.6);
     let aside = plan.dice.between(-0.2, 0.1);
     let place = pose.outward(vec3(aside, 0.0, size.z + 0.32));
-    let chair = Set::of(seats::office_chair(&mut plan.dice));
+    let chair = FurnitureSet::of(seats::office_chair(&mut plan.dice));
     plan.sight();
     plan.amid(chair, place, turned);
 }

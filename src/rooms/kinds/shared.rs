@@ -3,11 +3,11 @@
 use glam::{Vec3, vec3};
 
 use super::super::dice::Dice;
-use super::super::furniture::{Set, at, clutter, lamps, seats, storage, textiles, walls};
-use super::super::plan::{Plan, WALLS, Wall};
+use super::super::furniture::{FurnitureSet, at, clutter, lamps, seats, storage, textiles, walls};
+use super::super::plan::{FloorPlan, WALLS, Wall};
 use super::super::scene::{Piece, Pose};
 
-impl Plan {
+impl FloorPlan {
     /// Remembers the next thing that is put as one worth looking at.
     pub(super) fn sight(&mut self) {
         self.sights.push(self.scene.things.len());
@@ -23,7 +23,7 @@ impl Plan {
             return None;
         }
         let piece = make(&mut self.dice);
-        self.stand(&Set::of(piece), &WALLS)
+        self.stand(&FurnitureSet::of(piece), &WALLS)
     }
 
     /// Perhaps hangs a piece on a wall, so high.

@@ -8,7 +8,7 @@ use serde::Deserialize;
 use crate::dataset::Dataset;
 use crate::error::{Error, Result};
 use crate::files::{reading, write};
-use crate::questions::Asked;
+use crate::questions::GeneratedQuestion;
 use crate::questions::statistics::FrameStatistics;
 use crate::report::questions::review::{Item, page};
 use crate::types::QuestionId;
@@ -53,7 +53,7 @@ pub(super) fn review(
     path: &Path,
     dataset: &Dataset,
     frames: &[FrameStatistics],
-    asked: &[Asked],
+    asked: &[GeneratedQuestion],
 ) -> Result<()> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let items = asked.iter().filter_map(|asked| {

@@ -17,15 +17,15 @@ use crate::files::{reading, write};
 use crate::job::progress::Progress;
 use crate::job::workers::{ThreadArgs, pool};
 use crate::job::{Outcome, Show};
-use crate::questions::balance::Balanced;
+use crate::questions::balance::BalanceMode;
 use crate::questions::colors::Palette;
 use crate::questions::reason::Reason;
 use crate::questions::room::RoomSource;
 use crate::questions::rules::Rules;
 use crate::questions::statistics::{self, FrameStatistics, measure, strangers};
-use crate::questions::summary::Summary;
-use crate::questions::survey::Verdict as Candidate;
-use crate::questions::{Asked, Generated, Order, generate};
+use crate::questions::summary::QuestionSummary;
+use crate::questions::survey::RuleResult as Candidate;
+use crate::questions::{Generated, GeneratedQuestion, QuestionRequest, generate};
 use crate::report;
 use crate::types::manifest::Status;
 use crate::types::{Digest, Family, FrameId, Labels, QuestionId};
@@ -52,7 +52,7 @@ pub struct QuestionsArgs {
     pub families: Vec<Family>,
     /// How the answers are evened out
     #[arg(long, value_enum, default_value_t, help_heading = "Rules")]
-    pub balance: Balanced,
+    pub balance: BalanceMode,
     /// What says which room it is
     #[arg(long, value_enum, default_value_t, help_heading = "Rules")]
     pub room: RoomSource,
@@ -144,7 +144,7 @@ pub fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Outcome> {
         Error::data(args.data.display(), problem)
     })?;
     let (frames, failed) = measured(making, &dataset, labels, progress)?;
-    let order = Order {
+    let order = QuestionRequest {
         dataset: dataset.title(),
         labels,
         rules: &making.rules,
@@ -168,7 +168,7 @@ pub fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Outcome> {
     if let Some(path) = &args.candidates {
         write(path, &lines(candidates)?)?;
     }
-    let summary = Summary::new(&frames, &made, &order, failed);
+    let summary = QuestionSummary::new(&frames, &made, &order, failed);
     let json = report::questions::json(&summary)?;
     if let Some(folder) = &args.stats {
         write(&folder.join("statistics.json"), json.as_bytes())?;
@@ -314,7 +314,7 @@ struct Line<'a> {
 }
 
 impl<'a> Line<'a> {
-    fn of(asked: &'a Asked) -> Self {
+    fn of(asked: &'a GeneratedQuestion) -> Self {
         let question = &asked.question;
         Self {
             id: &question.id,

@@ -57,7 +57,7 @@ fn image(step: f64, pixel: f64, row: f64, seed: u64) -> Rgb {
 
 fn sees(image: &Rgb) -> bool {
     let palette = Palette::built_in().unwrap();
-    let look = Look::at(image, &masks(), SIZE, 1.0, &palette);
+    let look = MaskContrasts::at(image, &masks(), SIZE, 1.0, &palette);
     look.visible().any(|mask| mask == 2)
 }
 
@@ -95,7 +95,7 @@ fn a_gain_shows_no_more() {
         *code = (u32::from(*code) * 2).min(255) as u8;
     }
     let signals = |image: &Rgb| {
-        let look = Look::at(image, &masks(), SIZE, 1.0, &Palette::built_in().unwrap());
+        let look = MaskContrasts::at(image, &masks(), SIZE, 1.0, &Palette::built_in().unwrap());
         look.signal(&look.borders[&(1, 2)])
     };
     let (a, b) = (signals(&dim), signals(&bright));
@@ -117,7 +117,7 @@ fn colours_are_named_after_the_gain() {
     let dark = Rgb::new(height, width, samples).unwrap();
     let palette = Palette::built_in().unwrap();
     let name = |gain: f64| {
-        let look = Look::at(&dark, &masks(), SIZE, gain, &palette);
+        let look = MaskContrasts::at(&dark, &masks(), SIZE, gain, &palette);
         look.colors(2, &palette)[0].name()
     };
     assert_eq!((name(1.0), name(40.0)), ("black", "red"));
