@@ -16,14 +16,16 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use darkqa_eval::score::bootstrap::Resamples;
-use darkqa_eval::score::choice::Mode;
+use darkqa_eval::score::choice::ReadingMode;
 use darkqa_eval::score::cluster::Clusters;
 use darkqa_eval::score::curve::curves;
 use darkqa_eval::score::estimate::Estimate;
 use darkqa_eval::score::findings::Findings;
-use darkqa_eval::score::grid::{Count, Grid};
-use darkqa_eval::score::open::{Against, Group, OpenSummary, Outcome, Scored, Topic, open_summary};
-use darkqa_eval::score::paired::Paired;
+use darkqa_eval::score::grid::{ClusterCount, Grid};
+use darkqa_eval::score::open::{
+    AnswerOutcome, Baseline, Group, OpenSummary, QuestionGroups, ScoredAnswer, open_summary,
+};
+use darkqa_eval::score::paired::PairedComparison;
 use darkqa_eval::score::subject::Subject;
 use darkqa_eval::types::degradation::Kind;
 use darkqa_eval::types::{
@@ -83,12 +85,12 @@ fn intervals_of_shares_hold_the_truth() {
             for correlation in [0.0, 0.2] {
                 let held = percent(4000, || {
                     let sizes = sizes(&mut random, frames, least, most);
-                    let counts: Vec<Count> = sizes
+                    let counts: Vec<ClusterCount> = sizes
                         .into_iter()
                         .map(|replies| {
                             let rate = rate(&mut random, mean, correlation);
                             let right = (0..replies).filter(|_| random.random_bool(rate)).count();
-                            Count {
+                            ClusterCount {
                                 right: right as u32,
                                 replies: replies as u32,
                             }
@@ -149,14 +151,14 @@ fn walks(
                 (None, lit),
                 (Some(Severity::L4), if kept { lit } else { dark }),
             ] {
-                answers.push(Scored {
+                answers.push(ScoredAnswer {
                     subject: Subject::shown(MODEL, Some(&at(level))),
                     question,
-                    outcome: Outcome::Marked(mark),
+                    outcome: AnswerOutcome::Marked(mark),
                     cut: false,
                 });
             }
-            topics.push(Topic {
+            topics.push(QuestionGroups {
                 episode: walk.to_string(),
                 category: String::new(),
                 split: String::new(),
@@ -184,7 +186,7 @@ fn intervals_of_open_scores_hold_the_truth() {
                     let dark = Subject::shown(MODEL, Some(&at(Some(Severity::L4))));
                     let lit = Subject::shown(MODEL, Some(&at(None)));
                     let score = summary.cell(&lit, &Group::All).unwrap().score.unwrap();
-                    let change = summary.change(&dark, Against::Lit, &Group::All).unwrap();
+                    let change = summary.change(&dark, Baseline::Lit, &Group::All).unwrap();
                     scores += usize::from((score.low..=score.high).contains(&truth));
                     let change = change.difference;
                     drops += usize::from((change.low..=change.high).contains(&drop));
@@ -236,7 +238,7 @@ fn pair(
     records
 }
 
-fn paired(records: &[Record]) -> Paired {
+fn paired(records: &[Record]) -> PairedComparison {
     let clusters = clusters_of(records);
     let grid = Grid::new(records, &clusters);
     let raw = grid
@@ -244,7 +246,7 @@ fn paired(records: &[Record]) -> Paired {
         .iter()
         .position(|s| s.enhancer.is_none())
         .unwrap();
-    Paired::new(&grid, 1 - raw, raw, None, Mode::Strict).unwrap()
+    PairedComparison::new(&grid, 1 - raw, raw, None, ReadingMode::Strict).unwrap()
 }
 
 #[test]
@@ -407,7 +409,7 @@ fn a_made_set_gives_the_papers_arithmetic() {
     }
     let offers = records
         .iter()
-        .map(|record| darkqa_eval::score::chance::Offer {
+        .map(|record| darkqa_eval::score::chance::OfferedChoices {
             family: record.detail.family.clone(),
             choices: record.detail.choices.len(),
         });

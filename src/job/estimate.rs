@@ -14,7 +14,7 @@ use super::trial::Item as _;
 use crate::ask::Price;
 use crate::ask::Server;
 use crate::error::Result;
-use crate::report::forecast::{Forecast, Line};
+use crate::report::forecast::{CostLine, Forecast};
 use crate::types::{Condition, ImageFacts, View};
 
 /// How many sources are made into images, to know their size; of those with an enhancer one.
@@ -122,7 +122,7 @@ fn lines<E: Experiment>(
     phase: usize,
     plan: &Plan<E::Item>,
     coming: &[Expected],
-) -> Vec<Line> {
+) -> Vec<CostLine> {
     let sources = experiment.sources();
     let models = experiment.models(phase).iter().enumerate();
     let remote = models.filter(|(_, model)| model.model.is_remote());
@@ -174,7 +174,7 @@ impl Tokens {
 }
 
 /// What is left of one model.
-fn line(model: &ModelUnderTest, price: Option<Price>, tokens: &Tokens, phase: &str) -> Line {
+fn line(model: &ModelUnderTest, price: Option<Price>, tokens: &Tokens, phase: &str) -> CostLine {
     let requests = tokens.requests as f64;
     let longest = model
         .model
@@ -186,7 +186,7 @@ fn line(model: &ModelUnderTest, price: Option<Price>, tokens: &Tokens, phase: &s
         (_, View::Image) => "",
     };
     let dollars = |reply: f64| Some(price?.of(tokens.words + tokens.image?, reply));
-    Line {
+    CostLine {
         model: format!("{}{role}", model.model.name()),
         requests: tokens.requests,
         text_tokens: tokens.words,

@@ -11,7 +11,7 @@ use super::observer;
 use super::plan::Plan;
 use super::settings::RunPlace;
 use crate::error::{Error, Result};
-use crate::store::{self, Moved};
+use crate::store::{self, AddressChange};
 use crate::types::{Detail as _, Digest};
 
 /// The folder of runs without a name of their own.
@@ -73,10 +73,10 @@ fn label(ask: &Ask) -> String {
 }
 
 /// Whether the run may lie at another address than before: only if it is named as the one to go on with.
-pub(crate) fn moved(place: &RunPlace) -> Moved {
+pub(crate) fn moved(place: &RunPlace) -> AddressChange {
     match place {
-        RunPlace::Resume(_) => Moved::Allowed,
-        RunPlace::Named(_) | RunPlace::Automatic => Moved::Refused,
+        RunPlace::Resume(_) => AddressChange::Allowed,
+        RunPlace::Named(_) | RunPlace::Automatic => AddressChange::Refused,
     }
 }
 

@@ -12,7 +12,7 @@ use super::stored::{Asked, StoredRun, in_order};
 use super::thumbnail::Wanted;
 use super::{Outcome, Show, count};
 use crate::error::{Error, Result};
-use crate::store::{self, Moved, Store};
+use crate::store::{self, AddressChange, Store};
 use crate::types::manifest::{RunManifest, Status, differences};
 use crate::types::{ChoiceDetail, Detail, OpenDetail, Record, RunQuestion, Thumbnail, TrialKey};
 
@@ -98,7 +98,7 @@ fn merge_all<D: Detail + PartialEq>(
     if missing > 0 {
         manifest.status = Status::Incomplete;
     }
-    let mut store = Store::<D>::open(&args.out, &manifest, Moved::Refused)?;
+    let mut store = Store::<D>::open(&args.out, &manifest, AddressChange::Refused)?;
     store.write_questions(&questions)?;
     let there: HashMap<TrialKey, Record<D>> = store
         .records()?

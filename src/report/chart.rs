@@ -64,9 +64,9 @@ pub(super) fn files(figures: Vec<Figure>) -> impl Iterator<Item = (String, Vec<u
 
 /// How a line looks: the same number is the same look in every figure of a report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Look(pub usize);
+pub struct LineStyle(pub usize);
 
-impl Look {
+impl LineStyle {
     pub(super) fn colour(self) -> RGBColor {
         COLOURS[self.0 % COLOURS.len()]
     }
@@ -78,7 +78,7 @@ impl Look {
 
 /// What stands in a panel.
 #[derive(Debug, Clone)]
-pub enum Shape {
+pub enum PanelContent {
     /// Points over exposure drops, with the band of their intervals.
     Curve(Vec<(AxisLevel, Estimate)>),
     /// A level that holds in whatever light.
@@ -87,13 +87,13 @@ pub enum Shape {
 
 /// One line of a panel.
 #[derive(Debug, Clone)]
-pub struct Line {
+pub struct PlotLine {
     /// What the legend calls it; lines of one name are one entry.
     pub name: String,
     /// How it looks.
-    pub look: Look,
+    pub look: LineStyle,
     /// Where it runs.
-    pub shape: Shape,
+    pub shape: PanelContent,
 }
 
 /// One panel.
@@ -102,7 +102,7 @@ pub struct Panel {
     /// What it shows, with its n.
     pub title: String,
     /// Its lines.
-    pub lines: Vec<Line>,
+    pub lines: Vec<PlotLine>,
 }
 
 /// A figure of panels with one legend.
@@ -118,7 +118,7 @@ pub struct Chart {
     pub note: String,
 }
 
-pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+pub(super) type FigureArea<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 impl Chart {
     /// Draws the figure.
@@ -142,8 +142,8 @@ impl Chart {
     }
 
     /// The first line of each name, and where it stands below the panels.
-    fn legend(&self, width: i32) -> Vec<(&Line, (i32, i32))> {
-        let mut entries: Vec<(&Line, (i32, i32))> = Vec::new();
+    fn legend(&self, width: i32) -> Vec<(&PlotLine, (i32, i32))> {
+        let mut entries: Vec<(&PlotLine, (i32, i32))> = Vec::new();
         let (mut x, mut y) = (12, 4);
         for line in self.panels.iter().flat_map(|panel| &panel.lines) {
             if entries.iter().any(|(entry, _)| entry.name == line.name) {
@@ -161,10 +161,10 @@ impl Chart {
 
     fn draw(
         &self,
-        root: &Area<'_>,
+        root: &FigureArea<'_>,
         columns: usize,
         rows: i32,
-        legend: &[(&Line, (i32, i32))],
+        legend: &[(&PlotLine, (i32, i32))],
     ) -> Result<(), String> {
         let failed = |e: DrawingAreaErrorKind<_>| e.to_string();
         root.fill(&PAPER).map_err(failed)?;
@@ -173,7 +173,7 @@ impl Chart {
                 (index % columns) as i32 * PANEL.0,
                 (index / columns) as i32 * PANEL.1,
             );
-            let frame = Frame::new(corner, panel);
+            let frame = AxisFrame::new(corner, panel);
             frame.axes(root, panel, self.measure)?;
             for line in &panel.lines {
                 frame.line(root, line)?;
@@ -183,7 +183,7 @@ impl Chart {
         for (line, (x, y)) in legend {
             let (x, y) = (*x, top + *y + ROW / 2);
             stroke(root, line.look, flat(&line.shape), &[(x, y), (x + 34, y)])?;
-            if matches!(line.shape, Shape::Curve(_)) {
+            if matches!(line.shape, PanelContent::Curve(_)) {
                 mark(root, line.look, (x + 17, y))?;
             }
             words(root, &line.name, (x + 42, y), 13, LEFT)?;
@@ -194,8 +194,8 @@ impl Chart {
     }
 }
 
-fn flat(shape: &Shape) -> bool {
-    matches!(shape, Shape::Flat(_))
+fn flat(shape: &PanelContent) -> bool {
+    matches!(shape, PanelContent::Flat(_))
 }
 
 /// Words to the right of their place, to the left of it, and below it.
@@ -204,7 +204,7 @@ pub(super) const RIGHT: (HPos, VPos) = (HPos::Right, VPos::Center);
 pub(super) const BELOW: (HPos, VPos) = (HPos::Center, VPos::Top);
 
 /// Where a panel's axes are.
-struct Frame {
+struct AxisFrame {
     left: i32,
     top: i32,
     width: i32,
@@ -212,14 +212,14 @@ struct Frame {
     levels: Vec<AxisLevel>,
 }
 
-impl Frame {
+impl AxisFrame {
     fn new((x, y): (i32, i32), panel: &Panel) -> Self {
         let mut levels: Vec<AxisLevel> = panel
             .lines
             .iter()
             .flat_map(|line| match &line.shape {
-                Shape::Curve(points) => points.iter().map(|(level, _)| *level).collect(),
-                Shape::Flat(_) => Vec::new(),
+                PanelContent::Curve(points) => points.iter().map(|(level, _)| *level).collect(),
+                PanelContent::Flat(_) => Vec::new(),
             })
             .collect();
         levels.sort_unstable();
@@ -252,7 +252,7 @@ impl Frame {
         self.top + self.height - (f64::from(self.height) * share.clamp(0.0, 1.0)).round() as i32
     }
 
-    fn axes(&self, root: &Area<'_>, panel: &Panel, measure: &str) -> Result<(), String> {
+    fn axes(&self, root: &FigureArea<'_>, panel: &Panel, measure: &str) -> Result<(), String> {
         let right = self.left + self.width;
         for step in 0..=5 {
             let share = f64::from(step) / 5.0;
@@ -289,14 +289,14 @@ impl Frame {
             .map_err(|e| e.to_string())
     }
 
-    fn line(&self, root: &Area<'_>, line: &Line) -> Result<(), String> {
+    fn line(&self, root: &FigureArea<'_>, line: &PlotLine) -> Result<(), String> {
         let points = match &line.shape {
-            Shape::Flat(share) => {
+            PanelContent::Flat(share) => {
                 let y = self.y(*share);
                 let ends = [(self.left, y), (self.left + self.width, y)];
                 return stroke(root, line.look, true, &ends);
             }
-            Shape::Curve(points) => points,
+            PanelContent::Curve(points) => points,
         };
         let upper = points
             .iter()
@@ -320,7 +320,7 @@ impl Frame {
 }
 
 pub(super) fn path(
-    root: &Area<'_>,
+    root: &FigureArea<'_>,
     points: &[(i32, i32)],
     style: ShapeStyle,
 ) -> Result<(), String> {
@@ -329,7 +329,12 @@ pub(super) fn path(
 }
 
 /// A line in its look; a flat one is thinner, and always broken.
-fn stroke(root: &Area<'_>, look: Look, flat: bool, points: &[(i32, i32)]) -> Result<(), String> {
+fn stroke(
+    root: &FigureArea<'_>,
+    look: LineStyle,
+    flat: bool,
+    points: &[(i32, i32)],
+) -> Result<(), String> {
     let style = look.colour().stroke_width(if flat { 1 } else { 2 });
     let dash = match look.dash() {
         (0, _) if flat => (6, 4),
@@ -348,7 +353,7 @@ fn stroke(root: &Area<'_>, look: Look, flat: bool, points: &[(i32, i32)]) -> Res
 }
 
 /// The mark of a look at a place.
-fn mark(root: &Area<'_>, look: Look, (x, y): (i32, i32)) -> Result<(), String> {
+fn mark(root: &FigureArea<'_>, look: LineStyle, (x, y): (i32, i32)) -> Result<(), String> {
     let (fill, open) = (look.colour().filled(), look.colour().stroke_width(2));
     let drawn = match look.0 % 6 {
         0 => root.draw(&Circle::new((x, y), 4, fill)),
@@ -372,7 +377,7 @@ fn style(size: u32, (across, down): (HPos, VPos)) -> TextStyle<'static> {
 }
 
 pub(super) fn words(
-    root: &Area<'_>,
+    root: &FigureArea<'_>,
     text: &str,
     place: (i32, i32),
     size: u32,

@@ -2,14 +2,14 @@
 
 use serde::{Serialize, Serializer};
 
-use super::table::{Cell, Table};
+use super::table::{Table, TableCell};
 use super::tables::SUMMARY;
 use crate::error::{Error, Result};
 
 /// One field of a row; its number has as many digits as it takes to read it again.
 #[derive(Debug, Clone, Copy, Serialize)]
 #[serde(untagged)]
-pub(super) enum Field<'a> {
+pub(super) enum CsvField<'a> {
     /// There is nothing.
     None,
     /// Words.
@@ -32,25 +32,25 @@ fn plain<S: Serializer>(number: &f64, serializer: S) -> Result<S::Ok, S::Error> 
 }
 
 /// The fields of a cell, as many as its column has names.
-pub(super) fn fields(cell: &Cell, names: usize) -> impl Iterator<Item = Field<'_>> {
-    let mut fields = [Field::None; 4];
+pub(super) fn fields(cell: &TableCell, names: usize) -> impl Iterator<Item = CsvField<'_>> {
+    let mut fields = [CsvField::None; 4];
     match cell {
-        Cell::Blank | Cell::Absent | Cell::Missing => {}
-        Cell::Text(text) => fields[0] = Field::Text(text),
-        Cell::Count(count) => fields[0] = Field::Count(*count),
-        Cell::Number(number) => fields[0] = Field::Number(*number),
-        Cell::Verdict(verdict) => fields[0] = Field::Text(verdict.word()),
-        Cell::Threshold(t, _) => {
-            fields = [t.value, t.low, t.high, 0.0].map(Field::Number);
-            fields[3] = Field::None;
+        TableCell::Blank | TableCell::Absent | TableCell::Missing => {}
+        TableCell::Text(text) => fields[0] = CsvField::Text(text),
+        TableCell::Count(count) => fields[0] = CsvField::Count(*count),
+        TableCell::Number(number) => fields[0] = CsvField::Number(*number),
+        TableCell::Significance(verdict) => fields[0] = CsvField::Text(verdict.word()),
+        TableCell::Threshold(t, _) => {
+            fields = [t.value, t.low, t.high, 0.0].map(CsvField::Number);
+            fields[3] = CsvField::None;
         }
-        Cell::Estimate(e)
-        | Cell::Below(e)
-        | Cell::Guess(e)
-        | Cell::Strict(e, _)
-        | Cell::Changed(e, _) => {
-            fields = [e.value, e.low, e.high, 0.0].map(Field::Number);
-            fields[3] = Field::Count(e.n);
+        TableCell::Estimate(e)
+        | TableCell::Below(e)
+        | TableCell::Guess(e)
+        | TableCell::Strict(e, _)
+        | TableCell::Changed(e, _) => {
+            fields = [e.value, e.low, e.high, 0.0].map(CsvField::Number);
+            fields[3] = CsvField::Count(e.n);
         }
     }
     fields.into_iter().take(names)
@@ -93,10 +93,10 @@ pub(super) fn csv(parts: &[Table]) -> Result<Vec<u8>> {
             let fields = cells.flat_map(|(column, cell)| fields(cell, column.heads.csv.len()));
             let fields = fields.map(|field| match field {
                 // The summary is written by the same rules in both of its files.
-                Field::Number(number) if table.name != SUMMARY => Field::Plain(number),
+                CsvField::Number(number) if table.name != SUMMARY => CsvField::Plain(number),
                 field => field,
             });
-            let row: Vec<Field<'_>> = fields.collect();
+            let row: Vec<CsvField<'_>> = fields.collect();
             file.serialize(row).map_err(failed)?;
         }
     }

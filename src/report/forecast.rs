@@ -4,14 +4,14 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-use super::table::Kind::{Count, Text};
-use super::table::Layout;
+use super::table::ColumnKind::{Count, Text};
+use super::table::TableBuilder;
 use super::terminal;
 use crate::error::{Error, Result};
 
 /// What is left to ask of one model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Line {
+pub struct CostLine {
     /// The model, with how it is asked where that is without images.
     pub model: String,
     /// Requests left.
@@ -34,7 +34,7 @@ pub struct Line {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Forecast {
     /// What is left by model.
-    pub lines: Vec<Line>,
+    pub lines: Vec<CostLine>,
     /// Trials in all.
     pub trials: usize,
     /// Trials with a reply.
@@ -78,7 +78,7 @@ pub fn json(forecast: &Forecast) -> Result<String> {
 /// The forecast for people.
 #[must_use]
 pub fn render(forecast: &Forecast) -> String {
-    let table = Layout::new("estimate", &forecast.lines)
+    let table = TableBuilder::new("estimate", &forecast.lines)
         .column(Text, "terminal model", |line| line.model.clone())
         .column(Count, "terminal requests", |line| {
             count(line.requests as f64)

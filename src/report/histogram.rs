@@ -9,7 +9,7 @@ const LEAST: f64 = 1e-7;
 
 /// One line of the figure.
 #[derive(Debug, Clone)]
-pub struct Line {
+pub struct HistogramLine {
     /// What it is called.
     pub name: String,
     /// Differences of 8-bit codes with their shares.
@@ -20,7 +20,7 @@ pub struct Line {
 ///
 /// # Errors
 /// Where the figure cannot be drawn.
-pub fn histogram(title: &str, lines: &[Line]) -> Result<String> {
+pub fn histogram(title: &str, lines: &[HistogramLine]) -> Result<String> {
     let failed = |e: String| Error::data("figure", e);
     let reach = lines
         .iter()
@@ -90,7 +90,7 @@ mod tests {
 
     #[test]
     fn each_line_is_drawn_and_named() {
-        let line = |name: &str, shares: &[(i32, f64)]| Line {
+        let line = |name: &str, shares: &[(i32, f64)]| HistogramLine {
             name: name.to_owned(),
             shares: shares.to_vec(),
         };

@@ -6,7 +6,7 @@ use std::path::Path;
 use serde::{Serialize, Serializer};
 
 use super::csv::fields;
-use super::table::{Row, Table};
+use super::table::{Table, TableRow};
 use crate::error::{Error, Result};
 use crate::types::UnreadReason;
 use crate::types::manifest::RunManifest;
@@ -26,7 +26,7 @@ fn rows<S: Serializer>(table: &Table, serializer: S) -> Result<S::Ok, S::Error> 
 
 struct Named<'a> {
     table: &'a Table,
-    row: &'a Row,
+    row: &'a TableRow,
 }
 
 impl Serialize for Named<'_> {
@@ -58,20 +58,20 @@ struct Head<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     run: Option<&'a RunManifest>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    runs: Vec<Compared<'a>>,
+    runs: Vec<ComparedRun<'a>>,
     unread: &'a BTreeMap<UnreadReason, usize>,
 }
 
 /// A run among several.
 #[derive(Serialize)]
-struct Compared<'a> {
+struct ComparedRun<'a> {
     folder: &'a Path,
     run: &'a RunManifest,
 }
 
 /// What a document is about.
 #[derive(Debug, Clone, Copy)]
-pub enum Runs<'a> {
+pub enum RunList<'a> {
     /// A run, with its folder if the document is not itself in there.
     One(&'a RunManifest, Option<&'a Path>),
     /// Several, each with its folder.
@@ -85,13 +85,15 @@ pub enum Runs<'a> {
 pub fn summary(
     tables: &[Table],
     unread: &BTreeMap<UnreadReason, usize>,
-    runs: Runs<'_>,
+    runs: RunList<'_>,
 ) -> Result<String> {
     let (run, folder, runs) = match runs {
-        Runs::One(run, folder) => (Some(run), folder, [].as_slice()),
-        Runs::Several(runs) => (None, None, runs),
+        RunList::One(run, folder) => (Some(run), folder, [].as_slice()),
+        RunList::Several(runs) => (None, None, runs),
     };
-    let runs = runs.iter().map(|&(run, folder)| Compared { folder, run });
+    let runs = runs
+        .iter()
+        .map(|&(run, folder)| ComparedRun { folder, run });
     let head = Head {
         schema: "darkqa.summary/1",
         folder,

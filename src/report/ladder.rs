@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::table::Kind::Text;
-use super::table::{Cell, Format, Kind, Layout};
+use super::table::ColumnKind::Text;
+use super::table::{ColumnKind, TableBuilder, TableCell, TableFormat};
 use super::words::light;
 use crate::score::subject::Subject;
 use crate::types::{AxisLevel, EnhancerName, KindReading, View};
@@ -32,14 +32,14 @@ impl<'a> Series<'a> {
 }
 
 /// The numbers of one series by level.
-pub(super) type Steps<'a, C> = BTreeMap<AxisLevel, &'a C>;
+pub(super) type SeriesByLevel<'a, C> = BTreeMap<AxisLevel, &'a C>;
 
 /// The numbers of all subjects.
 pub(super) struct Ladder<'a, C> {
     /// The levels of all series.
     pub(super) levels: BTreeSet<AxisLevel>,
     /// The numbers of models that see.
-    pub(super) series: BTreeMap<Series<'a>, Steps<'a, C>>,
+    pub(super) series: BTreeMap<Series<'a>, SeriesByLevel<'a, C>>,
     /// The numbers without a level: those of models without images, and of guessing.
     pub(super) floors: Vec<(&'a Subject, &'a C)>,
 }
@@ -90,35 +90,37 @@ impl<'a, C> Ladder<'a, C> {
     pub(super) fn layout(
         &'a self,
         name: &'static str,
-        cell: impl Fn(Option<&C>) -> Cell,
-    ) -> Layout<Line<'a, C>> {
+        cell: impl Fn(Option<&C>) -> TableCell,
+    ) -> TableBuilder<LadderRow<'a, C>> {
         let series = self.series.iter();
-        let series = series.map(|(series, steps)| Line::Series(series, steps));
+        let series = series.map(|(series, steps)| LadderRow::Series(series, steps));
         let floors = self.floors.iter();
-        let floors = floors.map(|&(subject, cell)| Line::Floor(subject, cell));
-        let mut layout = Layout::new(name, series.chain(floors))
-            .hide(Format::Terminal, |line| matches!(line, Line::Floor(..)))
+        let floors = floors.map(|&(subject, cell)| LadderRow::Floor(subject, cell));
+        let mut layout = TableBuilder::new(name, series.chain(floors))
+            .hide(TableFormat::Terminal, |line| {
+                matches!(line, LadderRow::Floor(..))
+            })
             .column(Text, "page model | terminal model", |line| {
                 line.model().to_owned()
             })
-            .column(Text, "page light | terminal light", Line::light)
-            .column(Text, "latex Model", Line::label)
+            .column(Text, "page light | terminal light", LadderRow::light)
+            .column(Text, "latex Model", LadderRow::label)
             .column(Text, "latex Light", |line| match line {
-                Line::Series(series, _) => Cell::from(series.light()),
-                Line::Floor(..) => Cell::Blank,
+                LadderRow::Series(series, _) => TableCell::from(series.light()),
+                LadderRow::Floor(..) => TableCell::Blank,
             });
         for (place, level) in self.levels.iter().enumerate() {
             let names = format!("page {level} | terminal {level} | latex {level}");
-            layout = layout.column(Kind::Accuracy, &*names, |line| match line {
-                Line::Series(_, steps) => cell(steps.get(level).copied()),
-                Line::Floor(_, floor) if place == 0 => cell(Some(floor)),
-                Line::Floor(..) => Cell::Blank,
+            layout = layout.column(ColumnKind::Accuracy, &*names, |line| match line {
+                LadderRow::Series(_, steps) => cell(steps.get(level).copied()),
+                LadderRow::Floor(_, floor) if place == 0 => cell(Some(floor)),
+                LadderRow::Floor(..) => TableCell::Blank,
             });
         }
         if self.levels.is_empty() {
-            layout = layout.column(Kind::Accuracy, "page", |line| match line {
-                Line::Floor(_, floor) => cell(Some(floor)),
-                Line::Series(..) => Cell::Blank,
+            layout = layout.column(ColumnKind::Accuracy, "page", |line| match line {
+                LadderRow::Floor(_, floor) => cell(Some(floor)),
+                LadderRow::Series(..) => TableCell::Blank,
             });
         }
         layout
@@ -126,14 +128,14 @@ impl<'a, C> Ladder<'a, C> {
 }
 
 /// A row of a ladder's table.
-pub(super) enum Line<'a, C> {
+pub(super) enum LadderRow<'a, C> {
     /// A series with its numbers by level.
-    Series(&'a Series<'a>, &'a Steps<'a, C>),
+    Series(&'a Series<'a>, &'a SeriesByLevel<'a, C>),
     /// A subject without a level, and its number.
     Floor(&'a Subject, &'a C),
 }
 
-impl<C> Line<'_, C> {
+impl<C> LadderRow<'_, C> {
     fn model(&self) -> &str {
         match self {
             Self::Series(series, _) => series.model,

@@ -2,9 +2,9 @@
 
 use std::fmt::Write;
 
-use super::table::{Cell, Column, Format, Kind, Table};
+use super::table::{Column, ColumnKind, Table, TableCell, TableFormat};
 use super::words::{percent, points, words};
-use crate::score::comparison::Verdict;
+use crate::score::comparison::Significance;
 use crate::score::estimate::Estimate;
 
 /// All tables that have a caption for it.
@@ -45,7 +45,7 @@ fn table(caption: &str, table: &Table) -> String {
     let named = |column: &&Column| column.heads.latex.is_some();
     let columns = table.columns.iter().filter(named);
     let sides = columns.clone().map(|column| match column.kind {
-        Kind::Text | Kind::Verdict => 'l',
+        ColumnKind::Text | ColumnKind::Significance => 'l',
         _ => 'r',
     });
     let heads = columns.filter_map(|column| column.heads.latex.clone());
@@ -56,7 +56,7 @@ fn table(caption: &str, table: &Table) -> String {
     let _ = writeln!(text, "  \\begin{{tabular}}{{{sides}}}\n    \\toprule");
     text += &line(heads.collect());
     text += "    \\midrule\n";
-    for row in table.rows_in(Format::Latex) {
+    for row in table.rows_in(TableFormat::Latex) {
         let cells = table.cells(row).filter(|(column, _)| named(column));
         text += &line(
             cells
@@ -73,19 +73,19 @@ fn half(share: Estimate) -> String {
     format!("{} {{\\scriptsize$\\pm${half}}}", percent(share.value))
 }
 
-fn shown(kind: Kind, cell: &Cell) -> String {
+fn shown(kind: ColumnKind, cell: &TableCell) -> String {
     match (kind, cell) {
-        (_, Cell::Absent | Cell::Missing) => "--".to_owned(),
-        (_, Cell::Below(share)) => format!("\\underline{{{}}}", half(*share)),
-        (Kind::Accuracy | Kind::Percent, Cell::Estimate(share))
-        | (_, Cell::Guess(share) | Cell::Strict(share, _)) => half(*share),
-        (_, Cell::Changed(share, None)) => percent(share.value),
-        (_, Cell::Changed(share, Some(change))) => {
+        (_, TableCell::Absent | TableCell::Missing) => "--".to_owned(),
+        (_, TableCell::Below(share)) => format!("\\underline{{{}}}", half(*share)),
+        (ColumnKind::Accuracy | ColumnKind::Percent, TableCell::Estimate(share))
+        | (_, TableCell::Guess(share) | TableCell::Strict(share, _)) => half(*share),
+        (_, TableCell::Changed(share, None)) => percent(share.value),
+        (_, TableCell::Changed(share, Some(change))) => {
             let change = escaped(&points(*change));
             format!("{} {{\\scriptsize({change})}}", percent(share.value))
         }
-        (_, Cell::Verdict(Verdict::Better)) => "helps".to_owned(),
-        (_, Cell::Verdict(Verdict::Worse)) => "harms".to_owned(),
+        (_, TableCell::Significance(Significance::Better)) => "helps".to_owned(),
+        (_, TableCell::Significance(Significance::Worse)) => "harms".to_owned(),
         _ => escaped(&words(kind, cell)),
     }
 }

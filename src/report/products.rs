@@ -1,7 +1,7 @@
 //! Every file of a report: [`products`].
 
 use super::figures::figures;
-use super::page::{Shown, page};
+use super::page::{PageInputs, page};
 use super::samples::{figure, samples};
 use super::table::Table;
 use super::{chart, csv, latex};
@@ -15,7 +15,7 @@ use crate::score::findings::Findings;
 pub fn products<'a>(
     findings: &'a Findings<'a>,
     tables: &[Table],
-    shown: &Shown<'a>,
+    shown: &PageInputs<'a>,
 ) -> Result<Vec<(String, Vec<u8>)>> {
     let figures = figures(findings)?;
     let page = page(findings, tables, &figures, shown)?;

@@ -1,33 +1,33 @@
-//! What a comparison with real pairs shows: [`Summary`], and the files and figures beside it.
+//! What a comparison with real pairs shows: [`RealismSummary`], and the files and figures beside it.
 
 use serde::Serialize;
 
 use super::csv::csv;
-use super::histogram::{Line, histogram};
+use super::histogram::{HistogramLine, histogram};
 use super::sheet::{self, CropRow};
-use super::table::Kind::{Count, Number, Text};
-use super::table::Layout;
+use super::table::ColumnKind::{Count, Number, Text};
+use super::table::TableBuilder;
 use super::terminal;
 use crate::error::{Error, Result};
 use crate::score::realism::mean::Mean;
-use crate::score::realism::residual::{Bins, Empty, Residuals};
-use crate::score::realism::{Compared, Measured};
+use crate::score::realism::residual::{Bins, EmptyBins, Residuals};
+use crate::score::realism::{ImageComparison, PairComparison};
 use crate::types::Rgb;
 
 /// All pairs together.
 #[derive(Debug, Serialize)]
-pub struct Summary {
+pub struct RealismSummary {
     pairs: usize,
     #[serde(flatten)]
-    source: Source,
+    source: ComparedData,
     /// The rule of the divergence.
     kl_rule: String,
     /// The other rule about empty bins, where it matters.
     kl_other_rule: Option<String>,
     /// The mean exposure drop in EV.
     drop: Mean,
-    exposure: Row,
-    noise: Row,
+    exposure: MethodRow,
+    noise: MethodRow,
     clean_psnr: Mean,
     /// A line for each pair.
     #[serde(skip)]
@@ -36,15 +36,15 @@ pub struct Summary {
 
 /// By which rules residuals are compared.
 #[derive(Debug, Clone, Copy)]
-pub struct Rules {
+pub struct ResidualRules {
     /// The bins.
     pub bins: Bins,
     /// What is done about empty ones.
-    pub empty: Empty,
+    pub empty: EmptyBins,
 }
 
-impl Rules {
-    fn named(self, empty: Empty) -> String {
+impl ResidualRules {
+    fn named(self, empty: EmptyBins) -> String {
         match self.bins {
             Bins::Fu => format!("{}; {empty}", self.bins),
             Bins::Kousha => self.bins.to_string(),
@@ -54,7 +54,7 @@ impl Rules {
 
 /// What was compared.
 #[derive(Debug, Clone, Serialize)]
-pub struct Source {
+pub struct ComparedData {
     /// The seed of the noise.
     pub seed: u64,
     /// The choices of the synthesis.
@@ -66,7 +66,7 @@ pub struct Source {
 }
 
 /// One pair in a line, exposure drop alone before noise.
-fn line(pair: &Compared) -> String {
+fn line(pair: &PairComparison) -> String {
     let [ev, noise] = [&pair.exposure, &pair.noise].map(|measured| {
         let (psnr, ssim, kl) = (measured.psnr, measured.ssim, measured.kl.nats);
         format!("PSNR {psnr:.2} SSIM {ssim:.4} D_KL {kl:.3}")
@@ -79,7 +79,7 @@ fn line(pair: &Compared) -> String {
 
 /// One way to make the dark images.
 #[derive(Debug, Serialize)]
-struct Row {
+struct MethodRow {
     psnr: Mean,
     ssim: Mean,
     kl: Mean,
@@ -88,9 +88,12 @@ struct Row {
     empty_bins: Mean,
 }
 
-impl Row {
-    fn of(compared: &[&Compared], of: fn(&Compared) -> &Measured) -> Option<Self> {
-        let mean = |number: fn(&Measured) -> f64| {
+impl MethodRow {
+    fn of(
+        compared: &[&PairComparison],
+        of: fn(&PairComparison) -> &ImageComparison,
+    ) -> Option<Self> {
+        let mean = |number: fn(&ImageComparison) -> f64| {
             let numbers: Vec<f64> = compared.iter().map(|pair| number(of(pair))).collect();
             Mean::of(&numbers)
         };
@@ -104,13 +107,17 @@ impl Row {
     }
 }
 
-impl Summary {
+impl RealismSummary {
     /// Takes the means over all pairs.
     ///
     /// # Errors
     /// Where there is none.
-    pub fn new(rules: Rules, source: Source, compared: &[&Compared]) -> Result<Self> {
-        let mean = |number: fn(&Compared) -> f64| {
+    pub fn new(
+        rules: ResidualRules,
+        source: ComparedData,
+        compared: &[&PairComparison],
+    ) -> Result<Self> {
+        let mean = |number: fn(&PairComparison) -> f64| {
             let numbers: Vec<f64> = compared.iter().map(|pair| number(pair)).collect();
             Mean::of(&numbers)
         };
@@ -120,8 +127,8 @@ impl Summary {
                 kl_rule: rules.named(rules.empty),
                 kl_other_rule: (rules.bins == Bins::Fu).then(|| rules.named(rules.empty.other())),
                 drop: mean(|pair| f64::from(pair.drop))?,
-                exposure: Row::of(compared, |pair| &pair.exposure)?,
-                noise: Row::of(compared, |pair| &pair.noise)?,
+                exposure: MethodRow::of(compared, |pair| &pair.exposure)?,
+                noise: MethodRow::of(compared, |pair| &pair.noise)?,
                 clean_psnr: mean(|pair| pair.clean_psnr)?,
                 source,
                 by_pair: compared.iter().map(|pair| line(pair)).collect(),
@@ -143,7 +150,7 @@ impl Summary {
             ("exposure drop alone", &self.exposure),
             ("with sensor noise", &self.noise),
         ];
-        let mut layout = Layout::new("realism", ways)
+        let mut layout = TableBuilder::new("realism", ways)
             .column(Text, "terminal", |(name, _)| *name)
             .column(Text, "terminal PSNR dB", |(_, row)| shown(&row.psnr, 2))
             .column(Text, "terminal SSIM", |(_, row)| shown(&row.ssim, 4))
@@ -165,7 +172,7 @@ impl Summary {
 
     /// What stands below the table: the rules of its numbers, and each pair.
     fn notes(&self) -> Vec<String> {
-        let Source {
+        let ComparedData {
             unmatched, failed, ..
         } = self.source;
         let mut notes = vec![format!(
@@ -204,11 +211,11 @@ fn shown(mean: &Mean, digits: usize) -> String {
 }
 
 /// A row a pair and way of making it.
-pub fn pairs(compared: &[&Compared]) -> Result<Vec<u8>> {
+pub fn pairs(compared: &[&PairComparison]) -> Result<Vec<u8>> {
     let rows = compared.iter().flat_map(|pair| {
         [("ev", &pair.exposure), ("noise", &pair.noise)].map(|(way, made)| (*pair, way, made))
     });
-    let table = Layout::new("pairs", rows)
+    let table = TableBuilder::new("pairs", rows)
         .column(Text, "csv pair", |(pair, _, _)| pair.pair.clone())
         .column(Text, "csv drop", |(pair, _, _)| pair.drop.to_string())
         .column(Text, "csv variant", |(_, way, _)| *way)
@@ -225,7 +232,7 @@ pub fn pairs(compared: &[&Compared]) -> Result<Vec<u8>> {
 /// The spread of real and synthetic residuals by clean code.
 pub fn by_code(residuals: &[Residuals; 2]) -> Result<Vec<u8>> {
     let [real, noise] = residuals;
-    let table = Layout::new("residuals", real.by_code().zip(noise.by_code()))
+    let table = TableBuilder::new("residuals", real.by_code().zip(noise.by_code()))
         .column(Text, "csv code", |((code, _, _), _)| code.to_string())
         .column(Text, "csv n", |((_, n, _), _)| n.to_string())
         .column(Number, "csv real_mean", |((_, _, real), _)| real[0])
@@ -238,7 +245,7 @@ pub fn by_code(residuals: &[Residuals; 2]) -> Result<Vec<u8>> {
 
 /// Both residual histograms.
 pub fn figure([real, noise]: &[Residuals; 2]) -> Result<String> {
-    let line = |name: &str, residuals: &Residuals| Line {
+    let line = |name: &str, residuals: &Residuals| HistogramLine {
         name: name.to_owned(),
         shares: residuals.shares().collect(),
     };
@@ -251,7 +258,7 @@ pub fn figure([real, noise]: &[Residuals; 2]) -> Result<String> {
 
 /// Crops of the first pairs, in the light of the image that they were made from.
 #[must_use]
-pub fn crops<'a>(pairs: impl Iterator<Item = (&'a Compared, &'a [Rgb; 3])>) -> Rgb {
+pub fn crops<'a>(pairs: impl Iterator<Item = (&'a PairComparison, &'a [Rgb; 3])>) -> Rgb {
     let rows: Vec<CropRow<'_>> = pairs
         .map(|(compared, images)| CropRow {
             name: format!("{} (drop {:.2} EV)", compared.pair, compared.drop),

@@ -10,7 +10,7 @@ use crate::types::degradation::Axis;
 use crate::types::{AxisLevel, Condition, EnhancerName, FrameId, KindReading, Thumbnail};
 
 #[derive(Serialize)]
-pub(super) struct Samples {
+pub(super) struct SamplePage {
     levels: Vec<String>,
     rows: Vec<SampleRow>,
 }
@@ -18,11 +18,11 @@ pub(super) struct Samples {
 #[derive(Serialize)]
 struct SampleRow {
     name: String,
-    images: Vec<Option<Image>>,
+    images: Vec<Option<SampleImage>>,
 }
 
 #[derive(Serialize)]
-struct Image {
+struct SampleImage {
     url: String,
     alt: String,
 }
@@ -31,7 +31,7 @@ struct Image {
 const SAMPLES: usize = 3;
 
 /// The first frames over the levels: exposure drop, noise, and each enhancer.
-pub(super) fn samples(thumbnails: &[Thumbnail]) -> Option<Samples> {
+pub(super) fn samples(thumbnails: &[Thumbnail]) -> Option<SamplePage> {
     let mut frames: Vec<&FrameId> = thumbnails
         .iter()
         .map(|thumbnail| &thumbnail.frame)
@@ -64,7 +64,7 @@ pub(super) fn samples(thumbnails: &[Thumbnail]) -> Option<Samples> {
                     .iter()
                     .filter(|thumbnail| thumbnail.frame == *frame);
                 let found = here.find(|thumbnail| of(&thumbnail.condition, *at))?;
-                Some(Image {
+                Some(SampleImage {
                     url: found.small.clone(),
                     alt: format!("{} at {}", frame, found.condition),
                 })
@@ -81,7 +81,7 @@ pub(super) fn samples(thumbnails: &[Thumbnail]) -> Option<Samples> {
     let named = levels
         .iter()
         .map(|level| format!("{level}, {} {unit}", level.value()));
-    (!rows.is_empty()).then(|| Samples {
+    (!rows.is_empty()).then(|| SamplePage {
         levels: named.collect(),
         rows,
     })
@@ -92,7 +92,7 @@ const CELL: [usize; 2] = [200, 150];
 const HEAD: [usize; 2] = [180, 28];
 
 /// The samples as a figure of their own, the pictures within it.
-pub(super) fn figure(samples: &Samples) -> String {
+pub(super) fn figure(samples: &SamplePage) -> String {
     let size = [
         HEAD[0] + samples.levels.len() * (CELL[0] + 4),
         HEAD[1] + samples.rows.len() * (CELL[1] + 4),

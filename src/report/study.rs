@@ -13,7 +13,7 @@ const PLACE: &str = "/*STUDY*/null";
 
 /// A question as the page asks it; the true choice is not in it.
 #[derive(Debug, Clone, Serialize)]
-pub struct Asked {
+pub struct StudyQuestion {
     /// Its name.
     pub id: String,
     /// The number of its frame or walk.
@@ -23,12 +23,12 @@ pub struct Asked {
     /// The choices in the order shown; none where the answer is open.
     pub choices: Vec<String>,
     /// The frame or walk in each condition, in one order for all.
-    pub shots: Vec<Shot>,
+    pub shots: Vec<StudyImage>,
 }
 
 /// A frame or a walk in a condition.
 #[derive(Debug, Clone, Serialize)]
-pub struct Shot {
+pub struct StudyImage {
     /// What was done to it; told to the file of answers, not to the person.
     pub condition: String,
     /// Where the images are, from the page: one of a frame, all of a walk.
@@ -37,10 +37,10 @@ pub struct Shot {
 
 /// All that the page is told.
 #[derive(Serialize)]
-struct Told<'a> {
+struct StudyPage<'a> {
     /// Under which the browser keeps answers until they are saved.
     set: Digest,
-    items: &'a [Asked],
+    items: &'a [StudyQuestion],
 }
 
 /// One file that asks a person by number: each frame or walk in one condition alone, which goes on by one from person to person, so
@@ -49,14 +49,14 @@ struct Told<'a> {
 ///
 /// # Errors
 /// Where the questions cannot be written.
-pub fn page(items: &[Asked]) -> Result<String> {
+pub fn page(items: &[StudyQuestion]) -> Result<String> {
     let names = items.iter().flat_map(|item| {
         let images = item.shots.iter().flat_map(|shot| &shot.images);
         let shots = images.map(String::as_bytes);
         std::iter::once(item.id.as_bytes()).chain(shots)
     });
     let set = Digest::of_parts(names);
-    Ok(PAGE.replacen(PLACE, &embedded(&Told { set, items })?, 1))
+    Ok(PAGE.replacen(PLACE, &embedded(&StudyPage { set, items })?, 1))
 }
 
 #[cfg(test)]
@@ -65,12 +65,12 @@ mod tests {
 
     #[test]
     fn the_page_asks_and_does_not_tell() {
-        let asked = Asked {
+        let asked = StudyQuestion {
             id: "q".into(),
             frame: 0,
             text: "</script>?".into(),
             choices: vec!["a".into(), "b".into()],
-            shots: vec![Shot {
+            shots: vec![StudyImage {
                 condition: "L5-noise".into(),
                 images: vec!["images/0.png".into()],
             }],

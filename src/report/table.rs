@@ -1,7 +1,7 @@
-//! One table of a report: [`Table`], its [`Column`]s and [`Cell`]s. It holds numbers; how they look is the work of what
+//! One table of a report: [`Table`], its [`Column`]s and [`TableCell`]s. It holds numbers; how they look is the work of what
 //! writes it: `csv`, `json`, `latex`, `page` and `terminal`.
 
-use crate::score::comparison::Verdict;
+use crate::score::comparison::Significance;
 use crate::score::curve::Threshold;
 use crate::score::estimate::Estimate;
 
@@ -25,19 +25,19 @@ pub struct Table {
     /// The columns.
     pub columns: Vec<Column>,
     /// The rows.
-    pub rows: Vec<Row>,
+    pub rows: Vec<TableRow>,
 }
 
 /// A row.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Row {
+pub struct TableRow {
     /// A cell for each column.
-    pub cells: Vec<Cell>,
+    pub cells: Vec<TableCell>,
     /// What leaves it out.
-    pub hidden_in: Vec<Format>,
+    pub hidden_in: Vec<TableFormat>,
 }
 
-impl Row {
+impl TableRow {
     /// A row with room for the cells of any table.
     fn wide() -> Self {
         Self {
@@ -49,7 +49,7 @@ impl Row {
 
 /// What a row can be left out of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Format {
+pub enum TableFormat {
     /// The table at the end of a run.
     Terminal,
     /// The HTML page.
@@ -62,14 +62,14 @@ pub enum Format {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Column {
     /// What it holds.
-    pub kind: Kind,
+    pub kind: ColumnKind,
     /// Its names.
-    pub heads: Heads,
+    pub heads: ColumnHeads,
 }
 
 /// The names of a column. A format for which it has none leaves it out.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Heads {
+pub struct ColumnHeads {
     /// In CSV and JSON. Of several names an estimate fills the first with its value, then the ends of its interval, then n.
     pub csv: Vec<String>,
     /// In the terminal. Of two names a difference fills the first with its value and the second with its interval.
@@ -82,7 +82,7 @@ pub struct Heads {
 
 /// What a column holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum ColumnKind {
     /// Words.
     Text,
     /// A number of things.
@@ -106,12 +106,12 @@ pub enum Kind {
     /// A p-value.
     P,
     /// What a comparison shows.
-    Verdict,
+    Significance,
 }
 
 /// What stands in a cell.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Cell {
+pub enum TableCell {
     /// Nothing belongs here.
     Blank,
     /// What the cell is about was not asked.
@@ -137,13 +137,13 @@ pub enum Cell {
     /// A threshold, and the drop of the darkest level.
     Threshold(Threshold, f64),
     /// What a comparison shows.
-    Verdict(Verdict),
+    Significance(Significance),
 }
 
 /// Makes a cell of what a variant holds.
 macro_rules! cell_from {
     ($($type:ty => $variant:ident,)*) => {$(
-        impl From<$type> for Cell {
+        impl From<$type> for TableCell {
             fn from(value: $type) -> Self {
                 Self::$variant(value.into())
             }
@@ -157,10 +157,10 @@ cell_from! {
     usize => Count,
     f64 => Number,
     Estimate => Estimate,
-    Verdict => Verdict,
+    Significance => Significance,
 }
 
-impl<C: Into<Self>> From<Option<C>> for Cell {
+impl<C: Into<Self>> From<Option<C>> for TableCell {
     fn from(cell: Option<C>) -> Self {
         cell.map_or(Self::Missing, C::into)
     }
@@ -168,7 +168,7 @@ impl<C: Into<Self>> From<Option<C>> for Cell {
 
 /// Names by format, as `csv low high | terminal difference, 95 % interval | page difference [95 %]`: those of CSV are parted
 /// by a space, those of the terminal by a comma.
-impl From<&str> for Heads {
+impl From<&str> for ColumnHeads {
     fn from(names: &str) -> Self {
         let mut heads = Self::default();
         for part in names.split(" | ") {
@@ -186,12 +186,12 @@ impl From<&str> for Heads {
 }
 
 /// A table in the making: columns are added one by one, and each makes its cells from the items, one a row.
-pub(super) struct Layout<T> {
+pub(super) struct TableBuilder<T> {
     table: Table,
     items: Vec<T>,
 }
 
-impl<T> Layout<T> {
+impl<T> TableBuilder<T> {
     pub(super) fn new(name: &'static str, items: impl IntoIterator<Item = T>) -> Self {
         let items: Vec<T> = items.into_iter().collect();
         let table = Table {
@@ -203,7 +203,7 @@ impl<T> Layout<T> {
             notes: Vec::new(),
             latex: None,
             columns: Vec::new(),
-            rows: items.iter().map(|_| Row::wide()).collect(),
+            rows: items.iter().map(|_| TableRow::wide()).collect(),
         };
         Self { table, items }
     }
@@ -216,10 +216,10 @@ impl<T> Layout<T> {
     }
 
     /// Adds a column.
-    pub(super) fn column<C: Into<Cell>>(
+    pub(super) fn column<C: Into<TableCell>>(
         mut self,
-        kind: Kind,
-        heads: impl Into<Heads>,
+        kind: ColumnKind,
+        heads: impl Into<ColumnHeads>,
         cell: impl Fn(&T) -> C,
     ) -> Self {
         for (row, item) in self.table.rows.iter_mut().zip(&self.items) {
@@ -231,7 +231,7 @@ impl<T> Layout<T> {
     }
 
     /// Leaves rows out of a format.
-    pub(super) fn hide(mut self, format: Format, is_hidden: impl Fn(&T) -> bool) -> Self {
+    pub(super) fn hide(mut self, format: TableFormat, is_hidden: impl Fn(&T) -> bool) -> Self {
         for (row, item) in self.table.rows.iter_mut().zip(&self.items) {
             if is_hidden(item) {
                 row.hidden_in.push(format);
@@ -248,7 +248,7 @@ impl<T> Layout<T> {
 
 impl Table {
     /// The rows of a format.
-    pub(super) fn rows_in(&self, format: Format) -> impl Iterator<Item = &Row> {
+    pub(super) fn rows_in(&self, format: TableFormat) -> impl Iterator<Item = &TableRow> {
         let rows = self.rows.iter();
         rows.filter(move |row| !row.hidden_in.contains(&format))
     }
@@ -256,8 +256,8 @@ impl Table {
     /// The cells of a row with their columns.
     pub(super) fn cells<'t>(
         &'t self,
-        row: &'t Row,
-    ) -> impl Iterator<Item = (&'t Column, &'t Cell)> {
+        row: &'t TableRow,
+    ) -> impl Iterator<Item = (&'t Column, &'t TableCell)> {
         self.columns.iter().zip(&row.cells)
     }
 }
@@ -268,25 +268,34 @@ mod tests {
 
     #[test]
     fn a_column_has_a_name_in_each_format() {
-        let heads =
-            Heads::from("csv d low high | terminal difference, 95 % interval | page | latex $d$");
+        let heads = ColumnHeads::from(
+            "csv d low high | terminal difference, 95 % interval | page | latex $d$",
+        );
         assert_eq!(heads.csv, ["d", "low", "high"]);
         assert_eq!(heads.terminal, ["difference", "95 % interval"]);
         assert_eq!(heads.page.as_deref(), Some(""));
         assert_eq!(heads.latex.as_deref(), Some("$d$"));
-        assert_eq!(Heads::from("csv n").page, None);
+        assert_eq!(ColumnHeads::from("csv n").page, None);
     }
 
     #[test]
     fn cells_stand_below_their_columns_and_rows_can_be_left_out() {
-        let table = Layout::new("t", [1_usize, 2])
-            .column(Kind::Count, "csv n", |n| *n)
-            .column(Kind::Text, "page word", |n| (*n == 1).then_some("one"))
-            .hide(Format::Page, |n| *n == 2)
+        let table = TableBuilder::new("t", [1_usize, 2])
+            .column(ColumnKind::Count, "csv n", |n| *n)
+            .column(ColumnKind::Text, "page word", |n| {
+                (*n == 1).then_some("one")
+            })
+            .hide(TableFormat::Page, |n| *n == 2)
             .made();
-        assert_eq!(table.rows[0].cells, [Cell::Count(1), Cell::from("one")]);
-        assert_eq!(table.rows[1].cells, [Cell::Count(2), Cell::Missing]);
-        assert_eq!(table.rows_in(Format::Page).count(), 1);
-        assert_eq!(table.rows_in(Format::Terminal).count(), 2);
+        assert_eq!(
+            table.rows[0].cells,
+            [TableCell::Count(1), TableCell::from("one")]
+        );
+        assert_eq!(
+            table.rows[1].cells,
+            [TableCell::Count(2), TableCell::Missing]
+        );
+        assert_eq!(table.rows_in(TableFormat::Page).count(), 1);
+        assert_eq!(table.rows_in(TableFormat::Terminal).count(), 2);
     }
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
 use comfy_table::{CellAlignment, LineStyle};
 
-use super::table::{Cell, Column, Format, Kind, Table};
+use super::table::{Column, ColumnKind, Table, TableCell, TableFormat};
 use super::words::{half, percent, points, reach, stops, words};
 use crate::types::manifest::{Counts, RunManifest, Status};
 
@@ -20,18 +20,18 @@ pub(super) fn differing(strict: &str, lenient: &str) -> String {
 }
 
 /// A cell in the words of the terminal, one for each name of its column.
-pub(super) fn texts(kind: Kind, cell: &Cell) -> Vec<String> {
+pub(super) fn texts(kind: ColumnKind, cell: &TableCell) -> Vec<String> {
     match (kind, cell) {
-        (Kind::Points, Cell::Estimate(e)) => {
+        (ColumnKind::Points, TableCell::Estimate(e)) => {
             let interval = format!("{} to {}", points(e.low), points(e.high));
             vec![points(e.value), interval]
         }
-        (Kind::Threshold, Cell::Threshold(t, darkest)) => {
+        (ColumnKind::Threshold, TableCell::Threshold(t, darkest)) => {
             vec![stops(t.value, *darkest), reach(t.low, t.high, *darkest)]
         }
-        (Kind::Threshold, Cell::Missing) => vec!["–".to_owned(), words(kind, cell)],
-        (Kind::Share, Cell::Estimate(share)) => vec![half(*share)],
-        (_, Cell::Strict(strict, lenient)) => {
+        (ColumnKind::Threshold, TableCell::Missing) => vec!["–".to_owned(), words(kind, cell)],
+        (ColumnKind::Share, TableCell::Estimate(share)) => vec![half(*share)],
+        (_, TableCell::Strict(strict, lenient)) => {
             let lenient = differing(&percent(strict.value), &percent(*lenient));
             vec![half(*strict) + &lenient]
         }
@@ -68,7 +68,7 @@ pub(super) fn table(parts: &[Table]) -> String {
     let names = columns.clone().flat_map(|column| &column.heads.terminal);
     drawn.set_header(names);
     for table in parts {
-        for row in table.rows_in(Format::Terminal) {
+        for row in table.rows_in(TableFormat::Terminal) {
             let cells = table.cells(row);
             let cells = cells.filter(|(column, _)| !column.heads.terminal.is_empty());
             drawn.add_row(cells.flat_map(|(column, cell)| texts(column.kind, cell)));
@@ -81,7 +81,11 @@ pub(super) fn table(parts: &[Table]) -> String {
     for (column, kind) in drawn.column_iter_mut().zip(kinds) {
         if matches!(
             kind,
-            Kind::Count | Kind::Accuracy | Kind::Points | Kind::P | Kind::Percent
+            ColumnKind::Count
+                | ColumnKind::Accuracy
+                | ColumnKind::Points
+                | ColumnKind::P
+                | ColumnKind::Percent
         ) {
             column.set_cell_alignment(CellAlignment::Right);
         }

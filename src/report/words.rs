@@ -1,6 +1,6 @@
 //! Names and numbers in words: [`light`], [`family`], [`percent`] and others, and [`words`] of any cell.
 
-use super::table::{Cell, Kind};
+use super::table::{ColumnKind, TableCell};
 use crate::score::estimate::Estimate;
 use crate::score::subject::Subject;
 use crate::types::{EnhancerName, Family, KindReading};
@@ -80,40 +80,42 @@ pub(super) fn half(share: Estimate) -> String {
 }
 
 /// A cell as people read it.
-pub(super) fn words(kind: Kind, cell: &Cell) -> String {
+pub(super) fn words(kind: ColumnKind, cell: &TableCell) -> String {
     match cell {
-        Cell::Blank | Cell::Absent => String::new(),
-        Cell::Missing if kind == Kind::Threshold => "not above chance at L0".to_owned(),
-        Cell::Missing => "–".to_owned(),
-        Cell::Text(text) => text.clone(),
-        Cell::Count(count) => count.to_string(),
-        Cell::Number(value) => number(kind, *value),
-        Cell::Guess(share) => number(Kind::Number, 100.0 * share.value),
-        Cell::Estimate(number) | Cell::Below(number) => estimate(kind, *number),
-        Cell::Strict(share, _) | Cell::Changed(share, None) => half(*share),
-        Cell::Changed(share, Some(change)) => format!("{} ({})", half(*share), points(*change)),
-        Cell::Threshold(threshold, darkest) => {
+        TableCell::Blank | TableCell::Absent => String::new(),
+        TableCell::Missing if kind == ColumnKind::Threshold => "not above chance at L0".to_owned(),
+        TableCell::Missing => "–".to_owned(),
+        TableCell::Text(text) => text.clone(),
+        TableCell::Count(count) => count.to_string(),
+        TableCell::Number(value) => number(kind, *value),
+        TableCell::Guess(share) => number(ColumnKind::Number, 100.0 * share.value),
+        TableCell::Estimate(number) | TableCell::Below(number) => estimate(kind, *number),
+        TableCell::Strict(share, _) | TableCell::Changed(share, None) => half(*share),
+        TableCell::Changed(share, Some(change)) => {
+            format!("{} ({})", half(*share), points(*change))
+        }
+        TableCell::Threshold(threshold, darkest) => {
             let reach = reach(threshold.low, threshold.high, *darkest);
             format!("{} [{reach}]", stops(threshold.value, *darkest))
         }
-        Cell::Verdict(verdict) => verdict.word().to_owned(),
+        TableCell::Significance(verdict) => verdict.word().to_owned(),
     }
 }
 
-fn number(kind: Kind, number: f64) -> String {
+fn number(kind: ColumnKind, number: f64) -> String {
     match kind {
-        Kind::P => p(number),
-        Kind::Percent | Kind::Share | Kind::Accuracy => percent(number),
-        Kind::Points => points(number),
+        ColumnKind::P => p(number),
+        ColumnKind::Percent | ColumnKind::Share | ColumnKind::Accuracy => percent(number),
+        ColumnKind::Points => points(number),
         _ => format!("{number:.2}"),
     }
 }
 
-fn estimate(kind: Kind, estimate: Estimate) -> String {
+fn estimate(kind: ColumnKind, estimate: Estimate) -> String {
     let [value, low, high] = [estimate.value, estimate.low, estimate.high].map(|x| number(kind, x));
     match kind {
-        Kind::Percent => value,
-        Kind::Accuracy => half(estimate),
+        ColumnKind::Percent => value,
+        ColumnKind::Accuracy => half(estimate),
         _ => format!("{value} [{low}, {high}]"),
     }
 }

@@ -9,7 +9,7 @@ use crate::job::batch::replies;
 use crate::job::report::{choice, open};
 use crate::job::stored::{Asked, StoredRun, manifest};
 use crate::job::{Outcome, Show, count};
-use crate::store::{Moved, Store};
+use crate::store::{AddressChange, Store};
 use crate::types::{ChoiceDetail, Detail, OpenDetail};
 
 /// The flags of `batch import`.
@@ -42,7 +42,7 @@ fn import_into<D: Detail>(
     write: impl FnOnce(&Store<D>, StoredRun<D>, Show) -> Result<Outcome>,
 ) -> Result<Outcome> {
     let manifest = manifest(&args.run)?;
-    let mut store = Store::<D>::open(&args.run, &manifest, Moved::Allowed)?;
+    let mut store = Store::<D>::open(&args.run, &manifest, AddressChange::Allowed)?;
     let imported = replies::import(&mut store, &manifest, &args.files)?;
     let mut run = StoredRun::of(&args.run, manifest)?;
     let trials = run.manifest.counts.trials.max(run.records.len());

@@ -20,10 +20,10 @@ use crate::job::progress::Progress;
 use crate::job::workers::{ThreadArgs, pool};
 use crate::job::{Outcome, Show};
 use crate::report;
-use crate::report::realism::{Rules, Source, Summary};
-use crate::score::realism::residual::{Bins, Empty, Residuals, divergence};
+use crate::report::realism::{ComparedData, RealismSummary, ResidualRules};
+use crate::score::realism::residual::{Bins, EmptyBins, Residuals, divergence};
 use crate::score::realism::ssim::ssim;
-use crate::score::realism::{Compared, Measured, exposure_drop, psnr, same_size};
+use crate::score::realism::{ImageComparison, PairComparison, exposure_drop, psnr, same_size};
 use crate::synthesis::noise::Term;
 use crate::synthesis::{Negative, NoiseKey, SensorArgs, SensorSettings, expose_by};
 use crate::types::manifest::Status;
@@ -60,7 +60,7 @@ pub struct RealismArgs {
     pub kl_bins: Bins,
     /// What is done about empty bins of fu; both are shown
     #[arg(long, value_enum, default_value_t)]
-    pub kl_empty: Empty,
+    pub kl_empty: EmptyBins,
     /// The sensor and its noise.
     #[command(flatten)]
     pub sensor: SensorArgs,
@@ -88,7 +88,7 @@ fn drop_ev(text: &str) -> Result<f32, String> {
 
 /// A pair that was compared, with what the figures need.
 struct Work {
-    compared: Compared,
+    compared: PairComparison,
     /// Real and synthetic.
     residuals: [Residuals; 2],
     /// Real, by exposure and with noise, of the first pairs.
@@ -127,18 +127,18 @@ pub fn realism(args: &RealismArgs, progress: &Progress) -> Result<Outcome> {
         return Err(Error::data("pairs", "none of them could be compared"));
     }
     let failed = pairs.len() - works.len();
-    let compared: Vec<&Compared> = works.iter().map(|work| &work.compared).collect();
-    let rules = Rules {
+    let compared: Vec<&PairComparison> = works.iter().map(|work| &work.compared).collect();
+    let rules = ResidualRules {
         bins: args.kl_bins,
         empty: args.kl_empty,
     };
-    let source = Source {
+    let source = ComparedData {
         seed: sensor.seed,
         synthesis: serde_json::json!(sensor.readings.only()?),
         unmatched: unmatched.len(),
         failed,
     };
-    let summary = Summary::new(rules, source, &compared)?;
+    let summary = RealismSummary::new(rules, source, &compared)?;
     if let Some(out) = &args.out {
         files(out, &works, &summary)?;
     }
@@ -186,8 +186,8 @@ fn compare(args: &RealismArgs, sensor: &SensorSettings, pair: &Pair, shown: bool
     let [of_real, of_noise, of_exposure] = residuals;
     let (of_real, of_noise, of_exposure) = (of_real?, of_noise?, of_exposure?);
     let other = args.kl_empty.other();
-    let measured = |image: &Rgb, residuals: &Residuals| -> Result<Measured> {
-        Ok(Measured {
+    let measured = |image: &Rgb, residuals: &Residuals| -> Result<ImageComparison> {
+        Ok(ImageComparison {
             psnr: psnr(&real, image)?,
             ssim: ssim(&real, image)?,
             kl: divergence(&of_real, residuals, args.kl_bins, args.kl_empty),
@@ -195,7 +195,7 @@ fn compare(args: &RealismArgs, sensor: &SensorSettings, pair: &Pair, shown: bool
         })
     };
     Ok(Work {
-        compared: Compared {
+        compared: PairComparison {
             pair: pair.name.clone(),
             drop,
             exposure: measured(&exposure, &of_exposure)?,
@@ -208,9 +208,9 @@ fn compare(args: &RealismArgs, sensor: &SensorSettings, pair: &Pair, shown: bool
 }
 
 /// Leaves the numbers by pair, the summary and the figures in a folder.
-fn files(out: &Path, works: &[Work], summary: &Summary) -> Result<()> {
+fn files(out: &Path, works: &[Work], summary: &RealismSummary) -> Result<()> {
     fs::create_dir_all(out).map_err(|e| Error::file(out, "make", e))?;
-    let compared: Vec<&Compared> = works.iter().map(|work| &work.compared).collect();
+    let compared: Vec<&PairComparison> = works.iter().map(|work| &work.compared).collect();
     write(&out.join("pairs.csv"), &report::realism::pairs(&compared)?)?;
     write(&out.join("summary.json"), summary.json().as_bytes())?;
     let mut pooled = [Residuals::default(), Residuals::default()];

@@ -1,27 +1,27 @@
-//! The accuracy of each model in each condition: [`Summary`].
+//! The accuracy of each model in each condition: [`AccuracySummary`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
-use super::chance::{Offer, chance};
-use super::choice::Mode;
+use super::chance::{OfferedChoices, chance};
+use super::choice::ReadingMode;
 use super::estimate::Estimate;
-use super::grid::{Count, Grid, Mark};
+use super::grid::{ClusterCount, Grid, TrialResult};
 use super::health::Health;
 use super::subject::{CHANCE, Subject};
 use crate::types::{Family, KindReading, QuestionId, UnreadReason};
 
 /// The accuracy of one subject on one family, in one reading.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Cell {
+pub struct AccuracyCell {
     /// What it is about.
     #[serde(flatten)]
     pub subject: Subject,
     /// The family; `None` for all together.
     pub family: Option<Family>,
     /// How the replies were read.
-    pub mode: Mode,
+    pub mode: ReadingMode,
     /// Replies that named the true choice.
     pub right: usize,
     /// Replies in which no choice could be read: they count as wrong.
@@ -35,7 +35,7 @@ pub struct Cell {
     pub always: Option<Estimate>,
 }
 
-impl Cell {
+impl AccuracyCell {
     /// How many replies stand behind the accuracy.
     #[must_use]
     pub fn replies(&self) -> usize {
@@ -45,27 +45,32 @@ impl Cell {
 
 /// All cells of a run, ordered by subject, family and reading.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Summary {
+pub struct AccuracySummary {
     /// The cells.
-    pub cells: Vec<Cell>,
+    pub cells: Vec<AccuracyCell>,
     /// UnreadReason replies were unparsed in the strict reading, and how many.
     pub unread: BTreeMap<UnreadReason, usize>,
 }
 
-impl Summary {
+impl AccuracySummary {
     /// The cells of a family in one reading; of `None` those of all families together.
     pub fn of<'s>(
         &'s self,
         family: Option<&'s Family>,
-        mode: Mode,
-    ) -> impl Iterator<Item = &'s Cell> + Clone {
+        mode: ReadingMode,
+    ) -> impl Iterator<Item = &'s AccuracyCell> + Clone {
         let cells = self.cells.iter();
         cells.filter(move |cell| cell.mode == mode && cell.family.as_ref() == family)
     }
 
     /// The cell of a subject.
     #[must_use]
-    pub fn cell(&self, subject: &Subject, family: Option<&Family>, mode: Mode) -> Option<&Cell> {
+    pub fn cell(
+        &self,
+        subject: &Subject,
+        family: Option<&Family>,
+        mode: ReadingMode,
+    ) -> Option<&AccuracyCell> {
         self.cells.iter().find(|cell| {
             cell.mode == mode && cell.family.as_ref() == family && cell.subject == *subject
         })
@@ -77,20 +82,20 @@ impl Summary {
 pub fn summarize(
     grid: &Grid<'_>,
     health: &[Health],
-    questions: impl IntoIterator<Item = Offer>,
-) -> Summary {
-    let questions: Vec<Offer> = questions.into_iter().collect();
+    questions: impl IntoIterator<Item = OfferedChoices>,
+) -> AccuracySummary {
+    let questions: Vec<OfferedChoices> = questions.into_iter().collect();
     let families = grid.groups();
     let mut cells = Vec::new();
     for subject in 0..grid.subjects.len() {
         for family in &families {
-            cells.extend(Mode::ALL.map(|mode| cell(grid, subject, *family, mode)));
+            cells.extend(ReadingMode::ALL.map(|mode| cell(grid, subject, *family, mode)));
         }
     }
     // A family that a subject was not asked about has no cell.
     cells.retain(|cell| cell.accuracy.is_some() || cell.failed > 0);
     cells.extend(guesses(&questions));
-    Summary {
+    AccuracySummary {
         cells,
         unread: unread(health),
     }
@@ -105,14 +110,19 @@ fn unread(health: &[Health]) -> BTreeMap<UnreadReason, usize> {
     unread
 }
 
-fn cell(grid: &Grid<'_>, subject: usize, family: Option<&Family>, mode: Mode) -> Cell {
+fn cell(
+    grid: &Grid<'_>,
+    subject: usize,
+    family: Option<&Family>,
+    mode: ReadingMode,
+) -> AccuracyCell {
     let (mut unparsed, mut failed) = (0, 0);
     for (_, mark) in grid.of_family(subject, family) {
-        failed += usize::from(mark == Mark::Failed);
+        failed += usize::from(mark == TrialResult::Failed);
         unparsed += usize::from(mark.reading(mode) == Some(None));
     }
     let counts = grid.counts(subject, family, mode);
-    Cell {
+    AccuracyCell {
         subject: grid.subjects[subject].clone(),
         family: family.cloned(),
         mode,
@@ -129,10 +139,10 @@ fn always(
     grid: &Grid<'_>,
     subject: usize,
     family: Option<&Family>,
-    mode: Mode,
+    mode: ReadingMode,
 ) -> Option<Estimate> {
     // Items of a question stand together.
-    let mut questions = BTreeMap::<(u32, &QuestionId), Count>::new();
+    let mut questions = BTreeMap::<(u32, &QuestionId), ClusterCount>::new();
     for (item, mark) in grid.of_family(subject, family) {
         if let Some(chosen) = mark.reading(mode) {
             let count = questions
@@ -145,7 +155,7 @@ fn always(
     if questions.values().all(|count| count.replies == 1) {
         return None;
     }
-    let mut clusters = vec![Count::default(); grid.clusters];
+    let mut clusters = vec![ClusterCount::default(); grid.clusters];
     for ((cluster, _), count) in questions {
         let cluster = &mut clusters[cluster as usize];
         cluster.replies += 1;
@@ -154,7 +164,7 @@ fn always(
     Estimate::clustered(&clusters)
 }
 
-fn guesses(questions: &[Offer]) -> Vec<Cell> {
+fn guesses(questions: &[OfferedChoices]) -> Vec<AccuracyCell> {
     let families: BTreeSet<&Family> = questions.iter().map(|question| &question.family).collect();
     let groups = std::iter::once(None).chain(families.into_iter().map(Some));
     let cells = groups.flat_map(|family| {
@@ -162,7 +172,7 @@ fn guesses(questions: &[Offer]) -> Vec<Cell> {
             .iter()
             .filter(|question| family.is_none_or(|family| question.family == *family));
         let accuracy = chance(asked);
-        Mode::ALL.map(|mode| Cell {
+        ReadingMode::ALL.map(|mode| AccuracyCell {
             subject: Subject {
                 model: CHANCE.to_owned(),
                 view: None,

@@ -1,10 +1,10 @@
 //! How far two models agree: [`Agreement`].
 
 use super::bootstrap::Resamples;
-use super::choice::Mode;
-use super::comparison::{Kind, pairs};
+use super::choice::ReadingMode;
+use super::comparison::{ComparisonKind, pairs};
 use super::estimate::Estimate;
-use super::grid::{Count, Grid};
+use super::grid::{ClusterCount, Grid};
 use super::subject::Subject;
 
 /// Two models in one condition, in the strict reading.
@@ -23,7 +23,7 @@ pub struct Agreement {
 
 /// Of the items of a cluster that both replied to: all, those that both, the first, the second got right.
 #[derive(Debug, Clone, Copy, Default)]
-struct Rights {
+struct AgreementCounts {
     all: f32,
     both: f32,
     first: f32,
@@ -33,17 +33,17 @@ struct Rights {
 /// Every pair of models in every condition.
 #[must_use]
 pub fn agreements(grid: &Grid<'_>, draws: &Resamples) -> Vec<Agreement> {
-    let pairs = pairs(grid, Kind::Model).into_iter();
+    let pairs = pairs(grid, ComparisonKind::Model).into_iter();
     pairs
         .filter_map(|(first, second)| agreement(grid, draws, first, second))
         .collect()
 }
 
 fn agreement(grid: &Grid<'_>, draws: &Resamples, first: usize, second: usize) -> Option<Agreement> {
-    let mut same = vec![Count::default(); grid.clusters];
-    let mut rights = vec![Rights::default(); grid.clusters];
+    let mut same = vec![ClusterCount::default(); grid.clusters];
+    let mut rights = vec![AgreementCounts::default(); grid.clusters];
     for (index, item) in grid.items.iter().enumerate() {
-        let reading = |subject| grid.mark(subject, index).reading(Mode::Strict);
+        let reading = |subject| grid.mark(subject, index).reading(ReadingMode::Strict);
         let (Some(a), Some(b)) = (reading(first), reading(second)) else {
             continue;
         };
@@ -59,7 +59,8 @@ fn agreement(grid: &Grid<'_>, draws: &Resamples, first: usize, second: usize) ->
         cluster.second += share(b);
     }
     let same = Estimate::clustered(&same)?;
-    let total = |of: fn(&Rights) -> f32| rights.iter().map(|rights| f64::from(of(rights))).sum();
+    let total =
+        |of: fn(&AgreementCounts) -> f32| rights.iter().map(|rights| f64::from(of(rights))).sum();
     let value = kappa(
         total(|r| r.all),
         total(|r| r.both),
@@ -67,7 +68,9 @@ fn agreement(grid: &Grid<'_>, draws: &Resamples, first: usize, second: usize) ->
         total(|r| r.second),
     );
     let interval = || {
-        let sums = |of: fn(&Rights) -> f32| draws.sums(&rights.iter().map(of).collect::<Vec<_>>());
+        let sums = |of: fn(&AgreementCounts) -> f32| {
+            draws.sums(&rights.iter().map(of).collect::<Vec<_>>())
+        };
         let (all, both) = (sums(|r| r.all), sums(|r| r.both));
         let (first, second) = (sums(|r| r.first), sums(|r| r.second));
         let kappas = (0..all.len()).filter_map(|i| kappa(all[i], both[i], first[i], second[i]));

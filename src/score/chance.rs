@@ -5,14 +5,14 @@ use crate::types::{Family, Question};
 
 /// What a question offers.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Offer {
+pub struct OfferedChoices {
     /// Its family.
     pub family: Family,
     /// How many choices it has.
     pub choices: usize,
 }
 
-impl From<&Question> for Offer {
+impl From<&Question> for OfferedChoices {
     fn from(question: &Question) -> Self {
         Self {
             family: question.family.clone(),
@@ -24,7 +24,7 @@ impl From<&Question> for Offer {
 /// The exact accuracy of a uniform guess: the mean of 1 / number of choices (DarkQA, section IV); `None` of no questions.
 ///
 /// Summed over counts of choices, so that the order of the questions cannot change a digit.
-pub fn chance<'a>(questions: impl IntoIterator<Item = &'a Offer>) -> Option<Estimate> {
+pub fn chance<'a>(questions: impl IntoIterator<Item = &'a OfferedChoices>) -> Option<Estimate> {
     let mut counts = std::collections::BTreeMap::<usize, usize>::new();
     for question in questions {
         *counts.entry(question.choices).or_default() += 1;
@@ -41,8 +41,8 @@ pub fn chance<'a>(questions: impl IntoIterator<Item = &'a Offer>) -> Option<Esti
 mod tests {
     use super::*;
 
-    fn question(choices: usize) -> Offer {
-        Offer {
+    fn question(choices: usize) -> OfferedChoices {
+        OfferedChoices {
             family: Family::Closest,
             choices,
         }

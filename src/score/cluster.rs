@@ -7,7 +7,7 @@ use crate::types::{FrameId, QuestionId};
 
 /// What is taken as independent of each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Unit {
+pub enum ClusterUnit {
     /// Scenes: frames of one scene share its furniture and its light.
     Scene,
     /// Frames: questions about one frame share its pixels.
@@ -16,7 +16,7 @@ pub enum Unit {
     Question,
 }
 
-impl fmt::Display for Unit {
+impl fmt::Display for ClusterUnit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {
             Self::Scene => "scene",
@@ -33,7 +33,7 @@ impl fmt::Display for Unit {
 /// one, there are at least [`FEWEST_SCENES`] and some have more than a frame; else the frame; of one frame alone the question.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Clusters {
-    unit: Unit,
+    unit: ClusterUnit,
     of: HashMap<FrameId, u32>,
     /// Where all are about one frame: the cluster of each question.
     questions: HashMap<QuestionId, u32>,
@@ -64,7 +64,7 @@ impl Clusters {
                 Some(((*frame).clone(), *number))
             });
             return Self {
-                unit: Unit::Scene,
+                unit: ClusterUnit::Scene,
                 of: of.collect(),
                 count: numbers.len(),
                 questions: HashMap::new(),
@@ -72,7 +72,7 @@ impl Clusters {
         }
         if frames.len() == 1 {
             return Self {
-                unit: Unit::Question,
+                unit: ClusterUnit::Question,
                 count: asked.len(),
                 of: HashMap::new(),
                 questions: asked
@@ -84,9 +84,9 @@ impl Clusters {
         }
         Self {
             unit: if asked.len() == frames.len() {
-                Unit::Question
+                ClusterUnit::Question
             } else {
-                Unit::Frame
+                ClusterUnit::Frame
             },
             count: frames.len(),
             of: frames.into_iter().cloned().zip(0..).collect(),
@@ -96,7 +96,7 @@ impl Clusters {
 
     /// What the clusters are.
     #[must_use]
-    pub fn unit(&self) -> Unit {
+    pub fn unit(&self) -> ClusterUnit {
         self.unit
     }
 
@@ -134,12 +134,12 @@ mod tests {
     #[test]
     fn scenes_go_before_frames_where_there_are_enough() {
         for (frames, scenes, questions, unit, count) in [
-            (20, 10, 60, Unit::Scene, 10),
-            (20, 4, 60, Unit::Frame, 20),
-            (20, 0, 60, Unit::Frame, 20),
-            (20, 20, 60, Unit::Frame, 20),
-            (20, 0, 20, Unit::Question, 20),
-            (1, 0, 20, Unit::Question, 20),
+            (20, 10, 60, ClusterUnit::Scene, 10),
+            (20, 4, 60, ClusterUnit::Frame, 20),
+            (20, 0, 60, ClusterUnit::Frame, 20),
+            (20, 20, 60, ClusterUnit::Frame, 20),
+            (20, 0, 20, ClusterUnit::Question, 20),
+            (1, 0, 20, ClusterUnit::Question, 20),
         ] {
             let made = clusters(frames, scenes, questions);
             assert_eq!((made.unit(), made.count()), (unit, count));

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use super::choice::Mode;
+use super::choice::ReadingMode;
 use super::grid::Grid;
-use super::paired::Paired;
+use super::paired::PairedComparison;
 use super::significance::holm;
 use super::subject::Subject;
 use crate::types::{AxisLevel, Family, KindReading, View};
@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 /// What is compared with what.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Kind {
+pub enum ComparisonKind {
     /// A dark level with L0: what darkness costs.
     Level,
     /// Sensor noise with exposure drop alone, at one level.
@@ -25,7 +25,7 @@ pub enum Kind {
     Blind,
 }
 
-impl Kind {
+impl ComparisonKind {
     /// All, in the order of the tables.
     pub const ALL: [Self; 5] = [
         Self::Level,
@@ -50,7 +50,7 @@ impl Kind {
 
 /// What a comparison shows at the 5 % level, after Holm's correction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verdict {
+pub enum Significance {
     /// The first is better.
     Better,
     /// The first is worse.
@@ -59,7 +59,7 @@ pub enum Verdict {
     Tied,
 }
 
-impl Verdict {
+impl Significance {
     /// The word in tables.
     #[must_use]
     pub fn word(self) -> &'static str {
@@ -75,7 +75,7 @@ impl Verdict {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
     /// What is compared.
-    pub kind: Kind,
+    pub kind: ComparisonKind,
     /// The first: the darker, the noisy, the enhanced, the one that sees.
     pub first: Subject,
     /// What it is held against.
@@ -83,12 +83,12 @@ pub struct Comparison {
     /// The family; `None` for all.
     pub family: Option<Family>,
     /// The numbers.
-    pub paired: Paired,
+    pub paired: PairedComparison,
     /// The p-value after Holm's correction over all comparisons of this kind and these models, so that another model in the
     /// report changes no verdict; those by family are corrected among themselves.
     pub holm: f64,
     /// What that shows.
-    pub verdict: Verdict,
+    pub verdict: Significance,
 }
 
 /// All comparisons of a grid, by kind, family and subjects.
@@ -96,7 +96,7 @@ pub struct Comparison {
 pub fn comparisons(grid: &Grid<'_>) -> Vec<Comparison> {
     let families = grid.groups();
     let mut jobs = Vec::new();
-    for kind in Kind::ALL {
+    for kind in ComparisonKind::ALL {
         let pairs = pairs(grid, kind);
         for family in &families {
             jobs.extend(pairs.iter().map(|(a, b)| (kind, *family, *a, *b)));
@@ -110,9 +110,9 @@ pub fn comparisons(grid: &Grid<'_>) -> Vec<Comparison> {
                 first: grid.subjects[first].clone(),
                 second: grid.subjects[second].clone(),
                 family: family.cloned(),
-                paired: Paired::new(grid, first, second, family, Mode::Strict)?,
+                paired: PairedComparison::new(grid, first, second, family, ReadingMode::Strict)?,
                 holm: 1.0,
-                verdict: Verdict::Tied,
+                verdict: Significance::Tied,
             })
         });
     corrected(paired.collect())
@@ -137,28 +137,30 @@ fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
     all
 }
 
-fn verdict(difference: f64, p: f64) -> Verdict {
+fn verdict(difference: f64, p: f64) -> Significance {
     if p >= 0.05 {
-        Verdict::Tied
+        Significance::Tied
     } else if difference > 0.0 {
-        Verdict::Better
+        Significance::Better
     } else {
-        Verdict::Worse
+        Significance::Worse
     }
 }
 
 /// The indices of the subjects that a kind compares.
-pub(super) fn pairs(grid: &Grid<'_>, kind: Kind) -> Vec<(usize, usize)> {
+pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)> {
     let mut pairs = Vec::new();
     for (index, subject) in grid.subjects.iter().enumerate() {
         let against: Vec<usize> = match kind {
             // Darkness is what raw images show; what an enhancer leaves of it is read from the curves.
-            Kind::Level if subject.variant.kind.is_some() && subject.enhancer.is_none() => {
+            ComparisonKind::Level
+                if subject.variant.kind.is_some() && subject.enhancer.is_none() =>
+            {
                 let light =
                     Subject::seeing(&subject.model, AxisLevel::L0, &KindReading::NONE, None);
                 grid.find(&light).into_iter().collect()
             }
-            Kind::Variant => match subject
+            ComparisonKind::Variant => match subject
                 .variant
                 .kind
                 .and_then(crate::types::degradation::Kind::base)
@@ -172,11 +174,11 @@ pub(super) fn pairs(grid: &Grid<'_>, kind: Kind) -> Vec<(usize, usize)> {
                     };
                 }),
             },
-            Kind::Enhancer if subject.enhancer.is_some() => {
+            ComparisonKind::Enhancer if subject.enhancer.is_some() => {
                 one(grid, subject, |other| other.enhancer = None)
             }
-            Kind::Model => later_models(grid, index),
-            Kind::Blind if subject.view == Some(View::Image) => blind(grid, subject),
+            ComparisonKind::Model => later_models(grid, index),
+            ComparisonKind::Blind if subject.view == Some(View::Image) => blind(grid, subject),
             _ => Vec::new(),
         };
         pairs.extend(against.into_iter().map(|other| (index, other)));

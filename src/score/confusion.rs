@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::choice::Mode;
+use super::choice::ReadingMode;
 use super::estimate::Estimate;
-use super::grid::{Count, Grid};
+use super::grid::{ClusterCount, Grid};
 use super::subject::Subject;
 use crate::types::Family;
 
@@ -58,7 +58,7 @@ pub fn confusions(grid: &Grid<'_>) -> Vec<Confusion> {
 fn counts(grid: &Grid<'_>, subject: usize, family: &Family, labels: &[String]) -> Vec<Vec<usize>> {
     let mut counts = vec![vec![0; labels.len() + 1]; labels.len()];
     for (item, mark) in grid.of_family(subject, Some(family)) {
-        let Some(chosen) = mark.reading(Mode::Strict) else {
+        let Some(chosen) = mark.reading(ReadingMode::Strict) else {
             continue;
         };
         let place = |index: usize| {
@@ -163,7 +163,7 @@ pub fn hallucinations(grid: &Grid<'_>) -> Vec<Hallucination> {
 }
 
 fn rate(grid: &Grid<'_>, subject: usize, truth: &str, said: &str) -> Option<Estimate> {
-    let mut clusters = BTreeMap::<u32, Count>::new();
+    let mut clusters = BTreeMap::<u32, ClusterCount>::new();
     for (item, mark) in grid.of_family(subject, Some(&Family::Presence)) {
         let choices = &item.record.detail.choices;
         let is = |index: usize, text: &str| {
@@ -171,7 +171,7 @@ fn rate(grid: &Grid<'_>, subject: usize, truth: &str, said: &str) -> Option<Esti
                 .get(index)
                 .is_some_and(|choice| choice.eq_ignore_ascii_case(text))
         };
-        if let Some(chosen) = mark.reading(Mode::Strict)
+        if let Some(chosen) = mark.reading(ReadingMode::Strict)
             && is(item.record.detail.truth, truth)
         {
             let count = clusters.entry(item.cluster).or_default();
@@ -179,6 +179,6 @@ fn rate(grid: &Grid<'_>, subject: usize, truth: &str, said: &str) -> Option<Esti
             count.right += u32::from(chosen.is_some_and(|index| is(usize::from(index), said)));
         }
     }
-    let counts: Vec<Count> = clusters.into_values().collect();
+    let counts: Vec<ClusterCount> = clusters.into_values().collect();
     Estimate::clustered(&counts)
 }

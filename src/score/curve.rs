@@ -1,9 +1,9 @@
 //! Accuracy over darkness as a whole: [`Curve`], with its threshold and area.
 
 use super::bootstrap::Resamples;
-use super::choice::Mode;
+use super::choice::ReadingMode;
 use super::estimate::Estimate;
-use super::grid::{Count, Grid, Mark};
+use super::grid::{ClusterCount, Grid, TrialResult};
 use super::subject::Subject;
 use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
 
@@ -38,7 +38,7 @@ pub struct Curve {
 }
 
 /// The line of one model in one variant, raw or enhanced.
-pub(super) struct Points {
+pub(super) struct CurvePoints {
     pub(super) model: String,
     pub(super) variant: KindReading,
     pub(super) enhancer: Option<EnhancerName>,
@@ -46,7 +46,7 @@ pub(super) struct Points {
     pub(super) subjects: Vec<(AxisLevel, usize)>,
 }
 
-impl Points {
+impl CurvePoints {
     /// The lines of a grid of which L0 and a darker level were asked.
     pub(super) fn all(grid: &Grid<'_>) -> Vec<Self> {
         let dark = grid.subjects.iter().filter(|subject| {
@@ -93,7 +93,7 @@ impl Points {
 /// asked.
 #[must_use]
 pub fn curves(grid: &Grid<'_>, draws: &Resamples, family: Option<&Family>) -> Vec<Curve> {
-    Points::all(grid)
+    CurvePoints::all(grid)
         .into_iter()
         .filter_map(|points| curve(grid, draws, family, points))
         .collect()
@@ -103,13 +103,13 @@ fn curve(
     grid: &Grid<'_>,
     draws: &Resamples,
     family: Option<&Family>,
-    points: Points,
+    points: CurvePoints,
 ) -> Option<Curve> {
     let counts = points.subjects.iter();
-    let counts: Vec<Vec<Count>> = counts
-        .map(|(_, subject)| grid.counts(*subject, family, Mode::Strict))
+    let counts: Vec<Vec<ClusterCount>> = counts
+        .map(|(_, subject)| grid.counts(*subject, family, ReadingMode::Strict))
         .collect();
-    let total = |counts: &[Count], of: fn(&Count) -> u32| -> f64 {
+    let total = |counts: &[ClusterCount], of: fn(&ClusterCount) -> u32| -> f64 {
         counts.iter().map(|count| f64::from(of(count))).sum()
     };
     let replies: Vec<f64> = counts.iter().map(|c| total(c, |c| c.replies)).collect();
@@ -121,7 +121,7 @@ fn curve(
     let drops = points.drops();
     let guesses = guesses(grid, points.subjects[0].1, family);
     let chance = guesses.iter().map(|x| f64::from(*x)).sum::<f64>() / replies[0];
-    let resampled = Drawn::new(draws, &counts, &guesses);
+    let resampled = DrawnCurves::new(draws, &counts, &guesses);
     let within = |value: f64, drawn: Vec<f64>| {
         let [low, high] = draws.interval(drawn);
         [value, low.min(value), high.max(value)]
@@ -145,7 +145,7 @@ fn curve(
 }
 
 /// Whether the light is more than guessing: the interval of the accuracy at L0 lies above chance.
-fn above_chance(light: &[Count], chance: f64) -> bool {
+fn above_chance(light: &[ClusterCount], chance: f64) -> bool {
     Estimate::clustered(light).is_some_and(|estimate| estimate.low > chance)
 }
 
@@ -153,7 +153,7 @@ fn above_chance(light: &[Count], chance: f64) -> bool {
 fn guesses(grid: &Grid<'_>, light: usize, family: Option<&Family>) -> Vec<f32> {
     let mut guesses = vec![0.0_f32; grid.clusters];
     for (item, mark) in grid.of_family(light, family) {
-        if let Mark::Read { .. } = mark {
+        if let TrialResult::Read { .. } = mark {
             guesses[item.cluster as usize] += 1.0 / item.record.detail.choices.len() as f32;
         }
     }
@@ -161,15 +161,15 @@ fn guesses(grid: &Grid<'_>, light: usize, family: Option<&Family>) -> Vec<f32> {
 }
 
 /// A curve in every draw of the clusters.
-struct Drawn {
+struct DrawnCurves {
     /// Right answers and replies of each level, by draw.
     levels: Vec<[Vec<f64>; 2]>,
     guesses: Vec<f64>,
 }
 
-impl Drawn {
-    fn new(draws: &Resamples, counts: &[Vec<Count>], guesses: &[f32]) -> Self {
-        let sums = |counts: &[Count], of: fn(&Count) -> u32| {
+impl DrawnCurves {
+    fn new(draws: &Resamples, counts: &[Vec<ClusterCount>], guesses: &[f32]) -> Self {
+        let sums = |counts: &[ClusterCount], of: fn(&ClusterCount) -> u32| {
             draws.sums(
                 &counts
                     .iter()
@@ -251,7 +251,7 @@ fn falling(values: &[f64], weights: &[f64]) -> Vec<f64> {
 
 /// The mean height of the curve by the trapezoid rule, as a mean of scores: each level has its share of the width, so that a
 /// cluster's score is its right answers at each level, weighted, over its replies there.
-fn area(drops: &[f64], counts: &[Vec<Count>], replies: &[f64]) -> Option<Estimate> {
+fn area(drops: &[f64], counts: &[Vec<ClusterCount>], replies: &[f64]) -> Option<Estimate> {
     let weights = widths(drops);
     let levels = counts.iter().zip(replies).zip(&weights);
     let mut sums = vec![(0.0, 0.0); counts.first()?.len()];
@@ -307,7 +307,7 @@ mod tests {
         let widths = widths(&DROPS);
         assert!((widths.iter().sum::<f64>() - 1.0).abs() < 1e-12);
         let counts = |rights: [u32; 3]| {
-            let level = |right: u32| vec![Count { right, replies: 4 }; 10];
+            let level = |right: u32| vec![ClusterCount { right, replies: 4 }; 10];
             rights.map(level).to_vec()
         };
         let area = |rights| area(&[0.0, 2.0, 9.0], &counts(rights), &[40.0; 3]).unwrap();

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::grid::Count;
+use super::grid::ClusterCount;
 use super::student::student;
 
 /// The 97.5 % quantile of the standard normal distribution, for 95 % intervals.
@@ -45,7 +45,7 @@ impl Estimate {
     /// Methodol. 3:484, find it the best of seven for clustered shares). With one reply a cluster it is Wilson's own. Where
     /// all replies are right, or none, d is 1 + 0.2 (m − 1) for clusters of m replies (Kish 1965, section 5.4).
     #[must_use]
-    pub fn clustered(counts: &[Count]) -> Option<Self> {
+    pub fn clustered(counts: &[ClusterCount]) -> Option<Self> {
         let there = counts.iter().filter(|count| count.replies > 0);
         let n: usize = there.clone().map(|count| count.replies as usize).sum();
         if there.clone().all(|count| count.replies == 1) || there.clone().count() == 1 {
@@ -140,8 +140,8 @@ mod tests {
         assert!(all.high <= 1.0 && all.low < 1.0);
     }
 
-    fn counts(pairs: &[(u32, u32)]) -> Vec<Count> {
-        let count = |&(right, replies)| Count { right, replies };
+    fn counts(pairs: &[(u32, u32)]) -> Vec<ClusterCount> {
+        let count = |&(right, replies)| ClusterCount { right, replies };
         pairs.iter().map(count).collect()
     }
 

@@ -2,15 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use super::accuracy::{Summary, summarize};
+use super::accuracy::{AccuracySummary, summarize};
 use super::agreement::{Agreement, agreements};
 use super::bootstrap::Resamples;
-use super::chance::Offer;
-use super::cluster::{Clusters, Unit};
-use super::comparison::{Comparison, Kind, comparisons};
+use super::chance::OfferedChoices;
+use super::cluster::{ClusterUnit, Clusters};
+use super::comparison::{Comparison, ComparisonKind, comparisons};
 use super::confusion::{Confusion, Hallucination, confusions, hallucinations};
 use super::curve::{Curve, curves};
-use super::flips::{Fall, falls};
+use super::flips::{FirstFailure, falls};
 use super::grid::Grid;
 use super::health::{Health, healths};
 use super::subject::Subject;
@@ -22,9 +22,9 @@ pub struct Findings<'a> {
     /// The records, laid out.
     pub grid: Grid<'a>,
     /// What is taken as independent.
-    pub unit: Unit,
+    pub unit: ClusterUnit,
     /// The accuracies.
-    pub summary: Summary,
+    pub summary: AccuracySummary,
     /// What became of the trials besides.
     pub health: Vec<Health>,
     /// Differences.
@@ -36,7 +36,7 @@ pub struct Findings<'a> {
     /// False positives and negatives.
     pub hallucinations: Vec<Hallucination>,
     /// Where items fail first.
-    pub falls: Vec<Fall>,
+    pub falls: Vec<FirstFailure>,
     /// How far models agree.
     pub agreements: Vec<Agreement>,
 }
@@ -48,7 +48,7 @@ impl<'a> Findings<'a> {
     pub fn new(
         records: &'a [Record],
         scenes: &BTreeMap<FrameId, String>,
-        questions: impl IntoIterator<Item = Offer>,
+        questions: impl IntoIterator<Item = OfferedChoices>,
     ) -> Self {
         let asked = records
             .iter()
@@ -79,7 +79,7 @@ impl<'a> Findings<'a> {
     #[must_use]
     pub fn below_blind(&self, subject: &Subject, family: Option<&Family>) -> bool {
         self.comparisons.iter().any(|one| {
-            one.kind == Kind::Blind
+            one.kind == ComparisonKind::Blind
                 && one.family.as_ref() == family
                 && one.first == *subject
                 && one.paired.difference.value < 0.0

@@ -1,13 +1,13 @@
-//! Where an item is lost: [`Fall`].
+//! Where an item is lost: [`FirstFailure`].
 
-use super::choice::Mode;
-use super::curve::Points;
+use super::choice::ReadingMode;
+use super::curve::CurvePoints;
 use super::grid::Grid;
 use crate::types::{AxisLevel, EnhancerName, KindReading};
 
 /// One model in one variant, raw or enhanced: at which level its items fail first.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Fall {
+pub struct FirstFailure {
     /// The model.
     pub model: String,
     /// The variant.
@@ -21,10 +21,10 @@ pub struct Fall {
 
 /// Where items fail first, for every curve of a grid.
 #[must_use]
-pub fn falls(grid: &Grid<'_>) -> Vec<Fall> {
-    let lines = Points::all(grid).into_iter().map(|points| {
+pub fn falls(grid: &Grid<'_>) -> Vec<FirstFailure> {
+    let lines = CurvePoints::all(grid).into_iter().map(|points| {
         let first = (0..grid.items.len()).map(|item| first_failing(grid, &points, item));
-        Fall {
+        FirstFailure {
             first: first.collect(),
             model: points.model,
             variant: points.variant,
@@ -34,9 +34,9 @@ pub fn falls(grid: &Grid<'_>) -> Vec<Fall> {
     lines.collect()
 }
 
-fn first_failing(grid: &Grid<'_>, points: &Points, item: usize) -> Option<AxisLevel> {
+fn first_failing(grid: &Grid<'_>, points: &CurvePoints, item: usize) -> Option<AxisLevel> {
     for &(level, subject) in &points.subjects {
-        let chosen = grid.mark(subject, item).reading(Mode::Strict)?;
+        let chosen = grid.mark(subject, item).reading(ReadingMode::Strict)?;
         if !grid.items[item].is_right(chosen) {
             return Some(level);
         }

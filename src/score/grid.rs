@@ -2,14 +2,14 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use super::choice::Mode;
+use super::choice::ReadingMode;
 use super::cluster::Clusters;
 use super::subject::Subject;
 use crate::types::{AnswerReading, Family, QuestionId, Record, TrialOutcome};
 
 /// What came of one item for one subject.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mark {
+pub enum TrialResult {
     /// It was not asked.
     Absent,
     /// No reply came.
@@ -23,28 +23,28 @@ pub enum Mark {
     },
 }
 
-impl Mark {
+impl TrialResult {
     /// The reading in one mode; `None` where no reply came.
     #[must_use]
-    pub fn reading(self, mode: Mode) -> Option<Option<u8>> {
+    pub fn reading(self, mode: ReadingMode) -> Option<Option<u8>> {
         match (self, mode) {
             (Self::Absent | Self::Failed, _) => None,
-            (Self::Read { strict, .. }, Mode::Strict) => Some(strict),
-            (Self::Read { lenient, .. }, Mode::Lenient) => Some(lenient),
+            (Self::Read { strict, .. }, ReadingMode::Strict) => Some(strict),
+            (Self::Read { lenient, .. }, ReadingMode::Lenient) => Some(lenient),
         }
     }
 }
 
 /// One question in one order of its choices, asked the n-th time.
 #[derive(Debug, Clone, Copy)]
-pub struct Item<'a> {
+pub struct GridItem<'a> {
     /// A record of it: its question, frame, family, choices and truth.
     pub record: &'a Record,
     /// The cluster of its frame.
     pub cluster: u32,
 }
 
-impl Item<'_> {
+impl GridItem<'_> {
     /// Whether a reading is the true choice.
     #[must_use]
     pub fn is_right(&self, chosen: Option<u8>) -> bool {
@@ -64,10 +64,10 @@ pub struct Grid<'a> {
     /// Who was asked in which light, in order.
     pub subjects: Vec<Subject>,
     /// What was asked, by frame, question, order of choices and turn.
-    pub items: Vec<Item<'a>>,
+    pub items: Vec<GridItem<'a>>,
     /// How many clusters the items are in.
     pub clusters: usize,
-    marks: Vec<Mark>,
+    marks: Vec<TrialResult>,
     source: &'a [Record],
     /// Where each mark's record is in the source; [`u32::MAX`] where there is none.
     places: Vec<u32>,
@@ -75,7 +75,7 @@ pub struct Grid<'a> {
 
 /// How many replies a cluster holds, and how many of them are right.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Count {
+pub struct ClusterCount {
     /// Right ones.
     pub right: u32,
     /// All.
@@ -89,14 +89,14 @@ impl<'a> Grid<'a> {
     pub fn new(records: &'a [Record], clusters: &Clusters) -> Self {
         let mut subjects = BTreeMap::<Subject, usize>::new();
         let mut numbers = HashMap::<(&QuestionId, &[String], u32), usize>::new();
-        let mut items: Vec<Item<'a>> = Vec::new();
+        let mut items: Vec<GridItem<'a>> = Vec::new();
         for record in records {
             let Some(cluster) = clusters.of(&record.detail.frame, &record.question) else {
                 continue;
             };
             subjects.entry(Subject::of(record)).or_default();
             numbers.entry(key(record)).or_insert_with(|| {
-                items.push(Item { record, cluster });
+                items.push(GridItem { record, cluster });
                 items.len() - 1
             });
         }
@@ -108,7 +108,7 @@ impl<'a> Grid<'a> {
             numbers.insert(key(item.record), index);
         }
         let size = subjects.len() * items.len();
-        let (mut marks, mut places) = (vec![Mark::Absent; size], vec![u32::MAX; size]);
+        let (mut marks, mut places) = (vec![TrialResult::Absent; size], vec![u32::MAX; size]);
         for (index, record) in records.iter().enumerate() {
             let (subject, item) = (
                 subjects.get(&Subject::of(record)),
@@ -132,7 +132,7 @@ impl<'a> Grid<'a> {
 
     /// What came of an item for a subject, by their indices.
     #[must_use]
-    pub fn mark(&self, subject: usize, item: usize) -> Mark {
+    pub fn mark(&self, subject: usize, item: usize) -> TrialResult {
         self.marks[subject * self.items.len() + item]
     }
 
@@ -154,7 +154,7 @@ impl<'a> Grid<'a> {
         &'s self,
         subject: usize,
         family: Option<&'s Family>,
-    ) -> impl Iterator<Item = (&'s Item<'a>, Mark)> + 's {
+    ) -> impl Iterator<Item = (&'s GridItem<'a>, TrialResult)> + 's {
         let marks = &self.marks[subject * self.items.len()..(subject + 1) * self.items.len()];
         let all = self.items.iter().zip(marks.iter().copied());
         all.filter(move |(item, _)| item.is_of(family))
@@ -162,8 +162,13 @@ impl<'a> Grid<'a> {
 
     /// Right answers and replies of a subject by cluster.
     #[must_use]
-    pub fn counts(&self, subject: usize, family: Option<&Family>, mode: Mode) -> Vec<Count> {
-        let mut counts = vec![Count::default(); self.clusters];
+    pub fn counts(
+        &self,
+        subject: usize,
+        family: Option<&Family>,
+        mode: ReadingMode,
+    ) -> Vec<ClusterCount> {
+        let mut counts = vec![ClusterCount::default(); self.clusters];
         for (item, mark) in self.of_family(subject, family) {
             if let Some(chosen) = mark.reading(mode) {
                 let count = &mut counts[item.cluster as usize];
@@ -211,14 +216,14 @@ fn place(record: &Record) -> impl Ord + '_ {
     )
 }
 
-fn mark(record: &Record) -> Mark {
+fn mark(record: &Record) -> TrialResult {
     let chosen = |reading: AnswerReading| {
         let index = reading.chosen?;
         Some(index.min(usize::from(u8::MAX)) as u8)
     };
     match (record.detail.outcome, record.detail.strict) {
-        (TrialOutcome::Failed, _) | (_, None) => Mark::Failed,
-        (_, Some(strict)) => Mark::Read {
+        (TrialOutcome::Failed, _) | (_, None) => TrialResult::Failed,
+        (_, Some(strict)) => TrialResult::Read {
             strict: chosen(strict),
             lenient: record.detail.lenient.and_then(chosen),
         },

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::choice::Mode;
-use super::grid::{Grid, Mark};
+use super::choice::ReadingMode;
+use super::grid::{Grid, TrialResult};
 use super::subject::Subject;
 use crate::types::{FailureKind, Record, UnreadReason};
 
@@ -25,8 +25,8 @@ pub struct Health {
 }
 
 impl Health {
-    fn count(&mut self, mark: Mark, record: &Record) {
-        let Some(strict) = mark.reading(Mode::Strict) else {
+    fn count(&mut self, mark: TrialResult, record: &Record) {
+        let Some(strict) = mark.reading(ReadingMode::Strict) else {
             if let Some(failure) = &record.failure {
                 *self.failed.entry(failure.kind).or_default() += 1;
             }
@@ -34,7 +34,7 @@ impl Health {
         };
         self.replies += 1;
         self.read += usize::from(strict.is_some());
-        let lenient = mark.reading(Mode::Lenient).flatten();
+        let lenient = mark.reading(ReadingMode::Lenient).flatten();
         self.lenient_only += usize::from(strict.is_none() && lenient.is_some());
         if let Some(why) = record.detail.strict.and_then(|reading| reading.why) {
             *self.unread.entry(why).or_default() += 1;

@@ -1,6 +1,6 @@
-//! Two subjects on the same items: [`Paired`].
+//! Two subjects on the same items: [`PairedComparison`].
 
-use super::choice::Mode;
+use super::choice::ReadingMode;
 use super::estimate::Estimate;
 use super::grid::Grid;
 use super::significance::{mcnemar, sign_flip};
@@ -9,7 +9,7 @@ use crate::types::Family;
 
 /// How one subject does against another on the items that both replied to.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Paired {
+pub struct PairedComparison {
     /// The accuracy of the first.
     pub first: f64,
     /// The accuracy of the second.
@@ -28,30 +28,30 @@ pub struct Paired {
 
 /// The pairs of a cluster.
 #[derive(Debug, Clone, Copy, Default)]
-struct Pairs {
+struct ClusterPairs {
     all: i64,
     gained: i64,
     lost: i64,
 }
 
-impl Pairs {
+impl ClusterPairs {
     /// The sum of their differences, and their number.
     fn net(&self) -> (f64, f64) {
         ((self.gained - self.lost) as f64, self.all as f64)
     }
 }
 
-impl Paired {
-    /// Pairs two subjects by item; `None` where no item has a reply of both.
+impl PairedComparison {
+    /// ClusterPairs two subjects by item; `None` where no item has a reply of both.
     #[must_use]
     pub fn new(
         grid: &Grid<'_>,
         first: usize,
         second: usize,
         family: Option<&Family>,
-        mode: Mode,
+        mode: ReadingMode,
     ) -> Option<Self> {
-        let mut clusters = vec![Pairs::default(); grid.clusters];
+        let mut clusters = vec![ClusterPairs::default(); grid.clusters];
         let mut right = [0_usize; 2];
         for (index, item) in grid.items.iter().enumerate() {
             if !item.is_of(family) {
@@ -74,11 +74,11 @@ impl Paired {
         if n == 0 {
             return None;
         }
-        let sum = |of: fn(&Pairs) -> i64| clusters.iter().map(of).sum::<i64>() as usize;
+        let sum = |of: fn(&ClusterPairs) -> i64| clusters.iter().map(of).sum::<i64>() as usize;
         let (gained, lost) = (sum(|pairs| pairs.gained), sum(|pairs| pairs.lost));
         let differences = clusters.iter().map(|cluster| cluster.gained - cluster.lost);
         let differences: Vec<i64> = differences.collect();
-        let nets: Vec<(f64, f64)> = clusters.iter().map(Pairs::net).collect();
+        let nets: Vec<(f64, f64)> = clusters.iter().map(ClusterPairs::net).collect();
         Some(Self {
             first: right[0] as f64 / n as f64,
             second: right[1] as f64 / n as f64,
@@ -122,9 +122,10 @@ mod tests {
     use super::*;
 
     fn estimate(clusters: &[(i64, i64, i64)]) -> Estimate {
-        let clusters = clusters
-            .iter()
-            .map(|&(all, gained, lost)| Pairs { all, gained, lost });
+        let clusters =
+            clusters
+                .iter()
+                .map(|&(all, gained, lost)| ClusterPairs { all, gained, lost });
         let clusters: Vec<(f64, f64)> = clusters.map(|pairs| pairs.net()).collect();
         let n = clusters.iter().map(|(_, pairs)| pairs).sum::<f64>() as usize;
         difference(&clusters, n)

@@ -19,7 +19,7 @@ pub(super) const QUESTIONS: &str = "questions.jsonl";
 pub(super) const THUMBNAILS: &str = "thumbnails.jsonl";
 /// Whether a kept run may go on at another address of its endpoint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Moved {
+pub enum AddressChange {
     /// It may: the user has named this run as the one to go on with, and says so that it is the same model.
     Allowed,
     /// It may not: another server may serve another model by the same name.
@@ -160,7 +160,7 @@ pub(super) fn agree(
     folder: &Path,
     kept: &RunManifest,
     now: &RunManifest,
-    moved: Moved,
+    moved: AddressChange,
 ) -> Result<()> {
     let wrong = |problem: String| {
         let path = folder.to_owned();
@@ -186,7 +186,7 @@ pub(super) fn agree(
             second: after,
         } = difference;
         let address = field == ADDRESS;
-        if address && moved == Moved::Allowed {
+        if address && moved == AddressChange::Allowed {
             tracing::warn!("{value} was asked at {before} in this run; it goes on at {after}");
             continue;
         }

@@ -37,7 +37,7 @@ pub(super) fn json_lines<T: Serialize>(path: &Path, values: &[T]) -> Result<Vec<
 }
 
 /// The whole lines of a file of records, or of what else a run keeps; none where there is no such file.
-pub(super) fn lines<T: Line>(path: &Path) -> Result<Vec<T>> {
+pub(super) fn lines<T: StoredLine>(path: &Path) -> Result<Vec<T>> {
     let file = match File::open(path) {
         Ok(file) => file,
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
@@ -65,20 +65,20 @@ pub(super) fn lines<T: Line>(path: &Path) -> Result<Vec<T>> {
 }
 
 /// What a line of a run's files holds.
-pub(super) trait Line: DeserializeOwned {
+pub(super) trait StoredLine: DeserializeOwned {
     /// What it is called.
     const WHAT: &str;
 }
 
-impl<D: Detail> Line for Record<D> {
+impl<D: Detail> StoredLine for Record<D> {
     const WHAT: &str = "a record";
 }
 
-impl Line for RunQuestion {
+impl StoredLine for RunQuestion {
     const WHAT: &str = "a question";
 }
 
-impl Line for Thumbnail {
+impl StoredLine for Thumbnail {
     const WHAT: &str = "a thumbnail";
 }
 

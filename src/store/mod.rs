@@ -24,7 +24,7 @@ use folder::{QUESTIONS, RECORDS, THUMBNAILS, agree, claim, write, write_manifest
 use lines::{append, json_lines, lines, mend};
 
 pub use folder::{
-    Moved, find, read_manifest, read_questions, read_records, read_thumbnails, schema,
+    AddressChange, find, read_manifest, read_questions, read_records, read_thumbnails, schema,
 };
 
 /// The folder of batches in a run.
@@ -52,7 +52,7 @@ impl<D: Detail> Store<D> {
     /// # Errors
     /// Where the folder holds something else, another run (the message names the flag that differs), a broken record, or
     /// is held by another process.
-    pub fn open(folder: &Path, manifest: &RunManifest, moved: Moved) -> Result<Self> {
+    pub fn open(folder: &Path, manifest: &RunManifest, moved: AddressChange) -> Result<Self> {
         match read_manifest(folder, D::SCHEMA)? {
             Some(kept) => agree(folder, &kept, manifest, moved)?,
             None => claim(folder, manifest)?,

@@ -71,7 +71,7 @@ fn runs_of_other_versions_are_refused_by_what_they_are() {
 fn records_come_back_the_last_of_each_trial() {
     let base = tempfile::tempdir().unwrap();
     let folder = base.path().join("run");
-    let mut store = Store::open(&folder, &manifest(0), Moved::Refused).unwrap();
+    let mut store = Store::open(&folder, &manifest(0), AddressChange::Refused).unwrap();
     assert!(store.records().unwrap().is_empty());
     for (name, outcome) in [
         ("a", TrialOutcome::Failed),
@@ -81,7 +81,7 @@ fn records_come_back_the_last_of_each_trial() {
         store.append(&record(name, outcome)).unwrap();
     }
     drop(store);
-    let kept = Store::open(&folder, &manifest(0), Moved::Refused)
+    let kept = Store::open(&folder, &manifest(0), AddressChange::Refused)
         .unwrap()
         .records()
         .unwrap();
@@ -97,22 +97,22 @@ fn records_come_back_the_last_of_each_trial() {
 #[test]
 fn a_torn_line_is_cut_and_a_broken_one_is_named() {
     let base = tempfile::tempdir().unwrap();
-    let mut store = Store::open(base.path(), &manifest(0), Moved::Refused).unwrap();
+    let mut store = Store::open(base.path(), &manifest(0), AddressChange::Refused).unwrap();
     store.append(&record("a", TrialOutcome::Right)).unwrap();
     store.records.write_all(b"{\"key\":\"12").unwrap();
     drop(store);
-    let mut store = Store::open(base.path(), &manifest(0), Moved::Refused).unwrap();
+    let mut store = Store::open(base.path(), &manifest(0), AddressChange::Refused).unwrap();
     assert_eq!(store.records().unwrap().len(), 1);
     store.append(&record("b", TrialOutcome::Right)).unwrap();
     drop(store);
-    let kept = Store::open(base.path(), &manifest(0), Moved::Refused)
+    let kept = Store::open(base.path(), &manifest(0), AddressChange::Refused)
         .unwrap()
         .records();
     assert_eq!(kept.unwrap().len(), 2);
     let path = base.path().join(RECORDS);
     let text = fs::read_to_string(&path).unwrap();
     fs::write(&path, text.replacen("{\"key\"", "{\"kex\"", 1)).unwrap();
-    let store = Store::open(base.path(), &manifest(0), Moved::Refused).unwrap();
+    let store = Store::open(base.path(), &manifest(0), AddressChange::Refused).unwrap();
     let error = store.records().unwrap_err().to_string();
     assert!(
         error.contains("records.jsonl, line 1: not a record"),
@@ -123,8 +123,8 @@ fn a_torn_line_is_cut_and_a_broken_one_is_named() {
 #[test]
 fn another_run_is_refused_by_the_flag_that_differs() {
     let base = tempfile::tempdir().unwrap();
-    drop(Store::open(base.path(), &manifest(0), Moved::Refused).unwrap());
-    let error = Store::open(base.path(), &manifest(7), Moved::Refused)
+    drop(Store::open(base.path(), &manifest(0), AddressChange::Refused).unwrap());
+    let error = Store::open(base.path(), &manifest(7), AddressChange::Refused)
         .unwrap_err()
         .to_string();
     assert!(
@@ -136,9 +136,9 @@ fn another_run_is_refused_by_the_flag_that_differs() {
 #[test]
 fn a_run_is_held_by_one_process_and_a_strange_folder_is_left_alone() {
     let base = tempfile::tempdir().unwrap();
-    let _held = Store::open(base.path(), &manifest(0), Moved::Refused).unwrap();
+    let _held = Store::open(base.path(), &manifest(0), AddressChange::Refused).unwrap();
     assert!(
-        Store::open(base.path(), &manifest(0), Moved::Refused)
+        Store::open(base.path(), &manifest(0), AddressChange::Refused)
             .unwrap_err()
             .to_string()
             .contains("another process")
@@ -146,7 +146,7 @@ fn a_run_is_held_by_one_process_and_a_strange_folder_is_left_alone() {
     let strange = tempfile::tempdir().unwrap();
     fs::write(strange.path().join("thesis.tex"), "").unwrap();
     assert!(
-        Store::open(strange.path(), &manifest(0), Moved::Refused)
+        Store::open(strange.path(), &manifest(0), AddressChange::Refused)
             .unwrap_err()
             .to_string()
             .contains("not empty")
@@ -162,9 +162,9 @@ fn a_run_goes_on_at_another_address_where_it_is_named() {
         manifest
     };
     let base = tempfile::tempdir().unwrap();
-    drop(Store::open(base.path(), &at("here"), Moved::Refused).unwrap());
-    assert!(Store::open(base.path(), &at("there"), Moved::Allowed).is_ok());
-    let error = Store::open(base.path(), &at("there"), Moved::Refused).unwrap_err();
+    drop(Store::open(base.path(), &at("here"), AddressChange::Refused).unwrap());
+    assert!(Store::open(base.path(), &at("there"), AddressChange::Allowed).is_ok());
+    let error = Store::open(base.path(), &at("there"), AddressChange::Refused).unwrap_err();
     assert!(error.to_string().contains("--resume"), "{error}");
 }
 
@@ -172,7 +172,7 @@ fn a_run_goes_on_at_another_address_where_it_is_named() {
 fn what_a_killed_process_left_unfinished_is_in_nobodys_way() {
     let base = tempfile::tempdir().unwrap();
     fs::write(base.path().join(".manifest.json.part"), "{").unwrap();
-    assert!(Store::open(base.path(), &manifest(0), Moved::Refused).is_ok());
+    assert!(Store::open(base.path(), &manifest(0), AddressChange::Refused).is_ok());
 }
 
 #[test]
@@ -183,7 +183,14 @@ fn runs_are_found_by_their_hash() {
         "20260102-m-d-0123abcd",
         "20260103-m-d-99999999",
     ] {
-        drop(Store::open(&base.path().join(name), &manifest(0), Moved::Refused).unwrap());
+        drop(
+            Store::open(
+                &base.path().join(name),
+                &manifest(0),
+                AddressChange::Refused,
+            )
+            .unwrap(),
+        );
     }
     fs::create_dir(base.path().join("20260104-m-d-0123abcd")).unwrap();
     let found = find(base.path(), "0123abcd").unwrap();

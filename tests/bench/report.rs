@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use darkqa_eval::report::page::Shown;
+use darkqa_eval::report::page::PageInputs;
 use darkqa_eval::report::products::products;
 use darkqa_eval::report::tables::tables;
 use darkqa_eval::score::findings::Findings;
@@ -58,7 +58,7 @@ fn bench(c: &mut Criterion) {
     group.sample_size(10);
     group.bench_function("find what they say", |b| b.iter(|| black_box(find())));
     let findings = find();
-    let shown = Shown {
+    let shown = PageInputs {
         runs: Vec::new(),
         questions: &[],
         thumbnails: &[],

@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::job::outcome::Outcome;
 use crate::job::outcome::Show;
 use crate::job::stored::StoredRun;
-use crate::report::json::{Runs, summary};
+use crate::report::json::{RunList, summary};
 use crate::report::products::{PAGE, products};
 use crate::report::tables::tables;
 use crate::report::terminal::evaluation;
@@ -40,7 +40,7 @@ pub(super) fn in_its_folder(
         store.write(&name, &content)?;
     }
     let unread = &findings.summary.unread;
-    let json = |folder| summary(&tables, unread, Runs::One(manifest, folder));
+    let json = |folder| summary(&tables, unread, RunList::One(manifest, folder));
     store.write("summary.json", json(None)?.as_bytes())?;
     store.write_manifest(manifest)?;
     Ok(match show {

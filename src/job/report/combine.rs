@@ -6,8 +6,8 @@ use std::path::Path;
 use super::join::{Joined, join};
 use crate::error::{Error, Result};
 use crate::job::stored::StoredRun;
-use crate::report::page::{self, Shown};
-use crate::score::chance::Offer;
+use crate::report::page::{self, PageInputs};
+use crate::score::chance::OfferedChoices;
 use crate::score::findings::Findings;
 use crate::types::manifest::RunManifest;
 use crate::types::{ChoiceDetail, QuestionId, Record, RunQuestion};
@@ -25,14 +25,14 @@ impl Combined {
     }
 
     /// What the page shows besides.
-    pub(super) fn shown(&self) -> Shown<'_> {
-        let runs = self.runs.iter().map(|run| page::Run {
+    pub(super) fn shown(&self) -> PageInputs<'_> {
+        let runs = self.runs.iter().map(|run| page::PageRun {
             name: run.name.clone(),
             manifest: &run.manifest,
             records: &self.records[run.records.clone()],
             cost: run.cost.clone(),
         });
-        Shown {
+        PageInputs {
             runs: runs.collect(),
             questions: &self.questions,
             thumbnails: &self.thumbnails,
@@ -59,21 +59,22 @@ pub(super) fn combine(runs: Vec<StoredRun<ChoiceDetail>>) -> Result<Combined> {
 
 /// What is offered, for the chance line: each question as often as it has orders of its choices, since an answer to each order
 /// counts for itself; those not asked yet once. A run that kept no questions has those in its records.
-fn offers(records: &[Record], questions: &[RunQuestion]) -> Vec<Offer> {
+fn offers(records: &[Record], questions: &[RunQuestion]) -> Vec<OfferedChoices> {
     let mut orders = BTreeMap::<&QuestionId, BTreeSet<&[String]>>::new();
-    let mut all = BTreeMap::<&QuestionId, Offer>::new();
+    let mut all = BTreeMap::<&QuestionId, OfferedChoices>::new();
     for record in records {
         orders
             .entry(&record.question)
             .or_default()
             .insert(&record.detail.choices);
-        all.entry(&record.question).or_insert_with(|| Offer {
-            family: record.detail.family.clone(),
-            choices: record.detail.choices.len(),
-        });
+        all.entry(&record.question)
+            .or_insert_with(|| OfferedChoices {
+                family: record.detail.family.clone(),
+                choices: record.detail.choices.len(),
+            });
     }
     for question in questions {
-        all.entry(&question.id).or_insert_with(|| Offer {
+        all.entry(&question.id).or_insert_with(|| OfferedChoices {
             family: question.family.clone(),
             choices: question.choices.len(),
         });

@@ -7,14 +7,14 @@ use serde_json::Value;
 
 use super::join::join;
 use crate::error::{Error, Result};
-use crate::job::outcome::Outcome as Ended;
+use crate::job::outcome::Outcome;
 use crate::job::outcome::Show;
 use crate::job::predictions::{AnswerState, Prediction, predictions};
 use crate::job::stored::{StoredRun, in_order};
-use crate::report::openeqa::{OpenReport, Told, products, render, summary_json, tables};
+use crate::report::openeqa::{OpenReport, ReportedAnswer, products, render, summary_json, tables};
 use crate::report::table::Table;
 use crate::score::llm_match::{Protocol, mark};
-use crate::score::open::{OpenSummary, Outcome, Scored, Topic, open_summary};
+use crate::score::open::{AnswerOutcome, OpenSummary, QuestionGroups, ScoredAnswer, open_summary};
 use crate::store::Store;
 use crate::types::flag::read_word;
 use crate::types::manifest::Status;
@@ -31,7 +31,7 @@ pub(crate) struct Scores {
     judge: Option<String>,
     protocol: Protocol,
     summary: OpenSummary,
-    answers: Vec<Told>,
+    answers: Vec<ReportedAnswer>,
 }
 
 impl Scores {
@@ -46,20 +46,20 @@ impl Scores {
         let (mut scored, mut answers) = (Vec::new(), Vec::new());
         for prediction in predicted {
             let outcome = outcome(&prediction, ids[prediction.question], &marks, protocol);
-            scored.push(Scored {
+            scored.push(ScoredAnswer {
                 subject: prediction.subject.clone(),
                 question: prediction.question,
                 outcome,
                 cut: matches!(prediction.state, AnswerState::Text { cut: true, .. }),
             });
-            answers.push(Told {
+            answers.push(ReportedAnswer {
                 subject: prediction.subject,
                 question: prediction.question,
                 answer: prediction.full_answer,
                 outcome,
             });
         }
-        let topics: Vec<Topic> = run.questions.iter().map(topic).collect();
+        let topics: Vec<QuestionGroups> = run.questions.iter().map(topic).collect();
         Ok(Self {
             summary: open_summary(&scored, &topics),
             run,
@@ -72,7 +72,7 @@ impl Scores {
     /// Whether a mark came that cannot be read.
     fn unmarked(&self) -> bool {
         let mut answers = self.answers.iter();
-        answers.any(|answer| answer.outcome == Outcome::Unmarked)
+        answers.any(|answer| answer.outcome == AnswerOutcome::Unmarked)
     }
 
     fn report(&self) -> OpenReport<'_> {
@@ -178,12 +178,12 @@ pub(crate) fn write(
     store: &Store<OpenDetail>,
     run: StoredRun<OpenDetail>,
     show: Show,
-) -> Result<Ended> {
+) -> Result<Outcome> {
     let mut scores = Scores::new(run)?;
     if scores.run.manifest.status == Status::Complete && scores.unmarked() {
         scores.run.manifest.status = Status::Incomplete;
     }
-    Ok(Ended {
+    Ok(Outcome {
         status: scores.run.manifest.status,
         output: scores.write(store, show)?,
     })
@@ -208,23 +208,23 @@ fn outcome(
     question: &QuestionId,
     marks: &Marks<'_>,
     protocol: Protocol,
-) -> Outcome {
+) -> AnswerOutcome {
     let answer = match &prediction.state {
-        AnswerState::Missing => return Outcome::Missing,
-        AnswerState::Null => return Outcome::Null,
+        AnswerState::Missing => return AnswerOutcome::Missing,
+        AnswerState::Null => return AnswerOutcome::Null,
         AnswerState::Text { answer, .. } => answer,
     };
     let Some(record) = marks.get(&(question, &**answer)) else {
-        return Outcome::Unjudged;
+        return AnswerOutcome::Unjudged;
     };
     // Read again: alike in every table, also if an earlier version has kept it.
     let reply = record.reply.as_deref().unwrap_or_default();
-    mark(reply, protocol).map_or(Outcome::Unmarked, Outcome::Marked)
+    mark(reply, protocol).map_or(AnswerOutcome::Unmarked, AnswerOutcome::Marked)
 }
 
-fn topic(question: &RunQuestion) -> Topic {
+fn topic(question: &RunQuestion) -> QuestionGroups {
     let episode = question.frame.0.clone();
-    Topic {
+    QuestionGroups {
         split: episode.split('/').next().unwrap_or_default().to_owned(),
         category: question.family.name().to_owned(),
         episode,

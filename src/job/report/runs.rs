@@ -12,11 +12,11 @@ use crate::error::{Error, Result};
 use crate::files;
 use crate::job::stored::{AnyRun, StoredRun};
 use crate::job::{Outcome, Show, count};
-use crate::report::json::{Runs, summary};
+use crate::report::json::{RunList, summary};
 use crate::report::products::{PAGE, products};
 use crate::report::tables::tables;
 use crate::report::terminal::evaluation;
-use crate::store::{Moved, Store};
+use crate::store::{AddressChange, Store};
 use crate::types::manifest::Status;
 use crate::types::{ChoiceDetail, OpenDetail};
 
@@ -93,7 +93,7 @@ fn of_choices(args: &ReportArgs, mut runs: Vec<StoredRun<ChoiceDetail>>) -> Resu
     }
     let combined = combine(runs)?;
     output += &match (&*combined.runs, &args.out) {
-        ([run], None) => match Store::open(&run.folder, &run.manifest, Moved::Allowed) {
+        ([run], None) => match Store::open(&run.folder, &run.manifest, AddressChange::Allowed) {
             Ok(store) => in_its_folder(&store, &run.manifest, &combined, args.show())?,
             // A run under way, or in a folder that cannot be written to, is shown all the same.
             Err(held) => {
@@ -111,7 +111,7 @@ fn compare(combined: &Combined, args: &ReportArgs) -> Result<String> {
     let findings = combined.findings();
     let (tables, places) = (tables(&findings), combined.places());
     let shown = match args.show() {
-        Show::Json => summary(&tables, &findings.summary.unread, Runs::Several(&places))?,
+        Show::Json => summary(&tables, &findings.summary.unread, RunList::Several(&places))?,
         Show::Table => evaluation(&tables, &places),
     };
     let made = match args.out {
@@ -146,7 +146,7 @@ fn of_open(args: &ReportArgs, runs: Vec<StoredRun<OpenDetail>>) -> Result<String
     let scores = open::Scores::new(open::combine(runs)?)?;
     let run = &scores.run;
     if alone && args.out.is_none() {
-        match Store::open(&run.folder, &run.manifest, Moved::Allowed) {
+        match Store::open(&run.folder, &run.manifest, AddressChange::Allowed) {
             Ok(store) => return scores.write(&store, args.show()),
             Err(held) => tracing::warn!("the report is not written: {held}"),
         }
@@ -160,7 +160,7 @@ fn of_open(args: &ReportArgs, runs: Vec<StoredRun<OpenDetail>>) -> Result<String
 
 /// Reads all kept replies again and keeps the readings that changed; how many did.
 fn reread(run: &mut StoredRun<ChoiceDetail>) -> Result<usize> {
-    let mut store = Store::open(&run.folder, &run.manifest, Moved::Allowed)?;
+    let mut store = Store::open(&run.folder, &run.manifest, AddressChange::Allowed)?;
     let mut changed = 0;
     for record in &mut run.records {
         let now = record.clone().reread()?;

@@ -1,6 +1,6 @@
 //! What models say when they no longer see: hallucination and collapse.
 
-use super::super::chart::{Chart, Line, Panel, Shape};
+use super::super::chart::{Chart, Panel, PanelContent, PlotLine};
 use super::super::words::{family as family_name, light};
 use super::{GROUND, Overview};
 use crate::score::confusion::{Confusion, Hallucination};
@@ -19,8 +19,8 @@ impl Overview<'_> {
                 rate(rates.find(|rates| rates.subject == *subject)?)
             });
             let n = lines.iter().find_map(|line| match &line.shape {
-                Shape::Curve(points) => points.first().map(|(_, rate)| rate.n),
-                Shape::Flat(_) => None,
+                PanelContent::Curve(points) => points.first().map(|(_, rate)| rate.n),
+                PanelContent::Flat(_) => None,
             });
             let title = format!("{title}, n {}", n.unwrap_or(0));
             Panel { title, lines }
@@ -51,10 +51,10 @@ impl Overview<'_> {
                 Some(Estimate::exact(collapse.share, collapse.n))
             });
             let (share, n) = truth?;
-            lines.push(Line {
+            lines.push(PlotLine {
                 name: "commonest true answer".to_owned(),
                 look: GROUND,
-                shape: Shape::Flat(share),
+                shape: PanelContent::Flat(share),
             });
             let title = format!("{}, n {n}", family_name(Some(&family)));
             Some(Panel { title, lines })

@@ -5,10 +5,10 @@ mod thresholds;
 
 use std::collections::BTreeSet;
 
-use super::chart::{Chart, Figure, Line, Look, Panel, Shape};
+use super::chart::{Chart, Figure, LineStyle, Panel, PanelContent, PlotLine};
 use super::words::{family as family_name, light};
 use crate::error::Result;
-use crate::score::choice::Mode;
+use crate::score::choice::ReadingMode;
 use crate::score::estimate::Estimate;
 use crate::score::findings::Findings;
 use crate::score::subject::{CHANCE, Subject};
@@ -44,7 +44,7 @@ pub fn figures(findings: &Findings<'_>) -> Result<Vec<Figure>> {
 const BUILT_IN: [&str; 2] = ["random", "observer"];
 
 /// The look of what no model says: chance, and the truth.
-const GROUND: Look = Look(27);
+const GROUND: LineStyle = LineStyle(27);
 
 const ACCURACY: &str = "accuracy in %";
 
@@ -92,13 +92,16 @@ impl<'a> Overview<'a> {
 
     /// The accuracy of a subject on a family.
     fn share(&self, subject: &Subject, family: Option<&Family>) -> Option<Estimate> {
-        let cell = self.findings.summary.cell(subject, family, Mode::Strict)?;
+        let cell = self
+            .findings
+            .summary
+            .cell(subject, family, ReadingMode::Strict)?;
         cell.accuracy
     }
 
     /// The blind lines, each in the look of its model, and chance.
-    fn floors(&self, family: Option<&Family>) -> Vec<Line> {
-        let cells = self.findings.summary.of(family, Mode::Strict);
+    fn floors(&self, family: Option<&Family>) -> Vec<PlotLine> {
+        let cells = self.findings.summary.of(family, ReadingMode::Strict);
         let here = cells.filter(|cell| cell.subject.view != Some(View::Image));
         let lines = here.filter_map(|cell| {
             let model = &*cell.subject.model;
@@ -107,8 +110,8 @@ impl<'a> Overview<'a> {
             } else {
                 (format!("{model} without images"), self.look(model))
             };
-            let shape = Shape::Flat(cell.accuracy?.value);
-            Some(Line { name, look, shape })
+            let shape = PanelContent::Flat(cell.accuracy?.value);
+            Some(PlotLine { name, look, shape })
         });
         lines.collect()
     }
@@ -124,9 +127,9 @@ impl<'a> Overview<'a> {
         }
     }
 
-    fn look(&self, model: &str) -> Look {
+    fn look(&self, model: &str) -> LineStyle {
         let place = self.models.iter().position(|known| *known == model);
-        Look(place.unwrap_or(self.models.len()))
+        LineStyle(place.unwrap_or(self.models.len()))
     }
 
     /// What is drawn where one variant has to do: the last kind that was asked, the noisy one, in its first reading.
@@ -150,18 +153,18 @@ impl<'a> Overview<'a> {
         &self,
         variant: &KindReading,
         mut number: impl FnMut(&Subject) -> Option<Estimate>,
-    ) -> Vec<Line> {
+    ) -> Vec<PlotLine> {
         let models = self.models.iter();
-        let lines = models.map(|model| Line {
+        let lines = models.map(|model| PlotLine {
             name: (*model).to_owned(),
             look: self.look(model),
-            shape: Shape::Curve(self.points(model, variant, None, &mut number)),
+            shape: PanelContent::Curve(self.points(model, variant, None, &mut number)),
         });
         lines.collect()
     }
 
     /// The lines of the accuracy of all models, with what they are held against.
-    fn accuracies(&self, variant: &KindReading, family: Option<&Family>) -> Vec<Line> {
+    fn accuracies(&self, variant: &KindReading, family: Option<&Family>) -> Vec<PlotLine> {
         let mut lines = self.lines(variant, |subject| self.share(subject, family));
         lines.extend(self.floors(family));
         lines
@@ -204,13 +207,13 @@ impl<'a> Overview<'a> {
             let curves: Vec<Vec<(AxisLevel, Estimate)>> = curves
                 .map(|model| self.points(model, variant, None, |subject| self.share(subject, None)))
                 .collect();
-            Line {
+            PlotLine {
                 name: light(variant, None),
-                look: Look(index),
-                shape: Shape::Curve(mean(&curves)),
+                look: LineStyle(index),
+                shape: PanelContent::Curve(mean(&curves)),
             }
         };
-        let mut lines: Vec<Line> = variants.iter().enumerate().map(line).collect();
+        let mut lines: Vec<PlotLine> = variants.iter().enumerate().map(line).collect();
         let floors = self.floors(None).into_iter();
         lines.extend(floors.filter(|line| line.name == CHANCE));
         let title = match &*models {
@@ -241,14 +244,14 @@ impl<'a> Overview<'a> {
                         self.share(subject, None)
                     });
                     // L0 alone is no line of an enhancer's.
-                    (points.len() > 1).then(|| Line {
+                    (points.len() > 1).then(|| PlotLine {
                         name: enhancer.map_or("raw".to_owned(), ToString::to_string),
-                        look: Look(index),
-                        shape: Shape::Curve(points),
+                        look: LineStyle(index),
+                        shape: PanelContent::Curve(points),
                     })
                 };
                 let all = std::iter::once(None).chain(self.enhancers.iter().copied().map(Some));
-                let lines: Vec<Line> = all.enumerate().filter_map(line).collect();
+                let lines: Vec<PlotLine> = all.enumerate().filter_map(line).collect();
                 if lines.len() > 1 {
                     let title = format!("{model}, {}, n {}", light(&variant, None), self.n(None));
                     panels.push(Panel { title, lines });

@@ -2,7 +2,9 @@
 
 use plotters::prelude::*;
 
-use super::super::chart::{Area, BELOW, Figure, GRID, LEFT, Look, PAPER, RIGHT, path, words};
+use super::super::chart::{
+    BELOW, Figure, FigureArea, GRID, LEFT, LineStyle, PAPER, RIGHT, path, words,
+};
 use super::super::words::{light, stops};
 use crate::error::{Error, Result};
 use crate::score::curve::{Curve, Threshold};
@@ -49,10 +51,10 @@ pub(super) fn figure(findings: &Findings<'_>) -> Result<Option<Figure>> {
     }))
 }
 
-fn draw(root: &Area<'_>, rows: &[(&Curve, Threshold)], unit: &str) -> Result<(), String> {
+fn draw(root: &FigureArea<'_>, rows: &[(&Curve, Threshold)], unit: &str) -> Result<(), String> {
     let failed = |e: DrawingAreaErrorKind<_>| e.to_string();
     let x = |ev: f64| NAMES + (ev.clamp(0.0, MOST) / MOST * f64::from(AXIS)).round() as i32;
-    let dot = Look(0).colour();
+    let dot = LineStyle(0).colour();
     root.fill(&PAPER).map_err(failed)?;
     let bottom = 12 + rows.len() as i32 * ROW;
     for tick in 0..=9 {

@@ -3,7 +3,7 @@
 use super::open_report::OpenReport;
 use super::tables::ladder;
 use crate::error::Result;
-use crate::report::chart::{Chart, Figure, Line, Look, Panel, Shape};
+use crate::report::chart::{Chart, Figure, LineStyle, Panel, PanelContent, PlotLine};
 use crate::score::open::Group;
 
 /// The scores by level, all questions together, and by category where there are several.
@@ -55,18 +55,18 @@ fn panel(report: &OpenReport<'_>, group: &Group) -> Panel {
     let lines = lines.map(|(place, (series, steps))| {
         let steps = steps.iter();
         let points = steps.filter_map(|(level, cell)| Some((*level, cell.score?)));
-        Line {
+        PlotLine {
             name: format!("{}, {}", series.model, series.light()),
-            look: Look(place),
-            shape: Shape::Curve(points.collect()),
+            look: LineStyle(place),
+            shape: PanelContent::Curve(points.collect()),
         }
     });
     let blind = ladder.floors.iter().enumerate();
     let blind = blind.filter_map(|(place, (subject, cell))| {
-        Some(Line {
+        Some(PlotLine {
             name: format!("{} without images", subject.model),
-            look: Look(seeing + place),
-            shape: Shape::Flat(cell.score?.value),
+            look: LineStyle(seeing + place),
+            shape: PanelContent::Flat(cell.score?.value),
         })
     });
     let n = report.questions.len();

@@ -12,7 +12,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-pub use open_report::{OpenReport, Told};
+pub use open_report::{OpenReport, ReportedAnswer};
 pub use tables::tables;
 
 use self::coverage::coverage;

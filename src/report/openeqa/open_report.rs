@@ -1,7 +1,7 @@
 //! What a run of open questions says: [`OpenReport`].
 
 use crate::score::llm_match::Protocol;
-use crate::score::open::{OpenSummary, Outcome};
+use crate::score::open::{AnswerOutcome, OpenSummary};
 use crate::score::subject::Subject;
 use crate::types::manifest::RunManifest;
 use crate::types::{RunQuestion, Thumbnail};
@@ -22,14 +22,14 @@ pub struct OpenReport<'a> {
     /// The questions in the order of their file.
     pub questions: &'a [RunQuestion],
     /// The answers, each to one of the questions.
-    pub answers: &'a [Told],
+    pub answers: &'a [ReportedAnswer],
     /// The small copies of images, by walk and condition.
     pub thumbnails: &'a [Thumbnail],
 }
 
 /// One answer.
 #[derive(Debug, Clone)]
-pub struct Told {
+pub struct ReportedAnswer {
     /// Whose.
     pub subject: Subject,
     /// The question's place.
@@ -37,5 +37,5 @@ pub struct Told {
     /// In its own words; `None` where there is none.
     pub answer: Option<String>,
     /// What came of it.
-    pub outcome: Outcome,
+    pub outcome: AnswerOutcome,
 }

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde_json::{Value, json};
 
 use super::coverage::coverage;
-use super::open_report::{OpenReport, Told};
+use super::open_report::{OpenReport, ReportedAnswer};
 use super::tables::SECTION;
 use crate::error::Result;
 use crate::report::chart::Figure;
@@ -13,7 +13,7 @@ use crate::report::page::{STYLE, manifest_facts, tables};
 use crate::report::readable::readable;
 use crate::report::table::Table;
 use crate::report::template::filled;
-use crate::score::open::Outcome;
+use crate::score::open::AnswerOutcome;
 use crate::score::subject::Subject;
 use crate::types::{AxisLevel, View};
 
@@ -54,7 +54,7 @@ fn alerts(report: &OpenReport<'_>) -> Vec<String> {
     let (status, counts) = (report.manifest.status, report.manifest.counts);
     let mut alerts = Vec::new();
     let unmarked = report.answers.iter();
-    let unmarked = unmarked.filter(|told| told.outcome == Outcome::Unmarked);
+    let unmarked = unmarked.filter(|told| told.outcome == AnswerOutcome::Unmarked);
     match unmarked.count() {
         0 => {}
         n => alerts.push(format!(
@@ -96,7 +96,7 @@ fn intro(report: &OpenReport<'_>) -> Vec<String> {
 
 /// The walks in the order of their questions, each with its images and questions.
 fn walks(report: &OpenReport<'_>) -> Vec<Value> {
-    let mut told = BTreeMap::<usize, Vec<&Told>>::new();
+    let mut told = BTreeMap::<usize, Vec<&ReportedAnswer>>::new();
     for one in report.answers {
         told.entry(one.question).or_default().push(one);
     }
@@ -146,17 +146,17 @@ fn images(report: &OpenReport<'_>, episode: &str) -> Vec<Value> {
     own.iter().map(image).collect()
 }
 
-fn row(told: &Told) -> Value {
+fn row(told: &ReportedAnswer) -> Value {
     let mark = match told.outcome {
-        Outcome::Marked(mark) => mark.to_string(),
-        Outcome::Null => "0 (no answer)".to_owned(),
-        Outcome::Unmarked => "none in the judge's reply".to_owned(),
-        Outcome::Unjudged => "not judged".to_owned(),
-        Outcome::Missing => "–".to_owned(),
+        AnswerOutcome::Marked(mark) => mark.to_string(),
+        AnswerOutcome::Null => "0 (no answer)".to_owned(),
+        AnswerOutcome::Unmarked => "none in the judge's reply".to_owned(),
+        AnswerOutcome::Unjudged => "not judged".to_owned(),
+        AnswerOutcome::Missing => "–".to_owned(),
     };
     let answer = match (&told.answer, told.outcome) {
         (Some(answer), _) => readable(answer),
-        (None, Outcome::Missing) => "not answered".to_owned(),
+        (None, AnswerOutcome::Missing) => "not answered".to_owned(),
         (None, _) => "none".to_owned(),
     };
     let subject = &told.subject;
@@ -164,13 +164,13 @@ fn row(told: &Told) -> Value {
 }
 
 /// `gpt-4o L0 5 · L2-noise 4`, a text for each model that sees.
-fn marks(told: &[&Told]) -> Vec<String> {
+fn marks(told: &[&ReportedAnswer]) -> Vec<String> {
     let mut by_model = BTreeMap::<&str, Vec<String>>::new();
     for one in told {
         if one.subject.view == Some(View::Image) {
             let mark = match one.outcome {
-                Outcome::Marked(mark) => mark.to_string(),
-                Outcome::Null => "0".to_owned(),
+                AnswerOutcome::Marked(mark) => mark.to_string(),
+                AnswerOutcome::Null => "0".to_owned(),
                 _ => "–".to_owned(),
             };
             let model = by_model.entry(&one.subject.model).or_default();
@@ -183,7 +183,7 @@ fn marks(told: &[&Told]) -> Vec<String> {
         .collect()
 }
 
-fn lost(told: &[&Told]) -> bool {
+fn lost(told: &[&ReportedAnswer]) -> bool {
     let points = |subject: &Subject| {
         let mut own = told.iter().filter(|one| one.subject == *subject);
         own.find_map(|one| one.outcome.points())

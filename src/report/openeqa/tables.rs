@@ -1,14 +1,14 @@
 //! The tables of a run of open questions: [`tables`].
 
 use super::open_report::OpenReport;
-use crate::report::ladder::{Ladder, Series, Steps};
+use crate::report::ladder::{Ladder, Series, SeriesByLevel};
 use crate::report::latex::escaped;
-use crate::report::table::Kind::{Accuracy, Count, Points, Share, Text};
-use crate::report::table::{Cell, Kind, Layout, Table};
+use crate::report::table::ColumnKind::{Accuracy, Count, Points, Share, Text};
+use crate::report::table::{ColumnKind, Table, TableBuilder, TableCell};
 use crate::report::tables::{SUMMARY, reading};
 use crate::report::terminal::texts;
 use crate::score::estimate::Estimate;
-use crate::score::open::{Against, Group, OpenCell, OpenSummary};
+use crate::score::open::{Baseline, Group, OpenCell, OpenSummary};
 use crate::score::subject::Subject;
 
 /// The section of the page with all tables.
@@ -41,13 +41,13 @@ pub(super) fn ladder<'a>(summary: &'a OpenSummary, group: &Group) -> Ladder<'a, 
 }
 
 /// A score, and what it differs by from the lit frames; of the unrounded means.
-fn score(summary: &OpenSummary, cell: Option<&OpenCell>) -> Cell {
+fn score(summary: &OpenSummary, cell: Option<&OpenCell>) -> TableCell {
     let Some(cell) = cell else {
-        return Cell::Absent;
+        return TableCell::Absent;
     };
-    let change = summary.change(&cell.subject, Against::Lit, &cell.group);
+    let change = summary.change(&cell.subject, Baseline::Lit, &cell.group);
     let change = change.map(|change| change.difference.value);
-    Cell::from(cell.score.map(|score| Cell::Changed(score, change)))
+    TableCell::from(cell.score.map(|score| TableCell::Changed(score, change)))
 }
 
 fn summary(summary: &OpenSummary) -> Table {
@@ -56,7 +56,7 @@ fn summary(summary: &OpenSummary) -> Table {
         Some(change.difference)
     };
     let drop = "csv drop drop_low drop_high drop_n";
-    Layout::new(SUMMARY, &summary.cells)
+    TableBuilder::new(SUMMARY, &summary.cells)
         .subject(|cell| &cell.subject, |variant| variant.word().to_owned())
         .column(Text, "csv by", |cell| cell.group.kind())
         .column(Text, "csv group", |cell| cell.group.name().to_owned())
@@ -68,9 +68,9 @@ fn summary(summary: &OpenSummary) -> Table {
         .column(Count, "csv null", |cell| cell.null)
         .column(Count, "csv cut", |cell| cell.cut)
         .column(Share, "csv value low high", |cell| cell.score)
-        .column(Points, drop, |cell| change(cell, Against::Lit))
+        .column(Points, drop, |cell| change(cell, Baseline::Lit))
         .column(Points, "csv gain gain_low gain_high", |cell| {
-            change(cell, Against::Raw)
+            change(cell, Baseline::Raw)
         })
         .column(Text, "csv reading", |cell| reading(&cell.subject))
         .made()
@@ -106,7 +106,7 @@ fn levels(report: &OpenReport<'_>) -> Table {
     ));
     let floors = ladder.floors.iter();
     let notes = floors.map(|(subject, cell)| {
-        let shown = texts(Kind::Accuracy, &score(summary, Some(cell))).concat();
+        let shown = texts(ColumnKind::Accuracy, &score(summary, Some(cell))).concat();
         let (scored, due) = (cell.scored(), cell.due);
         let of = if scored == due {
             String::new()
@@ -135,7 +135,7 @@ fn by_group(
         }
     };
     let light = series.light();
-    let mut layout = Layout::new("groups", rows)
+    let mut layout = TableBuilder::new("groups", rows)
         .page(SECTION, &format!("{}, {light}", series.model))
         .column(Text, "terminal model", |(place, _)| {
             once(*place, series.model)
@@ -151,7 +151,7 @@ fn by_group(
             Accuracy,
             &*format!("terminal {level} | page {level}"),
             |(_, (_, ladder))| {
-                let steps: Option<&Steps<'_, OpenCell>> = ladder.series.get(series);
+                let steps: Option<&SeriesByLevel<'_, OpenCell>> = ladder.series.get(series);
                 let cell = steps.and_then(|steps| steps.get(level));
                 score(summary, cell.copied())
             },

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::open_report::{OpenReport, Told};
+use super::open_report::{OpenReport, ReportedAnswer};
 use crate::error::{Error, Result};
-use crate::score::open::Outcome;
+use crate::score::open::AnswerOutcome;
 use crate::score::subject::Subject;
 
 /// The folder of these files.
@@ -22,16 +22,16 @@ struct Answer<'a> {
 /// was not answered or not marked is left out. Where several people answered one question there is no such file, which has one
 /// answer a question.
 pub(super) fn files(report: &OpenReport<'_>) -> Result<Vec<(String, Vec<u8>)>> {
-    let mut by_subject = BTreeMap::<&Subject, BTreeMap<usize, Vec<&Told>>>::new();
+    let mut by_subject = BTreeMap::<&Subject, BTreeMap<usize, Vec<&ReportedAnswer>>>::new();
     for told in report.answers {
-        if told.outcome != Outcome::Missing {
+        if told.outcome != AnswerOutcome::Missing {
             let questions = by_subject.entry(&told.subject).or_default();
             questions.entry(told.question).or_default().push(told);
         }
     }
     let mut made = Vec::new();
     for (subject, questions) in by_subject {
-        let single: Option<Vec<(usize, &Told)>> = questions
+        let single: Option<Vec<(usize, &ReportedAnswer)>> = questions
             .into_iter()
             .map(|(question, told)| match &told[..] {
                 [one] => Some((question, *one)),
@@ -53,10 +53,12 @@ pub(super) fn files(report: &OpenReport<'_>) -> Result<Vec<(String, Vec<u8>)>> {
         };
         let marks = single.iter().filter_map(|(question, told)| {
             let mark = match told.outcome {
-                Outcome::Marked(mark) => mark,
+                AnswerOutcome::Marked(mark) => mark,
                 // Upstream's own score of an answer that is none.
-                Outcome::Null => 0,
-                Outcome::Missing | Outcome::Unjudged | Outcome::Unmarked => return None,
+                AnswerOutcome::Null => 0,
+                AnswerOutcome::Missing | AnswerOutcome::Unjudged | AnswerOutcome::Unmarked => {
+                    return None;
+                }
             };
             Some((&*report.questions[*question].id.0, mark))
         });

@@ -10,11 +10,11 @@ use flate2::write::GzEncoder;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::shown::Shown;
+use super::shown::PageInputs;
 use crate::error::{Error, Result};
-use crate::score::choice::Mode;
+use crate::score::choice::ReadingMode;
 use crate::score::findings::Findings;
-use crate::score::grid::{Grid, Mark};
+use crate::score::grid::{Grid, TrialResult};
 use crate::types::{AxisLevel, FrameId, QuestionId, RunQuestion, Thumbnail, UnreadReason, View};
 
 /// The codes of marks beside the indices of choices.
@@ -25,16 +25,16 @@ const ABSENT: u8 = 28;
 /// The longest reply on the page, in characters; shorter where all of them together are too long.
 const LONGEST: [usize; 5] = [20_000, 2_000, 400, 100, 30];
 /// How many bytes of different replies, and how many of small copies, are packed: the first that fit are taken.
-const ROOM: [Room; 3] = [
-    Room {
+const ROOM: [SizeLimit; 3] = [
+    SizeLimit {
         text: 12_000_000,
         pictures: 8_500_000,
     },
-    Room {
+    SizeLimit {
         text: 4_000_000,
         pictures: 4_000_000,
     },
-    Room {
+    SizeLimit {
         text: 1_000_000,
         pictures: 1_000_000,
     },
@@ -42,15 +42,15 @@ const ROOM: [Room; 3] = [
 /// The most bytes that the items may take of the page, which is to stay under 15 MB.
 const MOST_PACKED: usize = 13_500_000;
 
-/// Room for what can be left out of a page.
+/// SizeLimit for what can be left out of a page.
 #[derive(Debug, Clone, Copy)]
-struct Room {
+struct SizeLimit {
     text: usize,
     pictures: usize,
 }
 
 #[derive(Serialize)]
-struct Data<'a> {
+struct PageData<'a> {
     runs: Vec<String>,
     drops: BTreeMap<String, f64>,
     families: Vec<&'a str>,
@@ -140,7 +140,7 @@ impl<T: Copy + Eq + std::hash::Hash> Distinct<T> {
 ///
 /// # Errors
 /// Where it cannot be written.
-pub(super) fn packed<'a>(findings: &'a Findings<'a>, shown: &Shown<'a>) -> Result<String> {
+pub(super) fn packed<'a>(findings: &'a Findings<'a>, shown: &PageInputs<'a>) -> Result<String> {
     let mut packed = String::new();
     for room in ROOM {
         packed = pack(&data(findings, shown, room))?;
@@ -151,7 +151,7 @@ pub(super) fn packed<'a>(findings: &'a Findings<'a>, shown: &Shown<'a>) -> Resul
     Ok(packed)
 }
 
-fn pack(data: &Data<'_>) -> Result<String> {
+fn pack(data: &PageData<'_>) -> Result<String> {
     let failed = |e: &dyn std::fmt::Display| Error::data("report.html", e);
     let mut packed = GzEncoder::new(Vec::new(), Compression::new(6));
     serde_json::to_writer(std::io::BufWriter::new(&mut packed), data).map_err(|e| failed(&e))?;
@@ -160,7 +160,7 @@ fn pack(data: &Data<'_>) -> Result<String> {
     Ok(STANDARD.encode(bytes))
 }
 
-fn data<'a>(findings: &'a Findings<'a>, shown: &Shown<'a>, room: Room) -> Data<'a> {
+fn data<'a>(findings: &'a Findings<'a>, shown: &PageInputs<'a>, room: SizeLimit) -> PageData<'a> {
     let grid = &findings.grid;
     let listed: HashMap<&QuestionId, &RunQuestion> = shown
         .questions
@@ -208,7 +208,7 @@ fn data<'a>(findings: &'a Findings<'a>, shown: &Shown<'a>, room: Room) -> Data<'
             .collect()
     };
     let (reasons, why) = reasons(grid);
-    Data {
+    PageData {
         runs: shown.runs.iter().map(|run| run.name.clone()).collect(),
         drops: drops(grid),
         thumbnails: thumbnails(shown.thumbnails, &frames.places, room.pictures),
@@ -218,8 +218,8 @@ fn data<'a>(findings: &'a Findings<'a>, shown: &Shown<'a>, room: Room) -> Data<'
         questions,
         choices: choices.list,
         items,
-        strict: marks(Mode::Strict),
-        lenient: marks(Mode::Lenient),
+        strict: marks(ReadingMode::Strict),
+        lenient: marks(ReadingMode::Lenient),
         reasons,
         why,
         texts,
@@ -236,11 +236,11 @@ fn drops(grid: &Grid<'_>) -> BTreeMap<String, f64> {
         .collect()
 }
 
-fn code(mark: Mark, mode: Mode) -> u8 {
+fn code(mark: TrialResult, mode: ReadingMode) -> u8 {
     match mark {
-        Mark::Absent => ABSENT,
-        Mark::Failed => FAILED,
-        Mark::Read { .. } => mark.reading(mode).flatten().unwrap_or(UNREAD),
+        TrialResult::Absent => ABSENT,
+        TrialResult::Failed => FAILED,
+        TrialResult::Read { .. } => mark.reading(mode).flatten().unwrap_or(UNREAD),
     }
 }
 

@@ -8,7 +8,7 @@ mod sections;
 mod shown;
 pub(super) mod tables;
 
-pub use shown::{Run, Shown};
+pub use shown::{PageInputs, PageRun};
 
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -33,7 +33,7 @@ struct Page<'a> {
     /// What must be read before any number.
     alerts: Vec<String>,
     intro: Vec<String>,
-    sections: Vec<sections::Section<'a>>,
+    sections: Vec<sections::PageSection<'a>>,
     runs: Vec<Value>,
     /// The items, packed.
     data: String,
@@ -49,7 +49,7 @@ pub fn page<'a>(
     findings: &'a Findings<'a>,
     tables: &[Table],
     figures: &[Figure],
-    shown: &Shown<'a>,
+    shown: &PageInputs<'a>,
 ) -> Result<String> {
     filled(
         PAGE,
@@ -66,7 +66,7 @@ pub fn page<'a>(
     )
 }
 
-fn title(shown: &Shown<'_>) -> String {
+fn title(shown: &PageInputs<'_>) -> String {
     match &*shown.runs {
         [one] => format!("Seeing in the dark: {}", one.name),
         several => format!("Seeing in the dark: {} runs compared", several.len()),
@@ -74,7 +74,7 @@ fn title(shown: &Shown<'_>) -> String {
 }
 
 /// What must be read before any number: which run is not whole.
-fn alerts(shown: &Shown<'_>) -> Vec<String> {
+fn alerts(shown: &PageInputs<'_>) -> Vec<String> {
     let broken = shown
         .runs
         .iter()
@@ -107,7 +107,7 @@ fn intro(findings: &Findings<'_>) -> Vec<String> {
     )]
 }
 
-fn facts(run: &Run<'_>) -> Value {
+fn facts(run: &PageRun<'_>) -> Value {
     let manifest = run.manifest;
     let mut rows = about(manifest);
     rows.extend(spent(run.records));

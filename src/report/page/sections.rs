@@ -4,20 +4,20 @@ use serde::Serialize;
 
 use super::tables;
 use crate::report::chart::Figure;
-use crate::report::samples::{Samples, samples};
+use crate::report::samples::{SamplePage, samples};
 use crate::report::table::Table;
 use crate::report::tables::{ENHANCERS, SECTIONS};
 use crate::types::Thumbnail;
 
 /// A section as the template reads it.
 #[derive(Serialize)]
-pub(super) struct Section<'a> {
+pub(super) struct PageSection<'a> {
     id: &'static str,
     title: &'static str,
     note: &'static str,
     figures: Vec<&'a Figure>,
-    samples: Option<Samples>,
-    tables: Vec<tables::Shown<'a>>,
+    samples: Option<SamplePage>,
+    tables: Vec<tables::PageTable<'a>>,
 }
 
 /// All sections that the records have something for.
@@ -25,14 +25,14 @@ pub(super) fn sections<'a>(
     tables: &'a [Table],
     figures: &'a [Figure],
     thumbnails: &[Thumbnail],
-) -> Vec<Section<'a>> {
+) -> Vec<PageSection<'a>> {
     let sections = SECTIONS.iter().filter_map(|&(id, title, note, drawn)| {
         let figures = figures.iter().filter(|figure| drawn.contains(&figure.name));
         let figures: Vec<&Figure> = figures.collect();
         let samples = samples(thumbnails).filter(|_| id == ENHANCERS);
         let tables = tables::shown(tables, id);
         let is_there = !tables.is_empty() || !figures.is_empty() || samples.is_some();
-        is_there.then_some(Section {
+        is_there.then_some(PageSection {
             id,
             title,
             note,

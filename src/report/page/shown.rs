@@ -1,11 +1,11 @@
-//! What the page shows besides the findings: [`Shown`].
+//! What the page shows besides the findings: [`PageInputs`].
 
 use crate::types::manifest::RunManifest;
 use crate::types::{Record, RunQuestion, Thumbnail};
 
 /// A run on the page.
 #[derive(Debug, Clone)]
-pub struct Run<'a> {
+pub struct PageRun<'a> {
     /// What it is called: its folder.
     pub name: String,
     /// Its manifest.
@@ -18,9 +18,9 @@ pub struct Run<'a> {
 
 /// What is shown besides the findings.
 #[derive(Debug)]
-pub struct Shown<'a> {
+pub struct PageInputs<'a> {
     /// The runs.
-    pub runs: Vec<Run<'a>>,
+    pub runs: Vec<PageRun<'a>>,
     /// The questions, where they are kept.
     pub questions: &'a [RunQuestion],
     /// The small copies of images, where they are kept.

@@ -17,12 +17,12 @@ const BAR: i32 = 20;
 const WIDTH: i32 = 1100;
 
 /// One panel: bars by name.
-struct Panel {
+struct BarPanel {
     title: String,
     bars: Vec<(String, u64)>,
 }
 
-impl Panel {
+impl BarPanel {
     /// The largest first, those beyond [`MOST`] together.
     fn ranked(title: &str, counts: impl Iterator<Item = (String, u64)>) -> Self {
         let mut bars: Vec<(String, u64)> = counts.filter(|(_, count)| *count > 0).collect();
@@ -57,7 +57,7 @@ impl Panel {
 pub fn figure(summary: &QuestionSummary) -> Result<String> {
     let panels = panels(summary);
     // Two columns, each panel in the shorter one.
-    let mut columns: [(i32, Vec<(i32, &Panel)>); 2] = [(0, Vec::new()), (0, Vec::new())];
+    let mut columns: [(i32, Vec<(i32, &BarPanel)>); 2] = [(0, Vec::new()), (0, Vec::new())];
     for panel in &panels {
         let column = usize::from(columns[1].0 < columns[0].0);
         let (height, list) = &mut columns[column];
@@ -79,13 +79,13 @@ pub fn figure(summary: &QuestionSummary) -> Result<String> {
     Ok(svg)
 }
 
-fn panels(summary: &QuestionSummary) -> Vec<Panel> {
+fn panels(summary: &QuestionSummary) -> Vec<BarPanel> {
     let classes = |title: &str, count: fn(&crate::questions::summary::ClassCoverage) -> u64| {
         let counts = summary
             .classes
             .iter()
             .map(|(class, coverage)| (class.clone(), count(coverage)));
-        Panel::ranked(title, counts)
+        BarPanel::ranked(title, counts)
     };
     let words = |counts: &BTreeMap<String, usize>| {
         let counts: Vec<(String, u64)> = counts
@@ -96,11 +96,11 @@ fn panels(summary: &QuestionSummary) -> Vec<Panel> {
     };
     let families = summary.candidates.iter();
     let mut panels = vec![
-        Panel::ranked(
+        BarPanel::ranked(
             "Questions by family",
             families.map(|(family, candidates)| (family.to_string(), candidates.asked)),
         ),
-        Panel::ranked(
+        BarPanel::ranked(
             "Frames by room",
             summary
                 .rooms
@@ -110,7 +110,10 @@ fn panels(summary: &QuestionSummary) -> Vec<Panel> {
     ];
     for family in Family::PAPER {
         if let Some(answers) = summary.answers.get(&family) {
-            panels.push(Panel::ranked(&format!("Answers: {family}"), words(answers)));
+            panels.push(BarPanel::ranked(
+                &format!("Answers: {family}"),
+                words(answers),
+            ));
         }
     }
     panels.push(classes("Classes by questions about them", |coverage| {
@@ -123,7 +126,7 @@ fn panels(summary: &QuestionSummary) -> Vec<Panel> {
 
 type Area<'a, 'b> = DrawingArea<SVGBackend<'a>, Shift>;
 
-fn draw(root: &Area<'_, '_>, columns: &[(i32, Vec<(i32, &Panel)>); 2]) -> Result<(), String> {
+fn draw(root: &Area<'_, '_>, columns: &[(i32, Vec<(i32, &BarPanel)>); 2]) -> Result<(), String> {
     root.fill(&WHITE).map_err(|e| e.to_string())?;
     let half = WIDTH / 2;
     for (column, (_, panels)) in (0..).zip(columns) {
@@ -137,7 +140,7 @@ fn draw(root: &Area<'_, '_>, columns: &[(i32, Vec<(i32, &Panel)>); 2]) -> Result
 fn bars<'a>(
     root: &Area<'a, '_>,
     (left, top): (i32, i32),
-    panel: &Panel,
+    panel: &BarPanel,
 ) -> Result<(), DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>> {
     const NAMES: i32 = 190;
     const LONGEST: f64 = 220.0;

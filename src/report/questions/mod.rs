@@ -5,8 +5,8 @@ pub mod review;
 
 use std::fmt::{Display, Write as _};
 
-use super::table::Kind::{Count, Text};
-use super::table::Layout;
+use super::table::ColumnKind::{Count, Text};
+use super::table::TableBuilder;
 use super::{csv as files, terminal};
 use crate::error::{Error, Result};
 use crate::questions::summary::{Baselines, CandidateCounts, QuestionSummary};
@@ -33,7 +33,7 @@ pub fn table(summary: &QuestionSummary) -> String {
             format!("{:.1}", 100.0 * right(base) / base.questions as f64)
         })
     };
-    let table = Layout::new("questions", rows)
+    let table = TableBuilder::new("questions", rows)
         .column(Text, "terminal family", |(family, _)| *family)
         .column(Count, "terminal questions", |(_, candidates)| {
             candidates.map_or(summary.questions, |own| own.asked as usize)
@@ -205,7 +205,7 @@ pub fn csv(summary: &QuestionSummary) -> Result<Vec<u8>> {
         row("baselines", family, "majority", &base.majority);
         row("baselines", family, "prior", &base.prior);
     }
-    let table = Layout::new("statistics", rows)
+    let table = TableBuilder::new("statistics", rows)
         .column(Text, "csv table", |[table, ..]| table.clone())
         .column(Text, "csv row", |[_, row, ..]| row.clone())
         .column(Text, "csv column", |[.., column, _]| column.clone())

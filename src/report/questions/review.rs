@@ -14,7 +14,7 @@ const PLACE: &str = "/*QUESTIONS*/null";
 
 /// A question as the page shows it.
 #[derive(Debug, Serialize)]
-pub struct Item<'a> {
+pub struct ReviewItem<'a> {
     id: &'a str,
     frame: &'a str,
     family: &'a str,
@@ -28,7 +28,7 @@ pub struct Item<'a> {
     size: [usize; 2],
 }
 
-impl<'a> Item<'a> {
+impl<'a> ReviewItem<'a> {
     /// A question about an image at this place, of this size.
     #[must_use]
     pub fn new(asked: &'a GeneratedQuestion, image: String, size: [usize; 2]) -> Self {
@@ -49,10 +49,10 @@ impl<'a> Item<'a> {
 
 /// All that the page is told.
 #[derive(Serialize)]
-struct Told<'a> {
+struct ReviewPage<'a> {
     /// Under which the browser keeps the verdicts until they are saved.
     set: Digest,
-    items: &'a [Item<'a>],
+    items: &'a [ReviewItem<'a>],
 }
 
 /// One file that shows question by question with its image, its answer and the boxes of its evidence, takes verdicts from the
@@ -60,9 +60,9 @@ struct Told<'a> {
 ///
 /// # Errors
 /// Where the questions cannot be written.
-pub fn page(items: &[Item<'_>]) -> Result<String> {
+pub fn page(items: &[ReviewItem<'_>]) -> Result<String> {
     let set = Digest::of_parts(items.iter().map(|item| item.id.as_bytes()));
-    Ok(PAGE.replacen(PLACE, &embedded(&Told { set, items })?, 1))
+    Ok(PAGE.replacen(PLACE, &embedded(&ReviewPage { set, items })?, 1))
 }
 
 #[cfg(test)]
@@ -88,7 +88,7 @@ mod tests {
             about: String::new(),
             scene: String::new(),
         };
-        let page = page(&[Item::new(&asked, "a.png".into(), [4, 3])]).unwrap();
+        let page = page(&[ReviewItem::new(&asked, "a.png".into(), [4, 3])]).unwrap();
         assert!(!page.contains(PLACE));
         assert_eq!(page.to_lowercase().matches("</script").count(), 1);
         assert!(!page.contains("<!--"));

@@ -1,6 +1,6 @@
 //! Crops of images side by side.
 
-use super::{CELL, Canvas, GAP, LINE};
+use super::{CELL, GAP, LINE, SheetCanvas};
 use crate::types::Rgb;
 
 /// One row: what it shows, and its images, which are of one size.
@@ -19,7 +19,7 @@ pub struct CropRow<'a> {
 pub fn crops(columns: &[&str], rows: &[CropRow<'_>]) -> Rgb {
     let height = CELL * 2 / 3;
     let step = [LINE + height + GAP, CELL + GAP];
-    let mut sheet = Canvas::new(
+    let mut sheet = SheetCanvas::new(
         GAP + LINE + rows.len() * step[0],
         GAP + columns.len().max(1) * step[1],
     );

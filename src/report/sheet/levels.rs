@@ -1,6 +1,6 @@
 //! The paper's example figure: both variants by level.
 
-use super::{CELL, Canvas, GAP, LINE, fitted, letter_width, mean};
+use super::{CELL, GAP, LINE, SheetCanvas, fitted, letter_width, mean};
 use crate::types::degradation::Axis;
 use crate::types::{AxisLevel, Rgb};
 
@@ -28,7 +28,7 @@ pub fn levels(clean: &Rgb, columns: &[LevelColumn]) -> Rgb {
     let margin = 6 * letter_width() + GAP;
     // A label needs its room, however small the image is.
     let cell = width.max(CELL / 2);
-    let mut sheet = Canvas::new(
+    let mut sheet = SheetCanvas::new(
         GAP + LINE + 2 * (GAP + height.max(LINE)) + GAP,
         margin + (columns.len() + 1) * (cell + GAP),
     );
@@ -76,7 +76,13 @@ fn amplification(level: AxisLevel) -> Option<u16> {
 }
 
 /// The amplified middle of the image in a cell's lower right corner, with a white edge and its factor.
-fn inset(sheet: &mut Canvas, [top, left]: [usize; 2], size: [usize; 2], image: &Rgb, factor: u16) {
+fn inset(
+    sheet: &mut SheetCanvas,
+    [top, left]: [usize; 2],
+    size: [usize; 2],
+    image: &Rgb,
+    factor: u16,
+) {
     let [height, width] = size.map(|side| side / 2);
     if height < 4 || width < 4 {
         return;

@@ -20,13 +20,13 @@ const GAP: usize = 8;
 const CELL: usize = 360;
 
 /// A white sheet that pictures and words are put on.
-struct Canvas {
+struct SheetCanvas {
     height: usize,
     width: usize,
     samples: Vec<u8>,
 }
 
-impl Canvas {
+impl SheetCanvas {
     fn new(height: usize, width: usize) -> Self {
         Self {
             height,
@@ -131,7 +131,7 @@ mod tests {
 
     #[test]
     fn text_is_cut_where_its_place_ends() {
-        let mut canvas = Canvas::new(LINE, 100);
+        let mut canvas = SheetCanvas::new(LINE, 100);
         canvas.write([0, 0], 50, "MMMMMMMMMMMM", [0, 0, 0]);
         let inked = |from: usize| {
             (0..LINE).any(|row| (from..100).any(|column| canvas.pixel(row, column) != [255; 3]))

@@ -2,7 +2,7 @@
 
 use ndarray::Array2;
 
-use super::{CELL, Canvas, GAP, LINE};
+use super::{CELL, GAP, LINE, SheetCanvas};
 use crate::types::Rgb;
 
 /// One signal on the sensor.
@@ -30,7 +30,7 @@ pub fn noise(signals: &[Signal]) -> Rgb {
     };
     let (height, width) = (side(Array2::nrows, CELL * 3 / 4), side(Array2::ncols, CELL));
     let step = [GAP + 2 * LINE + height, GAP + CELL];
-    let mut sheet = Canvas::new(
+    let mut sheet = SheetCanvas::new(
         signals.len().div_ceil(COLUMNS) * step[0] + GAP,
         COLUMNS * step[1] + GAP,
     );

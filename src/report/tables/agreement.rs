@@ -1,11 +1,11 @@
 //! How far models agree in each condition.
 
-use crate::report::table::Kind::{Count, Ratio, Share, Text};
-use crate::report::table::{Layout, Table};
+use crate::report::table::ColumnKind::{Count, Ratio, Share, Text};
+use crate::report::table::{Table, TableBuilder};
 use crate::score::agreement::Agreement;
 
 pub(super) fn agreement(agreements: &[Agreement]) -> Table {
-    Layout::new("agreement", agreements)
+    TableBuilder::new("agreement", agreements)
         .page("agreement", "Agreement in each condition")
         .column(Text, "csv condition | page condition", |one| {
             one.first.condition()

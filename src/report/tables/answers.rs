@@ -1,7 +1,7 @@
 //! What models answer: false positives and negatives, collapse, and answers given against true ones.
 
-use crate::report::table::Kind::{Count, Number, Percent, Share, Text};
-use crate::report::table::{Layout, Table};
+use crate::report::table::ColumnKind::{Count, Number, Percent, Share, Text};
+use crate::report::table::{Table, TableBuilder};
 use crate::score::confusion::{Confusion, Hallucination};
 use crate::score::findings::Findings;
 
@@ -14,7 +14,7 @@ pub(super) fn answers(findings: &Findings<'_>) -> Vec<Table> {
 }
 
 fn hallucination(rates: &[Hallucination]) -> Table {
-    Layout::new("hallucination", rates)
+    TableBuilder::new("hallucination", rates)
         .subject(|rates| &rates.subject, ToString::to_string)
         .column(Share, "csv false_positive fp_low fp_high", |rates| {
             rates.false_positive
@@ -34,7 +34,7 @@ fn hallucination(rates: &[Hallucination]) -> Table {
 fn collapse(confusions: &[Confusion]) -> Table {
     let collapsed = confusions.iter();
     let collapsed = collapsed.filter_map(|one| Some((one, one.collapse()?)));
-    Layout::new("collapse", collapsed)
+    TableBuilder::new("collapse", collapsed)
         .page(
             "answers",
             "The answer given most often, and how often it is true",
@@ -71,7 +71,7 @@ fn confusion(confusions: &[Confusion]) -> Table {
         cells.map(move |cell| (one, cell))
     });
     let there = cells.filter(|(_, (_, _, count))| *count > 0);
-    Layout::new("confusion", there)
+    TableBuilder::new("confusion", there)
         .subject(|(one, _)| &one.subject, ToString::to_string)
         .family(|(one, _)| Some(&one.family))
         .column(Text, "csv truth", |(one, (truth, _, _))| {

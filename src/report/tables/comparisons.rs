@@ -1,10 +1,10 @@
 //! Every difference with its test, a table a kind of comparison: all families together, and by family.
 
 use super::sections::ENHANCERS;
-use crate::report::table::Kind::{Count, Number, P, Percent, Points, Text, Verdict};
-use crate::report::table::{Format, Layout, Table};
+use crate::report::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
+use crate::report::table::{Table, TableBuilder, TableFormat};
 use crate::report::words::name;
-use crate::score::comparison::{Comparison, Kind, Verdict as Shown};
+use crate::score::comparison::{Comparison, ComparisonKind, Significance};
 use crate::score::findings::Findings;
 
 /// The most rows of a kind in the terminal; all of them are in the file.
@@ -12,16 +12,16 @@ const MOST: usize = 40;
 
 pub(super) fn comparisons(findings: &Findings<'_>) -> Vec<Table> {
     let mut tables = Vec::new();
-    for kind in Kind::ALL {
+    for kind in ComparisonKind::ALL {
         let all = findings.comparisons.iter().filter(|one| one.kind == kind);
         let (whole, parts): (Vec<&Comparison>, Vec<&Comparison>) =
             all.partition(|one| one.family.is_none());
         let (caption, heading) = titles(kind);
         let mut total = table(kind, caption, &whole);
-        total.is_folded = kind != Kind::Enhancer;
+        total.is_folded = kind != ComparisonKind::Enhancer;
         if !whole.is_empty() {
             total.heading = heading.map(str::to_owned);
-            if kind == Kind::Enhancer {
+            if kind == ComparisonKind::Enhancer {
                 let caption = "Enhanced against raw, paired by question, in percentage points.";
                 total.latex = Some(caption.to_owned());
             }
@@ -35,22 +35,22 @@ pub(super) fn comparisons(findings: &Findings<'_>) -> Vec<Table> {
 }
 
 /// The caption on the page, and the line above the table in the terminal, where what darkness costs is read from the levels.
-fn titles(kind: Kind) -> (&'static str, Option<&'static str>) {
+fn titles(kind: ComparisonKind) -> (&'static str, Option<&'static str>) {
     match kind {
-        Kind::Level => ("Each dark level less L0, raw", None),
-        Kind::Variant => (
+        ComparisonKind::Level => ("Each dark level less L0, raw", None),
+        ComparisonKind::Variant => (
             "Sensor noise less exposure drop alone",
             Some("Sensor noise against exposure drop alone, paired by question"),
         ),
-        Kind::Enhancer => (
+        ComparisonKind::Enhancer => (
             "Enhanced less raw",
             Some("Enhanced against raw, paired by question"),
         ),
-        Kind::Model => (
+        ComparisonKind::Model => (
             "Model less model",
             Some("Model against model, paired by question"),
         ),
-        Kind::Blind => (
+        ComparisonKind::Blind => (
             "With images less without",
             Some("With images against without, paired by question"),
         ),
@@ -58,12 +58,12 @@ fn titles(kind: Kind) -> (&'static str, Option<&'static str>) {
 }
 
 /// Leaves out of the terminal what is there too much.
-fn shorten(table: &mut Table, kind: Kind, comparisons: &[&Comparison]) {
+fn shorten(table: &mut Table, kind: ComparisonKind, comparisons: &[&Comparison]) {
     let mut printed: Vec<usize> = (0..comparisons.len()).collect();
-    if kind == Kind::Blind {
+    if kind == ComparisonKind::Blind {
         // Blind models are held against raw images here; against enhanced ones in the file.
         printed.retain(|index| comparisons[*index].first.enhancer.is_none());
-        let is_better = |index: &usize| comparisons[*index].verdict == Shown::Better;
+        let is_better = |index: &usize| comparisons[*index].verdict == Significance::Better;
         if !printed.is_empty() && printed.iter().all(is_better) {
             let line = format!("better in all {} conditions", printed.len());
             table.notes.push(line);
@@ -78,27 +78,30 @@ fn shorten(table: &mut Table, kind: Kind, comparisons: &[&Comparison]) {
     }
     for (index, row) in table.rows.iter_mut().enumerate() {
         if !printed.contains(&index) {
-            row.hidden_in.push(Format::Terminal);
+            row.hidden_in.push(TableFormat::Terminal);
         }
     }
 }
 
-fn table(kind: Kind, caption: &str, comparisons: &[&Comparison]) -> Table {
+fn table(kind: ComparisonKind, caption: &str, comparisons: &[&Comparison]) -> Table {
     let section = match kind {
-        Kind::Enhancer => ENHANCERS,
+        ComparisonKind::Enhancer => ENHANCERS,
         _ => "comparisons",
     };
-    let layout = Layout::new("comparisons", comparisons.iter().copied()).page(section, caption);
+    let layout =
+        TableBuilder::new("comparisons", comparisons.iter().copied()).page(section, caption);
     let layout = numbers(whom(layout));
     layout
-        .column(Verdict, "csv verdict | terminal | page | latex", |one| {
-            one.verdict
-        })
+        .column(
+            ColumnKind::Significance,
+            "csv verdict | terminal | page | latex",
+            |one| one.verdict,
+        )
         .made()
 }
 
 /// What is compared with what.
-fn whom(layout: Layout<&Comparison>) -> Layout<&Comparison> {
+fn whom(layout: TableBuilder<&Comparison>) -> TableBuilder<&Comparison> {
     layout
         .column(Text, "csv kind", |one| one.kind.name())
         .column(Text, "csv model | latex Model", |one| {
@@ -115,7 +118,7 @@ fn whom(layout: Layout<&Comparison>) -> Layout<&Comparison> {
         .family(|one| one.family.as_ref())
 }
 
-fn numbers(layout: Layout<&Comparison>) -> Layout<&Comparison> {
+fn numbers(layout: TableBuilder<&Comparison>) -> TableBuilder<&Comparison> {
     let difference = "csv difference low high | terminal difference, 95 % interval | page difference [95 %] \
                       | latex Difference [95\\,\\%]";
     layout
@@ -153,7 +156,9 @@ fn numbers(layout: Layout<&Comparison>) -> Layout<&Comparison> {
 fn named(one: &Comparison) -> String {
     let (first, second) = (&one.first, &one.second);
     match one.kind {
-        Kind::Model => format!("{} – {}, {}", first.model, second.model, first.condition()),
+        ComparisonKind::Model => {
+            format!("{} – {}, {}", first.model, second.model, first.condition())
+        }
         _ if first.model == second.model => name(first),
         _ => format!("{} – {}", name(first), second.model),
     }

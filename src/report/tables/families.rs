@@ -1,10 +1,10 @@
 //! Accuracy by family: a row a subject, with images and without, and what is below a model without images marked.
 
 use crate::report::latex::escaped;
-use crate::report::table::Kind::{Percent, Text};
-use crate::report::table::{Cell, Heads, Layout, Table};
+use crate::report::table::ColumnKind::{Percent, Text};
+use crate::report::table::{ColumnHeads, Table, TableBuilder, TableCell};
 use crate::report::words::family as family_name;
-use crate::score::choice::Mode;
+use crate::score::choice::ReadingMode;
 use crate::score::findings::Findings;
 use crate::score::subject::Subject;
 use crate::types::Family;
@@ -12,7 +12,7 @@ use crate::types::Family;
 pub(super) fn families(findings: &Findings<'_>) -> Table {
     let subjects = findings.grid.subjects.iter().map(Some);
     // The last row is chance.
-    let mut layout = Layout::new("families", subjects.chain([None]))
+    let mut layout = TableBuilder::new("families", subjects.chain([None]))
         .page("families", "Accuracy in % by family")
         .column(Text, "page model | latex Model", |subject| {
             subject
@@ -24,10 +24,10 @@ pub(super) fn families(findings: &Findings<'_>) -> Table {
         });
     for family in findings.grid.groups() {
         let name = family_name(family);
-        let names = Heads {
+        let names = ColumnHeads {
             page: Some(name.to_owned()),
             latex: family.map(|_| escaped(name)),
-            ..Heads::default()
+            ..ColumnHeads::default()
         };
         layout = layout.column(Percent, names, |subject| share(findings, *subject, family));
     }
@@ -39,17 +39,17 @@ pub(super) fn families(findings: &Findings<'_>) -> Table {
     table
 }
 
-fn share(findings: &Findings<'_>, subject: Option<&Subject>, family: Option<&Family>) -> Cell {
-    let mut cells = findings.summary.of(family, Mode::Strict);
+fn share(findings: &Findings<'_>, subject: Option<&Subject>, family: Option<&Family>) -> TableCell {
+    let mut cells = findings.summary.of(family, ReadingMode::Strict);
     let cell = cells.find(|cell| match subject {
         Some(subject) => cell.subject == *subject,
         None => cell.subject.view.is_none(),
     });
     let below = subject.is_some_and(|subject| findings.below_blind(subject, family));
     match cell.and_then(|cell| cell.accuracy) {
-        None => Cell::Missing,
-        Some(chance) if subject.is_none() => Cell::Number(chance.value),
-        Some(share) if below => Cell::Below(share),
-        Some(share) => Cell::Estimate(share),
+        None => TableCell::Missing,
+        Some(chance) if subject.is_none() => TableCell::Number(chance.value),
+        Some(share) if below => TableCell::Below(share),
+        Some(share) => TableCell::Estimate(share),
     }
 }

@@ -1,7 +1,7 @@
 //! A row an item and curve: the level at which it is first not answered rightly; empty if it never fails.
 
-use crate::report::table::Kind::{Count, Text};
-use crate::report::table::{Layout, Table};
+use crate::report::table::ColumnKind::{Count, Text};
+use crate::report::table::{Table, TableBuilder};
 use crate::score::findings::Findings;
 
 pub(super) fn flips(findings: &Findings<'_>) -> Table {
@@ -10,7 +10,7 @@ pub(super) fn flips(findings: &Findings<'_>) -> Table {
         let items = items.iter().zip(&fall.first);
         items.map(move |(item, first)| (fall, item.record, *first))
     });
-    Layout::new("flips", rows)
+    TableBuilder::new("flips", rows)
         .column(Text, "csv question", |(_, record, _)| {
             record.question.to_string()
         })

@@ -1,7 +1,7 @@
 //! What became of the trials of each subject, besides right and wrong.
 
-use crate::report::table::Kind::{Count, Failures};
-use crate::report::table::{Layout, Table};
+use crate::report::table::ColumnKind::{Count, Failures};
+use crate::report::table::{Table, TableBuilder};
 use crate::report::words::percent;
 use crate::score::health::Health;
 use crate::types::{FailureKind, UnreadReason};
@@ -40,7 +40,7 @@ const OTHER: [UnreadReason; 4] = [
 ];
 
 pub(super) fn health(health: &[Health]) -> Table {
-    let mut layout = Layout::new("health", health)
+    let mut layout = TableBuilder::new("health", health)
         .page("health", "Replies and failures by subject")
         .subject(|health| &health.subject, ToString::to_string)
         .column(Count, "csv replies | page replies", |health| health.replies)

@@ -1,22 +1,22 @@
 //! Accuracy by level: a row a model, variant and enhancer.
 
-use crate::report::ladder::{Ladder, Line};
-use crate::report::table::Kind::Count;
-use crate::report::table::{Cell, Format, Kind, Row, Table};
+use crate::report::ladder::{Ladder, LadderRow};
+use crate::report::table::ColumnKind::Count;
+use crate::report::table::{ColumnKind, Table, TableCell, TableFormat, TableRow};
 use crate::report::terminal::{differing, texts};
 use crate::report::words::percent;
-use crate::score::accuracy::{Cell as Score, Summary};
-use crate::score::choice::Mode;
+use crate::score::accuracy::{AccuracyCell, AccuracySummary};
+use crate::score::choice::ReadingMode;
 use crate::score::findings::Findings;
 use crate::types::UnreadReason;
 
 pub(super) fn levels(findings: &Findings<'_>) -> Table {
     let summary = &findings.summary;
-    let strict = summary.of(None, Mode::Strict);
+    let strict = summary.of(None, ReadingMode::Strict);
     let ladder = Ladder::new(strict.map(|cell| (&cell.subject, cell)));
     let mut table = ladder
         .layout("levels", |cell| {
-            cell.map_or(Cell::Blank, |cell| accuracy(summary, cell))
+            cell.map_or(TableCell::Blank, |cell| accuracy(summary, cell))
         })
         .page(
             "accuracy",
@@ -25,7 +25,8 @@ pub(super) fn levels(findings: &Findings<'_>) -> Table {
         .column(Count, "terminal n", |line| replies(line))
         .column(Count, "terminal unparsed", |line| {
             let strict = line.sum(|cell| cell.unparsed).to_string();
-            let lenient = |cell: &Score| lenient(summary, cell).map_or(0, |cell| cell.unparsed);
+            let lenient =
+                |cell: &AccuracyCell| lenient(summary, cell).map_or(0, |cell| cell.unparsed);
             let lenient = line.sum(lenient).to_string();
             format!("{strict}{}", differing(&strict, &lenient))
         })
@@ -47,26 +48,30 @@ pub(super) fn levels(findings: &Findings<'_>) -> Table {
     table
 }
 
-fn lenient<'a>(summary: &'a Summary, strict: &Score) -> Option<&'a Score> {
-    summary.cell(&strict.subject, strict.family.as_ref(), Mode::Lenient)
+fn lenient<'a>(summary: &'a AccuracySummary, strict: &AccuracyCell) -> Option<&'a AccuracyCell> {
+    summary.cell(
+        &strict.subject,
+        strict.family.as_ref(),
+        ReadingMode::Lenient,
+    )
 }
 
-fn accuracy(summary: &Summary, cell: &Score) -> Cell {
+fn accuracy(summary: &AccuracySummary, cell: &AccuracyCell) -> TableCell {
     let Some(strict) = cell.accuracy else {
-        return Cell::Missing;
+        return TableCell::Missing;
     };
     if cell.subject.view.is_none() {
-        return Cell::Guess(strict);
+        return TableCell::Guess(strict);
     }
     match lenient(summary, cell).and_then(|cell| cell.accuracy) {
-        Some(lenient) => Cell::Strict(strict, lenient.value),
-        None => Cell::Estimate(strict),
+        Some(lenient) => TableCell::Strict(strict, lenient.value),
+        None => TableCell::Estimate(strict),
     }
 }
 
 /// How many replies stand behind the numbers of a series, from the least to the most.
-fn replies(line: &Line<'_, Score>) -> String {
-    let replies = line.steps().map(Score::replies);
+fn replies(line: &LadderRow<'_, AccuracyCell>) -> String {
+    let replies = line.steps().map(AccuracyCell::replies);
     match (replies.clone().min(), replies.max()) {
         (Some(least), Some(most)) if least != most => format!("{least}–{most}"),
         (least, _) => least.unwrap_or(0).to_string(),
@@ -74,12 +79,12 @@ fn replies(line: &Line<'_, Score>) -> String {
 }
 
 /// The share of questions that were answered rightly every time.
-fn always(cell: &Score) -> Option<String> {
+fn always(cell: &AccuracyCell) -> Option<String> {
     Some(percent(cell.always?.value))
 }
 
 /// Adds to the terminal, below each series that was asked more than once, how often it was right every time.
-fn add_always(table: &mut Table, ladder: &Ladder<'_, Score>) {
+fn add_always(table: &mut Table, ladder: &Ladder<'_, AccuracyCell>) {
     for (place, steps) in ladder.series.values().enumerate().rev() {
         if steps.values().all(|cell| cell.always.is_none()) {
             continue;
@@ -87,31 +92,31 @@ fn add_always(table: &mut Table, ladder: &Ladder<'_, Score>) {
         let levels = ladder.levels.iter();
         let at = levels.map(
             |level| match steps.get(level).and_then(|cell| always(cell)) {
-                Some(share) => Cell::Text(share),
-                None => Cell::Blank,
+                Some(share) => TableCell::Text(share),
+                None => TableCell::Blank,
             },
         );
         let names = [
-            Cell::Blank,
+            TableCell::Blank,
             "  right every time".into(),
-            Cell::Blank,
-            Cell::Blank,
+            TableCell::Blank,
+            TableCell::Blank,
         ];
-        let row = Row {
+        let row = TableRow {
             cells: names.into_iter().chain(at).collect(),
-            hidden_in: vec![Format::Page, Format::Latex],
+            hidden_in: vec![TableFormat::Page, TableFormat::Latex],
         };
         table.rows.insert(place + 1, row);
     }
 }
 
 /// The lines below the table: models without images, chance, and why replies could not be read.
-fn notes(summary: &Summary, ladder: &Ladder<'_, Score>) -> Vec<String> {
+fn notes(summary: &AccuracySummary, ladder: &Ladder<'_, AccuracyCell>) -> Vec<String> {
     let floors = ladder.floors.iter().map(|(_, cell)| *cell);
-    let (chance, blind): (Vec<&Score>, Vec<&Score>) =
+    let (chance, blind): (Vec<&AccuracyCell>, Vec<&AccuracyCell>) =
         floors.partition(|cell| cell.subject.view.is_none());
     let mut notes: Vec<String> = blind.into_iter().map(|cell| floor(summary, cell)).collect();
-    let mut all = summary.of(None, Mode::Strict);
+    let mut all = summary.of(None, ReadingMode::Strict);
     let asked = if all.any(|cell| cell.always.is_some()) {
         "orders of choices"
     } else {
@@ -126,8 +131,8 @@ fn notes(summary: &Summary, ladder: &Ladder<'_, Score>) -> Vec<String> {
     notes
 }
 
-fn floor(summary: &Summary, cell: &Score) -> String {
-    let accuracy = texts(Kind::Accuracy, &accuracy(summary, cell)).concat();
+fn floor(summary: &AccuracySummary, cell: &AccuracyCell) -> String {
+    let accuracy = texts(ColumnKind::Accuracy, &accuracy(summary, cell)).concat();
     let always = always(cell).map(|share| format!(", right every time {share}"));
     let unparsed = cell.unparsed.to_string();
     let lenient = lenient(summary, cell).map(|cell| cell.unparsed.to_string());
@@ -143,7 +148,7 @@ fn floor(summary: &Summary, cell: &Score) -> String {
 }
 
 /// UnreadReason replies could not be read, if that is not the model's own way of answering.
-fn unread(summary: &Summary) -> Option<String> {
+fn unread(summary: &AccuracySummary) -> Option<String> {
     let reasons = [
         (
             UnreadReason::Truncated,

@@ -12,8 +12,8 @@ mod subjects;
 mod summary;
 mod thresholds;
 
-use super::table::Kind::Text;
-use super::table::{Cell, Layout, Table};
+use super::table::ColumnKind::Text;
+use super::table::{Table, TableBuilder, TableCell};
 use super::words::{family, name};
 use crate::score::findings::Findings;
 use crate::score::subject::Subject;
@@ -42,14 +42,14 @@ pub fn tables(findings: &Findings<'_>) -> Vec<Table> {
     .collect()
 }
 
-impl<T> Layout<T> {
+impl<T> TableBuilder<T> {
     /// The columns that say whom a row is about.
     pub(in crate::report) fn subject(
         self,
         of: impl Fn(&T) -> &Subject,
         variant: impl Fn(&KindReading) -> String,
     ) -> Self {
-        let said = |text: Option<String>| Cell::from(text);
+        let said = |text: Option<String>| TableCell::from(text);
         self.column(Text, "csv model", |row| of(row).model.clone())
             .column(Text, "csv view", |row| {
                 said(of(row).view.map(|view| view.to_string()))

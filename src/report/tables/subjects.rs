@@ -1,12 +1,12 @@
 //! The accuracy of every subject with its interval and counts.
 
-use crate::report::table::Kind::{Count, Percent, Share, Text};
-use crate::report::table::{Cell, Layout, Table};
-use crate::score::accuracy::Summary;
-use crate::score::choice::Mode;
+use crate::report::table::ColumnKind::{Count, Percent, Share, Text};
+use crate::report::table::{Table, TableBuilder, TableCell};
+use crate::score::accuracy::AccuracySummary;
+use crate::score::choice::ReadingMode;
 
-pub(super) fn subjects(summary: &Summary) -> Table {
-    let mut table = Layout::new("subjects", summary.of(None, Mode::Strict))
+pub(super) fn subjects(summary: &AccuracySummary) -> Table {
+    let mut table = TableBuilder::new("subjects", summary.of(None, ReadingMode::Strict))
         .page(
             "accuracy",
             "Accuracy of every subject, all families together",
@@ -18,12 +18,14 @@ pub(super) fn subjects(summary: &Summary) -> Table {
         })
         .column(Share, "page accuracy in % [95 %]", |cell| {
             match (cell.subject.view, cell.accuracy) {
-                (None, Some(chance)) => Cell::Guess(chance),
-                (_, accuracy) => Cell::from(accuracy),
+                (None, Some(chance)) => TableCell::Guess(chance),
+                (_, accuracy) => TableCell::from(accuracy),
             }
         })
         .column(Percent, "page lenient", |cell| {
-            summary.cell(&cell.subject, None, Mode::Lenient)?.accuracy
+            summary
+                .cell(&cell.subject, None, ReadingMode::Lenient)?
+                .accuracy
         })
         .column(Count, "page n", |cell| cell.replies())
         .column(Count, "page not readable", |cell| cell.unparsed)

@@ -1,21 +1,21 @@
 //! Every accuracy: `summary.csv` and the rows of `summary.json`.
 
-use crate::report::table::Kind::{Count, Share, Text};
-use crate::report::table::{Cell, Layout, Table};
-use crate::score::accuracy::Summary;
-use crate::score::choice::Mode;
+use crate::report::table::ColumnKind::{Count, Share, Text};
+use crate::report::table::{Table, TableBuilder, TableCell};
+use crate::score::accuracy::AccuracySummary;
+use crate::score::choice::ReadingMode;
 use crate::score::subject::Subject;
 
 /// The name of the table.
 pub(in crate::report) const SUMMARY: &str = "summary";
 
-pub(super) fn summary(summary: &Summary) -> Table {
-    let layout = Layout::new(SUMMARY, &summary.cells)
+pub(super) fn summary(summary: &AccuracySummary) -> Table {
+    let layout = TableBuilder::new(SUMMARY, &summary.cells)
         .subject(|cell| &cell.subject, |variant| variant.word().to_owned())
         .family(|cell| cell.family.as_ref())
         .column(Text, "csv mode", |cell| match cell.mode {
-            Mode::Strict => "strict",
-            Mode::Lenient => "lenient",
+            ReadingMode::Strict => "strict",
+            ReadingMode::Lenient => "lenient",
         })
         .column(Count, "csv n", |cell| cell.replies())
         .column(Count, "csv right", |cell| {
@@ -35,6 +35,6 @@ pub(super) fn summary(summary: &Summary) -> Table {
 }
 
 /// The light reading of a subject.
-pub(in crate::report) fn reading(subject: &Subject) -> Cell {
-    Cell::from(subject.variant.reading.as_ref().map(ToString::to_string))
+pub(in crate::report) fn reading(subject: &Subject) -> TableCell {
+    TableCell::from(subject.variant.reading.as_ref().map(ToString::to_string))
 }

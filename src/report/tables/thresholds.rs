@@ -1,7 +1,7 @@
 //! Darkness thresholds and areas below the curves: all families together, and each.
 
-use crate::report::table::Kind::{Number, Share, Text, Threshold};
-use crate::report::table::{Cell, Layout, Table};
+use crate::report::table::ColumnKind::{Number, Share, Text, Threshold};
+use crate::report::table::{Table, TableBuilder, TableCell};
 use crate::report::words::light;
 use crate::score::curve::Curve;
 use crate::score::findings::Findings;
@@ -23,7 +23,7 @@ pub(super) fn thresholds(findings: &Findings<'_>) -> Vec<Table> {
 
 /// Thresholds are `inf` beyond the darkest level, and empty if the light is not above chance.
 fn table(caption: &str, curves: &[&Curve]) -> Table {
-    Layout::new("thresholds", curves)
+    TableBuilder::new("thresholds", curves)
         .page("thresholds", caption)
         .line(|curve| (&curve.model, &curve.variant, curve.enhancer.as_ref()))
         .column(Text, "terminal light | page light", |curve| {
@@ -40,7 +40,7 @@ fn table(caption: &str, curves: &[&Curve]) -> Table {
                 let darkest = curve.darkest.value();
                 curve
                     .threshold
-                    .map(|threshold| Cell::Threshold(threshold, darkest))
+                    .map(|threshold| TableCell::Threshold(threshold, darkest))
             },
         )
         .column(

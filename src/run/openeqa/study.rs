@@ -14,7 +14,7 @@ use crate::job::progress::Progress;
 use crate::job::timings::Timings;
 use crate::job::workers::pool;
 use crate::job::{Outcome, limit, pipeline};
-use crate::report::study::{Asked, Shot, page};
+use crate::report::study::{StudyImage, StudyQuestion, page};
 use crate::types::manifest::Status;
 use crate::types::{Condition, Digest};
 
@@ -53,7 +53,7 @@ pub(super) fn pack(
                 names.push(name);
             }
             images += names.len();
-            shots.push(Shot {
+            shots.push(StudyImage {
                 condition: condition.to_string(),
                 images: names,
             });
@@ -63,7 +63,7 @@ pub(super) fn pack(
             .questions
             .iter()
             .filter(|question| question.episode == walk.name.0);
-        asked.extend(questions.map(|question| Asked {
+        asked.extend(questions.map(|question| StudyQuestion {
             id: question.id.0.clone(),
             frame: number,
             text: question.text.clone(),

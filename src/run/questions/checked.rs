@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::files::{reading, write};
 use crate::questions::GeneratedQuestion;
 use crate::questions::statistics::FrameStatistics;
-use crate::report::questions::review::{Item, page};
+use crate::report::questions::review::{ReviewItem, page};
 use crate::types::QuestionId;
 
 /// A line of what a person said.
@@ -60,7 +60,7 @@ pub(super) fn review(
         let frame = &asked.question.frame;
         let size = frames.iter().find(|known| known.frame == *frame)?.size;
         let image = dataset.image_file(frame)?;
-        Some(Item::new(asked, link(folder, image), size))
+        Some(ReviewItem::new(asked, link(folder, image), size))
     });
     write(path, page(&items.collect::<Vec<_>>())?.as_bytes())
 }

@@ -12,7 +12,7 @@ use crate::job::Outcome;
 use crate::job::progress::Progress;
 use crate::job::rebuild::{ImageRebuilder, RebuildArgs};
 use crate::job::stored::StoredRun;
-use crate::report::study::{Asked, Shot, page};
+use crate::report::study::{StudyImage, StudyQuestion, page};
 use crate::types::manifest::Status;
 use crate::types::{Condition, Digest, FrameId, QuestionId, Record, RunQuestion};
 
@@ -86,14 +86,14 @@ pub fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
             let name = Digest::of_parts([frame.0.as_bytes(), condition.to_string().as_bytes()]);
             let name = format!("images/{}.{}", &name.to_string()[..16], made.ending);
             write(&args.out.join(&name), &made.file)?;
-            shots.push(Shot {
+            shots.push(StudyImage {
                 condition: condition.to_string(),
                 images: vec![name],
             });
             images += 1;
             bar.inc();
         }
-        asked.extend(questions.into_iter().map(|question| Asked {
+        asked.extend(questions.into_iter().map(|question| StudyQuestion {
             frame: number,
             choices: shown.get(&question.id).cloned().unwrap_or(question.choices),
             id: question.id.0,

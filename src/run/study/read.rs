@@ -15,7 +15,7 @@ use crate::job::report::choice;
 use crate::job::stored::StoredRun;
 
 use crate::job::{Outcome, Show, count, now};
-use crate::store::{Moved, Store};
+use crate::store::{AddressChange, Store};
 use crate::types::manifest::{Counts, RunManifest, Status};
 use crate::types::{ChoiceDetail, Condition, Detail, Digest, QuestionId, Record, Reply, TrialKey};
 
@@ -99,7 +99,7 @@ pub fn read(args: &ReadArgs) -> Result<Outcome> {
         return Err(Error::Run { path, problem });
     }
     let own = of_people(&manifest, args);
-    let mut store = Store::open(&args.out, &own, Moved::Allowed)?;
+    let mut store = Store::open(&args.out, &own, AddressChange::Allowed)?;
     store.write_questions(&questions)?;
     let mut people = People::new(store.records()?);
     for (asked, line) in known {

@@ -1,18 +1,18 @@
 //! The lenient reading: level after level, and the first that finds something decides.
 
 use super::clean;
-use super::names::{Grip, Name};
+use super::names::{Delimiting, Name};
 use super::plain::{fold, plain};
 use super::refusal::declines;
 use super::stated::{alternative, stated};
 use super::strict;
-use super::view::{Offered, View};
+use super::view::{ChoiceViews, ReplyView};
 use super::written::{boxed, json};
 use crate::types::question::{Answer, Choices, UnreadReason};
 
 /// Reads a reply, reasoning left out already.
 pub(super) fn read(text: &str, choices: &Choices) -> Answer {
-    let offered = Offered::new(choices);
+    let offered = ChoiceViews::new(choices);
     let tidy = clean::tidy(text);
     // A model that runs on and asks itself the next question has answered ours before.
     let first = clean::before_next_turn(&tidy).map(|before| levels(before, &offered));
@@ -25,10 +25,10 @@ pub(super) fn read(text: &str, choices: &Choices) -> Answer {
 }
 
 /// All levels, on a tidied text.
-fn levels(tidy: &str, offered: &Offered) -> Answer {
+fn levels(tidy: &str, offered: &ChoiceViews) -> Answer {
     let text = plain(tidy);
     let folded = fold(&text);
-    let view = View::new(&text, &folded, offered);
+    let view = ReplyView::new(&text, &folded, offered);
     None.or_else(|| contradiction(&view))
         .or_else(|| json(tidy, offered))
         .or_else(|| boxed(tidy, offered))
@@ -36,7 +36,7 @@ fn levels(tidy: &str, offered: &Offered) -> Answer {
 }
 
 /// The levels that need no form: of a reply without markup, or of a value in a form.
-pub(super) fn spoken(view: &View<'_>) -> Answer {
+pub(super) fn spoken(view: &ReplyView<'_>) -> Answer {
     None.or_else(|| contradiction(view))
         .or_else(|| strict::read(view.text, &view.offered.texts))
         .or_else(|| yes_or_no(view))
@@ -48,11 +48,11 @@ pub(super) fn spoken(view: &View<'_>) -> Answer {
 }
 
 /// A letter with the text of another choice: "B. bathroom".
-fn contradiction(view: &View<'_>) -> Option<Answer> {
+fn contradiction(view: &ReplyView<'_>) -> Option<Answer> {
     let labels = view
         .letters
         .iter()
-        .filter(|letter| letter.grip == Grip::Firm);
+        .filter(|letter| letter.grip == Delimiting::Firm);
     let mut wrong = labels.filter_map(|letter| {
         let text = view.labelled_text(letter)?;
         (text.choice != letter.choice).then_some(letter.choice)
@@ -65,7 +65,7 @@ fn contradiction(view: &View<'_>) -> Option<Answer> {
 }
 
 /// The leading word, where yes and no are offered: "Yes, there is no lamp".
-fn yes_or_no(view: &View<'_>) -> Option<Answer> {
+fn yes_or_no(view: &ReplyView<'_>) -> Option<Answer> {
     /// What "no" is part of at the beginning of a reply that does not answer.
     const NOT_AN_ANSWER: [&str; 8] = [
         "idea",
@@ -97,7 +97,7 @@ fn yes_or_no(view: &View<'_>) -> Option<Answer> {
     let named = |names: &[Name]| {
         names
             .iter()
-            .any(|name| name.choice == Some(other) && name.grip > Grip::Loose)
+            .any(|name| name.choice == Some(other) && name.grip > Delimiting::Loose)
     };
     Some(if named(&view.texts) || named(&view.letters) {
         Answer::Unparsed(UnreadReason::Ambiguous)
@@ -107,7 +107,7 @@ fn yes_or_no(view: &View<'_>) -> Option<Answer> {
 }
 
 /// The only choice named, and never but to deny it: "This is not a kitchen".
-fn denial(view: &View<'_>) -> Option<Answer> {
+fn denial(view: &ReplyView<'_>) -> Option<Answer> {
     let names = || view.letters.iter().chain(&view.texts);
     let first = names().next()?.choice?;
     let denied = |name: &Name| name.choice == Some(first) && view.denies(name);
@@ -115,11 +115,11 @@ fn denial(view: &View<'_>) -> Option<Answer> {
 }
 
 /// Letters in brackets or before punctuation: "(B)", "B, because there is a stove".
-fn letters(view: &View<'_>) -> Option<Answer> {
+fn letters(view: &ReplyView<'_>) -> Option<Answer> {
     let held = view
         .letters
         .iter()
-        .filter(|letter| letter.grip > Grip::Loose);
+        .filter(|letter| letter.grip > Delimiting::Loose);
     let first = held.clone().max_by_key(|letter| letter.grip)?;
     let Some(index) = first.choice else {
         return Some(Answer::Unparsed(UnreadReason::OutOfRange));
@@ -144,7 +144,7 @@ fn letters(view: &View<'_>) -> Option<Answer> {
     } else if held.clone().any(|letter| view.denies(letter)) {
         return Some(negated(view));
     } else if held.clone().any(contradicts)
-        || (first.grip < Grip::Firm && only_text && another(&view.texts[0]))
+        || (first.grip < Delimiting::Firm && only_text && another(&view.texts[0]))
     {
         UnreadReason::Contradiction
     } else {
@@ -154,7 +154,7 @@ fn letters(view: &View<'_>) -> Option<Answer> {
 }
 
 /// The texts of choices, as whole words: "It is a kitchen."
-fn texts(view: &View<'_>) -> Option<Answer> {
+fn texts(view: &ReplyView<'_>) -> Option<Answer> {
     let first = view.texts.first()?.choice?;
     let another = |name: &Name| name.choice != Some(first);
     if view.texts.iter().any(another) || view.letters.iter().any(another) {
@@ -167,7 +167,7 @@ fn texts(view: &View<'_>) -> Option<Answer> {
 }
 
 /// UnreadReason a choice that is named only beside a "not" was not read.
-fn negated(view: &View<'_>) -> Answer {
+fn negated(view: &ReplyView<'_>) -> Answer {
     Answer::Unparsed(if declines(view.folded) {
         UnreadReason::Refused
     } else {
@@ -176,7 +176,7 @@ fn negated(view: &View<'_>) -> Answer {
 }
 
 /// UnreadReason nothing at all was read.
-fn nothing(view: &View<'_>) -> Answer {
+fn nothing(view: &ReplyView<'_>) -> Answer {
     Answer::Unparsed(if declines(view.folded) {
         UnreadReason::Refused
     } else {

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use regex::Regex;
 
 use super::clean::compiled;
-use super::names::{Grip, Name, index_of, joins};
+use super::names::{Delimiting, Name, index_of, joins};
 
 /// Words that follow the letter A, never the article.
 pub(super) static AFTER_A: LazyLock<Regex> = LazyLock::new(|| {
@@ -28,7 +28,7 @@ pub(super) fn letters(text: &str, choices: usize) -> Vec<Name> {
         let letter = char::from(byte);
         let grip = grip(text, at, letter)?;
         let choice = index_of(letter).filter(|index| *index < choices);
-        (choice.is_some() || grip == Grip::Firm).then_some(Name {
+        (choice.is_some() || grip == Delimiting::Firm).then_some(Name {
             start: at,
             end: at + 1,
             choice,
@@ -39,7 +39,7 @@ pub(super) fn letters(text: &str, choices: usize) -> Vec<Name> {
 }
 
 /// How surely the letter at a byte is meant as a choice; `None` for a part of a word, an article, a pronoun.
-fn grip(text: &str, at: usize, letter: char) -> Option<Grip> {
+fn grip(text: &str, at: usize, letter: char) -> Option<Delimiting> {
     let (left, right) = (&text[..at], &text[at + 1..]);
     let (before, after) = (left.chars().next_back(), right.chars().next());
     if joins(before) || joins(after) || before == Some('\'') || after == Some('\'') {
@@ -49,12 +49,12 @@ fn grip(text: &str, at: usize, letter: char) -> Option<Grip> {
         return None;
     }
     if matches!(before, Some('(' | '[')) && matches!(after, Some(')' | ']')) {
-        return Some(Grip::Firm);
+        return Some(Delimiting::Firm);
     }
     let leading = at == 0 || left == "(" || left == "[";
     let label = matches!(after, Some('.' | ')' | ':' | ']'));
     if letter.is_ascii_lowercase() {
-        return (leading && label).then_some(Grip::Firm);
+        return (leading && label).then_some(Delimiting::Firm);
     }
     let words = right.trim_start_matches(' ');
     let ends = words.is_empty() || words.starts_with(['\n', '-', '–', '—']);
@@ -71,9 +71,9 @@ fn grip(text: &str, at: usize, letter: char) -> Option<Grip> {
     };
     match (ends || marked || bracket, name) {
         (false, false) => None,
-        _ if leading => Some(Grip::Firm),
-        (true, _) => Some(Grip::Plain),
-        (false, true) => Some(Grip::Loose),
+        _ if leading => Some(Delimiting::Firm),
+        (true, _) => Some(Delimiting::Plain),
+        (false, true) => Some(Delimiting::Loose),
     }
 }
 

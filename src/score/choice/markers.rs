@@ -10,7 +10,7 @@ use super::clean::compiled;
 
 /// How firmly a marker announces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum MarkerKind {
     /// "answer", "correct option": what it is said to be is the answer.
     Answer,
     /// "choose", "go with": a decision.
@@ -27,7 +27,7 @@ pub(super) struct Marker {
     /// The byte after its last.
     pub(super) end: usize,
     /// How firmly it announces.
-    pub(super) kind: Kind,
+    pub(super) kind: MarkerKind,
 }
 
 static MARKER: LazyLock<Regex> = LazyLock::new(|| {
@@ -51,9 +51,9 @@ static MARKER: LazyLock<Regex> = LazyLock::new(|| {
 pub(super) fn markers(folded: &str) -> impl Iterator<Item = Marker> {
     MARKER.captures_iter(folded).filter_map(|found| {
         let groups = [
-            ("answer", Kind::Answer),
-            ("decision", Kind::Decision),
-            ("mention", Kind::Mention),
+            ("answer", MarkerKind::Answer),
+            ("decision", MarkerKind::Decision),
+            ("mention", MarkerKind::Mention),
         ];
         let (mark, kind) = groups
             .into_iter()

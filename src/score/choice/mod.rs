@@ -1,7 +1,7 @@
 //! Reading the choice out of a reply, by exact match: [`read`] and [`readings`].
 //!
-//! Two readings are always reported beside each other. [`Mode::Strict`] takes a reply that is an answer and nothing
-//! else; [`Mode::Lenient`] also finds an answer inside a reply, and where two readings are possible it takes neither.
+//! Two readings are always reported beside each other. [`ReadingMode::Strict`] takes a reply that is an answer and nothing
+//! else; [`ReadingMode::Lenient`] also finds an answer inside a reply, and where two readings are possible it takes neither.
 //! No choice is ever guessed, and where the strict reading finds one the lenient reading finds the same.
 //!
 //! A reply passes through `clean` (hidden reasoning, invisible characters, leaked tokens), `strict`, and then the
@@ -29,14 +29,14 @@ use crate::types::reply::{Finish, Reply};
 /// How much of a reply may stand around the answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Mode {
+pub enum ReadingMode {
     /// Nothing: the whole reply is a choice's text, its letter, or its letter with its text. The headline number.
     Strict,
     /// Sentences, markup, JSON, LaTeX; as long as one choice alone is meant.
     Lenient,
 }
 
-impl Mode {
+impl ReadingMode {
     /// Both, the headline first.
     pub const ALL: [Self; 2] = [Self::Strict, Self::Lenient];
 }
@@ -47,17 +47,17 @@ impl Mode {
 /// read and is [`UnreadReason::Truncated`].
 ///
 /// ```
-/// use darkqa_eval::score::choice::{Mode, read};
+/// use darkqa_eval::score::choice::{ReadingMode, read};
 /// use darkqa_eval::types::{Answer, Choices, UnreadReason};
 ///
 /// let choices = Choices::new(vec!["kitchen".into(), "bedroom".into()], 0)?;
-/// assert_eq!(read("(B) bedroom", &choices, Mode::Strict), Answer::Chosen(1));
-/// assert_eq!(read("Answer: **B**", &choices, Mode::Strict), Answer::Unparsed(UnreadReason::NoChoice));
-/// assert_eq!(read("Answer: **B**", &choices, Mode::Lenient), Answer::Chosen(1));
+/// assert_eq!(read("(B) bedroom", &choices, ReadingMode::Strict), Answer::Chosen(1));
+/// assert_eq!(read("Answer: **B**", &choices, ReadingMode::Strict), Answer::Unparsed(UnreadReason::NoChoice));
+/// assert_eq!(read("Answer: **B**", &choices, ReadingMode::Lenient), Answer::Chosen(1));
 /// # Ok::<(), darkqa_eval::error::Error>(())
 /// ```
 #[must_use]
-pub fn read(reply: &str, choices: &Choices, mode: Mode) -> Answer {
+pub fn read(reply: &str, choices: &Choices, mode: ReadingMode) -> Answer {
     let text = match clean::spoken(reply) {
         Ok(text) => text,
         Err(why) => return Answer::Unparsed(why),
@@ -66,7 +66,7 @@ pub fn read(reply: &str, choices: &Choices, mode: Mode) -> Answer {
         return answer;
     }
     match (mode, lenient::read(text, choices)) {
-        (Mode::Strict, Answer::Chosen(_)) => Answer::Unparsed(UnreadReason::NoChoice),
+        (ReadingMode::Strict, Answer::Chosen(_)) => Answer::Unparsed(UnreadReason::NoChoice),
         (_, answer) => answer,
     }
 }
@@ -78,7 +78,7 @@ pub fn read(reply: &str, choices: &Choices, mode: Mode) -> Answer {
 /// not read leniently.
 #[must_use]
 pub fn readings(reply: &Reply, choices: &Choices) -> (Answer, Answer) {
-    let strict = read(&reply.text, choices, Mode::Strict);
+    let strict = read(&reply.text, choices, ReadingMode::Strict);
     if let Answer::Chosen(_) = strict {
         return (strict, strict);
     }
@@ -87,7 +87,7 @@ pub fn readings(reply: &Reply, choices: &Choices) -> (Answer, Answer) {
         Finish::Filter => UnreadReason::Filtered,
         Finish::Length => UnreadReason::Truncated,
         Finish::Stop | Finish::Other(_) | Finish::Unknown => {
-            return (strict, read(&reply.text, choices, Mode::Lenient));
+            return (strict, read(&reply.text, choices, ReadingMode::Lenient));
         }
     };
     (Answer::Unparsed(why), Answer::Unparsed(why))

@@ -8,7 +8,7 @@ use super::clean::compiled;
 
 /// How surely a name is meant as one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Grip {
+pub(super) enum Delimiting {
     /// A letter among words: enough to doubt another, too little to be an answer.
     Loose,
     /// A letter before punctuation or a line's end, or a choice's text.
@@ -27,7 +27,7 @@ pub(super) struct Name {
     /// Which choice; `None` for a letter beyond them.
     pub(super) choice: Option<usize>,
     /// How surely.
-    pub(super) grip: Grip,
+    pub(super) grip: Delimiting,
 }
 
 /// The index that a Latin letter stands for.

@@ -7,18 +7,18 @@ use regex::Regex;
 use super::clean::compiled;
 use super::lenient;
 use super::letters::{AFTER_A, AFTER_I, called_letter, hyphenated};
-use super::markers::{self, Kind, Lead, Marker};
-use super::names::{Grip, Name, index_of, joins};
+use super::markers::{self, Lead, Marker, MarkerKind};
+use super::names::{Delimiting, Name, index_of, joins};
 use super::plain::fold;
-use super::view::View;
+use super::view::ReplyView;
 use crate::types::question::{Answer, UnreadReason};
 
 /// One announcement.
 #[derive(Debug, Clone, Copy)]
-struct Saying {
+struct Announcement {
     /// Its first byte.
     at: usize,
-    kind: Kind,
+    kind: MarkerKind,
     what: What,
 }
 
@@ -32,35 +32,35 @@ enum What {
 
 /// The answer that a text announces: of those said to be the answer the last one; else the one that is decided for or
 /// spoken of, where there is only one.
-pub(super) fn stated(view: &View<'_>) -> Option<Answer> {
+pub(super) fn stated(view: &ReplyView<'_>) -> Option<Answer> {
     let marks: Vec<Marker> = markers::markers(view.folded).collect();
-    let mut sayings: Vec<Saying> = praised(view).collect();
+    let mut sayings: Vec<Announcement> = praised(view).collect();
     let mut end = view.text.len();
     for mark in marks.into_iter().rev() {
         sayings.extend(saying(view, mark, end));
-        if mark.kind == Kind::Answer {
+        if mark.kind == MarkerKind::Answer {
             end = mark.start;
         }
     }
     sayings.sort_by_key(|saying| saying.at);
-    let of = |kind: Kind| -> Vec<Saying> {
+    let of = |kind: MarkerKind| -> Vec<Announcement> {
         let same = sayings.iter().filter(|saying| saying.kind == kind);
         same.copied().collect()
     };
-    last(&of(Kind::Answer))
-        .or_else(|| only(&of(Kind::Decision), &[]))
-        .or_else(|| only(&of(Kind::Mention), &view.letters))
+    last(&of(MarkerKind::Answer))
+        .or_else(|| only(&of(MarkerKind::Decision), &[]))
+        .or_else(|| only(&of(MarkerKind::Mention), &view.letters))
 }
 
 /// The last that was said to be the answer, unless it was taken back.
-fn last(sayings: &[Saying]) -> Option<Answer> {
+fn last(sayings: &[Announcement]) -> Option<Answer> {
     let readable = |answer: Answer| {
         !matches!(
             answer,
             Answer::Unparsed(UnreadReason::NoChoice | UnreadReason::Refused)
         )
     };
-    let said = |saying: &Saying| match saying.what {
+    let said = |saying: &Announcement| match saying.what {
         What::Is(answer) => Some((saying.at, answer)),
         What::IsNot(_) => None,
     };
@@ -70,7 +70,7 @@ fn last(sayings: &[Saying]) -> Option<Answer> {
         .filter_map(said)
         .find(|(_, answer)| readable(*answer))
         .or_else(|| sayings.iter().rev().find_map(said))?;
-    let back = |saying: &Saying| {
+    let back = |saying: &Announcement| {
         saying.at > at
             && matches!((saying.what, answer), (What::IsNot(a), Answer::Chosen(b)) if a == b)
     };
@@ -82,7 +82,7 @@ fn last(sayings: &[Saying]) -> Option<Answer> {
 }
 
 /// The one choice that is spoken of; `beside` are letters that must not name another.
-fn only(sayings: &[Saying], beside: &[Name]) -> Option<Answer> {
+fn only(sayings: &[Announcement], beside: &[Name]) -> Option<Answer> {
     let mut chosen = None;
     for saying in sayings {
         match saying.what {
@@ -113,22 +113,22 @@ fn only(sayings: &[Saying], beside: &[Name]) -> Option<Answer> {
 }
 
 /// What a marker announces; `end` is where the next answer is announced.
-fn saying(view: &View<'_>, mark: Marker, end: usize) -> Option<Saying> {
+fn saying(view: &ReplyView<'_>, mark: Marker, end: usize) -> Option<Announcement> {
     let lead = markers::lead(view.folded, mark.end);
     let kind = match mark.kind {
-        Kind::Answer if !lead.linked => Kind::Mention,
+        MarkerKind::Answer if !lead.linked => MarkerKind::Mention,
         kind => kind,
     };
     let what = match announced(view, &lead) {
         Some((name, _)) if lead.denied || view.denies(&name) => What::IsNot(name.choice?),
         Some((_, answer)) => What::Is(answer),
-        None if lead.colon && kind == Kind::Answer => {
+        None if lead.colon && kind == MarkerKind::Answer => {
             let rest = view.text.get(*lead.steps.last()?..end)?.trim();
             What::Is(rest_of(view, rest)?)
         }
         None => return None,
     };
-    Some(Saying {
+    Some(Announcement {
         at: mark.start,
         kind,
         what,
@@ -136,13 +136,13 @@ fn saying(view: &View<'_>, mark: Marker, end: usize) -> Option<Saying> {
 }
 
 /// What is said after "Answer:" in more words than a name: in the rest of the line, else in all that follows.
-fn rest_of(view: &View<'_>, rest: &str) -> Option<Answer> {
+fn rest_of(view: &ReplyView<'_>, rest: &str) -> Option<Answer> {
     if rest.is_empty() {
         return None;
     }
     let line = rest.lines().next().unwrap_or_default();
     let [line, rest] =
-        [line, rest].map(|text| lenient::spoken(&View::new(text, &fold(text), view.offered)));
+        [line, rest].map(|text| lenient::spoken(&ReplyView::new(text, &fold(text), view.offered)));
     Some(match line {
         Answer::Unparsed(UnreadReason::NoChoice) => rest,
         line => line,
@@ -150,7 +150,7 @@ fn rest_of(view: &View<'_>, rest: &str) -> Option<Answer> {
 }
 
 /// The name that a marker leads to, with what it says once its surroundings are regarded.
-fn announced(view: &View<'_>, lead: &Lead) -> Option<(Name, Answer)> {
+fn announced(view: &ReplyView<'_>, lead: &Lead) -> Option<(Name, Answer)> {
     let far = *lead.steps.last()?;
     let longer = |name: &Name| name.end - name.start > 1;
     let name = view
@@ -166,13 +166,14 @@ fn announced(view: &View<'_>, lead: &Lead) -> Option<(Name, Answer)> {
         return Some((name, Answer::Unparsed(UnreadReason::OutOfRange)));
     };
     let contradicts = |text: Name| text.choice != Some(index);
-    let answer = if name.grip == Grip::Firm && view.labelled_text(&name).is_some_and(contradicts) {
-        Answer::Unparsed(UnreadReason::Contradiction)
-    } else if alternative(view, &name) {
-        Answer::Unparsed(UnreadReason::Ambiguous)
-    } else {
-        Answer::Chosen(index)
-    };
+    let answer =
+        if name.grip == Delimiting::Firm && view.labelled_text(&name).is_some_and(contradicts) {
+            Answer::Unparsed(UnreadReason::Contradiction)
+        } else if alternative(view, &name) {
+            Answer::Unparsed(UnreadReason::Ambiguous)
+        } else {
+            Answer::Chosen(index)
+        };
     Some((name, answer))
 }
 
@@ -184,7 +185,7 @@ static ALTERNATIVE: LazyLock<Regex> = LazyLock::new(|| {
 });
 
 /// Whether another choice is offered in the same breath: "B or C", "B/C", "kitchen or bathroom".
-pub(super) fn alternative(view: &View<'_>, name: &Name) -> bool {
+pub(super) fn alternative(view: &ReplyView<'_>, name: &Name) -> bool {
     let Some(link) = ALTERNATIVE.find(&view.folded[name.end..]) else {
         return false;
     };
@@ -194,7 +195,7 @@ pub(super) fn alternative(view: &View<'_>, name: &Name) -> bool {
 }
 
 /// The letter that is named where one is expected, in either case, in brackets or bare.
-fn letter_at(view: &View<'_>, at: usize) -> Option<Name> {
+fn letter_at(view: &ReplyView<'_>, at: usize) -> Option<Name> {
     let open = view.text[at..].starts_with(['(', '[']);
     let start = at + usize::from(open);
     let letter = view.text[start..]
@@ -206,7 +207,7 @@ fn letter_at(view: &View<'_>, at: usize) -> Option<Name> {
         start,
         end: start + 1,
         choice: index_of(letter).filter(|index| *index < view.offered.texts.len()),
-        grip: Grip::Firm,
+        grip: Delimiting::Firm,
     };
     let after = right.chars().next();
     if joins(after) || hyphenated(left, right) || (after == Some('\'') && !turkish_copula(right)) {
@@ -234,7 +235,7 @@ fn turkish_copula(right: &str) -> bool {
 }
 
 /// Names that are called the answer after they stand: "B is the correct answer".
-fn praised<'a>(view: &'a View<'_>) -> impl Iterator<Item = Saying> + 'a {
+fn praised<'a>(view: &'a ReplyView<'_>) -> impl Iterator<Item = Announcement> + 'a {
     let letters = view
         .letters
         .iter()
@@ -246,9 +247,9 @@ fn praised<'a>(view: &'a View<'_>) -> impl Iterator<Item = Saying> + 'a {
     letters
         .chain(texts)
         .filter(|name| !view.denies(name))
-        .map(|name| Saying {
+        .map(|name| Announcement {
             at: name.start,
-            kind: Kind::Answer,
+            kind: MarkerKind::Answer,
             what: What::Is(match name.choice {
                 Some(index) => Answer::Chosen(index),
                 None => Answer::Unparsed(UnreadReason::OutOfRange),

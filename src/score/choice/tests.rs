@@ -5,7 +5,7 @@
 use proptest::prelude::*;
 use serde::Deserialize;
 
-use super::{Mode, read, readings};
+use super::{ReadingMode, read, readings};
 use crate::types::question::{Answer, Choices, UnreadReason};
 use crate::types::reply::{Finish, Reply};
 
@@ -68,7 +68,10 @@ fn the_table_of_replies_is_read() {
     let mut wrong = Vec::new();
     for line in include_str!("../../../tests/data/replies.jsonl").lines() {
         let case: Case = serde_json::from_str(line).unwrap();
-        for (mode, want) in [(Mode::Strict, case.strict), (Mode::Lenient, case.lenient)] {
+        for (mode, want) in [
+            (ReadingMode::Strict, case.strict),
+            (ReadingMode::Lenient, case.lenient),
+        ] {
             let found = read(&case.reply, &choices(&case.of), mode);
             if found != want.into() {
                 wrong.push(format!("{mode:?} {line}: {found:?}"));
@@ -137,7 +140,7 @@ fn long_replies_are_read() {
         "There is a stove. {}\nAnswer: B",
         "It is dim here. ".repeat(10_000)
     );
-    let found = read(&answered, &rooms, Mode::Lenient);
+    let found = read(&answered, &rooms, ReadingMode::Lenient);
     assert_eq!(found, Answer::Chosen(1));
     // What any level looks for, over and over: were one of them quadratic, this test would not end in good time.
     for piece in [
@@ -165,7 +168,7 @@ fn long_replies_are_read() {
         "A bedroom. ",
     ] {
         let long = piece.repeat(20_000 / piece.len());
-        let _ = read(&long, &rooms, Mode::Lenient);
+        let _ = read(&long, &rooms, ReadingMode::Lenient);
     }
 }
 
@@ -252,8 +255,8 @@ proptest! {
     #[test]
     fn the_modes_never_disagree(reply in reply(), set in 0..SETS.len()) {
         let choices = choices(SETS[set].0);
-        let strict = read(&reply, &choices, Mode::Strict);
-        let lenient = read(&reply, &choices, Mode::Lenient);
+        let strict = read(&reply, &choices, ReadingMode::Strict);
+        let lenient = read(&reply, &choices, ReadingMode::Lenient);
         match (strict, lenient) {
             (Answer::Chosen(strict), lenient) => {
                 prop_assert_eq!(lenient, Answer::Chosen(strict));
@@ -280,7 +283,7 @@ proptest! {
             6 => (format!("{{\"answer\": \"{text}\"}}"), false),
             _ => (format!("**{letter}. {text}**"), false),
         };
-        prop_assert_eq!(read(&reply, &choices, Mode::Lenient), Answer::Chosen(index), "{}", reply);
-        prop_assert_eq!(read(&reply, &choices, Mode::Strict) == Answer::Chosen(index), strict, "{}", reply);
+        prop_assert_eq!(read(&reply, &choices, ReadingMode::Lenient), Answer::Chosen(index), "{}", reply);
+        prop_assert_eq!(read(&reply, &choices, ReadingMode::Strict) == Answer::Chosen(index), strict, "{}", reply);
     }
 }

@@ -1,13 +1,13 @@
 //! A plain text with every place where it names one of the offered choices.
 
 use super::letters::letters;
-use super::names::{Grip, Name, cut_number, denied, one_word};
+use super::names::{Delimiting, Name, cut_number, denied, one_word};
 use super::plain::{fold, plain};
 use super::{clean, markers};
 use crate::types::question::Choices;
 
 /// The choices as they can stand in a plain text.
-pub(super) struct Offered {
+pub(super) struct ChoiceViews {
     /// Their texts without markup.
     pub(super) texts: Vec<String>,
     /// The same in lower case without a final period, longest first, with the choices they belong to.
@@ -16,7 +16,7 @@ pub(super) struct Offered {
     pub(super) yes_no: Option<(usize, usize)>,
 }
 
-impl Offered {
+impl ChoiceViews {
     pub(super) fn new(choices: &Choices) -> Self {
         let texts: Vec<String> = choices
             .texts()
@@ -47,22 +47,22 @@ impl Offered {
 }
 
 /// A plain text and what it names.
-pub(super) struct View<'a> {
+pub(super) struct ReplyView<'a> {
     /// The text.
     pub(super) text: &'a str,
     /// The text in lower case, byte for byte.
     pub(super) folded: &'a str,
     /// What it is read against.
-    pub(super) offered: &'a Offered,
+    pub(super) offered: &'a ChoiceViews,
     /// Letters, from left to right.
     pub(super) letters: Vec<Name>,
     /// Texts of choices, from left to right, none inside a longer one.
     pub(super) texts: Vec<Name>,
 }
 
-impl<'a> View<'a> {
+impl<'a> ReplyView<'a> {
     /// Looks through a text; `folded` is [`fold`] of it.
-    pub(super) fn new(text: &'a str, folded: &'a str, offered: &'a Offered) -> Self {
+    pub(super) fn new(text: &'a str, folded: &'a str, offered: &'a ChoiceViews) -> Self {
         let texts = texts(folded, offered);
         let within = |letter: &Name| {
             let after = texts.partition_point(|name| name.start <= letter.start);
@@ -114,7 +114,7 @@ impl<'a> View<'a> {
 }
 
 /// Every whole-word place of a choice's text, longest texts first, from left to right.
-fn texts(folded: &str, offered: &Offered) -> Vec<Name> {
+fn texts(folded: &str, offered: &ChoiceViews) -> Vec<Name> {
     let mut taken = vec![false; folded.len()];
     let mut names = Vec::new();
     for (i, (text, choice)) in offered.folded.iter().enumerate() {
@@ -136,7 +136,7 @@ fn texts(folded: &str, offered: &Offered) -> Vec<Name> {
                 start,
                 end,
                 choice: Some(choice),
-                grip: Grip::Plain,
+                grip: Delimiting::Plain,
             }));
         }
     }

@@ -8,7 +8,7 @@ use serde_json::Value;
 use super::clean::compiled;
 use super::lenient;
 use super::plain::{fold, plain};
-use super::view::{Offered, View};
+use super::view::{ChoiceViews, ReplyView};
 use crate::types::question::{Answer, UnreadReason};
 
 /// Keys whose value is the answer, without case, spaces and punctuation.
@@ -54,7 +54,7 @@ const BOX_BYTES: usize = 2000;
 
 /// The answer under an answer's key in the JSON objects of a text. An object with such a key is the last word, also
 /// where its value cannot be read.
-pub(super) fn json(tidy: &str, offered: &Offered) -> Option<Answer> {
+pub(super) fn json(tidy: &str, offered: &ChoiceViews) -> Option<Answer> {
     let mut answers = Vec::new();
     let mut from = 0;
     while let Some(at) = tidy[from..].find('{') {
@@ -84,7 +84,7 @@ fn key_form(key: &str) -> String {
 }
 
 /// The answer that a JSON value gives. A number is a choice's text, never its position.
-fn value_answer(value: &Value, offered: &Offered) -> Answer {
+fn value_answer(value: &Value, offered: &ChoiceViews) -> Answer {
     let nothing = Answer::Unparsed(UnreadReason::NoChoice);
     match value {
         Value::String(text) => text_answer(text, offered),
@@ -111,7 +111,7 @@ fn value_answer(value: &Value, offered: &Offered) -> Answer {
 }
 
 /// The answer in `\boxed{…}` and `<answer>…</answer>`.
-pub(super) fn boxed(tidy: &str, offered: &Offered) -> Option<Answer> {
+pub(super) fn boxed(tidy: &str, offered: &ChoiceViews) -> Option<Answer> {
     let tagged = TAGGED
         .captures_iter(tidy)
         .filter_map(|found| found.get(1))
@@ -144,9 +144,9 @@ fn boxes(text: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-fn text_answer(text: &str, offered: &Offered) -> Answer {
+fn text_answer(text: &str, offered: &ChoiceViews) -> Answer {
     let text = plain(text);
-    lenient::spoken(&View::new(&text, &fold(&text), offered))
+    lenient::spoken(&ReplyView::new(&text, &fold(&text), offered))
 }
 
 /// The one choice that the answers agree on; what could not be read at all has no voice beside others.

@@ -1,11 +1,11 @@
-//! One answer and what came of it: [`Scored`], [`Outcome`].
+//! One answer and what came of it: [`ScoredAnswer`], [`AnswerOutcome`].
 
 use crate::score::llm_match::points;
 use crate::score::subject::Subject;
 
 /// What came of an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Outcome {
+pub enum AnswerOutcome {
     /// It was not given yet, or it failed: not scored.
     Missing,
     /// It was given and not judged yet: not scored.
@@ -18,7 +18,7 @@ pub enum Outcome {
     Marked(i64),
 }
 
-impl Outcome {
+impl AnswerOutcome {
     /// What it is worth, between 0 and 1; `None` where it is not scored.
     #[must_use]
     pub fn points(self) -> Option<f64> {
@@ -32,13 +32,13 @@ impl Outcome {
 
 /// One answer to one question.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Scored {
+pub struct ScoredAnswer {
     /// Whose it is.
     pub subject: Subject,
     /// The question's place among those asked.
     pub question: usize,
     /// What came of it.
-    pub outcome: Outcome,
+    pub outcome: AnswerOutcome,
     /// Whether the protocol has cut it before it was judged.
     pub cut: bool,
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::answer::{Outcome, Scored};
+use super::answer::{AnswerOutcome, ScoredAnswer};
 use super::group::Group;
 use crate::score::estimate::Estimate;
 use crate::score::subject::Subject;
@@ -46,7 +46,7 @@ impl OpenCell {
 pub(super) fn cell(
     subject: &Subject,
     group: &Group,
-    answers: &[&Scored],
+    answers: &[&ScoredAnswer],
     cluster: impl Fn(usize) -> usize,
 ) -> OpenCell {
     let count = |outcome| {
@@ -66,10 +66,10 @@ pub(super) fn cell(
         subject: subject.clone(),
         group: group.clone(),
         due: answers.len(),
-        missing: count(Outcome::Missing),
-        unjudged: count(Outcome::Unjudged),
-        unmarked: count(Outcome::Unmarked),
-        null: count(Outcome::Null),
+        missing: count(AnswerOutcome::Missing),
+        unjudged: count(AnswerOutcome::Unjudged),
+        unmarked: count(AnswerOutcome::Unmarked),
+        null: count(AnswerOutcome::Null),
         cut: answers.iter().filter(|answer| answer.cut).count(),
         score: Estimate::scored(&sums, MOST, n),
     }

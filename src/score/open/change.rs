@@ -1,8 +1,8 @@
-//! One score less another: [`Change`].
+//! One score less another: [`ScoreChange`].
 
 use std::collections::BTreeMap;
 
-use super::answer::Scored;
+use super::answer::ScoredAnswer;
 use super::group::Group;
 use crate::score::estimate::Estimate;
 use crate::score::paired::difference;
@@ -11,7 +11,7 @@ use crate::types::{AxisLevel, View};
 
 /// What a score is held against.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Against {
+pub enum Baseline {
     /// The same model on the lit frames.
     Lit,
     /// The same model at the same level without an enhancer.
@@ -20,11 +20,11 @@ pub enum Against {
 
 /// A subject's score less that of another, on the questions that both were scored on.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Change {
+pub struct ScoreChange {
     /// Whose.
     pub subject: Subject,
-    /// Against what.
-    pub against: Against,
+    /// Baseline what.
+    pub against: Baseline,
     /// On what.
     pub group: Group,
     /// The difference of the unrounded means; its `n` counts questions.
@@ -32,29 +32,29 @@ pub struct Change {
 }
 
 /// Whom a subject is held against.
-pub(super) fn others(subject: &Subject) -> Vec<(Against, Subject)> {
+pub(super) fn others(subject: &Subject) -> Vec<(Baseline, Subject)> {
     let Some(level) = subject.level.filter(|_| subject.view == Some(View::Image)) else {
         return Vec::new();
     };
     let seeing =
         |level, enhancer| Subject::seeing(&subject.model, level, &subject.variant, enhancer);
-    let lit = (level != AxisLevel::L0).then(|| (Against::Lit, seeing(AxisLevel::L0, None)));
+    let lit = (level != AxisLevel::L0).then(|| (Baseline::Lit, seeing(AxisLevel::L0, None)));
     let raw = subject
         .enhancer
         .is_some()
-        .then(|| (Against::Raw, seeing(level, None)));
+        .then(|| (Baseline::Raw, seeing(level, None)));
     lit.into_iter().chain(raw).collect()
 }
 
 /// The first's mean less the second's on the questions that both were scored on; several people's answers to one question count as
 /// their mean.
 pub(super) fn change(
-    first: &[&Scored],
-    second: &[&Scored],
+    first: &[&ScoredAnswer],
+    second: &[&ScoredAnswer],
     is_of: impl Fn(usize) -> bool,
     cluster: impl Fn(usize) -> usize,
 ) -> Option<Estimate> {
-    let means = |answers: &[&Scored]| {
+    let means = |answers: &[&ScoredAnswer]| {
         let mut means = BTreeMap::<usize, (f64, f64)>::new();
         for answer in answers.iter().filter(|answer| is_of(answer.question)) {
             if let Some(points) = answer.outcome.points() {

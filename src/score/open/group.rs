@@ -1,10 +1,10 @@
-//! Questions that are scored together: [`Group`], by the [`Topic`] of each.
+//! Questions that are scored together: [`Group`], by the [`QuestionGroups`] of each.
 
 use std::collections::BTreeSet;
 
 /// What a question belongs to.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Topic {
+pub struct QuestionGroups {
     /// Its walk.
     pub episode: String,
     /// Its category.
@@ -26,7 +26,7 @@ pub enum Group {
 
 impl Group {
     /// Whether a question belongs to it.
-    pub(super) fn has(&self, topic: &Topic) -> bool {
+    pub(super) fn has(&self, topic: &QuestionGroups) -> bool {
         match self {
             Self::All => true,
             Self::Split(split) => *split == topic.split,
@@ -55,7 +55,7 @@ impl Group {
 }
 
 /// All questions; the splits and the categories where there are several.
-pub(super) fn groups(topics: &[Topic]) -> Vec<Group> {
+pub(super) fn groups(topics: &[QuestionGroups]) -> Vec<Group> {
     let splits: BTreeSet<&String> = topics.iter().map(|topic| &topic.split).collect();
     let categories: BTreeSet<&String> = topics.iter().map(|topic| &topic.category).collect();
     let several = |names: BTreeSet<&String>, make: fn(String) -> Group| {

@@ -17,10 +17,10 @@ use self::change::{change, others};
 use self::group::groups;
 use super::subject::Subject;
 
-pub use answer::{Outcome, Scored};
+pub use answer::{AnswerOutcome, ScoredAnswer};
 pub use cell::OpenCell;
-pub use change::{Against, Change};
-pub use group::{Group, Topic};
+pub use change::{Baseline, ScoreChange};
+pub use group::{Group, QuestionGroups};
 
 /// Every score of a run.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,7 +32,7 @@ pub struct OpenSummary {
     /// Scores by subject, and by group within.
     pub cells: Vec<OpenCell>,
     /// Differences, likewise.
-    pub changes: Vec<Change>,
+    pub changes: Vec<ScoreChange>,
 }
 
 impl OpenSummary {
@@ -45,7 +45,12 @@ impl OpenSummary {
 
     /// How a subject does against another on a group.
     #[must_use]
-    pub fn change(&self, subject: &Subject, against: Against, group: &Group) -> Option<&Change> {
+    pub fn change(
+        &self,
+        subject: &Subject,
+        against: Baseline,
+        group: &Group,
+    ) -> Option<&ScoreChange> {
         self.changes.iter().find(|change| {
             change.subject == *subject && change.against == against && change.group == *group
         })
@@ -60,7 +65,7 @@ impl OpenSummary {
 
 /// Scores answers; `topics` holds what each question belongs to.
 #[must_use]
-pub fn open_summary(answers: &[Scored], topics: &[Topic]) -> OpenSummary {
+pub fn open_summary(answers: &[ScoredAnswer], topics: &[QuestionGroups]) -> OpenSummary {
     let episodes: BTreeMap<&str, usize> = topics
         .iter()
         .map(|topic| &*topic.episode)
@@ -76,7 +81,7 @@ pub fn open_summary(answers: &[Scored], topics: &[Topic]) -> OpenSummary {
             question
         }
     };
-    let mut by_subject = BTreeMap::<&Subject, Vec<&Scored>>::new();
+    let mut by_subject = BTreeMap::<&Subject, Vec<&ScoredAnswer>>::new();
     for answer in answers {
         by_subject.entry(&answer.subject).or_default().push(answer);
     }
@@ -84,8 +89,8 @@ pub fn open_summary(answers: &[Scored], topics: &[Topic]) -> OpenSummary {
     let (mut cells, mut changes) = (Vec::new(), Vec::new());
     for (subject, answers) in &by_subject {
         for group in &groups {
-            let of = |answer: &&&Scored| group.has(&topics[answer.question]);
-            let here: Vec<&Scored> = answers.iter().filter(of).copied().collect();
+            let of = |answer: &&&ScoredAnswer| group.has(&topics[answer.question]);
+            let here: Vec<&ScoredAnswer> = answers.iter().filter(of).copied().collect();
             cells.push(cell(subject, group, &here, cluster));
         }
         for (against, other) in others(subject) {
@@ -95,7 +100,7 @@ pub fn open_summary(answers: &[Scored], topics: &[Topic]) -> OpenSummary {
             for group in &groups {
                 let is_of = |question: usize| group.has(&topics[question]);
                 let difference = change(answers, theirs, is_of, cluster);
-                changes.extend(difference.map(|difference| Change {
+                changes.extend(difference.map(|difference| ScoreChange {
                     subject: (*subject).clone(),
                     against,
                     group: group.clone(),

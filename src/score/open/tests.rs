@@ -2,16 +2,16 @@
 
 use super::*;
 
-fn topic(episode: usize, category: &str) -> Topic {
-    Topic {
+fn topic(episode: usize, category: &str) -> QuestionGroups {
+    QuestionGroups {
         episode: format!("hm3d-v0/{episode:03}"),
         category: category.into(),
         split: "hm3d-v0".into(),
     }
 }
 
-fn scored(level: &str, question: usize, outcome: Outcome) -> Scored {
-    Scored {
+fn scored(level: &str, question: usize, outcome: AnswerOutcome) -> ScoredAnswer {
+    ScoredAnswer {
         subject: Subject::shown("m", Some(&level.parse().unwrap())),
         question,
         outcome,
@@ -21,8 +21,8 @@ fn scored(level: &str, question: usize, outcome: Outcome) -> Scored {
 
 #[test]
 fn marks_become_upstreams_score() {
-    use Outcome::{Marked, Missing, Null, Unmarked};
-    let topics: Vec<Topic> = (0..7).map(|i| topic(0, ["a", "b"][i % 2])).collect();
+    use AnswerOutcome::{Marked, Missing, Null, Unmarked};
+    let topics: Vec<QuestionGroups> = (0..7).map(|i| topic(0, ["a", "b"][i % 2])).collect();
     let outcomes = [
         Marked(5),
         Marked(5),
@@ -33,7 +33,7 @@ fn marks_become_upstreams_score() {
         Unmarked,
     ];
     let answers = outcomes.into_iter().enumerate();
-    let answers: Vec<Scored> = answers
+    let answers: Vec<ScoredAnswer> = answers
         .map(|(i, outcome)| scored("L0", i, outcome))
         .collect();
     let summary = open_summary(&answers, &topics);
@@ -49,9 +49,9 @@ fn marks_become_upstreams_score() {
 
 #[test]
 fn drops_are_of_unrounded_means_on_shared_questions() {
-    use Outcome::{Marked, Missing};
-    let topics: Vec<Topic> = (0..6).map(|i| topic(i / 2, "a")).collect();
-    let marks = |level: &str, marks: [i64; 6]| -> Vec<Scored> {
+    use AnswerOutcome::{Marked, Missing};
+    let topics: Vec<QuestionGroups> = (0..6).map(|i| topic(i / 2, "a")).collect();
+    let marks = |level: &str, marks: [i64; 6]| -> Vec<ScoredAnswer> {
         let outcome = |mark| if mark == 0 { Missing } else { Marked(mark) };
         let marks = marks.into_iter().enumerate();
         marks
@@ -66,14 +66,18 @@ fn drops_are_of_unrounded_means_on_shared_questions() {
     .concat();
     let summary = open_summary(&answers, &topics);
     let dark = Subject::shown("m", Some(&"L2-noise".parse().unwrap()));
-    let drop = summary.change(&dark, Against::Lit, &Group::All).unwrap();
+    let drop = summary.change(&dark, Baseline::Lit, &Group::All).unwrap();
     // (0.25 + 0 + 0.5 + 0.75 + 0) / 5, the fifth question being unanswered at L0.
     assert!((drop.difference.value + 0.3).abs() < 1e-12 && drop.difference.n == 5);
     assert!(drop.difference.low < -0.3 && drop.difference.high > -0.3);
     let mended = Subject::shown("m", Some(&"L2-noise+ruas".parse().unwrap()));
-    let gain = summary.change(&mended, Against::Raw, &Group::All).unwrap();
+    let gain = summary.change(&mended, Baseline::Raw, &Group::All).unwrap();
     assert!((gain.difference.value - 0.125).abs() < 1e-12);
-    assert!(summary.change(&mended, Against::Lit, &Group::All).is_some());
+    assert!(
+        summary
+            .change(&mended, Baseline::Lit, &Group::All)
+            .is_some()
+    );
     assert_eq!(summary.changes.len(), 3);
     assert_eq!((summary.unit, summary.clusters), ("episode", 3));
 }

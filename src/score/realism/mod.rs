@@ -14,7 +14,7 @@ use crate::types::Rgb;
 
 /// How one made image compares with the real one.
 #[derive(Debug, Clone, Copy, Serialize)]
-pub struct Measured {
+pub struct ImageComparison {
     /// In dB; null in JSON where it is infinite.
     pub psnr: f64,
     /// Structural similarity.
@@ -27,15 +27,15 @@ pub struct Measured {
 
 /// What one pair shows.
 #[derive(Debug, Clone, Serialize)]
-pub struct Compared {
+pub struct PairComparison {
     /// The pair's name.
     pub pair: String,
     /// The exposure drop in EV.
     pub drop: f32,
     /// By exposure drop alone.
-    pub exposure: Measured,
+    pub exposure: ImageComparison,
     /// With the sensor's noise.
-    pub noise: Measured,
+    pub noise: ImageComparison,
     /// PSNR of the sensor branch without noise: its tone, apart from its noise.
     pub clean_psnr: f64,
 }

@@ -107,7 +107,7 @@ pub enum Bins {
 /// What is done about empty bins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
-pub enum Empty {
+pub enum EmptyBins {
     /// 10⁻⁸ is added to the share of each bin, and the shares are made to sum to 1 again.
     #[default]
     Eps,
@@ -116,7 +116,7 @@ pub enum Empty {
     Drop,
 }
 
-impl Empty {
+impl EmptyBins {
     /// The other rule.
     #[must_use]
     pub fn other(self) -> Self {
@@ -167,9 +167,14 @@ pub struct Divergence {
     pub empty: usize,
 }
 
-/// D_KL(real ‖ synthetic) of two sets of residuals. [`Empty`] does not concern [`Bins::Kousha`], which leaves no bin empty.
+/// D_KL(real ‖ synthetic) of two sets of residuals. [`EmptyBins`] does not concern [`Bins::Kousha`], which leaves no bin empty.
 #[must_use]
-pub fn divergence(real: &Residuals, synthetic: &Residuals, bins: Bins, rule: Empty) -> Divergence {
+pub fn divergence(
+    real: &Residuals,
+    synthetic: &Residuals,
+    bins: Bins,
+    rule: EmptyBins,
+) -> Divergence {
     let [real, synthetic] = [real, synthetic].map(|residuals| residuals.binned(bins));
     let empty = real
         .iter()
@@ -177,9 +182,9 @@ pub fn divergence(real: &Residuals, synthetic: &Residuals, bins: Bins, rule: Emp
         .filter(|(p, q)| **p > 0 && **q == 0)
         .count();
     let added = match (bins, rule) {
-        (Bins::Kousha, _) => Added::Count,
-        (Bins::Fu, Empty::Eps) => Added::Share,
-        (Bins::Fu, Empty::Drop) => Added::Nothing,
+        (Bins::Kousha, _) => AddedCount::Count,
+        (Bins::Fu, EmptyBins::Eps) => AddedCount::Share,
+        (Bins::Fu, EmptyBins::Drop) => AddedCount::Nothing,
     };
     let [real, synthetic] = [real, synthetic].map(|counts| shares(&counts, added));
     let terms = real
@@ -194,25 +199,25 @@ pub fn divergence(real: &Residuals, synthetic: &Residuals, bins: Bins, rule: Emp
 
 /// What is added to each bin.
 #[derive(Clone, Copy)]
-enum Added {
+enum AddedCount {
     Nothing,
     Count,
     Share,
 }
 
-fn shares(counts: &[u64], added: Added) -> Vec<f64> {
+fn shares(counts: &[u64], added: AddedCount) -> Vec<f64> {
     let n = counts.iter().sum::<u64>() as f64;
     let raised: Vec<f64> = counts
         .iter()
         .map(|count| match added {
-            Added::Nothing => *count as f64 / n,
-            Added::Count => *count as f64 + 1.0,
-            Added::Share => *count as f64 / n + 1e-8,
+            AddedCount::Nothing => *count as f64 / n,
+            AddedCount::Count => *count as f64 + 1.0,
+            AddedCount::Share => *count as f64 / n + 1e-8,
         })
         .collect();
     let sum = match added {
-        Added::Nothing => 1.0,
-        Added::Count | Added::Share => raised.iter().sum(),
+        AddedCount::Nothing => 1.0,
+        AddedCount::Count | AddedCount::Share => raised.iter().sum(),
     };
     raised.iter().map(|share| share / sum).collect()
 }
@@ -226,7 +231,7 @@ impl fmt::Display for Bins {
     }
 }
 
-impl fmt::Display for Empty {
+impl fmt::Display for EmptyBins {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {
             Self::Eps => "eps: 1e-8 added to each bin's share",
@@ -251,9 +256,9 @@ mod tests {
     fn equal_residuals_are_no_distance_apart() {
         let same = residuals(&[(-3, 10), (0, 80), (7, 10)]);
         for (bins, rule) in [
-            (Bins::Fu, Empty::Eps),
-            (Bins::Fu, Empty::Drop),
-            (Bins::Kousha, Empty::Eps),
+            (Bins::Fu, EmptyBins::Eps),
+            (Bins::Fu, EmptyBins::Drop),
+            (Bins::Kousha, EmptyBins::Eps),
         ] {
             let found = divergence(&same, &same, bins, rule);
             assert!(found.nats.abs() < 1e-12 && found.empty == 0);
@@ -265,16 +270,16 @@ mod tests {
     fn hand_made_histograms_have_their_divergence() {
         let real = residuals(&[(0, 50), (20, 50)]);
         let bare = residuals(&[(0, 100)]);
-        let dropped = divergence(&real, &bare, Bins::Fu, Empty::Drop);
+        let dropped = divergence(&real, &bare, Bins::Fu, EmptyBins::Drop);
         assert!((dropped.nats - 0.5 * f64::ln(0.5)).abs() < 1e-12);
         assert_eq!(dropped.empty, 1);
-        let eps = divergence(&real, &bare, Bins::Fu, Empty::Eps);
+        let eps = divergence(&real, &bare, Bins::Fu, EmptyBins::Eps);
         let due = 0.5 * f64::ln(0.5) + 0.5 * f64::ln(0.5 / 1e-8);
         assert!((eps.nats - due).abs() < 1e-4, "{}", eps.nats);
         let other = residuals(&[(0, 25), (20, 75)]);
-        let found = divergence(&real, &other, Bins::Fu, Empty::Drop).nats;
+        let found = divergence(&real, &other, Bins::Fu, EmptyBins::Drop).nats;
         assert!((found - 0.5 * f64::ln(2.0) - 0.5 * f64::ln(2.0 / 3.0)).abs() < 1e-12);
-        let kousha = divergence(&real, &bare, Bins::Kousha, Empty::Eps).nats;
+        let kousha = divergence(&real, &bare, Bins::Kousha, EmptyBins::Eps).nats;
         let p = 51.0 / 230.0;
         let due = p * f64::ln(51.0 / 101.0) + p * f64::ln(51.0);
         assert!((kousha - due).abs() < 1e-12);
