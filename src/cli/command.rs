@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 use clap_complete::Shell;
 
-use crate::job::batch::BatchFiles;
+use crate::job::batch::BatchFileArgs;
 use crate::job::merge::MergeArgs;
 use crate::job::report::ReportArgs;
 use crate::run::batch::BatchImportArgs;
@@ -137,7 +137,7 @@ pub struct BatchExportArgs {
     pub evaluate: EvaluateArgs,
     /// Its files.
     #[command(flatten)]
-    pub files: BatchFiles,
+    pub files: BatchFileArgs,
 }
 
 /// What can be done with people's answers.

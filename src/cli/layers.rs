@@ -37,7 +37,7 @@ impl From<Error> for Problem {
 }
 
 /// What is said of one flag outside of the command line.
-struct Said {
+struct LayeredValue {
     /// Where: a variable, or a file and its key.
     origin: String,
     values: Vec<OsString>,
@@ -147,7 +147,7 @@ fn environment(
     all: &Command,
     command: &Command,
     variable: &impl Fn(&str) -> Option<OsString>,
-) -> Result<BTreeMap<String, Said>> {
+) -> Result<BTreeMap<String, LayeredValue>> {
     let names = std::env::vars_os().filter_map(|(name, _)| name.into_string().ok());
     let ours = names.filter(|name| name.starts_with(PREFIX));
     let mut known: Vec<String> = every_flag(all).iter().map(|flag| name_of(flag)).collect();
@@ -167,7 +167,7 @@ fn environment(
             Some(text) if list => text.split(',').map(OsString::from).collect(),
             _ => vec![text],
         };
-        Some((flag, Said { origin, values }))
+        Some((flag, LayeredValue { origin, values }))
     });
     Ok(said.collect())
 }
@@ -201,7 +201,7 @@ fn of_file(
     all: &Command,
     command: &Command,
     called: &[String],
-) -> Result<BTreeMap<String, Said>> {
+) -> Result<BTreeMap<String, LayeredValue>> {
     let text = reading::text(path)?;
     let table: Table = text.parse().map_err(|e| broken(path, &text, &e))?;
     let mut said = BTreeMap::new();
@@ -211,7 +211,7 @@ fn of_file(
 
 /// Takes the entries of a table, and of the tables in it those on the way to the command that is called.
 fn take(
-    said: &mut BTreeMap<String, Said>,
+    said: &mut BTreeMap<String, LayeredValue>,
     path: &Path,
     table: &Table,
     at: &Command,
@@ -242,7 +242,7 @@ fn take(
             let problem = "a text, a number, a switch or a list of them expected";
             Error::usage(&origin, problem)
         })?;
-        said.insert(flag, Said { origin, values });
+        said.insert(flag, LayeredValue { origin, values });
     }
     let tables = table
         .iter()
@@ -282,7 +282,7 @@ fn text_of(value: &Value) -> Option<OsString> {
 }
 
 /// The words that say a flag as if it were typed; a switch that is turned off has none.
-fn as_words(arg: &Arg, flag: &str, said: &Said) -> Result<Vec<OsString>> {
+fn as_words(arg: &Arg, flag: &str, said: &LayeredValue) -> Result<Vec<OsString>> {
     if !arg.get_action().takes_values() {
         let word = match &said.values[..] {
             [value] => value.to_str(),

@@ -18,7 +18,7 @@ use tracing_subscriber::EnvFilter;
 
 use crate::error::{Error, Result};
 use crate::job::merge::merge;
-use crate::job::progress::{Loudness, Progress};
+use crate::job::progress::{Progress, Verbosity};
 use crate::job::report::report;
 use crate::job::{Outcome, picture_words};
 use crate::run::evaluate::{evaluate, export_batch};
@@ -60,9 +60,9 @@ pub fn main(words: impl Iterator<Item = OsString>) -> ExitCode {
         Err(e) => return fail(&e.to_string()),
     };
     let progress = Progress::new(if cli.common.quiet {
-        Loudness::Quiet
+        Verbosity::Quiet
     } else {
-        Loudness::Normal
+        Verbosity::Normal
     });
     let filter =
         EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("darkqa_eval=warn"));

@@ -9,7 +9,7 @@ use super::command::{BatchCommand, Cli, Command};
 use super::layers;
 use crate::ask::{AccessArgs, ImageArgs, Parameters, Sending};
 use crate::enhance::{EnhancerArgs, RuntimeArgs, SizeArgs};
-use crate::job::batch::BatchFiles;
+use crate::job::batch::BatchFileArgs;
 use crate::job::models::ModelName;
 use crate::job::settings::JobArgs;
 use crate::run::evaluate::{EvaluateArgs, ShrinkArgs};
@@ -139,7 +139,7 @@ impl Idle {
             self.because("no judge is named", &ids::<JudgeArgs>());
         }
         if !args.batch {
-            self.because("--batch alone writes such files", &ids::<BatchFiles>());
+            self.because("--batch alone writes such files", &ids::<BatchFileArgs>());
         }
         if args.study.is_none() {
             self.job(&args.job, &[], &[], args.judge.judge.as_ref());

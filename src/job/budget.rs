@@ -1,7 +1,7 @@
 //! What a run costs: [`Budget`].
 
 use super::models::ModelUnderTest;
-use super::money::Money;
+use super::money::MoneySettings;
 use super::trial::{Item, Prompt, Trial};
 use crate::ask::Price;
 use crate::error::{Error, Result};
@@ -30,7 +30,7 @@ impl Budget {
     /// # Errors
     /// Where `--max-cost` is said and a model has no price: it could not be kept to.
     pub(crate) fn new<D>(
-        money: &Money,
+        money: &MoneySettings,
         models: &[ModelUnderTest],
         stored: &[Record<D>],
     ) -> Result<Self> {

@@ -42,7 +42,7 @@ impl EndReason {
 
 /// What is known of one model.
 #[derive(Debug, Default)]
-struct Health {
+struct ModelHealth {
     succeeded: bool,
     /// Failures since the last success that the server or the way to it is to blame for.
     outage: usize,
@@ -55,11 +55,11 @@ struct Health {
 
 /// One model that is watched.
 #[derive(Debug)]
-struct Watched {
+struct WatchedModel {
     name: String,
     /// Where it is asked.
     place: String,
-    health: Health,
+    health: ModelHealth,
 }
 
 /// Watches the outcomes for a reason to stop asking one model, or all.
@@ -67,7 +67,7 @@ struct Watched {
 pub(crate) struct CircuitBreaker {
     max_failures: Option<usize>,
     patience: usize,
-    models: Vec<Watched>,
+    models: Vec<WatchedModel>,
     failures: usize,
     stopped: bool,
     end: Option<EndReason>,
@@ -80,10 +80,10 @@ impl CircuitBreaker {
         concurrency: usize,
         max_failures: Option<usize>,
     ) -> Self {
-        let watched = models.iter().map(|one| Watched {
+        let watched = models.iter().map(|one| WatchedModel {
             name: one.model.name().to_owned(),
             place: one.place().to_owned(),
-            health: Health::default(),
+            health: ModelHealth::default(),
         });
         Self {
             max_failures,
@@ -139,7 +139,7 @@ impl CircuitBreaker {
             return;
         }
         self.failures += 1;
-        let Watched {
+        let WatchedModel {
             name,
             place: endpoint,
             health,

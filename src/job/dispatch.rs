@@ -12,9 +12,9 @@ use super::budget::Budget;
 use super::circuit_breaker::{CircuitBreaker, EndReason};
 use super::interrupt::Interrupt;
 use super::models::ModelUnderTest;
-use super::progress::{Bar, Progress};
+use super::progress::{Progress, StepBar};
 use super::settings::JobSettings;
-use super::timings::{Step, Timings};
+use super::timings::{TimedStep, Timings};
 use super::trial::{Item, PreparedGroup, Stimulus, Trial};
 use super::workers::unstarted;
 use crate::ask::{AskError, Call, Reach};
@@ -36,7 +36,7 @@ pub(crate) struct Dispatcher<'a> {
 
 /// How far a run has come.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Tally {
+pub(crate) struct TrialCounts {
     /// All trials.
     pub(crate) trials: usize,
     /// Those that have a reply.
@@ -57,7 +57,7 @@ impl Dispatcher<'_> {
     /// end what it is at.
     pub(crate) fn run<I: Item>(
         &self,
-        tally: Tally,
+        tally: TrialCounts,
         budget: Budget,
         store: &mut Store<I::Detail>,
         stoppers: Vec<Stopper>,
@@ -104,7 +104,7 @@ impl Dispatcher<'_> {
 struct ReplySink<'a, I: Item> {
     dispatcher: &'a Dispatcher<'a>,
     store: &'a mut Store<I::Detail>,
-    bar: Bar,
+    bar: StepBar,
     breaker: CircuitBreaker,
     budget: Budget,
     stoppers: Vec<Stopper>,
@@ -177,8 +177,8 @@ impl<I: Item> ReplySink<'_, I> {
                 break;
             }
             let state = match asking.len() {
-                0 => Some(Step::Idle),
-                n if n >= self.dispatcher.width() => Some(Step::Full),
+                0 => Some(TimedStep::Idle),
+                n if n >= self.dispatcher.width() => Some(TimedStep::Full),
                 _ => None,
             };
             let since = Instant::now();
@@ -208,7 +208,7 @@ impl<I: Item> ReplySink<'_, I> {
     }
 
     /// Takes note of how long it waited, and in what state.
-    fn waited(&self, state: Option<Step>, since: Instant) {
+    fn waited(&self, state: Option<TimedStep>, since: Instant) {
         if let Some(state) = state {
             self.dispatcher.timings.add(state, since.elapsed());
         }

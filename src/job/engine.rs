@@ -3,14 +3,14 @@
 use std::collections::HashSet;
 use std::path::PathBuf;
 
-use super::batch::{self, BatchFiles};
+use super::batch::{self, BatchFileArgs};
 use super::enhancers::OpenEnhancers;
 use super::estimate;
 use super::experiment::{DetailOf, Experiment, RecordOf};
 use super::folder;
 use super::manifest;
 use super::open_run::{OpenRun, answered, pipeline};
-use super::outcome::{Outcome, Show};
+use super::outcome::{Outcome, StdoutFormat};
 use super::plan::Plan;
 use super::progress::Progress;
 use super::timings::Timings;
@@ -62,7 +62,7 @@ impl<'a, E: Experiment> Job<'a, E> {
     ///
     /// # Errors
     /// If a model is built in, an image is larger than the endpoint takes, or a file cannot be written.
-    pub(crate) fn export_batch(self, files: &BatchFiles) -> Result<Outcome> {
+    pub(crate) fn export_batch(self, files: &BatchFileArgs) -> Result<Outcome> {
         batch::export::export(self.open()?, files)
     }
 
@@ -85,8 +85,8 @@ impl<'a, E: Experiment> Job<'a, E> {
         Ok(Outcome {
             status: Status::Complete,
             output: match settings.show {
-                Show::Json => json(&forecast)?,
-                Show::Table => render(&forecast),
+                StdoutFormat::Json => json(&forecast)?,
+                StdoutFormat::Table => render(&forecast),
             },
         })
     }

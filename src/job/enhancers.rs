@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 
 /// How enhancement models are run.
 #[derive(Debug, Clone, Default, Args)]
-pub struct Loading {
+pub struct EnhancerRunArgs {
     /// In which size.
     #[command(flatten)]
     pub size: SizeArgs,
@@ -41,7 +41,7 @@ pub(crate) fn read(models: &[PathBuf]) -> Result<Vec<ModelFile>> {
 
 /// Enhancement models, and ONNX Runtime if there are any.
 pub(crate) struct OpenEnhancers<'a> {
-    settings: Option<&'a Loading>,
+    settings: Option<&'a EnhancerRunArgs>,
     files: Vec<ModelFile>,
     pub(crate) enhancers: Vec<Enhancer>,
     version: Option<String>,
@@ -49,7 +49,7 @@ pub(crate) struct OpenEnhancers<'a> {
 
 impl<'a> OpenEnhancers<'a> {
     /// The models in these files, loaded when they are taken.
-    pub(crate) fn later(files: Vec<ModelFile>, settings: &'a Loading) -> Self {
+    pub(crate) fn later(files: Vec<ModelFile>, settings: &'a EnhancerRunArgs) -> Self {
         Self {
             settings: Some(settings),
             files,
@@ -62,7 +62,7 @@ impl<'a> OpenEnhancers<'a> {
     ///
     /// # Errors
     /// If ONNX Runtime is not there, or a file is no model that it runs.
-    pub(crate) fn load(files: Vec<ModelFile>, settings: &'a Loading) -> Result<Self> {
+    pub(crate) fn load(files: Vec<ModelFile>, settings: &'a EnhancerRunArgs) -> Result<Self> {
         let mut opened = Self {
             settings: None,
             files: Vec::new(),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use super::budget::{Budget, image_of, words};
-use super::experiment::{Expected, Experiment, RecordOf};
+use super::experiment::{ExpectedRequest, Experiment, RecordOf};
 use super::frame_work::FrameWork;
 use super::image_pipeline::ImagePipeline;
 use super::models::ModelUnderTest;
@@ -49,8 +49,8 @@ pub(crate) fn estimate<E: Experiment>(
     }
     let budget = Budget::new(money, &everyone, stored)?;
     let sample = match plans.first() {
-        Some(plan) => Sample::make(experiment, plan, pipeline)?,
-        None => Sample::default(),
+        Some(plan) => SampledImages::make(experiment, plan, pipeline)?,
+        None => SampledImages::default(),
     };
     let (mut bytes, mut largest_request, mut images, mut seconds) = (0.0, 0.0_f64, 0, 0.0);
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
@@ -121,7 +121,7 @@ fn lines<E: Experiment>(
     experiment: &E,
     phase: usize,
     plan: &Plan<E::Item>,
-    coming: &[Expected],
+    coming: &[ExpectedRequest],
 ) -> Vec<CostLine> {
     let sources = experiment.sources();
     let models = experiment.models(phase).iter().enumerate();
@@ -240,20 +240,20 @@ fn waiting(
 
 /// The mean size and time of an image.
 #[derive(Debug, Clone, Copy)]
-struct Mean {
+struct ImageMeans {
     bytes: f64,
     seconds: f64,
 }
 
 /// Images that were made to know their size and time.
 #[derive(Default)]
-struct Sample {
+struct SampledImages {
     images: Vec<ImageFacts>,
     /// Sum of bytes, of seconds, and how many, by condition.
     sums: BTreeMap<Condition, (f64, f64, usize)>,
 }
 
-impl Sample {
+impl SampledImages {
     /// Makes the images of the middle frame of a few sources spread over the plan.
     fn make<E: Experiment>(
         experiment: &E,
@@ -285,9 +285,9 @@ impl Sample {
         Ok(sample)
     }
 
-    fn mean(&self, condition: &Condition) -> Option<Mean> {
+    fn mean(&self, condition: &Condition) -> Option<ImageMeans> {
         let (bytes, seconds, n) = self.sums.get(condition)?;
-        Some(Mean {
+        Some(ImageMeans {
             bytes: bytes / *n as f64,
             seconds: seconds / *n as f64,
         })

@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use super::identity::{Columns, Identity};
 use super::models::ModelUnderTest;
-use super::outcome::{Outcome, Show};
+use super::outcome::{Outcome, StdoutFormat};
 use super::plan::SourcePlan;
 use super::recipe::Recipe;
 use super::settings::JobSettings;
@@ -24,7 +24,7 @@ pub(crate) type DetailOf<E> = <<E as Experiment>::Item as Item>::Detail;
 
 /// A request of a later phase that no plan can know yet.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Expected {
+pub(crate) struct ExpectedRequest {
     /// The model, by its place among those of the phase.
     pub(crate) model: usize,
     /// How many tokens its words are likely to have.
@@ -90,7 +90,7 @@ pub(crate) trait Experiment: Sync {
     fn plan(&self, phase: usize, stored: &[RecordOf<Self>]) -> Result<Vec<SourcePlan<Self::Item>>>;
 
     /// Requests of later phases that no plan can know yet: marks of answers to come.
-    fn to_come(&self, _left: &[SourcePlan<Self::Item>]) -> Vec<Expected> {
+    fn to_come(&self, _left: &[SourcePlan<Self::Item>]) -> Vec<ExpectedRequest> {
         Vec::new()
     }
 
@@ -99,6 +99,6 @@ pub(crate) trait Experiment: Sync {
         &self,
         store: &Store<DetailOf<Self>>,
         run: StoredRun<DetailOf<Self>>,
-        show: Show,
+        show: StdoutFormat,
     ) -> Result<Outcome>;
 }

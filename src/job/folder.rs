@@ -6,7 +6,7 @@ use jiff::Timestamp;
 use serde_json::json;
 
 use super::experiment::{DetailOf, Experiment};
-use super::models::{Ask, ModelName};
+use super::models::{AskSettings, ModelName};
 use super::observer;
 use super::plan::Plan;
 use super::settings::RunPlace;
@@ -57,7 +57,7 @@ fn automatic<E: Experiment>(experiment: &E) -> Result<PathBuf> {
 }
 
 /// The models in the name of a folder.
-fn label(ask: &Ask) -> String {
+fn label(ask: &AskSettings) -> String {
     let models = ask.models.iter().chain(&ask.blind_models);
     let names = models.map(|name| match name {
         ModelName::Random => "random".to_owned(),

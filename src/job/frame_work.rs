@@ -1,4 +1,4 @@
-//! One frame on its way to an image: [`FrameWork`], and the [`Steps`] that it goes through.
+//! One frame on its way to an image: [`FrameWork`], and the [`ImageSteps`] that it goes through.
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -7,8 +7,8 @@ use super::bilinear::bilinear;
 use super::recipe::Recipe;
 use super::scaling::Scaling;
 use super::source::{Frames, Source, SourceFrame};
-use super::timings::{Step, Timings};
-use super::walk::Darkened;
+use super::timings::{TimedStep, Timings};
+use super::walk::DegradedAt;
 use crate::ask::{ImageLimit, Payload, PayloadFormat};
 use crate::dataset::Picture;
 use crate::error::{Error, Result};
@@ -17,7 +17,7 @@ use crate::types::{Condition, Degradation, Digest, EnhancerName, FrameId, Rgb};
 
 /// What every image is made with.
 #[derive(Clone, Copy)]
-pub(crate) struct Steps<'a> {
+pub(crate) struct ImageSteps<'a> {
     pub(crate) frames: &'a dyn Frames,
     pub(crate) recipe: &'a Recipe,
     /// What an image may be; `None` if all models are built in.
@@ -25,10 +25,10 @@ pub(crate) struct Steps<'a> {
     pub(crate) timings: &'a Timings,
 }
 
-impl Steps<'_> {
+impl ImageSteps<'_> {
     /// The image as it is sent, and the pixels that were encoded.
     pub(crate) fn payload<'p>(&self, image: &'p Rgb) -> Result<(Arc<Payload>, Cow<'p, Rgb>)> {
-        let (payload, encoded) = self.timings.time(Step::Encode, || {
+        let (payload, encoded) = self.timings.time(TimedStep::Encode, || {
             let encoded = match self.recipe.scaling {
                 Scaling::MaxSide(side) => Payload::scaled(image, Some(side))?,
                 Scaling::LongerSide(side) if longer_side(image) != side => {
@@ -55,7 +55,7 @@ fn longer_side(image: &Rgb) -> usize {
 }
 
 /// A frame in one condition, as far as it comes without an enhancer.
-pub(crate) enum Staged {
+pub(crate) enum StagedFrame {
     /// As it is sent.
     Ready(Arc<Payload>),
     /// Still to be enhanced, and by what.
@@ -64,7 +64,7 @@ pub(crate) enum Staged {
 
 /// Cached steps of one frame: each is computed when it is first needed, and once.
 pub(crate) struct FrameWork<'a> {
-    pub(crate) steps: Steps<'a>,
+    pub(crate) steps: ImageSteps<'a>,
     frame: FrameId,
     key: NoiseKey,
     /// The digest of the file that the plan was made with.
@@ -77,18 +77,18 @@ pub(crate) struct FrameWork<'a> {
 
 impl<'a> FrameWork<'a> {
     /// A frame of a planned source. Its file is read when it is needed, and must still be the planned one.
-    pub(crate) fn planned(steps: Steps<'a>, source: &Source, frame: &SourceFrame) -> Self {
+    pub(crate) fn planned(steps: ImageSteps<'a>, source: &Source, frame: &SourceFrame) -> Self {
         let key = steps.recipe.noise(source, &frame.id);
         Self::new(steps, frame.id.clone(), key, Some(frame.digest))
     }
 
     /// A frame alone, whatever its file is.
-    pub(crate) fn of(steps: Steps<'a>, frame: FrameId) -> Self {
+    pub(crate) fn of(steps: ImageSteps<'a>, frame: FrameId) -> Self {
         let key = NoiseKey::new(steps.recipe.seed, &frame);
         Self::new(steps, frame, key, None)
     }
 
-    fn new(steps: Steps<'a>, frame: FrameId, key: NoiseKey, planned: Option<Digest>) -> Self {
+    fn new(steps: ImageSteps<'a>, frame: FrameId, key: NoiseKey, planned: Option<Digest>) -> Self {
         Self {
             steps,
             frame,
@@ -102,15 +102,15 @@ impl<'a> FrameWork<'a> {
     }
 
     /// The frame in a condition: as it is sent, or what the enhancer takes.
-    pub(crate) fn stage(&mut self, condition: &Condition) -> Result<Staged> {
+    pub(crate) fn stage(&mut self, condition: &Condition) -> Result<StagedFrame> {
         if let Some(payload) = self.as_it_is(condition)? {
-            return Ok(Staged::Ready(payload));
+            return Ok(StagedFrame::Ready(payload));
         }
         let steps = self.steps;
         let degraded = self.degraded(condition.degradation.as_ref())?;
         match &condition.enhancer {
-            None => Ok(Staged::Ready(steps.payload(degraded)?.0)),
-            Some(name) => Ok(Staged::ToEnhance(degraded.clone(), name.clone())),
+            None => Ok(StagedFrame::Ready(steps.payload(degraded)?.0)),
+            Some(name) => Ok(StagedFrame::ToEnhance(degraded.clone(), name.clone())),
         }
     }
 
@@ -141,7 +141,7 @@ impl<'a> FrameWork<'a> {
         let (steps, frame, planned) = (self.steps, &self.frame, self.planned);
         once(&mut self.picture, || {
             let read = || steps.frames.picture(frame);
-            let picture = steps.timings.time(Step::Decode, read)?;
+            let picture = steps.timings.time(TimedStep::Decode, read)?;
             if planned.is_none_or(|planned| planned == picture.digest()) {
                 return Ok(picture);
             }
@@ -153,13 +153,13 @@ impl<'a> FrameWork<'a> {
     /// The frame before its light is reduced: in its own size, or scaled before that.
     pub(crate) fn clean(&mut self) -> Result<&Rgb> {
         if self.clean.is_none() {
-            let Steps {
+            let ImageSteps {
                 recipe, timings, ..
             } = self.steps;
             let picture = self.picture()?;
-            let clean = timings.time(Step::Decode, || picture.decode())?;
+            let clean = timings.time(TimedStep::Decode, || picture.decode())?;
             self.clean = Some(match (recipe.scaled, recipe.scaling) {
-                (Darkened::Resized, Scaling::LongerSide(side)) if longer_side(&clean) != side => {
+                (DegradedAt::Resized, Scaling::LongerSide(side)) if longer_side(&clean) != side => {
                     bilinear(&clean, side)?
                 }
                 _ => clean,
@@ -200,7 +200,7 @@ impl<'a> FrameWork<'a> {
         let (_, image) = once(degraded, || {
             let reading = steps.recipe.readings.of(how)?;
             let degrade = || exposures.degrade(clean, how, key, reading);
-            Ok((how.cloned(), steps.timings.time(Step::Darken, degrade)))
+            Ok((how.cloned(), steps.timings.time(TimedStep::Darken, degrade)))
         })?;
         Ok(image)
     }

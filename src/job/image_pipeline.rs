@@ -10,11 +10,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 use rayon::prelude::*;
 use tokio::sync::mpsc::Sender;
 
-use super::frame_work::{FrameWork, Staged, Steps};
+use super::frame_work::{FrameWork, ImageSteps, StagedFrame};
 use super::plan::{SourcePlan, TrialGroup};
 use super::source::{Source, SourceFrame};
-use super::thumbnail::{Wanted, thumbnail};
-use super::timings::Step;
+use super::thumbnail::{MissingThumbnails, thumbnail};
+use super::timings::TimedStep;
 use super::trial::{Item, PreparedGroup, Stimulus};
 use super::workers::Workers;
 use crate::ask::{ImageLimit, Payload};
@@ -27,7 +27,7 @@ const LARGE: usize = 5_000_000;
 
 /// The steps from a frame to an image, with the enhancement models that take part in them.
 pub(crate) struct ImagePipeline<'a> {
-    pub(crate) steps: Steps<'a>,
+    pub(crate) steps: ImageSteps<'a>,
     pub(crate) enhancers: Vec<Enhancer>,
 }
 
@@ -113,7 +113,7 @@ impl<'a> ImagePipeline<'a> {
         mut self,
         sources: &[Source],
         plan: Vec<SourcePlan<I>>,
-        wanted: &Wanted,
+        wanted: &MissingThumbnails,
         workers: &Workers,
         out: &Sender<PreparedGroup<I>>,
     ) {
@@ -149,14 +149,17 @@ impl<'a> ImagePipeline<'a> {
         &mut self,
         sources: &[Source],
         plan: impl Iterator<Item = SourcePlan<I>>,
-        wanted: &Wanted,
+        wanted: &MissingThumbnails,
         out: &Sender<PreparedGroup<I>>,
     ) {
         let timings = self.steps.timings;
         // The error is that nobody waits for a group any more.
         let _ = self.one_by_one(sources, plan, wanted, |group| {
             let send = || out.blocking_send(group).is_ok();
-            timings.time(Step::Waiting, send).then_some(()).ok_or(())
+            timings
+                .time(TimedStep::Waiting, send)
+                .then_some(())
+                .ok_or(())
         });
     }
 
@@ -168,7 +171,7 @@ impl<'a> ImagePipeline<'a> {
         &mut self,
         sources: &[Source],
         plan: impl Iterator<Item = SourcePlan<I>>,
-        wanted: &Wanted,
+        wanted: &MissingThumbnails,
         mut take: impl FnMut(PreparedGroup<I>) -> Result<(), X>,
     ) -> Result<(), X> {
         for part in plan {
@@ -215,7 +218,7 @@ impl<'a> ImagePipeline<'a> {
         work: &mut SourceWork<'_>,
         condition: Option<&Condition>,
         source: &Source,
-        wanted: &Wanted,
+        wanted: &MissingThumbnails,
     ) -> Result<(Vec<Arc<Payload>>, Option<Thumbnail>)> {
         let Some(condition) = condition else {
             return Ok((Vec::new(), None));
@@ -247,7 +250,7 @@ impl<'a> ImagePipeline<'a> {
         let steps = work.steps;
         let copy = |image: &Payload, encoded: &Rgb| {
             let copy = || small_copy(name?, condition, image, Some(encoded));
-            steps.timings.time(Step::Encode, copy)
+            steps.timings.time(TimedStep::Encode, copy)
         };
         if let Some(image) = work.as_it_is(condition)? {
             // The file is decoded for its copy alone.
@@ -282,7 +285,7 @@ impl<'a> ImagePipeline<'a> {
             let staged = frames.par_iter().map(|frame| {
                 let mut work = FrameWork::planned(steps, source, frame);
                 let staged = conditions.iter().map(|condition| work.stage(condition));
-                staged.collect::<Result<Vec<Staged>>>()
+                staged.collect::<Result<Vec<StagedFrame>>>()
             });
             for staged in staged.collect::<Result<Vec<_>>>()? {
                 for (staged, made) in staged.into_iter().zip(&mut made) {
@@ -320,10 +323,10 @@ impl<'a> ImagePipeline<'a> {
         }
     }
 
-    fn finish(&mut self, staged: Staged) -> Result<Arc<Payload>> {
+    fn finish(&mut self, staged: StagedFrame) -> Result<Arc<Payload>> {
         match staged {
-            Staged::Ready(payload) => Ok(payload),
-            Staged::ToEnhance(image, name) => {
+            StagedFrame::Ready(payload) => Ok(payload),
+            StagedFrame::ToEnhance(image, name) => {
                 let image = self.enhanced(&image, &name)?;
                 Ok(self.steps.payload(&image)?.0)
             }
@@ -336,7 +339,7 @@ impl<'a> ImagePipeline<'a> {
             .find(|enhancer| enhancer.name() == name)
             .ok_or_else(|| Error::data(name, "this enhancer is not open"))?;
         let enhance = || enhancer.enhance(image);
-        self.steps.timings.time(Step::Enhance, enhance)
+        self.steps.timings.time(TimedStep::Enhance, enhance)
     }
 }
 

@@ -7,7 +7,7 @@ use serde_json::Value;
 use super::experiment::{DetailOf, Experiment};
 use super::folder::now;
 use super::identity;
-use super::picture_words::PictureWords;
+use super::picture_words::ImageWords;
 use crate::types::manifest::{Counts, RunManifest, Status};
 use crate::types::{Detail as _, Record};
 
@@ -70,7 +70,7 @@ pub(crate) fn go_on<E: Experiment>(experiment: &E, manifest: &mut RunManifest) {
 }
 
 /// The flags that decide the images: those said now, and of lists also what was said before.
-fn together(kept: &PictureWords, now: PictureWords) -> PictureWords {
+fn together(kept: &ImageWords, now: ImageWords) -> ImageWords {
     let mut all = kept.clone();
     for (flag, value) in now {
         let value = match (all.remove(&flag), value) {

@@ -8,9 +8,9 @@ use clap::Args;
 
 use super::report::{choice, open};
 use super::shard::Shard;
-use super::stored::{Asked, StoredRun, in_order};
-use super::thumbnail::Wanted;
-use super::{Outcome, Show, count};
+use super::stored::{ExperimentKind, StoredRun, in_order};
+use super::thumbnail::MissingThumbnails;
+use super::{Outcome, StdoutFormat, count};
 use crate::error::{Error, Result};
 use crate::store::{self, AddressChange, Store};
 use crate::types::manifest::{RunManifest, Status, differences};
@@ -34,12 +34,12 @@ pub struct MergeArgs {
 }
 
 /// A shard as it lies in its folder.
-struct Part<D> {
+struct MergePart<D> {
     shard: Shard,
     run: StoredRun<D>,
 }
 
-impl<D: Detail> Part<D> {
+impl<D: Detail> MergePart<D> {
     fn open(folder: &Path) -> Result<Self> {
         let run = StoredRun::open(folder)?;
         let Some(shard) = run.manifest.shard.as_deref() else {
@@ -60,7 +60,10 @@ impl<D: Detail> Part<D> {
 /// If a folder holds no shard, two hold one, one is of another run, or some are missing and that is refused.
 pub fn merge(args: &MergeArgs) -> Result<Outcome> {
     let folders = folders(&args.runs)?;
-    let kinds: Result<Vec<Asked>> = folders.iter().map(|folder| Asked::of(folder)).collect();
+    let kinds: Result<Vec<ExperimentKind>> = folders
+        .iter()
+        .map(|folder| ExperimentKind::of(folder))
+        .collect();
     let kinds = kinds?;
     if let Some(other) = kinds.iter().position(|kind| *kind != kinds[0]) {
         let problem = format!(
@@ -71,7 +74,7 @@ pub fn merge(args: &MergeArgs) -> Result<Outcome> {
         return Err(Error::Run { path, problem });
     }
     match kinds.first() {
-        Some(Asked::Open) => merge_all::<OpenDetail>(args, &folders, open::write),
+        Some(ExperimentKind::Open) => merge_all::<OpenDetail>(args, &folders, open::write),
         _ => merge_all::<ChoiceDetail>(args, &folders, choice::write),
     }
 }
@@ -79,9 +82,12 @@ pub fn merge(args: &MergeArgs) -> Result<Outcome> {
 fn merge_all<D: Detail + PartialEq>(
     args: &MergeArgs,
     folders: &[PathBuf],
-    write: impl FnOnce(&Store<D>, StoredRun<D>, Show) -> Result<Outcome>,
+    write: impl FnOnce(&Store<D>, StoredRun<D>, StdoutFormat) -> Result<Outcome>,
 ) -> Result<Outcome> {
-    let parts: Result<Vec<Part<D>>> = folders.iter().map(|folder| Part::open(folder)).collect();
+    let parts: Result<Vec<MergePart<D>>> = folders
+        .iter()
+        .map(|folder| MergePart::open(folder))
+        .collect();
     let mut parts = parts?;
     parts.sort_by_key(|part| part.shard);
     agree(&parts)?;
@@ -121,7 +127,7 @@ fn merge_all<D: Detail + PartialEq>(
         }
     }
     let run = StoredRun::of(&args.out, manifest)?;
-    write(&store, run, Show::of(args.json))
+    write(&store, run, StdoutFormat::of(args.json))
 }
 
 /// The folders of shards among those named and directly in them.
@@ -152,8 +158,8 @@ fn folders(named: &[PathBuf]) -> Result<Vec<PathBuf>> {
 }
 
 /// Makes sure that all are shards of one run, and none is there twice.
-fn agree<D>(parts: &[Part<D>]) -> Result<()> {
-    let wrong = |part: &Part<D>, problem: String| {
+fn agree<D>(parts: &[MergePart<D>]) -> Result<()> {
+    let wrong = |part: &MergePart<D>, problem: String| {
         let path = part.run.folder.clone();
         Err(Error::Run { path, problem })
     };
@@ -194,7 +200,7 @@ fn agree<D>(parts: &[Part<D>]) -> Result<()> {
 }
 
 /// How many shards are missing; an error that names them unless a partial merge is asked for.
-fn missing<D>(parts: &[Part<D>], partial: bool) -> Result<usize> {
+fn missing<D>(parts: &[MergePart<D>], partial: bool) -> Result<usize> {
     let Some(first) = parts.first() else {
         return Ok(0);
     };
@@ -221,7 +227,7 @@ fn missing<D>(parts: &[Part<D>], partial: bool) -> Result<usize> {
 }
 
 /// Says which shards are not done.
-fn unfinished<D>(parts: &[Part<D>]) {
+fn unfinished<D>(parts: &[MergePart<D>]) {
     for part in parts {
         let (status, counts) = (part.run.manifest.status, part.run.manifest.counts);
         if status != Status::Complete {
@@ -248,7 +254,7 @@ fn difference(one: &RunManifest, other: &RunManifest) -> Option<(String, String,
 }
 
 /// The manifest of the run that the shards are together.
-fn whole<D>(parts: &[Part<D>]) -> Result<RunManifest> {
+fn whole<D>(parts: &[MergePart<D>]) -> Result<RunManifest> {
     let manifests = parts.iter().map(|part| &part.run.manifest);
     let first = manifests.clone().next();
     let mut manifest = first
@@ -271,13 +277,14 @@ fn whole<D>(parts: &[Part<D>]) -> Result<RunManifest> {
 
 /// The records of all shards in the order of the questions, and the small copies of images that one run would have kept.
 fn together<D: Detail>(
-    parts: Vec<Part<D>>,
+    parts: Vec<MergePart<D>>,
     questions: &[RunQuestion],
 ) -> Result<(Vec<Record<D>>, Vec<Thumbnail>)> {
-    let wanted = Wanted::new(questions.iter().map(|question| &question.frame), Vec::new());
+    let wanted =
+        MissingThumbnails::new(questions.iter().map(|question| &question.frame), Vec::new());
     let (mut records, mut thumbnails) = (Vec::new(), Vec::new());
     let mut keys = HashMap::<TrialKey, PathBuf>::new();
-    for Part { run, .. } in parts {
+    for MergePart { run, .. } in parts {
         for record in run.records {
             if let Some(other) = keys.insert(record.key, run.folder.clone()) {
                 let problem = format!(

@@ -50,4 +50,4 @@ pub(crate) use engine::Job;
 pub(crate) use folder::now;
 pub(crate) use manifest::count;
 pub(crate) use open_run::{limit, pipeline};
-pub use outcome::{Outcome, Show};
+pub use outcome::{Outcome, StdoutFormat};

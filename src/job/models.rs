@@ -1,4 +1,4 @@
-//! The models of a run, as flags name them ([`ModelArgs`], [`Ask`]), and opened (`ModelUnderTest`).
+//! The models of a run, as flags name them ([`ModelArgs`], [`AskSettings`]), and opened (`ModelUnderTest`).
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -95,7 +95,7 @@ impl FromStr for ModelName {
 
 /// Who is asked, where, and with what key.
 #[derive(Debug)]
-pub struct Ask {
+pub struct AskSettings {
     /// The models.
     pub models: Vec<ModelName>,
     /// Whether they see the images.
@@ -108,7 +108,7 @@ pub struct Ask {
     pub parameters: Parameters,
 }
 
-impl Ask {
+impl AskSettings {
     /// Reads the key, if a model needs one.
     ///
     /// # Errors
@@ -165,7 +165,7 @@ impl ModelUnderTest {
 /// Opens the models that see and those that do not, none of them twice; nothing is sent. Built-in models that only one experiment
 /// has are made by `built_in`.
 pub(crate) fn open_all(
-    ask: &Ask,
+    ask: &AskSettings,
     built_in: impl Fn(&ModelName) -> Result<Model>,
 ) -> Result<Vec<ModelUnderTest>> {
     let server = ask.server.as_ref();

@@ -1,4 +1,4 @@
-//! What a run may cost: [`Money`].
+//! What a run may cost: [`MoneySettings`].
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -30,7 +30,7 @@ pub struct MoneyArgs {
 
 /// What a run may cost, and whether it is carried out.
 #[derive(Debug)]
-pub struct Money {
+pub struct MoneySettings {
     /// What models cost.
     pub prices: Prices,
     /// The most that this part of a run may cost, in dollars.
@@ -41,7 +41,7 @@ pub struct Money {
     pub dry_run: bool,
 }
 
-impl Money {
+impl MoneySettings {
     /// Reads the prices.
     ///
     /// # Errors

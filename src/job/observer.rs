@@ -45,7 +45,7 @@ impl<K: PartialEq, V: Clone> Shelf<K, V> {
 }
 
 /// What the observer looks with.
-struct Eye {
+struct Observer {
     dataset: Arc<Dataset>,
     labels: Labels,
     rules: Rules,
@@ -54,7 +54,7 @@ struct Eye {
     sights: Shelf<(FrameId, Digest), Result<Arc<Observation>, String>>,
 }
 
-impl Eye {
+impl Observer {
     fn watched(&self, frame: &FrameId) -> Result<Arc<ObservedFrame>, String> {
         self.frames.get(frame.clone(), || {
             let seen = self.dataset.frame(frame).map_err(|e| e.to_string())?;
@@ -106,7 +106,7 @@ pub(crate) fn open(
         )));
     }
     let digest = Digest::of_parts([&VERSION.to_le_bytes()[..], rules.digest().as_bytes()]);
-    let eye = Eye {
+    let eye = Observer {
         dataset: Arc::clone(dataset),
         labels,
         rules,

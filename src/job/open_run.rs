@@ -6,11 +6,11 @@ use std::time::Instant;
 
 use super::budget::Budget;
 use super::circuit_breaker::EndReason;
-use super::dispatch::{Dispatcher, Tally};
+use super::dispatch::{Dispatcher, TrialCounts};
 use super::enhancers::OpenEnhancers;
 use super::experiment::{DetailOf, Experiment, RecordOf};
 use super::folder::now;
-use super::frame_work::Steps;
+use super::frame_work::ImageSteps;
 use super::image_pipeline::ImagePipeline;
 use super::manifest;
 use super::models;
@@ -19,7 +19,7 @@ use super::plan::Plan;
 use super::progress::Progress;
 use super::settings::JobSettings;
 use super::stored::StoredRun;
-use super::thumbnail::Wanted;
+use super::thumbnail::MissingThumbnails;
 use super::timings::Timings;
 use super::workers::Workers;
 use crate::ask::ImageLimit;
@@ -42,7 +42,7 @@ pub(crate) struct OpenRun<'a, E: Experiment> {
 }
 
 /// What is left of a phase.
-pub(super) struct Left<E: Experiment> {
+pub(super) struct Remaining<E: Experiment> {
     pub(super) plan: Plan<E::Item>,
     pub(super) stored: Vec<RecordOf<E>>,
     /// How many trials wait for a batch.
@@ -84,7 +84,7 @@ impl<E: Experiment> OpenRun<'_, E> {
     }
 
     /// What of a phase has no reply and waits for none.
-    pub(super) fn left(&mut self, phase: usize) -> Result<Left<E>> {
+    pub(super) fn left(&mut self, phase: usize) -> Result<Remaining<E>> {
         let stored = self.store.records()?;
         let mut plan = Plan::new(self.experiment.plan(phase, &stored)?);
         self.keys.extend(&plan.keys);
@@ -92,7 +92,7 @@ impl<E: Experiment> OpenRun<'_, E> {
         plan.leave_out(|key| answered.contains(key));
         let sent = self.store.out_in_batches()?;
         let out = plan.leave_out(|key| sent.contains(key));
-        Ok(Left { plan, stored, out })
+        Ok(Remaining { plan, stored, out })
     }
 
     /// Says what a Batch API has been asked and has not answered: asked here, it would be paid for twice.
@@ -106,13 +106,13 @@ impl<E: Experiment> OpenRun<'_, E> {
         }
     }
 
-    fn ask_phase(&mut self, phase: usize, left: Left<E>) -> Result<EndReason> {
-        let Left { plan, stored, .. } = left;
+    fn ask_phase(&mut self, phase: usize, left: Remaining<E>) -> Result<EndReason> {
+        let Remaining { plan, stored, .. } = left;
         let experiment = self.experiment;
         let settings = experiment.settings();
         let models = experiment.models(phase);
         let budget = Budget::new(&settings.money, models, &stored)?;
-        let tally = Tally {
+        let tally = TrialCounts {
             trials: plan.keys.len(),
             answered: plan.keys.len() - plan.left(),
         };
@@ -166,8 +166,8 @@ impl<E: Experiment> OpenRun<'_, E> {
     }
 
     /// Notes how much there is to ask, and says how much of it is there.
-    fn begin(&mut self, tally: Tally, stored: &[RecordOf<E>]) -> Result<()> {
-        let Tally { trials, answered } = tally;
+    fn begin(&mut self, tally: TrialCounts, stored: &[RecordOf<E>]) -> Result<()> {
+        let TrialCounts { trials, answered } = tally;
         manifest::go_on(self.experiment, &mut self.manifest);
         self.manifest.platform.extend(self.enhancers.version());
         self.note_counts(stored)?;
@@ -225,7 +225,7 @@ pub(crate) fn pipeline<'a, E: Experiment>(
     timings: &'a Timings,
 ) -> ImagePipeline<'a> {
     ImagePipeline {
-        steps: Steps {
+        steps: ImageSteps {
             frames: experiment.frames(),
             recipe: experiment.recipe(),
             limit,
@@ -243,10 +243,10 @@ pub(crate) fn limit(settings: &JobSettings) -> Option<ImageLimit> {
 }
 
 /// The small copies of images that a run has yet to keep.
-pub(super) fn wanted<E: Experiment>(experiment: &E, folder: &Path) -> Result<Wanted> {
+pub(super) fn wanted<E: Experiment>(experiment: &E, folder: &Path) -> Result<MissingThumbnails> {
     let kept: Vec<Thumbnail> = store::read_thumbnails(folder)?;
     let names = experiment.sources().iter().map(|source| &source.name);
-    Ok(Wanted::new(names, kept))
+    Ok(MissingThumbnails::new(names, kept))
 }
 
 /// The trials that have a reply.

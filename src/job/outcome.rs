@@ -13,14 +13,14 @@ pub struct Outcome {
 
 /// What standard output gets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Show {
+pub enum StdoutFormat {
     /// A table.
     Table,
     /// The summary as JSON.
     Json,
 }
 
-impl Show {
+impl StdoutFormat {
     /// What the switch `--json` asks for.
     #[must_use]
     pub fn of(json: bool) -> Self {

@@ -1,4 +1,4 @@
-//! The flags that decide the images of a run, as they were said: a manifest keeps them, and they are read again (`Pictures`).
+//! The flags that decide the images of a run, as they were said: a manifest keeps them, and they are read again (`ImageFlags`).
 
 use std::collections::BTreeMap;
 use std::num::NonZeroU32;
@@ -16,12 +16,12 @@ use crate::error::{Error, Result};
 use crate::synthesis::SensorArgs;
 
 /// Flags by their long names: a text, a list of texts, or `true` for a switch.
-pub type PictureWords = BTreeMap<String, Value>;
+pub type ImageWords = BTreeMap<String, Value>;
 
 /// All flags that decide images.
 #[derive(Debug, Parser)]
 #[command(no_binary_name = true, disable_help_flag = true, mut_arg("frames", |arg| arg.required(false)))]
-pub(crate) struct Pictures {
+pub(crate) struct ImageFlags {
     #[command(flatten)]
     pub(crate) data: DataArgs,
     #[command(flatten)]
@@ -40,9 +40,9 @@ pub(crate) struct Pictures {
     pub(crate) walk: Option<Walk>,
 }
 
-impl Pictures {
+impl ImageFlags {
     /// Reads the flags of a manifest.
-    pub(crate) fn read(words: &PictureWords) -> Result<Self, String> {
+    pub(crate) fn read(words: &ImageWords) -> Result<Self, String> {
         let text = |value: &Value| {
             let text = value.as_str();
             text.map_or_else(|| value.to_string(), str::to_owned)
@@ -64,9 +64,9 @@ impl Pictures {
 ///
 /// # Errors
 /// If a value is no text that a manifest can hold.
-pub fn said(matches: &ArgMatches) -> Result<PictureWords> {
-    let flags = Pictures::command();
-    let mut words = PictureWords::new();
+pub fn said(matches: &ArgMatches) -> Result<ImageWords> {
+    let flags = ImageFlags::command();
+    let mut words = ImageWords::new();
     for argument in flags.get_arguments() {
         let id = argument.get_id().as_str();
         let (flag, action) = (argument.get_long().unwrap_or(id), argument.get_action());

@@ -17,7 +17,7 @@ pub struct Progress {
 
 /// Whether progress is wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Loudness {
+pub enum Verbosity {
     /// Where standard error is a terminal.
     Normal,
     /// Never.
@@ -27,8 +27,8 @@ pub enum Loudness {
 impl Progress {
     /// Progress on standard error.
     #[must_use]
-    pub fn new(loudness: Loudness) -> Self {
-        let shown = loudness == Loudness::Normal && io::stderr().is_terminal();
+    pub fn new(loudness: Verbosity) -> Self {
+        let shown = loudness == Verbosity::Normal && io::stderr().is_terminal();
         let target = if shown {
             ProgressDrawTarget::stderr()
         } else {
@@ -52,22 +52,22 @@ impl Progress {
     }
 
     /// A plain bar for a step of known length, gone when it is dropped.
-    pub(crate) fn bar(&self, what: &'static str, length: usize) -> Bar {
+    pub(crate) fn bar(&self, what: &'static str, length: usize) -> StepBar {
         let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len}");
         let bar = self
             .bars
             .add(ProgressBar::new(length as u64).with_message(what));
-        Bar(style.map_or(bar.clone(), |style| bar.with_style(style)))
+        StepBar(style.map_or(bar.clone(), |style| bar.with_style(style)))
     }
 
     /// The bar of the trials: answered, failed, rate, time left.
-    pub(crate) fn trials(&self, trials: usize, answered: usize) -> Bar {
+    pub(crate) fn trials(&self, trials: usize, answered: usize) -> StepBar {
         let bar = ProgressBar::new(trials as u64).with_position(answered as u64);
         let bar = self.bars.add(bar);
         bar.reset_eta();
         bar.enable_steady_tick(Duration::from_millis(500));
         let style = ProgressStyle::with_template("{wide_bar} {msg} of {len} · {rate} · {eta} left");
-        let bar = Bar(style.map_or(bar.clone(), |style| {
+        let bar = StepBar(style.map_or(bar.clone(), |style| {
             bar.with_style(style.with_key("rate", rate))
         }));
         bar.count(answered, 0, None);
@@ -82,9 +82,9 @@ fn rate(state: &ProgressState, out: &mut dyn fmt::Write) {
 }
 
 /// A bar that goes away with its step.
-pub(crate) struct Bar(ProgressBar);
+pub(crate) struct StepBar(ProgressBar);
 
-impl Bar {
+impl StepBar {
     pub(crate) fn inc(&self) {
         self.0.inc(1);
     }
@@ -102,7 +102,7 @@ impl Bar {
     }
 }
 
-impl Drop for Bar {
+impl Drop for StepBar {
     fn drop(&mut self) {
         self.0.finish_and_clear();
     }
@@ -110,9 +110,9 @@ impl Drop for Bar {
 
 /// Log lines go above the bars, to standard error.
 #[derive(Debug)]
-pub struct Above(MultiProgress);
+pub struct LogWriter(MultiProgress);
 
-impl Write for Above {
+impl Write for LogWriter {
     fn write(&mut self, line: &[u8]) -> io::Result<usize> {
         self.0.suspend(|| io::stderr().write(line))
     }
@@ -123,9 +123,9 @@ impl Write for Above {
 }
 
 impl<'a> MakeWriter<'a> for Progress {
-    type Writer = Above;
+    type Writer = LogWriter;
 
-    fn make_writer(&'a self) -> Above {
-        Above(self.bars.clone())
+    fn make_writer(&'a self) -> LogWriter {
+        LogWriter(self.bars.clone())
     }
 }

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::enhancers::{self, Loading, OpenEnhancers};
-use super::frame_work::Steps;
+use super::enhancers::{self, EnhancerRunArgs, OpenEnhancers};
+use super::frame_work::ImageSteps;
 use super::image_pipeline::ImagePipeline;
-use super::picture_words::Pictures;
+use super::picture_words::ImageFlags;
 use super::recipe::Recipe;
 use super::source::{Frames, Source, SourceFrame};
 use super::timings::Timings;
@@ -41,13 +41,13 @@ pub struct RebuildArgs {
 
 /// What makes the images of a run again, as its manifest says that they were made.
 pub(crate) struct ImageRebuilder {
-    place: Images,
+    place: FrameFolder,
     recipe: Recipe,
     enhancers: Vec<Enhancer>,
 }
 
 /// Where the frames lie.
-enum Images {
+enum FrameFolder {
     Frames(Dataset),
     Walks(WalkFolder, Walk),
 }
@@ -77,7 +77,7 @@ impl ImageRebuilder {
                 "the run does not say how its images were made".to_owned(),
             ));
         }
-        let pictures = Pictures::read(&manifest.images).map_err(wrong)?;
+        let pictures = ImageFlags::read(&manifest.images).map_err(wrong)?;
         let pictures = moved(pictures, &args).map_err(wrong)?;
         let mut conditions = conditions.iter();
         let enhanced = conditions.any(|condition| condition.enhancer.is_some());
@@ -88,13 +88,13 @@ impl ImageRebuilder {
         let (place, recipe) = if let Some(walk) = pictures.walk {
             let recipe = recipe.of_walks(&walk);
             let folder = WalkFolder::new(&walk, pictures.limit);
-            (Images::Walks(folder, walk), recipe)
+            (FrameFolder::Walks(folder, walk), recipe)
         } else {
             let frames = frames(&pictures.data.data)?;
             let frames = frames.with_most_pixels(pictures.limit.max_pixels.get());
-            (Images::Frames(frames), recipe)
+            (FrameFolder::Frames(frames), recipe)
         };
-        let loading = Loading {
+        let loading = EnhancerRunArgs {
             size: pictures.size,
             runtime: args.runtime,
             threads: args.threads,
@@ -118,11 +118,11 @@ impl ImageRebuilder {
             Error::data(name, problem)
         })?;
         let frames: &dyn Frames = match &self.place {
-            Images::Frames(dataset) => dataset,
-            Images::Walks(folder, _) => folder,
+            FrameFolder::Frames(dataset) => dataset,
+            FrameFolder::Walks(folder, _) => folder,
         };
         let mut pipeline = ImagePipeline {
-            steps: Steps {
+            steps: ImageSteps {
                 frames,
                 recipe: &self.recipe,
                 limit: None,
@@ -141,14 +141,16 @@ impl ImageRebuilder {
 
     fn source(&self, name: &FrameId) -> Result<Source> {
         match &self.place {
-            Images::Frames(dataset) => SourceFrame::inspect(dataset, name).map(Source::of_frame),
-            Images::Walks(folder, walk) => folder.source(&name.0, walk),
+            FrameFolder::Frames(dataset) => {
+                SourceFrame::inspect(dataset, name).map(Source::of_frame)
+            }
+            FrameFolder::Walks(folder, walk) => folder.source(&name.0, walk),
         }
     }
 }
 
 /// The same images, made of what lies elsewhere by now. The folder of walks is data, too.
-fn moved(mut pictures: Pictures, args: &RebuildArgs) -> Result<Pictures, String> {
+fn moved(mut pictures: ImageFlags, args: &RebuildArgs) -> Result<ImageFlags, String> {
     if let Some(data) = &args.data {
         match &mut pictures.walk {
             Some(walk) => walk.folder.clone_from(data),

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::scaling::Scaling;
 use super::source::{Source, SourceFrame};
-use super::walk::{CameraOf, Darkened, Walk};
+use super::walk::{CameraOf, DegradedAt, Walk};
 use crate::ask::PayloadFormat;
 use crate::enhance::{self, ModelFile};
 use crate::error::Result;
@@ -22,7 +22,7 @@ pub(crate) struct Recipe {
     pub(crate) format: PayloadFormat,
     pub(crate) scaling: Scaling,
     /// Whether light is reduced before or after scaling.
-    pub(crate) scaled: Darkened,
+    pub(crate) scaled: DegradedAt,
     /// What one state of the camera takes.
     pub(crate) camera_of: CameraOf,
     pub(crate) enhancers: Vec<(EnhancerName, Digest)>,
@@ -50,7 +50,7 @@ impl Recipe {
             readings: sensor.readings.clone(),
             format: PayloadFormat::Png,
             scaling: Scaling::Never,
-            scaled: Darkened::Native,
+            scaled: DegradedAt::Native,
             camera_of: CameraOf::Frame,
             enhancers: enhancers
                 .map(|file| (file.name().clone(), file.digest()))
@@ -83,12 +83,12 @@ impl Recipe {
     /// # Errors
     /// If the condition has a reading that the recipe lacks.
     pub(crate) fn stimulus(&self, source: &Source, condition: &Condition) -> Result<Digest> {
-        let images: Vec<ImageFacts<'_>> = source
+        let images: Vec<ImageKeyFacts<'_>> = source
             .frames
             .iter()
             .map(|frame| self.facts(source, frame, condition))
             .collect::<Result<_>>()?;
-        let shown: Vec<&ImageFacts<'_>> =
+        let shown: Vec<&ImageKeyFacts<'_>> =
             source.order.iter().map(|place| &images[*place]).collect();
         Digest::canonical("darkqa.images/2", &shown)
     }
@@ -98,7 +98,7 @@ impl Recipe {
         source: &'a Source,
         frame: &'a SourceFrame,
         condition: &Condition,
-    ) -> Result<ImageFacts<'a>> {
+    ) -> Result<ImageKeyFacts<'a>> {
         let how = condition.degradation.as_ref();
         let degradation = how.map(|how| {
             let kind = how.kind();
@@ -120,7 +120,7 @@ impl Recipe {
         let enhancer = condition.enhancer.as_ref();
         let enhancer =
             enhancer.and_then(|name| self.enhancers.iter().find(|(known, _)| known == name));
-        Ok(ImageFacts {
+        Ok(ImageKeyFacts {
             picture: frame.digest,
             degradation: degradation.transpose()?,
             enhancer: enhancer.map(|(_, digest)| EnhancerFacts {
@@ -129,14 +129,14 @@ impl Recipe {
             }),
             format: self.format.to_string(),
             scaling: self.scaling,
-            scaled_before: (self.scaled == Darkened::Resized).then_some(true),
+            scaled_before: (self.scaled == DegradedAt::Resized).then_some(true),
         })
     }
 }
 
 /// What decides an image.
 #[derive(Serialize)]
-struct ImageFacts<'a> {
+struct ImageKeyFacts<'a> {
     picture: Digest,
     degradation: Option<DegradationFacts<'a>>,
     enhancer: Option<EnhancerFacts>,

@@ -5,11 +5,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::enhancers::{self, Loading};
-use super::models::{Ask, ModelArgs};
-use super::money::{Money, MoneyArgs};
-use super::outcome::Show;
-use super::picture_words::PictureWords;
+use super::enhancers::{self, EnhancerRunArgs};
+use super::models::{AskSettings, ModelArgs};
+use super::money::{MoneyArgs, MoneySettings};
+use super::outcome::StdoutFormat;
+use super::picture_words::ImageWords;
 use super::shard::Shard;
 use crate::ask::{AccessArgs, Bounds, Constrain, ImageArgs, Parameters, PayloadFormat, Sending};
 use crate::enhance::{EnhancerArgs, ModelFile};
@@ -28,7 +28,7 @@ pub struct JobArgs {
     pub enhancers: EnhancerArgs,
     /// How enhancers are run.
     #[command(flatten)]
-    pub loading: Loading,
+    pub loading: EnhancerRunArgs,
     /// Who is asked.
     #[command(flatten)]
     pub models: ModelArgs,
@@ -55,7 +55,7 @@ pub struct JobArgs {
     pub output: OutputArgs,
     /// The flags that decide the images, as they were said.
     #[arg(skip)]
-    pub pictures: PictureWords,
+    pub pictures: ImageWords,
 }
 
 /// How a job is spread over processes.
@@ -94,9 +94,9 @@ pub struct JobSettings {
     /// Which images are enhanced, and by what.
     pub enhancers: EnhancerArgs,
     /// How enhancers are run.
-    pub loading: Loading,
+    pub loading: EnhancerRunArgs,
     /// Who is asked.
-    pub ask: Ask,
+    pub ask: AskSettings,
     /// The file format of images.
     pub format: PayloadFormat,
     /// The longest side of an image as sent, in pixels; `None` for as it is.
@@ -106,7 +106,7 @@ pub struct JobSettings {
     /// How many requests are in flight at once.
     pub concurrency: Bounds,
     /// What it may cost.
-    pub money: Money,
+    pub money: MoneySettings,
     /// Which part of the whole this is.
     pub shard: Shard,
     /// Print at the end how long each step took.
@@ -114,14 +114,14 @@ pub struct JobSettings {
     /// Where the run is kept.
     pub place: RunPlace,
     /// What standard output gets.
-    pub show: Show,
+    pub show: StdoutFormat,
     /// The flags that decide the images, as they were said.
-    pub pictures: PictureWords,
+    pub pictures: ImageWords,
 }
 
 /// What one experiment has of the settings of models and others have not.
 #[derive(Debug, Default)]
-pub struct OfExperiment {
+pub struct ExperimentSettings {
     /// What the server lets the model say.
     pub constrain: Constrain,
     /// What the server's sampling starts from.
@@ -167,7 +167,7 @@ impl JobArgs {
     ///
     /// # Errors
     /// [`Error::Usage`] with the flag that cannot be used.
-    pub fn resolve(self, own: &OfExperiment) -> Result<JobSettings> {
+    pub fn resolve(self, own: &ExperimentSettings) -> Result<JobSettings> {
         let shard = Shard::resolve(self.scale.shard.as_deref(), |name| std::env::var(name).ok())?;
         let sending = Sending {
             quota: shard.quota(self.sending.quota),
@@ -186,7 +186,7 @@ impl JobArgs {
         };
         Ok(JobSettings {
             light: LightSettings::resolve(&self.light)?,
-            ask: Ask::resolve(self.models, parameters, &access, sending)?,
+            ask: AskSettings::resolve(self.models, parameters, &access, sending)?,
             enhancers: self.enhancers,
             loading: self.loading,
             format: self.images.image,
@@ -195,10 +195,10 @@ impl JobArgs {
                 .max_image
                 .map(|megabytes| (megabytes * 1e6) as usize),
             concurrency: sending.concurrency,
-            money: Money::resolve(&self.money, shard)?,
+            money: MoneySettings::resolve(&self.money, shard)?,
             shard,
             show_timings: self.scale.timings,
-            show: Show::of(self.output.json),
+            show: StdoutFormat::of(self.output.json),
             place: RunPlace::from(self.output),
             pictures: self.pictures,
         })

@@ -85,7 +85,7 @@ impl Shard {
         said: Option<&str>,
         variable: impl Fn(&str) -> Option<String>,
     ) -> Result<Self> {
-        let system = System::of(&variable)?;
+        let system = BatchSystem::of(&variable)?;
         match (said, system) {
             (Some("none"), _) | (None, None) => Ok(Self::WHOLE),
             (Some("auto"), system) => {
@@ -182,14 +182,14 @@ fn number(text: &str, whole: &str) -> Result<NonZeroU32> {
 
 /// What a batch system says of a process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum System {
+enum BatchSystem {
     /// A task of a job array.
     Slurm { index: u32, of: NonZeroU32 },
     /// A pod of an indexed job, which is not told how many there are.
     Kubernetes { index: u32 },
 }
 
-impl System {
+impl BatchSystem {
     fn of(variable: &impl Fn(&str) -> Option<String>) -> Result<Option<Self>> {
         let value = |name: &str| -> Result<Option<u32>> {
             let parse = |text: String| {
@@ -237,7 +237,7 @@ impl System {
     }
 }
 
-impl fmt::Display for System {
+impl fmt::Display for BatchSystem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Slurm { index, of } => write!(f, "task {} of a Slurm array of {of}", index + 1),

@@ -86,14 +86,14 @@ pub(crate) enum AnyRun {
 
 /// What was asked in a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Asked {
+pub(crate) enum ExperimentKind {
     /// Questions with choices.
     Choice,
     /// Open questions.
     Open,
 }
 
-impl Asked {
+impl ExperimentKind {
     /// What was asked in the run of a folder.
     ///
     /// # Errors
@@ -115,9 +115,9 @@ impl AnyRun {
     /// # Errors
     /// If it holds no run.
     pub(crate) fn open(folder: &Path) -> Result<Self> {
-        Ok(match Asked::of(folder)? {
-            Asked::Choice => Self::Choice(StoredRun::open(folder)?),
-            Asked::Open => Self::Open(StoredRun::open(folder)?),
+        Ok(match ExperimentKind::of(folder)? {
+            ExperimentKind::Choice => Self::Choice(StoredRun::open(folder)?),
+            ExperimentKind::Open => Self::Open(StoredRun::open(folder)?),
         })
     }
 }
@@ -143,9 +143,9 @@ impl StoredRun<ChoiceDetail> {
 /// # Errors
 /// If it holds no run.
 pub(crate) fn manifest(folder: &Path) -> Result<RunManifest> {
-    let schema = match Asked::of(folder)? {
-        Asked::Choice => ChoiceDetail::SCHEMA,
-        Asked::Open => OpenDetail::SCHEMA,
+    let schema = match ExperimentKind::of(folder)? {
+        ExperimentKind::Choice => ChoiceDetail::SCHEMA,
+        ExperimentKind::Open => OpenDetail::SCHEMA,
     };
     store::read_manifest(folder, schema)?.ok_or_else(|| no_run(folder))
 }

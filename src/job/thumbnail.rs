@@ -1,4 +1,4 @@
-//! Small copies of the images that were sent, for the report: [`thumbnail`], and which of them are still [`Wanted`].
+//! Small copies of the images that were sent, for the report: [`thumbnail`], and which of them are still [`MissingThumbnails`].
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -19,12 +19,12 @@ const FORMAT: &str = "jpeg:72";
 
 /// The copies that a run has yet to keep.
 #[derive(Debug, Default)]
-pub(crate) struct Wanted {
+pub(crate) struct MissingThumbnails {
     frames: BTreeSet<FrameId>,
     there: BTreeSet<(FrameId, Condition)>,
 }
 
-impl Wanted {
+impl MissingThumbnails {
     /// Those of all frames where there are few, else of those with the lowest digests, whatever the order or shard in which
     /// they come; but for those that are there.
     pub(crate) fn new<'a>(

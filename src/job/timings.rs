@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 /// What a thread of the darkroom does, or what the asking waits for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Step {
+pub(crate) enum TimedStep {
     /// A file is read and decoded.
     Decode,
     /// Light is taken.
@@ -23,7 +23,7 @@ pub(crate) enum Step {
     Full,
 }
 
-impl Step {
+impl TimedStep {
     const ALL: [(Self, &str); 7] = [
         (Self::Decode, "decode"),
         (Self::Darken, "darken"),
@@ -38,29 +38,29 @@ impl Step {
 /// The time that went into each step, summed over threads.
 #[derive(Debug, Default)]
 pub(crate) struct Timings {
-    nanoseconds: [AtomicU64; Step::ALL.len()],
+    nanoseconds: [AtomicU64; TimedStep::ALL.len()],
 }
 
 impl Timings {
     /// Does something, and counts its time.
-    pub(crate) fn time<T>(&self, step: Step, act: impl FnOnce() -> T) -> T {
+    pub(crate) fn time<T>(&self, step: TimedStep, act: impl FnOnce() -> T) -> T {
         let started = Instant::now();
         let done = act();
         self.add(step, started.elapsed());
         done
     }
 
-    pub(crate) fn add(&self, step: Step, time: Duration) {
+    pub(crate) fn add(&self, step: TimedStep, time: Duration) {
         self.nanoseconds[step as usize].fetch_add(time.as_nanos() as u64, Ordering::Relaxed);
     }
 
-    fn seconds(&self, step: Step) -> f64 {
+    fn seconds(&self, step: TimedStep) -> f64 {
         self.nanoseconds[step as usize].load(Ordering::Relaxed) as f64 / 1e9
     }
 
     /// What bound a run that took so long on so many threads, in one line.
     pub(crate) fn told(&self, took: Duration, threads: usize) -> String {
-        Told {
+        TimingsText {
             timings: self,
             took: took.as_secs_f64(),
             threads,
@@ -69,34 +69,42 @@ impl Timings {
     }
 }
 
-struct Told<'a> {
+struct TimingsText<'a> {
     timings: &'a Timings,
     took: f64,
     threads: usize,
 }
 
-impl fmt::Display for Told<'_> {
+impl fmt::Display for TimingsText<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             timings,
             took,
             threads,
         } = *self;
-        let making = [Step::Decode, Step::Darken, Step::Enhance, Step::Encode];
+        let making = [
+            TimedStep::Decode,
+            TimedStep::Darken,
+            TimedStep::Enhance,
+            TimedStep::Encode,
+        ];
         let busy: f64 = making.iter().map(|step| timings.seconds(*step)).sum();
         write!(f, "timings: {took:.1} s; images:")?;
-        for (step, name) in Step::ALL {
+        for (step, name) in TimedStep::ALL {
             if making.contains(&step) {
                 write!(f, " {name} {:.1} s,", timings.seconds(step))?;
             }
         }
-        let (idle, full) = (timings.seconds(Step::Idle), timings.seconds(Step::Full));
+        let (idle, full) = (
+            timings.seconds(TimedStep::Idle),
+            timings.seconds(TimedStep::Full),
+        );
         write!(
             f,
             " {:.0} % of {threads} threads; they waited {:.1} s for requests; requests: none on the wire {idle:.1} s, all that may be \
              {full:.1} s; ",
             100.0 * busy / (took * threads as f64).max(1e-9),
-            timings.seconds(Step::Waiting)
+            timings.seconds(TimedStep::Waiting)
         )?;
         let slowest = making
             .into_iter()
@@ -106,10 +114,10 @@ impl fmt::Display for Told<'_> {
                 "the endpoint binds: more --concurrency, or a faster endpoint, would help"
             }
             _ if idle < took / 4.0 => "nothing binds much",
-            Some(Step::Enhance) => {
+            Some(TimedStep::Enhance) => {
                 "making images binds, enhancement most: more cores, --shard over machines or --llie-max-side would help"
             }
-            Some(Step::Encode) => {
+            Some(TimedStep::Encode) => {
                 "making images binds, encoding most: more cores, --shard over machines, or smaller images (--max-side, --image \
                  jpeg:95) would help"
             }
@@ -125,21 +133,29 @@ mod tests {
     #[test]
     fn the_line_says_what_binds() {
         let second = Duration::from_secs;
-        let told = |steps: &[(Step, u64)]| {
+        let told = |steps: &[(TimedStep, u64)]| {
             let timings = Timings::default();
             for (step, seconds) in steps {
                 timings.add(*step, second(*seconds));
             }
             timings.told(second(10), 2)
         };
-        let line = told(&[(Step::Encode, 12), (Step::Decode, 6), (Step::Idle, 9)]);
+        let line = told(&[
+            (TimedStep::Encode, 12),
+            (TimedStep::Decode, 6),
+            (TimedStep::Idle, 9),
+        ]);
         assert!(
             line.contains("decode 6.0 s") && line.contains("90 % of 2 threads"),
             "{line}"
         );
         assert!(line.contains("encoding most"), "{line}");
-        assert!(told(&[(Step::Full, 9)]).contains("the endpoint binds"));
-        assert!(told(&[(Step::Enhance, 9), (Step::Idle, 5)]).contains("enhancement most"));
-        assert!(told(&[(Step::Encode, 1), (Step::Idle, 1)]).contains("nothing binds much"));
+        assert!(told(&[(TimedStep::Full, 9)]).contains("the endpoint binds"));
+        assert!(
+            told(&[(TimedStep::Enhance, 9), (TimedStep::Idle, 5)]).contains("enhancement most")
+        );
+        assert!(
+            told(&[(TimedStep::Encode, 1), (TimedStep::Idle, 1)]).contains("nothing binds much")
+        );
     }
 }

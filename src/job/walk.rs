@@ -31,8 +31,8 @@ pub struct Walk {
     #[arg(id = "image-size", long, value_name = "PIXELS|native", value_parser = longer_side, default_value = "512")]
     pub side: Scaling,
     /// Where light is taken
-    #[arg(id = "degrade", long, value_enum, default_value_t = Darkened::Native)]
-    pub darkened: Darkened,
+    #[arg(id = "degrade", long, value_enum, default_value_t = DegradedAt::Native)]
+    pub darkened: DegradedAt,
     /// Which frames one state of the camera takes
     #[arg(id = "sensor", long, value_enum, default_value_t = CameraOf::Episode)]
     pub camera: CameraOf,
@@ -41,7 +41,7 @@ pub struct Walk {
 /// Where light is taken from a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
-pub enum Darkened {
+pub enum DegradedAt {
     /// Before the frames are scaled, as a camera would
     Native,
     /// After it, where the scaling averages no noise away

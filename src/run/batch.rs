@@ -7,8 +7,8 @@ use clap::Args;
 use crate::error::Result;
 use crate::job::batch::replies;
 use crate::job::report::{choice, open};
-use crate::job::stored::{Asked, StoredRun, manifest};
-use crate::job::{Outcome, Show, count};
+use crate::job::stored::{ExperimentKind, StoredRun, manifest};
+use crate::job::{Outcome, StdoutFormat, count};
 use crate::store::{AddressChange, Store};
 use crate::types::{ChoiceDetail, Detail, OpenDetail};
 
@@ -31,15 +31,15 @@ pub struct BatchImportArgs {
 /// # Errors
 /// If the folder holds no run or no batch, or a line is not one of such a file: those before it are kept.
 pub fn import(args: &BatchImportArgs) -> Result<Outcome> {
-    match Asked::of(&args.run)? {
-        Asked::Choice => import_into::<ChoiceDetail>(args, choice::write),
-        Asked::Open => import_into::<OpenDetail>(args, open::write),
+    match ExperimentKind::of(&args.run)? {
+        ExperimentKind::Choice => import_into::<ChoiceDetail>(args, choice::write),
+        ExperimentKind::Open => import_into::<OpenDetail>(args, open::write),
     }
 }
 
 fn import_into<D: Detail>(
     args: &BatchImportArgs,
-    write: impl FnOnce(&Store<D>, StoredRun<D>, Show) -> Result<Outcome>,
+    write: impl FnOnce(&Store<D>, StoredRun<D>, StdoutFormat) -> Result<Outcome>,
 ) -> Result<Outcome> {
     let manifest = manifest(&args.run)?;
     let mut store = Store::<D>::open(&args.run, &manifest, AddressChange::Allowed)?;
@@ -47,9 +47,9 @@ fn import_into<D: Detail>(
     let mut run = StoredRun::of(&args.run, manifest)?;
     let trials = run.manifest.counts.trials.max(run.records.len());
     run.manifest.count(count(trials, &run.records));
-    let show = Show::of(args.json);
+    let show = StdoutFormat::of(args.json);
     let mut outcome = write(&store, run, show)?;
-    if show == Show::Table {
+    if show == StdoutFormat::Table {
         outcome.output.insert_str(0, &imported);
     }
     Ok(outcome)

@@ -11,7 +11,7 @@ use crate::enhance::{Enhancer, ModelFile};
 use crate::error::{Error, Result};
 use crate::files::write;
 use crate::job::Outcome;
-use crate::job::enhancers::{Loading, OpenEnhancers};
+use crate::job::enhancers::{EnhancerRunArgs, OpenEnhancers};
 use crate::job::progress::Progress;
 use crate::types::manifest::Status;
 
@@ -33,7 +33,7 @@ pub struct EnhanceArgs {
     pub describe: bool,
     /// How the model is run.
     #[command(flatten)]
-    pub loading: Loading,
+    pub loading: EnhancerRunArgs,
     /// Make images again that are there already
     #[arg(long, help_heading = "Output")]
     pub force: bool,

@@ -79,7 +79,7 @@ pub fn import(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
     )?;
     let cores = pool(args.threads.threads)?;
     let bar = progress.bar("frames", frames.len());
-    let made: Vec<Option<Made>> = cores.install(|| {
+    let made: Vec<Option<WrittenFrame>> = cores.install(|| {
         let frames = frames.par_iter().map(|frame| {
             let made = one(args, &*adapter, frame);
             bar.inc();
@@ -90,7 +90,7 @@ pub fn import(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
     });
     drop(bar);
     let failed = made.iter().filter(|made| made.is_none()).count();
-    let made: Vec<Made> = made.into_iter().flatten().collect();
+    let made: Vec<WrittenFrame> = made.into_iter().flatten().collect();
     if made.is_empty() {
         return Err(Error::data(
             args.src.display(),
@@ -138,14 +138,14 @@ pub fn import(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
 }
 
 /// A frame that was written.
-struct Made {
+struct WrittenFrame {
     /// Its line of `frames.jsonl`.
     line: Map<String, Value>,
     /// The median of its depth in millimetres.
     depth: Option<u32>,
 }
 
-fn one(args: &ImportArgs, adapter: &dyn Adapter, frame: &ListedFrame) -> Result<Made> {
+fn one(args: &ImportArgs, adapter: &dyn Adapter, frame: &ListedFrame) -> Result<WrittenFrame> {
     for name in [&frame.scene, &frame.frame] {
         let mut parts = Path::new(name).components();
         if name.is_empty() || !parts.all(|part| matches!(part, Component::Normal(_))) {
@@ -205,7 +205,7 @@ fn one(args: &ImportArgs, adapter: &dyn Adapter, frame: &ListedFrame) -> Result<
             line.insert(key.to_owned(), value);
         }
     }
-    Ok(Made {
+    Ok(WrittenFrame {
         line,
         depth: median,
     })
@@ -219,7 +219,7 @@ fn median(depth: &Array2<u32>) -> Option<u32> {
 }
 
 /// What the depths are like; refused where most of them are none of a room.
-fn depths(made: &[Made]) -> Result<String> {
+fn depths(made: &[WrittenFrame]) -> Result<String> {
     let mut medians: Vec<u32> = made.iter().filter_map(|made| made.depth).collect();
     let Some(middle) = medians.len().checked_sub(1) else {
         return Ok("no depth: there will be no questions about the closest object\n".to_owned());

@@ -18,7 +18,7 @@ use crate::error::{Error, Result};
 use crate::files::write;
 use crate::job::progress::Progress;
 use crate::job::workers::{ThreadArgs, pool};
-use crate::job::{Outcome, Show};
+use crate::job::{Outcome, StdoutFormat};
 use crate::report;
 use crate::report::realism::{ComparedData, RealismSummary, ResidualRules};
 use crate::score::realism::residual::{Bins, EmptyBins, Residuals, divergence};
@@ -87,7 +87,7 @@ fn drop_ev(text: &str) -> Result<f32, String> {
 }
 
 /// A pair that was compared, with what the figures need.
-struct Work {
+struct PairWork {
     compared: PairComparison,
     /// Real and synthetic.
     residuals: [Residuals; 2],
@@ -112,7 +112,7 @@ pub fn realism(args: &RealismArgs, progress: &Progress) -> Result<Outcome> {
     }
     let cores = pool(args.threads.threads)?;
     let bar = progress.bar("pairs", pairs.len());
-    let results: Vec<Option<Work>> = cores.install(|| {
+    let results: Vec<Option<PairWork>> = cores.install(|| {
         let pairs = pairs.par_iter().enumerate();
         let compared = pairs.map(|(index, pair)| {
             let work = compare(args, &sensor, pair, index < MOST_CROPS);
@@ -122,7 +122,7 @@ pub fn realism(args: &RealismArgs, progress: &Progress) -> Result<Outcome> {
         compared.collect()
     });
     drop(bar);
-    let works: Vec<Work> = results.into_iter().flatten().collect();
+    let works: Vec<PairWork> = results.into_iter().flatten().collect();
     if works.is_empty() {
         return Err(Error::data("pairs", "none of them could be compared"));
     }
@@ -148,14 +148,19 @@ pub fn realism(args: &RealismArgs, progress: &Progress) -> Result<Outcome> {
         } else {
             Status::Incomplete
         },
-        output: match Show::of(args.json) {
-            Show::Table => summary.table(),
-            Show::Json => summary.json(),
+        output: match StdoutFormat::of(args.json) {
+            StdoutFormat::Table => summary.table(),
+            StdoutFormat::Json => summary.json(),
         },
     })
 }
 
-fn compare(args: &RealismArgs, sensor: &SensorSettings, pair: &Pair, shown: bool) -> Result<Work> {
+fn compare(
+    args: &RealismArgs,
+    sensor: &SensorSettings,
+    pair: &Pair,
+    shown: bool,
+) -> Result<PairWork> {
     let decoded = |path: &Path| {
         let bytes = fs::read(path).map_err(|e| Error::file(path, "read", e))?;
         let place = path.display().to_string();
@@ -194,7 +199,7 @@ fn compare(args: &RealismArgs, sensor: &SensorSettings, pair: &Pair, shown: bool
             kl_other: divergence(&of_real, residuals, args.kl_bins, other),
         })
     };
-    Ok(Work {
+    Ok(PairWork {
         compared: PairComparison {
             pair: pair.name.clone(),
             drop,
@@ -208,7 +213,7 @@ fn compare(args: &RealismArgs, sensor: &SensorSettings, pair: &Pair, shown: bool
 }
 
 /// Leaves the numbers by pair, the summary and the figures in a folder.
-fn files(out: &Path, works: &[Work], summary: &RealismSummary) -> Result<()> {
+fn files(out: &Path, works: &[PairWork], summary: &RealismSummary) -> Result<()> {
     fs::create_dir_all(out).map_err(|e| Error::file(out, "make", e))?;
     let compared: Vec<&PairComparison> = works.iter().map(|work| &work.compared).collect();
     write(&out.join("pairs.csv"), &report::realism::pairs(&compared)?)?;

@@ -37,7 +37,7 @@ pub struct ShowArgs {
 }
 
 /// What one model made of the item.
-struct Answer {
+struct ShownAnswer {
     model: String,
     condition: Option<Condition>,
     outcome: &'static str,
@@ -47,10 +47,10 @@ struct Answer {
 }
 
 /// The item, and what the models made of it.
-struct Item {
+struct ShownItem {
     source: FrameId,
     text: String,
-    answers: Vec<Answer>,
+    answers: Vec<ShownAnswer>,
 }
 
 /// Makes the images again, writes them, and says of each whether it is the one that was sent.
@@ -121,7 +121,7 @@ pub fn show(args: ShowArgs) -> Result<Outcome> {
 }
 
 /// The manifest of a run and one item of it; `None` if nothing was asked about it.
-fn read(run: AnyRun, name: &str) -> (RunManifest, Option<Item>) {
+fn read(run: AnyRun, name: &str) -> (RunManifest, Option<ShownItem>) {
     match run {
         AnyRun::Choice(run) => {
             let own = run
@@ -129,7 +129,7 @@ fn read(run: AnyRun, name: &str) -> (RunManifest, Option<Item>) {
                 .iter()
                 .filter(|record| record.question.0 == name);
             let records: Vec<&Record> = own.collect();
-            let item = records.first().map(|first| Item {
+            let item = records.first().map(|first| ShownItem {
                 source: first.detail.frame.clone(),
                 text: choice_text(first, listed(&run.questions, name)),
                 answers: records.iter().map(|record| choice_answer(record)).collect(),
@@ -142,7 +142,7 @@ fn read(run: AnyRun, name: &str) -> (RunManifest, Option<Item>) {
                 .iter()
                 .filter(|record| record.question.0 == name);
             let records: Vec<&Record<OpenDetail>> = own.collect();
-            let item = records.first().map(|first| Item {
+            let item = records.first().map(|first| ShownItem {
                 source: FrameId(first.detail.episode.clone()),
                 text: open_text(first, listed(&run.questions, name)),
                 answers: records.iter().map(|record| open_answer(record)).collect(),
@@ -172,8 +172,8 @@ fn choice_text(record: &Record, listed: Option<&RunQuestion>) -> String {
     text
 }
 
-fn choice_answer(record: &Record) -> Answer {
-    Answer {
+fn choice_answer(record: &Record) -> ShownAnswer {
+    ShownAnswer {
         model: record.model.clone(),
         condition: record.condition.clone(),
         outcome: match record.detail.outcome {
@@ -195,8 +195,8 @@ fn open_text(record: &Record<OpenDetail>, listed: Option<&RunQuestion>) -> Strin
     text
 }
 
-fn open_answer(record: &Record<OpenDetail>) -> Answer {
-    Answer {
+fn open_answer(record: &Record<OpenDetail>) -> ShownAnswer {
+    ShownAnswer {
         model: record.model.clone(),
         condition: record.condition.clone(),
         outcome: match (&record.failure, &record.detail.judged) {
@@ -216,7 +216,7 @@ fn reply(reply: Option<&str>, failure: Option<&types::Failure>) -> String {
 }
 
 /// The conditions that the item was shown in, or those of them that are wanted.
-fn conditions(answers: &[Answer], args: &ShowArgs) -> Result<Vec<Condition>> {
+fn conditions(answers: &[ShownAnswer], args: &ShowArgs) -> Result<Vec<Condition>> {
     let wanted = &args.condition;
     let there = answers.iter().filter_map(|answer| answer.condition.clone());
     let there: BTreeSet<Condition> = there.collect();
@@ -249,7 +249,7 @@ fn together(images: &[RebuiltImage]) -> Digest {
 }
 
 /// The digests of what was sent in a condition.
-fn sent(answers: &[Answer], condition: &Condition) -> BTreeSet<Digest> {
+fn sent(answers: &[ShownAnswer], condition: &Condition) -> BTreeSet<Digest> {
     let there = answers
         .iter()
         .filter(|answer| answer.condition.as_ref() == Some(condition));
@@ -258,7 +258,7 @@ fn sent(answers: &[Answer], condition: &Condition) -> BTreeSet<Digest> {
 
 /// What each model made of the item in a condition, or without an image; replies in the form of a JSON text, so that nothing in them
 /// reaches the terminal as a control.
-fn replies(answers: &[Answer], condition: Option<&Condition>) -> String {
+fn replies(answers: &[ShownAnswer], condition: Option<&Condition>) -> String {
     let mut text = String::new();
     let without = if condition.is_none() {
         " without an image"
@@ -269,7 +269,7 @@ fn replies(answers: &[Answer], condition: Option<&Condition>) -> String {
         .iter()
         .filter(|one| one.condition.as_ref() == condition)
     {
-        let Answer {
+        let ShownAnswer {
             model,
             outcome,
             reply,

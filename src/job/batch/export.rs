@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
-use super::BatchFiles;
+use super::BatchFileArgs;
 use super::requests::{Requests, remote, summary};
 use crate::error::Result;
 use crate::job::experiment::Experiment;
-use crate::job::open_run::{Left, OpenRun, limit, pipeline, wanted};
+use crate::job::open_run::{OpenRun, Remaining, limit, pipeline, wanted};
 use crate::job::outcome::Outcome;
 use crate::job::plan::Plan;
 use crate::job::timings::Timings;
@@ -16,7 +16,7 @@ use crate::types::manifest::Status;
 /// Writes the input files of the first phase that has anything left, and notes its trials in the run as sent.
 pub(crate) fn export<E: Experiment>(
     mut run: OpenRun<'_, E>,
-    files: &BatchFiles,
+    files: &BatchFileArgs,
 ) -> Result<Outcome> {
     for phase in 0..E::PHASES.len() {
         let models = run.experiment.models(phase);
@@ -27,7 +27,7 @@ pub(crate) fn export<E: Experiment>(
         }
         remote(models)?;
         run.note_counts(&left.stored)?;
-        let Left { plan, out, .. } = left;
+        let Remaining { plan, out, .. } = left;
         let trials = plan.keys.len();
         let answered = trials - plan.left() - out;
         let written = write(&mut run, phase, plan, files)?;
@@ -51,7 +51,7 @@ fn write<E: Experiment>(
     run: &mut OpenRun<'_, E>,
     phase: usize,
     plan: Plan<E::Item>,
-    files: &BatchFiles,
+    files: &BatchFileArgs,
 ) -> Result<Vec<(PathBuf, usize)>> {
     let (experiment, settings) = (run.experiment, run.experiment.settings());
     let workers = pool(settings.loading.threads.threads)?;

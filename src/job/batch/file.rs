@@ -1,4 +1,4 @@
-//! The input files of one model: [`Files`].
+//! The input files of one model: [`ModelInputFiles`].
 
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
@@ -12,17 +12,17 @@ use crate::types::{Detail, Record};
 const PART: &str = "part";
 
 /// The input files of one model, split by bytes and by requests.
-pub(crate) struct Files<D> {
+pub(crate) struct ModelInputFiles<D> {
     folder: PathBuf,
     stem: String,
     most_bytes: u64,
     most_requests: usize,
-    open: Option<Open<D>>,
+    open: Option<OpenFile<D>>,
     /// The whole ones, with their requests.
     done: Vec<(PathBuf, usize)>,
 }
 
-struct Open<D> {
+struct OpenFile<D> {
     path: PathBuf,
     file: BufWriter<File>,
     bytes: u64,
@@ -30,7 +30,7 @@ struct Open<D> {
     blanks: Vec<Record<D>>,
 }
 
-impl<D: Detail> Files<D> {
+impl<D: Detail> ModelInputFiles<D> {
     pub(crate) fn new(folder: &Path, model: &str, most_bytes: u64, most_requests: usize) -> Self {
         let safe = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
         Self {
@@ -87,14 +87,14 @@ impl<D: Detail> Files<D> {
     }
 
     /// A new file, numbered on from those that lie there.
-    fn next(&self) -> Result<Open<D>> {
+    fn next(&self) -> Result<OpenFile<D>> {
         let path = (1..=u32::MAX)
             .map(|n| self.folder.join(format!("{}-{n:03}.jsonl", self.stem)))
             .find(|path| !path.exists())
             .unwrap_or_default();
         let part = path.with_extension(PART);
         let file = File::create(&part).map_err(|e| Error::file(&part, "create", e))?;
-        Ok(Open {
+        Ok(OpenFile {
             path,
             file: BufWriter::new(file),
             bytes: 0,

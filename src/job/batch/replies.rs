@@ -16,7 +16,7 @@ use crate::types::{Detail, Record, Reply, TrialKey};
 
 /// What became of the lines.
 #[derive(Debug, Default)]
-struct Tally {
+struct ReplyCounts {
     answered: usize,
     failed: usize,
     /// Trials whose line was taken over already, or that have been answered otherwise.
@@ -44,7 +44,7 @@ pub(crate) fn import<D: Detail>(
     let blanks: HashMap<TrialKey, Record<D>> =
         blanks.into_iter().map(|blank| (blank.key, blank)).collect();
     let mut out = store.out_in_batches()?;
-    let mut tally = Tally::default();
+    let mut tally = ReplyCounts::default();
     for path in files {
         let file = File::open(path).map_err(|e| Error::file(path, "read", e))?;
         for (i, line) in BufReader::new(file).lines().enumerate() {
@@ -72,7 +72,7 @@ fn take<D: Detail>(
     manifest: &RunManifest,
     out: &mut BTreeSet<TrialKey>,
     store: &mut Store<D>,
-    tally: &mut Tally,
+    tally: &mut ReplyCounts,
 ) -> Result<()> {
     let key = line.id.parse::<TrialKey>().ok();
     let Some(blank) = key.and_then(|key| blanks.get(&key)) else {
@@ -110,8 +110,8 @@ fn constrain(manifest: &RunManifest, model: &str) -> Result<Constrain> {
     said.map_or(Ok(Constrain::None), read_word)
 }
 
-fn summary(tally: &Tally, out: usize) -> String {
-    let Tally {
+fn summary(tally: &ReplyCounts, out: usize) -> String {
+    let ReplyCounts {
         answered,
         failed,
         again,

@@ -4,8 +4,8 @@ use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::BatchFiles;
-use super::file::Files;
+use super::BatchFileArgs;
+use super::file::ModelInputFiles;
 use crate::error::{Error, Result};
 use crate::job::models::ModelUnderTest;
 use crate::job::trial::{Item, PreparedGroup};
@@ -16,7 +16,7 @@ pub(crate) struct Requests<'a, I: Item> {
     models: &'a [ModelUnderTest],
     url: Option<&'a str>,
     /// Those of each model.
-    files: Vec<Files<I::Detail>>,
+    files: Vec<ModelInputFiles<I::Detail>>,
     store: &'a mut Store<I::Detail>,
 }
 
@@ -27,7 +27,7 @@ impl<'a, I: Item> Requests<'a, I> {
     /// Where the folder cannot be made.
     pub(crate) fn new(
         models: &'a [ModelUnderTest],
-        config: &'a BatchFiles,
+        config: &'a BatchFileArgs,
         store: &'a mut Store<I::Detail>,
     ) -> Result<Self> {
         let folder = store.folder().join(BATCH);
@@ -36,7 +36,7 @@ impl<'a, I: Item> Requests<'a, I> {
         let files = models.iter().enumerate().map(|(i, model)| {
             // Two models may have names that make one file name, and one model may be asked with images and without.
             let stem = format!("{}-{}", i + 1, model.model.name());
-            Files::new(&folder, &stem, bytes, config.file_requests.get())
+            ModelInputFiles::new(&folder, &stem, bytes, config.file_requests.get())
         });
         Ok(Self {
             models,

@@ -8,7 +8,7 @@ use crate::dataset::Dataset;
 use crate::job::recipe::Recipe;
 use crate::job::scaling::Scaling;
 use crate::job::timings::Timings;
-use crate::job::walk::{CameraOf, Darkened};
+use crate::job::walk::{CameraOf, DegradedAt};
 use crate::synthesis::Readings;
 
 /// A folder with one frame as a plain PNG file, and the frame as a source.
@@ -39,11 +39,11 @@ fn sent(
         readings: Readings::default(),
         format: format.parse().unwrap(),
         scaling: max_side.map_or(Scaling::Never, Scaling::MaxSide),
-        scaled: Darkened::Native,
+        scaled: DegradedAt::Native,
         camera_of: CameraOf::Frame,
         enhancers: Vec::new(),
     };
-    let steps = Steps {
+    let steps = ImageSteps {
         frames: &dataset,
         recipe: &recipe,
         limit: None,

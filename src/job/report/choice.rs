@@ -3,7 +3,7 @@
 use super::combine::{Combined, combine};
 use crate::error::Result;
 use crate::job::outcome::Outcome;
-use crate::job::outcome::Show;
+use crate::job::outcome::StdoutFormat;
 use crate::job::stored::StoredRun;
 use crate::report::json::{RunList, summary};
 use crate::report::products::{PAGE, products};
@@ -17,7 +17,7 @@ use crate::types::{ChoiceDetail, Record};
 pub(crate) fn write(
     store: &Store,
     mut run: StoredRun<ChoiceDetail>,
-    show: Show,
+    show: StdoutFormat,
 ) -> Result<Outcome> {
     let manifest = run.manifest.clone();
     let records = run.records.into_iter().map(Record::reread);
@@ -32,7 +32,7 @@ pub(super) fn in_its_folder(
     store: &Store,
     manifest: &RunManifest,
     combined: &Combined,
-    show: Show,
+    show: StdoutFormat,
 ) -> Result<String> {
     let (folder, findings) = (store.folder(), combined.findings());
     let tables = tables(&findings);
@@ -44,8 +44,8 @@ pub(super) fn in_its_folder(
     store.write("summary.json", json(None)?.as_bytes())?;
     store.write_manifest(manifest)?;
     Ok(match show {
-        Show::Json => json(Some(folder))?,
-        Show::Table => {
+        StdoutFormat::Json => json(Some(folder))?,
+        StdoutFormat::Table => {
             let report = folder.join(PAGE);
             evaluation(&tables, &[(manifest, folder)]) + &format!("report: {}\n", report.display())
         }

@@ -12,14 +12,14 @@ use crate::types::{Detail, QuestionId, Record, RunQuestion, Thumbnail, TrialKey,
 
 /// Several runs as one.
 pub(super) struct Joined<D> {
-    pub(super) runs: Vec<Part>,
+    pub(super) runs: Vec<JoinedRun>,
     pub(super) records: Vec<Record<D>>,
     pub(super) questions: Vec<RunQuestion>,
     pub(super) thumbnails: Vec<Thumbnail>,
 }
 
 /// One of them.
-pub(super) struct Part {
+pub(super) struct JoinedRun {
     pub(super) folder: PathBuf,
     pub(super) name: String,
     pub(super) manifest: RunManifest,
@@ -61,7 +61,7 @@ pub(super) fn join<D: Detail>(
             }
             joined.records.push(record);
         }
-        joined.runs.push(Part {
+        joined.runs.push(JoinedRun {
             folder: run.folder,
             name,
             manifest: run.manifest,

@@ -8,7 +8,7 @@ use serde_json::Value;
 use super::join::join;
 use crate::error::{Error, Result};
 use crate::job::outcome::Outcome;
-use crate::job::outcome::Show;
+use crate::job::outcome::StdoutFormat;
 use crate::job::predictions::{AnswerState, Prediction, predictions};
 use crate::job::stored::{StoredRun, in_order};
 use crate::report::openeqa::{OpenReport, ReportedAnswer, products, render, summary_json, tables};
@@ -95,21 +95,26 @@ impl Scores {
     }
 
     /// What belongs on standard output.
-    pub(crate) fn shown(&self, show: Show) -> Result<String> {
+    pub(crate) fn shown(&self, show: StdoutFormat) -> Result<String> {
         let report = self.report();
         self.show(&report, &tables(&report), show)
     }
 
-    fn show(&self, report: &OpenReport<'_>, tables: &[Table], show: Show) -> Result<String> {
+    fn show(
+        &self,
+        report: &OpenReport<'_>,
+        tables: &[Table],
+        show: StdoutFormat,
+    ) -> Result<String> {
         let folder = &self.run.folder;
         match show {
-            Show::Table => Ok(render(report, tables, folder)),
-            Show::Json => summary_json(report, tables, Some(folder)),
+            StdoutFormat::Table => Ok(render(report, tables, folder)),
+            StdoutFormat::Json => summary_json(report, tables, Some(folder)),
         }
     }
 
     /// Writes the report and the manifest into the run's folder; what belongs on standard output.
-    pub(crate) fn write(&self, store: &Store<OpenDetail>, show: Show) -> Result<String> {
+    pub(crate) fn write(&self, store: &Store<OpenDetail>, show: StdoutFormat) -> Result<String> {
         let report = self.report();
         let tables = tables(&report);
         for (name, content) in products(&report, &tables)? {
@@ -177,7 +182,7 @@ pub(crate) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<StoredRun<Open
 pub(crate) fn write(
     store: &Store<OpenDetail>,
     run: StoredRun<OpenDetail>,
-    show: Show,
+    show: StdoutFormat,
 ) -> Result<Outcome> {
     let mut scores = Scores::new(run)?;
     if scores.run.manifest.status == Status::Complete && scores.unmarked() {

@@ -11,7 +11,7 @@ use super::open;
 use crate::error::{Error, Result};
 use crate::files;
 use crate::job::stored::{AnyRun, StoredRun};
-use crate::job::{Outcome, Show, count};
+use crate::job::{Outcome, StdoutFormat, count};
 use crate::report::json::{RunList, summary};
 use crate::report::products::{PAGE, products};
 use crate::report::tables::tables;
@@ -39,8 +39,8 @@ pub struct ReportArgs {
 }
 
 impl ReportArgs {
-    fn show(&self) -> Show {
-        Show::of(self.json)
+    fn show(&self) -> StdoutFormat {
+        StdoutFormat::of(self.json)
     }
 }
 
@@ -88,7 +88,7 @@ fn of_choices(args: &ReportArgs, mut runs: Vec<StoredRun<ChoiceDetail>>) -> Resu
             run.manifest.counts = count(run.manifest.counts.trials, &run.records);
         }
     }
-    if args.show() == Show::Json {
+    if args.show() == StdoutFormat::Json {
         output.clear();
     }
     let combined = combine(runs)?;
@@ -111,8 +111,10 @@ fn compare(combined: &Combined, args: &ReportArgs) -> Result<String> {
     let findings = combined.findings();
     let (tables, places) = (tables(&findings), combined.places());
     let shown = match args.show() {
-        Show::Json => summary(&tables, &findings.summary.unread, RunList::Several(&places))?,
-        Show::Table => evaluation(&tables, &places),
+        StdoutFormat::Json => {
+            summary(&tables, &findings.summary.unread, RunList::Several(&places))?
+        }
+        StdoutFormat::Table => evaluation(&tables, &places),
     };
     let made = match args.out {
         Some(_) => products(&findings, &tables, &combined.shown())?,
@@ -124,7 +126,7 @@ fn compare(combined: &Combined, args: &ReportArgs) -> Result<String> {
 /// Writes a report into `--out`, or says that this would.
 fn elsewhere(args: &ReportArgs, mut text: String, made: Vec<(String, Vec<u8>)>) -> Result<String> {
     let Some(out) = &args.out else {
-        if args.show() == Show::Table {
+        if args.show() == StdoutFormat::Table {
             text += "report: --out DIR writes it\n";
         }
         return Ok(text);
@@ -132,7 +134,7 @@ fn elsewhere(args: &ReportArgs, mut text: String, made: Vec<(String, Vec<u8>)>) 
     for (name, content) in made {
         files::write(&out.join(name), &content)?;
     }
-    if args.show() == Show::Table {
+    if args.show() == StdoutFormat::Table {
         let _ = writeln!(text, "report: {}", out.join(PAGE).display());
     }
     Ok(text)

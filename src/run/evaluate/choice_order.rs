@@ -24,7 +24,7 @@ pub struct ChoiceOrder {
 
 /// A question as it is shown once.
 #[derive(Debug)]
-pub(super) struct Arranged {
+pub(super) struct ShownQuestion {
     /// The question with its choices in the order shown.
     pub(super) question: Question,
     /// How many times the same has been shown before.
@@ -41,7 +41,7 @@ pub(super) fn arrange(
     question: &Question,
     showing: ChoiceOrder,
     seed: u64,
-) -> Result<Vec<Arranged>> {
+) -> Result<Vec<ShownQuestion>> {
     let choices = &question.choices;
     let mut order: Vec<usize> = (0..choices.len()).collect();
     if showing.shuffle_options {
@@ -65,7 +65,7 @@ pub(super) fn arrange(
             order.rotate_left(rotation);
             let texts = order.iter().map(|&index| choices.texts()[index].clone());
             let truth = order.iter().position(|&index| index == choices.truth());
-            arranged.push(Arranged {
+            arranged.push(ShownQuestion {
                 question: Question {
                     choices: Choices::new(texts.collect(), truth.unwrap_or_default())?,
                     ..question.clone()

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use serde_json::json;
 
 use super::plan::{ChoiceItem, trials};
-use super::setup::Setup;
+use super::setup::ChoiceSetup;
 use crate::error::Result;
 use crate::job::experiment::Experiment;
 use crate::job::identity::{self, Columns, Identity};
@@ -16,11 +16,11 @@ use crate::job::report;
 use crate::job::settings::JobSettings;
 use crate::job::source::{Frames, Source};
 use crate::job::stored::StoredRun;
-use crate::job::{Outcome, Show};
+use crate::job::{Outcome, StdoutFormat};
 use crate::store::Store;
 use crate::types::{ChoiceDetail, QuestionId, Record, RunQuestion};
 
-impl Experiment for Setup<'_> {
+impl Experiment for ChoiceSetup<'_> {
     type Item = ChoiceItem;
 
     const PHASES: &'static [&'static str] = &["answers"];
@@ -99,7 +99,7 @@ impl Experiment for Setup<'_> {
         &self,
         store: &Store<ChoiceDetail>,
         run: StoredRun<ChoiceDetail>,
-        show: Show,
+        show: StdoutFormat,
     ) -> Result<Outcome> {
         report::choice::write(store, run, show)
     }

@@ -8,12 +8,12 @@ mod settings;
 mod setup;
 
 use crate::error::Result;
-use crate::job::batch::BatchFiles;
+use crate::job::batch::BatchFileArgs;
 use crate::job::progress::Progress;
 use crate::job::{Job, Outcome};
 
 pub use settings::{EvaluateArgs, ShrinkArgs};
-use setup::Setup;
+use setup::ChoiceSetup;
 
 /// Runs an evaluation, or goes on with it; a dry run says what that would take.
 ///
@@ -21,7 +21,7 @@ use setup::Setup;
 /// If nothing can be asked, or no further trial could succeed; what had arrived by then is kept.
 pub fn evaluate(args: EvaluateArgs, progress: &Progress) -> Result<Outcome> {
     let config = args.resolve()?;
-    let (setup, files) = Setup::open(&config, progress)?;
+    let (setup, files) = ChoiceSetup::open(&config, progress)?;
     Job::new(&setup, files, progress)?.run()
 }
 
@@ -31,10 +31,10 @@ pub fn evaluate(args: EvaluateArgs, progress: &Progress) -> Result<Outcome> {
 /// If a model is built in, an image is larger than the endpoint takes, or a file cannot be written.
 pub fn export_batch(
     args: EvaluateArgs,
-    files: &BatchFiles,
+    files: &BatchFileArgs,
     progress: &Progress,
 ) -> Result<Outcome> {
     let config = args.resolve()?;
-    let (setup, models) = Setup::open(&config, progress)?;
+    let (setup, models) = ChoiceSetup::open(&config, progress)?;
     Job::new(&setup, models, progress)?.export_batch(files)
 }

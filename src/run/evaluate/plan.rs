@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::choice_order::arrange;
-use super::setup::Setup;
+use super::setup::ChoiceSetup;
 use crate::error::Result;
 use crate::job::models::{ModelUnderTest, asked_in};
 use crate::job::plan::{SourcePlan, TrialGroup};
@@ -21,14 +21,14 @@ pub(crate) struct ChoiceItem {
 }
 
 /// A question as it is shown once, with its words for models that see the image and for those that do not.
-struct Shown {
+struct QuestionPrompts {
     item: ChoiceItem,
     image: Prompt,
     blind: Prompt,
 }
 
 /// All trials, frame by frame: words alone first, and then condition by condition.
-pub(super) fn trials(setup: &Setup<'_>) -> Result<Vec<SourcePlan<ChoiceItem>>> {
+pub(super) fn trials(setup: &ChoiceSetup<'_>) -> Result<Vec<SourcePlan<ChoiceItem>>> {
     let mut by_source: Vec<Vec<&Question>> = vec![Vec::new(); setup.sources.len()];
     for question in &setup.questions {
         by_source[setup.places[&question.frame]].push(question);
@@ -46,7 +46,7 @@ pub(super) fn trials(setup: &Setup<'_>) -> Result<Vec<SourcePlan<ChoiceItem>>> {
 }
 
 fn groups(
-    setup: &Setup<'_>,
+    setup: &ChoiceSetup<'_>,
     source: usize,
     questions: &[&Question],
 ) -> Result<Vec<TrialGroup<ChoiceItem>>> {
@@ -57,7 +57,7 @@ fn groups(
                 let words = setup.config.prompts.render(view, &arranged.question)?;
                 Ok(Prompt::of(words.into()))
             };
-            shown.push(Shown {
+            shown.push(QuestionPrompts {
                 image: prompt(View::Image)?,
                 blind: prompt(View::Blind)?,
                 item: ChoiceItem {
@@ -75,10 +75,10 @@ fn groups(
 
 /// The trials in a condition; `None` if no model is asked in it.
 fn group(
-    setup: &Setup<'_>,
+    setup: &ChoiceSetup<'_>,
     source: usize,
     condition: Option<&Condition>,
-    shown: &[Shown],
+    shown: &[QuestionPrompts],
 ) -> Result<Option<TrialGroup<ChoiceItem>>> {
     let view = condition.map_or(View::Blind, |_| View::Image);
     let models = asked_in(&setup.models, condition);
@@ -112,7 +112,7 @@ fn group(
 }
 
 fn facts<'a>(
-    shown: &'a Shown,
+    shown: &'a QuestionPrompts,
     prompt: &'a Prompt,
     model: &'a ModelUnderTest,
     condition: Option<&'a Condition>,

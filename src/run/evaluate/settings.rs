@@ -9,7 +9,7 @@ use super::choice_order::ChoiceOrder;
 use crate::ask::{Constrain, Prompts};
 use crate::dataset::{DataArgs, PixelLimit, SelectionArgs};
 use crate::error::Result;
-use crate::job::settings::{JobArgs, JobSettings, OfExperiment};
+use crate::job::settings::{ExperimentSettings, JobArgs, JobSettings};
 
 /// The flags of an evaluation, by help heading.
 #[derive(Debug, Args)]
@@ -85,7 +85,7 @@ impl EvaluateArgs {
             limit: self.limit,
             order: self.order,
             prompts: prompts.map_or_else(Prompts::built_in, Prompts::load)?,
-            job: self.job.resolve(&OfExperiment {
+            job: self.job.resolve(&ExperimentSettings {
                 constrain: self.choice.constrain,
                 max_side: self.shrink.max_side,
                 sampling_seed: None,

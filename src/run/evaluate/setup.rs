@@ -1,4 +1,4 @@
-//! An evaluation, opened and checked: [`Setup`].
+//! An evaluation, opened and checked: [`ChoiceSetup`].
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -19,7 +19,7 @@ use crate::job::source::{Source, first_asked, inspect_all};
 use crate::types::{Condition, FrameId, Question};
 
 /// Everything an evaluation is made of, opened and checked; nothing is asked, and nothing written.
-pub(super) struct Setup<'a> {
+pub(super) struct ChoiceSetup<'a> {
     pub(super) config: &'a Evaluation,
     pub(super) dataset: Arc<Dataset>,
     pub(super) questions: Vec<Question>,
@@ -31,7 +31,7 @@ pub(super) struct Setup<'a> {
     pub(super) recipe: Recipe,
 }
 
-impl<'a> Setup<'a> {
+impl<'a> ChoiceSetup<'a> {
     /// Opens the data and the models; the enhancement models are read and not yet loaded.
     pub(super) fn open(
         config: &'a Evaluation,

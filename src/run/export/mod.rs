@@ -13,8 +13,8 @@ use crate::enhance::EnhancerArgs;
 use crate::error::{Error, Result};
 use crate::job::Outcome;
 use crate::job::conditions::conditions;
-use crate::job::enhancers::{self, Loading, OpenEnhancers};
-use crate::job::frame_work::{FrameWork, Steps};
+use crate::job::enhancers::{self, EnhancerRunArgs, OpenEnhancers};
+use crate::job::frame_work::{FrameWork, ImageSteps};
 use crate::job::image_pipeline::ImagePipeline;
 use crate::job::progress::Progress;
 use crate::job::questions::{open_data, select};
@@ -26,14 +26,14 @@ use crate::synthesis::{LightArgs, LightSettings};
 use crate::types::manifest::Status;
 use crate::types::{Condition, FrameId, Question};
 
-use set::{Form, Set};
+use set::{ReadySet, SetForm};
 
 /// The flags of `export`.
 #[derive(Debug, Args)]
 pub struct ExportArgs {
     /// The form
     #[arg(value_name = "KIND", value_enum)]
-    pub kind: Form,
+    pub kind: SetForm,
     /// A folder of frames, or a ready-made set (.tsv, .jsonl)
     #[arg(value_name = "DATA", value_parser = dataset::place)]
     pub data: DataPlace,
@@ -54,7 +54,7 @@ pub struct ExportArgs {
     pub enhancers: EnhancerArgs,
     /// How enhancers are run.
     #[command(flatten)]
-    pub loading: Loading,
+    pub loading: EnhancerRunArgs,
     /// Write over sets that are there already
     #[arg(long, help_heading = "Output")]
     pub force: bool,
@@ -75,7 +75,7 @@ pub fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> {
     let sources = workers.install(|| inspect_all(&dataset, &questions, progress))?;
     let mut sets = open_sets(args, &dataset, &conditions, &questions)?;
     let mut pipeline = ImagePipeline {
-        steps: Steps {
+        steps: ImageSteps {
             frames: &dataset,
             recipe: &recipe,
             limit: None,
@@ -129,10 +129,10 @@ fn open_sets(
     dataset: &Dataset,
     conditions: &[Condition],
     questions: &[Question],
-) -> Result<Vec<Set>> {
-    let sets: Vec<Set> = conditions
+) -> Result<Vec<ReadySet>> {
+    let sets: Vec<ReadySet> = conditions
         .iter()
-        .map(|condition| Set::new(args.kind, &args.out, dataset.name(), condition, questions))
+        .map(|condition| ReadySet::new(args.kind, &args.out, dataset.name(), condition, questions))
         .collect();
     let taken = sets.iter().find(|set| set.path().exists());
     match taken.filter(|_| !args.force) {

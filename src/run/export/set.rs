@@ -1,4 +1,4 @@
-//! One ready-made set: [`Set`].
+//! One ready-made set: [`ReadySet`].
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use crate::types::{Choices, Condition, Question};
 /// The form of a ready-made set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 #[value(rename_all = "lowercase")]
-pub enum Form {
+pub enum SetForm {
     /// A .tsv with the images in it, as VLMEvalKit reads it
     VlmEvalKit,
     /// metadata.jsonl beside the images, as Hugging Face and lmms-eval load it
@@ -29,17 +29,17 @@ pub enum Form {
 const LLAVA: &str = "Answer with the option's letter from the given choices directly.";
 
 /// The questions in one condition, written frame by frame, so that no more than one image is held.
-pub(super) struct Set {
-    form: Form,
+pub(super) struct ReadySet {
+    form: SetForm,
     path: PathBuf,
     /// The most choices of any question: so many columns has a table.
     most: usize,
     part: Option<csv::Writer<File>>,
 }
 
-impl Set {
+impl ReadySet {
     pub(super) fn new(
-        form: Form,
+        form: SetForm,
         out: &Path,
         data: &str,
         condition: &Condition,
@@ -47,9 +47,9 @@ impl Set {
     ) -> Self {
         let folder = out.join(condition.to_string());
         let path = match form {
-            Form::VlmEvalKit => out.join(format!("{data}_{condition}.tsv")),
-            Form::ImageFolder => folder.join("metadata.jsonl"),
-            Form::Llava => folder.join("questions.jsonl"),
+            SetForm::VlmEvalKit => out.join(format!("{data}_{condition}.tsv")),
+            SetForm::ImageFolder => folder.join("metadata.jsonl"),
+            SetForm::Llava => folder.join("questions.jsonl"),
         };
         let most = questions
             .iter()
@@ -76,16 +76,16 @@ impl Set {
         questions: &[(usize, &Question)],
     ) -> Result<()> {
         let file = format!("images/{name}.png");
-        if self.form != Form::VlmEvalKit {
+        if self.form != SetForm::VlmEvalKit {
             let folder = self.path.parent().unwrap_or(Path::new(""));
             write(&folder.join(&file), image)?;
         }
         let mut first = None;
         for &(index, question) in questions {
             match self.form {
-                Form::ImageFolder => self.line(&image_folder(&file, question))?,
-                Form::Llava => self.line(&llava(&file, question))?,
-                Form::VlmEvalKit => {
+                SetForm::ImageFolder => self.line(&image_folder(&file, question))?,
+                SetForm::Llava => self.line(&llava(&file, question))?,
+                SetForm::VlmEvalKit => {
                     // One row has the image, the others its index.
                     let cell = match first {
                         None => STANDARD.encode(image),
@@ -115,8 +115,8 @@ impl Set {
                 fs::create_dir_all(folder).map_err(|e| Error::file(folder, "make", e))?;
                 let file = File::create(&path).map_err(|e| Error::file(&path, "write", e))?;
                 let quotes = match self.form {
-                    Form::VlmEvalKit => csv::QuoteStyle::Necessary,
-                    Form::ImageFolder | Form::Llava => csv::QuoteStyle::Never,
+                    SetForm::VlmEvalKit => csv::QuoteStyle::Necessary,
+                    SetForm::ImageFolder | SetForm::Llava => csv::QuoteStyle::Never,
                 };
                 let mut builder = csv::WriterBuilder::new();
                 let part = none.insert(
@@ -125,7 +125,7 @@ impl Set {
                         .quote_style(quotes)
                         .from_writer(file),
                 );
-                if self.form == Form::VlmEvalKit {
+                if self.form == SetForm::VlmEvalKit {
                     let letters = (0..self.most).map(|i| letter(i).to_string());
                     let header = COLUMNS.iter().map(|&name| name.to_owned()).chain(letters);
                     part.write_record(header)

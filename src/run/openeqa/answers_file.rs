@@ -20,7 +20,7 @@ use crate::types::{
 
 /// An entry of a file; other fields are ignored.
 #[derive(Debug, Deserialize)]
-struct Entry {
+struct AnswerEntry {
     question_id: String,
     /// `null` where it could not be told.
     answer: Option<String>,
@@ -44,7 +44,7 @@ pub(super) fn read(
     let path = &config.path;
     let text = fs::read(path).map_err(|e| Error::file(path, "read", e))?;
     let wrong = |problem: String| Error::data(path.display(), problem);
-    let entries: Vec<Entry> = serde_json::from_slice(&text).map_err(|e| {
+    let entries: Vec<AnswerEntry> = serde_json::from_slice(&text).map_err(|e| {
         wrong(format!(
             "{e}; a JSON array of {{\"question_id\", \"answer\"}} expected, with \"condition\" or \"level\" and \"annotator\" \
              where there are several"
@@ -104,7 +104,7 @@ fn passed_over(path: &Path, strange: &[&str], all: usize) {
 }
 
 /// What was shown to whoever gave an answer: the lit frames where nothing is said, as in upstream's own files.
-fn condition(entry: &Entry, variants: KindSet) -> std::result::Result<Condition, String> {
+fn condition(entry: &AnswerEntry, variants: KindSet) -> std::result::Result<Condition, String> {
     let level = match (&entry.condition, entry.level.as_deref()) {
         (Some(condition), _) => return Ok(condition.clone()),
         (None, None | Some("L0")) => return Ok(Condition::L0),
@@ -127,7 +127,7 @@ fn condition(entry: &Entry, variants: KindSet) -> std::result::Result<Condition,
     }
 }
 
-fn key(name: &str, entry: &Entry, condition: &Condition, person: Option<&str>) -> TrialKey {
+fn key(name: &str, entry: &AnswerEntry, condition: &Condition, person: Option<&str>) -> TrialKey {
     let condition = condition.to_string();
     let answer = entry.answer.as_ref().map(|answer| format!("={answer}"));
     let parts = [

@@ -9,11 +9,11 @@ use serde_json::{Value, json};
 use super::marks::{marks, prompt};
 use super::plan::answers;
 use super::record::OpenItem;
-use super::setup::Setup;
+use super::setup::OpenSetup;
 use crate::ask::Server;
 use crate::error::Result;
 use crate::job::budget::words;
-use crate::job::experiment::{Expected, Experiment};
+use crate::job::experiment::{ExpectedRequest, Experiment};
 use crate::job::identity::{self, Columns, Identity};
 use crate::job::models::ModelUnderTest;
 use crate::job::plan::SourcePlan;
@@ -23,7 +23,7 @@ use crate::job::settings::JobSettings;
 use crate::job::source::{Frames, Source};
 use crate::job::stored::StoredRun;
 use crate::job::trial::Item as _;
-use crate::job::{Outcome, Show};
+use crate::job::{Outcome, StdoutFormat};
 use crate::store::Store;
 use crate::types::{Family, FrameId, OpenDetail, Record, RunQuestion};
 
@@ -31,7 +31,7 @@ use crate::types::{Family, FrameId, OpenDetail, Record, RunQuestion};
 const ANSWER: &str =
     "There is a small round table with two chairs next to the window of the living room.";
 
-impl Experiment for Setup<'_> {
+impl Experiment for OpenSetup<'_> {
     type Item = OpenItem;
 
     const PHASES: &'static [&'static str] = &["answers", "marks"];
@@ -142,7 +142,7 @@ impl Experiment for Setup<'_> {
         })
     }
 
-    fn to_come(&self, left: &[SourcePlan<OpenItem>]) -> Vec<Expected> {
+    fn to_come(&self, left: &[SourcePlan<OpenItem>]) -> Vec<ExpectedRequest> {
         if self.judge.is_none() {
             return Vec::new();
         }
@@ -155,7 +155,7 @@ impl Experiment for Setup<'_> {
                     question: Arc::clone(question),
                     answer: ANSWER.into(),
                 };
-                Some(Expected {
+                Some(ExpectedRequest {
                     model: 0,
                     words: words(&prompt(question, ANSWER)),
                     reply: mark.reply_tokens(),
@@ -170,7 +170,7 @@ impl Experiment for Setup<'_> {
         &self,
         store: &Store<OpenDetail>,
         run: StoredRun<OpenDetail>,
-        show: Show,
+        show: StdoutFormat,
     ) -> Result<Outcome> {
         open::write(store, run, show)
     }

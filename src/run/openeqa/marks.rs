@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use super::record::OpenItem;
-use super::setup::Setup;
+use super::setup::OpenSetup;
 use crate::ask::openeqa::judged;
 use crate::dataset::openeqa::OpenQuestion;
 use crate::error::Result;
@@ -28,7 +28,7 @@ fn key(judge: &ModelUnderTest, prompt: &Prompt) -> Result<TrialKey> {
 
 /// The marks of a run, each answer to a question once, walk by walk.
 pub(super) fn marks(
-    setup: &Setup<'_>,
+    setup: &OpenSetup<'_>,
     records: &[Record<OpenDetail>],
 ) -> Result<Vec<SourcePlan<OpenItem>>> {
     let Some(judge) = &setup.judge else {

@@ -21,7 +21,7 @@ use crate::job::{Job, Outcome};
 pub use judge::JudgeArgs;
 pub use settings::OpenEqaArgs;
 use settings::OpenTask;
-use setup::Setup;
+use setup::OpenSetup;
 
 /// Carries out what is to be done.
 ///
@@ -29,7 +29,7 @@ use setup::Setup;
 /// If nothing can be asked, or no further trial could succeed; what had arrived by then is kept.
 pub fn openeqa(args: OpenEqaArgs, progress: &Progress) -> Result<Outcome> {
     let config = args.resolve()?;
-    let (setup, files) = Setup::open(&config, progress)?;
+    let (setup, files) = OpenSetup::open(&config, progress)?;
     match &config.task {
         OpenTask::Run => Job::new(&setup, files, progress)?.run(),
         OpenTask::Batch(batch) => Job::new(&setup, files, progress)?.export_batch(batch),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::record::OpenItem;
-use super::setup::Setup;
+use super::setup::OpenSetup;
 use crate::ask::openeqa::{blind, vision};
 use crate::dataset::openeqa::OpenQuestion;
 use crate::error::Result;
@@ -14,7 +14,7 @@ use crate::job::trial::{KeyFacts, Prompt, Trial};
 use crate::types::{Condition, Digest, View};
 
 /// All answers, walk by walk: without images first, and then condition by condition.
-pub(super) fn answers(setup: &Setup<'_>) -> Result<Vec<SourcePlan<OpenItem>>> {
+pub(super) fn answers(setup: &OpenSetup<'_>) -> Result<Vec<SourcePlan<OpenItem>>> {
     let mut by_walk = BTreeMap::<&str, Vec<&Arc<OpenQuestion>>>::new();
     for question in &setup.questions {
         by_walk.entry(&question.episode).or_default().push(question);
@@ -36,7 +36,7 @@ pub(super) fn answers(setup: &Setup<'_>) -> Result<Vec<SourcePlan<OpenItem>>> {
 
 /// The answers in a condition; `None` if no model is asked in it.
 fn group(
-    setup: &Setup<'_>,
+    setup: &OpenSetup<'_>,
     source: usize,
     condition: Option<&Condition>,
     questions: &[&Arc<OpenQuestion>],

@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 /// Which questions of a file are asked.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "OpenEQA")]
-pub struct ChosenArgs {
+pub struct OpenSelectionArgs {
     /// Only questions of these splits, as hm3d-v0,scannet-v0; default: all
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = trimmed)]
     pub splits: Vec<String>,
@@ -34,7 +34,10 @@ fn trimmed(name: &str) -> Result<String, std::convert::Infallible> {
 }
 
 /// The questions that are asked.
-pub(super) fn select(all: Vec<OpenQuestion>, chosen: &ChosenArgs) -> Result<Vec<OpenQuestion>> {
+pub(super) fn select(
+    all: Vec<OpenQuestion>,
+    chosen: &OpenSelectionArgs,
+) -> Result<Vec<OpenQuestion>> {
     let subset = chosen.subset.as_deref().map(ids).transpose()?;
     if let (Some(subset), Some(path)) = (&subset, &chosen.subset) {
         let known: BTreeSet<&str> = all.iter().map(|question| &*question.id.0).collect();

@@ -6,12 +6,12 @@ use std::str::FromStr;
 use clap::{Arg, Args};
 
 use super::judge::{Judge, JudgeArgs};
-use super::questions::ChosenArgs;
+use super::questions::OpenSelectionArgs;
 use crate::dataset::PixelLimit;
 use crate::error::Result;
-use crate::job::batch::BatchFiles;
+use crate::job::batch::BatchFileArgs;
 use crate::job::models::ModelName;
-use crate::job::settings::{JobArgs, JobSettings, OfExperiment};
+use crate::job::settings::{ExperimentSettings, JobArgs, JobSettings};
 use crate::job::walk::Walk;
 use crate::score::llm_match::Protocol;
 
@@ -23,7 +23,7 @@ pub struct OpenEqaArgs {
     pub questions: PathBuf,
     /// Which of them.
     #[command(flatten)]
-    pub chosen: ChosenArgs,
+    pub chosen: OpenSelectionArgs,
     /// How walks are shown.
     #[command(flatten)]
     pub walk: Walk,
@@ -58,7 +58,7 @@ pub struct OpenEqaArgs {
     pub batch: bool,
     /// Their files.
     #[command(flatten)]
-    pub files: BatchFiles,
+    pub files: BatchFileArgs,
     /// What every experiment has.
     #[command(flatten)]
     pub job: JobArgs,
@@ -81,7 +81,7 @@ pub struct AnswersFile {
 #[derive(Debug)]
 pub(super) struct OpenEqa {
     pub(super) questions: PathBuf,
-    pub(super) chosen: ChosenArgs,
+    pub(super) chosen: OpenSelectionArgs,
     pub(super) walk: Walk,
     pub(super) limit: PixelLimit,
     pub(super) answers: Vec<AnswersFile>,
@@ -98,7 +98,7 @@ pub(super) enum OpenTask {
     /// Ask what is left, or say what that would take.
     Run,
     /// Write it as files of a Batch API.
-    Batch(BatchFiles),
+    Batch(BatchFileArgs),
     /// Write a page for people.
     Study(PathBuf),
 }
@@ -156,9 +156,9 @@ impl OpenEqaArgs {
             judge,
             protocol,
             task,
-            job: self.job.resolve(&OfExperiment {
+            job: self.job.resolve(&ExperimentSettings {
                 sampling_seed: seed,
-                ..OfExperiment::default()
+                ..ExperimentSettings::default()
             })?,
         })
     }

@@ -1,4 +1,4 @@
-//! An evaluation by open questions, opened and checked: [`Setup`].
+//! An evaluation by open questions, opened and checked: [`OpenSetup`].
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
@@ -20,7 +20,7 @@ use crate::job::walk::WalkFolder;
 use crate::types::{Condition, FrameId, OpenDetail, QuestionId, Record, View};
 
 /// Everything an evaluation by open questions is made of, opened and checked; nothing is asked, and nothing written.
-pub(super) struct Setup<'a> {
+pub(super) struct OpenSetup<'a> {
     pub(super) config: &'a OpenEqa,
     /// The questions that are asked, in the order of the file.
     pub(super) questions: Vec<Arc<OpenQuestion>>,
@@ -37,7 +37,7 @@ pub(super) struct Setup<'a> {
     pub(super) given: Vec<Record<OpenDetail>>,
 }
 
-impl<'a> Setup<'a> {
+impl<'a> OpenSetup<'a> {
     /// Opens the questions, the walks and the models; the enhancement models are read and not yet loaded.
     pub(super) fn open(config: &'a OpenEqa, progress: &Progress) -> Result<(Self, Vec<ModelFile>)> {
         let job = &config.job;

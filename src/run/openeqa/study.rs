@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::setup::Setup;
+use super::setup::OpenSetup;
 use crate::ask::Payload;
 use crate::enhance::ModelFile;
 use crate::error::Result;
@@ -23,7 +23,7 @@ use crate::types::{Condition, Digest};
 /// # Errors
 /// If a frame cannot be made or a file not be written.
 pub(super) fn pack(
-    setup: &Setup<'_>,
+    setup: &OpenSetup<'_>,
     files: Vec<ModelFile>,
     folder: &Path,
     progress: &Progress,

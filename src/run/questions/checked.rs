@@ -15,14 +15,14 @@ use crate::types::QuestionId;
 
 /// A line of what a person said.
 #[derive(Deserialize)]
-struct Said {
+struct CheckedLine {
     id: QuestionId,
-    verdict: Word,
+    verdict: Decision,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
-enum Word {
+enum Decision {
     Accept,
     Reject,
 }
@@ -37,11 +37,11 @@ pub(super) fn rejected(files: &[PathBuf]) -> Result<BTreeSet<QuestionId>> {
         let text = reading::text(path)?;
         let lines = text.trim_start_matches('\u{feff}').lines().enumerate();
         for (i, line) in lines.filter(|(_, line)| !line.trim().is_empty()) {
-            let said: Said =
+            let said: CheckedLine =
                 serde_json::from_str(line).map_err(|e| Error::json_line(path, i + 1, &e))?;
             match said.verdict {
-                Word::Reject => drop(rejected.insert(said.id)),
-                Word::Accept => drop(rejected.remove(&said.id)),
+                Decision::Reject => drop(rejected.insert(said.id)),
+                Decision::Accept => drop(rejected.remove(&said.id)),
             }
         }
     }

@@ -1,4 +1,4 @@
-//! What was measured of frames, kept by content beside the questions: [`Kept`].
+//! What was measured of frames, kept by content beside the questions: [`StatisticsCache`].
 //!
 //! One file, a frame a line. While frames are measured, a line is added the moment it is known, so that whatever stops the
 //! work, it goes on from there; in the end the file is written anew in the order of the frames.
@@ -15,13 +15,13 @@ use crate::questions::statistics::FrameStatistics;
 use crate::types::Digest;
 
 /// What was measured, by content.
-pub(super) struct Kept {
+pub(super) struct StatisticsCache {
     path: PathBuf,
     known: HashMap<Digest, FrameStatistics>,
     file: Mutex<File>,
 }
 
-impl Kept {
+impl StatisticsCache {
     /// Reads what is there. A line that is none, as the last one of a run that was stopped, is left out: its frame is measured
     /// again.
     pub(super) fn open(path: &Path) -> Result<Self> {

@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 use crate::files::{reading, write};
 use crate::job::progress::Progress;
 use crate::job::workers::{ThreadArgs, pool};
-use crate::job::{Outcome, Show};
+use crate::job::{Outcome, StdoutFormat};
 use crate::questions::balance::BalanceMode;
 use crate::questions::colors::Palette;
 use crate::questions::reason::Reason;
@@ -30,7 +30,7 @@ use crate::report;
 use crate::types::manifest::Status;
 use crate::types::{Digest, Family, FrameId, Labels, QuestionId};
 
-use kept::Kept;
+use kept::StatisticsCache;
 
 /// The flags of `questions`.
 #[derive(Debug, Args)]
@@ -101,13 +101,13 @@ fn family(name: &str) -> Result<Family, String> {
 }
 
 /// The flags with the tables that they name.
-struct Making<'a> {
+struct QuestionMaking<'a> {
     args: &'a QuestionsArgs,
     rules: Rules,
     palette: Palette,
 }
 
-impl<'a> Making<'a> {
+impl<'a> QuestionMaking<'a> {
     fn read(args: &'a QuestionsArgs) -> Result<Self> {
         let rules = read(args.rules.as_deref(), Rules::parse)?;
         let palette = read(args.colors.as_deref(), Palette::parse)?;
@@ -136,7 +136,7 @@ fn read<T>(path: Option<&Path>, parse: fn(&str) -> Result<T>) -> Result<Option<T
 /// # Errors
 /// Where there are no frames, no classes, or a file cannot be written.
 pub fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Outcome> {
-    let making = &Making::read(args)?;
+    let making = &QuestionMaking::read(args)?;
     let dataset = Dataset::of_frames(&args.data)?;
     let dataset = dataset.with_most_pixels(args.limit.max_pixels.get());
     let labels = dataset.labels().ok_or_else(|| {
@@ -164,7 +164,10 @@ pub fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Outcome> {
             candidates.push(told(frame, candidate));
         }
     })?;
-    write(&args.out, &lines(made.asked.iter().map(Line::of))?)?;
+    write(
+        &args.out,
+        &lines(made.asked.iter().map(WrittenQuestion::of))?,
+    )?;
     if let Some(path) = &args.candidates {
         write(path, &lines(candidates)?)?;
     }
@@ -189,9 +192,9 @@ pub fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Outcome> {
         } else {
             Status::Incomplete
         },
-        output: match Show::of(args.json) {
-            Show::Json => json,
-            Show::Table => format!(
+        output: match StdoutFormat::of(args.json) {
+            StdoutFormat::Json => json,
+            StdoutFormat::Table => format!(
                 "{}{}\n",
                 report::questions::table(&summary),
                 args.out.display()
@@ -201,7 +204,7 @@ pub fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Outcome> {
 }
 
 /// Says what is not wrong, but likely not meant.
-fn warn(made: &Generated, making: &Making<'_>) {
+fn warn(made: &Generated, making: &QuestionMaking<'_>) {
     for uneven in &made.uneven {
         tracing::warn!("{uneven}");
     }
@@ -225,12 +228,12 @@ fn beside(out: &Path, what: &str) -> PathBuf {
 
 /// Measures the frames that were not measured before, and counts those that cannot be.
 fn measured(
-    making: &Making<'_>,
+    making: &QuestionMaking<'_>,
     dataset: &Dataset,
     labels: &Labels,
     progress: &Progress,
 ) -> Result<(Vec<FrameStatistics>, usize)> {
-    let kept = Kept::open(&beside(&making.args.out, "statistics.jsonl"))?;
+    let kept = StatisticsCache::open(&beside(&making.args.out, "statistics.jsonl"))?;
     let cores = pool(making.args.threads.threads)?;
     let names: Vec<&FrameId> = dataset.frames().collect();
     let bar = progress.bar("frames", names.len());
@@ -257,7 +260,7 @@ fn measured(
 }
 
 /// All that decides what is measured, but for the frame.
-fn context(making: &Making<'_>, labels: &Labels) -> Digest {
+fn context(making: &QuestionMaking<'_>, labels: &Labels) -> Digest {
     let version = statistics::VERSION.to_le_bytes();
     let parts = [
         making.rules.measure_digest(),
@@ -272,10 +275,10 @@ fn context(making: &Making<'_>, labels: &Labels) -> Digest {
 }
 
 fn one(
-    making: &Making<'_>,
+    making: &QuestionMaking<'_>,
     dataset: &Dataset,
     labels: &Labels,
-    kept: &Kept,
+    kept: &StatisticsCache,
     context: Digest,
     name: &FrameId,
 ) -> Result<FrameStatistics> {
@@ -303,7 +306,7 @@ fn one(
 
 /// A question as a line of its file, in the order of the keys.
 #[derive(Serialize)]
-struct Line<'a> {
+struct WrittenQuestion<'a> {
     id: &'a QuestionId,
     frame: &'a FrameId,
     family: &'a Family,
@@ -313,7 +316,7 @@ struct Line<'a> {
     evidence: &'a Value,
 }
 
-impl<'a> Line<'a> {
+impl<'a> WrittenQuestion<'a> {
     fn of(asked: &'a GeneratedQuestion) -> Self {
         let question = &asked.question;
         Self {

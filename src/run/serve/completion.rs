@@ -1,4 +1,4 @@
-//! What is sent back: a [`Completion`] or a [`Fault`], in OpenAI's words.
+//! What is sent back: a [`Completion`] or a [`RequestFault`], in OpenAI's words.
 
 use axum::Json;
 use axum::http::{StatusCode, header};
@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 /// Whether an answer comes whole or as a stream of events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Form {
+pub(super) enum ReplyForm {
     Whole,
     Stream,
 }
@@ -17,7 +17,7 @@ pub(super) enum Form {
 pub(super) struct Completion {
     pub(super) model: String,
     pub(super) text: String,
-    pub(super) form: Form,
+    pub(super) form: ReplyForm,
 }
 
 impl Completion {
@@ -57,8 +57,8 @@ impl Completion {
 impl IntoResponse for Completion {
     fn into_response(self) -> Response {
         match self.form {
-            Form::Whole => Json(self.whole()).into_response(),
-            Form::Stream => {
+            ReplyForm::Whole => Json(self.whole()).into_response(),
+            ReplyForm::Stream => {
                 let kind = [(header::CONTENT_TYPE, "text/event-stream")];
                 (kind, self.events()).into_response()
             }
@@ -68,14 +68,14 @@ impl IntoResponse for Completion {
 
 /// Why there is no answer.
 #[derive(Debug)]
-pub(super) struct Fault {
+pub(super) struct RequestFault {
     status: StatusCode,
     message: String,
     parameter: Option<&'static str>,
     code: Option<&'static str>,
 }
 
-impl Fault {
+impl RequestFault {
     pub(super) fn new(status: StatusCode, message: impl Into<String>) -> Self {
         Self {
             status,
@@ -95,7 +95,7 @@ impl Fault {
     }
 }
 
-impl IntoResponse for Fault {
+impl IntoResponse for RequestFault {
     fn into_response(self) -> Response {
         let kind = if self.status.is_server_error() {
             "server_error"

@@ -33,10 +33,10 @@ use crate::job::progress::Progress;
 use crate::types::manifest::Status;
 use crate::types::{Choices, Digest, Family, FrameId, Question, QuestionId};
 
-use completion::{Completion, Fault};
+use completion::{Completion, RequestFault};
 use puzzle::Puzzle;
 use recognise::Likenesses;
-use request::Asked;
+use request::ServedQuestion;
 
 /// The largest request that is read, in bytes.
 const LARGEST: usize = 64 << 20;
@@ -56,7 +56,7 @@ pub struct ServeArgs {
 }
 
 /// What requests are answered with.
-struct Desk {
+struct ServerState {
     likenesses: Likenesses,
     /// The models by the names they have here: `darkqa-eval --model observer` would be the one in its own process.
     models: [(&'static str, Model); 2],
@@ -77,7 +77,7 @@ pub fn serve(args: &ServeArgs, progress: &Progress) -> Result<Outcome> {
         ("darkqa-random", Model::Random(prior)),
     ];
     let likenesses = Likenesses::of(&dataset, progress)?;
-    let desk = Arc::new(Desk { likenesses, models });
+    let desk = Arc::new(ServerState { likenesses, models });
     let runtime = runtime::Builder::new_multi_thread()
         .enable_all()
         .build()
@@ -89,7 +89,7 @@ pub fn serve(args: &ServeArgs, progress: &Progress) -> Result<Outcome> {
     })
 }
 
-async fn listen(args: &ServeArgs, desk: Arc<Desk>, progress: &Progress) -> Result<()> {
+async fn listen(args: &ServeArgs, desk: Arc<ServerState>, progress: &Progress) -> Result<()> {
     let address = SocketAddr::from((Ipv4Addr::LOCALHOST, args.port));
     let taken = |e| {
         let problem = format!(
@@ -122,27 +122,27 @@ async fn listen(args: &ServeArgs, desk: Arc<Desk>, progress: &Progress) -> Resul
 
 async fn nowhere() -> Response {
     let message = "there are GET /v1/models and POST /v1/chat/completions";
-    Fault::new(StatusCode::NOT_FOUND, message).into_response()
+    RequestFault::new(StatusCode::NOT_FOUND, message).into_response()
 }
 
-async fn models(State(desk): State<Arc<Desk>>) -> Response {
+async fn models(State(desk): State<Arc<ServerState>>) -> Response {
     completion::models(desk.names())
 }
 
-async fn complete(State(desk): State<Arc<Desk>>, body: Bytes) -> Response {
+async fn complete(State(desk): State<Arc<ServerState>>, body: Bytes) -> Response {
     match desk.answer(&body).await {
         Ok(completion) => completion.into_response(),
         Err(fault) => fault.into_response(),
     }
 }
 
-impl Desk {
+impl ServerState {
     fn names(&self) -> impl Iterator<Item = &'static str> {
         self.models.iter().map(|(name, _)| *name)
     }
 
-    async fn answer(&self, body: &[u8]) -> Result<Completion, Fault> {
-        let asked = Asked::read(body)?;
+    async fn answer(&self, body: &[u8]) -> Result<Completion, RequestFault> {
+        let asked = ServedQuestion::read(body)?;
         let model = self.models.iter().find(|(name, _)| *name == asked.model);
         let (_, model) = model.ok_or_else(|| {
             let names: Vec<&str> = self.names().collect();
@@ -151,7 +151,7 @@ impl Desk {
                 asked.model,
                 names.join(", ")
             );
-            Fault::new(StatusCode::NOT_FOUND, message).at("model", "model_not_found")
+            RequestFault::new(StatusCode::NOT_FOUND, message).at("model", "model_not_found")
         })?;
         let puzzle = Puzzle::read(&asked.text)?;
         let frame = asked
@@ -167,7 +167,7 @@ impl Desk {
             family: Family::Other(String::new()),
             text: puzzle.question,
             choices: Choices::new(puzzle.choices, 0)
-                .map_err(|e| Fault::new(StatusCode::BAD_REQUEST, e.to_string()))?,
+                .map_err(|e| RequestFault::new(StatusCode::BAD_REQUEST, e.to_string()))?,
             evidence: serde_json::Value::Null,
             frame: frame.cloned().unwrap_or(FrameId(String::new())),
         };
@@ -184,7 +184,7 @@ impl Desk {
         let reply = model
             .ask(call)
             .await
-            .map_err(|e| Fault::new(StatusCode::INTERNAL_SERVER_ERROR, e.failure.message))?;
+            .map_err(|e| RequestFault::new(StatusCode::INTERNAL_SERVER_ERROR, e.failure.message))?;
         Ok(Completion {
             model: asked.model,
             text: reply.text,

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use axum::http::StatusCode;
 use regex::Regex;
 
-use super::completion::Fault;
+use super::completion::RequestFault;
 use crate::types::question::letter;
 
 /// A question with its choices.
@@ -22,7 +22,7 @@ static CHOICE: LazyLock<Option<Regex>> =
 impl Puzzle {
     /// Reads the last question of a text: the choices are its lines of consecutive letters, the question is the last line
     /// with a question mark before them, else the line before them.
-    pub(super) fn read(text: &str) -> Result<Self, Fault> {
+    pub(super) fn read(text: &str) -> Result<Self, RequestFault> {
         let lines: Vec<&str> = text.lines().collect();
         let lettered: Vec<Option<(char, &str)>> = lines.iter().map(|line| choice(line)).collect();
         let first = lettered
@@ -31,7 +31,7 @@ impl Puzzle {
         let none = || {
             let message =
                 "no choices in the text; lines like \"A. yes\" and \"B. no\" are expected";
-            Fault::new(StatusCode::BAD_REQUEST, message)
+            RequestFault::new(StatusCode::BAD_REQUEST, message)
         };
         let first = first.ok_or_else(none)?;
         let mut choices = Vec::new();

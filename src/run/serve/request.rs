@@ -1,4 +1,4 @@
-//! What a request asks: [`Asked`].
+//! What a request asks: [`ServedQuestion`].
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use serde::Deserialize;
 
-use super::completion::{Fault, Form};
+use super::completion::{ReplyForm, RequestFault};
 use crate::ask::{Payload, PayloadFormat};
 use crate::dataset::Picture;
 use crate::dataset::picture::MOST_PIXELS;
@@ -15,7 +15,7 @@ use crate::types::Rgb;
 
 /// A request, as far as it is used; whatever else it says is taken and makes no difference.
 #[derive(Deserialize)]
-struct Body {
+struct ChatBody {
     model: String,
     messages: Vec<Message>,
     #[serde(default)]
@@ -39,29 +39,29 @@ enum Content {
 #[serde(tag = "type", rename_all = "snake_case")]
 enum Part {
     Text { text: String },
-    ImageUrl { image_url: Link },
+    ImageUrl { image_url: ImageLink },
 }
 
 #[derive(Deserialize)]
-struct Link {
+struct ImageLink {
     url: String,
 }
 
 /// What is asked.
-pub(super) struct Asked {
+pub(super) struct ServedQuestion {
     pub(super) model: String,
     /// All texts, one after the other.
     pub(super) text: String,
     /// The last image, decoded and as it is looked at.
     pub(super) image: Option<(Rgb, Arc<Payload>)>,
-    pub(super) form: Form,
+    pub(super) form: ReplyForm,
 }
 
-impl Asked {
+impl ServedQuestion {
     /// Reads the body of a request.
-    pub(super) fn read(body: &[u8]) -> Result<Self, Fault> {
-        let wrong = |message: String| Fault::new(StatusCode::BAD_REQUEST, message);
-        let body: Body = serde_json::from_slice(body)
+    pub(super) fn read(body: &[u8]) -> Result<Self, RequestFault> {
+        let wrong = |message: String| RequestFault::new(StatusCode::BAD_REQUEST, message);
+        let body: ChatBody = serde_json::from_slice(body)
             .map_err(|e| wrong(format!("the request is none that is understood: {e}")))?;
         let (mut text, mut image) = (String::new(), None);
         let mut say = |words: &str| {
@@ -87,18 +87,18 @@ impl Asked {
             text,
             image: image.map(|url| pixels(&url)).transpose()?,
             form: if body.stream == Some(true) {
-                Form::Stream
+                ReplyForm::Stream
             } else {
-                Form::Whole
+                ReplyForm::Whole
             },
         })
     }
 }
 
 /// The pixels of a data URL.
-fn pixels(url: &str) -> Result<(Rgb, Arc<Payload>), Fault> {
+fn pixels(url: &str) -> Result<(Rgb, Arc<Payload>), RequestFault> {
     let wrong = |message: String| {
-        Fault::new(StatusCode::BAD_REQUEST, message).at("image_url", "invalid_image_url")
+        RequestFault::new(StatusCode::BAD_REQUEST, message).at("image_url", "invalid_image_url")
     };
     let data = url
         .strip_prefix("data:image/")

@@ -14,7 +14,7 @@ use crate::files::reading;
 use crate::job::report::choice;
 use crate::job::stored::StoredRun;
 
-use crate::job::{Outcome, Show, count, now};
+use crate::job::{Outcome, StdoutFormat, count, now};
 use crate::store::{AddressChange, Store};
 use crate::types::manifest::{Counts, RunManifest, Status};
 use crate::types::{ChoiceDetail, Condition, Detail, Digest, QuestionId, Record, Reply, TrialKey};
@@ -41,7 +41,7 @@ pub struct ReadArgs {
 
 /// A line of a file of answers.
 #[derive(Debug, Deserialize)]
-struct Line {
+struct AnswerLine {
     question: Value,
     condition: String,
     #[serde(default)]
@@ -52,7 +52,7 @@ struct Line {
 
 /// What became of the lines.
 #[derive(Debug, Default)]
-struct Tally {
+struct AnswerCounts {
     answers: usize,
     /// Questions or conditions that the run has not asked.
     strange: BTreeSet<String>,
@@ -74,13 +74,13 @@ pub fn read(args: &ReadArgs) -> Result<Outcome> {
         "openeqa --answers NAME=FILE reads what people answered",
     )?;
     let asked = asked(records);
-    let mut tally = Tally::default();
+    let mut tally = AnswerCounts::default();
     let mut lines = Vec::new();
     for path in &args.files {
         lines.extend(answers(path)?);
     }
     // Before the folder is made, so that files of another study leave nothing behind.
-    let known: Vec<(&Record, Line)> = lines
+    let known: Vec<(&Record, AnswerLine)> = lines
         .into_iter()
         .filter_map(|line| {
             let (question, condition) = (name(&line.question), line.condition.clone());
@@ -111,14 +111,14 @@ pub fn read(args: &ReadArgs) -> Result<Outcome> {
     store.sync()?;
     let mut run = StoredRun::of(&args.out, own)?;
     run.manifest.count(count(run.records.len(), &run.records));
-    let mut outcome = choice::write(&store, run, Show::of(args.json))?;
-    if Show::of(args.json) == Show::Table {
+    let mut outcome = choice::write(&store, run, StdoutFormat::of(args.json))?;
+    if StdoutFormat::of(args.json) == StdoutFormat::Table {
         outcome.output.insert_str(0, &told(&tally));
     }
     Ok(outcome)
 }
 
-fn answers(path: &Path) -> Result<Vec<Line>> {
+fn answers(path: &Path) -> Result<Vec<AnswerLine>> {
     let text = reading::text(path)?;
     let lines = text.trim_start_matches('\u{feff}').lines().enumerate();
     lines
@@ -193,7 +193,7 @@ impl People {
     }
 
     /// The record of an answer; `None` where it is known already.
-    fn record(&mut self, asked: &Record, line: &Line, name: &str) -> Result<Option<Record>> {
+    fn record(&mut self, asked: &Record, line: &AnswerLine, name: &str) -> Result<Option<Record>> {
         let person = self::name(&line.person);
         let place = asked
             .condition
@@ -229,7 +229,7 @@ impl People {
     }
 }
 
-fn told(tally: &Tally) -> String {
+fn told(tally: &AnswerCounts) -> String {
     let mut text = format!("{} answers taken over\n", tally.answers);
     if let Some(first) = tally.strange.first() {
         let count = tally.strange.len();

@@ -15,8 +15,8 @@ use crate::dataset::{Picture, PixelLimit};
 use crate::error::{Error, Result};
 use crate::files::write;
 use crate::job::Outcome;
-use crate::job::frame_work::{FrameWork, Steps};
-use crate::job::progress::{Bar, Progress};
+use crate::job::frame_work::{FrameWork, ImageSteps};
+use crate::job::progress::{Progress, StepBar};
 use crate::job::recipe::Recipe;
 use crate::job::source::Frames;
 use crate::job::timings::Timings;
@@ -24,7 +24,7 @@ use crate::job::workers::{ThreadArgs, pool};
 use crate::synthesis::{LightArgs, LightSettings, NoiseKey};
 use crate::types::manifest::Status;
 use crate::types::{Condition, Degradation, FrameId, Rgb};
-use sidecar::Sidecar;
+use sidecar::ImageSidecar;
 
 /// The flags of `synthesize`.
 #[derive(Debug, Args)]
@@ -66,7 +66,7 @@ pub enum Sheet {
 }
 
 /// The flags, and the light that they say.
-struct Making<'a> {
+struct ImageMaking<'a> {
     args: &'a SynthesizeArgs,
     light: LightSettings,
 }
@@ -78,7 +78,7 @@ struct Making<'a> {
 /// # Errors
 /// Where nothing can be made: no such input, two frames of one name, no folder to write to.
 pub fn synthesize(args: &SynthesizeArgs, progress: &Progress) -> Result<Outcome> {
-    let making = &Making {
+    let making = &ImageMaking {
         args,
         light: LightSettings::resolve(&args.light)?,
     };
@@ -90,30 +90,32 @@ pub fn synthesize(args: &SynthesizeArgs, progress: &Progress) -> Result<Outcome>
     }
     let files = files(making);
     let bar = progress.bar("images", frames.entries.len() * files.len());
-    let made: Vec<Tally> = cores.install(|| {
+    let made: Vec<ImageCounts> = cores.install(|| {
         let entries = frames.entries.par_iter();
         entries
             .map(|entry| one(making, &frames, entry, &files, &bar))
             .collect()
     });
     drop(bar);
-    let total = made.iter().fold(Tally::default(), |sum, tally| Tally {
-        made: sum.made + tally.made,
-        kept: sum.kept + tally.kept,
-        failed: sum.failed + tally.failed,
-    });
+    let total = made
+        .iter()
+        .fold(ImageCounts::default(), |sum, tally| ImageCounts {
+            made: sum.made + tally.made,
+            kept: sum.kept + tally.kept,
+            failed: sum.failed + tally.failed,
+        });
     Ok(total.outcome(&args.out, frames.entries.len()))
 }
 
 /// What became of the images.
 #[derive(Debug, Clone, Copy, Default)]
-struct Tally {
+struct ImageCounts {
     made: usize,
     kept: usize,
     failed: usize,
 }
 
-impl Tally {
+impl ImageCounts {
     fn outcome(self, out: &Path, frames: usize) -> Outcome {
         let Self { made, kept, failed } = self;
         let kept = match kept {
@@ -140,39 +142,39 @@ impl Tally {
 
 /// One file of a frame.
 #[derive(Debug, Clone)]
-enum File {
+enum FrameFile {
     Image(Option<Degradation>),
     Sheet(Sheet),
 }
 
 /// The files of each frame.
-fn files(making: &Making<'_>) -> Vec<File> {
+fn files(making: &ImageMaking<'_>) -> Vec<FrameFile> {
     if let Some(sheet) = making.args.sheet {
-        return vec![File::Sheet(sheet)];
+        return vec![FrameFile::Sheet(sheet)];
     }
     let degradations = making.light.degradations().into_iter();
-    degradations.map(File::Image).collect()
+    degradations.map(FrameFile::Image).collect()
 }
 
 /// Makes all images of one frame.
 fn one(
-    making: &Making<'_>,
+    making: &ImageMaking<'_>,
     frames: &Inputs,
     entry: &InputFrame,
-    files: &[File],
-    bar: &Bar,
-) -> Tally {
-    let mut tally = Tally::default();
+    files: &[FrameFile],
+    bar: &StepBar,
+) -> ImageCounts {
+    let mut tally = ImageCounts::default();
     let frames = OneFrame { frames, entry };
     let recipe = Recipe::lossless(&making.light.sensor, &[]);
     let timings = Timings::default();
-    let steps = Steps {
+    let steps = ImageSteps {
         frames: &frames,
         recipe: &recipe,
         limit: None,
         timings: &timings,
     };
-    let mut work = Work {
+    let mut work = SynthesisWork {
         making,
         entry,
         frame: FrameWork::of(steps, entry.id.clone()),
@@ -184,13 +186,13 @@ fn one(
     }
     for file in files {
         let made = match file {
-            File::Image(degradation) => work.image(degradation.as_ref()),
-            File::Sheet(Sheet::Levels) => work.sheet("levels", sheet::levels),
-            File::Sheet(Sheet::Noise) => work.sheet("noise", sheet::terms),
+            FrameFile::Image(degradation) => work.image(degradation.as_ref()),
+            FrameFile::Sheet(Sheet::Levels) => work.sheet("levels", sheet::levels),
+            FrameFile::Sheet(Sheet::Noise) => work.sheet("noise", sheet::terms),
         };
         match made {
-            Ok(Made::New) => tally.made += 1,
-            Ok(Made::Kept) => tally.kept += 1,
+            Ok(ImageOutcome::New) => tally.made += 1,
+            Ok(ImageOutcome::Kept) => tally.kept += 1,
             Err(e) => {
                 tracing::error!("{e}");
                 tally.failed += 1;
@@ -214,38 +216,38 @@ impl Frames for OneFrame<'_> {
 }
 
 /// One frame being worked on.
-struct Work<'a> {
-    making: &'a Making<'a>,
+struct SynthesisWork<'a> {
+    making: &'a ImageMaking<'a>,
     entry: &'a InputFrame,
     frame: FrameWork<'a>,
 }
 
 /// Whether an image was made.
-enum Made {
+enum ImageOutcome {
     New,
     Kept,
 }
 
-impl Work<'_> {
-    fn image(&mut self, how: Option<&Degradation>) -> Result<Made> {
+impl SynthesisWork<'_> {
+    fn image(&mut self, how: Option<&Degradation>) -> Result<ImageOutcome> {
         let light = &self.making.light;
         let key = NoiseKey::new(light.sensor.seed, &self.entry.id);
         let condition = Condition::raw(how.cloned());
         let name = format!("{}_{condition}", self.entry.stem);
         let picture = self.frame.picture()?;
-        let sidecar = Sidecar::new(&self.entry.id, picture, how, light, &key)?;
+        let sidecar = ImageSidecar::new(&self.entry.id, picture, how, light, &key)?;
         let [image, json] =
             [".png", ".json"].map(|end| self.making.args.out.join(name.clone() + end));
         if !self.making.args.force && image.exists() && json.exists() {
             if sidecar.is_at(&json)? {
-                return Ok(Made::Kept);
+                return Ok(ImageOutcome::Kept);
             }
             let problem = "made from another image or with other settings; --force makes it again, another --out keeps both";
             return Err(Error::data(json.display(), problem));
         }
         write(&image, &png(self.frame.degraded(how)?)?)?;
         write(&json, sidecar.text().as_bytes())?;
-        Ok(Made::New)
+        Ok(ImageOutcome::New)
     }
 
     /// A figure; it has no file beside it, so one that is there is kept whatever it shows.
@@ -253,24 +255,24 @@ impl Work<'_> {
         &mut self,
         kind: &str,
         draw: fn(&Rgb, &FrameId, &LightSettings) -> Result<Rgb>,
-    ) -> Result<Made> {
+    ) -> Result<ImageOutcome> {
         let path = self
             .making
             .args
             .out
             .join(format!("{}_{kind}.png", self.entry.stem));
         if !self.making.args.force && path.exists() {
-            return Ok(Made::Kept);
+            return Ok(ImageOutcome::Kept);
         }
         let figure = draw(self.frame.clean()?, &self.entry.id, &self.making.light)?;
         write(&path, &png(&figure)?)?;
-        Ok(Made::New)
+        Ok(ImageOutcome::New)
     }
 }
 
 /// Makes the one image again that a file tells of.
 fn replay(args: &SynthesizeArgs, frames: &Inputs, file: &Path) -> Result<Outcome> {
-    let sidecar = Sidecar::read(file)?;
+    let sidecar = ImageSidecar::read(file)?;
     let [entry] = &frames.entries[..] else {
         let problem = format_args!(
             "one image is made again from one INPUT, not from {}",
@@ -286,9 +288,9 @@ fn replay(args: &SynthesizeArgs, frames: &Inputs, file: &Path) -> Result<Outcome
         return Err(Error::data(path.display(), problem));
     }
     write(&path, &png(&dark)?)?;
-    let made = Tally {
+    let made = ImageCounts {
         made: 1,
-        ..Tally::default()
+        ..ImageCounts::default()
     };
     Ok(made.outcome(&args.out, 1))
 }

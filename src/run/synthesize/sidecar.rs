@@ -1,4 +1,4 @@
-//! The file beside an image that holds all that made it: [`Sidecar`].
+//! The file beside an image that holds all that made it: [`ImageSidecar`].
 
 use std::path::Path;
 
@@ -21,7 +21,7 @@ const SCHEMA: &str = "darkqa.image/1";
 
 /// All that made an image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Sidecar {
+pub(super) struct ImageSidecar {
     schema: String,
     /// The version of this program, for the reader: [`Self::synthesis`] decides.
     darkqa_eval: String,
@@ -33,12 +33,12 @@ pub(super) struct Sidecar {
     drop: f64,
     /// The version of the branch of the synthesis.
     synthesis: u32,
-    sensor: Option<Sensor>,
+    sensor: Option<SensorRecord>,
 }
 
 /// What the sensor branch took.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Sensor {
+struct SensorRecord {
     seed: u64,
     /// The light reading that the parts below make up.
     #[serde(default = "paper")]
@@ -52,7 +52,7 @@ struct Sensor {
     state: CameraState,
 }
 
-impl Sidecar {
+impl ImageSidecar {
     pub(super) fn new(
         frame: &FrameId,
         picture: &Picture,
@@ -62,7 +62,7 @@ impl Sidecar {
     ) -> Result<Self> {
         let synthesis = light.sensor.readings.of(how)?;
         let sensor = how.and_then(|how| {
-            Some(Sensor {
+            Some(SensorRecord {
                 seed: light.sensor.seed,
                 reading: how.reading()?.clone(),
                 amplify: synthesis.amplify,
@@ -154,7 +154,7 @@ impl Sidecar {
             Draws::Shared => frame,
             Draws::Fresh => frame.at(severity),
         };
-        let Sensor { amplify, tone, .. } = *sensor;
+        let SensorRecord { amplify, tone, .. } = *sensor;
         let state = sensor.state.clone();
         let negative = Negative::taken(&clean, &key, &state, amplify, tone, &Term::ALL);
         Ok(negative.develop(severity))
