@@ -20,7 +20,7 @@ use crate::error::{Error, Result};
 use crate::job::merge::merge;
 use crate::job::progress::{Progress, Verbosity};
 use crate::job::report::report;
-use crate::job::{Outcome, picture_words};
+use crate::job::{Outcome, image_words};
 use crate::run::evaluate::{evaluate, export_batch};
 use crate::run::openeqa::openeqa;
 use crate::run::{self, study};
@@ -94,7 +94,7 @@ fn read(matches: &ArgMatches) -> Result<Cli> {
         _ => None,
     };
     if let Some(job) = job {
-        job.pictures = picture_words::said(own)?;
+        job.pictures = image_words::said(own)?;
     }
     Ok(cli)
 }

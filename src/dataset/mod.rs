@@ -3,7 +3,6 @@
 //! The door is [`Dataset::open`]. What the user points at decides the reader: a folder of frames ([`frames`]), a
 //! ready-made multiple-choice set ([`multiple_choice`]), or nothing, which is the built-in rooms ([`rooms`]).
 
-mod beside;
 mod dialect;
 pub(crate) mod frame_folder;
 pub mod frames;
@@ -18,6 +17,7 @@ pub mod picture;
 pub mod questions;
 pub(crate) mod raw_png;
 mod settings;
+mod sibling_files;
 mod table;
 mod view;
 

@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::beside::SiblingFiles;
+use super::sibling_files::SiblingFiles;
 use super::{Dataset, ImageSource, questions, stem, table};
 use crate::error::{Error, Result};
 use crate::types::{FrameId, Question};

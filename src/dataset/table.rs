@@ -12,7 +12,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use csv::{ByteRecord, Position, Reader, ReaderBuilder, StringRecord};
 
-use super::beside::SiblingFiles;
+use super::sibling_files::SiblingFiles;
 use super::{ImageSource, Picture, questions};
 use crate::error::{Error, Result};
 use crate::types::question::letter;

@@ -7,7 +7,7 @@ use serde_json::Value;
 use super::experiment::{DetailOf, Experiment};
 use super::folder::now;
 use super::identity;
-use super::picture_words::ImageWords;
+use super::image_words::ImageWords;
 use crate::types::manifest::{Counts, RunManifest, Status};
 use crate::types::{Detail as _, Record};
 

@@ -7,7 +7,7 @@ use clap::Args;
 use super::enhancers::{self, EnhancerRunArgs, OpenEnhancers};
 use super::frame_work::ImageSteps;
 use super::image_pipeline::ImagePipeline;
-use super::picture_words::ImageFlags;
+use super::image_words::ImageFlags;
 use super::recipe::Recipe;
 use super::source::{Frames, Source, SourceFrame};
 use super::timings::Timings;

@@ -6,10 +6,10 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::enhancers::{self, EnhancerRunArgs};
+use super::image_words::ImageWords;
 use super::models::{AskSettings, ModelArgs};
 use super::money::{MoneyArgs, MoneySettings};
 use super::outcome::StdoutFormat;
-use super::picture_words::ImageWords;
 use super::shard::Shard;
 use crate::ask::{AccessArgs, Bounds, Constrain, ImageArgs, Parameters, PayloadFormat, Sending};
 use crate::enhance::{EnhancerArgs, ModelFile};

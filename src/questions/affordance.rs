@@ -3,9 +3,9 @@
 use serde_json::json;
 
 use super::reason::Reason;
+use super::rule_context::{Candidate, RuleContext, RuleResult, falls, yes_no};
 use super::rules::ActivityRule;
 use super::statistics::Segment;
-use super::survey::{Candidate, RuleContext, RuleResult, falls, yes_no};
 use crate::types::Family;
 
 /// Both answers for every activity.

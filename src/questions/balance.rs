@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use clap::ValueEnum;
 
+use super::rule_context::GeneratedQuestion;
 use super::rules::BalanceRule;
-use super::survey::GeneratedQuestion;
 use crate::types::flag::flag_words;
 use crate::types::{Digest, Family};
 

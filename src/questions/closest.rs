@@ -3,9 +3,9 @@
 use serde_json::json;
 
 use super::reason::Reason;
+use super::rule_context::{Candidate, RuleContext, RuleResult, falls};
 use super::rules::{ClassFlag, GapScope};
 use super::statistics::{Segment, SegmentDepth};
-use super::survey::{Candidate, RuleContext, RuleResult, falls};
 use crate::types::Family;
 
 /// The one candidate of a frame.

@@ -4,9 +4,9 @@ use serde_json::json;
 
 use super::colors::{Color, Palette};
 use super::reason::Reason;
+use super::rule_context::{Candidate, RuleContext, RuleResult, falls};
 use super::rules::{ClassFlag, ColorChoices, ColorRule};
 use super::statistics::{Segment, ppm};
-use super::survey::{Candidate, RuleContext, RuleResult, falls};
 use crate::types::Family;
 
 /// Every segment of a class whose colour may be asked.

@@ -20,12 +20,12 @@ mod presence;
 pub mod reason;
 pub mod room;
 mod room_type;
+pub mod rule_context;
 pub mod rules;
 pub mod statistics;
 pub mod summary;
-pub mod survey;
 #[cfg(test)]
 mod tests;
 
 pub use generate::{Generated, QuestionRequest, generate};
-pub use survey::GeneratedQuestion;
+pub use rule_context::GeneratedQuestion;

@@ -5,9 +5,9 @@ use std::collections::BTreeSet;
 use serde_json::json;
 
 use super::reason::Reason;
+use super::rule_context::{Candidate, RuleContext, RuleResult, falls, yes_no};
 use super::rules::{ClassFlag, PresenceRule};
 use super::statistics::{Segment, ppm};
-use super::survey::{Candidate, RuleContext, RuleResult, falls, yes_no};
 use crate::types::Family;
 
 /// Yes and no for every asked class.

@@ -6,9 +6,9 @@ use serde::Serialize;
 
 use super::generate::{FamilyCounts, Generated, OmissionReason, QuestionRequest, stated};
 use super::reason::Reason;
+use super::rule_context::GeneratedQuestion;
 use super::rules::RuleBook;
 use super::statistics::FrameStatistics;
-use super::survey::GeneratedQuestion;
 use crate::types::{Digest, Family};
 
 /// The schema of the summary as JSON.

@@ -5,10 +5,10 @@
 //! is traced, so that its image, depth, classes and segments belong to each other to the pixel; it is a function of seed, its
 //! number and its size, the same bytes on every machine and for every number of threads. No model has trained on them.
 
-mod album;
 mod bvh;
 mod camera;
 mod dice;
+mod frame_cache;
 mod furniture;
 mod kinds;
 mod light;
@@ -29,8 +29,8 @@ use std::sync::{Arc, LazyLock};
 use clap::Args;
 use ndarray::Array2;
 
-use self::album::FrameCache;
 use self::dice::Dice;
+use self::frame_cache::FrameCache;
 use self::kinds::RoomKind;
 use self::plan::FloorPlan;
 use self::viewpoint::Height;

@@ -193,5 +193,5 @@ impl Observation {
 }
 
 fn yes_no(yes: bool) -> String {
-    super::survey::YES_NO[usize::from(!yes)].to_owned()
+    super::rule_context::YES_NO[usize::from(!yes)].to_owned()
 }

@@ -19,12 +19,12 @@ use crate::questions::colors::{Color, NONE, Palette};
 use crate::questions::generate::{Generated, QuestionRequest, generate};
 use crate::questions::reason::Reason;
 use crate::questions::room::{NoRoom, RoomSigns, RoomSource, classify};
+use crate::questions::rule_context::GeneratedQuestion;
+use crate::questions::rule_context::{Candidate, RuleResult};
 use crate::questions::rules::Rules;
 use crate::questions::statistics::{
     DepthAxis, FrameDepth, FrameStatistics, Segment, SegmentDepth, SegmentPlace, plain_word,
 };
-use crate::questions::survey::GeneratedQuestion;
-use crate::questions::survey::{Candidate, RuleResult};
 use crate::types::{Digest, Family, FrameId, Labels, QuestionId};
 
 /// A frame of the given segments: class, the data set's word, area.

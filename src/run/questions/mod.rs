@@ -1,7 +1,7 @@
 //! `questions`: multiple-choice questions about frames, by rule.
 
 mod checked;
-mod kept;
+mod statistics_cache;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -21,16 +21,16 @@ use crate::questions::balance::BalanceMode;
 use crate::questions::colors::Palette;
 use crate::questions::reason::Reason;
 use crate::questions::room::RoomSource;
+use crate::questions::rule_context::RuleResult as Candidate;
 use crate::questions::rules::Rules;
 use crate::questions::statistics::{self, FrameStatistics, measure, strangers};
 use crate::questions::summary::QuestionSummary;
-use crate::questions::survey::RuleResult as Candidate;
 use crate::questions::{Generated, GeneratedQuestion, QuestionRequest, generate};
 use crate::report;
 use crate::types::manifest::Status;
 use crate::types::{Digest, Family, FrameId, Labels, QuestionId};
 
-use kept::StatisticsCache;
+use statistics_cache::StatisticsCache;
 
 /// The flags of `questions`.
 #[derive(Debug, Args)]
