@@ -4,6 +4,59 @@
 //! noise of a sensor), enhances them with any low-light model given as ONNX, asks OpenAI-compatible endpoints questions about each
 //! image, scores the replies, and compares all of it.
 //!
+//! # The library
+//!
+//! The program `darkqa-eval` does all of this from the command line. The library has the three pieces that other programs use:
+//! [`synthesis`], [`enhance`] and [`score::choice`]; with [`questions`], and the vocabulary in [`types`].
+//!
+//! Degrade a frame. The noise follows from the seed and the name of the frame, so that the same call gives the same image:
+//!
+//! ```
+//! use darkqa_eval::synthesis::{NoiseKey, Synthesis, degrade};
+//! use darkqa_eval::types::FrameId;
+//! use darkqa_eval::{Degradation, Rgb};
+//!
+//! let clean = Rgb::new(2, 2, vec![128; 12])?;
+//! let how: Degradation = "L3-noise".parse()?;
+//! let key = NoiseKey::new(0, &FrameId("kitchen/0001".to_owned()));
+//! let degraded = degrade(&clean, Some(&how), &key, &Synthesis::default());
+//! assert!(degraded.samples().iter().all(|sample| *sample < 64));
+//! # Ok::<(), darkqa_eval::Error>(())
+//! ```
+//!
+//! Enhance an image with an ONNX model of your own:
+//!
+//! ```no_run
+//! use std::num::NonZeroUsize;
+//! use std::path::Path;
+//!
+//! use darkqa_eval::Rgb;
+//! use darkqa_eval::enhance::{Enhancer, Install, ModelFile, RuntimeSearch};
+//!
+//! let degraded = Rgb::new(480, 640, vec![9; 480 * 640 * 3])?;
+//! let runtime = RuntimeSearch { library: None, install: Install::Allowed }.open()?;
+//! let model = ModelFile::read(Path::new("zerodce.onnx"))?;
+//! let mut enhancer = Enhancer::open(model, &runtime, NonZeroUsize::new(4))?;
+//! let enhanced = enhancer.enhance(&degraded)?;
+//! assert_eq!((enhanced.height(), enhanced.width()), (480, 640));
+//! # Ok::<(), darkqa_eval::Error>(())
+//! ```
+//!
+//! Read a reply and score it. The strict reading takes the exact words of a choice alone, the lenient one finds them in a sentence:
+//!
+//! ```
+//! use darkqa_eval::Choices;
+//! use darkqa_eval::score::choice::readings;
+//! use darkqa_eval::types::{Answer, Reply};
+//!
+//! let choices = Choices::new(vec!["kitchen".to_owned(), "bedroom".to_owned()], 1)?;
+//! let reply = Reply::local("The answer is (B).".to_owned());
+//! let (strict, lenient) = readings(&reply, &choices);
+//! assert!(matches!(strict, Answer::Unparsed(_)));
+//! assert_eq!(lenient, Answer::Chosen(choices.truth()));
+//! # Ok::<(), darkqa_eval::Error>(())
+//! ```
+//!
 //! # The map
 //!
 //! Data flows one way. Each folder is a stage; the stages do not know each other. What is asked (words) and what is seen (light) meet
@@ -17,8 +70,8 @@
 //! types, error, files = the ground     job = the engine of everything asked     run = one folder or file a command     cli = words → calls
 //! ```
 //!
-//! - [`types`]: the vocabulary. [`Frame`](types::Frame)s are seen, [`Question`](types::Question)s are asked, a
-//!   [`Degradation`](types::Degradation) is what was done to a frame, a [`Condition`](types::Condition) is a degradation with or
+//! - [`types`]: the vocabulary. [`Frame`](types::Frame)s are seen, [`Question`]s are asked, a
+//!   [`Degradation`] is what was done to a frame, a [`Condition`] is a degradation with or
 //!   without an enhancer, a [`Reply`](types::Reply) is what a model sent, and a [`Record`](types::Record) is what came of one trial:
 //!   one question to one model in one condition.
 //! - [`labels`]: the label spaces NYU40, mpcat40, ADE150 and NYU13.
@@ -83,25 +136,33 @@
 //! | `report` | `types`, `error`, `score`, `questions` |
 //! | `job` | `files`, `types`, `error`, `rooms`, `labels`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `report` |
 //! | `run` | `job`, `files`, `types`, `error`, `rooms`, `labels`, `import`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `report` |
+//! | `internals` | `ask`, `dataset`, `enhance`, `job`, `labels`, `questions`, `report`, `rooms`, `score`, `synthesis`, `types`, `error` |
 //! | `cli` | `run`, `job`, `files`, `rooms`, `ask`, `enhance`, `score`, `synthesis`, `types`, `error` |
 //! | `main` | `cli`, `enhance` |
 
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 
-pub mod ask;
+mod ask;
+#[doc(hidden)]
 pub mod cli;
-pub mod dataset;
+mod dataset;
 pub mod enhance;
-pub mod error;
+mod error;
 mod files;
-pub mod import;
-pub mod job;
-pub mod labels;
+mod import;
+#[doc(hidden)]
+pub mod internals;
+mod job;
+mod labels;
 pub mod questions;
-pub mod report;
-pub mod rooms;
-pub mod run;
+mod report;
+mod rooms;
+mod run;
 pub mod score;
-pub mod store;
+mod store;
 pub mod synthesis;
 pub mod types;
+
+pub use error::{Error, Result};
+pub use types::degradation::Kind;
+pub use types::{Choices, Condition, Degradation, Digest, Question, Rgb, Severity};

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use darkqa_eval::ask::{
+use darkqa_eval::internals::ask::{
     Access, BaseUrl, Call, Constrain, Endpoint, ImageDetail, Message, Model, Parameters, Payload,
     PayloadFormat, Prompts, Query, Random, Remote, Script, Secret, Sending, Temperature,
     TokenField, Wire,

@@ -7,8 +7,9 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use darkqa_eval::enhance::{Enhancer, Install, ModelFile, Runtime, RuntimeSearch, Tiling};
-use darkqa_eval::rooms::Rooms;
-use darkqa_eval::synthesis::{Negative, NoiseKey, Synthesis, expose};
+use darkqa_eval::internals::rooms::Rooms;
+use darkqa_eval::internals::synthesis::{Negative, expose};
+use darkqa_eval::synthesis::{NoiseKey, Synthesis};
 use darkqa_eval::types::{Rgb, Severity};
 use support::onnx::Size::{Known, Named};
 use support::onnx::{self, Graph, Type};
@@ -23,7 +24,7 @@ fn runtime() -> Runtime {
     search.open().unwrap()
 }
 
-fn open(path: &Path) -> darkqa_eval::error::Result<Enhancer> {
+fn open(path: &Path) -> darkqa_eval::Result<Enhancer> {
     Enhancer::open(ModelFile::read(path)?, &runtime(), NonZeroUsize::new(1))
 }
 

@@ -6,8 +6,8 @@ use std::fs;
 use std::path::Path;
 
 use assert_cmd::Command;
-use darkqa_eval::dataset::{DataPlace, Dataset};
-use darkqa_eval::synthesis::expose;
+use darkqa_eval::internals::dataset::{DataPlace, Dataset};
+use darkqa_eval::internals::synthesis::expose;
 use darkqa_eval::types::{Question, Rgb, Severity};
 use image::{Rgb as Pixel, RgbImage};
 use tempfile::TempDir;

@@ -8,7 +8,7 @@ use std::io::Write as _;
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
-use darkqa_eval::ask::{
+use darkqa_eval::internals::ask::{
     Access, AskError, Endpoint, Message, Parameters, Payload, PayloadFormat, Reach, Remote, Secret,
     Sending, Temperature, Wire,
 };

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
-use darkqa_eval::dataset::Dataset;
+use darkqa_eval::internals::dataset::Dataset;
 use darkqa_eval::types::{DepthKind, Frame, FrameId};
 use image::{GrayImage, ImageBuffer, Luma, Rgb, RgbImage, Rgba, RgbaImage};
 use serde_json::Value;

@@ -9,8 +9,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::io::Cursor;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use darkqa_eval::dataset::Picture;
-use darkqa_eval::dataset::picture::MOST_PIXELS;
+use darkqa_eval::internals::dataset::{MOST_PIXELS, Picture};
 use image::{DynamicImage, ImageFormat, Rgb};
 
 /// The system's allocator, with the largest single request remembered.

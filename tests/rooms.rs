@@ -6,15 +6,12 @@ mod support;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use darkqa_eval::dataset::{DataPlace, Dataset};
-use darkqa_eval::questions::balance::BalanceMode;
-use darkqa_eval::questions::colors::Palette;
-use darkqa_eval::questions::room::RoomSource;
-use darkqa_eval::questions::rules::{ClassFlag, Rules};
-use darkqa_eval::questions::statistics::measure;
+use darkqa_eval::internals::dataset::{DataPlace, Dataset};
+use darkqa_eval::internals::questions::{
+    BalanceMode, ClassFlag, Palette, RoomSource, Rules, measure,
+};
+use darkqa_eval::internals::rooms::{Room, RoomTruth, Rooms, ThingTruth, VERSION, labels};
 use darkqa_eval::questions::{Generated, GeneratedQuestion, QuestionRequest, generate};
-use darkqa_eval::rooms::Rooms;
-use darkqa_eval::rooms::{Room, RoomTruth, ThingTruth, VERSION, labels};
 use darkqa_eval::types::{Digest, Family, Frame, FrameId};
 use rayon::prelude::*;
 use support::run::{Bench, records};

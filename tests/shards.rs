@@ -7,8 +7,6 @@ mod support;
 use std::collections::BTreeMap;
 use std::fs;
 
-use clap::Parser as _;
-use darkqa_eval::cli::Cli;
 use serde_json::Value;
 use support::endpoint::{Answer, MockEndpoint};
 use support::run::{Bench, called, files, records};
@@ -231,23 +229,6 @@ fn limits_and_means_are_shared_by_the_parts() {
         "1/2",
     ];
     assert_eq!(bench.call(&words).code, Some(130));
-}
-
-#[test]
-fn the_job_of_kubernetes_says_flags_that_there_are() {
-    let text = include_str!("../src/run/cluster/job.yaml");
-    let flags = text
-        .lines()
-        .filter_map(|line| line.trim().strip_prefix("- --"));
-    let flags: Vec<String> = flags.map(|flag| format!("--{flag}")).collect();
-    assert!(flags.len() > 4);
-    let words = std::iter::once("darkqa-eval".to_owned()).chain(flags);
-    let said = Cli::try_parse_from(words).unwrap().evaluate;
-    let shard = said.job.scale.shard.unwrap();
-    let parts = shard.strip_prefix("auto/").unwrap();
-    for field in ["completions", "parallelism"] {
-        assert!(text.contains(&format!("\n  {field}: {parts}\n")), "{field}");
-    }
 }
 
 /// The script as a node runs it, with a `scontrol` that writes down what it is told.

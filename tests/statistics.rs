@@ -15,19 +15,12 @@ mod support;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use darkqa_eval::score::bootstrap::Resamples;
-use darkqa_eval::score::choice::ReadingMode;
-use darkqa_eval::score::cluster::Clusters;
-use darkqa_eval::score::curve::curves;
-use darkqa_eval::score::estimate::Estimate;
-use darkqa_eval::score::findings::Findings;
-use darkqa_eval::score::grid::{ClusterCount, Grid};
-use darkqa_eval::score::open::{
-    AnswerOutcome, Baseline, Group, OpenSummary, QuestionGroups, ScoredAnswer, open_summary,
+use darkqa_eval::Kind;
+use darkqa_eval::internals::score::{
+    AnswerOutcome, Baseline, ClusterCount, Clusters, Estimate, Findings, Grid, Group, OpenSummary,
+    PairedComparison, QuestionGroups, Resamples, ScoredAnswer, Subject, curves, open_summary,
 };
-use darkqa_eval::score::paired::PairedComparison;
-use darkqa_eval::score::subject::Subject;
-use darkqa_eval::types::degradation::Kind;
+use darkqa_eval::score::choice::ReadingMode;
 use darkqa_eval::types::{
     AnswerReading, AxisLevel, Condition, Degradation, EnhancerName, Family, KindReading, Record,
     Severity,
@@ -409,7 +402,7 @@ fn a_made_set_gives_the_papers_arithmetic() {
     }
     let offers = records
         .iter()
-        .map(|record| darkqa_eval::score::chance::OfferedChoices {
+        .map(|record| darkqa_eval::internals::score::OfferedChoices {
             family: record.detail.family.clone(),
             choices: record.detail.choices.len(),
         });

@@ -18,7 +18,7 @@ pub(super) fn line(id: &str, url: &str, body: &[u8]) -> Result<Vec<u8>, serde_js
 
 /// One line of an output or error file.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct BatchLine {
+pub(crate) struct BatchLine {
     /// The id that the request was given.
     pub id: String,
     /// The reply, or why there is none.
@@ -28,7 +28,7 @@ pub struct BatchLine {
 impl BatchLine {
     /// Reads a line about a request on a wire; `None` where it is none of such a file.
     #[must_use]
-    pub fn read(line: &str, wire: Wire) -> Option<Self> {
+    pub(crate) fn read(line: &str, wire: Wire) -> Option<Self> {
         let line: Value = serde_json::from_str(line).ok()?;
         let id = line.get("custom_id")?.as_str()?.to_owned();
         Some(Self {
@@ -95,7 +95,7 @@ fn result(line: &Value, wire: Wire) -> Result<Reply, Failure> {
 
 /// A reply with the letter that a constraint asked for in place of the object around it; as it is where it has none.
 #[must_use]
-pub fn unconstrained(reply: Reply, constrain: Constrain, choices: usize) -> Reply {
+pub(crate) fn unconstrained(reply: Reply, constrain: Constrain, choices: usize) -> Reply {
     Reply {
         text: letter_of(constrain, choices, &reply.text).unwrap_or(reply.text),
         ..reply

@@ -6,7 +6,7 @@ use crate::types::ImageFacts;
 
 /// What is known of the images that an endpoint takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ImageLimit {
+pub(crate) struct ImageLimit {
     /// The most bytes of the encoded file.
     pub bytes: usize,
     /// The longest side, in pixels; `None` for any.
@@ -39,11 +39,11 @@ const fn limit(bytes: usize, side: Option<u32>, whose: &'static str) -> ImageLim
 
 impl ImageLimit {
     /// Where nothing is known: 20 MB, which no hosted model takes more of.
-    pub const UNKNOWN: Self = limit(20_000_000, None, "the default");
+    pub(crate) const UNKNOWN: Self = limit(20_000_000, None, "the default");
 
     /// The limit of an endpoint.
     #[must_use]
-    pub fn of(base: &BaseUrl) -> Self {
+    pub(crate) fn of(base: &BaseUrl) -> Self {
         let known = KNOWN.iter().find(|(host, _)| base.host().ends_with(host));
         known.map_or(Self::UNKNOWN, |(_, limit)| *limit)
     }
@@ -52,7 +52,7 @@ impl ImageLimit {
     ///
     /// # Errors
     /// [`Error::Data`] about the image, with the flags that make it smaller.
-    pub fn check(&self, image: &ImageFacts) -> Result<()> {
+    pub(crate) fn check(&self, image: &ImageFacts) -> Result<()> {
         let long = image.width.max(image.height);
         let mend = "make it smaller by --max-side, or by --image jpeg:95";
         let wrong = |problem: String| Err(Error::data("image", problem));
@@ -79,7 +79,7 @@ impl ImageLimit {
 
     /// The limit that the user states.
     #[must_use]
-    pub fn stated(bytes: usize) -> Self {
+    pub(crate) fn stated(bytes: usize) -> Self {
         limit(bytes, None, "--max-image")
     }
 }

@@ -11,7 +11,8 @@ use crate::types::question::letter;
 use crate::types::{Digest, FailureKind, Question, Reply};
 
 /// What a function says to a question: the index of a choice, or `None` where it does not know.
-pub type Opinion = dyn Fn(&Question, &Call<'_>) -> Result<Option<usize>, String> + Send + Sync;
+pub(crate) type Opinion =
+    dyn Fn(&Question, &Call<'_>) -> Result<Option<usize>, String> + Send + Sync;
 
 /// A model whose answers a function gives. Where it does not know, any choice is as likely as another, and the same one for
 /// the same seed, question, condition and turn.

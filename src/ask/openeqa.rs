@@ -12,7 +12,7 @@ const MATCH_EXTRA: &str = include_str!("../../prompts/openeqa/match-extra.txt");
 
 /// What a model that sees is asked: the words before its images, and those behind them.
 #[must_use]
-pub fn vision(question: &str) -> (String, String) {
+pub(crate) fn vision(question: &str) -> (String, String) {
     const QUERY: &str = "User Query:";
     let template = VISION.trim();
     let (before, behind) = template.split_once(QUERY).unwrap_or((template, ""));
@@ -22,14 +22,14 @@ pub fn vision(question: &str) -> (String, String) {
 
 /// What a model without images is asked.
 #[must_use]
-pub fn blind(question: &str) -> String {
+pub(crate) fn blind(question: &str) -> String {
     formatted(BLIND.trim(), &[("question", question)])
 }
 
 /// The answer in a blind model's reply (`parse_output`): the line behind the first "A:", without further ones in it; `None`
 /// where there is none, which is an error upstream.
 #[must_use]
-pub fn blind_answer(reply: &str) -> Option<String> {
+pub(crate) fn blind_answer(reply: &str) -> Option<String> {
     let (_, behind) = reply.split_once("A:")?;
     let line = behind.split('\n').next().unwrap_or(behind);
     Some(line.replace("A:", "").trim().to_owned())
@@ -37,7 +37,12 @@ pub fn blind_answer(reply: &str) -> Option<String> {
 
 /// What the judge is asked about an answer. Whether there are extra answers decides the template, also where the list is empty.
 #[must_use]
-pub fn judged(question: &str, answer: &str, extra: Option<&[String]>, prediction: &str) -> String {
+pub(crate) fn judged(
+    question: &str,
+    answer: &str,
+    extra: Option<&[String]>,
+    prediction: &str,
+) -> String {
     let values = [
         ("question", question),
         ("answer", answer),

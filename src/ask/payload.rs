@@ -32,7 +32,7 @@ pub struct Quality(u8);
 /// How images are sent.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Sending")]
-pub struct ImageArgs {
+pub(crate) struct ImageArgs {
     /// How images are sent: png (lossless) or jpeg:QUALITY
     #[arg(long, value_name = "FORMAT", default_value_t = PayloadFormat::Png)]
     pub image: PayloadFormat,
@@ -227,7 +227,7 @@ fn fitted(width: u32, height: u32, max_side: Option<NonZeroU32>) -> Option<(u32,
 ///
 /// # Errors
 /// If a side is too long for the format.
-pub fn png(image: &Rgb) -> Result<Vec<u8>> {
+pub(crate) fn png(image: &Rgb) -> Result<Vec<u8>> {
     let (width, height) = (side(image.width())?, side(image.height())?);
     let mut file = Vec::new();
     PngEncoder::new_with_quality(&mut file, CompressionType::Fast, RowFilter::Adaptive)

@@ -11,7 +11,7 @@ use crate::types::Usage;
 /// What a model charges, in dollars for a million tokens.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
-pub struct Price {
+pub(crate) struct Price {
     /// For the tokens of prompts, images included.
     pub input: f64,
     /// For the tokens of replies, hidden reasoning included.
@@ -23,13 +23,13 @@ pub struct Price {
 impl Price {
     /// The dollars for so many tokens of a prompt and of a reply.
     #[must_use]
-    pub fn of(&self, prompt: f64, reply: f64) -> f64 {
+    pub(crate) fn of(&self, prompt: f64, reply: f64) -> f64 {
         (prompt * self.input + reply * self.output) / 1e6
     }
 
     /// The dollars for what a request was charged; what the server did not tell counts as nothing.
     #[must_use]
-    pub fn charged(&self, usage: Usage) -> f64 {
+    pub(crate) fn charged(&self, usage: Usage) -> f64 {
         let tokens = |tokens: Option<u64>| tokens.unwrap_or(0) as f64;
         self.of(tokens(usage.prompt_tokens), tokens(usage.completion_tokens))
     }
@@ -38,7 +38,7 @@ impl Price {
 /// A table of prices by model, with its date.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
-pub struct Prices {
+pub(crate) struct Prices {
     /// The day on which the prices were looked up.
     pub as_of: String,
     /// What the Batch API charges, as a share of the price.
@@ -51,7 +51,7 @@ impl Prices {
     ///
     /// # Errors
     /// None that a user could meet: its form is held by a test.
-    pub fn built_in() -> Result<Self> {
+    pub(crate) fn built_in() -> Result<Self> {
         toml::from_str(include_str!("prices.toml"))
             .map_err(|e| Error::usage("src/ask/prices.toml", e.message()))
     }
@@ -60,7 +60,7 @@ impl Prices {
     ///
     /// # Errors
     /// Where it cannot be read, or a price is none.
-    pub fn load(path: &Path) -> Result<Self> {
+    pub(crate) fn load(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))?;
         let wrong = |problem: String| {
             let expected = "expected as-of = \"2026-11-20\", batch = 0.5 and [models] with lines like \
@@ -84,7 +84,7 @@ impl Prices {
     /// The price of a model: by its name, by the name behind a provider's (`openai/gpt-4o`), or by that of the line it is a
     /// dated version of (`gpt-4o-2024-08-06`).
     #[must_use]
-    pub fn of(&self, model: &str) -> Option<Price> {
+    pub(crate) fn of(&self, model: &str) -> Option<Price> {
         let bare = model.rsplit('/').next().unwrap_or(model);
         [model, bare].into_iter().find_map(|name| {
             let exact = self.models.get(name).copied();

@@ -26,7 +26,7 @@ const NO_KEY: &str = "none";
 /// The address stays a text until it is used: the command line would show one that cannot be read, and it may hold a password.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Model")]
-pub struct AccessArgs {
+pub(crate) struct AccessArgs {
     /// The endpoint; /chat/completions is appended; default: OPENAI_BASE_URL, else OpenAI's own
     #[arg(long, value_name = "URL")]
     pub base_url: Option<String>,
@@ -50,7 +50,7 @@ pub struct AccessArgs {
 
 /// Where requests go, and how.
 #[derive(Debug, Clone)]
-pub struct Server {
+pub(crate) struct Server {
     /// The address, the key and the certificates.
     pub access: Access,
     /// Timeouts, retries, pace.
@@ -60,7 +60,7 @@ pub struct Server {
 impl AccessArgs {
     /// The same endpoint without a key.
     #[must_use]
-    pub fn without_key(&self) -> Self {
+    pub(crate) fn without_key(&self) -> Self {
         Self {
             api_key_env: Some(NO_KEY.to_owned()),
             api_key_file: None,
@@ -72,7 +72,7 @@ impl AccessArgs {
     ///
     /// # Errors
     /// If the address is none, or a key or certificate is not where it is said to be.
-    pub fn server(&self, sending: Sending) -> Result<Server> {
+    pub(crate) fn server(&self, sending: Sending) -> Result<Server> {
         let named = self.base_url.clone().or_else(|| set("OPENAI_BASE_URL"));
         let base: BaseUrl = named.as_deref().unwrap_or(BASE_URL).parse()?;
         let authorities = self.ca_file.as_deref().map(Authorities::load).transpose()?;

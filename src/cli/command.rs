@@ -44,7 +44,7 @@ Results go to standard output, progress and logs to standard error (RUST_LOG=dar
     name = NAME, version, about, long_about, max_term_width = 110, after_help = AFTER_HELP,
     args_conflicts_with_subcommands = true
 )]
-pub struct Cli {
+pub(crate) struct Cli {
     /// Anything but an evaluation.
     #[command(subcommand)]
     pub command: Option<Command>,
@@ -59,7 +59,7 @@ pub struct Cli {
 /// What every command has.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Output")]
-pub struct CommonArgs {
+pub(crate) struct CommonArgs {
     /// No progress
     #[arg(long, global = true)]
     pub quiet: bool,
@@ -71,7 +71,7 @@ pub struct CommonArgs {
 
 /// What can be done besides evaluating.
 #[derive(Debug, Subcommand)]
-pub enum Command {
+pub(crate) enum Command {
     /// Write the low-light versions of images, as an evaluation would send them
     Synthesize(Box<SynthesizeArgs>),
     /// Hold the synthesis against real pairs of images in normal and low light
@@ -122,7 +122,7 @@ pub enum Command {
 
 /// What can be done with batches.
 #[derive(Debug, Subcommand)]
-pub enum BatchCommand {
+pub(crate) enum BatchCommand {
     /// Write what an evaluation has left to ask as files of a Batch API; takes the flags of the evaluation
     Export(Box<BatchExportArgs>),
     /// Take the replies of a Batch API over into a run
@@ -131,7 +131,7 @@ pub enum BatchCommand {
 
 /// The flags of `batch export`.
 #[derive(Debug, Args)]
-pub struct BatchExportArgs {
+pub(crate) struct BatchExportArgs {
     /// The evaluation.
     #[command(flatten)]
     pub evaluate: EvaluateArgs,
@@ -142,7 +142,7 @@ pub struct BatchExportArgs {
 
 /// What can be done with people's answers.
 #[derive(Debug, Subcommand)]
-pub enum StudyCommand {
+pub(crate) enum StudyCommand {
     /// Write a page on which people answer the questions of a run about the very images that its models were sent
     Pack(study::PackArgs),
     /// Take people's answers over as a run of a model of their own, to be compared by report

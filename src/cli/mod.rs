@@ -29,7 +29,7 @@ use crate::types::manifest::Status;
 use command::{BatchCommand, Command, NAME, StudyCommand};
 use layers::one_line;
 
-pub use command::Cli;
+use command::Cli;
 
 /// Finished, but some trials failed.
 const WITH_FAILURES: u8 = 1;

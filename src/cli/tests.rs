@@ -2,7 +2,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use clap::{Arg, Command as Clap};
+use clap::{Arg, Command as Clap, Parser as _};
 
 use super::*;
 
@@ -111,4 +111,21 @@ fn the_reference_is_that_of_the_program() {
         written == reference,
         "src/cli/README.md is another: UPDATE=1 cargo test --lib cli:: writes it"
     );
+}
+
+#[test]
+fn the_job_of_kubernetes_says_flags_that_there_are() {
+    let text = include_str!("../run/cluster/job.yaml");
+    let flags = text
+        .lines()
+        .filter_map(|line| line.trim().strip_prefix("- --"));
+    let flags: Vec<String> = flags.map(|flag| format!("--{flag}")).collect();
+    assert!(flags.len() > 4);
+    let words = std::iter::once("darkqa-eval".to_owned()).chain(flags);
+    let args = Cli::try_parse_from(words).unwrap().evaluate;
+    let shard = args.job.scale.shard.unwrap();
+    let parts = shard.strip_prefix("auto/").unwrap();
+    for field in ["completions", "parallelism"] {
+        assert!(text.contains(&format!("\n  {field}: {parts}\n")), "{field}");
+    }
 }

@@ -7,7 +7,7 @@
 //!   `over`, the segments, which `over_source` calls `renderer` or `connected_components` (objects) or `superpixel`
 //!   (parts). It may also say `depth_kind` (`planar` or `euclid`), `intrinsics` (`{"fx", "fy", "cx", "cy"}`), `room_gt`,
 //!   `t` (seconds) and `pose`.
-//! - `classes.json`: what the numbers of `sem` stand for ([`labels`]).
+//! - `classes.json`: what the numbers of `sem` stand for ([`crate::labels`]).
 //! - `dataset.json`: `{"schema": "darkqa.dataset/1", "name", "depth_kind"}`, both of which may be missing.
 //! - `scenes/<scene>/segments.json`: what is known of segments by name, `{"7": {"name", "canonical", "region"}}`.
 //!

@@ -5,16 +5,16 @@
 
 mod dialect;
 pub(crate) mod frame_folder;
-pub mod frames;
+pub(crate) mod frames;
 pub(crate) mod inputs;
 mod jpeg;
 pub(crate) mod maps;
-pub mod multiple_choice;
+pub(crate) mod multiple_choice;
 pub(crate) mod npy;
-pub mod openeqa;
-pub mod pairs;
-pub mod picture;
-pub mod questions;
+pub(crate) mod openeqa;
+pub(crate) mod pairs;
+pub(crate) mod picture;
+pub(crate) mod questions;
 pub(crate) mod raw_png;
 mod settings;
 mod sibling_files;
@@ -32,10 +32,10 @@ use crate::types::{Frame, FrameId, Labels, Question};
 
 use maps::MapPaths;
 use picture::MOST_PIXELS;
-pub use picture::Picture;
-pub use settings::{DataArgs, PixelLimit, SelectionArgs, place};
+pub(crate) use picture::Picture;
+pub(crate) use settings::{DataArgs, PixelLimit, SelectionArgs, place};
 use view::FrameFacts;
-pub use view::FrameFiles;
+pub(crate) use view::FrameFiles;
 
 /// Where the data are.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -12,7 +12,7 @@ use crate::types::QuestionId;
 
 /// An open question about a walk.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
-pub struct OpenQuestion {
+pub(crate) struct OpenQuestion {
     /// Its name.
     #[serde(rename = "question_id")]
     pub id: QuestionId,
@@ -34,7 +34,7 @@ pub struct OpenQuestion {
 impl OpenQuestion {
     /// The split that it belongs to: the first part of its walk's name, as `hm3d-v0`.
     #[must_use]
-    pub fn split(&self) -> &str {
+    pub(crate) fn split(&self) -> &str {
         self.episode.split('/').next().unwrap_or_default()
     }
 }
@@ -43,7 +43,7 @@ impl OpenQuestion {
 ///
 /// # Errors
 /// Where it cannot be read or is no such array, is empty, or has two questions of one id.
-pub fn questions(path: &Path) -> Result<Vec<OpenQuestion>> {
+pub(crate) fn questions(path: &Path) -> Result<Vec<OpenQuestion>> {
     let text = bytes(path)?;
     let wrong = |problem: String| Error::data(path.display(), problem);
     let questions: Vec<OpenQuestion> = serde_json::from_slice(&text).map_err(|e| {
@@ -65,7 +65,7 @@ pub fn questions(path: &Path) -> Result<Vec<OpenQuestion>> {
 ///
 /// # Errors
 /// Where the folder is missing or has none.
-pub fn walk(frames: &Path, episode: &str) -> Result<Vec<PathBuf>> {
+pub(crate) fn walk(frames: &Path, episode: &str) -> Result<Vec<PathBuf>> {
     let folder = frames.join(episode);
     let mut paths = entries(&folder)?;
     paths.retain(|path| path.to_string_lossy().ends_with("-rgb.png"));
@@ -80,7 +80,7 @@ pub fn walk(frames: &Path, episode: &str) -> Result<Vec<PathBuf>> {
 /// The indices of the frames that a model is shown: `np.round(np.linspace(0, n - 1, k))`, which rounds halves to even and
 /// repeats frames where there are fewer than `k`. Empty of no frames.
 #[must_use]
-pub fn sampled(n: usize, k: usize) -> Vec<usize> {
+pub(crate) fn sampled(n: usize, k: usize) -> Vec<usize> {
     if n == 0 {
         return Vec::new();
     }

@@ -15,7 +15,7 @@ const FOLDERS: [[&str; 2]; 3] = [
 
 /// One scene in normal and in low light.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Pair {
+pub(crate) struct Pair {
     /// What both files' names have in common.
     pub name: String,
     /// The image in normal light.
@@ -26,7 +26,7 @@ pub struct Pair {
 
 /// The pairs of a data set, by name.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Pairs {
+pub(crate) struct Pairs {
     /// The pairs.
     pub pairs: Vec<Pair>,
     /// Images without a partner.
@@ -46,7 +46,7 @@ impl Pairs {
     ///
     /// # Errors
     /// Where there is no pair, or two images of one name.
-    pub fn open(folder: &Path) -> Result<Self> {
+    pub(crate) fn open(folder: &Path) -> Result<Self> {
         let entries = entries(folder)?;
         let subfolder = |name: &str| {
             entries
@@ -76,7 +76,7 @@ impl Pairs {
     ///
     /// # Errors
     /// Where there is no pair, or two images of one name.
-    pub fn of_folders(normal: &Path, low: &Path) -> Result<Self> {
+    pub(crate) fn of_folders(normal: &Path, low: &Path) -> Result<Self> {
         let mut sides = [BTreeMap::new(), BTreeMap::new()];
         for (side, folder) in sides.iter_mut().zip([normal, low]) {
             for path in images(entries(folder)?) {

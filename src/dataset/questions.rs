@@ -52,7 +52,7 @@ pub(super) fn checked(family: Family) -> Result<Family> {
 /// # Errors
 /// With the file and the line: broken JSON, a missing key, choices that are no choices, an answer not among them,
 /// a family named as the total.
-pub fn read(path: &Path) -> Result<Vec<Question>> {
+pub(crate) fn read(path: &Path) -> Result<Vec<Question>> {
     let lines = json_lines::<Value>(path)?.into_iter();
     lines
         .map(|(number, value)| {

@@ -15,7 +15,7 @@ use crate::types::Family;
 /// Where the data are.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Data")]
-pub struct DataArgs {
+pub(crate) struct DataArgs {
     /// A folder of frames, a ready-made set (.tsv, .jsonl), or built-in rooms, rooms:frames=N,seed=N,size=WIDTHxHEIGHT
     #[arg(long, value_name = "DIR|FILE|rooms:…", value_parser = place, default_value_t)]
     pub data: DataPlace,
@@ -24,7 +24,7 @@ pub struct DataArgs {
 /// Which questions about them are asked.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Data")]
-pub struct SelectionArgs {
+pub(crate) struct SelectionArgs {
     /// The questions about a folder of frames; default: questions.jsonl in it, else made by rule from its maps
     #[arg(long, value_name = "FILE")]
     pub questions: Option<PathBuf>,
@@ -39,14 +39,14 @@ pub struct SelectionArgs {
 /// How large an image may be.
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Data")]
-pub struct PixelLimit {
+pub(crate) struct PixelLimit {
     /// The most pixels an image may have before it is refused undecoded
     #[arg(long, value_name = "N", default_value_t = NonZeroU64::new(MOST_PIXELS).unwrap_or(NonZeroU64::MIN))]
     pub max_pixels: NonZeroU64,
 }
 
 /// Reads a path, `rooms` or `rooms:frames=48,seed=7,size=1280x720`; a file or folder named rooms goes before the built-in ones.
-pub fn place(text: &str) -> Result<DataPlace, String> {
+pub(crate) fn place(text: &str) -> Result<DataPlace, String> {
     let path = PathBuf::from(text);
     match text.strip_prefix("rooms:") {
         Some(rooms) => rooms.parse().map(DataPlace::Rooms),

@@ -26,7 +26,7 @@ mod port;
 mod preset;
 mod protobuf;
 mod reading;
-pub mod runtime;
+pub(crate) mod runtime;
 mod search;
 mod session;
 mod settings;
@@ -38,8 +38,8 @@ mod weights;
 pub use enhancer::Enhancer;
 pub use file::ModelFile;
 pub use runtime::{Install, Runtime, RuntimeSearch, forbid_telemetry};
-pub use session::Stopper;
-pub use settings::{EnhancerArgs, RuntimeArgs, SizeArgs};
+pub(crate) use session::Stopper;
+pub(crate) use settings::{EnhancerArgs, RuntimeArgs, SizeArgs};
 pub use tiles::Tiling;
 
 /// The version of the way to and from a model: raised whenever a pixel changes, so that no result of an older one is taken

@@ -51,7 +51,7 @@ struct OpenRuntime {
 type Job = Box<dyn FnOnce() + Send>;
 
 /// The environment variable that keeps ONNX Runtime's telemetry off from the start, where it is `1`.
-pub const TELEMETRY_SWITCH: &str = "ORT_DISABLE_TELEMETRY";
+pub(crate) const TELEMETRY_SWITCH: &str = "ORT_DISABLE_TELEMETRY";
 
 /// Sets [`TELEMETRY_SWITCH`] for this process, so that ONNX Runtime sends nothing and leaves no identifier behind.
 ///

@@ -13,7 +13,7 @@ use crate::types::KindSet;
 /// The enhancers, and the images that they are given.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Enhancement")]
-pub struct EnhancerArgs {
+pub(crate) struct EnhancerArgs {
     /// An enhancement model as ONNX, or PRESET:FILE (zero-dce, zero-dce++, ruas-lol, ruas-upe, retinexformer, darkir, sci,
     /// iat, pairlie, enlightengan); repeatable: each is shown beside raw; default: none
     #[arg(long, value_name = "FILE")]
@@ -26,7 +26,7 @@ pub struct EnhancerArgs {
 /// In which size images are enhanced.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Enhancement")]
-pub struct SizeArgs {
+pub(crate) struct SizeArgs {
     /// Enhance in tiles of N × N pixels, their seams checked, or whole; auto is 256 for images above 1280 × 720 where
     /// sidecar or preset say that tiles are exact, else whole
     #[arg(long, value_name = "N|whole|auto", default_value_t)]
@@ -40,7 +40,7 @@ pub struct SizeArgs {
 /// Where ONNX Runtime is looked for.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Enhancement")]
-pub struct RuntimeArgs {
+pub(crate) struct RuntimeArgs {
     /// The ONNX Runtime library to load; default: ORT_DYLIB_PATH, else found, else installed once by pip
     #[arg(long, value_name = "FILE")]
     pub ort_lib: Option<PathBuf>,
@@ -52,7 +52,7 @@ pub struct RuntimeArgs {
 impl RuntimeArgs {
     /// The search that the flags and `ORT_DYLIB_PATH`, the variable of the `ort` crate, say.
     #[must_use]
-    pub fn search(&self) -> RuntimeSearch {
+    pub(crate) fn search(&self) -> RuntimeSearch {
         let variable = || env::var_os("ORT_DYLIB_PATH").filter(|path| !path.is_empty());
         RuntimeSearch {
             library: self

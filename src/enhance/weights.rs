@@ -95,7 +95,7 @@ impl Weights {
                 (14, FieldValue::Varint(value)) => location = value,
                 // float_data, packed or one by one; raw_data
                 (4 | 9, FieldValue::Bytes(bytes)) | (4, FieldValue::Fixed32(bytes)) => {
-                    floats.push(bytes)
+                    floats.push(bytes);
                 }
                 (13, FieldValue::Bytes(entry)) => names.extend(location_in(model, entry)?),
                 _ => {}

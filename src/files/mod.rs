@@ -1,4 +1,4 @@
-//! Files that are written whole, or not at all: [`write`] and [`write_synced`]; and what reading them has in common: [`reading`].
+//! Files that are written whole, or not at all: [`write()`] and [`write_synced`]; and what reading them has in common: [`reading`].
 
 pub(crate) mod reading;
 

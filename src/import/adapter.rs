@@ -15,7 +15,7 @@ use crate::types::{DepthKind, Intrinsics, Labels, Rgb, SegmentName, Segmentation
 /// What the user says of a data set's maps and its camera.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Maps")]
-pub struct StatedArgs {
+pub(crate) struct StatedArgs {
     /// The label space of the class maps: nyu40, nyu40-1 (from 0, 255 for void; kind nyu), nyu13, mpcat40, ade150, or a
     /// classes.json; default: what the kind has
     #[arg(long, value_name = "NAME|FILE")]
@@ -40,7 +40,7 @@ fn degrees(text: &str) -> Result<f64, String> {
 
 /// A frame that can be read.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ListedFrame {
+pub(crate) struct ListedFrame {
     /// Its scene.
     pub scene: String,
     /// Its name in the scene.
@@ -61,7 +61,7 @@ pub struct ListedFrame {
 
 /// The maps of a frame, of its image's size.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct FrameMaps {
+pub(crate) struct FrameMaps {
     /// Depth in millimetres, 0 where there is none.
     pub depth: Option<Array2<u32>>,
     /// Numbers of the label space.
@@ -74,7 +74,7 @@ pub struct FrameMaps {
 
 /// What is known of a data set without reading its maps.
 #[derive(Debug, Default)]
-pub struct Listing {
+pub(crate) struct Listing {
     /// Its frames, by scene and name.
     pub frames: Vec<ListedFrame>,
     /// What its numbers stand for.
@@ -112,7 +112,7 @@ impl Listing {
 }
 
 /// A kind of data set, opened.
-pub trait Adapter: fmt::Debug + Sync {
+pub(crate) trait Adapter: fmt::Debug + Sync {
     /// What is known of it without reading its maps.
     fn listing(&self) -> &Listing;
 

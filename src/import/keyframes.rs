@@ -11,7 +11,7 @@ use crate::types::flag::positive;
 /// Which frames of each scene are taken.
 #[derive(Debug, Clone, Copy, Default, Args)]
 #[command(next_help_heading = "Key frames")]
-pub struct KeyFrameArgs {
+pub(crate) struct KeyFrameArgs {
     /// One frame every N seconds of a scene (DarkQA: 2); default: every frame
     #[arg(long, value_name = "SECONDS", value_parser = positive, conflicts_with = "count")]
     pub every: Option<f64>,
@@ -26,7 +26,7 @@ pub struct KeyFrameArgs {
 impl KeyFrameArgs {
     /// Which frames are kept.
     #[must_use]
-    pub fn kept(&self) -> KeyFrames {
+    pub(crate) fn kept(&self) -> KeyFrames {
         match (self.every, self.count) {
             (Some(seconds), _) => KeyFrames::Seconds(seconds),
             (None, Some(count)) => KeyFrames::Count(count.get()),
@@ -37,7 +37,7 @@ impl KeyFrameArgs {
 
 /// Which frames of each scene are kept.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum KeyFrames {
+pub(crate) enum KeyFrames {
     /// All.
     Frame,
     /// One for each so many seconds, counted from the scene's first (DarkQA: 2).
@@ -53,7 +53,7 @@ pub enum KeyFrames {
 ///
 /// # Errors
 /// Where frames have no time and one is needed.
-pub fn choose(
+pub(crate) fn choose(
     frames: &[ListedFrame],
     every: KeyFrames,
     fps: Option<f64>,

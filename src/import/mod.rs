@@ -10,7 +10,7 @@ mod folder;
 mod habitat;
 mod hm3d;
 mod interface;
-pub mod keyframes;
+pub(crate) mod keyframes;
 mod mp3d;
 mod nyu;
 mod polygons;
@@ -24,11 +24,11 @@ use std::path::Path;
 use crate::error::{Error, Result};
 use crate::types::flag::flag_words;
 
-pub use adapter::{Adapter, FrameMaps, ListedFrame, Listing, StatedArgs};
+pub(crate) use adapter::{Adapter, FrameMaps, ListedFrame, StatedArgs};
 
 /// What lies in the folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum DataSetKind {
+pub(crate) enum DataSetKind {
     /// Renders of habitat-sim: HM3D-Sem, Matterport3D, Replica.
     Habitat,
     /// Frames of ScanNet, extracted.
@@ -49,7 +49,11 @@ flag_words!(DataSetKind);
 ///
 /// # Errors
 /// With the file or folder that is missing or not laid out as it should be, or the flag that must be said.
-pub fn open(kind: DataSetKind, folder: &Path, stated: &StatedArgs) -> Result<Box<dyn Adapter>> {
+pub(crate) fn open(
+    kind: DataSetKind,
+    folder: &Path,
+    stated: &StatedArgs,
+) -> Result<Box<dyn Adapter>> {
     if !folder.is_dir() {
         return Err(Error::usage(
             "--src",

@@ -61,7 +61,7 @@ pub fn bilinear(image: &Rgb, side: usize) -> Result<Rgb> {
 
 /// The height and width of an image whose longer side is scaled to so many pixels.
 #[must_use]
-pub fn size(height: usize, width: usize, side: usize) -> [usize; 2] {
+pub(crate) fn size(height: usize, width: usize, side: usize) -> [usize; 2] {
     let factor = side as f64 / height.max(width) as f64;
     [height, width].map(|length| scaled(length, factor))
 }

@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 
 /// How enhancement models are run.
 #[derive(Debug, Clone, Default, Args)]
-pub struct EnhancerRunArgs {
+pub(crate) struct EnhancerRunArgs {
     /// In which size.
     #[command(flatten)]
     pub size: SizeArgs,

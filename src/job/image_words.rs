@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 use crate::synthesis::SensorArgs;
 
 /// Flags by their long names: a text, a list of texts, or `true` for a switch.
-pub type ImageWords = BTreeMap<String, Value>;
+pub(crate) type ImageWords = BTreeMap<String, Value>;
 
 /// All flags that decide images.
 #[derive(Debug, Parser)]
@@ -64,7 +64,7 @@ impl ImageFlags {
 ///
 /// # Errors
 /// If a value is no text that a manifest can hold.
-pub fn said(matches: &ArgMatches) -> Result<ImageWords> {
+pub(crate) fn said(matches: &ArgMatches) -> Result<ImageWords> {
     let flags = ImageFlags::command();
     let mut words = ImageWords::new();
     for argument in flags.get_arguments() {

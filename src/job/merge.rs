@@ -18,7 +18,7 @@ use crate::types::{ChoiceDetail, Detail, OpenDetail, Record, RunQuestion, Thumbn
 
 /// The flags of `merge`.
 #[derive(Debug, Args)]
-pub struct MergeArgs {
+pub(crate) struct MergeArgs {
     /// The folders of the shards, or a folder that holds them
     #[arg(value_name = "RUN", required = true)]
     pub runs: Vec<PathBuf>,
@@ -58,7 +58,7 @@ impl<D: Detail> MergePart<D> {
 ///
 /// # Errors
 /// If a folder holds no shard, two hold one, one is of another run, or some are missing and that is refused.
-pub fn merge(args: &MergeArgs) -> Result<Outcome> {
+pub(crate) fn merge(args: &MergeArgs) -> Result<Outcome> {
     let folders = folders(&args.runs)?;
     let kinds: Result<Vec<ExperimentKind>> = folders
         .iter()

@@ -15,7 +15,7 @@ use crate::types::{Condition, View};
 /// Who is asked.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Model")]
-pub struct ModelArgs {
+pub(crate) struct ModelArgs {
     /// The model to ask, by its name at the endpoint; repeatable; built in: observer (frames with maps), random, script:FILE;
     /// default: none, one must be named
     #[arg(long, value_name = "NAME")]
@@ -37,7 +37,7 @@ impl ModelArgs {
 
 /// The name of a model.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum ModelName {
+pub(crate) enum ModelName {
     /// The built-in one that guesses.
     Random,
     /// The built-in one that looks at what the pixels still hold.
@@ -95,7 +95,7 @@ impl FromStr for ModelName {
 
 /// Who is asked, where, and with what key.
 #[derive(Debug)]
-pub struct AskSettings {
+pub(crate) struct AskSettings {
     /// The models.
     pub models: Vec<ModelName>,
     /// Whether they see the images.

@@ -13,7 +13,7 @@ use crate::types::flag::positive;
 /// When to stop.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Sending")]
-pub struct MoneyArgs {
+pub(crate) struct MoneyArgs {
     /// Stop when this many trials have failed; default: never
     #[arg(long, value_name = "N")]
     pub max_failures: Option<NonZeroUsize>,
@@ -30,7 +30,7 @@ pub struct MoneyArgs {
 
 /// What a run may cost, and whether it is carried out.
 #[derive(Debug)]
-pub struct MoneySettings {
+pub(crate) struct MoneySettings {
     /// What models cost.
     pub prices: Prices,
     /// The most that this part of a run may cost, in dollars.

@@ -4,7 +4,7 @@ use crate::types::manifest::Status;
 
 /// How a command ended.
 #[derive(Debug)]
-pub struct Outcome {
+pub(crate) struct Outcome {
     /// How far it came.
     pub status: Status,
     /// What belongs on standard output.
@@ -13,7 +13,7 @@ pub struct Outcome {
 
 /// What standard output gets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum StdoutFormat {
+pub(crate) enum StdoutFormat {
     /// A table.
     Table,
     /// The summary as JSON.
@@ -23,7 +23,7 @@ pub enum StdoutFormat {
 impl StdoutFormat {
     /// What the switch `--json` asks for.
     #[must_use]
-    pub fn of(json: bool) -> Self {
+    pub(crate) fn of(json: bool) -> Self {
         if json { Self::Json } else { Self::Table }
     }
 }

@@ -11,13 +11,13 @@ use crate::report::forecast::money;
 
 /// Where progress is shown: on a terminal, or nowhere.
 #[derive(Debug, Clone)]
-pub struct Progress {
+pub(crate) struct Progress {
     bars: MultiProgress,
 }
 
 /// Whether progress is wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verbosity {
+pub(crate) enum Verbosity {
     /// Where standard error is a terminal.
     Normal,
     /// Never.
@@ -27,7 +27,7 @@ pub enum Verbosity {
 impl Progress {
     /// Progress on standard error.
     #[must_use]
-    pub fn new(loudness: Verbosity) -> Self {
+    pub(crate) fn new(loudness: Verbosity) -> Self {
         let shown = loudness == Verbosity::Normal && io::stderr().is_terminal();
         let target = if shown {
             ProgressDrawTarget::stderr()
@@ -40,7 +40,7 @@ impl Progress {
     }
 
     /// Says one line above the bars; a pipe and `--quiet` hear nothing.
-    pub fn say(&self, line: &str) {
+    pub(crate) fn say(&self, line: &str) {
         // A line that cannot be shown is no reason to stop.
         let _ = self.bars.println(line);
     }
@@ -110,7 +110,7 @@ impl Drop for StepBar {
 
 /// Log lines go above the bars, to standard error.
 #[derive(Debug)]
-pub struct LogWriter(MultiProgress);
+pub(crate) struct LogWriter(MultiProgress);
 
 impl Write for LogWriter {
     fn write(&mut self, line: &[u8]) -> io::Result<usize> {

@@ -24,7 +24,7 @@ use crate::types::{Condition, Digest, FrameId};
 ///
 /// The variables are `DARKQA_MOVED_DATA` and `DARKQA_MOVED_LLIE`: what `DARKQA_DATA` says of new runs says nothing of this one.
 #[derive(Debug, Clone, Args)]
-pub struct RebuildArgs {
+pub(crate) struct RebuildArgs {
     /// The data, if they lie elsewhere by now; default: where they were
     #[arg(id = "moved_data", long = "data", value_name = "DIR|FILE|rooms:…")]
     pub data: Option<PathBuf>,

@@ -10,7 +10,7 @@ use crate::ask::Payload;
 /// In what size an image is sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Scaling {
+pub(crate) enum Scaling {
     /// In its own.
     Never,
     /// Made smaller if a side is longer than this, in pixels.

@@ -19,8 +19,8 @@ use crate::types::View;
 
 /// The flags that every experiment has.
 #[derive(Debug, Args)]
-pub struct JobArgs {
-    /// LightSettings.
+pub(crate) struct JobArgs {
+    /// Light.
     #[command(flatten)]
     pub light: LightArgs,
     /// Which images are enhanced, and by what.
@@ -61,7 +61,7 @@ pub struct JobArgs {
 /// How a job is spread over processes.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Scale")]
-pub struct ScaleArgs {
+pub(crate) struct ScaleArgs {
     /// Do one of N parts, by frames or walks: I/N; auto/N or auto as the batch system says (Slurm arrays, indexed Kubernetes jobs);
     /// none for everything. --rpm, --tpm and --max-cost are for all parts together; default: auto in a Slurm array, else none
     #[arg(long, value_name = "I/N|auto/N|auto|none")]
@@ -74,7 +74,7 @@ pub struct ScaleArgs {
 /// What is left behind.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Output")]
-pub struct OutputArgs {
+pub(crate) struct OutputArgs {
     /// The run folder; default: results/TIME-MODEL-DATA-HASH, found again by the same command
     #[arg(long, value_name = "DIR", conflicts_with = "resume")]
     pub out: Option<PathBuf>,
@@ -88,7 +88,7 @@ pub struct OutputArgs {
 
 /// The settings that every experiment has, validated. Files, environment and keys are read when they are made, and nowhere later.
 #[derive(Debug)]
-pub struct JobSettings {
+pub(crate) struct JobSettings {
     /// What is done to frames.
     pub light: LightSettings,
     /// Which images are enhanced, and by what.
@@ -121,7 +121,7 @@ pub struct JobSettings {
 
 /// What one experiment has of the settings of models and others have not.
 #[derive(Debug, Default)]
-pub struct ExperimentSettings {
+pub(crate) struct ExperimentSettings {
     /// What the server lets the model say.
     pub constrain: Constrain,
     /// What the server's sampling starts from.
@@ -167,7 +167,7 @@ impl JobArgs {
     ///
     /// # Errors
     /// [`Error::Usage`] with the flag that cannot be used.
-    pub fn resolve(self, own: &ExperimentSettings) -> Result<JobSettings> {
+    pub(crate) fn resolve(self, own: &ExperimentSettings) -> Result<JobSettings> {
         let shard = Shard::resolve(self.scale.shard.as_deref(), |name| std::env::var(name).ok())?;
         let sending = Sending {
             quota: shard.quota(self.sending.quota),
@@ -207,7 +207,7 @@ impl JobArgs {
 
 /// Where the run is kept.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum RunPlace {
+pub(crate) enum RunPlace {
     /// The folder of the same command, else a new one.
     Automatic,
     /// This folder.
@@ -229,7 +229,7 @@ impl From<OutputArgs> for RunPlace {
 impl RunPlace {
     /// Where a part of a run is kept: in a folder of its own within that of the whole.
     #[must_use]
-    pub fn of(&self, shard: Shard) -> Self {
+    pub(crate) fn of(&self, shard: Shard) -> Self {
         match self {
             Self::Named(path) if shard.is_part() => Self::Named(path.join(shard.folder())),
             Self::Resume(path) if shard.is_part() => Self::Resume(path.join(shard.folder())),

@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 /// One of several parts of an evaluation, by frames: those whose place among all, counted from 0, leaves `index` when divided by
 /// `of`. A frame is in one part with all its conditions and questions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Shard {
+pub(crate) struct Shard {
     /// Which, from 0.
     index: u32,
     /// Of how many.
@@ -20,37 +20,37 @@ pub struct Shard {
 
 impl Shard {
     /// All of it.
-    pub const WHOLE: Self = Self {
+    pub(crate) const WHOLE: Self = Self {
         index: 0,
         of: NonZeroU32::MIN,
     };
 
     /// Whether there are others.
     #[must_use]
-    pub fn is_part(self) -> bool {
+    pub(crate) fn is_part(self) -> bool {
         self.of.get() > 1
     }
 
     /// How many there are.
     #[must_use]
-    pub fn of(self) -> NonZeroU32 {
+    pub(crate) fn of(self) -> NonZeroU32 {
         self.of
     }
 
     /// Each of so many.
-    pub fn all(of: NonZeroU32) -> impl Iterator<Item = Self> {
+    pub(crate) fn all(of: NonZeroU32) -> impl Iterator<Item = Self> {
         (0..of.get()).map(move |index| Self { index, of })
     }
 
     /// Whether the frame at a place is in it.
     #[must_use]
-    pub fn has(self, place: usize) -> bool {
+    pub(crate) fn has(self, place: usize) -> bool {
         place as u64 % u64::from(self.of.get()) == u64::from(self.index)
     }
 
     /// Its share of a number that all parts have together: the shares sum to it, but that none is 0.
     #[must_use]
-    pub fn share(self, whole: NonZeroU32) -> NonZeroU32 {
+    pub(crate) fn share(self, whole: NonZeroU32) -> NonZeroU32 {
         let (of, whole) = (self.of.get(), whole.get());
         let share = whole / of + u32::from(self.index < whole % of);
         NonZeroU32::new(share).unwrap_or(NonZeroU32::MIN)
@@ -58,13 +58,13 @@ impl Shard {
 
     /// Its share of a sum of money.
     #[must_use]
-    pub fn part_of(self, sum: f64) -> f64 {
+    pub(crate) fn part_of(self, sum: f64) -> f64 {
         sum / f64::from(self.of.get())
     }
 
     /// The name of its folder among those of the other parts.
     #[must_use]
-    pub fn folder(self) -> String {
+    pub(crate) fn folder(self) -> String {
         let digits = self.of.to_string().len();
         format!("shard-{:0digits$}-of-{}", self.index + 1, self.of)
     }

@@ -20,7 +20,7 @@ use crate::types::FrameId;
 /// How a walk is shown.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "OpenEQA")]
-pub struct Walk {
+pub(crate) struct Walk {
     /// The folder of walks: the frames of a question lie in DIR/EPISODE_HISTORY/*-rgb.png
     #[arg(id = "frames", long, value_name = "DIR")]
     pub folder: PathBuf,
@@ -41,7 +41,7 @@ pub struct Walk {
 /// Where light is taken from a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
-pub enum DegradedAt {
+pub(crate) enum DegradedAt {
     /// Before the frames are scaled, as a camera would
     Native,
     /// After it, where the scaling averages no noise away
@@ -51,7 +51,7 @@ pub enum DegradedAt {
 /// What one state of the camera takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
-pub enum CameraOf {
+pub(crate) enum CameraOf {
     /// All frames of a walk: one camera recorded it
     Episode,
     /// Each frame

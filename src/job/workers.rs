@@ -10,7 +10,7 @@ use crate::types::flag::threads;
 
 /// How many threads make images.
 #[derive(Debug, Clone, Copy, Default, Args)]
-pub struct ThreadArgs {
+pub(crate) struct ThreadArgs {
     /// Threads of synthesis, enhancement and reading, 1024 at most; default: all cores
     #[arg(long, value_name = "N", value_parser = threads, help_heading = "Scale")]
     pub threads: Option<NonZeroUsize>,

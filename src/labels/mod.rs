@@ -24,7 +24,7 @@ const SPACES: [(&str, &str, &[u16]); 4] = [
 
 /// The names of the built-in spaces.
 #[must_use]
-pub fn names() -> Vec<&'static str> {
+pub(crate) fn names() -> Vec<&'static str> {
     SPACES.iter().map(|(name, ..)| *name).collect()
 }
 
@@ -56,7 +56,7 @@ pub fn space(name: &str) -> Option<Labels> {
 
 /// The canonical classes, those of mpcat40 without `void` and `unlabeled`.
 #[must_use]
-pub fn canonical() -> BTreeSet<String> {
+pub(crate) fn canonical() -> BTreeSet<String> {
     space("mpcat40").map_or_else(BTreeSet::new, |labels| labels.expressible)
 }
 

@@ -18,7 +18,6 @@ const SIDE: usize = 32;
 /// A basic colour term.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-#[expect(missing_docs, reason = "a colour says itself")]
 pub enum Color {
     Black,
     Grey,
@@ -86,9 +85,9 @@ impl Color {
 }
 
 /// How many bins a histogram of names has: the eleven terms, and none.
-pub const BINS: usize = 12;
+pub(crate) const BINS: usize = 12;
 /// The bin of what has no name.
-pub const NONE: usize = 11;
+pub(crate) const NONE: usize = 11;
 
 /// The name of every colour.
 #[derive(Clone, PartialEq, Eq)]

@@ -7,14 +7,19 @@ use super::statistics::FrameStatistics;
 
 /// In how many frames each asked class is well seen, by room and scene.
 #[derive(Debug, Default)]
-pub struct Frequency {
+pub(crate) struct Frequency {
     /// By room, then by scene; the room `""` is all frames.
     counts: BTreeMap<String, BTreeMap<String, BTreeMap<String, u64>>>,
 }
 
 impl Frequency {
     /// Counts a frame.
-    pub fn add(&mut self, statistics: &FrameStatistics, room: Option<&str>, book: &RuleBook) {
+    pub(crate) fn add(
+        &mut self,
+        statistics: &FrameStatistics,
+        room: Option<&str>,
+        book: &RuleBook,
+    ) {
         let evidence = statistics.evidence(book);
         let classes: BTreeSet<&str> = evidence
             .map(|segment| segment.class.as_str())
@@ -32,7 +37,12 @@ impl Frequency {
     /// The classes that may be expected in a room of a scene: the `most` commonest of that room in other scenes; where there
     /// is no such room elsewhere, of all frames. `None` where fewer than `most` classes are seen there: too little to tell.
     #[must_use]
-    pub fn expected(&self, room: &str, scene: &str, most: usize) -> Option<BTreeSet<String>> {
+    pub(crate) fn expected(
+        &self,
+        room: &str,
+        scene: &str,
+        most: usize,
+    ) -> Option<BTreeSet<String>> {
         let elsewhere = self.total(room, Some(scene));
         let counts = if elsewhere.is_empty() {
             self.total("", None)

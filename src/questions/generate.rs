@@ -209,7 +209,7 @@ fn room(
 
 /// The room that a person has stated, where questions ask about such a room.
 #[must_use]
-pub fn stated(frame: &FrameStatistics, book: &RuleBook) -> Option<String> {
+pub(crate) fn stated(frame: &FrameStatistics, book: &RuleBook) -> Option<String> {
     let stated = frame
         .room
         .as_deref()?

@@ -6,24 +6,24 @@
 //! frames come.
 
 mod affordance;
-pub mod balance;
+pub(crate) mod balance;
 mod closest;
 mod color;
 #[cfg(test)]
 mod color_tree;
-pub mod colors;
-pub mod frequency;
-pub mod generate;
-pub mod observer;
-pub mod pick;
+pub(crate) mod colors;
+pub(crate) mod frequency;
+pub(crate) mod generate;
+pub(crate) mod observer;
+pub(crate) mod pick;
 mod presence;
-pub mod reason;
-pub mod room;
+pub(crate) mod reason;
+pub(crate) mod room;
 mod room_type;
-pub mod rule_context;
-pub mod rules;
-pub mod statistics;
-pub mod summary;
+pub(crate) mod rule_context;
+pub(crate) mod rules;
+pub(crate) mod statistics;
+pub(crate) mod summary;
 #[cfg(test)]
 mod tests;
 

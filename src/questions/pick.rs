@@ -10,7 +10,7 @@ const DOMAIN: &[u8] = b"darkqa-eval questions 1";
 /// There is no state: a pick is the BLAKE3 digest of seed, data set, scene, frame and purpose, scaled to the range. So the
 /// order in which frames come changes nothing.
 #[derive(Debug, Clone, Copy)]
-pub struct Picker<'a> {
+pub(crate) struct Picker<'a> {
     /// The rulebook's.
     pub seed: u64,
     /// The data set's name.
@@ -22,7 +22,7 @@ pub struct Picker<'a> {
 impl Picker<'_> {
     /// The 64 bits of a purpose.
     #[must_use]
-    pub fn bits(&self, family: &str, purpose: &str) -> u64 {
+    pub(crate) fn bits(&self, family: &str, purpose: &str) -> u64 {
         let seed = self.seed.to_le_bytes();
         let parts = [
             DOMAIN,
@@ -42,12 +42,12 @@ impl Picker<'_> {
 
     /// A number below `count`, which is above 0.
     #[must_use]
-    pub fn pick(&self, family: &str, purpose: &str, count: usize) -> usize {
+    pub(crate) fn pick(&self, family: &str, purpose: &str, count: usize) -> usize {
         ((u128::from(self.bits(family, purpose)) * count as u128) >> 64) as usize
     }
 
     /// Shuffles, each order as likely as any other (Fisher and Yates).
-    pub fn shuffle<T>(&self, family: &str, list: &mut [T]) {
+    pub(crate) fn shuffle<T>(&self, family: &str, list: &mut [T]) {
         for last in (1..list.len()).rev() {
             let other = self.pick(family, &format!("shuffle {last}"), last + 1);
             list.swap(last, other);

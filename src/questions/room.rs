@@ -48,7 +48,7 @@ pub enum RoomSource {
 /// that contend, one wins by one of the rulebook's contests, or where the other is small and far behind: a room seen through
 /// a door.
 #[must_use]
-pub fn classify(statistics: &FrameStatistics, book: &RuleBook) -> RoomSigns {
+pub(crate) fn classify(statistics: &FrameStatistics, book: &RuleBook) -> RoomSigns {
     let signs = Signs::of(statistics, book);
     let mut scores = BTreeMap::new();
     let mut segments: BTreeMap<String, Vec<u32>> = BTreeMap::new();

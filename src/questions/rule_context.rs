@@ -13,7 +13,7 @@ use crate::types::{Family, Labels, Question};
 
 /// What the rules see of a frame.
 #[derive(Debug, Clone, Copy)]
-pub struct RuleContext<'a> {
+pub(crate) struct RuleContext<'a> {
     /// The rulebook.
     pub book: &'a RuleBook,
     /// The label space.
@@ -174,7 +174,7 @@ pub(super) fn falls(
 }
 
 /// The choices of a question that is answered by yes or no.
-pub const YES_NO: [&str; 2] = ["yes", "no"];
+pub(crate) const YES_NO: [&str; 2] = ["yes", "no"];
 
 /// The choices of a question that is answered by yes or no.
 pub(super) fn yes_no() -> Vec<String> {

@@ -16,7 +16,7 @@ const SCHEMA: &str = "darkqa.questions/1";
 
 /// What a set of questions is like. Shares are pairs of counts.
 #[derive(Debug, Serialize)]
-pub struct QuestionSummary {
+pub(crate) struct QuestionSummary {
     schema: &'static str,
     /// The data set's name for itself.
     pub dataset: String,
@@ -68,7 +68,7 @@ pub struct QuestionSummary {
 
 /// What became of the candidates of a family.
 #[derive(Debug, Default, Serialize)]
-pub struct CandidateCounts {
+pub(crate) struct CandidateCounts {
     /// Those that hold.
     pub viable: u64,
     /// Those that are asked.
@@ -85,7 +85,7 @@ pub struct CandidateCounts {
 
 /// What of a class there is.
 #[derive(Debug, Default, Serialize)]
-pub struct ClassCoverage {
+pub(crate) struct ClassCoverage {
     /// Pixels.
     pub pixels: u64,
     /// Segments that are not tiny.
@@ -98,7 +98,7 @@ pub struct ClassCoverage {
 
 /// What of a room there is.
 #[derive(Debug, Default, Serialize)]
-pub struct RoomCoverage {
+pub(crate) struct RoomCoverage {
     /// Frames that show it.
     pub frames: usize,
     /// Questions whose answer it is.
@@ -107,7 +107,7 @@ pub struct RoomCoverage {
 
 /// What answering without looking would score: right answers, or their expectation, out of the questions.
 #[derive(Debug, Default, Serialize)]
-pub struct Baselines {
+pub(crate) struct Baselines {
     /// Questions.
     pub questions: usize,
     /// The expected right answers of a uniform guess.
@@ -122,7 +122,7 @@ pub struct Baselines {
 impl QuestionSummary {
     /// What came of the frames; `failed` of them could not be measured.
     #[must_use]
-    pub fn new(
+    pub(crate) fn new(
         frames: &[FrameStatistics],
         made: &Generated,
         order: &QuestionRequest<'_>,

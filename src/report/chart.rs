@@ -45,7 +45,7 @@ const ROW: i32 = 20;
 
 /// One figure of a report.
 #[derive(Debug, Clone, Serialize)]
-pub struct Figure {
+pub(crate) struct Figure {
     /// Its name in files.
     pub name: &'static str,
     /// What it shows.
@@ -64,7 +64,7 @@ pub(super) fn files(figures: Vec<Figure>) -> impl Iterator<Item = (String, Vec<u
 
 /// How a line looks: the same number is the same look in every figure of a report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct LineStyle(pub usize);
+pub(crate) struct LineStyle(pub usize);
 
 impl LineStyle {
     pub(super) fn colour(self) -> RGBColor {
@@ -78,7 +78,7 @@ impl LineStyle {
 
 /// What stands in a panel.
 #[derive(Debug, Clone)]
-pub enum PanelContent {
+pub(crate) enum PanelContent {
     /// Points over exposure drops, with the band of their intervals.
     Curve(Vec<(AxisLevel, Estimate)>),
     /// A level that holds in whatever light.
@@ -87,7 +87,7 @@ pub enum PanelContent {
 
 /// One line of a panel.
 #[derive(Debug, Clone)]
-pub struct PlotLine {
+pub(crate) struct PlotLine {
     /// What the legend calls it; lines of one name are one entry.
     pub name: String,
     /// How it looks.
@@ -98,7 +98,7 @@ pub struct PlotLine {
 
 /// One panel.
 #[derive(Debug, Clone)]
-pub struct Panel {
+pub(crate) struct Panel {
     /// What it shows, with its n.
     pub title: String,
     /// Its lines.
@@ -107,7 +107,7 @@ pub struct Panel {
 
 /// A figure of panels with one legend.
 #[derive(Debug, Clone)]
-pub struct Chart {
+pub(crate) struct Chart {
     /// What is on the vertical axis, with its unit.
     pub measure: &'static str,
     /// The panels, row by row.
@@ -125,7 +125,7 @@ impl Chart {
     ///
     /// # Errors
     /// Where it cannot be drawn.
-    pub fn svg(&self) -> Result<String> {
+    pub(crate) fn svg(&self) -> Result<String> {
         let columns = self.columns.clamp(1, self.panels.len().max(1));
         let rows = self.panels.len().div_ceil(columns) as i32;
         let width = columns as i32 * PANEL.0;

@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 
 /// What is left to ask of one model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct CostLine {
+pub(crate) struct CostLine {
     /// The model, with how it is asked where that is without images.
     pub model: String,
     /// Requests left.
@@ -32,7 +32,7 @@ pub struct CostLine {
 
 /// What a run would take.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Forecast {
+pub(crate) struct Forecast {
     /// What is left by model.
     pub lines: Vec<CostLine>,
     /// Trials in all.
@@ -69,7 +69,7 @@ pub struct Forecast {
 }
 
 /// The forecast as JSON.
-pub fn json(forecast: &Forecast) -> Result<String> {
+pub(crate) fn json(forecast: &Forecast) -> Result<String> {
     let text = serde_json::to_string_pretty(forecast);
     text.map(|text| text + "\n")
         .map_err(|e| Error::data("the estimate", e))
@@ -77,7 +77,7 @@ pub fn json(forecast: &Forecast) -> Result<String> {
 
 /// The forecast for people.
 #[must_use]
-pub fn render(forecast: &Forecast) -> String {
+pub(crate) fn render(forecast: &Forecast) -> String {
     let table = TableBuilder::new("estimate", &forecast.lines)
         .column(Text, "terminal model", |line| line.model.clone())
         .column(Count, "terminal requests", |line| {
@@ -172,7 +172,7 @@ fn between(low: Option<f64>, high: Option<f64>, show: &dyn Fn(f64) -> String) ->
 
 /// Dollars, with as many digits as say something.
 #[must_use]
-pub fn money(dollars: f64) -> String {
+pub(crate) fn money(dollars: f64) -> String {
     if dollars > 0.0 && dollars < 0.995 {
         format!("${dollars:.4}")
     } else {

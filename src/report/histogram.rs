@@ -9,7 +9,7 @@ const LEAST: f64 = 1e-7;
 
 /// One line of the figure.
 #[derive(Debug, Clone)]
-pub struct HistogramLine {
+pub(crate) struct HistogramLine {
     /// What it is called.
     pub name: String,
     /// Differences of 8-bit codes with their shares.
@@ -20,7 +20,7 @@ pub struct HistogramLine {
 ///
 /// # Errors
 /// Where the figure cannot be drawn.
-pub fn histogram(title: &str, lines: &[HistogramLine]) -> Result<String> {
+pub(crate) fn histogram(title: &str, lines: &[HistogramLine]) -> Result<String> {
     let failed = |e: String| Error::data("figure", e);
     let reach = lines
         .iter()

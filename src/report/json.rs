@@ -71,7 +71,7 @@ struct ComparedRun<'a> {
 
 /// What a document is about.
 #[derive(Debug, Clone, Copy)]
-pub enum RunList<'a> {
+pub(crate) enum RunList<'a> {
     /// A run, with its folder if the document is not itself in there.
     One(&'a RunManifest, Option<&'a Path>),
     /// Several, each with its folder.
@@ -82,7 +82,7 @@ pub enum RunList<'a> {
 ///
 /// # Errors
 /// If it cannot be written.
-pub fn summary(
+pub(crate) fn summary(
     tables: &[Table],
     unread: &BTreeMap<UnreadReason, usize>,
     runs: RunList<'_>,

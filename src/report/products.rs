@@ -40,4 +40,4 @@ pub(super) fn numbers(tables: &[Table], head: &str) -> Result<Vec<(String, Vec<u
 }
 
 /// The name of the page.
-pub const PAGE: &str = "report.html";
+pub(crate) const PAGE: &str = "report.html";

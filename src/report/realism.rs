@@ -16,7 +16,7 @@ use crate::types::Rgb;
 
 /// All pairs together.
 #[derive(Debug, Serialize)]
-pub struct RealismSummary {
+pub(crate) struct RealismSummary {
     pairs: usize,
     #[serde(flatten)]
     source: ComparedData,
@@ -36,7 +36,7 @@ pub struct RealismSummary {
 
 /// By which rules residuals are compared.
 #[derive(Debug, Clone, Copy)]
-pub struct ResidualRules {
+pub(crate) struct ResidualRules {
     /// The bins.
     pub bins: Bins,
     /// What is done about empty ones.
@@ -54,7 +54,7 @@ impl ResidualRules {
 
 /// What was compared.
 #[derive(Debug, Clone, Serialize)]
-pub struct ComparedData {
+pub(crate) struct ComparedData {
     /// The seed of the noise.
     pub seed: u64,
     /// The choices of the synthesis.
@@ -112,7 +112,7 @@ impl RealismSummary {
     ///
     /// # Errors
     /// Where there is none.
-    pub fn new(
+    pub(crate) fn new(
         rules: ResidualRules,
         source: ComparedData,
         compared: &[&PairComparison],
@@ -139,13 +139,13 @@ impl RealismSummary {
 
     /// As JSON.
     #[must_use]
-    pub fn json(&self) -> String {
+    pub(crate) fn json(&self) -> String {
         format!("{:#}\n", serde_json::json!(self))
     }
 
     /// The paper's table, with intervals, and with the rules of its numbers below it.
     #[must_use]
-    pub fn table(&self) -> String {
+    pub(crate) fn table(&self) -> String {
         let ways = [
             ("exposure drop alone", &self.exposure),
             ("with sensor noise", &self.noise),
@@ -211,7 +211,7 @@ fn shown(mean: &Mean, digits: usize) -> String {
 }
 
 /// A row a pair and way of making it.
-pub fn pairs(compared: &[&PairComparison]) -> Result<Vec<u8>> {
+pub(crate) fn pairs(compared: &[&PairComparison]) -> Result<Vec<u8>> {
     let rows = compared.iter().flat_map(|pair| {
         [("ev", &pair.exposure), ("noise", &pair.noise)].map(|(way, made)| (*pair, way, made))
     });
@@ -230,7 +230,7 @@ pub fn pairs(compared: &[&PairComparison]) -> Result<Vec<u8>> {
 }
 
 /// The spread of real and synthetic residuals by clean code.
-pub fn by_code(residuals: &[Residuals; 2]) -> Result<Vec<u8>> {
+pub(crate) fn by_code(residuals: &[Residuals; 2]) -> Result<Vec<u8>> {
     let [real, noise] = residuals;
     let table = TableBuilder::new("residuals", real.by_code().zip(noise.by_code()))
         .column(Text, "csv code", |((code, _, _), _)| code.to_string())
@@ -244,7 +244,7 @@ pub fn by_code(residuals: &[Residuals; 2]) -> Result<Vec<u8>> {
 }
 
 /// Both residual histograms.
-pub fn figure([real, noise]: &[Residuals; 2]) -> Result<String> {
+pub(crate) fn figure([real, noise]: &[Residuals; 2]) -> Result<String> {
     let line = |name: &str, residuals: &Residuals| HistogramLine {
         name: name.to_owned(),
         shares: residuals.shares().collect(),
@@ -258,7 +258,7 @@ pub fn figure([real, noise]: &[Residuals; 2]) -> Result<String> {
 
 /// Crops of the first pairs, in the light of the image that they were made from.
 #[must_use]
-pub fn crops<'a>(pairs: impl Iterator<Item = (&'a PairComparison, &'a [Rgb; 3])>) -> Rgb {
+pub(crate) fn crops<'a>(pairs: impl Iterator<Item = (&'a PairComparison, &'a [Rgb; 3])>) -> Rgb {
     let rows: Vec<CropRow<'_>> = pairs
         .map(|(compared, images)| CropRow {
             name: format!("{} (drop {:.2} EV)", compared.pair, compared.drop),

@@ -13,7 +13,7 @@ const PLACE: &str = "/*STUDY*/null";
 
 /// A question as the page asks it; the true choice is not in it.
 #[derive(Debug, Clone, Serialize)]
-pub struct StudyQuestion {
+pub(crate) struct StudyQuestion {
     /// Its name.
     pub id: String,
     /// The number of its frame or walk.
@@ -28,7 +28,7 @@ pub struct StudyQuestion {
 
 /// A frame or a walk in a condition.
 #[derive(Debug, Clone, Serialize)]
-pub struct StudyImage {
+pub(crate) struct StudyImage {
     /// What was done to it; told to the file of answers, not to the person.
     pub condition: String,
     /// Where the images are, from the page: one of a frame, all of a walk.
@@ -49,7 +49,7 @@ struct StudyPage<'a> {
 ///
 /// # Errors
 /// Where the questions cannot be written.
-pub fn page(items: &[StudyQuestion]) -> Result<String> {
+pub(crate) fn page(items: &[StudyQuestion]) -> Result<String> {
     let names = items.iter().flat_map(|item| {
         let images = item.shots.iter().flat_map(|shot| &shot.images);
         let shots = images.map(String::as_bytes);

@@ -95,7 +95,7 @@ pub(super) fn table(parts: &[Table]) -> String {
 
 /// What stands at the end of an evaluation: how far each run has come if it is not complete, the tables, the runs' folders.
 #[must_use]
-pub fn evaluation(tables: &[Table], runs: &[(&RunManifest, &Path)]) -> String {
+pub(crate) fn evaluation(tables: &[Table], runs: &[(&RunManifest, &Path)]) -> String {
     let mut text = String::new();
     for (run, folder) in runs {
         if runs.len() > 1 && run.status != Status::Complete {

@@ -1,6 +1,6 @@
 //! How much light reaches a place: [`Lighting`].
 //!
-//! LightSource comes from the lamps and windows, each sampled with a shadow ray, and from what they light: rays over the half-space
+//! Light comes from the lamps and windows, each sampled with a shadow ray, and from what they light: rays over the half-space
 //! (as likely as their cosine) bring back what they meet, lit by one light in turn, plus what is left after many bounces, a
 //! constant. It is one bounce by sampling and the rest by a mean: soft shadows, dark corners and colours that bleed are there,
 //! caustics are not.

@@ -1,6 +1,6 @@
 //! A view of a room: its image and its maps, [`render`].
 //!
-//! Every pixel is traced once, those at edges four times more. LightGrid is slow to change: it is sampled at every other pixel of
+//! Every pixel is traced once, those at edges four times more. Light is slow to change: it is sampled at every other pixel of
 //! every other row, by neighbours in turn, smoothed between places of one plane, and spread from there; a place that has no
 //! neighbour of its kind is lit by samples of its own.
 

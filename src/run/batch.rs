@@ -14,7 +14,7 @@ use crate::types::{ChoiceDetail, Detail, OpenDetail};
 
 /// The flags of `batch import`.
 #[derive(Debug, Args)]
-pub struct BatchImportArgs {
+pub(crate) struct BatchImportArgs {
     /// The folder of the run that the batch was exported from
     #[arg(value_name = "RUN")]
     pub run: PathBuf,
@@ -30,7 +30,7 @@ pub struct BatchImportArgs {
 ///
 /// # Errors
 /// If the folder holds no run or no batch, or a line is not one of such a file: those before it are kept.
-pub fn import(args: &BatchImportArgs) -> Result<Outcome> {
+pub(crate) fn import(args: &BatchImportArgs) -> Result<Outcome> {
     match ExperimentKind::of(&args.run)? {
         ExperimentKind::Choice => import_into::<ChoiceDetail>(args, choice::write),
         ExperimentKind::Open => import_into::<OpenDetail>(args, open::write),

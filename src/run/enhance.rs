@@ -17,7 +17,7 @@ use crate::types::manifest::Status;
 
 /// The flags of `enhance`.
 #[derive(Debug, Args)]
-pub struct EnhanceArgs {
+pub(crate) struct EnhanceArgs {
     /// The model as ONNX, or PRESET:FILE (zero-dce, zero-dce++, ruas-lol, ruas-upe, retinexformer, darkir, sci, iat,
     /// pairlie, enlightengan)
     #[arg(value_name = "MODEL")]
@@ -48,7 +48,7 @@ pub struct EnhanceArgs {
 ///
 /// # Errors
 /// Where nothing can be made: no such model or input, two images of one name, no folder to write to.
-pub fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
+pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
     let files = vec![ModelFile::read(&args.model)?];
     let enhancers = OpenEnhancers::load(files, &args.loading)?.take()?;
     let [mut enhancer] = <[Enhancer; 1]>::try_from(enhancers)

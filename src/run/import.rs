@@ -28,7 +28,7 @@ const NAMED: usize = 12;
 
 /// The flags of `import`.
 #[derive(Debug, Args)]
-pub struct ImportArgs {
+pub(crate) struct ImportArgs {
     /// What lies in --src
     #[arg(value_name = "KIND", value_enum)]
     pub kind: DataSetKind,
@@ -64,7 +64,7 @@ pub struct ImportArgs {
 ///
 /// # Errors
 /// Where there are no frames, the folder holds others already, most depths are none of a room, or nothing could be read.
-pub fn import(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
+pub(crate) fn import(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
     let list = args.out.join("frames.jsonl");
     if !args.force && list.exists() {
         let problem =

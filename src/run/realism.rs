@@ -37,7 +37,7 @@ const DROPS: [f32; 2] = [-20.0, 20.0];
 
 /// The flags of `realism`.
 #[derive(Debug, Args)]
-pub struct RealismArgs {
+pub(crate) struct RealismArgs {
     /// A folder of pairs: normal/ and low/, high/ and low/, val_rgb_h/ and val_rgb_l/, or files like normal1.png and
     /// low1.png
     #[arg(
@@ -101,7 +101,7 @@ struct PairWork {
 ///
 /// # Errors
 /// Where there is no pair, none can be compared, or a file cannot be written.
-pub fn realism(args: &RealismArgs, progress: &Progress) -> Result<Outcome> {
+pub(crate) fn realism(args: &RealismArgs, progress: &Progress) -> Result<Outcome> {
     let Pairs { pairs, unmatched } = match (&args.pairs, &args.normal, &args.low) {
         (None, Some(normal), Some(low)) => Pairs::of_folders(normal, low)?,
         (folder, ..) => Pairs::open(folder.as_deref().unwrap_or(Path::new(".")))?,

@@ -19,7 +19,7 @@ use crate::types::{FrameId, Labels};
 
 /// The flags of `rooms`.
 #[derive(Debug, Args)]
-pub struct RoomsArgs {
+pub(crate) struct RoomsArgs {
     /// Where the frames go, in the common interface
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
@@ -38,7 +38,7 @@ pub struct RoomsArgs {
 ///
 /// # Errors
 /// Where the folder holds frames already, or a file cannot be written.
-pub fn rooms(args: &RoomsArgs, progress: &Progress) -> Result<Outcome> {
+pub(crate) fn rooms(args: &RoomsArgs, progress: &Progress) -> Result<Outcome> {
     let list = args.out.join(FRAMES);
     if !args.force && list.exists() {
         let problem =

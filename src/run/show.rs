@@ -18,7 +18,7 @@ use crate::types::{self, Condition, Digest, FrameId, OpenDetail, Record, RunQues
 
 /// The flags of `show`.
 #[derive(Debug, Args)]
-pub struct ShowArgs {
+pub(crate) struct ShowArgs {
     /// The folder of a run
     #[arg(value_name = "RUN")]
     pub run: PathBuf,
@@ -57,7 +57,7 @@ struct ShownItem {
 ///
 /// # Errors
 /// If the run or the item is not there, or its data or enhancers are not where they were.
-pub fn show(args: ShowArgs) -> Result<Outcome> {
+pub(crate) fn show(args: ShowArgs) -> Result<Outcome> {
     let folder = args.run.clone();
     let name = args.item.split('#').next().unwrap_or_default();
     let (manifest, item) = read(AnyRun::open(&folder)?, name);

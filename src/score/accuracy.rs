@@ -48,7 +48,7 @@ impl AccuracyCell {
 pub struct AccuracySummary {
     /// The cells.
     pub cells: Vec<AccuracyCell>,
-    /// UnreadReason replies were unparsed in the strict reading, and how many.
+    /// Why replies were unparsed in the strict reading, and how many.
     pub unread: BTreeMap<UnreadReason, usize>,
 }
 
@@ -79,7 +79,7 @@ impl AccuracySummary {
 
 /// Scores the items of a run; `health` is that of its subjects, and `questions` are what it asks, for the chance line.
 #[must_use]
-pub fn summarize(
+pub(crate) fn summarize(
     grid: &Grid<'_>,
     health: &[Health],
     questions: impl IntoIterator<Item = OfferedChoices>,
@@ -101,7 +101,7 @@ pub fn summarize(
     }
 }
 
-/// UnreadReason replies could not be read, in the strict reading.
+/// Why replies could not be read, in the strict reading.
 fn unread(health: &[Health]) -> BTreeMap<UnreadReason, usize> {
     let mut unread = BTreeMap::new();
     for (why, count) in health.iter().flat_map(|health| &health.unread) {

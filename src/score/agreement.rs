@@ -32,7 +32,7 @@ struct AgreementCounts {
 
 /// Every pair of models in every condition.
 #[must_use]
-pub fn agreements(grid: &Grid<'_>, draws: &Resamples) -> Vec<Agreement> {
+pub(crate) fn agreements(grid: &Grid<'_>, draws: &Resamples) -> Vec<Agreement> {
     let pairs = pairs(grid, ComparisonKind::Model).into_iter();
     pairs
         .filter_map(|(first, second)| agreement(grid, draws, first, second))

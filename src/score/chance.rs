@@ -24,7 +24,9 @@ impl From<&Question> for OfferedChoices {
 /// The exact accuracy of a uniform guess: the mean of 1 / number of choices (DarkQA, section IV); `None` of no questions.
 ///
 /// Summed over counts of choices, so that the order of the questions cannot change a digit.
-pub fn chance<'a>(questions: impl IntoIterator<Item = &'a OfferedChoices>) -> Option<Estimate> {
+pub(crate) fn chance<'a>(
+    questions: impl IntoIterator<Item = &'a OfferedChoices>,
+) -> Option<Estimate> {
     let mut counts = std::collections::BTreeMap::<usize, usize>::new();
     for question in questions {
         *counts.entry(question.choices).or_default() += 1;

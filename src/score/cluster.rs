@@ -41,7 +41,7 @@ pub struct Clusters {
 }
 
 /// With fewer scenes than this their spread says too little; frames are the clusters then.
-pub const FEWEST_SCENES: usize = 8;
+pub(crate) const FEWEST_SCENES: usize = 8;
 
 impl Clusters {
     /// Clusters the frames of questions; `scenes` holds the scene of each frame where it is known.

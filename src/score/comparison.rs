@@ -93,7 +93,7 @@ pub struct Comparison {
 
 /// All comparisons of a grid, by kind, family and subjects.
 #[must_use]
-pub fn comparisons(grid: &Grid<'_>) -> Vec<Comparison> {
+pub(crate) fn comparisons(grid: &Grid<'_>) -> Vec<Comparison> {
     let families = grid.groups();
     let mut jobs = Vec::new();
     for kind in ComparisonKind::ALL {

@@ -26,7 +26,7 @@ pub struct Confusion {
 
 /// The confusions of every subject, for families of few different answers.
 #[must_use]
-pub fn confusions(grid: &Grid<'_>) -> Vec<Confusion> {
+pub(crate) fn confusions(grid: &Grid<'_>) -> Vec<Confusion> {
     let mut all = Vec::new();
     for family in grid.families() {
         let items = grid
@@ -150,7 +150,7 @@ pub struct Hallucination {
 /// The hallucination of every subject on the questions whether an object is there (DarkQA, section IV); replies without a
 /// readable answer are among the replies, and are neither.
 #[must_use]
-pub fn hallucinations(grid: &Grid<'_>) -> Vec<Hallucination> {
+pub(crate) fn hallucinations(grid: &Grid<'_>) -> Vec<Hallucination> {
     let subjects = grid.subjects.iter().enumerate();
     let rates = subjects.map(|(index, subject)| Hallucination {
         subject: subject.clone(),

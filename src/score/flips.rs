@@ -21,7 +21,7 @@ pub struct FirstFailure {
 
 /// Where items fail first, for every curve of a grid.
 #[must_use]
-pub fn falls(grid: &Grid<'_>) -> Vec<FirstFailure> {
+pub(crate) fn falls(grid: &Grid<'_>) -> Vec<FirstFailure> {
     let lines = CurvePoints::all(grid).into_iter().map(|points| {
         let first = (0..grid.items.len()).map(|item| first_failing(grid, &points, item));
         FirstFailure {

@@ -26,6 +26,7 @@ pub enum TrialResult {
 impl TrialResult {
     /// The reading in one mode; `None` where no reply came.
     #[must_use]
+    #[expect(clippy::option_option, reason = "no reply came, or none could be read")]
     pub fn reading(self, mode: ReadingMode) -> Option<Option<u8>> {
         match (self, mode) {
             (Self::Absent | Self::Failed, _) => None,

@@ -18,9 +18,9 @@ pub struct Health {
     pub read: usize,
     /// Replies in which only the lenient reading found one.
     pub lenient_only: usize,
-    /// UnreadReason the strict reading found none, and how often.
+    /// Why the strict reading found none, and how often.
     pub unread: BTreeMap<UnreadReason, usize>,
-    /// UnreadReason no reply came, and how often.
+    /// Why no reply came, and how often.
     pub failed: BTreeMap<FailureKind, usize>,
 }
 
@@ -57,7 +57,7 @@ impl Health {
 
 /// The health of every subject, in their order.
 #[must_use]
-pub fn healths(grid: &Grid<'_>) -> Vec<Health> {
+pub(crate) fn healths(grid: &Grid<'_>) -> Vec<Health> {
     let subjects = grid.subjects.iter().enumerate();
     let healths = subjects.map(|(index, subject)| {
         let mut health = Health {

@@ -7,7 +7,7 @@ use crate::types::flag::flag_words;
 
 /// How answers are judged and a judge's reply is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Protocol {
+pub(crate) enum Protocol {
     /// Answers [`shortened`], marks read as by upstream's `parse_score`, character for character.
     Upstream,
     /// Answers whole; marks the same, and those with space, a full stop, emphasis or a fraction of five about them.
@@ -21,7 +21,7 @@ flag_words!(Protocol);
 /// It is meant for sentences that the token limit has cut; it also makes "about 1." of "about 1.5 meters". An answer without a
 /// full stop, or with nothing behind it, stays.
 #[must_use]
-pub fn shortened(answer: &str) -> &str {
+pub(crate) fn shortened(answer: &str) -> &str {
     match answer.rfind('.') {
         Some(at) if at + 1 < answer.len() => &answer[..=at],
         _ => answer,
@@ -31,7 +31,7 @@ pub fn shortened(answer: &str) -> &str {
 /// The mark in a judge's reply; `None` where there is none. Upstream takes any whole number, which [`points`] brings between 1
 /// and 5; the tolerant reading takes 1 to 5 alone.
 #[must_use]
-pub fn mark(reply: &str, protocol: Protocol) -> Option<i64> {
+pub(crate) fn mark(reply: &str, protocol: Protocol) -> Option<i64> {
     upstream(reply).or_else(|| match protocol {
         Protocol::Upstream => None,
         Protocol::Tolerant => tolerant(reply),
@@ -75,7 +75,7 @@ fn tolerant(reply: &str) -> Option<i64> {
 
 /// What one item is worth, between 0 and 1: (clip(mark, 1, 5) − 1) / 4; an answer that was not given is worth 0, unjudged.
 #[must_use]
-pub fn points(mark: Option<i64>) -> f64 {
+pub(crate) fn points(mark: Option<i64>) -> f64 {
     mark.map_or(0.0, |mark| (mark.clamp(1, 5) - 1) as f64 / 4.0)
 }
 

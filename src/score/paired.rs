@@ -42,7 +42,7 @@ impl ClusterPairs {
 }
 
 impl PairedComparison {
-    /// ClusterPairs two subjects by item; `None` where no item has a reply of both.
+    /// Pairs two subjects by item; `None` where no item has a reply of both.
     #[must_use]
     pub fn new(
         grid: &Grid<'_>,

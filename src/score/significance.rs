@@ -5,7 +5,7 @@
 ///
 /// It takes pairs as independent; [`sign_flip`] does not.
 #[must_use]
-pub fn mcnemar(gained: usize, lost: usize) -> f64 {
+pub(crate) fn mcnemar(gained: usize, lost: usize) -> f64 {
     let few = gained.min(lost);
     let masses = binomial(gained + lost);
     let tail: f64 = masses.iter().take(few + 1).sum();
@@ -19,7 +19,7 @@ pub fn mcnemar(gained: usize, lost: usize) -> f64 {
 /// test; with more it keeps its size where pairs of a cluster go together, which McNemar's does not (the permutation form of
 /// Durkalski et al. 2003, Stat. Med. 22:2417).
 #[must_use]
-pub fn sign_flip(differences: &[i64]) -> f64 {
+pub(crate) fn sign_flip(differences: &[i64]) -> f64 {
     let total = differences.iter().sum::<i64>().unsigned_abs() as usize;
     let mut sizes: Vec<usize> = differences
         .iter()
@@ -81,7 +81,7 @@ fn binomial(n: usize) -> Vec<f64> {
 /// Holm's adjusted p-values (Holm 1979, Scand. J. Stat. 6:65), in the order given: below 0.05 they are significant with
 /// the chance of any false alarm among them held at 5 %.
 #[must_use]
-pub fn holm(values: &[f64]) -> Vec<f64> {
+pub(crate) fn holm(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
     let mut adjusted = vec![0.0; values.len()];

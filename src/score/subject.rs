@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::types::{AxisLevel, Condition, EnhancerName, KindReading, Record, View};
 
 /// The name under which guessing stands among the models.
-pub const CHANCE: &str = "chance";
+pub(crate) const CHANCE: &str = "chance";
 
 /// What a cell of a table is about.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]

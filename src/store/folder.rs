@@ -19,7 +19,7 @@ pub(super) const QUESTIONS: &str = "questions.jsonl";
 pub(super) const THUMBNAILS: &str = "thumbnails.jsonl";
 /// Whether a kept run may go on at another address of its endpoint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum AddressChange {
+pub(crate) enum AddressChange {
     /// It may: the user has named this run as the one to go on with, and says so that it is the same model.
     Allowed,
     /// It may not: another server may serve another model by the same name.
@@ -46,7 +46,7 @@ pub(super) fn write_manifest(folder: &Path, manifest: &RunManifest) -> Result<()
 
 /// What a run folder holds: the last record of each trial, in the order of their first; a last line that was cut off while it
 /// was written is passed over.
-pub fn read_records<D: Detail>(folder: &Path) -> Result<Vec<Record<D>>> {
+pub(crate) fn read_records<D: Detail>(folder: &Path) -> Result<Vec<Record<D>>> {
     let mut latest = HashMap::<TrialKey, usize>::new();
     let mut records: Vec<Record<D>> = Vec::new();
     for record in lines::<Record<D>>(&folder.join(RECORDS))? {
@@ -61,18 +61,18 @@ pub fn read_records<D: Detail>(folder: &Path) -> Result<Vec<Record<D>>> {
 }
 
 /// The questions of a run; none where it was made by a version that kept none.
-pub fn read_questions(folder: &Path) -> Result<Vec<RunQuestion>> {
+pub(crate) fn read_questions(folder: &Path) -> Result<Vec<RunQuestion>> {
     lines(&folder.join(QUESTIONS))
 }
 
 /// The small copies of images of a run; none where it kept none.
-pub fn read_thumbnails(folder: &Path) -> Result<Vec<Thumbnail>> {
+pub(crate) fn read_thumbnails(folder: &Path) -> Result<Vec<Thumbnail>> {
     lines(&folder.join(THUMBNAILS))
 }
 
 /// The newest run folder in `base` whose name ends in `-<hash>`.
 #[must_use]
-pub fn find(base: &Path, hash: &str) -> Option<PathBuf> {
+pub(crate) fn find(base: &Path, hash: &str) -> Option<PathBuf> {
     let ending = format!("-{hash}");
     let folders = fs::read_dir(base).ok()?.flatten().map(|entry| entry.path());
     folders
@@ -89,7 +89,7 @@ pub fn find(base: &Path, hash: &str) -> Option<PathBuf> {
 ///
 /// # Errors
 /// Where its manifest cannot be read.
-pub fn schema(folder: &Path) -> Result<Option<String>> {
+pub(crate) fn schema(folder: &Path) -> Result<Option<String>> {
     Ok(any_manifest(folder)?.map(|manifest| manifest.schema))
 }
 
@@ -97,7 +97,7 @@ pub fn schema(folder: &Path) -> Result<Option<String>> {
 ///
 /// # Errors
 /// Where it cannot be read, or is that of a run with other records than those of `schema`.
-pub fn read_manifest(folder: &Path, schema: &str) -> Result<Option<RunManifest>> {
+pub(crate) fn read_manifest(folder: &Path, schema: &str) -> Result<Option<RunManifest>> {
     let Some(manifest) = any_manifest(folder)? else {
         return Ok(None);
     };

@@ -23,12 +23,12 @@ use crate::types::{
 use folder::{QUESTIONS, RECORDS, THUMBNAILS, agree, claim, write, write_manifest};
 use lines::{append, json_lines, lines, mend};
 
-pub use folder::{
+pub(crate) use folder::{
     AddressChange, find, read_manifest, read_questions, read_records, read_thumbnails, schema,
 };
 
 /// The folder of batches in a run.
-pub const BATCH: &str = "batch";
+pub(crate) const BATCH: &str = "batch";
 /// The trials that were sent in batches.
 const TRIALS: &str = "trials.jsonl";
 
@@ -37,7 +37,7 @@ const SYNC_EVERY: Duration = Duration::from_secs(2);
 
 /// An open run folder, held by this process alone.
 #[derive(Debug)]
-pub struct Store<D = ChoiceDetail> {
+pub(crate) struct Store<D = ChoiceDetail> {
     folder: PathBuf,
     records: File,
     synced: Instant,
@@ -52,7 +52,11 @@ impl<D: Detail> Store<D> {
     /// # Errors
     /// Where the folder holds something else, another run (the message names the flag that differs), a broken record, or
     /// is held by another process.
-    pub fn open(folder: &Path, manifest: &RunManifest, moved: AddressChange) -> Result<Self> {
+    pub(crate) fn open(
+        folder: &Path,
+        manifest: &RunManifest,
+        moved: AddressChange,
+    ) -> Result<Self> {
         match read_manifest(folder, D::SCHEMA)? {
             Some(kept) => agree(folder, &kept, manifest, moved)?,
             None => claim(folder, manifest)?,
@@ -83,12 +87,12 @@ impl<D: Detail> Store<D> {
     }
 
     /// What the run holds: the last record of each trial, in the order of their first.
-    pub fn records(&self) -> Result<Vec<Record<D>>> {
+    pub(crate) fn records(&self) -> Result<Vec<Record<D>>> {
         read_records(&self.folder)
     }
 
     /// Takes note that these trials are out in a batch.
-    pub fn append_to_batch(&mut self, records: &[Record<D>]) -> Result<()> {
+    pub(crate) fn append_to_batch(&mut self, records: &[Record<D>]) -> Result<()> {
         let path = self.folder.join(BATCH).join(TRIALS);
         append(&path, records)?
             .sync_all()
@@ -96,7 +100,7 @@ impl<D: Detail> Store<D> {
     }
 
     /// Keeps a small copy of an image.
-    pub fn append_thumbnail(&mut self, thumbnail: &Thumbnail) -> Result<()> {
+    pub(crate) fn append_thumbnail(&mut self, thumbnail: &Thumbnail) -> Result<()> {
         append(
             &self.folder.join(THUMBNAILS),
             std::slice::from_ref(thumbnail),
@@ -108,7 +112,7 @@ impl<D: Detail> Store<D> {
     ///
     /// # Errors
     /// If one that it had is another by now: other words, choices, answer or image.
-    pub fn add_questions(&self, mut questions: Vec<RunQuestion>) -> Result<()> {
+    pub(crate) fn add_questions(&self, mut questions: Vec<RunQuestion>) -> Result<()> {
         let ids = questions.iter().map(|question| question.id.clone());
         let places: HashMap<QuestionId, usize> = ids.zip(0..).collect();
         for known in read_questions(&self.folder)? {
@@ -134,7 +138,7 @@ impl<D: Detail> Store<D> {
     }
 
     /// Keeps the questions of the run.
-    pub fn write_questions(&self, questions: &[RunQuestion]) -> Result<()> {
+    pub(crate) fn write_questions(&self, questions: &[RunQuestion]) -> Result<()> {
         self.write(
             QUESTIONS,
             &json_lines(&self.folder.join(QUESTIONS), questions)?,
@@ -142,12 +146,12 @@ impl<D: Detail> Store<D> {
     }
 
     /// The trials that were sent in batches, as they were before anything came of them, each as often as it was sent.
-    pub fn batched(&self) -> Result<Vec<Record<D>>> {
+    pub(crate) fn batched(&self) -> Result<Vec<Record<D>>> {
         lines(&self.folder.join(BATCH).join(TRIALS))
     }
 
     /// The trials that are out in a batch: sent more often than a reply or a failure of theirs was taken over.
-    pub fn out_in_batches(&self) -> Result<BTreeSet<TrialKey>> {
+    pub(crate) fn out_in_batches(&self) -> Result<BTreeSet<TrialKey>> {
         let mut out = HashMap::<TrialKey, usize>::new();
         for record in self.batched()? {
             *out.entry(record.key).or_default() += 1;
@@ -170,12 +174,12 @@ impl<D: Detail> Store<D> {
 
     /// The run folder.
     #[must_use]
-    pub fn folder(&self) -> &Path {
+    pub(crate) fn folder(&self) -> &Path {
         &self.folder
     }
 
     /// Appends one record: once this returns, killing the process cannot lose it.
-    pub fn append(&mut self, record: &Record<D>) -> Result<()> {
+    pub(crate) fn append(&mut self, record: &Record<D>) -> Result<()> {
         let path = || self.folder.join(RECORDS);
         let mut line =
             serde_json::to_vec(record).map_err(|e| Error::file(path(), "write", e.into()))?;
@@ -191,7 +195,7 @@ impl<D: Detail> Store<D> {
     }
 
     /// Forces all records to the disk.
-    pub fn sync(&mut self) -> Result<()> {
+    pub(crate) fn sync(&mut self) -> Result<()> {
         self.synced = Instant::now();
         self.records
             .sync_data()
@@ -199,12 +203,12 @@ impl<D: Detail> Store<D> {
     }
 
     /// Writes the manifest.
-    pub fn write_manifest(&self, manifest: &RunManifest) -> Result<()> {
+    pub(crate) fn write_manifest(&self, manifest: &RunManifest) -> Result<()> {
         write_manifest(&self.folder, manifest)
     }
 
     /// Writes a file into the run folder, whole or not at all; one that already says this is left as it is.
-    pub fn write(&self, name: &str, content: &[u8]) -> Result<()> {
+    pub(crate) fn write(&self, name: &str, content: &[u8]) -> Result<()> {
         write(&self.folder, name, content)
     }
 }

@@ -6,7 +6,7 @@ use super::lanes::{LANES, Lanes};
 
 /// The four colour planes of an RGGB mosaic, each of half the height and half the width.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Plane {
+pub(crate) enum Plane {
     /// Red: even rows, even columns.
     R,
     /// Green in the rows of red: even rows, odd columns.
@@ -19,11 +19,11 @@ pub enum Plane {
 
 impl Plane {
     /// All four, in the order in which per-plane numbers are listed.
-    pub const ALL: [Self; 4] = [Self::R, Self::Gr, Self::Gb, Self::B];
+    pub(crate) const ALL: [Self; 4] = [Self::R, Self::Gr, Self::Gb, Self::B];
 
     /// The plane of a sensor site.
     #[must_use]
-    pub fn at(row: usize, column: usize) -> Self {
+    pub(crate) fn at(row: usize, column: usize) -> Self {
         Self::ALL[2 * (row & 1) + (column & 1)]
     }
 }

@@ -3,54 +3,56 @@
 //! Every transcendental function is `libm`'s, so that the results are the same bits on every machine.
 
 /// The exponent that stands for the sRGB curve (DarkQA, eqs. 1 and 3).
-pub const GAMMA: f64 = 2.2;
+pub(crate) const GAMMA: f64 = 2.2;
 
 /// The floor below the powers (DarkQA, ε of eq. 1).
-pub const FLOOR: f64 = 1e-8;
+pub(crate) const FLOOR: f64 = 1e-8;
 
 /// Linear light of a display value in [0, 1] (DarkQA, eq. 1).
 #[must_use]
-pub fn gamma_expand(display: f64) -> f64 {
+pub(crate) fn gamma_expand(display: f64) -> f64 {
     libm::pow(display.max(FLOOR), GAMMA)
 }
 
 /// The display value of linear light in [0, 1] (DarkQA, eq. 3).
 #[must_use]
-pub fn gamma_compress(linear: f64) -> f64 {
+pub(crate) fn gamma_compress(linear: f64) -> f64 {
     libm::pow(linear.max(FLOOR), 1.0 / GAMMA)
 }
 
 /// The inverse of the tone curve 3x² − 2x³, for values in [0, 1] (Brooks et al. 2019, `inverse_smoothstep`).
 #[must_use]
-pub fn inverse_smoothstep(display: f64) -> f64 {
+pub(crate) fn inverse_smoothstep(display: f64) -> f64 {
     let display = display.clamp(0.0, 1.0);
     0.5 - libm::sin(libm::asin(1.0 - 2.0 * display) / 3.0)
 }
 
 /// The factor 2^−ΔEV by which light falls (DarkQA, eq. 2).
+#[cfg(test)]
 #[must_use]
-pub fn light_left(drop_ev: f64) -> f64 {
+pub(crate) fn light_left(drop_ev: f64) -> f64 {
     libm::exp2(-drop_ev)
 }
 
 /// The factor 2^(−ΔEV/2.2) by which display values fall: the exposure drop behind the gamma (DarkQA, eqs. 2 and 3).
 #[must_use]
-pub fn display_left(drop_ev: f64) -> f64 {
+pub(crate) fn display_left(drop_ev: f64) -> f64 {
     libm::exp2(-drop_ev / GAMMA)
 }
 
 /// The tone curve 3x² − 2x³, for values in [0, 1].
 #[inline(always)]
 #[must_use]
-pub fn smoothstep(display: f32) -> f32 {
+pub(crate) fn smoothstep(display: f32) -> f32 {
     display * display * (3.0 - 2.0 * display)
 }
 
 /// The nearest 8-bit code of a display value; values outside [0, 1] take the nearest end.
 ///
 /// Rounding, not truncation: that would add half a code of bias, 7 % of a grey at L5.
+#[cfg(test)]
 #[must_use]
-pub fn to_code(display: f64) -> u8 {
+pub(crate) fn to_code(display: f64) -> u8 {
     (255.0 * display.clamp(0.0, 1.0) + 0.5).floor() as u8
 }
 

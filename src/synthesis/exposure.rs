@@ -7,7 +7,7 @@ use super::lanes::{Isa, Kernel};
 use crate::types::{Rgb, Severity};
 
 /// The version of the exposure branch: raised whenever a pixel changes.
-pub const VERSION: u32 = 1;
+pub(crate) const VERSION: u32 = 1;
 
 /// Samples that one thread takes at a time.
 const PART: usize = 1 << 16;
@@ -41,7 +41,7 @@ pub fn expose(clean: &Rgb, drop: Severity) -> Rgb {
 
 /// The image after any exposure drop in EV, without noise; ties between codes fall as single precision has them.
 #[must_use]
-pub fn expose_by(clean: &Rgb, drop_ev: f64) -> Rgb {
+pub(crate) fn expose_by(clean: &Rgb, drop_ev: f64) -> Rgb {
     let mut dark = Rgb::black(clean.height(), clean.width());
     expose_into(clean, drop_ev, &mut dark);
     dark
@@ -88,7 +88,7 @@ const TIE: f64 = 1e-9;
 
 /// The code that each 8-bit code becomes: floor(2^(−ΔEV/2.2) · code + ½), ties up.
 #[must_use]
-pub fn table(drop: Severity) -> [u8; 256] {
+pub(crate) fn table(drop: Severity) -> [u8; 256] {
     let left = curve::display_left(drop.value());
     std::array::from_fn(|code| (code as f64 * left + 0.5 + TIE).floor() as u8)
 }

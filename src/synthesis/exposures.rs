@@ -47,7 +47,7 @@ impl Exposures {
 /// The version of a kind: raised whenever one of its pixels changes, so that no result of an older one is taken for its
 /// own.
 #[must_use]
-pub fn version(kind: Kind) -> u32 {
+pub(crate) fn version(kind: Kind) -> u32 {
     match kind {
         Kind::Exposure => super::exposure::VERSION,
         Kind::Sensor => super::VERSION,
@@ -56,7 +56,7 @@ pub fn version(kind: Kind) -> u32 {
 
 /// Whether random numbers enter, so that seed and frame decide the pixels too.
 #[must_use]
-pub fn is_random(kind: Kind) -> bool {
+pub(crate) fn is_random(kind: Kind) -> bool {
     match kind {
         Kind::Exposure => false,
         Kind::Sensor => true,

@@ -5,20 +5,20 @@
 //! gives the same bits; tests hold them to it.
 
 /// The number of samples that a kernel works on at once.
-pub const LANES: usize = 64;
+pub(crate) const LANES: usize = 64;
 
 /// One number a sample.
-pub type Lanes<T> = [T; LANES];
+pub(crate) type Lanes<T> = [T; LANES];
 
 /// Work that is compiled once for each [`Isa`].
-pub trait Kernel {
+pub(crate) trait Kernel {
     /// Does it. Must be `#[inline(always)]`, as must be all that it calls: inlined code takes the caller's instructions.
     fn run(self);
 }
 
 /// An instruction set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Isa {
+pub(crate) enum Isa {
     /// What every machine of the architecture has.
     Baseline,
     /// x86-64 with 256-bit vectors.
@@ -31,8 +31,9 @@ pub enum Isa {
 
 impl Isa {
     /// Those that this machine has, the best last.
+    #[cfg(test)]
     #[must_use]
-    pub fn present() -> Vec<Self> {
+    pub(crate) fn present() -> Vec<Self> {
         [
             Some(Self::Baseline),
             #[cfg(target_arch = "x86_64")]
@@ -47,7 +48,7 @@ impl Isa {
 
     /// The best that this machine has.
     #[must_use]
-    pub fn best() -> Self {
+    pub(crate) fn best() -> Self {
         #[cfg(target_arch = "x86_64")]
         if has_avx512() {
             return Self::Avx512;
@@ -59,7 +60,7 @@ impl Isa {
 
     /// Runs a kernel with these instructions, or with the baseline's where the machine lacks them.
     #[expect(unsafe_code, reason = "only the check before it makes the call sound")]
-    pub fn run(self, kernel: impl Kernel) {
+    pub(crate) fn run(self, kernel: impl Kernel) {
         match self {
             // SAFETY: the machine has the instructions that the function is compiled for.
             #[cfg(target_arch = "x86_64")]

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! Exposure   sRGB ─ gamma ─ × 2^−ΔEV ─ gamma⁻¹ ─ 8 bit                            a table of 256 codes
-//! SensorSettings     sRGB ─ unprocess ─ RAW ─ shot, read, row, quantisation ─ balance ─┐
+//! Sensor     sRGB ─ unprocess ─ RAW ─ shot, read, row, quantisation ─ balance ─┐
 //!                                                     a Negative, drawn once ◄─┘
 //!            Negative ─ demosaic ─ camera → sRGB ─ × 2^−ΔEV ─ gamma⁻¹ ─ 8 bit     for each level
 //! ```
@@ -21,31 +21,33 @@
     reason = "only inlined code is compiled for a kernel's instruction set, see lanes"
 )]
 
-pub mod bayer;
-pub mod camera;
-pub mod colour;
-pub mod curve;
-pub mod exposure;
+pub(crate) mod bayer;
+pub(crate) mod camera;
+pub(crate) mod colour;
+pub(crate) mod curve;
+pub(crate) mod exposure;
 mod exposures;
 mod isp;
-pub mod lanes;
-pub mod negative;
-pub mod noise;
-pub mod piecewise;
-pub mod poisson;
-pub mod quantile;
-pub mod random;
+pub(crate) mod lanes;
+pub(crate) mod negative;
+pub(crate) mod noise;
+pub(crate) mod piecewise;
+pub(crate) mod poisson;
+pub(crate) mod quantile;
+pub(crate) mod random;
 mod reading;
 mod settings;
-pub mod unprocess;
+pub(crate) mod unprocess;
 
 pub use camera::{Calibration, CameraModel, CameraState, Sampling};
-pub use exposure::{expose, expose_by};
-pub use exposures::{Exposures, is_random, version};
-pub use negative::{Negative, ladder};
+pub(crate) use exposure::{expose, expose_by};
+pub use exposures::Exposures;
+pub(crate) use exposures::{is_random, version};
+pub(crate) use negative::{Negative, ladder};
 pub use random::NoiseKey;
-pub use reading::{Amplify, Coupling, Draws, LightReading, Readings, Synthesis, Tone};
-pub use settings::{LightArgs, LightSettings, SensorArgs, SensorSettings};
+pub(crate) use reading::Readings;
+pub use reading::{Amplify, Coupling, Draws, LightReading, Synthesis, Tone};
+pub(crate) use settings::{LightArgs, LightSettings, SensorArgs, SensorSettings};
 
 use crate::types::{Degradation, Rgb};
 

@@ -46,7 +46,7 @@ pub fn add(raw: &mut Bayer, state: &CameraState, key: &NoiseKey, amplify: Amplif
 
 /// Photon shot noise on the attenuated signal y: K · Poisson(y / K), of mean y and variance K · y.
 #[inline(always)]
-pub fn shot(adu: &mut Lanes<f32>, gain: f32, words: [&Lanes<u32>; 2]) {
+pub(crate) fn shot(adu: &mut Lanes<f32>, gain: f32, words: [&Lanes<u32>; 2]) {
     for y in adu.iter_mut() {
         *y /= gain;
     }
@@ -58,7 +58,13 @@ pub fn shot(adu: &mut Lanes<f32>, gain: f32, words: [&Lanes<u32>; 2]) {
 
 /// Read noise: σ_TL · Q_λ(u) and the offset of the plane (Wei et al. 2021).
 #[inline(always)]
-pub fn read(adu: &mut Lanes<f32>, scale: f32, shape: &Quantile, offset: f32, words: &Lanes<u32>) {
+pub(crate) fn read(
+    adu: &mut Lanes<f32>,
+    scale: f32,
+    shape: &Quantile,
+    offset: f32,
+    words: &Lanes<u32>,
+) {
     let quantiles = shape.lanes(words);
     for (y, quantile) in adu.iter_mut().zip(&quantiles) {
         *y += scale * quantile + offset;
@@ -67,13 +73,13 @@ pub fn read(adu: &mut Lanes<f32>, scale: f32, shape: &Quantile, offset: f32, wor
 
 /// Row noise: one number of N(0, σ_r²) for the whole sensor row, that is for both of its planes (Wei et al. 2021).
 #[must_use]
-pub fn row(deviation: f64, stream: Stream, row: usize) -> f32 {
+pub(crate) fn row(deviation: f64, stream: Stream, row: usize) -> f32 {
     (deviation * stream.at(Site::new(row, 0)).normal()) as f32
 }
 
 /// Quantisation noise: U(−½, ½), the error of rounding to a whole ADU.
 #[inline(always)]
-pub fn quantisation(adu: &mut Lanes<f32>, words: &Lanes<u32>) {
+pub(crate) fn quantisation(adu: &mut Lanes<f32>, words: &Lanes<u32>) {
     for (y, word) in adu.iter_mut().zip(words) {
         *y += word.cast_signed() as f32 * (1.0 / 4_294_967_296.0);
     }

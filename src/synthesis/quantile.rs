@@ -12,29 +12,29 @@ const LAST: f32 = 2_147_483_520.0;
 ///
 /// Its tails go out to u = 2⁻³³.
 #[derive(Debug, Clone)]
-pub struct Quantile(Piecewise);
+pub(crate) struct Quantile(Piecewise);
 
 /// That of the standard normal distribution.
-pub static NORMAL: LazyLock<Quantile> = LazyLock::new(|| Quantile::new(standard_normal));
+pub(crate) static NORMAL: LazyLock<Quantile> = LazyLock::new(|| Quantile::new(standard_normal));
 
 impl Quantile {
     /// Tabulates a quantile function, given for u in (0, ½].
     #[must_use]
-    pub fn new(function: impl Fn(f64) -> f64) -> Self {
+    pub(crate) fn new(function: impl Fn(f64) -> f64) -> Self {
         let cell = libm::ldexp(1.0, -32);
         Self(Piecewise::new(-1, |place| function(place * cell)))
     }
 
     /// That of Tukey's λ distribution of a shape.
     #[must_use]
-    pub fn tukey_lambda(shape: f64) -> Self {
+    pub(crate) fn tukey_lambda(shape: f64) -> Self {
         Self::new(|u| tukey_lambda(u, shape))
     }
 
     /// The quantile that 32 random bits name: the sign, and 31 bits of u.
     #[inline(always)]
     #[must_use]
-    pub fn at(&self, word: u32) -> f32 {
+    pub(crate) fn at(&self, word: u32) -> f32 {
         let place = (word & 0x7FFF_FFFF).cast_signed() as f32 + 0.5;
         let lower = self.0.at(if place < LAST { place } else { LAST });
         f32::from_bits(lower.to_bits() ^ (word & 0x8000_0000))
@@ -43,7 +43,7 @@ impl Quantile {
     /// The quantiles of many words.
     #[inline(always)]
     #[must_use]
-    pub fn lanes(&self, words: &Lanes<u32>) -> Lanes<f32> {
+    pub(crate) fn lanes(&self, words: &Lanes<u32>) -> Lanes<f32> {
         let mut numbers = [0.0; LANES];
         for (number, word) in numbers.iter_mut().zip(words) {
             *number = self.at(*word);
@@ -57,7 +57,7 @@ impl Quantile {
 ///
 /// Written as a difference of exp(λ ln u) − 1, which keeps its digits for every λ near 0.
 #[must_use]
-pub fn tukey_lambda(u: f64, shape: f64) -> f64 {
+pub(crate) fn tukey_lambda(u: f64, shape: f64) -> f64 {
     let (below, above) = (libm::log(u), libm::log1p(-u));
     if shape == 0.0 {
         below - above

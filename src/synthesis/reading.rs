@@ -86,7 +86,7 @@ impl Synthesis {
 /// The light readings of a run, by name; at least one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(transparent)]
-pub struct Readings(BTreeMap<ReadingName, Synthesis>);
+pub(crate) struct Readings(BTreeMap<ReadingName, Synthesis>);
 
 impl Default for Readings {
     fn default() -> Self {
@@ -103,7 +103,7 @@ impl From<Synthesis> for Readings {
 impl Readings {
     /// Several named readings, with one camera; `paper` alone of an empty list.
     #[must_use]
-    pub fn named(readings: &[LightReading], camera: &CameraModel) -> Self {
+    pub(crate) fn named(readings: &[LightReading], camera: &CameraModel) -> Self {
         let contents = readings.iter();
         let contents: BTreeMap<_, _> = contents
             .map(|reading| (reading.name(), Synthesis::of(*reading, camera.clone())))
@@ -115,7 +115,7 @@ impl Readings {
     }
 
     /// The names with the contents, `paper` first.
-    pub fn iter(&self) -> impl Iterator<Item = (&ReadingName, &Synthesis)> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (&ReadingName, &Synthesis)> {
         self.0.iter()
     }
 
@@ -124,7 +124,7 @@ impl Readings {
     ///
     /// # Errors
     /// If the run does not know the reading.
-    pub fn of(&self, how: Option<&Degradation>) -> Result<&Synthesis> {
+    pub(crate) fn of(&self, how: Option<&Degradation>) -> Result<&Synthesis> {
         let content = match how.and_then(Degradation::reading) {
             None => self.0.values().next(),
             Some(name) => self.0.get(name),
@@ -144,7 +144,7 @@ impl Readings {
     ///
     /// # Errors
     /// If there are several, where a command takes one.
-    pub fn only(&self) -> Result<&Synthesis> {
+    pub(crate) fn only(&self) -> Result<&Synthesis> {
         let mut contents = self.0.values();
         match (contents.next(), contents.next()) {
             (Some(one), None) => Ok(one),

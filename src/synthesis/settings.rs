@@ -14,8 +14,8 @@ use crate::types::{AxisLevel, Degradation, KindSet, ReadingName, Severity};
 
 /// The levels and kinds of degradation.
 #[derive(Debug, Clone, Args)]
-#[command(next_help_heading = "LightSettings")]
-pub struct LightArgs {
+#[command(next_help_heading = "Light")]
+pub(crate) struct LightArgs {
     /// Levels, as L0-L5 or L0,L3, and exposure drops in EV up to 16, as L0,3.3
     #[arg(long, value_name = "LEVELS", default_value = "L0-L5")]
     pub levels: Levels,
@@ -29,12 +29,12 @@ pub struct LightArgs {
 
 /// The sensor and its noise.
 #[derive(Debug, Clone, Args)]
-#[command(next_help_heading = "LightSettings")]
-pub struct SensorArgs {
+#[command(next_help_heading = "Light")]
+pub(crate) struct SensorArgs {
     /// The seed of all random draws
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// LightSettings readings, how the paper's noise is understood, one or several as paper,eld; flags beside one go before its parts and
+    /// Light readings, how the paper's noise is understood, one or several as paper,eld; flags beside one go before its parts and
     /// make it custom
     ///
     /// Conditions with noise carry the reading's name, as L3-noise@physical; that of paper is bare, L3-noise.
@@ -80,11 +80,11 @@ pub struct SensorArgs {
 
 /// Levels, the lightest first, none twice.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Levels(pub Vec<AxisLevel>);
+pub(crate) struct Levels(pub Vec<AxisLevel>);
 
-/// LightSettings readings by name.
+/// Light readings by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Profile {
+pub(crate) enum Profile {
     /// DarkQA to the letter
     Paper,
     /// --amplify all
@@ -111,7 +111,7 @@ impl Profile {
 
 /// What is done to frames.
 #[derive(Debug)]
-pub struct LightSettings {
+pub(crate) struct LightSettings {
     /// The levels, lightest first, none twice.
     pub levels: Vec<AxisLevel>,
     /// The kinds of degradation at all levels but L0.
@@ -122,7 +122,7 @@ pub struct LightSettings {
 
 /// What takes the noisy images.
 #[derive(Debug)]
-pub struct SensorSettings {
+pub(crate) struct SensorSettings {
     /// The seed of all random draws.
     pub seed: u64,
     /// The light readings of the sensor branch.
@@ -134,7 +134,7 @@ impl LightSettings {
     ///
     /// # Errors
     /// [`Error::Usage`] with the flag that cannot be used.
-    pub fn resolve(args: &LightArgs) -> Result<Self> {
+    pub(crate) fn resolve(args: &LightArgs) -> Result<Self> {
         Ok(Self {
             levels: args.levels.0.clone(),
             variants: args.variant,
@@ -143,7 +143,7 @@ impl LightSettings {
     }
 
     /// What is done to each frame, level by level: each kind, in each light reading if it has readings; `None` is L0.
-    pub fn degradations(&self) -> Vec<Option<Degradation>> {
+    pub(crate) fn degradations(&self) -> Vec<Option<Degradation>> {
         let mut all = Vec::new();
         for level in &self.levels {
             let Some(severity) = level.severity() else {
@@ -173,7 +173,7 @@ impl SensorSettings {
     ///
     /// # Errors
     /// [`Error::Usage`] with the flag that cannot be used.
-    pub fn resolve(args: &SensorArgs) -> Result<Self> {
+    pub(crate) fn resolve(args: &SensorArgs) -> Result<Self> {
         Ok(Self {
             seed: args.seed,
             readings: readings(args)?,

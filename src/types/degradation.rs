@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Deserializer, Serialize};
 
-pub use super::severity::{Axis, Severity};
+pub(crate) use super::severity::{Axis, Severity};
 use super::words::written_as_text;
 use crate::error::Error;
 

@@ -164,7 +164,7 @@ pub enum TrialOutcome {
 pub struct AnswerReading {
     /// The index of the choice.
     pub chosen: Option<usize>,
-    /// UnreadReason there is none.
+    /// Why there is none.
     pub why: Option<UnreadReason>,
 }
 

@@ -17,7 +17,7 @@ const MAX_THREADS: usize = 1024;
 ///
 /// # Errors
 /// With what is expected.
-pub fn positive(text: &str) -> Result<f64, String> {
+pub(crate) fn positive(text: &str) -> Result<f64, String> {
     let value = text.trim().parse().ok();
     let value = value.filter(|value: &f64| value.is_finite() && *value > 0.0);
     value.ok_or_else(|| "a number above 0 expected".to_owned())
@@ -27,7 +27,7 @@ pub fn positive(text: &str) -> Result<f64, String> {
 ///
 /// # Errors
 /// With what is expected.
-pub fn seconds(text: &str) -> Result<Duration, String> {
+pub(crate) fn seconds(text: &str) -> Result<Duration, String> {
     let duration = positive(text)
         .ok()
         .and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
@@ -39,7 +39,7 @@ pub fn seconds(text: &str) -> Result<Duration, String> {
 ///
 /// # Errors
 /// With what is expected.
-pub fn threads(text: &str) -> Result<NonZeroUsize, String> {
+pub(crate) fn threads(text: &str) -> Result<NonZeroUsize, String> {
     let threads = text.trim().parse().ok();
     let threads = threads.filter(|threads: &NonZeroUsize| threads.get() <= MAX_THREADS);
     threads.ok_or_else(|| format!("a number from 1 to {MAX_THREADS} expected"))

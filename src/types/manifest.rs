@@ -40,7 +40,7 @@ pub struct Counts {
 }
 
 /// The fields in which two identities differ, each with what the one says and what the other says; `unset` where it says nothing.
-pub fn differences<'a>(
+pub(crate) fn differences<'a>(
     one: &'a BTreeMap<String, Value>,
     other: &'a BTreeMap<String, Value>,
 ) -> impl Iterator<Item = (&'a str, String, String)> {

@@ -1,22 +1,22 @@
 //! The shared vocabulary: no input or output, no pixel mathematics.
 
-pub mod axis_level;
+pub(crate) mod axis_level;
 mod canonical;
-pub mod condition;
-pub mod degradation;
-pub mod detail;
-pub mod digest;
-pub mod flag;
-pub mod frame;
-pub mod kind_set;
-pub mod labels;
-pub mod manifest;
-pub mod question;
-pub mod record;
-pub mod reply;
-pub mod run_question;
-pub mod severity;
-pub mod trial_key;
+pub(crate) mod condition;
+pub(crate) mod degradation;
+pub(crate) mod detail;
+pub(crate) mod digest;
+pub(crate) mod flag;
+pub(crate) mod frame;
+pub(crate) mod kind_set;
+pub(crate) mod labels;
+pub(crate) mod manifest;
+pub(crate) mod question;
+pub(crate) mod record;
+pub(crate) mod reply;
+pub(crate) mod run_question;
+pub(crate) mod severity;
+pub(crate) mod trial_key;
 pub(crate) mod words;
 
 pub use axis_level::{AxisLevel, KindReading};

@@ -162,7 +162,7 @@ impl Choices {
 
 /// The letter of the choice at an index: 0 is `A`.
 #[must_use]
-pub fn letter(index: usize) -> char {
+pub(crate) fn letter(index: usize) -> char {
     char::from(b'A' + (index % Choices::MOST) as u8)
 }
 
@@ -192,7 +192,7 @@ pub enum Answer {
     Unparsed(UnreadReason),
 }
 
-/// UnreadReason no choice could be read from a reply.
+/// Why no choice could be read from a reply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum UnreadReason {

@@ -6,14 +6,12 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use darkqa_eval::ask::{Payload, PayloadFormat};
-use darkqa_eval::job::bilinear::bilinear;
-use darkqa_eval::synthesis::exposure::expose_into;
-use darkqa_eval::synthesis::noise::{self, Term};
-use darkqa_eval::synthesis::unprocess::unprocess;
-use darkqa_eval::synthesis::{
-    Amplify, Draws, Negative, NoiseKey, Synthesis, expose, ladder as develop_ladder,
+use darkqa_eval::internals::ask::{Payload, PayloadFormat};
+use darkqa_eval::internals::job::bilinear;
+use darkqa_eval::internals::synthesis::{
+    Negative, Term, add_noise, expose, expose_into, ladder as develop_ladder, unprocess,
 };
+use darkqa_eval::synthesis::{Amplify, Draws, NoiseKey, Synthesis};
 use darkqa_eval::types::{FrameId, Rgb, Severity};
 
 /// A frame with edges, ramps and some texture, made by integer arithmetic.
@@ -108,7 +106,7 @@ fn parts(c: &mut Criterion) {
     ];
     for (name, terms) in sets {
         group.bench_function(name, |b| {
-            b.iter(|| noise::add(black_box(&mut raw), &state, &key, Amplify::ShotOnly, terms));
+            b.iter(|| add_noise(black_box(&mut raw), &state, &key, Amplify::ShotOnly, terms));
         });
         raw = unprocess(&clean, &state);
     }

@@ -7,10 +7,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use darkqa_eval::dataset::Dataset;
-use darkqa_eval::questions::colors::Palette;
-use darkqa_eval::questions::rules::Rules;
-use darkqa_eval::questions::statistics::measure;
+use darkqa_eval::internals::dataset::Dataset;
+use darkqa_eval::internals::questions::{Palette, Rules, measure};
 use darkqa_eval::types::{
     DepthKind, Digest, Frame, FrameId, Intrinsics, Label, Labels, Rgb, Segmentation,
 };

@@ -15,11 +15,9 @@ use std::collections::BTreeMap;
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use darkqa_eval::report::page::PageInputs;
-use darkqa_eval::report::products::products;
-use darkqa_eval::report::tables::tables;
-use darkqa_eval::score::findings::Findings;
-use darkqa_eval::types::degradation::Kind;
+use darkqa_eval::Kind;
+use darkqa_eval::internals::report::{PageInputs, products, tables};
+use darkqa_eval::internals::score::Findings;
 use darkqa_eval::types::{Condition, Degradation, Digest, Family, Record, Severity};
 use made::record;
 

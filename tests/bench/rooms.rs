@@ -7,11 +7,8 @@
 use std::hint::black_box;
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
-use darkqa_eval::questions::colors::Palette;
-use darkqa_eval::questions::observer::ObservedFrame;
-use darkqa_eval::questions::rules::Rules;
-use darkqa_eval::rooms::Rooms;
-use darkqa_eval::rooms::{Room, labels};
+use darkqa_eval::internals::questions::{ObservedFrame, Palette, Rules};
+use darkqa_eval::internals::rooms::{Room, Rooms, labels};
 
 const ROOMS: Rooms = Rooms {
     frames: 12,

@@ -16,4 +16,4 @@ pub(super) use wait::asked_wait;
 pub(super) use window::Window;
 
 pub use gate::Quota;
-pub use window::Bounds;
+pub(crate) use window::Bounds;

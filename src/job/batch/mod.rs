@@ -16,7 +16,7 @@ use clap::Args;
 /// What the input files of a Batch API are like; the limits are those of OpenAI and Azure.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Batch")]
-pub struct BatchFileArgs {
+pub(crate) struct BatchFileArgs {
     /// The most bytes of a file, in MB
     #[arg(long, value_name = "MB", default_value = "200")]
     pub file_size: NonZeroU64,

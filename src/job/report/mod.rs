@@ -7,4 +7,4 @@ mod join;
 pub(crate) mod open;
 mod runs;
 
-pub use runs::{ReportArgs, report};
+pub(crate) use runs::{ReportArgs, report};

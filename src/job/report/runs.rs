@@ -22,7 +22,7 @@ use crate::types::{ChoiceDetail, OpenDetail};
 
 /// The flags of `report`.
 #[derive(Debug, Args)]
-pub struct ReportArgs {
+pub(crate) struct ReportArgs {
     /// Folders of runs
     #[arg(value_name = "RUN", required = true)]
     pub runs: Vec<PathBuf>,
@@ -48,7 +48,7 @@ impl ReportArgs {
 ///
 /// # Errors
 /// If a folder holds no run, a record is broken, or the runs asked different questions.
-pub fn report(args: &ReportArgs) -> Result<Outcome> {
+pub(crate) fn report(args: &ReportArgs) -> Result<Outcome> {
     let (mut choice, mut open) = (Vec::new(), Vec::new());
     for folder in &args.runs {
         match AnyRun::open(folder)? {

@@ -1,4 +1,4 @@
-//! What the words of data sets mean: [`Names`], from a word to a class of mpcat40.
+//! What the words of data sets mean: [`meaning()`], from a word to a class of mpcat40.
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;

@@ -3,7 +3,7 @@
 //! The image is cut into square cells. Where two masks meet in one, the means of their pixels there are compared: close to
 //! the border between them, so that light which changes over the room plays no part. The squares of these differences, each
 //! over its own uncertainty, are added up over all cells of a border, for the sign of a contrast changes along it as patterns
-//! and light do. PixelNoise alone makes one of each on average; what is more than that is contrast. Rose's criterion says that a
+//! and light do. Noise alone makes one of each on average; what is more than that is contrast. Rose's criterion says that a
 //! signal is seen where it is at least five times its uncertainty (Rose, "The sensitivity performance of the human eye on an
 //! absolute scale", J. Opt. Soc. Am. 38:196, 1948; Burgess, "The Rose model, revisited", J. Opt. Soc. Am. A 16:633, 1999);
 //! here, that the excess is five times the deviation of the sum, or that the differences, added up with their signs, are five
@@ -12,7 +12,7 @@
 //!
 //! The uncertainty is that of noise, not of patterns, and comes from the image itself: how unlike the halves of cells within one
 //! mask are, of cells about as bright, in the smoother half of them (towards the lower envelope; Liu, Freeman, Szeliski and Kang,
-//! "PixelNoise estimation from a single image", CVPR 2006); the noise that rows share, from how unlike neighbouring rows of the
+//! "Noise estimation from a single image", CVPR 2006); the noise that rows share, from how unlike neighbouring rows of the
 //! whole image are; and the rounding to whole codes.
 
 use std::collections::BTreeMap;
@@ -22,7 +22,7 @@ use crate::questions::colors::{Color, Palette};
 use crate::types::Rgb;
 
 /// Rose's criterion: a difference is seen where it is so many times its uncertainty.
-pub const ROSE: f64 = 5.0;
+pub(crate) const ROSE: f64 = 5.0;
 
 /// A cell has a side of this share of the image's shorter side.
 const CELLS: usize = 60;
@@ -55,7 +55,7 @@ static LINEAR: LazyLock<[u32; 256]> = LazyLock::new(|| {
 
 /// The linear light of a code, in 65,535ths.
 #[must_use]
-pub fn linear(code: u8) -> u32 {
+pub(crate) fn linear(code: u8) -> u32 {
     LINEAR[usize::from(code)]
 }
 
@@ -146,7 +146,7 @@ impl PixelNoise {
 
 /// What is seen of the masks of an image.
 #[derive(Debug)]
-pub struct MaskContrasts {
+pub(crate) struct MaskContrasts {
     borders: BTreeMap<(u32, u32), Vec<MaskBorder>>,
     shades: BTreeMap<u32, Shades>,
     /// Brightness and variance of the cells within one mask, by channel; then what they tell.
@@ -293,7 +293,7 @@ impl MaskContrasts {
     }
 
     /// The masks of whose outline half is seen.
-    pub fn visible(&self) -> impl Iterator<Item = usize> {
+    pub(crate) fn visible(&self) -> impl Iterator<Item = usize> {
         let mut outlines: BTreeMap<u32, [f64; 2]> = BTreeMap::new();
         for ((a, b), border) in &self.borders {
             let seen = self.signal(border) >= ROSE;

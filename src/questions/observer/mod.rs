@@ -19,7 +19,7 @@
 //! (one number, the mean of its linear light), which stands in for an eye that is adapted to the dark: colours are named as
 //! they are after this one gain.
 
-pub mod contrast;
+pub(crate) mod contrast;
 mod wording;
 
 use std::collections::BTreeMap;
@@ -34,10 +34,10 @@ use crate::types::{Digest, Frame, Labels, Question, Rgb};
 
 use contrast::{MaskContrasts, mean_light};
 use wording::QuestionTopic;
-pub use wording::understood;
+pub(crate) use wording::understood;
 
 /// What the observer does, and how: a change of it is another observer.
-pub const VERSION: u32 = 1;
+pub(crate) const VERSION: u32 = 1;
 
 /// A frame as the observer knows it: where everything is, and nothing of how it looks but its mean light.
 #[derive(Debug)]

@@ -54,6 +54,6 @@ impl QuestionTopic {
 
 /// Whether a question is one of the rulebook's, so that the observer can answer it.
 #[must_use]
-pub fn understood(question: &Question, rules: &Rules) -> bool {
+pub(crate) fn understood(question: &Question, rules: &Rules) -> bool {
     QuestionTopic::of(question, rules.book()).is_some()
 }

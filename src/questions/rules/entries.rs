@@ -10,7 +10,6 @@ use crate::questions::colors::Color;
 /// What is measured of a frame.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "rules.toml says what each entry is")]
 pub struct MeasureRule {
     pub border_px: usize,
     pub erosion_per_height: usize,
@@ -30,7 +29,7 @@ pub struct MeasureRule {
 /// What makes a segment evidence.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "rules.toml says what each entry is")]
+#[expect(clippy::struct_field_names, reason = "the names are those of rules.toml")]
 pub struct EvidenceRule {
     pub area_ppm: u64,
     pub side_per_height_ppm: u64,
@@ -92,7 +91,6 @@ pub struct Confusable {
 /// When a room has a type.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "rules.toml says what each entry is")]
 pub struct RoomRule {
     pub least_score: u32,
     pub least_lead: u32,
@@ -177,7 +175,6 @@ pub struct Contest {
 /// A room seen through a door.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "rules.toml says what each entry is")]
 pub struct Doorway {
     pub area_ratio: u64,
     pub depth_ratio_ppm: u64,
@@ -186,7 +183,6 @@ pub struct Doorway {
 /// What must hold before anything is said to be absent.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "rules.toml says what each entry is")]
 pub struct ClosedWorld {
     pub void_ppm: u64,
     pub mirror_ppm: u64,
@@ -195,7 +191,6 @@ pub struct ClosedWorld {
 /// The thresholds of "What type of room is this?"
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "rules.toml says what each entry is")]
 pub struct RoomTypeRule {
     pub text: String,
     pub labelled_ppm: u64,
@@ -206,7 +201,6 @@ pub struct RoomTypeRule {
 /// The template of "Is this room suitable for this?"
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "rules.toml says what each entry is")]
 pub struct AffordanceRule {
     pub text: String,
     pub strict: bool,
@@ -229,7 +223,6 @@ pub struct ActivityRule {
 /// The thresholds of "Is there a chair in the image?"
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "rules.toml says what each entry is")]
 pub struct PresenceRule {
     pub text: String,
     pub area_ppm: u64,
@@ -242,7 +235,6 @@ pub struct PresenceRule {
 /// The thresholds of "What color is the chair in the image?"
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "rules.toml says what each entry is")]
 pub struct ColorRule {
     pub text: String,
     pub lone_ppm: u64,
@@ -273,7 +265,6 @@ pub enum ColorChoices {
 /// The thresholds of "Which object is closest to the camera?"
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "rules.toml says what each entry is")]
 pub struct ClosestRule {
     pub text: String,
     pub area_ppm: u64,
@@ -300,7 +291,6 @@ pub enum GapScope {
 /// How the answers are evened out.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "rules.toml says what each entry is")]
 pub struct BalanceRule {
     pub max_repeat: usize,
     pub least_entropy_ppm: u64,

@@ -24,7 +24,7 @@ use crate::types::{Digest, FrameId};
 pub use measure::measure;
 
 /// What is measured, and how. A change of it makes every kept statistic anew.
-pub const VERSION: u64 = 1;
+pub(crate) const VERSION: u64 = 1;
 
 /// What is measured of a frame.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -142,7 +142,7 @@ pub struct SegmentDepth {
     pub p90: u32,
 }
 
-/// SegmentPlace a segment stands, by its word.
+/// Where a segment stands, by its word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SegmentPlace {
@@ -167,7 +167,7 @@ fn is_zero(count: &usize) -> bool {
 
 /// A share in millionths.
 #[must_use]
-pub fn ppm(part: u64, whole: u64) -> u64 {
+pub(crate) fn ppm(part: u64, whole: u64) -> u64 {
     part * 1_000_000 / whole.max(1)
 }
 
@@ -302,7 +302,7 @@ impl Segment {
 /// A data set's word in its one spelling, and where it says that the thing stands: lower case, single spaces, without the
 /// suffixes `/otherroom` and `/outside` of HM3D-Sem.
 #[must_use]
-pub fn plain_word(word: &str) -> (String, SegmentPlace) {
+pub(crate) fn plain_word(word: &str) -> (String, SegmentPlace) {
     let lower = word.to_lowercase();
     let mut stands = SegmentPlace::Here;
     let mut rest = lower.trim();
@@ -324,6 +324,6 @@ pub fn plain_word(word: &str) -> (String, SegmentPlace) {
 
 /// The label numbers of a frame that its label space has not.
 #[must_use]
-pub fn strangers(statistics: &FrameStatistics) -> BTreeSet<u16> {
+pub(crate) fn strangers(statistics: &FrameStatistics) -> BTreeSet<u16> {
     statistics.unknown.keys().copied().collect()
 }

@@ -18,7 +18,7 @@ use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
 ///
 /// # Errors
 /// Where one cannot be drawn.
-pub fn figures(findings: &Findings<'_>) -> Result<Vec<Figure>> {
+pub(crate) fn figures(findings: &Findings<'_>) -> Result<Vec<Figure>> {
     let view = Overview::new(findings);
     let charts = [
         ("accuracy", view.accuracy()),

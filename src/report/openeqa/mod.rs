@@ -12,8 +12,8 @@ use std::path::Path;
 
 use serde::Serialize;
 
-pub use open_report::{OpenReport, ReportedAnswer};
-pub use tables::tables;
+pub(crate) use open_report::{OpenReport, ReportedAnswer};
+pub(crate) use tables::tables;
 
 use self::coverage::coverage;
 use crate::error::Result;
@@ -27,7 +27,10 @@ use crate::types::manifest::RunManifest;
 ///
 /// # Errors
 /// If one cannot be made.
-pub fn products(report: &OpenReport<'_>, tables: &[Table]) -> Result<Vec<(String, Vec<u8>)>> {
+pub(crate) fn products(
+    report: &OpenReport<'_>,
+    tables: &[Table],
+) -> Result<Vec<(String, Vec<u8>)>> {
     let figures = figure::figures(report)?;
     let page = page::page(report, tables, &figures)?;
     let mut made = numbers(tables, "Table")?;
@@ -55,7 +58,7 @@ struct Head<'a> {
 ///
 /// # Errors
 /// If it cannot be written.
-pub fn summary_json(
+pub(crate) fn summary_json(
     report: &OpenReport<'_>,
     tables: &[Table],
     folder: Option<&Path>,
@@ -75,7 +78,7 @@ pub fn summary_json(
 /// What stands at the end of a run: how far it has come if it is not complete, scores by level, by split and by category, what they
 /// rest on, and where it lies.
 #[must_use]
-pub fn render(report: &OpenReport<'_>, tables: &[Table], folder: &Path) -> String {
+pub(crate) fn render(report: &OpenReport<'_>, tables: &[Table], folder: &Path) -> String {
     let mut text = terminal::progress(report.manifest, "answers and marks there");
     match report.judge {
         Some(_) => text += &terminal::render(tables),

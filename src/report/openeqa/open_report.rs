@@ -8,7 +8,7 @@ use crate::types::{RunQuestion, Thumbnail};
 
 /// Everything that a run of open questions says.
 #[derive(Debug, Clone)]
-pub struct OpenReport<'a> {
+pub(crate) struct OpenReport<'a> {
     /// The scores.
     pub summary: &'a OpenSummary,
     /// The run.
@@ -29,7 +29,7 @@ pub struct OpenReport<'a> {
 
 /// One answer.
 #[derive(Debug, Clone)]
-pub struct ReportedAnswer {
+pub(crate) struct ReportedAnswer {
     /// Whose.
     pub subject: Subject,
     /// The question's place.

@@ -16,7 +16,7 @@ pub(super) const SECTION: &str = "scores";
 
 /// Every table of a run; the first is the summary.
 #[must_use]
-pub fn tables(report: &OpenReport<'_>) -> Vec<Table> {
+pub(crate) fn tables(report: &OpenReport<'_>) -> Vec<Table> {
     let mut tables = vec![summary(report.summary), levels(report)];
     let of = |group| ladder(report.summary, group);
     let groups: Vec<(&Group, Ladder<'_, OpenCell>)> = report

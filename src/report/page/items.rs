@@ -42,7 +42,7 @@ const ROOM: [SizeLimit; 3] = [
 /// The most bytes that the items may take of the page, which is to stay under 15 MB.
 const MOST_PACKED: usize = 13_500_000;
 
-/// SizeLimit for what can be left out of a page.
+/// Room for what can be left out of a page.
 #[derive(Debug, Clone, Copy)]
 struct SizeLimit {
     text: usize,

@@ -8,7 +8,8 @@ mod sections;
 mod shown;
 pub(super) mod tables;
 
-pub use shown::{PageInputs, PageRun};
+pub use shown::PageInputs;
+pub(crate) use shown::PageRun;
 
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -45,7 +46,7 @@ struct Page<'a> {
 ///
 /// # Errors
 /// Where a figure cannot be drawn.
-pub fn page<'a>(
+pub(crate) fn page<'a>(
     findings: &'a Findings<'a>,
     tables: &[Table],
     figures: &[Figure],

@@ -54,7 +54,7 @@ impl BarPanel {
 ///
 /// # Errors
 /// Where the figure cannot be drawn.
-pub fn figure(summary: &QuestionSummary) -> Result<String> {
+pub(crate) fn figure(summary: &QuestionSummary) -> Result<String> {
     let panels = panels(summary);
     // Two columns, each panel in the shorter one.
     let mut columns: [(i32, Vec<(i32, &BarPanel)>); 2] = [(0, Vec::new()), (0, Vec::new())];

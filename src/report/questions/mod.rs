@@ -1,7 +1,7 @@
 //! What a set of questions is like: a table, a file of all counts, and a figure.
 
-pub mod figure;
-pub mod review;
+pub(crate) mod figure;
+pub(crate) mod review;
 
 use std::fmt::{Display, Write as _};
 
@@ -17,7 +17,7 @@ const REASONS: usize = 3;
 
 /// The table at the end: questions by family with what came of their candidates and what not looking would score.
 #[must_use]
-pub fn table(summary: &QuestionSummary) -> String {
+pub(crate) fn table(summary: &QuestionSummary) -> String {
     let families = Family::PAPER.iter().filter_map(|family| {
         let candidates = summary.candidates.get(family)?;
         Some((family.name(), Some(candidates)))
@@ -131,7 +131,7 @@ fn word<T: serde::Serialize>(value: &T) -> String {
 ///
 /// # Errors
 /// Where it cannot be written as such.
-pub fn json(summary: &QuestionSummary) -> Result<String> {
+pub(crate) fn json(summary: &QuestionSummary) -> Result<String> {
     let text = serde_json::to_string_pretty(summary).map_err(|e| Error::data("statistics", e))?;
     Ok(text + "\n")
 }
@@ -140,7 +140,7 @@ pub fn json(summary: &QuestionSummary) -> Result<String> {
 ///
 /// # Errors
 /// Where it cannot be written as such.
-pub fn csv(summary: &QuestionSummary) -> Result<Vec<u8>> {
+pub(crate) fn csv(summary: &QuestionSummary) -> Result<Vec<u8>> {
     let mut rows: Vec<[String; 4]> = Vec::new();
     let mut row = |table: &str, row: &dyn Display, column: &str, count: &dyn Display| {
         rows.push([table, &row.to_string(), column, &count.to_string()].map(str::to_owned));

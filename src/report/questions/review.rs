@@ -14,7 +14,7 @@ const PLACE: &str = "/*QUESTIONS*/null";
 
 /// A question as the page shows it.
 #[derive(Debug, Serialize)]
-pub struct ReviewItem<'a> {
+pub(crate) struct ReviewItem<'a> {
     id: &'a str,
     frame: &'a str,
     family: &'a str,
@@ -31,7 +31,7 @@ pub struct ReviewItem<'a> {
 impl<'a> ReviewItem<'a> {
     /// A question about an image at this place, of this size.
     #[must_use]
-    pub fn new(asked: &'a GeneratedQuestion, image: String, size: [usize; 2]) -> Self {
+    pub(crate) fn new(asked: &'a GeneratedQuestion, image: String, size: [usize; 2]) -> Self {
         let question = &asked.question;
         Self {
             id: &question.id.0,
@@ -60,7 +60,7 @@ struct ReviewPage<'a> {
 ///
 /// # Errors
 /// Where the questions cannot be written.
-pub fn page(items: &[ReviewItem<'_>]) -> Result<String> {
+pub(crate) fn page(items: &[ReviewItem<'_>]) -> Result<String> {
     let set = Digest::of_parts(items.iter().map(|item| item.id.as_bytes()));
     Ok(PAGE.replacen(PLACE, &embedded(&ReviewPage { set, items })?, 1))
 }

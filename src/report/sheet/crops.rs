@@ -5,7 +5,7 @@ use crate::types::Rgb;
 
 /// One row: what it shows, and its images, which are of one size.
 #[derive(Debug, Clone)]
-pub struct CropRow<'a> {
+pub(crate) struct CropRow<'a> {
     /// What the images have in common.
     pub name: String,
     /// The images.
@@ -16,7 +16,7 @@ pub struct CropRow<'a> {
 
 /// The middle of each image, pixel for pixel, lightened as its row says, below the columns' names.
 #[must_use]
-pub fn crops(columns: &[&str], rows: &[CropRow<'_>]) -> Rgb {
+pub(crate) fn crops(columns: &[&str], rows: &[CropRow<'_>]) -> Rgb {
     let height = CELL * 2 / 3;
     let step = [LINE + height + GAP, CELL + GAP];
     let mut sheet = SheetCanvas::new(

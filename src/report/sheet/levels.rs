@@ -6,7 +6,7 @@ use crate::types::{AxisLevel, Rgb};
 
 /// One level of a frame.
 #[derive(Debug, Clone)]
-pub struct LevelColumn {
+pub(crate) struct LevelColumn {
     /// Which.
     pub level: AxisLevel,
     /// By exposure drop alone.
@@ -22,7 +22,7 @@ pub struct LevelColumn {
 /// picked, not averaged, so that the noise keeps its strength. The paper says "pixel intensities amplified": codes taken
 /// so many times would leave nothing of a bright room but white, so its light is meant.
 #[must_use]
-pub fn levels(clean: &Rgb, columns: &[LevelColumn]) -> Rgb {
+pub(crate) fn levels(clean: &Rgb, columns: &[LevelColumn]) -> Rgb {
     let size = fitted(clean.height(), clean.width());
     let [height, width] = size;
     let margin = 6 * letter_width() + GAP;

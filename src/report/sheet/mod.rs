@@ -1,4 +1,4 @@
-//! Figures made of pictures: [`levels`], [`noise`] and [`crops`], with words on them.
+//! Figures made of pictures: [`levels()`], [`noise()`] and [`crops()`], with words on them.
 
 mod crops;
 mod levels;
@@ -6,9 +6,9 @@ mod noise;
 
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 
-pub use crops::{CropRow, crops};
-pub use levels::{LevelColumn, levels};
-pub use noise::{Signal, noise};
+pub(crate) use crops::{CropRow, crops};
+pub(crate) use levels::{LevelColumn, levels};
+pub(crate) use noise::{Signal, noise};
 
 use crate::types::Rgb;
 

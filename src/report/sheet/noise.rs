@@ -7,7 +7,7 @@ use crate::types::Rgb;
 
 /// One signal on the sensor.
 #[derive(Debug, Clone)]
-pub struct Signal {
+pub(crate) struct Signal {
     /// What it is called.
     pub name: String,
     /// Height × width, in ADU.
@@ -18,7 +18,7 @@ pub struct Signal {
 ///
 /// Grey goes from three standard deviations below the mean, black, to three above it, white.
 #[must_use]
-pub fn noise(signals: &[Signal]) -> Rgb {
+pub(crate) fn noise(signals: &[Signal]) -> Rgb {
     const COLUMNS: usize = 3;
     let side = |length: fn(&Array2<f32>) -> usize, most: usize| {
         signals

@@ -147,7 +147,7 @@ fn floor(summary: &AccuracySummary, cell: &AccuracyCell) -> String {
     )
 }
 
-/// UnreadReason replies could not be read, if that is not the model's own way of answering.
+/// Why replies could not be read, if that is not the model's own way of answering.
 fn unread(summary: &AccuracySummary) -> Option<String> {
     let reasons = [
         (

@@ -10,7 +10,7 @@ use crate::types::{Choices, Digest, Question};
 /// In which orders the choices of a question are shown, and how often it is asked in each.
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Data")]
-pub struct ChoiceOrder {
+pub(crate) struct ChoiceOrder {
     /// Show the choices of each question in an order drawn from --seed, the same in every condition
     #[arg(long)]
     pub shuffle_options: bool,

@@ -12,14 +12,14 @@ use crate::job::batch::BatchFileArgs;
 use crate::job::progress::Progress;
 use crate::job::{Job, Outcome};
 
-pub use settings::{EvaluateArgs, ShrinkArgs};
+pub(crate) use settings::{EvaluateArgs, ShrinkArgs};
 use setup::ChoiceSetup;
 
 /// Runs an evaluation, or goes on with it; a dry run says what that would take.
 ///
 /// # Errors
 /// If nothing can be asked, or no further trial could succeed; what had arrived by then is kept.
-pub fn evaluate(args: EvaluateArgs, progress: &Progress) -> Result<Outcome> {
+pub(crate) fn evaluate(args: EvaluateArgs, progress: &Progress) -> Result<Outcome> {
     let config = args.resolve()?;
     let (setup, files) = ChoiceSetup::open(&config, progress)?;
     Job::new(&setup, files, progress)?.run()
@@ -29,7 +29,7 @@ pub fn evaluate(args: EvaluateArgs, progress: &Progress) -> Result<Outcome> {
 ///
 /// # Errors
 /// If a model is built in, an image is larger than the endpoint takes, or a file cannot be written.
-pub fn export_batch(
+pub(crate) fn export_batch(
     args: EvaluateArgs,
     files: &BatchFileArgs,
     progress: &Progress,

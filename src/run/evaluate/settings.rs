@@ -13,7 +13,7 @@ use crate::job::settings::{ExperimentSettings, JobArgs, JobSettings};
 
 /// The flags of an evaluation, by help heading.
 #[derive(Debug, Args)]
-pub struct EvaluateArgs {
+pub(crate) struct EvaluateArgs {
     /// Data.
     #[command(flatten)]
     pub data: DataArgs,
@@ -40,7 +40,7 @@ pub struct EvaluateArgs {
 /// How questions with choices are put to a model.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Model")]
-pub struct ChoiceArgs {
+pub(crate) struct ChoiceArgs {
     /// What the server lets the model say; other numbers than unconstrained ones
     #[arg(long, value_enum, default_value_t)]
     pub constrain: Constrain,
@@ -52,7 +52,7 @@ pub struct ChoiceArgs {
 /// In which size images are sent.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Sending")]
-pub struct ShrinkArgs {
+pub(crate) struct ShrinkArgs {
     /// Shrink images whose longer side is longer than this, in pixels; default: never
     #[arg(long, value_name = "PIXELS")]
     pub max_side: Option<NonZeroU32>,

@@ -30,7 +30,7 @@ use set::{ReadySet, SetForm};
 
 /// The flags of `export`.
 #[derive(Debug, Args)]
-pub struct ExportArgs {
+pub(crate) struct ExportArgs {
     /// The form
     #[arg(value_name = "KIND", value_enum)]
     pub kind: SetForm,
@@ -46,7 +46,7 @@ pub struct ExportArgs {
     /// How large an image may be.
     #[command(flatten)]
     pub limit: PixelLimit,
-    /// LightSettings.
+    /// Light.
     #[command(flatten)]
     pub light: LightArgs,
     /// Which images are enhanced, and by what.
@@ -64,7 +64,7 @@ pub struct ExportArgs {
 ///
 /// # Errors
 /// Where the data cannot be read, a set is there already, or a file cannot be written.
-pub fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> {
+pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> {
     let dataset = open_data(&args.data, &args.selection, args.limit, progress)?;
     let questions = select(&dataset, &args.selection)?;
     let files = enhancers::read(&args.enhancers.llie)?;

@@ -16,7 +16,7 @@ use crate::types::{Choices, Condition, Question};
 /// The form of a ready-made set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 #[value(rename_all = "lowercase")]
-pub enum SetForm {
+pub(crate) enum SetForm {
     /// A .tsv with the images in it, as VLMEvalKit reads it
     VlmEvalKit,
     /// metadata.jsonl beside the images, as Hugging Face and lmms-eval load it

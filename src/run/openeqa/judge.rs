@@ -14,7 +14,7 @@ use crate::score::llm_match::Protocol;
 /// Who marks the answers.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Judge")]
-pub struct JudgeArgs {
+pub(crate) struct JudgeArgs {
     /// The model that marks the answers; default: none, answers are gathered and not marked
     #[arg(long, value_name = "NAME")]
     pub judge: Option<ModelName>,

@@ -18,8 +18,8 @@ use crate::error::Result;
 use crate::job::progress::Progress;
 use crate::job::{Job, Outcome};
 
-pub use judge::JudgeArgs;
-pub use settings::OpenEqaArgs;
+pub(crate) use judge::JudgeArgs;
+pub(crate) use settings::OpenEqaArgs;
 use settings::OpenTask;
 use setup::OpenSetup;
 
@@ -27,7 +27,7 @@ use setup::OpenSetup;
 ///
 /// # Errors
 /// If nothing can be asked, or no further trial could succeed; what had arrived by then is kept.
-pub fn openeqa(args: OpenEqaArgs, progress: &Progress) -> Result<Outcome> {
+pub(crate) fn openeqa(args: OpenEqaArgs, progress: &Progress) -> Result<Outcome> {
     let config = args.resolve()?;
     let (setup, files) = OpenSetup::open(&config, progress)?;
     match &config.task {

@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 /// Which questions of a file are asked.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "OpenEQA")]
-pub struct OpenSelectionArgs {
+pub(crate) struct OpenSelectionArgs {
     /// Only questions of these splits, as hm3d-v0,scannet-v0; default: all
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = trimmed)]
     pub splits: Vec<String>,

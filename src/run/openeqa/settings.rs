@@ -17,7 +17,7 @@ use crate::score::llm_match::Protocol;
 
 /// The flags of `openeqa`.
 #[derive(Debug, Args)]
-pub struct OpenEqaArgs {
+pub(crate) struct OpenEqaArgs {
     /// The questions, as open-eqa-v0.json
     #[arg(long, value_name = "FILE", help_heading = "OpenEQA")]
     pub questions: PathBuf,
@@ -66,11 +66,11 @@ pub struct OpenEqaArgs {
 
 /// The seed that is sent to servers, if any.
 #[derive(Debug, Clone, Copy)]
-pub struct SamplingSeed(Option<u64>);
+pub(crate) struct SamplingSeed(Option<u64>);
 
 /// Answers of people or another program.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct AnswersFile {
+pub(crate) struct AnswersFile {
     /// What they stand under among the models.
     pub name: String,
     /// The file.
@@ -107,7 +107,7 @@ impl OpenEqaArgs {
     /// The flags that this command shares with an evaluation, with the defaults and the words that they have here: upstream's, and
     /// the levels of the paper's table.
     #[must_use]
-    pub fn own(arg: Arg) -> Arg {
+    pub(crate) fn own(arg: Arg) -> Arg {
         match arg.get_id().as_str() {
             "levels" => arg.default_value("L0,L2,L4"),
             "variant" => arg.default_value("noise"),

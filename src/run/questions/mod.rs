@@ -34,7 +34,7 @@ use statistics_cache::StatisticsCache;
 
 /// The flags of `questions`.
 #[derive(Debug, Args)]
-pub struct QuestionsArgs {
+pub(crate) struct QuestionsArgs {
     /// A folder of frames with their maps (frames.jsonl, classes.json), as import makes it
     #[arg(value_name = "DATA")]
     pub data: PathBuf,
@@ -135,7 +135,7 @@ fn read<T>(path: Option<&Path>, parse: fn(&str) -> Result<T>) -> Result<Option<T
 ///
 /// # Errors
 /// Where there are no frames, no classes, or a file cannot be written.
-pub fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Outcome> {
+pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Outcome> {
     let making = &QuestionMaking::read(args)?;
     let dataset = Dataset::of_frames(&args.data)?;
     let dataset = dataset.with_most_pixels(args.limit.max_pixels.get());

@@ -43,7 +43,7 @@ const LARGEST: usize = 64 << 20;
 
 /// The flags of `serve`.
 #[derive(Debug, Args)]
-pub struct ServeArgs {
+pub(crate) struct ServeArgs {
     /// The frames that the observer knows: rooms:frames=N,seed=N,size=WIDTHxHEIGHT, or a folder of frames with maps
     #[arg(long, value_name = "DIR|rooms:…", value_parser = dataset::place, default_value_t)]
     pub data: DataPlace,
@@ -66,7 +66,7 @@ struct ServerState {
 ///
 /// # Errors
 /// Where the frames cannot be read, or the port is taken.
-pub fn serve(args: &ServeArgs, progress: &Progress) -> Result<Outcome> {
+pub(crate) fn serve(args: &ServeArgs, progress: &Progress) -> Result<Outcome> {
     let dataset = Arc::new(Dataset::open_unasked(&args.data)?);
     let prior = Random { seed: args.seed };
     let models = [

@@ -3,5 +3,5 @@
 mod pack;
 mod read;
 
-pub use pack::{PackArgs, pack};
-pub use read::{ReadArgs, read};
+pub(crate) use pack::{PackArgs, pack};
+pub(crate) use read::{ReadArgs, read};

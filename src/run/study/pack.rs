@@ -18,7 +18,7 @@ use crate::types::{Condition, Digest, FrameId, QuestionId, Record, RunQuestion};
 
 /// The flags of `study pack`.
 #[derive(Debug, Args)]
-pub struct PackArgs {
+pub(crate) struct PackArgs {
     /// The folder of a run
     #[arg(value_name = "RUN")]
     pub run: PathBuf,
@@ -40,7 +40,7 @@ pub struct PackArgs {
 ///
 /// # Errors
 /// Where the run kept no questions, or its data or enhancers are not where they were.
-pub fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
+pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
     let StoredRun {
         manifest,
         records,

@@ -21,7 +21,7 @@ use crate::types::{ChoiceDetail, Condition, Detail, Digest, QuestionId, Record, 
 
 /// The flags of `study read`.
 #[derive(Debug, Args)]
-pub struct ReadArgs {
+pub(crate) struct ReadArgs {
     /// The folder of the run whose questions were answered
     #[arg(value_name = "RUN")]
     pub run: PathBuf,
@@ -63,7 +63,7 @@ struct AnswerCounts {
 ///
 /// # Errors
 /// Where the folder holds no run or a line is no answer; or nothing in the files was asked in the run.
-pub fn read(args: &ReadArgs) -> Result<Outcome> {
+pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
     let StoredRun {
         manifest,
         records,

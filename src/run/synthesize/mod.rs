@@ -28,14 +28,14 @@ use sidecar::ImageSidecar;
 
 /// The flags of `synthesize`.
 #[derive(Debug, Args)]
-pub struct SynthesizeArgs {
+pub(crate) struct SynthesizeArgs {
     /// Images, folders of images, or folders of frames (frames.jsonl)
     #[arg(required = true, value_name = "INPUT")]
     pub inputs: Vec<PathBuf>,
     /// Where the images go, each with a JSON file that holds all that made it
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// LightSettings.
+    /// Light.
     #[command(flatten)]
     pub light: LightArgs,
     /// Make again the image that this JSON file stands beside, from the one INPUT that it was made from; default: make images of
@@ -58,7 +58,7 @@ pub struct SynthesizeArgs {
 
 /// A figure of one frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Sheet {
+pub(crate) enum Sheet {
     /// Both variants by level, with amplified crops
     Levels,
     /// Each term of the noise alone
@@ -77,7 +77,7 @@ struct ImageMaking<'a> {
 ///
 /// # Errors
 /// Where nothing can be made: no such input, two frames of one name, no folder to write to.
-pub fn synthesize(args: &SynthesizeArgs, progress: &Progress) -> Result<Outcome> {
+pub(crate) fn synthesize(args: &SynthesizeArgs, progress: &Progress) -> Result<Outcome> {
     let making = &ImageMaking {
         args,
         light: LightSettings::resolve(&args.light)?,

@@ -61,7 +61,7 @@ static NEXT_TURN: LazyLock<Regex> = LazyLock::new(|| {
 /// What follows the last mark that ends reasoning, trimmed.
 ///
 /// # Errors
-/// UnreadReason nothing is left to read.
+/// Why nothing is left to read.
 pub(super) fn spoken(reply: &str) -> Result<&str, UnreadReason> {
     let (mut text, mark) = match END.find_iter(reply).last() {
         Some(mark) => (&reply[mark.end()..], mark.as_str()),

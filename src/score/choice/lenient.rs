@@ -166,7 +166,7 @@ fn texts(view: &ReplyView<'_>) -> Option<Answer> {
     Some(Answer::Chosen(first))
 }
 
-/// UnreadReason a choice that is named only beside a "not" was not read.
+/// Why a choice that is named only beside a "not" was not read.
 fn negated(view: &ReplyView<'_>) -> Answer {
     Answer::Unparsed(if declines(view.folded) {
         UnreadReason::Refused
@@ -175,7 +175,7 @@ fn negated(view: &ReplyView<'_>) -> Answer {
     })
 }
 
-/// UnreadReason nothing at all was read.
+/// Why nothing at all was read.
 fn nothing(view: &ReplyView<'_>) -> Answer {
     Answer::Unparsed(if declines(view.folded) {
         UnreadReason::Refused

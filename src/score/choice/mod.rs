@@ -54,7 +54,7 @@ impl ReadingMode {
 /// assert_eq!(read("(B) bedroom", &choices, ReadingMode::Strict), Answer::Chosen(1));
 /// assert_eq!(read("Answer: **B**", &choices, ReadingMode::Strict), Answer::Unparsed(UnreadReason::NoChoice));
 /// assert_eq!(read("Answer: **B**", &choices, ReadingMode::Lenient), Answer::Chosen(1));
-/// # Ok::<(), darkqa_eval::error::Error>(())
+/// # Ok::<(), darkqa_eval::Error>(())
 /// ```
 #[must_use]
 pub fn read(reply: &str, choices: &Choices, mode: ReadingMode) -> Answer {

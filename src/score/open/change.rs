@@ -23,7 +23,7 @@ pub enum Baseline {
 pub struct ScoreChange {
     /// Whose.
     pub subject: Subject,
-    /// Baseline what.
+    /// Against what.
     pub against: Baseline,
     /// On what.
     pub group: Group,

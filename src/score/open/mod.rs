@@ -18,8 +18,9 @@ use self::group::groups;
 use super::subject::Subject;
 
 pub use answer::{AnswerOutcome, ScoredAnswer};
-pub use cell::OpenCell;
-pub use change::{Baseline, ScoreChange};
+pub(crate) use cell::OpenCell;
+pub use change::Baseline;
+pub(crate) use change::ScoreChange;
 pub use group::{Group, QuestionGroups};
 
 /// Every score of a run.

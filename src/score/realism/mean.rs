@@ -6,7 +6,7 @@ use crate::score::student::student;
 
 /// A mean with its 95 % interval by Student's t distribution; one number alone has none.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Mean {
+pub(crate) struct Mean {
     /// The mean; `None` in JSON where it is infinite.
     pub value: f64,
     /// The interval.
@@ -18,7 +18,7 @@ pub struct Mean {
 impl Mean {
     /// The mean of numbers, of which some may be infinite; `None` of none.
     #[must_use]
-    pub fn of(numbers: &[f64]) -> Option<Self> {
+    pub(crate) fn of(numbers: &[f64]) -> Option<Self> {
         let n = numbers.len();
         if n == 0 {
             return None;

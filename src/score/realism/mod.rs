@@ -1,20 +1,20 @@
 //! How near a made image is to a real one: [`psnr`], [`ssim`](ssim::ssim), and the divergence of their noise
 //! ([`residual`]).
 
-pub mod mean;
-pub mod residual;
-pub mod ssim;
+pub(crate) mod mean;
+pub(crate) mod residual;
+pub(crate) mod ssim;
 
 use residual::Divergence;
 use serde::Serialize;
-pub use ssim::same_size;
+pub(crate) use ssim::same_size;
 
 use crate::error::{Error, Result};
 use crate::types::Rgb;
 
 /// How one made image compares with the real one.
 #[derive(Debug, Clone, Copy, Serialize)]
-pub struct ImageComparison {
+pub(crate) struct ImageComparison {
     /// In dB; null in JSON where it is infinite.
     pub psnr: f64,
     /// Structural similarity.
@@ -27,7 +27,7 @@ pub struct ImageComparison {
 
 /// What one pair shows.
 #[derive(Debug, Clone, Serialize)]
-pub struct PairComparison {
+pub(crate) struct PairComparison {
     /// The pair's name.
     pub pair: String,
     /// The exposure drop in EV.
@@ -44,7 +44,7 @@ pub struct PairComparison {
 ///
 /// # Errors
 /// Where the sizes differ.
-pub fn psnr(a: &Rgb, b: &Rgb) -> Result<f64> {
+pub(crate) fn psnr(a: &Rgb, b: &Rgb) -> Result<f64> {
     same_size(a, b)?;
     let squares = a.samples().iter().zip(b.samples()).map(|(a, b)| {
         let difference = u64::from(a.abs_diff(*b));
@@ -58,7 +58,7 @@ pub fn psnr(a: &Rgb, b: &Rgb) -> Result<f64> {
 ///
 /// # Errors
 /// Where either is black.
-pub fn exposure_drop(normal: &Rgb, low: &Rgb) -> Result<f32> {
+pub(crate) fn exposure_drop(normal: &Rgb, low: &Rgb) -> Result<f32> {
     let linear: [f64; 256] =
         std::array::from_fn(|code| libm::pow((code as f64 / 255.0).max(1e-8), 2.2));
     let mean = |image: &Rgb| {

@@ -15,7 +15,7 @@ const STEPS: usize = 511;
 
 /// How often each difference of codes occurs, all channels pooled, and how it spreads by clean code.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Residuals {
+pub(crate) struct Residuals {
     /// Of −255 to 255.
     counts: Vec<u64>,
     /// By clean code: number, sum, and sum of squares.
@@ -36,7 +36,7 @@ impl Residuals {
     ///
     /// # Errors
     /// Where the sizes differ.
-    pub fn of(image: &Rgb, clean: &Rgb) -> Result<Self> {
+    pub(crate) fn of(image: &Rgb, clean: &Rgb) -> Result<Self> {
         same_size(image, clean)?;
         let mut residuals = Self::default();
         for (code, clean) in image.samples().iter().zip(clean.samples()) {
@@ -51,7 +51,7 @@ impl Residuals {
     }
 
     /// Adds those of another image.
-    pub fn add(&mut self, other: &Self) {
+    pub(crate) fn add(&mut self, other: &Self) {
         for (a, b) in self.counts.iter_mut().zip(&other.counts) {
             *a += b;
         }
@@ -63,13 +63,13 @@ impl Residuals {
     }
 
     /// Each difference of codes, −255 to 255, with its share of all.
-    pub fn shares(&self) -> impl Iterator<Item = (i32, f64)> {
+    pub(crate) fn shares(&self) -> impl Iterator<Item = (i32, f64)> {
         let n = self.counts.iter().sum::<u64>().max(1) as f64;
         (-255..).zip(self.counts.iter().map(move |count| *count as f64 / n))
     }
 
     /// Of each clean code that occurs: the code, how often, and the residual's mean and standard deviation.
-    pub fn by_code(&self) -> impl Iterator<Item = (usize, i64, [f64; 2])> {
+    pub(crate) fn by_code(&self) -> impl Iterator<Item = (usize, i64, [f64; 2])> {
         let codes = self.codes.iter().enumerate();
         codes
             .filter(|(_, [n, ..])| *n > 0)
@@ -96,7 +96,7 @@ impl Residuals {
 /// The bins of a residual histogram.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
-pub enum Bins {
+pub(crate) enum Bins {
     /// Residuals in [0, 1] units, 64 bins from −0.1 to 0.1 and one beyond either end, as the code of Fu et al. 2023 has it.
     #[default]
     Fu,
@@ -107,7 +107,7 @@ pub enum Bins {
 /// What is done about empty bins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
-pub enum EmptyBins {
+pub(crate) enum EmptyBins {
     /// 10⁻⁸ is added to the share of each bin, and the shares are made to sum to 1 again.
     #[default]
     Eps,
@@ -119,7 +119,7 @@ pub enum EmptyBins {
 impl EmptyBins {
     /// The other rule.
     #[must_use]
-    pub fn other(self) -> Self {
+    pub(crate) fn other(self) -> Self {
         match self {
             Self::Eps => Self::Drop,
             Self::Drop => Self::Eps,
@@ -160,7 +160,7 @@ fn inner_edge(index: usize) -> f64 {
 
 /// How far the synthetic residuals are from the real ones.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Divergence {
+pub(crate) struct Divergence {
     /// D_KL(real ‖ synthetic) in nats.
     pub nats: f64,
     /// The bins that are empty on the synthetic side alone.
@@ -169,7 +169,7 @@ pub struct Divergence {
 
 /// D_KL(real ‖ synthetic) of two sets of residuals. [`EmptyBins`] does not concern [`Bins::Kousha`], which leaves no bin empty.
 #[must_use]
-pub fn divergence(
+pub(crate) fn divergence(
     real: &Residuals,
     synthetic: &Residuals,
     bins: Bins,

@@ -13,7 +13,7 @@ const TAPS: usize = 2 * RADIUS + 1;
 const MOMENTS: usize = 5;
 
 /// Refuses images of different sizes, with both of them.
-pub fn same_size(a: &Rgb, b: &Rgb) -> Result<()> {
+pub(crate) fn same_size(a: &Rgb, b: &Rgb) -> Result<()> {
     let [a, b] = [a, b].map(|image| (image.width(), image.height()));
     if a == b {
         return Ok(());
@@ -33,7 +33,7 @@ pub fn same_size(a: &Rgb, b: &Rgb) -> Result<()> {
 ///
 /// # Errors
 /// Where the sizes differ, or a side is shorter than the window.
-pub fn ssim(a: &Rgb, b: &Rgb) -> Result<f64> {
+pub(crate) fn ssim(a: &Rgb, b: &Rgb) -> Result<f64> {
     same_size(a, b)?;
     let (height, width) = (a.height(), a.width());
     if height < TAPS || width < TAPS {

@@ -4,7 +4,8 @@ mod calibration;
 
 use std::sync::Arc;
 
-pub use calibration::{Calibration, GainStep, LogFit, SensorNoise};
+pub use calibration::Calibration;
+pub(crate) use calibration::SensorNoise;
 use calibration::{GAINS, RATIOS};
 use rand_distr::{Distribution as _, Open01};
 use serde::ser::SerializeStruct;
@@ -154,7 +155,7 @@ pub struct CameraState {
 }
 
 impl CameraState {
-    /// CameraStream the camera of the frame that `key` belongs to.
+    /// Draws the camera of the frame that `key` belongs to.
     ///
     /// Matrix and gains follow Brooks et al. 2019, the sensor's noise Wei et al. 2021, K and r DarkQA.
     #[must_use]

@@ -1,0 +1,63 @@
+//! What the tests and benches of this crate use beyond its public surface. It may change with any version.
+
+pub mod ask {
+    pub use crate::ask::{
+        Access, AskError, BaseUrl, Call, Constrain, Endpoint, ImageDetail, Message, Model,
+        Parameters, Payload, PayloadFormat, Prompts, Query, Quota, Random, Reach, Remote, Script,
+        Secret, Sending, Temperature, TokenField, Wire,
+    };
+}
+
+pub mod dataset {
+    pub use crate::dataset::picture::{MOST_PIXELS, Picture};
+    pub use crate::dataset::{DataPlace, Dataset};
+}
+
+pub mod job {
+    pub use crate::job::bilinear::bilinear;
+}
+
+pub mod labels {
+    pub use crate::labels::space;
+}
+
+pub mod questions {
+    pub use crate::questions::balance::BalanceMode;
+    pub use crate::questions::colors::Palette;
+    pub use crate::questions::observer::ObservedFrame;
+    pub use crate::questions::room::RoomSource;
+    pub use crate::questions::rules::{ClassFlag, Rules};
+    pub use crate::questions::statistics::measure;
+}
+
+pub mod report {
+    pub use crate::report::page::PageInputs;
+    pub use crate::report::products::products;
+    pub use crate::report::tables::tables;
+}
+
+pub mod rooms {
+    pub use crate::rooms::{Room, RoomTruth, Rooms, ThingTruth, VERSION, labels};
+}
+
+pub mod score {
+    pub use crate::score::bootstrap::Resamples;
+    pub use crate::score::chance::OfferedChoices;
+    pub use crate::score::cluster::Clusters;
+    pub use crate::score::curve::curves;
+    pub use crate::score::estimate::Estimate;
+    pub use crate::score::findings::Findings;
+    pub use crate::score::grid::{ClusterCount, Grid};
+    pub use crate::score::open::{
+        AnswerOutcome, Baseline, Group, OpenSummary, QuestionGroups, ScoredAnswer, open_summary,
+    };
+    pub use crate::score::paired::PairedComparison;
+    pub use crate::score::subject::Subject;
+}
+
+pub mod synthesis {
+    pub use crate::synthesis::exposure::{expose, expose_into};
+    pub use crate::synthesis::negative::{Negative, ladder};
+    pub use crate::synthesis::noise::{Term, add as add_noise};
+    pub use crate::synthesis::unprocess::unprocess;
+}
