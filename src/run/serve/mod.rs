@@ -67,7 +67,7 @@ struct ServerState {
 /// # Errors
 /// Where the frames cannot be read, or the port is taken.
 pub(crate) fn serve(args: &ServeArgs, progress: &Progress) -> Result<Outcome> {
-    let dataset = Arc::new(Dataset::open_unasked(&args.data)?);
+    let dataset = Arc::new(Dataset::open_without_questions(&args.data)?);
     let prior = Random { seed: args.seed };
     let models = [
         (
