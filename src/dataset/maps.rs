@@ -33,7 +33,7 @@ pub(crate) enum DepthFile {
     /// A 16-bit grey PNG file; 0 means no depth.
     Png {
         path: PathBuf,
-        /// Metres per unit.
+        /// Metres per unit of the samples.
         scale: f64,
     },
     /// A `.npy` file of metres as 4- or 8-byte floats. NaN, an infinity, 0 and negative numbers mean no depth.

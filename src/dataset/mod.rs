@@ -40,7 +40,7 @@ pub(crate) use view::FrameFiles;
 /// The place of the data: what `--data` names.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum DataPlace {
-    /// The built-in rooms.
+    /// The built-in rooms with these settings.
     Rooms(Rooms),
     /// A folder or file of the user.
     Path(PathBuf),
@@ -57,7 +57,7 @@ pub(crate) enum ImageSource {
     },
     /// A base64 cell of a table, by the position of its row in the file.
     Cell(table::ImageCell),
-    /// A built-in room.
+    /// A frame of the built-in rooms.
     Room(rooms::Room),
 }
 

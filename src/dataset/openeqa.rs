@@ -17,7 +17,6 @@ pub(crate) struct OpenQuestion {
     pub id: QuestionId,
     #[serde(rename = "question")]
     pub text: String,
-    /// The true answer.
     pub answer: String,
     /// Other right answers. `None`, if the item has no such key, leads to another prompt of the judge.
     #[serde(rename = "extra_answers")]

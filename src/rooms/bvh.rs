@@ -1,38 +1,41 @@
-//! Where a ray meets a scene: [`Bvh`], a binary tree of boxes over triangles.
+//! Intersection of rays with triangles: [`Bvh`], a binary tree of boxes (bounding volume hierarchy).
 
 use glam::{Vec3, Vec3A};
 
-/// A half-line; `start` and `invert`, one over its direction, are for meeting boxes.
+/// A ray. `start` and `invert` (1 / direction) repeat it in the form that box tests need.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ray {
     pub(super) from: Vec3,
-    pub(super) along: Vec3,
+    pub(super) direction: Vec3,
     start: Vec3A,
     invert: Vec3A,
 }
 
 impl Ray {
-    pub(super) fn new(from: Vec3, along: Vec3) -> Self {
-        // No part of a direction is 0, so that nothing below is 0 × ∞, of which machines differ in what they make.
+    pub(super) fn new(from: Vec3, direction: Vec3) -> Self {
+        // No component is 0, so that 0 × ∞ cannot occur: its result differs between machines.
         let part = |value: f32| 1.0 / if value.abs() < 1e-9 { 1e-9 } else { value };
         Self {
             from,
-            along,
+            direction,
             start: from.into(),
-            invert: Vec3A::new(part(along.x), part(along.y), part(along.z)),
+            invert: Vec3A::new(part(direction.x), part(direction.y), part(direction.z)),
         }
     }
 }
 
-/// Where a ray meets a triangle: how far along, which, and how near to its second and third corner.
+/// The point where a ray hits a triangle.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Hit {
-    pub(super) far: f32,
+    /// The distance along the ray in metres.
+    pub(super) distance: f32,
+    /// The index of the triangle.
     pub(super) face: usize,
+    /// The barycentric weights of the second and the third corner.
     pub(super) weights: [f32; 2],
 }
 
-/// A triangle as a corner and two edges, and whether light passes it.
+/// A triangle as a corner and two edges; `clear` if light passes through it.
 #[derive(Debug, Clone, Copy)]
 struct Leaf {
     corner: Vec3,
@@ -41,7 +44,7 @@ struct Leaf {
     clear: bool,
 }
 
-/// A box; an inner node has its second child at `next` and the first beside itself, a leaf has `count` triangles from `next`.
+/// A box. The first child of an inner node follows it and the second is at `next`. A leaf has `count` triangles from `next`.
 #[derive(Debug, Clone, Copy)]
 struct Node {
     low: Vec3A,
@@ -51,16 +54,16 @@ struct Node {
     axis: usize,
 }
 
-/// The tree.
+/// A tree of boxes over all triangles of a scene.
 #[derive(Debug)]
 pub(super) struct Bvh {
     nodes: Vec<Node>,
     leaves: Vec<Leaf>,
 }
 
-/// A leaf has at most so many triangles where they can be parted.
-const FEW: usize = 4;
-/// Places at which a node may be cut.
+/// The maximum number of triangles in a leaf (chosen).
+const LEAF_SIZE: usize = 4;
+/// The number of bins along an axis for splitting a node (chosen).
 const BINS: usize = 12;
 
 struct BuildItem {
@@ -71,7 +74,7 @@ struct BuildItem {
 }
 
 impl Bvh {
-    /// The tree over triangles, each with whether light passes it.
+    /// The tree over triangles. The `bool` is `true` if light passes through the triangle.
     pub(super) fn new(faces: impl Iterator<Item = ([Vec3; 3], bool)>) -> Self {
         let mut items: Vec<BuildItem> = faces
             .enumerate()
@@ -100,7 +103,7 @@ impl Bvh {
 
     fn build(&mut self, items: &mut [BuildItem]) {
         let (low, high) = bounds(items);
-        let place = self.nodes.len();
+        let index = self.nodes.len();
         self.nodes.push(Node {
             low: low.into(),
             high: high.into(),
@@ -108,28 +111,28 @@ impl Bvh {
             count: items.len() as u32,
             axis: 0,
         });
-        if items.len() <= FEW {
+        if items.len() <= LEAF_SIZE {
             self.leaves.extend(items.iter().map(|item| item.leaf));
             return;
         }
-        let (axis, middle) = cut(items);
+        let (axis, middle) = split(items);
         let (first, second) = items.split_at_mut(middle);
         self.build(first);
         let next = self.nodes.len() as u32;
         self.build(second);
-        let node = &mut self.nodes[place];
+        let node = &mut self.nodes[index];
         (node.next, node.count, node.axis) = (next, 0, axis);
     }
 
-    /// The first triangle that a ray meets before a distance.
-    pub(super) fn first(&self, ray: &Ray, before: f32) -> Option<Hit> {
+    /// The first triangle that a ray hits within a distance.
+    pub(super) fn first(&self, ray: &Ray, max_distance: f32) -> Option<Hit> {
         let mut found: Option<Hit> = None;
-        let mut far = before;
-        self.visit(ray, &mut far, |leaf, far| {
-            if let Some((at, weights)) = leaf.meet(ray, *far) {
-                *far = at;
+        let mut distance = max_distance;
+        self.visit(ray, &mut distance, |leaf, distance| {
+            if let Some((at, weights)) = leaf.hit_by(ray, *distance) {
+                *distance = at;
                 found = Some(Hit {
-                    far: at,
+                    distance: at,
                     face: leaf.face as usize,
                     weights,
                 });
@@ -139,27 +142,27 @@ impl Bvh {
         found
     }
 
-    /// Whether anything that casts a shadow lies on a ray before a distance.
-    pub(super) fn blocked(&self, ray: &Ray, before: f32) -> bool {
-        let (mut blocked, mut far) = (false, before);
-        self.visit(ray, &mut far, |leaf, far| {
-            blocked = !leaf.clear && leaf.meet(ray, *far).is_some();
+    /// Whether a ray hits anything that casts a shadow within a distance.
+    pub(super) fn blocked(&self, ray: &Ray, max_distance: f32) -> bool {
+        let (mut blocked, mut distance) = (false, max_distance);
+        self.visit(ray, &mut distance, |leaf, distance| {
+            blocked = !leaf.clear && leaf.hit_by(ray, *distance).is_some();
             blocked
         });
         blocked
     }
 
-    /// Visits the triangles whose boxes a ray meets, near ones first, until one says that it is enough.
-    fn visit(&self, ray: &Ray, far: &mut f32, mut enough: impl FnMut(&Leaf, &mut f32) -> bool) {
+    /// Visits the triangles in the boxes that a ray hits, near boxes first, until `stop` returns `true`.
+    fn visit(&self, ray: &Ray, distance: &mut f32, mut stop: impl FnMut(&Leaf, &mut f32) -> bool) {
         let mut stack = [0_u32; 64];
         let (mut depth, mut at) = (0, 0_usize);
         loop {
             let node = &self.nodes[at];
-            if node.meets(ray, *far) {
+            if node.hits(ray, *distance) {
                 if node.count > 0 {
                     let from = node.next as usize;
                     for leaf in &self.leaves[from..from + node.count as usize] {
-                        if enough(leaf, far) {
+                        if stop(leaf, distance) {
                             return;
                         }
                     }
@@ -185,22 +188,22 @@ impl Bvh {
 }
 
 impl Node {
-    /// Whether a ray meets the box before a distance (Kay and Kajiya, SIGGRAPH 1986).
-    fn meets(&self, ray: &Ray, far: f32) -> bool {
+    /// Whether a ray hits the box within a distance (Kay and Kajiya, SIGGRAPH 1986).
+    fn hits(&self, ray: &Ray, distance: f32) -> bool {
         let (a, b) = (
             (self.low - ray.start) * ray.invert,
             (self.high - ray.start) * ray.invert,
         );
         let (near, out) = (a.min(b), a.max(b));
-        near.max_element().max(0.0) <= out.min_element().min(far)
+        near.max_element().max(0.0) <= out.min_element().min(distance)
     }
 }
 
 impl Leaf {
-    /// Where a ray meets the triangle, from either side (Möller and Trumbore, 1997).
-    fn meet(&self, ray: &Ray, before: f32) -> Option<(f32, [f32; 2])> {
+    /// The distance and weights where a ray hits the triangle, from either side (Möller and Trumbore, 1997).
+    fn hit_by(&self, ray: &Ray, max_distance: f32) -> Option<(f32, [f32; 2])> {
         let [first, second] = self.edges;
-        let p = ray.along.cross(second);
+        let p = ray.direction.cross(second);
         let determinant = first.dot(p);
         if determinant.abs() < 1e-12 {
             return None;
@@ -212,12 +215,12 @@ impl Leaf {
             return None;
         }
         let q = t.cross(first);
-        let v = ray.along.dot(q) * invert;
+        let v = ray.direction.dot(q) * invert;
         if v < 0.0 || u + v > 1.0 {
             return None;
         }
-        let far = second.dot(q) * invert;
-        (far > 1e-5 && far < before).then_some((far, [u, v]))
+        let distance = second.dot(q) * invert;
+        (distance > 1e-5 && distance < max_distance).then_some((distance, [u, v]))
     }
 }
 
@@ -233,9 +236,9 @@ fn area(low: Vec3, high: Vec3) -> f32 {
     size.x * size.y + size.y * size.z + size.z * size.x
 }
 
-/// Parts items where rays will have the least to do (the surface area heuristic in bins; Wald, 2007): the axis, and how many
-/// come first.
-fn cut(items: &mut [BuildItem]) -> (usize, usize) {
+/// Sorts items for the split with the lowest cost for rays (binned surface area heuristic; Wald, 2007). Returns the axis and
+/// the number of items in the first part.
+fn split(items: &mut [BuildItem]) -> (usize, usize) {
     let (low, high) = items.iter().fold(
         (Vec3::splat(f32::MAX), Vec3::splat(f32::MIN)),
         |(low, high), item| (low.min(item.middle), high.max(item.middle)),
@@ -259,20 +262,24 @@ fn cut(items: &mut [BuildItem]) -> (usize, usize) {
             });
             (area(low, high) * count as f32, count)
         };
-        for place in 1..BINS {
-            let ((left, some), (right, others)) = (sum(&bins[..place]), sum(&bins[place..]));
-            if some > 0 && others > 0 && best.is_none_or(|(least, ..)| left + right < least) {
-                best = Some((left + right, axis, place));
+        for index in 1..BINS {
+            let ((left, left_count), (right, right_count)) =
+                (sum(&bins[..index]), sum(&bins[index..]));
+            if left_count > 0
+                && right_count > 0
+                && best.is_none_or(|(lowest, ..)| left + right < lowest)
+            {
+                best = Some((left + right, axis, index));
             }
         }
     }
-    let Some((_, axis, place)) = best else {
-        // All of them lie at one place.
+    let Some((_, axis, index)) = best else {
+        // All items are at the same point.
         return (0, items.len() / 2);
     };
-    // A stable order, so that the tree is a function of the scene.
-    items.sort_by_key(|item| bin(item, axis) >= place);
-    let first = items.iter().filter(|item| bin(item, axis) < place).count();
+    // The sort is stable, so that the tree depends only on the scene.
+    items.sort_by_key(|item| bin(item, axis) >= index);
+    let first = items.iter().filter(|item| bin(item, axis) < index).count();
     (axis, first)
 }
 
@@ -284,7 +291,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_tree_finds_what_a_search_through_all_finds() {
+    fn the_tree_finds_what_a_search_through_all_triangles_finds() {
         let mut dice = Dice::new(3, &["bvh"]);
         let mut point = |size: f32| {
             vec3(
@@ -300,20 +307,20 @@ mod tests {
             })
             .collect();
         let tree = Bvh::new(faces.iter().map(|face| (*face, false)));
-        let mut met = 0;
+        let mut hit_count = 0;
         for _ in 0..2000 {
             let ray = Ray::new(point(6.0), point(1.0).normalize());
-            let all = tree.leaves.iter().filter_map(|leaf| leaf.meet(&ray, 5.0));
-            let nearest = all.map(|(far, _)| far).reduce(f32::min);
-            assert_eq!(tree.first(&ray, 5.0).map(|hit| hit.far), nearest);
+            let all = tree.leaves.iter().filter_map(|leaf| leaf.hit_by(&ray, 5.0));
+            let nearest = all.map(|(distance, _)| distance).reduce(f32::min);
+            assert_eq!(tree.first(&ray, 5.0).map(|hit| hit.distance), nearest);
             assert_eq!(tree.blocked(&ray, 5.0), nearest.is_some());
-            met += usize::from(nearest.is_some());
+            hit_count += usize::from(nearest.is_some());
         }
-        assert!((100..1900).contains(&met), "{met}");
+        assert!((100..1900).contains(&hit_count), "{hit_count}");
     }
 
     #[test]
-    fn light_passes_what_is_clear_and_many_faces_at_one_place_do_no_harm() {
+    fn light_passes_clear_faces_and_many_faces_at_one_place_do_no_harm() {
         let wall = [
             vec3(-1.0, -1.0, 1.0),
             vec3(3.0, -1.0, 1.0),

@@ -1,18 +1,18 @@
-//! Where a room is looked at from: [`Camera`].
+//! The camera of a frame: [`Camera`].
 
 use glam::{Vec3, vec3};
 
 use super::bvh::Ray;
-use super::mesh::turn;
+use super::mesh::cos_sin;
 use crate::types::Intrinsics;
 
-/// A pinhole camera that is upright but for a tilt.
+/// A pinhole camera, rotated about y and tilted downwards, without roll.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Camera {
     pub(super) at: Vec3,
-    /// Turned about y; at 0 it looks along −z.
+    /// The rotation about y in radians; at 0 the camera looks along −z.
     pub(super) angle: f32,
-    /// Turned downwards.
+    /// The downward tilt in radians.
     pub(super) tilt: f32,
     /// Width and height of the image in pixels.
     pub(super) size: [usize; 2],
@@ -20,11 +20,11 @@ pub(super) struct Camera {
     focal: f32,
 }
 
-/// Half of the tangent-plane's width that a camera sees at a distance of 1: about 84° across.
+/// Half of the width of the view at a distance of 1 (chosen): an angle of about 84° across.
 const HALF_WIDTH: f32 = 0.9;
 
 impl Camera {
-    /// A camera for images of a size.
+    /// A camera at a place, for images of a size in pixels.
     pub(super) fn new(at: Vec3, angle: f32, tilt: f32, size: [usize; 2]) -> Self {
         let longer = size[0].max(size[1] * 4 / 3);
         Self {
@@ -36,7 +36,7 @@ impl Camera {
         }
     }
 
-    /// The same view in another size.
+    /// The same view with another image size.
     pub(super) fn sized(&self, size: [usize; 2]) -> Self {
         Self::new(self.at, self.angle, self.tilt, size)
     }
@@ -56,13 +56,13 @@ impl Camera {
         }
     }
 
-    /// The axis along which it looks.
+    /// The optical axis: the direction in which the camera looks.
     pub(super) fn axis(&self) -> Vec3 {
-        self.turned(Vec3::NEG_Z)
+        self.to_room(Vec3::NEG_Z)
     }
 
-    fn turned(&self, v: Vec3) -> Vec3 {
-        let (tilt, angle) = (turn(-self.tilt), turn(self.angle));
+    fn to_room(&self, v: Vec3) -> Vec3 {
+        let (tilt, angle) = (cos_sin(-self.tilt), cos_sin(self.angle));
         let v = vec3(
             v.x,
             v.y * tilt.x - v.z * tilt.y,
@@ -75,24 +75,24 @@ impl Camera {
         )
     }
 
-    /// The ray through a place of the image; whole numbers are the middles of pixels.
+    /// The ray through a point of the image; whole numbers are the centers of pixels.
     pub(super) fn ray(&self, x: f32, y: f32) -> Ray {
         let [cx, cy] = self.middle();
-        let along = vec3((x - cx) / self.focal, (cy - y) / self.focal, -1.0);
-        Ray::new(self.at, self.turned(along).normalize())
+        let direction = vec3((x - cx) / self.focal, (cy - y) / self.focal, -1.0);
+        Ray::new(self.at, self.to_room(direction).normalize())
     }
 
-    /// Whether a place is within the view, hidden or not.
+    /// Whether a point is within the view, hidden or not.
     pub(super) fn sees(&self, place: Vec3) -> bool {
-        let way = place - self.at;
-        let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::NEG_Z].map(|axis| way.dot(self.turned(axis)));
+        let offset = place - self.at;
+        let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::NEG_Z].map(|axis| offset.dot(self.to_room(axis)));
         let [half_width, half_height] = self.size.map(|side| side as f32 / 2.0 / self.focal);
         z > 0.0 && x.abs() <= half_width * z && y.abs() <= half_height * z
     }
 
-    /// The pose as a matrix from the camera to the room, row by row: x to the right, y up, z backwards.
+    /// The pose as a matrix from the camera (x right, y up, z backwards) to the room, row by row.
     pub(super) fn pose(&self) -> [f32; 16] {
-        let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(|v| self.turned(v));
+        let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(|v| self.to_room(v));
         let at = self.at;
         [
             x.x, y.x, z.x, at.x, x.y, y.y, z.y, at.y, x.z, y.z, z.z, at.z, 0.0, 0.0, 0.0, 1.0,

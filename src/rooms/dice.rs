@@ -1,15 +1,15 @@
-//! Draws that a seed and a name decide: [`Dice`].
+//! Random numbers that a seed and names decide: [`Dice`].
 
 use blake3::OutputReader;
 
 use crate::types::Digest;
 
-/// A row of numbers that its parts decide: the output stream of BLAKE3 over their digest.
+/// A sequence of random numbers: the output stream of BLAKE3, keyed by the digest of a seed and names.
 #[derive(Debug, Clone)]
 pub(super) struct Dice(OutputReader);
 
 impl Dice {
-    /// The row of a seed, for one use of it.
+    /// The sequence of a seed for one use, which `parts` name.
     pub(super) fn new(seed: u64, parts: &[&str]) -> Self {
         let seed = seed.to_le_bytes();
         let all = [&b"darkqa-eval rooms"[..], &seed]
@@ -25,27 +25,27 @@ impl Dice {
         u32::from_le_bytes(bytes)
     }
 
-    /// A number from 0 to 1, 1 left out.
+    /// A number from 0 to 1, without 1.
     pub(super) fn unit(&mut self) -> f32 {
         (self.word() >> 8) as f32 / (1_u32 << 24) as f32
     }
 
-    /// A number between two.
+    /// A number from `low` to `high`, without `high`.
     pub(super) fn between(&mut self, low: f32, high: f32) -> f32 {
         low + (high - low) * self.unit()
     }
 
-    /// A whole number below another, which is above 0.
+    /// A whole number below `count`, which must be above 0.
     pub(super) fn below(&mut self, count: usize) -> usize {
         ((u64::from(self.word()) * count as u64) >> 32) as usize
     }
 
-    /// Whether something of this probability happens.
+    /// `true` with this probability.
     pub(super) fn chance(&mut self, probability: f32) -> bool {
         self.unit() < probability
     }
 
-    /// One of several, of which there is at least one.
+    /// One entry of a list, which must not be empty.
     pub(super) fn pick<T: Copy>(&mut self, list: &[T]) -> T {
         list[self.below(list.len())]
     }
@@ -56,18 +56,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_parts_decide_the_row() {
-        let row = |seed, parts: &[&str]| -> Vec<u32> {
+    fn the_parts_decide_the_sequence() {
+        let sequence = |seed, parts: &[&str]| -> Vec<u32> {
             let mut dice = Dice::new(seed, parts);
             (0..4).map(|_| dice.word()).collect()
         };
-        assert_eq!(row(1, &["a", "b"]), row(1, &["a", "b"]));
-        assert_ne!(row(1, &["a", "b"]), row(1, &["ab"]));
-        assert_ne!(row(1, &["a"]), row(2, &["a"]));
+        assert_eq!(sequence(1, &["a", "b"]), sequence(1, &["a", "b"]));
+        assert_ne!(sequence(1, &["a", "b"]), sequence(1, &["ab"]));
+        assert_ne!(sequence(1, &["a"]), sequence(2, &["a"]));
     }
 
     #[test]
-    fn draws_keep_to_their_bounds() {
+    fn numbers_stay_within_their_bounds() {
         let mut dice = Dice::new(0, &[]);
         let mut counts = [0; 3];
         for _ in 0..3000 {

@@ -1,37 +1,37 @@
-//! How much light reaches a place: [`Lighting`].
+//! The light that reaches a point: [`Lighting`].
 //!
-//! Light comes from the lamps and windows, each sampled with a shadow ray, and from what they light: rays over the half-space
-//! (as likely as their cosine) bring back what they meet, lit by one light in turn, plus what is left after many bounces, a
-//! constant. It is one bounce by sampling and the rest by a mean: soft shadows, dark corners and colours that bleed are there,
-//! caustics are not.
+//! Direct light comes from lamps and windows; each is sampled with a shadow ray. Indirect light comes from other things:
+//! rays over the half-space (cosine-weighted) return the colour of what they hit, lit by one light each, plus a constant
+//! ambient light. So the first bounce is sampled and later bounces are averaged. This gives soft shadows, dark corners and
+//! colour bleeding, but no caustics.
 
 use glam::{Vec3, vec3};
 
 use super::bvh::{Bvh, Ray};
-use super::mesh::turn;
+use super::mesh::cos_sin;
 use super::scene::{LightSource, Scene};
 use super::spot::Spot;
 use super::surface::hash;
 
-/// Samples are laid out on so many by so many strata; neighbours take turns.
+/// The strata per axis of a sample pattern (chosen). Neighbouring pixels use different strata.
 pub(super) const STRATA: usize = 4;
-/// Rays over the half-space at each place.
-const GATHERED: usize = 4;
-/// What one ray brings back is at most so many times the light of many bounces.
+/// The number of rays over the half-space per point (chosen).
+const INDIRECT_RAYS: usize = 4;
+/// The maximum light of one ray, as a multiple of the ambient light (chosen).
 const BOUND: f32 = 5.0;
-/// How far a shadow ray starts off a face.
-const OFF: f32 = 2e-3;
+/// The distance in metres between a surface and the start of a shadow ray (chosen).
+const OFFSET: f32 = 2e-3;
 
 /// The light of a scene.
 #[derive(Debug)]
 pub(super) struct Lighting<'a> {
     pub(super) scene: &'a Scene,
     pub(super) tree: &'a Bvh,
-    /// What reaches any place after many bounces.
+    /// The ambient light: what reaches every point after many bounces, by channel.
     pub(super) ambient: Vec3,
 }
 
-/// Which stratum a sample is in, and what jitters it.
+/// The stratum of a sample, and the pixel whose coordinates decide its jitter.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LightSample {
     pub(super) stratum: usize,
@@ -39,9 +39,9 @@ pub(super) struct LightSample {
 }
 
 impl LightSample {
-    /// Two numbers from 0 to 1 in the stratum, for one use.
+    /// Two numbers from 0 to 1 within the stratum, for one purpose.
     fn pair(self, purpose: usize) -> [f32; 2] {
-        // Each use meets the strata in an order of its own (5 and 11 have no common factor with 16).
+        // Each purpose uses the strata in its own order (5, 11 and 13 have no common factor with 16).
         let count = STRATA * STRATA;
         let turned = (self.stratum * [1, 5, 11, 13][purpose % 4] + purpose * 7) % count;
         let [x, y] = self.place;
@@ -54,16 +54,18 @@ impl LightSample {
 }
 
 impl Lighting<'_> {
-    /// The light that reaches a place: straight from lamps and windows, and by way of other things.
-    pub(super) fn reaching(&self, spot: &Spot, sample: LightSample) -> [Vec3; 2] {
-        let gathered: Vec3 = (0..GATHERED).map(|i| self.gathered(spot, sample, i)).sum();
+    /// The light that reaches a point: direct from lamps and windows, and indirect by way of other things.
+    pub(super) fn incoming(&self, spot: &Spot, sample: LightSample) -> [Vec3; 2] {
+        let indirect: Vec3 = (0..INDIRECT_RAYS)
+            .map(|i| self.indirect(spot, sample, i))
+            .sum();
         [
             self.direct(spot.at, spot.normal, sample),
-            gathered / GATHERED as f32,
+            indirect / INDIRECT_RAYS as f32,
         ]
     }
 
-    /// The light that lamps and windows alone bring to a place.
+    /// The direct light of lamps and windows at a point.
     pub(super) fn direct(&self, at: Vec3, normal: Vec3, sample: LightSample) -> Vec3 {
         let lights = self.scene.lights.iter().enumerate();
         lights
@@ -71,10 +73,10 @@ impl Lighting<'_> {
             .sum()
     }
 
-    /// What one ray over the half-space brings back.
-    fn gathered(&self, spot: &Spot, sample: LightSample, which: usize) -> Vec3 {
+    /// The light that one ray over the half-space returns.
+    fn indirect(&self, spot: &Spot, sample: LightSample, which: usize) -> Vec3 {
         let [u, v] = sample.pair(12 + which);
-        let around = turn(std::f32::consts::TAU * u);
+        let around = cos_sin(std::f32::consts::TAU * u);
         let (out, up) = (v.sqrt(), (1.0 - v).max(0.0).sqrt());
         let aside = if spot.normal.x.abs() > 0.7 {
             Vec3::Y
@@ -83,27 +85,27 @@ impl Lighting<'_> {
         };
         let across = spot.normal.cross(aside).normalize();
         let over = spot.normal.cross(across);
-        let along = across * (around.x * out) + over * (around.y * out) + spot.normal * up;
-        let ray = Ray::new(spot.at + spot.normal * OFF, along);
-        let Some(met) = Spot::first(self.scene, self.tree, &ray) else {
+        let direction = across * (around.x * out) + over * (around.y * out) + spot.normal * up;
+        let ray = Ray::new(spot.at + spot.normal * OFFSET, direction);
+        let Some(hit) = Spot::first(self.scene, self.tree, &ray) else {
             return self.ambient;
         };
-        if met.glow != Vec3::ZERO {
-            // What shines by itself is counted as a light already.
+        if hit.glow != Vec3::ZERO {
+            // A thing that glows is already counted as a light.
             return self.ambient * 0.5;
         }
         let count = self.scene.lights.len().max(1);
         let chosen = (sample.stratum + which) % count;
         let direct = self.scene.lights.get(chosen).map_or(Vec3::ZERO, |light| {
-            self.from(light, met.at, met.normal, sample.pair(24 + which)) * count as f32
+            self.from(light, hit.at, hit.normal, sample.pair(24 + which)) * count as f32
         });
-        // A ray that meets the place just below a lamp would leave a spot of its own: what it brings is bounded.
-        met.color * (direct + self.ambient).min(self.ambient * BOUND)
+        // The light is limited, because a ray that hits a point close to a lamp would cause a bright dot.
+        hit.color * (direct + self.ambient).min(self.ambient * BOUND)
     }
 
-    /// The light that one light brings to a place.
+    /// The light that one lamp or window sends to a point.
     fn from(&self, light: &LightSource, at: Vec3, normal: Vec3, [u, v]: [f32; 2]) -> Vec3 {
-        let start = at + normal * OFF;
+        let start = at + normal * OFFSET;
         let (target, strength) = match *light {
             LightSource::Panel {
                 corner,
@@ -112,9 +114,9 @@ impl Lighting<'_> {
                 radiance,
             } => {
                 let target = corner + a * u + b * v;
-                let way = target - start;
-                let square = way.length_squared().max(0.01);
-                let shines = (-facing.dot(way)).max(0.0) / square.sqrt();
+                let offset = target - start;
+                let square = offset.length_squared().max(0.01);
+                let shines = (-facing.dot(offset)).max(0.0) / square.sqrt();
                 let area = a.cross(b).length();
                 (
                     target,
@@ -129,21 +131,24 @@ impl Lighting<'_> {
                 let to = (middle - start).normalize_or_zero();
                 let aside = if to.x.abs() > 0.7 { Vec3::Y } else { Vec3::X };
                 let across = to.cross(aside).normalize_or_zero();
-                let around = turn(std::f32::consts::TAU * u);
+                let around = cos_sin(std::f32::consts::TAU * u);
                 let disc = across * around.x + to.cross(across) * around.y;
                 let target = middle + disc * (radius * v.sqrt());
                 let square = (middle - start).length_squared().max(0.02);
                 (target, radiance * (radius * radius / square))
             }
         };
-        let way = target - start;
-        let far = way.length();
-        let along = way / far;
-        let slant = normal.dot(along);
+        let offset = target - start;
+        let distance = offset.length();
+        let direction = offset / distance;
+        let slant = normal.dot(direction);
         if slant <= 0.0 || strength == Vec3::ZERO {
             return Vec3::ZERO;
         }
-        if self.tree.blocked(&Ray::new(start, along), far - 2.0 * OFF) {
+        if self
+            .tree
+            .blocked(&Ray::new(start, direction), distance - 2.0 * OFFSET)
+        {
             Vec3::ZERO
         } else {
             strength * slant
@@ -151,7 +156,7 @@ impl Lighting<'_> {
     }
 }
 
-/// The share of each channel in how bright light is (ITU-R BT.709).
+/// The luminance of linear light (ITU-R BT.709).
 pub(super) fn brightness(light: Vec3) -> f32 {
     light.dot(vec3(0.2126, 0.7152, 0.0722))
 }

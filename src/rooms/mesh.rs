@@ -1,7 +1,7 @@
-//! Shapes of triangles: [`Mesh`], with the solids that furniture is made of.
+//! Triangle meshes: [`Mesh`], with the solids that furniture is made of.
 //!
-//! Lengths are metres; x goes to the right, y up and z to the front. A piece stands on y = 0, with its back at z = 0 and its
-//! middle at x = 0.
+//! Lengths are metres and angles radians. x points to the right, y up and z to the front. A piece stands on y = 0, with its
+//! back at z = 0 and its middle at x = 0.
 
 use std::f32::consts::{PI, TAU};
 
@@ -9,14 +9,14 @@ use glam::{Vec2, Vec3, vec2, vec3};
 
 use super::surface::Surface;
 
-/// A corner of a triangle: where it is, and the normal there.
+/// A corner of a triangle: its position, and the surface normal there.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Corner {
     pub(super) at: Vec3,
     pub(super) normal: Vec3,
 }
 
-/// Three corners, and which of the mesh's surfaces they have.
+/// A triangle: three corners, and the index of its surface in the mesh.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Face {
     pub(super) corners: [Corner; 3],
@@ -24,11 +24,11 @@ pub(super) struct Face {
 }
 
 impl Face {
-    /// Places all over it, its corners among them, about so far apart.
-    pub(super) fn places(&self, apart: f32) -> impl Iterator<Item = Vec3> {
+    /// Points on the triangle with its corners, at most `spacing` metres apart along each edge.
+    pub(super) fn points(&self, spacing: f32) -> impl Iterator<Item = Vec3> {
         let [a, b, c] = self.corners.map(|corner| corner.at);
         let longest = (b - a).length().max((c - a).length()).max((c - b).length());
-        let count = (longest / apart).ceil().max(1.0) as usize;
+        let count = (longest / spacing).ceil().max(1.0) as usize;
         (0..=count).flat_map(move |i| {
             (0..=count - i).map(move |j| {
                 a + (b - a) * (i as f32 / count as f32) + (c - a) * (j as f32 / count as f32)
@@ -37,26 +37,26 @@ impl Face {
     }
 }
 
-/// A shape of triangles.
+/// A mesh of triangles with their surfaces.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Mesh {
     pub(super) faces: Vec<Face>,
     pub(super) surfaces: Vec<Surface>,
 }
 
-/// Sides of what is round.
+/// The number of sides of round shapes (chosen).
 const SIDES: usize = 20;
-/// Rows of what is round in both ways.
+/// The number of rows of shapes that are round in two directions (chosen).
 const ROWS: usize = 10;
 
-/// The sine and cosine of an angle, the same on every machine.
-pub(super) fn turn(angle: f32) -> Vec2 {
+/// The cosine (x) and sine (y) of an angle in radians, the same on every machine.
+pub(super) fn cos_sin(angle: f32) -> Vec2 {
     let (sine, cosine) = libm::sincosf(angle);
     vec2(cosine, sine)
 }
 
 impl Mesh {
-    /// The place of a surface.
+    /// The index of a surface, which is added if it is new.
     fn surface(&mut self, surface: &Surface) -> usize {
         if let Some(known) = self.surfaces.iter().position(|known| known == surface) {
             return known;
@@ -72,7 +72,7 @@ impl Mesh {
         }
     }
 
-    /// A flat piece with four corners in their order around it.
+    /// A flat quadrilateral. The order of its corners decides the normal: (b - a) × (d - a).
     pub(super) fn quad(&mut self, [a, b, c, d]: [Vec3; 4], surface: &Surface) {
         let surface = self.surface(surface);
         let normal = (b - a).cross(d - a).normalize_or_zero();
@@ -81,7 +81,7 @@ impl Mesh {
         self.triangle([a, c, d].map(corner), surface);
     }
 
-    /// A surface over a grid of corners, smooth; each row is as long as the first.
+    /// A smooth surface over a grid of points. All rows have the same length.
     pub(super) fn grid(&mut self, rows: &[Vec<Vec3>], surface: &Surface) {
         let surface = self.surface(surface);
         let (height, width) = (rows.len(), rows.first().map_or(0, Vec::len));
@@ -98,7 +98,7 @@ impl Mesh {
             let mut across = rows[below][x] - rows[above][x];
             let mut along_here = along;
             if along.length_squared() < 1e-12 {
-                // The pole of something round: its neighbours' row tells.
+                // At the pole of a round shape the neighbouring row gives the direction.
                 let near = if y == 0 { 1 } else { y - 1 };
                 along_here = rows[near][right] - rows[near][left];
             }
@@ -125,7 +125,7 @@ impl Mesh {
         }
     }
 
-    /// A block with sharp edges.
+    /// A box with sharp edges, from its lowest to its highest corner.
     pub(super) fn block(&mut self, low: Vec3, high: Vec3, surface: &Surface) {
         let at = |x: usize, y: usize, z: usize| {
             let pick = |which: usize, low: f32, high: f32| if which == 0 { low } else { high };
@@ -147,12 +147,12 @@ impl Mesh {
         }
     }
 
-    /// A block that reaches as far to the left as to the right: half its width, and from where to where it goes up and forwards.
+    /// A box centered at x = 0: half of its width, and its lower and upper bounds in y and z.
     pub(super) fn board(&mut self, half: f32, y: [f32; 2], z: [f32; 2], surface: &Surface) {
         self.block(vec3(-half, y[0], z[0]), vec3(half, y[1], z[1]), surface);
     }
 
-    /// A [board](Self::board) with round edges.
+    /// A [board](Self::board) with rounded edges.
     pub(super) fn cushion(
         &mut self,
         half: f32,
@@ -165,30 +165,30 @@ impl Mesh {
         self.soft(low, high, radius, surface);
     }
 
-    /// A block by its middle on the floor plan, its bottom and its size.
+    /// A box by the center of its bottom face and its size.
     pub(super) fn slab(&mut self, foot: Vec3, size: Vec3, surface: &Surface) {
         let half = vec3(size.x / 2.0, 0.0, size.z / 2.0);
         self.block(foot - half, foot + half + vec3(0.0, size.y, 0.0), surface);
     }
 
-    /// Two such blocks, as far to the left as to the right.
+    /// Two [slabs](Self::slab), at x and at −x.
     pub(super) fn slabs(&mut self, foot: Vec3, size: Vec3, surface: &Surface) {
         for x in [-foot.x, foot.x] {
             self.slab(vec3(x, foot.y, foot.z), size, surface);
         }
     }
 
-    /// A block whose edges are round: the sum of a block and a ball.
+    /// A box with rounded edges: the Minkowski sum of a box and a ball.
     pub(super) fn soft(&mut self, low: Vec3, high: Vec3, radius: f32, surface: &Surface) {
         let radius = radius.min((high - low).min_element() / 2.0 * 0.999);
         let (middle, inner) = ((low + high) / 2.0, (high - low) / 2.0 - Vec3::splat(radius));
         let ball = |row: usize, side: usize| {
-            let down = turn(PI * row as f32 / ROWS as f32);
-            let around = turn(TAU * (side as f32 + 0.5) / SIDES as f32);
+            let down = cos_sin(PI * row as f32 / ROWS as f32);
+            let around = cos_sin(TAU * (side as f32 + 0.5) / SIDES as f32);
             vec3(around.x * down.y, down.x, around.y * down.y)
         };
         let sign = |value: f32| if value < 0.0 { -1.0 } else { 1.0 };
-        // Rows and sides are doubled where the block's flat faces lie, so that they stay flat.
+        // The middle row is doubled, so that the flat sides between the rounded edges stay flat.
         let mut rows = Vec::new();
         for (row, end) in (0..=ROWS).flat_map(|row| {
             let twice = row == ROWS / 2;
@@ -216,7 +216,7 @@ impl Mesh {
         self.lid(&bottom, Vec3::NEG_Y, surface);
     }
 
-    /// Closes a flat ring.
+    /// A flat cap over a closed ring of points.
     fn lid(&mut self, ring: &[Vec3], normal: Vec3, surface: &Surface) {
         let surface = self.surface(surface);
         let middle = ring.iter().sum::<Vec3>() / ring.len() as f32;
@@ -226,12 +226,12 @@ impl Mesh {
         }
     }
 
-    /// Something turned on a lathe: radii at heights above a foot, from below.
+    /// A solid of revolution about y with sharp edges: (radius, height above `foot`) pairs, from below.
     pub(super) fn lathe(&mut self, foot: Vec3, profile: &[(f32, f32)], surface: &Surface) {
         self.oval(foot, profile, 1.0, surface);
     }
 
-    /// Something turned on a lathe, then drawn out along z by a factor.
+    /// A [lathe](Self::lathe) solid, stretched along z by the factor `depth`.
     pub(super) fn oval(
         &mut self,
         foot: Vec3,
@@ -239,14 +239,14 @@ impl Mesh {
         depth: f32,
         surface: &Surface,
     ) {
-        // Each stretch between two radii has normals of its own: a lathe's edges are sharp.
+        // Each section between two radii has its own normals, so that the edges are sharp.
         for pair in profile.windows(2) {
             let rings = [pair[0], pair[1]].map(|at| ring(foot, at, depth));
             self.grid(&rings, surface);
         }
     }
 
-    /// Something smooth turned on a lathe.
+    /// A smooth solid of revolution about y, stretched along z by the factor `depth`.
     pub(super) fn vessel(
         &mut self,
         foot: Vec3,
@@ -258,12 +258,12 @@ impl Mesh {
         self.grid(&rings.collect::<Vec<_>>(), surface);
     }
 
-    /// A rod between two points, closed at its ends.
+    /// A cylinder between two points, with closed ends.
     pub(super) fn rod(&mut self, from: Vec3, to: Vec3, radius: f32, surface: &Surface) {
         self.cone(from, to, [radius, radius], surface);
     }
 
-    /// A rod whose ends have radii of their own.
+    /// A rod with a different radius at each end.
     pub(super) fn cone(&mut self, from: Vec3, to: Vec3, radii: [f32; 2], surface: &Surface) {
         let axis = (to - from).normalize_or_zero();
         let aside = if axis.y.abs() > 0.9 { Vec3::X } else { Vec3::Y };
@@ -271,7 +271,7 @@ impl Mesh {
         let over = axis.cross(across);
         let ring = |middle: Vec3, radius: f32| -> Vec<Vec3> {
             let point = |side: usize| {
-                let around = turn(TAU * (side % SIDES) as f32 / SIDES as f32);
+                let around = cos_sin(TAU * (side % SIDES) as f32 / SIDES as f32);
                 middle + (across * around.x + over * around.y) * radius
             };
             (0..=SIDES).map(point).collect()
@@ -282,12 +282,12 @@ impl Mesh {
         self.lid(&high, axis, surface);
     }
 
-    /// An ellipsoid.
+    /// An ellipsoid by its center and its three radii.
     pub(super) fn ball(&mut self, middle: Vec3, radii: Vec3, surface: &Surface) {
         let row = |row: usize| -> Vec<Vec3> {
-            let down = turn(PI * row as f32 / ROWS as f32);
+            let down = cos_sin(PI * row as f32 / ROWS as f32);
             let point = |side: usize| {
-                let around = turn(TAU * (side % SIDES) as f32 / SIDES as f32);
+                let around = cos_sin(TAU * (side % SIDES) as f32 / SIDES as f32);
                 middle + vec3(around.x * down.y, down.x, around.y * down.y) * radii
             };
             (0..=SIDES).rev().map(point).collect()
@@ -296,18 +296,18 @@ impl Mesh {
         self.grid(&rows, surface);
     }
 
-    /// A pillow: thick in its middle, thin at its seam. `size` is its width, height and thickness as it stands; `lean` turns its
-    /// head back by an angle.
+    /// A pillow: thick in its middle, thin at its seam. `size` is the width, height and thickness of the standing pillow; `lean`
+    /// tilts its top backwards by an angle.
     pub(super) fn pillow(&mut self, middle: Vec3, size: Vec3, lean: f32, surface: &Surface) {
         const CELLS: usize = 10;
-        let tilt = turn(lean);
+        let tilt = cos_sin(lean);
         for side in [1.0_f32, -1.0] {
             let point = |row: usize, column: usize| {
                 let along = |cell: usize| 2.0 * cell as f32 / CELLS as f32 - 1.0;
                 let (u, v) = (along(column) * side, -along(row));
                 let (u4, v4) = (u * u * u * u, v * v * v * v);
                 let swell = ((1.0 - u4) * (1.0 - v4)).max(0.0).sqrt();
-                // Corners stand out a little beyond the edges between them.
+                // The corners reach a little farther out than the middle of the edges.
                 let pinch = vec2(1.0 - 0.06 * (1.0 - v * v), 1.0 - 0.06 * (1.0 - u * u));
                 let flat = vec3(u * pinch.x, v * pinch.y, side * swell) * size / 2.0;
                 let turned = vec3(
@@ -324,7 +324,7 @@ impl Mesh {
         }
     }
 
-    /// Cloth that hangs in folds, from its upper edge at y to the lower: `width` along x, around z.
+    /// Cloth that hangs in folds from `left`: `width` along x, `drop` downwards; `fold` is the width of one fold.
     pub(super) fn drape(
         &mut self,
         left: Vec3,
@@ -336,7 +336,7 @@ impl Mesh {
         let columns = ((width / fold) as usize).max(1) * 8;
         let point = |column: usize, height: f32| {
             let share = column as f32 / columns as f32;
-            let wave = turn(TAU * share * width / fold).y;
+            let wave = cos_sin(TAU * share * width / fold).y;
             let depth = 0.3 * fold * wave * (0.6 + 0.4 * height);
             left + vec3(share * width, -height * drop, depth)
         };
@@ -347,14 +347,14 @@ impl Mesh {
         self.grid(&rows, surface);
     }
 
-    /// Adds another shape, turned about y and moved.
+    /// Adds another mesh, rotated about y by `angle` and moved to `at`.
     pub(super) fn add(&mut self, other: &Self, at: Vec3, angle: f32) {
-        let facing = turn(angle);
+        let rotation = cos_sin(angle);
         let spin = |v: Vec3| {
             vec3(
-                v.x * facing.x + v.z * facing.y,
+                v.x * rotation.x + v.z * rotation.y,
                 v.y,
-                v.z * facing.x - v.x * facing.y,
+                v.z * rotation.x - v.x * rotation.y,
             )
         };
         let places: Vec<usize> = other.surfaces.iter().map(|s| self.surface(s)).collect();
@@ -367,7 +367,7 @@ impl Mesh {
         }));
     }
 
-    /// The corners of the box around it.
+    /// The lowest and the highest corner of the bounding box.
     pub(super) fn bounds(&self) -> [Vec3; 2] {
         let corners = self.faces.iter().flat_map(|face| face.corners);
         corners.fold(
@@ -376,10 +376,10 @@ impl Mesh {
         )
     }
 }
-/// The points of a lathe's ring, closed: its radius and height above a foot, drawn out along z by a factor.
+/// A closed ring of points about y, by its radius and its height above `foot`; `depth` stretches it along z.
 fn ring(foot: Vec3, (radius, height): (f32, f32), depth: f32) -> Vec<Vec3> {
     let point = |side: usize| {
-        let around = turn(TAU * (side % SIDES) as f32 / SIDES as f32);
+        let around = cos_sin(TAU * (side % SIDES) as f32 / SIDES as f32);
         foot + vec3(around.x * radius, height, around.y * radius * depth)
     };
     (0..=SIDES).map(point).collect()

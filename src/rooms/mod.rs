@@ -1,9 +1,9 @@
-//! The built-in rooms: furnished indoor views with exact truth, made by a seed.
+//! The built-in rooms: images of furnished rooms with exact ground truth, generated from a seed.
 //!
-//! Each scene is one room of one of six kinds, furnished by rule and chance out of parametric pieces (`furniture`), and lit
-//! by its windows and lamps. Two frames show it: from the height of a person's eyes, and from that of a small robot. A frame
-//! is traced, so that its image, depth, classes and segments belong to each other to the pixel; it is a function of seed, its
-//! number and its size, the same bytes on every machine and for every number of threads. No model has trained on them.
+//! Each scene is one room of one of six kinds. Rules and random draws furnish it with parametric pieces (`furniture`); windows
+//! and lamps light it. Two frames show it: from the eye height of a person, and from that of a small robot. Frames are ray
+//! traced, so image, depth, classes and segments agree in every pixel. Seed, number and size decide a frame: the bytes are
+//! the same on every machine and for every number of threads. No model was trained on these rooms.
 
 mod bvh;
 mod camera;
@@ -38,19 +38,19 @@ use crate::error::{Error, Result};
 use crate::labels;
 use crate::types::{DepthKind, Digest, Frame, FrameId, Labels, SegmentName, Segmentation};
 
-/// What the rooms are made by. Any change of a pixel or a name is another version.
+/// The version of the generator. Any change of a pixel or a name needs another version.
 pub const VERSION: u32 = 1;
 
-/// The label space of the rooms.
+/// The label space of the semantic maps.
 const SPACE: &str = "mpcat40";
 
-/// Which rooms are made: `frames=48,seed=7,size=1280x720`.
+/// The settings of the rooms, as `frames=48,seed=7,size=1280x720`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Args)]
 pub struct Rooms {
-    /// This many frames, two of each room
+    /// The number of frames, two of each room
     #[arg(long, value_name = "N", value_parser = frames, default_value = "48")]
     pub frames: usize,
-    /// What decides the rooms
+    /// The seed of the rooms
     #[arg(long, value_name = "N", default_value_t = 7)]
     pub seed: u64,
     /// Width and height in pixels
@@ -68,9 +68,9 @@ impl Default for Rooms {
     }
 }
 
-/// The longest side that a room is drawn with.
+/// The maximum width and height of a frame in pixels (chosen).
 const LONGEST: usize = 8192;
-/// The most frames that are made.
+/// The maximum number of frames (chosen).
 const MOST: usize = 1_000_000;
 
 impl fmt::Display for Rooms {
@@ -84,37 +84,37 @@ impl fmt::Display for Rooms {
     }
 }
 
-/// One frame of the rooms, by its place among them.
+/// One frame of the rooms, by its index; drawn only when needed.
 #[derive(Debug, Clone)]
 pub struct Room {
     rooms: Rooms,
     index: usize,
-    album: Arc<FrameCache>,
+    cache: Arc<FrameCache>,
 }
 
-/// What the generator knows of a frame: the truth that questions can be held to.
+/// The ground truth of a frame, for checking questions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RoomTruth {
-    /// The kind of the room.
+    /// The kind of the room, as `living room`.
     pub room: &'static str,
-    /// Everything in the room; the number of a segment is its place, from 1.
+    /// Everything in the room, in the order of the segment numbers, which start at 1.
     pub things: Vec<ThingTruth>,
 }
 
-/// Places on a thing are looked at so near to each other, in metres.
-const REACH: f32 = 0.06;
+/// The maximum distance in metres between neighbouring points at which the surface of a thing is sampled (chosen).
+const SPACING: f32 = 0.06;
 
-/// What the generator knows of a thing.
+/// The ground truth of one thing in the room.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ThingTruth {
-    /// Its own word.
+    /// The name of the thing, as `coffee table`.
     pub word: &'static str,
-    /// Its class in mpcat40.
+    /// The class of the thing in mpcat40.
     pub class: &'static str,
-    /// The name of the colour of most of it; empty where it has none that people agree on.
+    /// The name of its main colour; empty if people would not agree on one.
     pub color: &'static str,
-    /// How far the nearest place of its shape that is within the view is from the camera, in metres, hidden or not; to within
-    /// a few centimetres.
+    /// The distance in metres from the camera to the nearest point of the thing within the view, hidden or not. The error is
+    /// a few centimetres. `f32::MAX` if no point is within the view.
     pub near: f32,
 }
 
@@ -144,14 +144,14 @@ impl FromStr for Rooms {
     }
 }
 
-/// Reads a number of frames.
+/// The number of frames in a text.
 fn frames(text: &str) -> Result<usize, String> {
     let frames = text.parse().ok();
     let frames = frames.filter(|frames| (1..=MOST).contains(frames));
     frames.ok_or_else(|| format!("a number from 1 to {MOST} expected"))
 }
 
-/// Reads a width and a height in pixels.
+/// The width and height in a text, in pixels.
 fn size(text: &str) -> Result<[usize; 2], String> {
     let pixels = |text: &str| {
         let pixels = text.parse().ok();
@@ -163,27 +163,27 @@ fn size(text: &str) -> Result<[usize; 2], String> {
 }
 
 impl Rooms {
-    /// The name of the data set: rooms of one seed are one.
+    /// The name of the data set. It depends on the seed only.
     #[must_use]
     pub fn title(&self) -> String {
         format!("rooms-{}", self.seed)
     }
 
-    /// Their frames.
+    /// The frames with their ids. Nothing is drawn yet.
     pub fn all(self) -> impl Iterator<Item = (FrameId, Room)> {
-        let album = Arc::new(FrameCache::default());
+        let cache = Arc::new(FrameCache::default());
         (0..self.frames).map(move |index| {
             let room = Room {
                 rooms: self,
                 index,
-                album: Arc::clone(&album),
+                cache: Arc::clone(&cache),
             };
             (room.id(), room)
         })
     }
 }
 
-/// What the numbers of the rooms' maps stand for.
+/// The labels of the semantic maps.
 #[must_use]
 pub fn labels() -> Labels {
     labels::space(SPACE).unwrap_or_default()
@@ -202,14 +202,14 @@ impl Room {
         }
     }
 
-    /// The name of its scene, as `living-room-0003`.
+    /// The name of the scene, as `living-room-0003`.
     #[must_use]
     pub fn scene(&self) -> String {
         let number = self.index / 2 / RoomKind::ALL.len();
         format!("{}-{number:04}", self.kind().name().replace(' ', "-"))
     }
 
-    /// Its name in its scene: how high the camera is.
+    /// The name of the frame within its scene: the height of the camera, `eye` or `robot`.
     #[must_use]
     pub fn view(&self) -> &'static str {
         self.height().name()
@@ -219,7 +219,7 @@ impl Room {
         FrameId(format!("{}/{}", self.scene(), self.view()))
     }
 
-    /// All that decides its pixels.
+    /// The digest of everything that decides the pixels of the frame.
     #[must_use]
     pub fn digest(&self) -> Digest {
         let [width, height] = self.rooms.size.map(|side| (side as u64).to_le_bytes());
@@ -251,15 +251,15 @@ impl Room {
         viewpoint::camera(plan, self.height(), self.rooms.size, &mut dice)
     }
 
-    /// What the generator knows of it.
+    /// The ground truth of the frame.
     #[must_use]
     pub fn truth(&self) -> RoomTruth {
         let plan = self.plan();
         let camera = self.camera(&plan);
         let mut near = vec![f32::MAX; plan.scene.things.len()];
         for (face, owner) in plan.scene.mesh.faces.iter().zip(&plan.scene.owners) {
-            let seen = face.places(REACH).filter(|place| camera.sees(*place));
-            let nearest = seen.map(|place| place.distance(camera.at));
+            let visible = face.points(SPACING).filter(|point| camera.sees(*point));
+            let nearest = visible.map(|point| point.distance(camera.at));
             near[*owner] = nearest.fold(near[*owner], f32::min);
         }
         let things = plan.scene.things.iter().zip(near);
@@ -276,12 +276,12 @@ impl Room {
         }
     }
 
-    /// The frame with its maps.
+    /// The frame with its maps, from the cache or drawn.
     ///
     /// # Errors
-    /// None but where a map is not of the image's size, which cannot be.
+    /// If a map has another size than the image, which cannot happen.
     pub fn frame(&self) -> Result<Arc<Frame>> {
-        self.album.frame(self.index, || self.draw())
+        self.cache.frame(self.index, || self.draw())
     }
 
     fn draw(&self) -> Result<Frame> {
@@ -321,7 +321,7 @@ impl Room {
         })
     }
 
-    /// Where the camera is: from its axes (x to the right, y up, z backwards) to those of the room, row by row, in metres.
+    /// The camera pose in metres: a matrix from the camera (x right, y up, z backwards) to the room, row by row.
     #[must_use]
     pub fn pose(&self) -> [f32; 16] {
         self.camera(&self.plan()).pose()
@@ -363,7 +363,7 @@ mod tests {
             assert_ne!(number(class), 0, "{class} is no class");
             match meaning(word) {
                 Meaning::Class(known) => assert_eq!(class, known, "{word}"),
-                // Words that no data set has may have any class but none of another's.
+                // Words that no data set has may have any class, but they are listed here.
                 Meaning::Nothing | Meaning::Unlisted => {
                     assert!(
                         ["desk lamp", "bowl of fruit", "mug", "wall", "tv"].contains(&word),
@@ -375,7 +375,7 @@ mod tests {
     }
 
     #[test]
-    fn the_album_forgets_what_was_drawn_long_ago() {
+    fn the_cache_drops_the_oldest_frames() {
         let rooms = Rooms {
             frames: 2,
             seed: 1,
@@ -384,13 +384,13 @@ mod tests {
         let all: Vec<Room> = rooms.all().map(|(_, room)| room).collect();
         let first = all[0].frame().unwrap();
         assert!(Arc::ptr_eq(&first, &all[0].frame().unwrap()));
-        let album = FrameCache::default();
+        let cache = FrameCache::default();
         let big = Frame {
             rgb: crate::types::Rgb::black(2000, 3000),
             ..first.as_ref().clone()
         };
         for index in 0..5 {
-            album.frame(index, || Ok(big.clone())).unwrap();
+            cache.frame(index, || Ok(big.clone())).unwrap();
         }
         // 78 MB each: only the last one fits.
         let mut drawn = 0;
@@ -399,7 +399,7 @@ mod tests {
                 drawn += 1;
                 Ok(big.clone())
             };
-            album.frame(index, draw).unwrap();
+            cache.frame(index, draw).unwrap();
         }
         assert_eq!(drawn, 1);
     }

@@ -1,18 +1,19 @@
-//! Paints whose colour people call by one name: [`Paint`].
+//! Paints in colours that people agree on: [`Paint`].
 
 use glam::{Vec3, vec3};
 
 use super::dice::Dice;
 
-/// A paint: the name of its colour, and the colour in linear light.
+/// A colour and its name.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Paint {
-    /// One of the eleven basic colour terms; empty where people disagree.
+    /// One of the eleven basic colour terms; empty if people would disagree.
     pub(super) name: &'static str,
+    /// The colour in linear light, red, green and blue.
     pub(super) color: Vec3,
 }
 
-/// The sRGB codes of the paints of each name. They are strong, so that shade leaves their name as it is.
+/// The sRGB codes of the paints of each name. The colours are strong, so that shade does not change their name.
 const NAMED: [(&str, &[[u8; 3]]); 11] = [
     ("black", &[[24, 24, 26], [30, 28, 28]]),
     ("grey", &[[128, 128, 130], [118, 120, 122], [136, 134, 132]]),
@@ -27,7 +28,7 @@ const NAMED: [(&str, &[[u8; 3]]); 11] = [
     ("brown", &[[120, 76, 44], [106, 66, 38], [132, 86, 52]]),
 ];
 
-/// One sRGB code in linear light (IEC 61966-2-1).
+/// The linear light of one sRGB code (IEC 61966-2-1).
 pub(super) fn linear(code: u8) -> f32 {
     let value = f32::from(code) / 255.0;
     if value <= 0.04045 {
@@ -37,13 +38,13 @@ pub(super) fn linear(code: u8) -> f32 {
     }
 }
 
-/// Three sRGB codes in linear light.
+/// The linear light of three sRGB codes.
 pub(super) fn rgb([red, green, blue]: [u8; 3]) -> Vec3 {
     vec3(linear(red), linear(green), linear(blue))
 }
 
 impl Paint {
-    /// A paint of one of these names.
+    /// A random paint with one of these names.
     pub(super) fn of(names: &[&str], dice: &mut Dice) -> Self {
         let name = dice.pick(names);
         let known = NAMED.iter().find(|(known, _)| *known == name);
@@ -54,7 +55,7 @@ impl Paint {
         }
     }
 
-    /// A colour that has no name people agree on.
+    /// A colour without a name that people agree on.
     pub(super) fn nameless(codes: [u8; 3]) -> Self {
         Self {
             name: "",
@@ -63,7 +64,7 @@ impl Paint {
     }
 }
 
-/// The names of all paints.
+/// The eleven names of paints.
 pub(super) const ALL: [&str; 11] = [
     "black", "grey", "white", "red", "orange", "yellow", "green", "blue", "purple", "pink", "brown",
 ];

@@ -1,4 +1,4 @@
-//! The floor plan of a room: four walls, and what stands and hangs where: [`FloorPlan`].
+//! The floor plan of a room: four walls, and the places of everything that stands and hangs ([`FloorPlan`]).
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -11,7 +11,7 @@ use super::paint::rgb;
 use super::scene::{Piece, Pose, Scene, kind};
 use super::surface::{Pattern, Surface};
 
-/// A wall, named as on a map whose north is where z is 0.
+/// A wall of the room. North is at z = 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Wall {
     North,
@@ -20,11 +20,10 @@ pub(super) enum Wall {
     West,
 }
 
-/// All walls.
 pub(super) const WALLS: [Wall; 4] = [Wall::North, Wall::East, Wall::South, Wall::West];
 
 impl Wall {
-    /// How far a piece is turned that stands with its back to the wall.
+    /// The rotation in radians of a piece with its back to the wall.
     pub(super) fn angle(self) -> f32 {
         match self {
             Self::North => 0.0,
@@ -44,7 +43,7 @@ impl Wall {
     }
 }
 
-/// What a room's floor is.
+/// The kind of floor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Flooring {
     Wood,
@@ -52,7 +51,7 @@ pub(super) enum Flooring {
     Carpet,
 }
 
-/// A rectangle of the floor: the smallest x and z, and the largest.
+/// A rectangle of the floor in metres: minimum x and z, maximum x and z.
 #[derive(Debug, Clone, Copy)]
 struct FloorArea([f32; 4]);
 
@@ -63,7 +62,7 @@ impl FloorArea {
     }
 }
 
-/// A rectangle of a wall: along it, then up.
+/// A rectangle of a wall in metres: its bounds along the wall, and its bounds in height.
 #[derive(Debug, Clone, Copy)]
 struct WallPatch {
     wall: Wall,
@@ -72,26 +71,26 @@ struct WallPatch {
 }
 
 impl WallPatch {
-    /// The part that reaches as far to both sides of a place along the wall.
+    /// The rectangle that reaches equally far to both sides of a position along the wall.
     fn around(wall: Wall, along: f32, reach: f32, up: [f32; 2]) -> Self {
         let along = [along - reach, along + reach];
         Self { wall, along, up }
     }
 }
 
-/// The room while it is furnished.
+/// A room while it is furnished.
 pub(super) struct FloorPlan {
     pub(super) scene: Scene,
-    /// Width, height and depth.
+    /// Width (x), height (y) and depth (z) in metres.
     pub(super) size: Vec3,
     pub(super) dice: Dice,
-    /// What is worth looking at.
-    pub(super) sights: Vec<usize>,
+    /// The indices of things that the camera should look at.
+    pub(super) focus_things: Vec<usize>,
     areas: Vec<FloorArea>,
     patches: Vec<WallPatch>,
 }
 
-/// Places are tried so often before a piece is left out.
+/// The number of places that are tried for a piece before it is left out (chosen).
 const TRIES: usize = 60;
 
 impl FloorPlan {
@@ -108,7 +107,7 @@ impl FloorPlan {
         let mut plan = Self {
             scene: Scene::default(),
             size,
-            sights: Vec::new(),
+            focus_things: Vec::new(),
             areas: Vec::new(),
             patches: Vec::new(),
             dice,
@@ -121,7 +120,7 @@ impl FloorPlan {
             vec3(size.x, size.y + 0.05, size.z),
             &ceiling,
         );
-        plan.put(
+        plan.add(
             Piece::new(kind("ceiling", "ceiling"), mesh, ""),
             at(Vec3::ZERO, 0.0),
         );
@@ -139,8 +138,8 @@ impl FloorPlan {
                 let board = Surface::plain([244, 244, 242]);
                 mesh.block(vec3(left, 0.0, 0.0), vec3(right, 0.09, 0.014), &board);
             }
-            let pose = plan.on(wall, width / 2.0, 0.0);
-            plan.put(Piece::new(kind("wall", "wall"), mesh, ""), pose);
+            let pose = plan.wall_pose(wall, width / 2.0, 0.0);
+            plan.add(Piece::new(kind("wall", "wall"), mesh, ""), pose);
         }
         plan
     }
@@ -173,13 +172,13 @@ impl FloorPlan {
             vec3(self.size.x, 0.0, self.size.z),
             &surface,
         );
-        self.put(
+        self.add(
             Piece::new(kind("floor", "floor"), mesh, ""),
             at(Vec3::ZERO, 0.0),
         );
     }
 
-    /// The length of a wall.
+    /// The length of a wall in metres.
     pub(super) fn width(&self, wall: Wall) -> f32 {
         match wall {
             Wall::North | Wall::South => self.size.x,
@@ -187,8 +186,8 @@ impl FloorPlan {
         }
     }
 
-    /// The pose of a piece whose back is at a wall, so far along it and so high.
-    pub(super) fn on(&self, wall: Wall, along: f32, up: f32) -> Pose {
+    /// The pose of a piece with its back at a wall, `along` metres from its left end and `up` metres high.
+    pub(super) fn wall_pose(&self, wall: Wall, along: f32, up: f32) -> Pose {
         let place = match wall {
             Wall::North => vec3(along, up, 0.0),
             Wall::East => vec3(self.size.x, up, along),
@@ -198,22 +197,28 @@ impl FloorPlan {
         at(place, wall.angle())
     }
 
-    /// Puts a piece anywhere; its number.
-    #[expect(clippy::needless_pass_by_value, reason = "a piece is put once")]
-    pub(super) fn put(&mut self, piece: Piece, pose: Pose) -> usize {
-        self.scene.put(&piece, pose);
+    /// Adds a piece without a check for free space, and returns its index.
+    #[expect(clippy::needless_pass_by_value, reason = "a piece is added once")]
+    pub(super) fn add(&mut self, piece: Piece, pose: Pose) -> usize {
+        self.scene.add(&piece, pose);
         self.scene.things.len() - 1
     }
 
-    /// Puts a piece on or beside another one, in that one's own lengths.
-    pub(super) fn beside(&mut self, base: &Pose, piece: Piece, place: Vec3, angle: f32) -> usize {
-        self.put(piece, at(base.outward(place), base.angle + angle))
+    /// Adds a piece on or next to another one, at a place in the coordinates of that one. Returns its index.
+    pub(super) fn add_relative(
+        &mut self,
+        base: &Pose,
+        piece: Piece,
+        place: Vec3,
+        angle: f32,
+    ) -> usize {
+        self.add(piece, at(base.to_room(place), base.angle + angle))
     }
 
-    fn all(&mut self, set: FurnitureSet, pose: &Pose) -> usize {
+    fn add_set(&mut self, set: FurnitureSet, pose: &Pose) -> usize {
         let first = self.scene.things.len();
-        for (piece, own) in set.pieces {
-            self.beside(pose, piece, own.at, own.angle);
+        for (piece, relative) in set.pieces {
+            self.add_relative(pose, piece, relative.at, relative.angle);
         }
         first
     }
@@ -223,12 +228,12 @@ impl FloorPlan {
             vec3(-size.x / 2.0, 0.0, from),
             vec3(size.x / 2.0, 0.0, from + size.z),
         ]
-        .map(|corner| pose.outward(corner));
+        .map(|corner| pose.to_room(corner));
         let (low, high) = (corners[0].min(corners[1]), corners[0].max(corners[1]));
         FloorArea([low.x, low.z, high.x, high.z])
     }
 
-    fn free(&self, area: &FloorArea) -> bool {
+    fn is_free(&self, area: &FloorArea) -> bool {
         let FloorArea([left, back, right, front]) = *area;
         left > 0.0
             && back > 0.0
@@ -237,7 +242,7 @@ impl FloorPlan {
             && !self.areas.iter().any(|other| other.meets(area, 0.04))
     }
 
-    fn open(&self, patch: &WallPatch) -> bool {
+    fn is_free_on_wall(&self, patch: &WallPatch) -> bool {
         !self.patches.iter().any(|other| {
             other.wall == patch.wall
                 && other.along[0] < patch.along[1]
@@ -247,23 +252,23 @@ impl FloorPlan {
         })
     }
 
-    /// Stands a set at a wall, so far along it, where nothing is in its way; its pose.
+    /// Places a set at a wall, `along` metres from its left end. Returns its pose; `None` if something is in the way.
     pub(super) fn stand_at(&mut self, set: FurnitureSet, wall: Wall, along: f32) -> Option<Pose> {
-        let pose = self.on(wall, along, 0.0);
-        let pose = at(pose.outward(vec3(0.0, 0.0, 0.016)), pose.angle);
+        let pose = self.wall_pose(wall, along, 0.0);
+        let pose = at(pose.to_room(vec3(0.0, 0.0, 0.016)), pose.angle);
         let area = Self::area(&pose, set.size, 0.0);
         let half = set.size.x / 2.0;
         let patch = WallPatch::around(wall, along, half, [0.0, set.size.y + 0.02]);
-        if !self.free(&area) || !self.open(&patch) {
+        if !self.is_free(&area) || !self.is_free_on_wall(&patch) {
             return None;
         }
         self.areas.push(area);
         self.patches.push(patch);
-        self.all(set, &pose);
+        self.add_set(set, &pose);
         Some(pose)
     }
 
-    /// Stands a set somewhere at one of these walls; `None` where there is no room for it.
+    /// Places a set at a random place of one of these walls; `None` if there is no space.
     pub(super) fn stand(&mut self, set: &FurnitureSet, choices: &[Wall]) -> Option<Pose> {
         (0..TRIES).find_map(|_| {
             let wall = self.dice.pick(choices);
@@ -273,7 +278,7 @@ impl FloorPlan {
         })
     }
 
-    /// Stands a set in the corner of a wall.
+    /// Places a set at an end of one of these walls, in the corner; `None` if there is no space.
     pub(super) fn corner(&mut self, set: &FurnitureSet, choices: &[Wall]) -> Option<Pose> {
         (0..TRIES).find_map(|_| {
             let wall = self.dice.pick(choices);
@@ -287,26 +292,31 @@ impl FloorPlan {
         })
     }
 
-    /// Stands a set in the open, its middle at a place; its pose.
-    pub(super) fn amid(&mut self, set: FurnitureSet, place: Vec3, angle: f32) -> Option<Pose> {
-        let back = at(place, angle).outward(vec3(0.0, 0.0, -set.size.z / 2.0));
+    /// Places a set away from walls, with its middle at a place. Returns its pose; `None` if something is in the way.
+    pub(super) fn stand_free(
+        &mut self,
+        set: FurnitureSet,
+        place: Vec3,
+        angle: f32,
+    ) -> Option<Pose> {
+        let back = at(place, angle).to_room(vec3(0.0, 0.0, -set.size.z / 2.0));
         let pose = at(back, angle);
         let area = Self::area(&pose, set.size, 0.0);
-        if !self.free(&area) {
+        if !self.is_free(&area) {
             return None;
         }
         self.areas.push(area);
-        self.all(set, &pose);
+        self.add_set(set, &pose);
         Some(pose)
     }
 
-    /// Keeps a part of the floor in front of a pose free of what comes later.
+    /// Reserves a part of the floor in front of a pose, so that later sets stay out of it.
     pub(super) fn keep_free(&mut self, pose: &Pose, size: Vec3, from: f32) {
         let area = Self::area(pose, size, from);
         self.areas.push(area);
     }
 
-    /// Hangs a piece of a size on one of these walls, its lower edge so high, where nothing is behind or before it.
+    /// Hangs a piece on one of these walls at height `up`; `None` if there is no free place.
     pub(super) fn hang(&mut self, piece: &Piece, choices: &[Wall], up: f32) -> Option<Pose> {
         let [low, high] = piece.mesh.bounds();
         let half = high.x.max(-low.x) + 0.06;
@@ -315,17 +325,17 @@ impl FloorPlan {
             let along = self.dice.between(half, self.width(wall) - half);
             let patch =
                 WallPatch::around(wall, along, half, [up + low.y - 0.05, up + high.y + 0.05]);
-            self.open(&patch).then(|| {
+            self.is_free_on_wall(&patch).then(|| {
                 self.patches.push(patch);
-                let pose = self.on(wall, along, up);
-                self.put(piece.clone(), pose);
+                let pose = self.wall_pose(wall, along, up);
+                self.add(piece.clone(), pose);
                 pose
             })
         })
     }
 
-    /// Hangs a piece above a pose at a wall, without asking what is there.
-    pub(super) fn above(&mut self, pose: &Pose, piece: Piece, up: f32) -> usize {
+    /// Hangs a piece above a pose at a wall, without a check for free space. Returns its index.
+    pub(super) fn hang_above(&mut self, pose: &Pose, piece: Piece, up: f32) -> usize {
         let [low, high] = piece.mesh.bounds();
         let wall = WALLS
             .into_iter()
@@ -343,10 +353,10 @@ impl FloorPlan {
                 up: [up + low.y, up + high.y],
             });
         }
-        self.beside(pose, piece, vec3(0.0, up, 0.0), 0.0)
+        self.add_relative(pose, piece, vec3(0.0, up, 0.0), 0.0)
     }
 
-    /// Cuts a door into one of these walls.
+    /// Adds a door to one of these walls, if there is space.
     pub(super) fn door(&mut self, choices: &[Wall]) {
         let door = FurnitureSet::of(walls::door(&mut self.dice));
         let size = door.size + vec3(0.05, 0.0, 0.0);
@@ -355,30 +365,30 @@ impl FloorPlan {
             let wall = self.dice.pick(choices);
             let half = size.x / 2.0 + 0.1;
             let along = self.dice.between(half, self.width(wall) - half);
-            let pose = self.on(wall, along, 0.0);
+            let pose = self.wall_pose(wall, along, 0.0);
             let patch = WallPatch::around(wall, along, half, [0.0, size.y + 0.1]);
-            if self.open(&patch) {
+            if self.is_free_on_wall(&patch) {
                 self.patches.push(patch);
                 self.keep_free(&pose, vec3(0.9, 0.0, 0.75), 0.0);
-                self.all(set, &pose);
+                self.add_set(set, &pose);
                 return;
             }
         }
     }
 
-    /// A window in one of these walls, with what hangs before it.
+    /// Adds a window with its curtains or blinds to one of these walls, if there is space. `sill` is its height in metres.
     pub(super) fn window(
         &mut self,
         choices: &[Wall],
         width: f32,
         sill: f32,
-        dress: WindowDressing,
+        dressing: WindowDressing,
     ) {
         let height = 2.2 - sill;
         for _ in 0..TRIES {
             let wall = self.dice.pick(choices);
             let reach = width / 2.0
-                + if dress == WindowDressing::Curtains {
+                + if dressing == WindowDressing::Curtains {
                     0.62
                 } else {
                     0.15
@@ -389,19 +399,19 @@ impl FloorPlan {
             }
             let along = self.dice.between(reach + 0.05, span - reach - 0.05);
             let patch = WallPatch::around(wall, along, reach, [sill - 0.12, 2.3]);
-            if !self.open(&patch) {
+            if !self.is_free_on_wall(&patch) {
                 continue;
             }
             self.patches.push(patch);
-            let pose = self.on(wall, along, sill);
+            let pose = self.wall_pose(wall, along, sill);
             let daylight = self.dice.between(10.0, 14.0);
-            self.put(walls::window(width, height, daylight), pose);
-            match dress {
+            self.add(walls::window(width, height, daylight), pose);
+            match dressing {
                 WindowDressing::Bare => {}
                 WindowDressing::Blinds => {
                     let share = self.dice.between(0.3, 0.75);
                     let piece = walls::blinds(width, height, share, &mut self.dice);
-                    self.put(piece, pose);
+                    self.add(piece, pose);
                 }
                 WindowDressing::Curtains => {
                     let drop = if self.dice.chance(0.7) {
@@ -411,10 +421,10 @@ impl FloorPlan {
                     };
                     let rail = at(vec3(pose.at.x, 2.3, pose.at.z), pose.angle);
                     for piece in textiles::curtains(width, drop, &mut self.dice) {
-                        self.put(piece, rail);
+                        self.add(piece, rail);
                     }
                     if drop > 2.0 {
-                        // Nothing stands in the folds.
+                        // Long curtains need free space in front of the wall.
                         let size = vec3(2.0 * reach, 0.0, 0.2);
                         self.keep_free(&at(vec3(pose.at.x, 0.0, pose.at.z), pose.angle), size, 0.0);
                     }
@@ -424,7 +434,7 @@ impl FloorPlan {
         }
     }
 
-    /// Whether a person or a robot could be at a place of the floor.
+    /// Whether a camera can be at a place of the floor, with `margin` metres to walls and furniture.
     pub(super) fn walkable(&self, place: Vec3, margin: f32) -> bool {
         let point = FloorArea([place.x, place.z, place.x, place.z]);
         let inside = |value: f32, end: f32| (margin..=end - margin).contains(&value);
@@ -434,7 +444,7 @@ impl FloorPlan {
     }
 }
 
-/// What hangs before a window.
+/// The curtains or blinds of a window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum WindowDressing {
     Bare,

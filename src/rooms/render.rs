@@ -1,8 +1,8 @@
-//! A view of a room: its image and its maps, [`render`].
+//! The image and the maps of a room from one camera: [`render`].
 //!
-//! Every pixel is traced once, those at edges four times more. Light is slow to change: it is sampled at every other pixel of
-//! every other row, by neighbours in turn, smoothed between places of one plane, and spread from there; a place that has no
-//! neighbour of its kind is lit by samples of its own.
+//! Every pixel is traced once, and pixels at edges four times more. Light changes slowly, so it is sampled at every second
+//! pixel of every second row, smoothed between points of the same plane, and interpolated. A point without a similar
+//! neighbour gets its own samples.
 
 use std::sync::LazyLock;
 
@@ -16,28 +16,28 @@ use super::scene::Scene;
 use super::spot::{Gloss, Spot, reflected};
 use crate::types::Rgb;
 
-/// What is seen of a room.
+/// The image and the maps of a view.
 #[derive(Debug)]
 pub(super) struct RenderedView {
     pub(super) rgb: Rgb,
-    /// Millimetres along the optical axis.
+    /// The depth of each pixel in millimetres along the optical axis; 0 if there is none.
     pub(super) depth: Vec<u32>,
-    /// The number of the thing at each pixel, from 1.
+    /// The number of the thing at each pixel, from 1; 0 if there is none.
     pub(super) things: Vec<u32>,
 }
 
-/// How the corners of a pixel at an edge are laid out (the rotated grid of four).
-const WITHIN: [[f32; 2]; 4] = [
+/// The offsets of the four rays of a pixel at an edge, in pixels (rotated grid).
+const SUBPIXELS: [[f32; 2]; 4] = [
     [-0.125, -0.375],
     [0.375, -0.125],
     [0.125, 0.375],
     [-0.375, 0.125],
 ];
 
-/// Neighbouring pixels whose colours differ by more are an edge.
+/// The minimum difference of linear colours between neighbouring pixels that makes an edge (chosen).
 const EDGE: f32 = 0.06;
 
-/// Renders a view.
+/// The image and the maps of a scene, as a camera sees it.
 pub(super) fn render(scene: &Scene, camera: &Camera) -> RenderedView {
     let tree = scene.tree();
     let [width, height] = camera.size;
@@ -46,12 +46,12 @@ pub(super) fn render(scene: &Scene, camera: &Camera) -> RenderedView {
         .with_min_len(width)
         .map(|i| {
             let ray = camera.ray((i % width) as f32, (i / width) as f32);
-            Spot::seen(scene, &tree, &ray)
+            Spot::through_mirror(scene, &tree, &ray)
         })
         .collect();
     let lighting = lighting(scene, &tree, &spots);
     let light = LightGrid::new(&lighting, &spots, camera.size);
-    let plain: Vec<Vec3> = spots
+    let colors: Vec<Vec3> = spots
         .par_iter()
         .enumerate()
         .map(|(i, spot)| match spot {
@@ -63,30 +63,30 @@ pub(super) fn render(scene: &Scene, camera: &Camera) -> RenderedView {
         })
         .collect();
     let exposure = 1.2 / light.typical().max(1e-6);
-    let samples: Vec<[u8; 3]> = plain
+    let samples: Vec<[u8; 3]> = colors
         .par_iter()
         .enumerate()
         .map(|(i, color)| {
             let at = [i % width, i / width];
-            let seen = if edge(&spots, &plain, camera.size, at, exposure) {
-                let rays = WITHIN.map(|[dx, dy]| [at[0] as f32 + dx, at[1] as f32 + dy]);
+            let mapped = if is_edge(&spots, &colors, camera.size, at, exposure) {
+                let rays = SUBPIXELS.map(|[dx, dy]| [at[0] as f32 + dx, at[1] as f32 + dy]);
                 let colors = rays.map(|[x, y]| {
-                    let spot = Spot::seen(scene, &tree, &camera.ray(x, y));
+                    let spot = Spot::through_mirror(scene, &tree, &camera.ray(x, y));
                     let color = spot.map_or(*color, |spot| light.shade(&spot, camera.at, [x, y]));
-                    developed(color * exposure)
+                    tone_mapped(color * exposure)
                 });
                 colors.iter().sum::<Vec3>() / 4.0
             } else {
-                developed(*color * exposure)
+                tone_mapped(*color * exposure)
             };
-            seen.to_array().map(encoded)
+            mapped.to_array().map(srgb_code)
         })
         .collect();
     let axis = camera.axis();
     let depth = spots.iter().enumerate().map(|(i, spot)| {
         let ray = camera.ray((i % width) as f32, (i / width) as f32);
         spot.map_or(0, |spot| {
-            (spot.far * ray.along.dot(axis) * 1000.0 + 0.5) as u32
+            (spot.distance * ray.direction.dot(axis) * 1000.0 + 0.5) as u32
         })
     });
     RenderedView {
@@ -100,8 +100,8 @@ pub(super) fn render(scene: &Scene, camera: &Camera) -> RenderedView {
     }
 }
 
-/// The numbers of the things that a small view shows, from 1.
-pub(super) fn glimpse(scene: &Scene, tree: &Bvh, camera: &Camera) -> Vec<u32> {
+/// The number of the thing at each pixel of a small view, from 1; 0 if there is none.
+pub(super) fn preview(scene: &Scene, tree: &Bvh, camera: &Camera) -> Vec<u32> {
     let [width, height] = camera.size;
     (0..width * height)
         .map(|i| {
@@ -112,7 +112,7 @@ pub(super) fn glimpse(scene: &Scene, tree: &Bvh, camera: &Camera) -> Vec<u32> {
         .collect()
 }
 
-/// The light of a scene: what is left after many bounces is as much as its walls would give back of what reaches them.
+/// The lighting of a scene. The ambient light is estimated from the direct light and the colours of visible points.
 fn lighting<'a>(scene: &'a Scene, tree: &'a Bvh, spots: &[Option<Spot>]) -> Lighting<'a> {
     let mut lighting = Lighting {
         scene,
@@ -120,7 +120,7 @@ fn lighting<'a>(scene: &'a Scene, tree: &'a Bvh, spots: &[Option<Spot>]) -> Ligh
         ambient: Vec3::ZERO,
     };
     let step = (spots.len() / 1024).max(1);
-    let (mut direct, mut given, mut count) = (Vec3::ZERO, Vec3::ZERO, 0.0);
+    let (mut direct, mut albedo, mut count) = (Vec3::ZERO, Vec3::ZERO, 0.0);
     for (i, spot) in spots.iter().step_by(step).flatten().enumerate() {
         if spot.glow == Vec3::ZERO {
             let sample = LightSample {
@@ -128,31 +128,31 @@ fn lighting<'a>(scene: &'a Scene, tree: &'a Bvh, spots: &[Option<Spot>]) -> Ligh
                 place: [i as i32, -1],
             };
             direct += lighting.direct(spot.at, spot.normal, sample);
-            given += spot.color;
+            albedo += spot.color;
             count += 1.0;
         }
     }
     if count > 0.0 {
-        let (direct, given) = (direct / count, given / count);
-        // A room sends light back again and again: g / (1 - g) of it, of which a part is sampled.
-        let many = given / (Vec3::ONE - given.min(Vec3::splat(0.75)));
-        let left = direct * (many * 0.9 + 0.16);
-        // The colours of what is in view are not those of the whole room: most of them average out.
-        lighting.ambient = left.lerp(Vec3::splat(brightness(left)), 0.65);
+        let (direct, albedo) = (direct / count, albedo / count);
+        // Light is reflected many times: a / (1 - a) of it for an albedo a. A part of that is sampled.
+        let bounced = albedo / (Vec3::ONE - albedo.min(Vec3::splat(0.75)));
+        let ambient = direct * (bounced * 0.9 + 0.16);
+        // The visible colours are not those of the whole room, so the ambient colour is moved towards grey.
+        lighting.ambient = ambient.lerp(Vec3::splat(brightness(ambient)), 0.65);
     }
     lighting
 }
 
-/// The light at every other pixel of every other row.
+/// The light at every second pixel of every second row.
 struct LightGrid<'a> {
     lighting: &'a Lighting<'a>,
     grid: [usize; 2],
     places: Vec<Option<Spot>>,
-    /// Straight from lamps and windows, and by way of other things, which is smoother.
-    reaching: [Vec<Vec3>; 2],
+    /// The direct light, and the indirect light, which is smoother.
+    incoming: [Vec<Vec3>; 2],
 }
 
-/// How far apart the neighbours are that are smoothed over, one pass after the other.
+/// The distances between smoothed neighbours in each pass, for direct and for indirect light (chosen).
 const PASSES: [&[usize]; 2] = [&[1, 2, 1], &[1, 2, 4, 8, 2]];
 
 impl<'a> LightGrid<'a> {
@@ -161,7 +161,7 @@ impl<'a> LightGrid<'a> {
         let places: Vec<Option<Spot>> = (0..grid[0] * grid[1])
             .map(|i| spots[(i / grid[0]) * 2 * size[0] + (i % grid[0]) * 2])
             .collect();
-        let reaching: Vec<[Vec3; 2]> = places
+        let incoming: Vec<[Vec3; 2]> = places
             .par_iter()
             .enumerate()
             .map(|(i, spot)| {
@@ -170,26 +170,26 @@ impl<'a> LightGrid<'a> {
                     stratum: (x % STRATA) + (y % STRATA) * STRATA,
                     place: [x as i32, y as i32],
                 };
-                let lit = spot.as_ref().filter(|spot| spot.glow == Vec3::ZERO);
-                lit.map_or([Vec3::ZERO; 2], |spot| lighting.reaching(spot, sample))
+                let shaded = spot.as_ref().filter(|spot| spot.glow == Vec3::ZERO);
+                shaded.map_or([Vec3::ZERO; 2], |spot| lighting.incoming(spot, sample))
             })
             .collect();
         let mut light = Self {
             lighting,
             grid,
             places,
-            reaching: [0, 1].map(|part| reaching.iter().map(|light| light[part]).collect()),
+            incoming: [0, 1].map(|part| incoming.iter().map(|light| light[part]).collect()),
         };
         for (part, passes) in PASSES.iter().enumerate() {
             for step in *passes {
-                light.reaching[part] = light.smooth(&light.reaching[part], *step as i32);
+                light.incoming[part] = light.smooth(&light.incoming[part], *step as i32);
             }
         }
         light
     }
 
-    /// Takes the mean of neighbours of one plane, so many places apart (the à-trous filter of Dammertz et al., HPG 2010).
-    fn smooth(&self, reaching: &[Vec3], step: i32) -> Vec<Vec3> {
+    /// One smoothing pass: the mean of neighbours in the same plane, `step` apart (à-trous filter, Dammertz et al., HPG 2010).
+    fn smooth(&self, incoming: &[Vec3], step: i32) -> Vec<Vec3> {
         let [width, height] = self.grid;
         let smoothed = (0..width * height).into_par_iter().map(|i| {
             let Some(own) = &self.places[i] else {
@@ -205,8 +205,8 @@ impl<'a> LightGrid<'a> {
                     }
                     let j = v as usize * width + u as usize;
                     if let Some(other) = &self.places[j] {
-                        let weight = alike(own, other);
-                        sum += reaching[j] * weight;
+                        let weight = similarity(own, other);
+                        sum += incoming[j] * weight;
                         weights += weight;
                     }
                 }
@@ -216,7 +216,7 @@ impl<'a> LightGrid<'a> {
         smoothed.collect()
     }
 
-    /// The light at a place of the image.
+    /// The light that reaches a point of the image.
     fn at(&self, spot: &Spot, [x, y]: [f32; 2]) -> Vec3 {
         let [width, height] = self.grid;
         let (u, v) = ((x * 0.5).max(0.0), (y * 0.5).max(0.0));
@@ -231,8 +231,8 @@ impl<'a> LightGrid<'a> {
             if let Some(other) = &self.places[place] {
                 let near = (1.0 - (u - (left + dx as f32)).abs()).max(0.0)
                     * (1.0 - (v - (top + dy as f32)).abs()).max(0.0);
-                let weight = (near + 0.01) * alike(spot, other);
-                sum += (self.reaching[0][place] + self.reaching[1][place]) * weight;
+                let weight = (near + 0.01) * similarity(spot, other);
+                sum += (self.incoming[0][place] + self.incoming[1][place]) * weight;
                 weights += weight;
             }
         }
@@ -244,29 +244,32 @@ impl<'a> LightGrid<'a> {
                 stratum,
                 place: [(x * 8.0) as i32, (y * 8.0) as i32],
             };
-            let [direct, gathered] = self.lighting.reaching(spot, sample);
-            direct + gathered
+            let [direct, indirect] = self.lighting.incoming(spot, sample);
+            direct + indirect
         });
         samples.sum::<Vec3>() / (STRATA * STRATA) as f32
     }
 
-    /// The light that a place of the image sends to the camera.
+    /// The light that a point of the image sends to the camera.
     fn shade(&self, spot: &Spot, from: Vec3, at: [f32; 2]) -> Vec3 {
         if spot.glow != Vec3::ZERO {
-            // A lamp is as bright as its glow beside what is usual in the room, so that it never goes grey.
+            // The brightness of a lamp is relative to that of the room, so that it never looks grey.
             return spot.glow * self.typical();
         }
-        let reaching = self.at(spot, at);
-        let matte = spot.color * reaching;
+        let incoming = self.at(spot, at);
+        let matte = spot.color * incoming;
         if spot.glossy == Gloss::Dull {
             return matte;
         }
-        let along = (spot.at - from).normalize_or_zero();
-        let slant = (-along.dot(spot.normal)).clamp(0.0, 1.0);
+        let direction = (spot.at - from).normalize_or_zero();
+        let slant = (-direction.dot(spot.normal)).clamp(0.0, 1.0);
         // Schlick's approximation of Fresnel's equations for an index of 1.5.
         let rest = 1.0 - slant;
         let share = 0.04 + 0.96 * rest * rest * rest * rest * rest;
-        let ray = Ray::new(spot.at + spot.normal * 1e-3, reflected(along, spot.normal));
+        let ray = Ray::new(
+            spot.at + spot.normal * 1e-3,
+            reflected(direction, spot.normal),
+        );
         let back = Spot::first(self.lighting.scene, self.lighting.tree, &ray);
         let back = back.map_or(Vec3::ZERO, |back| {
             back.color * self.lighting.ambient * 1.6 + back.glow * self.typical()
@@ -274,15 +277,15 @@ impl<'a> LightGrid<'a> {
         matte * (1.0 - 0.5 * share) + back * (0.5 * share)
     }
 
-    /// How bright the light is that usually reaches a place in the view.
+    /// The typical brightness of the light in the view.
     fn typical(&self) -> f32 {
         brightness(self.lighting.ambient) * 2.2
     }
 }
 
-/// How much two places have to do with each other: 1 on one plane, 0 on different things.
-fn alike(a: &Spot, b: &Spot) -> f32 {
-    if a.shown != b.shown || a.thing != b.thing {
+/// The similarity of two points: 1 in the same plane, 0 on different things.
+fn similarity(a: &Spot, b: &Spot) -> f32 {
+    if a.seen_thing != b.seen_thing || a.thing != b.thing {
         return 0.0;
     }
     let facing = a.normal.dot(b.normal);
@@ -290,13 +293,13 @@ fn alike(a: &Spot, b: &Spot) -> f32 {
         return 0.0;
     }
     let off = (b.at - a.at).dot(a.normal).abs();
-    let reach = 0.01 + 0.01 * a.far;
+    let reach = 0.01 + 0.01 * a.distance;
     let near = (1.0 - off / (3.0 * reach)).max(0.0);
     near * (facing - 0.75) * 4.0
 }
 
-/// Whether a pixel is at an edge, of things or of colours.
-fn edge(
+/// Whether a pixel is at an edge between things or colours.
+fn is_edge(
     spots: &[Option<Spot>],
     colors: &[Vec3],
     [width, height]: [usize; 2],
@@ -312,21 +315,21 @@ fn edge(
     ];
     neighbours.into_iter().flatten().any(|other| {
         let differ = match (&spots[own], &spots[other]) {
-            (Some(a), Some(b)) => a.thing != b.thing || a.shown != b.shown,
+            (Some(a), Some(b)) => a.thing != b.thing || a.seen_thing != b.seen_thing,
             _ => true,
         };
         let (a, b) = (
-            developed(colors[own] * exposure),
-            developed(colors[other] * exposure),
+            tone_mapped(colors[own] * exposure),
+            tone_mapped(colors[other] * exposure),
         );
         differ || (a - b).abs().max_element() > EDGE
     })
 }
 
-/// What a camera makes of light: bright light is pressed together, so that windows keep their clouds.
-fn developed(light: Vec3) -> Vec3 {
+/// Linear light after tone mapping: bright light is compressed, so that windows keep details.
+fn tone_mapped(light: Vec3) -> Vec3 {
     const KNEE: f32 = 0.6;
-    let press = |value: f32| {
+    let compress = |value: f32| {
         if value <= KNEE {
             value
         } else {
@@ -334,12 +337,12 @@ fn developed(light: Vec3) -> Vec3 {
             KNEE + (1.0 - KNEE) * over / (1.0 + over * 0.8).min(1.0 + over)
         }
     };
-    Vec3::new(press(light.x), press(light.y), press(light.z)).min(Vec3::ONE)
+    Vec3::new(compress(light.x), compress(light.y), compress(light.z)).min(Vec3::ONE)
 }
 
-/// The sRGB code of linear light (IEC 61966-2-1), to the nearest.
-fn encoded(value: f32) -> u8 {
-    /// The least light of each code above 0: half-way, in codes, from the one below.
+/// The nearest sRGB code of linear light (IEC 61966-2-1).
+fn srgb_code(value: f32) -> u8 {
+    /// The minimum light of each code above 0: halfway, in codes, from the code below.
     static STEPS: LazyLock<Vec<f32>> = LazyLock::new(|| {
         let step = |code: u16| {
             let value = (f32::from(code) - 0.5) / 255.0;

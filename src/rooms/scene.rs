@@ -1,30 +1,30 @@
-//! A room with all that stands in it: [`Scene`], made of [`Thing`]s.
+//! A room with everything in it: [`Scene`], made of [`Thing`]s.
 
 use glam::{Vec3, vec3};
 
 use super::bvh::Bvh;
-use super::mesh::{Mesh, turn};
+use super::mesh::{Mesh, cos_sin};
 use super::surface::{Surface, SurfaceFinish};
 
-/// What a thing is called.
+/// The word and the class of a thing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct ThingKind {
-    /// Its own word, as `coffee table`.
+    /// The name of the thing, as `coffee table`.
     pub(super) word: &'static str,
-    /// Its class in mpcat40.
+    /// The class of the thing in mpcat40.
     pub(super) class: &'static str,
 }
 
-/// A kind by its word and class.
 pub(super) const fn kind(word: &'static str, class: &'static str) -> ThingKind {
     ThingKind { word, class }
 }
 
-/// A piece before it has a place: its kind, its shape, and the name of the colour that most of it has; empty where there is none.
+/// A thing before it has a place in the room.
 #[derive(Debug, Clone)]
 pub(super) struct Piece {
     pub(super) kind: ThingKind,
     pub(super) mesh: Mesh,
+    /// The name of its main colour; empty if there is none.
     pub(super) color: &'static str,
     pub(super) light: Option<LightSource>,
 }
@@ -40,7 +40,7 @@ impl Piece {
     }
 }
 
-/// Where a piece stands, and how far it is turned about y.
+/// The position of a piece in metres, and its rotation about y in radians.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pose {
     pub(super) at: Vec3,
@@ -48,34 +48,34 @@ pub(super) struct Pose {
 }
 
 impl Pose {
-    /// A place of the room in the piece's own lengths.
-    pub(super) fn inward(&self, place: Vec3) -> Vec3 {
-        self.unturned(place - self.at)
+    /// A point of the room in the coordinates of the piece.
+    pub(super) fn to_piece(&self, place: Vec3) -> Vec3 {
+        self.direction_to_piece(place - self.at)
     }
 
-    /// A direction of the room in the piece's own.
-    pub(super) fn unturned(&self, v: Vec3) -> Vec3 {
-        let facing = turn(self.angle);
+    /// A direction of the room in the coordinates of the piece.
+    pub(super) fn direction_to_piece(&self, v: Vec3) -> Vec3 {
+        let rotation = cos_sin(self.angle);
         vec3(
-            v.x * facing.x - v.z * facing.y,
+            v.x * rotation.x - v.z * rotation.y,
             v.y,
-            v.z * facing.x + v.x * facing.y,
+            v.z * rotation.x + v.x * rotation.y,
         )
     }
 
-    /// A place of the piece in the room.
-    pub(super) fn outward(&self, v: Vec3) -> Vec3 {
-        let facing = turn(self.angle);
+    /// A point of the piece in the coordinates of the room.
+    pub(super) fn to_room(&self, v: Vec3) -> Vec3 {
+        let rotation = cos_sin(self.angle);
         self.at
             + vec3(
-                v.x * facing.x + v.z * facing.y,
+                v.x * rotation.x + v.z * rotation.y,
                 v.y,
-                v.z * facing.x - v.x * facing.y,
+                v.z * rotation.x - v.x * rotation.y,
             )
     }
 }
 
-/// A piece in its place.
+/// A piece at its place in the room.
 #[derive(Debug, Clone)]
 pub(super) struct Thing {
     pub(super) kind: ThingKind,
@@ -83,17 +83,17 @@ pub(super) struct Thing {
     pub(super) pose: Pose,
 }
 
-/// What lights the room.
+/// A light of the room.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum LightSource {
-    /// A flat light, as the daylight in a window: a corner, its two edges, where it shines, and how bright it is by channel.
+    /// A flat light, as the daylight in a window: a corner, two edges, the direction it shines in, and radiance by channel.
     Panel {
         corner: Vec3,
         edges: [Vec3; 2],
         normal: Vec3,
         radiance: Vec3,
     },
-    /// A round light, as a bulb.
+    /// A sphere of light, as a bulb: center and radius in metres, and radiance by channel.
     Bulb {
         middle: Vec3,
         radius: f32,
@@ -102,7 +102,7 @@ pub(super) enum LightSource {
 }
 
 impl LightSource {
-    /// The light of a piece, in its place.
+    /// The light of a piece in the coordinates of the room.
     fn placed(self, pose: &Pose) -> Self {
         match self {
             Self::Panel {
@@ -111,9 +111,9 @@ impl LightSource {
                 normal,
                 radiance,
             } => {
-                let turned = |v: Vec3| pose.outward(v) - pose.at;
+                let turned = |v: Vec3| pose.to_room(v) - pose.at;
                 Self::Panel {
-                    corner: pose.outward(corner),
+                    corner: pose.to_room(corner),
                     edges: edges.map(turned),
                     normal: turned(normal),
                     radiance,
@@ -124,7 +124,7 @@ impl LightSource {
                 radius,
                 radiance,
             } => Self::Bulb {
-                middle: pose.outward(middle),
+                middle: pose.to_room(middle),
                 radius,
                 radiance,
             },
@@ -132,21 +132,21 @@ impl LightSource {
     }
 }
 
-/// A room with all that stands in it.
+/// A room with everything in it.
 #[derive(Debug, Default)]
 pub(super) struct Scene {
-    /// The things; the number of the segment of each is its place, from 1.
+    /// The things in the order of their segment numbers, which start at 1.
     pub(super) things: Vec<Thing>,
     pub(super) lights: Vec<LightSource>,
-    /// The shape of all of them.
+    /// The triangles of all things.
     pub(super) mesh: Mesh,
-    /// The thing that each face belongs to.
+    /// The index of the thing that each face belongs to.
     pub(super) owners: Vec<usize>,
 }
 
 impl Scene {
-    /// Puts a piece into its place.
-    pub(super) fn put(&mut self, piece: &Piece, pose: Pose) {
+    /// Adds a piece with a pose.
+    pub(super) fn add(&mut self, piece: &Piece, pose: Pose) {
         self.mesh.add(&piece.mesh, pose.at, pose.angle);
         self.owners.resize(self.mesh.faces.len(), self.things.len());
         self.lights
@@ -163,7 +163,7 @@ impl Scene {
         &self.mesh.surfaces[self.mesh.faces[face].surface]
     }
 
-    /// The tree of its faces.
+    /// The tree over all faces, for tracing rays.
     pub(super) fn tree(&self) -> Bvh {
         Bvh::new(self.mesh.faces.iter().map(|face| {
             let clear = matches!(

@@ -1,4 +1,4 @@
-//! What a ray meets: [`Spot`].
+//! The point where a ray hits a thing: [`Spot`].
 
 use glam::Vec3;
 
@@ -6,23 +6,23 @@ use super::bvh::{Bvh, Hit, Ray};
 use super::scene::Scene;
 use super::surface::SurfaceFinish;
 
-/// What is known of the place where a ray meets a thing.
+/// The point where a ray hits a thing, with the properties of the surface there.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Spot {
     pub(super) at: Vec3,
-    /// Looks to where the ray came from.
+    /// The surface normal, on the side that the ray came from.
     pub(super) normal: Vec3,
-    /// The share of light that it gives back.
+    /// The share of light that the surface reflects, by channel.
     pub(super) color: Vec3,
-    /// The light that it sends out by itself.
+    /// The light that the surface emits, by channel.
     pub(super) glow: Vec3,
-    /// The thing that is met first.
+    /// The index of the first thing that the ray hits.
     pub(super) thing: usize,
-    /// The thing whose colour is seen: another one where the first is a mirror.
-    pub(super) shown: usize,
-    /// How far the first thing is, along the ray.
-    pub(super) far: f32,
-    /// Whether the thing has a highlight.
+    /// The index of the thing whose colour is seen; another one if the first is a mirror.
+    pub(super) seen_thing: usize,
+    /// The distance to the first thing along the ray, in metres.
+    pub(super) distance: f32,
+    /// Whether the surface has a highlight.
     pub(super) glossy: Gloss,
 }
 
@@ -33,32 +33,32 @@ pub(super) enum Gloss {
     Shiny,
 }
 
-/// Farther than any room is long.
+/// A distance in metres beyond the length of any room.
 pub(super) const FAR: f32 = 100.0;
 
 impl Spot {
-    /// What a ray meets first, mirrors taken as things of their own.
+    /// The first point that a ray hits; a mirror counts as a thing.
     pub(super) fn first(scene: &Scene, tree: &Bvh, ray: &Ray) -> Option<Self> {
         let hit = tree.first(ray, FAR)?;
         Some(Self::of(scene, ray, hit))
     }
 
-    /// What a ray meets first, and where that is a mirror, what is seen in it.
-    pub(super) fn seen(scene: &Scene, tree: &Bvh, ray: &Ray) -> Option<Self> {
+    /// The first point that a ray hits; for a mirror, with the colour of what is seen in it.
+    pub(super) fn through_mirror(scene: &Scene, tree: &Bvh, ray: &Ray) -> Option<Self> {
         let hit = tree.first(ray, FAR)?;
         let spot = Self::of(scene, ray, hit);
         if scene.surface(hit.face).finish != SurfaceFinish::Mirror {
             return Some(spot);
         }
-        let along = reflected(ray.along, spot.normal);
-        let back = Ray::new(spot.at + spot.normal * 1e-3, along);
-        let behind = Self::first(scene, tree, &back)?;
+        let direction = reflected(ray.direction, spot.normal);
+        let back = Ray::new(spot.at + spot.normal * 1e-3, direction);
+        let mirrored = Self::first(scene, tree, &back)?;
         Some(Self {
-            color: behind.color * 0.92,
+            color: mirrored.color * 0.92,
             thing: spot.thing,
-            far: spot.far,
+            distance: spot.distance,
             glossy: Gloss::Dull,
-            ..behind
+            ..mirrored
         })
     }
 
@@ -69,12 +69,12 @@ impl Spot {
         let [u, v] = hit.weights;
         let [a, b, c] = face.corners.map(|corner| corner.normal);
         let mut normal = (a * (1.0 - u - v) + b * u + c * v).normalize_or_zero();
-        if normal.dot(ray.along) > 0.0 {
+        if normal.dot(ray.direction) > 0.0 {
             normal = -normal;
         }
-        let at = ray.from + ray.along * hit.far;
+        let at = ray.from + ray.direction * hit.distance;
         let pose = &scene.things[thing].pose;
-        let color = surface.color_at(pose.inward(at), pose.unturned(normal));
+        let color = surface.color_at(pose.to_piece(at), pose.direction_to_piece(normal));
         let (color, glow) = match surface.finish {
             SurfaceFinish::Glow(strength) => (color, color * strength),
             SurfaceFinish::Matte | SurfaceFinish::Glossy | SurfaceFinish::Mirror => {
@@ -87,8 +87,8 @@ impl Spot {
             color,
             glow,
             thing,
-            shown: thing,
-            far: hit.far,
+            seen_thing: thing,
+            distance: hit.distance,
             glossy: if surface.finish == SurfaceFinish::Glossy {
                 Gloss::Shiny
             } else {
@@ -98,7 +98,7 @@ impl Spot {
     }
 }
 
-/// A direction thrown back by a face.
-pub(super) fn reflected(along: Vec3, normal: Vec3) -> Vec3 {
-    along - normal * (2.0 * along.dot(normal))
+/// A direction after reflection by a surface.
+pub(super) fn reflected(direction: Vec3, normal: Vec3) -> Vec3 {
+    direction - normal * (2.0 * direction.dot(normal))
 }

@@ -1,56 +1,56 @@
-//! What things are made of: [`Surface`], with patterns that are functions of the place on the thing.
+//! Surfaces of things: [`Surface`], with patterns that depend on the point in the coordinates of the thing.
 
 use glam::{Vec2, Vec3, vec2, vec3};
 
 use super::paint::{Paint, rgb};
 
-/// What a face is made of.
+/// The material of a face.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Surface {
-    /// How much light it gives back, in linear light by channel, where the pattern changes nothing.
+    /// The share of linear light that the surface reflects, by channel, before the pattern changes it.
     pub(super) color: Vec3,
     pub(super) pattern: Pattern,
     pub(super) finish: SurfaceFinish,
 }
 
-/// How the colour goes over a thing.
+/// The way in which the colour varies over a surface. Lengths are metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Pattern {
     Plain,
-    /// Wood whose grain goes along an axis (0 x, 1 y, 2 z).
+    /// Wood with its grain along an axis (0 x, 1 y, 2 z).
     Grain(usize),
-    /// Boards along z, of this width.
+    /// Floor boards along z, of this width.
     Boards(f32),
-    /// Square tiles of this size; the joints have this colour.
+    /// Square tiles of this size, with joints of this colour.
     Tiles(f32, Vec3),
-    /// Threads.
+    /// Woven cloth with visible threads.
     Cloth,
-    /// A soft pile, as of towels and carpets.
+    /// The soft pile of towels and carpets.
     Pile,
-    /// Stone with specks.
+    /// Stone with darker specks, as of counters.
     Stone,
-    /// Broad stripes of a second colour along y, so wide.
+    /// Stripes along y of this width, in a second colour.
     Stripes(f32, Vec3),
-    /// A landscape on a canvas of this width and height, drawn from this seed.
+    /// A painting on a canvas of this width and height, drawn from this seed.
     Canvas(Vec2, u32),
     /// A rug of this width and depth with a border of a second colour.
     Rug(Vec2, Vec3),
-    /// The view out of a window of this height whose sill is at y = 0.
+    /// The view out of a window of this height, with its sill at y = 0.
     Outdoors(f32),
     /// The dark face of a screen of this width and height.
     Screen(Vec2),
 }
 
-/// How a face gives light back.
+/// The way in which a surface reflects light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum SurfaceFinish {
-    /// Alike to all sides.
+    /// The same light in all directions.
     Matte,
-    /// With a highlight.
+    /// Matte with a highlight.
     Glossy,
-    /// As it came.
+    /// A mirror image of the room.
     Mirror,
-    /// It shines by itself, so many times its colour, and casts no shadow.
+    /// A source of light, this many times as bright as its colour; it casts no shadow.
     Glow(f32),
 }
 
@@ -63,7 +63,7 @@ impl Surface {
         }
     }
 
-    /// Plain paint.
+    /// Matte paint of one colour.
     pub(super) fn paint(paint: Paint) -> Self {
         Self::new(paint.color, Pattern::Plain, SurfaceFinish::Matte)
     }
@@ -73,17 +73,17 @@ impl Surface {
         Self::new(paint.color, Pattern::Plain, SurfaceFinish::Glossy)
     }
 
-    /// Cloth.
+    /// Matte cloth of one colour.
     pub(super) fn cloth(paint: Paint) -> Self {
         Self::new(paint.color, Pattern::Cloth, SurfaceFinish::Matte)
     }
 
-    /// A colour by its sRGB codes.
+    /// A matte colour by its sRGB codes.
     pub(super) fn plain(codes: [u8; 3]) -> Self {
         Self::new(rgb(codes), Pattern::Plain, SurfaceFinish::Matte)
     }
 
-    /// Bright metal.
+    /// Glossy grey metal, as steel.
     pub(super) fn steel() -> Self {
         Self::new(rgb([176, 178, 182]), Pattern::Plain, SurfaceFinish::Glossy)
     }
@@ -107,7 +107,7 @@ impl Surface {
         Self::new(paint.color, Pattern::Grain(axis), SurfaceFinish::Matte)
     }
 
-    /// The colour at a place on the thing, whose face looks in a direction there.
+    /// The colour at a point with a surface normal, both in the coordinates of the thing.
     pub(super) fn color_at(&self, place: Vec3, normal: Vec3) -> Vec3 {
         let across = flat(place, normal);
         match self.pattern {
@@ -143,7 +143,7 @@ impl Surface {
     }
 }
 
-/// The place on the plane that a face lies in most nearly.
+/// The two coordinates of a point on the axis plane that is closest to the face.
 fn flat(place: Vec3, normal: Vec3) -> Vec2 {
     let size = normal.abs();
     if size.y >= size.x && size.y >= size.z {
@@ -155,7 +155,7 @@ fn flat(place: Vec3, normal: Vec3) -> Vec2 {
     }
 }
 
-/// Light streaks along an axis.
+/// The brightness of wood: streaks along an axis.
 fn grain(place: Vec3, axis: usize) -> f32 {
     let mut stretched = place * 42.0;
     stretched[axis] *= 0.05;
@@ -201,7 +201,7 @@ fn rug(color: Vec3, place: Vec3, size: Vec2, border: Vec3) -> Vec3 {
     }
 }
 
-/// A landscape or shapes, as prints on a wall have them.
+/// The colour of a painting: hills for even seeds, discs for odd ones.
 fn canvas(place: Vec3, size: Vec2, seed: u32) -> Vec3 {
     let seed = seed as i32;
     let at = vec2(place.x / size.x + 0.5, place.y / size.y);
@@ -214,7 +214,7 @@ fn canvas(place: Vec3, size: Vec2, seed: u32) -> Vec3 {
         )
     };
     if seed % 2 == 0 {
-        // Hills under a sky.
+        // Hills under a sky
         let mut color = tint(0).lerp(vec3(0.75, 0.82, 0.9), 0.35 + 0.5 * at.y);
         for hill in 1..4 {
             let height = 0.62 - 0.17 * hill as f32
@@ -225,7 +225,7 @@ fn canvas(place: Vec3, size: Vec2, seed: u32) -> Vec3 {
         }
         color
     } else {
-        // Discs on a ground.
+        // Discs on a background
         let mut color = tint(0) * 0.6 + Vec3::splat(0.3);
         for disc in 1..6 {
             let middle = vec2(hash(seed, disc, 9), hash(seed, disc, 10));
@@ -238,24 +238,24 @@ fn canvas(place: Vec3, size: Vec2, seed: u32) -> Vec3 {
     }
 }
 
-/// Sky over trees over a lawn, out of focus.
+/// The colour of a blurred view of trees under a sky.
 fn outdoors(place: Vec3, height: f32) -> Vec3 {
     let up = place.y / height;
     let trees = 0.3 + 0.22 * noise(vec3(place.x * 2.2, 3.0, 7.0)) + 0.06 * noise(place * 9.0);
     let sky = vec3(0.72, 0.84, 1.0).lerp(vec3(0.95, 0.97, 1.0), (1.0 - up).clamp(0.0, 1.0));
-    let wood = vec3(0.30, 0.42, 0.24) * (0.7 + 0.6 * noise(place * 7.0));
+    let green = vec3(0.30, 0.42, 0.24) * (0.7 + 0.6 * noise(place * 7.0));
     let blur = ((up - trees) / 0.08).clamp(0.0, 1.0);
-    wood.lerp(sky, blur)
+    green.lerp(sky, blur)
 }
 
-/// A wave between -1 and 1 with a period of 2, without any function that machines round differently.
+/// A wave from -1 to 1 with a period of 2. It uses no function whose rounding differs between machines.
 fn ripple(value: f32) -> f32 {
     let share = value * 0.5 - (value * 0.5).floor();
     let tent = 1.0 - 4.0 * (share - 0.5).abs();
     tent * (1.5 - 0.5 * tent * tent)
 }
 
-/// A number from 0 to 1 that three whole numbers decide.
+/// A pseudo-random number from 0 to 1, decided by three whole numbers.
 pub(super) fn hash(x: i32, y: i32, z: i32) -> f32 {
     let mut bits = (x as u32).wrapping_mul(0x8da6_b343)
         ^ (y as u32).wrapping_mul(0xd816_3841)

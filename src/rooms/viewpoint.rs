@@ -1,18 +1,18 @@
-//! Where a room is looked at from: of many places, the one that shows the most of it: [`camera`].
+//! The choice of the camera: of many random places, the one with the best view ([`camera`]).
 
 use glam::{Vec3, vec3};
 
 use super::camera::Camera;
 use super::dice::Dice;
 use super::plan::FloorPlan;
-use super::render::glimpse;
+use super::render::preview;
 
-/// How high a camera is.
+/// The height of a camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Height {
-    /// That of a person's eyes.
+    /// Eye height of a person: 1.4 to 1.65 m.
     Eye,
-    /// That of a small robot.
+    /// Camera height of a small robot: 0.55 to 0.85 m.
     Robot,
 }
 
@@ -32,12 +32,12 @@ impl Height {
     }
 }
 
-/// So many places are looked from.
+/// The number of camera places that are tried (chosen).
 const PLACES: usize = 36;
-/// The size of a look, in pixels.
-const GLIMPSE: [usize; 2] = [64, 40];
+/// The size in pixels of the preview that rates a place (chosen).
+const PREVIEW: [usize; 2] = [64, 40];
 
-/// The camera of a view.
+/// The camera of a frame. If no place is suitable, it stands in the middle of the room.
 pub(super) fn camera(
     plan: &FloorPlan,
     height: Height,
@@ -56,19 +56,19 @@ pub(super) fn camera(
             up,
             dice.between(0.0, plan.size.z),
         );
-        let target = sight(plan, dice);
+        let target = focus_place(plan, dice);
         let sway = vec3(dice.between(-0.5, 0.5), 0.0, dice.between(-0.5, 0.5));
-        let way = target + sway - place;
-        let far = vec3(way.x, 0.0, way.z).length();
-        if !plan.walkable(place, margin) || far < 0.8 {
+        let offset = target + sway - place;
+        let distance = vec3(offset.x, 0.0, offset.z).length();
+        if !plan.walkable(place, margin) || distance < 0.8 {
             continue;
         }
         // At angle 0 the camera looks along −z.
-        let angle = libm::atan2f(-way.x, -way.z);
-        let tilt = libm::atan2f((-way.y).max(0.0), far.max(1.5)) * 0.55;
+        let angle = libm::atan2f(-offset.x, -offset.z);
+        let tilt = libm::atan2f((-offset.y).max(0.0), distance.max(1.5)) * 0.55;
         let camera = Camera::new(place, angle, tilt, size);
-        let score = score(plan, &glimpse(&plan.scene, &tree, &camera.sized(GLIMPSE)));
-        if best.as_ref().is_none_or(|(most, _)| score > *most) {
+        let score = score(plan, &preview(&plan.scene, &tree, &camera.sized(PREVIEW)));
+        if best.as_ref().is_none_or(|(highest, _)| score > *highest) {
             best = Some((score, camera));
         }
     }
@@ -76,10 +76,10 @@ pub(super) fn camera(
     best.map_or_else(|| Camera::new(middle, 0.0, 0.1, size), |(_, camera)| camera)
 }
 
-/// The place of something worth looking at.
-fn sight(plan: &FloorPlan, dice: &mut Dice) -> Vec3 {
+/// The place of a random thing to look at.
+fn focus_place(plan: &FloorPlan, dice: &mut Dice) -> Vec3 {
     let known: Vec<usize> = plan
-        .sights
+        .focus_things
         .iter()
         .copied()
         .filter(|thing| *thing < plan.scene.things.len())
@@ -88,15 +88,15 @@ fn sight(plan: &FloorPlan, dice: &mut Dice) -> Vec3 {
         return plan.size / 2.0;
     }
     let thing = &plan.scene.things[dice.pick(&known)];
-    thing.pose.outward(vec3(0.0, 0.5, 0.3))
+    thing.pose.to_room(vec3(0.0, 0.5, 0.3))
 }
 
-/// How good a view is: many things, none of them too large, and what is worth looking at among them.
-fn score(plan: &FloorPlan, seen: &[u32]) -> f32 {
+/// The rating of a view. Many things and things to look at raise it; very large and cut-off things lower it.
+fn score(plan: &FloorPlan, visible: &[u32]) -> f32 {
     let mut counts = vec![0_usize; plan.scene.things.len() + 1];
     let mut cut = vec![0_usize; counts.len()];
-    let [width, height] = GLIMPSE;
-    for (i, thing) in seen.iter().enumerate() {
+    let [width, height] = PREVIEW;
+    for (i, thing) in visible.iter().enumerate() {
         counts[*thing as usize] += 1;
         let [x, y] = [i % width, i / width];
         if x == 0 || y == 0 || x + 1 == width || y + 1 == height {
@@ -106,7 +106,7 @@ fn score(plan: &FloorPlan, seen: &[u32]) -> f32 {
     let building = ["wall", "floor", "ceiling", "door", "window"];
     let mut score = 0.0;
     for (i, thing) in plan.scene.things.iter().enumerate() {
-        let share = counts[i + 1] as f32 / seen.len() as f32;
+        let share = counts[i + 1] as f32 / visible.len() as f32;
         if share == 0.0 {
             continue;
         }
@@ -117,7 +117,7 @@ fn score(plan: &FloorPlan, seen: &[u32]) -> f32 {
         if share > 0.003 {
             score += 0.1 + share.min(0.06) * 4.0;
         }
-        if plan.sights.contains(&i) && share > 0.012 {
+        if plan.focus_things.contains(&i) && share > 0.012 {
             score += 0.35;
         }
         score -= (cut[i + 1] as f32 / width as f32).min(0.5) * 0.5;

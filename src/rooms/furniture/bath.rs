@@ -1,4 +1,4 @@
-//! What bathrooms have.
+//! Pieces for bathrooms.
 
 use glam::{Vec3, vec3};
 
@@ -22,7 +22,7 @@ fn ceramic(dice: &mut Dice) -> (Surface, &'static str) {
 pub(in super::super) fn toilet(dice: &mut Dice) -> Piece {
     let (white, name) = ceramic(dice);
     let mut mesh = Mesh::default();
-    // The bowl on its foot, oval.
+    // The oval bowl on its foot.
     mesh.vessel(
         vec3(0.0, 0.0, 0.44),
         &[
@@ -38,7 +38,7 @@ pub(in super::super) fn toilet(dice: &mut Dice) -> Piece {
         1.28,
         &white,
     );
-    // Seat and lid, the lid raised against the tank.
+    // The seat; the raised lid leans on the tank.
     mesh.oval(
         vec3(0.0, 0.395, 0.44),
         &[
@@ -68,7 +68,7 @@ pub(in super::super) fn toilet(dice: &mut Dice) -> Piece {
     Piece::new(kind("toilet", "toilet"), mesh, name)
 }
 
-/// The raised lid of a toilet: half an oval that leans on the tank.
+/// The points of the raised lid of a toilet: half an oval that leans on the tank.
 fn lid() -> Vec<Vec<Vec3>> {
     (0..=8)
         .map(|row| {
@@ -98,7 +98,7 @@ pub(in super::super) fn vanity(dice: &mut Dice) -> FurnitureSet {
     FurnitureSet::of(base).and(basin(width, dice), at(vec3(0.0, 0.74, 0.0), 0.0))
 }
 
-/// A basin of a width, on what stands below it.
+/// A basin of a width, to be placed on a cabinet.
 fn basin(width: f32, dice: &mut Dice) -> Piece {
     let (white, name) = ceramic(dice);
     let steel = Surface::steel();
@@ -230,12 +230,13 @@ pub(in super::super) fn bathtub(dice: &mut Dice) -> Piece {
     Piece::new(kind("bathtub", "bathtub"), mesh, name)
 }
 
-/// A rectangle with round corners, closed.
+/// The points of a closed horizontal rectangle with round corners.
 fn ring(middle: Vec3, half_width: f32, half_depth: f32) -> Vec<Vec3> {
     let radius = 0.16_f32.min(half_depth * 0.8);
     let mut points: Vec<Vec3> = (0..24)
         .map(|i| {
-            let around = super::super::mesh::turn(std::f32::consts::TAU * (i as f32 + 0.5) / 24.0);
+            let around =
+                super::super::mesh::cos_sin(std::f32::consts::TAU * (i as f32 + 0.5) / 24.0);
             let sign = |v: f32| if v < 0.0 { -1.0 } else { 1.0 };
             middle
                 + vec3(
@@ -249,7 +250,7 @@ fn ring(middle: Vec3, half_width: f32, half_depth: f32) -> Vec<Vec3> {
     points
 }
 
-/// A shower: a tray, tiles, a panel at its side, a rail with the head.
+/// A shower: a tray, tiles, a glass panel at one side, and a rail with the shower head.
 pub(in super::super) fn shower(dice: &mut Dice) -> Piece {
     let white = Surface::gloss(Paint::nameless([236, 238, 238]));
     let tint = dice.pick(&[[168, 196, 206], [186, 206, 196], [214, 208, 196]]);
@@ -283,7 +284,7 @@ pub(in super::super) fn shower(dice: &mut Dice) -> Piece {
     Piece::new(kind("shower", "shower"), mesh, "")
 }
 
-/// A roll of paper on its holder, its back at the wall.
+/// A roll of paper on its holder, with its back at the wall.
 pub(in super::super) fn toilet_paper() -> Piece {
     let mut mesh = Mesh::default();
     let paper = Surface::plain([244, 243, 240]);

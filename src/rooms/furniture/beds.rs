@@ -1,4 +1,4 @@
-//! Beds, with their pillows.
+//! Beds with their pillows, and cushions.
 
 use glam::{Vec3, vec3};
 
@@ -35,7 +35,7 @@ pub(in super::super) fn bed(dice: &mut Dice) -> FurnitureSet {
         0.07,
         &sheet,
     );
-    // The blanket hangs over both sides and the foot, and is turned back at the head.
+    // The blanket hangs over both sides and the foot, and is folded back at the head.
     let from = dice.between(0.55, 0.7);
     mesh.cushion(
         half + 0.035,
@@ -64,7 +64,7 @@ pub(in super::super) fn bed(dice: &mut Dice) -> FurnitureSet {
     set
 }
 
-/// A pillow or cushion around its middle, leaning back by an angle.
+/// A pillow or cushion with its center at the origin, tilted backwards by an angle.
 pub(in super::super) fn pillow(
     word: &'static str,
     size: Vec3,
@@ -77,7 +77,7 @@ pub(in super::super) fn pillow(
     Piece::new(kind(word, "cushion"), mesh, color)
 }
 
-/// A cushion for a sofa or a chair: around its middle.
+/// A cushion for a sofa or a chair, with its center at the origin.
 pub(in super::super) fn cushion(dice: &mut Dice) -> Piece {
     let paint = Paint::of(&ALL, dice);
     let mut surface = Surface::cloth(paint);

@@ -1,14 +1,14 @@
-//! Plants, and the small things that stand about.
+//! Plants and small things.
 
 use glam::{Vec3, vec3};
 
 use super::super::dice::Dice;
-use super::super::mesh::{Mesh, turn};
+use super::super::mesh::{Mesh, cos_sin};
 use super::super::paint::{ALL, Paint};
 use super::super::scene::{Piece, kind};
 use super::super::surface::Surface;
 
-/// A plant in its pot, so tall.
+/// A plant in its pot, with its height in metres.
 pub(in super::super) fn plant(height: f32, dice: &mut Dice) -> Piece {
     let pot = Surface::paint(Paint::of(
         &["white", "brown", "black", "grey", "orange"],
@@ -16,28 +16,28 @@ pub(in super::super) fn plant(height: f32, dice: &mut Dice) -> Piece {
     ));
     let radius = height * 0.13 + 0.03;
     let foot = vec3(0.0, 0.0, radius + 0.1 * height);
-    let tall = height * 0.28;
+    let pot_height = height * 0.28;
     let mut mesh = Mesh::default();
     mesh.lathe(
         foot,
         &[
             (0.0, 0.0),
             (radius * 0.75, 0.0),
-            (radius, tall),
-            (radius * 0.88, tall),
-            (radius * 0.85, tall * 0.85),
+            (radius, pot_height),
+            (radius * 0.88, pot_height),
+            (radius * 0.85, pot_height * 0.85),
         ],
         &pot,
     );
     let soil = Surface::plain([58, 42, 32]);
     mesh.lathe(
-        foot + vec3(0.0, tall * 0.86, 0.0),
+        foot + vec3(0.0, pot_height * 0.86, 0.0),
         &[(0.0, 0.0), (radius * 0.86, 0.0)],
         &soil,
     );
     let greens = [[58, 112, 50], [44, 96, 52], [86, 132, 58]];
     let leaves = 16 + dice.below(10);
-    let stem = foot + vec3(0.0, tall * 0.8, 0.0);
+    let stem = foot + vec3(0.0, pot_height * 0.8, 0.0);
     for i in 0..leaves {
         let green = Surface::plain(dice.pick(&greens));
         let angle = 2.4 * i as f32 + dice.between(-0.2, 0.2);
@@ -55,7 +55,7 @@ pub(in super::super) fn plant(height: f32, dice: &mut Dice) -> Piece {
     Piece::new(kind("potted plant", "plant"), mesh, "")
 }
 
-/// A leaf on a bent stem: it rises so far, reaches so far out, and hangs at its end.
+/// Adds a leaf on a bent stem: it rises by `rise`, reaches out by `reach`, and hangs down at its end.
 fn leaf(
     mesh: &mut Mesh,
     stem: Vec3,
@@ -65,7 +65,7 @@ fn leaf(
     height: f32,
     green: &Surface,
 ) {
-    let out = turn(angle);
+    let out = cos_sin(angle);
     let (forward, aside) = (vec3(out.x, 0.0, out.y), vec3(-out.y, 0.0, out.x));
     let spine = |share: f32| {
         let bent = share * share;
@@ -90,7 +90,7 @@ fn leaf(
     mesh.grid(&rows, green);
 }
 
-/// A few books on their sides.
+/// A stack of two to four lying books.
 pub(in super::super) fn books(dice: &mut Dice) -> Piece {
     let mut mesh = Mesh::default();
     let mut y = 0.0;
@@ -105,7 +105,6 @@ pub(in super::super) fn books(dice: &mut Dice) -> Piece {
     Piece::new(kind("book", "objects"), mesh, "")
 }
 
-/// A vase.
 pub(in super::super) fn vase(dice: &mut Dice) -> Piece {
     let paint = Paint::of(&ALL, dice);
     let mut mesh = Mesh::default();
@@ -145,7 +144,7 @@ pub(in super::super) fn fruit(dice: &mut Dice) -> Piece {
         &bowl,
     );
     for i in 0..5 {
-        let out = turn(1.3 * i as f32);
+        let out = cos_sin(1.3 * i as f32);
         let paint = Paint::of(&["red", "orange", "yellow", "green"], dice);
         let reach = if i == 0 { 0.0 } else { 0.062 };
         mesh.ball(
@@ -161,7 +160,6 @@ pub(in super::super) fn fruit(dice: &mut Dice) -> Piece {
     Piece::new(kind("bowl of fruit", "objects"), mesh, "")
 }
 
-/// A mug.
 pub(in super::super) fn mug(dice: &mut Dice) -> Piece {
     let paint = Paint::of(&ALL, dice);
     let mut mesh = Mesh::default();
@@ -191,7 +189,6 @@ pub(in super::super) fn mug(dice: &mut Dice) -> Piece {
     Piece::new(kind("mug", "objects"), mesh, paint.name)
 }
 
-/// A bottle.
 pub(in super::super) fn bottle(dice: &mut Dice) -> Piece {
     let paint = Paint::of(
         &["white", "green", "blue", "pink", "orange", "purple"],
@@ -232,7 +229,6 @@ pub(in super::super) fn basket() -> Piece {
     Piece::new(kind("basket", "objects"), mesh, "")
 }
 
-/// A keyboard.
 pub(in super::super) fn keyboard() -> Piece {
     let mut mesh = Mesh::default();
     mesh.cushion(

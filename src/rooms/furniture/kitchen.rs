@@ -1,20 +1,20 @@
-//! What kitchens have.
+//! Pieces for kitchens.
 
 use glam::{Vec3, vec3};
 
 use super::super::dice::Dice;
-use super::super::mesh::{Mesh, turn};
+use super::super::mesh::{Mesh, cos_sin};
 use super::super::paint::Paint;
 use super::super::scene::{Piece, kind};
 use super::super::surface::{Pattern, Surface};
 use super::storage::cabinet_of;
 use super::{FurnitureSet, at};
 
-/// The height of counters.
+/// The height of counters in metres.
 pub(in super::super) const COUNTER: f32 = 0.9;
 const DEPTH: f32 = 0.62;
 
-/// The paints of one kitchen: its cabinets, its counter, its appliances.
+/// The paints of the cabinets, the counter and the appliances of one kitchen.
 #[derive(Debug, Clone, Copy)]
 pub(in super::super) struct Style {
     cabinets: Paint,
@@ -36,8 +36,8 @@ impl Style {
     }
 }
 
-/// Cabinets below a counter, with a sink in it where that is wished for.
-pub(in super::super) fn run(width: f32, sink: bool, style: &Style) -> FurnitureSet {
+/// Cabinets below a counter, with a sink if `sink` is set.
+pub(in super::super) fn base_cabinets(width: f32, sink: bool, style: &Style) -> FurnitureSet {
     let doors = ((width / 0.5) as usize).max(1);
     let base = cabinet_of(
         kind("kitchen cabinet", "cabinet"),
@@ -108,7 +108,7 @@ fn kitchen_sink([half, back, front]: [f32; 3]) -> Piece {
     mesh.rod(foot, foot + vec3(0.0, 0.26, 0.0), 0.016, &steel);
     let mut last = foot + vec3(0.0, 0.26, 0.0);
     for i in 1..=6 {
-        let out = turn(std::f32::consts::PI * (1.0 - i as f32 / 6.0));
+        let out = cos_sin(std::f32::consts::PI * (1.0 - i as f32 / 6.0));
         let next = foot + vec3(0.0, 0.26 + 0.09 * out.y, 0.09 + 0.09 * out.x);
         mesh.rod(last, next, 0.013, &steel);
         last = next;
@@ -214,8 +214,8 @@ pub(in super::super) fn refrigerator(style: &Style, dice: &mut Dice) -> Piece {
     )
 }
 
-/// Cabinets on the wall, their lower edge at y = 0.
-pub(in super::super) fn upper(width: f32, style: &Style) -> Piece {
+/// Wall cabinets, with their lower edge at y = 0.
+pub(in super::super) fn wall_cabinets(width: f32, style: &Style) -> Piece {
     let doors = ((width / 0.45) as usize).max(1);
     cabinet_of(
         kind("kitchen cabinet", "cabinet"),
@@ -225,7 +225,6 @@ pub(in super::super) fn upper(width: f32, style: &Style) -> Piece {
     )
 }
 
-/// A microwave oven.
 pub(in super::super) fn microwave(style: &Style) -> Piece {
     let body = Surface::gloss(style.appliances);
     let glass = Surface::gloss(Paint::nameless([28, 28, 30]));
@@ -239,7 +238,7 @@ pub(in super::super) fn microwave(style: &Style) -> Piece {
     Piece::new(kind("microwave", "appliances"), mesh, style.appliances.name)
 }
 
-/// A hood above a stove, its lower edge at y = 0.
+/// A hood for above a stove, with its lower edge at y = 0.
 pub(in super::super) fn hood() -> Piece {
     let steel = Surface::steel();
     let mut mesh = Mesh::default();

@@ -1,4 +1,4 @@
-//! Lamps, with the light they give.
+//! Lamps with their light sources.
 
 use glam::{Vec3, vec3};
 
@@ -8,7 +8,7 @@ use super::super::paint::{Paint, rgb};
 use super::super::scene::{LightSource, Piece, kind};
 use super::super::surface::{Pattern, Surface, SurfaceFinish};
 
-/// Warm light, as a white-balanced camera sees it beside daylight.
+/// The colour of warm light, as a camera that is white-balanced for daylight sees it.
 const WARM: Vec3 = Vec3::new(1.0, 0.94, 0.85);
 
 fn shade() -> Surface {
@@ -31,7 +31,7 @@ fn metal(dice: &mut Dice) -> Surface {
     Surface::gloss(Paint::of(&["black", "grey", "white", "brown"], dice))
 }
 
-/// A lamp that stands on the floor.
+/// A floor lamp with its shade.
 pub(in super::super) fn floor_lamp(dice: &mut Dice) -> Piece {
     let frame = metal(dice);
     let height = dice.between(1.45, 1.65);
@@ -46,7 +46,7 @@ pub(in super::super) fn floor_lamp(dice: &mut Dice) -> Piece {
     piece
 }
 
-/// A lamp for a table.
+/// A table lamp with its shade.
 pub(in super::super) fn table_lamp(dice: &mut Dice) -> Piece {
     let paint = Paint::of(
         &["blue", "white", "red", "green", "black", "brown", "grey"],
@@ -118,7 +118,7 @@ pub(in super::super) fn ceiling_lamp() -> Piece {
     piece
 }
 
-/// A lamp that hangs from the ceiling, which is at y = 0, by so much.
+/// A lamp that hangs `drop` metres below the ceiling, which is at y = 0.
 pub(in super::super) fn pendant(drop: f32, dice: &mut Dice) -> Piece {
     let frame = Surface::plain([30, 30, 32]);
     let paint = Paint::of(&["black", "white", "red", "yellow", "blue", "green"], dice);
@@ -136,14 +136,14 @@ pub(in super::super) fn pendant(drop: f32, dice: &mut Dice) -> Piece {
     piece
 }
 
-/// A lamp with several shades that hangs from the ceiling, which is at y = 0.
+/// A lamp with several shades that hangs `drop` metres below the ceiling, which is at y = 0.
 pub(in super::super) fn chandelier(drop: f32) -> Piece {
     let frame = Surface::gloss(Paint::nameless([120, 96, 52]));
     let mut mesh = Mesh::default();
     mesh.rod(Vec3::ZERO, vec3(0.0, -drop, 0.0), 0.01, &frame);
     mesh.ball(vec3(0.0, -drop, 0.0), vec3(0.05, 0.07, 0.05), &frame);
     for i in 0..5 {
-        let out = super::super::mesh::turn(std::f32::consts::TAU * i as f32 / 5.0);
+        let out = super::super::mesh::cos_sin(std::f32::consts::TAU * i as f32 / 5.0);
         let end = vec3(out.x * 0.3, -drop + 0.03, out.y * 0.3);
         mesh.rod(vec3(0.0, -drop - 0.02, 0.0), end, 0.009, &frame);
         mesh.lathe(end, &[(0.05, 0.0), (0.075, 0.12)], &shade());

@@ -17,16 +17,16 @@ use super::mesh::Mesh;
 use super::scene::{Piece, Pose};
 use super::surface::Surface;
 
-/// Pieces that stand together, each with its place among them; the whole stands like one piece.
+/// Pieces that belong together, each with its pose within the set. A set is placed like one piece.
 #[derive(Debug, Clone, Default)]
 pub(super) struct FurnitureSet {
     pub(super) pieces: Vec<(Piece, Pose)>,
-    /// Width, height and depth.
+    /// Width, height and depth in metres.
     pub(super) size: Vec3,
 }
 
 impl FurnitureSet {
-    /// One piece alone, its size taken from its shape.
+    /// A set of one piece, with the size of that piece.
     pub(super) fn of(piece: Piece) -> Self {
         let [low, high] = piece.mesh.bounds();
         let width = 2.0 * high.x.max(-low.x);
@@ -37,19 +37,19 @@ impl FurnitureSet {
         }
     }
 
-    /// The same with one more piece.
+    /// The set with one more piece.
     pub(super) fn and(mut self, piece: Piece, pose: Pose) -> Self {
         self.pieces.push((piece, pose));
         self
     }
 }
 
-/// A pose.
+/// The pose at a place, rotated about y by an angle in radians.
 pub(super) fn at(place: Vec3, angle: f32) -> Pose {
     Pose { at: place, angle }
 }
 
-/// Four square legs below a plate.
+/// Adds four square legs below a plate.
 fn legs(mesh: &mut Mesh, size: Vec3, inset: f32, thick: f32, surface: &Surface) {
     for (x, z) in [(-1.0, 0.0), (1.0, 0.0), (-1.0, 1.0), (1.0, 1.0)] {
         let foot = vec3(

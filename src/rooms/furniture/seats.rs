@@ -1,9 +1,9 @@
-//! Chairs, stools, sofas.
+//! Chairs, stools, armchairs and sofas.
 
 use glam::{Vec3, vec3};
 
 use super::super::dice::Dice;
-use super::super::mesh::{Mesh, turn};
+use super::super::mesh::{Mesh, cos_sin};
 use super::super::paint::{ALL, Paint};
 use super::super::scene::{Piece, ThingKind, kind};
 use super::super::surface::Surface;
@@ -20,7 +20,7 @@ pub(in super::super) fn chair(name: ThingKind, paint: Paint, dice: &mut Dice) ->
     chair_of(name, paint, &surface, usize::from(dice.chance(0.5)))
 }
 
-/// A chair in one of two styles: a back of slats, or a whole one.
+/// A chair in one of two styles: a back of slats (0) or a closed back.
 pub(in super::super) fn chair_of(
     name: ThingKind,
     paint: Paint,
@@ -57,7 +57,7 @@ pub(in super::super) fn chair_of(
     Piece::new(name, mesh, paint.name)
 }
 
-/// A chair on castors.
+/// An office chair on castors.
 pub(in super::super) fn office_chair(dice: &mut Dice) -> Piece {
     let paint = Paint::of(
         &["black", "black", "grey", "blue", "red", "green", "orange"],
@@ -66,7 +66,7 @@ pub(in super::super) fn office_chair(dice: &mut Dice) -> Piece {
     let (cloth, frame) = (Surface::cloth(paint), Surface::plain([34, 34, 36]));
     let mut mesh = Mesh::default();
     for i in 0..5 {
-        let out = turn(std::f32::consts::TAU * i as f32 / 5.0);
+        let out = cos_sin(std::f32::consts::TAU * i as f32 / 5.0);
         let end = vec3(out.x * 0.3, 0.06, 0.3 + out.y * 0.3);
         mesh.cone(vec3(0.0, 0.1, 0.3), end, [0.03, 0.02], &frame);
         mesh.ball(vec3(end.x, 0.03, end.z), Vec3::splat(0.03), &frame);
@@ -98,7 +98,7 @@ pub(in super::super) fn stool(height: f32, dice: &mut Dice) -> Piece {
     let mut mesh = Mesh::default();
     let radius = 0.18;
     for i in 0..4 {
-        let out = turn(std::f32::consts::TAU * (i as f32 + 0.5) / 4.0);
+        let out = cos_sin(std::f32::consts::TAU * (i as f32 + 0.5) / 4.0);
         let foot = vec3(out.x * radius, 0.0, radius + out.y * radius);
         let top = vec3(
             out.x * radius * 0.6,
@@ -109,7 +109,7 @@ pub(in super::super) fn stool(height: f32, dice: &mut Dice) -> Piece {
     }
     if height > 0.55 {
         let ring = |i: usize| {
-            let out = turn(std::f32::consts::TAU * (i as f32 + 0.5) / 4.0);
+            let out = cos_sin(std::f32::consts::TAU * (i as f32 + 0.5) / 4.0);
             vec3(
                 out.x * radius * 0.87,
                 height * 0.32,
@@ -126,7 +126,7 @@ pub(in super::super) fn stool(height: f32, dice: &mut Dice) -> Piece {
     Piece::new(kind("stool", "stool"), mesh, paint.name)
 }
 
-/// A sofa for so many, with cushions.
+/// A sofa for a number of people, with cushions.
 pub(in super::super) fn sofa(seats: usize, dice: &mut Dice) -> FurnitureSet {
     let paint = Paint::of(&ALL, dice);
     let set = FurnitureSet::of(upholstered(kind("sofa", "sofa"), seats, paint, dice));
@@ -147,7 +147,6 @@ pub(in super::super) fn sofa(seats: usize, dice: &mut Dice) -> FurnitureSet {
     set
 }
 
-/// An armchair.
 pub(in super::super) fn armchair(dice: &mut Dice) -> Piece {
     let paint = Paint::of(&ALL, dice);
     upholstered(kind("armchair", "chair"), 1, paint, dice)

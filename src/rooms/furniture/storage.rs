@@ -1,4 +1,4 @@
-//! Chests of drawers, cabinets, shelves.
+//! Chests of drawers, cabinets and shelves.
 
 use glam::{Vec3, vec3};
 
@@ -8,7 +8,7 @@ use super::super::paint::{ALL, Paint, rgb};
 use super::super::scene::{Piece, ThingKind, kind};
 use super::super::surface::{Pattern, Surface, SurfaceFinish};
 
-/// The colours that storage comes in.
+/// The colours of storage. A colour that is listed twice is twice as likely.
 const COLORS: [&str; 10] = [
     "brown", "white", "brown", "white", "black", "grey", "blue", "green", "red", "yellow",
 ];
@@ -21,7 +21,7 @@ fn finish(paint: Paint) -> Surface {
     }
 }
 
-/// A chest of so many rows and columns of drawers.
+/// A chest with a number of rows and columns of drawers.
 pub(in super::super) fn chest(
     word: &'static str,
     size: Vec3,
@@ -72,7 +72,7 @@ pub(in super::super) fn chest(
     Piece::new(kind(word, "chest_of_drawers"), mesh, paint.name)
 }
 
-/// A cabinet with so many doors side by side.
+/// A cabinet in a random colour, with a number of doors side by side.
 pub(in super::super) fn cabinet(
     name: ThingKind,
     size: Vec3,
@@ -83,7 +83,7 @@ pub(in super::super) fn cabinet(
     cabinet_of(name, size, doors, paint)
 }
 
-/// A cabinet in a paint.
+/// A cabinet in a paint, with a number of doors side by side.
 pub(in super::super) fn cabinet_of(
     name: ThingKind,
     size: Vec3,
@@ -113,7 +113,7 @@ pub(in super::super) fn cabinet_of(
             vec3(right, high, size.z),
             &surface,
         );
-        // A frame around each door's panel.
+        // A frame around the panel of each door.
         let rail = 0.05_f32.min(width * 0.2);
         for [from, to] in [
             [
@@ -209,7 +209,7 @@ fn books(mesh: &mut Mesh, [from, to]: [f32; 2], y: f32, rise: f32, dice: &mut Di
     }
 }
 
-/// A board on the wall with a few things on it; its back is at the wall, its board at y = 0.
+/// A wall shelf with a few books. Its back is at the wall, and its board at y = 0.
 pub(in super::super) fn wall_shelf(dice: &mut Dice) -> Piece {
     let paint = Paint::of(
         &["white", "brown", "black", "blue", "green", "yellow", "red"],

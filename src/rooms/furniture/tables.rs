@@ -9,7 +9,7 @@ use super::super::scene::{Piece, ThingKind, kind};
 use super::super::surface::Surface;
 use super::legs;
 
-/// The colours that tables come in.
+/// The colours of tables. A colour that is listed more often is more likely.
 const COLORS: [&str; 11] = [
     "brown", "brown", "brown", "white", "white", "black", "grey", "red", "green", "blue", "yellow",
 ];

@@ -1,4 +1,4 @@
-//! What is made of cloth and lies or hangs.
+//! Curtains, towels and rugs.
 
 use glam::{Vec3, vec2, vec3};
 
@@ -8,8 +8,8 @@ use super::super::paint::{ALL, Paint};
 use super::super::scene::{Piece, kind};
 use super::super::surface::{Pattern, Surface};
 
-/// The two halves of a curtain at the sides of a window of a width, from y = 0 downwards, one thing each; their rod is the
-/// first's.
+/// The two curtains at the sides of a window of a width, from y = 0 downwards. Each is one thing; the rod belongs to the
+/// first.
 pub(in super::super) fn curtains(window: f32, drop: f32, dice: &mut Dice) -> [Piece; 2] {
     let paint = Paint::of(&ALL, dice);
     let cloth = Surface::cloth(paint);
@@ -29,14 +29,14 @@ pub(in super::super) fn curtains(window: f32, drop: f32, dice: &mut Dice) -> [Pi
     [half(-out - width, true), half(out, false)]
 }
 
-/// A towel over a rail on the wall; the rail is at y = 0.
+/// A towel over a rail on the wall, with the rail at y = 0.
 pub(in super::super) fn towel(dice: &mut Dice) -> Piece {
     let paint = Paint::of(&ALL, dice);
     let cloth = Surface::paint(paint).with(Pattern::Pile);
     let (width, drop) = (dice.between(0.36, 0.5), dice.between(0.55, 0.75));
     let mut mesh = Mesh::default();
     for (z, share) in [(0.09, 1.0), (0.045, 0.8)] {
-        let wave = |x: f32| 0.006 * super::super::mesh::turn(x * 14.0).y;
+        let wave = |x: f32| 0.006 * super::super::mesh::cos_sin(x * 14.0).y;
         let row = |y: f32| -> Vec<Vec3> {
             (0..=12)
                 .map(|i| {
@@ -66,7 +66,7 @@ pub(in super::super) fn towel(dice: &mut Dice) -> Piece {
     Piece::new(kind("towel", "towel"), mesh, paint.name)
 }
 
-/// A rug of a size, around its middle.
+/// A rug of a size, with its center at the origin.
 pub(in super::super) fn rug(width: f32, depth: f32, dice: &mut Dice) -> Piece {
     let tints = [
         [158, 96, 84],

@@ -1,4 +1,4 @@
-//! What hangs on walls or is part of them; the back of each is at z = 0.
+//! Pieces that hang on walls or stand at them, with their back at z = 0.
 
 use glam::{Vec3, vec2, vec3};
 
@@ -8,7 +8,7 @@ use super::super::paint::{Paint, rgb};
 use super::super::scene::{LightSource, Piece, kind};
 use super::super::surface::{Pattern, Surface, SurfaceFinish};
 
-/// Four bars around a rectangle whose lower edge is at y = 0.
+/// Adds four bars around a rectangle with its lower edge at y = 0.
 fn frame(mesh: &mut Mesh, width: f32, height: f32, bar: f32, thick: f32, surface: &Surface) {
     let (left, right) = (-width / 2.0, width / 2.0);
     for [low, high] in [
@@ -37,7 +37,6 @@ fn sheet(mesh: &mut Mesh, width: f32, height: f32, z: f32, surface: &Surface) {
     );
 }
 
-/// A framed picture.
 pub(in super::super) fn picture(dice: &mut Dice) -> Piece {
     let (width, height) = (dice.between(0.4, 0.85), dice.between(0.4, 0.65));
     let wood = Surface::paint(Paint::of(&["black", "brown", "white"], dice));
@@ -59,12 +58,12 @@ pub(in super::super) fn mirror(width: f32, height: f32, dice: &mut Dice) -> Piec
     Piece::new(kind("mirror", "mirror"), mesh, "")
 }
 
-/// A flat television for the wall or, with a foot, for what it stands on.
+/// A flat television, for the wall or with a foot.
 pub(in super::super) fn television(width: f32, foot: bool) -> Piece {
     panel(kind("tv", "tv_monitor"), width, foot)
 }
 
-/// A computer's monitor on its foot.
+/// A computer monitor on its foot.
 pub(in super::super) fn monitor(width: f32) -> Piece {
     panel(kind("monitor", "tv_monitor"), width, true)
 }
@@ -92,7 +91,7 @@ fn panel(name: super::super::scene::ThingKind, width: f32, foot: bool) -> Piece 
     Piece::new(name, mesh, "black")
 }
 
-/// A window of a size whose sill is at y = 0, with the daylight that comes in.
+/// A window of a size with its sill at y = 0. `daylight` is the radiance of the light that comes in.
 pub(in super::super) fn window(width: f32, height: f32, daylight: f32) -> Piece {
     let half = width / 2.0;
     let white = Surface::plain([240, 240, 238]);
@@ -122,7 +121,7 @@ pub(in super::super) fn window(width: f32, height: f32, daylight: f32) -> Piece 
     piece
 }
 
-/// Blinds before a window of a size whose sill is at y = 0, let down by a share.
+/// Blinds in front of a window of a size with its sill at y = 0; `share` is the covered part of the height.
 pub(in super::super) fn blinds(width: f32, height: f32, share: f32, dice: &mut Dice) -> Piece {
     let half = width / 2.0;
     let paint = Paint::of(&["white", "white", "grey", "brown", "green", "blue"], dice);

@@ -1,4 +1,4 @@
-//! Bathrooms.
+//! Furnishing of bathrooms.
 
 use glam::vec3;
 
@@ -14,20 +14,20 @@ pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
     plan.door(&[door]);
     let tub = plan.dice.chance(0.65);
     if tub {
-        plan.sight();
+        plan.focus_on_next();
         let set = FurnitureSet::of(bath::bathtub(&mut plan.dice));
         plan.corner(&set, &WALLS);
     }
     if !tub || plan.dice.chance(0.5) {
-        plan.sight();
+        plan.focus_on_next();
         let set = FurnitureSet::of(bath::shower(&mut plan.dice));
         plan.corner(&set, &WALLS);
     }
     if plan.dice.chance(0.92) {
-        plan.sight();
+        plan.focus_on_next();
         let set = FurnitureSet::of(bath::toilet(&mut plan.dice));
         if let Some(pose) = plan.stand(&set, &WALLS) {
-            plan.beside(&pose, bath::toilet_paper(), vec3(0.42, 0.72, -0.01), 0.0);
+            plan.add_relative(&pose, bath::toilet_paper(), vec3(0.42, 0.72, -0.01), 0.0);
         }
     }
     if plan.dice.chance(0.85) {
@@ -36,30 +36,30 @@ pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
         } else {
             FurnitureSet::of(bath::pedestal_sink(&mut plan.dice))
         };
-        plan.sight();
+        plan.focus_on_next();
         if let Some(pose) = plan.stand(&set, &WALLS)
             && plan.dice.chance(0.6)
         {
             let width = plan.dice.between(0.45, 0.65);
             let piece = walls::mirror(width, 0.7, &mut plan.dice);
-            plan.above(&pose, piece, 1.22);
+            plan.hang_above(&pose, piece, 1.22);
         }
     }
-    let dress = plan.dice.pick(&[
+    let dressing = plan.dice.pick(&[
         WindowDressing::Blinds,
         WindowDressing::Bare,
         WindowDressing::Curtains,
     ]);
-    plan.window(&WALLS, 0.75, 1.25, dress);
+    plan.window(&WALLS, 0.75, 1.25, dressing);
     for _ in 0..2 {
-        plan.perhaps(0.7, 1.35, textiles::towel);
+        plan.maybe_hang(0.7, 1.35, textiles::towel);
     }
-    plan.maybe(0.4, low_stool);
-    plan.maybe(0.35, |_| clutter::basket());
+    plan.maybe_stand(0.4, low_stool);
+    plan.maybe_stand(0.35, |_| clutter::basket());
     if plan.dice.chance(0.3) {
         plan.plant(1.0);
     }
-    plan.perhaps(0.35, 1.45, storage::wall_shelf);
+    plan.maybe_hang(0.35, 1.45, storage::wall_shelf);
     let middle = vec3(size.x / 2.0, 0.0, size.z / 2.0);
     plan.rug(0.5, middle, [0.9, 0.6], 0.0);
     plan.ceiling_lamp();

@@ -1,4 +1,4 @@
-//! Bedrooms.
+//! Furnishing of bedrooms.
 
 use glam::vec3;
 
@@ -16,55 +16,55 @@ pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
     bed(&mut plan, wall);
     plan.door(&[wall.opposite()]);
     let width = plan.dice.between(1.1, 1.5);
-    let dress = if plan.dice.chance(0.75) {
+    let dressing = if plan.dice.chance(0.75) {
         WindowDressing::Curtains
     } else {
         WindowDressing::Blinds
     };
-    plan.window(&sides(wall), width, 0.85, dress);
-    if let Some(pose) = plan.maybe(0.6, dresser) {
-        plan.sights.push(plan.scene.things.len() - 1);
+    plan.window(&sides(wall), width, 0.85, dressing);
+    if let Some(pose) = plan.maybe_stand(0.6, dresser) {
+        plan.focus_things.push(plan.scene.things.len() - 1);
         if plan.dice.chance(0.5) {
             let piece = walls::mirror(0.6, 0.7, &mut plan.dice);
-            plan.above(&pose, piece, 1.1);
+            plan.hang_above(&pose, piece, 1.1);
         } else if plan.dice.chance(0.4) {
-            plan.beside(
+            plan.add_relative(
                 &pose,
                 walls::television(0.8, true),
                 vec3(0.0, 0.9, 0.05),
                 0.0,
             );
         } else {
-            plan.top(&pose, 0.92, &[-0.3, 0.1, 0.35], &SMALL);
+            plan.place_on_top(&pose, 0.92, &[-0.3, 0.1, 0.35], &SMALL);
         }
     }
-    plan.maybe(0.35, |dice| {
+    plan.maybe_stand(0.35, |dice| {
         storage::cabinet(kind("wardrobe", "furniture"), vec3(1.2, 2.0, 0.58), 2, dice)
     });
-    plan.maybe(0.4, |dice| {
+    plan.maybe_stand(0.4, |dice| {
         let paint = super::super::paint::Paint::of(&super::super::paint::ALL, dice);
         seats::chair(kind("chair", "chair"), paint, dice)
     });
-    plan.maybe(0.3, low_stool);
-    plan.maybe(0.2, storage::bookshelf);
+    plan.maybe_stand(0.3, low_stool);
+    plan.maybe_stand(0.2, storage::bookshelf);
     plan.plant(0.45);
     plan.pictures(2);
-    plan.perhaps(0.2, 1.5, storage::wall_shelf);
+    plan.maybe_hang(0.2, 1.5, storage::wall_shelf);
     plan.ceiling_lamp();
     plan
 }
 
-/// A bed with what stands beside it.
+/// Places a bed with nightstands, lamps, a rug and a picture.
 fn bed(plan: &mut FloorPlan, wall: Wall) {
     let set = beds::bed(&mut plan.dice);
     let span = plan.width(wall);
     let along = span / 2.0 + plan.dice.between(-0.3, 0.3);
     let size = set.size;
-    plan.sight();
+    plan.focus_on_next();
     let Some(pose) = plan.stand_at(set, wall, along) else {
         return;
     };
-    let foot = at(pose.outward(vec3(0.0, 0.0, size.z * 0.75)), pose.angle);
+    let foot = at(pose.to_room(vec3(0.0, 0.0, size.z * 0.75)), pose.angle);
     plan.rug(0.5, foot.at, [size.x + 0.9, 1.5], pose.angle);
     for side in [-1.0, 1.0] {
         if plan.dice.chance(0.75) {
@@ -75,15 +75,15 @@ fn bed(plan: &mut FloorPlan, wall: Wall) {
             if let Some(pose) = plan.stand_at(set, wall, place) {
                 if plan.dice.chance(0.75) {
                     let lamp = lamps::table_lamp(&mut plan.dice);
-                    plan.beside(&pose, lamp, vec3(0.0, top, 0.05), 0.0);
+                    plan.add_relative(&pose, lamp, vec3(0.0, top, 0.05), 0.0);
                 } else {
-                    plan.top(&pose, top, &[0.0], &SMALL);
+                    plan.place_on_top(&pose, top, &[0.0], &SMALL);
                 }
             }
         }
     }
     if plan.dice.chance(0.5) {
         let piece = walls::picture(&mut plan.dice);
-        plan.above(&pose, piece, 1.4);
+        plan.hang_above(&pose, piece, 1.4);
     }
 }

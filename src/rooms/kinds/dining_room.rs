@@ -1,4 +1,4 @@
-//! Dining rooms.
+//! Furnishing of dining rooms.
 
 use glam::{Vec3, vec3};
 
@@ -17,34 +17,34 @@ pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
     table(&mut plan);
     plan.door(&WALLS);
     let width = plan.dice.between(1.2, 1.8);
-    let dress = if plan.dice.chance(0.7) {
+    let dressing = if plan.dice.chance(0.7) {
         WindowDressing::Curtains
     } else {
         WindowDressing::Bare
     };
-    plan.window(&WALLS, width, 0.75, dress);
+    plan.window(&WALLS, width, 0.75, dressing);
     if plan.dice.chance(0.65) {
         let (width, name) = (plan.dice.between(1.2, 1.6), kind("cabinet", "cabinet"));
         let piece = storage::cabinet(name, vec3(width, 0.85, 0.45), 3, &mut plan.dice);
         if let Some(pose) = plan.stand(&FurnitureSet::of(piece), &WALLS) {
-            plan.sights.push(plan.scene.things.len() - 1);
-            plan.top(&pose, 0.85, &[-0.35, 0.0, 0.35], &SMALL);
+            plan.focus_things.push(plan.scene.things.len() - 1);
+            plan.place_on_top(&pose, 0.85, &[-0.35, 0.0, 0.35], &SMALL);
         }
     }
-    plan.maybe(0.3, super::shared::dresser);
-    plan.maybe(0.3, storage::bookshelf);
-    if plan.maybe(0.45, walls::fireplace).is_some() {
-        plan.sights.push(plan.scene.things.len() - 1);
+    plan.maybe_stand(0.3, super::shared::dresser);
+    plan.maybe_stand(0.3, storage::bookshelf);
+    if plan.maybe_stand(0.45, walls::fireplace).is_some() {
+        plan.focus_things.push(plan.scene.things.len() - 1);
     }
-    plan.maybe(0.2, low_stool);
+    plan.maybe_stand(0.2, low_stool);
     plan.plant(0.6);
     plan.pictures(3);
-    plan.perhaps(0.2, 1.25, |dice| walls::mirror(0.6, 0.9, dice));
-    plan.perhaps(0.2, 1.45, storage::wall_shelf);
+    plan.maybe_hang(0.2, 1.25, |dice| walls::mirror(0.6, 0.9, dice));
+    plan.maybe_hang(0.2, 1.45, storage::wall_shelf);
     plan
 }
 
-/// The table, its chairs, and the lamp above.
+/// Places the table, its chairs, and the lamp above it.
 fn table(plan: &mut FloorPlan) {
     let name = kind("dining table", "table");
     let middle = vec3(plan.size.x / 2.0, 0.0, plan.size.z / 2.0)
@@ -70,16 +70,16 @@ fn table(plan: &mut FloorPlan) {
         )
     };
     plan.rug(0.4, middle, [length + 1.2, depth + 1.3], angle);
-    plan.sight();
+    plan.focus_on_next();
     let pose = at(
-        at(middle, angle).outward(vec3(0.0, 0.0, -depth / 2.0)),
+        at(middle, angle).to_room(vec3(0.0, 0.0, -depth / 2.0)),
         angle,
     );
-    plan.put(piece, pose);
-    // The chairs belong to the table: they are put without asking, and the whole is kept free.
+    plan.add(piece, pose);
+    // The chairs belong to the table: they are added without a check, and the floor under them is reserved.
     let around = at(middle, angle);
     plan.keep_free(
-        &at(around.outward(vec3(0.0, 0.0, -depth / 2.0 - 0.5)), angle),
+        &at(around.to_room(vec3(0.0, 0.0, -depth / 2.0 - 0.5)), angle),
         vec3(length + 0.9, 0.0, depth + 1.0),
         0.0,
     );
@@ -94,9 +94,9 @@ fn table(plan: &mut FloorPlan) {
         Surface::paint(paint)
     };
     let seat = |plan: &mut FloorPlan, place: Vec3, turned: f32| {
-        plan.sight();
+        plan.focus_on_next();
         let piece = seats::chair_of(kind("dining chair", "chair"), paint, &surface, style);
-        plan.beside(&around, piece, place, turned);
+        plan.add_relative(&around, piece, place, turned);
     };
     let out = depth / 2.0 + 0.3;
     let columns: &[f32] = if round { &[0.0] } else { &[-0.36, 0.36] };
@@ -114,12 +114,12 @@ fn table(plan: &mut FloorPlan) {
     } else {
         clutter::vase(&mut plan.dice)
     };
-    plan.beside(&pose, piece, vec3(0.0, 0.75, depth / 2.0 - 0.1), 0.0);
+    plan.add_relative(&pose, piece, vec3(0.0, 0.75, depth / 2.0 - 0.1), 0.0);
     let ceiling = vec3(middle.x, plan.size.y, middle.z);
     let lamp = if plan.dice.chance(0.5) {
         lamps::chandelier(0.75)
     } else {
         lamps::pendant(0.95, &mut plan.dice)
     };
-    plan.put(lamp, at(ceiling, 0.0));
+    plan.add(lamp, at(ceiling, 0.0));
 }

@@ -1,10 +1,10 @@
-//! Kitchens.
+//! Furnishing of kitchens.
 
 use glam::vec3;
 
 use super::super::dice::Dice;
 use super::super::furniture::kitchen::{
-    COUNTER, Style, hood, microwave, refrigerator, run, stove, upper,
+    COUNTER, Style, base_cabinets, hood, microwave, refrigerator, stove, wall_cabinets,
 };
 use super::super::furniture::{FurnitureSet, at, clutter, lamps, seats, tables};
 use super::super::paint::{ALL, Paint};
@@ -18,15 +18,15 @@ pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
     let mut plan = FloorPlan::new(size, ground, false, dice);
     let wall = plan.dice.pick(&WALLS);
     let style = Style::new(&mut plan.dice);
-    row(&mut plan, wall, &style);
+    kitchen_row(&mut plan, wall, &style);
     let [left, right] = sides(wall);
     plan.door(&[wall.opposite()]);
-    let dress = plan.dice.pick(&[
+    let dressing = plan.dice.pick(&[
         WindowDressing::Bare,
         WindowDressing::Blinds,
         WindowDressing::Curtains,
     ]);
-    plan.window(&[left, right, wall.opposite()], 1.2, 1.05, dress);
+    plan.window(&[left, right, wall.opposite()], 1.2, 1.05, dressing);
     eating(&mut plan, wall);
     plan.plant(0.3);
     plan.pictures(2);
@@ -34,8 +34,8 @@ pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
     plan
 }
 
-/// Refrigerator, counters, stove and sink along a wall.
-fn row(plan: &mut FloorPlan, wall: Wall, style: &Style) {
+/// Places the refrigerator, counters, stove and sink along a wall.
+fn kitchen_row(plan: &mut FloorPlan, wall: Wall, style: &Style) {
     let span = plan.width(wall);
     let fridge = plan.dice.chance(0.8);
     let taken = if fridge { 0.78 } else { 0.0 };
@@ -49,27 +49,35 @@ fn row(plan: &mut FloorPlan, wall: Wall, style: &Style) {
         middle
     };
     if fridge {
-        plan.sight();
+        plan.focus_on_next();
         let set = FurnitureSet::of(refrigerator(style, &mut plan.dice));
         plan.stand_at(set, wall, next(0.74));
     }
-    if let Some(pose) = plan.stand_at(run(first - 0.05, false, style), wall, next(first - 0.05)) {
+    if let Some(pose) = plan.stand_at(
+        base_cabinets(first - 0.05, false, style),
+        wall,
+        next(first - 0.05),
+    ) {
         if plan.dice.chance(0.6) {
-            plan.beside(&pose, microwave(style), vec3(0.0, COUNTER, 0.1), 0.0);
+            plan.add_relative(&pose, microwave(style), vec3(0.0, COUNTER, 0.1), 0.0);
         } else {
-            plan.top(&pose, COUNTER, &[0.0], &[clutter::fruit, clutter::bottle]);
+            plan.place_on_top(&pose, COUNTER, &[0.0], &[clutter::fruit, clutter::bottle]);
         }
-        plan.above(&pose, upper(first - 0.05, style), 1.48);
+        plan.hang_above(&pose, wall_cabinets(first - 0.05, style), 1.48);
     }
-    plan.sight();
+    plan.focus_on_next();
     if let Some(pose) = plan.stand_at(FurnitureSet::of(stove(style)), wall, next(0.63)) {
-        plan.above(&pose, hood(), 1.6);
+        plan.hang_above(&pose, hood(), 1.6);
     }
-    plan.sight();
-    if let Some(pose) = plan.stand_at(run(second - 0.05, sinks, style), wall, next(second - 0.05)) {
-        plan.above(&pose, upper(second - 0.05, style), 1.48);
+    plan.focus_on_next();
+    if let Some(pose) = plan.stand_at(
+        base_cabinets(second - 0.05, sinks, style),
+        wall,
+        next(second - 0.05),
+    ) {
+        plan.hang_above(&pose, wall_cabinets(second - 0.05, style), 1.48);
         let x = second / 2.0 - 0.22;
-        plan.top(
+        plan.place_on_top(
             &pose,
             COUNTER,
             &[x],
@@ -78,44 +86,44 @@ fn row(plan: &mut FloorPlan, wall: Wall, style: &Style) {
     }
 }
 
-/// A table with what one sits on.
+/// Places a table with chairs or stools, and a lamp.
 fn eating(plan: &mut FloorPlan, wall: Wall) {
     if plan.dice.chance(0.3) {
         return;
     }
-    let before = plan.on(wall, plan.width(wall) / 2.0, 0.0);
+    let before = plan.wall_pose(wall, plan.width(wall) / 2.0, 0.0);
     let side = plan.dice.between(-0.6, 0.6);
     let far = plan.dice.between(2.2, 2.5);
-    let place = before.outward(vec3(side, 0.0, far));
+    let place = before.to_room(vec3(side, 0.0, far));
     let table = tables::round(kind("table", "table"), 0.42, 0.75, &mut plan.dice);
-    let Some(pose) = plan.amid(FurnitureSet::of(table), place, 0.0) else {
+    let Some(pose) = plan.stand_free(FurnitureSet::of(table), place, 0.0) else {
         return;
     };
-    plan.sights.push(plan.scene.things.len() - 1);
+    plan.focus_things.push(plan.scene.things.len() - 1);
     let paint = Paint::of(&ALL, &mut plan.dice);
     let stools = plan.dice.chance(0.4);
     let start = plan.dice.between(0.0, 6.0);
     for i in 0..=plan.dice.below(3) {
         let angle = start + i as f32 * 2.2;
-        let out = super::super::mesh::turn(angle);
+        let out = super::super::mesh::cos_sin(angle);
         let piece = if stools {
             seats::stool(0.5, &mut plan.dice)
         } else {
             seats::chair(kind("chair", "chair"), paint, &mut plan.dice)
         };
-        // Each faces the table: its front is z, which a turn about y takes to (sin, cos).
+        // Each faces the table: its front is z, which a rotation about y moves to (sin, cos).
         let back = vec3(place.x, 0.0, place.z) - vec3(out.y, 0.0, out.x) * 0.85;
         let set = FurnitureSet::of(piece);
-        plan.amid(set, back + vec3(out.y, 0.0, out.x) * 0.2, angle);
+        plan.stand_free(set, back + vec3(out.y, 0.0, out.x) * 0.2, angle);
     }
     if plan.dice.chance(0.5) {
         let top = vec3(0.0, 0.75, 0.3);
         let piece = clutter::fruit(&mut plan.dice);
-        plan.beside(&pose, piece, top, 0.0);
+        plan.add_relative(&pose, piece, top, 0.0);
     }
     if plan.dice.chance(0.5) {
         let lamp = lamps::pendant(0.95, &mut plan.dice);
         let height = plan.size.y;
-        plan.put(lamp, at(vec3(place.x, height, place.z), 0.0));
+        plan.add(lamp, at(vec3(place.x, height, place.z), 0.0));
     }
 }

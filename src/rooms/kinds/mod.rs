@@ -1,4 +1,4 @@
-//! The kinds of rooms, one file each: how large they are, and what is in them.
+//! The kinds of rooms, one file each: their size and furniture.
 
 mod bathroom;
 mod bedroom;
@@ -23,7 +23,7 @@ pub(super) enum RoomKind {
 }
 
 impl RoomKind {
-    /// All of them, in the order in which they take turns.
+    /// All kinds, in the order in which scenes use them.
     pub(super) const ALL: [Self; 6] = [
         Self::Bedroom,
         Self::Bathroom,
@@ -33,7 +33,7 @@ impl RoomKind {
         Self::Office,
     ];
 
-    /// Its name, as `living room`.
+    /// The name of the kind, as `living room`.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Bedroom => "bedroom",

@@ -1,4 +1,4 @@
-//! Pieces and their places that several kinds of rooms share.
+//! Furniture that several kinds of rooms share, and helpers to place it.
 
 use glam::{Vec3, vec3};
 
@@ -8,13 +8,13 @@ use super::super::plan::{FloorPlan, WALLS, Wall};
 use super::super::scene::{Piece, Pose};
 
 impl FloorPlan {
-    /// Remembers the next thing that is put as one worth looking at.
-    pub(super) fn sight(&mut self) {
-        self.sights.push(self.scene.things.len());
+    /// Marks the next thing that is added as one that the camera should look at.
+    pub(super) fn focus_on_next(&mut self) {
+        self.focus_things.push(self.scene.things.len());
     }
 
-    /// Perhaps stands a piece somewhere at a wall.
-    pub(super) fn maybe(
+    /// Places a piece at a wall, with this probability; `None` if it is not placed.
+    pub(super) fn maybe_stand(
         &mut self,
         probability: f32,
         make: impl FnOnce(&mut Dice) -> Piece,
@@ -26,8 +26,8 @@ impl FloorPlan {
         self.stand(&FurnitureSet::of(piece), &WALLS)
     }
 
-    /// Perhaps hangs a piece on a wall, so high.
-    pub(super) fn perhaps(
+    /// Hangs a piece on a wall at height `up`, with this probability.
+    pub(super) fn maybe_hang(
         &mut self,
         probability: f32,
         up: f32,
@@ -39,8 +39,8 @@ impl FloorPlan {
         }
     }
 
-    /// Puts a few of these on top of something, side by side: where they stand, from its left.
-    pub(super) fn top(
+    /// Adds random small pieces on top of another piece, at the x positions `places`, in metres from its middle.
+    pub(super) fn place_on_top(
         &mut self,
         base: &Pose,
         height: f32,
@@ -51,37 +51,37 @@ impl FloorPlan {
             let make = self.dice.pick(makers);
             let piece = make(&mut self.dice);
             let angle = self.dice.between(-0.3, 0.3);
-            self.beside(base, piece, vec3(*x, height, 0.08), angle);
+            self.add_relative(base, piece, vec3(*x, height, 0.08), angle);
         }
     }
 
-    /// A lamp below the middle of the ceiling.
+    /// Adds a lamp below the middle of the ceiling.
     pub(super) fn ceiling_lamp(&mut self) {
         let place = vec3(self.size.x / 2.0, self.size.y, self.size.z / 2.0);
-        self.put(lamps::ceiling_lamp(), at(place, 0.0));
+        self.add(lamps::ceiling_lamp(), at(place, 0.0));
     }
 
-    /// Pictures, up to so many.
-    pub(super) fn pictures(&mut self, most: usize) {
-        for _ in 0..=self.dice.below(most) {
+    /// Hangs up to `count` pictures.
+    pub(super) fn pictures(&mut self, count: usize) {
+        for _ in 0..=self.dice.below(count) {
             let up = self.dice.between(1.3, 1.5);
-            self.perhaps(0.8, up, walls::picture);
+            self.maybe_hang(0.8, up, walls::picture);
         }
     }
 
-    /// Perhaps a plant at a wall.
+    /// Places a plant at a wall, with this probability.
     pub(super) fn plant(&mut self, probability: f32) {
-        self.maybe(probability, |dice| {
+        self.maybe_stand(probability, |dice| {
             let height = dice.between(0.7, 1.3);
             clutter::plant(height, dice)
         });
     }
 
-    /// Perhaps a rug at a place.
+    /// Adds a rug at a place, with this probability.
     pub(super) fn rug(&mut self, probability: f32, place: Vec3, size: [f32; 2], angle: f32) {
         if self.dice.chance(probability) {
             let piece = textiles::rug(size[0], size[1], &mut self.dice);
-            self.put(piece, at(place, angle));
+            self.add(piece, at(place, angle));
         }
     }
 }
@@ -103,7 +103,7 @@ pub(super) fn low_stool(dice: &mut Dice) -> Piece {
     seats::stool(0.45, dice)
 }
 
-/// The walls beside one.
+/// The two walls next to a wall.
 pub(super) fn sides(wall: Wall) -> [Wall; 2] {
     match wall {
         Wall::North | Wall::South => [Wall::East, Wall::West],

@@ -44,7 +44,7 @@ pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
     let StoredRun {
         manifest,
         records,
-        questions: questions,
+        questions,
         ..
     } = StoredRun::of_choices(&args.run, "openeqa --study DIR makes their page")?;
     let wrong = |problem: String| {
