@@ -12,6 +12,7 @@ pub(crate) mod kind_set;
 pub(crate) mod labels;
 pub(crate) mod manifest;
 pub(crate) mod question;
+pub(crate) mod recent;
 pub(crate) mod record;
 pub(crate) mod reply;
 pub(crate) mod run_question;
