@@ -34,6 +34,7 @@ use self::plan::FloorPlan;
 use self::viewpoint::Height;
 use crate::error::{Error, Result};
 use crate::labels;
+use crate::types::Decides;
 use crate::types::recent::Recent;
 use crate::types::{DepthKind, Digest, Frame, FrameId, Labels, SegmentName, Segmentation};
 
@@ -58,13 +59,13 @@ fn frames_kept([width, height]: [usize; 2]) -> usize {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Args)]
 pub struct Rooms {
     /// This many frames, two of each room
-    #[arg(long, value_name = "N", value_parser = frames, default_value = "48")]
+    #[arg(long, value_name = "N", value_parser = frames, default_value = "48", add = Decides::Trials)]
     pub frames: usize,
     /// What decides the rooms
-    #[arg(long, value_name = "N", default_value_t = 7)]
+    #[arg(long, value_name = "N", default_value_t = 7, add = Decides::Pixels)]
     pub seed: u64,
     /// Width and height in pixels
-    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size, default_value = "640x480")]
+    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size, default_value = "640x480", add = Decides::Pixels)]
     pub size: [usize; 2],
 }
 
