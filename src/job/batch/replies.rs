@@ -34,7 +34,7 @@ pub(crate) fn import<D: Detail>(
     manifest: &RunManifest,
     files: &[PathBuf],
 ) -> Result<String> {
-    let blanks = store.batched()?;
+    let blanks = store.batch_trials()?;
     if blanks.is_empty() {
         let problem =
             "nothing of this run is out in a batch: its requests are written first".to_owned();
@@ -43,7 +43,7 @@ pub(crate) fn import<D: Detail>(
     }
     let blanks: HashMap<TrialKey, Record<D>> =
         blanks.into_iter().map(|blank| (blank.key, blank)).collect();
-    let mut out = store.out_in_batches()?;
+    let mut out = store.pending_in_batches()?;
     let mut tally = ReplyCounts::default();
     for path in files {
         let file = File::open(path).map_err(|e| Error::file(path, "read", e))?;
