@@ -6,7 +6,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
-use crate::ask::batch::{BatchLine, unconstrained};
+use crate::ask::batch::{BatchLine, with_letter};
 use crate::ask::{Constrain, Wire};
 use crate::error::{Error, Result};
 use crate::store::Store;
@@ -91,7 +91,7 @@ fn take<D: Detail>(
             let choices = blank.detail.choices().len();
             let reply = Reply {
                 attempts: 1,
-                ..unconstrained(reply, constrain, choices)
+                ..with_letter(reply, constrain, choices)
             };
             blank.answered(reply)?
         }
