@@ -33,6 +33,8 @@ pub(crate) fn is_unfinished(name: &OsStr) -> bool {
     name.to_string_lossy().ends_with(UNFINISHED)
 }
 
+// tempfile's `persist` is not used: its random name leaves a further file after each killed process, and its file mode denies
+// access to colleagues who share a results folder.
 fn replace(path: &Path, content: &[u8], sync: impl FnOnce(&File) -> io::Result<()>) -> Result<()> {
     if let Some(folder) = path.parent() {
         fs::create_dir_all(folder).map_err(|e| Error::file(folder, "create", e))?;
