@@ -1,19 +1,19 @@
-//! The values that were made last: [`Recent`].
+//! A small cache of recent values: [`Recent`].
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// A cache of the `capacity` values that were added last. A thread that needs what another one is making waits for it.
+/// A cache of the `capacity` values that were added last. A thread waits for a value that another thread is computing.
 ///
-/// First in, first out. The caches of libraries weigh how often a value is used (quick_cache was tried): with room for one or two
-/// large frames they turn a new frame away, which is the one that is needed next.
+/// The oldest value is removed first. Caches of libraries consider how often a value is used (quick_cache was tried): with a
+/// capacity of one or two large frames they reject a new frame, although it is needed next.
 #[derive(Debug)]
 pub(crate) struct Recent<K, V> {
     capacity: usize,
     slots: Mutex<VecDeque<(K, Slot<V>)>>,
 }
 
-/// A value, or `None` until it is made.
+/// A value; `None` until it is computed.
 type Slot<V> = Arc<Mutex<Option<V>>>;
 
 impl<K: PartialEq + Clone, V: Clone> Recent<K, V> {
@@ -22,7 +22,7 @@ impl<K: PartialEq + Clone, V: Clone> Recent<K, V> {
         Self { capacity, slots }
     }
 
-    /// The value of a key, made if it is not there; what fails is tried again the next time.
+    /// The value of a key, computed by `make` if it is not cached. Errors are not cached.
     ///
     /// # Errors
     /// Those of `make`.
@@ -32,9 +32,9 @@ impl<K: PartialEq + Clone, V: Clone> Recent<K, V> {
         if let Some(value) = &*value {
             return Ok(value.clone());
         }
-        let made = make()?;
-        *value = Some(made.clone());
-        Ok(made)
+        let new = make()?;
+        *value = Some(new.clone());
+        Ok(new)
     }
 
     fn slot(&self, key: &K) -> Slot<V> {
@@ -56,17 +56,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_last_values_are_kept_and_failures_are_not() {
+    fn the_last_values_are_cached_and_errors_are_not() {
         let cache = Recent::new(2);
-        let mut made = Vec::new();
+        let mut computed = Vec::new();
         for key in [1, 2, 1, 3, 1, 3] {
             let value = cache.get(&key, || {
-                made.push(key);
+                computed.push(key);
                 Ok::<_, ()>(key * 10)
             });
             assert_eq!(value, Ok(key * 10));
         }
-        assert_eq!(made, [1, 2, 3, 1]);
+        assert_eq!(computed, [1, 2, 3, 1]);
         assert_eq!(cache.get(&7, || Err("no")), Err("no"));
         assert_eq!(cache.get(&7, || Ok::<_, ()>(70)), Ok(70));
     }
