@@ -107,7 +107,7 @@ impl Palette {
     }
 
     /// Reads a table: 1,024 lines (red, then green) of 32 letters (blue), each `k` black, `a` grey, `w` white, `r` red, `o`
-    /// orange, `y` yellow, `g` green, `b` blue, `p` purple, `i` pink, `n` brown, `.` no name. Lines that start with `#` are ignored.
+    /// orange, `y` yellow, `g` green, `b` blue, `p` purple, `i` pink, `n` brown, `.` no name. Lines with `#` are ignored.
     ///
     /// # Errors
     /// [`Error::Data`] if the text has another form.

@@ -46,7 +46,7 @@ pub enum Reason {
     Bright,
     /// Too many pixels are black.
     Crushed,
-    /// No colour dominates.
+    /// No colour dominates the object.
     Motley,
     /// People do not agree on a name for the colour.
     Nameless,

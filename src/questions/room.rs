@@ -22,7 +22,7 @@ pub struct RoomSigns {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum NoRoom {
-    /// No clue holds.
+    /// No clue of the rulebook holds.
     NoSigns,
     /// The highest score is too low.
     Weak,

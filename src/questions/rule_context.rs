@@ -29,11 +29,9 @@ pub(crate) struct RuleContext<'a> {
 /// A question that may be asked of a frame, with its one true answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Candidate {
-    /// Kind of question.
     pub family: Family,
     /// Subject of the question: a class or an activity; empty for the room type.
     pub about: String,
-    /// The question in words.
     pub text: String,
     /// The choices in the order in which they are offered.
     pub choices: Vec<String>,
@@ -87,7 +85,6 @@ pub enum RuleResult {
 /// A candidate that cannot be asked.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Rejection {
-    /// Kind of question.
     pub family: Family,
     /// Subject of the question: a class or an activity; may be empty.
     pub about: String,

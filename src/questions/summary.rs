@@ -18,17 +18,14 @@ const SCHEMA: &str = "darkqa.questions/1";
 #[derive(Debug, Serialize)]
 pub(crate) struct QuestionSummary {
     schema: &'static str,
-    /// Name of the data set.
     pub dataset: String,
     /// Digest of the rulebook.
     pub rules: Digest,
     /// Digest of the colour table.
     pub colors: Digest,
-    /// Version of the rulebook.
     pub rules_version: String,
     /// How far the answers were balanced: none, binary or full.
     pub balance: String,
-    /// Number of scenes.
     pub scenes: usize,
     /// Number of frames that were measured.
     pub frames: usize,
@@ -36,7 +33,6 @@ pub(crate) struct QuestionSummary {
     pub failed: usize,
     /// Number of frames that are too dark to ask about.
     pub dark: usize,
-    /// Number of questions.
     pub questions: usize,
     /// Numbers of candidates by outcome, for each family.
     pub candidates: BTreeMap<Family, CandidateCounts>,
@@ -71,7 +67,6 @@ pub(crate) struct QuestionSummary {
 pub(crate) struct CandidateCounts {
     /// Number of candidates that the rules accept.
     pub viable: u64,
-    /// Number of questions that are asked.
     pub asked: u64,
     /// Number of viable candidates of frames that are asked another question of the family.
     pub not_chosen: u64,
@@ -108,7 +103,6 @@ pub(crate) struct RoomCoverage {
 /// Scores of answering without the image, as numbers of right answers or their expected values.
 #[derive(Debug, Default, Serialize)]
 pub(crate) struct Baselines {
-    /// Number of questions.
     pub questions: usize,
     /// Expected number of right answers of a uniform guess.
     pub chance: f64,

@@ -37,33 +37,23 @@ pub struct RuleBook {
     pub version: String,
     /// Seed of every pick between candidates that are equally good.
     pub seed: u64,
-    /// Thresholds for measuring a frame.
     pub measure: MeasureRule,
-    /// Thresholds that a segment must pass to be evidence.
     pub qualified: EvidenceRule,
-    /// Names and properties of the canonical classes.
+    /// Canonical classes by name.
     pub class: BTreeMap<String, ClassRule>,
-    /// Words that change how a segment of a class is treated.
     pub names: WordRules,
-    /// Groups of classes that may be mistaken for each other.
     pub confusable: Vec<Confusable>,
-    /// Scores that a room type needs, and the room types asked about.
     pub room: RoomRule,
-    /// Tokens of segments; the first that matches counts.
+    /// The first token that matches a segment counts.
     pub token: Vec<TokenRule>,
-    /// Combinations of objects that are evidence for a room type.
     pub clue: Vec<Clue>,
-    /// Rules by which one of two rival room types wins.
     pub contest: Vec<Contest>,
-    /// Thresholds for a room seen through a door.
     pub doorway: Doorway,
-    /// Limits of a frame in which something can be called absent.
     pub closed_world: ClosedWorld,
     /// "What type of room is this?"
     pub room_type: RoomTypeRule,
     /// "Is this room suitable for this?"
     pub affordance: AffordanceRule,
-    /// Activities that a room may be suitable for.
     pub activity: Vec<ActivityRule>,
     /// "Is there a chair in the image?"
     pub presence: PresenceRule,
@@ -71,7 +61,6 @@ pub struct RuleBook {
     pub color: ColorRule,
     /// "Which object is closest to the camera?"
     pub closest: ClosestRule,
-    /// Limits for balancing the answers.
     pub balance: BalanceRule,
 }
 

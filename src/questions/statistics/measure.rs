@@ -13,9 +13,9 @@ use crate::types::{Digest, Frame, Labels};
 
 /// Measures a frame.
 ///
-/// Counts are whole pixels and lengths whole millimetres. Floating-point numbers are used only to convert depth from the
-/// optical axis to the ray, `z · √(1 + ((x − cx) / fx)² + ((y − cy) / fy)²)`. IEEE 754 rounds these operations the same way on
-/// every machine.
+/// Counts are whole pixels and lengths whole millimetres. Only the conversion of depth from the optical axis to the ray,
+/// `z · √(1 + ((x − cx) / fx)² + ((y − cy) / fy)²)`, uses floating-point numbers. IEEE 754 rounds these operations the same
+/// way on every machine.
 ///
 /// # Errors
 /// [`crate::error::Error::Data`] with the frame if it has no classes at all.

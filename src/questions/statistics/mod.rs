@@ -104,7 +104,7 @@ pub struct Segment {
     /// Number of parts that were merged, for maps of parts; else 0.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub parts: usize,
-    /// Number of pixels.
+    /// Number of pixels of the whole mask.
     pub area: u64,
     /// Number of pixels that have the class of the segment.
     pub pure: u64,
@@ -137,7 +137,7 @@ pub struct SegmentDepth {
     pub valid: u64,
     /// 10 % quantile in millimetres.
     pub p10: u32,
-    /// Median in millimetres.
+    /// 50 % quantile in millimetres.
     pub median: u32,
     /// 90 % quantile in millimetres.
     pub p90: u32,

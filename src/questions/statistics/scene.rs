@@ -16,7 +16,7 @@ const VOID: u32 = u32::MAX;
 
 /// Source of the label of a pixel.
 enum LabelSource<'a> {
-    /// A semantic map.
+    /// A semantic map, which gives each pixel a label.
     OfPixels(CowArray<'a, u16, Ix2>),
     /// The names of segments: the label of each mask, or [`VOID`]. Index 0 stands for pixels without a mask.
     OfMasks(Vec<u32>),

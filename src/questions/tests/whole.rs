@@ -1,4 +1,4 @@
-//! All families together.
+//! Tests of all families together.
 
 use proptest::prelude::*;
 
