@@ -2,7 +2,7 @@
 //!
 //! The names are the eleven basic terms of Berlin and Kay (1969). The table has one name for each 8 × 8 × 8 block of codes,
 //! so that no floating-point number decides an answer. The decision tree over CIELAB in `color_tree.rs` generates it, and a
-//! test checks that. Where neighbouring names overlap (beige, teal, between grey and white), a colour has no name, and no
+//! test checks that. Where neighbouring names overlap (beige, teal, light greys), a colour has no name, and no
 //! question about it is asked.
 
 use serde::{Deserialize, Serialize};

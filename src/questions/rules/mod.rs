@@ -108,7 +108,7 @@ impl Rules {
         self.digest
     }
 
-    /// The digest of `[measure]`, which alone decides the statistics of a frame.
+    /// The digest of `[measure]`, the part of the rulebook that decides the statistics of a frame.
     #[must_use]
     pub fn measure_digest(&self) -> Digest {
         self.measure_digest
