@@ -75,7 +75,7 @@ pub(crate) fn import(args: &ImportArgs, progress: &Progress) -> Result<Outcome> 
     let adapter = open(args.kind, &args.src, &args.stated)?;
     let frames = choose(
         &adapter.listing().frames,
-        args.key_frames.kept(),
+        args.key_frames.selection(),
         args.key_frames.fps,
     )?;
     let cores = pool(args.threads.threads)?;

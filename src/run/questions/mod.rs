@@ -23,7 +23,7 @@ use crate::questions::reason::Reason;
 use crate::questions::room::RoomSource;
 use crate::questions::rule_context::RuleResult as Candidate;
 use crate::questions::rules::Rules;
-use crate::questions::statistics::{self, FrameStatistics, measure, strangers};
+use crate::questions::statistics::{self, FrameStatistics, measure, unknown_labels};
 use crate::questions::summary::QuestionSummary;
 use crate::questions::{Generated, GeneratedQuestion, QuestionRequest, generate};
 use crate::report;
@@ -209,8 +209,8 @@ fn warn(made: &Generated, making: &QuestionMaking<'_>) {
     for uneven in &made.uneven {
         tracing::warn!("{uneven}");
     }
-    let closest = made.tallies.get(&Family::Closest);
-    let scale = closest.and_then(|tally| tally.fallen.get(&Reason::Scale));
+    let closest = made.counts.get(&Family::Closest);
+    let scale = closest.and_then(|counts| counts.rejections.get(&Reason::Scale));
     if let Some(frames) = scale {
         let measure = &making.rules.book().measure;
         tracing::warn!(
@@ -295,7 +295,7 @@ fn one(
         kept.add(&found)?;
         found
     };
-    let unknown = strangers(&found);
+    let unknown = unknown_labels(&found);
     if making.args.strict && !unknown.is_empty() {
         let problem = format_args!(
             "its semantic map has the numbers {unknown:?}, which classes.json has not"
@@ -335,7 +335,7 @@ impl<'a> WrittenQuestion<'a> {
 /// A candidate as a line of its file.
 fn told(frame: &FrameId, candidate: &Candidate) -> Value {
     match candidate {
-        Candidate::Holds(claim) => json!({
+        Candidate::Viable(claim) => json!({
             "frame": frame,
             "family": claim.family,
             "about": claim.about,
@@ -344,7 +344,7 @@ fn told(frame: &FrameId, candidate: &Candidate) -> Value {
             "question": claim.text,
             "evidence": claim.evidence,
         }),
-        Candidate::Falls(fallen) => json!({
+        Candidate::Rejected(fallen) => json!({
             "frame": frame,
             "family": fallen.family,
             "about": fallen.about,
