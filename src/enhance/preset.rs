@@ -81,4 +81,26 @@ mod tests {
             .to_string();
         assert!(message.contains("zero-dce, "), "{message}");
     }
+
+    #[test]
+    fn every_preset_is_described_and_stands_in_the_help() {
+        let all: BTreeMap<String, ModelSidecar> = toml::from_str(PRESETS).unwrap();
+        let [readme, help] = [
+            include_str!("../../models/README.md"),
+            include_str!("settings.rs"),
+        ];
+        let missing: Vec<String> = all
+            .into_keys()
+            .filter(|name| {
+                let as_authors = name.replace("-pp", "++");
+                [readme, help]
+                    .iter()
+                    .any(|text| !text.contains(name) && !text.contains(&as_authors))
+            })
+            .collect();
+        assert!(
+            missing.is_empty(),
+            "models/README.md or the help of --llie lacks {missing:?}"
+        );
+    }
 }

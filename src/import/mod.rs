@@ -78,3 +78,28 @@ pub(crate) fn open(
     }
     Ok(adapter)
 }
+
+#[cfg(test)]
+mod tests {
+    use clap::ValueEnum as _;
+
+    use super::*;
+
+    #[test]
+    fn every_kind_is_described_and_tested() {
+        let readme = include_str!("README.md");
+        let tests = include_str!("../../tests/import.rs");
+        let missing: Vec<String> = DataSetKind::value_variants()
+            .iter()
+            .map(ToString::to_string)
+            .filter(|kind| {
+                !readme.contains(&format!("\n## {kind}: "))
+                    || !tests.contains(&format!("\"{kind}\""))
+            })
+            .collect();
+        assert!(
+            missing.is_empty(),
+            "import/README.md or tests/import.rs lacks {missing:?}"
+        );
+    }
+}

@@ -359,3 +359,29 @@ fn a_state_can_be_written_down() {
     assert_eq!(state["bias"].as_array().map(Vec::len), Some(4));
     assert_eq!(state["rgb_to_camera"][2].as_array().map(Vec::len), Some(3));
 }
+
+#[test]
+fn every_kind_of_degradation_is_made_described_and_tested() {
+    use crate::types::degradation::Kind;
+    use crate::types::{Degradation, FrameId, Rgb};
+
+    let clean = Rgb::new(4, 4, vec![200; 48]).unwrap();
+    let key = super::NoiseKey::new(0, &FrameId("a".to_owned()));
+    let described = include_str!("../../results/README.md");
+    let tested = include_str!("../../tests/synthesize.rs");
+    let mut missing = Vec::new();
+    for kind in Kind::ALL {
+        let how = Degradation::new(kind, kind.ladder()[2], None).unwrap();
+        if super::degrade(&clean, Some(&how), &key, &super::Synthesis::default()) == clean {
+            missing.push(format!("{kind:?} changes no pixel"));
+        }
+        let word = kind.word();
+        if !described.contains(&format!("`{word}`")) {
+            missing.push(format!("{word} in results/README.md"));
+        }
+        if !tested.contains(&format!("-{word}")) {
+            missing.push(format!("L…-{word} in tests/synthesize.rs"));
+        }
+    }
+    assert!(missing.is_empty(), "{missing:?}");
+}

@@ -185,3 +185,24 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn every_family_has_its_rule_its_tests_and_its_description() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let readme = std::fs::read_to_string(root.join("README.md")).unwrap();
+    let mut missing = Vec::new();
+    for family in Family::PAPER {
+        for file in [
+            format!("src/questions/{family}.rs"),
+            format!("src/questions/tests/{family}.rs"),
+        ] {
+            if !root.join(&file).is_file() {
+                missing.push(file);
+            }
+        }
+        if !readme.contains(&family.to_string()) {
+            missing.push(format!("{family} in README.md"));
+        }
+    }
+    assert!(missing.is_empty(), "{missing:?}");
+}
