@@ -177,7 +177,7 @@ fn time_is_said_of_walks_too() {
     scripts(&house);
     let called = run(&house, &["--out", "run", "--timings"]);
     assert!(
-        called.stderr.contains("timings:") && called.stderr.contains("darken"),
+        called.stderr.contains("timings:") && called.stderr.contains("degrade"),
         "{}",
         called.stderr
     );

@@ -8,7 +8,7 @@ use super::*;
 use crate::types::Decides;
 
 #[test]
-fn the_command_line_is_sound() {
+fn the_command_line_is_valid() {
     Cli::command().help_expected(true).debug_assert();
 }
 
@@ -67,7 +67,7 @@ fn row(text: &mut String, arg: &Arg) {
         _ => String::new(),
     };
     let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
-    let (what, said) = match help.rsplit_once("; default: ") {
+    let (what, stated) = match help.rsplit_once("; default: ") {
         Some((what, default)) => (what.to_owned(), default.to_owned()),
         None => (help, String::new()),
     };
@@ -79,7 +79,7 @@ fn row(text: &mut String, arg: &Arg) {
     let default = match &defaults[..] {
         _ if !arg.get_action().takes_values() => "off".to_owned(),
         [] if arg.is_required_set() => "required".to_owned(),
-        [] => said,
+        [] => stated,
         values => format!("`{}`", values.join(",")),
     };
     let possible = arg.get_possible_values();
@@ -104,7 +104,7 @@ fn row(text: &mut String, arg: &Arg) {
 }
 
 #[test]
-fn the_reference_is_that_of_the_program() {
+fn the_flag_reference_is_up_to_date() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/cli/README.md");
     let reference = reference();
     if std::env::var_os("UPDATE").is_some() {
@@ -113,12 +113,12 @@ fn the_reference_is_that_of_the_program() {
     let written = fs::read_to_string(&path).unwrap_or_default();
     assert!(
         written == reference,
-        "src/cli/README.md is another: UPDATE=1 cargo test --lib cli:: writes it"
+        "src/cli/README.md is out of date: UPDATE=1 cargo test --lib cli:: writes it"
     );
 }
 
 #[test]
-fn the_job_of_kubernetes_says_flags_that_there_are() {
+fn the_kubernetes_job_uses_flags_that_exist() {
     let text = include_str!("../run/cluster/job.yaml");
     let flags = text
         .lines()
@@ -176,7 +176,7 @@ fn every_flag_says_what_it_is_what_it_decides_and_its_default() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Words alone: without line breaks, indentation and the escapes of roff.
+/// The words of a text, without line breaks, indentation and the escapes of roff.
 fn words_of(text: &str) -> String {
     let plain = text.replace("\\-", "-").replace("\\\\", "\\");
     plain

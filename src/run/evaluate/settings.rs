@@ -77,7 +77,7 @@ impl EvaluateArgs {
     /// [`Error::Usage`](crate::error::Error::Usage) with the flag that cannot be used.
     pub(super) fn resolve(self) -> Result<Evaluation> {
         if self.job.models.is_empty() {
-            return Err(self.job.nameless());
+            return Err(self.job.no_model_error());
         }
         let prompts = self.choice.prompts.as_deref();
         Ok(Evaluation {

@@ -57,7 +57,7 @@ impl JudgeArgs {
             return Ok(None);
         };
         let in_words = |e: crate::error::Error| e.at("the judge");
-        model.answers_in_words().map_err(in_words)?;
+        model.require_open_answers().map_err(in_words)?;
         let of_models = &job.access;
         let mut access = of_models.clone();
         let own = self.judge_base_url.is_some()

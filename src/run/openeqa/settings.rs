@@ -138,11 +138,11 @@ impl OpenEqaArgs {
         };
         let nobody = self.job.models.is_empty() && self.answers.is_empty();
         if nobody && !matches!(task, OpenTask::Study(_)) {
-            return Err(self.job.nameless());
+            return Err(self.job.no_model_error());
         }
         let models = &self.job.models;
         let mut names = models.model.iter().chain(&models.blind_model);
-        names.try_for_each(ModelName::answers_in_words)?;
+        names.try_for_each(ModelName::require_open_answers)?;
         let SamplingSeed(seed) = self.sampling_seed;
         let protocol = self.judge.protocol;
         let judge = self.judge.resolve(&self.job, seed)?;
