@@ -16,7 +16,7 @@ const CIRCLES: [(&[&str], &str); 2] = [
         &[
             "score/choice/lenient.rs",
             "score/choice/stated.rs",
-            "score/choice/written.rs",
+            "score/choice/structured.rs",
         ],
         "to stay: a reply within a reply is read by the reader that found it",
     ),
