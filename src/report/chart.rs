@@ -250,7 +250,6 @@ impl AxisFrame {
         format!("level; {title} in {unit}")
     }
 
-    /// Vertical position of a share.
     fn y(&self, share: f64) -> i32 {
         self.top + self.height - (f64::from(self.height) * share.clamp(0.0, 1.0)).round() as i32
     }

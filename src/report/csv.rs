@@ -10,11 +10,8 @@ use crate::error::{Error, Result};
 #[derive(Debug, Clone, Copy, Serialize)]
 #[serde(untagged)]
 pub(super) enum CsvField<'a> {
-    /// An empty field.
     None,
-    /// Text, without quotes.
     Text(&'a str),
-    /// A whole number.
     Count(usize),
     /// A number as JSON writes it: `1.0`.
     Number(f64),

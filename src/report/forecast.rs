@@ -124,11 +124,11 @@ pub(crate) fn render(forecast: &Forecast) -> String {
         100.0 * forecast.batch
     );
     if forecast.lines.iter().any(|line| line.dollars.is_none()) {
-        text.push_str("unknown: a table of --prices FILE can state the price of a model and its image-tokens\n");
+        text.push_str("unknown: state the price of a model and its image-tokens in a table of --prices FILE\n");
     }
     let _ = writeln!(
         text,
-        "to send: {} in {images} images, the largest {:.2} MB ({sampled} made to find out)",
+        "to send: {} with {images} images, the largest {:.2} MB (of {sampled} made as a sample)",
         bytes(forecast.bytes),
         forecast.largest_image as f64 / 1e6
     );
@@ -137,12 +137,12 @@ pub(crate) fn render(forecast: &Forecast) -> String {
     }
     let _ = writeln!(
         text,
-        "time: {} of waiting ({pace}), {} of making images beside it",
+        "time: {} of waiting ({pace}), {} of making images in parallel",
         hours(forecast.asking_seconds),
         hours(forecast.making_seconds)
     );
     if let Some(problem) = &forecast.too_large {
-        let _ = writeln!(text, "the run would not begin: {problem}");
+        let _ = writeln!(text, "the run would not start: {problem}");
     }
     text
 }

@@ -24,7 +24,6 @@ fn rows<S: Serializer>(table: &Table, serializer: S) -> Result<S::Ok, S::Error> 
     serializer.collect_seq(table.rows.iter().map(|row| Named { table, row }))
 }
 
-/// A row as an object with the column names as keys.
 struct Named<'a> {
     table: &'a Table,
     row: &'a TableRow,

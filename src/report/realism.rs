@@ -8,6 +8,7 @@ use super::sheet::{self, CropRow};
 use super::table::ColumnKind::{Count, Number, Text};
 use super::table::TableBuilder;
 use super::terminal;
+use super::words::counted;
 use crate::error::{Error, Result};
 use crate::score::realism::mean::Mean;
 use crate::score::realism::residual::{Bins, EmptyBins, Residuals};
@@ -24,7 +25,7 @@ pub(crate) struct RealismSummary {
     kl_rule: String,
     /// The same with the other rule for empty bins; `None` for bins that are never empty.
     kl_other_rule: Option<String>,
-    /// Exposure drop in EV.
+    /// Mean exposure drop in EV.
     drop: Mean,
     exposure: MethodRow,
     noise: MethodRow,
@@ -179,8 +180,7 @@ impl RealismSummary {
         let other = self.kl_other_rule.iter();
         notes.extend(other.map(|rule| format!("other rule: {rule}")));
         notes.push(
-            "exposure drop alone has no residual: its D_KL tells of the rule, not of noise"
-                .to_owned(),
+            "exposure drop alone has no residual: its D_KL shows the rule, not noise".to_owned(),
         );
         notes.push(format!(
             "drop {} EV; PSNR of the sensor branch without noise {} dB",
@@ -190,14 +190,15 @@ impl RealismSummary {
         notes.extend(self.by_pair.iter().cloned());
         if failed > 0 || unmatched > 0 {
             notes.push(format!(
-                "{failed} pairs failed, {unmatched} images without a partner"
+                "{} failed, {} without a partner",
+                counted(failed, "pair"),
+                counted(unmatched, "image")
             ));
         }
         notes
     }
 }
 
-/// A mean with half of its interval.
 fn mean_text(mean: &Mean, digits: usize) -> String {
     if mean.value.is_infinite() {
         return "∞".to_owned();

@@ -49,11 +49,8 @@ impl TableRow {
 /// A format that can leave rows out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TableFormat {
-    /// The table at the end of a run.
     Terminal,
-    /// The HTML page.
     Page,
-    /// `tables.tex`.
     Latex,
 }
 
@@ -119,13 +116,13 @@ pub enum TableCell {
     Text(String),
     /// A number of things.
     Count(usize),
-    /// A plain number.
+    /// A number without an interval.
     Number(f64),
     /// A number with its interval.
     Estimate(Estimate),
     /// An accuracy below that of a model without images.
     Below(Estimate),
-    /// Accuracy of guessing.
+    /// Expected accuracy of guessing.
     Guess(Estimate),
     /// Accuracy in the strict reading, and its value in the lenient reading.
     Strict(Estimate, f64),

@@ -32,6 +32,12 @@ pub(super) fn name(subject: &Subject) -> String {
     format!("{} {}", subject.model, subject.condition())
 }
 
+/// A number of things: `1 pair`, `2 pairs`.
+pub(super) fn counted(number: usize, noun: &str) -> String {
+    let ending = if number == 1 { "" } else { "s" };
+    format!("{number} {noun}{ending}")
+}
+
 /// A share in percent, with one decimal.
 pub(super) fn percent(share: f64) -> String {
     format!("{:.1}", 100.0 * share)

@@ -15,7 +15,6 @@ use crate::types::{Family, KindReading, QuestionId, UnreadReason};
 /// Accuracy of one subject on one family in one reading.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AccuracyCell {
-    /// Model and condition.
     #[serde(flatten)]
     pub subject: Subject,
     /// Question family; `None` for all families together.
@@ -168,10 +167,10 @@ fn chance_cells(questions: &[OfferedChoices]) -> Vec<AccuracyCell> {
     let families: BTreeSet<&Family> = questions.iter().map(|question| &question.family).collect();
     let groups = std::iter::once(None).chain(families.into_iter().map(Some));
     let cells = groups.flat_map(|family| {
-        let asked = questions
+        let of_family = questions
             .iter()
             .filter(|question| family.is_none_or(|family| question.family == *family));
-        let accuracy = chance(asked);
+        let accuracy = chance(of_family);
         ReadingMode::ALL.map(|mode| AccuracyCell {
             subject: Subject {
                 model: CHANCE.to_owned(),

@@ -19,16 +19,13 @@ pub struct Agreement {
     pub kappa: Option<Estimate>,
 }
 
-/// Counts over the items of a cluster to which both models replied.
+/// Counts over the items of a cluster to which both models replied: all, and those that both, the first or the second got
+/// right.
 #[derive(Debug, Clone, Copy, Default)]
 struct AgreementCounts {
-    /// All such items.
     all: f32,
-    /// Items that both models got right.
     both: f32,
-    /// Items that the first model got right.
     first: f32,
-    /// Items that the second model got right.
     second: f32,
 }
 

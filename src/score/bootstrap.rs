@@ -16,7 +16,6 @@ const SEED: u64 = 0x6461_726b_7161;
 /// Draws of all clusters with replacement. Every statistic uses the same draws, so that differences are paired.
 #[derive(Debug)]
 pub struct Resamples {
-    /// Number of clusters.
     clusters: usize,
     /// Number of times that each cluster occurs in each draw, draw by draw.
     times: Vec<u8>,

@@ -102,7 +102,7 @@ impl Clusters {
         self.unit
     }
 
-    /// Number of clusters.
+    /// Number of clusters of all questions.
     #[must_use]
     pub fn count(&self) -> usize {
         self.count

@@ -14,9 +14,7 @@ const MAX_LABELS: usize = 26;
 /// Confusion table of one subject on one family, in the strict reading.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Confusion {
-    /// Model and condition.
     pub subject: Subject,
-    /// Question family.
     pub family: Family,
     /// The different answers, sorted.
     pub labels: Vec<String>,
@@ -87,7 +85,7 @@ pub struct Collapse {
     pub entropy: f64,
     /// Entropy of the true answers, in bits, over all replies.
     pub true_entropy: f64,
-    /// Number of replies.
+    /// Number of replies, readable or not.
     pub n: usize,
 }
 
@@ -140,7 +138,6 @@ fn entropy(counts: impl Iterator<Item = usize> + Clone) -> f64 {
 /// Rates at which a subject reports absent objects and overlooks present ones.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hallucination {
-    /// Model and condition.
     pub subject: Subject,
     /// Share of "yes" among replies to questions whose truth is "no".
     pub false_positive: Option<Estimate>,

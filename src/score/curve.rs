@@ -162,7 +162,6 @@ fn guesses(grid: &Grid<'_>, clean: usize, family: Option<&Family>) -> Vec<f32> {
 struct DrawnCurves {
     /// Right answers and replies of each level, by draw.
     levels: Vec<[Vec<f64>; 2]>,
-    /// Expected number of right guesses at L0, by draw.
     guesses: Vec<f64>,
 }
 

@@ -66,7 +66,7 @@ pub struct Grid<'a> {
     pub subjects: Vec<Subject>,
     /// Items, sorted by frame, question, repeat and order of choices.
     pub items: Vec<GridItem<'a>>,
-    /// Number of clusters.
+    /// Number of clusters of all items.
     pub clusters: usize,
     /// Results, subject by subject.
     results: Vec<TrialResult>,
@@ -80,7 +80,7 @@ pub struct Grid<'a> {
 pub struct ClusterCount {
     /// Number of right replies.
     pub right: u32,
-    /// Number of replies.
+    /// Number of replies, right or wrong.
     pub replies: u32,
 }
 

@@ -8,7 +8,6 @@ use crate::score::estimate::Estimate;
 use crate::types::Family;
 
 impl Overview<'_> {
-    /// Rates of false positives and false negatives by level.
     pub(super) fn hallucination(&self) -> Option<(String, Chart)> {
         let variant = self.main_variant()?;
         if self.findings.hallucinations.is_empty() {

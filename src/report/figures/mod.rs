@@ -132,8 +132,8 @@ impl<'a> Overview<'a> {
     }
 
     fn style(&self, model: &str) -> LineStyle {
-        let place = self.models.iter().position(|known| *known == model);
-        LineStyle(place.unwrap_or(self.models.len()))
+        let index = self.models.iter().position(|known| *known == model);
+        LineStyle(index.unwrap_or(self.models.len()))
     }
 
     /// The variant for figures that show only one: the last kind that was asked, in its first light reading.
@@ -184,13 +184,11 @@ impl<'a> Overview<'a> {
         )
     }
 
-    /// Number of items of a family.
     fn n(&self, family: Option<&Family>) -> usize {
         let items = self.findings.grid.items.iter();
         items.filter(|item| item.is_of(family)).count()
     }
 
-    /// A panel for each variant.
     fn accuracy(&self) -> Option<(String, Chart)> {
         let variants = self.tested_variants();
         let panels = variants.iter().map(|variant| Panel {
@@ -245,7 +243,6 @@ impl<'a> Overview<'a> {
         Some((caption, chart))
     }
 
-    /// A panel for each variant and model that has an enhancer.
     fn enhancers(&self) -> Option<(String, Chart)> {
         let mut panels = Vec::new();
         for variant in self.tested_variants() {
@@ -277,7 +274,6 @@ impl<'a> Overview<'a> {
         )
     }
 
-    /// A panel for each family.
     fn families(&self) -> Option<(String, Chart)> {
         let variant = &self.main_variant()?;
         let families = self.findings.grid.families();

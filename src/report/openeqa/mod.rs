@@ -79,10 +79,10 @@ pub(crate) fn summary_json(
 /// scored answers, and the folder.
 #[must_use]
 pub(crate) fn render(report: &OpenReport<'_>, tables: &[Table], folder: &Path) -> String {
-    let mut text = terminal::progress(report.manifest, "answers and marks there");
+    let mut text = terminal::progress(report.manifest, "answers and marks stored");
     match report.judge {
         Some(_) => text += &terminal::render(tables),
-        None => text += "Nothing is marked: --judge NAME has the answers marked\n",
+        None => text += "No answer is marked: name a judge with --judge NAME\n",
     }
     for line in coverage(report) {
         let _ = writeln!(text, "{line}");

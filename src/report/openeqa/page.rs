@@ -117,9 +117,7 @@ fn walks(report: &OpenReport<'_>) -> Vec<Value> {
             "answer": readable(&question.answer),
             "extra": extra,
             "category": question.family.name(),
-            // The marks of models with images, as text.
             "marks": marks(&answers),
-            // Whether a model has fewer points at some level than on the clean frames.
             "lost": lost(&answers),
             "rows": answers.into_iter().map(row).collect::<Vec<_>>(),
         }));
@@ -186,8 +184,8 @@ fn marks(answers: &[&ReportedAnswer]) -> Vec<String> {
 /// Whether some subject with a level has fewer points than the same model on the clean frames.
 fn lost(answers: &[&ReportedAnswer]) -> bool {
     let points = |subject: &Subject| {
-        let mut own = answers.iter().filter(|answer| answer.subject == *subject);
-        own.find_map(|answer| answer.outcome.points())
+        let mut of_subject = answers.iter().filter(|answer| answer.subject == *subject);
+        of_subject.find_map(|answer| answer.outcome.points())
     };
     answers.iter().any(|answer| {
         let subject = &answer.subject;

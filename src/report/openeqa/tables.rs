@@ -106,14 +106,14 @@ fn levels(report: &OpenReport<'_>) -> Table {
     ));
     let without_level = ladder.without_level.iter();
     let notes = without_level.map(|(subject, cell)| {
-        let shown = texts(ColumnKind::Accuracy, &score(summary, Some(cell))).concat();
+        let text = texts(ColumnKind::Accuracy, &score(summary, Some(cell))).concat();
         let (scored, planned) = (cell.scored(), cell.planned);
         let of = if scored == planned {
             String::new()
         } else {
             format!(" of {planned}")
         };
-        format!("{} without images: {shown}, n {scored}{of}", subject.model)
+        format!("{} without images: {text}, n {scored}{of}", subject.model)
     });
     table.notes = notes.collect();
     table

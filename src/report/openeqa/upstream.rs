@@ -84,7 +84,6 @@ fn file_name(name: &str) -> String {
     name.replace(|c: char| !(c.is_alphanumeric() || "-_.+".contains(c)), "_")
 }
 
-/// A value as an indented JSON file.
 fn json_file(value: &impl Serialize) -> Result<Vec<u8>> {
     let mut text = serde_json::to_vec_pretty(value).map_err(|e| Error::data(FOLDER, e))?;
     text.push(b'\n');

@@ -238,7 +238,6 @@ fn drops(grid: &Grid<'_>) -> BTreeMap<String, f64> {
         .collect()
 }
 
-/// Code of a result: the index of the choice, or one of the codes above.
 fn code(result: TrialResult, mode: ReadingMode) -> u8 {
     match result {
         TrialResult::Absent => ABSENT,

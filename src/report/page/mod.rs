@@ -108,7 +108,6 @@ fn intro(findings: &Findings<'_>) -> Vec<String> {
     )]
 }
 
-/// Name and facts of a run.
 fn facts(run: &PageRun<'_>) -> Value {
     let manifest = run.manifest;
     let mut rows = about(manifest);

@@ -7,6 +7,7 @@ use std::fmt::{Display, Write as _};
 
 use super::table::ColumnKind::{Count, Text};
 use super::table::TableBuilder;
+use super::words::counted;
 use super::{csv as files, terminal};
 use crate::error::{Error, Result};
 use crate::questions::summary::{Baselines, CandidateCounts, QuestionSummary};
@@ -80,8 +81,10 @@ fn notes(summary: &QuestionSummary, text: &mut String) {
         let _ = writeln!(text, "{line}");
     };
     note(format!(
-        "{} questions about {} frames of {} scenes; prior: the commonest answer to the same words in other scenes",
-        summary.questions, summary.frames, summary.scenes
+        "{} about {} of {}; prior: the commonest answer to the same words in other scenes",
+        counted(summary.questions, "question"),
+        counted(summary.frames, "frame"),
+        counted(summary.scenes, "scene")
     ));
     let sum = |count: fn(&CandidateCounts) -> u64| -> u64 {
         summary.candidates.values().map(count).sum()
@@ -99,23 +102,26 @@ fn notes(summary: &QuestionSummary, text: &mut String) {
     let [both, same] = summary.room_agreement;
     if both > 0 {
         note(format!(
-            "rooms: {same} of {both} that are seen and stated agree"
+            "rooms: {same} of {both} that are both seen and stated agree"
         ));
     }
     if summary.dark > 0 {
-        note(format!("{} frames are too dark to ask about", summary.dark));
+        note(format!(
+            "too dark to ask about: {}",
+            counted(summary.dark, "frame")
+        ));
     }
     if summary.failed > 0 {
         note(format!(
-            "{} frames could not be measured, and have no questions",
-            summary.failed
+            "no questions, because measuring failed: {}",
+            counted(summary.failed, "frame")
         ));
     }
     if !summary.unknown.is_empty() {
         let ids: Vec<String> = summary.unknown.keys().take(8).map(u16::to_string).collect();
         note(format!(
-            "numbers that classes.json does not have were taken as unlabelled: {} of them, as {} (--strict refuses them)",
-            summary.unknown.len(),
+            "{} not in classes.json and read as unlabelled, for example {} (--strict makes this an error)",
+            counted(summary.unknown.len(), "number"),
             ids.join(", ")
         ));
     }

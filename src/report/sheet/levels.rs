@@ -7,7 +7,6 @@ use crate::types::{AxisLevel, Rgb};
 /// The images of a frame at one level.
 #[derive(Debug, Clone)]
 pub(crate) struct LevelColumn {
-    /// The level.
     pub level: AxisLevel,
     /// Image with exposure drop alone.
     pub exposure: Rgb,

@@ -104,7 +104,6 @@ fn table(kind: ComparisonKind, caption: &str, comparisons: &[&Comparison]) -> Ta
         .build()
 }
 
-/// Adds the columns of the two subjects.
 fn subjects(builder: TableBuilder<&Comparison>) -> TableBuilder<&Comparison> {
     builder
         .column(Text, "csv kind", |comparison| comparison.kind.name())
@@ -126,7 +125,6 @@ fn subjects(builder: TableBuilder<&Comparison>) -> TableBuilder<&Comparison> {
         .family(|comparison| comparison.family.as_ref())
 }
 
-/// Adds the columns of the numbers and p-values.
 fn numbers(builder: TableBuilder<&Comparison>) -> TableBuilder<&Comparison> {
     let difference = "csv difference low high | terminal difference, 95 % interval | page difference [95 %] \
                       | latex Difference [95\\,\\%]";

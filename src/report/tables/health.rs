@@ -77,7 +77,6 @@ pub(super) fn health(health: &[Health]) -> Table {
     builder.build()
 }
 
-/// A count with its share of the replies.
 fn share(health: &Health, count: usize) -> String {
     let of = health.replies.max(1) as f64;
     format!("{count} ({} %)", percent(count as f64 / of))

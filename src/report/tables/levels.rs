@@ -48,7 +48,6 @@ pub(super) fn levels(findings: &Findings<'_>) -> Table {
     table
 }
 
-/// The cell of the same subject and family in the lenient reading.
 fn lenient<'a>(summary: &'a AccuracySummary, strict: &AccuracyCell) -> Option<&'a AccuracyCell> {
     summary.cell(
         &strict.subject,
@@ -122,7 +121,7 @@ fn notes(summary: &AccuracySummary, ladder: &Ladder<'_, AccuracyCell>) -> Vec<St
         .map(|cell| note_without_images(summary, cell))
         .collect();
     let mut all = summary.of(None, ReadingMode::Strict);
-    let asked = if all.any(|cell| cell.always.is_some()) {
+    let unit = if all.any(|cell| cell.always.is_some()) {
         "orders of choices"
     } else {
         "questions"
@@ -130,7 +129,7 @@ fn notes(summary: &AccuracySummary, ladder: &Ladder<'_, AccuracyCell>) -> Vec<St
     let chance = chance.into_iter().filter_map(|cell| cell.accuracy);
     notes.extend(chance.map(|chance| {
         let share = 100.0 * chance.value;
-        format!("chance: {share:.2} over {} {asked}", chance.n)
+        format!("chance: {share:.2} over {} {unit}", chance.n)
     }));
     notes.extend(unread(summary));
     notes

@@ -76,7 +76,6 @@ pub(super) fn json(tidy: &str, choices: &ChoiceViews) -> Option<Answer> {
     agreed(&answers)
 }
 
-/// A JSON key in lower case without spaces and punctuation.
 fn key_form(key: &str) -> String {
     key.chars()
         .filter(|c| c.is_alphanumeric())

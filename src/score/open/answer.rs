@@ -33,7 +33,7 @@ impl AnswerOutcome {
 /// One answer of one subject to one question.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScoredAnswer {
-    /// Model and condition.
+    /// Model and condition that gave the answer.
     pub subject: Subject,
     /// Index of the question among those asked.
     pub question: usize,

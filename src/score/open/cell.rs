@@ -14,9 +14,7 @@ const MAX_WEIGHT: f64 = 4.0;
 /// Score of a subject on a group of questions, with the counts behind it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OpenCell {
-    /// Model and condition.
     pub subject: Subject,
-    /// The questions.
     pub group: Group,
     /// Number of answers that the run asks for.
     pub planned: usize,

@@ -21,10 +21,8 @@ pub enum Baseline {
 /// Score of a subject minus that of a baseline, on the questions for which both have a score.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScoreChange {
-    /// Model and condition.
     pub subject: Subject,
     pub baseline: Baseline,
-    /// The questions.
     pub group: Group,
     /// Difference of the unrounded means. Its `n` is the number of questions.
     pub difference: Estimate,

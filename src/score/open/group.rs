@@ -16,7 +16,7 @@ pub struct QuestionGroups {
 /// A group of questions that are scored together.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Group {
-    /// All questions.
+    /// All questions of the run.
     All,
     /// The questions of a split.
     Split(String),

@@ -28,7 +28,7 @@ pub use group::{Group, QuestionGroups};
 pub struct OpenSummary {
     /// Unit of the clusters: `episode`, or `question` if there is only one episode.
     pub unit: &'static str,
-    /// Number of clusters.
+    /// Number of clusters of all questions.
     pub clusters: usize,
     /// Scores, ordered by subject, then by group.
     pub cells: Vec<OpenCell>,
@@ -57,7 +57,7 @@ impl OpenSummary {
         })
     }
 
-    /// All groups, sorted.
+    /// All groups that have a score, sorted.
     #[must_use]
     pub fn groups(&self) -> BTreeSet<&Group> {
         self.cells.iter().map(|cell| &cell.group).collect()

@@ -11,7 +11,7 @@ pub(crate) struct Mean {
     pub value: f64,
     /// Ends of the interval; `None` for a single number or an infinite mean.
     pub interval: Option<[f64; 2]>,
-    /// Number of numbers.
+    /// Number of values that the mean is taken over.
     pub n: usize,
 }
 

@@ -75,7 +75,8 @@ pub(crate) fn exposure_drop(normal: &Rgb, low: &Rgb) -> Result<f32> {
     };
     let black = |image: &Rgb| image.samples().iter().all(|code| *code == 0);
     if black(normal) || black(low) {
-        let problem = "an image is black, so there is no drop to estimate; give one with --ev";
+        let problem =
+            "an image is black, so its exposure drop cannot be estimated; set it with --ev";
         return Err(Error::data("pair", problem));
     }
     Ok(libm::log2(mean(normal) / mean(low)) as f32)

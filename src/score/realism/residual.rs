@@ -117,7 +117,6 @@ pub(crate) enum EmptyBins {
 }
 
 impl EmptyBins {
-    /// The other rule.
     #[must_use]
     pub(crate) fn other(self) -> Self {
         match self {
