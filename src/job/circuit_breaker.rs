@@ -223,7 +223,7 @@ mod tests {
             failure,
             attempts: 1,
             reach,
-            refused: None,
+            refused_field: None,
         }
     }
 

@@ -273,7 +273,7 @@ impl<I: Item> ReplySink<'_, I> {
             },
             attempts: 0,
             reach: Reach::Trial,
-            refused: None,
+            refused_field: None,
         };
         for ready in ready {
             self.keep(Ok((ready, Err(error.clone()))))?;

@@ -90,7 +90,7 @@ impl<E: Experiment> OpenRun<'_, E> {
         self.keys.extend(&plan.keys);
         let answered = answered(&stored);
         plan.leave_out(|key| answered.contains(key));
-        let sent = self.store.out_in_batches()?;
+        let sent = self.store.pending_in_batches()?;
         let out = plan.leave_out(|key| sent.contains(key));
         Ok(Remaining { plan, stored, out })
     }

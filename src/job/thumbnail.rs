@@ -60,7 +60,7 @@ pub(crate) fn thumbnail(
     sent: &Payload,
     encoded: Option<&Rgb>,
 ) -> Result<Thumbnail> {
-    let image = sent.seen(encoded)?;
+    let image = sent.received(encoded)?;
     let stops = match condition.enhancer {
         None => condition
             .degradation

@@ -6,7 +6,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
-use crate::ask::batch::{BatchLine, unconstrained};
+use crate::ask::batch::{BatchLine, with_letter};
 use crate::ask::{Constrain, Wire};
 use crate::error::{Error, Result};
 use crate::store::Store;
@@ -34,7 +34,7 @@ pub(crate) fn import<D: Detail>(
     manifest: &RunManifest,
     files: &[PathBuf],
 ) -> Result<String> {
-    let blanks = store.batched()?;
+    let blanks = store.batch_trials()?;
     if blanks.is_empty() {
         let problem =
             "nothing of this run is out in a batch: its requests are written first".to_owned();
@@ -43,7 +43,7 @@ pub(crate) fn import<D: Detail>(
     }
     let blanks: HashMap<TrialKey, Record<D>> =
         blanks.into_iter().map(|blank| (blank.key, blank)).collect();
-    let mut out = store.out_in_batches()?;
+    let mut out = store.pending_in_batches()?;
     let mut tally = ReplyCounts::default();
     for path in files {
         let file = File::open(path).map_err(|e| Error::file(path, "read", e))?;
@@ -91,7 +91,7 @@ fn take<D: Detail>(
             let choices = blank.detail.choices().len();
             let reply = Reply {
                 attempts: 1,
-                ..unconstrained(reply, constrain, choices)
+                ..with_letter(reply, constrain, choices)
             };
             blank.answered(reply)?
         }
