@@ -48,7 +48,7 @@ pub(crate) fn predictions(
         .iter()
         .filter(|record| record.detail.step == Step::Answer)
     {
-        let subject = Subject::shown(&record.model, record.condition.as_ref());
+        let subject = Subject::new(&record.model, record.condition.as_ref());
         if record.via != Via::File {
             asked_subjects.insert(subject.clone());
         }

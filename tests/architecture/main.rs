@@ -45,7 +45,7 @@ const CIRCLES: [(&[&str], &str); 3] = [
         &[
             "score/choice/lenient.rs",
             "score/choice/stated.rs",
-            "score/choice/written.rs",
+            "score/choice/structured.rs",
         ],
         "it stays: a reply within a reply is read by the reader that found it",
     ),
