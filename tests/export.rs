@@ -172,7 +172,7 @@ fn nothing_is_written_over_unasked() {
     let assert = run(data.path(), "llava", out.path(), &flags).code(2);
     let said = String::from_utf8(assert.get_output().stderr.clone()).unwrap();
     assert!(
-        said.contains("questions.jsonl: there already; --force"),
+        said.contains("questions.jsonl: the set exists already; --force"),
         "{said}"
     );
     run(

@@ -224,7 +224,7 @@ fn what_is_wrong_with_renders_is_said() {
     );
     let said = scene.refused("habitat", &[]);
     assert!(
-        said.contains("scene_dataset_config.json") && said.contains("none of its frames"),
+        said.contains("scene_dataset_config.json") && said.contains("no frame of it could be read"),
         "{said}"
     );
     scene.text(
@@ -253,7 +253,7 @@ fn what_is_wrong_with_renders_is_said() {
     assert!(
         scene
             .refused("habitat", &[])
-            .contains("frames are there already; --force")
+            .contains("the folder has frames already; --force")
     );
     scene.run("habitat", &["--force", "--count", "2"]).success();
     assert_eq!(

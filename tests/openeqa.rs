@@ -302,8 +302,8 @@ fn what_is_missing_is_named_and_counted_and_nothing_is_lost() {
     let called = house.call(&flags);
     assert_eq!(called.code, Some(1), "{called:?}");
     for said in [
-        "1 of 4 ids are no questions of the file: q9",
-        "1 of 2 walks cannot be shown (scannet-v0/001-b): their 1 questions are left unanswered",
+        "1 of 4 ids are not in the file of questions: q9",
+        "1 of 2 walks cannot be shown (scannet-v0/001-b); unanswered questions: 1",
     ] {
         assert!(called.stderr.contains(said), "{said}: {}", called.stderr);
     }

@@ -310,7 +310,7 @@ fn people_enter_as_a_model() {
     assert_eq!(read.code, Some(0), "{read:?}");
     assert!(
         read.stdout.contains(
-            "18 answers taken over\n1 items in the files were not asked in the run, as nobody at L0"
+            "answers imported: 18\nitems in the files that the run did not ask: 1, as nobody at L0"
         ),
         "{read:?}"
     );

@@ -1,20 +1,20 @@
-//! Lines of questions as other tools write them: [`translated`].
+//! Conversion of question lines that other tools write: [`translated`].
 //!
-//! - Hugging Face's `imagefolder` and lmms-eval: `{"file_name" or "image", "id", "question", "options", "answer", "category"}`; the
-//!   options are a list of texts, with or without their letters before them (VSI-Bench), or a text that looks like such a list;
-//!   the answer is a letter or a text.
-//! - LLaVA: `{"question_id", "image", "text", "category"}`, the choices in the text, a line each with its letter, and the letter
-//!   of the true one in `answer`.
+//! - Hugging Face's `imagefolder` and lmms-eval: `{"file_name" or "image", "id", "question", "options", "answer", "category"}`. The
+//!   options are a list of texts, with or without letters before them (VSI-Bench), or a text with such a list in JSON. The
+//!   answer is a letter or a text.
+//! - LLaVA: `{"question_id", "image", "text", "category"}`. Each choice is a line of the text with its letter. `answer` is the
+//!   letter of the true choice.
 
 use serde_json::{Map, Value, json};
 
 use crate::types::Choices;
 use crate::types::question::letter;
 
-/// A line in our keys; one that is in them already stays as it is.
+/// A line with the keys of this program. A line that has them already is not changed.
 ///
 /// # Errors
-/// Where it says what is asked in another tool's way and not all of it, or an answer that may mean two choices.
+/// If a line of another tool is incomplete, or its answer may mean two choices.
 pub(super) fn translated(value: Value) -> Result<Value, String> {
     let Value::Object(mut line) = value else {
         return Ok(value);
@@ -50,22 +50,22 @@ pub(super) fn translated(value: Value) -> Result<Value, String> {
     Ok(Value::Object(line))
 }
 
-fn rename(line: &mut Map<String, Value>, theirs: &str, ours: &str) {
-    if !line.contains_key(ours)
-        && let Some(value) = line.remove(theirs)
+fn rename(line: &mut Map<String, Value>, from: &str, to: &str) {
+    if !line.contains_key(to)
+        && let Some(value) = line.remove(from)
     {
-        line.insert(ours.to_owned(), value);
+        line.insert(to.to_owned(), value);
     }
 }
 
-/// The options without their letters, where every one has its own before it.
+/// The options. If every option begins with its own letter, the letters are removed.
 fn options_of(options: &Value) -> Result<Vec<String>, String> {
     let list: Option<Vec<String>> = match options {
         Value::Array(list) => list
             .iter()
             .map(|option| Some(option.as_str()?.to_owned()))
             .collect(),
-        // Some sets hold the list as a text.
+        // Some sets store the list as a text.
         Value::String(text) => serde_json::from_str(text).ok(),
         _ => None,
     };
@@ -73,13 +73,13 @@ fn options_of(options: &Value) -> Result<Vec<String>, String> {
     let bare: Option<Vec<String>> = list
         .iter()
         .enumerate()
-        .map(|(i, option)| lettered(option, i))
+        .map(|(i, option)| after_letter(option, i))
         .collect();
     Ok(bare.unwrap_or(list))
 }
 
-/// What stands behind the letter of an index: `A. yes`, `A) yes`, `(A) yes`, `A: yes`.
-fn lettered(text: &str, index: usize) -> Option<String> {
+/// The text after the letter of an index, as in `A. yes`, `A) yes`, `(A) yes` and `A: yes`; `None` without the letter.
+fn after_letter(text: &str, index: usize) -> Option<String> {
     if index >= Choices::MOST {
         return None;
     }
@@ -90,19 +90,21 @@ fn lettered(text: &str, index: usize) -> Option<String> {
     (!rest.is_empty()).then(|| rest.to_owned())
 }
 
-/// The question and the choices of a text that ends with a line for each of them, and perhaps an instruction.
+/// The question and the choices of a text with one line per choice; an instruction may follow.
 fn in_text(text: &str) -> Option<(String, Vec<String>)> {
     let lines: Vec<&str> = text.lines().collect();
-    let first = lines.iter().position(|line| lettered(line, 0).is_some())?;
+    let first = lines
+        .iter()
+        .position(|line| after_letter(line, 0).is_some())?;
     let choices: Vec<String> = (0..)
         .zip(&lines[first..])
-        .map_while(|(i, line)| lettered(line, i))
+        .map_while(|(i, line)| after_letter(line, i))
         .collect();
     let question = lines[..first].join("\n").trim().to_owned();
     (choices.len() >= 2 && !question.is_empty()).then_some((question, choices))
 }
 
-/// The choice that an answer means: one of this text, or the one of this letter.
+/// The index of the choice that an answer means, by its text or by its letter.
 fn truth(answer: &str, options: &[String]) -> Result<usize, String> {
     let by_text = options.iter().position(|option| option == answer);
     let bare = answer
@@ -160,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn what_may_mean_two_things_is_refused() {
+    fn an_ambiguous_or_incomplete_line_is_refused() {
         for (line, says) in [
             (
                 json!({"options": ["B", "A"], "answer": "A", "question": "?"}),
@@ -180,7 +182,7 @@ mod tests {
             let problem = read(line).unwrap_err();
             assert!(problem.contains(says), "{problem}");
         }
-        // The letter of its own text is no second meaning.
+        // A text that is also its own letter is not ambiguous.
         assert_eq!(
             read(json!({"options": ["A", "B"], "answer": "A", "question": "?"}))
                 .unwrap()

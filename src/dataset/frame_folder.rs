@@ -1,4 +1,4 @@
-//! Frames written into a folder of the common interface, as [`crate::dataset::frames`] reads it: [`FramePaths`].
+//! Writing frames into a folder of the common interface, which [`crate::dataset::frames`] reads: [`FramePaths`].
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -13,10 +13,10 @@ use crate::files::write;
 use crate::labels;
 use crate::types::{DepthKind, Labels, Rgb, SegmentName, Segmentation};
 
-/// The list of the frames.
+/// The file that lists the frames.
 pub(crate) const FRAMES: &str = "frames.jsonl";
 
-/// Where the files of one frame go.
+/// The output folder, scene and name that decide the paths of the files of one frame.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FramePaths<'a> {
     pub(crate) out: &'a Path,
@@ -24,11 +24,11 @@ pub(crate) struct FramePaths<'a> {
     pub(crate) frame: &'a str,
 }
 
-/// A line of the list.
+/// One line of `frames.jsonl`.
 type ListLine = Map<String, Value>;
 
 impl FramePaths<'_> {
-    /// What begins the line of the frame.
+    /// The first fields of the line of the frame: scene, frame, width and height.
     pub(crate) fn line(&self, rgb: &Rgb) -> ListLine {
         let facts = [
             ("scene", json!(self.scene)),
@@ -42,14 +42,14 @@ impl FramePaths<'_> {
             .collect()
     }
 
-    /// Writes one of its files; the path below the folder.
+    /// Writes one file of the frame, and returns its path below the folder.
     pub(crate) fn write(&self, kind: &str, ending: &str, bytes: &[u8]) -> Result<String> {
         let path = format!("scenes/{}/{kind}/{}.{ending}", self.scene, self.frame);
         write(&self.out.join(&path), bytes)?;
         Ok(path)
     }
 
-    /// Writes its depth: millimetres as 16-bit PNG.
+    /// Writes the depth in millimetres as a 16-bit PNG, and adds it to the line.
     pub(crate) fn depth(
         &self,
         line: &mut ListLine,
@@ -64,22 +64,22 @@ impl FramePaths<'_> {
         Ok(())
     }
 
-    /// Writes its classes.
+    /// Writes the class of each pixel as a 16-bit PNG, and adds it to the line.
     pub(crate) fn semantic(&self, line: &mut ListLine, semantic: &Array2<u16>) -> Result<()> {
         let path = self.write("sem", "png", &grey(semantic)?)?;
         line.insert("sem".to_owned(), json!(path));
         Ok(())
     }
 
-    /// Writes its segments: as 16-bit PNG, or as `.npy` where there are too many.
+    /// Writes the segments as a 16-bit PNG, or as `.npy` if an id needs more than 16 bits, and adds them to the line.
     pub(crate) fn segments(
         &self,
         line: &mut ListLine,
         segments: &Array2<u32>,
         segmentation: Segmentation,
     ) -> Result<()> {
-        let most = segments.iter().copied().max().unwrap_or(0);
-        let path = if u16::try_from(most).is_ok() {
+        let max_id = segments.iter().copied().max().unwrap_or(0);
+        let path = if u16::try_from(max_id).is_ok() {
             self.write("over", "png", &grey(&segments.mapv(|id| id as u16))?)?
         } else {
             self.write("over", "npy", &npy(segments))?
@@ -94,7 +94,7 @@ impl FramePaths<'_> {
     }
 }
 
-/// Writes what is known of the segments of a scene by name, where anything is.
+/// Writes the names of the segments of a scene; no file if there are none.
 pub(crate) fn names(out: &Path, scene: &str, names: &BTreeMap<u32, SegmentName>) -> Result<()> {
     if names.is_empty() {
         return Ok(());
@@ -104,15 +104,15 @@ pub(crate) fn names(out: &Path, scene: &str, names: &BTreeMap<u32, SegmentName>)
     write(&path, text.as_bytes())
 }
 
-/// Writes what tells of the whole folder; the list of frames last, for with it the folder is complete.
+/// Writes the files about the whole folder. The list of frames is last, because it marks the folder as complete.
 pub(crate) fn finish<'a>(
     out: &Path,
     labels: &Labels,
-    about: &Value,
+    info: &Value,
     lines: impl Iterator<Item = &'a ListLine>,
 ) -> Result<()> {
     write(&out.join("classes.json"), labels::json(labels).as_bytes())?;
-    write(&out.join("dataset.json"), format!("{about:#}\n").as_bytes())?;
+    write(&out.join("dataset.json"), format!("{info:#}\n").as_bytes())?;
     let mut list = String::new();
     for line in lines {
         let line = serde_json::to_string(line).map_err(|e| Error::data(FRAMES, e))?;
@@ -122,12 +122,12 @@ pub(crate) fn finish<'a>(
     write(&out.join(FRAMES), list.as_bytes())
 }
 
-/// Numbers as `.npy` (numpy.lib.format, version 1.0).
+/// The bytes of a `.npy` file (numpy.lib.format, version 1.0).
 fn npy(segments: &Array2<u32>) -> Vec<u8> {
     let (height, width) = segments.dim();
     let header =
         format!("{{'descr': '<u4', 'fortran_order': False, 'shape': ({height}, {width}), }}");
-    // The numbers begin at a multiple of 64 bytes, after a newline.
+    // The header ends with a newline at a multiple of 64 bytes, where the numbers begin.
     let length = (header.len() + 11).next_multiple_of(64) - 10;
     let mut file = b"\x93NUMPY\x01\x00".to_vec();
     file.extend((length as u16).to_le_bytes());
@@ -136,7 +136,7 @@ fn npy(segments: &Array2<u32>) -> Vec<u8> {
     file
 }
 
-/// A map as 16-bit grey PNG.
+/// The bytes of a 16-bit grey PNG.
 fn grey(map: &Array2<u16>) -> Result<Vec<u8>> {
     let (height, width) = map.dim();
     let samples: Vec<u8> = map.iter().flat_map(|value| value.to_ne_bytes()).collect();

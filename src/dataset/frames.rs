@@ -1,18 +1,18 @@
 //! A folder of frames.
 //!
-//! With a `frames.jsonl` it is the common interface, paths relative to the folder:
+//! A folder with a `frames.jsonl` has the common interface. Its paths are relative to the folder:
 //!
-//! - `frames.jsonl`: one frame a line, `{"scene", "frame", "rgb", …}`; a frame's name is `scene/frame`. A line may name maps
-//!   of the image's size: `depth`, in metres as `.npy` or in units of `depth_scale` metres as PNG; `sem`, the classes; and
-//!   `over`, the segments, which `over_source` calls `renderer` or `connected_components` (objects) or `superpixel`
-//!   (parts). It may also say `depth_kind` (`planar` or `euclid`), `intrinsics` (`{"fx", "fy", "cx", "cy"}`), `room_gt`,
+//! - `frames.jsonl`: one frame per line, `{"scene", "frame", "rgb", …}`; the name of a frame is `scene/frame`. A line may name
+//!   maps of the size of the image: `depth`, in metres as `.npy` or in units of `depth_scale` metres as PNG; `sem`, the
+//!   classes; and `over`, the segments. `over_source` is `renderer` or `connected_components` (objects) or `superpixel`
+//!   (parts). Also optional: `depth_kind` (`planar` or `euclid`), `intrinsics` (`{"fx", "fy", "cx", "cy"}`), `room_gt`,
 //!   `t` (seconds) and `pose`.
-//! - `classes.json`: what the numbers of `sem` stand for ([`crate::labels`]).
-//! - `dataset.json`: `{"schema": "darkqa.dataset/1", "name", "depth_kind"}`, both of which may be missing.
-//! - `scenes/<scene>/segments.json`: what is known of segments by name, `{"7": {"name", "canonical", "region"}}`.
+//! - `classes.json`: the class of each number in `sem` ([`crate::labels`]).
+//! - `dataset.json`: `{"schema": "darkqa.dataset/1", "name", "depth_kind"}`; the last two are optional.
+//! - `scenes/<scene>/segments.json`: the segments that have names, `{"7": {"name", "canonical", "region"}}`.
 //!
-//! Without the list, every PNG and JPEG file in the folder is a frame, named by its file name. The questions lie beside
-//! them in `questions.jsonl`.
+//! Without the list, every PNG and JPEG file in the folder is a frame, named by its file name. The questions are in
+//! `questions.jsonl` in the same folder.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -31,19 +31,18 @@ use crate::types::{DepthKind, FrameId, Intrinsics, Labels, SegmentName, Segmenta
 
 /// The file that lists the frames of the common interface.
 const FRAMES: &str = "frames.jsonl";
-/// The questions about a folder of frames.
+/// The file of the questions about the frames of the folder.
 const QUESTIONS: &str = "questions.jsonl";
-
-/// What the numbers of the semantic maps stand for.
+/// The file with the class of each number in the semantic maps.
 const CLASSES: &str = "classes.json";
-/// What the data set is.
+/// The file with the name of the data set and the kind of its depth.
 const DATASET: &str = "dataset.json";
-/// The schema of `dataset.json`.
+/// The value of `schema` in `dataset.json`.
 const SCHEMA: &str = "darkqa.dataset/1";
-/// The segments of a scene by name.
+/// The file with the names of the segments of a scene.
 const SEGMENTS: &str = "segments.json";
 
-/// `dataset.json`, as far as it is used.
+/// The fields of `dataset.json` that are used.
 #[derive(Debug, Default, Deserialize)]
 struct DataSetInfo {
     schema: String,
@@ -51,10 +50,10 @@ struct DataSetInfo {
     depth_kind: Option<DepthKind>,
 }
 
-/// The segments of the scenes by name, each scene's read once.
+/// Scene → segment number → name. The file of each scene is read once.
 type SceneNames = BTreeMap<String, Arc<BTreeMap<u32, SegmentName>>>;
 
-/// The keys of a line of `frames.jsonl` that are used.
+/// The fields of a line of `frames.jsonl` that are used.
 #[derive(Debug, Deserialize)]
 struct FrameLine {
     scene: String,
@@ -70,7 +69,7 @@ struct FrameLine {
     room_gt: Option<String>,
 }
 
-/// Where a map of segments comes from.
+/// The way in which a map of segments was made.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum SegmentSource {
@@ -80,11 +79,11 @@ enum SegmentSource {
 }
 
 impl FrameLine {
-    /// The files of the frame, all of which exist, and what its line says of them.
+    /// The files of the frame and the other facts of its line. Every file must exist.
     fn source(
         self,
         folder: &Path,
-        about: &DataSetInfo,
+        info: &DataSetInfo,
         names: &SceneNames,
     ) -> Result<ImageSource, String> {
         let existing = |file: PathBuf| {
@@ -113,7 +112,7 @@ impl FrameLine {
             ));
         }
         let view = FrameFacts {
-            depth_kind: self.depth_kind.or(about.depth_kind).unwrap_or_default(),
+            depth_kind: self.depth_kind.or(info.depth_kind).unwrap_or_default(),
             intrinsics: self.intrinsics,
             segmentation: match self.over_source {
                 Some(SegmentSource::Superpixel) => Segmentation::Parts,
@@ -129,11 +128,11 @@ impl FrameLine {
     }
 }
 
-/// The frames of a folder, without questions, and what their numbers stand for.
+/// The frames of a folder and the labels of its maps, without questions.
 pub(super) fn frames(folder: &Path) -> Result<Dataset> {
-    let about = about(folder)?;
+    let info = data_set_info(folder)?;
     let labels = labels(folder)?;
-    let title = about.name.unwrap_or_default();
+    let title = info.name.unwrap_or_default();
     let name = if title.is_empty() {
         stem(folder)
     } else {
@@ -147,27 +146,27 @@ pub(super) fn frames(folder: &Path) -> Result<Dataset> {
     })
 }
 
-/// What the numbers of a folder stand for, where it says so.
+/// The labels of the semantic maps of a folder; `None` without a `classes.json`.
 pub(super) fn labels(folder: &Path) -> Result<Option<Labels>> {
     let classes = folder.join(CLASSES);
-    let there = classes.exists().then(|| labels::read(&classes));
-    there.transpose()
+    let labels = classes.exists().then(|| labels::read(&classes));
+    labels.transpose()
 }
 
-fn about(folder: &Path) -> Result<DataSetInfo> {
+fn data_set_info(folder: &Path) -> Result<DataSetInfo> {
     let path = folder.join(DATASET);
     if !path.exists() {
         return Ok(DataSetInfo::default());
     }
-    let about: DataSetInfo = json(&path)?;
-    if about.schema != SCHEMA {
-        let problem = format_args!("schema {:?}; {SCHEMA:?} expected", about.schema);
+    let info: DataSetInfo = json(&path)?;
+    if info.schema != SCHEMA {
+        let problem = format_args!("schema {:?}; {SCHEMA:?} expected", info.schema);
         return Err(Error::data(path.display(), problem));
     }
-    Ok(about)
+    Ok(info)
 }
 
-/// The segments of a scene by name, where there are any.
+/// Segment number → name in a scene; empty without a `segments.json`.
 fn segment_names(folder: &Path, scene: &str) -> Result<Arc<BTreeMap<u32, SegmentName>>> {
     let path = folder.join("scenes").join(scene).join(SEGMENTS);
     if !path.exists() {
@@ -180,7 +179,7 @@ fn segment_names(folder: &Path, scene: &str) -> Result<Arc<BTreeMap<u32, Segment
         .find(|(_, name)| !canonical.contains(&name.canonical))
     {
         let problem = format_args!(
-            "segment {id} ({:?}) is said to be {:?}, which is no class of mpcat40",
+            "segment {id} ({:?}) has the class {:?}, which is not a class of mpcat40",
             name.name, name.canonical
         );
         return Err(Error::data(path.display(), problem));
@@ -200,20 +199,20 @@ pub(super) fn open(folder: &Path, questions: Option<&Path>) -> Result<Dataset> {
         return Err(Error::data(folder.display(), problem));
     }
     let questions = questions::read(&file)?;
-    Dataset::new(stem(folder), sources(folder)?, Vec::new()).asked(questions, &file)
+    Dataset::new(stem(folder), sources(folder)?, Vec::new()).with_questions_of(questions, &file)
 }
 
-/// The frames of a folder: those that its list names, else its images.
+/// The frames of a folder: those in `frames.jsonl`, or every image if there is no such list.
 pub(super) fn sources(folder: &Path) -> Result<BTreeMap<FrameId, ImageSource>> {
     let list = folder.join(FRAMES);
     if list.exists() {
-        listed(folder, &list)
+        frames_of_list(folder, &list)
     } else {
         images(folder)
     }
 }
 
-/// One image file, named as it would be in its folder.
+/// One image file as a data set of one frame, named by its file name.
 pub(super) fn image(path: &Path) -> Result<BTreeMap<FrameId, ImageSource>> {
     fs::metadata(path).map_err(|e| Error::file(path, "read", e))?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -221,8 +220,8 @@ pub(super) fn image(path: &Path) -> Result<BTreeMap<FrameId, ImageSource>> {
     Ok([(id, ImageSource::image(path.to_owned()))].into())
 }
 
-fn listed(folder: &Path, list: &Path) -> Result<BTreeMap<FrameId, ImageSource>> {
-    let (about, mut names) = (about(folder)?, SceneNames::new());
+fn frames_of_list(folder: &Path, list: &Path) -> Result<BTreeMap<FrameId, ImageSource>> {
+    let (info, mut names) = (data_set_info(folder)?, SceneNames::new());
     let mut sources = BTreeMap::new();
     for (number, line) in json_lines::<FrameLine>(list)? {
         let id = FrameId(format!("{}/{}", line.scene, line.frame));
@@ -230,7 +229,7 @@ fn listed(folder: &Path, list: &Path) -> Result<BTreeMap<FrameId, ImageSource>> 
             names.insert(line.scene.clone(), segment_names(folder, &line.scene)?);
         }
         let source = line
-            .source(folder, &about, &names)
+            .source(folder, &info, &names)
             .map_err(|problem| Error::line(list, number, problem))?;
         if sources.insert(id.clone(), source).is_some() {
             let problem = format_args!("a second frame {:?}", id.0);
@@ -262,7 +261,7 @@ mod tests {
 
     use super::*;
 
-    /// A folder of one image, its maps and a list of the given line.
+    /// A folder of one image, its maps and a `frames.jsonl` of one line with these extra keys.
     fn folder(keys: &str) -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
@@ -295,7 +294,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_line_names_must_be_there() {
+    fn every_file_that_a_line_names_must_exist() {
         for (keys, says) in [
             (r#","depth":"no.png","depth_scale":1"#, "no.png"),
             (r#","sem":"no.png""#, "no such file: "),
@@ -317,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn a_byte_order_mark_is_no_part_of_the_first_line() {
+    fn a_byte_order_mark_is_ignored() {
         let folder = folder("");
         let list = folder.path().join(FRAMES);
         let text = fs::read_to_string(&list).unwrap();

@@ -1,4 +1,4 @@
-//! The images that a command is given by files and folders: [`Inputs`].
+//! The images of a command whose arguments are files and folders: [`Inputs`].
 
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
@@ -7,39 +7,39 @@ use super::{Dataset, Picture};
 use crate::error::{Error, Result};
 use crate::types::FrameId;
 
-/// The frames of all inputs.
+/// The frames of all files and folders.
 pub(crate) struct Inputs {
     sets: Vec<Dataset>,
     pub(crate) entries: Vec<InputFrame>,
 }
 
-/// One frame, and what its files are called.
+/// One frame, and the name of its output files.
 pub(crate) struct InputFrame {
     set: usize,
     pub(crate) id: FrameId,
-    /// The path below the output folder, without the ending.
+    /// The path below the output folder, without the file extension.
     pub(crate) stem: String,
 }
 
 impl Inputs {
-    /// Lists the frames; no image is read.
+    /// The frames of the inputs; no image is read.
     ///
     /// # Errors
-    /// Where an input is missing, two frames would have one name, or a name leads out of a folder.
+    /// If an input is missing, two frames would have the same name, or a name leads out of the output folder.
     pub(crate) fn open(inputs: &[PathBuf], most_pixels: u64) -> Result<Self> {
         let sets: Vec<Dataset> = inputs
             .iter()
             .map(|path| Ok(Dataset::of_images(path)?.with_most_pixels(most_pixels)))
             .collect::<Result<_>>()?;
         let mut entries = Vec::new();
-        let mut taken: BTreeMap<String, String> = BTreeMap::new();
+        let mut used_names: BTreeMap<String, String> = BTreeMap::new();
         for (set, (dataset, input)) in sets.iter().zip(inputs).enumerate() {
             for id in dataset.frames() {
                 let stem = stem(id)?;
-                let whole = format!("{:?} of {}", id.0, input.display());
-                if let Some(other) = taken.insert(stem.clone(), whole.clone()) {
+                let described = format!("{:?} of {}", id.0, input.display());
+                if let Some(other) = used_names.insert(stem.clone(), described.clone()) {
                     let problem = format!(
-                        "{whole} and {other} would both be written as {stem}; give each its own --out"
+                        "{described} and {other} would both be written as {stem}; give each its own --out"
                     );
                     return Err(Error::usage("INPUT", problem));
                 }
@@ -55,7 +55,7 @@ impl Inputs {
     }
 }
 
-/// The name of a frame's files: its own, without the ending of an image.
+/// The name of the output files of a frame: the name of the frame, without an image extension.
 pub(crate) fn stem(id: &FrameId) -> Result<String> {
     let path = Path::new(&id.0);
     if !path

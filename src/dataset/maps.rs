@@ -1,7 +1,7 @@
-//! The maps that lie beside an image: [`MapPaths`].
+//! The maps of an image, read from their files: [`MapPaths`].
 //!
-//! A map has one number for each pixel of its image and its very size: it is never scaled to fit, for between two ids
-//! there is no third.
+//! A map has one number for each pixel of its image, so both have the same size. A map of another size is refused and
+//! not scaled, because ids cannot be interpolated.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,37 +13,35 @@ use super::raw_png::{RawPng, SampleForm};
 use crate::error::{Error, Result};
 use crate::types::Digest;
 
-/// The deepest a pixel may be, in millimetres: a kilometre. No room is; a map that says more has its unit wrong, as
-/// where millimetres are taken for metres.
+/// The maximum depth of a pixel in millimetres: a kilometre (chosen). No room is as deep. A larger value means a wrong
+/// unit, as millimetres that are read as metres.
 const MOST_DEPTH: f64 = 1e6;
 
 /// The map files of a frame, each of which may be missing.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct MapPaths {
-    /// Depth.
     pub(crate) depth: Option<DepthFile>,
-    /// The class of each pixel: a PNG file, 8-bit grey, 16-bit grey or with a palette whose places are the ids.
+    /// The class of each pixel: a PNG file of 8-bit grey, 16-bit grey or palette indices.
     pub(crate) semantic: Option<PathBuf>,
     /// The segment of each pixel, 0 for none: a 16-bit grey PNG file, or a `.npy` file of integers.
     pub(crate) segments: Option<PathBuf>,
 }
 
-/// A file of depth.
+/// The file of a depth map.
 #[derive(Debug, Clone)]
 pub(crate) enum DepthFile {
-    /// A 16-bit grey PNG file, 0 where there is no depth.
+    /// A 16-bit grey PNG file; 0 means no depth.
     Png {
-        /// Where it is.
         path: PathBuf,
-        /// Metres in one unit.
+        /// Metres per unit.
         scale: f64,
     },
-    /// A `.npy` file of metres as 4- or 8-byte floats; NaN, an infinity, 0 or less where there is no depth.
+    /// A `.npy` file of metres as 4- or 8-byte floats. NaN, an infinity, 0 and negative numbers mean no depth.
     Npy(PathBuf),
 }
 
 impl DepthFile {
-    /// The file at `path` with the `depth_scale` of its frame.
+    /// The depth file at `path`; `scale` is the `depth_scale` of the frame.
     pub(crate) fn new(path: PathBuf, scale: Option<f64>) -> Result<Self, String> {
         match (is_npy(&path), scale) {
             (true, None | Some(1.0)) => Ok(Self::Npy(path)),
@@ -69,7 +67,7 @@ impl DepthFile {
         }
     }
 
-    /// Depth of the file's own size.
+    /// The depth in millimetres, in the size that the file has.
     pub(crate) fn decode_alone(&self, bytes: &[u8]) -> Result<Array2<u32>, String> {
         let size = match self {
             Self::Png { .. } => RawPng::open(bytes, &[SampleForm::Grey16])?.size,
@@ -81,7 +79,7 @@ impl DepthFile {
     fn decode(&self, bytes: &[u8], size: Size) -> Result<Array2<u32>, String> {
         match self {
             Self::Png { scale, .. } => {
-                // Scaled once: most scales are a round number of millimetres, and then this is exact.
+                // Multiplied first: most scales are a round number of millimetres, and then this is exact.
                 let unit = scale * 1_000.0;
                 let table = (0..=u16::MAX).map(|units| millimetres(units.into(), unit));
                 let table: Vec<u32> = table.map(|depth| depth.unwrap_or(u32::MAX)).collect();
@@ -103,17 +101,17 @@ impl DepthFile {
 }
 
 impl MapPaths {
-    /// No maps at all.
+    /// The paths of a frame without maps.
     pub(crate) const NONE: Self = Self {
         depth: None,
         semantic: None,
         segments: None,
     };
 
-    /// Reads the files, undecoded.
+    /// The bytes of the files, not decoded.
     ///
     /// # Errors
-    /// With the file that cannot be read.
+    /// If a file cannot be read; the error names it.
     pub(crate) fn read(&self) -> Result<MapFiles<'_>> {
         let read = |path| fs::read(path).map_err(|e| Error::file(path, "read", e));
         let depth = self.depth.as_ref().map(DepthFile::path);
@@ -136,7 +134,7 @@ pub(crate) struct MapFiles<'a> {
 }
 
 impl MapFiles<'_> {
-    /// The content of the maps: of the files, and the unit of depth.
+    /// The digest of the files and of the unit of depth.
     pub(crate) fn digest(&self) -> Digest {
         let unit = match &self.maps.depth {
             Some(DepthFile::Png { scale, .. }) => scale.to_string(),
@@ -157,13 +155,13 @@ impl MapFiles<'_> {
     /// Depth in millimetres.
     ///
     /// # Errors
-    /// As for the other maps, with the file: one of another form or another size than the image, or with a value that
-    /// cannot be.
+    /// If the file has another form, another size than the image, or an impossible value; the error names it. The same
+    /// holds for the other maps.
     pub(crate) fn depth(&self, size: Size) -> Result<Option<Array2<u32>>> {
         let Some((file, bytes)) = self.maps.depth.as_ref().zip(self.depth.as_ref()) else {
             return Ok(None);
         };
-        of(file.path(), file.decode(bytes, size)).map(Some)
+        in_file(file.path(), file.decode(bytes, size)).map(Some)
     }
 
     /// The class of each pixel.
@@ -171,7 +169,7 @@ impl MapFiles<'_> {
         let Some((path, bytes)) = self.maps.semantic.as_ref().zip(self.semantic.as_ref()) else {
             return Ok(None);
         };
-        of(path, semantic(bytes, size)).map(Some)
+        in_file(path, semantic(bytes, size)).map(Some)
     }
 
     /// The segment of each pixel.
@@ -179,7 +177,7 @@ impl MapFiles<'_> {
         let Some((path, bytes)) = self.maps.segments.as_ref().zip(self.segments.as_ref()) else {
             return Ok(None);
         };
-        of(path, segments(bytes, size, is_npy(path))).map(Some)
+        in_file(path, segments(bytes, size, is_npy(path))).map(Some)
     }
 }
 
@@ -196,22 +194,22 @@ fn segments(bytes: &[u8], size: Size, as_npy: bool) -> Result<Array2<u32>, Strin
     if as_npy {
         return grid(size, npy(bytes, size)?.integers()?.map(segment));
     }
-    // 8 bits hold 255 segments, and a wider id is cut to them without a trace.
+    // 8 bits hold 255 segments only, and a larger id that was written to them is lost without an error.
     let ids = png(bytes, &[SampleForm::Grey16], size, u32::from)?;
     Array2::from_shape_vec(size, ids).map_err(|e| e.to_string())
 }
 
-/// The id of a segment.
+/// The id of a segment, checked for its range.
 fn segment(id: i128) -> Result<u32, String> {
     u32::try_from(id).map_err(|_| {
         format!(
-            "{id} is no id of a segment; 0 (none) to {} expected",
+            "{id} is not the id of a segment; 0 (none) to {} expected",
             u32::MAX
         )
     })
 }
 
-/// A depth in units of so many millimetres as whole ones, to the nearest, half to even; 0 where there is none.
+/// A depth in whole millimetres, rounded half to even; 0 if there is none. `unit` is millimetres per unit.
 fn millimetres(units: f64, unit: f64) -> Result<u32, String> {
     if !units.is_finite() || units <= 0.0 {
         return Ok(0);
@@ -232,8 +230,8 @@ fn is_npy(path: &Path) -> bool {
         .is_some_and(|ending| ending.eq_ignore_ascii_case("npy"))
 }
 
-/// Says of which file a problem is.
-fn of<T>(path: &Path, read: Result<T, String>) -> Result<T> {
+/// A result whose error names the file.
+fn in_file<T>(path: &Path, read: Result<T, String>) -> Result<T> {
     read.map_err(|problem| Error::data(path.display(), problem))
 }
 
@@ -244,17 +242,17 @@ fn png<T: Clone>(
     of: impl Fn(u16) -> T,
 ) -> Result<Vec<T>, String> {
     let png = RawPng::open(bytes, forms)?;
-    same(png.size, size)?;
+    check_size(png.size, size)?;
     png.samples(of)
 }
 
 fn npy(bytes: &[u8], size: Size) -> Result<Npy<'_>, String> {
     let npy = Npy::parse(bytes)?;
-    same(npy.size, size)?;
+    check_size(npy.size, size)?;
     Ok(npy)
 }
 
-fn same(map: Size, image: Size) -> Result<(), String> {
+fn check_size(map: Size, image: Size) -> Result<(), String> {
     if map == image {
         return Ok(());
     }

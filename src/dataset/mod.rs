@@ -1,7 +1,7 @@
-//! Stage 1, READ: anything → images and the questions that came with them.
+//! Data sets: images, their maps, and the questions that came with them.
 //!
-//! The door is [`Dataset::open`]. What the user points at decides the reader: a folder of frames ([`frames`]), a
-//! ready-made multiple-choice set ([`multiple_choice`]), or nothing, which is the built-in rooms ([`rooms`]).
+//! The entry point is [`Dataset::open`]. The path decides the reader: a folder of frames ([`frames`]) or a
+//! ready-made multiple-choice set ([`multiple_choice`]). Without a path the data are the built-in rooms ([`rooms`]).
 
 mod dialect;
 pub(crate) mod frame_folder;
@@ -37,32 +37,32 @@ pub(crate) use settings::{DataArgs, PixelLimit, SelectionArgs, place};
 use view::FrameFacts;
 pub(crate) use view::FrameFiles;
 
-/// Where the data are.
+/// The place of the data: what `--data` names.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum DataPlace {
     /// The built-in rooms.
     Rooms(Rooms),
-    /// A folder or file of the user's.
+    /// A folder or file of the user.
     Path(PathBuf),
 }
 
-/// Where one image is, with its maps.
+/// The place of one image and of its maps.
 #[derive(Debug, Clone)]
 pub(crate) enum ImageSource {
-    /// An image file, and the map files beside it.
+    /// An image file, its map files, and the other facts about the frame.
     File {
         rgb: PathBuf,
         maps: MapPaths,
         view: FrameFacts,
     },
-    /// A base64 cell of a table: the row's place in the file.
+    /// A base64 cell of a table, by the position of its row in the file.
     Cell(table::ImageCell),
     /// A built-in room.
     Room(rooms::Room),
 }
 
 impl ImageSource {
-    /// An image file that has no maps.
+    /// An image file without maps.
     fn image(rgb: PathBuf) -> Self {
         Self::File {
             rgb,
@@ -76,7 +76,7 @@ impl ImageSource {
 #[derive(Debug)]
 pub struct Dataset {
     name: String,
-    /// The name that the data set gives itself; empty where it gives none.
+    /// The `name` in `dataset.json`; empty if there is none.
     title: String,
     pub(crate) sources: BTreeMap<FrameId, ImageSource>,
     questions: Vec<Question>,
@@ -103,15 +103,15 @@ impl Dataset {
     /// The frames at a place, without questions. No image is read.
     ///
     /// # Errors
-    /// Where the place is no folder of frames.
-    pub fn open_unasked(place: &DataPlace) -> Result<Self> {
+    /// If the place is not a folder of frames.
+    pub fn open_without_questions(place: &DataPlace) -> Result<Self> {
         match place {
             DataPlace::Rooms(rooms) => Ok(Self::of_rooms(*rooms)),
             DataPlace::Path(folder) => Self::of_frames(folder),
         }
     }
 
-    /// The built-in rooms, without questions. No image is made.
+    /// The built-in rooms, without questions. No image is drawn yet.
     fn of_rooms(rooms: Rooms) -> Self {
         let sources = rooms
             .all()
@@ -124,32 +124,32 @@ impl Dataset {
         }
     }
 
-    /// The same with these questions.
+    /// The same data set with these questions.
     #[must_use]
     pub fn with_questions(self, questions: Vec<Question>) -> Self {
         Self { questions, ..self }
     }
 
-    /// The same with the questions of a file, each of which is about one of its frames.
-    fn asked(self, questions: Vec<Question>, file: &Path) -> Result<Self> {
+    /// The same data set with the questions of a file. Each must be about one of its frames.
+    fn with_questions_of(self, questions: Vec<Question>, file: &Path) -> Result<Self> {
         if questions.is_empty() {
             return Err(Error::data(file.display(), "no questions in it"));
         }
-        let stray = questions
+        let unmatched = questions
             .iter()
             .find(|question| !self.sources.contains_key(&question.frame));
-        if let Some(stray) = stray {
+        if let Some(unmatched) = unmatched {
             let example = self.sources.keys().next().map_or("", |id| id.0.as_str());
             let problem = format_args!(
                 "question {:?} is about the frame {:?}, which {} does not have (its frames are named like {example:?})",
-                stray.id.0, stray.frame.0, self.name
+                unmatched.id.0, unmatched.frame.0, self.name
             );
             return Err(Error::data(file.display(), problem));
         }
         Ok(self.with_questions(questions))
     }
 
-    /// The images at a place, an image file or a folder of frames, without questions. No image is read.
+    /// The images of an image file or a folder of frames, without questions. No image is read.
     pub fn of_images(path: &Path) -> Result<Self> {
         let sources = if path.is_dir() {
             frames::sources(path)?
@@ -159,7 +159,7 @@ impl Dataset {
         Ok(Self::new(stem(path), sources, Vec::new()))
     }
 
-    /// The frames of a folder with what its labels stand for, without questions. No image is read.
+    /// The frames of a folder and the labels of its maps, without questions. No image is read.
     pub fn of_frames(folder: &Path) -> Result<Self> {
         if !folder.is_dir() {
             return Err(Error::usage(
@@ -170,10 +170,10 @@ impl Dataset {
         frames::frames(folder)
     }
 
-    /// What the numbers of the semantic maps at a place stand for, whether or not it has questions.
+    /// The labels of the semantic maps at a place, whether or not it has questions.
     ///
     /// # Errors
-    /// With the file that cannot be read.
+    /// If `classes.json` cannot be read; the error names the file.
     pub fn labels_at(place: &DataPlace) -> Result<Option<Labels>> {
         match place {
             DataPlace::Rooms(_) => Ok(Some(rooms::labels())),
@@ -182,13 +182,13 @@ impl Dataset {
         }
     }
 
-    /// What the numbers of the semantic maps stand for; `None` where the data set does not say.
+    /// The meaning of each number in the semantic maps; `None` if the data set has no `classes.json`.
     #[must_use]
     pub fn labels(&self) -> Option<&Labels> {
         self.labels.as_ref()
     }
 
-    /// Reads images of up to so many pixels, instead of [`MOST_PIXELS`].
+    /// The same data set with another limit of pixels per image than [`MOST_PIXELS`].
     #[must_use]
     pub fn with_most_pixels(self, most_pixels: u64) -> Self {
         Self {
@@ -197,12 +197,12 @@ impl Dataset {
         }
     }
 
-    /// The frames, by name.
+    /// The ids of the frames, in alphabetical order.
     pub fn frames(&self) -> impl Iterator<Item = &FrameId> {
         self.sources.keys()
     }
 
-    /// The scene of a frame; empty where the data set says nothing of scenes.
+    /// The scene of a frame; empty if the data set does not name scenes.
     #[must_use]
     pub fn scene(&self, id: &FrameId) -> String {
         match self.sources.get(id) {
@@ -212,17 +212,17 @@ impl Dataset {
         }
     }
 
-    /// Opens the data at a place; `questions` overrides the questions beside a folder of frames.
+    /// The data at a place; `questions` replaces the `questions.jsonl` of a folder of frames.
     ///
     /// No image is read. Every question is checked: its choices, its answer among them, its frame among the images. The
-    /// built-in rooms and a folder of frames with maps but without questions have none yet: they are made by rule, from what
-    /// [`Self::labels`] says of the maps, and given by [`Self::with_questions`].
+    /// built-in rooms, and a folder of frames with maps but no questions, have none yet. The caller makes those by rule
+    /// from [`Self::labels`] and adds them by [`Self::with_questions`].
     pub fn open(place: &DataPlace, questions: Option<&Path>) -> Result<Self> {
         let dataset = match place {
             DataPlace::Rooms(rooms) => {
                 let rooms = Self::of_rooms(*rooms);
                 match questions {
-                    Some(file) => rooms.asked(questions::read(file)?, file)?,
+                    Some(file) => rooms.with_questions_of(questions::read(file)?, file)?,
                     None => rooms,
                 }
             }
@@ -256,13 +256,13 @@ impl Dataset {
         Ok(dataset)
     }
 
-    /// A short name for tables and folders: the folder's own, or the file's without its ending.
+    /// A short name for tables and folders: the name of the folder, or of the file without its extension.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The name that the data set gives itself in its `dataset.json`, the same wherever it lies; empty where it gives none.
+    /// The `name` in `dataset.json`, which does not change when the folder moves; empty if there is none.
     #[must_use]
     pub fn title(&self) -> &str {
         &self.title
@@ -274,7 +274,7 @@ impl Dataset {
         &self.questions
     }
 
-    /// The image of a frame as it lies in the data set, not decoded.
+    /// The image of a frame as it is stored, not decoded.
     pub fn picture(&self, frame: &FrameId) -> Result<Picture> {
         match self.sources.get(frame) {
             Some(ImageSource::File { rgb: path, .. }) => fs::read(path)
@@ -293,7 +293,7 @@ impl Dataset {
         }
     }
 
-    /// The image file of a frame; `None` where it has none of its own.
+    /// The image file of a frame; `None` for a cell of a table or a built-in room.
     #[must_use]
     pub fn image_file(&self, frame: &FrameId) -> Option<&Path> {
         match self.sources.get(frame)? {
@@ -302,10 +302,10 @@ impl Dataset {
         }
     }
 
-    /// The files of a frame, undecoded.
+    /// The files of a frame, not decoded.
     ///
     /// # Errors
-    /// With the file that cannot be read.
+    /// If a file cannot be read; the error names it.
     pub fn files<'a>(&'a self, frame: &'a FrameId) -> Result<FrameFiles<'a>> {
         const NONE: &MapPaths = &MapPaths::NONE;
         static UNKNOWN: LazyLock<FrameFacts> = LazyLock::new(FrameFacts::default);
@@ -321,10 +321,10 @@ impl Dataset {
         })
     }
 
-    /// A frame: its image decoded, with the maps that the data set has of it.
+    /// A frame with its image and its maps, decoded.
     ///
     /// # Errors
-    /// With the file: an image or a map that cannot be read, a map of another size than the image.
+    /// If an image or a map cannot be read, or a map has another size than the image; the error names the file.
     pub fn frame(&self, frame: &FrameId) -> Result<Frame> {
         self.files(frame)?.decode()
     }
@@ -339,7 +339,7 @@ fn refuse(questions: Option<&Path>, why: &str) -> Result<()> {
     })
 }
 
-/// The name of a folder, or of a file without its ending.
+/// The name of a folder, or of a file without its extension.
 fn stem(path: &Path) -> String {
     let named = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let name = if named.is_dir() {
@@ -358,7 +358,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_a_file_loses_its_ending() {
+    fn only_a_file_loses_its_extension() {
         let folder = tempfile::tempdir().unwrap();
         let (inner, set) = (
             folder.path().join("data.v1"),

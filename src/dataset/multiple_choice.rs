@@ -1,8 +1,8 @@
-//! Ready-made image multiple-choice sets.
+//! Ready-made sets of multiple-choice questions about images.
 //!
-//! `.tsv` as `table.rs` describes, `.jsonl` as [`questions`] describes, with `image`, and a folder of images with
-//! `metadata.jsonl`, as Hugging Face's `imagefolder` has it. Paths are relative to the file, and a
-//! frame is named by the path of its image, spelled in one way (`beside.rs`).
+//! Three forms are read: a `.tsv` file (`table.rs`), a `.jsonl` file ([`questions`], with `image`), and a folder of images
+//! with `metadata.jsonl`, as Hugging Face's `imagefolder` has it. Paths are relative to the file. The name of a frame is
+//! the normalised path of its image (`sibling_files.rs`).
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -12,15 +12,15 @@ use super::{Dataset, ImageSource, questions, stem, table};
 use crate::error::{Error, Result};
 use crate::types::{FrameId, Question};
 
-/// The questions of a folder of images.
+/// The file of the questions of a folder of images.
 const METADATA: &str = "metadata.jsonl";
 
-/// Whether a folder is one of images with their questions, and not of frames.
+/// Whether a folder holds images with questions, and not frames.
 pub(super) fn is_image_folder(path: &Path) -> bool {
     path.join(METADATA).is_file() && !path.join("frames.jsonl").exists()
 }
 
-/// Opens a folder of images with their questions.
+/// The data set of a folder of images with their questions.
 pub(super) fn open_image_folder(folder: &Path) -> Result<Dataset> {
     let (sources, questions) = jsonl(&folder.join(METADATA))?;
     Ok(Dataset::new(stem(folder), sources, questions))
@@ -49,10 +49,10 @@ pub(super) fn open(path: &Path) -> Result<Dataset> {
 
 fn jsonl(path: &Path) -> Result<(BTreeMap<FrameId, ImageSource>, Vec<Question>)> {
     let mut questions = questions::read(path)?;
-    let beside = SiblingFiles::of(path);
+    let siblings = SiblingFiles::of(path);
     let mut sources = BTreeMap::new();
     for question in &mut questions {
-        let (frame, file) = beside.image(&question.frame.0).map_err(|problem| {
+        let (frame, file) = siblings.image(&question.frame.0).map_err(|problem| {
             Error::data(
                 path.display(),
                 format_args!("question {:?}: {problem}", question.id.0),
@@ -77,7 +77,7 @@ mod tests {
 
     use super::*;
 
-    /// A set of this name and text, with two images in a folder beside it and one outside.
+    /// A temporary set file, two images in a folder next to it, and one image outside.
     struct Scene(tempfile::TempDir);
 
     impl Scene {
@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn one_file_is_one_frame_however_it_is_spelled() {
+    fn one_file_is_one_frame_however_its_path_is_spelled() {
         let outside = Scene::new("x", "");
         let absolute = outside.path("out.png").display().to_string();
         let spellings = [
@@ -161,7 +161,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn a_link_is_followed_before_its_parent_is_taken() {
+    fn a_symbolic_link_is_followed_before_its_parent() {
         let scene = Scene::new("a.tsv", "");
         fs::create_dir_all(scene.path("far/deep")).unwrap();
         let image = RgbImage::from_pixel(2, 1, image::Rgb([9; 3]));
@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_that_cannot_be_asked_are_named() {
+    fn rows_with_a_fault_are_named() {
         let header =
             "index\timage_path\tquestion\tA\tB\tanswer\tcategory\n1\tfr/a.png\t?\tx\ty\tA\tc\n";
         for (row, says) in [
@@ -212,7 +212,7 @@ mod tests {
         let scene = Scene::new("a.jsonl", empty);
         let error = scene.open("a.jsonl").unwrap_err().to_string();
         assert!(
-            error.ends_with("question \"1\": no image is named"),
+            error.ends_with("question \"1\": the path of the image is empty"),
             "{error}"
         );
     }

@@ -1,20 +1,17 @@
-//! Arrays as NumPy saves them: [`Npy`].
+//! Two-dimensional arrays in the `.npy` format of NumPy: [`Npy`].
 //!
-//! The format is that of `numpy.lib.format`: `\x93NUMPY`, a version, the header's length, and as header a Python
-//! dictionary with `descr`, `fortran_order` and `shape`; then the numbers, row by row. Versions 1 to 3 differ only in
-//! the width of the length and the header's encoding.
-//!
-//! This is code of ours because the libraries for it (npyz, ndarray-npy) read into memory what is only passed on here, take every
-//! type of numbers by a branch of ours all the same, and cost 34 and 45 CPU seconds of building for their parser of Python.
+//! The format (`numpy.lib.format`): `\x93NUMPY`, a version, the length of the header, the header, and the numbers row by
+//! row. The header is a Python dictionary with `descr`, `fortran_order` and `shape`. Versions 1 to 3 differ only in the
+//! width of the length field and the encoding of the header.
 
 use std::sync::LazyLock;
 
 use regex::Regex;
 
-/// What every such file begins with.
+/// The first six bytes of every `.npy` file.
 const MAGIC: &[u8] = b"\x93NUMPY";
 
-/// The dictionary before the numbers, its keys in any order. None of its strings that matters here has an escape in it.
+/// The dictionary in the header, with its keys in any order. The strings that are used here contain no escapes.
 static HEADER: LazyLock<Option<Regex>> = LazyLock::new(|| {
     let pattern = r#"(?x) ^ \s* \{ (?: \s* ['"] (?:
             descr ['"] \s* : \s* ['"] (?<descr> [^'"]*) ['"]
@@ -24,7 +21,7 @@ static HEADER: LazyLock<Option<Regex>> = LazyLock::new(|| {
     Regex::new(pattern).ok()
 });
 
-/// How the numbers of a file are read, each from its bytes.
+/// The type of the numbers of a file, with a function that reads one number from its bytes.
 #[derive(Debug, Clone, Copy)]
 enum NumberForm {
     Floats(fn(&[u8]) -> f64),
@@ -32,7 +29,7 @@ enum NumberForm {
 }
 
 impl NumberForm {
-    /// Those of one byte, and the little-endian ones: the size of one, and how it is read.
+    /// The size of one number in bytes, and its type; `None` unless `descr` is of one byte or little-endian.
     fn of(descr: &str) -> Option<(usize, Self)> {
         Some(match descr {
             "<f4" => (4, Self::Floats(|b| f32::from_le_bytes(sized(b)).into())),
@@ -50,33 +47,33 @@ impl NumberForm {
     }
 }
 
-/// The bytes of one number; a chunk always has as many as its type.
+/// The bytes of one number. A chunk always has the size of its type.
 fn sized<const N: usize>(chunk: &[u8]) -> [u8; N] {
     chunk.first_chunk().copied().unwrap_or([0; N])
 }
 
-/// A two-dimensional array in a file's bytes.
+/// A two-dimensional array in the bytes of a file.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Npy<'a> {
     numbers: NumberForm,
     /// The size of a number in bytes.
     width: usize,
-    /// Height and width.
+    /// Height and width of the array (rows, columns).
     pub(crate) size: (usize, usize),
     data: &'a [u8],
 }
 
 impl<'a> Npy<'a> {
-    /// Reads the header and checks that the numbers are all there.
+    /// Reads the header and checks that no number is missing.
     pub(crate) fn parse(bytes: &'a [u8]) -> Result<Self, String> {
         let rest = bytes
             .strip_prefix(MAGIC)
-            .ok_or("not a .npy file: it does not begin as numpy.save begins one")?;
+            .ok_or("not a .npy file: it does not begin with \\x93NUMPY")?;
         let (header, data) = split(rest)?;
         let header = String::from_utf8_lossy(header);
         let (descr, fortran, shape) = fields(&header).ok_or_else(|| {
             let header = header.trim_end();
-            format!("its header is not that of one .npy array: {header:.200}")
+            format!("its header is not that of a .npy array: {header:.200}")
         })?;
         let (width, numbers) = NumberForm::of(descr).ok_or_else(|| {
             format!("its numbers are {descr:?}; little-endian integers or floats of 4 or 8 bytes expected")
@@ -104,7 +101,7 @@ impl<'a> Npy<'a> {
         })
     }
 
-    /// The numbers, row by row, where they are floating-point.
+    /// The floating-point numbers, row by row; an error if the file holds integers.
     pub(crate) fn floats(self) -> Result<impl Iterator<Item = f64>, String> {
         match self.numbers {
             NumberForm::Floats(read) => Ok(self.data.chunks_exact(self.width).map(read)),
@@ -114,7 +111,7 @@ impl<'a> Npy<'a> {
         }
     }
 
-    /// The numbers, row by row, where they are integers.
+    /// The integers, row by row; an error if the file holds floating-point numbers.
     pub(crate) fn integers(self) -> Result<impl Iterator<Item = i128>, String> {
         match self.numbers {
             NumberForm::Integers(read) => Ok(self.data.chunks_exact(self.width).map(read)),
@@ -123,17 +120,17 @@ impl<'a> Npy<'a> {
     }
 }
 
-/// Splits what follows the magic into the header and the data.
+/// The header and the data: the two parts after the first six bytes.
 fn split(rest: &[u8]) -> Result<(&[u8], &[u8]), String> {
-    let cut = || "not a whole .npy file: it ends within its header".to_owned();
-    let (&[major, _minor], rest) = rest.split_first_chunk().ok_or_else(cut)?;
+    let truncated = || "not a whole .npy file: it ends within its header".to_owned();
+    let (&[major, _minor], rest) = rest.split_first_chunk().ok_or_else(truncated)?;
     let (length, rest) = match major {
         1 => {
-            let (length, rest) = rest.split_first_chunk().ok_or_else(cut)?;
+            let (length, rest) = rest.split_first_chunk().ok_or_else(truncated)?;
             (u16::from_le_bytes(*length).into(), rest)
         }
         2 | 3 => {
-            let (length, rest) = rest.split_first_chunk().ok_or_else(cut)?;
+            let (length, rest) = rest.split_first_chunk().ok_or_else(truncated)?;
             (u32::from_le_bytes(*length) as usize, rest)
         }
         _ => {
@@ -142,10 +139,10 @@ fn split(rest: &[u8]) -> Result<(&[u8], &[u8]), String> {
             ));
         }
     };
-    rest.split_at_checked(length).ok_or_else(cut)
+    rest.split_at_checked(length).ok_or_else(truncated)
 }
 
-/// What a header says: the type of the numbers, whether columns go first, and the shape.
+/// The fields of a header: the type of the numbers, whether columns come first, and the shape.
 fn fields(header: &str) -> Option<(&str, &str, Vec<usize>)> {
     let found = HEADER.as_ref()?.captures(header)?;
     let field = |name| Some(found.name(name)?.as_str());

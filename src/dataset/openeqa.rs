@@ -1,4 +1,4 @@
-//! OpenEQA's episodic-memory questions and the walks that they are about: [`OpenQuestion`], [`questions`] and [`sampled`].
+//! OpenEQA's episodic-memory questions and the frames of their walks: [`OpenQuestion`], [`questions`] and [`sampled`].
 //! After `facebookresearch/open-eqa` at cfa3fce.
 
 use std::collections::BTreeSet;
@@ -10,39 +10,37 @@ use crate::error::{Error, Result};
 use crate::files::reading::{bytes, entries};
 use crate::types::QuestionId;
 
-/// An open question about a walk.
+/// An open question about a walk through a building.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 pub(crate) struct OpenQuestion {
-    /// Its name.
     #[serde(rename = "question_id")]
     pub id: QuestionId,
-    /// The question in words.
     #[serde(rename = "question")]
     pub text: String,
     /// The true answer.
     pub answer: String,
-    /// Other answers that are right, too; `None` where the item has no such key, which decides the judge's prompt.
+    /// Other right answers. `None`, if the item has no such key, leads to another prompt of the judge.
     #[serde(rename = "extra_answers")]
     pub extra: Option<Vec<String>>,
-    /// What it asks for, as "object localization".
+    /// The kind of question, as "object localization".
     pub category: String,
-    /// The walk, as `hm3d-v0/000-hm3d-BFRyYbPCCPE`.
+    /// The name of the walk, as `hm3d-v0/000-hm3d-BFRyYbPCCPE`.
     #[serde(rename = "episode_history")]
     pub episode: String,
 }
 
 impl OpenQuestion {
-    /// The split that it belongs to: the first part of its walk's name, as `hm3d-v0`.
+    /// The split of the question: the first part of the name of its walk, as `hm3d-v0`.
     #[must_use]
     pub(crate) fn split(&self) -> &str {
         self.episode.split('/').next().unwrap_or_default()
     }
 }
 
-/// Reads a file of questions, a JSON array as upstream's `open-eqa-v0.json`.
+/// The questions of a file: a JSON array as upstream's `open-eqa-v0.json`.
 ///
 /// # Errors
-/// Where it cannot be read or is no such array, is empty, or has two questions of one id.
+/// If the file cannot be read, is not such an array, is empty, or has two questions with the same id.
 pub(crate) fn questions(path: &Path) -> Result<Vec<OpenQuestion>> {
     let text = bytes(path)?;
     let wrong = |problem: String| Error::data(path.display(), problem);
@@ -61,10 +59,10 @@ pub(crate) fn questions(path: &Path) -> Result<Vec<OpenQuestion>> {
     Ok(questions)
 }
 
-/// The frames of a walk, by name: the files of its folder that end in `-rgb.png`.
+/// The frames of a walk, sorted by name: the files of its folder that end in `-rgb.png`.
 ///
 /// # Errors
-/// Where the folder is missing or has none.
+/// If the folder is missing or has no such file.
 pub(crate) fn walk(frames: &Path, episode: &str) -> Result<Vec<PathBuf>> {
     let folder = frames.join(episode);
     let mut paths = entries(&folder)?;
@@ -77,15 +75,15 @@ pub(crate) fn walk(frames: &Path, episode: &str) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-/// The indices of the frames that a model is shown: `np.round(np.linspace(0, n - 1, k))`, which rounds halves to even and
-/// repeats frames where there are fewer than `k`. Empty of no frames.
+/// The indices of the `k` frames that a model is shown: `np.round(np.linspace(0, n - 1, k))`. It rounds half to even and
+/// repeats frames if `n` is less than `k`; empty if `n` is 0.
 #[must_use]
 pub(crate) fn sampled(n: usize, k: usize) -> Vec<usize> {
     if n == 0 {
         return Vec::new();
     }
     let last = (n - 1) as f64;
-    // numpy: arange(k) · step, and the end itself in the last place.
+    // numpy computes arange(k) · step, and puts the end itself in the last place.
     let step = if k > 1 { last / (k - 1) as f64 } else { 0.0 };
     let at = |index: usize| {
         let place = if index + 1 == k && k > 1 {
@@ -128,9 +126,9 @@ mod tests {
         let extra =
             one.replace("\"a\"", "\"b\"")
                 .replacen('{', "{\"extra_answers\": [\"here\"], ", 1);
-        let made = read(&format!("[{one}, {extra}]")).unwrap();
-        assert_eq!((made[0].split(), &made[0].extra), ("hm3d-v0", &None));
-        assert_eq!(made[1].extra.as_deref(), Some(&["here".to_owned()][..]));
+        let loaded = read(&format!("[{one}, {extra}]")).unwrap();
+        assert_eq!((loaded[0].split(), &loaded[0].extra), ("hm3d-v0", &None));
+        assert_eq!(loaded[1].extra.as_deref(), Some(&["here".to_owned()][..]));
         for (text, says) in [
             ("[]", "no questions in it"),
             ("{}", "a JSON array of"),

@@ -1,4 +1,4 @@
-//! Pairs of the same scene in normal and in low light: [`Pairs`].
+//! Pairs of images of the same scene in normal and in low light: [`Pairs`].
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -6,17 +6,17 @@ use std::path::{Path, PathBuf};
 use crate::error::{Error, Result};
 use crate::files::reading::{entries, is_image};
 
-/// The folders that pairs lie in, normal light first: LISU's, LOL's, and plain ones.
+/// The folder names of pairs, normal light first, as in LISU, in LOL and by plain words.
 const FOLDERS: [[&str; 2]; 3] = [
     ["normal", "low"],
     ["high", "low"],
     ["val_rgb_h", "val_rgb_l"],
 ];
 
-/// One scene in normal and in low light.
+/// Two images of one scene: in normal and in low light.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Pair {
-    /// What both files' names have in common.
+    /// The part that both file names share.
     pub name: String,
     /// The image in normal light.
     pub normal: PathBuf,
@@ -27,13 +27,13 @@ pub(crate) struct Pair {
 /// The pairs of a data set, by name.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Pairs {
-    /// The pairs.
+    /// Sorted by name.
     pub pairs: Vec<Pair>,
     /// Images without a partner.
     pub unmatched: Vec<PathBuf>,
 }
 
-/// Which of a pair's images a name is of.
+/// The light of an image, by its file name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum PairSide {
     Normal,
@@ -41,11 +41,12 @@ enum PairSide {
 }
 
 impl Pairs {
-    /// The pairs below a folder: in `normal` and `low`, `high` and `low` or `val_rgb_h` and `val_rgb_l` (in any case), or
-    /// beside each other, named by `normal` or `high` and `low` at either end (`normal00733.png`, `low00733.png`).
+    /// The pairs below a folder. They are in the folders `normal` and `low`, `high` and `low`, or `val_rgb_h` and
+    /// `val_rgb_l` (upper or lower case). Or they are in one folder, and their names begin or end with `normal` or `high`
+    /// and with `low` (`normal00733.png`, `low00733.png`).
     ///
     /// # Errors
-    /// Where there is no pair, or two images of one name.
+    /// If there is no pair, or two images of one side have the same name.
     pub(crate) fn open(folder: &Path) -> Result<Self> {
         let entries = entries(folder)?;
         let subfolder = |name: &str| {
@@ -72,10 +73,10 @@ impl Pairs {
         })
     }
 
-    /// The pairs of two folders, by the files' names without their endings and without `normal`, `high` or `low`.
+    /// The pairs of two folders, by the file names without their extensions and without `normal`, `high` or `low`.
     ///
     /// # Errors
-    /// Where there is no pair, or two images of one name.
+    /// If there is no pair, or two images of one side have the same name.
     pub(crate) fn of_folders(normal: &Path, low: &Path) -> Result<Self> {
         let mut sides = [BTreeMap::new(), BTreeMap::new()];
         for (side, folder) in sides.iter_mut().zip([normal, low]) {
@@ -111,14 +112,14 @@ fn add(side: &mut BTreeMap<String, PathBuf>, name: String, path: &Path) -> Resul
     match side.insert(name, path.to_owned()) {
         None => Ok(()),
         Some(other) => {
-            let problem = format_args!("of the same name as {}", other.display());
+            let problem = format_args!("same name as {}", other.display());
             Err(Error::data(path.display(), problem))
         }
     }
 }
 
-/// A name without the words at its ends that say which light it is of, and that light; what begins as one and ends as the
-/// other is of the light that it begins with.
+/// A name without the word for the light at its beginning or end, and that light. A name that begins with one light and
+/// ends with the other has the light that it begins with.
 fn role(stem: &str) -> (String, Option<PairSide>) {
     const WORDS: [(&str, PairSide); 3] = [
         ("normal", PairSide::Normal),
@@ -127,15 +128,15 @@ fn role(stem: &str) -> (String, Option<PairSide>) {
     ];
     let bare = |rest: &str| rest.trim_matches(['_', '-', '.', ' ']).to_owned();
     let lower = stem.to_ascii_lowercase();
-    let begun = WORDS.iter().find(|(word, _)| lower.starts_with(word));
-    let ended = WORDS.iter().find(|(word, light)| {
-        lower.ends_with(word) && begun.is_none_or(|(_, begun)| begun == light)
+    let prefix = WORDS.iter().find(|(word, _)| lower.starts_with(word));
+    let suffix = WORDS.iter().find(|(word, light)| {
+        lower.ends_with(word) && prefix.is_none_or(|(_, prefix)| prefix == light)
     });
-    let first = begun.map_or(0, |(word, _)| word.len());
-    let last = stem.len() - ended.map_or(0, |(word, _)| word.len());
-    match begun.or(ended) {
+    let first = prefix.map_or(0, |(word, _)| word.len());
+    let last = stem.len() - suffix.map_or(0, |(word, _)| word.len());
+    match prefix.or(suffix) {
         Some((_, light)) if first <= last => (bare(&stem[first..last]), Some(*light)),
-        // The word alone.
+        // The name is the word alone.
         Some((_, light)) => (String::new(), Some(*light)),
         None => (stem.to_owned(), None),
     }
@@ -198,21 +199,21 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_partner_is_named() {
+    fn images_without_a_partner_are_named() {
         let folder = folder(&[
             "normal1.png",
             "low1.png",
-            "low1_mended.png",
+            "low1_edited.png",
             "high3.png",
             "x.png",
         ]);
         let pairs = Pairs::open(folder.path()).unwrap();
         let unmatched: Vec<String> = pairs.unmatched.iter().map(|path| file_name(path)).collect();
-        assert_eq!(unmatched, ["high3.png", "low1_mended.png", "x.png"]);
+        assert_eq!(unmatched, ["high3.png", "low1_edited.png", "x.png"]);
     }
 
     #[test]
-    fn no_pair_and_two_of_a_name_are_errors() {
+    fn no_pair_and_two_images_of_one_name_are_errors() {
         let none = folder(&["a.png", "low/1.png"]);
         let error = Pairs::open(none.path()).unwrap_err().to_string();
         assert!(error.contains("--normal DIR"), "{error}");

@@ -1,4 +1,4 @@
-//! An image as it lies in a data set: [`Picture`].
+//! The image of a frame before decoding: [`Picture`].
 
 use std::io::Cursor;
 
@@ -9,30 +9,30 @@ use crate::error::{Error, Result};
 use crate::rooms::Room;
 use crate::types::{Digest, Rgb};
 
-/// What every PNG file begins with.
+/// The first eight bytes of every PNG file.
 const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
 
-/// The most pixels an image may have where nobody says otherwise.
+/// The default of the maximum number of pixels in an image (chosen).
 pub const MOST_PIXELS: u64 = 100_000_000;
 
-/// An image, not yet decoded where it came as a file.
+/// An image as stored: the bytes of a file, or a built-in room.
 #[derive(Debug)]
 pub enum Picture {
     /// A PNG or JPEG file.
     Encoded {
-        /// The file's bytes.
+        /// The bytes of the file.
         bytes: Vec<u8>,
-        /// Where it came from, for messages.
+        /// The file and line that it came from, for messages.
         place: String,
-        /// The most pixels it may have: one with more is refused before it is inflated.
+        /// The maximum number of pixels. A larger image is refused before it is decompressed.
         most_pixels: u64,
     },
-    /// A built-in room, drawn where it is needed.
+    /// A built-in room, drawn when its pixels are needed.
     Drawn(Room),
 }
 
 impl Picture {
-    /// The content: of the file, or all that decides the pixels of a room.
+    /// The digest of the file, or of everything that decides the pixels of a room.
     #[must_use]
     pub fn digest(&self) -> Digest {
         match self {
@@ -41,10 +41,10 @@ impl Picture {
         }
     }
 
-    /// Checks that the picture can be shown, before anything is asked about it, and returns its width and height in pixels.
+    /// The width and height in pixels, after a check that the picture can be decoded.
     ///
-    /// A PNG file is held to its checksums, which find any damage for a hundredth of what inflating costs; where that
-    /// does not settle it (JPEG files have none, an alpha channel may hide something) the picture is decoded.
+    /// For an RGB PNG the checksums are enough: they find any damage at a hundredth of the cost of decompressing. Every
+    /// other file is decoded, because JPEG has no checksums and an alpha channel may be transparent.
     pub fn check(&self) -> Result<(u32, u32)> {
         let (bytes, place, most_pixels) = match self {
             Self::Drawn(room) => return Ok(room.size().map(|side| side as u32).into()),
@@ -56,18 +56,18 @@ impl Picture {
         };
         let decoder = decoder(bytes, place, most_pixels)?;
         if bytes.starts_with(PNG) && decoder.color_type() == ColorType::Rgb8 {
-            whole(bytes, place)?;
+            check_complete(bytes, place)?;
         } else {
             self.decode()?;
         }
         Ok(decoder.dimensions())
     }
 
-    /// The pixels as 8-bit sRGB; a file that is cut or, as a PNG, not as its checksums say is refused.
+    /// The pixels as 8-bit sRGB. A truncated file, or a PNG with a wrong checksum, is refused.
     ///
-    /// Grey becomes three equal channels, a palette its colours, 16 bits the nearest 8, and an alpha channel is dropped
-    /// where it is opaque everywhere. CMYK and transparency are refused: there is no one right way to show them. EXIF
-    /// orientation is not applied, as by every tool that reads label maps beside the image.
+    /// Grey becomes three equal channels, a palette becomes its colours, and 16 bits are rounded to 8. An alpha channel
+    /// is dropped if it is opaque everywhere. CMYK and transparency are refused: there is no one right way to show them.
+    /// EXIF orientation is ignored, because label maps are not rotated with it.
     pub fn decode(&self) -> Result<Rgb> {
         let (bytes, place, most_pixels) = match self {
             Self::Drawn(room) => return Ok(room.frame()?.rgb.clone()),
@@ -78,8 +78,8 @@ impl Picture {
             } => (bytes, place, *most_pixels),
         };
         let decoder = decoder(bytes, place, most_pixels)?;
-        // The decoders are content with all the samples, the JPEG decoder with less than that.
-        whole(bytes, place)?;
+        // The PNG decoder stops after the last sample, and the JPEG decoder accepts fewer samples than it should.
+        check_complete(bytes, place)?;
         let image = DynamicImage::from_decoder(decoder)
             .map_err(|e| Error::data(place, format_args!("not a whole image: {e}")))?;
         if image.color().has_alpha()
@@ -124,24 +124,24 @@ fn decoder<'a>(bytes: &'a [u8], place: &str, most_pixels: u64) -> Result<impl Im
     Ok(decoder)
 }
 
-/// Makes sure that a PNG or JPEG file goes on until its own end mark, and that a PNG's checksums hold.
-fn whole(file: &[u8], place: &str) -> Result<()> {
+/// Checks that a PNG or JPEG file reaches its end mark, and that the checksums of a PNG are right.
+fn check_complete(file: &[u8], place: &str) -> Result<()> {
     let fault = match file.strip_prefix(PNG) {
         Some(chunks) => png_fault(chunks),
         None if JpegOutline::of(file).ends => None,
-        None => Some(CUT),
+        None => Some(TRUNCATED),
     };
     let problem = match fault {
         None => return Ok(()),
-        Some(CUT) => format!("not a whole image: {CUT}, at byte {}", file.len()),
+        Some(TRUNCATED) => format!("not a whole image: {TRUNCATED}, at byte {}", file.len()),
         Some(fault) => format!("not a whole image: {fault}"),
     };
     Err(Error::data(place, problem + "; copy or export it again"))
 }
 
-const CUT: &str = "the file ends before its end mark";
+const TRUNCATED: &str = "the file ends before its end mark";
 
-/// What is wrong with the chunks of a PNG file, followed until the last one, `IEND`.
+/// The first fault in the chunks of a PNG file, up to the last chunk, `IEND`; `None` if there is none.
 fn png_fault(mut chunks: &[u8]) -> Option<&'static str> {
     while let Some((length, rest)) = chunks.split_first_chunk::<4>()
         && let Some((body, rest)) =
@@ -149,14 +149,14 @@ fn png_fault(mut chunks: &[u8]) -> Option<&'static str> {
         && let Some((checksum, rest)) = rest.split_first_chunk::<4>()
     {
         if crc32fast::hash(body) != u32::from_be_bytes(*checksum) {
-            return Some("a checksum in it does not hold");
+            return Some("a checksum in it is wrong");
         }
         if body.starts_with(b"IEND") {
             return None;
         }
         chunks = rest;
     }
-    Some(CUT)
+    Some(TRUNCATED)
 }
 
 #[cfg(test)]
@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cut_file_is_named() {
+    fn a_truncated_file_is_named() {
         let mut picture = png(&GrayImage::new(64, 64).into());
         if let Picture::Encoded { bytes, .. } = &mut picture {
             bytes.truncate(bytes.len() / 2);
@@ -253,7 +253,7 @@ mod tests {
         );
     }
 
-    /// What is said of bytes that are no whole picture; it is one line that begins with the file.
+    /// The error for bytes that are not a complete picture. It is one line and begins with the file.
     fn fault(bytes: Vec<u8>) -> String {
         let place = "a.png";
         let error = encoded(bytes, place).decode().unwrap_err();
@@ -319,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cut_jpeg_is_named() {
+    fn a_truncated_jpeg_is_named() {
         let bytes = jpeg(jpeg_encoder::ColorType::Rgb, 3);
         for length in [bytes.len() / 2, bytes.len() - 40, bytes.len() - 2] {
             let cut = fault(bytes[..length].to_vec());
@@ -328,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bomb_is_refused_before_it_is_inflated() {
+    fn a_bomb_is_refused_before_it_is_decompressed() {
         let Picture::Encoded {
             mut bytes, place, ..
         } = png(&GrayImage::new(1, 1).into())

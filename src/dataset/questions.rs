@@ -1,8 +1,8 @@
-//! Files of questions: one JSON object a line.
+//! Files of questions: one JSON object per line.
 //!
 //! `{"id", "frame", "family", "question", "choices", "answer", "evidence"}`; a ready-made set has `"image"`, a path
-//! beside the file, in place of `"frame"`. `answer` is the text of the true choice. Lines as other tools write them are
-//! read, too (`dialect.rs`).
+//! relative to the file, in place of `"frame"`. `answer` is the text of the true choice. Lines that other tools write are
+//! converted first (`dialect.rs`).
 
 use std::path::Path;
 
@@ -33,7 +33,7 @@ pub(super) fn other() -> Family {
     Family::Other("other".to_owned())
 }
 
-/// Refuses a family that would bear the name of the total in the tables.
+/// The family, unless it has the name that the tables use for the total.
 pub(super) fn checked(family: Family) -> Result<Family> {
     if family.name().trim() == Family::TOTAL {
         return Err(Error::data(
@@ -47,11 +47,11 @@ pub(super) fn checked(family: Family) -> Result<Family> {
     Ok(family)
 }
 
-/// Reads a file of questions.
+/// The questions of a file.
 ///
 /// # Errors
-/// With the file and the line: broken JSON, a missing key, choices that are no choices, an answer not among them,
-/// a family named as the total.
+/// If a line is not valid JSON, a key is missing, the choices are not valid, the answer is not among them, or the family
+/// has the name of the total. The error names the file and the line.
 pub(crate) fn read(path: &Path) -> Result<Vec<Question>> {
     let lines = json_lines::<Value>(path)?.into_iter();
     lines

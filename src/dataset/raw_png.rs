@@ -1,7 +1,7 @@
-//! A PNG file of numbers: [`RawPng`].
+//! PNG files whose samples are ids or other numbers: [`RawPng`].
 //!
-//! A label map says ids, not colours, so a sample is taken as it is stored: a palette is not looked up, and no bits are
-//! spread over a larger range.
+//! A label map holds ids, not colours, so a sample is used as it is stored: a palette index is not replaced by its colour,
+//! and no value is scaled to a larger range.
 
 use std::io::Cursor;
 
@@ -10,28 +10,26 @@ use png::{BitDepth, ColorType, Decoder, DecodingError, Reader, Transformations};
 use super::picture::MOST_PIXELS;
 use crate::types::words::words;
 
-/// What the samples of a PNG file are.
+/// The form of the samples of a PNG file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum SampleForm {
-    /// Grey of 8 bits.
     Grey8,
-    /// Grey of 16 bits.
     Grey16,
-    /// Places in a palette, of 1 to 8 bits.
+    /// Palette indices of 1 to 8 bits.
     Palette,
 }
 
 words!(SampleForm { Grey8 = "8-bit grey", Grey16 = "16-bit grey", Palette = "palette" });
 
-/// A PNG file of one number a pixel, not yet inflated.
+/// A PNG file with one number per pixel, not yet decompressed.
 pub(crate) struct RawPng<'a> {
     reader: Reader<Cursor<&'a [u8]>>,
-    /// Height and width.
+    /// Height and width in pixels.
     pub(crate) size: (usize, usize),
 }
 
 impl<'a> RawPng<'a> {
-    /// Reads the header; a file of another form than `forms` or of too many pixels is refused.
+    /// Reads the header. A file of another form than `forms`, or with too many pixels, is refused.
     pub(crate) fn open(bytes: &'a [u8], forms: &[SampleForm]) -> Result<Self, String> {
         let mut decoder = Decoder::new(Cursor::new(bytes));
         decoder.set_transformations(Transformations::IDENTITY);
@@ -63,7 +61,7 @@ impl<'a> RawPng<'a> {
         })
     }
 
-    /// The samples, row by row, each as `of` makes it.
+    /// The samples, row by row, each converted by `of`.
     pub(crate) fn samples<T: Clone>(mut self, of: impl Fn(u16) -> T) -> Result<Vec<T>, String> {
         let not_whole = |e: DecodingError| format!("not a whole PNG: {e}");
         let bits = self.reader.info().bit_depth;
@@ -99,17 +97,17 @@ impl<'a> RawPng<'a> {
     }
 }
 
-/// The sample at `x` of a row of so many bits a sample, as the PNG specification packs it (section 7.2): high bits first.
+/// The sample at `x` of a row with fewer than 8 bits per sample: high bits first (PNG specification, section 7.2).
 fn sample(row: &[u8], x: usize, bits: BitDepth) -> u16 {
     let bits = bits as usize;
     let (byte, place) = (x * bits / 8, x * bits % 8);
     u16::from((row[byte] << place) >> (8 - bits))
 }
 
-/// The form of a PNG file that has one.
+/// The form of the samples of a PNG file; `None` if ids cannot be read from them.
 ///
-/// Grey of fewer than 8 bits has none: such a file may as well be one of 8 bits that an optimiser packed, where 1 stands
-/// for 255, 85 or 17.
+/// Grey of fewer than 8 bits is not read. Such a file may be an 8-bit one that an optimiser packed, in which 1 means 255,
+/// 85 or 17.
 fn form(color: ColorType, bits: BitDepth) -> Option<SampleForm> {
     match (color, bits) {
         (ColorType::Grayscale, BitDepth::Eight) => Some(SampleForm::Grey8),

@@ -1,4 +1,4 @@
-//! What flags say of data: [`DataArgs`], [`SelectionArgs`], [`PixelLimit`].
+//! The flags for data: [`DataArgs`], [`SelectionArgs`], [`PixelLimit`].
 
 use std::convert::Infallible;
 use std::fmt;
@@ -13,7 +13,7 @@ use crate::rooms::Rooms;
 use crate::types::Decides;
 use crate::types::Family;
 
-/// Where the data are.
+/// The flag for the place of the data.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Data")]
 pub(crate) struct DataArgs {
@@ -22,7 +22,7 @@ pub(crate) struct DataArgs {
     pub data: DataPlace,
 }
 
-/// Which questions about them are asked.
+/// The flags that select questions.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Data")]
 pub(crate) struct SelectionArgs {
@@ -37,16 +37,16 @@ pub(crate) struct SelectionArgs {
     pub families: Vec<Family>,
 }
 
-/// How large an image may be.
+/// The flag for the maximum size of an image.
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Data")]
 pub(crate) struct PixelLimit {
-    /// The most pixels an image may have before it is refused undecoded
-    #[arg(long, value_name = "N", default_value_t = NonZeroU64::new(MOST_PIXELS).unwrap_or(NonZeroU64::MIN), add = Decides::Nothing)]
+    /// The maximum number of pixels of an image; a larger one is refused before it is decoded
+    #[arg(long, value_name = "N", default_value_t = NonZeroU64::new(MOST_PIXELS).unwrap_or(NonZeroU64::MIN))]
     pub max_pixels: NonZeroU64,
 }
 
-/// Reads a path, `rooms` or `rooms:frames=48,seed=7,size=1280x720`; a file or folder named rooms goes before the built-in ones.
+/// The place in a text: a path, `rooms` or `rooms:frames=48,seed=7,size=1280x720`. A file or folder named `rooms` is a path.
 pub(crate) fn place(text: &str) -> Result<DataPlace, String> {
     let path = PathBuf::from(text);
     match text.strip_prefix("rooms:") {

@@ -1,8 +1,8 @@
-//! A table of questions about images, `.tsv` as VLMEvalKit writes it (`vlmeval/dataset/image_mcq.py`).
+//! Tables of questions about images: `.tsv` as VLMEvalKit writes it (`vlmeval/dataset/image_mcq.py`).
 //!
 //! Tab-separated with a header: `index`, `question`, an optional `hint`, the choices in the columns `A`, `B`, … (an empty
-//! cell is no choice), `answer` (a letter), `category`, and either `image_path` or `image`, which holds the file in base64
-//! or the index of the row that does.
+//! cell is not a choice), `answer` (a letter), `category`, and `image_path` or `image`. A cell of `image` holds the file
+//! in base64, or the index of the row that does.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -18,10 +18,10 @@ use crate::error::{Error, Result};
 use crate::types::question::letter;
 use crate::types::{Choices, Family, FrameId, Question, QuestionId};
 
-/// A longer cell of the column `image` is a file, a shorter one the index of another row (as in VLMEvalKit).
+/// The maximum length of an index in the column `image`. A longer cell is a file in base64 (as in VLMEvalKit).
 const LONGEST_INDEX: usize = 64;
 
-/// The columns of a table by what they hold.
+/// The positions of the columns of a table.
 struct TableColumns {
     index: usize,
     question: usize,
@@ -64,25 +64,28 @@ impl TableColumns {
         let id = filled(row, self.index, "index")?.to_owned();
         filled(row, self.question, "question")?;
         let answer = cell(self.answer).trim();
-        let shown: Vec<(char, &str)> = self
+        let filled_choices: Vec<(char, &str)> = self
             .choices
             .iter()
             .map(|&(letter, column)| (letter, cell(column)))
             .filter(|(_, text)| !text.trim().is_empty())
             .collect();
-        let truth = shown
+        let truth = filled_choices
             .iter()
             .position(|(letter, _)| answer == letter.to_string())
             .ok_or_else(|| {
                 Error::data(
                     "answer",
                     format_args!(
-                        "question {id:?}: the answer {answer:?} is none of its choices' letters"
+                        "question {id:?}: the answer {answer:?} is not the letter of one of its choices"
                     ),
                 )
             })?;
         let choices = Choices::new(
-            shown.iter().map(|(_, text)| (*text).to_owned()).collect(),
+            filled_choices
+                .iter()
+                .map(|(_, text)| (*text).to_owned())
+                .collect(),
             truth,
         )?;
         let hint = self.hint.map(cell).filter(|hint| !hint.trim().is_empty());
@@ -107,7 +110,7 @@ impl TableColumns {
     }
 }
 
-/// A cell without the space around it, which must not be empty.
+/// The text of a cell without the space around it. An empty cell is an error.
 fn filled<'a>(row: &'a StringRecord, column: usize, name: &str) -> Result<&'a str> {
     match row.get(column).unwrap_or_default().trim() {
         "" => Err(Error::data(
@@ -126,7 +129,7 @@ fn reader(path: &Path) -> Result<Reader<File>> {
         .from_reader(file))
 }
 
-/// Reads the table: its images and its questions.
+/// The images and the questions of a table.
 pub(super) fn read(path: &Path) -> Result<(BTreeMap<FrameId, ImageSource>, Vec<Question>)> {
     let mut reader = reader(path)?;
     let header = reader
@@ -138,7 +141,7 @@ pub(super) fn read(path: &Path) -> Result<(BTreeMap<FrameId, ImageSource>, Vec<Q
             format_args!("not a VLMEvalKit table: {problem}"),
         )
     })?;
-    let beside = SiblingFiles::of(path);
+    let siblings = SiblingFiles::of(path);
     let (mut sources, mut questions) = (BTreeMap::new(), Vec::new());
     let mut row = StringRecord::new();
     while reader
@@ -151,7 +154,7 @@ pub(super) fn read(path: &Path) -> Result<(BTreeMap<FrameId, ImageSource>, Vec<Q
         let frame = match columns.image {
             ImageColumn::Path(column) => {
                 let image = filled(&row, column, "image_path").map_err(at)?;
-                let (frame, file) = beside
+                let (frame, file) = siblings
                     .image(image)
                     .map_err(|problem| Error::data(&place, problem))?;
                 sources.insert(frame.clone(), ImageSource::image(file));
@@ -174,20 +177,20 @@ pub(super) fn read(path: &Path) -> Result<(BTreeMap<FrameId, ImageSource>, Vec<Q
         };
         questions.push(columns.question(&row, frame).map_err(at)?);
     }
-    if let Some(stray) = questions
+    if let Some(unmatched) = questions
         .iter()
         .find(|question| !sources.contains_key(&question.frame))
     {
         let problem = format_args!(
-            "question {:?} shares the image of row {:?}, which holds none",
-            stray.id.0, stray.frame.0
+            "question {:?} uses the image of row {:?}, which has no image",
+            unmatched.id.0, unmatched.frame.0
         );
         return Err(Error::data(path.display(), problem));
     }
     Ok((sources, questions))
 }
 
-/// The place of an image in a table: read when it is needed, so that a table of gigabytes is never held.
+/// The place of an image in a table. It is read when needed, so that a table of gigabytes is never in memory.
 #[derive(Debug, Clone)]
 pub(crate) struct ImageCell {
     file: PathBuf,

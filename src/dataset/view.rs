@@ -1,4 +1,4 @@
-//! What a data set says of a frame beside its files: [`FrameFacts`]; and the files' bytes: [`FrameFiles`].
+//! The facts about a frame that are not in its images: [`FrameFacts`]; and the bytes of its files: [`FrameFiles`].
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use super::maps::MapFiles;
 use crate::error::Result;
 use crate::types::{DepthKind, Digest, Frame, FrameId, Intrinsics, SegmentName, Segmentation};
 
-/// What a data set says of a frame beside its files.
+/// The facts about a frame that are not in its images: scene, camera, names of segments, room.
 #[derive(Debug, Clone, Default, Serialize)]
 pub(crate) struct FrameFacts {
     pub(crate) scene: String,
@@ -22,7 +22,7 @@ pub(crate) struct FrameFacts {
     pub(crate) room: Option<String>,
 }
 
-/// As pairs: the keys of JSON are texts.
+/// Writes a map as a list of pairs, because the keys of a JSON object can only be texts.
 fn pairs<S: Serializer>(
     names: &BTreeMap<u32, SegmentName>,
     serializer: S,
@@ -30,7 +30,7 @@ fn pairs<S: Serializer>(
     serializer.collect_seq(names)
 }
 
-/// The files of a frame as they lie in the data set, undecoded.
+/// The files of a frame as they are stored, not decoded.
 #[derive(Debug)]
 pub struct FrameFiles<'a> {
     pub(crate) id: &'a FrameId,
@@ -40,10 +40,10 @@ pub struct FrameFiles<'a> {
 }
 
 impl FrameFiles<'_> {
-    /// The content of all files, and of what is said about them; not the name.
+    /// The digest of all files and facts, without the name of the frame.
     ///
     /// # Errors
-    /// If a number of the camera is not finite.
+    /// If a number of the camera intrinsics is not finite.
     pub fn digest(&self) -> Result<Digest> {
         let parts = [
             self.picture.digest(),
@@ -55,10 +55,10 @@ impl FrameFiles<'_> {
         ))
     }
 
-    /// The frame.
+    /// The frame with its image and maps decoded.
     ///
     /// # Errors
-    /// With the file: an image or a map that is broken, a map of another size than the image.
+    /// If an image or a map is broken, or a map has another size than the image; the error names the file.
     pub fn decode(&self) -> Result<Frame> {
         if let Picture::Drawn(room) = &self.picture {
             return Ok(room.frame()?.as_ref().clone());

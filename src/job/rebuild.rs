@@ -179,6 +179,6 @@ fn frames(place: &DataPlace) -> Result<Dataset> {
     match place {
         DataPlace::Path(path) if path.join("frames.jsonl").is_file() => Dataset::of_frames(path),
         DataPlace::Path(_) => Dataset::open(place, None),
-        DataPlace::Rooms(_) => Dataset::open_unasked(place),
+        DataPlace::Rooms(_) => Dataset::open_without_questions(place),
     }
 }

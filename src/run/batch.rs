@@ -1,4 +1,4 @@
-//! `batch import`: the output of a Batch API, as records.
+//! `batch import`: reading the output of a Batch API into the records of a run.
 
 use std::path::PathBuf;
 
@@ -27,10 +27,10 @@ pub(crate) struct BatchImportArgs {
     pub json: bool,
 }
 
-/// Imports the replies of output and error files, each of them once, however often a file is given.
+/// Imports the replies of output and error files. Each reply is imported once, even if a file is imported again.
 ///
 /// # Errors
-/// If the folder holds no run or no batch, or a line is not one of such a file: those before it are kept.
+/// If the folder holds no run or no batch, or a line is not valid. The replies of the lines before it stay imported.
 pub(crate) fn import(args: &BatchImportArgs) -> Result<Outcome> {
     match ExperimentKind::of(&args.run)? {
         ExperimentKind::Choice => import_into::<ChoiceDetail>(args, choice::write),

@@ -1,4 +1,4 @@
-//! `enhance`: images as a model mends them, or what is known of the model.
+//! `enhance`: writing images that an enhancer made, or describing the enhancer.
 
 use std::path::{Path, PathBuf};
 
@@ -29,26 +29,26 @@ pub(crate) struct EnhanceArgs {
     /// Where the enhanced images go, as PNG under their own names; default: nowhere, with --describe
     #[arg(long, value_name = "DIR", required_unless_present = "describe", add = Decides::Nothing)]
     pub out: Option<PathBuf>,
-    /// Tell how the model is fed and read, and what says so; enhances nothing
-    #[arg(long, conflicts_with_all = ["inputs", "out"], add = Decides::Nothing)]
+    /// Print how the model's input and output are read, and why; enhances nothing
+    #[arg(long, conflicts_with_all = ["inputs", "out"])]
     pub describe: bool,
-    /// How the model is run.
+    /// The flags for running enhancers.
     #[command(flatten)]
     pub loading: EnhancerRunArgs,
-    /// Make images again that are there already
-    #[arg(long, help_heading = "Output", add = Decides::Nothing)]
+    /// Replace images that exist already
+    #[arg(long, help_heading = "Output")]
     pub force: bool,
-    /// How large an image may be.
+    /// The maximum size of an image.
     #[command(flatten)]
     pub limit: PixelLimit,
 }
 
-/// Makes the images, or describes the model.
+/// Enhances the images, or describes the model.
 ///
-/// What cannot be made of one image is said, counted, and does not stop the others.
+/// If one image fails, the error is logged and counted, and the others continue.
 ///
 /// # Errors
-/// Where nothing can be made: no such model or input, two images of one name, no folder to write to.
+/// If the model or an input is missing, two images have the same name, or the folder cannot be written to.
 pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
     let files = vec![ModelFile::read(&args.model)?];
     let enhancers = OpenEnhancers::load(files, &args.loading)?.take()?;
@@ -62,14 +62,14 @@ pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome
     };
     let images = Inputs::open(&args.inputs, args.limit.max_pixels.get())?;
     let bar = progress.bar("images", images.entries.len());
-    let (mut made, mut kept, mut failed) = (0, 0, 0);
+    let (mut written, mut unchanged, mut failed) = (0, 0, 0);
     for entry in &images.entries {
         let path = out.join(format!("{}.png", entry.stem));
         if path.exists() && !args.force {
-            kept += 1;
+            unchanged += 1;
         } else {
-            match one(&mut enhancer, &images, entry, &path) {
-                Ok(()) => made += 1,
+            match enhance_one(&mut enhancer, &images, entry, &path) {
+                Ok(()) => written += 1,
                 Err(e) => {
                     failed += 1;
                     tracing::error!("{e}");
@@ -90,17 +90,22 @@ pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome
             Status::Incomplete
         },
         output: format!(
-            "{}: {made} made by {}{}{}\n",
+            "{}: {written} made by {}{}{}\n",
             out.display(),
             enhancer.name(),
-            count(kept, "kept as they were (--force makes them again)"),
+            count(unchanged, "kept as they were (--force makes them again)"),
             count(failed, "failed")
         ),
     })
 }
 
-fn one(enhancer: &mut Enhancer, images: &Inputs, entry: &InputFrame, path: &Path) -> Result<()> {
-    let mended = enhancer.enhance(&images.picture(entry)?.decode()?);
-    let named = |e| Error::data(format_args!("image {:?}", entry.id.0), e);
-    write(path, &png(&mended.map_err(named)?)?)
+fn enhance_one(
+    enhancer: &mut Enhancer,
+    images: &Inputs,
+    entry: &InputFrame,
+    path: &Path,
+) -> Result<()> {
+    let enhanced = enhancer.enhance(&images.picture(entry)?.decode()?);
+    let with_name = |e| Error::data(format_args!("image {:?}", entry.id.0), e);
+    write(path, &png(&enhanced.map_err(with_name)?)?)
 }

@@ -1,4 +1,4 @@
-//! `import`: another data set → frames of the common interface.
+//! `import`: writing the frames of another data set in the common interface.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -21,17 +21,17 @@ use crate::job::workers::{ThreadArgs, pool};
 use crate::types::Decides;
 use crate::types::manifest::Status;
 
-/// The median depths of a frame of a room, in millimetres: outside of them its scale is wrong, or it looks at a wall.
+/// Plausible median depths of a frame in millimetres (chosen). Outside this range the scale is wrong, or it shows a wall.
 const ROOM: std::ops::RangeInclusive<u32> = 300..=15_000;
 
-/// How many words without a class are named.
+/// The maximum number of words without a class that are printed.
 const NAMED: usize = 12;
 
 /// The flags of `import`.
 #[derive(Debug, Args)]
 pub(crate) struct ImportArgs {
-    /// What lies in --src
-    #[arg(value_name = "KIND", value_enum, add = Decides::Pixels)]
+    /// The kind of data set in --src
+    #[arg(value_name = "KIND", value_enum)]
     pub kind: DataSetKind,
     /// The data set, laid out as src/import/README.md shows
     #[arg(long, value_name = "DIR", add = Decides::Pixels)]
@@ -42,34 +42,35 @@ pub(crate) struct ImportArgs {
     /// The name the data set gives itself; questions are named by it; default: the kind
     #[arg(long, value_name = "NAME", add = Decides::Reply)]
     pub name: Option<String>,
-    /// What is said of its maps.
+    /// Facts about the maps that the data set does not state.
     #[command(flatten)]
     pub stated: StatedArgs,
-    /// Which frames are taken.
+    /// The flags that select key frames.
     #[command(flatten)]
     pub key_frames: KeyFrameArgs,
     /// Write into a folder that holds frames already
     #[arg(long, help_heading = "Output", add = Decides::Nothing)]
     pub force: bool,
-    /// How large an image may be.
+    /// The maximum size of an image.
     #[command(flatten)]
     pub limit: PixelLimit,
-    /// On how many threads.
+    /// The number of threads.
     #[command(flatten)]
     pub threads: ThreadArgs,
 }
 
 /// Imports the frames.
 ///
-/// What cannot be read of one frame is said, counted, and does not stop the others.
+/// If one frame fails, the error is logged and counted, and the others continue.
 ///
 /// # Errors
-/// Where there are no frames, the folder holds others already, most depths are none of a room, or nothing could be read.
+/// If there are no frames, the folder holds frames already, the typical depth is not that of a room, or no frame could be
+/// read.
 pub(crate) fn import(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
     let list = args.out.join("frames.jsonl");
     if !args.force && list.exists() {
         let problem =
-            "frames are there already; --force writes over them, another --out keeps both";
+            "the folder has frames already; --force overwrites them, another --out keeps both";
         return Err(Error::data(list.display(), problem));
     }
     let adapter = open(args.kind, &args.src, &args.stated)?;
@@ -78,27 +79,28 @@ pub(crate) fn import(args: &ImportArgs, progress: &Progress) -> Result<Outcome> 
         args.key_frames.selection(),
         args.key_frames.fps,
     )?;
-    let cores = pool(args.threads.threads)?;
+    let workers = pool(args.threads.threads)?;
     let bar = progress.bar("frames", frames.len());
-    let made: Vec<Option<WrittenFrame>> = cores.install(|| {
+    let written: Vec<Option<WrittenFrame>> = workers.install(|| {
         let frames = frames.par_iter().map(|frame| {
-            let made = one(args, &*adapter, frame);
+            let written = write_frame(args, &*adapter, frame);
             bar.inc();
-            made.map_err(|e| tracing::error!("{}/{}: {e}", frame.scene, frame.frame))
+            written
+                .map_err(|e| tracing::error!("{}/{}: {e}", frame.scene, frame.frame))
                 .ok()
         });
         frames.collect()
     });
     drop(bar);
-    let failed = made.iter().filter(|made| made.is_none()).count();
-    let made: Vec<WrittenFrame> = made.into_iter().flatten().collect();
-    if made.is_empty() {
+    let failed = written.iter().filter(|written| written.is_none()).count();
+    let written: Vec<WrittenFrame> = written.into_iter().flatten().collect();
+    if written.is_empty() {
         return Err(Error::data(
             args.src.display(),
-            "none of its frames could be read",
+            "no frame of it could be read",
         ));
     }
-    let note = depths(&made)?;
+    let note = depths(&written)?;
     let mut scenes: Vec<&str> = frames.iter().map(|frame| frame.scene.as_str()).collect();
     scenes.dedup();
     let listing = adapter.listing();
@@ -107,19 +109,19 @@ pub(crate) fn import(args: &ImportArgs, progress: &Progress) -> Result<Outcome> 
             frame_folder::names(&args.out, scene, names)?;
         }
     }
-    let about = json!({
+    let info = json!({
         "schema": "darkqa.dataset/1",
         "name": args.name.as_deref().unwrap_or(&args.kind.to_string()),
         "label_space": listing.labels.space,
         "depth_kind": listing.depth_kind,
         "source": args.kind.to_string(),
     });
-    let lines = made.iter().map(|made| &made.line);
-    frame_folder::finish(&args.out, &listing.labels, &about, lines)?;
+    let lines = written.iter().map(|written| &written.line);
+    frame_folder::finish(&args.out, &listing.labels, &info, lines)?;
     let mut output = format!(
         "{}: {} frames of {} scenes{}\n{note}",
         args.out.display(),
-        made.len(),
+        written.len(),
         scenes.len(),
         if failed == 0 {
             String::new()
@@ -140,13 +142,17 @@ pub(crate) fn import(args: &ImportArgs, progress: &Progress) -> Result<Outcome> 
 
 /// A frame that was written.
 struct WrittenFrame {
-    /// Its line of `frames.jsonl`.
+    /// The line of the frame in `frames.jsonl`.
     line: Map<String, Value>,
-    /// The median of its depth in millimetres.
+    /// The median depth in millimetres; `None` without a depth map.
     depth: Option<u32>,
 }
 
-fn one(args: &ImportArgs, adapter: &dyn Adapter, frame: &ListedFrame) -> Result<WrittenFrame> {
+fn write_frame(
+    args: &ImportArgs,
+    adapter: &dyn Adapter,
+    frame: &ListedFrame,
+) -> Result<WrittenFrame> {
     for name in [&frame.scene, &frame.frame] {
         let mut parts = Path::new(name).components();
         if name.is_empty() || !parts.all(|part| matches!(part, Component::Normal(_))) {
@@ -167,15 +173,15 @@ fn one(args: &ImportArgs, adapter: &dyn Adapter, frame: &ListedFrame) -> Result<
         segments,
         room,
     } = adapter.read(frame, &rgb)?;
-    let place = FramePaths {
+    let paths = FramePaths {
         out: &args.out,
         scene: &frame.scene,
         frame: &frame.frame,
     };
-    let mut line = place.line(&rgb);
+    let mut line = paths.line(&rgb);
     let source = frame.rgb.file_name().map(|name| name.to_string_lossy());
     line.insert("source".to_owned(), json!(source));
-    // A JPEG file stays one: what it has lost stays lost, and its pixels stay the same.
+    // A JPEG file is copied as it is, so that its pixels stay the same.
     let jpeg = frame
         .rgb
         .extension()
@@ -184,17 +190,17 @@ fn one(args: &ImportArgs, adapter: &dyn Adapter, frame: &ListedFrame) -> Result<
         Picture::Encoded { bytes, .. } if jpeg => bytes,
         _ => png(&rgb)?,
     };
-    let image = place.write("rgb", if jpeg { "jpg" } else { "png" }, &content)?;
+    let image = paths.write("rgb", if jpeg { "jpg" } else { "png" }, &content)?;
     line.insert("rgb".to_owned(), json!(image));
     let median = depth.as_ref().and_then(median);
     if let Some(depth) = &depth {
-        place.depth(&mut line, depth, adapter.listing().depth_kind)?;
+        paths.depth(&mut line, depth, adapter.listing().depth_kind)?;
     }
     if let Some(semantic) = &semantic {
-        place.semantic(&mut line, semantic)?;
+        paths.semantic(&mut line, semantic)?;
     }
     if let Some(segments) = &segments {
-        place.segments(&mut line, segments, adapter.listing().segmentation)?;
+        paths.segments(&mut line, segments, adapter.listing().segmentation)?;
     }
     for (key, value) in [
         ("t", json!(frame.time)),
@@ -212,16 +218,16 @@ fn one(args: &ImportArgs, adapter: &dyn Adapter, frame: &ListedFrame) -> Result<
     })
 }
 
-/// The median of what has depth.
+/// The median of all depths above 0, in millimetres; `None` if there are none.
 fn median(depth: &Array2<u32>) -> Option<u32> {
     let mut depths: Vec<u32> = depth.iter().copied().filter(|depth| *depth > 0).collect();
     let middle = depths.len().checked_sub(1)? / 2;
     Some(*depths.select_nth_unstable(middle).1)
 }
 
-/// What the depths are like; refused where most of them are none of a room.
-fn depths(made: &[WrittenFrame]) -> Result<String> {
-    let mut medians: Vec<u32> = made.iter().filter_map(|made| made.depth).collect();
+/// A note about the typical depth; an error if it is not that of a room.
+fn depths(written: &[WrittenFrame]) -> Result<String> {
+    let mut medians: Vec<u32> = written.iter().filter_map(|written| written.depth).collect();
     let Some(middle) = medians.len().checked_sub(1) else {
         return Ok("no depth: there will be no questions about the closest object\n".to_owned());
     };
@@ -230,7 +236,7 @@ fn depths(made: &[WrittenFrame]) -> Result<String> {
     let metres = |depth: u32| f64::from(depth) / 1000.0;
     if !ROOM.contains(&typical) {
         let problem = format_args!(
-            "the frames' typical depth is {} m, but that of rooms lies between {} and {} m; --depth-scale says how many metres a unit of depth is",
+            "the typical depth of the frames is {} m, but that of rooms is between {} and {} m; set --depth-scale to the metres per unit of depth",
             metres(typical),
             metres(*ROOM.start()),
             metres(*ROOM.end())
@@ -240,7 +246,7 @@ fn depths(made: &[WrittenFrame]) -> Result<String> {
     Ok(format!("typical depth: {:.2} m\n", metres(typical)))
 }
 
-/// The words that no table has a class for.
+/// A note of the words for which no table has a class.
 fn words(unlisted: &BTreeMap<String, usize>) -> String {
     if unlisted.is_empty() {
         return String::new();

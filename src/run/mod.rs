@@ -1,4 +1,4 @@
-//! One folder or file a command. What several of them need is in [`job`](crate::job) or below; no command uses another's folder.
+//! One folder or file per command. Shared parts are in [`job`](crate::job) or below; no command uses the folder of another.
 
 pub(crate) mod batch;
 pub(crate) mod enhance;

@@ -1,9 +1,9 @@
-//! `realism`: the synthesis against real pairs of images in normal and low light, as the paper's comparison on
-//! LLRGBD-real (DarkQA, Table I).
+//! `realism`: comparing the synthesis with real pairs of images in normal and low light, as the paper does on LLRGBD-real
+//! (DarkQA, Table I).
 //!
-//! Each pair's image in normal light is made as dark as its partner, by exposure drop alone and with the sensor's noise,
-//! and both are compared with the real one. Residuals stand over the dropped clean image on either side; those of the
-//! exposure drop itself are 0 everywhere, so that its divergence says how empty bins are counted, and no more.
+//! The image in normal light is made as dark as its partner, by exposure drop alone and with sensor noise. Both results
+//! are compared with the real image. A residual is the difference from the clean image after the exposure drop. The
+//! residuals of the exposure drop alone are 0, so its divergence depends only on how empty bins are counted.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -30,10 +30,10 @@ use crate::types::Decides;
 use crate::types::manifest::Status;
 use crate::types::{FrameId, Rgb};
 
-/// The most pairs whose crops are shown.
+/// The maximum number of pairs whose crops are shown (chosen).
 const MOST_CROPS: usize = 8;
 
-/// The exposure drops that can be asked for, in EV.
+/// The minimum and maximum of `--ev`, in EV.
 const DROPS: [f32; 2] = [-20.0, 20.0];
 
 /// The flags of `realism`.
@@ -70,15 +70,15 @@ pub(crate) struct RealismArgs {
     /// Print the summary as JSON instead of a table
     #[arg(long, help_heading = "Output", add = Decides::Nothing)]
     pub json: bool,
-    /// How large an image may be.
+    /// The maximum size of an image.
     #[command(flatten)]
     pub limit: PixelLimit,
-    /// On how many threads.
+    /// The number of threads.
     #[command(flatten)]
     pub threads: ThreadArgs,
 }
 
-/// Reads an exposure drop.
+/// The exposure drop in a text, in EV.
 fn drop_ev(text: &str) -> Result<f32, String> {
     let [least, most] = DROPS;
     let ev = text.parse().ok();
@@ -86,21 +86,21 @@ fn drop_ev(text: &str) -> Result<f32, String> {
     ev.ok_or_else(|| format!("a number from {least} to {most} expected"))
 }
 
-/// A pair that was compared, with what the figures need.
+/// The comparison of a pair, with the data for the figures.
 struct PairWork {
     compared: PairComparison,
-    /// Real and synthetic.
+    /// The residuals of the real and of the noisy image.
     residuals: [Residuals; 2],
-    /// Real, by exposure and with noise, of the first pairs.
+    /// The real image, the one by exposure alone and the noisy one; `None` if no crops are shown.
     images: Option<[Rgb; 3]>,
 }
 
 /// Compares all pairs.
 ///
-/// A pair that cannot be compared is said, counted, and does not stop the others.
+/// If one pair fails, the error is logged and counted, and the others continue.
 ///
 /// # Errors
-/// Where there is no pair, none can be compared, or a file cannot be written.
+/// If there is no pair, none can be compared, or a file cannot be written.
 pub(crate) fn realism(args: &RealismArgs, progress: &Progress) -> Result<Outcome> {
     let Pairs { pairs, unmatched } = match (&args.pairs, &args.normal, &args.low) {
         (None, Some(normal), Some(low)) => Pairs::of_folders(normal, low)?,
@@ -110,9 +110,9 @@ pub(crate) fn realism(args: &RealismArgs, progress: &Progress) -> Result<Outcome
     for path in &unmatched {
         tracing::warn!("{}: no partner in the other light", path.display());
     }
-    let cores = pool(args.threads.threads)?;
+    let workers = pool(args.threads.threads)?;
     let bar = progress.bar("pairs", pairs.len());
-    let results: Vec<Option<PairWork>> = cores.install(|| {
+    let results: Vec<Option<PairWork>> = workers.install(|| {
         let pairs = pairs.par_iter().enumerate();
         let compared = pairs.map(|(index, pair)| {
             let work = compare(args, &sensor, pair, index < MOST_CROPS);
@@ -124,7 +124,7 @@ pub(crate) fn realism(args: &RealismArgs, progress: &Progress) -> Result<Outcome
     drop(bar);
     let works: Vec<PairWork> = results.into_iter().flatten().collect();
     if works.is_empty() {
-        return Err(Error::data("pairs", "none of them could be compared"));
+        return Err(Error::data("pairs", "no pair could be compared"));
     }
     let failed = pairs.len() - works.len();
     let compared: Vec<&PairComparison> = works.iter().map(|work| &work.compared).collect();
@@ -140,7 +140,7 @@ pub(crate) fn realism(args: &RealismArgs, progress: &Progress) -> Result<Outcome
     };
     let summary = RealismSummary::new(rules, source, &compared)?;
     if let Some(out) = &args.out {
-        files(out, &works, &summary)?;
+        write_files(out, &works, &summary)?;
     }
     Ok(Outcome {
         status: if failed == 0 {
@@ -212,8 +212,8 @@ fn compare(
     })
 }
 
-/// Leaves the numbers by pair, the summary and the figures in a folder.
-fn files(out: &Path, works: &[PairWork], summary: &RealismSummary) -> Result<()> {
+/// Writes the numbers of each pair, the summary and the figures into a folder.
+fn write_files(out: &Path, works: &[PairWork], summary: &RealismSummary) -> Result<()> {
     fs::create_dir_all(out).map_err(|e| Error::file(out, "make", e))?;
     let compared: Vec<&PairComparison> = works.iter().map(|work| &work.compared).collect();
     write(&out.join("pairs.csv"), &report::realism::pairs(&compared)?)?;

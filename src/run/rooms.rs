@@ -1,4 +1,4 @@
-//! `rooms`: the built-in rooms as files.
+//! `rooms`: writing the built-in rooms as files.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -24,76 +24,76 @@ pub(crate) struct RoomsArgs {
     /// Where the frames go, in the common interface
     #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub out: PathBuf,
-    /// Which rooms.
+    /// The rooms to make.
     #[command(flatten)]
     pub rooms: Rooms,
     /// Write into a folder that holds frames already
     #[arg(long, add = Decides::Nothing)]
     pub force: bool,
-    /// On how many threads.
+    /// The number of threads.
     #[command(flatten)]
     pub threads: ThreadArgs,
 }
 
-/// Writes the rooms in the common interface. So many frames as there are threads stand in memory at once.
+/// Writes the rooms in the common interface. Each thread holds one frame in memory.
 ///
 /// # Errors
-/// Where the folder holds frames already, or a file cannot be written.
+/// If the folder holds frames already, or a file cannot be written.
 pub(crate) fn rooms(args: &RoomsArgs, progress: &Progress) -> Result<Outcome> {
     let list = args.out.join(FRAMES);
     if !args.force && list.exists() {
         let problem =
-            "frames are there already; --force writes over them, another --out keeps both";
+            "the folder has frames already; --force overwrites them, another --out keeps both";
         return Err(Error::data(list.display(), problem));
     }
-    let cores = pool(args.threads.threads)?;
+    let workers = pool(args.threads.threads)?;
     let rooms: BTreeMap<FrameId, Room> = args.rooms.all().collect();
     let bar = progress.bar("rooms", rooms.len());
-    let lines: Vec<Map<String, Value>> = cores.install(|| {
+    let lines: Vec<Map<String, Value>> = workers.install(|| {
         let lines = rooms
             .values()
             .collect::<Vec<_>>()
             .into_par_iter()
             .map(|room| {
-                let line = one(args, room);
+                let line = write_frame(args, room);
                 bar.inc();
                 line
             });
         lines.collect::<Result<_>>()
     })?;
     drop(bar);
-    let about = json!({
+    let info = json!({
         "schema": "darkqa.dataset/1",
         "name": args.rooms.title(),
         "label_space": "mpcat40",
         "source": format!("darkqa-eval rooms {} {}", rooms::VERSION, args.rooms),
     });
     let labels: Labels = rooms::labels();
-    frame_folder::finish(&args.out, &labels, &about, lines.iter())?;
+    frame_folder::finish(&args.out, &labels, &info, lines.iter())?;
     Ok(Outcome {
         status: Status::Complete,
         output: format!("{}: {} frames\n", args.out.display(), lines.len()),
     })
 }
 
-fn one(args: &RoomsArgs, room: &Room) -> Result<Map<String, Value>> {
+fn write_frame(args: &RoomsArgs, room: &Room) -> Result<Map<String, Value>> {
     let frame = room.frame()?;
-    let place = FramePaths {
+    let paths = FramePaths {
         out: &args.out,
         scene: &frame.scene,
         frame: room.view(),
     };
-    let mut line = place.line(&frame.rgb);
-    let image = place.write("rgb", "png", &png(&frame.rgb)?)?;
+    let mut line = paths.line(&frame.rgb);
+    let image = paths.write("rgb", "png", &png(&frame.rgb)?)?;
     line.insert("rgb".to_owned(), json!(image));
     if let Some(depth) = &frame.depth {
-        place.depth(&mut line, depth, frame.depth_kind)?;
+        paths.depth(&mut line, depth, frame.depth_kind)?;
     }
     if let Some(semantic) = &frame.semantic {
-        place.semantic(&mut line, semantic)?;
+        paths.semantic(&mut line, semantic)?;
     }
     if let Some(segments) = &frame.segments {
-        place.segments(&mut line, segments, frame.segmentation)?;
+        paths.segments(&mut line, segments, frame.segmentation)?;
     }
     line.insert("intrinsics".to_owned(), json!(frame.intrinsics));
     line.insert("pose".to_owned(), json!(room.pose()));

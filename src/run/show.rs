@@ -1,4 +1,4 @@
-//! `show`: the images that one item was asked with, made again and proved by their digests.
+//! `show`: making the images of one item again, and checking by their digests that they are those that were sent.
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -32,32 +32,32 @@ pub(crate) struct ShowArgs {
     /// Where the images go; default: shown in the folder of the run
     #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub out: Option<PathBuf>,
-    /// Where everything lies by now.
+    /// Where the data and enhancers are now.
     #[command(flatten)]
     pub rebuild: RebuildArgs,
 }
 
-/// What one model made of the item.
+/// The reply of one model to the item, in one condition.
 struct ShownAnswer {
     model: String,
     condition: Option<Condition>,
     outcome: &'static str,
     reply: String,
-    /// The digest of what was sent.
+    /// The digest of the image that was sent, or of all images of a walk.
     sent: Option<Digest>,
 }
 
-/// The item, and what the models made of it.
+/// The item and the replies to it.
 struct ShownItem {
     source: FrameId,
     text: String,
     answers: Vec<ShownAnswer>,
 }
 
-/// Makes the images again, writes them, and says of each whether it is the one that was sent.
+/// Makes the images again, writes them, and prints for each whether it is the one that was sent.
 ///
 /// # Errors
-/// If the run or the item is not there, or its data or enhancers are not where they were.
+/// If the run or the item is missing, or its data or enhancers are not found.
 pub(crate) fn show(args: ShowArgs) -> Result<Outcome> {
     let folder = args.run.clone();
     let name = args.item.split('#').next().unwrap_or_default();
@@ -78,9 +78,9 @@ pub(crate) fn show(args: ShowArgs) -> Result<Outcome> {
     let mut text = item.text;
     let mut all_same = true;
     for (condition, images) in conditions.iter().zip(images) {
-        let several = images.len() > 1;
+        let multiple = images.len() > 1;
         for (place, image) in images.iter().enumerate() {
-            let place = if several {
+            let place = if multiple {
                 format!("_{place:03}")
             } else {
                 String::new()
@@ -94,22 +94,22 @@ pub(crate) fn show(args: ShowArgs) -> Result<Outcome> {
             write(&path, &image.file)?;
             let _ = writeln!(text, "{condition}: {}", path.display());
         }
-        let digest = together(&images);
+        let digest = joint_digest(&images);
         let sent = sent(&item.answers, condition);
-        let proof = if sent.is_empty() {
-            format!("nothing is known of what was sent; {digest} now")
+        let comparison = if sent.is_empty() {
+            format!("the digest of what was sent is not stored; {digest} now")
         } else if sent.iter().all(|sent| *sent == digest) {
             format!("the very bytes that were sent ({digest})")
         } else {
             all_same = false;
             format!("NOT the bytes that were sent: {digest} now")
         };
-        let _ = writeln!(text, "{condition}: {proof}");
+        let _ = writeln!(text, "{condition}: {comparison}");
         text += &replies(&item.answers, Some(condition));
     }
     text += &replies(&item.answers, None);
     if !all_same {
-        text += "what decides the images is not as it was: the data, an enhancement model, or this program\n";
+        text += "the data, an enhancement model or this program has changed since the run\n";
     }
     Ok(Outcome {
         status: if all_same {
@@ -121,31 +121,31 @@ pub(crate) fn show(args: ShowArgs) -> Result<Outcome> {
     })
 }
 
-/// The manifest of a run and one item of it; `None` if nothing was asked about it.
+/// The manifest of a run, and one item of it; `None` if the run did not ask the item.
 fn read(run: AnyRun, name: &str) -> (RunManifest, Option<ShownItem>) {
     match run {
         AnyRun::Choice(run) => {
-            let own = run
+            let matching = run
                 .records
                 .iter()
                 .filter(|record| record.question.0 == name);
-            let records: Vec<&Record> = own.collect();
+            let records: Vec<&Record> = matching.collect();
             let item = records.first().map(|first| ShownItem {
                 source: first.detail.frame.clone(),
-                text: choice_text(first, listed(&run.questions, name)),
+                text: choice_text(first, stored_question(&run.questions, name)),
                 answers: records.iter().map(|record| choice_answer(record)).collect(),
             });
             (run.manifest, item)
         }
         AnyRun::Open(run) => {
-            let own = run
+            let matching = run
                 .records
                 .iter()
                 .filter(|record| record.question.0 == name);
-            let records: Vec<&Record<OpenDetail>> = own.collect();
+            let records: Vec<&Record<OpenDetail>> = matching.collect();
             let item = records.first().map(|first| ShownItem {
                 source: FrameId(first.detail.episode.clone()),
-                text: open_text(first, listed(&run.questions, name)),
+                text: open_text(first, stored_question(&run.questions, name)),
                 answers: records.iter().map(|record| open_answer(record)).collect(),
             });
             (run.manifest, item)
@@ -153,14 +153,14 @@ fn read(run: AnyRun, name: &str) -> (RunManifest, Option<ShownItem>) {
     }
 }
 
-fn listed<'a>(questions: &'a [RunQuestion], name: &str) -> Option<&'a RunQuestion> {
+fn stored_question<'a>(questions: &'a [RunQuestion], name: &str) -> Option<&'a RunQuestion> {
     questions.iter().find(|question| question.id.0 == name)
 }
 
-fn choice_text(record: &Record, listed: Option<&RunQuestion>) -> String {
+fn choice_text(record: &Record, stored_question: Option<&RunQuestion>) -> String {
     let mut text = format!("{}, about {}\n", record.question, record.detail.frame);
-    if let Some(listed) = listed {
-        let _ = writeln!(text, "{}", listed.text);
+    if let Some(stored_question) = stored_question {
+        let _ = writeln!(text, "{}", stored_question.text);
     }
     for (index, choice) in record.detail.choices.iter().enumerate() {
         let truth = if index == record.detail.truth {
@@ -188,10 +188,14 @@ fn choice_answer(record: &Record) -> ShownAnswer {
     }
 }
 
-fn open_text(record: &Record<OpenDetail>, listed: Option<&RunQuestion>) -> String {
+fn open_text(record: &Record<OpenDetail>, stored_question: Option<&RunQuestion>) -> String {
     let mut text = format!("{}, about {}\n", record.question, record.detail.episode);
-    if let Some(listed) = listed {
-        let _ = writeln!(text, "{}\n  {}  (true)", listed.text, listed.answer);
+    if let Some(stored_question) = stored_question {
+        let _ = writeln!(
+            text,
+            "{}\n  {}  (true)",
+            stored_question.text, stored_question.answer
+        );
     }
     text
 }
@@ -216,49 +220,49 @@ fn reply(reply: Option<&str>, failure: Option<&types::Failure>) -> String {
     text.chars().take(200).collect()
 }
 
-/// The conditions that the item was shown in, or those of them that are wanted.
+/// The conditions of the item, limited to those of `--condition`.
 fn conditions(answers: &[ShownAnswer], args: &ShowArgs) -> Result<Vec<Condition>> {
     let wanted = &args.condition;
-    let there = answers.iter().filter_map(|answer| answer.condition.clone());
-    let there: BTreeSet<Condition> = there.collect();
-    if there.is_empty() {
+    let asked = answers.iter().filter_map(|answer| answer.condition.clone());
+    let asked: BTreeSet<Condition> = asked.collect();
+    if asked.is_empty() {
         let problem =
-            "the item was asked without images alone: there is nothing to show".to_owned();
+            "the item was only asked without images, so there is nothing to show".to_owned();
         let path = args.run.clone();
         return Err(Error::Run { path, problem });
     }
     if wanted.is_empty() {
-        return Ok(there.into_iter().collect());
+        return Ok(asked.into_iter().collect());
     }
-    if let Some(missing) = wanted.iter().find(|condition| !there.contains(condition)) {
-        let there: Vec<String> = there.iter().map(ToString::to_string).collect();
+    if let Some(missing) = wanted.iter().find(|condition| !asked.contains(condition)) {
+        let asked: Vec<String> = asked.iter().map(ToString::to_string).collect();
         let problem = format!(
             "the item was not asked at {missing}; it was at {}",
-            there.join(", ")
+            asked.join(", ")
         );
         return Err(Error::usage("--condition", problem));
     }
     Ok(wanted.clone())
 }
 
-/// The digest of images that are sent together, as a record has it.
-fn together(images: &[RebuiltImage]) -> Digest {
+/// The digest of images that are sent together, as in a record.
+fn joint_digest(images: &[RebuiltImage]) -> Digest {
     match images {
         [only] => only.digest,
-        several => Digest::of_parts(several.iter().map(|image| &image.digest.as_bytes()[..])),
+        multiple => Digest::of_parts(multiple.iter().map(|image| &image.digest.as_bytes()[..])),
     }
 }
 
-/// The digests of what was sent in a condition.
+/// The digests of the images that were sent in a condition.
 fn sent(answers: &[ShownAnswer], condition: &Condition) -> BTreeSet<Digest> {
-    let there = answers
+    let matching = answers
         .iter()
         .filter(|answer| answer.condition.as_ref() == Some(condition));
-    there.filter_map(|answer| answer.sent).collect()
+    matching.filter_map(|answer| answer.sent).collect()
 }
 
-/// What each model made of the item in a condition, or without an image; replies in the form of a JSON text, so that nothing in them
-/// reaches the terminal as a control.
+/// The reply of each model in a condition, or without an image. Replies are escaped, so that they cannot send control
+/// characters to the terminal.
 fn replies(answers: &[ShownAnswer], condition: Option<&Condition>) -> String {
     let mut text = String::new();
     let without = if condition.is_none() {
@@ -268,7 +272,7 @@ fn replies(answers: &[ShownAnswer], condition: Option<&Condition>) -> String {
     };
     for answer in answers
         .iter()
-        .filter(|one| one.condition.as_ref() == condition)
+        .filter(|answer| answer.condition.as_ref() == condition)
     {
         let ShownAnswer {
             model,

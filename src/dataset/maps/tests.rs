@@ -11,7 +11,7 @@ fn deep(size: (u32, u32), values: &[u16]) -> Vec<u8> {
     png_file(size, ColorType::Grayscale, BitDepth::Sixteen, &data)
 }
 
-fn written(name: &str, bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
+fn temporary_file(name: &str, bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     fs::write(&path, bytes).unwrap();
@@ -19,7 +19,7 @@ fn written(name: &str, bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
 }
 
 fn depth(name: &str, bytes: &[u8], scale: Option<f64>, size: Size) -> Result<Array2<u32>> {
-    let (_folder, path) = written(name, bytes);
+    let (_folder, path) = temporary_file(name, bytes);
     let maps = MapPaths {
         depth: Some(DepthFile::new(path, scale).unwrap()),
         ..MapPaths::default()
@@ -78,7 +78,7 @@ fn depth_is_rounded_half_to_even_and_0_where_there_is_none() {
 }
 
 #[test]
-fn depth_no_room_has_is_refused() {
+fn a_depth_beyond_any_room_is_refused() {
     let error = depth("d.png", &deep((1, 1), &[2500]), Some(1.0), (1, 1)).unwrap_err();
     let error = error.to_string();
     assert!(error.contains("d.png: a depth of 2500 m"), "{error}");
@@ -89,7 +89,7 @@ fn depth_no_room_has_is_refused() {
 }
 
 #[test]
-fn a_scale_must_be_one() {
+fn an_impossible_scale_is_refused() {
     for (name, scale) in [
         ("d.png", None),
         ("d.png", Some(0.0)),
@@ -112,34 +112,38 @@ fn classes_are_read_in_every_form() {
         (shallow(ColorType::Indexed), array![[7, 255]]),
         (deep(size, &[7, 40_000]), array![[7, 40_000]]),
     ] {
-        let (_folder, path) = written("s.png", &bytes);
+        let (_folder, path) = temporary_file("s.png", &bytes);
         assert_eq!(semantic(&path, (1, 2)).unwrap(), expected);
     }
     let colour = png_file((1, 1), ColorType::Rgb, BitDepth::Eight, &[1, 2, 3]);
-    let (_folder, path) = written("s.png", &colour);
+    let (_folder, path) = temporary_file("s.png", &colour);
     let error = semantic(&path, (1, 1)).unwrap_err().to_string();
     assert!(error.contains("s.png: an RGB PNG of 8 bits"), "{error}");
 }
 
 #[test]
 fn segments_are_read_in_every_form() {
-    let (_folder, path) = written("o.png", &deep((1, 2), &[0, 65_535]));
+    let (_folder, path) = temporary_file("o.png", &deep((1, 2), &[0, 65_535]));
     assert_eq!(segments(&path, (1, 2)).unwrap(), array![[0, 65_535]]);
     let ids = [0_i64, 4_294_967_295].map(i64::to_le_bytes).concat();
-    let (_folder, path) = written("o.npy", &npy_file("<i8", "(2, 1)", &ids));
+    let (_folder, path) = temporary_file("o.npy", &npy_file("<i8", "(2, 1)", &ids));
     assert_eq!(segments(&path, (2, 1)).unwrap(), array![[0], [u32::MAX]]);
     for id in [-1_i64, 4_294_967_296] {
-        let (_folder, path) = written("o.npy", &npy_file("<i8", "(1, 1)", &id.to_le_bytes()));
+        let (_folder, path) =
+            temporary_file("o.npy", &npy_file("<i8", "(1, 1)", &id.to_le_bytes()));
         let error = segments(&path, (1, 1)).unwrap_err().to_string();
-        assert!(error.contains(&format!("o.npy: {id} is no id")), "{error}");
+        assert!(
+            error.contains(&format!("o.npy: {id} is not the id")),
+            "{error}"
+        );
     }
 }
 
 #[test]
 fn a_map_of_another_size_is_named_with_both_sizes() {
     let says = "1 × 2 pixels (height × width), but its image has 2 × 1";
-    let (_folder, png) = written("m.png", &deep((1, 2), &[1, 2]));
-    let (_folder, npy) = written("m.npy", &npy_file("|u1", "(1, 2)", &[1, 2]));
+    let (_folder, png) = temporary_file("m.png", &deep((1, 2), &[1, 2]));
+    let (_folder, npy) = temporary_file("m.npy", &npy_file("|u1", "(1, 2)", &[1, 2]));
     let units = deep((1, 2), &[1, 2]);
     for error in [
         depth("m.png", &units, Some(0.001), (2, 1)).unwrap_err(),
@@ -153,7 +157,7 @@ fn a_map_of_another_size_is_named_with_both_sizes() {
 }
 
 #[test]
-fn a_cut_map_is_named() {
+fn a_truncated_map_is_named() {
     let mut noise = 1_u32;
     let values: Vec<u16> = std::iter::repeat_with(|| {
         noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -162,7 +166,7 @@ fn a_cut_map_is_named() {
     .take(32 * 32)
     .collect();
     let bytes = deep((32, 32), &values);
-    let (_folder, path) = written("o.png", &bytes[..bytes.len() / 2]);
+    let (_folder, path) = temporary_file("o.png", &bytes[..bytes.len() / 2]);
     let error = segments(&path, (32, 32)).unwrap_err().to_string();
     assert!(error.contains("o.png: not a whole PNG"), "{error}");
 }

@@ -2,7 +2,7 @@ use proptest::prelude::*;
 
 use super::*;
 
-/// A file as `numpy.save` writes it, in the given version.
+/// A `.npy` file of the given version, as `numpy.save` writes it.
 pub(crate) fn file(major: u8, header: &str, data: &[u8]) -> Vec<u8> {
     let mut bytes = MAGIC.to_vec();
     bytes.extend([major, 0]);
@@ -72,7 +72,7 @@ fn every_integer_is_read() {
 }
 
 #[test]
-fn other_arrays_are_refused_by_what_they_are() {
+fn the_error_names_why_an_array_is_refused() {
     let fortran = "{'descr': '|u1', 'fortran_order': True, 'shape': (1, 1), }\n";
     let twice_open = "{'descr': '|u1', 'fortran_order': False, 'shape': (1, 1)} }\n";
     let record = "{'descr': [('x', '<f4')], 'fortran_order': False, 'shape': (1, 1), }\n";
@@ -104,7 +104,7 @@ fn other_arrays_are_refused_by_what_they_are() {
 }
 
 #[test]
-fn a_file_cut_anywhere_is_refused() {
+fn a_file_truncated_anywhere_is_refused() {
     let whole = array("<u2", "(2, 2)", &[0; 8]);
     assert!(Npy::parse(&whole).is_ok());
     for end in 0..whole.len() {

@@ -2,7 +2,7 @@ use proptest::prelude::*;
 
 use super::*;
 
-/// A PNG file of the given packed rows.
+/// A PNG file with the given packed rows.
 pub(crate) fn png(
     (height, width): (u32, u32),
     color: ColorType,
@@ -14,7 +14,7 @@ pub(crate) fn png(
     encoder.set_color(color);
     encoder.set_depth(bits);
     if color == ColorType::Indexed {
-        // Every colour the same: were the palette looked up, no place would be told from another.
+        // All colours are the same, so that a decoder that replaces indices by colours fails the test.
         encoder.set_palette(vec![200; 3 << (bits as u8)]);
     }
     let mut writer = encoder.write_header().unwrap();
@@ -28,7 +28,7 @@ fn read(bytes: &[u8], forms: &[SampleForm]) -> Result<Vec<u16>, String> {
 }
 
 #[test]
-fn places_in_a_palette_stay_places() {
+fn palette_indices_stay_indices() {
     for (bits, data, expected) in [
         (
             BitDepth::Eight,
@@ -133,7 +133,7 @@ fn other_forms_are_refused_by_name() {
 }
 
 #[test]
-fn a_bomb_is_refused_before_it_is_inflated() {
+fn a_bomb_is_refused_before_it_is_decompressed() {
     let mut bytes = png((1, 1), ColorType::Grayscale, BitDepth::Sixteen, &[0, 0]);
     bytes[16..24].copy_from_slice(&[0, 1, 0, 0, 0, 1, 0, 0]);
     seal(&mut bytes);
@@ -144,7 +144,7 @@ fn a_bomb_is_refused_before_it_is_inflated() {
     );
 }
 
-/// Makes the checksum of the file's header fit its changed content.
+/// Updates the checksum of the header after its content was changed.
 fn seal(bytes: &mut [u8]) {
     let sum = crc32(&bytes[12..29]);
     bytes[29..33].copy_from_slice(&sum.to_be_bytes());

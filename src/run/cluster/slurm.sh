@@ -4,8 +4,8 @@
 #     sbatch --array=0-15 slurm.sh --out runs/a --model gpt-4o --data frames/ --rpm 500
 #     darkqa-eval merge runs/a --out runs/a-whole        # when all tasks are done
 #
-# Each task does the part that its number in the array says. The key comes from the environment of sbatch, or --api-key-file.
-# A task that is preempted, or near its time limit, finishes what is on the wire, and goes on when it is started again.
+# Each task does the part with its number in the array. The key comes from the environment of sbatch, or --api-key-file.
+# A task that is preempted, or near its time limit, finishes the requests in flight, and continues when it is started again.
 #SBATCH --job-name=darkqa
 #SBATCH --array=0-3
 #SBATCH --cpus-per-task=1
@@ -26,7 +26,7 @@ if [ -n "$stopped" ]; then
   wait "$child"
   code=$?
 fi
-# 130: interrupted, with more to do. By itself, too, Slurm starts a preempted task again; one at its time limit it does not.
+# 130: interrupted, with more to do. Slurm restarts a preempted task without this, but not one at its time limit.
 if [ -n "$stopped" ] && [ "$code" -eq 130 ]; then
   scontrol requeue "${SLURM_ARRAY_JOB_ID}_${SLURM_ARRAY_TASK_ID}"
 fi

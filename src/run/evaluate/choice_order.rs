@@ -1,4 +1,4 @@
-//! In which orders the choices of a question are shown: [`ChoiceOrder`], [`arrange`].
+//! The orders in which the choices of a question are shown: [`ChoiceOrder`], [`arrange`].
 
 use std::num::NonZeroU32;
 
@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::types::Decides;
 use crate::types::{Choices, Digest, Question};
 
-/// In which orders the choices of a question are shown, and how often it is asked in each.
+/// The flags for the order of choices and for repeats.
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Data")]
 pub(crate) struct ChoiceOrder {
@@ -23,30 +23,30 @@ pub(crate) struct ChoiceOrder {
     pub repeats: NonZeroU32,
 }
 
-/// A question as it is shown once.
+/// One order in which a question is shown.
 #[derive(Debug)]
 pub(super) struct ShownQuestion {
     /// The question with its choices in the order shown.
     pub(super) question: Question,
-    /// How many times the same has been shown before.
+    /// The number of times that this order was shown before.
     pub(super) repeat: u32,
-    /// How many times it has been shown before, in whatever order.
+    /// The number of times that the question was shown before, in any order.
     pub(super) turn: u32,
 }
 
-/// Every way in which a question is shown: each rotation of its first order, all of them as often as is wanted.
+/// All orders in which a question is shown: each rotation of the first order, repeated `--repeats` times.
 ///
-/// The choices of a record are those shown, so its readings need no mapping back; two orders have two keys, because the
-/// choices enter them.
+/// A record holds the choices in the order shown, so its readings need no mapping back. Two orders have two keys, because
+/// the choices enter the key.
 pub(super) fn arrange(
     question: &Question,
-    showing: ChoiceOrder,
+    choice_order: ChoiceOrder,
     seed: u64,
 ) -> Result<Vec<ShownQuestion>> {
     let choices = &question.choices;
     let mut order: Vec<usize> = (0..choices.len()).collect();
-    if showing.shuffle_options {
-        // Sorted by a digest each: a random order that other questions do not move.
+    if choice_order.shuffle_options {
+        // Sorted by one digest per choice: a random order that does not depend on other questions.
         order.sort_by_cached_key(|&index| {
             let text = choices.texts()[index].as_bytes();
             let parts = [
@@ -58,9 +58,13 @@ pub(super) fn arrange(
             *Digest::of_parts(parts).as_bytes()
         });
     }
-    let rotations = if showing.circular { choices.len() } else { 1 };
+    let rotations = if choice_order.circular {
+        choices.len()
+    } else {
+        1
+    };
     let mut arranged = Vec::new();
-    for repeat in 0..showing.repeats.get() {
+    for repeat in 0..choice_order.repeats.get() {
         for rotation in 0..rotations {
             let mut order = order.clone();
             order.rotate_left(rotation);
@@ -99,12 +103,12 @@ mod tests {
     }
 
     fn shown(id: usize, shuffled: bool, circular: bool, repeats: u32) -> Vec<(String, u32)> {
-        let showing = ChoiceOrder {
+        let choice_order = ChoiceOrder {
             shuffle_options: shuffled,
             circular,
             repeats: NonZeroU32::new(repeats).unwrap(),
         };
-        let arranged = arrange(&question(id), showing, 7).unwrap();
+        let arranged = arrange(&question(id), choice_order, 7).unwrap();
         let shown = arranged.iter().map(|arranged| {
             let choices = &arranged.question.choices;
             assert_eq!(choices.texts()[choices.truth()], "b");
@@ -114,24 +118,24 @@ mod tests {
     }
 
     #[test]
-    fn every_rotation_is_shown_as_often_as_wanted() {
-        let said = |text: &str, repeat| (text.to_owned(), repeat);
-        assert_eq!(shown(0, false, false, 1), [said("abc", 0)]);
+    fn every_rotation_is_shown_as_often_as_asked_for() {
+        let expected = |text: &str, repeat| (text.to_owned(), repeat);
+        assert_eq!(shown(0, false, false, 1), [expected("abc", 0)]);
         assert_eq!(
             shown(0, false, true, 2),
             [
-                said("abc", 0),
-                said("bca", 0),
-                said("cab", 0),
-                said("abc", 1),
-                said("bca", 1),
-                said("cab", 1)
+                expected("abc", 0),
+                expected("bca", 0),
+                expected("cab", 0),
+                expected("abc", 1),
+                expected("bca", 1),
+                expected("cab", 1)
             ]
         );
     }
 
     #[test]
-    fn shuffled_orders_are_all_as_frequent_and_stay() {
+    fn shuffled_orders_are_equally_frequent_and_reproducible() {
         let mut counts = BTreeMap::<String, usize>::new();
         for id in 0..6000 {
             let order = shown(id, true, false, 1);
@@ -139,7 +143,7 @@ mod tests {
             *counts.entry(order[0].0.clone()).or_default() += 1;
         }
         assert_eq!(counts.len(), 6);
-        // 1000 each, give or take four deviations.
+        // The expected count is 1000; the bounds are four standard deviations.
         assert!(
             counts.values().all(|n| (885..=1115).contains(n)),
             "{counts:?}"

@@ -1,4 +1,4 @@
-//! Questions with choices as an [`Experiment`].
+//! The [`Experiment`] of questions with choices.
 
 use std::collections::HashMap;
 

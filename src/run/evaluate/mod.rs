@@ -1,4 +1,4 @@
-//! Questions with choices, asked about each frame: [`evaluate`].
+//! The evaluation: questions with choices about each frame ([`evaluate`]).
 
 mod choice_order;
 mod experiment;
@@ -15,17 +15,17 @@ use crate::job::{Job, Outcome};
 pub(crate) use settings::{EvaluateArgs, ShrinkArgs};
 use setup::ChoiceSetup;
 
-/// Runs an evaluation, or goes on with it; a dry run says what that would take.
+/// Runs an evaluation or continues it; a dry run prints the estimate of its cost.
 ///
 /// # Errors
-/// If nothing can be asked, or no further trial could succeed; what had arrived by then is kept.
+/// If nothing can be asked, or no further trial could succeed. Replies that have arrived stay stored.
 pub(crate) fn evaluate(args: EvaluateArgs, progress: &Progress) -> Result<Outcome> {
     let config = args.resolve()?;
     let (setup, files) = ChoiceSetup::open(&config, progress)?;
     Job::new(&setup, files, progress)?.run()
 }
 
-/// Writes what is left to ask as files of a Batch API, and notes their trials in the run as sent.
+/// Writes the remaining trials as files of a Batch API, and marks them in the run as sent.
 ///
 /// # Errors
 /// If a model is built in, an image is larger than the endpoint takes, or a file cannot be written.

@@ -10,24 +10,24 @@ use crate::job::plan::{SourcePlan, TrialGroup};
 use crate::job::trial::{KeyFacts, Prompt, Trial};
 use crate::types::{Condition, Digest, Question, View};
 
-/// A question with choices, in one order of them.
+/// A question with its choices in one order.
 #[derive(Debug, Clone)]
 pub(crate) struct ChoiceItem {
     pub(super) question: Arc<Question>,
-    /// How many times the same was asked before.
+    /// The number of times that this order was asked before.
     pub(super) repeat: u32,
-    /// How many times the question was put before, in whatever order of its choices.
+    /// The number of times that the question was asked before, in any order of its choices.
     pub(super) turn: u32,
 }
 
-/// A question as it is shown once, with its words for models that see the image and for those that do not.
+/// One order of a question, with the prompts for models that see the image and for blind models.
 struct QuestionPrompts {
     item: ChoiceItem,
     image: Prompt,
     blind: Prompt,
 }
 
-/// All trials, frame by frame: words alone first, and then condition by condition.
+/// All trials, grouped by frame: first the trials without an image, then those of each condition.
 pub(super) fn trials(setup: &ChoiceSetup<'_>) -> Result<Vec<SourcePlan<ChoiceItem>>> {
     let mut by_source: Vec<Vec<&Question>> = vec![Vec::new(); setup.sources.len()];
     for question in &setup.questions {

@@ -1,4 +1,4 @@
-//! A question with choices as a trial, and its record before anything came of it.
+//! The trial of a question with choices, and its record before the reply.
 
 use super::plan::ChoiceItem;
 use crate::ask::Query;
@@ -9,7 +9,7 @@ impl Item for ChoiceItem {
     type Detail = ChoiceDetail;
 
     fn reply_tokens(&self) -> f64 {
-        // It names a letter.
+        // The reply is one letter.
         4.0
     }
 

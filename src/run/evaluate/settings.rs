@@ -1,4 +1,4 @@
-//! What an evaluation takes: [`EvaluateArgs`], and its settings: [`Evaluation`].
+//! The flags of an evaluation ([`EvaluateArgs`]) and its validated settings ([`Evaluation`]).
 
 use std::num::NonZeroU32;
 use std::path::PathBuf;
@@ -15,30 +15,30 @@ use crate::types::Decides;
 /// The flags of an evaluation, by help heading.
 #[derive(Debug, Args)]
 pub(crate) struct EvaluateArgs {
-    /// Data.
+    /// The place of the data.
     #[command(flatten)]
     pub data: DataArgs,
-    /// Questions about them.
+    /// The flags that select questions.
     #[command(flatten)]
     pub selection: SelectionArgs,
-    /// How choices are shown.
+    /// The order in which choices are shown.
     #[command(flatten)]
     pub order: ChoiceOrder,
-    /// How large an image may be.
+    /// The maximum size of an image.
     #[command(flatten)]
     pub limit: PixelLimit,
-    /// What every experiment has.
+    /// The flags that every experiment has.
     #[command(flatten)]
     pub job: JobArgs,
-    /// How questions with choices are put.
+    /// The flags for asking questions with choices.
     #[command(flatten)]
     pub choice: ChoiceArgs,
-    /// In which size images are sent.
+    /// The size in which images are sent.
     #[command(flatten)]
     pub shrink: ShrinkArgs,
 }
 
-/// How questions with choices are put to a model.
+/// The flags for asking questions with choices.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Model")]
 pub(crate) struct ChoiceArgs {
@@ -50,7 +50,7 @@ pub(crate) struct ChoiceArgs {
     pub prompts: Option<PathBuf>,
 }
 
-/// In which size images are sent.
+/// The flag for the size in which images are sent.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Sending")]
 pub(crate) struct ShrinkArgs {
@@ -71,10 +71,10 @@ pub(super) struct Evaluation {
 }
 
 impl EvaluateArgs {
-    /// Looks at the files and variables that the flags name.
+    /// The settings, after reading the files and environment variables that the flags name.
     ///
     /// # Errors
-    /// [`Error::Usage`](crate::error::Error::Usage) with the flag that cannot be used.
+    /// [`Error::Usage`](crate::error::Error::Usage), which names the flag with the invalid value.
     pub(super) fn resolve(self) -> Result<Evaluation> {
         if self.job.models.is_empty() {
             return Err(self.job.no_model_error());

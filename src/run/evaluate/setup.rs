@@ -1,4 +1,4 @@
-//! An evaluation, opened and checked: [`ChoiceSetup`].
+//! The data and models of an evaluation, opened and checked: [`ChoiceSetup`].
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -18,13 +18,13 @@ use crate::job::shard::part;
 use crate::job::source::{Source, first_asked, inspect_all};
 use crate::types::{Condition, FrameId, Question};
 
-/// Everything an evaluation is made of, opened and checked; nothing is asked, and nothing written.
+/// All data and models of an evaluation, opened and checked. Nothing is asked or written yet.
 pub(super) struct ChoiceSetup<'a> {
     pub(super) config: &'a Evaluation,
     pub(super) dataset: Arc<Dataset>,
     pub(super) questions: Vec<Question>,
     pub(super) sources: Vec<Source>,
-    /// The place of each frame among the sources.
+    /// The index of each frame in `sources`.
     pub(super) places: HashMap<FrameId, usize>,
     pub(super) models: Vec<ModelUnderTest>,
     pub(super) conditions: Vec<Condition>,
@@ -32,22 +32,26 @@ pub(super) struct ChoiceSetup<'a> {
 }
 
 impl<'a> ChoiceSetup<'a> {
-    /// Opens the data and the models; the enhancement models are read and not yet loaded.
+    /// Opens the data and the models. The files of the enhancers are read but not yet loaded.
     pub(super) fn open(
         config: &'a Evaluation,
         progress: &Progress,
     ) -> Result<(Self, Vec<ModelFile>)> {
         let job = &config.job;
         // If every model is blind, no image is read and no enhancer is opened.
-        let seeing = job.shows_images();
-        let files = if seeing { job.enhancers()? } else { Vec::new() };
+        let shows_images = job.shows_images();
+        let files = if shows_images {
+            job.enhancers()?
+        } else {
+            Vec::new()
+        };
         let dataset = &config.data.data;
         let dataset = open_data(dataset, &config.selection, config.limit, progress)?;
         let dataset = Arc::new(dataset);
         let questions = select(&dataset, &config.selection)?;
         let questions = part(questions, job.shard, |question| question.frame.0.clone())?;
         let models = open_models(config, &dataset, &questions)?;
-        let sources = if seeing {
+        let sources = if shows_images {
             inspect_all(&dataset, &questions, progress)?
         } else {
             let frames = first_asked(&questions).into_iter();
@@ -71,7 +75,7 @@ impl<'a> ChoiceSetup<'a> {
     }
 }
 
-/// Opens all models; nothing is sent.
+/// The models, opened; nothing is sent.
 fn open_models(
     config: &Evaluation,
     dataset: &Arc<Dataset>,

@@ -1,4 +1,4 @@
-//! `export`: ready-made sets for other tools, one for each condition, with its images.
+//! `export`: writing ready-made sets for other tools, one set with its images per condition.
 
 mod set;
 
@@ -32,8 +32,8 @@ use set::{ReadySet, SetForm};
 /// The flags of `export`.
 #[derive(Debug, Args)]
 pub(crate) struct ExportArgs {
-    /// The form
-    #[arg(value_name = "KIND", value_enum, add = Decides::Nothing)]
+    /// The form of the sets
+    #[arg(value_name = "KIND", value_enum)]
     pub kind: SetForm,
     /// A folder of frames, or a ready-made set (.tsv, .jsonl)
     #[arg(value_name = "DATA", value_parser = dataset::place, add = Decides::Reply)]
@@ -41,30 +41,30 @@ pub(crate) struct ExportArgs {
     /// Where the sets go, one for each condition
     #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub out: PathBuf,
-    /// Which questions.
+    /// The flags that select questions.
     #[command(flatten)]
     pub selection: SelectionArgs,
-    /// How large an image may be.
+    /// The maximum size of an image.
     #[command(flatten)]
     pub limit: PixelLimit,
-    /// Light.
+    /// The flags for the degradations.
     #[command(flatten)]
     pub light: LightArgs,
-    /// Which images are enhanced, and by what.
+    /// The enhancers, and the images that they apply to.
     #[command(flatten)]
     pub enhancers: EnhancerArgs,
-    /// How enhancers are run.
+    /// The flags for running enhancers.
     #[command(flatten)]
     pub loading: EnhancerRunArgs,
-    /// Write over sets that are there already
-    #[arg(long, help_heading = "Output", add = Decides::Nothing)]
+    /// Replace sets that exist already
+    #[arg(long, help_heading = "Output")]
     pub force: bool,
 }
 
-/// Writes the sets.
+/// Writes one set per condition.
 ///
 /// # Errors
-/// Where the data cannot be read, a set is there already, or a file cannot be written.
+/// If the data cannot be read, a set exists already, or a file cannot be written.
 pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> {
     let dataset = open_data(&args.data, &args.selection, args.limit, progress)?;
     let questions = select(&dataset, &args.selection)?;
@@ -92,16 +92,16 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
     let bar = progress.bar("images", frames.len() * conditions.len());
     workers.install(|| {
         for (frame, source) in &frames {
-            let of_frame: Vec<(usize, &Question)> = questions
+            let frame_questions: Vec<(usize, &Question)> = questions
                 .iter()
                 .enumerate()
                 .filter(|(_, question)| question.frame == **frame)
                 .collect();
-            for planned in &source.frames {
-                let mut work = FrameWork::planned(pipeline.steps, source, planned);
+            for source_frame in &source.frames {
+                let mut work = FrameWork::planned(pipeline.steps, source, source_frame);
                 for (condition, set) in conditions.iter().zip(&mut sets) {
                     let pixels = pipeline.pixels(&mut work, condition)?;
-                    set.take(&names[frame], &png(&pixels)?, &of_frame)?;
+                    set.add(&names[frame], &png(&pixels)?, &frame_questions)?;
                     bar.inc();
                 }
             }
@@ -135,26 +135,26 @@ fn open_sets(
         .iter()
         .map(|condition| ReadySet::new(args.kind, &args.out, dataset.name(), condition, questions))
         .collect();
-    let taken = sets.iter().find(|set| set.path().exists());
-    match taken.filter(|_| !args.force) {
+    let existing = sets.iter().find(|set| set.path().exists());
+    match existing.filter(|_| !args.force) {
         Some(set) => Err(Error::data(
             set.path().display(),
-            "there already; --force writes over it, another --out keeps both",
+            "the set exists already; --force overwrites it, another --out keeps both",
         )),
         None => Ok(sets),
     }
 }
 
-/// A file name for each frame: its own without folders and ending, with a number where two would be the same.
+/// A unique file name for each frame: its own name without folders and extension, with a number if two are the same.
 fn names<'a>(frames: impl Iterator<Item = &'a FrameId>) -> BTreeMap<&'a FrameId, String> {
-    let mut taken = BTreeSet::new();
+    let mut used = BTreeSet::new();
     let name = |frame: &'a FrameId| {
         let plain = |letter: char| letter.is_alphanumeric() || "-_.".contains(letter);
         let name = frame.bare().replace(|letter| !plain(letter), "_");
         let name = name.trim_start_matches('.').to_owned();
         let mut unique = name.clone();
         let mut number = 2;
-        while !taken.insert(unique.to_lowercase()) {
+        while !used.insert(unique.to_lowercase()) {
             unique = format!("{name}-{number}");
             number += 1;
         }

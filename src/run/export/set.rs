@@ -1,4 +1,4 @@
-//! One ready-made set: [`ReadySet`].
+//! The writer of one ready-made set: [`ReadySet`].
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -25,15 +25,15 @@ pub(crate) enum SetForm {
     Llava,
 }
 
-/// What LLaVA's questions end with.
+/// The last sentence of each question for LLaVA.
 const LLAVA: &str = "Answer with the option's letter from the given choices directly.";
 
-/// The questions in one condition, written frame by frame, so that no more than one image is held.
+/// The set of one condition, written frame by frame, so that only one image is in memory.
 pub(super) struct ReadySet {
     form: SetForm,
     path: PathBuf,
-    /// The most choices of any question: so many columns has a table.
-    most: usize,
+    /// The maximum number of choices of a question: the number of choice columns of a table.
+    max_choices: usize,
     part: Option<csv::Writer<File>>,
 }
 
@@ -51,25 +51,25 @@ impl ReadySet {
             SetForm::ImageFolder => folder.join("metadata.jsonl"),
             SetForm::Llava => folder.join("questions.jsonl"),
         };
-        let most = questions
+        let max_choices = questions
             .iter()
             .map(|question| question.choices.len())
             .max();
         Self {
             form,
             path,
-            most: most.unwrap_or(0),
+            max_choices: max_choices.unwrap_or(0),
             part: None,
         }
     }
 
-    /// The file that a reader is pointed at.
+    /// The main file of the set.
     pub(super) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Takes an image under a name with the questions about it.
-    pub(super) fn take(
+    /// Adds an image under a name, with the questions about it.
+    pub(super) fn add(
         &mut self,
         name: &str,
         image: &[u8],
@@ -86,14 +86,14 @@ impl ReadySet {
                 SetForm::ImageFolder => self.line(&image_folder(&file, question))?,
                 SetForm::Llava => self.line(&llava(&file, question))?,
                 SetForm::VlmEvalKit => {
-                    // One row has the image, the others its index.
+                    // The first row has the image, the others the index of that row.
                     let cell = match first {
                         None => STANDARD.encode(image),
                         Some(first) => usize::to_string(&first),
                     };
                     first = first.or(Some(index));
                     let mut cells = table(index, cell, question);
-                    cells.resize(COLUMNS.len() + self.most, String::new());
+                    cells.resize(COLUMNS.len() + self.max_choices, String::new());
                     self.cells(cells)?;
                 }
             }
@@ -105,9 +105,9 @@ impl ReadySet {
         self.cells(vec![value.to_string()])
     }
 
-    /// Writes a row; a line of JSON is one of a single cell that is never quoted.
+    /// Writes a row. A line of JSON is a row with one cell that is never quoted.
     fn cells(&mut self, cells: Vec<String>) -> Result<()> {
-        let path = beside(&self.path);
+        let path = partial_path(&self.path);
         let part = match &mut self.part {
             Some(part) => part,
             none => {
@@ -126,7 +126,7 @@ impl ReadySet {
                         .from_writer(file),
                 );
                 if self.form == SetForm::VlmEvalKit {
-                    let letters = (0..self.most).map(|i| letter(i).to_string());
+                    let letters = (0..self.max_choices).map(|i| letter(i).to_string());
                     let header = COLUMNS.iter().map(|&name| name.to_owned()).chain(letters);
                     part.write_record(header)
                         .map_err(|e| Error::data(path.display(), e))?;
@@ -138,9 +138,9 @@ impl ReadySet {
             .map_err(|e| Error::data(path.display(), e))
     }
 
-    /// Gives the set its name: it is whole.
+    /// Renames the complete file to its final name, and returns that name.
     pub(super) fn finish(self) -> Result<PathBuf> {
-        let part = beside(&self.path);
+        let part = partial_path(&self.path);
         if let Some(mut writer) = self.part {
             writer.flush().map_err(|e| Error::file(&part, "write", e))?;
         }
@@ -149,18 +149,18 @@ impl ReadySet {
     }
 }
 
-/// Where a set is written until it is whole.
-fn beside(path: &Path) -> PathBuf {
+/// The temporary path of a set until it is complete.
+fn partial_path(path: &Path) -> PathBuf {
     let mut part = path.as_os_str().to_owned();
     part.push(".part");
     part.into()
 }
 
-/// The columns of a table before the choices.
+/// The columns of a table before those of the choices.
 const COLUMNS: [&str; 6] = ["index", "image", "question", "answer", "category", "id"];
 
-/// A row of VLMEvalKit's table (`vlmeval/dataset/image_mcq.py`): its index is a number, and a short cell of `image` is the index
-/// of the row that has the image.
+/// A row of VLMEvalKit's table (`vlmeval/dataset/image_mcq.py`). The index is a number. A short cell in the column `image`
+/// is the index of the row that has the image.
 fn table(index: usize, image: String, question: &Question) -> Vec<String> {
     let truth = letter(question.choices.truth()).to_string();
     let head = [
@@ -176,7 +176,7 @@ fn table(index: usize, image: String, question: &Question) -> Vec<String> {
         .collect()
 }
 
-/// A line of `metadata.jsonl`.
+/// A line of `metadata.jsonl` for an image folder.
 fn image_folder(file: &str, question: &Question) -> Value {
     json!({
         "file_name": file,
@@ -188,7 +188,7 @@ fn image_folder(file: &str, question: &Question) -> Value {
     })
 }
 
-/// A line of LLaVA's questions (`llava/eval/model_vqa_loader.py`), with the letter of the true choice.
+/// A line of a question file for LLaVA (`llava/eval/model_vqa_loader.py`), with the letter of the true choice.
 fn llava(file: &str, question: &Question) -> Value {
     json!({
         "question_id": question.id,
@@ -199,7 +199,7 @@ fn llava(file: &str, question: &Question) -> Value {
     })
 }
 
-/// The choices, a line each with its letter.
+/// The choices, one line each with its letter.
 fn lettered(choices: &Choices) -> String {
     let lines = choices.texts().iter().enumerate();
     lines

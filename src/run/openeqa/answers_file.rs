@@ -1,4 +1,4 @@
-//! Answers of people or other programs, as upstream's result files hold them: [`read`].
+//! Files with answers of people or other programs, in the form of upstream's result files: [`read`].
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -22,20 +22,21 @@ use crate::types::{
 #[derive(Debug, Deserialize)]
 struct AnswerEntry {
     question_id: String,
-    /// `null` where it could not be told.
+    /// `None` (`null`) if the person could not answer.
     answer: Option<String>,
-    /// What was shown, as `L2-noise`.
+    /// The condition that was shown, as `L2-noise`.
     condition: Option<Condition>,
-    /// The same by its level alone.
+    /// The level of the condition that was shown, as `L2`.
     level: Option<String>,
-    /// Who gave it, where several people did.
+    /// The person who answered, if there were several.
     annotator: Option<Value>,
 }
 
-/// The answers of a file as records, in its order. Those to questions that are not asked are passed over, named and counted.
+/// The answers of a file as records, in its order. A warning names and counts answers to questions that are not asked.
 ///
 /// # Errors
-/// Where the file cannot be read, says twice what one person answered, or a level without its variant.
+/// If the file cannot be read, has two answers of one person to the same question in the same condition, or names a level
+/// that several variants have.
 pub(super) fn read(
     config: &AnswersFile,
     questions: &[Arc<OpenQuestion>],
@@ -55,11 +56,11 @@ pub(super) fn read(
         .enumerate()
         .map(|(index, question)| (&*question.id.0, index))
         .collect();
-    let (mut records, mut strange) = (Vec::new(), Vec::new());
+    let (mut records, mut unknown) = (Vec::new(), Vec::new());
     let mut seen = BTreeSet::new();
     for entry in &entries {
         let Some(&index) = known.get(&*entry.question_id) else {
-            strange.push(&*entry.question_id);
+            unknown.push(&*entry.question_id);
             continue;
         };
         let condition = condition(entry, variants)
@@ -88,22 +89,22 @@ pub(super) fn read(
             ..record
         });
     }
-    passed_over(path, &strange, entries.len());
+    warn_of_unknown(path, &unknown, entries.len());
     Ok(records)
 }
 
-fn passed_over(path: &Path, strange: &[&str], all: usize) {
-    if !strange.is_empty() {
+fn warn_of_unknown(path: &Path, unknown: &[&str], all: usize) {
+    if !unknown.is_empty() {
         tracing::warn!(
             "{}: {} of {all} answers are to questions that are not asked: {}",
             path.display(),
-            strange.len(),
-            some(strange)
+            unknown.len(),
+            some(unknown)
         );
     }
 }
 
-/// What was shown to whoever gave an answer: the lit frames where nothing is said, as in upstream's own files.
+/// The condition that an answer was given in: the clean frames if the entry names none, as in upstream's own files.
 fn condition(entry: &AnswerEntry, variants: KindSet) -> std::result::Result<Condition, String> {
     let level = match (&entry.condition, entry.level.as_deref()) {
         (Some(condition), _) => return Ok(condition.clone()),
@@ -121,7 +122,7 @@ fn condition(entry: &AnswerEntry, variants: KindSet) -> std::result::Result<Cond
     match (degradations.pop(), degradations.is_empty()) {
         (Some(degradation), true) => Ok(Condition::raw(Some(degradation))),
         _ => Err(format!(
-            "\"level\" does not say which variant was shown; \"condition\": \"{}\" does",
+            "\"level\" does not tell which variant was shown; write \"condition\": \"{}\" instead",
             example.unwrap_or_default()
         )),
     }

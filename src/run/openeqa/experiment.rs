@@ -1,4 +1,4 @@
-//! Open questions, and marks for the answers, as an [`Experiment`].
+//! The [`Experiment`] of open questions and of marks for the answers.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -27,7 +27,7 @@ use crate::job::{Outcome, StdoutFormat};
 use crate::store::Store;
 use crate::types::{Family, FrameId, OpenDetail, Record, RunQuestion};
 
-/// An answer as it may be: as long as one with so many tokens.
+/// A typical answer, for estimating the length of a judge's prompt.
 const ANSWER: &str =
     "There is a small round table with two chairs next to the window of the living room.";
 
@@ -43,8 +43,8 @@ impl Experiment for OpenSetup<'_> {
 
     fn server(&self) -> Option<&Server> {
         let judge = self.config.judge.as_ref();
-        let own = self.config.job.ask.server.as_ref();
-        own.or(judge.and_then(|judge| judge.server.as_ref()))
+        let of_models = self.config.job.ask.server.as_ref();
+        of_models.or(judge.and_then(|judge| judge.server.as_ref()))
     }
 
     fn data(&self) -> &str {
@@ -127,8 +127,8 @@ impl Experiment for OpenSetup<'_> {
         ]
     }
 
-    fn imported_records(&self) -> &[Record<OpenDetail>] {
-        &self.given
+    fn given(&self) -> &[Record<OpenDetail>] {
+        &self.file_answers
     }
 
     fn plan(
@@ -142,13 +142,13 @@ impl Experiment for OpenSetup<'_> {
         })
     }
 
-    fn expected_requests(&self, left: &[SourcePlan<OpenItem>]) -> Vec<ExpectedRequest> {
+    fn to_come(&self, remaining: &[SourcePlan<OpenItem>]) -> Vec<ExpectedRequest> {
         if self.judge.is_none() {
             return Vec::new();
         }
-        let groups = left.iter().flat_map(|part| &part.groups);
+        let groups = remaining.iter().flat_map(|part| &part.groups);
         let trials = groups.flat_map(|group| &group.trials);
-        // Each answer that is still to come may be unlike any other.
+        // Each answer that has not arrived may differ from all others, so each needs a mark.
         let marks = trials.filter_map(|trial| match &trial.item {
             OpenItem::Answer(question) => {
                 let mark = OpenItem::Mark {

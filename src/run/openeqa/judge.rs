@@ -1,4 +1,4 @@
-//! Who marks the answers, as flags say it ([`JudgeArgs`]), and with the endpoint and its key ([`Judge`]).
+//! The flags of the judge ([`JudgeArgs`]), and the judge with its endpoint and key ([`Judge`]).
 
 use std::num::NonZeroU32;
 use std::path::PathBuf;
@@ -12,7 +12,7 @@ use crate::job::settings::JobArgs;
 use crate::score::llm_match::Protocol;
 use crate::types::Decides;
 
-/// Who marks the answers.
+/// The flags of the judge, the model that marks the answers.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Judge")]
 pub(crate) struct JudgeArgs {
@@ -40,30 +40,29 @@ pub(crate) struct JudgeArgs {
     pub judge_max_tokens: NonZeroU32,
 }
 
-/// Who marks the answers.
+/// The model that marks the answers, with its endpoint.
 #[derive(Debug)]
 pub(super) struct Judge {
     pub(super) model: ModelName,
-    /// Its endpoint; `None` if it is built in.
+    /// The endpoint; `None` if the model is built in.
     pub(super) server: Option<Server>,
-    /// How it is to speak; its name is set.
+    /// The parameters of a request; the name of the model is filled in later.
     pub(super) parameters: Parameters,
 }
 
 impl JudgeArgs {
-    /// Reads the key of the judge's endpoint. The key of one endpoint is never sent to another.
+    /// The judge with the key of its endpoint; `None` without `--judge`. The key of one endpoint is never sent to another.
     pub(super) fn resolve(self, job: &JobArgs, seed: Option<u64>) -> Result<Option<Judge>> {
         let Some(model) = self.judge else {
             return Ok(None);
         };
-        let in_words = |e: crate::error::Error| e.at("the judge");
-        model.require_open_answers().map_err(in_words)?;
-        let of_models = &job.access;
-        let mut access = of_models.clone();
-        let own = self.judge_base_url.is_some()
+        let of_judge = |e: crate::error::Error| e.at("the judge");
+        model.answers_in_words().map_err(of_judge)?;
+        let mut access = job.access.clone();
+        let own_access = self.judge_base_url.is_some()
             || self.judge_api_key_env.is_some()
             || self.judge_api_key_file.is_some();
-        if own {
+        if own_access {
             access = AccessArgs {
                 base_url: self.judge_base_url.or(access.base_url),
                 api_key_env: self.judge_api_key_env,
@@ -79,7 +78,7 @@ impl JudgeArgs {
         let server = remote.then(|| access.server(job.sending)).transpose();
         Ok(Some(Judge {
             model,
-            server: server.map_err(in_words)?,
+            server: server.map_err(of_judge)?,
             parameters: Parameters {
                 temperature: self.judge_temperature,
                 max_tokens: self.judge_max_tokens,

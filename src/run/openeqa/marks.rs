@@ -1,4 +1,4 @@
-//! What the judge is to mark: [`marks`].
+//! The trials for the marks of the judge: [`marks`].
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -14,19 +14,19 @@ use crate::job::predictions::{AnswerState, predictions};
 use crate::job::trial::{Prompt, Trial};
 use crate::types::{Digest, OpenDetail, QuestionId, Record, TrialKey};
 
-/// The words that have an answer marked.
+/// The prompt that asks the judge to mark an answer.
 pub(super) fn prompt(question: &OpenQuestion, answer: &str) -> Prompt {
     let extra = question.extra.as_deref();
     Prompt::of(judge_prompt(&question.text, &question.answer, extra, answer).into())
 }
 
-/// The same answer to the same question is judged once, whatever model gave it in whatever condition.
+/// The key of a mark. The model and condition do not enter it, so the same answer to a question is judged once.
 fn key(judge: &ModelUnderTest, prompt: &Prompt) -> Result<TrialKey> {
     let facts = (judge.model.name(), &*judge.digest, &*prompt.before);
     Digest::canonical("darkqa.mark/2", &facts).map(Into::into)
 }
 
-/// The marks of a run, each answer to a question once, walk by walk.
+/// The trials for all marks of a run, grouped by walk. Each distinct answer to a question is marked once.
 pub(super) fn marks(
     setup: &OpenSetup<'_>,
     records: &[Record<OpenDetail>],

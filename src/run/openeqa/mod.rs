@@ -1,7 +1,7 @@
 //! `openeqa`: open questions about walks through dark houses, and a judge that marks the answers.
 //!
-//! The answers are asked for first, walk by walk, and then the marks of those that came; both by the engine of an evaluation. Models,
-//! levels, answers of people and judges may be added to a run.
+//! The models are asked for the answers first, walk by walk. Then the judge is asked for the marks. Both use the engine of
+//! an evaluation. Models, levels, answers of people and judges may be added to a run.
 
 mod answers_file;
 mod experiment;
@@ -23,10 +23,10 @@ pub(crate) use settings::OpenEqaArgs;
 use settings::OpenTask;
 use setup::OpenSetup;
 
-/// Carries out what is to be done.
+/// Asks the questions, writes them as a batch, or writes a study page, as the flags decide.
 ///
 /// # Errors
-/// If nothing can be asked, or no further trial could succeed; what had arrived by then is kept.
+/// If nothing can be asked, or no further trial could succeed. Replies that have arrived stay stored.
 pub(crate) fn openeqa(args: OpenEqaArgs, progress: &Progress) -> Result<Outcome> {
     let config = args.resolve()?;
     let (setup, files) = OpenSetup::open(&config, progress)?;

@@ -1,4 +1,4 @@
-//! The answers that are asked for: [`answers`].
+//! The trials for the answers: [`answers`].
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use crate::job::plan::{SourcePlan, TrialGroup};
 use crate::job::trial::{KeyFacts, Prompt, Trial};
 use crate::types::{Condition, Digest, View};
 
-/// All answers, walk by walk: without images first, and then condition by condition.
+/// The trials of all answers, grouped by walk: first those without images, then those of each condition.
 pub(super) fn answers(setup: &OpenSetup<'_>) -> Result<Vec<SourcePlan<OpenItem>>> {
     let mut by_walk = BTreeMap::<&str, Vec<&Arc<OpenQuestion>>>::new();
     for question in &setup.questions {
@@ -34,7 +34,7 @@ pub(super) fn answers(setup: &OpenSetup<'_>) -> Result<Vec<SourcePlan<OpenItem>>
         .collect()
 }
 
-/// The answers in a condition; `None` if no model is asked in it.
+/// The trials in a condition; `None` if no model is asked in it.
 fn group(
     setup: &OpenSetup<'_>,
     source: usize,
@@ -67,7 +67,7 @@ fn group(
     }))
 }
 
-/// The words of a question for a model that sees the walk, or for one that does not.
+/// The prompt of a question for a model that sees the walk, or for a blind one.
 fn prompt(question: &OpenQuestion, view: View) -> Prompt {
     match view {
         View::Blind => Prompt::of(blind(&question.text).into()),

@@ -1,4 +1,4 @@
-//! Which questions of a file are asked: [`select`].
+//! The selection of questions from a file: [`select`].
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -11,7 +11,7 @@ use crate::dataset::openeqa::OpenQuestion;
 use crate::error::{Error, Result};
 use crate::types::Decides;
 
-/// Which questions of a file are asked.
+/// The flags that select questions.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "OpenEQA")]
 pub(crate) struct OpenSelectionArgs {
@@ -37,67 +37,70 @@ fn trimmed(name: &str) -> Result<String, std::convert::Infallible> {
 /// The questions that are asked.
 pub(super) fn select(
     all: Vec<OpenQuestion>,
-    chosen: &OpenSelectionArgs,
+    selection: &OpenSelectionArgs,
 ) -> Result<Vec<OpenQuestion>> {
-    let subset = chosen.subset.as_deref().map(ids).transpose()?;
-    if let (Some(subset), Some(path)) = (&subset, &chosen.subset) {
+    let subset = selection.subset.as_deref().map(ids).transpose()?;
+    if let (Some(subset), Some(path)) = (&subset, &selection.subset) {
         let known: BTreeSet<&str> = all.iter().map(|question| &*question.id.0).collect();
-        let strange: Vec<&str> = subset
+        let unknown: Vec<&str> = subset
             .iter()
             .map(|id| &**id)
             .filter(|id| !known.contains(id))
             .collect();
-        if !strange.is_empty() {
+        if !unknown.is_empty() {
             tracing::warn!(
-                "{}: {} of {} ids are no questions of the file: {}",
+                "{}: {} of {} ids are not in the file of questions: {}",
                 path.display(),
-                strange.len(),
+                unknown.len(),
                 subset.len(),
-                some(&strange)
+                some(&unknown)
             );
         }
     }
-    among(
+    check_known(
         "--splits",
-        &chosen.splits,
+        &selection.splits,
         all.iter().map(OpenQuestion::split),
     )?;
     let categories = all.iter().map(|question| &*question.category);
-    among("--categories", &chosen.categories, categories)?;
+    check_known("--categories", &selection.categories, categories)?;
     let has = |list: &[String], name: &str| list.is_empty() || list.iter().any(|one| one == name);
     let questions = all.into_iter().filter(|question| {
-        has(&chosen.splits, question.split())
-            && has(&chosen.categories, &question.category)
+        has(&selection.splits, question.split())
+            && has(&selection.categories, &question.category)
             && subset
                 .as_ref()
                 .is_none_or(|subset| subset.contains(&question.id.0))
     });
     let questions: Vec<OpenQuestion> = questions
-        .take(chosen.limit.map_or(usize::MAX, usize::from))
+        .take(selection.limit.map_or(usize::MAX, usize::from))
         .collect();
     if questions.is_empty() {
-        let problem =
-            "no question of the file is of all that --splits, --categories and --subset name";
+        let problem = "no question of the file matches all of --splits, --categories and --subset";
         return Err(Error::usage("--questions", problem));
     }
     Ok(questions)
 }
 
-/// Makes sure that what is chosen is there.
-fn among<'a>(flag: &str, chosen: &[String], there: impl Iterator<Item = &'a str>) -> Result<()> {
-    let there: BTreeSet<&str> = there.collect();
-    let mut wanted = chosen.iter();
-    match wanted.find(|name| !there.contains(&***name)) {
+/// Checks that every selected name occurs in the file.
+fn check_known<'a>(
+    flag: &str,
+    names: &[String],
+    known: impl Iterator<Item = &'a str>,
+) -> Result<()> {
+    let known: BTreeSet<&str> = known.collect();
+    let mut wanted = names.iter();
+    match wanted.find(|name| !known.contains(&***name)) {
         None => Ok(()),
         Some(missing) => {
-            let there: Vec<&str> = there.into_iter().collect();
-            let problem = format!("{missing:?} is none of {}", there.join(", "));
+            let known: Vec<&str> = known.into_iter().collect();
+            let problem = format!("{missing:?} is not one of {}", known.join(", "));
             Err(Error::usage(flag, problem))
         }
     }
 }
 
-/// The ids in a file.
+/// The ids in a file, a JSON array.
 fn ids(path: &Path) -> Result<BTreeSet<String>> {
     let text = fs::read(path).map_err(|e| Error::file(path, "read", e))?;
     serde_json::from_slice(&text).map_err(|e| {
@@ -106,7 +109,7 @@ fn ids(path: &Path) -> Result<BTreeSet<String>> {
     })
 }
 
-/// A few of a list, in words.
+/// The first entries of a list as text, with the number of the others.
 pub(super) fn some(list: &[&str]) -> String {
     const FEW: usize = 3;
     let shown = list

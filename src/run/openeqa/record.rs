@@ -1,4 +1,4 @@
-//! What is asked: [`OpenItem`], a question or an answer to it that is to be marked; and the record of either.
+//! The subject of a trial ([`OpenItem`]): an open question, or an answer to be marked; and the record of either.
 
 use std::sync::Arc;
 
@@ -7,15 +7,15 @@ use crate::dataset::openeqa::OpenQuestion;
 use crate::job::trial::{Item, Stimulus, Trial};
 use crate::types::{Digest, OpenDetail, Record, Step, WalkFacts};
 
-/// What one trial is about.
+/// The subject of one trial.
 #[derive(Debug, Clone)]
 pub(crate) enum OpenItem {
-    /// An open question.
+    /// An open question to a model.
     Answer(Arc<OpenQuestion>),
-    /// An answer that is to be marked.
+    /// An answer for the judge to mark.
     Mark {
         question: Arc<OpenQuestion>,
-        /// As it is judged.
+        /// The answer as the judge sees it.
         answer: Arc<str>,
     },
 }
@@ -33,9 +33,9 @@ impl Item for OpenItem {
 
     fn reply_tokens(&self) -> f64 {
         match self {
-            // A short sentence.
+            // The reply is a short sentence.
             Self::Answer(_) => 20.0,
-            // "Your mark: 5".
+            // The reply is "Your mark: 5".
             Self::Mark { .. } => 4.0,
         }
     }
@@ -47,7 +47,7 @@ impl Item for OpenItem {
     fn source(&self) -> &str {
         match self {
             Self::Answer(question) => &question.episode,
-            // A judge sees no frames: what it refuses, it refuses about the question.
+            // A judge sees no frames, so its failures are counted by question.
             Self::Mark { question, .. } => &question.id.0,
         }
     }
@@ -74,7 +74,7 @@ impl Item for OpenItem {
     }
 }
 
-/// What is known of a trial before it is made.
+/// The detail of a record before the reply.
 pub(super) fn detail(question: &OpenQuestion, step: Step) -> OpenDetail {
     OpenDetail {
         step,
@@ -88,7 +88,7 @@ pub(super) fn detail(question: &OpenQuestion, step: Step) -> OpenDetail {
     }
 }
 
-/// The images of a stimulus together; `None` of none.
+/// The facts of all images of a stimulus together; `None` without images.
 fn facts(images: &[Arc<Payload>]) -> Option<WalkFacts> {
     let first = images.first()?.facts();
     let digests = images.iter().map(|image| image.facts().digest);

@@ -1,4 +1,4 @@
-//! What `openeqa` takes: [`OpenEqaArgs`], and its settings: [`OpenEqa`].
+//! The flags of `openeqa` ([`OpenEqaArgs`]) and its validated settings ([`OpenEqa`]).
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -22,13 +22,13 @@ pub(crate) struct OpenEqaArgs {
     /// The questions, as open-eqa-v0.json
     #[arg(long, value_name = "FILE", help_heading = "OpenEQA", add = Decides::Reply)]
     pub questions: PathBuf,
-    /// Which of them.
+    /// The flags that select questions.
     #[command(flatten)]
     pub chosen: OpenSelectionArgs,
-    /// How walks are shown.
+    /// The flags for showing walks.
     #[command(flatten)]
     pub walk: Walk,
-    /// How large a frame may be.
+    /// The maximum size of an image.
     #[command(flatten)]
     pub limit: PixelLimit,
     /// What the servers' sampling starts from, or none
@@ -42,7 +42,7 @@ pub(crate) struct OpenEqaArgs {
     /// beside them where it is not L0), to be marked like a model's; repeatable; default: none
     #[arg(long, value_name = "NAME=FILE", help_heading = "OpenEQA", add = Decides::Trials)]
     pub answers: Vec<AnswersFile>,
-    /// Who marks the answers.
+    /// The flags of the judge.
     #[command(flatten)]
     pub judge: JudgeArgs,
     /// Write a page on which people answer the questions about the frames into this folder, and ask no model; default: ask models
@@ -55,24 +55,23 @@ pub(crate) struct OpenEqaArgs {
     /// Write what is left to ask as files of a Batch API, answers first and then marks, and ask nothing
     #[arg(long, help_heading = "Batch", conflicts_with = "dry_run", add = Decides::Nothing)]
     pub batch: bool,
-    /// Their files.
+    /// The flags for the batch files.
     #[command(flatten)]
     pub files: BatchFileArgs,
-    /// What every experiment has.
+    /// The flags that every experiment has.
     #[command(flatten)]
     pub job: JobArgs,
 }
 
-/// The seed that is sent to servers, if any.
+/// The sampling seed that is sent to servers; `None` if none is sent.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SamplingSeed(Option<u64>);
 
-/// Answers of people or another program.
+/// A file with answers of people or of another program.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct AnswersFile {
-    /// What they stand under among the models.
+    /// The name of the answers in tables, next to the names of models.
     pub name: String,
-    /// The file.
     pub path: PathBuf,
 }
 
@@ -84,27 +83,27 @@ pub(super) struct OpenEqa {
     pub(super) walk: Walk,
     pub(super) limit: PixelLimit,
     pub(super) answers: Vec<AnswersFile>,
-    /// Who marks the answers; `None` for nobody.
+    /// The judge; `None` if the answers are not marked.
     pub(super) judge: Option<Judge>,
     pub(super) protocol: Protocol,
     pub(super) task: OpenTask,
     pub(super) job: JobSettings,
 }
 
-/// What is to be done.
+/// The task of the command.
 #[derive(Debug)]
 pub(super) enum OpenTask {
-    /// Ask what is left, or say what that would take.
+    /// Ask the remaining trials; with `--dry-run` print the estimate of their cost.
     Run,
-    /// Write it as files of a Batch API.
+    /// Write the remaining trials as files of a Batch API.
     Batch(BatchFileArgs),
-    /// Write a page for people.
+    /// Write a page on which people answer, into this folder.
     Study(PathBuf),
 }
 
 impl OpenEqaArgs {
-    /// The flags that this command shares with an evaluation, with the defaults and the words that they have here: upstream's, and
-    /// the levels of the paper's table.
+    /// A flag shared with an evaluation, with the default and help text of this command. The defaults are those of upstream,
+    /// and the levels those of the paper's table.
     #[must_use]
     pub(crate) fn own(arg: Arg) -> Arg {
         match arg.get_id().as_str() {
@@ -126,19 +125,19 @@ impl OpenEqaArgs {
         }
     }
 
-    /// Looks at the files and variables that the flags name.
+    /// The settings, after reading the files and environment variables that the flags name.
     ///
     /// # Errors
-    /// [`Error::Usage`](crate::error::Error::Usage) with the flag that cannot be used.
+    /// [`Error::Usage`](crate::error::Error::Usage), which names the flag with the invalid value.
     pub(super) fn resolve(self) -> Result<OpenEqa> {
         let task = match (self.study, self.batch) {
             (Some(folder), _) => OpenTask::Study(folder),
             (None, true) => OpenTask::Batch(self.files),
             (None, false) => OpenTask::Run,
         };
-        let nobody = self.job.models.is_empty() && self.answers.is_empty();
-        if nobody && !matches!(task, OpenTask::Study(_)) {
-            return Err(self.job.no_model_error());
+        let nothing_to_ask = self.job.models.is_empty() && self.answers.is_empty();
+        if nothing_to_ask && !matches!(task, OpenTask::Study(_)) {
+            return Err(self.job.nameless());
         }
         let models = &self.job.models;
         let mut names = models.model.iter().chain(&models.blind_model);

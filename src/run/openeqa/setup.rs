@@ -1,4 +1,4 @@
-//! An evaluation by open questions, opened and checked: [`OpenSetup`].
+//! The data and models of an evaluation by open questions, opened and checked: [`OpenSetup`].
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
@@ -19,26 +19,26 @@ use crate::job::source::Source;
 use crate::job::walk::WalkFolder;
 use crate::types::{Condition, FrameId, OpenDetail, QuestionId, Record, View};
 
-/// Everything an evaluation by open questions is made of, opened and checked; nothing is asked, and nothing written.
+/// All data and models of an evaluation by open questions, opened and checked. Nothing is asked or written yet.
 pub(super) struct OpenSetup<'a> {
     pub(super) config: &'a OpenEqa,
     /// The questions that are asked, in the order of the file.
     pub(super) questions: Vec<Arc<OpenQuestion>>,
-    /// The place of each question in the file.
+    /// The index of each question in the file.
     pub(super) file_places: HashMap<QuestionId, usize>,
     pub(super) walks: WalkFolder,
-    /// The walks, in the order of the questions.
+    /// The walks in the order in which questions name them.
     pub(super) sources: Vec<Source>,
     pub(super) conditions: Vec<Condition>,
     pub(super) models: Vec<ModelUnderTest>,
     pub(super) judge: Option<ModelUnderTest>,
     pub(super) recipe: Recipe,
-    /// The answers of files.
-    pub(super) given: Vec<Record<OpenDetail>>,
+    /// The answers from `--answers` files.
+    pub(super) file_answers: Vec<Record<OpenDetail>>,
 }
 
 impl<'a> OpenSetup<'a> {
-    /// Opens the questions, the walks and the models; the enhancement models are read and not yet loaded.
+    /// Opens the questions, the walks and the models. The files of the enhancers are read but not yet loaded.
     pub(super) fn open(config: &'a OpenEqa, progress: &Progress) -> Result<(Self, Vec<ModelFile>)> {
         let job = &config.job;
         let all = openeqa::questions(&config.questions)?;
@@ -51,14 +51,18 @@ impl<'a> OpenSetup<'a> {
             models::open(name, None, &job.ask.parameters)
         })?;
         let judge = config.judge.as_ref().map(judge).transpose()?;
-        // If nobody sees a frame, none is read and no enhancer is opened.
-        let seeing = matches!(config.task, OpenTask::Study(_)) || job.shows_images();
-        let files = if seeing { job.enhancers()? } else { Vec::new() };
+        // If no model or person sees a frame, none is read and no enhancer is opened.
+        let shows_frames = matches!(config.task, OpenTask::Study(_)) || job.shows_images();
+        let files = if shows_frames {
+            job.enhancers()?
+        } else {
+            Vec::new()
+        };
         let recipe = Recipe::new(&job.light.sensor, job.format, None, &files);
         let recipe = recipe.of_walks(&config.walk);
         let walks = WalkFolder::new(&config.walk, config.limit);
         let names = names(&questions);
-        let (sources, conditions) = if seeing {
+        let (sources, conditions) = if shows_frames {
             let sources = walks.inspect(&names, &config.walk, progress);
             warn_of_unseen(&sources, &questions)?;
             let on = job.enhancers.llie_on;
@@ -77,27 +81,30 @@ impl<'a> OpenSetup<'a> {
             models,
             judge,
             recipe,
-            given: Vec::new(),
+            file_answers: Vec::new(),
         };
-        setup.given = setup.answers_of_files()?;
+        setup.file_answers = setup.answers_of_files()?;
         Ok((setup, files))
     }
 
-    /// The place of a question's walk among the sources.
+    /// The index in `sources` of the walk of a question.
     pub(super) fn walk_of(&self, question: &OpenQuestion) -> usize {
         let mut sources = self.sources.iter();
         let place = sources.position(|source| source.name.0 == question.episode);
         place.unwrap_or_default()
     }
 
-    /// The answers of all files.
+    /// The answers from all `--answers` files.
     fn answers_of_files(&self) -> Result<Vec<Record<OpenDetail>>> {
         let models = self.models.iter();
         let mut names: BTreeSet<&str> = models.map(|model| model.model.name()).collect();
         let mut all = Vec::new();
         for file in &self.config.answers {
             if !names.insert(&file.name) {
-                let problem = format_args!("{} is named twice among models and answers", file.name);
+                let problem = format_args!(
+                    "the name {:?} is used twice among models and answers",
+                    file.name
+                );
                 return Err(Error::usage("--answers", problem));
             }
             let variants = self.config.job.light.variants;
@@ -114,7 +121,7 @@ fn judge(config: &Judge) -> Result<ModelUnderTest> {
     ModelUnderTest::new(model, View::Blind, server)
 }
 
-/// The walks of the questions in their order.
+/// The distinct walks of the questions, in order of first use.
 fn names(questions: &[OpenQuestion]) -> Vec<String> {
     let mut seen = BTreeSet::new();
     let first = questions
@@ -123,7 +130,7 @@ fn names(questions: &[OpenQuestion]) -> Vec<String> {
     first.map(|question| question.episode.clone()).collect()
 }
 
-/// Names and counts the walks that cannot be shown; only if that is all of them it is an error.
+/// Warns of the walks that cannot be shown; an error if none can be shown.
 fn warn_of_unseen(sources: &[Source], questions: &[OpenQuestion]) -> Result<()> {
     let missing: BTreeMap<&str, &str> = sources
         .iter()
@@ -137,15 +144,15 @@ fn warn_of_unseen(sources: &[Source], questions: &[OpenQuestion]) -> Result<()> 
             format!("no walk can be shown: {problem}; DIR/EPISODE_HISTORY/*-rgb.png expected");
         return Err(Error::usage("--frames", problem));
     }
-    let lost = questions.iter();
-    let lost = lost.filter(|question| missing.contains_key(&*question.episode));
+    let unanswered = questions.iter();
+    let unanswered = unanswered.filter(|question| missing.contains_key(&*question.episode));
     let walks: Vec<&str> = missing.keys().copied().collect();
     tracing::warn!(
-        "{} of {} walks cannot be shown ({}): their {} questions are left unanswered; the first: {problem}",
+        "{} of {} walks cannot be shown ({}); unanswered questions: {}; the first problem: {problem}",
         walks.len(),
         sources.len(),
         some(&walks),
-        lost.count()
+        unanswered.count()
     );
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! A page on which people answer open questions about walks, each walk in one condition alone.
+//! The study page of open questions: each person sees each walk in one condition only.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -18,10 +18,10 @@ use crate::report::study::{StudyImage, StudyQuestion, page};
 use crate::types::manifest::Status;
 use crate::types::{Condition, Digest};
 
-/// Writes the page and its images, each the very file that a model would be sent; the true answers are not in it.
+/// Writes the page and its images. Each image is the file that a model would be sent. The page has no true answers.
 ///
 /// # Errors
-/// If a frame cannot be made or a file not be written.
+/// If a frame cannot be computed or a file cannot be written.
 pub(super) fn pack(
     setup: &OpenSetup<'_>,
     files: Vec<ModelFile>,
@@ -44,8 +44,8 @@ pub(super) fn pack(
         let shown = workers.install(|| pipeline.images(walk, &conditions))?;
         let mut shots = Vec::new();
         for (condition, mut payloads) in conditions.iter().zip(shown) {
-            // A frame that only repeats the one before is shown once.
-            payloads.dedup_by(|next, before| Arc::ptr_eq(next, before));
+            // A frame that repeats the one before it is shown once.
+            payloads.dedup_by(|next, previous| Arc::ptr_eq(next, previous));
             let mut names = Vec::with_capacity(payloads.len());
             for (place, payload) in payloads.iter().enumerate() {
                 let name = image(&walk.name.0, condition, place, payload);
@@ -88,7 +88,7 @@ pub(super) fn pack(
     })
 }
 
-/// The name of an image, which says nothing of the level.
+/// The file name of an image, which does not reveal the level.
 fn image(walk: &str, condition: &Condition, place: usize, payload: &Payload) -> String {
     let digest = Digest::of_parts([walk.as_bytes(), condition.to_string().as_bytes()]);
     let ending = if payload.facts().format == "png" {

@@ -1,4 +1,4 @@
-//! The human check: its page, and what people said on it.
+//! The check of questions by people: the page, and the verdicts that it saves.
 
 use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
@@ -13,7 +13,7 @@ use crate::questions::statistics::FrameStatistics;
 use crate::report::questions::review::{ReviewItem, page};
 use crate::types::QuestionId;
 
-/// A line of what a person said.
+/// A line of a file of verdicts.
 #[derive(Deserialize)]
 struct CheckedLine {
     id: QuestionId,
@@ -27,49 +27,49 @@ enum Decision {
     Reject,
 }
 
-/// The questions that people have rejected; what the later line says of a question holds.
+/// The questions that people rejected. If several lines are about one question, the last one counts.
 ///
 /// # Errors
-/// With the file and line that is none.
+/// If a line is not a verdict; the error names the file and the line.
 pub(super) fn rejected(files: &[PathBuf]) -> Result<BTreeSet<QuestionId>> {
     let mut rejected = BTreeSet::new();
     for path in files {
         let text = reading::text(path)?;
         let lines = text.trim_start_matches('\u{feff}').lines().enumerate();
         for (i, line) in lines.filter(|(_, line)| !line.trim().is_empty()) {
-            let said: CheckedLine =
+            let verdict_line: CheckedLine =
                 serde_json::from_str(line).map_err(|e| Error::json_line(path, i + 1, &e))?;
-            match said.verdict {
-                Decision::Reject => drop(rejected.insert(said.id)),
-                Decision::Accept => drop(rejected.remove(&said.id)),
+            match verdict_line.verdict {
+                Decision::Reject => drop(rejected.insert(verdict_line.id)),
+                Decision::Accept => drop(rejected.remove(&verdict_line.id)),
             }
         }
     }
     Ok(rejected)
 }
 
-/// Writes the page of all questions.
+/// Writes the page on which people check all questions.
 pub(super) fn review(
     path: &Path,
     dataset: &Dataset,
     frames: &[FrameStatistics],
-    asked: &[GeneratedQuestion],
+    questions: &[GeneratedQuestion],
 ) -> Result<()> {
     let folder = path.parent().unwrap_or(Path::new(""));
-    let items = asked.iter().filter_map(|asked| {
-        let frame = &asked.question.frame;
+    let items = questions.iter().filter_map(|generated| {
+        let frame = &generated.question.frame;
         let size = frames.iter().find(|known| known.frame == *frame)?.size;
         let image = dataset.image_file(frame)?;
-        Some(ReviewItem::new(asked, link(folder, image), size))
+        Some(ReviewItem::new(generated, link(folder, image), size))
     });
     write(path, page(&items.collect::<Vec<_>>())?.as_bytes())
 }
 
-/// The way from a folder to a file, as a link of a page.
+/// The relative link from a folder to a file.
 fn link(from: &Path, to: &Path) -> String {
     let absolute = |path: &Path| {
-        let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-        whole.canonicalize().unwrap_or(whole)
+        let absolute_path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        absolute_path.canonicalize().unwrap_or(absolute_path)
     };
     let (from, to) = (absolute(from), absolute(to));
     let common = from
@@ -85,7 +85,7 @@ fn link(from: &Path, to: &Path) -> String {
     up.chain(down).collect::<Vec<_>>().join("/")
 }
 
-/// A name as a part of a link (RFC 3986, section 2.3).
+/// A name, percent-encoded as a part of a link (RFC 3986, section 2.3).
 fn escaped(name: &str) -> String {
     let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-._~".contains(&byte);
     name.bytes()
@@ -106,7 +106,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_last_word_holds() {
+    fn the_last_verdict_counts() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("v.jsonl");
         let lines = [

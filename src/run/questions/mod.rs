@@ -1,4 +1,4 @@
-//! `questions`: multiple-choice questions about frames, by rule.
+//! `questions`: making multiple-choice questions about frames, by rule.
 
 mod checked;
 mod statistics_cache;
@@ -21,7 +21,7 @@ use crate::questions::balance::BalanceMode;
 use crate::questions::colors::Palette;
 use crate::questions::reason::Reason;
 use crate::questions::room::RoomSource;
-use crate::questions::rule_context::RuleResult as Candidate;
+use crate::questions::rule_context::RuleResult;
 use crate::questions::rules::Rules;
 use crate::questions::statistics::{self, FrameStatistics, measure, unknown_labels};
 use crate::questions::summary::QuestionSummary;
@@ -39,8 +39,8 @@ pub(crate) struct QuestionsArgs {
     /// A folder of frames with their maps (frames.jsonl, classes.json), as import makes it
     #[arg(value_name = "DATA", add = Decides::Reply)]
     pub data: PathBuf,
-    /// Where the questions go (.jsonl); what was measured of the frames is kept beside it
-    #[arg(long, value_name = "FILE", value_parser = file, add = Decides::Nothing)]
+    /// Where the questions go (.jsonl); the statistics of the frames go into a file next to it
+    #[arg(long, value_name = "FILE", value_parser = file)]
     pub out: PathBuf,
     /// The rulebook; default: the one built in (src/questions/rules.toml)
     #[arg(long, value_name = "FILE", help_heading = "Rules", add = Decides::Trials)]
@@ -54,14 +54,14 @@ pub(crate) struct QuestionsArgs {
     /// How the answers are evened out
     #[arg(long, value_enum, default_value_t, help_heading = "Rules", add = Decides::Trials)]
     pub balance: BalanceMode,
-    /// What says which room it is
-    #[arg(long, value_enum, default_value_t, help_heading = "Rules", add = Decides::Trials)]
+    /// Where the kind of room is read from
+    #[arg(long, value_enum, default_value_t, help_heading = "Rules")]
     pub room: RoomSource,
     /// Refuse numbers of a semantic map that classes.json does not have, instead of counting them as unlabelled
     #[arg(long, help_heading = "Rules", add = Decides::Trials)]
     pub strict: bool,
-    /// Write what became of every candidate, a line each; default: not written
-    #[arg(long, value_name = "FILE", help_heading = "Checking", add = Decides::Nothing)]
+    /// Write every candidate and why it was taken or rejected, one per line; default: not written
+    #[arg(long, value_name = "FILE", help_heading = "Checking")]
     pub candidates: Option<PathBuf>,
     /// Write the statistics of frames, questions and answers: JSON, CSV and a figure; default: not written
     #[arg(long, value_name = "DIR", help_heading = "Checking", add = Decides::Nothing)]
@@ -75,23 +75,24 @@ pub(crate) struct QuestionsArgs {
     /// Print the statistics as JSON instead of a table
     #[arg(long, help_heading = "Output", add = Decides::Nothing)]
     pub json: bool,
-    /// How large an image may be.
+    /// The maximum size of an image.
     #[command(flatten)]
     pub limit: PixelLimit,
-    /// On how many threads.
+    /// The number of threads.
     #[command(flatten)]
     pub threads: ThreadArgs,
 }
 
-/// Reads the path of a file that questions go to.
+/// The path of the file that questions are written to.
 fn file(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
-    let fit = path.file_stem().is_some() && !path.is_dir();
-    fit.then_some(path)
+    let valid = path.file_stem().is_some() && !path.is_dir();
+    valid
+        .then_some(path)
         .ok_or_else(|| "a file expected, as questions.jsonl".to_owned())
 }
 
-/// Reads a family of questions that are made by rule.
+/// The family of questions in a text; only families that are made by rule.
 fn family(name: &str) -> Result<Family, String> {
     match Family::from(name.trim()) {
         Family::Other(_) => {
@@ -101,7 +102,7 @@ fn family(name: &str) -> Result<Family, String> {
     }
 }
 
-/// The flags with the tables that they name.
+/// The flags, and the tables of rules and colours that they name.
 struct QuestionMaking<'a> {
     args: &'a QuestionsArgs,
     rules: Rules,
@@ -130,22 +131,22 @@ fn read<T>(path: Option<&Path>, parse: fn(&str) -> Result<T>) -> Result<Option<T
         .map_err(|e| e.at(path.display().to_string()))
 }
 
-/// Makes the questions.
+/// Makes the questions and writes them.
 ///
-/// What cannot be measured of one frame is said, counted, and does not stop the others.
+/// If one frame fails, the error is logged and counted, and the others continue.
 ///
 /// # Errors
-/// Where there are no frames, no classes, or a file cannot be written.
+/// If there are no frames or no classes, or a file cannot be written.
 pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Outcome> {
     let making = &QuestionMaking::read(args)?;
     let dataset = Dataset::of_frames(&args.data)?;
     let dataset = dataset.with_most_pixels(args.limit.max_pixels.get());
     let labels = dataset.labels().ok_or_else(|| {
-        let problem = "no classes.json in this folder, which says what the numbers of its maps stand for; `darkqa-eval import` writes one";
+        let problem = "no classes.json in this folder, which gives the class of each number in its maps; `darkqa-eval import` writes one";
         Error::data(args.data.display(), problem)
     })?;
     let (frames, failed) = measured(making, &dataset, labels, progress)?;
-    let order = QuestionRequest {
+    let request = QuestionRequest {
         dataset: dataset.title(),
         labels,
         rules: &making.rules,
@@ -160,19 +161,19 @@ pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Out
         rejected: checked::rejected(&args.verdicts)?,
     };
     let mut candidates = Vec::new();
-    let made = generate(&frames, &order, |frame, candidate| {
+    let generated = generate(&frames, &request, |frame, result| {
         if args.candidates.is_some() {
-            candidates.push(told(frame, candidate));
+            candidates.push(candidate_line(frame, result));
         }
     })?;
     write(
         &args.out,
-        &lines(made.asked.iter().map(WrittenQuestion::of))?,
+        &lines(generated.asked.iter().map(WrittenQuestion::of))?,
     )?;
     if let Some(path) = &args.candidates {
         write(path, &lines(candidates)?)?;
     }
-    let summary = QuestionSummary::new(&frames, &made, &order, failed);
+    let summary = QuestionSummary::new(&frames, &generated, &request, failed);
     let json = report::questions::json(&summary)?;
     if let Some(folder) = &args.stats {
         write(&folder.join("statistics.json"), json.as_bytes())?;
@@ -184,9 +185,9 @@ pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Out
         write(&folder.join("statistics.svg"), figure.as_bytes())?;
     }
     if let Some(page) = &args.review {
-        checked::review(page, &dataset, &frames, &made.asked)?;
+        checked::review(page, &dataset, &frames, &generated.asked)?;
     }
-    warn(&made, making);
+    warn(&generated, making);
     Ok(Outcome {
         status: if failed == 0 {
             Status::Complete
@@ -204,44 +205,44 @@ pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Out
     })
 }
 
-/// Says what is not wrong, but likely not meant.
-fn warn(made: &Generated, making: &QuestionMaking<'_>) {
-    for uneven in &made.uneven {
+/// Warns of results that are valid but probably not intended.
+fn warn(generated: &Generated, making: &QuestionMaking<'_>) {
+    for uneven in &generated.uneven {
         tracing::warn!("{uneven}");
     }
-    let closest = made.counts.get(&Family::Closest);
-    let scale = closest.and_then(|counts| counts.rejections.get(&Reason::Scale));
+    let closest = generated.tallies.get(&Family::Closest);
+    let scale = closest.and_then(|tally| tally.fallen.get(&Reason::Scale));
     if let Some(frames) = scale {
         let measure = &making.rules.book().measure;
         tracing::warn!(
-            "{frames} frames have a median depth outside {}–{} mm, which no room has, and are asked nothing of depth; is their depth_scale right?",
+            "{frames} frames have a median depth outside {}–{} mm, which no room has, so no questions about depth are made; is their depth_scale right?",
             measure.least_median_depth_mm,
             measure.most_median_depth_mm
         );
     }
 }
 
-/// The file of what was measured, beside the questions.
-fn beside(out: &Path, what: &str) -> PathBuf {
+/// The path of the statistics cache, next to the questions.
+fn statistics_path(out: &Path) -> PathBuf {
     let stem = out.file_stem().unwrap_or_default().to_string_lossy();
-    out.with_file_name(format!("{stem}.{what}"))
+    out.with_file_name(format!("{stem}.statistics.jsonl"))
 }
 
-/// Measures the frames that were not measured before, and counts those that cannot be.
+/// The statistics of all frames, and the number of frames that failed. Only frames that are not in the cache are measured.
 fn measured(
     making: &QuestionMaking<'_>,
     dataset: &Dataset,
     labels: &Labels,
     progress: &Progress,
 ) -> Result<(Vec<FrameStatistics>, usize)> {
-    let kept = StatisticsCache::open(&beside(&making.args.out, "statistics.jsonl"))?;
-    let cores = pool(making.args.threads.threads)?;
+    let cache = StatisticsCache::open(&statistics_path(&making.args.out))?;
+    let workers = pool(making.args.threads.threads)?;
     let names: Vec<&FrameId> = dataset.frames().collect();
     let bar = progress.bar("frames", names.len());
     let context = context(making, labels);
-    let results: Vec<Option<FrameStatistics>> = cores.install(|| {
+    let results: Vec<Option<FrameStatistics>> = workers.install(|| {
         let frames = names.par_iter().map(|name| {
-            let found = one(making, dataset, labels, &kept, context, name);
+            let found = measure_frame(making, dataset, labels, &cache, context, name);
             bar.inc();
             found.map_err(|e| tracing::error!("{e}")).ok()
         });
@@ -253,14 +254,14 @@ fn measured(
     if frames.is_empty() {
         return Err(Error::data(
             making.args.data.display(),
-            "none of its frames could be measured",
+            "no frame in this folder could be measured",
         ));
     }
-    kept.finish(&frames)?;
+    cache.finish(&frames)?;
     Ok((frames, failed))
 }
 
-/// All that decides what is measured, but for the frame.
+/// The digest of everything that decides the statistics, except the frame.
 fn context(making: &QuestionMaking<'_>, labels: &Labels) -> Digest {
     let version = statistics::VERSION.to_le_bytes();
     let parts = [
@@ -275,37 +276,41 @@ fn context(making: &QuestionMaking<'_>, labels: &Labels) -> Digest {
     )
 }
 
-fn one(
+fn measure_frame(
     making: &QuestionMaking<'_>,
     dataset: &Dataset,
     labels: &Labels,
-    kept: &StatisticsCache,
+    cache: &StatisticsCache,
     context: Digest,
     name: &FrameId,
 ) -> Result<FrameStatistics> {
     let files = dataset.files(name)?;
-    let seen = files.digest()?;
-    let parts = [&context.as_bytes()[..], seen.as_bytes(), name.0.as_bytes()];
+    let content = files.digest()?;
+    let parts = [
+        &context.as_bytes()[..],
+        content.as_bytes(),
+        name.0.as_bytes(),
+    ];
     let key = Digest::of_parts(parts);
-    let found = if let Some(found) = kept.get(key) {
+    let found = if let Some(found) = cache.get(key) {
         found
     } else {
         let frame = files.decode()?;
         let found = measure(&frame, labels, &making.rules, &making.palette, key)?;
-        kept.add(&found)?;
+        cache.add(&found)?;
         found
     };
     let unknown = unknown_labels(&found);
     if making.args.strict && !unknown.is_empty() {
         let problem = format_args!(
-            "its semantic map has the numbers {unknown:?}, which classes.json has not"
+            "its semantic map has the numbers {unknown:?}, which are not in classes.json"
         );
         return Err(Error::data(format_args!("frame {:?}", name.0), problem));
     }
     Ok(found)
 }
 
-/// A question as a line of its file, in the order of the keys.
+/// A question as a line of the output file, with the keys in this order.
 #[derive(Serialize)]
 struct WrittenQuestion<'a> {
     id: &'a QuestionId,
@@ -332,24 +337,24 @@ impl<'a> WrittenQuestion<'a> {
     }
 }
 
-/// A candidate as a line of its file.
-fn told(frame: &FrameId, candidate: &Candidate) -> Value {
-    match candidate {
-        Candidate::Viable(claim) => json!({
+/// A candidate as a line of the `--candidates` file.
+fn candidate_line(frame: &FrameId, result: &RuleResult) -> Value {
+    match result {
+        RuleResult::Holds(candidate) => json!({
             "frame": frame,
-            "family": claim.family,
-            "about": claim.about,
-            "answer": claim.answer(),
+            "family": candidate.family,
+            "about": candidate.about,
+            "answer": candidate.answer(),
             "reason": null,
-            "question": claim.text,
-            "evidence": claim.evidence,
+            "question": candidate.text,
+            "evidence": candidate.evidence,
         }),
-        Candidate::Rejected(fallen) => json!({
+        RuleResult::Falls(rejection) => json!({
             "frame": frame,
-            "family": fallen.family,
-            "about": fallen.about,
-            "answer": fallen.answer,
-            "reason": fallen.reason,
+            "family": rejection.family,
+            "about": rejection.about,
+            "answer": rejection.answer,
+            "reason": rejection.reason,
         }),
     }
 }

@@ -1,7 +1,7 @@
-//! What was measured of frames, kept by content beside the questions: [`StatisticsCache`].
+//! The cache of the statistics of frames, in a file next to the questions: [`StatisticsCache`].
 //!
-//! One file, a frame a line. While frames are measured, a line is added the moment it is known, so that whatever stops the
-//! work, it goes on from there; in the end the file is written anew in the order of the frames.
+//! The file has one line per frame. A line is added as soon as its frame is measured, so that an interrupted command
+//! continues there. At the end the file is rewritten in the order of the frames.
 
 use std::collections::HashMap;
 use std::fs::{self, File, OpenOptions};
@@ -14,7 +14,7 @@ use crate::files::write;
 use crate::questions::statistics::FrameStatistics;
 use crate::types::Digest;
 
-/// What was measured, by content.
+/// The statistics of frames, by the digest of everything that decides them.
 pub(super) struct StatisticsCache {
     path: PathBuf,
     known: HashMap<Digest, FrameStatistics>,
@@ -22,18 +22,18 @@ pub(super) struct StatisticsCache {
 }
 
 impl StatisticsCache {
-    /// Reads what is there. A line that is none, as the last one of a run that was stopped, is left out: its frame is measured
-    /// again.
+    /// Reads the file if it exists. A broken line, as the last one of an interrupted command, is ignored: its frame is
+    /// measured again.
     pub(super) fn open(path: &Path) -> Result<Self> {
         let mut known = HashMap::new();
-        let mut cut = false;
+        let mut broken = false;
         match File::open(path) {
             Ok(file) => {
                 for line in BufReader::new(file).split(b'\n') {
                     let line = line.map_err(|e| Error::file(path, "read", e))?;
                     match serde_json::from_slice::<FrameStatistics>(&line) {
                         Ok(statistics) => drop(known.insert(statistics.key, statistics)),
-                        Err(_) => cut = true,
+                        Err(_) => broken = true,
                     }
                 }
             }
@@ -45,8 +45,8 @@ impl StatisticsCache {
         }
         let file = OpenOptions::new().create(true).append(true).open(path);
         let mut file = file.map_err(|e| Error::file(path, "write", e))?;
-        if cut {
-            // What comes next must not hang on to half a line.
+        if broken {
+            // The next line must not continue a half-written one.
             file.write_all(b"\n")
                 .map_err(|e| Error::file(path, "write", e))?;
         }
@@ -57,12 +57,12 @@ impl StatisticsCache {
         })
     }
 
-    /// What was measured of such content.
+    /// The statistics with a key.
     pub(super) fn get(&self, key: Digest) -> Option<FrameStatistics> {
         self.known.get(&key).cloned()
     }
 
-    /// Keeps what was measured.
+    /// Appends the statistics of a frame to the file.
     pub(super) fn add(&self, statistics: &FrameStatistics) -> Result<()> {
         let line = line(statistics)?;
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
@@ -70,7 +70,7 @@ impl StatisticsCache {
             .map_err(|e| Error::file(&self.path, "write", e))
     }
 
-    /// Leaves exactly these frames, in this order.
+    /// Rewrites the file with exactly these frames, in this order.
     pub(super) fn finish(self, frames: &[FrameStatistics]) -> Result<()> {
         let lines = frames.iter().map(line).collect::<Result<Vec<_>>>()?;
         drop(self.file);

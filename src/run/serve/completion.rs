@@ -1,4 +1,4 @@
-//! What is sent back: a [`Completion`] or a [`RequestFault`], in OpenAI's words.
+//! The response, a [`Completion`] or a [`RequestFault`], in OpenAI's format.
 
 use axum::Json;
 use axum::http::{StatusCode, header};
@@ -6,14 +6,14 @@ use axum::response::{IntoResponse, Response};
 use jiff::Timestamp;
 use serde_json::{Value, json};
 
-/// Whether an answer comes whole or as a stream of events.
+/// The form of a response: one JSON body or a stream of events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ReplyForm {
     Whole,
     Stream,
 }
 
-/// An answer.
+/// A successful response.
 pub(super) struct Completion {
     pub(super) model: String,
     pub(super) text: String,
@@ -38,7 +38,7 @@ impl Completion {
             "logprobs": null,
             "finish_reason": "stop",
         }]);
-        // Nothing is counted in tokens here.
+        // Tokens are not counted.
         whole["usage"] = json!({"prompt_tokens": 0, "completion_tokens": 0, "total_tokens": 0});
         whole
     }
@@ -49,8 +49,8 @@ impl Completion {
             chunk["choices"] = json!([{"index": 0, "delta": delta, "finish_reason": finish}]);
             format!("data: {chunk}\n\n")
         };
-        let said = json!({"role": "assistant", "content": self.text});
-        chunk(said, Value::Null) + &chunk(json!({}), json!("stop")) + "data: [DONE]\n\n"
+        let delta = json!({"role": "assistant", "content": self.text});
+        chunk(delta, Value::Null) + &chunk(json!({}), json!("stop")) + "data: [DONE]\n\n"
     }
 }
 
@@ -66,7 +66,7 @@ impl IntoResponse for Completion {
     }
 }
 
-/// Why there is no answer.
+/// An error response.
 #[derive(Debug)]
 pub(super) struct RequestFault {
     status: StatusCode,
@@ -85,7 +85,7 @@ impl RequestFault {
         }
     }
 
-    /// The same, with the parameter at fault and a code.
+    /// The same error, with the name of the wrong parameter and a code.
     pub(super) fn at(self, parameter: &'static str, code: &'static str) -> Self {
         Self {
             parameter: Some(parameter),
@@ -112,7 +112,7 @@ impl IntoResponse for RequestFault {
     }
 }
 
-/// The list of the models.
+/// The response with the list of models.
 pub(super) fn models<'a>(names: impl Iterator<Item = &'a str>) -> Response {
     let models = names.map(
         |name| json!({"id": name, "object": "model", "created": 0, "owned_by": "darkqa-eval"}),

@@ -1,9 +1,8 @@
-//! `serve`: the built-in models behind an OpenAI-compatible endpoint on loopback, for trying clients and for CI without
-//! keys.
+//! `serve`: the built-in models at an OpenAI-compatible endpoint on loopback, for trying clients and for CI without keys.
 //!
 //! `POST /v1/chat/completions` takes a multiple-choice question with or without an image and answers with a letter; `GET
-//! /v1/models` names the models. The observer has to know which frame an image shows: it is told by nothing but the image
-//! (`recognise`). Only this machine is answered, any key is accepted, nothing is charged and nothing is kept.
+//! /v1/models` lists the models. The observer must know which frame an image shows, and finds it by the image alone
+//! (`recognise`). Only requests from this machine are answered. Any key is accepted, and nothing is charged or stored.
 
 mod completion;
 mod puzzle;
@@ -39,7 +38,7 @@ use puzzle::Puzzle;
 use recognise::Likenesses;
 use request::ServedQuestion;
 
-/// The largest request that is read, in bytes.
+/// The maximum size of a request in bytes (chosen).
 const LARGEST: usize = 64 << 20;
 
 /// The flags of `serve`.
@@ -51,24 +50,24 @@ pub(crate) struct ServeArgs {
     /// The port on 127.0.0.1, 0 for any that is free
     #[arg(long, value_name = "N", default_value_t = 8089, add = Decides::Nothing)]
     pub port: u16,
-    /// What decides the guesses
-    #[arg(long, value_name = "N", default_value_t = 0, add = Decides::Pixels)]
+    /// The seed of the guesses
+    #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
 }
 
-/// What requests are answered with.
+/// The state that all requests share.
 struct ServerState {
     likenesses: Likenesses,
-    /// The models by the names they have here: `darkqa-eval --model observer` would be the one in its own process.
+    /// The models by their names at this endpoint. They differ from `--model observer`, which runs without an endpoint.
     models: [(&'static str, Model); 2],
 }
 
-/// Answers requests until it is interrupted.
+/// Answers requests until the process is interrupted.
 ///
 /// # Errors
-/// Where the frames cannot be read, or the port is taken.
+/// If the frames cannot be read, or another process uses the port.
 pub(crate) fn serve(args: &ServeArgs, progress: &Progress) -> Result<Outcome> {
-    let dataset = Arc::new(Dataset::open_unasked(&args.data)?);
+    let dataset = Arc::new(Dataset::open_without_questions(&args.data)?);
     let prior = Random { seed: args.seed };
     let models = [
         (
@@ -78,42 +77,41 @@ pub(crate) fn serve(args: &ServeArgs, progress: &Progress) -> Result<Outcome> {
         ("darkqa-random", Model::Random(prior)),
     ];
     let likenesses = Likenesses::of(&dataset, progress)?;
-    let desk = Arc::new(ServerState { likenesses, models });
+    let state = Arc::new(ServerState { likenesses, models });
     let runtime = runtime::Builder::new_multi_thread()
         .enable_all()
         .build()
         .map_err(|e| Error::usage("serve", e))?;
-    runtime.block_on(listen(args, desk, progress))?;
+    runtime.block_on(listen(args, state, progress))?;
     Ok(Outcome {
         status: Status::Complete,
         output: String::new(),
     })
 }
 
-async fn listen(args: &ServeArgs, desk: Arc<ServerState>, progress: &Progress) -> Result<()> {
+async fn listen(args: &ServeArgs, state: Arc<ServerState>, progress: &Progress) -> Result<()> {
     let address = SocketAddr::from((Ipv4Addr::LOCALHOST, args.port));
-    let taken = |e| {
-        let problem = format!(
-            "{address} cannot be listened at: {e}; --port N takes another, 0 any that is free"
-        );
+    let cannot_listen = |e| {
+        let problem =
+            format!("cannot listen at {address}: {e}; --port N takes another port, 0 any free one");
         Error::usage("--port", problem)
     };
     let listener = tokio::net::TcpListener::bind(address)
         .await
-        .map_err(taken)?;
-    let address = listener.local_addr().map_err(taken)?;
-    let names: Vec<&str> = desk.names().collect();
+        .map_err(cannot_listen)?;
+    let address = listener.local_addr().map_err(cannot_listen)?;
+    let names: Vec<&str> = state.names().collect();
     progress.say(&format!("models: {}; Ctrl-C ends it", names.join(", ")));
-    // Whoever waits for the address on standard output gets it at once; who does not read it is served all the same.
+    // A client may wait for the address on standard output. A closed output is ignored.
     let mut out = std::io::stdout().lock();
     let _ = writeln!(out, "http://{address}/v1").and_then(|()| out.flush());
     drop(out);
     let app = Router::new()
         .route("/v1/models", get(models))
         .route("/v1/chat/completions", post(complete))
-        .fallback(nowhere)
+        .fallback(not_found)
         .layer(DefaultBodyLimit::max(LARGEST))
-        .with_state(desk);
+        .with_state(state);
     let mut interrupt = Interrupt::listen()?;
     axum::serve(listener, app)
         .with_graceful_shutdown(async move { interrupt.next().await })
@@ -121,17 +119,17 @@ async fn listen(args: &ServeArgs, desk: Arc<ServerState>, progress: &Progress) -
         .map_err(|e| Error::usage("serve", e))
 }
 
-async fn nowhere() -> Response {
-    let message = "there are GET /v1/models and POST /v1/chat/completions";
+async fn not_found() -> Response {
+    let message = "no such path; use GET /v1/models or POST /v1/chat/completions";
     RequestFault::new(StatusCode::NOT_FOUND, message).into_response()
 }
 
-async fn models(State(desk): State<Arc<ServerState>>) -> Response {
-    completion::models(desk.names())
+async fn models(State(state): State<Arc<ServerState>>) -> Response {
+    completion::models(state.names())
 }
 
-async fn complete(State(desk): State<Arc<ServerState>>, body: Bytes) -> Response {
-    match desk.answer(&body).await {
+async fn complete(State(state): State<Arc<ServerState>>, body: Bytes) -> Response {
+    match state.answer(&body).await {
         Ok(completion) => completion.into_response(),
         Err(fault) => fault.into_response(),
     }
@@ -143,24 +141,24 @@ impl ServerState {
     }
 
     async fn answer(&self, body: &[u8]) -> Result<Completion, RequestFault> {
-        let asked = ServedQuestion::read(body)?;
-        let model = self.models.iter().find(|(name, _)| *name == asked.model);
+        let request = ServedQuestion::read(body)?;
+        let model = self.models.iter().find(|(name, _)| *name == request.model);
         let (_, model) = model.ok_or_else(|| {
             let names: Vec<&str> = self.names().collect();
             let message = format!(
-                "the model {:?} is none of {}",
-                asked.model,
+                "the model {:?} is not one of {}",
+                request.model,
                 names.join(", ")
             );
             RequestFault::new(StatusCode::NOT_FOUND, message).at("model", "model_not_found")
         })?;
-        let puzzle = Puzzle::read(&asked.text)?;
-        let frame = asked
+        let puzzle = Puzzle::read(&request.text)?;
+        let frame = request
             .image
             .as_ref()
             .and_then(|(image, _)| self.likenesses.most_like(image));
-        let words = Digest::of(asked.text.as_bytes()).to_string();
-        let image = asked.image.as_ref().map(|(_, payload)| payload);
+        let words = Digest::of(request.text.as_bytes()).to_string();
+        let image = request.image.as_ref().map(|(_, payload)| payload);
         let images = image.map(std::slice::from_ref);
         let seen = image.map_or_else(String::new, |image| image.facts().digest.to_string());
         let question = Question {
@@ -176,9 +174,9 @@ impl ServerState {
             query: Query::Choice(&question),
             condition: None,
             message: Message {
-                // What is no frame of the data is not seen.
+                // An image that shows no frame of the data is not passed on.
                 images: images.filter(|_| frame.is_some()).unwrap_or_default(),
-                ..Message::words(&asked.text)
+                ..Message::words(&request.text)
             },
             turn: 0,
         };
@@ -187,9 +185,9 @@ impl ServerState {
             .await
             .map_err(|e| RequestFault::new(StatusCode::INTERNAL_SERVER_ERROR, e.failure.message))?;
         Ok(Completion {
-            model: asked.model,
+            model: request.model,
             text: reply.text,
-            form: asked.form,
+            form: request.form,
         })
     }
 }

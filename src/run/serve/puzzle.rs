@@ -1,4 +1,4 @@
-//! A multiple-choice question in a text of anybody's wording: [`Puzzle`].
+//! A multiple-choice question found in a free text: [`Puzzle`].
 
 use std::sync::LazyLock;
 
@@ -20,8 +20,8 @@ static CHOICE: LazyLock<Option<Regex>> =
     LazyLock::new(|| Regex::new(r"^\s*[(\[]?([A-Z])[)\].:]+\s*(\S.*?)\s*$").ok());
 
 impl Puzzle {
-    /// Reads the last question of a text: the choices are its lines of consecutive letters, the question is the last line
-    /// with a question mark before them, else the line before them.
+    /// The last question of a text. The choices are lines with consecutive letters. The question is the last line before
+    /// them that ends with a question mark, else the line just before them.
     pub(super) fn read(text: &str) -> Result<Self, RequestFault> {
         let lines: Vec<&str> = text.lines().collect();
         let lettered: Vec<Option<(char, &str)>> = lines.iter().map(|line| choice(line)).collect();

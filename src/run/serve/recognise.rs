@@ -1,8 +1,8 @@
-//! Which frame an image shows: [`Likenesses`].
+//! Recognition of the frame that an image shows: [`Likenesses`].
 //!
-//! The linear light of an image is averaged over a coarse grid, which leaves little of a sensor's noise, and correlated
-//! with that of every frame: a correlation does not change with how bright the image is. So frames are found again at every
-//! level that leaves a trace of them.
+//! The linear light of an image is averaged over a coarse grid, which removes most of the sensor noise, and correlated
+//! with that of every frame. A correlation does not depend on the brightness of the image. So a frame is recognised at
+//! every level that still shows some of it.
 
 use rayon::prelude::*;
 
@@ -12,17 +12,17 @@ use crate::job::progress::Progress;
 use crate::questions::observer::contrast::linear;
 use crate::types::{FrameId, Rgb};
 
-/// Cells of the grid, across and down.
+/// The number of grid cells, horizontally and vertically (chosen).
 const GRID: [usize; 2] = [32, 24];
 
-/// An image that correlates less than this with every frame shows none of them.
+/// The minimum correlation for an image to show a frame (chosen).
 const LEAST: f64 = 0.5;
 
-/// All frames, as they are recognised.
+/// Each frame with its cell values.
 pub(super) struct Likenesses(Vec<(FrameId, Vec<f64>)>);
 
 impl Likenesses {
-    /// Looks at every frame once.
+    /// The cell values of every frame of a data set.
     pub(super) fn of(dataset: &Dataset, progress: &Progress) -> Result<Self> {
         let names: Vec<&FrameId> = dataset.frames().collect();
         let bar = progress.bar("looking at frames", names.len());
@@ -34,7 +34,7 @@ impl Likenesses {
         seen.collect::<Result<_>>().map(Self)
     }
 
-    /// The frame that an image is most like; `None` where it is like none.
+    /// The frame with the highest correlation to an image; `None` if it is below the minimum.
     pub(super) fn most_like(&self, image: &Rgb) -> Option<&FrameId> {
         let own = likeness(image);
         let correlation =
@@ -43,12 +43,12 @@ impl Likenesses {
             .0
             .iter()
             .map(|(name, other)| (correlation(other), name));
-        let (most, name) = found.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        (most >= LEAST).then_some(name)
+        let (highest, name) = found.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        (highest >= LEAST).then_some(name)
     }
 }
 
-/// The light of each cell, as numbers of mean 0 and of squares that sum to 1.
+/// The square root of the light of each cell, shifted to mean 0 and scaled so that the squares sum to 1.
 fn likeness(image: &Rgb) -> Vec<f64> {
     let (width, height) = (image.width(), image.height());
     let mut cells = vec![(0_u64, 0_u64); GRID[0] * GRID[1]];
@@ -62,7 +62,7 @@ fn likeness(image: &Rgb) -> Vec<f64> {
             .sum::<u64>();
         *count += 1;
     }
-    // The square root, so that a window does not outweigh the room.
+    // The square root keeps a bright window from dominating the rest.
     let lights: Vec<f64> = cells
         .iter()
         .map(|(light, count)| (*light as f64 / (*count).max(1) as f64).sqrt())

@@ -1,4 +1,4 @@
-//! What a request asks: [`ServedQuestion`].
+//! The question of a request: [`ServedQuestion`].
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::dataset::Picture;
 use crate::dataset::picture::MOST_PIXELS;
 use crate::types::Rgb;
 
-/// A request, as far as it is used; whatever else it says is taken and makes no difference.
+/// The fields of a request that are used. Other fields are ignored.
 #[derive(Deserialize)]
 struct ChatBody {
     model: String,
@@ -47,35 +47,35 @@ struct ImageLink {
     url: String,
 }
 
-/// What is asked.
+/// The question of a request: a model, the text and the image.
 pub(super) struct ServedQuestion {
     pub(super) model: String,
-    /// All texts, one after the other.
+    /// The texts of all messages, joined.
     pub(super) text: String,
-    /// The last image, decoded and as it is looked at.
+    /// The last image: its pixels, and the payload for the model.
     pub(super) image: Option<(Rgb, Arc<Payload>)>,
     pub(super) form: ReplyForm,
 }
 
 impl ServedQuestion {
-    /// Reads the body of a request.
+    /// The question in the body of a request.
     pub(super) fn read(body: &[u8]) -> Result<Self, RequestFault> {
         let wrong = |message: String| RequestFault::new(StatusCode::BAD_REQUEST, message);
         let body: ChatBody = serde_json::from_slice(body)
-            .map_err(|e| wrong(format!("the request is none that is understood: {e}")))?;
+            .map_err(|e| wrong(format!("the request is not a valid chat completion: {e}")))?;
         let (mut text, mut image) = (String::new(), None);
-        let mut say = |words: &str| {
+        let mut append = |words: &str| {
             text.push_str(words);
             text.push('\n');
         };
         for message in body.messages {
             match message.content {
                 None => {}
-                Some(Content::Text(words)) => say(&words),
+                Some(Content::Text(words)) => append(&words),
                 Some(Content::Parts(parts)) => {
                     for part in parts {
                         match part {
-                            Part::Text { text } => say(&text),
+                            Part::Text { text } => append(&text),
                             Part::ImageUrl { image_url } => image = Some(image_url.url),
                         }
                     }
@@ -95,7 +95,7 @@ impl ServedQuestion {
     }
 }
 
-/// The pixels of a data URL.
+/// The pixels of a data URL, and the payload for the model.
 fn pixels(url: &str) -> Result<(Rgb, Arc<Payload>), RequestFault> {
     let wrong = |message: String| {
         RequestFault::new(StatusCode::BAD_REQUEST, message).at("image_url", "invalid_image_url")
@@ -105,13 +105,13 @@ fn pixels(url: &str) -> Result<(Rgb, Arc<Payload>), RequestFault> {
         .and_then(|rest| rest.split_once(";base64,"));
     let (_, data) = data.ok_or_else(|| {
         wrong(
-            "only data URLs are looked at: data:image/png;base64,… or data:image/jpeg;base64,…"
+            "only data URLs are accepted: data:image/png;base64,… or data:image/jpeg;base64,…"
                 .to_owned(),
         )
     })?;
     let bytes = STANDARD
         .decode(data)
-        .map_err(|e| wrong(format!("the image is no base64: {e}")))?;
+        .map_err(|e| wrong(format!("the image is not base64: {e}")))?;
     let picture = Picture::Encoded {
         bytes,
         place: "image_url".to_owned(),

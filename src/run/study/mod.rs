@@ -1,4 +1,4 @@
-//! `study`: people in the place of a model.
+//! `study`: asking people the questions of a run.
 
 mod pack;
 mod read;

@@ -1,4 +1,4 @@
-//! `study pack`: a page on which people answer what the models were asked.
+//! `study pack`: writing a page on which people answer the questions of a run.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroUsize;
@@ -26,26 +26,26 @@ pub(crate) struct PackArgs {
     /// Where the page and its images go
     #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub out: PathBuf,
-    /// Ask about N questions, drawn by their names; default: all
-    #[arg(long, value_name = "N", add = Decides::Trials)]
+    /// Ask only N questions, chosen by a hash of their ids; default: all
+    #[arg(long, value_name = "N")]
     pub items: Option<NonZeroUsize>,
     /// Only these conditions, as L3-noise+zerodce; repeatable; default: all of the run
     #[arg(long, value_name = "CONDITION", add = Decides::Nothing)]
     pub condition: Vec<Condition>,
-    /// Where everything lies by now.
+    /// Where the data and enhancers are now.
     #[command(flatten)]
     pub rebuild: RebuildArgs,
 }
 
-/// Makes the page and its images, each the very file that the models were sent.
+/// Writes the page and its images. Each image is the file that the models were sent.
 ///
 /// # Errors
-/// Where the run kept no questions, or its data or enhancers are not where they were.
+/// If the run stores no questions, or its data or enhancers are not found.
 pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
     let StoredRun {
         manifest,
         records,
-        questions: listed,
+        questions: questions,
         ..
     } = StoredRun::of_choices(&args.run, "openeqa --study DIR makes their page")?;
     let wrong = |problem: String| {
@@ -53,13 +53,11 @@ pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
         Error::Run { path, problem }
     };
     let conditions = conditions(&records, &args.condition)?;
-    if listed.is_empty() || conditions.is_empty() {
-        return Err(wrong(
-            "no questions about images are kept in this run".to_owned(),
-        ));
+    if questions.is_empty() || conditions.is_empty() {
+        return Err(wrong("this run has no questions about images".to_owned()));
     }
     let shown = first_order(&records);
-    let chosen = chosen(listed, args.items.map_or(usize::MAX, usize::from));
+    let chosen = chosen(questions, args.items.map_or(usize::MAX, usize::from));
     let mut frames = BTreeMap::<FrameId, Vec<RunQuestion>>::new();
     for question in chosen {
         frames
@@ -74,19 +72,19 @@ pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
     for (number, (frame, questions)) in frames.into_iter().enumerate() {
         let mut shots = Vec::new();
         let rebuilt = rebuilder.images(&frame, &conditions)?;
-        for (condition, made) in conditions.iter().zip(rebuilt.iter().flatten()) {
+        for (condition, image) in conditions.iter().zip(rebuilt.iter().flatten()) {
             if let Some(sent) = sent.get(&(frame.clone(), condition.clone()))
-                && *sent != made.digest
+                && *sent != image.digest
             {
                 let problem = format!(
-                    "{frame} at {condition} is not the image that was sent: the data, an enhancement model or this program is another"
+                    "{frame} at {condition} is not the image that was sent: the data, an enhancement model or this program has changed"
                 );
                 return Err(wrong(problem));
             }
-            // The name says nothing of the level.
+            // The name does not reveal the level.
             let name = Digest::of_parts([frame.0.as_bytes(), condition.to_string().as_bytes()]);
-            let name = format!("images/{}.{}", &name.to_string()[..16], made.ending);
-            write(&args.out.join(&name), &made.file)?;
+            let name = format!("images/{}.{}", &name.to_string()[..16], image.ending);
+            write(&args.out.join(&name), &image.file)?;
             shots.push(StudyImage {
                 condition: condition.to_string(),
                 images: vec![name],
@@ -118,21 +116,21 @@ pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
 }
 
 fn conditions(records: &[Record], wanted: &[Condition]) -> Result<Vec<Condition>> {
-    let there: BTreeSet<Condition> = records
+    let asked: BTreeSet<Condition> = records
         .iter()
         .filter_map(|record| record.condition.clone())
         .collect();
-    if let Some(missing) = wanted.iter().find(|condition| !there.contains(condition)) {
+    if let Some(missing) = wanted.iter().find(|condition| !asked.contains(condition)) {
         let problem = format_args!("nothing was asked at {missing} in this run");
         return Err(Error::usage("--condition", problem));
     }
     if wanted.is_empty() {
-        return Ok(there.into_iter().collect());
+        return Ok(asked.into_iter().collect());
     }
     Ok(wanted.to_vec())
 }
 
-/// The choices of each question in the order that they were first shown in.
+/// The choices of each question, in the first order in which they were shown.
 fn first_order(records: &[Record]) -> BTreeMap<QuestionId, Vec<String>> {
     let mut orders = BTreeMap::new();
     for record in records {
@@ -143,14 +141,14 @@ fn first_order(records: &[Record]) -> BTreeMap<QuestionId, Vec<String>> {
     orders
 }
 
-/// So many questions, those with the lowest digests of their names.
-fn chosen(mut listed: Vec<RunQuestion>, most: usize) -> Vec<RunQuestion> {
-    listed.sort_by_cached_key(|question| *Digest::of(question.id.0.as_bytes()).as_bytes());
-    listed.truncate(most);
-    listed
+/// The `count` questions whose ids have the lowest digests.
+fn chosen(mut questions: Vec<RunQuestion>, count: usize) -> Vec<RunQuestion> {
+    questions.sort_by_cached_key(|question| *Digest::of(question.id.0.as_bytes()).as_bytes());
+    questions.truncate(count);
+    questions
 }
 
-/// The digests of the images that were sent.
+/// The digest of each image that was sent, by frame and condition.
 fn sent(records: &[Record]) -> BTreeMap<(FrameId, Condition), Digest> {
     let sent = records.iter().filter_map(|record| {
         let place = (record.detail.frame.clone(), record.condition.clone()?);

@@ -1,4 +1,4 @@
-//! `study read`: people's answers as a run of a model of their own.
+//! `study read`: reading the answers of people into a run in which they take the place of a model.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt::Write;
@@ -32,8 +32,8 @@ pub(crate) struct ReadArgs {
     /// The folder of the people's run
     #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub out: PathBuf,
-    /// What the people are called among the models
-    #[arg(long, value_name = "NAME", default_value = "human", value_parser = NonEmptyStringValueParser::new(), add = Decides::Reply)]
+    /// The name of the people in tables, next to the names of models
+    #[arg(long, value_name = "NAME", default_value = "human", value_parser = NonEmptyStringValueParser::new())]
     pub name: String,
     /// Print the summary as JSON instead of a table
     #[arg(long, add = Decides::Nothing)]
@@ -47,23 +47,23 @@ struct AnswerLine {
     condition: String,
     #[serde(default)]
     person: Value,
-    /// A letter or the text of a choice; nothing where the person could not tell.
+    /// A letter or the text of a choice; `None` if the person could not answer.
     answer: Option<String>,
 }
 
-/// What became of the lines.
+/// The numbers of lines by outcome.
 #[derive(Debug, Default)]
 struct AnswerCounts {
     answers: usize,
-    /// Questions or conditions that the run has not asked.
-    strange: BTreeSet<String>,
+    /// Questions or conditions that the run did not ask.
+    unknown: BTreeSet<String>,
 }
 
-/// Takes answers over. The same files read again change nothing, further files add to it, and a later answer of the same
-/// person to the same question in the same condition takes the place of the earlier one.
+/// Imports answers. Reading a file again changes nothing, and further files add to the run. A later answer of a person to
+/// the same question in the same condition replaces the earlier one.
 ///
 /// # Errors
-/// Where the folder holds no run or a line is no answer; or nothing in the files was asked in the run.
+/// If the folder holds no run, a line is not an answer, or the run asked nothing that is in the files.
 pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
     let StoredRun {
         manifest,
@@ -75,12 +75,12 @@ pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
         "openeqa --answers NAME=FILE reads what people answered",
     )?;
     let asked = asked(records);
-    let mut tally = AnswerCounts::default();
+    let mut counts = AnswerCounts::default();
     let mut lines = Vec::new();
     for path in &args.files {
         lines.extend(answers(path)?);
     }
-    // Before the folder is made, so that files of another study leave nothing behind.
+    // Checked before the folder is created, so that files of another study leave no empty run.
     let known: Vec<(&Record, AnswerLine)> = lines
         .into_iter()
         .filter_map(|line| {
@@ -88,7 +88,7 @@ pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
             let place = (QuestionId(question), condition.parse::<Condition>().ok()?);
             let record = asked.get(&place);
             if record.is_none() {
-                tally.strange.insert(format!("{} at {condition}", place.0));
+                counts.unknown.insert(format!("{} at {condition}", place.0));
             }
             Some((record?, line))
         })
@@ -99,22 +99,22 @@ pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
         let path = args.run.clone();
         return Err(Error::Run { path, problem });
     }
-    let own = of_people(&manifest, args);
-    let mut store = Store::open(&args.out, &own, AddressChange::Allowed)?;
+    let people_manifest = of_people(&manifest, args);
+    let mut store = Store::open(&args.out, &people_manifest, AddressChange::Allowed)?;
     store.write_questions(&questions)?;
     let mut people = People::new(store.records()?);
     for (asked, line) in known {
-        tally.answers += 1;
+        counts.answers += 1;
         if let Some(record) = people.record(asked, &line, &args.name)? {
             store.append(&record)?;
         }
     }
     store.sync()?;
-    let mut run = StoredRun::of(&args.out, own)?;
+    let mut run = StoredRun::of(&args.out, people_manifest)?;
     run.manifest.count(count(run.records.len(), &run.records));
     let mut outcome = choice::write(&store, run, StdoutFormat::of(args.json))?;
     if StdoutFormat::of(args.json) == StdoutFormat::Table {
-        outcome.output.insert_str(0, &told(&tally));
+        outcome.output.insert_str(0, &summary(&counts));
     }
     Ok(outcome)
 }
@@ -128,14 +128,14 @@ fn answers(path: &Path) -> Result<Vec<AnswerLine>> {
         .collect()
 }
 
-/// A name that may have been written as a number.
+/// A name, which may be written as a number.
 fn name(value: &Value) -> String {
     value
         .as_str()
         .map_or_else(|| value.to_string(), str::to_owned)
 }
 
-/// A record of each question and condition that was asked with an image.
+/// One record of each question and condition that was asked with an image.
 fn asked(records: Vec<Record>) -> HashMap<(QuestionId, Condition), Record> {
     let mut asked = HashMap::new();
     for record in records {
@@ -148,7 +148,7 @@ fn asked(records: Vec<Record>) -> HashMap<(QuestionId, Condition), Record> {
     asked
 }
 
-/// The manifest of the people's run: the images are those of the run that they were asked about.
+/// The manifest of the people's run. Its images are those of the run that the questions came from.
 fn of_people(run: &RunManifest, args: &ReadArgs) -> RunManifest {
     let identity = [
         ("--model", json!([args.name])),
@@ -172,19 +172,19 @@ fn of_people(run: &RunManifest, args: &ReadArgs) -> RunManifest {
     }
 }
 
-/// Who has answered what: the first to answer an item is its first turn, so that people and models are compared item by item.
+/// The answers so far. The first person to answer an item gets its first turn, so people and models are compared by item.
 struct People {
     answers: HashMap<TrialKey, Record>,
     next: HashMap<(QuestionId, Option<Condition>), u32>,
 }
 
 impl People {
-    fn new(kept: Vec<Record>) -> Self {
+    fn new(stored: Vec<Record>) -> Self {
         let mut people = Self {
             answers: HashMap::new(),
             next: HashMap::new(),
         };
-        for record in kept {
+        for record in stored {
             let item = (record.question.clone(), record.condition.clone());
             let next = people.next.entry(item).or_default();
             *next = (*next).max(record.detail.repeat + 1);
@@ -193,7 +193,7 @@ impl People {
         people
     }
 
-    /// The record of an answer; `None` where it is known already.
+    /// The record of an answer; `None` if the same answer is stored already.
     fn record(&mut self, asked: &Record, line: &AnswerLine, name: &str) -> Result<Option<Record>> {
         let person = self::name(&line.person);
         let place = asked
@@ -207,8 +207,8 @@ impl People {
             .next
             .entry((asked.question.clone(), asked.condition.clone()))
             .or_default();
-        let kept = self.answers.get(&key);
-        let turn = kept.map_or(*next, |kept| kept.detail.repeat);
+        let stored = self.answers.get(&key);
+        let turn = stored.map_or(*next, |stored| stored.detail.repeat);
         *next = (*next).max(turn + 1);
         let detail = ChoiceDetail {
             repeat: turn,
@@ -222,7 +222,7 @@ impl People {
         };
         let mut answered = blank.answered(reply)?;
         answered.latency_ms = None;
-        if kept == Some(&answered) {
+        if stored == Some(&answered) {
             return Ok(None);
         }
         self.answers.insert(key, answered.clone());
@@ -230,13 +230,13 @@ impl People {
     }
 }
 
-fn told(tally: &AnswerCounts) -> String {
-    let mut text = format!("{} answers taken over\n", tally.answers);
-    if let Some(first) = tally.strange.first() {
-        let count = tally.strange.len();
+fn summary(counts: &AnswerCounts) -> String {
+    let mut text = format!("answers imported: {}\n", counts.answers);
+    if let Some(first) = counts.unknown.first() {
+        let count = counts.unknown.len();
         let _ = writeln!(
             text,
-            "{count} items in the files were not asked in the run, as {first}"
+            "items in the files that the run did not ask: {count}, as {first}"
         );
     }
     text

@@ -1,4 +1,4 @@
-//! `synthesize`: low-light versions of images as files, as an evaluation of the same folder would send them.
+//! `synthesize`: writing low-light versions of images, the same as an evaluation of the same folder would send.
 
 mod sheet;
 mod sidecar;
@@ -33,31 +33,30 @@ pub(crate) struct SynthesizeArgs {
     /// Images, folders of images, or folders of frames (frames.jsonl)
     #[arg(required = true, value_name = "INPUT", add = Decides::Pixels)]
     pub inputs: Vec<PathBuf>,
-    /// Where the images go, each with a JSON file that holds all that made it
-    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
+    /// Where the images go, each with a JSON file of all settings that made it
+    #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Light.
+    /// The flags for the degradations.
     #[command(flatten)]
     pub light: LightArgs,
-    /// Make again the image that this JSON file stands beside, from the one INPUT that it was made from; default: make images of
-    /// all levels
-    #[arg(long, value_name = "FILE", help_heading = "Synthesis", add = Decides::Pixels)]
+    /// Make again the image of this JSON file, from the one INPUT that it was made from; default: make images of all levels
+    #[arg(long, value_name = "FILE", help_heading = "Synthesis")]
     pub from: Option<PathBuf>,
     /// One figure per input instead; default: images
     #[arg(long, value_enum, help_heading = "Synthesis", conflicts_with = "from", add = Decides::Nothing)]
     pub sheet: Option<Sheet>,
-    /// Make again what is there already
-    #[arg(long, help_heading = "Synthesis", add = Decides::Nothing)]
+    /// Replace images that exist already
+    #[arg(long, help_heading = "Synthesis")]
     pub force: bool,
-    /// How large an image may be.
+    /// The maximum size of an image.
     #[command(flatten)]
     pub limit: PixelLimit,
-    /// On how many threads.
+    /// The number of threads.
     #[command(flatten)]
     pub threads: ThreadArgs,
 }
 
-/// A figure of one frame.
+/// The kind of a figure of one frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Sheet {
     /// Both variants by level, with amplified crops
@@ -66,64 +65,68 @@ pub(crate) enum Sheet {
     Noise,
 }
 
-/// The flags, and the light that they say.
+/// The flags, and the light settings that they give.
 struct ImageMaking<'a> {
     args: &'a SynthesizeArgs,
     light: LightSettings,
 }
 
-/// Makes the images that the command asks for.
+/// Writes the images or figures of all inputs.
 ///
-/// What cannot be made of one frame is said, counted, and does not stop the others.
+/// If one frame fails, the error is logged and counted, and the others continue.
 ///
 /// # Errors
-/// Where nothing can be made: no such input, two frames of one name, no folder to write to.
+/// If an input is missing, two frames have the same name, or the folder cannot be written to.
 pub(crate) fn synthesize(args: &SynthesizeArgs, progress: &Progress) -> Result<Outcome> {
     let making = &ImageMaking {
         args,
         light: LightSettings::resolve(&args.light)?,
     };
     let frames = Inputs::open(&args.inputs, args.limit.max_pixels.get())?;
-    let cores = pool(args.threads.threads)?;
+    let workers = pool(args.threads.threads)?;
     fs::create_dir_all(&args.out).map_err(|e| Error::file(&args.out, "make", e))?;
     if let Some(file) = &args.from {
-        return cores.install(|| replay(args, &frames, file));
+        return workers.install(|| replay(args, &frames, file));
     }
     let files = files(making);
     let bar = progress.bar("images", frames.entries.len() * files.len());
-    let made: Vec<ImageCounts> = cores.install(|| {
+    let counts: Vec<ImageCounts> = workers.install(|| {
         let entries = frames.entries.par_iter();
         entries
-            .map(|entry| one(making, &frames, entry, &files, &bar))
+            .map(|entry| write_files(making, &frames, entry, &files, &bar))
             .collect()
     });
     drop(bar);
-    let total = made
+    let total = counts
         .iter()
-        .fold(ImageCounts::default(), |sum, tally| ImageCounts {
-            made: sum.made + tally.made,
-            kept: sum.kept + tally.kept,
-            failed: sum.failed + tally.failed,
+        .fold(ImageCounts::default(), |sum, counts| ImageCounts {
+            written: sum.written + counts.written,
+            unchanged: sum.unchanged + counts.unchanged,
+            failed: sum.failed + counts.failed,
         });
     Ok(total.outcome(&args.out, frames.entries.len()))
 }
 
-/// What became of the images.
+/// The numbers of images by outcome.
 #[derive(Debug, Clone, Copy, Default)]
 struct ImageCounts {
-    made: usize,
-    kept: usize,
+    written: usize,
+    unchanged: usize,
     failed: usize,
 }
 
 impl ImageCounts {
     fn outcome(self, out: &Path, frames: usize) -> Outcome {
-        let Self { made, kept, failed } = self;
-        let kept = match kept {
+        let Self {
+            written,
+            unchanged,
+            failed,
+        } = self;
+        let unchanged = match unchanged {
             0 => String::new(),
             n => format!(", {n} kept as they were (--force makes them again)"),
         };
-        let lost = match failed {
+        let failures = match failed {
             0 => String::new(),
             n => format!(", {n} failed"),
         };
@@ -134,21 +137,21 @@ impl ImageCounts {
                 Status::Incomplete
             },
             output: format!(
-                "{}: {made} made of {frames} frames{kept}{lost}\n",
+                "{}: {written} made of {frames} frames{unchanged}{failures}\n",
                 out.display()
             ),
         }
     }
 }
 
-/// One file of a frame.
+/// The content of one output file of a frame: an image in a degradation (`None` for the clean frame), or a figure.
 #[derive(Debug, Clone)]
 enum FrameFile {
     Image(Option<Degradation>),
     Sheet(Sheet),
 }
 
-/// The files of each frame.
+/// The output files of each frame.
 fn files(making: &ImageMaking<'_>) -> Vec<FrameFile> {
     if let Some(sheet) = making.args.sheet {
         return vec![FrameFile::Sheet(sheet)];
@@ -157,15 +160,15 @@ fn files(making: &ImageMaking<'_>) -> Vec<FrameFile> {
     degradations.map(FrameFile::Image).collect()
 }
 
-/// Makes all images of one frame.
-fn one(
+/// Writes all files of one frame.
+fn write_files(
     making: &ImageMaking<'_>,
     frames: &Inputs,
     entry: &InputFrame,
     files: &[FrameFile],
     bar: &StepBar,
 ) -> ImageCounts {
-    let mut tally = ImageCounts::default();
+    let mut counts = ImageCounts::default();
     let frames = OneFrame { frames, entry };
     let recipe = Recipe::lossless(&making.light.sensor, &[]);
     let timings = Timings::default();
@@ -182,29 +185,29 @@ fn one(
     };
     if let Err(e) = work.frame.picture() {
         tracing::error!("{e}");
-        tally.failed = files.len();
-        return tally;
+        counts.failed = files.len();
+        return counts;
     }
     for file in files {
-        let made = match file {
+        let outcome = match file {
             FrameFile::Image(degradation) => work.image(degradation.as_ref()),
             FrameFile::Sheet(Sheet::Levels) => work.sheet("levels", sheet::levels),
             FrameFile::Sheet(Sheet::Noise) => work.sheet("noise", sheet::terms),
         };
-        match made {
-            Ok(ImageOutcome::New) => tally.made += 1,
-            Ok(ImageOutcome::Kept) => tally.kept += 1,
+        match outcome {
+            Ok(ImageOutcome::Written) => counts.written += 1,
+            Ok(ImageOutcome::Unchanged) => counts.unchanged += 1,
             Err(e) => {
                 tracing::error!("{e}");
-                tally.failed += 1;
+                counts.failed += 1;
             }
         }
         bar.inc();
     }
-    tally
+    counts
 }
 
-/// One frame of the inputs, whose name may be that of a frame of another input.
+/// One frame of the inputs. A frame of another input may have the same name.
 struct OneFrame<'a> {
     frames: &'a Inputs,
     entry: &'a InputFrame,
@@ -216,17 +219,17 @@ impl Frames for OneFrame<'_> {
     }
 }
 
-/// One frame being worked on.
+/// The state of the work on one frame.
 struct SynthesisWork<'a> {
     making: &'a ImageMaking<'a>,
     entry: &'a InputFrame,
     frame: FrameWork<'a>,
 }
 
-/// Whether an image was made.
+/// The outcome of one output file.
 enum ImageOutcome {
-    New,
-    Kept,
+    Written,
+    Unchanged,
 }
 
 impl SynthesisWork<'_> {
@@ -241,17 +244,17 @@ impl SynthesisWork<'_> {
             [".png", ".json"].map(|end| self.making.args.out.join(name.clone() + end));
         if !self.making.args.force && image.exists() && json.exists() {
             if sidecar.is_at(&json)? {
-                return Ok(ImageOutcome::Kept);
+                return Ok(ImageOutcome::Unchanged);
             }
             let problem = "made from another image or with other settings; --force makes it again, another --out keeps both";
             return Err(Error::data(json.display(), problem));
         }
         write(&image, &png(self.frame.degraded(how)?)?)?;
         write(&json, sidecar.text().as_bytes())?;
-        Ok(ImageOutcome::New)
+        Ok(ImageOutcome::Written)
     }
 
-    /// A figure; it has no file beside it, so one that is there is kept whatever it shows.
+    /// Writes a figure. It has no JSON file, so an existing figure is not replaced even if its settings differ.
     fn sheet(
         &mut self,
         kind: &str,
@@ -263,35 +266,35 @@ impl SynthesisWork<'_> {
             .out
             .join(format!("{}_{kind}.png", self.entry.stem));
         if !self.making.args.force && path.exists() {
-            return Ok(ImageOutcome::Kept);
+            return Ok(ImageOutcome::Unchanged);
         }
         let figure = draw(self.frame.clean()?, &self.entry.id, &self.making.light)?;
         write(&path, &png(&figure)?)?;
-        Ok(ImageOutcome::New)
+        Ok(ImageOutcome::Written)
     }
 }
 
-/// Makes the one image again that a file tells of.
+/// Makes the image of a JSON file again.
 fn replay(args: &SynthesizeArgs, frames: &Inputs, file: &Path) -> Result<Outcome> {
     let sidecar = ImageSidecar::read(file)?;
     let [entry] = &frames.entries[..] else {
         let problem = format_args!(
-            "one image is made again from one INPUT, not from {}",
+            "one INPUT expected, the image that FILE was made from; got {}",
             frames.entries.len()
         );
         return Err(Error::usage("--from", problem));
     };
     let picture = frames.picture(entry)?;
-    let dark = sidecar.replay(&picture, file)?;
+    let degraded = sidecar.replay(&picture, file)?;
     let path = args.out.join(sidecar.name(&stem(&sidecar.frame())?));
     if !args.force && path.exists() {
-        let problem = "there already; --force makes it again";
+        let problem = "the file exists already; --force makes it again";
         return Err(Error::data(path.display(), problem));
     }
-    write(&path, &png(&dark)?)?;
-    let made = ImageCounts {
-        made: 1,
+    write(&path, &png(&degraded)?)?;
+    let counts = ImageCounts {
+        written: 1,
         ..ImageCounts::default()
     };
-    Ok(made.outcome(&args.out, 1))
+    Ok(counts.outcome(&args.out, 1))
 }

@@ -1,4 +1,4 @@
-//! The figures of `synthesize --sheet`: what is on them is made here, [`crate::report::sheet`] draws it.
+//! The figures of `synthesize --sheet`. Their images are computed here and drawn by [`crate::report::sheet`].
 
 use ndarray::Array2;
 
@@ -16,7 +16,7 @@ fn severities(light: &LightSettings) -> Vec<Severity> {
     levels.filter_map(|level| level.severity()).collect()
 }
 
-/// Both variants of a frame by level.
+/// The figure of a frame at each level, by exposure alone and with noise.
 pub(super) fn levels(clean: &Rgb, frame: &FrameId, light: &LightSettings) -> Result<Rgb> {
     let severities = severities(light);
     let key = NoiseKey::new(light.sensor.seed, frame);
@@ -38,7 +38,7 @@ pub(super) fn levels(clean: &Rgb, frame: &FrameId, light: &LightSettings) -> Res
     Ok(sheet::levels(clean, &columns))
 }
 
-/// The terms of a frame's noise, at the darkest level that is asked for (which matters where levels share no negative).
+/// The figure of the noise terms of a frame, at the darkest level asked for. The level matters if each has its own negative.
 pub(super) fn terms(clean: &Rgb, frame: &FrameId, light: &LightSettings) -> Result<Rgb> {
     let level = severities(light).pop().unwrap_or(Severity::L5);
     let (synthesis, frame) = (
@@ -52,12 +52,12 @@ pub(super) fn terms(clean: &Rgb, frame: &FrameId, light: &LightSettings) -> Resu
     let state = synthesis.state(&frame, level);
     let raw = unprocess(clean, &state);
     let range = state.adu_range as f32;
-    let under = |terms: &[Term]| {
+    let with_terms = |terms: &[Term]| {
         let mut noisy = raw.clone();
         noise::add(&mut noisy, &state, &key, synthesis.amplify, terms);
         adu(&noisy, range)
     };
-    let clean = under(&[]);
+    let clean = with_terms(&[]);
     let signal = |name: String, adu| Signal { name, adu };
     let mut signals = vec![signal("RAW".to_owned(), clean.clone())];
     for (name, term) in [
@@ -66,13 +66,13 @@ pub(super) fn terms(clean: &Rgb, frame: &FrameId, light: &LightSettings) -> Resu
         ("row noise", Term::Row),
         ("quantisation noise", Term::Quantisation),
     ] {
-        signals.push(signal(name.to_owned(), under(&[term]) - &clean));
+        signals.push(signal(name.to_owned(), with_terms(&[term]) - &clean));
     }
     let name = format!(
         "noisy RAW (K {:.2}, r {:.0})",
         state.system_gain, state.ratio
     );
-    signals.push(signal(name, under(&Term::ALL)));
+    signals.push(signal(name, with_terms(&Term::ALL)));
     Ok(sheet::noise(&signals))
 }
 

@@ -1,4 +1,4 @@
-//! The file beside an image that holds all that made it: [`ImageSidecar`].
+//! The JSON file of an image with everything needed to make it again: [`ImageSidecar`].
 
 use std::path::Path;
 
@@ -16,31 +16,31 @@ use crate::synthesis::{
 };
 use crate::types::{Condition, Degradation, FrameId, ReadingName, Rgb};
 
-/// The schema of these files.
+/// The value of `schema` in these files.
 const SCHEMA: &str = "darkqa.image/1";
 
-/// All that made an image.
+/// Everything that decides the pixels of an image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct ImageSidecar {
     schema: String,
-    /// The version of this program, for the reader: [`Self::synthesis`] decides.
+    /// The version of this program, for information only; [`Self::synthesis`] is what is checked.
     darkqa_eval: String,
     frame: String,
-    /// The content of the image that it was made from.
+    /// The digest of the image that this one was made from.
     source: String,
     condition: Condition,
     /// The exposure drop in EV.
     drop: f64,
-    /// The version of the branch of the synthesis.
+    /// The version of the synthesis branch (exposure or sensor) that made the image.
     synthesis: u32,
     sensor: Option<SensorRecord>,
 }
 
-/// What the sensor branch took.
+/// The inputs of the sensor branch.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct SensorRecord {
     seed: u64,
-    /// The light reading that the parts below make up.
+    /// The light reading, as defined by the fields below.
     #[serde(default = "paper")]
     reading: ReadingName,
     amplify: Amplify,
@@ -87,22 +87,26 @@ impl ImageSidecar {
 
     pub(super) fn read(path: &Path) -> Result<Self> {
         let text = reading::text(path)?;
-        let read: Self = serde_json::from_str(&text)
-            .map_err(|e| Error::data(path.display(), format_args!("tells of no image: {e}")))?;
+        let read: Self = serde_json::from_str(&text).map_err(|e| {
+            Error::data(
+                path.display(),
+                format_args!("not a JSON file of an image: {e}"),
+            )
+        })?;
         if read.schema != SCHEMA {
-            let problem = format_args!("of the form {:?}; {SCHEMA:?} expected", read.schema);
+            let problem = format_args!("schema {:?}; {SCHEMA:?} expected", read.schema);
             return Err(Error::data(path.display(), problem));
         }
         Ok(read)
     }
 
-    /// Whether the file at `path` tells of the same image, whatever program version wrote it.
+    /// Whether the file at `path` describes the same image, even if another program version wrote it.
     pub(super) fn is_at(&self, path: &Path) -> Result<bool> {
-        let there = Self::read(path)?;
+        let stored = Self::read(path)?;
         Ok(Self {
-            darkqa_eval: there.darkqa_eval.clone(),
+            darkqa_eval: stored.darkqa_eval.clone(),
             ..self.clone()
-        } == there)
+        } == stored)
     }
 
     pub(super) fn text(&self) -> String {
@@ -118,10 +122,10 @@ impl ImageSidecar {
         format!("{stem}_{}.png", self.condition)
     }
 
-    /// Makes the image again from the picture that it was made from.
+    /// The image, made again from the same picture.
     ///
     /// # Errors
-    /// Where the picture is another one, or this program's synthesis is not that which made it.
+    /// If the picture has other content, or the synthesis of this program has another version.
     pub(super) fn replay(&self, picture: &Picture, path: &Path) -> Result<Rgb> {
         let wrong = |problem: String| Error::data(path.display(), problem);
         let how = self.condition.degradation.as_ref();
@@ -131,7 +135,7 @@ impl ImageSidecar {
         }
         if self.synthesis != version(how) {
             return Err(wrong(format!(
-                "made by synthesis {} of darkqa-eval {}; this one has synthesis {}",
+                "made by synthesis {} of darkqa-eval {}; this program has synthesis {}",
                 self.synthesis,
                 self.darkqa_eval,
                 version(how)
@@ -142,7 +146,7 @@ impl ImageSidecar {
             (None, _) => return Ok(clean),
             (Some(how), Some(sensor)) => (how.severity(), sensor),
             (Some(how), None) if how.reading().is_some() => {
-                return Err(wrong("the sensor's state is missing".to_owned()));
+                return Err(wrong("the state of the sensor is missing".to_owned()));
             }
             (how, None) => {
                 let key = NoiseKey::new(0, &self.frame());
@@ -161,12 +165,12 @@ impl ImageSidecar {
     }
 }
 
-/// The reading of files that name none.
+/// The light reading of files that do not name one.
 fn paper() -> ReadingName {
     ReadingName::PAPER
 }
 
-/// The version of the branch that makes a degradation; an untouched frame has that of the exposure branch.
+/// The version of the branch that makes a degradation. A clean frame has the version of the exposure branch.
 fn version(how: Option<&Degradation>) -> u32 {
     how.map_or(exposure::VERSION, |how| synthesis::version(how.kind()))
 }
