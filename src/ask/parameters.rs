@@ -8,6 +8,7 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 use serde_json::{Value, json};
 
+use crate::types::Decides;
 use crate::types::flag::flag_words;
 use crate::types::words::written_as_text;
 
@@ -22,27 +23,27 @@ pub struct Parameters {
     #[arg(skip)]
     pub model: String,
     /// Sampling temperature; default for the server's own; auto for 0, or the server's own where the model refuses any other
-    #[arg(long, value_name = "T|auto|default", default_value_t = Temperature::Auto)]
+    #[arg(long, value_name = "T|auto|default", default_value_t = Temperature::Auto, add = Decides::Reply)]
     pub temperature: Temperature,
     /// Draw only from the likeliest tokens that together have this probability; default: not sent
-    #[arg(long, value_name = "P", value_parser = share)]
+    #[arg(long, value_name = "P", value_parser = share, add = Decides::Reply)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub top_p: Option<f64>,
     /// The most tokens of a reply, hidden reasoning included
     ///
     /// A letter needs 16; a reasoning model burns hundreds before it.
-    #[arg(long, value_name = "N", default_value_t = Self::MAX_TOKENS)]
+    #[arg(long, value_name = "N", default_value_t = Self::MAX_TOKENS, add = Decides::Reply)]
     pub max_tokens: NonZeroU32,
     /// The field that carries that limit; auto is max_completion_tokens at OpenAI itself, max_tokens elsewhere, and the other one
     /// where the server asks for it
-    #[arg(long, value_name = "FIELD", value_enum, default_value_t = TokenField::Auto)]
+    #[arg(long, value_name = "FIELD", value_enum, default_value_t = TokenField::Auto, add = Decides::Reply)]
     #[serde(skip)]
     pub token_field: TokenField,
     /// How long a reasoning model thinks, in the server's words (none, minimal, low, medium, high …); default: not sent
-    #[arg(long, value_name = "EFFORT")]
+    #[arg(long, value_name = "EFFORT", add = Decides::Reply)]
     pub reasoning_effort: Option<String>,
     /// How closely the server looks at images; default: not sent
-    #[arg(long, value_name = "DETAIL", value_enum)]
+    #[arg(long, value_name = "DETAIL", value_enum, add = Decides::Reply)]
     pub detail: Option<ImageDetail>,
     /// What the server's sampling starts from, where it takes that: with a temperature above 0 replies are then more alike.
     #[arg(skip)]

@@ -14,6 +14,7 @@ use image::{ExtendedColorType, ImageBuffer, ImageEncoder as _, imageops};
 
 use super::plain_png;
 use crate::error::{Error, Result};
+use crate::types::Decides;
 use crate::types::{Digest, ImageFacts, Rgb};
 
 /// The file format in which images are sent. PNG and JPEG alone: servers refuse others.
@@ -34,7 +35,7 @@ pub struct Quality(u8);
 #[command(next_help_heading = "Sending")]
 pub(crate) struct ImageArgs {
     /// How images are sent: png (lossless) or jpeg:QUALITY
-    #[arg(long, value_name = "FORMAT", default_value_t = PayloadFormat::Png)]
+    #[arg(long, value_name = "FORMAT", default_value_t = PayloadFormat::Png, add = Decides::Pixels)]
     pub image: PayloadFormat,
 }
 

@@ -11,6 +11,7 @@ use super::secret::Secret;
 use super::sending::Sending;
 use super::url::BaseUrl;
 use crate::error::{Error, Result};
+use crate::types::Decides;
 
 /// The endpoint if none is named.
 const BASE_URL: &str = "https://api.openai.com/v1";
@@ -28,23 +29,23 @@ const NO_KEY: &str = "none";
 #[command(next_help_heading = "Model")]
 pub(crate) struct AccessArgs {
     /// The endpoint; /chat/completions is appended; default: OPENAI_BASE_URL, else OpenAI's own
-    #[arg(long, value_name = "URL")]
+    #[arg(long, value_name = "URL", add = Decides::Reply)]
     pub base_url: Option<String>,
     /// The variable that holds the API key, or none for an endpoint without keys; default: OPENAI_API_KEY (at Azure
     /// AZURE_OPENAI_API_KEY before it)
-    #[arg(long, value_name = "NAME|none", conflicts_with = "api_key_file")]
+    #[arg(long, value_name = "NAME|none", conflicts_with = "api_key_file", add = Decides::Nothing)]
     pub api_key_env: Option<String>,
     /// A file that holds the API key; default: none, a variable holds it
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", add = Decides::Nothing)]
     pub api_key_file: Option<PathBuf>,
     /// The header that carries the key; auto is api-key at Azure, else bearer
-    #[arg(long, value_name = "HEADER", value_enum, default_value_t)]
+    #[arg(long, value_name = "HEADER", value_enum, default_value_t, add = Decides::Nothing)]
     pub key_header: KeyHeader,
     /// A PEM file of certificate authorities to trust besides the system's; default: none
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", add = Decides::Nothing)]
     pub ca_file: Option<PathBuf>,
     /// Send a key over unencrypted http to another machine
-    #[arg(long)]
+    #[arg(long, add = Decides::Nothing)]
     pub allow_http: bool,
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory as _, Parser, Subcommand};
 use clap_complete::Shell;
 
 use crate::job::batch::BatchFileArgs;
@@ -21,6 +21,7 @@ use crate::run::serve::ServeArgs;
 use crate::run::show::ShowArgs;
 use crate::run::study;
 use crate::run::synthesize::SynthesizeArgs;
+use crate::types::Decides;
 
 /// What the program is called.
 pub(super) const NAME: &str = "darkqa-eval";
@@ -30,6 +31,8 @@ Precedence: flag, then environment (DARKQA_CONCURRENCY=16 for --concurrency 16),
 OPENAI_BASE_URL, OPENAI_API_KEY and ORT_DYLIB_PATH are defaults: whatever names another goes before them.
 Exit codes: 0 everything scored; 1 finished with failures; 2 usage, configuration or a fatal error; 130 interrupted,
 or stopped by --max-cost.
+[trials], [reply] and [pixels] mark what a flag decides: which trials there are, what a model is sent, the content of images. No other flag
+changes an answer.
 Results go to standard output, progress and logs to standard error (RUST_LOG=darkqa_eval=debug shows more).";
 
 /// Measures how well a vision-language model sees in the dark.
@@ -61,11 +64,11 @@ pub(crate) struct Cli {
 #[command(next_help_heading = "Output")]
 pub(crate) struct CommonArgs {
     /// No progress
-    #[arg(long, global = true)]
+    #[arg(long, global = true, add = Decides::Nothing)]
     pub quiet: bool,
     /// A TOML file of flags by their long names; those of one command alone stand in a table of its name; default:
     /// DARKQA_CONFIG, else none
-    #[arg(long, global = true, value_name = "FILE")]
+    #[arg(long, global = true, value_name = "FILE", add = Decides::Nothing)]
     pub config: Option<PathBuf>,
 }
 
@@ -109,13 +112,13 @@ pub(crate) enum Command {
     /// Print the completions of a shell, to be put where it looks for them
     Completions {
         /// The shell
-        #[arg(value_enum)]
+        #[arg(value_enum, add = Decides::Nothing)]
         shell: Shell,
     },
     /// Write the manual, a page a command
     Man {
         /// Where the pages go
-        #[arg(value_name = "DIR")]
+        #[arg(value_name = "DIR", add = Decides::Nothing)]
         folder: PathBuf,
     },
 }
@@ -147,4 +150,26 @@ pub(crate) enum StudyCommand {
     Pack(study::PackArgs),
     /// Take people's answers over as a run of a model of their own, to be compared by report
     Read(study::ReadArgs),
+}
+
+/// The command line with the class of each flag in its help: `[pixels]` behind what the flag is.
+pub(super) fn command() -> clap::Command {
+    marked(Cli::command())
+}
+
+fn marked(command: clap::Command) -> clap::Command {
+    let mark = |arg: clap::Arg| {
+        let class = Decides::of(&arg).filter(|class| *class != Decides::Nothing);
+        let Some(class) = class.map(Decides::word) else {
+            return arg;
+        };
+        let help = arg.get_help().map(|help| format!("{help} [{class}]"));
+        let long = arg.get_long_help().map(|help| format!("{help} [{class}]"));
+        let arg = arg.help(help.unwrap_or_default());
+        match long {
+            Some(long) => arg.long_help(long),
+            None => arg,
+        }
+    };
+    command.mut_args(mark).mut_subcommands(marked)
 }

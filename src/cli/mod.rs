@@ -41,7 +41,7 @@ const INTERRUPTED: u8 = 130;
 /// The program: what these words ask for, carried out.
 #[must_use]
 pub fn main(words: impl Iterator<Item = OsString>) -> ExitCode {
-    let matches = match layers::parse(Cli::command(), words.collect(), |name| {
+    let matches = match layers::parse(command::command(), words.collect(), |name| {
         std::env::var_os(name)
     }) {
         Ok(matches) => matches,
@@ -129,7 +129,7 @@ fn carry_out(cli: Cli, progress: &Progress) -> Result<Outcome> {
 
 fn completions(shell: Shell) -> Outcome {
     let mut script = Vec::new();
-    clap_complete::generate(shell, &mut Cli::command(), NAME, &mut script);
+    clap_complete::generate(shell, &mut command::command(), NAME, &mut script);
     Outcome {
         status: Status::Complete,
         output: String::from_utf8_lossy(&script).into_owned(),
@@ -138,7 +138,7 @@ fn completions(shell: Shell) -> Outcome {
 
 fn manual(folder: &Path) -> Result<Outcome> {
     std::fs::create_dir_all(folder).map_err(|e| Error::file(folder, "create", e))?;
-    let command = Cli::command().disable_help_subcommand(true);
+    let command = command::command().disable_help_subcommand(true);
     clap_mangen::generate_to(command, folder).map_err(|e| Error::file(folder, "write", e))?;
     Ok(Outcome {
         status: Status::Complete,

@@ -5,6 +5,7 @@ use std::path::Path;
 use clap::{Arg, Command as Clap, Parser as _};
 
 use super::*;
+use crate::types::Decides;
 
 #[test]
 fn the_command_line_is_sound() {
@@ -16,7 +17,9 @@ fn reference() -> String {
     let mut command = Cli::command();
     command.build();
     let mut text = "# All flags\n\nWritten by `UPDATE=1 cargo test --lib cli::`, from what `--help` shows. A variable is `DARKQA_` and the name of the \
-                    flag in capitals; a key of a `--config` file is the name of the flag; both have another name where one is given.\n"
+                    flag in capitals; a key of a `--config` file is the name of the flag; both have another name where one is given. What a flag \
+                    decides: which *trials* there are, what a model is sent besides the image (*reply*), the content of images (*pixels*), or *nothing* of these: \
+                    then a run is the same run with any value of it.\n"
         .to_owned();
     section(&mut text, &command, "darkqa-eval");
     text
@@ -33,7 +36,7 @@ fn section(text: &mut String, command: &Clap, name: &str) {
     let is_only_a_group =
         command.is_subcommand_required_set() || name.ends_with("batch") || name.ends_with("study");
     if !is_only_a_group {
-        text.push_str("\n| flag | default | |\n|---|---|---|\n");
+        text.push_str("\n| flag | default | decides | |\n|---|---|---|---|\n");
         for arg in args {
             row(text, arg);
         }
@@ -92,9 +95,10 @@ fn row(text: &mut String, arg: &Arg) {
     let escaped = |text: &str| text.replace('|', "\\|").replace('\n', " ");
     let _ = writeln!(
         text,
-        "| `{}`{key} | {} | {}{words} |",
+        "| `{}`{key} | {} | {} | {}{words} |",
         escaped(&flag),
         escaped(&default),
+        Decides::of(arg).map_or("", Decides::word),
         escaped(&what)
     );
 }
@@ -128,4 +132,87 @@ fn the_job_of_kubernetes_says_flags_that_there_are() {
     for field in ["completions", "parallelism"] {
         assert!(text.contains(&format!("\n  {field}: {parts}\n")), "{field}");
     }
+}
+
+/// All commands, the program itself first.
+fn commands(command: &Clap) -> Vec<&Clap> {
+    let inner = command
+        .get_subcommands()
+        .filter(|inner| inner.get_name() != "help");
+    std::iter::once(command)
+        .chain(inner.flat_map(commands))
+        .collect()
+}
+
+fn is_of_clap(arg: &Arg) -> bool {
+    matches!(arg.get_id().as_str(), "help" | "version")
+}
+
+#[test]
+fn every_flag_says_what_it_is_what_it_decides_and_its_default() {
+    let mut root = Cli::command();
+    root.build();
+    let mut wrong = Vec::new();
+    for command in commands(&root) {
+        for arg in command.get_arguments().filter(|arg| !is_of_clap(arg)) {
+            let name = format!("{} {}", command.get_name(), arg.get_id());
+            let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
+            if help.is_empty() {
+                wrong.push(format!("{name}: no help"));
+            }
+            if Decides::of(arg).is_none() {
+                wrong.push(format!("{name}: no class, as `add = Decides::Nothing`"));
+            }
+            let has_default = !arg.get_action().takes_values()
+                || arg.is_required_set()
+                || arg.is_positional()
+                || !arg.get_default_values().is_empty()
+                || help.contains("; default: ");
+            if !has_default {
+                wrong.push(format!("{name}: no default, as `; default: none`"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Words alone: without line breaks, indentation and the escapes of roff.
+fn words_of(text: &str) -> String {
+    let plain = text.replace("\\-", "-").replace("\\\\", "\\");
+    plain
+        .split_whitespace()
+        .filter(|word| *word != ".br")
+        .collect::<Vec<_>>()
+        .join(" ")
+        .replace("\\&", "")
+        .replace("\\*(Aq", "'")
+}
+
+#[test]
+fn the_manual_says_what_the_help_says() {
+    let mut root = command::command();
+    root.build();
+    let mut wrong = Vec::new();
+    for command in commands(&root) {
+        let mut page = Vec::new();
+        clap_mangen::Man::new(command.clone())
+            .render(&mut page)
+            .unwrap();
+        let page = words_of(&String::from_utf8(page).unwrap());
+        let shown = words_of(&command.clone().term_width(0).render_long_help().to_string());
+        for arg in command.get_arguments().filter(|arg| !is_of_clap(arg)) {
+            let help = arg.get_long_help().or(arg.get_help());
+            let help = words_of(&help.map(ToString::to_string).unwrap_or_default());
+            for (text, place) in [(&page, "manual"), (&shown, "help")] {
+                if !text.contains(&help) {
+                    wrong.push(format!(
+                        "{} {}: not in the {place}",
+                        command.get_name(),
+                        arg.get_id()
+                    ));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }

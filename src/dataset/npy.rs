@@ -3,6 +3,9 @@
 //! The format is that of `numpy.lib.format`: `\x93NUMPY`, a version, the header's length, and as header a Python
 //! dictionary with `descr`, `fortran_order` and `shape`; then the numbers, row by row. Versions 1 to 3 differ only in
 //! the width of the length and the header's encoding.
+//!
+//! This is code of ours because the libraries for it (npyz, ndarray-npy) read into memory what is only passed on here, take every
+//! type of numbers by a branch of ours all the same, and cost 34 and 45 CPU seconds of building for their parser of Python.
 
 use std::sync::LazyLock;
 

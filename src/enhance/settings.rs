@@ -8,6 +8,7 @@ use clap::Args;
 
 use super::runtime::{Install, RuntimeSearch};
 use super::tiles::Tiling;
+use crate::types::Decides;
 use crate::types::KindSet;
 
 /// The enhancers, and the images that they enhance.
@@ -16,10 +17,10 @@ use crate::types::KindSet;
 pub(crate) struct EnhancerArgs {
     /// An enhancement model as ONNX, or PRESET:FILE (zero-dce, zero-dce++, ruas-lol, ruas-upe, retinexformer, darkir, sci,
     /// iat, pairlie, enlightengan); repeatable: each is shown beside raw; default: none
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", add = Decides::Trials)]
     pub llie: Vec<PathBuf>,
     /// Which degraded variants are enhanced
-    #[arg(long, value_name = "noise|ev|both", default_value_t = KindSet::NOISE)]
+    #[arg(long, value_name = "noise|ev|both", default_value_t = KindSet::NOISE, add = Decides::Trials)]
     pub llie_on: KindSet,
 }
 
@@ -29,11 +30,11 @@ pub(crate) struct EnhancerArgs {
 pub(crate) struct SizeArgs {
     /// Enhance in tiles of N × N pixels, their seams checked, or whole; auto is 256 for images above 1280 × 720 where
     /// sidecar or preset say that tiles are exact, else whole
-    #[arg(long, value_name = "N|whole|auto", default_value_t)]
+    #[arg(long, value_name = "N|whole|auto", default_value_t, add = Decides::Pixels)]
     pub tile: Tiling,
     /// Largest longer side in pixels: larger images are reduced to it, enhanced and scaled back (bilinear); for models that
     /// need the whole image and too much memory for it; default: no limit
-    #[arg(long, value_name = "PIXELS")]
+    #[arg(long, value_name = "PIXELS", add = Decides::Pixels)]
     pub llie_max_side: Option<NonZeroUsize>,
 }
 
@@ -42,10 +43,10 @@ pub(crate) struct SizeArgs {
 #[command(next_help_heading = "Enhancement")]
 pub(crate) struct RuntimeArgs {
     /// The ONNX Runtime library to load; default: ORT_DYLIB_PATH, else found, else installed once by pip
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", add = Decides::Nothing)]
     pub ort_lib: Option<PathBuf>,
     /// Never install ONNX Runtime
-    #[arg(long)]
+    #[arg(long, add = Decides::Nothing)]
     pub offline: bool,
 }
 

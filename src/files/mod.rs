@@ -33,6 +33,8 @@ pub(crate) fn is_unfinished(name: &OsStr) -> bool {
     name.to_string_lossy().ends_with(UNFINISHED)
 }
 
+// Not tempfile's `persist`: its random name leaves another file behind whenever a process is killed, and its mode shuts out the
+// colleagues with whom a results folder is shared.
 fn whole(path: &Path, content: &[u8], sync: impl FnOnce(&File) -> io::Result<()>) -> Result<()> {
     if let Some(folder) = path.parent() {
         fs::create_dir_all(folder).map_err(|e| Error::file(folder, "create", e))?;

@@ -9,6 +9,7 @@ use ndarray::Array2;
 
 use crate::error::{Error, Result};
 use crate::labels;
+use crate::types::Decides;
 use crate::types::flag::positive;
 use crate::types::{DepthKind, Intrinsics, Labels, Rgb, SegmentName, Segmentation};
 
@@ -18,17 +19,17 @@ use crate::types::{DepthKind, Intrinsics, Labels, Rgb, SegmentName, Segmentation
 pub(crate) struct StatedArgs {
     /// The label space of the class maps: nyu40, nyu40-1 (from 0, 255 for void; kind nyu), nyu13, mpcat40, ade150, or a
     /// classes.json; default: what the kind has
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, value_name = "NAME|FILE", add = Decides::Pixels)]
     pub labels: Option<String>,
     /// The metres in one unit of depth PNG files: 0.001 for millimetres, 0.0002 for 1/5000 m; .npy files are in metres; default:
     /// what the kind has
-    #[arg(long, value_name = "METRES", value_parser = positive)]
+    #[arg(long, value_name = "METRES", value_parser = positive, add = Decides::Pixels)]
     pub depth_scale: Option<f64>,
     /// What depth is measured along; default: planar
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, add = Decides::Pixels)]
     pub depth_kind: Option<DepthKind>,
     /// The horizontal field of view in degrees, where the data set does not say how its camera projects; default: not known
-    #[arg(long, value_name = "DEGREES", value_parser = degrees)]
+    #[arg(long, value_name = "DEGREES", value_parser = degrees, add = Decides::Pixels)]
     pub hfov: Option<f64>,
 }
 

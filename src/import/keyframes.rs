@@ -6,6 +6,7 @@ use clap::Args;
 
 use super::adapter::ListedFrame;
 use crate::error::{Error, Result};
+use crate::types::Decides;
 use crate::types::flag::positive;
 
 /// Which frames of each scene are taken.
@@ -13,13 +14,13 @@ use crate::types::flag::positive;
 #[command(next_help_heading = "Key frames")]
 pub(crate) struct KeyFrameArgs {
     /// One frame every N seconds of a scene (DarkQA: 2); default: every frame
-    #[arg(long, value_name = "SECONDS", value_parser = positive, conflicts_with = "count")]
+    #[arg(long, value_name = "SECONDS", value_parser = positive, conflicts_with = "count", add = Decides::Trials)]
     pub every: Option<f64>,
     /// This many frames of each scene, evenly spread; default: every frame
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", add = Decides::Trials)]
     pub count: Option<NonZeroUsize>,
     /// Frames a second, where frames have no time of their own; default: not known
-    #[arg(long, value_name = "N", value_parser = positive)]
+    #[arg(long, value_name = "N", value_parser = positive, add = Decides::Trials)]
     pub fps: Option<f64>,
 }
 

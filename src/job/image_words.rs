@@ -14,6 +14,7 @@ use crate::dataset::{DataArgs, PixelLimit};
 use crate::enhance::SizeArgs;
 use crate::error::{Error, Result};
 use crate::synthesis::SensorArgs;
+use crate::types::Decides;
 
 /// Flags by their long names: a text, a list of texts, or `true` for a switch.
 pub(crate) type ImageWords = BTreeMap<String, Value>;
@@ -28,13 +29,13 @@ pub(crate) struct ImageFlags {
     pub(crate) limit: PixelLimit,
     #[command(flatten)]
     pub(crate) sensor: SensorArgs,
-    #[arg(long)]
+    #[arg(long, add = Decides::Trials)]
     pub(crate) llie: Vec<PathBuf>,
     #[command(flatten)]
     pub(crate) size: SizeArgs,
     #[command(flatten)]
     pub(crate) images: ImageArgs,
-    #[arg(long)]
+    #[arg(long, add = Decides::Pixels)]
     pub(crate) max_side: Option<NonZeroU32>,
     #[command(flatten)]
     pub(crate) walk: Option<Walk>,

@@ -13,6 +13,7 @@ use super::thumbnail::MissingThumbnails;
 use super::{Outcome, StdoutFormat, count};
 use crate::error::{Error, Result};
 use crate::store::{self, AddressChange, Store};
+use crate::types::Decides;
 use crate::types::manifest::{RunManifest, Status, differences};
 use crate::types::{ChoiceDetail, Detail, OpenDetail, Record, RunQuestion, Thumbnail, TrialKey};
 
@@ -20,16 +21,16 @@ use crate::types::{ChoiceDetail, Detail, OpenDetail, Record, RunQuestion, Thumbn
 #[derive(Debug, Args)]
 pub(crate) struct MergeArgs {
     /// The folders of the shards, or a folder that holds them
-    #[arg(value_name = "RUN", required = true)]
+    #[arg(value_name = "RUN", required = true, add = Decides::Nothing)]
     pub runs: Vec<PathBuf>,
     /// The folder of the whole run
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub out: PathBuf,
     /// Merge what there is where shards are missing, to look at it
-    #[arg(long)]
+    #[arg(long, add = Decides::Nothing)]
     pub partial: bool,
     /// Print the summary as JSON instead of a table
-    #[arg(long)]
+    #[arg(long, add = Decides::Nothing)]
     pub json: bool,
 }
 

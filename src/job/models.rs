@@ -10,6 +10,7 @@ use strsim::damerau_levenshtein;
 
 use crate::ask::{AccessArgs, Endpoint, Model, Parameters, Remote, Script, Sending, Server, Wire};
 use crate::error::{Error, Result};
+use crate::types::Decides;
 use crate::types::{Condition, View};
 
 /// Who is asked.
@@ -18,13 +19,13 @@ use crate::types::{Condition, View};
 pub(crate) struct ModelArgs {
     /// The model to ask, by its name at the endpoint; repeatable; built in: observer (frames with maps), random, script:FILE;
     /// default: none, one must be named
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", add = Decides::Trials)]
     pub model: Vec<ModelName>,
     /// Show the models no image: words alone
-    #[arg(long)]
+    #[arg(long, add = Decides::Trials)]
     pub blind: bool,
     /// Add a text-only baseline by this model; repeatable; default: none
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", add = Decides::Trials)]
     pub blind_model: Vec<ModelName>,
 }
 

@@ -8,6 +8,7 @@ use clap::Args;
 use super::shard::Shard;
 use crate::ask::Prices;
 use crate::error::Result;
+use crate::types::Decides;
 use crate::types::flag::positive;
 
 /// When to stop.
@@ -15,16 +16,16 @@ use crate::types::flag::positive;
 #[command(next_help_heading = "Sending")]
 pub(crate) struct MoneyArgs {
     /// Stop when this many trials have failed; default: never
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", add = Decides::Nothing)]
     pub max_failures: Option<NonZeroUsize>,
     /// Stop before the run has cost more than this; the same command with more goes on; default: never
-    #[arg(long, value_name = "DOLLARS", value_parser = positive)]
+    #[arg(long, value_name = "DOLLARS", value_parser = positive, add = Decides::Nothing)]
     pub max_cost: Option<f64>,
     /// A TOML file of prices in place of the built-in table; default: the built-in table
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", add = Decides::Nothing)]
     pub prices: Option<PathBuf>,
     /// Send nothing: print requests, tokens, dollars, hours and bytes
-    #[arg(long)]
+    #[arg(long, add = Decides::Nothing)]
     pub dry_run: bool,
 }
 

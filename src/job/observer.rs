@@ -1,7 +1,6 @@
 //! The observer as a model: [`open`].
 
-use std::collections::VecDeque;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::Arc;
 
 use crate::ask::{Call, Local, Random};
 use crate::dataset::{DataPlace, Dataset};
@@ -9,40 +8,14 @@ use crate::error::{Error, Result};
 use crate::questions::colors::Palette;
 use crate::questions::observer::{Observation, ObservedFrame, VERSION, understood};
 use crate::questions::rules::Rules;
+use crate::types::recent::Recent;
 use crate::types::{Digest, FrameId, Labels, Question};
 
 /// The name in records and tables.
 pub(crate) const NAME: &str = "observer";
 
-/// So many frames and sights are kept: questions about one image come together.
+/// How many frames and observations are kept: questions about one image come together.
 const KEPT: usize = 40;
-
-/// What was made last, each for its name. One who needs what another is making waits for it.
-struct Shelf<K, V>(Mutex<VecDeque<(K, Arc<OnceLock<V>>)>>);
-
-impl<K: PartialEq, V: Clone> Shelf<K, V> {
-    fn new() -> Self {
-        Self(Mutex::new(VecDeque::new()))
-    }
-
-    fn get(&self, name: K, make: impl FnOnce() -> V) -> V {
-        let place = {
-            let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-            let found = kept.iter().find(|(known, _)| *known == name);
-            if let Some((_, place)) = found {
-                Arc::clone(place)
-            } else {
-                let place = Arc::new(OnceLock::new());
-                kept.push_back((name, Arc::clone(&place)));
-                if kept.len() > KEPT {
-                    kept.pop_front();
-                }
-                place
-            }
-        };
-        place.get_or_init(make).clone()
-    }
-}
 
 /// What the observer looks with.
 struct Observer {
@@ -50,13 +23,13 @@ struct Observer {
     labels: Labels,
     rules: Rules,
     palette: Palette,
-    frames: Shelf<FrameId, Result<Arc<ObservedFrame>, String>>,
-    sights: Shelf<(FrameId, Digest), Result<Arc<Observation>, String>>,
+    frames: Recent<FrameId, Arc<ObservedFrame>>,
+    sights: Recent<(FrameId, Digest), Arc<Observation>>,
 }
 
 impl Observer {
     fn watched(&self, frame: &FrameId) -> Result<Arc<ObservedFrame>, String> {
-        self.frames.get(frame.clone(), || {
+        self.frames.get(frame, || {
             let seen = self.dataset.frame(frame).map_err(|e| e.to_string())?;
             ObservedFrame::new(&seen, &self.labels, &self.rules, &self.palette)
                 .map(Arc::new)
@@ -69,10 +42,11 @@ impl Observer {
             return Ok(None);
         };
         let frame = &question.frame;
-        let sight = self.sights.get((frame.clone(), image.facts().digest), || {
+        let place = (frame.clone(), image.facts().digest);
+        let sight = self.sights.get(&place, || {
             let watched = self.watched(frame)?;
             let pixels = image.decode().map_err(|e| e.to_string())?;
-            Ok(Arc::new(watched.look(&pixels, &self.palette)))
+            Ok::<_, String>(Arc::new(watched.look(&pixels, &self.palette)))
         })?;
         Ok(sight.answer(question, &self.rules))
     }
@@ -111,8 +85,8 @@ pub(crate) fn open(
         labels,
         rules,
         palette: Palette::built_in()?,
-        frames: Shelf::new(),
-        sights: Shelf::new(),
+        frames: Recent::new(KEPT),
+        sights: Recent::new(KEPT),
     };
     if let Some(first) = questions.first() {
         eye.watched(&first.frame).map_err(unusable)?;

@@ -17,6 +17,7 @@ use crate::dataset::{DataPlace, Dataset, place};
 use crate::enhance::{Enhancer, RuntimeArgs};
 use crate::error::{Error, Result};
 use crate::synthesis::SensorSettings;
+use crate::types::Decides;
 use crate::types::manifest::RunManifest;
 use crate::types::{Condition, Digest, FrameId};
 
@@ -26,10 +27,10 @@ use crate::types::{Condition, Digest, FrameId};
 #[derive(Debug, Clone, Args)]
 pub(crate) struct RebuildArgs {
     /// The data, if they lie elsewhere by now; default: where they were
-    #[arg(id = "moved_data", long = "data", value_name = "DIR|FILE|rooms:…")]
+    #[arg(id = "moved_data", long = "data", value_name = "DIR|FILE|rooms:…", add = Decides::Nothing)]
     pub data: Option<PathBuf>,
     /// The enhancement models, if they lie elsewhere by now; repeatable; default: where they were
-    #[arg(id = "moved_llie", long = "llie", value_name = "FILE")]
+    #[arg(id = "moved_llie", long = "llie", value_name = "FILE", add = Decides::Nothing)]
     pub llie: Vec<PathBuf>,
     /// By which ONNX Runtime.
     #[command(flatten)]

@@ -15,6 +15,7 @@ use crate::ask::{AccessArgs, Bounds, Constrain, ImageArgs, Parameters, PayloadFo
 use crate::enhance::{EnhancerArgs, ModelFile};
 use crate::error::{Error, Result};
 use crate::synthesis::{LightArgs, LightSettings};
+use crate::types::Decides;
 use crate::types::View;
 
 /// The flags that every experiment has.
@@ -64,10 +65,10 @@ pub(crate) struct JobArgs {
 pub(crate) struct ScaleArgs {
     /// Do one of N parts, by frames or walks: I/N; auto/N or auto as the batch system says (Slurm arrays, indexed Kubernetes jobs);
     /// none for everything. --rpm, --tpm and --max-cost are for all parts together; default: auto in a Slurm array, else none
-    #[arg(long, value_name = "I/N|auto/N|auto|none")]
+    #[arg(long, value_name = "I/N|auto/N|auto|none", add = Decides::Trials)]
     pub shard: Option<String>,
     /// Say at the end where the time went, what binds and what would help
-    #[arg(long)]
+    #[arg(long, add = Decides::Nothing)]
     pub timings: bool,
 }
 
@@ -76,13 +77,13 @@ pub(crate) struct ScaleArgs {
 #[command(next_help_heading = "Output")]
 pub(crate) struct OutputArgs {
     /// The run folder; default: results/TIME-MODEL-DATA-HASH, found again by the same command
-    #[arg(long, value_name = "DIR", conflicts_with = "resume")]
+    #[arg(long, value_name = "DIR", conflicts_with = "resume", add = Decides::Nothing)]
     pub out: Option<PathBuf>,
     /// Go on with the run in this folder; takes the same flags as the run had; default: none
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub resume: Option<PathBuf>,
     /// Print the summary as JSON instead of a table
-    #[arg(long)]
+    #[arg(long, add = Decides::Nothing)]
     pub json: bool,
 }
 

@@ -15,6 +15,7 @@ use super::source::{Frames, Source, SourceFrame};
 use crate::dataset::openeqa::{sampled, walk};
 use crate::dataset::{Picture, PixelLimit};
 use crate::error::{Error, Result};
+use crate::types::Decides;
 use crate::types::FrameId;
 
 /// How a walk is shown.
@@ -22,19 +23,19 @@ use crate::types::FrameId;
 #[command(next_help_heading = "OpenEQA")]
 pub(crate) struct Walk {
     /// The folder of walks: the frames of a question lie in DIR/EPISODE_HISTORY/*-rgb.png
-    #[arg(id = "frames", long, value_name = "DIR")]
+    #[arg(id = "frames", long, value_name = "DIR", add = Decides::Reply)]
     pub folder: PathBuf,
     /// How many frames of a walk are shown, spread evenly over it: 50 as upstream shows GPT-4V (Claude 3: 20, Gemini: 15)
-    #[arg(id = "num-frames", long, value_name = "K", default_value = "50")]
+    #[arg(id = "num-frames", long, value_name = "K", default_value = "50", add = Decides::Reply)]
     pub frames: NonZeroUsize,
     /// The longer side of the frames as sent, in pixels, or native; scaled as upstream does (OpenCV, bilinear)
-    #[arg(id = "image-size", long, value_name = "PIXELS|native", value_parser = longer_side, default_value = "512")]
+    #[arg(id = "image-size", long, value_name = "PIXELS|native", value_parser = longer_side, default_value = "512", add = Decides::Pixels)]
     pub side: Scaling,
     /// Where light is taken
-    #[arg(id = "degrade", long, value_enum, default_value_t = DegradedAt::Native)]
+    #[arg(id = "degrade", long, value_enum, default_value_t = DegradedAt::Native, add = Decides::Pixels)]
     pub darkened: DegradedAt,
     /// Which frames one state of the camera takes
-    #[arg(id = "sensor", long, value_enum, default_value_t = CameraOf::Episode)]
+    #[arg(id = "sensor", long, value_enum, default_value_t = CameraOf::Episode, add = Decides::Pixels)]
     pub camera: CameraOf,
 }
 

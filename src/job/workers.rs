@@ -6,13 +6,14 @@ use clap::Args;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::error::{Error, Result};
+use crate::types::Decides;
 use crate::types::flag::threads;
 
 /// How many threads make images.
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub(crate) struct ThreadArgs {
     /// Threads of synthesis, enhancement and reading, 1024 at most; default: all cores
-    #[arg(long, value_name = "N", value_parser = threads, help_heading = "Scale")]
+    #[arg(long, value_name = "N", value_parser = threads, help_heading = "Scale", add = Decides::Nothing)]
     pub threads: Option<NonZeroUsize>,
 }
 

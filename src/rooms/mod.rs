@@ -8,7 +8,6 @@
 mod bvh;
 mod camera;
 mod dice;
-mod frame_cache;
 mod furniture;
 mod kinds;
 mod light;
@@ -30,12 +29,13 @@ use clap::Args;
 use ndarray::Array2;
 
 use self::dice::Dice;
-use self::frame_cache::FrameCache;
 use self::kinds::RoomKind;
 use self::plan::FloorPlan;
 use self::viewpoint::Height;
 use crate::error::{Error, Result};
 use crate::labels;
+use crate::types::Decides;
+use crate::types::recent::Recent;
 use crate::types::{DepthKind, Digest, Frame, FrameId, Labels, SegmentName, Segmentation};
 
 /// What the rooms are made by. Any change of a pixel or a name is another version.
@@ -44,17 +44,28 @@ pub const VERSION: u32 = 1;
 /// The label space of the rooms.
 const SPACE: &str = "mpcat40";
 
+/// The bytes of the frames that are kept: a room is drawn when its image is needed, and not again when its maps are.
+const KEPT: usize = 104 << 20;
+
+/// The bytes of a pixel: three of colour, four of depth, two of class, four of segment.
+const PIXEL: usize = 13;
+
+/// How many frames of a size are kept; at least one.
+fn frames_kept([width, height]: [usize; 2]) -> usize {
+    (KEPT / (width * height * PIXEL).max(1)).max(1)
+}
+
 /// Which rooms are made: `frames=48,seed=7,size=1280x720`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Args)]
 pub struct Rooms {
     /// This many frames, two of each room
-    #[arg(long, value_name = "N", value_parser = frames, default_value = "48")]
+    #[arg(long, value_name = "N", value_parser = frames, default_value = "48", add = Decides::Trials)]
     pub frames: usize,
     /// What decides the rooms
-    #[arg(long, value_name = "N", default_value_t = 7)]
+    #[arg(long, value_name = "N", default_value_t = 7, add = Decides::Pixels)]
     pub seed: u64,
     /// Width and height in pixels
-    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size, default_value = "640x480")]
+    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size, default_value = "640x480", add = Decides::Pixels)]
     pub size: [usize; 2],
 }
 
@@ -89,7 +100,7 @@ impl fmt::Display for Rooms {
 pub struct Room {
     rooms: Rooms,
     index: usize,
-    album: Arc<FrameCache>,
+    cache: Arc<Recent<usize, Arc<Frame>>>,
 }
 
 /// What the generator knows of a frame: the truth that questions can be held to.
@@ -171,12 +182,12 @@ impl Rooms {
 
     /// Their frames.
     pub fn all(self) -> impl Iterator<Item = (FrameId, Room)> {
-        let album = Arc::new(FrameCache::default());
+        let cache = Arc::new(Recent::new(frames_kept(self.size)));
         (0..self.frames).map(move |index| {
             let room = Room {
                 rooms: self,
                 index,
-                album: Arc::clone(&album),
+                cache: Arc::clone(&cache),
             };
             (room.id(), room)
         })
@@ -281,7 +292,8 @@ impl Room {
     /// # Errors
     /// None but where a map is not of the image's size, which cannot be.
     pub fn frame(&self) -> Result<Arc<Frame>> {
-        self.album.frame(self.index, || self.draw())
+        let draw = || self.draw().map(Arc::new);
+        self.cache.get(&self.index, draw)
     }
 
     fn draw(&self) -> Result<Frame> {
@@ -375,7 +387,7 @@ mod tests {
     }
 
     #[test]
-    fn the_album_forgets_what_was_drawn_long_ago() {
+    fn a_room_is_drawn_once() {
         let rooms = Rooms {
             frames: 2,
             seed: 1,
@@ -384,24 +396,8 @@ mod tests {
         let all: Vec<Room> = rooms.all().map(|(_, room)| room).collect();
         let first = all[0].frame().unwrap();
         assert!(Arc::ptr_eq(&first, &all[0].frame().unwrap()));
-        let album = FrameCache::default();
-        let big = Frame {
-            rgb: crate::types::Rgb::black(2000, 3000),
-            ..first.as_ref().clone()
-        };
-        for index in 0..5 {
-            album.frame(index, || Ok(big.clone())).unwrap();
-        }
-        // 78 MB each: only the last one fits.
-        let mut drawn = 0;
-        for index in [4, 3] {
-            let draw = || {
-                drawn += 1;
-                Ok(big.clone())
-            };
-            album.frame(index, draw).unwrap();
-        }
-        assert_eq!(drawn, 1);
+        let sizes = [[640, 480], [3000, 2000], [4000, 4000]];
+        assert_eq!(sizes.map(frames_kept), [27, 1, 1]);
     }
 
     #[test]

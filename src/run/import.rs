@@ -18,6 +18,7 @@ use crate::import::{Adapter, DataSetKind, FrameMaps, ListedFrame, StatedArgs, op
 use crate::job::Outcome;
 use crate::job::progress::Progress;
 use crate::job::workers::{ThreadArgs, pool};
+use crate::types::Decides;
 use crate::types::manifest::Status;
 
 /// The median depths of a frame of a room, in millimetres: outside of them its scale is wrong, or it looks at a wall.
@@ -30,16 +31,16 @@ const NAMED: usize = 12;
 #[derive(Debug, Args)]
 pub(crate) struct ImportArgs {
     /// What lies in --src
-    #[arg(value_name = "KIND", value_enum)]
+    #[arg(value_name = "KIND", value_enum, add = Decides::Pixels)]
     pub kind: DataSetKind,
     /// The data set, laid out as src/import/README.md shows
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", add = Decides::Pixels)]
     pub src: PathBuf,
     /// Where the frames go, in the common interface
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub out: PathBuf,
     /// The name the data set gives itself; questions are named by it; default: the kind
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", add = Decides::Reply)]
     pub name: Option<String>,
     /// What is said of its maps.
     #[command(flatten)]
@@ -48,7 +49,7 @@ pub(crate) struct ImportArgs {
     #[command(flatten)]
     pub key_frames: KeyFrameArgs,
     /// Write into a folder that holds frames already
-    #[arg(long, help_heading = "Output")]
+    #[arg(long, help_heading = "Output", add = Decides::Nothing)]
     pub force: bool,
     /// How large an image may be.
     #[command(flatten)]

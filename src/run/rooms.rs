@@ -14,6 +14,7 @@ use crate::job::Outcome;
 use crate::job::progress::Progress;
 use crate::job::workers::{ThreadArgs, pool};
 use crate::rooms::{self, Room, Rooms};
+use crate::types::Decides;
 use crate::types::manifest::Status;
 use crate::types::{FrameId, Labels};
 
@@ -21,13 +22,13 @@ use crate::types::{FrameId, Labels};
 #[derive(Debug, Args)]
 pub(crate) struct RoomsArgs {
     /// Where the frames go, in the common interface
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub out: PathBuf,
     /// Which rooms.
     #[command(flatten)]
     pub rooms: Rooms,
     /// Write into a folder that holds frames already
-    #[arg(long)]
+    #[arg(long, add = Decides::Nothing)]
     pub force: bool,
     /// On how many threads.
     #[command(flatten)]

@@ -252,7 +252,7 @@ mod tests {
                 plane[0][..2].copy_from_slice(&[0.1, if row == 0 { -0.1 } else { 0.9 }]);
             }
             developer(Tone::None).balance(row, &mut line);
-            line.seal();
+            line.repeat_edges();
         }
         let expected = [
             [0.1 * 2.15 * 1.25, 0.1 * 1.25, 0.0, 0.0],

@@ -10,6 +10,7 @@ use clap::{Args, ValueEnum};
 use super::reading::{Amplify, Coupling, Draws, LightReading, Readings, Synthesis, Tone};
 use super::{Calibration, CameraModel, Sampling};
 use crate::error::{Error, Result};
+use crate::types::Decides;
 use crate::types::degradation::Kind;
 use crate::types::{AxisLevel, Degradation, KindSet, ReadingName, Severity};
 
@@ -18,10 +19,10 @@ use crate::types::{AxisLevel, Degradation, KindSet, ReadingName, Severity};
 #[command(next_help_heading = "Light")]
 pub(crate) struct LightArgs {
     /// Levels, as L0-L5 or L0,L3, and exposure drops in EV up to 16, as L0,3.3
-    #[arg(long, value_name = "LEVELS", default_value = "L0-L5")]
+    #[arg(long, value_name = "LEVELS", default_value = "L0-L5", add = Decides::Trials)]
     pub levels: Levels,
     /// Which of the paired variants: ev (exposure drop alone), noise (with sensor noise), both
-    #[arg(long, value_name = "ev|noise|both", default_value_t = KindSet::BOTH)]
+    #[arg(long, value_name = "ev|noise|both", default_value_t = KindSet::BOTH, add = Decides::Trials)]
     pub variant: KindSet,
     /// The sensor and its noise.
     #[command(flatten)]
@@ -33,7 +34,7 @@ pub(crate) struct LightArgs {
 #[command(next_help_heading = "Light")]
 pub(crate) struct SensorArgs {
     /// The seed of all random draws
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, add = Decides::Pixels)]
     pub seed: u64,
     /// Light readings, ways to understand the paper's noise, one or several as paper,eld; the four flags below replace choices
     /// of a single reading and make it custom
@@ -44,38 +45,37 @@ pub(crate) struct SensorArgs {
         value_name = "LIST",
         value_enum,
         value_delimiter = ',',
-        default_value = "paper"
-    )]
+        default_value = "paper", add = Decides::Trials)]
     pub profile: Vec<Profile>,
     /// What the light ratio r amplifies; default: as --profile says, shot-only in paper
     ///
     /// It is the choice that matters most. At grey 128, L1, K 0.77 and r 200, read, row and quantisation noise add 0.03, 0
     /// and 0 codes of deviation with shot-only, and 9–19, 1–3 and 1–2 codes with all. shot-only is the default because it is
     /// what the paper says, and because the paper's comparison with real images fits the weaker noise.
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, add = Decides::Pixels)]
     pub amplify: Option<Amplify>,
     /// Where a forward tone curve stands; default: as --profile says, none in paper
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, add = Decides::Pixels)]
     pub tone: Option<Tone>,
     /// Whether the levels of a frame are developed from one noisy RAW image or each from its own; default: as --profile says, shared
     /// in paper
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, add = Decides::Pixels)]
     pub draws: Option<Draws>,
     /// What the light ratio r depends on; default: as --profile says, independent in paper
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, add = Decides::Pixels)]
     pub coupling: Option<Coupling>,
     /// The sensor: sony-a7s2, nikon-d850, canon-eos-5d4, canon-eos-70d, canon-eos-700d, or a TOML file of a calibration
-    #[arg(long, value_name = "NAME|FILE", default_value = "sony-a7s2")]
+    #[arg(long, value_name = "NAME|FILE", default_value = "sony-a7s2", add = Decides::Pixels)]
     pub camera: String,
     /// Pin the system gain K of the sensor, in ADU per electron; default: log-uniform in the camera's range (0.1–6 for
     /// sony-a7s2) for each image
-    #[arg(long, value_name = "K")]
+    #[arg(long, value_name = "K", add = Decides::Pixels)]
     pub gain: Option<f64>,
     /// Pin the light ratio r of the sensor noise; default: uniform in 100–300 for each image
-    #[arg(long, value_name = "R")]
+    #[arg(long, value_name = "R", add = Decides::Pixels)]
     pub ratio: Option<f64>,
     /// Take the middle of every distribution for each image, instead of a draw
-    #[arg(long)]
+    #[arg(long, add = Decides::Pixels)]
     pub fixed: bool,
 }
 

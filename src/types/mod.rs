@@ -3,6 +3,7 @@
 pub(crate) mod axis_level;
 mod canonical;
 pub(crate) mod condition;
+pub(crate) mod decides;
 pub(crate) mod degradation;
 pub(crate) mod detail;
 pub(crate) mod digest;
@@ -12,6 +13,7 @@ pub(crate) mod kind_set;
 pub(crate) mod labels;
 pub(crate) mod manifest;
 pub(crate) mod question;
+pub(crate) mod recent;
 pub(crate) mod record;
 pub(crate) mod reply;
 pub(crate) mod run_question;
@@ -21,6 +23,7 @@ pub(crate) mod words;
 
 pub use axis_level::{AxisLevel, KindReading};
 pub use condition::{Condition, EnhancerName};
+pub(crate) use decides::Decides;
 pub use degradation::{Degradation, ReadingName};
 pub use detail::{
     AnswerReading, ChoiceDetail, ImageFacts, OpenDetail, Step, TrialOutcome, WalkFacts,

@@ -1,5 +1,6 @@
 //! Rate limiter of an endpoint: [`Gate`] decides when the next request may be sent.
 
+use crate::types::Decides;
 use std::num::NonZeroU32;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -15,10 +16,10 @@ use super::learned::{LearnedRate, StatedRate, WIDEST};
 #[command(next_help_heading = "Sending")]
 pub struct Quota {
     /// The most requests in a minute; default: as many as the server takes
-    #[arg(id = "rpm", long, value_name = "N")]
+    #[arg(id = "rpm", long, value_name = "N", add = Decides::Nothing)]
     pub requests: Option<NonZeroU32>,
     /// The most tokens in a minute, of prompts and replies; default: as many as the server takes
-    #[arg(id = "tpm", long, value_name = "N")]
+    #[arg(id = "tpm", long, value_name = "N", add = Decides::Nothing)]
     pub tokens: Option<NonZeroU32>,
 }
 

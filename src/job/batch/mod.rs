@@ -9,6 +9,7 @@ mod file;
 pub(crate) mod replies;
 mod requests;
 
+use crate::types::Decides;
 use std::num::{NonZeroU64, NonZeroUsize};
 
 use clap::Args;
@@ -18,13 +19,13 @@ use clap::Args;
 #[command(next_help_heading = "Batch")]
 pub(crate) struct BatchFileArgs {
     /// The most bytes of a file, in MB
-    #[arg(long, value_name = "MB", default_value = "200")]
+    #[arg(long, value_name = "MB", default_value = "200", add = Decides::Nothing)]
     pub file_size: NonZeroU64,
     /// The most requests of a file
-    #[arg(long, value_name = "N", default_value = "50000")]
+    #[arg(long, value_name = "N", default_value = "50000", add = Decides::Nothing)]
     pub file_requests: NonZeroUsize,
     /// The path that each line asks; default: that of the model's API, /v1/chat/completions
-    #[arg(long, value_name = "PATH", value_parser = path)]
+    #[arg(long, value_name = "PATH", value_parser = path, add = Decides::Nothing)]
     pub url: Option<String>,
 }
 

@@ -17,6 +17,7 @@ use crate::report::products::{PAGE, products};
 use crate::report::tables::tables;
 use crate::report::terminal::evaluation;
 use crate::store::{AddressChange, Store};
+use crate::types::Decides;
 use crate::types::manifest::Status;
 use crate::types::{ChoiceDetail, OpenDetail};
 
@@ -24,17 +25,17 @@ use crate::types::{ChoiceDetail, OpenDetail};
 #[derive(Debug, Args)]
 pub(crate) struct ReportArgs {
     /// Folders of runs
-    #[arg(value_name = "RUN", required = true)]
+    #[arg(value_name = "RUN", required = true, add = Decides::Nothing)]
     pub runs: Vec<PathBuf>,
     /// Read all kept replies again by the rules of this version; asks nothing, and keeps the readings that changed
-    #[arg(long)]
+    #[arg(long, add = Decides::Nothing)]
     pub rescore: bool,
     /// Where the report goes: report.html, tables as CSV and LaTeX, figures as SVG; default: the folder of the run where it
     /// is one, else nowhere
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub out: Option<PathBuf>,
     /// Print the summary as JSON instead of a table
-    #[arg(long)]
+    #[arg(long, add = Decides::Nothing)]
     pub json: bool,
 }
 

@@ -29,7 +29,10 @@ pub struct MeasureRule {
 /// What makes a segment evidence.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[expect(clippy::struct_field_names, reason = "the names are those of rules.toml")]
+#[expect(
+    clippy::struct_field_names,
+    reason = "the names are those of rules.toml"
+)]
 pub struct EvidenceRule {
     pub area_ppm: u64,
     pub side_per_height_ppm: u64,

@@ -5,6 +5,7 @@ use std::num::NonZeroU32;
 use clap::Args;
 
 use crate::error::Result;
+use crate::types::Decides;
 use crate::types::{Choices, Digest, Question};
 
 /// In which orders the choices of a question are shown, and how often it is asked in each.
@@ -12,13 +13,13 @@ use crate::types::{Choices, Digest, Question};
 #[command(next_help_heading = "Data")]
 pub(crate) struct ChoiceOrder {
     /// Show the choices of each question in an order drawn from --seed, the same in every condition
-    #[arg(long)]
+    #[arg(long, add = Decides::Reply)]
     pub shuffle_options: bool,
     /// Ask each question once for every rotation of its choices: what a model answers by position averages out
-    #[arg(long)]
+    #[arg(long, add = Decides::Reply)]
     pub circular: bool,
     /// Ask everything N times
-    #[arg(long, value_name = "N", default_value_t = NonZeroU32::MIN)]
+    #[arg(long, value_name = "N", default_value_t = NonZeroU32::MIN, add = Decides::Trials)]
     pub repeats: NonZeroU32,
 }
 

@@ -27,6 +27,7 @@ use crate::questions::statistics::{self, FrameStatistics, measure, strangers};
 use crate::questions::summary::QuestionSummary;
 use crate::questions::{Generated, GeneratedQuestion, QuestionRequest, generate};
 use crate::report;
+use crate::types::Decides;
 use crate::types::manifest::Status;
 use crate::types::{Digest, Family, FrameId, Labels, QuestionId};
 
@@ -36,43 +37,43 @@ use statistics_cache::StatisticsCache;
 #[derive(Debug, Args)]
 pub(crate) struct QuestionsArgs {
     /// A folder of frames with their maps (frames.jsonl, classes.json), as import makes it
-    #[arg(value_name = "DATA")]
+    #[arg(value_name = "DATA", add = Decides::Reply)]
     pub data: PathBuf,
     /// Where the questions go (.jsonl); what was measured of the frames is kept beside it
-    #[arg(long, value_name = "FILE", value_parser = file)]
+    #[arg(long, value_name = "FILE", value_parser = file, add = Decides::Nothing)]
     pub out: PathBuf,
     /// The rulebook; default: the one built in (src/questions/rules.toml)
-    #[arg(long, value_name = "FILE", help_heading = "Rules")]
+    #[arg(long, value_name = "FILE", help_heading = "Rules", add = Decides::Trials)]
     pub rules: Option<PathBuf>,
     /// The names of colours, a table like src/questions/colors.txt; default: the one built in
-    #[arg(long, value_name = "FILE", help_heading = "Rules")]
+    #[arg(long, value_name = "FILE", help_heading = "Rules", add = Decides::Trials)]
     pub colors: Option<PathBuf>,
     /// Only these families: room_type, affordance, presence, color, closest; default: all
-    #[arg(long, value_name = "LIST", help_heading = "Rules", value_delimiter = ',', value_parser = family)]
+    #[arg(long, value_name = "LIST", help_heading = "Rules", value_delimiter = ',', value_parser = family, add = Decides::Trials)]
     pub families: Vec<Family>,
     /// How the answers are evened out
-    #[arg(long, value_enum, default_value_t, help_heading = "Rules")]
+    #[arg(long, value_enum, default_value_t, help_heading = "Rules", add = Decides::Trials)]
     pub balance: BalanceMode,
     /// What says which room it is
-    #[arg(long, value_enum, default_value_t, help_heading = "Rules")]
+    #[arg(long, value_enum, default_value_t, help_heading = "Rules", add = Decides::Trials)]
     pub room: RoomSource,
     /// Refuse numbers of a semantic map that classes.json does not have, instead of counting them as unlabelled
-    #[arg(long, help_heading = "Rules")]
+    #[arg(long, help_heading = "Rules", add = Decides::Trials)]
     pub strict: bool,
     /// Write what became of every candidate, a line each; default: not written
-    #[arg(long, value_name = "FILE", help_heading = "Checking")]
+    #[arg(long, value_name = "FILE", help_heading = "Checking", add = Decides::Nothing)]
     pub candidates: Option<PathBuf>,
     /// Write the statistics of frames, questions and answers: JSON, CSV and a figure; default: not written
-    #[arg(long, value_name = "DIR", help_heading = "Checking")]
+    #[arg(long, value_name = "DIR", help_heading = "Checking", add = Decides::Nothing)]
     pub stats: Option<PathBuf>,
     /// Write a page on which a person accepts or rejects each question; default: not written
-    #[arg(long, value_name = "FILE.html", help_heading = "Checking")]
+    #[arg(long, value_name = "FILE.html", help_heading = "Checking", add = Decides::Nothing)]
     pub review: Option<PathBuf>,
     /// Leave out what a person has rejected on such a page; repeatable; default: nothing
-    #[arg(long, value_name = "FILE", help_heading = "Checking")]
+    #[arg(long, value_name = "FILE", help_heading = "Checking", add = Decides::Trials)]
     pub verdicts: Vec<PathBuf>,
     /// Print the statistics as JSON instead of a table
-    #[arg(long, help_heading = "Output")]
+    #[arg(long, help_heading = "Output", add = Decides::Nothing)]
     pub json: bool,
     /// How large an image may be.
     #[command(flatten)]
