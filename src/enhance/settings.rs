@@ -1,4 +1,4 @@
-//! What flags say of enhancers: [`EnhancerArgs`], [`SizeArgs`], [`RuntimeArgs`].
+//! Flags of enhancers: [`EnhancerArgs`], [`SizeArgs`], [`RuntimeArgs`].
 
 use std::env;
 use std::num::NonZeroUsize;
@@ -11,7 +11,7 @@ use super::tiles::Tiling;
 use crate::types::Decides;
 use crate::types::KindSet;
 
-/// The enhancers, and the images that they are given.
+/// The enhancers, and the images that they enhance.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Enhancement")]
 pub(crate) struct EnhancerArgs {
@@ -24,7 +24,7 @@ pub(crate) struct EnhancerArgs {
     pub llie_on: KindSet,
 }
 
-/// In which size images are enhanced.
+/// Size in which images are enhanced.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Enhancement")]
 pub(crate) struct SizeArgs {
@@ -32,13 +32,13 @@ pub(crate) struct SizeArgs {
     /// sidecar or preset say that tiles are exact, else whole
     #[arg(long, value_name = "N|whole|auto", default_value_t, add = Decides::Pixels)]
     pub tile: Tiling,
-    /// Enhance images whose longer side is longer than this, in pixels, in that size, and scale the result back (bilinear):
-    /// for models that need the whole image and too much memory for it; default: never
+    /// Largest longer side in pixels: larger images are reduced to it, enhanced and scaled back (bilinear); for models that
+    /// need the whole image and too much memory for it; default: no limit
     #[arg(long, value_name = "PIXELS", add = Decides::Pixels)]
     pub llie_max_side: Option<NonZeroUsize>,
 }
 
-/// Where ONNX Runtime is looked for.
+/// Source of the library of ONNX Runtime.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Enhancement")]
 pub(crate) struct RuntimeArgs {
@@ -51,7 +51,7 @@ pub(crate) struct RuntimeArgs {
 }
 
 impl RuntimeArgs {
-    /// The search that the flags and `ORT_DYLIB_PATH`, the variable of the `ort` crate, say.
+    /// The search that the flags and `ORT_DYLIB_PATH`, the variable of the `ort` crate, define.
     #[must_use]
     pub(crate) fn search(&self) -> RuntimeSearch {
         let variable = || env::var_os("ORT_DYLIB_PATH").filter(|path| !path.is_empty());

@@ -78,7 +78,7 @@ impl<'a> OpenEnhancers<'a> {
         for file in files {
             let enhancer = Enhancer::open(file, &runtime, settings.threads.threads)?
                 .with_tiling(settings.size.tile)
-                .with_most_side(settings.size.llie_max_side);
+                .with_max_side(settings.size.llie_max_side);
             opened.enhancers.push(enhancer);
         }
         opened.version = Some(runtime.version().to_owned());

@@ -73,7 +73,7 @@ impl Recipe {
         let own = NoiseKey::new(self.seed, frame);
         match self.camera_of {
             CameraOf::Frame => own,
-            CameraOf::Episode => own.taken_on(&NoiseKey::new(self.seed, &source.name)),
+            CameraOf::Episode => own.with_camera_of(&NoiseKey::new(self.seed, &source.name)),
         }
     }
 

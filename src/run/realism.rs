@@ -184,7 +184,8 @@ fn compare(
     let state = synthesis.state_by(&key, f64::from(drop));
     let take = |terms: &[Term]| {
         let (amplify, tone) = (synthesis.amplify, synthesis.tone);
-        Negative::taken(&normal, &key, &state, amplify, tone, terms).develop_by(f64::from(drop))
+        Negative::with_state(&normal, &key, &state, amplify, tone, terms)
+            .develop_by(f64::from(drop))
     };
     let (noise, clean) = (take(&Term::ALL), take(&[]));
     let residuals = [&real, &noise, &exposure].map(|image| Residuals::of(image, &exposure));
