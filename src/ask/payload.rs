@@ -14,8 +14,7 @@ use image::{ExtendedColorType, ImageBuffer, ImageEncoder as _, imageops};
 
 use super::plain_png;
 use crate::error::{Error, Result};
-use crate::types::Decides;
-use crate::types::{Digest, ImageFacts, Rgb};
+use crate::types::{Decides, Digest, ImageFacts, Rgb};
 
 /// The file format in which images are sent: PNG or JPEG, because servers refuse others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

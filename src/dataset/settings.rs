@@ -10,8 +10,7 @@ use clap::Args;
 use super::DataPlace;
 use super::picture::MOST_PIXELS;
 use crate::rooms::Rooms;
-use crate::types::Decides;
-use crate::types::Family;
+use crate::types::{Decides, Family};
 
 /// The flag for the place of the data.
 #[derive(Debug, Clone, Args)]
@@ -42,7 +41,7 @@ pub(crate) struct SelectionArgs {
 #[command(next_help_heading = "Data")]
 pub(crate) struct PixelLimit {
     /// The maximum number of pixels of an image; a larger one is refused before it is decoded
-    #[arg(long, value_name = "N", default_value_t = NonZeroU64::new(MOST_PIXELS).unwrap_or(NonZeroU64::MIN))]
+    #[arg(long, value_name = "N", default_value_t = NonZeroU64::new(MOST_PIXELS).unwrap_or(NonZeroU64::MIN), add = Decides::Nothing)]
     pub max_pixels: NonZeroU64,
 }
 

@@ -8,8 +8,7 @@ use clap::Args;
 
 use super::runtime::{Install, RuntimeSearch};
 use super::tiles::Tiling;
-use crate::types::Decides;
-use crate::types::KindSet;
+use crate::types::{Decides, KindSet};
 
 /// The enhancers, and the images that they enhance.
 #[derive(Debug, Clone, Args)]

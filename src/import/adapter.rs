@@ -9,9 +9,8 @@ use ndarray::Array2;
 
 use crate::error::{Error, Result};
 use crate::labels;
-use crate::types::Decides;
 use crate::types::flag::positive;
-use crate::types::{DepthKind, Intrinsics, Labels, Rgb, SegmentName, Segmentation};
+use crate::types::{Decides, DepthKind, Intrinsics, Labels, Rgb, SegmentName, Segmentation};
 
 /// Flags that describe the maps and the camera of a data set.
 #[derive(Debug, Clone, Default, Args)]

@@ -13,9 +13,10 @@ use super::thumbnail::MissingThumbnails;
 use super::{Outcome, StdoutFormat, count};
 use crate::error::{Error, Result};
 use crate::store::{self, AddressChange, Store};
-use crate::types::Decides;
 use crate::types::manifest::{RunManifest, Status, differences};
-use crate::types::{ChoiceDetail, Detail, OpenDetail, Record, RunQuestion, Thumbnail, TrialKey};
+use crate::types::{
+    ChoiceDetail, Decides, Detail, OpenDetail, Record, RunQuestion, Thumbnail, TrialKey,
+};
 
 /// The flags of `merge`.
 #[derive(Debug, Args)]

@@ -17,9 +17,8 @@ use crate::dataset::{DataPlace, Dataset, place};
 use crate::enhance::{Enhancer, RuntimeArgs};
 use crate::error::{Error, Result};
 use crate::synthesis::SensorSettings;
-use crate::types::Decides;
 use crate::types::manifest::RunManifest;
-use crate::types::{Condition, Digest, FrameId};
+use crate::types::{Condition, Decides, Digest, FrameId};
 
 /// Flags for the current paths of a run's data and enhancers, and for running them.
 ///

@@ -15,8 +15,7 @@ use crate::ask::{AccessArgs, Bounds, Constrain, ImageArgs, Parameters, PayloadFo
 use crate::enhance::{EnhancerArgs, ModelFile};
 use crate::error::{Error, Result};
 use crate::synthesis::{LightArgs, LightSettings};
-use crate::types::Decides;
-use crate::types::View;
+use crate::types::{Decides, View};
 
 /// The flags that every experiment has.
 #[derive(Debug, Args)]

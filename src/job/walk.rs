@@ -15,8 +15,7 @@ use super::source::{Frames, Source, SourceFrame};
 use crate::dataset::openeqa::{sampled, walk};
 use crate::dataset::{Picture, PixelLimit};
 use crate::error::{Error, Result};
-use crate::types::Decides;
-use crate::types::FrameId;
+use crate::types::{Decides, FrameId};
 
 /// Flags that decide which frames of a walk are shown, and how.
 #[derive(Debug, Clone, Args)]

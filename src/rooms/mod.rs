@@ -34,9 +34,8 @@ use self::plan::FloorPlan;
 use self::viewpoint::Height;
 use crate::error::{Error, Result};
 use crate::labels;
-use crate::types::Decides;
 use crate::types::recent::Recent;
-use crate::types::{DepthKind, Digest, Frame, FrameId, Labels, SegmentName, Segmentation};
+use crate::types::{Decides, DepthKind, Digest, Frame, FrameId, Labels, SegmentName, Segmentation};
 
 /// What the rooms are made by. Any change of a pixel or a name is another version.
 pub const VERSION: u32 = 1;

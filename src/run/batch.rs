@@ -10,8 +10,7 @@ use crate::job::report::{choice, open};
 use crate::job::stored::{ExperimentKind, StoredRun, manifest};
 use crate::job::{Outcome, StdoutFormat, count};
 use crate::store::{AddressChange, Store};
-use crate::types::Decides;
-use crate::types::{ChoiceDetail, Detail, OpenDetail};
+use crate::types::{ChoiceDetail, Decides, Detail, OpenDetail};
 
 /// The flags of `batch import`.
 #[derive(Debug, Args)]

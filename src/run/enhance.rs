@@ -30,13 +30,13 @@ pub(crate) struct EnhanceArgs {
     #[arg(long, value_name = "DIR", required_unless_present = "describe", add = Decides::Nothing)]
     pub out: Option<PathBuf>,
     /// Print how the model's input and output are read, and why; enhances nothing
-    #[arg(long, conflicts_with_all = ["inputs", "out"])]
+    #[arg(long, conflicts_with_all = ["inputs", "out"], add = Decides::Nothing)]
     pub describe: bool,
     /// The flags for running enhancers.
     #[command(flatten)]
     pub loading: EnhancerRunArgs,
     /// Replace images that exist already
-    #[arg(long, help_heading = "Output")]
+    #[arg(long, help_heading = "Output", add = Decides::Nothing)]
     pub force: bool,
     /// The maximum size of an image.
     #[command(flatten)]

@@ -31,7 +31,7 @@ const NAMED: usize = 12;
 #[derive(Debug, Args)]
 pub(crate) struct ImportArgs {
     /// The kind of data set in --src
-    #[arg(value_name = "KIND", value_enum)]
+    #[arg(value_name = "KIND", value_enum, add = Decides::Pixels)]
     pub kind: DataSetKind,
     /// The data set, laid out as src/import/README.md shows
     #[arg(long, value_name = "DIR", add = Decides::Pixels)]

@@ -26,9 +26,8 @@ use crate::score::realism::ssim::ssim;
 use crate::score::realism::{ImageComparison, PairComparison, exposure_drop, psnr, same_size};
 use crate::synthesis::noise::Term;
 use crate::synthesis::{Negative, NoiseKey, SensorArgs, SensorSettings, expose_by};
-use crate::types::Decides;
 use crate::types::manifest::Status;
-use crate::types::{FrameId, Rgb};
+use crate::types::{Decides, FrameId, Rgb};
 
 /// The maximum number of pairs whose crops are shown (chosen).
 const MOST_CROPS: usize = 8;

@@ -14,9 +14,8 @@ use crate::job::Outcome;
 use crate::job::progress::Progress;
 use crate::job::workers::{ThreadArgs, pool};
 use crate::rooms::{self, Room, Rooms};
-use crate::types::Decides;
 use crate::types::manifest::Status;
-use crate::types::{FrameId, Labels};
+use crate::types::{Decides, FrameId, Labels};
 
 /// The flags of `rooms`.
 #[derive(Debug, Args)]

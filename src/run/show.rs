@@ -12,10 +12,9 @@ use crate::files::write;
 use crate::job::Outcome;
 use crate::job::rebuild::{ImageRebuilder, RebuildArgs, RebuiltImage};
 use crate::job::stored::AnyRun;
-use crate::types::Decides;
 use crate::types::manifest::{RunManifest, Status};
 use crate::types::question::letter;
-use crate::types::{self, Condition, Digest, FrameId, OpenDetail, Record, RunQuestion};
+use crate::types::{self, Condition, Decides, Digest, FrameId, OpenDetail, Record, RunQuestion};
 
 /// The flags of `show`.
 #[derive(Debug, Args)]

@@ -10,9 +10,8 @@ use clap::{Args, ValueEnum};
 use super::reading::{Amplify, Coupling, Draws, LightReading, Readings, Synthesis, Tone};
 use super::{Calibration, CameraModel, Sampling};
 use crate::error::{Error, Result};
-use crate::types::Decides;
 use crate::types::degradation::Kind;
-use crate::types::{AxisLevel, Degradation, KindSet, ReadingName, Severity};
+use crate::types::{AxisLevel, Decides, Degradation, KindSet, ReadingName, Severity};
 
 /// The levels and kinds of degradation.
 #[derive(Debug, Clone, Args)]

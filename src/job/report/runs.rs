@@ -17,9 +17,8 @@ use crate::report::products::{PAGE, products};
 use crate::report::tables::tables;
 use crate::report::terminal::evaluation;
 use crate::store::{AddressChange, Store};
-use crate::types::Decides;
 use crate::types::manifest::Status;
-use crate::types::{ChoiceDetail, OpenDetail};
+use crate::types::{ChoiceDetail, Decides, OpenDetail};
 
 /// The flags of `report`.
 #[derive(Debug, Args)]

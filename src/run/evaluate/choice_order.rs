@@ -5,8 +5,7 @@ use std::num::NonZeroU32;
 use clap::Args;
 
 use crate::error::Result;
-use crate::types::Decides;
-use crate::types::{Choices, Digest, Question};
+use crate::types::{Choices, Decides, Digest, Question};
 
 /// The flags for the order of choices and for repeats.
 #[derive(Debug, Clone, Copy, Args)]

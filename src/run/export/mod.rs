@@ -23,9 +23,8 @@ use crate::job::source::{Source, inspect_all};
 use crate::job::timings::Timings;
 use crate::job::workers::pool;
 use crate::synthesis::{LightArgs, LightSettings};
-use crate::types::Decides;
 use crate::types::manifest::Status;
-use crate::types::{Condition, FrameId, Question};
+use crate::types::{Condition, Decides, FrameId, Question};
 
 use set::{ReadySet, SetForm};
 
@@ -33,7 +32,7 @@ use set::{ReadySet, SetForm};
 #[derive(Debug, Args)]
 pub(crate) struct ExportArgs {
     /// The form of the sets
-    #[arg(value_name = "KIND", value_enum)]
+    #[arg(value_name = "KIND", value_enum, add = Decides::Nothing)]
     pub kind: SetForm,
     /// A folder of frames, or a ready-made set (.tsv, .jsonl)
     #[arg(value_name = "DATA", value_parser = dataset::place, add = Decides::Reply)]
@@ -57,7 +56,7 @@ pub(crate) struct ExportArgs {
     #[command(flatten)]
     pub loading: EnhancerRunArgs,
     /// Replace sets that exist already
-    #[arg(long, help_heading = "Output")]
+    #[arg(long, help_heading = "Output", add = Decides::Nothing)]
     pub force: bool,
 }
 

@@ -127,7 +127,7 @@ impl Experiment for OpenSetup<'_> {
         ]
     }
 
-    fn given(&self) -> &[Record<OpenDetail>] {
+    fn imported_records(&self) -> &[Record<OpenDetail>] {
         &self.file_answers
     }
 
@@ -142,7 +142,7 @@ impl Experiment for OpenSetup<'_> {
         })
     }
 
-    fn to_come(&self, remaining: &[SourcePlan<OpenItem>]) -> Vec<ExpectedRequest> {
+    fn expected_requests(&self, remaining: &[SourcePlan<OpenItem>]) -> Vec<ExpectedRequest> {
         if self.judge.is_none() {
             return Vec::new();
         }

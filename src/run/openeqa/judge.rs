@@ -57,7 +57,7 @@ impl JudgeArgs {
             return Ok(None);
         };
         let of_judge = |e: crate::error::Error| e.at("the judge");
-        model.answers_in_words().map_err(of_judge)?;
+        model.require_open_answers().map_err(of_judge)?;
         let mut access = job.access.clone();
         let own_access = self.judge_base_url.is_some()
             || self.judge_api_key_env.is_some()

@@ -137,7 +137,7 @@ impl OpenEqaArgs {
         };
         let nothing_to_ask = self.job.models.is_empty() && self.answers.is_empty();
         if nothing_to_ask && !matches!(task, OpenTask::Study(_)) {
-            return Err(self.job.nameless());
+            return Err(self.job.no_model_error());
         }
         let models = &self.job.models;
         let mut names = models.model.iter().chain(&models.blind_model);

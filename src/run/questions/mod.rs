@@ -27,9 +27,8 @@ use crate::questions::statistics::{self, FrameStatistics, measure, unknown_label
 use crate::questions::summary::QuestionSummary;
 use crate::questions::{Generated, GeneratedQuestion, QuestionRequest, generate};
 use crate::report;
-use crate::types::Decides;
 use crate::types::manifest::Status;
-use crate::types::{Digest, Family, FrameId, Labels, QuestionId};
+use crate::types::{Decides, Digest, Family, FrameId, Labels, QuestionId};
 
 use statistics_cache::StatisticsCache;
 
@@ -40,7 +39,7 @@ pub(crate) struct QuestionsArgs {
     #[arg(value_name = "DATA", add = Decides::Reply)]
     pub data: PathBuf,
     /// Where the questions go (.jsonl); the statistics of the frames go into a file next to it
-    #[arg(long, value_name = "FILE", value_parser = file)]
+    #[arg(long, value_name = "FILE", value_parser = file, add = Decides::Nothing)]
     pub out: PathBuf,
     /// The rulebook; default: the one built in (src/questions/rules.toml)
     #[arg(long, value_name = "FILE", help_heading = "Rules", add = Decides::Trials)]
@@ -55,13 +54,13 @@ pub(crate) struct QuestionsArgs {
     #[arg(long, value_enum, default_value_t, help_heading = "Rules", add = Decides::Trials)]
     pub balance: BalanceMode,
     /// Where the kind of room is read from
-    #[arg(long, value_enum, default_value_t, help_heading = "Rules")]
+    #[arg(long, value_enum, default_value_t, help_heading = "Rules", add = Decides::Trials)]
     pub room: RoomSource,
     /// Refuse numbers of a semantic map that classes.json does not have, instead of counting them as unlabelled
     #[arg(long, help_heading = "Rules", add = Decides::Trials)]
     pub strict: bool,
     /// Write every candidate and why it was taken or rejected, one per line; default: not written
-    #[arg(long, value_name = "FILE", help_heading = "Checking")]
+    #[arg(long, value_name = "FILE", help_heading = "Checking", add = Decides::Nothing)]
     pub candidates: Option<PathBuf>,
     /// Write the statistics of frames, questions and answers: JSON, CSV and a figure; default: not written
     #[arg(long, value_name = "DIR", help_heading = "Checking", add = Decides::Nothing)]
@@ -210,8 +209,8 @@ fn warn(generated: &Generated, making: &QuestionMaking<'_>) {
     for uneven in &generated.uneven {
         tracing::warn!("{uneven}");
     }
-    let closest = generated.tallies.get(&Family::Closest);
-    let scale = closest.and_then(|tally| tally.fallen.get(&Reason::Scale));
+    let closest = generated.counts.get(&Family::Closest);
+    let scale = closest.and_then(|tally| tally.rejections.get(&Reason::Scale));
     if let Some(frames) = scale {
         let measure = &making.rules.book().measure;
         tracing::warn!(
@@ -340,7 +339,7 @@ impl<'a> WrittenQuestion<'a> {
 /// A candidate as a line of the `--candidates` file.
 fn candidate_line(frame: &FrameId, result: &RuleResult) -> Value {
     match result {
-        RuleResult::Holds(candidate) => json!({
+        RuleResult::Viable(candidate) => json!({
             "frame": frame,
             "family": candidate.family,
             "about": candidate.about,
@@ -349,7 +348,7 @@ fn candidate_line(frame: &FrameId, result: &RuleResult) -> Value {
             "question": candidate.text,
             "evidence": candidate.evidence,
         }),
-        RuleResult::Falls(rejection) => json!({
+        RuleResult::Rejected(rejection) => json!({
             "frame": frame,
             "family": rejection.family,
             "about": rejection.about,

@@ -29,9 +29,8 @@ use crate::job::Outcome;
 use crate::job::interrupt::Interrupt;
 use crate::job::observer;
 use crate::job::progress::Progress;
-use crate::types::Decides;
 use crate::types::manifest::Status;
-use crate::types::{Choices, Digest, Family, FrameId, Question, QuestionId};
+use crate::types::{Choices, Decides, Digest, Family, FrameId, Question, QuestionId};
 
 use completion::{Completion, RequestFault};
 use puzzle::Puzzle;
@@ -51,7 +50,7 @@ pub(crate) struct ServeArgs {
     #[arg(long, value_name = "N", default_value_t = 8089, add = Decides::Nothing)]
     pub port: u16,
     /// The seed of the guesses
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, add = Decides::Pixels)]
     pub seed: u64,
 }
 

@@ -13,9 +13,8 @@ use crate::job::progress::Progress;
 use crate::job::rebuild::{ImageRebuilder, RebuildArgs};
 use crate::job::stored::StoredRun;
 use crate::report::study::{StudyImage, StudyQuestion, page};
-use crate::types::Decides;
 use crate::types::manifest::Status;
-use crate::types::{Condition, Digest, FrameId, QuestionId, Record, RunQuestion};
+use crate::types::{Condition, Decides, Digest, FrameId, QuestionId, Record, RunQuestion};
 
 /// The flags of `study pack`.
 #[derive(Debug, Args)]
@@ -27,7 +26,7 @@ pub(crate) struct PackArgs {
     #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub out: PathBuf,
     /// Ask only N questions, chosen by a hash of their ids; default: all
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", add = Decides::Trials)]
     pub items: Option<NonZeroUsize>,
     /// Only these conditions, as L3-noise+zerodce; repeatable; default: all of the run
     #[arg(long, value_name = "CONDITION", add = Decides::Nothing)]
@@ -45,7 +44,7 @@ pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
     let StoredRun {
         manifest,
         records,
-        questions: questions,
+        questions,
         ..
     } = StoredRun::of_choices(&args.run, "openeqa --study DIR makes their page")?;
     let wrong = |problem: String| {

@@ -13,12 +13,13 @@ use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::job::report::choice;
 use crate::job::stored::StoredRun;
-use crate::types::Decides;
 
 use crate::job::{Outcome, StdoutFormat, count, now};
 use crate::store::{AddressChange, Store};
 use crate::types::manifest::{Counts, RunManifest, Status};
-use crate::types::{ChoiceDetail, Condition, Detail, Digest, QuestionId, Record, Reply, TrialKey};
+use crate::types::{
+    ChoiceDetail, Condition, Decides, Detail, Digest, QuestionId, Record, Reply, TrialKey,
+};
 
 /// The flags of `study read`.
 #[derive(Debug, Args)]
@@ -33,7 +34,7 @@ pub(crate) struct ReadArgs {
     #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub out: PathBuf,
     /// The name of the people in tables, next to the names of models
-    #[arg(long, value_name = "NAME", default_value = "human", value_parser = NonEmptyStringValueParser::new())]
+    #[arg(long, value_name = "NAME", default_value = "human", value_parser = NonEmptyStringValueParser::new(), add = Decides::Reply)]
     pub name: String,
     /// Print the summary as JSON instead of a table
     #[arg(long, add = Decides::Nothing)]
