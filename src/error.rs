@@ -1,7 +1,7 @@
 //! The one error type of the crate.
 //!
-//! A variant says whose fault it is and where; its message ends with what mends it. There is no `From<io::Error>`:
-//! an error of the operating system without its path helps nobody.
+//! Each variant names the cause and the place; its message ends with the remedy. There is no `From<io::Error>`: an error of
+//! the operating system is of no use without its path.
 
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
@@ -9,48 +9,48 @@ use std::path::{Path, PathBuf};
 /// A `Result` with this crate's [`Error`].
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// What went wrong, by whose fault it is.
+/// An error, by its cause.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A flag, an environment variable or a line of the configuration file that cannot be used.
     #[error("{origin}: {problem}")]
     Usage {
-        /// The flag, variable or file that said it.
+        /// The flag, variable or file that holds the value.
         origin: String,
-        /// What was expected, and how to mend it.
+        /// What was expected, and how to fix it.
         problem: String,
     },
-    /// Words that no command takes, as the parser of the command line says it.
+    /// A command line that could not be parsed, in the words of the parser.
     #[error("{0}")]
     CommandLine(String),
     /// A file or folder that could not be read or written.
     #[error("{}: cannot {action}: {source}", path.display())]
     File {
-        /// Where.
+        /// The file or folder.
         path: PathBuf,
-        /// What was tried: "read", "write", "create".
+        /// The action that failed: "read", "write", "create".
         action: &'static str,
-        /// What the operating system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
-    /// A file of the user's data whose content is not what it should be.
+    /// A data file of the user with unexpected content.
     #[error("{place}: {problem}")]
     Data {
-        /// The file, with its line or frame where there is one.
+        /// The file, with the line or frame if known.
         place: String,
-        /// What was expected, and how to mend it.
+        /// What was expected, and how to fix it.
         problem: String,
     },
     /// An enhancement model that cannot be used.
     #[error("{}: {problem}", path.display())]
     Enhancer {
-        /// The ONNX file.
+        /// The path of the ONNX file.
         path: PathBuf,
-        /// What is wrong with it, and how to mend it.
+        /// What is wrong with it, and how to fix it.
         problem: String,
     },
-    /// ONNX Runtime's library was not found, not fit or could not be installed.
+    /// The library of ONNX Runtime was not found, is not suitable or could not be installed.
     #[error("ONNX Runtime: {0}")]
     Runtime(String),
     /// A prompt template that is missing, broken or does not fit its question.
@@ -61,20 +61,20 @@ pub enum Error {
         /// What is wrong with it.
         problem: String,
     },
-    /// An endpoint that cannot be used at all: every further request would fail alike.
+    /// An endpoint that cannot be used: every further request would fail in the same way.
     #[error("{endpoint}: {problem}")]
     Endpoint {
         /// The base URL without credentials.
         endpoint: String,
-        /// What it answered, and how to mend it.
+        /// What it answered, and how to fix it.
         problem: String,
     },
-    /// A run folder that does not fit what was asked.
+    /// A run folder that does not match the command.
     #[error("{}: {problem}", path.display())]
     Run {
         /// The run folder or its file.
         path: PathBuf,
-        /// What is wrong, and how to mend it.
+        /// What is wrong, and how to fix it.
         problem: String,
     },
 }
@@ -97,7 +97,7 @@ impl Error {
         }
     }
 
-    /// An error in a data file; `place` is its path, with a line or frame where there is one.
+    /// An error in a data file; `place` is its path, with the line or frame if known.
     pub fn data(place: impl Display, problem: impl Display) -> Self {
         Self::Data {
             place: place.to_string(),
@@ -105,7 +105,7 @@ impl Error {
         }
     }
 
-    /// The same error, said of another flag or place: what a type's own parser reports gets the flag it came by.
+    /// The same error at another flag or place: the parser of a type does not know the flag of its value.
     #[must_use]
     pub fn at(self, origin: impl Into<String>) -> Self {
         match self {
@@ -121,7 +121,7 @@ impl Error {
         }
     }
 
-    /// An error of JSON in one line (counted from 1) of a data file, without the place that serde counts within the line.
+    /// A JSON error in one line (counted from 1) of a data file, without serde's position within the line.
     #[must_use]
     pub fn json_line(path: &Path, line: usize, error: &serde_json::Error) -> Self {
         let text = error.to_string();

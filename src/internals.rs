@@ -1,4 +1,4 @@
-//! What the tests and benches of this crate use beyond its public surface. It may change with any version.
+//! Internal items that the tests and benchmarks of this crate use. They may change with any version.
 
 pub mod ask {
     pub use crate::ask::{

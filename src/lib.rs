@@ -115,8 +115,9 @@
 //!
 //! # Who may import whom
 //!
-//! `tests/architecture.rs` reads this table and fails on a breach. No file of `run` uses another command's, and no room has a circle of
-//! files but those that `tests/support/circles.rs` lists with a reason.
+//! `tests/architecture/` reads this table and fails on a breach. A room may use only rooms whose rows are above its own. No file of
+//! `run` uses another command's, and files import each other in no circles but those that `tests/architecture/main.rs` lists with
+//! a reason.
 //!
 //! | module | may use |
 //! |---|---|

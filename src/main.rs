@@ -1,4 +1,4 @@
-//! The program.
+//! The `darkqa-eval` program.
 
 use std::process::ExitCode;
 

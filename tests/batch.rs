@@ -96,7 +96,7 @@ fn what_is_left_goes_out_in_files_and_comes_back_in_any_order() {
     let idle = bench.call(&RUN);
     assert_eq!(idle.code, Some(1), "{idle:?}");
     assert!(
-        idle.stderr.contains("16 trials are out in a batch"),
+        idle.stderr.contains("16 trials are waiting for a batch"),
         "{idle:?}"
     );
     assert!(exported(&bench, &[]).starts_with("0 requests in 0 files"));
@@ -117,7 +117,7 @@ fn what_is_left_goes_out_in_files_and_comes_back_in_any_order() {
     assert_eq!(back.code, Some(1), "{back:?}");
     assert!(
         back.stdout
-            .starts_with("14 replies taken over, 2 failed, 1 are of another run\n"),
+            .starts_with("replies: 14 imported, 2 failed, 1 of another run\n"),
         "{back:?}"
     );
     assert!(
@@ -128,7 +128,7 @@ fn what_is_left_goes_out_in_files_and_comes_back_in_any_order() {
     assert!(
         again
             .stdout
-            .starts_with("0 replies taken over, 0 failed, 16 were taken over before"),
+            .starts_with("replies: 0 imported, 0 failed, 16 imported before"),
         "{again:?}"
     );
     for record in records(&bench.path("run"))
@@ -142,9 +142,9 @@ fn what_is_left_goes_out_in_files_and_comes_back_in_any_order() {
     }
 
     // What expired goes out again, and once more if it fails once more; in the end it is asked directly.
-    assert!(exported(&bench, &[]).starts_with("2 requests in 1 files; 14 are answered already"));
+    assert!(exported(&bench, &[]).starts_with("2 requests in 1 file; 14 already answered"));
     assert!(
-        exported(&bench, &[]).starts_with("0 requests in 0 files; 14 are answered already, 2 out")
+        exported(&bench, &[]).starts_with("0 requests in 0 files; 14 already answered, 2 waiting")
     );
     bench.call(&["batch", "import", "run", "errors.jsonl"]);
     let mock = MockEndpoint::start([Answer::text("C")]);

@@ -117,7 +117,7 @@ fn a_sidecar_says_which_output_it_is() {
 fn a_model_of_a_fixed_size_is_fed_and_read_by_resizing() {
     let (_folder, mut enhancer) = loaded(&onnx::fixed(16, 24));
     // Multiples are tried for a model of any size alone, and nothing else is said.
-    let tried = |enhancer: &Enhancer| enhancer.describe().contains("tried; then 4");
+    let tried = |enhancer: &Enhancer| enhancer.describe().contains("tried first, then 4");
     assert!(!tried(&enhancer), "{}", enhancer.describe());
     assert!(tried(&loaded(&onnx::identity()).1));
     let same = image(16, 24);
@@ -177,7 +177,7 @@ fn other_conventions_are_refused_by_name() {
     for (graph, part) in [
         (
             onnx::shaped(Type::Float, &[Known(1), Known(1), any[0], any[1]]),
-            "no image of three",
+            "not an image of three",
         ),
         (
             onnx::shaped(Type::Long, &[Known(1), Known(3), any[0], any[1]]),
@@ -267,7 +267,7 @@ fn sides_are_filled_up_to_multiples() {
 #[test]
 fn tiles_are_exact_or_refused() {
     let image = image(90, 150);
-    let tiles = |side| Tiling::Of(NonZeroUsize::new(side).unwrap());
+    let tiles = |side| Tiling::Side(NonZeroUsize::new(side).unwrap());
     let (_folder, mut blurred) = loaded(&onnx::blurred());
     let whole = blurred.enhance(&image).unwrap();
     for sidecar in ["", "tile = \"exact:2\"", "tile = \"exact:2\"\nmultiple = 4"] {
@@ -312,7 +312,7 @@ fn tiles_are_exact_or_refused() {
         .enhance(&image)
         .unwrap_err()
         .to_string();
-    assert!(message.contains("need the whole image"), "{message}");
+    assert!(message.contains("needs the whole image"), "{message}");
 }
 
 #[test]
@@ -329,7 +329,7 @@ fn a_fixed_size_is_a_tile_where_tiles_are_exact() {
 #[test]
 fn large_images_may_be_enhanced_in_a_smaller_size() {
     let (_folder, enhancer) = stated(&onnx::of_eights(), "multiple = 8");
-    let mut enhancer = enhancer.with_most_side(NonZeroUsize::new(40));
+    let mut enhancer = enhancer.with_max_side(NonZeroUsize::new(40));
     // 100 × 64 as 40 × 24: multiples of eight.
     let flat = Rgb::new(64, 100, [9, 120, 250].repeat(6400)).unwrap();
     assert_eq!(enhancer.enhance(&flat).unwrap(), flat);
@@ -418,7 +418,7 @@ fn a_preset_says_what_its_authors_do() {
         ["sci", "zero-dce"].map(|preset| ModelFile::read(&said(preset)).unwrap().digest());
     assert_ne!(digests[0], digests[1]);
     let message = open(&said("nonesuch")).err().unwrap().to_string();
-    assert!(message.contains("is no preset"), "{message}");
+    assert!(message.contains("is not a preset"), "{message}");
 }
 
 #[test]

@@ -230,7 +230,7 @@ fn kept_replies_are_read_again_without_a_call() {
     assert!(bench.complete(&["report", "run"]).contains("0.0 ±"));
     let anew = bench.complete(&["report", "run", "--rescore"]);
     assert!(
-        anew.starts_with("6 of 6 records read otherwise than before\n"),
+        anew.starts_with("6 of 6 records now read differently\n"),
         "{anew}"
     );
     assert!(anew.ends_with(&table), "{anew}");

@@ -284,7 +284,8 @@ fn every_field_of_open_questions_refuses_another_value() {
 type Addition = (&'static str, &'static str, usize);
 
 /// What may be added to an evaluation. A part of the noise model that is said makes another light reading.
-const ADDITIONS: [Addition; 16] = [
+const ADDITIONS: [Addition; 17] = [
+    ("", "--blind", 3),
     ("", "--model m --model n", 9),
     ("", "--model n", 9),
     ("", "--blind-model m", 3),
@@ -319,6 +320,117 @@ const OPEN_ADDITIONS: [Addition; 9] = [
     ("", "--profile physical", 3),
     ("--limit 2", "--limit 3", 2),
 ];
+
+/// What changes no answer: given on the folder of a run, it asks nothing.
+const NOTHING: [&str; 22] = [
+    "--max-pixels 1000000",
+    "--threads 1",
+    "--offline",
+    "--api-key-env none",
+    "--api-key-file key.txt",
+    "--key-header api-key",
+    "--allow-http",
+    "--concurrency 2",
+    "--rpm 6000",
+    "--tpm 900000",
+    "--timeout 60",
+    "--retries 1",
+    "--max-wait 9",
+    "--max-image 3",
+    "--max-failures 4",
+    "--max-cost 5",
+    "--prices prices.toml",
+    "--dry-run",
+    "--timings",
+    "--json",
+    "--quiet",
+    "--config other.toml",
+];
+
+#[test]
+fn what_decides_nothing_asks_nothing() {
+    let scene = Scene::new();
+    let bench = &scene.house.0;
+    bench.file("key.txt", "k\n");
+    bench.file("other.toml", "retries = 3\n");
+    let prices = "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 1, output = 1 }\n";
+    bench.file("prices.toml", prices);
+    let enhanced = |otherwise: &str| format!("--limit 1 --llie one.onnx {otherwise}");
+    scene.complete(&EVALUATION, &enhanced(""), "run");
+    for otherwise in NOTHING {
+        scene.adds(&EVALUATION, &enhanced(otherwise), "run", 0);
+    }
+}
+
+/// Flags that the tables here leave out, and where they are held.
+const ELSEWHERE: [(&str, &str); 17] = [
+    ("--splits", "tests/openeqa.rs"),
+    ("--categories", "tests/openeqa.rs"),
+    ("--file-size", "tests/batch.rs"),
+    ("--file-requests", "tests/batch.rs"),
+    ("--url", "tests/batch.rs"),
+    ("--out", "names the folder"),
+    ("--resume", "names the folder"),
+    ("--shard", "tests/shards.rs"),
+    ("--ort-lib", "a library of one machine: tests/enhance.rs"),
+    ("--ca-file", "takes a server with TLS: tests/ask.rs"),
+    ("--frames", "tests/openeqa.rs"),
+    ("--answers", "tests/openeqa.rs"),
+    ("--judge", "marks are trials of their own: tests/openeqa.rs"),
+    ("--protocol", "tests/openeqa.rs"),
+    ("--subset", "tests/openeqa.rs"),
+    ("--study", "tests/openeqa.rs"),
+    ("--batch", "tests/batch.rs"),
+];
+
+/// The flags of a command with what each decides, from the list that is written from the program.
+fn classes(command: &str) -> Vec<(&'static str, &'static str)> {
+    let all = include_str!("../src/cli/README.md");
+    let title = format!("## darkqa-eval{command}\n");
+    let (_, section) = all.split_once(&title).unwrap();
+    let section = section.split("\n## ").next().unwrap();
+    let rows = section.lines().filter(|line| line.starts_with("| `--"));
+    rows.map(|row| {
+        let unescaped: Vec<&str> = row.split(" | ").collect();
+        let flag = unescaped[0].trim_start_matches("| `");
+        let flag = flag.split([' ', '`']).next().unwrap();
+        (flag, unescaped[2])
+    })
+    .collect()
+}
+
+#[test]
+fn every_flag_is_held_to_what_it_decides() {
+    let first = |args: &&'static str| args.split(' ').next().unwrap();
+    let refused = REFUSED.iter().chain(&OPEN_REFUSED);
+    let refused = refused.map(|(_, args)| first(args));
+    let added = ADDITIONS.iter().chain(&OPEN_ADDITIONS);
+    let added = added.map(|(_, args, _)| first(args));
+    // Of `--llie one.onnx --llie-on both` the last flag is the one that is tried.
+    let on = std::iter::once("--llie-on");
+    let decide: BTreeSet<&str> = refused.chain(added).chain(on).collect();
+    let nothing: BTreeSet<&str> = NOTHING.iter().map(first).collect();
+    let elsewhere: BTreeSet<&str> = ELSEWHERE.iter().map(|(flag, _)| *flag).collect();
+    let mut wrong = Vec::new();
+    for command in ["", " openeqa"] {
+        let classes = classes(command);
+        assert!(classes.len() > 40, "{classes:?}");
+        for (flag, class) in classes {
+            let held = match class {
+                "nothing" => nothing.contains(flag) && !decide.contains(flag),
+                "trials" | "reply" | "pixels" => decide.contains(flag) && !nothing.contains(flag),
+                _ => false,
+            };
+            // The keys and addresses of a judge are those of a model, in the same structure.
+            if !held && !elsewhere.contains(flag) && !flag.starts_with("--judge-") {
+                wrong.push(format!(
+                    "{command} {flag}: {class}, and no row of that kind"
+                ));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
 
 #[test]
 fn another_value_of_a_column_is_asked_alone() {

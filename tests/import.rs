@@ -420,7 +420,7 @@ fn dumps_of_ai2_thor() {
     assert!(
         scene
             .refused("thor", &["--force"])
-            .contains("\"red\" is no colour")
+            .contains("\"red\" is not a colour")
     );
 }
 
@@ -434,7 +434,7 @@ fn folders_of_images_and_maps() {
     assert!(
         scene
             .refused("folder", &[])
-            .contains("--labels: which label space")
+            .contains("--labels: the label space")
     );
     assert!(
         scene

@@ -463,7 +463,7 @@ fn nothing_is_asked_twice_and_what_was_out_in_a_batch_is_taken_over() {
     ];
     let batch = [&flags[..], &["--batch"]].concat();
     let told = house.call(&batch);
-    assert!(told.stdout.contains("6 requests in 1 files"), "{told:?}");
+    assert!(told.stdout.contains("6 requests in 1 file;"), "{told:?}");
     let answer = |file: &str, text: &dyn Fn(usize) -> String| {
         let input = fs::read_to_string(house.0.path(file)).unwrap();
         let lines = input.lines().enumerate().map(|(i, line)| {
@@ -476,10 +476,7 @@ fn nothing_is_asked_twice_and_what_was_out_in_a_batch_is_taken_over() {
         let words = ["batch", "import", "run", "out.jsonl"];
         let called = called(&mut house.0.command(&words));
         assert_eq!(called.code, Some(0), "{called:?}");
-        assert!(
-            called.stdout.contains("replies taken over, 0 failed"),
-            "{called:?}"
-        );
+        assert!(called.stdout.contains("imported, 0 failed"), "{called:?}");
     };
     let line: Value = serde_json::from_str(
         fs::read_to_string(house.0.path("run/batch/1-m-001.jsonl"))
@@ -493,7 +490,7 @@ fn nothing_is_asked_twice_and_what_was_out_in_a_batch_is_taken_over() {
     answer("run/batch/1-m-001.jsonl", &|i| format!("answer {i}"));
     // Now the marks, one for each different answer.
     let told = house.call(&batch);
-    assert!(told.stdout.contains("6 requests in 1 files"), "{told:?}");
+    assert!(told.stdout.contains("6 requests in 1 file;"), "{told:?}");
     answer("run/batch/1-j-001.jsonl", &|_| "Your mark: 4".to_owned());
     let called = house.call(&flags);
     assert_eq!(called.code, Some(0), "{called:?}");

@@ -138,7 +138,7 @@ fn a_broken_pair_does_not_stop_the_others() {
         "{}",
         called.stderr
     );
-    assert!(called.stdout.contains("1 pairs failed"));
+    assert!(called.stdout.contains("1 pair failed"));
     for (words, says) in [
         (&["realism", "nowhere"][..], "nowhere"),
         (&["realism", "pairs/low"], "--normal DIR"),

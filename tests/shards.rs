@@ -150,17 +150,17 @@ fn missing_double_and_foreign_parts_are_named() {
     bench.complete(&with(&["--out", "again", "--shard", "3/3"]));
     refused(
         &["parts", "again", "--out", "n"],
-        "shard 3/3 is there twice, also in",
+        "shard 3/3 is present twice, also in",
     );
     bench.complete(&with(&["--out", "other", "--shard", "2/3", "--seed", "9"]));
     refused(&["parts", "other", "--out", "n"], "is of another run than");
     bench.complete(&with(&["--out", "four", "--shard", "2/4"]));
     refused(
         &["parts", "four", "--out", "n"],
-        "is no part of the same run",
+        "cannot be of the same run",
     );
     bench.complete(&with(&["--out", "whole"]));
-    refused(&["whole", "--out", "n"], "the run is no shard");
+    refused(&["whole", "--out", "n"], "the run is not a shard");
     refused(&["nowhere", "--out", "n"], "nowhere");
     let empty = bench.call(&with(&["--out", "x", "--shard", "7/7"]));
     assert!(

@@ -145,7 +145,7 @@ fn walks(
                 (Some(Severity::L4), if kept { lit } else { dark }),
             ] {
                 answers.push(ScoredAnswer {
-                    subject: Subject::shown(MODEL, Some(&at(level))),
+                    subject: Subject::new(MODEL, Some(&at(level))),
                     question,
                     outcome: AnswerOutcome::Marked(mark),
                     cut: false,
@@ -176,10 +176,10 @@ fn intervals_of_open_scores_hold_the_truth() {
                 let (mut scores, mut drops) = (0, 0);
                 for _ in 0..1000 {
                     let summary = walks(&mut random, count, marks, mean, rho);
-                    let dark = Subject::shown(MODEL, Some(&at(Some(Severity::L4))));
-                    let lit = Subject::shown(MODEL, Some(&at(None)));
+                    let dark = Subject::new(MODEL, Some(&at(Some(Severity::L4))));
+                    let lit = Subject::new(MODEL, Some(&at(None)));
                     let score = summary.cell(&lit, &Group::All).unwrap().score.unwrap();
-                    let change = summary.change(&dark, Baseline::Lit, &Group::All).unwrap();
+                    let change = summary.change(&dark, Baseline::Clean, &Group::All).unwrap();
                     scores += usize::from((score.low..=score.high).contains(&truth));
                     let change = change.difference;
                     drops += usize::from((change.low..=change.high).contains(&drop));

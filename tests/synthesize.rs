@@ -74,7 +74,11 @@ fn any_drop_and_several_readings_are_made() {
         .concat(),
     );
     assert_eq!(refused.code, Some(2), "{refused:?}");
-    assert!(refused.stderr.contains("--tone: beside several profiles"));
+    assert!(
+        refused
+            .stderr
+            .contains("--tone: cannot be combined with several profiles")
+    );
 }
 
 #[test]

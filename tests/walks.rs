@@ -165,7 +165,7 @@ fn the_images_of_a_walk_are_made_again_and_proved() {
     let refused = run(&house, &["--out", "run"]);
     assert_eq!(refused.code, Some(2), "{refused:?}");
     assert!(
-        refused.stderr.contains("is another in this run"),
+        refused.stderr.contains("is not the one stored in this run"),
         "{}",
         refused.stderr
     );
@@ -177,7 +177,7 @@ fn time_is_said_of_walks_too() {
     scripts(&house);
     let called = run(&house, &["--out", "run", "--timings"]);
     assert!(
-        called.stderr.contains("timings:") && called.stderr.contains("darken"),
+        called.stderr.contains("timings:") && called.stderr.contains("degrade"),
         "{}",
         called.stderr
     );

@@ -1,4 +1,4 @@
-//! How an endpoint is reached: [`Access`], its address, key and certificates.
+//! The address, key and certificates of an endpoint: [`Access`].
 
 use std::error::Error as _;
 use std::path::Path;
@@ -13,23 +13,23 @@ use super::url::BaseUrl;
 use super::wire::Wire;
 use crate::error::{Error, Result};
 
-/// How long a connection may take to come about.
+/// The maximum time to open a connection; chosen.
 const CONNECT: Duration = Duration::from_secs(10);
 
-/// The address of an endpoint with all that opens its door.
+/// The address of an endpoint with everything that is needed to connect to it.
 #[derive(Debug, Clone)]
 pub struct Access {
-    /// The address.
+    /// The base URL of the endpoint.
     pub base: BaseUrl,
-    /// The key; without one no header carries any.
+    /// The API key; `None` if no header with a key is sent.
     pub key: Option<Secret>,
     /// The header that carries the key.
     pub key_header: KeyHeader,
-    /// Further headers that say who asks and are no secret: `OpenAI-Organization`, `OpenAI-Project`.
+    /// Further headers that name the account and are not secret: `OpenAI-Organization`, `OpenAI-Project`.
     pub headers: Vec<(&'static str, String)>,
-    /// Certificate authorities that are trusted besides those of the system.
+    /// Certificate authorities that are trusted in addition to those of the system.
     pub authorities: Authorities,
-    /// Whether a key may travel unencrypted to another machine.
+    /// Whether a key may be sent unencrypted to another machine.
     pub allow_http: bool,
 }
 
@@ -47,13 +47,13 @@ impl Access {
         }
     }
 
-    /// What must be taken out of everything that the server says.
+    /// The filter that removes keys and passwords from the server's texts.
     pub(super) fn scrub(&self) -> Scrub {
         let key = self.key.as_ref().map(|key| key.expose().to_owned());
         Scrub::new(self.base.secrets().into_iter().chain(key))
     }
 
-    /// Refuses what would give a key away or send two.
+    /// Refuses settings that would send a key unencrypted, or send two keys.
     pub(super) fn check(&self, scrub: &Scrub) -> Result<()> {
         let base = &self.base;
         let secret = self.key.is_some() || !scrub.is_empty();
@@ -61,20 +61,22 @@ impl Access {
             return Err(Error::usage(
                 "--base-url",
                 format_args!(
-                    "the key would travel to {base} for all to read; use https://, or --allow-http if the network is yours"
+                    "the key would be sent unencrypted to {base}; use https://, or --allow-http on a network that you trust"
                 ),
             ));
         }
         if self.key.is_some() && base.has_credentials() {
             return Err(Error::usage(
                 "--base-url",
-                format_args!("{base} comes with a user name and with a key; leave one of them out"),
+                format_args!(
+                    "{base} has a user name in the address, and a key is set too; remove one of them"
+                ),
             ));
         }
         Ok(())
     }
 
-    /// The headers of every request on a wire.
+    /// The headers of every request to an API.
     pub(super) fn headers(&self, wire: Wire) -> Result<HeaderMap> {
         let form = match self.key_header {
             KeyHeader::Auto if self.base.is_azure() => KeyHeader::ApiKey,
@@ -83,16 +85,21 @@ impl Access {
         };
         let mut headers = wire.headers(self.key.as_ref(), form)?;
         for (name, text) in &self.headers {
-            let unfit = |_| Error::usage(*name, "no HTTP header can carry it");
+            let invalid = |_| {
+                Error::usage(
+                    *name,
+                    "the value has characters that an HTTP header cannot carry",
+                )
+            };
             let name = HeaderName::try_from(*name)
-                .map_err(|_| Error::usage(*name, "this is no name of a header"))?;
-            headers.insert(name, HeaderValue::try_from(text).map_err(unfit)?);
+                .map_err(|_| Error::usage(*name, "this is not a valid name of an HTTP header"))?;
+            headers.insert(name, HeaderValue::try_from(text).map_err(invalid)?);
         }
         Ok(headers)
     }
 
-    /// The client of all requests: redirects are not followed, for a POST would become a GET and the key go elsewhere;
-    /// proxies are those of the environment (`HTTPS_PROXY`, `NO_PROXY`, …), and none for this machine.
+    /// The HTTP client of all requests. It follows no redirects, because a POST would become a GET and the key would be sent
+    /// elsewhere. Proxies come from the environment (`HTTPS_PROXY`, `NO_PROXY`, …); there is none for this machine.
     pub(super) fn client(&self, timeout: Duration, scrub: &Scrub) -> Result<Client> {
         let mut client = Client::builder()
             .user_agent(concat!("darkqa-eval/", env!("CARGO_PKG_VERSION")))
@@ -107,12 +114,12 @@ impl Access {
         }
         client.build().map_err(|error| Error::Endpoint {
             endpoint: self.base.to_string(),
-            problem: scrub.line(&chain(&error)),
+            problem: scrub.line(&with_causes(&error)),
         })
     }
 }
 
-/// Certificate authorities of the user's own.
+/// Custom certificate authorities, as of a private CA.
 #[derive(Debug, Clone, Default)]
 pub struct Authorities(Vec<Certificate>);
 
@@ -120,7 +127,7 @@ impl Authorities {
     /// Reads a PEM file of one or more certificates.
     ///
     /// # Errors
-    /// Where it cannot be read or holds none.
+    /// If it cannot be read or has no certificate.
     pub fn load(path: &Path) -> Result<Self> {
         let pem = std::fs::read(path).map_err(|e| Error::file(path, "read", e))?;
         let found = Certificate::from_pem_bundle(&pem).unwrap_or_default();
@@ -128,7 +135,7 @@ impl Authorities {
             return Err(Error::usage(
                 "--ca-file",
                 format_args!(
-                    "{}: no certificate in it; a PEM file expected, which begins with -----BEGIN CERTIFICATE-----",
+                    "{}: there is no certificate in it; expected a PEM file, which begins with -----BEGIN CERTIFICATE-----",
                     path.display()
                 ),
             ));
@@ -137,15 +144,15 @@ impl Authorities {
     }
 }
 
-/// An error with all that caused it: reqwest's own words alone say only that something failed.
-pub(super) fn chain(error: &reqwest::Error) -> String {
-    let mut words = error.to_string();
+/// The text of an error with its causes: reqwest's own text says only that something failed.
+pub(super) fn with_causes(error: &reqwest::Error) -> String {
+    let mut text = error.to_string();
     let mut cause = error.source();
     while let Some(error) = cause {
-        words = format!("{words}: {error}");
+        text = format!("{text}: {error}");
         cause = error.source();
     }
-    words
+    text
 }
 
 #[cfg(test)]
@@ -161,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn the_key_travels_in_the_header_of_its_server() {
+    fn the_key_is_sent_in_the_header_that_the_server_expects() {
         let azure = "https://r.openai.azure.com/openai/v1/";
         for (base, header, name, value) in [
             (azure, KeyHeader::Auto, "api-key", "sk-0123"),

@@ -1,4 +1,4 @@
-//! The lines of Batch API files: [`Model::batch_line`](super::Model::batch_line) makes one, [`BatchLine`] reads one.
+//! The lines of Batch API files: [`Model::batch_line`](super::Model::batch_line) writes a line, [`BatchLine`] reads one.
 
 use serde_json::Value;
 
@@ -9,7 +9,7 @@ use super::secret::Scrub;
 use super::wire::Wire;
 use crate::types::{Failure, FailureKind, Reply};
 
-/// One line of an input file: `{"custom_id", "method", "url", "body"}` with a line end, the body as it would be sent alone.
+/// One line of an input file: `{"custom_id", "method", "url", "body"}` with a line end; the body is that of a single request.
 pub(super) fn line(id: &str, url: &str, body: &[u8]) -> Result<Vec<u8>, serde_json::Error> {
     let (id, url) = (serde_json::to_string(id)?, serde_json::to_string(url)?);
     let head = format!("{{\"custom_id\":{id},\"method\":\"POST\",\"url\":{url},\"body\":");
@@ -19,14 +19,14 @@ pub(super) fn line(id: &str, url: &str, body: &[u8]) -> Result<Vec<u8>, serde_js
 /// One line of an output or error file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct BatchLine {
-    /// The id that the request was given.
+    /// The id of the request, which the input line sets.
     pub id: String,
-    /// The reply, or why there is none.
+    /// The reply, or the reason why there is none.
     pub result: Result<Reply, Failure>,
 }
 
 impl BatchLine {
-    /// Reads a line about a request on a wire; `None` where it is none of such a file.
+    /// Reads a line about a request to an API; `None` if the line is not one of such a file.
     #[must_use]
     pub(crate) fn read(line: &str, wire: Wire) -> Option<Self> {
         let line: Value = serde_json::from_str(line).ok()?;
@@ -43,17 +43,17 @@ fn result(line: &Value, wire: Wire) -> Result<Reply, Failure> {
     let status = response.and_then(|response| response.get("status_code")?.as_u64());
     let status = status.and_then(|status| u16::try_from(status).ok());
     let error = line.get("error").filter(|error| !error.is_null());
-    let fail = |kind, said: &str| {
-        let said = Scrub::default().line(said);
+    let fail = |kind, text: &str| {
+        let text = Scrub::default().line(text);
         Err(Failure {
             kind,
             status: status.filter(|status| (100..1000).contains(status)),
-            message: format!("the batch says: {said}"),
+            message: format!("the batch says: {text}"),
         })
     };
     if let Some(error) = error {
         let complaint = Complaint::of_error(error);
-        let kind = if complaint.is_any(&["batch_expired", "batch_cancelled"]) {
+        let kind = if complaint.has_code(&["batch_expired", "batch_cancelled"]) {
             FailureKind::Timeout
         } else {
             FailureKind::Request
@@ -67,7 +67,7 @@ fn result(line: &Value, wire: Wire) -> Result<Reply, Failure> {
             "a line with neither a response nor an error",
         );
     };
-    // The body of a reply that failed is a text with some servers.
+    // Some servers write the body of a failed request as a text.
     let text = body
         .as_str()
         .map_or_else(|| body.to_string(), str::to_owned);
@@ -93,9 +93,9 @@ fn result(line: &Value, wire: Wire) -> Result<Reply, Failure> {
     }
 }
 
-/// A reply with the letter that a constraint asked for in place of the object around it; as it is where it has none.
+/// A reply whose text is replaced by the letter in it, if the reply is constrained and has one.
 #[must_use]
-pub(crate) fn unconstrained(reply: Reply, constrain: Constrain, choices: usize) -> Reply {
+pub(crate) fn with_letter(reply: Reply, constrain: Constrain, choices: usize) -> Reply {
     Reply {
         text: letter_of(constrain, choices, &reply.text).unwrap_or(reply.text),
         ..reply
@@ -107,7 +107,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_of_every_outcome_are_read() {
+    fn lines_with_replies_and_failures_are_read() {
         let read = |line: &str| BatchLine::read(line, Wire::Chat).unwrap();
         let answered = read(
             r#"{"id":"batch_req_1","custom_id":"k","response":{"status_code":200,"request_id":"r","body":{"choices":[{"message":{"content":"B"},"finish_reason":"stop"}],"usage":{"prompt_tokens":9}}},"error":null}"#,
@@ -116,7 +116,7 @@ mod tests {
         let reply = answered.result.unwrap();
         assert_eq!(reply.text, "B");
         assert_eq!(reply.usage.unwrap().prompt_tokens, Some(9));
-        for (line, kind, said) in [
+        for (line, kind, message) in [
             (
                 r#"{"custom_id":"k","response":null,"error":{"code":"batch_expired","message":"This request could not be executed before the completion window expired."}}"#,
                 FailureKind::Timeout,
@@ -141,7 +141,7 @@ mod tests {
         ] {
             let failure = read(line).result.unwrap_err();
             assert_eq!(failure.kind, kind, "{line}");
-            assert!(failure.message.contains(said), "{}", failure.message);
+            assert!(failure.message.contains(message), "{}", failure.message);
         }
         for wrong in ["", "{}", r#"{"custom_id":7}"#, "[1]"] {
             assert_eq!(BatchLine::read(wrong, Wire::Chat), None, "{wrong}");

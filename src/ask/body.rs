@@ -1,4 +1,4 @@
-//! The body of a request: [`Parts`], words around images that many requests share.
+//! The body of a request: [`Parts`], text around images that many requests share.
 
 use std::convert::Infallible;
 use std::pin::Pin;
@@ -8,7 +8,7 @@ use std::task::{Context, Poll};
 use bytes::Bytes;
 use http_body::{Body, Frame, SizeHint};
 
-/// Pieces of bytes sent one after the other as one body of known length; cloning it copies no bytes.
+/// A body of known length that is sent in pieces; cloning it copies no bytes.
 #[derive(Debug, Clone)]
 pub(super) struct Parts {
     pieces: Arc<[Bytes]>,
@@ -16,13 +16,13 @@ pub(super) struct Parts {
 }
 
 impl Parts {
-    /// The body of these pieces, in order; empty ones are passed over.
+    /// The body of these pieces, in order; empty pieces are skipped.
     pub(super) fn new(pieces: impl IntoIterator<Item = Bytes>) -> Self {
         let pieces = pieces.into_iter().collect();
         Self { pieces, next: 0 }
     }
 
-    /// All of it in one piece.
+    /// The whole body in one piece.
     pub(super) fn joined(&self) -> Vec<u8> {
         self.pieces.concat()
     }
@@ -54,7 +54,7 @@ impl Body for Parts {
         self.rest().iter().all(Bytes::is_empty)
     }
 
-    /// Exact, so that the request has a `Content-Length`: some servers take no chunked bodies.
+    /// The exact size, so that the request has a `Content-Length`: some servers accept no chunked bodies.
     fn size_hint(&self) -> SizeHint {
         SizeHint::with_exact(self.rest().iter().map(|piece| piece.len() as u64).sum())
     }
@@ -65,18 +65,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pieces_come_in_order_and_count_down() {
+    fn pieces_come_in_order_and_the_remaining_size_falls() {
         let piece = Bytes::from_static;
         let mut body = Parts::new([piece(b"ab"), piece(b""), piece(b"cde")]);
         let mut context = Context::from_waker(std::task::Waker::noop());
         let mut seen = Vec::new();
-        let mut left = vec![body.size_hint().exact()];
+        let mut remaining = vec![body.size_hint().exact()];
         while let Poll::Ready(Some(Ok(frame))) = Pin::new(&mut body).poll_frame(&mut context) {
             seen.extend_from_slice(frame.data_ref().unwrap());
-            left.push(body.size_hint().exact());
+            remaining.push(body.size_hint().exact());
         }
         assert_eq!(seen, b"abcde");
-        assert_eq!(left, [Some(5), Some(3), Some(0)]);
+        assert_eq!(remaining, [Some(5), Some(3), Some(0)]);
         assert!(body.is_end_stream());
         assert!(Parts::new([piece(b""), piece(b""), piece(b"")]).is_end_stream());
     }

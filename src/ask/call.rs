@@ -1,4 +1,4 @@
-//! What is put to a model: [`Call`], a question as a [`Query`] and as a [`Message`].
+//! One question to a model, [`Call`]: the question as a [`Query`] and as a [`Message`].
 
 use std::sync::Arc;
 
@@ -6,12 +6,12 @@ use super::failure::{AskError, Reach};
 use super::payload::Payload;
 use crate::types::{Condition, FailureKind, Question, QuestionId};
 
-/// What is put to a model.
+/// A question to a model, with choices or open.
 #[derive(Debug, Clone, Copy)]
 pub enum Query<'a> {
     /// A question with choices.
     Choice(&'a Question),
-    /// A question that is answered in words of one's own, by its name.
+    /// An open question, by its name.
     Open(&'a QuestionId),
 }
 
@@ -25,7 +25,7 @@ impl<'a> Query<'a> {
         }
     }
 
-    /// How many choices there are; 0 where the answer is open.
+    /// The number of choices; 0 if the question is open.
     #[must_use]
     pub fn choices(self) -> usize {
         match self {
@@ -34,7 +34,7 @@ impl<'a> Query<'a> {
         }
     }
 
-    /// The question with choices, for models that know no other.
+    /// The question with choices; an error if it is open, for models that can only choose.
     pub(super) fn choice(self) -> Result<&'a Question, AskError> {
         match self {
             Self::Choice(question) => Ok(question),
@@ -51,19 +51,19 @@ impl<'a> Query<'a> {
     }
 }
 
-/// The one message of a conversation: words, images, and the words behind them.
+/// The single message of a conversation: text, images, and the text after them.
 #[derive(Debug, Clone, Copy)]
 pub struct Message<'a> {
-    /// The words before the images; all of them where there are no images.
+    /// The text before the images; the whole text if there are none.
     pub before: &'a str,
-    /// The images; none for a question put in words alone.
+    /// The images; empty for a question without images.
     pub images: &'a [Arc<Payload>],
-    /// The words behind the images; empty for none.
+    /// The text after the images; may be empty.
     pub behind: &'a str,
 }
 
 impl<'a> Message<'a> {
-    /// Words alone.
+    /// A message of text, without images.
     #[must_use]
     pub fn words(before: &'a str) -> Self {
         Self {
@@ -77,12 +77,12 @@ impl<'a> Message<'a> {
 /// Everything a model needs to answer one question.
 #[derive(Debug, Clone, Copy)]
 pub struct Call<'a> {
-    /// The question; models made in process look at it, the others at the message.
+    /// The question; models in this process read it, remote models read the message.
     pub query: Query<'a>,
-    /// What the images show; `None` where none are shown.
+    /// The condition of the images; `None` if there are no images.
     pub condition: Option<&'a Condition>,
-    /// The question in words, with its images.
+    /// The text of the question, with its images.
     pub message: Message<'a>,
-    /// How many times the question was put before, in whatever order of its choices.
+    /// The number of times the question was asked before, in any order of its choices.
     pub turn: u32,
 }

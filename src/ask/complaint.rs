@@ -1,41 +1,41 @@
-//! What a server says went wrong, in whichever shape it says so: [`Complaint`].
+//! The error in a server's response, in any of the known JSON shapes: [`Complaint`].
 
 use serde_json::Value;
 
-/// An error in the words of a server; not yet scrubbed.
+/// An error as the server states it; secrets are not yet removed.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct Complaint {
-    /// The words.
+    /// The error text of the server.
     pub(super) message: String,
-    /// Its kind: `invalid_request_error`, `insufficient_quota`.
+    /// The kind of error, as `invalid_request_error` or `insufficient_quota`.
     pub(super) kind: Option<String>,
-    /// Its code: `model_not_found`, or a number as text.
+    /// The error code, as `model_not_found`, or a number as text.
     pub(super) code: Option<String>,
-    /// The field of the request that it is about.
+    /// The field of the request that the error is about.
     pub(super) param: Option<String>,
-    /// Whether a moderator refused what was asked, rather than who asked.
+    /// Whether moderation refused the content of the request, and not the account.
     pub(super) moderated: bool,
 }
 
 impl Complaint {
-    /// The error at the top level of a body, if there is one: `error` as an object or text, or without `error` the flat shapes of
-    /// vLLM, FastAPI and problem+json.
+    /// The error at the top level of a body, if there is one: `error` as an object or text, or the flat shapes of vLLM, FastAPI
+    /// and problem+json.
     pub(super) fn of(body: &Value) -> Option<Self> {
         Self::in_error(body).or_else(|| {
             ["message", "detail", "title"]
                 .iter()
-                .any(|field| body.get(field).is_some_and(says_something))
+                .any(|field| body.get(field).is_some_and(is_filled))
                 .then(|| Self::of_error(body))
         })
     }
 
-    /// The error in the field `error` alone.
+    /// The error in the field `error`; flat shapes are not read.
     pub(super) fn in_error(body: &Value) -> Option<Self> {
-        let error = body.get("error").filter(|error| says_something(error));
+        let error = body.get("error").filter(|error| is_filled(error));
         error.map(Self::of_error)
     }
 
-    /// The error that a value named `error` holds.
+    /// The error in the value of a field `error`.
     pub(super) fn of_error(error: &Value) -> Self {
         let metadata = error.get("metadata");
         let mut message = text(error)
@@ -45,11 +45,11 @@ impl Complaint {
                     .find_map(|f| text(error.get(f)?))
             })
             .unwrap_or_else(|| error.to_string());
-        // OpenRouter passes on what the provider said beside its own words.
+        // OpenRouter sends the provider's text in addition to its own.
         if let Some(raw) = metadata.and_then(|metadata| text(metadata.get("raw")?)) {
             message = format!("{message}: {raw}");
         }
-        let field = |name| error.get(name).and_then(word);
+        let field = |name| error.get(name).and_then(text_or_number);
         Self {
             message,
             kind: field("type"),
@@ -61,7 +61,7 @@ impl Complaint {
         }
     }
 
-    /// The error in the body of a refused request, whatever it is.
+    /// The error in the body of a refused request: JSON, an HTML page or plain text.
     pub(super) fn of_body(body: &str) -> Self {
         let parsed: Option<Value> = serde_json::from_str(body).ok();
         parsed.as_ref().and_then(Self::of).unwrap_or_else(|| Self {
@@ -70,39 +70,39 @@ impl Complaint {
         })
     }
 
-    /// Whether its code or kind is one of these words.
-    pub(super) fn is_any(&self, words: &[&str]) -> bool {
+    /// Whether the code or kind is one of these.
+    pub(super) fn has_code(&self, codes: &[&str]) -> bool {
         [&self.code, &self.kind]
             .into_iter()
             .flatten()
-            .any(|said| words.contains(&said.as_str()))
+            .any(|code| codes.contains(&code.as_str()))
     }
 
-    /// Whether the message holds one of these wordings, in any case.
-    pub(super) fn says_any(&self, wordings: &[&str]) -> bool {
+    /// Whether the message has one of these phrases, without regard to letter case.
+    pub(super) fn mentions_any(&self, phrases: &[&str]) -> bool {
         let message = self.message.to_lowercase();
-        wordings.iter().any(|wording| message.contains(wording))
+        phrases.iter().any(|phrase| message.contains(phrase))
     }
 
-    /// The HTTP status that its code stands for.
+    /// The error code as an HTTP status; `None` if it is not one from 400 to 599.
     pub(super) fn status(&self) -> Option<u16> {
         let status = self.code.as_ref()?.parse().ok()?;
         (400..600).contains(&status).then_some(status)
     }
 }
 
-/// Why the body of a reply with a status of success holds no answer.
+/// The reason why a body with a status of success has no reply.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum UnreadableReply {
-    /// The server says that something went wrong.
+    /// The body states an error.
     Complaint(Complaint),
-    /// The body is no reply of the wire; what it is instead.
+    /// The body is not a reply of the API; the text says what it is.
     Other(String),
 }
 
-/// The title of an HTML page.
+/// The title of an HTML page; `None` if the body is not one.
 pub(super) fn page_title(body: &str) -> Option<String> {
-    // ASCII folding keeps byte positions.
+    // ASCII lower case keeps byte positions.
     let lower = body.trim_start().to_ascii_lowercase();
     let is_page = lower.starts_with("<!doctype html") || lower.starts_with("<html");
     if !is_page {
@@ -119,7 +119,7 @@ pub(super) fn page_title(body: &str) -> Option<String> {
     Some(format!("an HTML page titled {title:?}"))
 }
 
-fn says_something(value: &Value) -> bool {
+fn is_filled(value: &Value) -> bool {
     match value {
         Value::Null | Value::Bool(false) => false,
         Value::String(text) => !text.trim().is_empty(),
@@ -129,7 +129,7 @@ fn says_something(value: &Value) -> bool {
     }
 }
 
-/// A text, or the texts of a list of complaints such as FastAPI makes.
+/// A text, or the joined texts of a list of errors, as FastAPI sends them.
 fn text(value: &Value) -> Option<String> {
     match value {
         Value::String(text) if !text.trim().is_empty() => Some(text.clone()),
@@ -145,7 +145,7 @@ fn text(value: &Value) -> Option<String> {
 }
 
 /// A text or a number, as text.
-fn word(value: &Value) -> Option<String> {
+fn text_or_number(value: &Value) -> Option<String> {
     match value {
         Value::String(text) => Some(text.clone()),
         Value::Number(number) => Some(number.to_string()),
@@ -158,7 +158,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_shape_is_read() {
+    fn errors_of_every_shape_are_read() {
         for (body, message, code) in [
             (
                 r#"{"error":{"message":"m","type":"t","code":"c"}}"#,
@@ -210,8 +210,8 @@ mod tests {
     }
 
     #[test]
-    fn no_error_is_no_complaint() {
-        for fine in [
+    fn a_body_without_an_error_is_not_a_complaint() {
+        for body in [
             r#"{"choices":[],"error":null}"#,
             r#"{"choices":[],"error":""}"#,
             r#"{"error":{},"message":""}"#,
@@ -219,9 +219,9 @@ mod tests {
             r"[]",
         ] {
             assert_eq!(
-                Complaint::of(&serde_json::from_str(fine).unwrap()),
+                Complaint::of(&serde_json::from_str(body).unwrap()),
                 None,
-                "{fine}"
+                "{body}"
             );
         }
     }

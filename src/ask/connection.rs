@@ -6,7 +6,7 @@ use reqwest::header::{CONTENT_TYPE, HeaderMap};
 use reqwest::{Client, Response, StatusCode};
 use tokio::time::Instant;
 
-use super::access::{Access, chain};
+use super::access::{Access, with_causes};
 use super::body::Parts;
 use super::failure::FailedTry;
 use super::secret::Scrub;
@@ -14,11 +14,11 @@ use super::url::BaseUrl;
 use crate::error::Result;
 use crate::types::FailureKind;
 
-/// The most of a reply that is read, unpacked: no completion of a few tokens comes near, and memory is not the server's to
-/// fill.
-const LONGEST_REPLY: usize = 16 << 20;
+/// The maximum size of a decompressed reply, in bytes; chosen. A reply of a few tokens is far smaller, and a server must not
+/// fill the memory.
+const MAX_REPLY: usize = 16 << 20;
 
-/// Pooled connections to a server, and what may not be shown of its words.
+/// Pooled connections to a server, and the filter for secrets in its texts.
 #[derive(Debug)]
 pub(super) struct Connection {
     pub(super) base: BaseUrl,
@@ -27,12 +27,12 @@ pub(super) struct Connection {
     timeout: Duration,
 }
 
-/// What came back for one request.
+/// The response to one request.
 pub(super) struct HttpReply {
     pub(super) status: StatusCode,
     pub(super) headers: HeaderMap,
     pub(super) body: Vec<u8>,
-    /// The time from sending to the last byte.
+    /// The time from sending the request to the last byte of the response.
     pub(super) took: Duration,
 }
 
@@ -45,7 +45,7 @@ impl HttpReply {
 }
 
 impl Connection {
-    /// Makes ready to connect; nothing is sent yet.
+    /// The connections to an endpoint; nothing is sent yet.
     pub(super) fn new(access: &Access, scrub: Scrub, timeout: Duration) -> Result<Self> {
         Ok(Self {
             client: access.client(timeout, &scrub)?,
@@ -55,7 +55,7 @@ impl Connection {
         })
     }
 
-    /// Sends a body to a path behind the base URL.
+    /// Sends a body to a path below the base URL.
     pub(super) async fn post(
         &self,
         path: &str,
@@ -69,12 +69,15 @@ impl Connection {
             .headers(headers.clone())
             .header(CONTENT_TYPE, "application/json")
             .body(reqwest::Body::wrap(body));
-        let response = request.send().await.map_err(|error| self.broken(error))?;
+        let response = request
+            .send()
+            .await
+            .map_err(|error| self.failed_try(error))?;
         let status = response.status();
         let headers = response.headers().clone();
         let body = match self.receive(response).await {
-            Err(tried) if status.is_success() => return Err(tried),
-            // A refusal whose words were lost on the way is a refusal all the same.
+            Err(failed) if status.is_success() => return Err(failed),
+            // The status alone says that the request was refused.
             body => body.unwrap_or_default(),
         };
         Ok(HttpReply {
@@ -85,11 +88,15 @@ impl Connection {
         })
     }
 
-    /// The body of a reply, unpacked where it is compressed, up to a length.
+    /// The body of a response, decompressed, up to [`MAX_REPLY`].
     async fn receive(&self, mut response: Response) -> Result<Vec<u8>, FailedTry> {
         let mut body = Vec::new();
-        while let Some(chunk) = response.chunk().await.map_err(|error| self.broken(error))? {
-            if body.len() + chunk.len() > LONGEST_REPLY {
+        while let Some(chunk) = response
+            .chunk()
+            .await
+            .map_err(|error| self.failed_try(error))?
+        {
+            if body.len() + chunk.len() > MAX_REPLY {
                 let message = format!("{} answered with more than 16 MiB", self.base);
                 return Err(FailedTry::new(FailureKind::Response, message));
             }
@@ -98,8 +105,8 @@ impl Connection {
         Ok(body)
     }
 
-    /// A try without a whole reply.
-    fn broken(&self, error: reqwest::Error) -> FailedTry {
+    /// The failure of a request without a complete response.
+    fn failed_try(&self, error: reqwest::Error) -> FailedTry {
         let (kind, message) = if error.is_timeout() {
             let timeout = self.timeout.as_secs_f64();
             (
@@ -110,18 +117,18 @@ impl Connection {
                 ),
             )
         } else {
-            let said = self.scrub.line(&chain(&error.without_url()));
+            let text = self.scrub.line(&with_causes(&error.without_url()));
             // Companies and universities often sign their certificates with a private CA.
-            let hint = if said.contains("UnknownIssuer") {
+            let hint = if text.contains("UnknownIssuer") {
                 "; name the authority that signed it by --ca-file"
             } else {
                 ""
             };
-            let message = format!("{}: {said}{hint}", self.base);
+            let message = format!("{}: {text}{hint}", self.base);
             (FailureKind::Connection, message)
         };
         FailedTry {
-            again: true,
+            retryable: true,
             ..FailedTry::new(kind, message)
         }
     }

@@ -1,14 +1,14 @@
-//! A reply that is constrained to one letter: the schema that asks for it, and [`letter_of`] a reply.
+//! Replies that are constrained to one letter: the JSON schema in the request, and [`letter_of`] a reply.
 
 use serde_json::{Value, json};
 
 use super::parameters::Constrain;
 use crate::types::question::letter;
 
-/// The field of the object that `--constrain json` asks for.
+/// The name of the only field in a reply with `--constrain json`.
 pub(super) const ANSWER: &str = "answer";
 
-/// The JSON schema of an object with one of the letters.
+/// The JSON schema of an object whose only field is one of the letters.
 pub(super) fn schema(letters: &[char]) -> Value {
     json!({
         "type": "object", "additionalProperties": false, "required": [ANSWER],
@@ -16,20 +16,20 @@ pub(super) fn schema(letters: &[char]) -> Value {
     })
 }
 
-/// The letter in a reply that is what a constraint asked for; `None` if the server has not kept to it, or if there is none.
+/// The letter in a constrained reply; `None` without a constraint, or if the server did not follow it.
 pub(super) fn letter_of(constrain: Constrain, choices: usize, reply: &str) -> Option<String> {
     let object: Option<Value> = match constrain {
         Constrain::None => return None,
         Constrain::Json => serde_json::from_str(reply).ok(),
         Constrain::Choice => None,
     };
-    let said = match &object {
+    let text = match &object {
         Some(object) if object.as_object()?.len() == 1 => object.get(ANSWER)?.as_str()?,
         Some(_) => return None,
         None => reply,
     };
     let mut letters = (0..choices).map(|index| letter(index).to_string());
-    letters.find(|letter| letter == said.trim())
+    letters.find(|letter| letter == text.trim())
 }
 
 #[cfg(test)]
@@ -37,7 +37,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_constrained_reply_is_the_letter_in_it() {
+    fn the_letter_of_a_constrained_reply_is_found() {
         use Constrain::{Choice, Json};
         for (constrain, reply, letter) in [
             (Json, "{\"answer\": \"B\"}", Some("B")),

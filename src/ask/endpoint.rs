@@ -1,4 +1,4 @@
-//! One server and how it is talked to: [`Endpoint`].
+//! A server and the way requests are sent to it: [`Endpoint`].
 
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, SystemTime};
@@ -23,10 +23,10 @@ use super::wire::Wire;
 use crate::error::Result;
 use crate::types::{Failure, FailureKind, Reply};
 
-/// The longest wait of our own making; a server may ask for longer ones.
-const LONGEST_DELAY: Duration = Duration::from_secs(30);
+/// The maximum wait between retries if the server asks for none; chosen. A server may ask for longer waits.
+const MAX_DELAY: Duration = Duration::from_secs(30);
 
-/// One server: its address, key, pooled connections, and the pauses it asked for.
+/// A server: its address, key, pooled connections, and the pauses that it asked for.
 #[derive(Debug)]
 pub struct Endpoint {
     access: Access,
@@ -37,7 +37,7 @@ pub struct Endpoint {
     closing: watch::Sender<bool>,
 }
 
-/// One request, as often as it is sent.
+/// One request, which may be sent several times.
 pub(super) struct Request<'a> {
     pub(super) wire: Wire,
     pub(super) headers: &'a HeaderMap,
@@ -46,10 +46,10 @@ pub(super) struct Request<'a> {
 }
 
 impl Endpoint {
-    /// Makes ready to talk to an endpoint; nothing is sent yet.
+    /// An endpoint that is ready for requests; nothing is sent yet.
     ///
     /// # Errors
-    /// Where a key would be sent unencrypted to another machine, or is given twice.
+    /// If a key would be sent unencrypted to another machine, or if two keys are set.
     pub fn open(access: Access, sending: Sending) -> Result<Self> {
         let scrub = access.scrub();
         access.check(&scrub)?;
@@ -63,13 +63,13 @@ impl Endpoint {
         })
     }
 
-    /// How many requests may be on the wire now, within [`Sending::concurrency`].
+    /// The number of requests that may be in flight now, within [`Sending::concurrency`].
     #[must_use]
     pub fn width(&self) -> usize {
         self.window.width()
     }
 
-    /// The base URL; shown without user, password and query string.
+    /// The base URL; its text has no user, password and query string.
     #[must_use]
     pub fn base(&self) -> &BaseUrl {
         &self.access.base
@@ -83,46 +83,46 @@ impl Endpoint {
         self.access.key.is_some() || self.base().has_credentials()
     }
 
-    /// The headers of every request on a wire.
+    /// The headers of every request to an API.
     pub(super) fn headers(&self, wire: Wire) -> Result<HeaderMap> {
         self.access.headers(wire)
     }
 
-    /// Lets no further request go out: those on the wire are finished, those that wait give up at once.
+    /// Stops further requests: those in flight are finished, those that wait fail at once.
     pub fn close(&self) {
         self.closing.send_replace(true);
     }
 
-    /// Ends once the endpoint is closed.
+    /// Waits until the endpoint is closed.
     async fn closed(&self) {
-        // The sender lives as long as the endpoint, so this only ends by a change.
+        // The sender lives as long as the endpoint, so only a change can end this wait.
         let _ = self.closing.subscribe().wait_for(|closing| *closing).await;
     }
 
-    /// Waits for one's turn; an error where the endpoint is closed first.
-    async fn turn(&self) -> Result<(), FailedTry> {
-        let ended = "the run ended before it was asked";
+    /// Waits until the request may be sent; an error if the endpoint is closed before.
+    async fn wait_turn(&self) -> Result<(), FailedTry> {
+        let message = "the run ended before it was asked";
         tokio::select! {
             biased;
             () = self.closed() => Err(FailedTry {
                 reach: Reach::Interrupted,
-                ..FailedTry::new(FailureKind::Connection, ended.to_owned())
+                ..FailedTry::new(FailureKind::Connection, message.to_owned())
             }),
             () = self.gate.pass() => Ok(()),
         }
     }
 
-    /// Sends a request, again where that may help. Nothing is left behind where the future is dropped.
+    /// Sends a request, with retries after failures that may pass. The future may be dropped at any time.
     pub(super) async fn ask(&self, request: &Request<'_>) -> Result<Reply, AskError> {
         let attempts = AtomicU32::new(0);
         let backoff = ExponentialBuilder::new()
             .with_jitter()
             .with_min_delay(self.sending.first_delay)
-            .with_max_delay(LONGEST_DELAY)
+            .with_max_delay(MAX_DELAY)
             .with_max_times(self.sending.retries as usize);
         let closing = self.closing.subscribe();
         let outcome = (|| async {
-            self.turn().await?;
+            self.wait_turn().await?;
             attempts.fetch_add(1, Ordering::Relaxed);
             self.send(request).await
         })
@@ -136,28 +136,28 @@ impl Endpoint {
                 }
             }
         })
-        .when(|tried: &FailedTry| tried.again)
-        // `None` where the retries are used up.
-        .adjust(|tried, own| own.map(|own| tried.wait.unwrap_or(own)))
-        .notify(|tried, wait| {
-            debug!(endpoint = %self.base(), ?wait, problem = tried.failure.message, "trying again");
+        .when(|failed: &FailedTry| failed.retryable)
+        // `None` if the retries are used up.
+        .adjust(|failed, delay| delay.map(|delay| failed.wait.unwrap_or(delay)))
+        .notify(|failed, wait| {
+            debug!(endpoint = %self.base(), ?wait, problem = failed.failure.message, "trying again");
         })
         .await;
         let attempts = attempts.into_inner();
         match outcome {
             Ok(reply) => Ok(Reply { attempts, ..reply }),
-            Err(tried) => Err(tried.after(attempts)),
+            Err(failed) => Err(failed.after(attempts)),
         }
     }
 
-    /// One try.
+    /// Sends the request once.
     async fn send(&self, request: &Request<'_>) -> Result<Reply, FailedTry> {
         let Request { wire, headers, .. } = *request;
         let started = Instant::now();
         let body = request.body.clone();
         let posted = self.connection.post(wire.path(), headers, body).await;
-        let answer = posted.inspect_err(|tried| {
-            if tried.failure.kind == FailureKind::Timeout {
+        let answer = posted.inspect_err(|failed| {
+            if failed.failure.kind == FailureKind::Timeout {
                 self.window.overloaded(started);
             }
         })?;
@@ -172,49 +172,50 @@ impl Endpoint {
             if answer.status.is_redirection() {
                 complaint.message = format!("moved to {}", answer.header(LOCATION.as_str()));
             }
-            return Err(self.refused(status, &complaint, &answer, request));
+            return Err(self.refused_try(status, &complaint, &answer, request));
         }
         let unreadable = match wire.reply(&answer.body, answer.header(CONTENT_TYPE.as_str())) {
             Ok(reply) => return Ok(self.succeeded(reply, &answer)),
             Err(unreadable) => unreadable,
         };
-        let mut tried = match unreadable {
-            // Without a code of its own it is the server's failure, and may pass.
+        let mut failed = match unreadable {
+            // An error without a code is a failure of the server, which may pass.
             UnreadableReply::Complaint(complaint) => {
                 let code = complaint.status().unwrap_or(500);
-                self.refused(code, &complaint, &answer, request)
+                self.refused_try(code, &complaint, &answer, request)
             }
             UnreadableReply::Other(what) => {
                 let what = self.connection.scrub.line(&what);
                 let message = format!("{} answered with {what}", self.base());
                 FailedTry {
-                    again: true,
+                    retryable: true,
                     ..FailedTry::new(FailureKind::Response, message)
                 }
             }
         };
-        tried.failure.status = Some(status);
-        Err(tried)
+        failed.failure.status = Some(status);
+        Err(failed)
     }
 
-    /// The reply without keys, once its cost and what the server says is left are noted.
+    /// The reply without keys; its tokens and the remaining limits are noted in the gate.
     fn succeeded(&self, reply: Reply, answer: &HttpReply) -> Reply {
         self.window.succeeded(answer.took);
-        let left = Allowance::read(&answer.headers, SystemTime::now());
+        let allowance = Allowance::read(&answer.headers, SystemTime::now());
         let tokens = reply.usage.and_then(|usage| usage.total());
-        self.gate.ease(tokens, left, self.sending.max_wait);
-        let clean = |text: String| self.connection.scrub.reply(text);
+        self.gate
+            .succeeded(tokens, allowance, self.sending.max_wait);
+        let scrubbed = |text: String| self.connection.scrub.reply(text);
         Reply {
-            text: clean(reply.text),
-            refusal: reply.refusal.map(clean),
-            served_model: reply.served_model.map(clean),
+            text: scrubbed(reply.text),
+            refusal: reply.refusal.map(scrubbed),
+            served_model: reply.served_model.map(scrubbed),
             latency_ms: answer.took.as_millis() as u64,
             ..reply
         }
     }
 
-    /// A try that the server says failed, with this status.
-    fn refused(
+    /// The failure of a request that the server refused with this status.
+    fn refused_try(
         &self,
         status: u16,
         complaint: &Complaint,
@@ -223,29 +224,29 @@ impl Endpoint {
     ) -> FailedTry {
         let mut class = FailureClass::of(status, complaint, request.wire, request.sent);
         match answer.header("x-should-retry") {
-            "true" => class.again = true,
-            "false" => class.again = false,
+            "true" => class.retryable = true,
+            "false" => class.retryable = false,
             _ => {}
         }
         let hint = class.hint.as_deref();
         let message = self.message(status, complaint, hint, &self.request_id(answer));
-        let wait = asked_wait(&answer.headers, SystemTime::now()).filter(|_| class.again);
-        let mut tried = FailedTry {
+        let wait = asked_wait(&answer.headers, SystemTime::now()).filter(|_| class.retryable);
+        let mut failed = FailedTry {
             failure: Failure {
                 kind: class.kind,
                 status: Some(status),
                 message,
             },
             reach: class.reach,
-            again: class.again,
+            retryable: class.retryable,
             wait,
-            refused: class.refused,
+            refused_field: class.refused_field,
         };
-        self.pause(status, &mut tried);
-        tried
+        self.pause(status, &mut failed);
+        failed
     }
 
-    /// What is said about a refused request.
+    /// The error text for a refused request.
     fn message(
         &self,
         status: u16,
@@ -254,9 +255,9 @@ impl Endpoint {
         request_id: &str,
     ) -> String {
         let mut message = format!("{} answered {status}", self.base());
-        let said = self.connection.scrub.line(&complaint.message);
-        if !said.is_empty() {
-            message = format!("{message}: {said}");
+        let text = self.connection.scrub.line(&complaint.message);
+        if !text.is_empty() {
+            message = format!("{message}: {text}");
         }
         if let Some(hint) = hint {
             message = format!("{message} ({hint})");
@@ -267,39 +268,39 @@ impl Endpoint {
         message
     }
 
-    /// Lets all requests wait as long as the server asked one to; one that would wait too long is given up.
-    fn pause(&self, status: u16, tried: &mut FailedTry) {
-        let longest = self.sending.max_wait;
-        match tried.wait {
-            Some(wait) if wait > longest => {
-                tried.again = false;
+    /// Makes all requests wait as long as the server asked; a request that would wait more than `--max-wait` is given up.
+    fn pause(&self, status: u16, failed: &mut FailedTry) {
+        let max_wait = self.sending.max_wait;
+        match failed.wait {
+            Some(wait) if wait > max_wait => {
+                failed.retryable = false;
                 if asks_for_pause(status) {
-                    tried.reach = Reach::Endpoint;
+                    failed.reach = Reach::Endpoint;
                 }
-                tried.failure.message = format!(
+                failed.failure.message = format!(
                     "{} (it asks to wait {:.0} s, beyond --max-wait of {:.0} s)",
-                    tried.failure.message,
+                    failed.failure.message,
                     wait.as_secs_f64(),
-                    longest.as_secs_f64()
+                    max_wait.as_secs_f64()
                 );
             }
-            Some(wait) if status == 429 => self.gate.shut(wait),
-            Some(wait) if asks_for_pause(status) => self.gate.hold(wait),
-            // It does not say how long: all wait as long as the one that was turned away does first.
-            None if asks_for_pause(status) && tried.again => {
-                self.gate.hold(self.sending.first_delay);
+            Some(wait) if status == 429 => self.gate.rate_limited(wait),
+            Some(wait) if asks_for_pause(status) => self.gate.pause(wait),
+            // The server states no time: all wait as long as the refused request does before its first retry.
+            None if asks_for_pause(status) && failed.retryable => {
+                self.gate.pause(self.sending.first_delay);
             }
             _ => {}
         }
     }
 
-    /// The server's name for a request, fit to be shown.
+    /// The server's id of a request, without secrets; empty if it sent none.
     fn request_id(&self, answer: &HttpReply) -> String {
         self.connection.scrub.line(answer.header("x-request-id"))
     }
 }
 
-/// Whether a status means that there is no room for any request now.
+/// Whether a status means that the server accepts no request at the moment.
 fn asks_for_pause(status: u16) -> bool {
     matches!(status, 429 | 503 | 529)
 }

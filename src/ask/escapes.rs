@@ -1,12 +1,12 @@
-//! Escapes of JSON that stand for no character: [`mended`].
+//! Repair of JSON escapes that stand for no character: [`repaired`].
 
-/// The text with every `\ud800`–`\udfff` that has no other half replaced by `\ufffd`; `None` where there is none.
+/// The text with every unpaired surrogate `\ud800`–`\udfff` replaced by `\ufffd`; `None` if there is none.
 ///
-/// Servers that cut a reply within an emoji send such halves. JSON allows them, text cannot hold them, and a reply that
-/// was paid for must not be lost over one.
-pub(super) fn mended(json: &str) -> Option<String> {
+/// Servers that cut a reply within an emoji send such surrogates. JSON allows them, but a text cannot contain them, and a
+/// reply that was paid for must not be lost.
+pub(super) fn repaired(json: &str) -> Option<String> {
     let bytes = json.as_bytes();
-    let mut out = String::new();
+    let mut text = String::new();
     let (mut copied, mut at) = (0, 0);
     while at < bytes.len() {
         if bytes[at] != b'\\' {
@@ -16,23 +16,23 @@ pub(super) fn mended(json: &str) -> Option<String> {
         at += match unit(bytes, at) {
             Some(0xD800..=0xDBFF) if matches!(unit(bytes, at + 6), Some(0xDC00..=0xDFFF)) => 12,
             Some(0xD800..=0xDFFF) => {
-                out.push_str(json.get(copied..at)?);
-                out.push_str("\\ufffd");
+                text.push_str(json.get(copied..at)?);
+                text.push_str("\\ufffd");
                 copied = at + 6;
                 6
             }
-            // Any other escape is of two bytes at least; what follows them is no escape.
+            // Any other escape has at least two bytes; further bytes begin no escape.
             _ => 2,
         };
     }
     if copied == 0 {
         return None;
     }
-    out.push_str(json.get(copied..)?);
-    Some(out)
+    text.push_str(json.get(copied..)?);
+    Some(text)
 }
 
-/// The UTF-16 unit that an escape `\uXXXX` at this place stands for.
+/// The UTF-16 unit of an escape `\uXXXX` at this position; `None` if there is none.
 fn unit(bytes: &[u8], at: usize) -> Option<u16> {
     let escape = bytes.get(at..at + 6)?;
     let digits = escape.strip_prefix(b"\\u")?;
@@ -44,7 +44,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn halves_are_replaced_and_pairs_kept() {
+    fn unpaired_surrogates_are_replaced_and_pairs_are_not() {
         for (json, expected) in [
             (r#""B \ud83d""#, Some(r#""B \ufffd""#)),
             (
@@ -55,7 +55,7 @@ mod tests {
             (r#""\ud83""#, None),
             ("é\\", None),
         ] {
-            assert_eq!(mended(json).as_deref(), expected, "{json}");
+            assert_eq!(repaired(json).as_deref(), expected, "{json}");
         }
     }
 }

@@ -1,56 +1,56 @@
-//! Why no reply came: [`AskError`] of a question, [`FailedTry`] of one of its requests.
+//! The reason why no reply came: [`AskError`] for a question, [`FailedTry`] for one of its requests.
 
 use std::time::Duration;
 
 use super::field::AdaptableField;
 use crate::types::{Failure, FailureKind};
 
-/// How far a failure reaches.
+/// The requests that a failure affects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reach {
-    /// This one request failed; another may succeed.
+    /// Only this request; another may succeed.
     Trial,
-    /// Every further request to this model would fail alike: key, credit, address, name, parameters.
+    /// Every further request to this model: the cause is the key, credit, address, name or parameters.
     Endpoint,
-    /// None: it was given up because the run ends, and may not even have been sent.
+    /// None: the run ended before the reply, and the request may not have been sent.
     Interrupted,
 }
 
-/// Why no reply came.
+/// The reason why a question has no reply.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{}", failure.message)]
 pub struct AskError {
-    /// What went wrong in the last try.
+    /// The failure of the last try.
     pub failure: Failure,
-    /// How many requests were sent.
+    /// The number of requests that were sent.
     pub attempts: u32,
-    /// Whether it is worth asking anything else.
+    /// The requests that the failure affects.
     pub reach: Reach,
-    /// The field that the server does not take, where it is one that can be sent otherwise.
-    pub refused: Option<AdaptableField>,
+    /// The field that the server refused, if the program can change how it is sent.
+    pub refused_field: Option<AdaptableField>,
 }
 
 impl AskError {
-    /// A failure without an HTTP status, which says nothing about other questions.
+    /// A failure without an HTTP status, which does not affect other questions.
     pub(super) fn new(kind: FailureKind, message: String, attempts: u32) -> Self {
         FailedTry::new(kind, message).after(attempts)
     }
 }
 
-/// One try that brought no reply.
+/// One request without a reply.
 pub(super) struct FailedTry {
     pub(super) failure: Failure,
     pub(super) reach: Reach,
     /// Whether the same request may succeed later.
-    pub(super) again: bool,
-    /// The wait that the server asked for.
+    pub(super) retryable: bool,
+    /// The wait that the server asked for; `None` if it asked for none.
     pub(super) wait: Option<Duration>,
-    /// The field that it refused.
-    pub(super) refused: Option<AdaptableField>,
+    /// The field that the server refused, if the program can change how it is sent.
+    pub(super) refused_field: Option<AdaptableField>,
 }
 
 impl FailedTry {
-    /// A try without an HTTP status, not to be repeated.
+    /// A failed request without an HTTP status, which is not retried.
     pub(super) fn new(kind: FailureKind, message: String) -> Self {
         Self {
             failure: Failure {
@@ -59,19 +59,19 @@ impl FailedTry {
                 message,
             },
             reach: Reach::Trial,
-            again: false,
+            retryable: false,
             wait: None,
-            refused: None,
+            refused_field: None,
         }
     }
 
-    /// The error of a question whose last try this was, the last of so many.
+    /// The error of the question if this was the last of its `attempts` requests.
     pub(super) fn after(self, attempts: u32) -> AskError {
         AskError {
             failure: self.failure,
             attempts,
             reach: self.reach,
-            refused: self.refused,
+            refused_field: self.refused_field,
         }
     }
 }

@@ -1,4 +1,4 @@
-//! What follows from a refused request: [`FailureClass`] says whether to send it again, what else would fail, and which flag helps.
+//! The class of a refused request, [`FailureClass`]: whether to retry it, which other requests would fail, and which flag helps.
 
 use super::complaint::Complaint;
 use super::failure::Reach;
@@ -6,20 +6,20 @@ use super::field::{AdaptableField, RequestField, SentFields, is_unsupported};
 use super::wire::Wire;
 use crate::types::FailureKind;
 
-/// What to make of a refused request.
+/// The consequences of a refused request.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct FailureClass {
     pub(super) kind: FailureKind,
     pub(super) reach: Reach,
     /// Whether the same request may succeed later.
-    pub(super) again: bool,
-    /// What the user can do.
+    pub(super) retryable: bool,
+    /// The remedy for the user.
     pub(super) hint: Option<String>,
-    /// The field that it was refused for.
-    pub(super) refused: Option<AdaptableField>,
+    /// The field that the server refused, if the program can change how it is sent.
+    pub(super) refused_field: Option<AdaptableField>,
 }
 
-/// Codes and types that mean: no money. They come with 429 as well, where waiting does not help.
+/// Codes and types that mean: no credit. Some servers send them with status 429, although waiting does not help.
 const NO_CREDIT: [&str; 4] = [
     "insufficient_quota",
     "billing_hard_limit_reached",
@@ -33,8 +33,8 @@ const NO_CREDIT_WORDS: [&str; 4] = [
     "out of credits",
 ];
 
-/// Codes and types that mean the same for every request, with whatever status they come.
-const HOPELESS: [&str; 6] = [
+/// Codes and types of errors that every request would get, with any status.
+const PERMANENT: [&str; 6] = [
     "invalid_api_key",
     "authentication_error",
     "model_not_found",
@@ -43,10 +43,10 @@ const HOPELESS: [&str; 6] = [
     "unsupported_country_region_territory",
 ];
 
-/// What LiteLLM says, with status 400, of a wrong key where it has no database of keys, and of a model it does not know.
-const HOPELESS_WORDS: [&str; 2] = ["no connected db", "invalid model name passed in"];
+/// LiteLLM's texts with status 400 for a wrong key, if it has no database of keys, and for an unknown model.
+const PERMANENT_WORDS: [&str; 2] = ["no connected db", "invalid model name passed in"];
 
-/// Codes and types that mean: a moderator refused what was asked. Another question may pass.
+/// Codes and types that mean: moderation refused the content. Another question may be accepted.
 const MODERATED: [&str; 5] = [
     "content_filter",
     "ResponsibleAIPolicyViolation",
@@ -55,8 +55,8 @@ const MODERATED: [&str; 5] = [
     "data_inspection_failed",
 ];
 
-/// What OpenAI, vLLM, Ollama, llama.cpp (with status 500) and OpenRouter say of an image sent to a model without eyes.
-const NO_EYES: [&str; 7] = [
+/// The texts of OpenAI, vLLM, Ollama, llama.cpp (with status 500) and OpenRouter for an image sent to a text-only model.
+const NO_IMAGES: [&str; 7] = [
     "image_url is only supported by certain models",
     "is not a multimodal model",
     "does not support image",
@@ -66,110 +66,113 @@ const NO_EYES: [&str; 7] = [
     "no endpoints found that support image input",
 ];
 
-/// The remedy where there is no money.
+/// The remedy for an account without credit.
 const ADD_CREDIT: &str = "the account has no credit left: add some, then go on with --resume";
 
 impl FailureClass {
-    /// The class of a refused request, by its status and by what the server said about it.
+    /// The class of a refused request, from its status and the server's error.
     pub(super) fn of(status: u16, complaint: &Complaint, wire: Wire, sent: SentFields<'_>) -> Self {
-        let no_credit = complaint.is_any(&NO_CREDIT)
-            || (matches!(status, 400 | 402 | 403 | 429) && complaint.says_any(&NO_CREDIT_WORDS));
+        let no_credit = complaint.has_code(&NO_CREDIT)
+            || (matches!(status, 400 | 402 | 403 | 429)
+                && complaint.mentions_any(&NO_CREDIT_WORDS));
         match status {
             429 if no_credit => Self {
                 kind: FailureKind::RateLimit,
-                ..Self::hopeless(ADD_CREDIT)
+                ..Self::permanent(ADD_CREDIT)
             },
-            _ if no_credit => Self::hopeless(ADD_CREDIT),
-            _ if sent.has_image && complaint.says_any(&NO_EYES) => Self::hopeless(
+            _ if no_credit => Self::permanent(ADD_CREDIT),
+            _ if sent.has_image && complaint.mentions_any(&NO_IMAGES) => Self::permanent(
                 "the model takes no images: choose another --model, or ask it without them by --blind",
             ),
             300..400 => {
-                Self::hopeless("redirects are not followed: give the final address as --base-url")
+                Self::permanent("redirects are not followed: give the final address as --base-url")
             }
             401 if !sent.has_key => {
-                Self::hopeless("no key was sent: name one by --api-key-env or --api-key-file")
+                Self::permanent("no key was sent: name one by --api-key-env or --api-key-file")
             }
-            401 => Self::hopeless("check the key that --api-key-env or --api-key-file names"),
-            400.. if complaint.is_any(&HOPELESS) || complaint.says_any(&HOPELESS_WORDS) => {
-                Self::hopeless("check the key, --model and --base-url")
+            401 => Self::permanent("check the key that --api-key-env or --api-key-file names"),
+            400.. if complaint.has_code(&PERMANENT) || complaint.mentions_any(&PERMANENT_WORDS) => {
+                Self::permanent("check the key, --model and --base-url")
             }
-            400..500 if complaint.is_any(&MODERATED) || (status == 403 && moderated(complaint)) => {
+            400..500
+                if complaint.has_code(&MODERATED) || (status == 403 && moderated(complaint)) =>
+            {
                 Self {
                     kind: FailureKind::Filtered,
-                    ..Self::refused()
+                    ..Self::request_refused()
                 }
             }
-            402 => Self::hopeless(ADD_CREDIT),
-            403 | 407 => Self::hopeless(
+            402 => Self::permanent(ADD_CREDIT),
+            403 | 407 => Self::permanent(
                 "the key may not use this model from here: check the key and --model",
             ),
-            404 | 410 => Self::hopeless("check --base-url (many end with /v1) and --model"),
-            405 => Self::hopeless(&format!(
+            404 | 410 => Self::permanent("check --base-url (many end with /v1) and --model"),
+            405 => Self::permanent(&format!(
                 "check --base-url: requests go to its path with /{} behind it",
                 wire.path()
             )),
-            408 | 425 => Self::passing(FailureKind::Timeout),
+            408 | 425 => Self::transient(FailureKind::Timeout),
             413 => Self {
                 hint: Some("send smaller images: --max-side, or --image jpeg:95".to_owned()),
-                ..Self::refused()
+                ..Self::request_refused()
             },
-            429 => Self::passing(FailureKind::RateLimit),
-            // 498 and 499 are Groq's and nginx' words for: no room, and: gone away.
-            409 | 498 | 499 | 500.. => Self::passing(FailureKind::Server),
+            429 => Self::transient(FailureKind::RateLimit),
+            // 498 is Groq's status for no capacity, 499 is nginx's for a connection that the client closed.
+            409 | 498 | 499 | 500.. => Self::transient(FailureKind::Server),
             _ => Self::of_field(complaint, &wire.fields(sent)),
         }
     }
 
-    /// Every other request would fail alike.
-    fn hopeless(hint: &str) -> Self {
+    /// A failure that every other request would have too.
+    fn permanent(hint: &str) -> Self {
         Self {
             reach: Reach::Endpoint,
             hint: Some(hint.to_owned()),
-            ..Self::refused()
+            ..Self::request_refused()
         }
     }
 
-    /// The same request may succeed later.
-    fn passing(kind: FailureKind) -> Self {
+    /// A failure after which the same request may succeed later.
+    fn transient(kind: FailureKind) -> Self {
         Self {
             kind,
-            again: true,
-            ..Self::refused()
+            retryable: true,
+            ..Self::request_refused()
         }
     }
 
-    /// This one request is refused.
-    fn refused() -> Self {
+    /// A failure of this request alone, which is not retried.
+    fn request_refused() -> Self {
         Self {
             kind: FailureKind::Request,
             reach: Reach::Trial,
-            again: false,
+            retryable: false,
             hint: None,
-            refused: None,
+            refused_field: None,
         }
     }
 
-    /// A refused request that may be about one of its fields. If the server names the field, every other request with it
-    /// fails alike; if only its words do, it could be about this one request.
+    /// The class of a request that may have been refused for one of its fields. If the server names the field, every other
+    /// request with it fails too. If only the text mentions it, the cause may be this request alone.
     fn of_field(complaint: &Complaint, fields: &[RequestField]) -> Self {
         let mut sent = fields.iter().filter(|field| field.sent);
         let (reach, field) = match sent.clone().find(|field| field.is_named(complaint)) {
             Some(field) => (Reach::Endpoint, field),
             None => match sent.find(|field| field.is_mentioned(complaint)) {
                 Some(field) => (Reach::Trial, field),
-                None => return Self::refused(),
+                None => return Self::request_refused(),
             },
         };
         Self {
             reach,
-            refused: field.refused.filter(|_| is_unsupported(complaint)),
-            ..Self::hopeless(field.hint)
+            refused_field: field.adaptable.filter(|_| is_unsupported(complaint)),
+            ..Self::permanent(field.hint)
         }
     }
 }
 
 fn moderated(complaint: &Complaint) -> bool {
-    complaint.moderated || complaint.says_any(&["moderation", "flagged"])
+    complaint.moderated || complaint.mentions_any(&["moderation", "flagged"])
 }
 
 #[cfg(test)]
@@ -185,7 +188,7 @@ mod tests {
         }
     }
 
-    fn judged(status: u16, body: &str) -> FailureClass {
+    fn classify(status: u16, body: &str) -> FailureClass {
         let sent = SentFields {
             parameters: &parameters(),
             fields: RequestFields {
@@ -199,11 +202,11 @@ mod tests {
     }
 
     #[test]
-    fn statuses_are_told_apart() {
+    fn each_status_has_its_class() {
         for status in [301, 302, 307, 401, 402, 403, 404, 405, 407, 410] {
-            let class = judged(status, "");
+            let class = classify(status, "");
             assert_eq!(
-                (class.reach, class.again),
+                (class.reach, class.retryable),
                 (Reach::Endpoint, false),
                 "{status}"
             );
@@ -220,14 +223,18 @@ mod tests {
             (529, FailureKind::Server),
             (599, FailureKind::Server),
         ] {
-            let class = judged(status, "");
-            assert_eq!((class.reach, class.again), (Reach::Trial, true), "{status}");
+            let class = classify(status, "");
+            assert_eq!(
+                (class.reach, class.retryable),
+                (Reach::Trial, true),
+                "{status}"
+            );
             assert_eq!(class.kind, kind);
         }
         for status in [400, 413, 415, 422] {
-            let class = judged(status, "");
+            let class = classify(status, "");
             assert_eq!(
-                (class.reach, class.again),
+                (class.reach, class.retryable),
                 (Reach::Trial, false),
                 "{status}"
             );
@@ -235,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn words_overrule_the_status() {
+    fn codes_and_texts_overrule_the_status() {
         for (status, body) in [
             (
                 429,
@@ -259,30 +266,30 @@ mod tests {
                 r#"{"object":"error","message":"X is not a multimodal model None","code":400}"#,
             ),
         ] {
-            let class = judged(status, body);
+            let class = classify(status, body);
             assert_eq!(
-                (class.reach, class.again),
+                (class.reach, class.retryable),
                 (Reach::Endpoint, false),
                 "{body}"
             );
         }
-        // A minute's limit of Gemini speaks of quota too; waiting helps.
+        // Gemini's limit per minute mentions a quota too; waiting helps.
         let minute = r#"{"error":{"code":429,"status":"RESOURCE_EXHAUSTED","message":"You exceeded your current quota, please check your plan"}}"#;
-        assert!(judged(429, minute).again);
+        assert!(classify(429, minute).retryable);
         let moderated =
             r#"{"error":{"code":403,"message":"x","metadata":{"reasons":["violence"]}}}"#;
         let filtered = r#"{"error":{"code":"content_filter","message":"x","innererror":{"code":"ResponsibleAIPolicyViolation"}}}"#;
         for (status, body) in [(403, moderated), (400, filtered)] {
-            let class = judged(status, body);
+            let class = classify(status, body);
             assert_eq!(
-                (class.reach, class.again, class.kind),
+                (class.reach, class.retryable, class.kind),
                 (Reach::Trial, false, FailureKind::Filtered)
             );
         }
     }
 
     #[test]
-    fn the_flag_that_mends_it_is_named() {
+    fn the_flag_that_helps_is_named() {
         for (body, reach, flag) in [
             (
                 r#"{"error":{"param":"temperature","message":"x"}}"#,
@@ -305,22 +312,22 @@ mod tests {
                 "--reasoning-effort",
             ),
         ] {
-            let class = judged(400, body);
+            let class = classify(400, body);
             assert_eq!(class.reach, reach, "{body}");
             assert!(class.hint.unwrap().contains(flag), "{body}");
         }
-        // What was not sent is not to blame.
+        // A field that was not sent is not the cause.
         for body in [
             r#"{"error":{"param":"max_completion_tokens","message":"x"}}"#,
             r#"{"error":{"param":"messages.[0].content.[1].image_url.detail","message":"x"}}"#,
         ] {
-            assert_eq!(judged(400, body).hint, None, "{body}");
+            assert_eq!(classify(400, body).hint, None, "{body}");
         }
     }
 
     #[test]
-    fn a_field_that_is_not_taken_is_told_from_one_that_does_not_fit() {
-        for (body, refused) in [
+    fn an_unsupported_field_differs_from_one_with_a_wrong_value() {
+        for (body, refused_field) in [
             (
                 r#"{"error":{"param":"max_tokens","code":"unsupported_parameter","message":"x"}}"#,
                 Some(AdaptableField::TokenField),
@@ -342,7 +349,7 @@ mod tests {
                 None,
             ),
         ] {
-            assert_eq!(judged(400, body).refused, refused, "{body}");
+            assert_eq!(classify(400, body).refused_field, refused_field, "{body}");
         }
     }
 }

@@ -1,28 +1,29 @@
-//! The fields of a request about which servers differ: [`RequestField`] is one of them, [`RequestFields`] are those that are adapted.
+//! The fields of a request that not all servers accept: [`RequestField`] is one of them, [`RequestFields`] are those that the
+//! program adapts.
 
 use super::complaint::Complaint;
 use super::parameters::{Parameters, Temperature, TokenField};
 
-/// A field that a server does not take and that can be sent otherwise.
+/// A field that a server may refuse and that the program can send in another way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AdaptableField {
-    /// The token limit, by this name.
+    /// The token limit, which has two names.
     TokenField,
-    /// Any temperature but its own.
+    /// The temperature; some models accept only their default.
     Temperature,
 }
 
-/// Which of the fields about which servers differ a request has; found out once for a whole run.
+/// The adaptable fields of a request, as found out once for a whole run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct RequestFields {
     /// The name of the token limit, never `Auto`.
     pub(super) token_field: TokenField,
-    /// The temperature, where one is sent.
+    /// The temperature; `None` if none is sent.
     pub(super) temperature: Option<f64>,
 }
 
 impl RequestFields {
-    /// What is tried first at a host.
+    /// The fields of the first request to a host.
     pub(super) fn first(parameters: &Parameters, host: &str) -> Self {
         Self {
             token_field: parameters.token_field.at(host),
@@ -35,7 +36,7 @@ impl RequestFields {
     }
 }
 
-/// What a request has in it that a server may complain about.
+/// The contents of a request that a server may refuse.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SentFields<'a> {
     pub(super) parameters: &'a Parameters,
@@ -44,7 +45,7 @@ pub(super) struct SentFields<'a> {
     pub(super) has_key: bool,
 }
 
-/// How servers say that they do not know a field or do not take its value, rather than that it does not fit this request.
+/// Words by which servers say that they do not support a field or its value, and not that the value is wrong.
 const UNSUPPORTED: [&str; 10] = [
     "unsupported",
     "not supported",
@@ -58,42 +59,42 @@ const UNSUPPORTED: [&str; 10] = [
     "instead",
 ];
 
-/// A field of a request with what is known of it.
+/// A field of a request, with the remedy if it is refused.
 pub(super) struct RequestField {
     pub(super) name: &'static str,
-    /// Whether it was sent; what was not is not to blame.
+    /// Whether the field was sent; otherwise it is not the cause.
     pub(super) sent: bool,
-    /// How to send it otherwise.
+    /// The remedy for the user: the flag that changes the field.
     pub(super) hint: &'static str,
-    /// What it is, where the program can send it otherwise.
-    pub(super) refused: Option<AdaptableField>,
+    /// The kind of field, if the program can send it in another way.
+    pub(super) adaptable: Option<AdaptableField>,
 }
 
 impl RequestField {
-    /// Whether the server names it as what is wrong.
+    /// Whether the server names the field as the cause.
     pub(super) fn is_named(&self, complaint: &Complaint) -> bool {
         let param = complaint.param.as_deref();
         param.is_some_and(|param| param.rsplit(['.', '/']).next() == Some(self.name))
     }
 
-    /// Whether the server's words speak of it.
+    /// Whether the server's text mentions the field.
     pub(super) fn is_mentioned(&self, complaint: &Complaint) -> bool {
         mentions(&complaint.message, self.name)
     }
 }
 
-/// Whether the server does not know the field, or does not take any value like it.
+/// Whether the server says that it does not support a field or a kind of value.
 pub(super) fn is_unsupported(complaint: &Complaint) -> bool {
     let codes = [
         "unsupported_parameter",
         "unsupported_value",
         "unknown_parameter",
     ];
-    complaint.says_any(&UNSUPPORTED) || complaint.is_any(&codes)
+    complaint.mentions_any(&UNSUPPORTED) || complaint.has_code(&codes)
 }
 
-/// Whether a text holds a name as a whole word: `max_tokens` is not in `max_tokens_total`.
+/// Whether a text has a name as a whole word: `max_tokens` is not in `max_tokens_total`.
 fn mentions(text: &str, name: &str) -> bool {
-    let inside = |c: char| c.is_alphanumeric() || c == '_';
-    text.split(|c: char| !inside(c)).any(|word| word == name)
+    let is_name = |c: char| c.is_alphanumeric() || c == '_';
+    text.split(|c: char| !is_name(c)).any(|word| word == name)
 }

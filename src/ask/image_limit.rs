@@ -1,23 +1,23 @@
-//! The largest image that an endpoint takes: [`ImageLimit`].
+//! The maximum size of an image that an endpoint accepts: [`ImageLimit`].
 
 use super::url::BaseUrl;
 use crate::error::{Error, Result};
 use crate::types::ImageFacts;
 
-/// What is known of the images that an endpoint takes.
+/// The maximum size of images that an endpoint accepts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct ImageLimit {
-    /// The most bytes of the encoded file.
+    /// The maximum size of the encoded file, in bytes.
     pub bytes: usize,
-    /// The longest side, in pixels; `None` for any.
+    /// The maximum length of a side, in pixels; `None` for any.
     pub side: Option<u32>,
-    /// Whose limit it is.
-    pub whose: &'static str,
+    /// The provider or setting that the limit comes from.
+    pub origin: &'static str,
 }
 
-/// Limits by how the host ends. A limit on the base64 text is three quarters of it in bytes of the file.
+/// Limits by the end of the host name. A limit on the base64 text allows three quarters of it in bytes of the file.
 const KNOWN: [(&str, ImageLimit); 7] = [
-    // Of a request of 50 MB with everything in it, so somewhat less (platform.openai.com/docs/guides/images-vision).
+    // A whole request may have 50 MB; this is less (platform.openai.com/docs/guides/images-vision).
     ("api.openai.com", limit(20_000_000, None, "OpenAI")),
     (".azure.com", limit(20_000_000, None, "Azure")),
     // 5 MB of base64 and 8000 pixels (docs.anthropic.com/en/docs/build-with-claude/vision).
@@ -33,12 +33,16 @@ const KNOWN: [(&str, ImageLimit); 7] = [
     ("api.mistral.ai", limit(10_000_000, None, "Mistral")),
 ];
 
-const fn limit(bytes: usize, side: Option<u32>, whose: &'static str) -> ImageLimit {
-    ImageLimit { bytes, side, whose }
+const fn limit(bytes: usize, side: Option<u32>, origin: &'static str) -> ImageLimit {
+    ImageLimit {
+        bytes,
+        side,
+        origin,
+    }
 }
 
 impl ImageLimit {
-    /// Where nothing is known: 20 MB, which no hosted model takes more of.
+    /// The limit for unknown endpoints: 20 MB; no hosted model accepts more.
     pub(crate) const UNKNOWN: Self = limit(20_000_000, None, "the default");
 
     /// The limit of an endpoint.
@@ -48,36 +52,36 @@ impl ImageLimit {
         known.map_or(Self::UNKNOWN, |(_, limit)| *limit)
     }
 
-    /// Makes sure that an image is within the limit.
+    /// Checks that an image is within the limit.
     ///
     /// # Errors
     /// [`Error::Data`] about the image, with the flags that make it smaller.
     pub(crate) fn check(&self, image: &ImageFacts) -> Result<()> {
         let long = image.width.max(image.height);
-        let mend = "make it smaller by --max-side, or by --image jpeg:95";
+        let remedy = "make it smaller by --max-side, or by --image jpeg:95";
         let wrong = |problem: String| Err(Error::data("image", problem));
         let megabytes = |bytes: usize| bytes as f64 / 1e6;
         if image.bytes > self.bytes {
             return wrong(format!(
-                "{} × {} pixels are {:.1} MB as {}, more than the {} MB of {}; {mend}, or take another limit by --max-image",
+                "{} × {} pixels are {:.1} MB as {}, more than the {} MB of {}; {remedy}, or take another limit by --max-image",
                 image.width,
                 image.height,
                 megabytes(image.bytes),
                 image.format,
                 megabytes(self.bytes),
-                self.whose,
+                self.origin,
             ));
         }
         match self.side {
             Some(side) if long > side as usize => wrong(format!(
-                "a side of {long} pixels is more than the {side} of {}; {mend}",
-                self.whose
+                "a side of {long} pixels is more than the {side} of {}; {remedy}",
+                self.origin
             )),
             _ => Ok(()),
         }
     }
 
-    /// The limit that the user states.
+    /// The limit that the user set by `--max-image`.
     #[must_use]
     pub(crate) fn stated(bytes: usize) -> Self {
         limit(bytes, None, "--max-image")
@@ -92,12 +96,12 @@ mod tests {
     fn limits_are_known_by_host() {
         let of = |base: &str| ImageLimit::of(&base.parse().unwrap());
         assert_eq!(of("https://api.anthropic.com/v1").side, Some(8000));
-        assert_eq!(of("https://r.openai.azure.com/openai/v1").whose, "Azure");
+        assert_eq!(of("https://r.openai.azure.com/openai/v1").origin, "Azure");
         assert_eq!(of("http://127.0.0.1:8000/v1"), ImageLimit::UNKNOWN);
     }
 
     #[test]
-    fn what_is_beyond_the_limit_names_what_mends_it() {
+    fn an_image_beyond_the_limit_is_an_error_with_a_remedy() {
         let image = |bytes, width| ImageFacts {
             digest: crate::types::Digest::of(b""),
             bytes,

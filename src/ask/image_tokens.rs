@@ -1,28 +1,28 @@
-//! How many tokens a model takes an image for: [`image_tokens`].
+//! The number of tokens that a model counts for an image: [`image_tokens`].
 //!
-//! Only for estimates before anything is sent; what a reply was charged for is told by the server.
+//! It is used only for estimates before anything is sent; the server states what a reply was charged.
 
 use super::parameters::ImageDetail;
 
-/// How a family of models counts.
+/// The rule by which a family of models counts the tokens of an image.
 #[derive(Debug, Clone, Copy)]
 enum Rule {
-    /// OpenAI's tiles: the image is made to fit 2048 × 2048, then its shorter side 768; a base and a price for each tile of
-    /// 512 × 512, in low detail the base alone (platform.openai.com/docs/guides/images-vision, "Calculating costs").
+    /// OpenAI's tiles: the image is scaled to fit 2048 × 2048, then to a shorter side of 768. There is a base, and a number
+    /// for each tile of 512 × 512; low detail has only the base (platform.openai.com/docs/guides/images-vision, "Calculating
+    /// costs").
     Tiles { base: u64, tile: u64 },
-    /// OpenAI's patches of 32 × 32, the image made smaller until it has no more than so many in this and in high detail, times
-    /// a factor (same page; the factors of the gpt-5 line as users measured them,
-    /// community.openai.com/t/1377015).
+    /// OpenAI's patches of 32 × 32 times a factor. The image is first reduced to at most `most` patches, or `high` in high
+    /// detail (same page; users measured the factors of the gpt-5 line, community.openai.com/t/1377015).
     Patches { most: f64, high: f64, factor: f64 },
-    /// Anthropic's: width × height / 750, the longer side made to fit first
-    /// (docs.anthropic.com/en/docs/build-with-claude/vision), no more than so many.
+    /// Anthropic's rule: width × height / 750, at most `most`; the longer side is first scaled down to `side`
+    /// (docs.anthropic.com/en/docs/build-with-claude/vision).
     Area { side: f64, most: f64 },
-    /// Gemini 2's: 258 where both sides are 384 at most, else 258 for each tile of two thirds of the shorter side
-    /// (ai.google.dev/gemini-api/docs/tokens).
+    /// Gemini 2's rule: 258 if both sides are at most 384, otherwise 258 for each square tile, whose side is two thirds of
+    /// the image's shorter side (ai.google.dev/gemini-api/docs/tokens).
     Crops,
-    /// The same for all images.
+    /// The same number for all images.
     Fixed(u64),
-    /// Merged patches of so many pixels a side, the image made to fit this side first where there is one.
+    /// Merged patches with sides of `patch` pixels; the longer side of the image is first scaled down to `side`.
     Merged { patch: f64, side: f64 },
 }
 
@@ -44,7 +44,7 @@ const fn merged(patch: f64, side: f64) -> Rule {
     Merged { patch, side }
 }
 
-/// Families by how the name of a model begins; the first that fits holds.
+/// Families by the beginning of a model's name; the first match applies.
 const FAMILIES: [(&str, Rule); 38] = [
     ("gpt-4o-mini", tiles(2833, 5667)),
     ("gpt-4.1-mini", patches(1536.0, 1536.0, 1.62)),
@@ -86,7 +86,7 @@ const FAMILIES: [(&str, Rule); 38] = [
     ("kimi", merged(28.0, f64::MAX)),
 ];
 
-/// How many tokens an image of this width and height is to a model, by its family; `None` where that is not known.
+/// The number of tokens that a model counts for an image of this size in pixels; `None` if its family is unknown.
 pub(super) fn image_tokens(
     model: &str,
     detail: Option<ImageDetail>,
@@ -139,8 +139,8 @@ impl Rule {
     }
 }
 
-/// How many patches of 32 × 32 cover an image after it was made small enough for so many: the scale is chosen so that the
-/// sides are whole numbers of patches (OpenAI, same page).
+/// The number of patches of 32 × 32 that cover an image after it is reduced to at most `most` patches. The scale makes the
+/// sides whole numbers of patches (OpenAI, same page).
 fn fitted_patches(width: f64, height: f64, most: f64) -> f64 {
     let cover = |scale: f64| {
         let patches = |side: f64| (side * scale / 32.0).ceil().max(1.0);
@@ -159,7 +159,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn published_counts_come_out() {
+    fn counts_match_the_published_ones() {
         let high = Some(ImageDetail::High);
         for (model, detail, width, height, tokens) in [
             // platform.openai.com/docs/guides/images-vision
@@ -168,7 +168,7 @@ mod tests {
             ("gpt-4o", Some(ImageDetail::Low), 4096, 8192, 85),
             ("o4-mini", None, 1024, 1024, 1762),
             ("gpt-4.1-mini", None, 1024, 1024, 1659),
-            // community.openai.com/t/1262691, without the words: 128 × 64
+            // community.openai.com/t/1262691, without the text: 128 × 64
             ("openai/gpt-4.1-2025-04-14", high, 128, 64, 255),
             ("gpt-4o-mini", high, 128, 64, 8500),
             // ai.google.dev/gemini-api/docs/tokens

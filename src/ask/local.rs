@@ -1,4 +1,4 @@
-//! A model that a function makes in process: [`Local`].
+//! A model whose answers a function of this process gives: [`Local`].
 
 use std::fmt;
 
@@ -10,12 +10,12 @@ use super::random::Random;
 use crate::types::question::letter;
 use crate::types::{Digest, FailureKind, Question, Reply};
 
-/// What a function says to a question: the index of a choice, or `None` where it does not know.
+/// A function that answers a question: the index of a choice, or `None` if it does not know.
 pub(crate) type Opinion =
     dyn Fn(&Question, &Call<'_>) -> Result<Option<usize>, String> + Send + Sync;
 
-/// A model whose answers a function gives. Where it does not know, any choice is as likely as another, and the same one for
-/// the same seed, question, condition and turn.
+/// A model whose answers a function gives. If the function does not know, a choice is guessed as [`Random`] does: the same
+/// seed, question, condition and turn give the same guess.
 pub struct Local {
     name: String,
     digest: Digest,
@@ -30,7 +30,7 @@ impl fmt::Debug for Local {
 }
 
 impl Local {
-    /// A model of a name; `digest` is that of all that decides what the function says.
+    /// A model with a name; `digest` is the digest of everything that decides the function's answers.
     #[must_use]
     pub fn new(name: String, digest: Digest, prior: Random, opinion: Box<Opinion>) -> Self {
         Self {

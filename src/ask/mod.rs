@@ -1,9 +1,10 @@
-//! Stage 4, ask: a prompt and an image go out, a [`Reply`](crate::types::Reply) comes back. The only asynchronous stage.
+//! Stage 4, ask: sends a prompt and an image to a model and receives a [`Reply`](crate::types::Reply). The only asynchronous
+//! stage.
 //!
-//! [`Prompts`] turn a question into words, [`Payload`] an image into the text of a data URL; both are CPU work and done before.
-//! A [`Model`] takes the two as the [`Message`] of a [`Call`]. [`Remote`] is a model behind an [`Endpoint`]; what belongs to one
-//! server (address, key, connections, pauses) lives in the endpoint and is shared by all models asked there. What requests and
-//! replies look like is the [`Wire`]'s: one file an API, in `wire/`.
+//! [`Prompts`] turn a question into text, [`Payload`] an image into the text of a data URL; both are CPU work and done before.
+//! A [`Model`] takes the two as the [`Message`] of a [`Call`]. [`Remote`] is a model at an [`Endpoint`]. The endpoint has the
+//! address, key, connections and pauses of one server; all models at that server share it. A [`Wire`] defines the form of
+//! requests and replies: one file an API, in `wire/`.
 
 mod access;
 pub(crate) mod batch;

@@ -1,4 +1,4 @@
-//! Something that can be asked: [`Model`].
+//! The models that can be asked: [`Model`].
 
 use serde_json::Value;
 
@@ -14,16 +14,16 @@ use super::script::Script;
 use crate::error::Result;
 use crate::types::{Digest, Reply};
 
-/// Something that can be asked.
+/// A model, remote or in this process.
 #[derive(Debug)]
 pub enum Model {
-    /// A model behind an endpoint.
+    /// A model at an endpoint.
     Remote(Remote),
-    /// Any choice, as likely as another.
+    /// Random guesses, each choice equally likely.
     Random(Random),
-    /// Replies out of a file.
+    /// Replies from a file.
     Script(Script),
-    /// What a function says.
+    /// Answers of a function in this process.
     Local(Local),
 }
 
@@ -39,7 +39,7 @@ impl Model {
         }
     }
 
-    /// What decides a reply besides prompt and image: the model and its parameters, not where it is asked.
+    /// The content that decides a reply besides prompt and image: the model and its parameters, but not the address.
     #[must_use]
     pub fn content(&self) -> Value {
         match self {
@@ -58,51 +58,51 @@ impl Model {
         Digest::canonical("darkqa.model/2", &self.content())
     }
 
-    /// How many questions may be under way at once; `None` where it does not matter.
+    /// The number of questions that may be in flight at once; `None` for any number.
     #[must_use]
     pub fn width(&self) -> Option<usize> {
         match self {
             Self::Remote(model) => Some(model.endpoint().width()),
-            // It works on this machine's own cores.
+            // It computes on the cores of this machine.
             Self::Local(_) => std::thread::available_parallelism().ok().map(usize::from),
             Self::Random(_) | Self::Script(_) => None,
         }
     }
 
-    /// Lets nothing further go out to the model's endpoint; what is on the wire is finished.
+    /// Stops further requests to the model's endpoint; those in flight are finished.
     pub fn close(&self) {
         if let Self::Remote(model) = self {
             model.endpoint().close();
         }
     }
 
-    /// Whether it is asked over a network, and so can fail for reasons of its own.
+    /// Whether the model is asked over a network, which can fail.
     #[must_use]
     pub fn is_remote(&self) -> bool {
         self.remote().is_some()
     }
 
-    /// How its requests differ from the first one, because the server refused a field; see [`Remote::adapted`].
+    /// The changes to requests after the server refused a field; see [`Remote::adapted`].
     #[must_use]
     pub fn adapted(&self) -> Vec<String> {
         self.remote().map_or_else(Vec::new, Remote::adapted)
     }
 
-    /// The tokens that an image of this width and height has for it; `None` where that is not known.
+    /// The number of tokens of an image of this width and height, in pixels; `None` if unknown.
     #[must_use]
     pub fn image_tokens(&self, width: u64, height: u64) -> Option<u64> {
         let Parameters { model, detail, .. } = self.remote()?.parameters();
         image_tokens(model, *detail, width, height)
     }
 
-    /// The maximum number of tokens of a reply, if it has one.
+    /// The maximum number of tokens in a reply; `None` for models without this limit.
     #[must_use]
     pub fn max_tokens(&self) -> Option<u32> {
         Some(self.remote()?.parameters().max_tokens.get())
     }
 
-    /// One line of a Batch API's input file, with a line end; `None` if the model cannot be asked in a batch. `url` is the path
-    /// that the line asks, if it is another than the one of the wire.
+    /// One line of a Batch API's input file, with a line end; `None` if the model cannot be asked in a batch. `url` replaces
+    /// the API's path in the line.
     ///
     /// # Errors
     /// If the line cannot be written as JSON.
@@ -114,12 +114,12 @@ impl Model {
         choices: usize,
     ) -> Result<Option<Vec<u8>>, serde_json::Error> {
         let remote = self.remote();
-        let Some((model, known)) = remote.and_then(|model| Some((model, model.batch_url()?)))
+        let Some((model, default_url)) = remote.and_then(|model| Some((model, model.batch_url()?)))
         else {
             return Ok(None);
         };
         let body = model.body(message, choices)?;
-        batch::line(id, url.unwrap_or(known), &body).map(Some)
+        batch::line(id, url.unwrap_or(default_url), &body).map(Some)
     }
 
     fn remote(&self) -> Option<&Remote> {
@@ -129,7 +129,7 @@ impl Model {
         }
     }
 
-    /// Puts one question. Dropping the future gives up the request and leaves nothing behind.
+    /// Asks one question. The future may be dropped at any time, which gives up the request.
     pub async fn ask(&self, call: Call<'_>) -> Result<Reply, AskError> {
         match self {
             Self::Remote(model) => model.ask(call.message, call.query.choices()).await,

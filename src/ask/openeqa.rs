@@ -1,16 +1,16 @@
-//! The words of OpenEQA: what a model and its judge are asked, byte for byte as `facebookresearch/open-eqa` at cfa3fce asks it.
+//! The prompts of OpenEQA for models and the judge, byte for byte those of `facebookresearch/open-eqa` at cfa3fce.
 
 use std::sync::LazyLock;
 
 use regex::Regex;
 
-/// Upstream's templates (MIT, Meta Platforms), each stripped as upstream strips them when it reads them.
+/// Upstream's templates (MIT, Meta Platforms). They are stripped before use, as upstream does.
 const VISION: &str = include_str!("../../prompts/openeqa/vision.txt");
 const BLIND: &str = include_str!("../../prompts/openeqa/blind.txt");
 const MATCH: &str = include_str!("../../prompts/openeqa/match.txt");
 const MATCH_EXTRA: &str = include_str!("../../prompts/openeqa/match-extra.txt");
 
-/// What a model that sees is asked: the words before its images, and those behind them.
+/// The prompt for a model with images: the text before the images, and the text after them.
 #[must_use]
 pub(crate) fn vision(question: &str) -> (String, String) {
     const QUERY: &str = "User Query:";
@@ -20,14 +20,14 @@ pub(crate) fn vision(question: &str) -> (String, String) {
     (before.to_owned(), format!("{QUERY}{behind}"))
 }
 
-/// What a model without images is asked.
+/// The prompt for a model without images.
 #[must_use]
 pub(crate) fn blind(question: &str) -> String {
     formatted(BLIND.trim(), &[("question", question)])
 }
 
-/// The answer in a blind model's reply (`parse_output`): the line behind the first "A:", without further ones in it; `None`
-/// where there is none, which is an error upstream.
+/// The answer in a blind model's reply (`parse_output`): the line after the first "A:", without any further "A:". `None` if
+/// there is none, which is an error upstream.
 #[must_use]
 pub(crate) fn blind_answer(reply: &str) -> Option<String> {
     let (_, behind) = reply.split_once("A:")?;
@@ -35,9 +35,9 @@ pub(crate) fn blind_answer(reply: &str) -> Option<String> {
     Some(line.replace("A:", "").trim().to_owned())
 }
 
-/// What the judge is asked about an answer. Whether there are extra answers decides the template, also where the list is empty.
+/// The prompt for the judge about an answer. A list of extra answers selects another template, even if it is empty.
 #[must_use]
-pub(crate) fn judged(
+pub(crate) fn judge_prompt(
     question: &str,
     answer: &str,
     extra: Option<&[String]>,
@@ -58,7 +58,7 @@ pub(crate) fn judged(
     }
 }
 
-/// A template with its values, as Python's `str.format`: braces in a value are not read again.
+/// A template filled with values, as by Python's `str.format`: braces within a value are plain text.
 fn formatted(template: &str, values: &[(&str, &str)]) -> String {
     let mut text = String::new();
     let mut rest = template;
@@ -81,11 +81,11 @@ fn python_list(texts: &[String]) -> String {
     format!("[{}]", texts.join(", "))
 }
 
-/// What Python's `str.isprintable` takes as not printable: the categories "Other" and "Separator" but for the space.
+/// The characters that Python's `str.isprintable` rejects: the categories "Other" and "Separator" except the space.
 static UNPRINTABLE: LazyLock<Option<Regex>> =
     LazyLock::new(|| Regex::new(r"^[\p{C}\p{Z}--\x20]$").ok());
 
-/// A text as Python's `repr` prints it: in single quotes, in double ones where it holds a single and no double one.
+/// A text as Python's `repr` prints it: in single quotes, or in double quotes if it has a single quote and no double quote.
 fn python_repr(text: &str) -> String {
     let quote = if text.contains('\'') && !text.contains('"') {
         '"'
@@ -111,7 +111,7 @@ fn python_repr(text: &str) -> String {
     printed
 }
 
-/// A character by its number, in as few digits as Python takes.
+/// The escape of a character, with as few digits as Python uses.
 fn escape(code: u32) -> String {
     match code {
         0..0x100 => format!("\\x{code:02x}"),
@@ -134,7 +134,7 @@ mod tests {
     use super::*;
     use crate::types::Digest;
 
-    /// What Python 3.11.7 prints.
+    /// Texts and their `repr` in Python 3.11.7.
     const GOLDEN: [(&str, &str); 20] = [
         ("", "''"),
         ("plain", "'plain'"),
@@ -162,7 +162,7 @@ mod tests {
     ];
 
     #[test]
-    fn templates_are_upstreams() {
+    fn templates_are_those_of_upstream() {
         // Bytes of the files at cfa3fce, stripped.
         for (template, bytes) in [
             (VISION, 321),
@@ -194,17 +194,17 @@ mod tests {
         ] {
             assert_eq!(blind_answer(reply).as_deref(), answer);
         }
-        let plain = judged("Q {prediction}", "it's", None, "{answer}");
+        let plain = judge_prompt("Q {prediction}", "it's", None, "{answer}");
         assert!(
             plain.ends_with(
                 "Your Turn:\nQuestion: Q {prediction}\nAnswer: it's\nResponse: {answer}"
             )
         );
         let extra = ["Next to the stairs", "it's here", "\"both\" it's"].map(str::to_owned);
-        let asked = judged("Q", "A", Some(&extra), "P");
+        let prompt = judge_prompt("Q", "A", Some(&extra), "P");
         let list = r#"Extra Answers: ['Next to the stairs', "it's here", '"both" it\'s']"#;
-        assert!(asked.contains(list), "{asked}");
-        assert!(judged("Q", "A", Some(&[]), "P").contains("Extra Answers: []\n"));
+        assert!(prompt.contains(list), "{prompt}");
+        assert!(judge_prompt("Q", "A", Some(&[]), "P").contains("Extra Answers: []\n"));
     }
 
     #[test]

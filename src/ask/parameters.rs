@@ -1,4 +1,4 @@
-//! How a model is to speak: [`Parameters`].
+//! The model's name and sampling settings in a request: [`Parameters`].
 
 use std::fmt;
 use std::num::NonZeroU32;
@@ -8,13 +8,14 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 use serde_json::{Value, json};
 
+use crate::types::Decides;
 use crate::types::flag::flag_words;
 use crate::types::words::written_as_text;
 
-/// What a model is called and how it is to speak; what is `None` is left out of the request.
+/// The name of a model and the settings of its replies; a setting that is `None` is left out of the request.
 ///
-/// As it is written in JSON it holds all that can change a reply, and decides the key of each trial: a field that is not said is not
-/// written, so that a new one changes no key of before.
+/// The JSON form has everything that can change a reply, and is part of the key of each trial. Settings that are not set are not
+/// written or null, so that a new setting changes no earlier key.
 #[derive(Debug, Clone, PartialEq, Args, Serialize)]
 #[command(next_help_heading = "Model")]
 pub struct Parameters {
@@ -22,41 +23,41 @@ pub struct Parameters {
     #[arg(skip)]
     pub model: String,
     /// Sampling temperature; default for the server's own; auto for 0, or the server's own where the model refuses any other
-    #[arg(long, value_name = "T|auto|default", default_value_t = Temperature::Auto)]
+    #[arg(long, value_name = "T|auto|default", default_value_t = Temperature::Auto, add = Decides::Reply)]
     pub temperature: Temperature,
     /// Draw only from the likeliest tokens that together have this probability; default: not sent
-    #[arg(long, value_name = "P", value_parser = share)]
+    #[arg(long, value_name = "P", value_parser = probability, add = Decides::Reply)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub top_p: Option<f64>,
     /// The most tokens of a reply, hidden reasoning included
     ///
     /// A letter needs 16; a reasoning model burns hundreds before it.
-    #[arg(long, value_name = "N", default_value_t = Self::MAX_TOKENS)]
+    #[arg(long, value_name = "N", default_value_t = Self::MAX_TOKENS, add = Decides::Reply)]
     pub max_tokens: NonZeroU32,
     /// The field that carries that limit; auto is max_completion_tokens at OpenAI itself, max_tokens elsewhere, and the other one
     /// where the server asks for it
-    #[arg(long, value_name = "FIELD", value_enum, default_value_t = TokenField::Auto)]
+    #[arg(long, value_name = "FIELD", value_enum, default_value_t = TokenField::Auto, add = Decides::Reply)]
     #[serde(skip)]
     pub token_field: TokenField,
     /// How long a reasoning model thinks, in the server's words (none, minimal, low, medium, high …); default: not sent
-    #[arg(long, value_name = "EFFORT")]
+    #[arg(long, value_name = "EFFORT", add = Decides::Reply)]
     pub reasoning_effort: Option<String>,
     /// How closely the server looks at images; default: not sent
-    #[arg(long, value_name = "DETAIL", value_enum)]
+    #[arg(long, value_name = "DETAIL", value_enum, add = Decides::Reply)]
     pub detail: Option<ImageDetail>,
-    /// What the server's sampling starts from, where it takes that: with a temperature above 0 replies are then more alike.
+    /// The seed of the server's sampling, if the server supports it: replies at a temperature above 0 are then more alike.
     #[arg(skip)]
     pub seed: Option<u64>,
-    /// What the server lets the model say.
+    /// The constraint that the server puts on the model's reply.
     #[arg(skip)]
     pub constrain: Constrain,
 }
 
 impl Parameters {
-    /// The token limit where none is set.
+    /// The default of the token limit; chosen.
     pub const MAX_TOKENS: NonZeroU32 = NonZeroU32::new(1024).unwrap();
 
-    /// The smallest request every server takes: the model at temperature 0 with room for a reasoned reply.
+    /// The settings that every server accepts: temperature 0, and enough tokens for a reply with reasoning.
     #[must_use]
     pub fn new(model: String) -> Self {
         Self {
@@ -72,12 +73,12 @@ impl Parameters {
         }
     }
 
-    /// The token limit that is sent; `None` for none.
+    /// The token limit that is sent; `None` if none is sent.
     pub(super) fn limit(&self) -> Option<u32> {
         (self.token_field != TokenField::Omit).then_some(self.max_tokens.get())
     }
 
-    /// All that can change a reply. The name of the token limit's field does not; whether a limit is sent does.
+    /// The settings that can change a reply. Whether a token limit is sent is one of them; the name of its field is not.
     pub(super) fn content(&self) -> Value {
         let mut content = json!(self);
         content["max_tokens"] = self.limit().into();
@@ -86,21 +87,20 @@ impl Parameters {
 }
 
 /// Reads a probability above 0.
-fn share(text: &str) -> Result<f64, String> {
-    let share = text.parse().ok();
-    let share = share.filter(|share| 0.0 < *share && *share <= 1.0);
-    share.ok_or_else(|| "a number above 0 and up to 1 expected".to_owned())
+fn probability(text: &str) -> Result<f64, String> {
+    let value = text.parse().ok();
+    let value = value.filter(|value| 0.0 < *value && *value <= 1.0);
+    value.ok_or_else(|| "a number above 0 and up to 1 expected".to_owned())
 }
 
 /// The sampling temperature of a request.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Temperature {
-    /// 0, the likeliest answer, as repeatable as the server allows; the server's own where the model refuses any, as
-    /// reasoning models do.
+    /// 0, which gives the likeliest answer. If the model refuses it, as reasoning models do, the server's default.
     Auto,
-    /// The server's own: none is sent.
+    /// The server's default: no temperature is sent.
     Server,
-    /// This one.
+    /// A given temperature, 0 or more.
     Of(f64),
 }
 
@@ -153,7 +153,7 @@ impl TokenField {
     }
 }
 
-/// In what resolution a server is to look at an image.
+/// The resolution at which the server reads an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum ImageDetail {
@@ -165,8 +165,8 @@ pub enum ImageDetail {
     High,
 }
 
-/// What a server lets a model say. Anything but `None` measures something else: what the model would say if it had to
-/// name a letter.
+/// The constraint on a model's reply. Any value but `None` measures something else: the model's answer if it must name a
+/// letter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Constrain {
@@ -209,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn the_content_is_what_decides_a_reply() {
+    fn settings_that_decide_a_reply_change_the_content() {
         let base = Parameters::new("m".into());
         let mut others = vec![base.clone(); 8];
         others[0].model = "n".into();

@@ -1,4 +1,4 @@
-//! An image as it is sent: [`Payload`], in a [`PayloadFormat`].
+//! An image encoded for a request: [`Payload`], in a [`PayloadFormat`].
 
 use std::borrow::Cow;
 use std::fmt;
@@ -14,14 +14,14 @@ use image::{ExtendedColorType, ImageBuffer, ImageEncoder as _, imageops};
 
 use super::plain_png;
 use crate::error::{Error, Result};
-use crate::types::{Digest, ImageFacts, Rgb};
+use crate::types::{Decides, Digest, ImageFacts, Rgb};
 
-/// The file format in which images are sent. PNG and JPEG alone: servers refuse others.
+/// The file format in which images are sent: PNG or JPEG, because servers refuse others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PayloadFormat {
-    /// Lossless: the model sees the very pixels that were made.
+    /// Lossless: the model receives exactly the pixels that were made.
     Png,
-    /// Smaller, without subsampling of colour, but noise in the dark is what it throws away first.
+    /// Smaller, without chroma subsampling; it loses the noise in dark areas first.
     Jpeg(Quality),
 }
 
@@ -29,12 +29,12 @@ pub enum PayloadFormat {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Quality(u8);
 
-/// How images are sent.
+/// The flag for the file format of images.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Sending")]
 pub(crate) struct ImageArgs {
     /// How images are sent: png (lossless) or jpeg:QUALITY
-    #[arg(long, value_name = "FORMAT", default_value_t = PayloadFormat::Png)]
+    #[arg(long, value_name = "FORMAT", default_value_t = PayloadFormat::Png, add = Decides::Pixels)]
     pub image: PayloadFormat,
 }
 
@@ -80,7 +80,7 @@ impl FromStr for PayloadFormat {
     }
 }
 
-/// An encoded image, ready to be put into any number of requests; cloning it copies no pixels.
+/// An encoded image for any number of requests; cloning it copies no pixels.
 #[derive(Clone)]
 pub struct Payload {
     facts: ImageFacts,
@@ -88,10 +88,10 @@ pub struct Payload {
 }
 
 impl Payload {
-    /// Encodes an image as [`Self::scaled`] makes it.
+    /// Encodes an image after [`Self::scaled`].
     ///
     /// # Errors
-    /// Where the image is larger than the format allows.
+    /// If the image is larger than the format allows.
     pub fn encode(
         image: &Rgb,
         format: PayloadFormat,
@@ -106,27 +106,25 @@ impl Payload {
         Ok(Self::of_file(&file, width, height, format))
     }
 
-    /// The pixels that are encoded: the image made smaller (Lanczos3) where its longer side is beyond `max_side` pixels, never
-    /// larger.
+    /// The pixels that are encoded: the image, reduced (Lanczos3) if its longer side is more than `max_side` pixels.
     ///
     /// # Errors
-    /// Where a side is too long for any format.
+    /// If a side is too long for any format.
     pub fn scaled(image: &Rgb, max_side: Option<NonZeroU32>) -> Result<Cow<'_, Rgb>> {
         let from = (side(image.width())?, side(image.height())?);
         let Some((width, height)) = fitted(from.0, from.1, max_side) else {
             return Ok(Cow::Borrowed(image));
         };
         let source = ImageBuffer::<image::Rgb<u8>, _>::from_raw(from.0, from.1, image.samples());
-        let source = source.ok_or_else(|| unfit("its samples do not fill its sides"))?;
+        let source = source.ok_or_else(|| image_error("its samples do not fill its sides"))?;
         let smaller = imageops::resize(&source, width, height, imageops::FilterType::Lanczos3);
         Rgb::new(height as usize, width as usize, smaller.into_raw()).map(Cow::Owned)
     }
 
-    /// The bytes of a PNG file as they are, without decoding or encoding: only where that is the same as encoding its
-    /// pixels, which is 8-bit RGB with nothing in the file that changes how it is shown, nothing that says more than its
-    /// pixels do, and no side beyond `max_side`. `None` for every other file.
+    /// The bytes of a PNG file, without decoding or encoding. The file must have plain 8-bit RGB, nothing that changes how it
+    /// is shown or says more than its pixels, and no side of more than `max_side` pixels. `None` for every other file.
     ///
-    /// Whether the file is whole is not looked at: it must have been decoded before.
+    /// The file is not checked for damage: it must have been decoded before.
     #[must_use]
     pub fn of_plain_png(file: &[u8], max_side: Option<NonZeroU32>) -> Option<Self> {
         let (width, height) = plain_png::size(file)?;
@@ -136,41 +134,43 @@ impl Payload {
         Some(Self::of_file(file, width, height, PayloadFormat::Png))
     }
 
-    /// The width and height in which an image of this size is sent: as it is, or made to fit `max_side`.
+    /// The width and height in which an image of this size is sent, in pixels: unchanged, or reduced to fit `max_side`.
     #[must_use]
     pub fn fitted(width: u32, height: u32, max_side: Option<NonZeroU32>) -> (u32, u32) {
         fitted(width, height, max_side).unwrap_or((width, height))
     }
 
-    /// What a record keeps of the image: the digest and size of the encoded file, its sides and format.
+    /// The facts for the record: digest and size of the encoded file, width, height and format.
     #[must_use]
     pub fn facts(&self) -> &ImageFacts {
         &self.facts
     }
 
-    /// The encoded file.
+    /// The bytes of the encoded file.
     ///
     /// # Errors
-    /// None but where memory is short: it was encoded here.
+    /// None in practice: the base64 text was made here.
     pub fn file(&self) -> Result<Vec<u8>> {
         let base64 = self.data_url.splitn(2, |byte| *byte == b',').nth(1);
-        STANDARD.decode(base64.unwrap_or_default()).map_err(unfit)
+        STANDARD
+            .decode(base64.unwrap_or_default())
+            .map_err(image_error)
     }
 
-    /// The pixels, as whoever receives the image sees them.
+    /// The pixels as the receiver of the image decodes them.
     ///
     /// # Errors
-    /// None but where memory is short: it was encoded here.
+    /// Only if memory is short: the file was encoded here.
     pub fn decode(&self) -> Result<Rgb> {
         let image = image::load_from_memory(&self.file()?)
-            .map_err(unfit)?
+            .map_err(image_error)?
             .into_rgb8();
         let (height, width) = (image.height() as usize, image.width() as usize);
         Rgb::new(height, width, image.into_raw())
     }
 
-    /// As [`Self::decode`], without decoding where those that were encoded are at hand and the format loses nothing.
-    pub(crate) fn seen<'a>(&self, encoded: Option<&'a Rgb>) -> Result<Cow<'a, Rgb>> {
+    /// The pixels as by [`Self::decode`]; a lossless payload whose pixels are passed in is not decoded.
+    pub(crate) fn received<'a>(&self, encoded: Option<&'a Rgb>) -> Result<Cow<'a, Rgb>> {
         match encoded {
             Some(pixels) if self.facts.format == PayloadFormat::Png.name() => {
                 Ok(Cow::Borrowed(pixels))
@@ -179,7 +179,7 @@ impl Payload {
         }
     }
 
-    /// `data:image/png;base64,…`, shared and not copied.
+    /// The image as `data:image/png;base64,…`; the bytes are shared, not copied.
     #[must_use]
     pub fn data_url(&self) -> Bytes {
         self.data_url.clone()
@@ -208,22 +208,23 @@ impl fmt::Debug for Payload {
     }
 }
 
-fn unfit(problem: impl fmt::Display) -> Error {
+fn image_error(problem: impl fmt::Display) -> Error {
     Error::data("image", problem)
 }
 
 fn side(pixels: usize) -> Result<u32> {
-    u32::try_from(pixels).map_err(|_| unfit(format_args!("a side of {pixels} pixels is too long")))
+    u32::try_from(pixels)
+        .map_err(|_| image_error(format_args!("a side of {pixels} pixels is too long")))
 }
 
-/// The sides of an image made to fit `max_side`, `None` where it fits already.
+/// The sides of an image reduced to fit `max_side`; `None` if it fits already.
 fn fitted(width: u32, height: u32, max_side: Option<NonZeroU32>) -> Option<(u32, u32)> {
-    let (longer, most) = (u64::from(width.max(height)), u64::from(max_side?.get()));
-    let scaled = |side: u32| ((u64::from(side) * most + longer / 2) / longer).max(1) as u32;
-    (longer > most).then(|| (scaled(width), scaled(height)))
+    let (longer, max) = (u64::from(width.max(height)), u64::from(max_side?.get()));
+    let scaled = |side: u32| ((u64::from(side) * max + longer / 2) / longer).max(1) as u32;
+    (longer > max).then(|| (scaled(width), scaled(height)))
 }
 
-/// An image as a PNG file, lossless at the lowest effort: 26 times faster than the usual effort for files 2 % larger.
+/// An image as a lossless PNG file, at the lowest compression effort: 26 times faster than the default, files are 2 % larger.
 ///
 /// # Errors
 /// If a side is too long for the format.
@@ -232,23 +233,23 @@ pub(crate) fn png(image: &Rgb) -> Result<Vec<u8>> {
     let mut file = Vec::new();
     PngEncoder::new_with_quality(&mut file, CompressionType::Fast, RowFilter::Adaptive)
         .write_image(image.samples(), width, height, ExtendedColorType::Rgb8)
-        .map_err(unfit)?;
+        .map_err(image_error)?;
     Ok(file)
 }
 
 fn jpeg(samples: &[u8], width: u32, height: u32, quality: Quality) -> Result<Vec<u8>> {
     let (Ok(width), Ok(height)) = (u16::try_from(width), u16::try_from(height)) else {
-        return Err(unfit(format_args!(
+        return Err(image_error(format_args!(
             "{width} × {height} pixels are too many for a JPEG; set --max-side, or --image png"
         )));
     };
     let mut file = Vec::new();
     let mut encoder = jpeg_encoder::Encoder::new(&mut file, quality.0);
-    // 4:4:4: colour noise at full resolution, as far as the quality allows.
+    // 4:4:4 keeps colour noise at full resolution, as far as the quality allows.
     encoder.set_sampling_factor(jpeg_encoder::SamplingFactor::R_4_4_4);
     encoder
         .encode(samples, width, height, jpeg_encoder::ColorType::Rgb)
-        .map_err(unfit)?;
+        .map_err(image_error)?;
     Ok(file)
 }
 
@@ -284,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn png_is_lossless_and_its_facts_are_true() {
+    fn png_is_lossless_and_its_facts_are_right() {
         let image = noise(5, 7);
         let payload = Payload::encode(&image, PayloadFormat::Png, None).unwrap();
         let file = file(&payload);
@@ -324,7 +325,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_format_does_not_allow_is_an_error() {
+    fn an_image_too_large_for_the_format_is_an_error() {
         let wide = Rgb::new(1, 65_536, vec![0; 65_536 * 3]).unwrap();
         let jpeg = "jpeg:95".parse().unwrap();
         let error = Payload::encode(&wide, jpeg, None).unwrap_err();

@@ -1,45 +1,45 @@
-//! Whether a PNG file is its pixels and nothing else: [`size`].
+//! The check that a PNG file has nothing but plain pixels: [`size`].
 
 const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 
-/// Width and height of a PNG file that holds plain 8-bit RGB: one header, image data, an end, and else at most the chunks that
-/// change nothing (`sRGB`, and `pHYs` with square pixels). `None` for all other files: what else a chunk may hold (transparency,
-/// gamma, profiles, orientation, frames, text) would be shown differently, or tell the endpoint more than the pixels.
+/// Width and height of a PNG file with plain 8-bit RGB: one header, image data, an end, and at most chunks that change nothing
+/// (`sRGB`, and `pHYs` with square pixels). `None` for all other files: further chunks (transparency, gamma, profiles,
+/// orientation, frames, text) could change how the image is shown, or give the endpoint more than the pixels.
 pub(super) fn size(file: &[u8]) -> Option<(u32, u32)> {
     let mut rest = file.strip_prefix(SIGNATURE)?;
-    let (first, header, behind) = chunk(rest)?;
+    let (first, header, after) = chunk(rest)?;
     if &first != b"IHDR" {
         return None;
     }
     let size = plain_header(header)?;
-    rest = behind;
+    rest = after;
     let mut has_data = false;
     loop {
-        let (kind, content, behind) = chunk(rest)?;
+        let (kind, content, after) = chunk(rest)?;
         match &kind {
             b"IDAT" => has_data = has_data || !content.is_empty(),
             b"sRGB" if content.len() == 1 => {}
             b"pHYs" if content.len() == 9 && content[..4] == content[4..8] => {}
-            // Whatever follows the end is no part of the image.
-            b"IEND" if content.is_empty() && behind.is_empty() && has_data => return Some(size),
+            // Bytes after the end are not part of the image, so such a file is not plain.
+            b"IEND" if content.is_empty() && after.is_empty() && has_data => return Some(size),
             _ => return None,
         }
-        rest = behind;
+        rest = after;
     }
 }
 
-/// The sides, where the header says 8-bit RGB without interlacing.
+/// Width and height in pixels, if the header says 8-bit RGB without interlacing.
 fn plain_header(header: &[u8]) -> Option<(u32, u32)> {
     let (width, rest) = header.split_first_chunk::<4>()?;
     let (height, rest) = rest.split_first_chunk::<4>()?;
     let size = (u32::from_be_bytes(*width), u32::from_be_bytes(*height));
-    // Bit depth 8, colour type 2 (RGB), the only compression and filter methods there are, no interlacing.
+    // Bit depth 8, colour type 2 (RGB), the only compression and filter methods that exist, no interlacing.
     let plain = rest == [8, 2, 0, 0, 0] && size.0 > 0 && size.1 > 0;
     plain.then_some(size)
 }
 
-/// The kind and content of the first chunk, and what is behind it; `None` where the file ends too early. Checksums are not
-/// looked at: whoever sends a file as it is has held it to them before.
+/// The kind and content of the first chunk, and the bytes after it; `None` if the file ends too early. Checksums are not
+/// verified: the caller has decoded the file before.
 fn chunk(bytes: &[u8]) -> Option<([u8; 4], &[u8], &[u8])> {
     let (length, rest) = bytes.split_first_chunk::<4>()?;
     let (kind, rest) = rest.split_first_chunk::<4>()?;
@@ -70,7 +70,7 @@ mod tests {
     }
 
     #[test]
-    fn plain_files_are_known() {
+    fn plain_files_are_accepted() {
         let rgb = header([8, 2, 0, 0, 0]);
         let square = [1, 2, 3, 4, 1, 2, 3, 4, 1];
         let file = png(&[

@@ -1,4 +1,4 @@
-//! What models cost: [`Prices`].
+//! The prices of models: [`Prices`].
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -8,26 +8,26 @@ use serde::Deserialize;
 use crate::error::{Error, Result};
 use crate::types::Usage;
 
-/// What a model charges, in dollars for a million tokens.
+/// The price of a model, in dollars per million tokens.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct Price {
-    /// For the tokens of prompts, images included.
+    /// The price of prompts, images included, in dollars per million tokens.
     pub input: f64,
-    /// For the tokens of replies, hidden reasoning included.
+    /// The price of replies, hidden reasoning included, in dollars per million tokens.
     pub output: f64,
-    /// How many tokens an image is, where that is known better than by the model's family.
+    /// The number of tokens of an image; `None` to use the rule of the model's family.
     pub image_tokens: Option<u64>,
 }
 
 impl Price {
-    /// The dollars for so many tokens of a prompt and of a reply.
+    /// The price in dollars of these numbers of prompt and reply tokens.
     #[must_use]
     pub(crate) fn of(&self, prompt: f64, reply: f64) -> f64 {
         (prompt * self.input + reply * self.output) / 1e6
     }
 
-    /// The dollars for what a request was charged; what the server did not tell counts as nothing.
+    /// The price in dollars of a request; tokens that the server did not state count as 0.
     #[must_use]
     pub(crate) fn charged(&self, usage: Usage) -> f64 {
         let tokens = |tokens: Option<u64>| tokens.unwrap_or(0) as f64;
@@ -39,9 +39,9 @@ impl Price {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct Prices {
-    /// The day on which the prices were looked up.
+    /// The date of the prices.
     pub as_of: String,
-    /// What the Batch API charges, as a share of the price.
+    /// The share of the price that the Batch API charges.
     pub batch: f64,
     models: BTreeMap<String, Price>,
 }
@@ -50,16 +50,16 @@ impl Prices {
     /// The table that comes with the program, `src/ask/prices.toml`.
     ///
     /// # Errors
-    /// None that a user could meet: its form is held by a test.
+    /// None in practice: a test reads the table.
     pub(crate) fn built_in() -> Result<Self> {
         toml::from_str(include_str!("prices.toml"))
             .map_err(|e| Error::usage("src/ask/prices.toml", e.message()))
     }
 
-    /// Reads a table of the user's own, in the form of the built-in one.
+    /// Reads a custom table in the form of the built-in one.
     ///
     /// # Errors
-    /// Where it cannot be read, or a price is none.
+    /// If it cannot be read, or a price is negative or not finite.
     pub(crate) fn load(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))?;
         let wrong = |problem: String| {
@@ -72,33 +72,35 @@ impl Prices {
         let numbers = prices.models.iter().flat_map(|(name, price)| {
             [(name, price.input), (name, price.output)].map(|(name, n)| (name.as_str(), n))
         });
-        let sound = |n: f64| n.is_finite() && n >= 0.0;
+        let is_price = |n: f64| n.is_finite() && n >= 0.0;
         let mut numbers = numbers.chain([("batch", prices.batch)]);
-        if let Some((name, number)) = numbers.find(|(_, n)| !sound(*n)) {
-            return Err(wrong(format!("{name}: {number} is no price")));
+        if let Some((name, number)) = numbers.find(|(_, n)| !is_price(*n)) {
+            return Err(wrong(format!(
+                "{name}: {number} is not a number of 0 or more"
+            )));
         }
         drop(numbers);
         Ok(prices)
     }
 
-    /// The price of a model: by its name, by the name behind a provider's (`openai/gpt-4o`), or by that of the line it is a
-    /// dated version of (`gpt-4o-2024-08-06`).
+    /// The price of a model: by its name, by the name after a provider's (`openai/gpt-4o`), or by the name without a version
+    /// (`gpt-4o-2024-08-06`). `None` if the table has none of these.
     #[must_use]
     pub(crate) fn of(&self, model: &str) -> Option<Price> {
         let bare = model.rsplit('/').next().unwrap_or(model);
         [model, bare].into_iter().find_map(|name| {
             let exact = self.models.get(name).copied();
             exact.or_else(|| {
-                let mut lines = self.models.iter();
-                let line =
-                    lines.find(|(line, _)| name.strip_prefix(&***line).is_some_and(is_version));
-                line.map(|(_, price)| *price)
+                let mut models = self.models.iter();
+                let unversioned =
+                    models.find(|(known, _)| name.strip_prefix(&***known).is_some_and(is_version));
+                unversioned.map(|(_, price)| *price)
             })
         })
     }
 }
 
-/// Whether what follows a name says only which version of it is meant: a date, `latest`, `preview`.
+/// Whether the rest of a model's name is only a version: a date, `latest` or `preview`.
 fn is_version(rest: &str) -> bool {
     rest.strip_prefix(['-', '@']).is_some_and(|version| {
         version == "latest"
@@ -112,14 +114,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_built_in_table_is_whole() {
+    fn the_built_in_table_is_complete() {
         let prices = Prices::built_in().unwrap();
         assert!(prices.models.len() > 50);
         assert!(prices.as_of.starts_with("20"));
     }
 
     #[test]
-    fn versions_cost_what_their_line_costs() {
+    fn a_version_has_the_price_of_its_model() {
         let prices = Prices::built_in().unwrap();
         let input = |model| prices.of(model).map(|price| price.input);
         assert_eq!(input("gpt-4o"), Some(2.5));
@@ -140,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_of_ones_own_is_checked() {
+    fn a_custom_table_is_checked() {
         let file = tempfile::NamedTempFile::new().unwrap();
         let load = |text: &str| {
             std::fs::write(file.path(), text).unwrap();

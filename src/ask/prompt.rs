@@ -1,4 +1,4 @@
-//! The words a model is asked with: [`Prompts`].
+//! The text of questions to a model: [`Prompts`].
 
 use std::fs;
 use std::path::Path;
@@ -12,7 +12,7 @@ use crate::types::{Choices, Digest, Family, FrameId, Question, QuestionId, View}
 const CHOICE: &str = "choice.txt";
 const BLIND: &str = "blind.txt";
 
-/// The templates of `prompts/`, or a user's in their place.
+/// The prompt templates: those of `prompts/`, or the user's.
 #[derive(Debug)]
 pub struct Prompts {
     templates: Environment<'static>,
@@ -23,15 +23,15 @@ impl Prompts {
     /// The prompts that come with the program.
     ///
     /// # Errors
-    /// None that a user could meet: the embedded templates are tried out by the tests.
+    /// None in practice: the tests render the embedded templates.
     pub fn built_in() -> Result<Self> {
         Self::new(Sources::default())
     }
 
-    /// The prompts of a folder, those that it lacks being the built-in ones.
+    /// The prompts of a folder; for missing ones, the built-in prompts.
     ///
     /// # Errors
-    /// Where the folder holds no prompt, or a file that is none; where a template is broken or leaves out the question or a choice.
+    /// If the folder has no prompt or another file, or if a template is broken or leaves out the question or a choice.
     pub fn load(dir: &Path) -> Result<Self> {
         let unreadable = |error| Error::file(dir, "read", error);
         let mut sources = Sources::default();
@@ -90,11 +90,11 @@ impl Prompts {
         self.digest
     }
 
-    /// The words for one question. Question and choices stand in them as they are, whatever they hold.
+    /// The prompt for one question. The texts of question and choices are inserted unchanged.
     ///
     /// # Errors
-    /// Where the template fails, or the question or a choice is not to be found in the outcome: such a prompt would cost
-    /// money and measure nothing.
+    /// If the template fails, or if its output lacks the question or a choice: such a prompt would cost money and measure
+    /// nothing.
     pub fn render(&self, view: View, question: &Question) -> Result<String> {
         let name = match view {
             View::Image => CHOICE,
@@ -152,7 +152,7 @@ fn wrong(name: &str, problem: impl std::fmt::Display) -> Error {
     }
 }
 
-/// A question whose words occur in no template by chance.
+/// A question whose texts occur in no template by chance.
 fn sample() -> Result<Question> {
     let texts = (1..=5).map(|i| format!("sample-choice-{i}-of-5")).collect();
     Ok(Question {
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn built_in_prompts_read_as_they_should() {
+    fn built_in_prompts_have_the_expected_text() {
         let prompts = Prompts::built_in().unwrap();
         let asked = question("What type of room is this?", &["Kitchen", "Bedroom"]);
         assert_eq!(
@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_question_holds_is_no_template() {
+    fn template_syntax_in_a_question_is_plain_text() {
         let hostile = question(
             "{{ 7 * 7 }} {% raw %} <b>\"url\":\"\"</b>\nand a second line",
             &["{{ question }}", "a & b", "{# gone #}"],
@@ -223,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_replaces_what_it_holds() {
+    fn a_folder_replaces_the_prompts_that_it_has() {
         let own = "Q: {{ question }}\r\n{% for c in choices %}({{ c.letter }}) {{ c.text }}\r\n{% endfor %}";
         let prompts = loaded(&[("choice.txt", own), ("README.md", "x"), (".swp", "x")]).unwrap();
         let asked = question("Red?", &["yes", "no"]);
@@ -242,7 +242,7 @@ mod tests {
     #[test]
     fn broken_folders_are_errors() {
         let choices = "{% for c in choices %}{{ c.text }}{% endfor %}";
-        for (files, said) in [
+        for (files, expected) in [
             (vec![], "neither"),
             (vec![("chioce.txt", "x")], "chioce.txt"),
             (vec![("choice.txt", choices)], "question"),
@@ -261,7 +261,7 @@ mod tests {
             (vec![("choice.txt", "{% for %}")], "choice.txt"),
         ] {
             let error = loaded(&files).unwrap_err().to_string();
-            assert!(error.contains(said), "{error}");
+            assert!(error.contains(expected), "{error}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The model that guesses: [`Random`].
+//! A model that guesses at random: [`Random`].
 
 use serde_json::{Value, json};
 
@@ -6,11 +6,11 @@ use super::call::Call;
 use crate::types::question::letter;
 use crate::types::{Digest, Question};
 
-/// Answers with the letter of any choice, each as likely; the same one for the same seed, question, condition and turn, in
-/// whatever order they are asked.
+/// A model that answers with the letter of a random choice, each equally likely. The guess depends only on the seed, question,
+/// condition and turn, and not on the order in which questions are asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Random {
-    /// What decides the guesses.
+    /// The seed of the guesses.
     pub seed: u64,
 }
 
@@ -23,18 +23,18 @@ impl Random {
     }
 
     pub(super) fn answer(self, question: &Question, call: Call<'_>) -> String {
-        let mut shown = call.condition.map(ToString::to_string).unwrap_or_default();
+        let mut context = call.condition.map(ToString::to_string).unwrap_or_default();
         if call.turn > 0 {
-            shown = format!("{shown} turn {}", call.turn);
+            context = format!("{context} turn {}", call.turn);
         }
         let mut digest = Digest::of_parts([
             Self::NAME.as_bytes(),
             &self.seed.to_le_bytes(),
             question.id.0.as_bytes(),
-            shown.as_bytes(),
+            context.as_bytes(),
         ]);
         let count = question.choices.len() as u64;
-        // Numbers beyond the last full round of the choices are drawn again: taking the remainder would favour the first ones.
+        // Numbers above the largest multiple of `count` are drawn again: their remainder would favour the first choices.
         let fair = u64::MAX - u64::MAX % count;
         loop {
             let (words, _) = digest.as_bytes().as_chunks::<8>();

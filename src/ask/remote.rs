@@ -1,4 +1,4 @@
-//! The model behind an endpoint: [`Remote`].
+//! A model at an endpoint: [`Remote`].
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -17,24 +17,24 @@ use super::wire::Wire;
 use crate::error::Result;
 use crate::types::{FailureKind, Reply};
 
-/// One model of an endpoint, asked by one wire with one set of parameters.
+/// One model of an endpoint, asked through one API with one set of parameters.
 #[derive(Debug)]
 pub struct Remote {
     endpoint: Arc<Endpoint>,
     wire: Wire,
     headers: HeaderMap,
     parameters: Parameters,
-    /// The fields that the server takes, as far as is known.
+    /// The fields that the server accepts, as far as is known.
     fields: Mutex<RequestFields>,
-    /// Whether a reply has come that no constraint was put on.
-    unconstrained: AtomicBool,
+    /// Whether the warning about an unconstrained reply was printed.
+    warned_unconstrained: AtomicBool,
 }
 
 impl Remote {
     /// The model that `parameters` name; models of one endpoint share its connections and its pauses.
     ///
     /// # Errors
-    /// If a header cannot carry what it should.
+    /// If a header value has characters that HTTP does not allow.
     pub fn open(endpoint: Arc<Endpoint>, wire: Wire, parameters: Parameters) -> Result<Self> {
         Ok(Self {
             headers: endpoint.headers(wire)?,
@@ -42,30 +42,30 @@ impl Remote {
             endpoint,
             wire,
             parameters,
-            unconstrained: AtomicBool::new(false),
+            warned_unconstrained: AtomicBool::new(false),
         })
     }
 
-    /// The model, by the endpoint's name.
+    /// The name of the model at the endpoint.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.parameters.model
     }
 
-    /// Where it is asked.
+    /// The endpoint at which the model is asked.
     #[must_use]
     pub fn endpoint(&self) -> &Endpoint {
         &self.endpoint
     }
 
-    /// How it is asked.
+    /// The parameters of every request.
     #[must_use]
     pub fn parameters(&self) -> &Parameters {
         &self.parameters
     }
 
-    /// How the requests differ from the first one, where the server has refused a field of it: what is left to the
-    /// program (`auto`) is adapted once for all requests, and never for one alone.
+    /// The changes to requests after the server refused a field: settings that are left to the program (`auto`) are adapted
+    /// once for all requests, and never for a single one.
     #[must_use]
     pub fn adapted(&self) -> Vec<String> {
         let (first, now) = (
@@ -79,32 +79,32 @@ impl Remote {
         field.into_iter().chain(temperature).collect()
     }
 
-    /// The wire and all parameters that can change a reply.
+    /// The API and all parameters that can change a reply.
     pub(super) fn content(&self) -> Value {
         let mut content = self.parameters.content();
         content["wire"] = json!(self.wire);
         content
     }
 
-    /// The path that a line of a Batch API's file asks; `None` if the wire has no batches.
+    /// The path in a line of a Batch API's file; `None` if the API has no batches.
     pub(super) fn batch_url(&self) -> Option<&'static str> {
         self.wire.batch_url()
     }
 
-    /// Sends the one message of a conversation, which offers so many choices (0 where the answer is open).
+    /// Sends the single message of a conversation with this number of choices; 0 if the question is open.
     pub async fn ask(&self, message: Message<'_>, choices: usize) -> Result<Reply, AskError> {
         let mut attempts = 0;
         loop {
             let fields = self.fields();
             match self.ask_with(fields, message, choices).await {
-                Err(error) if self.adapt(fields, error.refused) => attempts += error.attempts,
+                Err(error) if self.adapt(fields, error.refused_field) => attempts += error.attempts,
                 Err(error) => {
                     let attempts = attempts + error.attempts;
                     return Err(AskError { attempts, ..error });
                 }
                 Ok(reply) => {
                     let attempts = attempts + reply.attempts;
-                    let text = self.unwrapped(reply.text, choices);
+                    let text = self.letter_or_text(reply.text, choices);
                     return Ok(Reply {
                         text,
                         attempts,
@@ -118,7 +118,7 @@ impl Remote {
     /// The body of a request as it would be sent now, in one piece.
     ///
     /// # Errors
-    /// Where it cannot be written as JSON.
+    /// If it cannot be written as JSON.
     pub fn body(&self, message: Message<'_>, choices: usize) -> Result<Vec<u8>, serde_json::Error> {
         let (parameters, fields) = (&self.parameters, self.fields());
         let body = self.wire.body(parameters, fields, message, choices)?;
@@ -155,16 +155,16 @@ impl Remote {
         *self.fields.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Changes the field that a request with `sent` was refused for, where that is left to the program; whether it is worth
-    /// asking again.
-    fn adapt(&self, sent: RequestFields, refused: Option<AdaptableField>) -> bool {
+    /// Changes the field for which a request with the fields `sent` was refused, if its setting is `auto`. Returns whether to
+    /// ask again.
+    fn adapt(&self, sent: RequestFields, refused_field: Option<AdaptableField>) -> bool {
         let first = RequestFields::first(&self.parameters, self.endpoint.host());
         let mut now = self.fields.lock().unwrap_or_else(PoisonError::into_inner);
         if *now != sent {
-            // Another request has found out in the meanwhile.
-            return refused.is_some();
+            // Another request has changed the fields in the meantime.
+            return refused_field.is_some();
         }
-        match refused {
+        match refused_field {
             Some(AdaptableField::TokenField)
                 if self.parameters.token_field == TokenField::Auto
                     && sent.token_field == first.token_field =>
@@ -186,7 +186,7 @@ impl Remote {
             {
                 now.temperature = None;
                 warn!(
-                    "{}: it takes no temperature of 0, so the server's own holds for the whole run",
+                    "{}: the server refuses a temperature of 0; its default is used for the whole run",
                     self.name()
                 );
                 true
@@ -195,17 +195,17 @@ impl Remote {
         }
     }
 
-    /// The letter in a reply that was constrained to be one; said once where the server does not keep to it.
-    fn unwrapped(&self, text: String, choices: usize) -> String {
+    /// The letter in a constrained reply, else the text. Warns once if the server does not follow the constraint.
+    fn letter_or_text(&self, text: String, choices: usize) -> String {
         let constrain = self.parameters.constrain;
         if constrain == Constrain::None {
             return text;
         }
         letter_of(constrain, choices, &text).unwrap_or_else(|| {
-            if !self.unconstrained.swap(true, Ordering::Relaxed) {
+            if !self.warned_unconstrained.swap(true, Ordering::Relaxed) {
                 warn!(
-                    "{}: a reply is not what --constrain {constrain} asked for; the server may not know it, or the reply was cut \
-                     (--max-tokens)",
+                    "{}: a reply does not have the form that --constrain {constrain} requests; the server may not support it, or the \
+                     reply was truncated (--max-tokens)",
                     self.name()
                 );
             }

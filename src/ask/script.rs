@@ -1,4 +1,4 @@
-//! The model that reads its lines: [`Script`].
+//! A model whose replies come from a file: [`Script`].
 
 use std::collections::HashMap;
 use std::fs;
@@ -11,9 +11,9 @@ use super::failure::AskError;
 use crate::error::{Error, Result};
 use crate::types::{Condition, Digest, FailureKind, QuestionId, Reply};
 
-/// Replies out of a JSONL file, one a line:
+/// Replies from a JSONL file, one a line:
 /// `{"question": "<id>", "reply": ".."}`, the same with `"condition": "L3-noise"` for one condition, `{"default": ".."}` for the rest.
-/// The most specific line wins.
+/// The most specific line applies.
 #[derive(Debug)]
 pub struct Script {
     name: String,
@@ -22,12 +22,12 @@ pub struct Script {
     replies: HashMap<Cue, String>,
 }
 
-/// What a line answers to.
+/// The questions that a line answers.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 enum Cue {
-    Shown(QuestionId, Condition),
-    Asked(QuestionId),
-    Anything,
+    InCondition(QuestionId, Condition),
+    Question(QuestionId),
+    Default,
 }
 
 #[derive(Deserialize)]
@@ -43,10 +43,10 @@ impl Line {
     fn read(self) -> Option<(Cue, String)> {
         match (self.question, self.condition, self.reply, self.default) {
             (Some(id), Some(condition), Some(reply), None) => {
-                Some((Cue::Shown(id, condition), reply))
+                Some((Cue::InCondition(id, condition), reply))
             }
-            (Some(id), None, Some(reply), None) => Some((Cue::Asked(id), reply)),
-            (None, None, None, Some(reply)) => Some((Cue::Anything, reply)),
+            (Some(id), None, Some(reply), None) => Some((Cue::Question(id), reply)),
+            (None, None, None, Some(reply)) => Some((Cue::Default, reply)),
             _ => None,
         }
     }
@@ -56,7 +56,7 @@ impl Script {
     /// Reads a file of replies.
     ///
     /// # Errors
-    /// With file and line where a line is broken or answers to what an earlier one answered to.
+    /// If a line is broken, or has the same question and condition as an earlier line.
     pub fn load(path: &Path) -> Result<Self> {
         let text = fs::read_to_string(path).map_err(|error| Error::file(path, "read", error))?;
         let text = text.trim_start_matches('\u{feff}');
@@ -72,11 +72,13 @@ impl Script {
                 Error::line(
                     path,
                     number,
-                    r#"expected {"question": "<id>", "reply": ".."}, with "condition": "L3-noise" where it is for one condition, or {"default": ".."}"#,
+                    r#"expected {"question": "<id>", "reply": ".."}, with "condition": "L3-noise" if it is for one condition, or {"default": ".."}"#,
                 )
             })?;
             if let Some(first) = lines.insert(cue.clone(), number) {
-                let problem = format_args!("answers to the same as line {first}; keep one of them");
+                let problem = format_args!(
+                    "answers the same question as line {first}; keep one of the two lines"
+                );
                 return Err(Error::line(path, number, problem));
             }
             replies.insert(cue, reply);
@@ -89,7 +91,7 @@ impl Script {
         })
     }
 
-    /// `script:` and the file.
+    /// The name in records and tables: `script:` and the path.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
@@ -105,9 +107,12 @@ impl Script {
         condition: Option<&Condition>,
     ) -> Result<Reply, AskError> {
         let reply = condition
-            .and_then(|condition| self.replies.get(&Cue::Shown(id.clone(), condition.clone())))
-            .or_else(|| self.replies.get(&Cue::Asked(id.clone())))
-            .or_else(|| self.replies.get(&Cue::Anything));
+            .and_then(|condition| {
+                self.replies
+                    .get(&Cue::InCondition(id.clone(), condition.clone()))
+            })
+            .or_else(|| self.replies.get(&Cue::Question(id.clone())))
+            .or_else(|| self.replies.get(&Cue::Default));
         reply.cloned().map(Reply::local).ok_or_else(|| {
             let message = format!(
                 r#"{} has no reply to question {id} and no {{"default": ".."}} line"#,
@@ -129,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn a_byte_order_mark_is_no_part_of_the_first_line() {
+    fn a_byte_order_mark_is_not_part_of_the_first_line() {
         let line = r#"{"default": "A"}"#;
         let marked = load(&format!("\u{feff}{line}\n")).unwrap();
         let plain = load(&format!("{line}\n")).unwrap();
@@ -137,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn a_broken_line_is_named_once() {
+    fn the_error_names_a_broken_line_once() {
         let error = load("\n{\n").unwrap_err().to_string();
         assert!(
             error.ends_with(", line 2: EOF while parsing an object"),

@@ -1,36 +1,37 @@
-//! What nobody may read: [`Secret`], and [`Scrub`], which takes secrets out of other people's words.
+//! API keys that are never printed ([`Secret`]), and removal of keys from text that a server sent ([`Scrub`]).
 
 use std::fmt;
 
 use crate::error::{Error, Result};
 
-/// A key that is never printed.
+/// An API key that is never printed.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Secret(String);
 
 impl Secret {
-    /// Takes a key without the blanks around it; `origin` is the variable or file it came from, for the error.
+    /// A key without the spaces around it; `origin` is its variable or file, for the error.
     ///
     /// # Errors
-    /// Where it is empty or holds anything but visible ASCII, which no HTTP header can carry. The error does not show it.
+    /// If it is empty or has characters other than visible ASCII, which an HTTP header cannot carry. The error does not show
+    /// the key.
     pub fn new(text: &str, origin: &str) -> Result<Self> {
         let key = text.trim();
         if key.is_empty() {
             return Err(Error::usage(
                 origin,
-                "the key is empty; an endpoint without a key needs none set",
+                "the key is empty; for an endpoint without keys use --api-key-env none",
             ));
         }
         if !key.bytes().all(|byte| byte.is_ascii_graphic()) {
             return Err(Error::usage(
                 origin,
-                "the key holds blanks or characters that no HTTP header can carry; it must be one line of visible ASCII",
+                "the key has spaces or characters that an HTTP header cannot carry; it must be one line of visible ASCII",
             ));
         }
         Ok(Self(key.to_owned()))
     }
 
-    /// The key itself.
+    /// The key as plain text, for HTTP headers.
     pub(super) fn expose(&self) -> &str {
         &self.0
     }
@@ -42,40 +43,43 @@ impl fmt::Debug for Secret {
     }
 }
 
-/// How many characters of a server's words are kept.
-const KEPT: usize = 300;
+/// The maximum number of characters of a server's text; chosen.
+const MAX_LINE: usize = 300;
 
-/// Shorter secrets are stand-ins like `x` for servers that want any key; taking them out would spoil every word.
-const SHORTEST: usize = 4;
+/// The minimum length of a secret that is removed. Shorter ones are placeholders like `x` for servers that accept any key;
+/// their removal would destroy ordinary words.
+const MIN_SECRET: usize = 4;
 
-/// Shorter secrets are left standing in a model's reply: no real key is, and a word that an answer may need must not be lost.
-const SHORTEST_IN_REPLY: usize = 16;
+/// The minimum length of a secret that is removed from a model's reply. Real keys are longer, and an answer may need a shorter
+/// word.
+const MIN_SECRET_IN_REPLY: usize = 16;
 
-/// Makes the words of a server fit for a terminal, a log and a table: one line, no control characters, no secrets, not long.
+/// A filter that makes the text of a server safe for a terminal, a log and a table: one short line without control characters
+/// and secrets.
 #[derive(Clone, Default)]
 pub(super) struct Scrub(Vec<String>);
 
 impl Scrub {
-    /// A scrub for these secrets.
+    /// The filter for these secrets.
     pub(super) fn new(secrets: impl IntoIterator<Item = String>) -> Self {
         let mut secrets: Vec<String> = secrets
             .into_iter()
-            .filter(|secret| secret.len() >= SHORTEST)
+            .filter(|secret| secret.len() >= MIN_SECRET)
             .collect();
-        // The longest first, so that a secret within another one does not leave the rest of it standing.
+        // The longest first: if one secret contains another, no part of the longer one must remain.
         secrets.sort_by_key(|secret| std::cmp::Reverse(secret.len()));
         secrets.dedup();
         Self(secrets)
     }
 
-    /// Whether there is anything to hide.
+    /// Whether there are no secrets to remove.
     pub(super) fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// A model's reply as it came, except that a key which it echoes is taken out.
+    /// A model's reply without keys that it repeats, otherwise unchanged.
     pub(super) fn reply(&self, text: String) -> String {
-        let keys = self.0.iter().filter(|key| key.len() >= SHORTEST_IN_REPLY);
+        let keys = self.0.iter().filter(|key| key.len() >= MIN_SECRET_IN_REPLY);
         keys.fold(text, |text, key| {
             if text.contains(key) {
                 text.replace(key, "[secret]")
@@ -85,23 +89,23 @@ impl Scrub {
         })
     }
 
-    /// The text on one line of at most 300 characters.
+    /// The text on one line of at most 300 characters, without secrets.
     pub(super) fn line(&self, text: &str) -> String {
         let shown: String = text.chars().filter(|c| !is_hidden(*c)).collect();
         let words: Vec<&str> = shown.split_whitespace().collect();
         let mut line = words.join(" ");
-        // Cut last: a cut before could leave the first half of a secret.
+        // Shorten last: otherwise the first half of a secret could remain.
         for secret in &self.0 {
             line = line.replace(secret, "[secret]");
         }
-        match line.char_indices().nth(KEPT) {
+        match line.char_indices().nth(MAX_LINE) {
             None => line,
             Some((end, _)) => format!("{}…", &line[..end]),
         }
     }
 }
 
-/// Controls other than white space, and the marks that turn or hide text.
+/// Whether a character is a control other than white space, or a mark that reverses or hides text.
 fn is_hidden(c: char) -> bool {
     (c.is_control() && !c.is_whitespace())
         || matches!(c, '\u{200B}'..='\u{200F}' | '\u{202A}'..='\u{202E}' | '\u{2060}'..='\u{2069}' | '\u{FEFF}')
@@ -130,22 +134,22 @@ mod tests {
     }
 
     #[test]
-    fn replies_lose_keys_and_nothing_else() {
+    fn only_keys_are_removed_from_replies() {
         let scrub = Scrub::new(["kitchen".to_owned(), "sk-0123456789abcdef".to_owned()]);
         let reply = "A  kitchen\nsk-0123456789abcdef".to_owned();
         assert_eq!(scrub.reply(reply), "A  kitchen\n[secret]");
     }
 
     #[test]
-    fn secrets_are_taken_out_before_the_cut() {
+    fn secrets_are_removed_before_the_text_is_shortened() {
         let scrub = Scrub::new(["sk-abcdef".to_owned(), "sk-abcdef-long".to_owned()]);
         assert_eq!(
             scrub.line("key \u{1b}[31msk-abc\u{200b}def-long,\r\n\tsk-abcdef"),
             "key [31m[secret], [secret]"
         );
-        let long = format!("{}sk-abcdef", "x".repeat(KEPT - 4));
+        let long = format!("{}sk-abcdef", "x".repeat(MAX_LINE - 4));
         assert!(!scrub.line(&long).contains("sk-"));
-        assert_eq!(scrub.line(&"é".repeat(400)).chars().count(), KEPT + 1);
+        assert_eq!(scrub.line(&"é".repeat(400)).chars().count(), MAX_LINE + 1);
         assert_eq!(
             Scrub::new(["x".to_owned()]).line("an axe\u{202e}"),
             "an axe"

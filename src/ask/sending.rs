@@ -1,38 +1,39 @@
-//! How requests are sent and sent again: [`Sending`].
+//! The settings for sending and retrying requests: [`Sending`].
 
 use std::time::Duration;
 
 use clap::Args;
 
 use super::pace::{Bounds, Quota};
+use crate::types::Decides;
 use crate::types::flag::{positive, seconds};
 
-/// How requests are sent and sent again.
+/// The settings for sending and retrying requests.
 #[derive(Debug, Clone, Copy, PartialEq, Args)]
 #[command(next_help_heading = "Sending")]
 pub struct Sending {
     /// Requests in flight at once: N, fewer where the server is overloaded; MIN-MAX, from MIN up as far as replies come no
     /// slower; or auto, from 8 up to 32, down to 1
-    #[arg(long, value_name = "N|MIN-MAX|auto", default_value = "auto")]
+    #[arg(long, value_name = "N|MIN-MAX|auto", default_value = "auto", add = Decides::Nothing)]
     pub concurrency: Bounds,
-    /// What may be sent in a minute.
+    /// The user's limits per minute.
     #[command(flatten)]
     pub quota: Quota,
     /// Seconds until a try is given up, reply included
-    #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "120")]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "120", add = Decides::Nothing)]
     pub timeout: Duration,
-    /// Further tries after a failure that may pass
-    #[arg(long, value_name = "N", default_value_t = 5)]
+    /// Retries after a temporary failure
+    #[arg(long, value_name = "N", default_value_t = 5, add = Decides::Nothing)]
     pub retries: u32,
-    /// The wait before the first retry where the server asks for none; each further one doubles, and each is drawn out at
-    /// random by up to its length.
+    /// The wait before the first retry if the server asks for none. Each further wait doubles, and each is extended at random
+    /// by up to its length.
     #[arg(skip = FIRST_DELAY)]
     pub first_delay: Duration,
     /// The longest wait, in seconds, that a server may ask for; beyond it the request is given up
-    #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "120")]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "120", add = Decides::Nothing)]
     pub max_wait: Duration,
     /// The largest image file that is sent, in MB; default: what is known of the endpoint, else 20
-    #[arg(long, value_name = "MB", value_parser = positive)]
+    #[arg(long, value_name = "MB", value_parser = positive, add = Decides::Nothing)]
     pub max_image: Option<f64>,
 }
 

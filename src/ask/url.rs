@@ -1,4 +1,4 @@
-//! Where requests go: [`BaseUrl`].
+//! The base URL of an endpoint: [`BaseUrl`].
 
 use std::fmt;
 use std::net::IpAddr;
@@ -12,12 +12,12 @@ use reqwest::Url;
 use super::wire::Wire;
 use crate::error::{Error, Result};
 
-/// The base URL of an endpoint, taken word for word: no `/v1` is added or assumed.
+/// The base URL of an endpoint, used exactly as written: no `/v1` is added or assumed.
 #[derive(Clone, PartialEq, Eq)]
 pub struct BaseUrl(Url);
 
 impl BaseUrl {
-    /// The address of what lies behind its path, as `chat/completions`; the query string is kept.
+    /// The URL of a path below the base URL, as `chat/completions`; the query string stays.
     pub(super) fn join(&self, path: &str) -> Url {
         let mut url = self.0.clone();
         url.set_path(&format!("{}/{path}", self.0.path().trim_end_matches('/')));
@@ -30,7 +30,7 @@ impl BaseUrl {
         self.0.host_str().unwrap_or_default()
     }
 
-    /// Whether it names this machine.
+    /// Whether the host is this machine.
     #[must_use]
     pub fn is_loopback(&self) -> bool {
         let host = self.host();
@@ -40,37 +40,36 @@ impl BaseUrl {
             || bare.parse::<IpAddr>().is_ok_and(|ip| ip.is_loopback())
     }
 
-    /// Whether it is an endpoint of Azure, which wants a key in a header of its own.
+    /// Whether the endpoint is Azure's, which expects the key in the header `api-key`.
     #[must_use]
     pub fn is_azure(&self) -> bool {
         AZURE.iter().any(|domain| self.host().ends_with(domain))
     }
 
-    /// Whether what is sent there can be read on the way.
+    /// Whether requests are sent unencrypted.
     #[must_use]
     pub fn is_plain(&self) -> bool {
         self.0.scheme() == "http"
     }
 
-    /// Whether it carries a user name or password of its own.
+    /// Whether the URL has a user name or password.
     #[must_use]
     pub fn has_credentials(&self) -> bool {
         !self.0.username().is_empty() || self.0.password().is_some()
     }
 
-    /// Everything in it that must not be shown: user and password in every form that a server could echo, and the values of its
-    /// query string.
+    /// The secrets in the URL: user and password in every form that a server could repeat, and the values of the query string.
     pub(super) fn secrets(&self) -> Vec<String> {
         let mut secrets = Vec::new();
         if self.has_credentials() {
             let (user, password) = (self.0.username(), self.0.password().unwrap_or_default());
-            let (user_read, password_read) = (decoded(user), decoded(password));
-            secrets.push(STANDARD.encode(format!("{user_read}:{password_read}")));
+            let (plain_user, plain_password) = (decoded(user), decoded(password));
+            secrets.push(STANDARD.encode(format!("{plain_user}:{plain_password}")));
             secrets.extend([user, password].map(str::to_owned));
-            secrets.extend([user_read, password_read]);
+            secrets.extend([plain_user, plain_password]);
         }
         for pair in self.0.query().unwrap_or_default().split('&') {
-            // Azure's version is no secret, and its errors speak about it.
+            // The API version of Azure is not secret, and Azure's errors mention it.
             if let Some((name, value)) = pair.split_once('=')
                 && name != "api-version"
             {
@@ -81,14 +80,14 @@ impl BaseUrl {
     }
 }
 
-/// Where Azure serves models: by resource (`R.openai.azure.com`) and by project.
+/// The domains at which Azure serves models, by resource (`R.openai.azure.com`) and by project.
 const AZURE: [&str; 3] = [
     ".openai.azure.com",
     ".cognitiveservices.azure.com",
     ".services.ai.azure.com",
 ];
 
-/// Undoes percent encoding.
+/// A text without percent encoding.
 fn decoded(text: &str) -> String {
     percent_decode_str(text).decode_utf8_lossy().into_owned()
 }
@@ -96,7 +95,7 @@ fn decoded(text: &str) -> String {
 impl FromStr for BaseUrl {
     type Err = Error;
 
-    /// Reads an address; the error does not show it, for it may hold a password.
+    /// Reads an address. The error does not show it, because it may have a password.
     fn from_str(text: &str) -> Result<Self> {
         let wrong = |problem: &str| Error::usage("--base-url", problem);
         let url = Url::parse(text.trim()).map_err(|error| {
@@ -111,21 +110,21 @@ impl FromStr for BaseUrl {
         }
         if url.fragment().is_some() {
             return Err(wrong(
-                "an address with '#' cannot be used; leave that part off",
+                "an address with '#' cannot be used; remove '#' and everything after it",
             ));
         }
         for path in Wire::ALL.map(Wire::path) {
             let before = url.path().trim_end_matches('/').strip_suffix(path);
             if before.is_some_and(|before| before.ends_with('/')) {
                 return Err(wrong(&format!(
-                    "leave /{path} off the end; it is added to the address"
+                    "remove /{path} from the end; it is appended to the address"
                 )));
             }
         }
         let base = Self(url);
         if base.is_azure() && base.0.path().trim_matches('/').is_empty() {
             return Err(wrong(
-                "an address of Azure needs its path: https://RESOURCE.openai.azure.com/openai/v1, or \
+                "an address of Azure needs a path: https://RESOURCE.openai.azure.com/openai/v1, or \
                  https://RESOURCE.openai.azure.com/openai/deployments/DEPLOYMENT?api-version=VERSION",
             ));
         }
@@ -159,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn the_path_is_taken_word_for_word() {
+    fn the_path_is_used_exactly_as_written() {
         for (base, completions) in [
             (
                 "https://api.openai.com/v1",
@@ -212,22 +211,22 @@ mod tests {
     }
 
     #[test]
-    fn this_machine_is_known() {
-        for here in [
+    fn addresses_of_this_machine_are_recognized() {
+        for local in [
             "http://localhost:1/",
             "http://127.0.0.1/",
             "http://127.9.9.9/v1",
             "http://[::1]:8/v1",
             "http://LOCALHOST/",
         ] {
-            assert!(url(here).is_loopback(), "{here}");
+            assert!(url(local).is_loopback(), "{local}");
         }
-        for there in [
+        for remote in [
             "http://192.168.0.1/",
             "http://localhost.example.com/",
             "http://[::2]/",
         ] {
-            assert!(!url(there).is_loopback(), "{there}");
+            assert!(!url(remote).is_loopback(), "{remote}");
         }
     }
 }

@@ -1,8 +1,8 @@
-//! What can be called, and with which flags: [`Cli`].
+//! The commands of the program and their flags: [`Cli`].
 
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory as _, Parser, Subcommand};
 use clap_complete::Shell;
 
 use crate::job::batch::BatchFileArgs;
@@ -21,15 +21,17 @@ use crate::run::serve::ServeArgs;
 use crate::run::show::ShowArgs;
 use crate::run::study;
 use crate::run::synthesize::SynthesizeArgs;
+use crate::types::Decides;
 
-/// What the program is called.
 pub(super) const NAME: &str = "darkqa-eval";
 
 const AFTER_HELP: &str = "\
 Precedence: flag, then environment (DARKQA_CONCURRENCY=16 for --concurrency 16), then --config FILE, then default.
-OPENAI_BASE_URL, OPENAI_API_KEY and ORT_DYLIB_PATH are defaults: whatever names another goes before them.
+OPENAI_BASE_URL, OPENAI_API_KEY and ORT_DYLIB_PATH are defaults: a flag, a DARKQA_ variable or a file replaces them.
 Exit codes: 0 everything scored; 1 finished with failures; 2 usage, configuration or a fatal error; 130 interrupted,
 or stopped by --max-cost.
+[trials], [reply] and [pixels] mark what a flag decides: which trials there are, what a model is sent, the content of images. No other flag
+changes an answer.
 Results go to standard output, progress and logs to standard error (RUST_LOG=darkqa_eval=debug shows more).";
 
 /// Measures how well a vision-language model sees in the dark.
@@ -45,48 +47,48 @@ Results go to standard output, progress and logs to standard error (RUST_LOG=dar
     args_conflicts_with_subcommands = true
 )]
 pub(crate) struct Cli {
-    /// Anything but an evaluation.
+    /// The command; `None` for an evaluation.
     #[command(subcommand)]
     pub command: Option<Command>,
-    /// What to evaluate, and how.
+    /// Flags of an evaluation, used without a command.
     #[command(flatten)]
     pub evaluate: EvaluateArgs,
-    /// What every command has.
+    /// Flags that every command has.
     #[command(flatten)]
     pub common: CommonArgs,
 }
 
-/// What every command has.
+/// Flags that every command has.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Output")]
 pub(crate) struct CommonArgs {
-    /// No progress
-    #[arg(long, global = true)]
+    /// Show no progress bars
+    #[arg(long, global = true, add = Decides::Nothing)]
     pub quiet: bool,
     /// A TOML file of flags by their long names; those of one command alone stand in a table of its name; default:
     /// DARKQA_CONFIG, else none
-    #[arg(long, global = true, value_name = "FILE")]
+    #[arg(long, global = true, value_name = "FILE", add = Decides::Nothing)]
     pub config: Option<PathBuf>,
 }
 
-/// What can be done besides evaluating.
+/// The commands besides an evaluation.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Write the low-light versions of images, as an evaluation would send them
     Synthesize(Box<SynthesizeArgs>),
-    /// Hold the synthesis against real pairs of images in normal and low light
+    /// Compare the synthesis with real pairs of images in normal and low light
     Realism(Box<RealismArgs>),
     /// Make multiple-choice questions about frames, by rule, from their depth, class and segment maps
     Questions(Box<QuestionsArgs>),
-    /// Take over frames of another data set into the common interface
+    /// Import frames of another data set as a folder of frames
     Import(Box<ImportArgs>),
     /// Write ready-made sets for other tools, one for each condition, with its images
     Export(Box<ExportArgs>),
     /// Write the built-in rooms as frames with depth, class and segment maps
     Rooms(RoomsArgs),
-    /// Enhance images by an ONNX model, as an evaluation would; or tell how it is fed and read
+    /// Enhance images with an ONNX model, as an evaluation would; or describe its inputs and outputs
     Enhance(Box<EnhanceArgs>),
-    /// Ask through a Batch API, at half the price: write its input files, take over its output files
+    /// Ask through a Batch API, at half the price: write its input files, import its output files
     #[command(subcommand)]
     Batch(BatchCommand),
     /// Ask OpenEQA's open questions about walks through dark houses, the answers marked by a judge (LLM-Match)
@@ -95,56 +97,78 @@ pub(crate) enum Command {
     /// judge. The same answer to the same question is judged once. What was answered or marked is never asked again.
     #[command(name = "openeqa", mut_args(OpenEqaArgs::own))]
     OpenEqa(Box<OpenEqaArgs>),
-    /// Answer as the built-in models do behind an OpenAI-compatible endpoint on this machine, for trying clients without keys
+    /// Serve the built-in models at an OpenAI-compatible endpoint on this machine, to try clients without keys
     Serve(ServeArgs),
-    /// Show what runs hold, from their records alone: tables, figures and one HTML file; several runs are compared
+    /// Show the results of runs, from their records alone: tables, figures and one HTML file; several runs are compared
     Report(ReportArgs),
-    /// Put the shards of an evaluation together as the one run that they are
+    /// Merge the shards of an evaluation into one run
     Merge(MergeArgs),
-    /// Make the images that one question was asked with again, bit for bit, and prove it by their digests
+    /// Make the images of one question again, bit for bit, and check their digests
     Show(ShowArgs),
-    /// Let people answer what the models were asked: write a page for them, take their answers over as a model's
+    /// Let people answer what the models were asked: write a page for them, import their answers as a model's
     #[command(subcommand)]
     Study(StudyCommand),
-    /// Print the completions of a shell, to be put where it looks for them
+    /// Print the completions of a shell, to save where the shell looks for them
     Completions {
-        /// The shell
-        #[arg(value_enum)]
+        /// The shell to print them for
+        #[arg(value_enum, add = Decides::Nothing)]
         shell: Shell,
     },
-    /// Write the manual, a page a command
+    /// Write the manual, one page per command
     Man {
-        /// Where the pages go
-        #[arg(value_name = "DIR")]
+        /// Folder for the pages
+        #[arg(value_name = "DIR", add = Decides::Nothing)]
         folder: PathBuf,
     },
 }
 
-/// What can be done with batches.
+/// The commands for batches.
 #[derive(Debug, Subcommand)]
 pub(crate) enum BatchCommand {
     /// Write what an evaluation has left to ask as files of a Batch API; takes the flags of the evaluation
     Export(Box<BatchExportArgs>),
-    /// Take the replies of a Batch API over into a run
+    /// Import the replies of a Batch API into a run
     Import(BatchImportArgs),
 }
 
 /// The flags of `batch export`.
 #[derive(Debug, Args)]
 pub(crate) struct BatchExportArgs {
-    /// The evaluation.
+    /// Flags of the evaluation.
     #[command(flatten)]
     pub evaluate: EvaluateArgs,
-    /// Its files.
+    /// Flags of the input files.
     #[command(flatten)]
     pub files: BatchFileArgs,
 }
 
-/// What can be done with people's answers.
+/// The commands for people's answers.
 #[derive(Debug, Subcommand)]
 pub(crate) enum StudyCommand {
     /// Write a page on which people answer the questions of a run about the very images that its models were sent
     Pack(study::PackArgs),
-    /// Take people's answers over as a run of a model of their own, to be compared by report
+    /// Import people's answers as the run of a model, to compare with `report`
     Read(study::ReadArgs),
+}
+
+/// The command line, with the class of each flag at the end of its help, such as `[pixels]`.
+pub(super) fn command() -> clap::Command {
+    marked(Cli::command())
+}
+
+fn marked(command: clap::Command) -> clap::Command {
+    let mark = |arg: clap::Arg| {
+        let class = Decides::of(&arg).filter(|class| *class != Decides::Nothing);
+        let Some(class) = class.map(Decides::word) else {
+            return arg;
+        };
+        let help = arg.get_help().map(|help| format!("{help} [{class}]"));
+        let long = arg.get_long_help().map(|help| format!("{help} [{class}]"));
+        let arg = arg.help(help.unwrap_or_default());
+        match long {
+            Some(long) => arg.long_help(long),
+            None => arg,
+        }
+    };
+    command.mut_args(mark).mut_subcommands(marked)
 }

@@ -1,8 +1,8 @@
-//! Where a setting comes from: flag, environment, file.
+//! The sources of a setting: flag, environment, file.
 //!
-//! What the environment and a file say of flags that nobody typed is turned into words, and these stand behind those typed when all of
-//! them are parsed, once. So a value is read alike wherever it stands. ripgrep does so with its configuration file
-//! (`crates/core/flags/parse.rs`).
+//! Values from the environment and a file, for flags that were not typed, are turned into words and appended to the typed words. All of
+//! them are parsed together, once. So a value is read in the same way wherever it comes from. ripgrep does so with its configuration
+//! file (`crates/core/flags/parse.rs`).
 
 use std::collections::BTreeMap;
 use std::ffi::{OsStr, OsString};
@@ -16,17 +16,16 @@ use toml::{Table, Value};
 use crate::error::{Error, Result};
 use crate::files::reading;
 
-/// What every variable of the environment begins with.
+/// Prefix of this program's environment variables.
 const PREFIX: &str = "DARKQA_";
 
-/// The flag of the file, and its variable.
+/// Name of the flag for the configuration file.
 const CONFIG: &str = "config";
 
-/// Why there is nothing to carry out.
+/// The reason why no command is carried out.
 pub(super) enum Problem {
-    /// Something is wrong.
     Error(Error),
-    /// Help or the version is asked for.
+    /// The text of `--help` or `--version`, which clap returns as an error.
     Help(clap::Error),
 }
 
@@ -36,34 +35,34 @@ impl From<Error> for Problem {
     }
 }
 
-/// What is said of one flag outside of the command line.
+/// Value of one flag from the environment or a file.
 struct LayeredValue {
-    /// Where: a variable, or a file and its key.
+    /// Source of the value for messages: a variable, or a file and a key in it.
     origin: String,
     values: Vec<OsString>,
 }
 
-/// Parses the words typed, with what the environment and the `--config` file say of the flags that nobody typed.
+/// The matches of the typed words, with values from the environment and the `--config` file for flags that were not typed.
 ///
 /// # Errors
-/// With the flag, the variable or the entry of the file that cannot be used.
+/// Names the flag, the variable or the entry of the file that cannot be used.
 pub(super) fn parse(
     mut all: Command,
     typed: Vec<OsString>,
     variable: impl Fn(&str) -> Option<OsString>,
 ) -> Result<ArgMatches, Problem> {
-    // Copied before it is built: this setting reaches the commands within a command only then.
+    // Cloned before `build`: only then does this setting reach the nested commands.
     let lenient = all.clone().ignore_errors(true);
     all.build();
     let Ok(matches) = lenient.try_get_matches_from(&typed) else {
-        return read(all, typed, &BTreeMap::new());
+        return parse_words(all, typed, &BTreeMap::new());
     };
-    let (path, own) = called(&matches);
+    let (path, own) = called_command(&matches);
     let command = descend(&all, &path);
-    let mut taken: Vec<&Arg> = of_flags(command)
+    let mut set: Vec<&Arg> = settable_flags(command)
         .filter(|arg| own.value_source(arg.get_id().as_str()) == Some(ValueSource::CommandLine))
         .collect();
-    let environment = environment(&all, command, &variable)?;
+    let environment = environment_values(&all, command, &variable)?;
     let file = match own.get_one::<PathBuf>(CONFIG) {
         Some(path) => Some(path.clone()),
         None => variable("DARKQA_CONFIG")
@@ -71,37 +70,37 @@ pub(super) fn parse(
             .map(PathBuf::from),
     };
     let file = match file {
-        Some(file) => of_file(&file, &all, command, &path)?,
+        Some(file) => file_values(&file, &all, command, &path)?,
         None => BTreeMap::new(),
     };
     let (mut words, mut origins) = (Vec::new(), BTreeMap::new());
     for layer in [environment, file] {
-        let mut claimed = Vec::new();
-        for arg in of_flags(command) {
-            let hidden = || taken.iter().any(|other| hides(command, other, arg));
-            if let Some(said) = layer.get(&key(arg)).filter(|_| !hidden()) {
+        let mut newly_set = Vec::new();
+        for arg in settable_flags(command) {
+            let hidden = || set.iter().any(|other| hides(command, other, arg));
+            if let Some(value) = layer.get(&key(arg)).filter(|_| !hidden()) {
                 let flag = arg.get_long().unwrap_or_default();
-                words.extend(as_words(arg, flag, said)?);
-                origins.insert(flag.to_owned(), said.origin.clone());
-                claimed.push(arg);
+                words.extend(as_words(arg, flag, value)?);
+                origins.insert(flag.to_owned(), value.origin.clone());
+                newly_set.push(arg);
             }
         }
-        taken.extend(claimed);
+        set.extend(newly_set);
     }
     let mut typed = typed;
     let end = typed.iter().position(|word| word == "--");
     let end = end.unwrap_or(typed.len());
     typed.splice(end..end, words);
-    read(all, typed, &origins)
+    parse_words(all, typed, &origins)
 }
 
 /// The matches of the command that is called.
-pub(super) fn own(matches: &ArgMatches) -> &ArgMatches {
-    called(matches).1
+pub(super) fn command_matches(matches: &ArgMatches) -> &ArgMatches {
+    called_command(matches).1
 }
 
-/// The names of the command that is called, and its matches.
-fn called(matches: &ArgMatches) -> (Vec<String>, &ArgMatches) {
+/// The names on the way to the command that is called, and its matches.
+fn called_command(matches: &ArgMatches) -> (Vec<String>, &ArgMatches) {
     let (mut path, mut own) = (Vec::new(), matches);
     while let Some((name, matches)) = own.subcommand() {
         path.push(name.to_owned());
@@ -116,8 +115,8 @@ fn descend<'a>(all: &'a Command, path: &[String]) -> &'a Command {
     })
 }
 
-/// The flags of a command that layers can set.
-fn of_flags(command: &Command) -> impl Iterator<Item = &Arg> {
+/// The flags of a command that the environment and a file can set.
+fn settable_flags(command: &Command) -> impl Iterator<Item = &Arg> {
     let settable = |arg: &&Arg| {
         let long = arg.get_long();
         long.is_some() && !matches!(long, Some("help" | "version" | CONFIG))
@@ -125,42 +124,45 @@ fn of_flags(command: &Command) -> impl Iterator<Item = &Arg> {
     command.get_arguments().filter(settable)
 }
 
-/// The name of a flag in files, and with other letters in variables: that of its field, which is its own but for flags that mean
-/// something else than an evaluation's of the same name.
+/// The name of a flag in files, which [`variable_name`] turns into that of its variable. It is the name of the field. That differs
+/// from the flag's name only if an evaluation has a flag of the same name and another meaning.
 fn key(arg: &Arg) -> String {
     arg.get_id().as_str().replace('_', "-")
 }
 
-/// Whether a flag that is said hides another in the layers below: the same one, or one that it conflicts with.
-fn hides(command: &Command, said: &Arg, other: &Arg) -> bool {
-    let conflicts = |one: &Arg, with: &Arg| {
-        let mut all = command.get_arg_conflicts_with(one).into_iter();
+/// Whether a flag that is set hides another in lower layers: the same flag, or one that conflicts with it.
+fn hides(command: &Command, set: &Arg, other: &Arg) -> bool {
+    let conflicts = |arg: &Arg, with: &Arg| {
+        let mut all = command.get_arg_conflicts_with(arg).into_iter();
         all.any(|arg| arg.get_id() == with.get_id())
     };
-    said.get_id() == other.get_id() || conflicts(said, other) || conflicts(other, said)
+    set.get_id() == other.get_id() || conflicts(set, other) || conflicts(other, set)
 }
 
 /// The flags that the environment sets: `DARKQA_MAX_TOKENS` is `--max-tokens`; a list is separated by commas.
 ///
-/// A variable that only another command knows is passed over; one that no command knows is refused.
-fn environment(
+/// A variable that only another command knows is skipped. One that no command knows is refused.
+fn environment_values(
     all: &Command,
     command: &Command,
     variable: &impl Fn(&str) -> Option<OsString>,
 ) -> Result<BTreeMap<String, LayeredValue>> {
     let names = std::env::vars_os().filter_map(|(name, _)| name.into_string().ok());
     let ours = names.filter(|name| name.starts_with(PREFIX));
-    let mut known: Vec<String> = every_flag(all).iter().map(|flag| name_of(flag)).collect();
-    known.push(name_of(CONFIG));
+    let mut known: Vec<String> = every_flag(all)
+        .iter()
+        .map(|flag| variable_name(flag))
+        .collect();
+    known.push(variable_name(CONFIG));
     for name in ours {
         if !known.contains(&name) {
-            let problem = format_args!("no flag of this name{}", near(&name, &known, ""));
+            let problem = format_args!("no flag of this name{}", suggestion(&name, &known, ""));
             return Err(Error::usage(name.clone(), problem));
         }
     }
-    let said = of_flags(command).filter_map(|arg| {
+    let values = settable_flags(command).filter_map(|arg| {
         let flag = key(arg);
-        let origin = name_of(&flag);
+        let origin = variable_name(&flag);
         let text = variable(&origin).filter(|text| !text.is_empty())?;
         let list = matches!(arg.get_action(), ArgAction::Append);
         let values = match text.to_str() {
@@ -169,56 +171,56 @@ fn environment(
         };
         Some((flag, LayeredValue { origin, values }))
     });
-    Ok(said.collect())
+    Ok(values.collect())
 }
 
 /// The variable of a flag.
-fn name_of(flag: &str) -> String {
+fn variable_name(flag: &str) -> String {
     format!("{PREFIX}{}", flag.replace('-', "_").to_uppercase())
 }
 
 /// The flags of all commands.
 fn every_flag(command: &Command) -> Vec<String> {
-    let mut all: Vec<String> = of_flags(command).map(key).collect();
+    let mut all: Vec<String> = settable_flags(command).map(key).collect();
     all.extend(command.get_subcommands().flat_map(every_flag));
     all
 }
 
-/// The nearest of several names, as a question; empty if none is near.
-fn near(name: &str, known: &[String], before: &str) -> String {
+/// The most similar of the known names, as a question; empty if none is similar.
+fn suggestion(name: &str, known: &[String], prefix: &str) -> String {
     let alike = |other: &&String| strsim::jaro_winkler(name, other);
     let nearest = known.iter().max_by(|a, b| alike(a).total_cmp(&alike(b)));
     let nearest = nearest.filter(|other| alike(other) > 0.8);
     nearest.map_or_else(String::new, |other| {
-        format!("; did you mean {before}{other}?")
+        format!("; did you mean {prefix}{other}?")
     })
 }
 
-/// The flags that a TOML file sets: `max-tokens = 16`, `model = ["a", "b"]`, `blind = true`; those of one command alone in a table of
-/// its name, which go before those at the top.
-fn of_file(
+/// The flags that a TOML file sets: `max-tokens = 16`, `model = ["a", "b"]`, `blind = true`. A table with the name
+/// of a command is for this command alone, and overrides the flags at the top of the file.
+fn file_values(
     path: &Path,
     all: &Command,
     command: &Command,
     called: &[String],
 ) -> Result<BTreeMap<String, LayeredValue>> {
     let text = reading::text(path)?;
-    let table: Table = text.parse().map_err(|e| broken(path, &text, &e))?;
-    let mut said = BTreeMap::new();
-    take(&mut said, path, &table, all, (command, called), &[])?;
-    Ok(said)
+    let table: Table = text.parse().map_err(|e| invalid_toml(path, &text, &e))?;
+    let mut values = BTreeMap::new();
+    read_table(&mut values, path, &table, all, (command, called), &[])?;
+    Ok(values)
 }
 
-/// Takes the entries of a table, and of the tables in it those on the way to the command that is called.
-fn take(
-    said: &mut BTreeMap<String, LayeredValue>,
+/// Adds the entries of a table, and of those nested tables that lead to the command that is called.
+fn read_table(
+    flag_values: &mut BTreeMap<String, LayeredValue>,
     path: &Path,
     table: &Table,
     at: &Command,
     (command, called): (&Command, &[String]),
     within: &[&str],
 ) -> Result<()> {
-    let flags: Vec<String> = of_flags(command).map(key).collect();
+    let flags: Vec<String> = settable_flags(command).map(key).collect();
     for (key, value) in table.iter().filter(|(_, value)| !value.is_table()) {
         let flag = key.replace('_', "-");
         let place = [within, &[key]].concat().join(".");
@@ -230,7 +232,7 @@ fn take(
         if !flags.contains(&flag) {
             let problem = format_args!(
                 "there is no flag --{flag} here{}",
-                near(&flag, &flags, "--")
+                suggestion(&flag, &flags, "--")
             );
             return Err(Error::usage(origin, problem));
         }
@@ -242,7 +244,7 @@ fn take(
             let problem = "a text, a number, a switch or a list of them expected";
             Error::usage(&origin, problem)
         })?;
-        said.insert(flag, LayeredValue { origin, values });
+        flag_values.insert(flag, LayeredValue { origin, values });
     }
     let tables = table
         .iter()
@@ -254,23 +256,35 @@ fn take(
                 .map(|c| c.get_name().to_owned())
                 .collect();
             let origin = format!("{}, [{name}]", path.display());
-            let problem = format_args!("there is no command {name}{}", near(name, &names, ""));
+            let problem =
+                format_args!("there is no command {name}{}", suggestion(name, &names, ""));
             return Err(Error::usage(origin, problem));
         };
         if called.first().is_some_and(|called| called == name) {
             let within = [within, &[name]].concat();
-            take(said, path, inner, next, (command, &called[1..]), &within)?;
+            read_table(
+                flag_values,
+                path,
+                inner,
+                next,
+                (command, &called[1..]),
+                &within,
+            )?;
         }
     }
     Ok(())
 }
 
-/// What is wrong with a TOML file, in one line that names its own.
-fn broken(path: &Path, text: &str, error: &toml::de::Error) -> Error {
+/// The error about invalid TOML, on one line and with its line number.
+fn invalid_toml(path: &Path, text: &str, error: &toml::de::Error) -> Error {
     let before = error.span().and_then(|span| text.get(..span.start));
     let line = before.unwrap_or_default().matches('\n').count() + 1;
     let problem: Vec<&str> = error.message().lines().map(str::trim).collect();
-    Error::line(path, line, format_args!("no TOML: {}", problem.join(", ")))
+    Error::line(
+        path,
+        line,
+        format_args!("not valid TOML: {}", problem.join(", ")),
+    )
 }
 
 fn text_of(value: &Value) -> Option<OsString> {
@@ -281,17 +295,17 @@ fn text_of(value: &Value) -> Option<OsString> {
     }
 }
 
-/// The words that say a flag as if it were typed; a switch that is turned off has none.
-fn as_words(arg: &Arg, flag: &str, said: &LayeredValue) -> Result<Vec<OsString>> {
+/// The words that set a flag on the command line; none for a switch that is turned off.
+fn as_words(arg: &Arg, flag: &str, value: &LayeredValue) -> Result<Vec<OsString>> {
     if !arg.get_action().takes_values() {
-        let word = match &said.values[..] {
+        let word = match &value.values[..] {
             [value] => value.to_str(),
             _ => None,
         };
         return match word {
             Some("1" | "true" | "yes") => Ok(vec![format!("--{flag}").into()]),
             Some("0" | "false" | "no") => Ok(Vec::new()),
-            _ => Err(Error::usage(&said.origin, "true or false expected")),
+            _ => Err(Error::usage(&value.origin, "true or false expected")),
         };
     }
     let word = |value: &OsString| {
@@ -299,17 +313,17 @@ fn as_words(arg: &Arg, flag: &str, said: &LayeredValue) -> Result<Vec<OsString>>
         word.push(value);
         word
     };
-    // A list of a flag that takes one text with commas is that text.
+    // If a flag takes one text with commas, a list is joined to that text.
     let list = matches!(arg.get_action(), ArgAction::Append);
-    if list || said.values.len() == 1 {
-        return Ok(said.values.iter().map(word).collect());
+    if list || value.values.len() == 1 {
+        return Ok(value.values.iter().map(word).collect());
     }
-    let together = said.values.join(OsStr::new(","));
-    Ok(vec![word(&together)])
+    let joined = value.values.join(OsStr::new(","));
+    Ok(vec![word(&joined)])
 }
 
-/// Parses all words; an error about a flag that was not typed names where it is said.
-fn read(
+/// The matches of all words. An error about a flag that was not typed names the source of its value.
+fn parse_words(
     mut command: Command,
     words: Vec<OsString>,
     origins: &BTreeMap<String, String>,
@@ -320,11 +334,11 @@ fn read(
             ErrorKind::DisplayHelp
             | ErrorKind::DisplayVersion
             | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => Problem::Help(e),
-            _ => Problem::Error(said_where(&e, origins)),
+            _ => Problem::Error(with_origin(&e, origins)),
         })
 }
 
-fn said_where(error: &clap::Error, origins: &BTreeMap<String, String>) -> Error {
+fn with_origin(error: &clap::Error, origins: &BTreeMap<String, String>) -> Error {
     let flag = match error.get(ContextKind::InvalidArg) {
         Some(ContextValue::String(flag)) => flag.trim_start_matches("--"),
         _ => "",
@@ -337,7 +351,7 @@ fn said_where(error: &clap::Error, origins: &BTreeMap<String, String>) -> Error 
     }
 }
 
-/// What clap says, in one line: what is wrong, and what may be meant.
+/// The text of an error of clap on one line: the problem and the suggestion.
 pub(super) fn one_line(error: &clap::Error) -> String {
     let text = error.render().to_string();
     let lines = text.lines().map(str::trim);

@@ -1,7 +1,8 @@
-//! The command line: what can be called, and with which flags.
+//! The command line: commands, their flags, and exit codes.
 //!
-//! The flags of a command stand in a structure beside the command; several share groups of flags, each in the room that uses it. The
-//! environment and a `--config` file are turned into words before they are parsed (see `cli/layers.rs`), so every value is read by one parser.
+//! The flags of a command are a struct in the module of the command. Flags that several commands share are groups in the modules that
+//! use them. The environment and a `--config` file are turned into words before parsing (see `cli/layers.rs`), so one parser reads all
+//! values.
 
 mod command;
 mod layers;
@@ -12,7 +13,7 @@ use std::io::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 
-use clap::{ArgMatches, CommandFactory as _, FromArgMatches as _};
+use clap::{ArgMatches, FromArgMatches as _};
 use clap_complete::Shell;
 use tracing_subscriber::EnvFilter;
 
@@ -31,24 +32,24 @@ use layers::one_line;
 
 use command::Cli;
 
-/// Finished, but some trials failed.
+/// Exit code: finished, but some trials failed.
 const WITH_FAILURES: u8 = 1;
-/// Usage, configuration, or an error that stops everything.
+/// Exit code: wrong usage or configuration, or an error that stops everything.
 const FATAL: u8 = 2;
-/// Interrupted; the same command goes on.
+/// Exit code: interrupted, or stopped by `--max-cost`; the same command continues.
 const INTERRUPTED: u8 = 130;
 
-/// The program: what these words ask for, carried out.
+/// The exit code of the program, after it has carried out the command that these words name.
 #[must_use]
 pub fn main(words: impl Iterator<Item = OsString>) -> ExitCode {
-    let matches = match layers::parse(Cli::command(), words.collect(), |name| {
+    let matches = match layers::parse(command::command(), words.collect(), |name| {
         std::env::var_os(name)
     }) {
         Ok(matches) => matches,
         Err(layers::Problem::Error(e)) => return fail(&e.to_string()),
         Err(layers::Problem::Help(help)) => {
             let written = help.print();
-            // Half a command: its help says the other half, on standard error.
+            // A part of the command is missing: clap prints its help on standard error.
             return match written {
                 Ok(()) if !help.use_stderr() => ExitCode::SUCCESS,
                 _ => ExitCode::from(FATAL),
@@ -77,16 +78,16 @@ pub fn main(words: impl Iterator<Item = OsString>) -> ExitCode {
     }
     match carry_out(cli, &progress) {
         Ok(outcome) => finish(outcome),
-        // An error of this crate says its cause itself.
+        // The text of an error of this crate includes its cause.
         Err(e) => fail(&e.to_string()),
     }
 }
 
-/// The command line with the words that its run keeps.
+/// The parsed command line, with the image flags that the manifest of a run stores.
 fn read(matches: &ArgMatches) -> Result<Cli> {
     let mut cli = Cli::from_arg_matches(matches)
         .map_err(|e| Error::usage("the command line", one_line(&e)))?;
-    let own = layers::own(matches);
+    let own = layers::command_matches(matches);
     let job = match &mut cli.command {
         None => Some(&mut cli.evaluate.job),
         Some(Command::Batch(BatchCommand::Export(args))) => Some(&mut args.evaluate.job),
@@ -94,7 +95,7 @@ fn read(matches: &ArgMatches) -> Result<Cli> {
         _ => None,
     };
     if let Some(job) = job {
-        job.pictures = image_words::said(own)?;
+        job.image_flags = image_words::typed_flags(own)?;
     }
     Ok(cli)
 }
@@ -129,7 +130,7 @@ fn carry_out(cli: Cli, progress: &Progress) -> Result<Outcome> {
 
 fn completions(shell: Shell) -> Outcome {
     let mut script = Vec::new();
-    clap_complete::generate(shell, &mut Cli::command(), NAME, &mut script);
+    clap_complete::generate(shell, &mut command::command(), NAME, &mut script);
     Outcome {
         status: Status::Complete,
         output: String::from_utf8_lossy(&script).into_owned(),
@@ -138,7 +139,7 @@ fn completions(shell: Shell) -> Outcome {
 
 fn manual(folder: &Path) -> Result<Outcome> {
     std::fs::create_dir_all(folder).map_err(|e| Error::file(folder, "create", e))?;
-    let command = Cli::command().disable_help_subcommand(true);
+    let command = command::command().disable_help_subcommand(true);
     clap_mangen::generate_to(command, folder).map_err(|e| Error::file(folder, "write", e))?;
     Ok(Outcome {
         status: Status::Complete,
@@ -150,7 +151,7 @@ fn finish(Outcome { status, output }: Outcome) -> ExitCode {
     let written = std::io::stdout().lock().write_all(output.as_bytes());
     match (status, written) {
         (Status::Cancelled, _) => ExitCode::from(INTERRUPTED),
-        // Whoever reads the output may have enough of it.
+        // A reader of the output, such as `head`, may close the pipe early.
         (_, Err(e)) if e.kind() != std::io::ErrorKind::BrokenPipe => fail(&e.to_string()),
         (Status::Complete, _) => ExitCode::SUCCESS,
         _ => ExitCode::from(WITH_FAILURES),

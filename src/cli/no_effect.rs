@@ -1,4 +1,4 @@
-//! What is said in a call and can change nothing: [`without_effect`].
+//! Warnings about flags that have no effect in a call: [`without_effect`].
 
 use std::collections::BTreeSet;
 
@@ -19,21 +19,21 @@ use crate::synthesis::{LightArgs, SensorArgs};
 use crate::types::KindSet;
 use crate::types::degradation::Kind;
 
-/// A line for each reason why flags of the call change nothing.
+/// One line for each reason why flags of the call have no effect.
 pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
-    let mut idle = Idle::new(layers::own(matches));
+    let mut idle = NoEffect::new(layers::command_matches(matches));
     match &cli.command {
         None => idle.evaluation(&cli.evaluate),
         Some(Command::Batch(BatchCommand::Export(args))) => idle.evaluation(&args.evaluate),
         Some(Command::OpenEqa(args)) => idle.open(args),
         Some(Command::Synthesize(args)) => {
             if args.from.is_some() {
-                let why = "--from makes an image as its own file says";
+                let why = "--from makes an image with the settings in its file";
                 idle.because(why, &light());
             }
             if args.sheet.is_some() {
                 idle.because(
-                    "a sheet shows what it shows of both variants",
+                    "a sheet decides which variants it shows",
                     &["variant".into()],
                 );
             }
@@ -57,19 +57,19 @@ pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
     idle.lines
 }
 
-/// The fields of a group of flags.
+/// The ids of the flags in a group.
 fn ids<A: Args>() -> Vec<String> {
     let command = A::augment_args(Clap::new(""));
     let ids = command.get_arguments().map(|arg| arg.get_id().to_string());
     ids.collect()
 }
 
-/// What decides degraded images alone: the seed decides guesses and orders, too.
+/// The flags that decide only degraded images. Without the seed, which decides guesses and orders, too.
 fn light() -> Vec<String> {
     without_seed(ids::<LightArgs>())
 }
 
-/// What decides noise alone.
+/// The flags that decide only noise.
 fn sensor() -> Vec<String> {
     without_seed(ids::<SensorArgs>())
 }
@@ -88,13 +88,13 @@ fn enhancement() -> Vec<String> {
     .concat()
 }
 
-/// What was said, and what of it turned out to change nothing.
-struct Idle {
-    said: BTreeSet<String>,
+/// The flags that were typed, and the warnings about those without effect.
+struct NoEffect {
+    typed: BTreeSet<String>,
     lines: Vec<String>,
 }
 
-impl Idle {
+impl NoEffect {
     fn new(matches: &ArgMatches) -> Self {
         let ids = matches.ids().map(ToString::to_string);
         let typed = |id: &String| {
@@ -102,16 +102,16 @@ impl Idle {
             is_flag && matches.value_source(id) == Some(ValueSource::CommandLine)
         };
         Self {
-            said: ids.filter(typed).collect(),
+            typed: ids.filter(typed).collect(),
             lines: Vec::new(),
         }
     }
 
-    /// Notes those of these flags that were said; each is noted for the first reason alone.
+    /// Adds a warning about those of these flags that were typed. Each flag is named once, with the first reason.
     fn because(&mut self, why: &str, flags: &[String]) {
         let idle: Vec<String> = flags
             .iter()
-            .filter(|id| self.said.remove(*id))
+            .filter(|id| self.typed.remove(*id))
             .map(|id| format!("--{}", id.replace('_', "-")))
             .collect();
         if !idle.is_empty() {
@@ -139,14 +139,14 @@ impl Idle {
             self.because("no judge is named", &ids::<JudgeArgs>());
         }
         if !args.batch {
-            self.because("--batch alone writes such files", &ids::<BatchFileArgs>());
+            self.because("only --batch writes such files", &ids::<BatchFileArgs>());
         }
         if args.study.is_none() {
             self.job(&args.job, &[], &[], args.judge.judge.as_ref());
         }
     }
 
-    /// What every experiment has: `images` are further flags of images, `replies` further ones of what is asked of servers.
+    /// Checks the flags of every experiment. `images` adds flags of images, `replies` adds flags of requests to servers.
     fn job(
         &mut self,
         args: &JobArgs,
@@ -184,30 +184,30 @@ impl Idle {
         }
     }
 
-    /// What is idle as levels and variants are.
+    /// Checks the flags of light against the levels and variants.
     fn light(&mut self, args: &LightArgs) {
         let kinds: Vec<Kind> = args.variant.kinds().collect();
         if args.levels.0.iter().all(|level| level.severity().is_none()) {
             let idle = [sensor(), enhancement(), vec!["variant".into()]].concat();
-            self.because("L0 alone is untouched", &idle);
+            self.because("the only level is L0, which is not degraded", &idle);
         } else if !kinds.iter().any(|kind| kind.has_readings()) {
             self.because("no variant has noise", &sensor());
         }
     }
 
-    /// What is idle as enhancers are.
+    /// Checks the flags of enhancement against the enhancers.
     fn enhancement(&mut self, light: &LightArgs, args: &EnhancerArgs) {
         if args.llie.is_empty() {
             self.because("no --llie is named", &enhancement());
-        } else if !share(light.variant, args.llie_on) {
+        } else if !overlap(light.variant, args.llie_on) {
             let why = "--llie-on names no variant of --variant";
             self.because(why, &enhancement());
         }
     }
 }
 
-fn share(one: KindSet, other: KindSet) -> bool {
-    one.kinds().any(|kind| other.includes(kind))
+fn overlap(first: KindSet, second: KindSet) -> bool {
+    first.kinds().any(|kind| second.includes(kind))
 }
 
 #[cfg(test)]
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn what_changes_nothing_is_said() {
+    fn flags_without_effect_are_named() {
         for (words, idle) in [
             (
                 "--model m --blind --llie f.onnx --levels L3",
@@ -238,11 +238,11 @@ mod tests {
             ),
             (
                 "--model m --llie f.onnx --levels L0",
-                "--llie: no effect: L0 alone is untouched",
+                "--llie: no effect: the only level is L0",
             ),
             (
                 "--model m --levels L0 --variant ev --ratio 9 --fixed",
-                "--ratio, --fixed, --variant: no effect: L0 alone",
+                "--ratio, --fixed, --variant: no effect: the only level is L0",
             ),
             (
                 "--model m --variant ev --profile eld",
@@ -274,7 +274,7 @@ mod tests {
             ),
             (
                 "openeqa --questions q --frames f --model m --url /v1",
-                "--url: no effect: --batch alone",
+                "--url: no effect: only --batch",
             ),
             (
                 "openeqa --questions q --frames f --study s --rpm 9",
@@ -282,7 +282,7 @@ mod tests {
             ),
             (
                 "openeqa --questions q --frames f --model m --levels L0 --gain 1",
-                "--gain: no effect: L0 alone",
+                "--gain: no effect: the only level is L0",
             ),
             (
                 "synthesize a --out b --from c --levels L3 --camera x",
@@ -294,7 +294,7 @@ mod tests {
             ),
             (
                 "synthesize a --out b --levels L0 --tone none",
-                "--tone: no effect: L0 alone",
+                "--tone: no effect: the only level is L0",
             ),
             (
                 "export llava a --out b --llie-on ev",

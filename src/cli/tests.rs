@@ -2,12 +2,13 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use clap::{Arg, Command as Clap, Parser as _};
+use clap::{Arg, Command as Clap, CommandFactory as _, Parser as _};
 
 use super::*;
+use crate::types::Decides;
 
 #[test]
-fn the_command_line_is_sound() {
+fn the_command_line_is_valid() {
     Cli::command().help_expected(true).debug_assert();
 }
 
@@ -16,7 +17,9 @@ fn reference() -> String {
     let mut command = Cli::command();
     command.build();
     let mut text = "# All flags\n\nWritten by `UPDATE=1 cargo test --lib cli::`, from what `--help` shows. A variable is `DARKQA_` and the name of the \
-                    flag in capitals; a key of a `--config` file is the name of the flag; both have another name where one is given.\n"
+                    flag in capitals; a key of a `--config` file is the name of the flag; both have another name where one is given. What a flag \
+                    decides: which *trials* there are, what a model is sent besides the image (*reply*), the content of images (*pixels*), or *nothing* of these: \
+                    then a run is the same run with any value of it.\n"
         .to_owned();
     section(&mut text, &command, "darkqa-eval");
     text
@@ -33,7 +36,7 @@ fn section(text: &mut String, command: &Clap, name: &str) {
     let is_only_a_group =
         command.is_subcommand_required_set() || name.ends_with("batch") || name.ends_with("study");
     if !is_only_a_group {
-        text.push_str("\n| flag | default | |\n|---|---|---|\n");
+        text.push_str("\n| flag | default | decides | |\n|---|---|---|---|\n");
         for arg in args {
             row(text, arg);
         }
@@ -64,7 +67,7 @@ fn row(text: &mut String, arg: &Arg) {
         _ => String::new(),
     };
     let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
-    let (what, said) = match help.rsplit_once("; default: ") {
+    let (what, stated) = match help.rsplit_once("; default: ") {
         Some((what, default)) => (what.to_owned(), default.to_owned()),
         None => (help, String::new()),
     };
@@ -76,7 +79,7 @@ fn row(text: &mut String, arg: &Arg) {
     let default = match &defaults[..] {
         _ if !arg.get_action().takes_values() => "off".to_owned(),
         [] if arg.is_required_set() => "required".to_owned(),
-        [] => said,
+        [] => stated,
         values => format!("`{}`", values.join(",")),
     };
     let possible = arg.get_possible_values();
@@ -92,15 +95,16 @@ fn row(text: &mut String, arg: &Arg) {
     let escaped = |text: &str| text.replace('|', "\\|").replace('\n', " ");
     let _ = writeln!(
         text,
-        "| `{}`{key} | {} | {}{words} |",
+        "| `{}`{key} | {} | {} | {}{words} |",
         escaped(&flag),
         escaped(&default),
+        Decides::of(arg).map_or("", Decides::word),
         escaped(&what)
     );
 }
 
 #[test]
-fn the_reference_is_that_of_the_program() {
+fn the_flag_reference_is_up_to_date() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/cli/README.md");
     let reference = reference();
     if std::env::var_os("UPDATE").is_some() {
@@ -109,12 +113,12 @@ fn the_reference_is_that_of_the_program() {
     let written = fs::read_to_string(&path).unwrap_or_default();
     assert!(
         written == reference,
-        "src/cli/README.md is another: UPDATE=1 cargo test --lib cli:: writes it"
+        "src/cli/README.md is out of date: UPDATE=1 cargo test --lib cli:: writes it"
     );
 }
 
 #[test]
-fn the_job_of_kubernetes_says_flags_that_there_are() {
+fn the_kubernetes_job_uses_flags_that_exist() {
     let text = include_str!("../run/cluster/job.yaml");
     let flags = text
         .lines()
@@ -128,4 +132,87 @@ fn the_job_of_kubernetes_says_flags_that_there_are() {
     for field in ["completions", "parallelism"] {
         assert!(text.contains(&format!("\n  {field}: {parts}\n")), "{field}");
     }
+}
+
+/// All commands, the program itself first.
+fn commands(command: &Clap) -> Vec<&Clap> {
+    let inner = command
+        .get_subcommands()
+        .filter(|inner| inner.get_name() != "help");
+    std::iter::once(command)
+        .chain(inner.flat_map(commands))
+        .collect()
+}
+
+fn is_of_clap(arg: &Arg) -> bool {
+    matches!(arg.get_id().as_str(), "help" | "version")
+}
+
+#[test]
+fn every_flag_says_what_it_is_what_it_decides_and_its_default() {
+    let mut root = Cli::command();
+    root.build();
+    let mut wrong = Vec::new();
+    for command in commands(&root) {
+        for arg in command.get_arguments().filter(|arg| !is_of_clap(arg)) {
+            let name = format!("{} {}", command.get_name(), arg.get_id());
+            let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
+            if help.is_empty() {
+                wrong.push(format!("{name}: no help"));
+            }
+            if Decides::of(arg).is_none() {
+                wrong.push(format!("{name}: no class, as `add = Decides::Nothing`"));
+            }
+            let has_default = !arg.get_action().takes_values()
+                || arg.is_required_set()
+                || arg.is_positional()
+                || !arg.get_default_values().is_empty()
+                || help.contains("; default: ");
+            if !has_default {
+                wrong.push(format!("{name}: no default, as `; default: none`"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// The words of a text, without line breaks, indentation and the escapes of roff.
+fn words_of(text: &str) -> String {
+    let plain = text.replace("\\-", "-").replace("\\\\", "\\");
+    plain
+        .split_whitespace()
+        .filter(|word| *word != ".br")
+        .collect::<Vec<_>>()
+        .join(" ")
+        .replace("\\&", "")
+        .replace("\\*(Aq", "'")
+}
+
+#[test]
+fn the_manual_says_what_the_help_says() {
+    let mut root = command::command();
+    root.build();
+    let mut wrong = Vec::new();
+    for command in commands(&root) {
+        let mut page = Vec::new();
+        clap_mangen::Man::new(command.clone())
+            .render(&mut page)
+            .unwrap();
+        let page = words_of(&String::from_utf8(page).unwrap());
+        let shown = words_of(&command.clone().term_width(0).render_long_help().to_string());
+        for arg in command.get_arguments().filter(|arg| !is_of_clap(arg)) {
+            let help = arg.get_long_help().or(arg.get_help());
+            let help = words_of(&help.map(ToString::to_string).unwrap_or_default());
+            for (text, place) in [(&page, "manual"), (&shown, "help")] {
+                if !text.contains(&help) {
+                    wrong.push(format!(
+                        "{} {}: not in the {place}",
+                        command.get_name(),
+                        arg.get_id()
+                    ));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }

@@ -10,14 +10,14 @@ use clap::Args;
 use super::DataPlace;
 use super::picture::MOST_PIXELS;
 use crate::rooms::Rooms;
-use crate::types::Family;
+use crate::types::{Decides, Family};
 
 /// The flag for the place of the data.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Data")]
 pub(crate) struct DataArgs {
     /// A folder of frames, a ready-made set (.tsv, .jsonl), or built-in rooms, rooms:frames=N,seed=N,size=WIDTHxHEIGHT
-    #[arg(long, value_name = "DIR|FILE|rooms:…", value_parser = place, default_value_t)]
+    #[arg(long, value_name = "DIR|FILE|rooms:…", value_parser = place, default_value_t, add = Decides::Reply)]
     pub data: DataPlace,
 }
 
@@ -26,13 +26,13 @@ pub(crate) struct DataArgs {
 #[command(next_help_heading = "Data")]
 pub(crate) struct SelectionArgs {
     /// The questions about a folder of frames; default: questions.jsonl in it, else made by rule from its maps
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", add = Decides::Reply)]
     pub questions: Option<PathBuf>,
     /// Only the first N questions; default: all
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", add = Decides::Trials)]
     pub limit: Option<NonZeroUsize>,
     /// Only these question families (or categories of a ready-made set), separated by commas; default: all
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = family)]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = family, add = Decides::Trials)]
     pub families: Vec<Family>,
 }
 
@@ -41,7 +41,7 @@ pub(crate) struct SelectionArgs {
 #[command(next_help_heading = "Data")]
 pub(crate) struct PixelLimit {
     /// The maximum number of pixels of an image; a larger one is refused before it is decoded
-    #[arg(long, value_name = "N", default_value_t = NonZeroU64::new(MOST_PIXELS).unwrap_or(NonZeroU64::MIN))]
+    #[arg(long, value_name = "N", default_value_t = NonZeroU64::new(MOST_PIXELS).unwrap_or(NonZeroU64::MIN), add = Decides::Nothing)]
     pub max_pixels: NonZeroU64,
 }
 

@@ -1,4 +1,5 @@
-//! How a model is fed and read, where its graph cannot say: [`TensorLayout`], [`ChannelOrder`], [`ValueRange`], [`Padding`], [`Tile`], [`Rounding`].
+//! Parts of a model's convention, which its graph may not state: [`TensorLayout`], [`ChannelOrder`], [`ValueRange`],
+//! [`Padding`], [`Tile`], [`Rounding`].
 //!
 //! The words are those of the sidecar, `MODEL.onnx.toml`.
 
@@ -9,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::types::words::{as_text, words};
 
-/// The order of a tensor's dimensions.
+/// Order of a tensor's dimensions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum TensorLayout {
@@ -17,21 +18,21 @@ pub(super) enum TensorLayout {
     Nchw,
     /// Batch, height, width, channels.
     Nhwc,
-    /// Channels, height, width.
+    /// Channels, height, width, without a batch.
     Chw,
-    /// Height, width, channels.
+    /// Height, width, channels, without a batch.
     Hwc,
 }
 
 impl TensorLayout {
     pub(super) const ALL: [Self; 4] = [Self::Nchw, Self::Nhwc, Self::Chw, Self::Hwc];
 
-    /// Whether a channel is a plane of its own.
+    /// Whether each channel is a separate plane.
     pub(super) fn is_planar(self) -> bool {
         matches!(self, Self::Nchw | Self::Chw)
     }
 
-    /// The dimensions of one image of three channels.
+    /// Dimensions of one image of three channels.
     pub(super) fn dims(self, [height, width]: [usize; 2]) -> Vec<usize> {
         match self {
             Self::Nchw => vec![1, 3, height, width],
@@ -41,7 +42,7 @@ impl TensorLayout {
         }
     }
 
-    /// The places of channels, height and width among the dimensions.
+    /// Indices of channels, height and width among the dimensions.
     pub(super) fn places(self) -> [usize; 3] {
         match self {
             Self::Nchw => [1, 2, 3],
@@ -51,7 +52,6 @@ impl TensorLayout {
         }
     }
 
-    /// How many dimensions there are.
     pub(super) fn rank(self) -> usize {
         match self {
             Self::Nchw | Self::Nhwc => 4,
@@ -62,20 +62,20 @@ impl TensorLayout {
 
 words!(TensorLayout { Nchw = "NCHW", Nhwc = "NHWC", Chw = "CHW", Hwc = "HWC" });
 
-/// The order of channels.
+/// Order of the colour channels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum ChannelOrder {
-    /// Red first, as all published models.
+    /// Red first, as in all published models.
     #[default]
     Rgb,
-    /// Blue first, as OpenCV.
+    /// Blue first, as in OpenCV.
     Bgr,
 }
 
 impl ChannelOrder {
-    /// The channel of an RGB image that is the model's `channel`.
-    pub(super) fn of(self, channel: usize) -> usize {
+    /// Channel of an RGB image that corresponds to the model's `channel`.
+    pub(super) fn rgb_channel(self, channel: usize) -> usize {
         match self {
             Self::Rgb => channel,
             Self::Bgr => 2 - channel,
@@ -85,22 +85,22 @@ impl ChannelOrder {
 
 words!(ChannelOrder { Rgb = "RGB", Bgr = "BGR" });
 
-/// What black and white are.
+/// Values of black and white.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum ValueRange {
-    /// 0 and 1.
+    /// Black 0, white 1.
     #[serde(rename = "0..1")]
     Unit,
-    /// 0 and 255.
+    /// Black 0, white 255.
     #[serde(rename = "0..255")]
     Bytes,
-    /// −1 and 1.
+    /// Black −1, white 1.
     #[serde(rename = "-1..1")]
     Signed,
 }
 
 impl ValueRange {
-    /// A code of 0..255 in this range; dividing as the models' own scripts do.
+    /// Value of a code of 0..255 in this range, divided as the models' own scripts do.
     pub(super) fn of_code(self, code: f32) -> f32 {
         match self {
             Self::Unit => code / 255.0,
@@ -109,7 +109,7 @@ impl ValueRange {
         }
     }
 
-    /// The code of a value in this range, unbounded.
+    /// Code of a value in this range, not clamped to 0..255.
     pub(super) fn code(self, value: f32) -> f32 {
         match self {
             Self::Unit => value * 255.0,
@@ -125,18 +125,19 @@ impl fmt::Display for ValueRange {
     }
 }
 
-/// What stands beside an image whose size is no multiple of the model's.
+/// Pixels that fill an image up to the model's multiple, to the right and below.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Padding {
-    /// The image mirrored at its last pixel, to the right and below.
+    /// The image, mirrored at its last pixel.
     #[default]
     Reflect,
-    /// Black.
+    /// Black, code 0 in each channel.
     Zero,
-    /// The last pixel over and over.
+    /// The last pixel, repeated.
     Replicate,
-    /// Nothing: the model sees as much as fits. What is left of the image comes from a second look, shifted to its end.
+    /// No padding: the model gets the largest part that fits. The rest comes from another run on a part that ends at the
+    /// image's edge.
     Crop,
 }
 
@@ -146,14 +147,14 @@ impl fmt::Display for Padding {
     }
 }
 
-/// How a value between two codes becomes one.
+/// Conversion of a value between two codes to a code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Rounding {
-    /// The nearest, half away from zero.
+    /// The nearest code; halves are rounded away from zero.
     #[default]
     Round,
-    /// The lower.
+    /// The next lower code.
     Truncate,
 }
 
@@ -163,12 +164,12 @@ impl fmt::Display for Rounding {
     }
 }
 
-/// Whether a pixel depends on its surroundings alone.
+/// How far a pixel of the result depends on the image around it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Tile {
     /// It depends on the whole image.
     None,
-    /// It depends on so many pixels to each side, so that tiles with that much context are exact.
+    /// It depends on the given number of pixels on each side, so that tiles with that context are exact.
     Exact(usize),
 }
 
@@ -190,7 +191,7 @@ impl FromStr for Tile {
             ("none", _) => Ok(Self::None),
             (_, Some(Ok(context))) if context <= 4096 => Ok(Self::Exact(context)),
             _ => Err(format!(
-                "tile is {text:?}; \"none\", or \"exact:8\" with the context in pixels expected"
+                "tile is {text:?}; expected \"none\", or \"exact:8\" with the context in pixels"
             )),
         }
     }
@@ -198,21 +199,18 @@ impl FromStr for Tile {
 
 as_text!(Tile);
 
-/// What the elements of a tensor are.
+/// Type of a tensor's elements.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum ElementType {
-    /// 32-bit floats.
     Float32,
-    /// 16-bit floats.
     Float16,
-    /// Bytes.
     Uint8,
-    /// Anything else, by its name.
+    /// Any other type, by its name; not supported for images.
     Other(String),
 }
 
 impl ElementType {
-    /// The range that goes with a type.
+    /// Value range that images of this type usually have.
     pub(super) fn usual_range(&self) -> ValueRange {
         match self {
             Self::Uint8 => ValueRange::Bytes,

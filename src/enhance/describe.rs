@@ -1,4 +1,4 @@
-//! What was found of a model, and why it is taken to be so: [`Description`].
+//! Description of a model's convention for users, with the source of each value: [`Description`].
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -9,126 +9,143 @@ use super::preset::Preset;
 use super::sidecar::ModelSidecar;
 use super::tiles::MULTIPLES;
 
-/// The source of what the graph itself says.
+/// Source of values that the graph itself states.
 const GRAPH: &str = "graph";
 
-/// What is needed beside the convention itself to tell where it comes from.
+/// Sources of a model's convention, and its number of flushed weights.
 #[derive(Debug)]
 pub(super) struct Description {
-    /// What the sidecar states.
+    /// The user's sidecar; empty if there is none.
     pub(super) sidecar: ModelSidecar,
-    /// What a preset states.
+    /// The preset, if one was named.
     pub(super) preset: Option<Preset>,
-    /// Weights that were set to zero.
+    /// Number of subnormal weights that were set to zero.
     pub(super) flushed: usize,
 }
 
-/// A table of what, how and why.
+/// Rows of a table: name, value, source.
 struct Lines(Vec<[String; 3]>);
 
 impl Lines {
-    fn add(&mut self, what: &str, how: impl std::fmt::Display, why: impl Into<String>) {
-        self.0.push([what.to_owned(), how.to_string(), why.into()]);
+    fn add(&mut self, name: &str, value: impl std::fmt::Display, source: impl Into<String>) {
+        self.0
+            .push([name.to_owned(), value.to_string(), source.into()]);
     }
 }
 
 impl Description {
     /// The table as text.
-    pub(super) fn text(&self, path: &Path, graph: &Graph, stated: &ModelSidecar) -> String {
+    pub(super) fn text(&self, path: &Path, graph: &Graph, convention: &ModelSidecar) -> String {
         let mut lines = Lines(Vec::new());
-        self.input(&mut lines, graph, stated);
+        self.input(&mut lines, graph, convention);
         self.output(&mut lines, graph);
-        let why = match stated.tile {
-            Some(_) => self.why(|s| s.tile.is_some(), ""),
-            None => "not said; --tile N tries, and checks every seam".to_owned(),
+        let source = match convention.tile {
+            Some(_) => self.source(|s| s.tile.is_some(), ""),
+            None => "not stated; --tile N tries it and checks every seam".to_owned(),
         };
-        lines.add("tile", stated.tile.unwrap_or(Tile::None), why);
+        lines.add("tile", convention.tile.unwrap_or(Tile::None), source);
         lines.add(
             "subnormal weights",
             self.flushed,
-            "set to zero; they change no byte",
+            "set to zero, which changes no byte",
         );
-        written(path, &lines.0)
+        aligned(path, &lines.0)
     }
 
-    /// How the model is fed.
-    fn input(&self, lines: &mut Lines, graph: &Graph, stated: &ModelSidecar) {
+    /// Adds the lines about the input.
+    fn input(&self, lines: &mut Lines, graph: &Graph, convention: &ModelSidecar) {
         let (signature, feeding) = (&graph.signature, &graph.feeding);
         let side = |size: Option<usize>| size.map_or("any".to_owned(), |size| size.to_string());
         lines.add("input", &signature.input.port, GRAPH);
-        let why = self.why(|s| s.layout_in.is_some(), "graph: where its 3 is");
-        lines.add("layout_in", feeding.layout, why);
+        let source = self.source(|s| s.layout_in.is_some(), "graph: the dimension of size 3");
+        lines.add("layout_in", feeding.layout, source);
         let height_width = format!("{} × {}", side(signature.height), side(signature.width));
         lines.add("height × width", height_width, GRAPH);
-        let usual = "usual; a graph cannot say";
-        let why = self.why(|s| s.color.is_some(), usual);
-        lines.add("color", feeding.color, why);
-        let why = self.why(|s| s.range_in.is_some(), "usual for its type");
-        lines.add("range_in", feeding.range, why);
-        if stated.mean.is_some() || stated.std.is_some() {
-            let said = format!("{:?}, {:?}", feeding.mean, feeding.std);
-            let why = self.why(|s| s.mean.is_some() || s.std.is_some(), usual);
-            lines.add("mean, std", said, why);
+        let usual = "usual; a graph cannot state it";
+        let source = self.source(|s| s.color.is_some(), usual);
+        lines.add("color", feeding.color, source);
+        let source = self.source(|s| s.range_in.is_some(), "usual for its type");
+        lines.add("range_in", feeding.range, source);
+        if convention.mean.is_some() || convention.std.is_some() {
+            let value = format!("{:?}, {:?}", feeding.mean, feeding.std);
+            let source = self.source(|s| s.mean.is_some() || s.std.is_some(), usual);
+            lines.add("mean, std", value, source);
         }
-        match stated.multiple {
+        match convention.multiple {
             Some(multiple) => {
-                lines.add("multiple", multiple, self.why(|s| s.multiple.is_some(), ""));
+                lines.add(
+                    "multiple",
+                    multiple,
+                    self.source(|s| s.multiple.is_some(), ""),
+                );
             }
             None if signature.takes_any_size() => {
                 let others = MULTIPLES[1..].iter().map(ToString::to_string);
                 let others = others.collect::<Vec<_>>().join(", ");
-                let why = format!("tried; then {others} where it fails");
-                lines.add("multiple", MULTIPLES[0], why);
+                let source = format!("tried first, then {others} if it fails");
+                lines.add("multiple", MULTIPLES[0], source);
             }
             None => lines.add("multiple", 1, "its size is fixed"),
         }
-        lines.add("pad", feeding.pad, self.why(|s| s.pad.is_some(), "usual"));
+        lines.add(
+            "pad",
+            feeding.pad,
+            self.source(|s| s.pad.is_some(), "usual"),
+        );
         for extra in &signature.extras {
-            let why = self.why(|s| s.extra.contains_key(&extra.port.name), "");
-            lines.add(&format!("extra.{}", extra.port.name), extra.value, why);
+            let source = self.source(|s| s.extra.contains_key(&extra.port.name), "");
+            lines.add(&format!("extra.{}", extra.port.name), extra.value, source);
         }
     }
 
-    /// How it is read.
+    /// Adds the lines about the output.
     fn output(&self, lines: &mut Lines, graph: &Graph) {
         let (output, reading) = (&graph.signature.output, &graph.reading);
-        let why = match output.why {
-            "stated" => self.why(|s| s.output.is_some(), GRAPH),
-            why => why.to_owned(),
+        let source = match output.reason {
+            "stated" => self.source(|s| s.output.is_some(), GRAPH),
+            reason => reason.to_owned(),
         };
-        lines.add("output", &output.port, why);
+        lines.add("output", &output.port, source);
         let fallback = match reading.layout {
-            Some(_) => "graph: where its 3 is",
-            None => "as the input; what comes decides",
+            Some(_) => "graph: the dimension of size 3",
+            None => "as the input; the actual output decides",
         };
-        let why = self.why(|s| s.layout_out.is_some(), fallback);
-        lines.add("layout_out", reading.layout.unwrap_or(reading.likely), why);
-        let checked = "as the input; what comes is checked";
-        let why = self.why(|s| s.range_out.is_some(), checked);
-        lines.add("range_out", reading.range, why);
-        let why = self.why(|s| s.rounding.is_some(), "usual");
-        lines.add("rounding", reading.rounding, why);
+        let source = self.source(|s| s.layout_out.is_some(), fallback);
+        lines.add(
+            "layout_out",
+            reading.layout.unwrap_or(reading.preferred),
+            source,
+        );
+        let checked = "as the input; the actual output is checked";
+        let source = self.source(|s| s.range_out.is_some(), checked);
+        lines.add("range_out", reading.range, source);
+        let source = self.source(|s| s.rounding.is_some(), "usual");
+        lines.add("rounding", reading.rounding, source);
     }
 
-    /// Where a statement comes from.
-    fn why(&self, states: impl Fn(&ModelSidecar) -> bool, otherwise: &str) -> String {
+    /// Source of a value: sidecar or preset if they state it, else `otherwise`.
+    fn source(&self, states: impl Fn(&ModelSidecar) -> bool, otherwise: &str) -> String {
         match &self.preset {
             _ if states(&self.sidecar) => "sidecar".to_owned(),
-            Some(preset) if states(&preset.states) => format!("preset {}", preset.name),
+            Some(preset) if states(&preset.convention) => format!("preset {}", preset.name),
             _ => otherwise.to_owned(),
         }
     }
 }
 
-fn written(path: &Path, lines: &[[String; 3]]) -> String {
+fn aligned(path: &Path, lines: &[[String; 3]]) -> String {
     let widths = [0, 1].map(|column| {
         let cells = lines.iter().map(|line| line[column].chars().count());
         cells.max().unwrap_or(0)
     });
     let mut text = format!("{}\n", path.display());
-    for [what, how, why] in lines {
-        // Writing to a text cannot fail.
-        let _ = writeln!(text, "  {what:0$}  {how:1$}  {why}", widths[0], widths[1]);
+    for [name, value, source] in lines {
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            text,
+            "  {name:0$}  {value:1$}  {source}",
+            widths[0], widths[1]
+        );
     }
     text
 }

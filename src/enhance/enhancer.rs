@@ -18,52 +18,53 @@ use super::session::{GraphSource, Stopper};
 use super::sidecar::ModelSidecar;
 use super::tiles::{Cutting, MULTIPLES, TilePlan, TileWindow, TiledImage, Tiling};
 
-/// The sides of tiles where nobody says them, in pixels: measured as fast as the whole image with a twelfth of its memory.
+/// Side of a tile with `--tile auto`, in pixels: measured to be as fast as the whole image, with a twelfth of its memory.
 const TILE: usize = 256;
-/// The most pixels of an image that is not cut into tiles by itself.
-const WHOLE: usize = 1280 * 720;
-/// The context of tiles that are asked for without anybody saying how much is exact.
+/// Largest image, in pixels, that `--tile auto` does not cut and whose memory is not checked; chosen.
+const MAX_WHOLE: usize = 1280 * 720;
+/// Context of tiles, in pixels, if `--tile N` is set and no sidecar or preset states the exact context; chosen.
 const CONTEXT: usize = 32;
 
-/// What is known of the memory that a model needs.
+/// Memory that a model needs, as far as it is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum MemoryEstimate {
-    /// Nothing yet.
+    /// It has not been measured yet.
     Unknown,
-    /// It cannot be told.
-    Untold,
-    /// So much a pixel.
-    Of(MemoryCost),
+    /// It cannot be measured.
+    Unmeasurable,
+    /// It was measured, per pixel.
+    Known(MemoryCost),
 }
 
-/// An enhancement model, loaded and ready.
+/// A loaded enhancement model.
 pub struct Enhancer {
     path: PathBuf,
     name: EnhancerName,
     graph: Graph,
-    stated: ModelSidecar,
+    convention: ModelSidecar,
     tiling: Tiling,
-    most_side: Option<NonZeroUsize>,
+    max_side: Option<NonZeroUsize>,
     cost: MemoryEstimate,
     description: Description,
 }
 
 impl Enhancer {
-    /// Loads a model from the file as it was read, so that its digest is that of what runs; `threads` is how many threads one image is computed with, `None` for as many as there are cores.
+    /// Loads a model from the bytes that [`ModelFile::read`] read, so that the digest is that of the model that runs.
+    /// `threads` is the number of threads for one image, by default the number of cores.
     ///
     /// # Errors
-    /// Where the file is no ONNX model, ONNX Runtime refuses it, or its inputs and outputs are not one RGB image each.
+    /// If the file is not an ONNX model, ONNX Runtime refuses it, or its inputs and outputs are not one RGB image each.
     pub fn open(
         mut file: ModelFile,
         runtime: &Runtime,
         threads: Option<NonZeroUsize>,
     ) -> Result<Self> {
-        let none = ModelSidecar::default();
+        let empty = ModelSidecar::default();
         let preset = file.preset.as_ref();
-        let stated = file
+        let convention = file
             .sidecar
             .clone()
-            .over(preset.map_or(&none, |preset| &preset.states));
+            .with_defaults(preset.map_or(&empty, |preset| &preset.convention));
         let flushed = file.weights.flush_subnormals(&mut file.bytes);
         // ONNX Runtime finds external data only from the model's path.
         let source = if file.weights.external.is_empty() {
@@ -71,7 +72,7 @@ impl Enhancer {
         } else {
             GraphSource::Path(file.path.clone())
         };
-        let graph = Graph::load(source, &stated, runtime, threads)?.map_err(|problem| {
+        let graph = Graph::load(source, &convention, runtime, threads)?.map_err(|problem| {
             let path = file.path.clone();
             Error::Enhancer { path, problem }
         })?;
@@ -79,9 +80,9 @@ impl Enhancer {
             path: file.path,
             name: file.name,
             graph,
-            stated,
+            convention,
             tiling: Tiling::Auto,
-            most_side: None,
+            max_side: None,
             cost: MemoryEstimate::Unknown,
             description: Description {
                 sidecar: file.sidecar,
@@ -91,28 +92,29 @@ impl Enhancer {
         })
     }
 
-    /// Cuts images otherwise.
+    /// Sets how images are cut into tiles; the default is [`Tiling::Auto`].
     #[must_use]
     pub fn with_tiling(self, tiling: Tiling) -> Self {
         Self { tiling, ..self }
     }
 
-    /// Enhances images whose longer side is longer in that size, and scales the result back.
+    /// Sets the largest longer side, in pixels: larger images are reduced to it, enhanced and scaled back.
     #[must_use]
-    pub fn with_most_side(self, most_side: Option<NonZeroUsize>) -> Self {
-        Self { most_side, ..self }
+    pub fn with_max_side(self, max_side: Option<NonZeroUsize>) -> Self {
+        Self { max_side, ..self }
     }
 
-    /// The name in tables and records: the file's name without its extension.
+    /// Name in tables and records: the file's name without its extension.
     #[must_use]
     pub fn name(&self) -> &EnhancerName {
         &self.name
     }
 
-    /// What was found in the graph and beside it, and why it is taken to be so: lines of text.
+    /// A table, as text, of how the model is fed and read, with the source of each value.
     #[must_use]
     pub fn describe(&self) -> String {
-        self.description.text(&self.path, &self.graph, &self.stated)
+        self.description
+            .text(&self.path, &self.graph, &self.convention)
     }
 
     /// A handle that ends a run from another thread.
@@ -123,59 +125,59 @@ impl Enhancer {
 
     /// Enhances an image; the result has the same size.
     ///
-    /// Where the model is of a fixed size the image is cut into tiles of it, if they are exact, or else resized to it and its
-    /// result back, with a bilinear filter.
+    /// If the model has a fixed size, the image is cut into tiles of that size, if they are exact. Otherwise it is resized to
+    /// that size and the result is resized back, with a bilinear filter.
     ///
     /// # Errors
-    /// Where the model fails on this image, gives another size than it was given, or values that are not numbers or of
-    /// another range than was said; where tiles do not fit together.
-    pub fn enhance(&mut self, dark: &Rgb) -> Result<Rgb> {
-        let size = [dark.height(), dark.width()];
-        if let Some(smaller) = self.reduced(size) {
-            return self.resized(dark, smaller);
+    /// If the model fails on this image, gives another size than it was given, or values that are not numbers or not in the
+    /// expected range; if tiles differ where they overlap.
+    pub fn enhance(&mut self, image: &Rgb) -> Result<Rgb> {
+        let size = [image.height(), image.width()];
+        if let Some(smaller) = self.reduced_size(size) {
+            return self.enhance_resized(image, smaller);
         }
         let fixed = [
             self.graph.signature.height.unwrap_or(size[0]),
             self.graph.signature.width.unwrap_or(size[1]),
         ];
-        let cut_exactly = matches!(self.stated.tile, Some(Tile::Exact(_)))
+        let cut_exactly = matches!(self.convention.tile, Some(Tile::Exact(_)))
             && fixed.iter().zip(size).all(|(fixed, size)| *fixed <= size);
         if fixed != size && !cut_exactly {
-            return self.resized(dark, fixed);
+            return self.enhance_resized(image, fixed);
         }
-        let multiples: &[usize] = match self.stated.multiple {
+        let multiples: &[usize] = match self.convention.multiple {
             Some(multiple) => &[multiple.get()],
             None if fixed == size && self.graph.signature.takes_any_size() => &MULTIPLES,
             None => &[1],
         };
-        self.estimate(dark, fixed)?;
-        let mut first = None;
+        self.check_memory(image, fixed)?;
+        let mut first_problem = None;
         for multiple in multiples {
-            match self.enhanced(dark, fixed, *multiple)? {
+            match self.enhance_padded(image, fixed, *multiple)? {
                 Ok(enhanced) => return Ok(enhanced),
-                Err(problem) => drop(first.get_or_insert(problem)),
+                Err(problem) => drop(first_problem.get_or_insert(problem)),
             }
         }
-        Err(self.fault(first.unwrap_or_default()))
+        Err(self.fault(first_problem.unwrap_or_default()))
     }
 
-    /// Refuses a large image that would need more memory than there is, before it is spent.
-    fn estimate(&mut self, dark: &Rgb, fixed: [usize; 2]) -> Result<()> {
-        let size = [dark.height(), dark.width()];
+    /// Refuses a large image that would need more memory than is available.
+    fn check_memory(&mut self, image: &Rgb, fixed: [usize; 2]) -> Result<()> {
+        let size = [image.height(), image.width()];
         let pixels = size[0] * size[1];
-        let multiple = self.stated.multiple.map_or(1, NonZeroUsize::get);
-        let cut = self.cut(size, fixed, multiple)?;
-        let probed =
+        let multiple = self.convention.multiple.map_or(1, NonZeroUsize::get);
+        let cut = self.cutting(size, fixed, multiple)?;
+        let can_probe =
             size.iter().all(|side| *side >= PROBES[1]) && self.graph.signature.takes_any_size();
-        if pixels <= WHOLE || cut.tile != cut.area || !probed {
+        if pixels <= MAX_WHOLE || cut.tile != cut.area || !can_probe {
             return Ok(());
         }
         if self.cost == MemoryEstimate::Unknown {
             self.cost = self
-                .probed(dark)?
-                .map_or(MemoryEstimate::Untold, MemoryEstimate::Of);
+                .memory_cost(image)?
+                .map_or(MemoryEstimate::Unmeasurable, MemoryEstimate::Known);
         }
-        let MemoryEstimate::Of(cost) = self.cost else {
+        let MemoryEstimate::Known(cost) = self.cost else {
             return Ok(());
         };
         let Some(available) = memory::available() else {
@@ -183,14 +185,14 @@ impl Enhancer {
         };
         cost.fits(pixels, available).map_err(|[needed, available]| {
             self.fault(format!(
-                "would need about {needed:.1} GB of memory for an image of {} × {}, and {available:.1} GB are free; --tile 256 does with a fraction of it where the model is local, --llie-max-side 1280 with a smaller image where it is not",
+                "would need about {needed:.1} GB of memory for an image of {} × {}, and {available:.1} GB are free; --tile 256 needs a fraction of it, if a pixel depends only on the pixels around it; otherwise --llie-max-side 1280 enhances a smaller image",
                 size[1], size[0]
             ))
         })
     }
 
-    /// What small parts of an image need; `None` where that tells nothing.
-    fn probed(&self, dark: &Rgb) -> Result<Option<MemoryCost>> {
+    /// Memory cost, measured on small parts of an image; `None` if it cannot be measured.
+    fn memory_cost(&self, image: &Rgb) -> Result<Option<MemoryCost>> {
         let mut resident = [0; 2];
         for (side, resident) in PROBES.into_iter().zip(&mut resident) {
             let window = TileWindow {
@@ -199,8 +201,8 @@ impl Enhancer {
                 right: side,
                 bottom: side,
             };
-            let ran = self.graph.probe(dark, window)?;
-            let (RunResult::Gave(()), Some(bytes)) = (ran, memory::resident()) else {
+            let result = self.graph.probe(image, window)?;
+            let (RunResult::Output(()), Some(bytes)) = (result, memory::resident()) else {
                 return Ok(None);
             };
             *resident = bytes;
@@ -208,48 +210,48 @@ impl Enhancer {
         Ok(MemoryCost::of(resident))
     }
 
-    /// The size in which an image is enhanced that is too large for its own: of the same shape, and of the model's multiple.
-    fn reduced(&self, size: [usize; 2]) -> Option<[usize; 2]> {
-        let most = self.most_side.map(NonZeroUsize::get)?;
+    /// Size to which a too large image is reduced: of the same shape, in the model's multiples. `None` if it is not reduced.
+    fn reduced_size(&self, size: [usize; 2]) -> Option<[usize; 2]> {
+        let max_side = self.max_side.map(NonZeroUsize::get)?;
         let longest = size[0].max(size[1]);
-        if longest <= most || !self.graph.signature.takes_any_size() {
+        if longest <= max_side || !self.graph.signature.takes_any_size() {
             return None;
         }
-        let multiple = self.stated.multiple.map_or(1, NonZeroUsize::get);
+        let multiple = self.convention.multiple.map_or(1, NonZeroUsize::get);
         Some(size.map(|side| {
-            let scaled = (side * most + longest / 2) / longest;
+            let scaled = (side * max_side + longest / 2) / longest;
             (scaled / multiple * multiple).max(multiple)
         }))
     }
 
-    /// Enhances an image whose sides are filled up to multiples; a problem that another multiple may solve is given back.
-    fn enhanced(
+    /// Enhances an image whose sides are padded to multiples. The inner error is a problem that another multiple may solve.
+    fn enhance_padded(
         &self,
-        dark: &Rgb,
+        image: &Rgb,
         fixed: [usize; 2],
         multiple: usize,
     ) -> Result<std::result::Result<Rgb, String>> {
-        let size = [dark.height(), dark.width()];
-        let cut = self.cut(size, fixed, multiple)?;
+        let size = [image.height(), image.width()];
+        let cut = self.cutting(size, fixed, multiple)?;
         let plan = TilePlan::of(cut).ok_or_else(|| self.too_small(cut))?;
         let mut canvas = TiledImage::new(cut.area);
         for (row, column) in plan.tiles() {
-            let (seen, taken) = (
-                TileWindow::seen(row, column),
-                TileWindow::taken(row, column),
+            let (input, output) = (
+                TileWindow::input_of(row, column),
+                TileWindow::output_of(row, column),
             );
-            match self.graph.window(dark, seen, taken)? {
-                RunResult::Gave(bytes) => canvas.put(row, column, &bytes),
+            match self.graph.window(image, input, output)? {
+                RunResult::Output(bytes) => canvas.add(row, column, &bytes),
                 RunResult::Failed(problem) => return Ok(Err(problem)),
-                RunResult::Unusable(values) => return Err(self.unusable(values, dark)),
+                RunResult::Unusable(values) => return Err(self.unusable(values, image)),
             }
         }
         let (enhanced, seam) = canvas.finish();
         if !self.crops(size, multiple) && !seam.holds() {
             return Err(self.fault(format!(
-                "is not to be cut: its {} tiles differ by up to {} codes at their seams in {} of {} samples, so that a pixel depends on more than {} pixels around it. Leave --tile out for the whole image, or state more context (tile = \"exact:N\" in MODEL.onnx.toml)",
+                "cannot be cut: its {} tiles differ by up to {} codes at their seams, in {} of {} samples, so a pixel depends on more than {} pixels around it. Leave out --tile to enhance the whole image, or state more context (tile = \"exact:N\" in MODEL.onnx.toml)",
                 plan.count(),
-                seam.most,
+                seam.max_difference,
                 seam.differing,
                 seam.compared,
                 cut.context
@@ -262,19 +264,19 @@ impl Enhancer {
         }))
     }
 
-    /// Whether an image is seen in parts of multiples that overlap, so that their seams need not hold.
+    /// Whether an image is enhanced in overlapping parts instead of padded, which may differ where they overlap.
     fn crops(&self, size: [usize; 2], multiple: usize) -> bool {
         self.graph.feeding.pad == Padding::Crop && size.iter().any(|side| side % multiple != 0)
     }
 
-    /// The area that tiles cover, and how they are cut.
-    fn cut(&self, size: [usize; 2], fixed: [usize; 2], multiple: usize) -> Result<Cutting> {
-        let down = |side: usize| side / multiple * multiple;
+    /// Area that the tiles cover, and their size and context.
+    fn cutting(&self, size: [usize; 2], fixed: [usize; 2], multiple: usize) -> Result<Cutting> {
+        let round_down = |side: usize| side / multiple * multiple;
         if self.crops(size, multiple) {
-            let tile = size.map(down);
+            let tile = size.map(round_down);
             if tile.contains(&0) {
                 return Err(self.fault(format!(
-                    "takes images of multiples of {multiple} pixels, and {} × {} is smaller than that",
+                    "takes images whose sides are multiples of {multiple} pixels, and {} × {} is smaller than that",
                     size[1], size[0]
                 )));
             }
@@ -286,25 +288,27 @@ impl Enhancer {
             });
         }
         let area = size.map(|side| side.next_multiple_of(multiple));
-        let stated = match self.stated.tile {
+        let exact_context = match self.convention.tile {
             Some(Tile::Exact(context)) => Some(context),
             _ => None,
         };
-        let context = stated.unwrap_or(CONTEXT);
-        let square = |side: usize| [down(side).max(multiple); 2];
-        let tile = match (self.tiling, stated) {
+        let context = exact_context.unwrap_or(CONTEXT);
+        let square = |side: usize| [round_down(side).max(multiple); 2];
+        let tile = match (self.tiling, exact_context) {
             _ if fixed != size => fixed,
-            (Tiling::Of(asked), _) if self.stated.tile == Some(Tile::None) => {
+            (Tiling::Side(side), _) if self.convention.tile == Some(Tile::None) => {
                 return Err(Error::usage(
                     "--tile",
                     format_args!(
-                        "{asked}, but {} is said to need the whole image (tile = \"none\" in its sidecar or preset)",
+                        "{side} is not possible: {} needs the whole image (tile = \"none\" in its sidecar or preset)",
                         self.name
                     ),
                 ));
             }
-            (Tiling::Of(asked), _) => square(asked.get()),
-            (Tiling::Auto, Some(_)) if size[0] * size[1] > WHOLE => square(TILE.max(4 * context)),
+            (Tiling::Side(side), _) => square(side.get()),
+            (Tiling::Auto, Some(_)) if size[0] * size[1] > MAX_WHOLE => {
+                square(TILE.max(4 * context))
+            }
             (Tiling::Auto | Tiling::Whole, _) => area,
         };
         Ok(Cutting {
@@ -317,21 +321,21 @@ impl Enhancer {
 
     fn too_small(&self, cut: Cutting) -> Error {
         self.fault(format!(
-            "cannot be cut into tiles of {} × {} pixels: with {} pixels of context on each side nothing is left of them; --tile N says larger ones",
+            "cannot be cut into tiles of {} × {} pixels: with {} pixels of context on each side nothing is left of them; set larger ones with --tile N",
             cut.tile[1], cut.tile[0], cut.context
         ))
     }
 
-    /// Enhances an image in the size that the model takes.
-    fn resized(&self, dark: &Rgb, fixed: [usize; 2]) -> Result<Rgb> {
-        let planes = Planes::of(dark).resized(fixed[0], fixed[1]);
+    /// Enhances an image that is resized to `fixed`, and resizes the result back.
+    fn enhance_resized(&self, image: &Rgb, fixed: [usize; 2]) -> Result<Rgb> {
+        let planes = Planes::of(image).resized(fixed[0], fixed[1]);
         let planes = planes.map_err(|e| self.fault(e))?;
         let enhanced = match self.graph.planes(&planes)? {
-            RunResult::Gave(planes) => planes,
+            RunResult::Output(planes) => planes,
             RunResult::Failed(problem) => return Err(self.fault(problem)),
-            RunResult::Unusable(values) => return Err(self.unusable(values, dark)),
+            RunResult::Unusable(values) => return Err(self.unusable(values, image)),
         };
-        let enhanced = enhanced.resized(dark.height(), dark.width());
+        let enhanced = enhanced.resized(image.height(), image.width());
         let enhanced = enhanced.map_err(|e| self.fault(e))?;
         enhanced
             .to_rgb(self.graph.reading.rounding)
@@ -349,22 +353,18 @@ impl Enhancer {
         let range = self.graph.reading.range;
         self.fault(match values {
             OutOfRange::NotNumbers => format!(
-                "gave values that are not numbers (NaN) for an image of {} × {}; its weights or a division by zero in it are at fault",
+                "gave values that are not numbers (NaN) for an image of {} × {}; check its weights and its divisions by zero",
                 image.width(),
                 image.height()
             ),
-            OutOfRange::Beyond {
-                least,
-                most,
-                likely,
-            } => format!(
-                "gave values from {least} to {most}, which are not of {range} as is usual; where they are of {likely}, say so in MODEL.onnx.toml beside it: `range_out = \"{likely}\"` (or `range_out = \"{range}\"` where they are as they should be)"
+            OutOfRange::Beyond { min, max, likely } => format!(
+                "gave values from {min} to {max}, but {range} is usual; if its range is {likely}, state it in MODEL.onnx.toml beside it: `range_out = \"{likely}\"` (or `range_out = \"{range}\"` if the values are right)"
             ),
         })
     }
 }
 
-/// The top left part of an image.
+/// Top left part of an image.
 fn cropped(image: &Rgb, [height, width]: [usize; 2]) -> Rgb {
     let mut part = Rgb::black(height, width);
     let lines = part.samples_mut().chunks_exact_mut(3 * width);

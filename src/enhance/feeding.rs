@@ -1,6 +1,6 @@
-//! From an image of bytes to the tensor that a model takes: [`Feeding`].
+//! Conversion of an image of bytes to the tensor that a model takes: [`Feeding`].
 //!
-//! One pass: a table of 256 values a channel holds range, mean and deviation.
+//! It takes one pass: a table of 256 values per channel combines range, mean and deviation.
 
 use half::f16;
 
@@ -12,27 +12,25 @@ use super::signature::Signature;
 use super::tiles::TileWindow;
 use crate::types::Rgb;
 
-/// How an image becomes a tensor.
+/// Conversion of an image to a tensor.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Feeding {
     pub(super) layout: TensorLayout,
     pub(super) element: ElementType,
     pub(super) color: ChannelOrder,
     pub(super) range: ValueRange,
-    /// Taken from each channel, then divided by, in the model's order.
+    /// Subtracted from each channel, in the model's channel order and range; then `std` divides it.
     pub(super) mean: [f32; 3],
     pub(super) std: [f32; 3],
     pub(super) pad: Padding,
 }
 
-/// A tensor for a model.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Input {
     pub(super) dims: Vec<usize>,
     pub(super) data: TensorData,
 }
 
-/// The elements of a tensor.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum TensorData {
     Float32(Vec<f32>),
@@ -40,7 +38,7 @@ pub(super) enum TensorData {
     Uint8(Vec<u8>),
 }
 
-/// The source of a pixel beyond the end of a side, or `None` for black.
+/// Index of the pixel that is copied to position `at`, which may be beyond the end of the side; `None` for black.
 fn source(at: usize, side: usize, pad: Padding) -> Option<usize> {
     if at < side {
         return Some(at);
@@ -49,7 +47,7 @@ fn source(at: usize, side: usize, pad: Padding) -> Option<usize> {
         Padding::Zero => None,
         Padding::Replicate | Padding::Crop => Some(side - 1),
         Padding::Reflect => {
-            // Mirrored at the last pixel and, where the image is smaller than what is missing, at the first again.
+            // Mirrored at the last pixel, and again at the first if the padding is larger than the image.
             let period = (2 * (side - 1)).max(1);
             let within = at % period;
             Some(within.min(period - within).min(side - 1))
@@ -58,21 +56,21 @@ fn source(at: usize, side: usize, pad: Padding) -> Option<usize> {
 }
 
 impl Feeding {
-    /// What graph and statements say.
-    pub(super) fn of(signature: &Signature, stated: &ModelSidecar) -> Self {
+    /// The conversion that signature and convention define.
+    pub(super) fn of(signature: &Signature, convention: &ModelSidecar) -> Self {
         let element = signature.input.port.element.clone();
         Self {
             layout: signature.input.layout,
-            range: stated.range_in.unwrap_or(element.usual_range()),
+            range: convention.range_in.unwrap_or(element.usual_range()),
             element,
-            color: stated.color.unwrap_or_default(),
-            mean: stated.mean.unwrap_or([0.0; 3]),
-            std: stated.std.unwrap_or([1.0; 3]),
-            pad: stated.pad.unwrap_or_default(),
+            color: convention.color.unwrap_or_default(),
+            mean: convention.mean.unwrap_or([0.0; 3]),
+            std: convention.std.unwrap_or([1.0; 3]),
+            pad: convention.pad.unwrap_or_default(),
         }
     }
 
-    /// A window of an image, padded where it goes beyond.
+    /// The tensor of a window of an image, padded beyond the image's edges.
     pub(super) fn window(&self, image: &Rgb, window: TileWindow) -> Input {
         let sources = |from: usize, to: usize, side: usize| -> Vec<Option<usize>> {
             (from..to).map(|at| source(at, side, self.pad)).collect()
@@ -80,10 +78,10 @@ impl Feeding {
         let rows = sources(window.top, window.bottom, image.height());
         let columns = sources(window.left, window.right, image.width());
         let (samples, width) = (image.samples(), image.width());
-        // Where no column is padded, they follow each other.
+        // Without padded columns, the pixels of a row are contiguous.
         let inside = window.right <= image.width();
         let row_of = |row: Option<usize>, channel: usize| {
-            let channel = self.color.of(channel);
+            let channel = self.color.rgb_channel(channel);
             let row = row.map(|row| &samples[row * width * 3..][..width * 3]);
             let columns = &columns;
             columns
@@ -124,11 +122,11 @@ impl Feeding {
         }
     }
 
-    /// A whole image of floats.
+    /// The tensor of a whole image of floats.
     pub(super) fn planes(&self, planes: &Planes) -> Input {
         let [height, width] = [planes.height, planes.width];
         let value = |channel: usize, pixel: usize| {
-            let unit = planes.samples[self.color.of(channel) * height * width + pixel];
+            let unit = planes.samples[self.color.rgb_channel(channel) * height * width + pixel];
             (channel, unit)
         };
         let order: Vec<(usize, f32)> = if self.layout.is_planar() {
@@ -167,7 +165,7 @@ impl Feeding {
         }
     }
 
-    /// The value of each byte by channel of the model.
+    /// Value of each byte, for each channel of the model.
     fn table(&self) -> [[f32; 256]; 3] {
         [0, 1, 2].map(|channel: usize| {
             std::array::from_fn(|byte| {
@@ -178,7 +176,6 @@ impl Feeding {
     }
 }
 
-/// The order of samples.
 #[derive(Clone, Copy)]
 enum SampleOrder {
     Planar,

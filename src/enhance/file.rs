@@ -1,4 +1,4 @@
-//! An enhancement model as it lies on disk: [`ModelFile`].
+//! An enhancement model on disk: [`ModelFile`].
 
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
@@ -12,7 +12,7 @@ use super::preset::Preset;
 use super::sidecar::{self, ModelSidecar};
 use super::weights::Weights;
 
-/// An ONNX file with its sidecar, read and checked as far as that goes without ONNX Runtime.
+/// An ONNX file with its sidecar, read and checked as far as possible without ONNX Runtime.
 #[derive(Debug)]
 pub struct ModelFile {
     pub(super) path: PathBuf,
@@ -20,21 +20,21 @@ pub struct ModelFile {
     pub(super) digest: Digest,
     pub(super) bytes: Vec<u8>,
     pub(super) weights: Weights,
-    /// What the sidecar states.
+    /// The user's sidecar; empty if there is none.
     pub(super) sidecar: ModelSidecar,
-    /// What a preset states beside it.
+    /// The preset, if one was named.
     pub(super) preset: Option<Preset>,
 }
 
 impl ModelFile {
-    /// Reads a model, `FILE.onnx` or `PRESET:FILE.onnx`, its sidecar `FILE.onnx.toml` where there is one, and the files that
-    /// hold its external data.
+    /// Reads a model, `FILE.onnx` or `PRESET:FILE.onnx`, its sidecar `FILE.onnx.toml` if there is one, and the files of its
+    /// external data.
     ///
     /// # Errors
-    /// Where a file cannot be read, the model is no ONNX model, its name is no [`EnhancerName`], the sidecar has an unknown
-    /// key, or there is no such preset.
-    pub fn read(said: &Path) -> Result<Self> {
-        let (preset, path) = Preset::split(said)?;
+    /// If a file cannot be read or is not an ONNX model, its name is not an [`EnhancerName`], the sidecar has an unknown key,
+    /// or the preset does not exist.
+    pub fn read(model: &Path) -> Result<Self> {
+        let (preset, path) = Preset::split(model)?;
         let path = path.as_path();
         let bytes = std::fs::read(path).map_err(|e| Error::file(path, "read", e))?;
         let weights = Weights::find(&bytes).map_err(|_| not_onnx(path, &bytes))?;
@@ -53,30 +53,30 @@ impl ModelFile {
         })
     }
 
-    /// The name in tables and records: the file's name without its extension.
+    /// Name in tables and records: the file's name without its extension.
     #[must_use]
     pub fn name(&self) -> &EnhancerName {
         &self.name
     }
 
-    /// The digest of everything that the user gave: the model, its external data, and what sidecar and preset state.
+    /// Digest of the model, its external data, and the convention of sidecar and preset.
     #[must_use]
     pub fn digest(&self) -> Digest {
         self.digest
     }
 }
 
-/// What decides an enhanced image beside the dark one.
+/// Content of an enhancer's digest: all that decides an enhanced image, except the degraded one.
 #[derive(Serialize)]
 struct EnhancementFacts<'a> {
     file: Digest,
-    /// External data by where the model says that it lies.
+    /// Digests of external data, by the location that the model states.
     external: BTreeMap<&'a str, Digest>,
     convention: ModelSidecar,
 }
 
-/// The digest of a model's content, its external data and the convention that sidecar and preset state together; each file
-/// is hashed alone, so that only one is in memory at a time.
+/// Digest of a model's content, its external data and the convention of sidecar and preset. Each file is hashed alone, so
+/// that only one is in memory at a time.
 fn digest(
     path: &Path,
     bytes: &[u8],
@@ -93,17 +93,17 @@ fn digest(
     let sidecar = sidecar.clone();
     let convention = match preset {
         None => sidecar,
-        Some(preset) => sidecar.over(&preset.states),
+        Some(preset) => sidecar.with_defaults(&preset.convention),
     };
     let facts = EnhancementFacts {
         file: Digest::of(bytes),
         external,
-        convention: convention.resolved(),
+        convention: convention.without_defaults(),
     };
     Digest::canonical("darkqa.enhancer/2", &facts)
 }
 
-/// The path of a file with external data, which must lie in the model's folder or below (ONNX Runtime refuses others too).
+/// Path of a file with external data, which must be in the model's folder or below (ONNX Runtime refuses others too).
 fn external_path(model: &Path, location: &str) -> Result<PathBuf> {
     let relative = Path::new(location);
     let inside = relative
@@ -113,7 +113,7 @@ fn external_path(model: &Path, location: &str) -> Result<PathBuf> {
         return Err(Error::Enhancer {
             path: model.to_owned(),
             problem: format!(
-                "its weights are said to lie in {location:?}, outside of its folder; put them beside it and export it again"
+                "names {location:?} as a file of its weights, which is outside its folder; export it again with the weights beside it"
             ),
         });
     }
@@ -122,9 +122,9 @@ fn external_path(model: &Path, location: &str) -> Result<PathBuf> {
 
 fn not_onnx(path: &Path, bytes: &[u8]) -> Error {
     let problem = if bytes.starts_with(b"version https://git-lfs") {
-        "is a Git LFS pointer and no model; fetch the model itself with `git lfs pull`"
+        "is a Git LFS pointer, not a model; fetch the model itself with `git lfs pull`"
     } else {
-        "is no ONNX model, or a part of one; fetch it again, and export a PyTorch or TensorFlow model to ONNX first"
+        "is not a complete ONNX model; download it again, or export it to ONNX if it is a PyTorch or TensorFlow model"
     };
     Error::Enhancer {
         path: path.to_owned(),
@@ -136,7 +136,7 @@ fn not_onnx(path: &Path, bytes: &[u8]) -> Error {
 mod tests {
     use super::*;
 
-    /// `ir_version = 8` and a graph that is empty but for one initialiser, with external data in `location`.
+    /// `ir_version = 8` and a graph with only one initialiser, whose external data is in `location`.
     fn model(location: &str) -> Vec<u8> {
         let field = |number: u8, content: &[u8]| {
             [&[number << 3 | 2, content.len() as u8], content].concat()
@@ -167,13 +167,13 @@ mod tests {
         let third = digest();
         write("a.onnx", &model("./a.bin"));
         let all = [first, second, third, digest()];
-        for (i, one) in all.iter().enumerate() {
-            assert!(!all[..i].contains(one), "{i}");
+        for (i, digest) in all.iter().enumerate() {
+            assert!(!all[..i].contains(digest), "{i}");
         }
     }
 
     #[test]
-    fn what_holds_anyway_may_be_stated() {
+    fn stating_a_default_does_not_change_the_digest() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.onnx");
         std::fs::write(&path, model("a.bin")).unwrap();
@@ -197,16 +197,16 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_used_is_named() {
+    fn a_file_that_cannot_be_used_is_refused_with_the_reason() {
         let folder = tempfile::tempdir().unwrap();
         let cases: [(&str, &[u8], &str); 5] = [
-            ("text.onnx", b"not a model", "is no ONNX model"),
+            ("text.onnx", b"not a model", "is not a complete ONNX model"),
             (
                 "lfs.onnx",
                 b"version https://git-lfs.github.com/spec/v1\n",
                 "git lfs pull",
             ),
-            ("out.onnx", &model("../secret"), "outside of its folder"),
+            ("out.onnx", &model("../secret"), "outside its folder"),
             ("gone.onnx", &model("gone.bin"), "gone.bin: cannot read"),
             ("a b.onnx", &model("x"), "rename the file"),
         ];

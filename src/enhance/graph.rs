@@ -1,4 +1,4 @@
-//! A graph loaded into ONNX Runtime, with the way images are fed to it and read back: [`Graph`].
+//! A graph loaded into ONNX Runtime, with the conversion of images to and from it: [`Graph`].
 
 use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -10,14 +10,14 @@ use super::feeding::{Feeding, Input};
 use super::planes::Planes;
 use super::reading::{OutOfRange, OutputReading, TensorSamples};
 use super::runtime::Runtime;
-use super::session::{GraphSource, SessionOptions, Stopper, builder, ports, run, said};
+use super::session::{GraphSource, SessionOptions, Stopper, builder, one_line, ports, run};
 use super::sidecar::ModelSidecar;
 use super::signature::Signature;
 use super::tiles::TileWindow;
 use crate::error::Result;
 use crate::types::Rgb;
 
-/// A model that is loaded and ready.
+/// A loaded graph with its session.
 pub(super) struct Graph {
     pub(super) signature: Arc<Signature>,
     pub(super) feeding: Feeding,
@@ -27,13 +27,13 @@ pub(super) struct Graph {
     options: Arc<SessionOptions>,
 }
 
-/// What became of a run.
+/// Result of a run of a model.
 pub(super) enum RunResult<T> {
-    /// It gave this.
-    Gave(T),
-    /// It failed on an image of this size; what is wrong, to follow the file's name.
+    /// What was read from the output.
+    Output(T),
+    /// It failed on an image of this size; the message follows the file's name.
     Failed(String),
-    /// Its values cannot be those of an image.
+    /// The values of the output are not those of an image.
     Unusable(OutOfRange),
 }
 
@@ -41,10 +41,10 @@ impl Graph {
     /// Loads a model.
     ///
     /// # Errors
-    /// The inner one says what is wrong with the model, to follow the file's name.
+    /// The inner error is what is wrong with the model; the message follows the file's name.
     pub(super) fn load(
         source: GraphSource,
-        stated: &ModelSidecar,
+        convention: &ModelSidecar,
         runtime: &Runtime,
         threads: Option<NonZeroUsize>,
     ) -> Result<std::result::Result<Self, String>> {
@@ -53,21 +53,21 @@ impl Graph {
             builder(&environment, threads).and_then(|builder| source.commit(builder))
         })?;
         Ok(session
-            .map_err(|e| format!("ONNX Runtime cannot load it: {}", said(&e)))
-            .and_then(|session| Self::new(session, stated, runtime)))
+            .map_err(|e| format!("ONNX Runtime cannot load it: {}", one_line(&e)))
+            .and_then(|session| Self::new(session, convention, runtime)))
     }
 
     fn new(
         session: Session,
-        stated: &ModelSidecar,
+        convention: &ModelSidecar,
         runtime: &Runtime,
     ) -> std::result::Result<Self, String> {
         let (inputs, outputs) = (ports(session.inputs()), ports(session.outputs()));
-        let signature = Signature::of(&inputs, &outputs, stated)?;
-        let options = SessionOptions::of(&signature.output.port.name).map_err(|e| said(&e))?;
+        let signature = Signature::of(&inputs, &outputs, convention)?;
+        let options = SessionOptions::of(&signature.output.port.name).map_err(|e| one_line(&e))?;
         Ok(Self {
-            feeding: Feeding::of(&signature, stated),
-            reading: Arc::new(OutputReading::of(&signature, stated)),
+            feeding: Feeding::of(&signature, convention),
+            reading: Arc::new(OutputReading::of(&signature, convention)),
             signature: Arc::new(signature),
             runtime: runtime.clone(),
             session: Arc::new(Mutex::new(session)),
@@ -80,7 +80,7 @@ impl Graph {
         Stopper(Arc::clone(&self.options))
     }
 
-    /// Runs on a window of an image, and gives the bytes of a part of the window.
+    /// Runs the model on a window of an image; returns the bytes of a part of the window.
     pub(super) fn window(
         &self,
         image: &Rgb,
@@ -94,13 +94,13 @@ impl Graph {
         })
     }
 
-    /// Runs on a window of an image without a look at what it gives.
+    /// Runs the model on a window of an image and ignores its output.
     pub(super) fn probe(&self, image: &Rgb, window: TileWindow) -> Result<RunResult<()>> {
         let input = self.feeding.window(image, window);
         self.run(input, window.size(), |_, _| Ok(()))
     }
 
-    /// Runs on a whole image of floats.
+    /// Runs the model on a whole image of floats.
     pub(super) fn planes(&self, planes: &Planes) -> Result<RunResult<Planes>> {
         let (input, size) = (self.feeding.planes(planes), [planes.height, planes.width]);
         let reading = Arc::clone(&self.reading);
@@ -109,7 +109,7 @@ impl Graph {
         })
     }
 
-    /// Runs the model, and reads what it gives before another run writes over it.
+    /// Runs the model, and reads its output before another run overwrites it.
     fn run<T: Send + 'static>(
         &self,
         input: Input,
@@ -123,22 +123,22 @@ impl Graph {
         let [height, width] = size;
         self.runtime.run(move || {
             let mut session = session.lock().unwrap_or_else(PoisonError::into_inner);
-            let ran = run(
+            let result = run(
                 &mut session,
                 &options,
                 &signature,
                 input,
                 |dims, samples| match reading.layout(dims, size) {
-                    Some(layout) => read(samples, layout).map_or_else(RunResult::Unusable, RunResult::Gave),
+                    Some(layout) => read(samples, layout).map_or_else(RunResult::Unusable, RunResult::Output),
                     None => RunResult::Failed(format!(
-                        "gave {dims:?} for an image of {width} × {height}: it does not keep the size of an image; where it takes multiples of some size alone, say it in MODEL.onnx.toml beside it: `multiple = 8`"
+                        "gave {dims:?} for an image of {width} × {height}: the output must have the size of the input; if it only takes multiples of some size, state it in MODEL.onnx.toml beside it: `multiple = 8`"
                     )),
                 },
             );
-            ran.unwrap_or_else(|e| {
-                let words = said(&e);
+            result.unwrap_or_else(|e| {
+                let problem = one_line(&e);
                 RunResult::Failed(format!(
-                    "failed on an image of {width} × {height} ({words}); where it takes multiples of some size alone, say it in MODEL.onnx.toml beside it: `multiple = 8`"
+                    "failed on an image of {width} × {height} ({problem}); if it only takes multiples of some size, state it in MODEL.onnx.toml beside it: `multiple = 8`"
                 ))
             })
         })

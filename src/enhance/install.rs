@@ -1,4 +1,4 @@
-//! The installation of ONNX Runtime's library out of its PyPI wheel into the user's cache: [`install`].
+//! Installation of ONNX Runtime's library from its PyPI wheel into the user's cache: [`install`].
 
 use std::env::consts;
 use std::fs::{self, File};
@@ -11,16 +11,16 @@ use zip::ZipArchive;
 
 use super::library::PINNED;
 
-/// The library of one platform in the wheel of version [`PINNED`].
+/// Library of one platform in the wheel of version [`PINNED`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Pin {
     os: &'static str,
     arch: &'static str,
-    /// The wheel's platform tag.
+    /// Platform tag of the wheel.
     tag: &'static str,
-    /// The library's file name, in `onnxruntime/capi/` of the wheel.
+    /// File name of the library, in `onnxruntime/capi/` of the wheel.
     file: &'static str,
-    /// The SHA-256 of the library, which is the same file in the wheels for every version of Python.
+    /// SHA-256 of the library, which is the same file in the wheels for all versions of Python.
     sha256: &'static str,
 }
 
@@ -57,7 +57,7 @@ const PINS: [Pin; 4] = [
 ];
 
 impl Pin {
-    /// The pin of the platform that this program was built for; `None` where no wheel is known to fit.
+    /// Pin of the platform that this program was built for; `None` if no known wheel fits.
     pub(super) fn of_this_platform() -> Option<Self> {
         // The wheels need the GNU C library.
         if cfg!(target_env = "musl") {
@@ -72,7 +72,7 @@ impl Pin {
     }
 }
 
-/// The ways to call pip, in the order in which they are tried.
+/// Commands that call pip, in the order in which they are tried.
 const PIPS: [&[&str]; 4] = [
     &["python3", "-m", "pip"],
     &["pip3"],
@@ -80,38 +80,38 @@ const PIPS: [&[&str]; 4] = [
     &["python", "-m", "pip"],
 ];
 
-/// Downloads the pinned wheel with pip, takes the library out of it, checks it and puts it into `folder`.
+/// Downloads the pinned wheel with pip, extracts the library, checks it and puts it into `folder`; returns its path.
 ///
-/// Everything happens in a folder of its own beside `folder`, and the library is moved into place whole: two processes that
-/// install at once do not disturb each other, and one that is interrupted leaves nothing that could be loaded.
+/// The work is done in a temporary folder beside `folder`, and the library is then moved in one step. So two processes can
+/// install at once, and an interrupted one leaves nothing that could be loaded.
 ///
 /// # Errors
-/// A sentence that says what failed.
+/// A message that says what failed.
 pub(super) fn install(pin: Pin, folder: &Path) -> Result<PathBuf, String> {
-    let beside = folder.parent().unwrap_or(folder);
-    fs::create_dir_all(beside).map_err(|e| at(beside, "cannot be created", &e))?;
-    let workshop = tempfile::Builder::new()
+    let parent = folder.parent().unwrap_or(folder);
+    fs::create_dir_all(parent).map_err(|e| path_error(parent, "cannot be created", &e))?;
+    let temporary = tempfile::Builder::new()
         .prefix("installing-")
-        .tempdir_in(beside)
-        .map_err(|e| at(beside, "cannot be written", &e))?;
-    download(pin, workshop.path())?;
-    let wheel = wheel_in(workshop.path())?;
-    let unpacked = workshop.path().join(pin.file);
+        .tempdir_in(parent)
+        .map_err(|e| path_error(parent, "cannot be written", &e))?;
+    download(pin, temporary.path())?;
+    let wheel = wheel_in(temporary.path())?;
+    let unpacked = temporary.path().join(pin.file);
     unpack(&wheel, pin, &unpacked)?;
-    let place = folder.join(pin.file);
-    fs::create_dir_all(folder).map_err(|e| at(folder, "cannot be created", &e))?;
-    match fs::rename(&unpacked, &place) {
-        // Windows does not replace a library that another process has loaded: that one is as good.
-        Err(_) if place.is_file() => Ok(place),
-        Err(error) => Err(at(&place, "cannot be written", &error)),
-        Ok(()) => Ok(place),
+    let library = folder.join(pin.file);
+    fs::create_dir_all(folder).map_err(|e| path_error(folder, "cannot be created", &e))?;
+    match fs::rename(&unpacked, &library) {
+        // Windows does not replace a library that another process has loaded. That one is the same file.
+        Err(_) if library.is_file() => Ok(library),
+        Err(error) => Err(path_error(&library, "cannot be written", &error)),
+        Ok(()) => Ok(library),
     }
 }
 
-/// Lets the first pip that there is download the wheel into `folder`.
+/// Downloads the wheel into `folder` with the first pip that is present.
 fn download(pin: Pin, folder: &Path) -> Result<(), String> {
     for pip in PIPS {
-        let output = command(pip, pin, folder).output();
+        let output = download_command(pip, pin, folder).output();
         match output {
             Ok(output) if output.status.success() => return Ok(()),
             Ok(output) if !is_missing(&output) => {
@@ -121,15 +121,15 @@ fn download(pin: Pin, folder: &Path) -> Result<(), String> {
                     last_line(&output)
                 ));
             }
-            // No such program, or a Python without pip: the next one.
+            // No such program, or a Python without pip: try the next one.
             Ok(_) | Err(_) => {}
         }
     }
     Err("there is no pip on PATH".to_owned())
 }
 
-/// The command that downloads the wheel, whatever version of Python runs pip.
-fn command(pip: &[&str], pin: Pin, folder: &Path) -> Command {
+/// Command that downloads the wheel; it works for any version of Python that runs pip.
+fn download_command(pip: &[&str], pin: Pin, folder: &Path) -> Command {
     let mut command = Command::new(pip[0]);
     command
         .args(&pip[1..])
@@ -143,14 +143,14 @@ fn command(pip: &[&str], pin: Pin, folder: &Path) -> Command {
     command
 }
 
-/// Whether a Python said that it has no pip.
+/// Whether the program, or pip in its Python, does not exist.
 fn is_missing(output: &Output) -> bool {
-    // 127 is a shim (pyenv, asdf) that stands for a program that is not there.
+    // 127 is the exit status of a shim (pyenv, asdf) for a program that does not exist.
     output.status.code() == Some(127)
         || String::from_utf8_lossy(&output.stderr).contains("No module named pip")
 }
 
-/// The last line that says something.
+/// Last non-empty line of stdout and stderr, else the exit status.
 fn last_line(output: &Output) -> String {
     let text = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes));
     let mut lines = text.iter().flat_map(|text| text.lines());
@@ -159,14 +159,14 @@ fn last_line(output: &Output) -> String {
 }
 
 fn wheel_in(folder: &Path) -> Result<PathBuf, String> {
-    let entries = fs::read_dir(folder).map_err(|e| at(folder, "cannot be read", &e))?;
+    let entries = fs::read_dir(folder).map_err(|e| path_error(folder, "cannot be read", &e))?;
     let mut paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
     paths
         .find(|path| path.extension().is_some_and(|extension| extension == "whl"))
         .ok_or_else(|| "pip downloaded no wheel".to_owned())
 }
 
-/// Takes the library out of a wheel into `target`, if it is the pinned one.
+/// Extracts the library from a wheel into `target`; an error if it is not the pinned one.
 fn unpack(wheel: &Path, pin: Pin, target: &Path) -> Result<(), String> {
     let broken = |e: &dyn std::error::Error| format!("{}: {e}", wheel.display());
     let file = File::open(wheel).map_err(|e| broken(&e))?;
@@ -175,18 +175,19 @@ fn unpack(wheel: &Path, pin: Pin, target: &Path) -> Result<(), String> {
         .by_name(&format!("onnxruntime/capi/{}", pin.file))
         .map_err(|e| broken(&e))?;
     let mut hasher = Sha256::new();
-    copy(&mut library, target, &mut hasher).map_err(|e| at(target, "cannot be written", &e))?;
+    copy(&mut library, target, &mut hasher)
+        .map_err(|e| path_error(target, "cannot be written", &e))?;
     let found = hex(&hasher.finalize());
     if found == pin.sha256 {
         return Ok(());
     }
     Err(format!(
-        "{} in the wheel that pip downloaded has the SHA-256 {found} in place of {}; it was not installed. Look at pip's index and find-links settings (`pip config list`)",
+        "{} in the wheel that pip downloaded has the SHA-256 {found} instead of {}; it was not installed. Check pip's index and find-links settings (`pip config list`)",
         pin.file, pin.sha256
     ))
 }
 
-/// Writes what `source` gives into a file and into the hasher.
+/// Copies `source` into a file and into the hasher.
 fn copy(source: &mut impl Read, target: &Path, hasher: &mut Sha256) -> io::Result<()> {
     let mut file = File::create(target)?;
     let mut buffer = vec![0; 1 << 16];
@@ -207,7 +208,7 @@ fn hex(bytes: &[u8]) -> String {
         .collect()
 }
 
-fn at(path: &Path, what: &str, error: &io::Error) -> String {
+fn path_error(path: &Path, what: &str, error: &io::Error) -> String {
     format!("{} {what}: {error}", path.display())
 }
 
@@ -216,7 +217,7 @@ mod tests {
     use super::*;
     use zip::write::SimpleFileOptions;
 
-    /// Writes a wheel with `content` for a library; returns the pin that it would satisfy.
+    /// Writes a wheel with `content` as its library; returns the pin that it satisfies.
     fn wheel(path: &Path, name: &str, content: &[u8]) -> Pin {
         let mut writer = zip::ZipWriter::new(File::create(path).unwrap());
         let options = SimpleFileOptions::default();
@@ -259,7 +260,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn the_last_line_of_pip_is_told() {
+    fn the_last_line_of_pip_is_reported() {
         let output = |script| Command::new("sh").args(["-c", script]).output().unwrap();
         let failed = output("echo Looking; echo 'ERROR: none found' >&2; echo >&2; exit 1");
         assert_eq!(last_line(&failed), "ERROR: none found");

@@ -1,4 +1,4 @@
-//! A file that may be ONNX Runtime's library, and whether it is: [`probe`].
+//! Check whether a file is a usable library of ONNX Runtime: [`probe`].
 
 use std::error::Error as _;
 use std::ffi::CStr;
@@ -7,13 +7,13 @@ use std::path::Path;
 use libloading::{Library, Symbol};
 use ort::sys::OrtApiBase;
 
-/// The version of the library that is installed where none is found; its pins are in `install.rs`.
+/// Version of the library that is installed if none is found; its pins are in `install.rs`.
 pub(super) const PINNED: &str = "1.31.1";
 
-/// The oldest minor version 1.x that serves: the lowest C API that the `ort` crate speaks.
+/// Oldest usable minor version 1.x: the lowest version of the C API that the `ort` crate supports.
 pub(super) const OLDEST: u32 = ort::MINOR_VERSION;
 
-/// Whether a file's name is that of ONNX Runtime's library on an operating system (named as [`std::env::consts::OS`]).
+/// Whether a file has the name of ONNX Runtime's library on an operating system (named as in [`std::env::consts::OS`]).
 pub(super) fn is_library_name(os: &str, name: &str) -> bool {
     match os {
         "windows" => name.eq_ignore_ascii_case("onnxruntime.dll"),
@@ -27,16 +27,16 @@ pub(super) fn is_library_name(os: &str, name: &str) -> bool {
     }
 }
 
-/// Loads a library, asks it for its version and lets go of it again.
+/// Loads a library, asks it for its version and unloads it; returns the version.
 ///
-/// Everything that could go wrong later is tried here, because `ort` panics where a library does not give it its API.
+/// All that could fail later is tried here, because `ort` panics if a library does not give it the API.
 ///
 /// # Errors
-/// What is wrong with the file, to follow its path.
+/// What is wrong with the file; the message follows its path.
 pub(super) fn probe(path: &Path) -> Result<String, String> {
     let metadata = std::fs::metadata(path).map_err(|e| format!("cannot be read: {e}"))?;
     if !metadata.is_file() {
-        return Err("is no file; name the library itself".to_owned());
+        return Err("is not a file; name the library itself".to_owned());
     }
     let version = version_of(path)?;
     match minor(&version) {
@@ -48,7 +48,7 @@ pub(super) fn probe(path: &Path) -> Result<String, String> {
     }
 }
 
-/// The `x` of version `1.x.y`.
+/// Minor version `x` of version `1.x.y`.
 fn minor(version: &str) -> Option<u32> {
     let mut parts = version.split('.');
     parts.next().filter(|major| *major == "1")?;
@@ -61,10 +61,10 @@ fn minor(version: &str) -> Option<u32> {
     reason = "a dynamic library can be asked for its version in no other way"
 )]
 fn version_of(path: &Path) -> Result<String, String> {
-    // SAFETY: loading runs the library's initialisers. The file bears ONNX Runtime's name or was named by the user, who
-    // asks for it to be loaded; ONNX Runtime's initialisers have no preconditions.
+    // SAFETY: loading runs the library's initialisers. The file has the name of ONNX Runtime's library, or the user asked
+    // for it to be loaded; ONNX Runtime's initialisers have no preconditions.
     let library = unsafe { Library::new(path) }.map_err(|e| {
-        // The loader's own words are in the source; the error itself says only that it failed.
+        // The loader's message is in the source; the error itself only says that loading failed.
         let reason = e
             .source()
             .map_or_else(|| e.to_string(), ToString::to_string);
@@ -78,7 +78,7 @@ fn version_of(path: &Path) -> Result<String, String> {
             .map_err(|_| "is not ONNX Runtime: it exports no OrtGetApiBase".to_owned())?;
         get()
     };
-    // SAFETY: where it is not null it points at a static of the library, which stays loaded to the end of this function.
+    // SAFETY: if it is not null, it points to a static of the library, which stays loaded to the end of this function.
     let Some(base) = (unsafe { base.as_ref() }) else {
         return Err("gives no API".to_owned());
     };
@@ -91,7 +91,7 @@ fn version_of(path: &Path) -> Result<String, String> {
             (base.GetApi)(ort::sys::ORT_API_VERSION),
         )
     };
-    // An older library gives none; its version says so better.
+    // An older library gives no API either; the caller's error about its version is clearer.
     if api.is_null() && minor(&version).is_none_or(|minor| minor >= OLDEST) {
         return Err(format!(
             "is version {version} but does not give API {OLDEST}"
@@ -105,7 +105,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn libraries_are_known_by_name() {
+    fn libraries_are_recognised_by_name() {
         for (os, name, expected) in [
             ("linux", "libonnxruntime.so", true),
             ("linux", "libonnxruntime.so.1.31.1", true),
@@ -130,13 +130,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_library_is_refused() {
+    fn a_file_that_is_not_a_library_is_refused() {
         let folder = tempfile::tempdir().unwrap();
         let text = folder.path().join("libonnxruntime.so");
         std::fs::write(&text, "not a library").unwrap();
         for (path, part) in [
             (folder.path().join("missing.so"), "cannot be read"),
-            (folder.path().to_owned(), "is no file"),
+            (folder.path().to_owned(), "is not a file"),
             (text, "cannot be loaded"),
         ] {
             let problem = probe(&path).unwrap_err();

@@ -1,19 +1,20 @@
-//! What a whole image will cost in memory, before it is spent: [`MemoryCost`].
+//! Estimate of the memory that a whole image needs: [`MemoryCost`].
 //!
-//! ONNX Runtime does not say what a graph needs. So two small parts of the image go through first, and what the process grew by
-//! between them tells the bytes of a pixel. Where the system does not tell (anything but Linux), nothing is estimated.
+//! ONNX Runtime does not report how much memory a graph needs. So two small parts of the image are enhanced first, and the
+//! growth of the process between them gives the bytes per pixel. This needs Linux's `/proc`; on other systems nothing is
+//! estimated.
 
 use std::fs;
 
-/// The sides of the two parts.
+/// Sides of the two parts, in pixels.
 pub(super) const PROBES: [usize; 2] = [128, 256];
 
-/// What a model needs for a pixel, in bytes.
+/// Memory that a model needs for one pixel, in bytes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct MemoryCost(f64);
 
 impl MemoryCost {
-    /// From what was resident after each of the parts; `None` where that tells nothing.
+    /// Cost from the resident bytes after each of the two parts; `None` if they did not grow.
     pub(super) fn of(resident: [u64; 2]) -> Option<Self> {
         let grown = resident[1]
             .checked_sub(resident[0])
@@ -22,7 +23,7 @@ impl MemoryCost {
         Some(Self(grown as f64 / pixels as f64))
     }
 
-    /// Whether an image of so many pixels fits into what is available; else both in gigabytes.
+    /// Checks that an image of `pixels` fits into the `available` bytes; the error is needed and available memory in gigabytes.
     pub(super) fn fits(self, pixels: usize, available: u64) -> Result<(), [f64; 2]> {
         const GIGABYTE: f64 = 1e9;
         let needed = self.0 * pixels as f64;
@@ -34,13 +35,13 @@ impl MemoryCost {
     }
 }
 
-/// The bytes of this process that lie in memory.
+/// Resident memory of this process, in bytes.
 pub(super) fn resident() -> Option<u64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     kilobytes(&status, "VmRSS:")
 }
 
-/// The bytes that a process may still take: what the machine has free, and what its control group leaves.
+/// Memory that this process may still use, in bytes: the smaller of the machine's free memory and its control group's rest.
 pub(super) fn available() -> Option<u64> {
     let free = kilobytes(&fs::read_to_string("/proc/meminfo").ok()?, "MemAvailable:")?;
     let number = |path: &str| -> Option<u64> {
@@ -54,14 +55,14 @@ pub(super) fn available() -> Option<u64> {
             "/sys/fs/cgroup/memory/memory.usage_in_bytes",
         ),
     ];
-    let left = groups.iter().filter_map(|(most, used)| {
-        let (most, used) = (number(most)?, number(used)?);
-        Some(most.saturating_sub(used))
+    let unused = groups.iter().filter_map(|(limit, used)| {
+        let (limit, used) = (number(limit)?, number(used)?);
+        Some(limit.saturating_sub(used))
     });
-    Some(left.fold(free, u64::min))
+    Some(unused.fold(free, u64::min))
 }
 
-/// The value of a line like `VmRSS:  1234 kB`, in bytes.
+/// Value of a line like `VmRSS:  1234 kB`, in bytes.
 fn kilobytes(text: &str, name: &str) -> Option<u64> {
     let line = text.lines().find_map(|line| line.strip_prefix(name))?;
     let value: u64 = line.split_whitespace().next()?.parse().ok()?;
@@ -73,10 +74,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_grew_tells_the_cost() {
+    fn growth_gives_the_cost() {
         assert_eq!(MemoryCost::of([5, 5]), None);
         assert_eq!(MemoryCost::of([7, 5]), None);
-        // 800 bytes a pixel.
+        // 800 bytes per pixel.
         let cost = MemoryCost::of([1_000, 1_000 + 800 * 3 * 128 * 128]).unwrap();
         assert_eq!(cost.fits(1_000_000, 800_000_001), Ok(()));
         let [needed, available] = cost.fits(1_000_000, 500_000_000).unwrap_err();

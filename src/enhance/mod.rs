@@ -1,4 +1,4 @@
-//! Stage 3, enhance: a dark image through the user's own ONNX model on ONNX Runtime's CPU provider.
+//! Stage 3, enhance: a degraded image → an enhanced one, by the user's ONNX model on ONNX Runtime's CPU provider.
 //!
 //! ```text
 //! RuntimeSearch::open ─► Runtime ─┐
@@ -6,10 +6,10 @@
 //! ModelFile::read ─► name, digest ┘
 //! ```
 //!
-//! How a model is fed and read comes from its graph (layout, type, sizes), else from a sidecar `MODEL.onnx.toml`, else from a
-//! preset (`zero-dce:FILE`), else from what published models do (RGB, 0..1); what none of them says and matters is refused by
-//! name. [`ModelFile::read`] needs no runtime: a file that is no ONNX model is found out before anything is searched or
-//! installed, and a resumed run knows its digest.
+//! The convention of a model (how it is fed and read) comes from its graph (layout, type, sizes), else from a sidecar
+//! `MODEL.onnx.toml`, else from a preset (`zero-dce:FILE`), else from what published models do (RGB, 0..1). A model that
+//! still lacks something is refused, with its name. [`ModelFile::read`] needs no runtime: a file that is not an ONNX model
+//! is refused before anything is searched or installed, and a resumed run knows its digest.
 
 mod convention;
 mod describe;
@@ -42,6 +42,6 @@ pub(crate) use session::Stopper;
 pub(crate) use settings::{EnhancerArgs, RuntimeArgs, SizeArgs};
 pub use tiles::Tiling;
 
-/// The version of the way to and from a model: raised whenever a pixel changes, so that no result of an older one is taken
-/// for its own.
+/// Version of feeding and reading models, raised whenever a pixel changes, so that results of an older version are not
+/// reused.
 pub const VERSION: u32 = 1;

@@ -1,10 +1,10 @@
-//! Which output of a graph is the enhanced image: [`Output::choose`].
+//! Choice of the output of a graph that is the enhanced image: [`Output::choose`].
 
 use super::convention::TensorLayout;
 use super::port::{Dim, Port, list};
 use super::sidecar::OutputChoice;
 
-/// The names that exporters give the enhanced image where a model has other outputs beside it.
+/// Names that exporters give the enhanced image if a model has other outputs too.
 const IMAGE_NAMES: [&str; 8] = [
     "enhanced",
     "enhanced_image",
@@ -16,31 +16,32 @@ const IMAGE_NAMES: [&str; 8] = [
     "image",
 ];
 
-/// The output that is an image.
+/// The output that is the enhanced image.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Output {
-    /// The graph's words for it.
+    /// Name, type and dimensions in the graph.
     pub(super) port: Port,
-    /// The order of its dimensions; `None` where only a run shows it.
+    /// Order of its dimensions; `None` if only a run shows it.
     pub(super) layout: Option<TensorLayout>,
-    /// Why it is this one.
-    pub(super) why: &'static str,
+    /// Reason for the choice, for users; `stated` if sidecar or preset state it.
+    pub(super) reason: &'static str,
 }
 
 impl Output {
-    /// The image among the outputs: the stated one, the only one, else the one that names and structure agree on.
+    /// The image among the outputs: the stated one, the only one, else the one that names and structure agree on. `fits`
+    /// says whether an output can be the image.
     ///
     /// # Errors
-    /// A sentence that follows the file's name.
+    /// The message follows the file's name.
     pub(super) fn choose(
         outputs: &[Port],
         stated: Option<&OutputChoice>,
         fits: impl Fn(&Port) -> bool,
     ) -> Result<Self, String> {
         let images: Vec<usize> = (0..outputs.len()).filter(|&i| fits(&outputs[i])).collect();
-        let (index, why) = match (images.as_slice(), stated) {
+        let (index, reason) = match (images.as_slice(), stated) {
             ([only], None) => (*only, "the only output that can be the image"),
-            // A preset's index is that of its authors' model, whose other outputs an export may have left out.
+            // A preset's index counts the outputs of the authors' model. An export may have fewer.
             ([only], Some(OutputChoice::Index(_))) if outputs.len() == 1 => {
                 (*only, "the only output")
             }
@@ -67,12 +68,12 @@ impl Output {
         Ok(Self {
             layout: port.layout(),
             port,
-            why,
+            reason,
         })
     }
 }
 
-/// The output that is stated, where it can be the image.
+/// Index of the stated output, which must exist and be able to be the image.
 fn stated_output(
     outputs: &[Port],
     choice: &OutputChoice,
@@ -84,29 +85,29 @@ fn stated_output(
     };
     let problem = match found {
         Some(index) if fits(&outputs[index]) => return Ok(index),
-        Some(_) => "which is none of its image outputs",
+        Some(_) => "which is not one of its image outputs",
         None => "which it does not have",
     };
     Err(format!(
-        "its sidecar says {choice}, {problem}; it has {}",
+        "its sidecar or preset states {choice}, {problem}; it has {}",
         list(outputs)
     ))
 }
 
-/// The one image output with a telling name.
+/// The only image output that has one of [`IMAGE_NAMES`].
 ///
-/// An exporter that is given fewer names than there are outputs spends them from the first on and numbers the rest:
-/// `output` is then the first output, whatever that is (of Zero-DCE, the wrong one). So a name at the first place tells
-/// something only where the others have names too.
+/// An exporter that gets fewer names than outputs names the first ones and numbers the rest. `output` is then the first
+/// output, whatever that is (for Zero-DCE, the wrong one). So a name of the first output counts only if the others are
+/// named too.
 fn by_name(outputs: &[Port], images: &[usize]) -> Option<usize> {
     let named = |i: &usize| IMAGE_NAMES.contains(&outputs[*i].name.as_str());
-    let mut telling = images.iter().copied().filter(named);
-    let one = telling.next().filter(|_| telling.next().is_none())?;
-    let named_by_hand = one > 0 || !outputs.iter().any(|port| is_numbered(&port.name));
-    named_by_hand.then_some(one)
+    let mut matching = images.iter().copied().filter(named);
+    let only = matching.next().filter(|_| matching.next().is_none())?;
+    let named_by_hand = only > 0 || !outputs.iter().any(|port| is_numbered(&port.name));
+    named_by_hand.then_some(only)
 }
 
-/// Whether an exporter made up this name: a number, a path of modules, or an operator's name.
+/// Whether an exporter generated this name: a number, a path of modules, or an operator's name.
 fn is_numbered(name: &str) -> bool {
     const OPERATORS: [&str; 19] = [
         "add", "cat", "clamp", "clip", "concat", "conv", "conv2d", "div", "getitem", "identity",
@@ -118,7 +119,7 @@ fn is_numbered(name: &str) -> bool {
     word.is_empty() || name.contains(['/', ':', '.']) || OPERATORS.contains(&word.as_str())
 }
 
-/// The second of Zero-DCE's three outputs, which is the image whatever their names are.
+/// Index of the second of Zero-DCE's three outputs, which is the image whatever their names are.
 ///
 /// `enhance_net_nopool.forward` of <https://github.com/Li-Chongyi/Zero-DCE> returns the image after four curves, the
 /// image after all eight, and the 8 × 3 = 24 channels of the curves themselves. No other published model has this shape.

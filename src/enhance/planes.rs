@@ -1,4 +1,4 @@
-//! An image of floats, for models of a fixed size: [`Planes`].
+//! Images of floats, for models of a fixed size: [`Planes`].
 
 use image::imageops::{FilterType, resize};
 use image::{ImageBuffer, Luma};
@@ -6,19 +6,17 @@ use image::{ImageBuffer, Luma};
 use super::convention::Rounding;
 use crate::types::Rgb;
 
-/// An image of three planes, red, green, blue, one after the other, 0..1.
+/// Image of three planes, red, green, blue, one after the other, with samples in 0..1.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Planes {
-    /// The height in pixels.
     pub(super) height: usize,
-    /// The width in pixels.
     pub(super) width: usize,
-    /// 3 × height × width samples.
+    /// The samples, 3 × height × width.
     pub(super) samples: Vec<f32>,
 }
 
 impl Planes {
-    /// The image with its bytes divided by 255.
+    /// The planes of an image, its bytes divided by 255.
     pub(super) fn of(image: &Rgb) -> Self {
         let pixels = image.samples().chunks_exact(3);
         let samples = (0..3)
@@ -35,7 +33,7 @@ impl Planes {
         }
     }
 
-    /// The image in bytes: each sample held within 0..1 and times 255. `None` where there is no pixel.
+    /// The image in bytes: each sample is clamped to 0..1 and multiplied by 255. `None` if there is no pixel.
     pub(super) fn to_rgb(&self, rounding: Rounding) -> Option<Rgb> {
         let plane = self.height * self.width;
         let byte = |sample: f32| {
@@ -54,11 +52,11 @@ impl Planes {
         Rgb::new(self.height, self.width, samples).ok()
     }
 
-    /// The image in another size, for models of a fixed one, with its samples held within 0..1 first.
+    /// The image in another size, for models of a fixed size; its samples are clamped to 0..1 first.
     ///
-    /// The filter is bilinear, widened by the ratio where the image shrinks: unlike sharper filters it makes no value that
-    /// was not between those of the image, so neither haloes nor samples out of range go into a model or come back.
-    /// Samples stay floats throughout; in bytes the few levels that a dark image has would be rounded twice.
+    /// The filter is bilinear, widened by the ratio if the image shrinks. Unlike sharper filters it stays within the image's
+    /// values, so it makes neither haloes nor samples out of range. Samples stay floats, because in bytes the few codes of a
+    /// dark image would be rounded twice.
     pub(super) fn resized(&self, height: usize, width: usize) -> Result<Self, String> {
         let side = |size: usize| u32::try_from(size).map_err(|e| e.to_string());
         let (from, to) = (
@@ -69,7 +67,7 @@ impl Planes {
         for plane in self.samples.chunks_exact(self.height * self.width) {
             let plane = plane.iter().map(|sample| sample.clamp(0.0, 1.0)).collect();
             let plane = ImageBuffer::<Luma<f32>, Vec<f32>>::from_raw(from.0, from.1, plane)
-                .ok_or("a plane of another size than its image")?;
+                .ok_or("a plane has another size than its image")?;
             samples.extend(resize(&plane, to.0, to.1, FilterType::Triangle).into_raw());
         }
         Ok(Self {
@@ -84,7 +82,7 @@ impl Planes {
 mod tests {
     use super::*;
 
-    /// An image in which no two samples near each other are alike.
+    /// An image whose neighbouring samples all differ.
     fn image(height: usize, width: usize) -> Rgb {
         let samples = (0..height * width * 3).map(|i| (i * 37 % 256) as u8);
         Rgb::new(height, width, samples.collect()).unwrap()
@@ -105,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_are_held_in_range_and_rounded() {
+    fn samples_are_clamped_and_rounded() {
         let planes = Planes {
             height: 1,
             width: 2,
@@ -119,29 +117,29 @@ mod tests {
     }
 
     #[test]
-    fn resizing_keeps_flat_colours_and_the_range() {
+    fn resizing_preserves_flat_colours_and_the_range() {
         let flat = Rgb::new(9, 7, [3, 120, 255].repeat(63)).unwrap();
-        let there = Planes::of(&flat).resized(4, 16).unwrap();
+        let resized = Planes::of(&flat).resized(4, 16).unwrap();
         assert_eq!(
-            (there.height, there.width, there.samples.len()),
+            (resized.height, resized.width, resized.samples.len()),
             (4, 16, 192)
         );
         assert_eq!(
-            there
+            resized
                 .resized(9, 7)
                 .unwrap()
                 .to_rgb(Rounding::Round)
                 .unwrap(),
             flat
         );
-        let mut wild = Planes::of(&image(8, 8));
-        wild.samples[0] = 5.0;
-        let resized = wild.resized(16, 5).unwrap();
+        let mut too_large = Planes::of(&image(8, 8));
+        too_large.samples[0] = 5.0;
+        let resized = too_large.resized(16, 5).unwrap();
         assert!(resized.samples.iter().all(|x| (0.0..=1.0).contains(x)));
     }
 
     #[test]
-    fn resizing_puts_pixels_where_they_belong() {
+    fn resizing_keeps_pixels_in_their_places() {
         let halves: Vec<u8> = (0..16)
             .flat_map(|i| [if i % 4 < 2 { 0 } else { 255 }; 3])
             .collect();

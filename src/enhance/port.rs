@@ -1,4 +1,4 @@
-//! Inputs and outputs of a graph in its own words: [`Port`].
+//! Inputs and outputs of a graph: [`Port`].
 
 use std::fmt;
 
@@ -7,18 +7,16 @@ use super::convention::{ElementType, TensorLayout};
 /// An input or output of a graph.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Port {
-    /// Its name.
     pub(super) name: String,
-    /// What its elements are.
     pub(super) element: ElementType,
-    /// Its dimensions; empty for a number, and where the graph does not say even how many there are.
+    /// Dimensions; empty for a single number, and if the graph does not state their number.
     pub(super) dims: Vec<Dim>,
 }
 
 /// One dimension of a tensor.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Dim {
-    /// A size that the graph fixes.
+    /// Size that the graph fixes.
     Known(usize),
     /// Any size, with the graph's name for it, which may be empty.
     Free(String),
@@ -65,25 +63,25 @@ impl fmt::Display for Port {
 }
 
 impl Port {
-    /// The layout of an image of three channels, where its dimensions say it.
+    /// Layout of an image of three channels; `None` if the dimensions do not determine it.
     pub(super) fn layout(&self) -> Option<TensorLayout> {
         let mut fitting = TensorLayout::ALL.into_iter().filter(|layout| {
             self.dims.len() == layout.rank()
                 && self.dims[layout.places()[0]].known() == Some(3)
                 && (layout.rank() == 3 || self.dims[0].can_be(1))
         });
-        // A size of 3 in two places says nothing.
+        // With a size of 3 in two places, the layout is ambiguous.
         fitting.next().filter(|_| fitting.next().is_none())
     }
 
-    /// Whether the dimensions leave room for three channels somewhere; a plane of grey, which has a 1 in their place, does not.
+    /// Whether one of the dimensions can be three channels; false for a grey image, which has a dimension of 1 instead.
     pub(super) fn may_be_image(&self) -> bool {
         let last = &self.dims[self.dims.len().saturating_sub(3)..];
         let grey = last.iter().any(|dim| dim.known() == Some(1));
         (3..=4).contains(&self.dims.len()) && !grey && last.iter().any(|dim| dim.can_be(3))
     }
 
-    /// Whether it can be an image of this height and width in a layout. What the graph leaves open can.
+    /// Whether it can be an image of this height and width in a layout. Open dimensions can have any size.
     pub(super) fn can_be_image(&self, layout: TensorLayout, [height, width]: [&Dim; 2]) -> bool {
         let [channels, rows, columns] = layout.places();
         let shape = self.dims.is_empty()
@@ -101,7 +99,7 @@ impl Port {
     }
 }
 
-/// Ports in words.
+/// The ports as text, for messages.
 pub(super) fn list(ports: &[Port]) -> String {
     if ports.is_empty() {
         return "none".to_owned();

@@ -1,27 +1,24 @@
-//! The fields of a protobuf message by number and place, without a schema: [`fields`].
+//! Fields of a protobuf message by number and byte position, without a schema: [`fields`].
 //!
-//! The encoding is that of <https://protobuf.dev/programming-guides/encoding/>. Groups, which ONNX never had, are refused.
+//! The encoding is that of <https://protobuf.dev/programming-guides/encoding/>. Groups, which ONNX never used, are refused.
 
 use std::ops::Range;
 
-/// The bytes are no protobuf message.
+/// The error for bytes that are not a protobuf message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Malformed;
 
-/// The value of a field; ranges are byte positions in the whole buffer.
+/// Value of a field; ranges are byte positions in the whole buffer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum FieldValue {
-    /// An integer.
     Varint(u64),
-    /// Four bytes, little-endian.
     Fixed32(Range<usize>),
-    /// Eight bytes, little-endian.
     Fixed64(Range<usize>),
     /// A string, some bytes, a message or packed numbers.
     Bytes(Range<usize>),
 }
 
-/// The fields, in order, of the message that fills `within` of `buffer`; ends after the first error.
+/// Iterator over the fields of the message at `within` in `buffer`; it ends after the first error.
 pub(super) fn fields(buffer: &[u8], within: Range<usize>) -> FieldsOf<'_> {
     let message = buffer.get(..within.end).unwrap_or_default();
     FieldsOf {
@@ -30,11 +27,10 @@ pub(super) fn fields(buffer: &[u8], within: Range<usize>) -> FieldsOf<'_> {
     }
 }
 
-/// See [`fields`].
 pub(super) struct FieldsOf<'a> {
     /// The buffer up to the end of the message.
     message: &'a [u8],
-    /// Where the next field begins.
+    /// Position of the next field.
     at: usize,
 }
 
@@ -101,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn every_kind_of_field_is_read() {
+    fn fields_of_every_type_are_read() {
         let bytes = [
             8, 0x96, 1, // field 1: 150
             0x12, 2, b'h', b'i', // field 2: "hi"

@@ -1,6 +1,6 @@
-//! From the tensor that a model gives to an image of bytes: [`OutputReading`].
+//! Conversion of a model's output tensor to an image of bytes: [`OutputReading`].
 //!
-//! One pass of clamping and rounding, after one that looks for what cannot be.
+//! One pass checks the values, another clamps and rounds them.
 
 use half::f16;
 
@@ -10,16 +10,16 @@ use super::sidecar::ModelSidecar;
 use super::signature::Signature;
 use super::tiles::TileWindow;
 
-/// How a tensor becomes an image.
+/// Conversion of an output tensor to an image.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct OutputReading {
-    /// `None` where only a run shows it.
+    /// Order of the dimensions; `None` if only a run shows it.
     pub(super) layout: Option<TensorLayout>,
-    /// The layout that is taken where two fit.
-    pub(super) likely: TensorLayout,
+    /// Layout that is chosen if several fit: that of the input.
+    pub(super) preferred: TensorLayout,
     pub(super) color: ChannelOrder,
     pub(super) range: ValueRange,
-    /// Whether somebody said the range; else it is checked against what comes.
+    /// Whether the range is known or must be checked against the values.
     pub(super) certainty: Certainty,
     pub(super) rounding: Rounding,
 }
@@ -27,29 +27,27 @@ pub(super) struct OutputReading {
 /// Whether the range of an output is known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Certainty {
-    /// A sidecar, a preset or the type says it.
+    /// A sidecar, a preset or the type states it.
     Known,
-    /// It is the usual one.
+    /// It is the input's or the usual range.
     Assumed,
 }
 
-/// What is wrong with the values of an output.
+/// Problem with the values of an output.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum OutOfRange {
-    /// Some are not numbers.
+    /// Some values are not numbers (NaN).
     NotNumbers,
-    /// They are of another range than the one that was assumed.
+    /// The values have another range than the assumed one.
     Beyond {
-        /// The smallest.
-        least: f32,
-        /// The largest.
-        most: f32,
-        /// The range that they look like.
+        min: f32,
+        max: f32,
+        /// Range that the values seem to have.
         likely: ValueRange,
     },
 }
 
-/// A view of the elements of an output.
+/// Elements of an output tensor.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum TensorSamples<'a> {
     Float32(&'a [f32]),
@@ -58,31 +56,31 @@ pub(super) enum TensorSamples<'a> {
 }
 
 impl OutputReading {
-    /// What graph and statements say.
-    pub(super) fn of(signature: &Signature, stated: &ModelSidecar) -> Self {
+    /// The conversion that signature and convention define.
+    pub(super) fn of(signature: &Signature, convention: &ModelSidecar) -> Self {
         let output = &signature.output;
-        let (range, certainty) = match (stated.range_out, &output.port.element) {
+        let (range, certainty) = match (convention.range_out, &output.port.element) {
             (Some(range), _) => (range, Certainty::Known),
             (None, ElementType::Uint8) => (ValueRange::Bytes, Certainty::Known),
-            // What is not said of the output is as in the input.
+            // Without a statement, the output has the range of the input.
             (None, _) => (
-                stated
+                convention
                     .range_in
                     .unwrap_or(signature.input.port.element.usual_range()),
                 Certainty::Assumed,
             ),
         };
         Self {
-            layout: stated.layout_out.or(output.layout),
-            likely: signature.input.layout,
-            color: stated.color.unwrap_or_default(),
+            layout: convention.layout_out.or(output.layout),
+            preferred: signature.input.layout,
+            color: convention.color.unwrap_or_default(),
             range,
             certainty,
-            rounding: stated.rounding.unwrap_or_default(),
+            rounding: convention.rounding.unwrap_or_default(),
         }
     }
 
-    /// The layout of an output of such dimensions for an image of such a size; `None` where it is no such image.
+    /// Layout of an output with dimensions `dims` for an image of this size; `None` if it cannot be one.
     pub(super) fn layout(&self, dims: &[i64], size: [usize; 2]) -> Option<TensorLayout> {
         let fits = |layout: &TensorLayout| {
             let wanted = layout.dims(size);
@@ -94,13 +92,13 @@ impl OutputReading {
         };
         match self.layout {
             Some(layout) => Some(layout).filter(fits),
-            None => std::iter::once(self.likely)
+            None => std::iter::once(self.preferred)
                 .chain(TensorLayout::ALL)
                 .find(fits),
         }
     }
 
-    /// The bytes of a part of an output, red, green and blue of each pixel; `size` is that of the whole output.
+    /// The bytes of a part of an output, as red, green and blue of each pixel; `size` is that of the whole output.
     pub(super) fn bytes(
         &self,
         samples: TensorSamples<'_>,
@@ -128,7 +126,7 @@ impl OutputReading {
         }
     }
 
-    /// The whole output as floats of 0..1.
+    /// The whole output as floats in 0..1.
     pub(super) fn planes(
         &self,
         samples: TensorSamples<'_>,
@@ -142,7 +140,7 @@ impl OutputReading {
         };
         self.check(&values)?;
         let at = |channel: usize, pixel: usize| {
-            let channel = self.color.of(channel);
+            let channel = self.color.rgb_channel(channel);
             let value = if layout.is_planar() {
                 values[channel * height * width + pixel]
             } else {
@@ -170,60 +168,61 @@ impl OutputReading {
         part: TileWindow,
         byte: impl Fn(T) -> u8,
     ) -> Vec<u8> {
-        let mut out = vec![0; 3 * part.size()[0] * part.size()[1]];
-        let lines = out.chunks_exact_mut(3 * part.size()[1]);
+        let mut bytes = vec![0; 3 * part.size()[0] * part.size()[1]];
+        let lines = bytes.chunks_exact_mut(3 * part.size()[1]);
         for (y, line) in (part.top..part.bottom).zip(lines) {
             for channel in 0..3 {
-                let place = self.color.of(channel);
+                let source = self.color.rgb_channel(channel);
                 let pixels = line.iter_mut().skip(channel).step_by(3);
                 if layout.is_planar() {
-                    let row = &samples[place * height * width + y * width..][..width];
-                    for (out, sample) in pixels.zip(&row[part.left..part.right]) {
-                        *out = byte(*sample);
+                    let row = &samples[source * height * width + y * width..][..width];
+                    for (target, sample) in pixels.zip(&row[part.left..part.right]) {
+                        *target = byte(*sample);
                     }
                 } else {
                     let row = &samples[3 * y * width..][..3 * width];
                     let row = row[3 * part.left..3 * part.right].iter();
-                    for (out, sample) in pixels.zip(row.skip(place).step_by(3)) {
-                        *out = byte(*sample);
+                    for (target, sample) in pixels.zip(row.skip(source).step_by(3)) {
+                        *target = byte(*sample);
                     }
                 }
             }
         }
-        out
+        bytes
     }
 
-    /// Refuses what is no number, and what cannot be of the range that was assumed.
+    /// Refuses values that are not numbers, and values that do not fit the assumed range.
     ///
-    /// Models that do not clamp overshoot by a little: it takes one sample in 20 beyond all overshooting to tell another range.
+    /// Models that do not clamp overshoot by a little. So the range counts as wrong only if more than one sample in 20 is far
+    /// outside.
     fn check(&self, values: &[f32]) -> Result<(), OutOfRange> {
-        let (mut strange, mut below, mut above) = (0_usize, 0_usize, 0_usize);
-        let mut most = f32::NEG_INFINITY;
+        let (mut nans, mut below, mut above) = (0_usize, 0_usize, 0_usize);
+        let mut max = f32::NEG_INFINITY;
         for value in values {
-            most = if *value > most { *value } else { most };
-            strange += usize::from(value.is_nan());
+            max = if *value > max { *value } else { max };
+            nans += usize::from(value.is_nan());
             below += usize::from(*value < -0.2);
             above += usize::from(*value > 8.0);
         }
-        if strange > 0 {
+        if nans > 0 {
             return Err(OutOfRange::NotNumbers);
         }
-        let many = values.len() / 20;
+        let tolerated = values.len() / 20;
         let likely = match (self.certainty, self.range) {
-            (Certainty::Assumed, ValueRange::Unit) if above > many => ValueRange::Bytes,
-            (Certainty::Assumed, ValueRange::Unit) if below > many => ValueRange::Signed,
-            (Certainty::Assumed, ValueRange::Bytes) if most <= 1.5 => ValueRange::Unit,
+            (Certainty::Assumed, ValueRange::Unit) if above > tolerated => ValueRange::Bytes,
+            (Certainty::Assumed, ValueRange::Unit) if below > tolerated => ValueRange::Signed,
+            (Certainty::Assumed, ValueRange::Bytes) if max <= 1.5 => ValueRange::Unit,
             _ => return Ok(()),
         };
         Err(OutOfRange::Beyond {
-            least: values.iter().copied().fold(f32::INFINITY, f32::min),
-            most,
+            min: values.iter().copied().fold(f32::INFINITY, f32::min),
+            max,
             likely,
         })
     }
 }
 
-/// The code nearest to a value of 0..255, half away from zero.
+/// The code nearest to a value of 0..255; halves are rounded away from zero.
 pub(super) fn nearest(code: f32) -> u8 {
     let below = code as u8;
     below + u8::from(code - f32::from(below) >= 0.5)

@@ -1,10 +1,10 @@
-//! ONNX Runtime's library, found or installed, and open: [`RuntimeSearch::open`], [`Runtime`].
+//! ONNX Runtime's library, found or installed, and opened: [`RuntimeSearch::open`], [`Runtime`].
 //!
-//! A process has one ONNX Runtime, so the first one that is opened is every later one's too.
+//! A process has one ONNX Runtime, so every later call of `open` returns the first one.
 //!
-//! Released builds send telemetry to Microsoft unless they are told not to. The C API can say so only after the library
-//! has reported the start of the process and left an identifier in the user's cache folder (seen with 1.31.1 on Linux);
-//! the environment variable [`TELEMETRY_SWITCH`] comes before that. A program calls [`forbid_telemetry`] first of all.
+//! Released builds send telemetry to Microsoft by default. The C API can switch it off only after the library has reported
+//! the start of the process and left an identifier in the user's cache folder (seen with 1.31.1 on Linux). The environment
+//! variable [`TELEMETRY_SWITCH`] acts before that, so programs must call [`forbid_telemetry`] first.
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Sender, channel};
@@ -19,25 +19,25 @@ use super::install::{Pin, install};
 use super::library::{OLDEST, PINNED, probe};
 use super::search::Surroundings;
 
-/// Whether a library that was found nowhere may be installed.
+/// Whether the library may be installed if it is not found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Install {
-    /// With pip, into the user's cache folder, once.
+    /// Install it with pip into the user's cache folder, once.
     Allowed,
-    /// Not at all (`--offline`).
+    /// Do not install it (`--offline`).
     Offline,
 }
 
-/// Where ONNX Runtime is to come from.
+/// Search for the library of ONNX Runtime.
 #[derive(Debug, Clone)]
 pub struct RuntimeSearch {
-    /// The library that was named (`--ort-lib`, `ORT_DYLIB_PATH`), which is then the only one tried.
+    /// Library to use (`--ort-lib`, `ORT_DYLIB_PATH`); if set, no other is tried.
     pub library: Option<PathBuf>,
-    /// What to do where none is found.
+    /// Whether the library may be installed if it is not found.
     pub install: Install,
 }
 
-/// ONNX Runtime, open. Clones are the same one.
+/// The opened ONNX Runtime. Clones share it.
 #[derive(Clone)]
 pub struct Runtime(Arc<OpenRuntime>);
 
@@ -50,41 +50,41 @@ struct OpenRuntime {
 
 type Job = Box<dyn FnOnce() + Send>;
 
-/// The environment variable that keeps ONNX Runtime's telemetry off from the start, where it is `1`.
+/// Environment variable that switches off ONNX Runtime's telemetry from the start if it is `1`.
 pub(crate) const TELEMETRY_SWITCH: &str = "ORT_DISABLE_TELEMETRY";
 
 /// Sets [`TELEMETRY_SWITCH`] for this process, so that ONNX Runtime sends nothing and leaves no identifier behind.
 ///
 /// # Safety
-/// No other thread of the process may be running: the environment is not to be changed while C code may read it.
+/// No other thread of the process may be running, because the environment must not change while C code may read it.
 #[expect(
     unsafe_code,
-    reason = "ONNX Runtime can be told in no other way before it starts"
+    reason = "there is no other way to switch off telemetry before ONNX Runtime starts"
 )]
 pub unsafe fn forbid_telemetry() {
-    // SAFETY: the caller vouches that there is no other thread that could read the environment meanwhile.
+    // SAFETY: the caller guarantees that no other thread could read the environment meanwhile.
     unsafe { std::env::set_var(TELEMETRY_SWITCH, "1") };
 }
 
-/// The runtime of this process, once it is open.
+/// The runtime of this process; `None` until it is opened.
 static OPEN: Mutex<Option<Runtime>> = Mutex::new(None);
 
 impl RuntimeSearch {
-    /// Opens the library that was named; else the first that fits beside the program, in the user's cache, in the Python
-    /// environments on `PATH` or in the system's folders; else, where that is allowed, installs version 1.31.1 with pip.
+    /// Opens the named library. Without one, it opens the first usable one beside the program, in the user's cache, in the
+    /// Python environments on `PATH` or in the system's folders. Else it installs version 1.31.1 with pip, if allowed.
     ///
     /// # Errors
-    /// Where the named library does not fit, or none was found and none could be installed. The message says what was
-    /// tried and the ways out.
+    /// If the named library is not usable, or none was found and none could be installed. The message says what was tried
+    /// and how to provide one.
     pub fn open(&self) -> Result<Runtime> {
-        // Held throughout: a second thread waits for the first one's installation.
+        // The lock is held to the end, so that a second thread waits for the first one's installation.
         let mut open = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(runtime) = open.as_ref() {
             return self.check_same(runtime);
         }
         let (path, version) = match &self.library {
             Some(path) => {
-                let version = probe(path).map_err(|e| named_wrongly(path, &e))?;
+                let version = probe(path).map_err(|e| unusable_library(path, &e))?;
                 (path.clone(), version)
             }
             None => find(&Surroundings::of_this_process(), self.install)?,
@@ -93,14 +93,14 @@ impl RuntimeSearch {
         Ok(open.insert(runtime).clone())
     }
 
-    /// Gives the runtime that is open already, unless another was named.
+    /// Returns the runtime that is already open; an error if another library is named.
     fn check_same(&self, runtime: &Runtime) -> Result<Runtime> {
         let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
         match &self.library {
-            Some(path) if real(path) != real(runtime.path()) => Err(named_wrongly(
+            Some(path) if real(path) != real(runtime.path()) => Err(unusable_library(
                 path,
                 &format!(
-                    "cannot be loaded beside {}, which this process has loaded",
+                    "cannot be loaded, because this process has already loaded {}",
                     runtime.path().display()
                 ),
             )),
@@ -109,7 +109,7 @@ impl RuntimeSearch {
     }
 }
 
-/// The first library that fits, or one that is installed now; with its version.
+/// Path and version of the first usable library, or of one that is installed now.
 fn find(surroundings: &Surroundings, allowed: Install) -> Result<(PathBuf, String)> {
     let mut rejected = Vec::new();
     for path in surroundings.candidates() {
@@ -125,10 +125,10 @@ fn find(surroundings: &Surroundings, allowed: Install) -> Result<(PathBuf, Strin
         Install::Offline => Err("--offline forbids its installation".to_owned()),
         Install::Allowed => install_here(surroundings),
     };
-    installed.map_err(|problem| Error::Runtime(nowhere(&problem, &rejected)))
+    installed.map_err(|problem| Error::Runtime(not_found_message(&problem, &rejected)))
 }
 
-/// Installs the pinned library into the cache.
+/// Installs the pinned library into the cache; returns its path and version.
 fn install_here(surroundings: &Surroundings) -> Result<(PathBuf, String), String> {
     let pin = Pin::of_this_platform().ok_or_else(|| {
         format!(
@@ -154,18 +154,18 @@ fn install_here(surroundings: &Surroundings) -> Result<(PathBuf, String), String
     Ok((path, version))
 }
 
-/// What to say where there is no library.
-fn nowhere(problem: &str, rejected: &[String]) -> String {
+/// Message for a missing library: what was tried, and how to provide one.
+fn not_found_message(problem: &str, rejected: &[String]) -> String {
     let rejected = match rejected {
         [] => String::new(),
-        some => format!(" (passed over: {})", some.join("; ")),
+        rejected => format!(" (skipped: {})", rejected.join("; ")),
     };
     format!(
-        "no library was found{rejected}, and {problem}. Three ways out: install the Python package into the environment on PATH (`pip install onnxruntime=={PINNED}`); or name the library of any release from 1.{OLDEST} on with --ort-lib FILE or ORT_DYLIB_PATH; or let it be installed: without --offline, with pip on PATH and a package index within reach"
+        "no library was found{rejected}, and {problem}. Three ways out: install the Python package into the environment on PATH (`pip install onnxruntime=={PINNED}`); or name the library of any release from 1.{OLDEST} on with --ort-lib FILE or ORT_DYLIB_PATH; or let it be installed: without --offline, with pip on PATH and a reachable package index"
     )
 }
 
-fn named_wrongly(path: &Path, problem: &str) -> Error {
+fn unusable_library(path: &Path, problem: &str) -> Error {
     Error::Runtime(format!(
         "{} {problem}; name the library of ONNX Runtime 1.{OLDEST} or later with --ort-lib FILE or ORT_DYLIB_PATH, or leave both out to have it found",
         path.display()
@@ -173,7 +173,7 @@ fn named_wrongly(path: &Path, problem: &str) -> Error {
 }
 
 impl Runtime {
-    /// Loads a library that was probed, and starts its thread.
+    /// Loads a library that [`probe`] accepted, and starts its thread.
     fn start(path: PathBuf, version: String) -> Result<Self> {
         let fault = |e: &dyn std::error::Error| Error::Runtime(format!("{}: {e}", path.display()));
         if std::env::var_os(TELEMETRY_SWITCH).is_none_or(|value| value != "1") {
@@ -181,7 +181,7 @@ impl Runtime {
                 "ONNX Runtime may report its use to Microsoft; {TELEMETRY_SWITCH}=1 in the environment forbids that"
             );
         }
-        // What it has to say of errors comes back as errors too; the rest is for those who look for it.
+        // Errors are also returned to the caller, so log messages are shown only at debug level.
         let logger = Arc::new(|level, _: &str, _: &str, place: &str, message: &str| {
             if matches!(level, LogLevel::Warning | LogLevel::Error | LogLevel::Fatal) {
                 tracing::debug!("ONNX Runtime, {place}: {message}");
@@ -204,13 +204,13 @@ impl Runtime {
         })))
     }
 
-    /// The library's file.
+    /// Path of the library's file.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.0.path
     }
 
-    /// The library's version, such as `1.31.1`.
+    /// Version of the library, such as `1.31.1`.
     #[must_use]
     pub fn version(&self) -> &str {
         &self.0.version
@@ -220,19 +220,19 @@ impl Runtime {
         &self.0.environment
     }
 
-    /// Runs a job on the runtime's own thread and waits for it.
+    /// Runs a job on the runtime's thread, waits for it and returns its result.
     ///
-    /// Sessions are made and run there because the switch that treats subnormal numbers as zero is one of the calling
-    /// thread's, and is thrown by the first session alone. So every model has it, and no other thread of the program does:
-    /// what that computes cannot depend on whether a model was loaded before.
+    /// Sessions are created and run there because the setting that treats subnormal numbers as zero belongs to the calling
+    /// thread, and only the first session sets it. So it holds for every model, but for no other thread of the program, whose
+    /// results thus do not depend on whether a model was loaded before.
     pub(super) fn run<T: Send + 'static>(
         &self,
         job: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T> {
-        let ended = || Error::Runtime("its thread ended; this is a fault of the program".into());
+        let ended = || Error::Runtime("its thread ended, which is a bug of this program".into());
         let (sender, result) = channel();
         let job = Box::new(move || {
-            // Nobody waits for the result only where the waiting thread is gone.
+            // Sending fails only if the waiting thread has ended.
             drop(sender.send(job()));
         });
         self.0.jobs.send(job).map_err(|_| ended())?;
@@ -253,7 +253,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn without_a_library_offline_the_ways_out_are_told() {
+    fn without_a_library_offline_the_message_says_how_to_provide_one() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("libonnxruntime.so"), "text").unwrap();
         let surroundings = Surroundings {
@@ -267,7 +267,7 @@ mod tests {
             assert!(message.contains(part), "{message}");
         }
         if cfg!(target_os = "linux") {
-            assert!(message.contains("passed over"), "{message}");
+            assert!(message.contains("skipped"), "{message}");
         }
     }
 

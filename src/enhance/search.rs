@@ -1,4 +1,4 @@
-//! Where ONNX Runtime's library may lie on this machine: [`Surroundings::candidates`].
+//! Search for ONNX Runtime's library on this machine: [`Surroundings::candidates`].
 
 use std::cmp::Reverse;
 use std::collections::HashSet;
@@ -7,25 +7,25 @@ use std::path::{Path, PathBuf};
 
 use super::library::{PINNED, is_library_name};
 
-/// What of the process's surroundings decides where a library is looked for.
+/// Folders and variables of the process that decide where a library is searched.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Surroundings {
-    /// The folder of the running program.
+    /// Folder of the running program.
     pub(super) program: Option<PathBuf>,
-    /// The user's cache folder.
+    /// Cache folder of the user.
     pub(super) cache: Option<PathBuf>,
-    /// `VIRTUAL_ENV`: the Python environment that is switched on.
+    /// `VIRTUAL_ENV`: the active Python environment.
     pub(super) virtual_env: Option<PathBuf>,
-    /// `PATH`.
+    /// Folders of the variable `PATH`.
     pub(super) path: Vec<PathBuf>,
-    /// The user's home folder.
+    /// Home folder of the user.
     pub(super) home: Option<PathBuf>,
-    /// The system's library folders.
+    /// Library folders of the system.
     pub(super) system: Vec<PathBuf>,
 }
 
 impl Surroundings {
-    /// Those of this process.
+    /// The surroundings of this process.
     pub(super) fn of_this_process() -> Self {
         let folder = |name| {
             env::var_os(name)
@@ -60,14 +60,14 @@ impl Surroundings {
         }
     }
 
-    /// The folder of the cache where a library of the pinned version is kept; `None` where there is no cache folder.
+    /// Folder of the cache for a library of the pinned version; `None` if there is no cache folder.
     pub(super) fn installed(&self) -> Option<PathBuf> {
         let cache = self.cache.as_ref()?;
         Some(cache.join("darkqa-eval").join("onnxruntime").join(PINNED))
     }
 
-    /// The files that bear the library's name, in the order in which they are to be tried: beside the program, in the cache,
-    /// in Python environments, in the system's folders.
+    /// Files with the library's name, in the order in which they are tried: beside the program, in the cache, in Python
+    /// environments, in the system's folders.
     pub(super) fn candidates(&self) -> Vec<PathBuf> {
         let folders = self
             .program
@@ -80,13 +80,13 @@ impl Surroundings {
         folders
             .flat_map(|folder| libraries_in(&folder))
             .filter(|path| {
-                // One library often goes by several names.
+                // Several names often link to one library.
                 seen.insert(path.canonicalize().unwrap_or_else(|_| path.clone()))
             })
             .collect()
     }
 
-    /// The `onnxruntime/capi` folders of the Python environments on `PATH`, without running any Python.
+    /// The `onnxruntime/capi` folders of the Python environments on `PATH`; no Python is run.
     fn python_packages(&self) -> Vec<PathBuf> {
         let mut prefixes: Vec<PathBuf> = self.virtual_env.iter().cloned().collect();
         for folder in &self.path {
@@ -95,10 +95,10 @@ impl Surroundings {
                 if !python.is_file() {
                     continue;
                 }
-                // A virtual environment's Python is a link to the one it was made from.
+                // The Python of a virtual environment is a link to the one it was created from.
                 let target = python.canonicalize().unwrap_or_else(|_| python.clone());
                 for python in [python, target] {
-                    // Windows keeps it at the top of an installation, or in its `Scripts`.
+                    // On Windows it is at the top of an installation, or in its `Scripts`.
                     prefixes.extend(python.ancestors().skip(1).take(2).map(Path::to_owned));
                 }
             }
@@ -111,7 +111,7 @@ impl Surroundings {
     }
 }
 
-/// The `onnxruntime/capi` folders under one prefix of Python.
+/// The `onnxruntime/capi` folders under one installation prefix of Python.
 fn packages_in(prefix: &Path) -> Vec<PathBuf> {
     let mut roots = vec![prefix.join("Lib")];
     for lib in ["lib", "lib64", "local/lib"] {
@@ -129,7 +129,7 @@ fn packages_in(prefix: &Path) -> Vec<PathBuf> {
         .collect()
 }
 
-/// The libraries in one folder, the newest version by name first, one without a version in its name last.
+/// Libraries in one folder, by the version in their names, the newest first, one without a version last.
 fn libraries_in(folder: &Path) -> Vec<PathBuf> {
     let mut found: Vec<(Reverse<Vec<u32>>, PathBuf)> = sorted_entries(folder)
         .into_iter()
@@ -145,7 +145,7 @@ fn libraries_in(folder: &Path) -> Vec<PathBuf> {
     found.into_iter().map(|(_, path)| path).collect()
 }
 
-/// What lies in a folder, by name; nothing where it cannot be read.
+/// Paths in a folder, sorted; empty if it cannot be read.
 fn sorted_entries(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).into_iter().flatten();
     let mut paths: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
@@ -153,9 +153,9 @@ fn sorted_entries(folder: &Path) -> Vec<PathBuf> {
     paths
 }
 
-/// The folders in which this operating system keeps its libraries.
+/// Folders in which this operating system keeps its libraries.
 ///
-/// On Windows there are none: what lies in `System32` is the one of Windows itself, which Microsoft asks others not to use.
+/// On Windows there are none: the library in `System32` belongs to Windows, and Microsoft asks others not to use it.
 fn system_folders() -> Vec<PathBuf> {
     let folders: Vec<String> = match consts::OS {
         "windows" => Vec::new(),
@@ -179,7 +179,7 @@ fn system_folders() -> Vec<PathBuf> {
 mod tests {
     use super::*;
 
-    /// Makes an empty file and the folders above it.
+    /// Creates an empty file and the folders above it.
     fn touch(path: &Path) {
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(path, "").unwrap();

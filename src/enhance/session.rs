@@ -1,4 +1,4 @@
-//! A session of ONNX Runtime: made, run, ended.
+//! Sessions of ONNX Runtime: creation, runs and early stop.
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -15,11 +15,11 @@ use super::port::{Dim, Port};
 use super::reading::TensorSamples;
 use super::signature::{NumberInput, Signature};
 
-/// How a session is run: which output is wanted, and whether it is to end early.
+/// Options of the runs of a session: the selected output, and the signal to stop.
 pub(super) struct SessionOptions(RunOptions<HasSelectedOutputs>);
 
 impl SessionOptions {
-    /// Those of a run that gives one output.
+    /// Options for runs that return one output.
     pub(super) fn of(output: &str) -> ort::Result<Self> {
         let selected = OutputSelector::no_default().with(output);
         Ok(Self(RunOptions::new()?.with_outputs(selected)))
@@ -27,32 +27,32 @@ impl SessionOptions {
 }
 
 // SAFETY: `ort` withholds `Sync` because a selected output may hold a preallocated tensor, which two runs would write at
-// once. None is ever preallocated here (`SessionOptions::of` selects by name alone), runs are held apart by the session's
-// mutex, and the one call made beside a run is `terminate`, which ONNX Runtime documents for use from another thread.
-#[expect(unsafe_code, reason = "a run can be ended in no other way")]
+// once. None is ever preallocated here (`SessionOptions::of` selects by name alone), and the session's mutex keeps runs
+// apart. The only call during a run is `terminate`, which ONNX Runtime documents for use from another thread.
+#[expect(unsafe_code, reason = "there is no other way to stop a run")]
 unsafe impl Sync for SessionOptions {}
 
-/// Ends the run of an enhancer from another thread.
+/// Handle that stops an enhancer from another thread.
 #[derive(Clone)]
 pub struct Stopper(pub(super) Arc<SessionOptions>);
 
 impl Stopper {
-    /// Ends the image that is being made, with an error, and every later one.
+    /// Stops the current image, with an error, and every later one.
     pub fn stop(&self) {
-        // A run that cannot be ended is one that is waited for.
+        // If a run cannot be stopped, the program waits for it.
         if let Err(e) = self.0.0.terminate() {
             tracing::debug!("the enhancer cannot be stopped: {e}");
         }
     }
 }
 
-/// An error of ONNX Runtime in one line.
-pub(super) fn said(error: &ort::Error) -> String {
+/// Message of an error of ONNX Runtime, in one line.
+pub(super) fn one_line(error: &ort::Error) -> String {
     let words: Vec<&str> = error.message().split_whitespace().collect();
     words.join(" ")
 }
 
-/// Runs a session on an image, and reads the output before another run writes over it.
+/// Runs a session on an image, and reads its output before another run overwrites it.
 pub(super) fn run<T>(
     session: &mut Session,
     options: &SessionOptions,
@@ -102,7 +102,7 @@ fn number(extra: &NumberInput) -> ort::Result<DynValue> {
     })
 }
 
-/// Where a session gets its graph from.
+/// Source of the graph of a session.
 pub(super) enum GraphSource {
     Memory(Vec<u8>),
     Path(PathBuf),
@@ -117,30 +117,29 @@ impl GraphSource {
     }
 }
 
-/// The options of a session.
+/// Builder of a session with this program's options. `threads` is the number of threads, by default that of the cores.
 pub(super) fn builder(
     environment: &Environment,
     threads: Option<NonZeroUsize>,
 ) -> ort::Result<SessionBuilder> {
-    // Left alone, ONNX Runtime pins one thread to each core, against whatever else runs there.
+    // By default ONNX Runtime pins one thread to each core, even if other programs use it.
     let threads = threads
         .or_else(|| std::thread::available_parallelism().ok())
         .map_or(1, NonZeroUsize::get);
     let builder = Session::builder(environment)?
         .with_optimization_level(GraphOptimizationLevel::All)?
         .with_intra_threads(threads)?
-        // Plans of one image's memory do not fit the next one's size, and are kept: twice the memory for nothing.
+        // A memory plan fits images of one size only, but all are kept: twice the memory without benefit.
         .with_memory_pattern(false)?
         .with_flush_to_zero()?;
     Ok(builder)
 }
 
-/// The inputs or outputs of a session.
+/// Inputs or outputs of a session as ports.
 pub(super) fn ports(outlets: &[Outlet]) -> Vec<Port> {
     outlets.iter().map(port).collect()
 }
 
-/// An input or output of a session in this module's own words.
 fn port(outlet: &Outlet) -> Port {
     let (element, dims) = match outlet.dtype() {
         ValueType::Tensor {

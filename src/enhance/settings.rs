@@ -1,4 +1,4 @@
-//! What flags say of enhancers: [`EnhancerArgs`], [`SizeArgs`], [`RuntimeArgs`].
+//! Flags of enhancers: [`EnhancerArgs`], [`SizeArgs`], [`RuntimeArgs`].
 
 use std::env;
 use std::num::NonZeroUsize;
@@ -8,49 +8,49 @@ use clap::Args;
 
 use super::runtime::{Install, RuntimeSearch};
 use super::tiles::Tiling;
-use crate::types::KindSet;
+use crate::types::{Decides, KindSet};
 
-/// The enhancers, and the images that they are given.
+/// The enhancers, and the images that they enhance.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Enhancement")]
 pub(crate) struct EnhancerArgs {
     /// An enhancement model as ONNX, or PRESET:FILE (zero-dce, zero-dce++, ruas-lol, ruas-upe, retinexformer, darkir, sci,
     /// iat, pairlie, enlightengan); repeatable: each is shown beside raw; default: none
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", add = Decides::Trials)]
     pub llie: Vec<PathBuf>,
     /// Which degraded variants are enhanced
-    #[arg(long, value_name = "noise|ev|both", default_value_t = KindSet::NOISE)]
+    #[arg(long, value_name = "noise|ev|both", default_value_t = KindSet::NOISE, add = Decides::Trials)]
     pub llie_on: KindSet,
 }
 
-/// In which size images are enhanced.
+/// Size in which images are enhanced.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Enhancement")]
 pub(crate) struct SizeArgs {
     /// Enhance in tiles of N × N pixels, their seams checked, or whole; auto is 256 for images above 1280 × 720 where
     /// sidecar or preset say that tiles are exact, else whole
-    #[arg(long, value_name = "N|whole|auto", default_value_t)]
+    #[arg(long, value_name = "N|whole|auto", default_value_t, add = Decides::Pixels)]
     pub tile: Tiling,
-    /// Enhance images whose longer side is longer than this, in pixels, in that size, and scale the result back (bilinear):
-    /// for models that need the whole image and too much memory for it; default: never
-    #[arg(long, value_name = "PIXELS")]
+    /// Largest longer side in pixels: larger images are reduced to it, enhanced and scaled back (bilinear); for models that
+    /// need the whole image and too much memory for it; default: no limit
+    #[arg(long, value_name = "PIXELS", add = Decides::Pixels)]
     pub llie_max_side: Option<NonZeroUsize>,
 }
 
-/// Where ONNX Runtime is looked for.
+/// Source of the library of ONNX Runtime.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Enhancement")]
 pub(crate) struct RuntimeArgs {
     /// The ONNX Runtime library to load; default: ORT_DYLIB_PATH, else found, else installed once by pip
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", add = Decides::Nothing)]
     pub ort_lib: Option<PathBuf>,
     /// Never install ONNX Runtime
-    #[arg(long)]
+    #[arg(long, add = Decides::Nothing)]
     pub offline: bool,
 }
 
 impl RuntimeArgs {
-    /// The search that the flags and `ORT_DYLIB_PATH`, the variable of the `ort` crate, say.
+    /// The search that the flags and `ORT_DYLIB_PATH`, the variable of the `ort` crate, define.
     #[must_use]
     pub(crate) fn search(&self) -> RuntimeSearch {
         let variable = || env::var_os("ORT_DYLIB_PATH").filter(|path| !path.is_empty());

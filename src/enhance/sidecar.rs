@@ -1,4 +1,4 @@
-//! What is stated about a model, by a user beside it, in `MODEL.onnx.toml`, or by a preset: [`ModelSidecar`].
+//! Statements about a model, in the user's `MODEL.onnx.toml` beside it or in a preset: [`ModelSidecar`].
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -11,49 +11,48 @@ use serde::{Deserialize, Serialize};
 use super::convention::{ChannelOrder, Padding, Rounding, TensorLayout, Tile, ValueRange};
 use crate::error::{Error, Result};
 
-/// The statements of a sidecar; every key may be missing, an unknown key is an error.
+/// Statements of a sidecar. Every key may be missing; an unknown key is an error.
 #[derive(Debug, Default, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ModelSidecar {
-    /// The dimensions of the input.
+    /// Order of the input's dimensions.
     pub(super) layout_in: Option<TensorLayout>,
-    /// Those of the output.
+    /// Order of the output's dimensions.
     pub(super) layout_out: Option<TensorLayout>,
-    /// The order of channels, of both.
+    /// Order of the channels of input and output.
     pub(super) color: Option<ChannelOrder>,
-    /// What black and white are in the input.
+    /// Values of black and white in the input.
     pub(super) range_in: Option<ValueRange>,
-    /// What they are in the output.
+    /// Values of black and white in the output.
     pub(super) range_out: Option<ValueRange>,
-    /// Taken from each channel of the input, in its order and range.
+    /// Number subtracted from each channel of the input, in its channel order and range.
     pub(super) mean: Option<[f32; 3]>,
-    /// What each channel is then divided by.
+    /// Number that each channel is then divided by.
     pub(super) std: Option<[f32; 3]>,
-    /// Of what the height and the width must be multiples.
+    /// Number of pixels of which height and width must be multiples.
     pub(super) multiple: Option<NonZeroUsize>,
-    /// What fills an image up to a multiple.
+    /// Pixels that fill an image up to a multiple.
     pub(super) pad: Option<Padding>,
-    /// Which output is the enhanced image.
+    /// Output that is the enhanced image.
     pub(super) output: Option<OutputChoice>,
-    /// Whether tiles are exact.
+    /// Whether tiles are exact, and with which context.
     pub(super) tile: Option<Tile>,
-    /// How a value becomes a byte.
+    /// Rounding of values to bytes.
     pub(super) rounding: Option<Rounding>,
-    /// The values of further inputs of one number each.
+    /// Values of further inputs, which are single numbers, by their names.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub(super) extra: BTreeMap<String, f32>,
 }
 
-/// An output by its place, counted from 0, or by its name.
+/// Output of a graph, by index or by name.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(
     untagged,
     expecting = "`output` is an index from 0 or a name in quotes"
 )]
 pub(super) enum OutputChoice {
-    /// Its place among the outputs, from 0.
+    /// Index among the outputs, from 0.
     Index(usize),
-    /// Its name.
     Name(String),
 }
 
@@ -66,14 +65,14 @@ impl fmt::Display for OutputChoice {
     }
 }
 
-/// The path of a model's sidecar: the model's own with `.toml` after it.
+/// Path of a model's sidecar: the model's path followed by `.toml`.
 pub(super) fn path_for(model: &Path) -> PathBuf {
     let mut path = model.as_os_str().to_owned();
     path.push(".toml");
     path.into()
 }
 
-/// The text of the sidecar of a model; empty where there is none.
+/// Text of a model's sidecar; empty if there is none.
 pub(super) fn text_for(model: &Path) -> Result<String> {
     let path = path_for(model);
     match std::fs::read_to_string(&path) {
@@ -84,35 +83,37 @@ pub(super) fn text_for(model: &Path) -> Result<String> {
 }
 
 impl ModelSidecar {
-    /// Reads the text of the sidecar of `model`.
+    /// Parses the text of the sidecar of `model`.
     ///
     /// # Errors
-    /// With the file: an unknown key, or a value that cannot be.
+    /// If a key is unknown or a value is not allowed; the message names the file.
     pub(super) fn parse(model: &Path, text: &str) -> Result<Self> {
         let wrong = |problem: &str| {
             Error::data(
                 path_for(model).display(),
-                format_args!("{problem}; models/README.md has all keys"),
+                format_args!("{problem}; models/README.md lists all keys"),
             )
         };
-        let read: Self = toml::from_str(text).map_err(|e| wrong(e.message()))?;
+        let sidecar: Self = toml::from_str(text).map_err(|e| wrong(e.message()))?;
         let finite = |numbers: Option<[f32; 3]>| numbers.into_iter().flatten().all(f32::is_finite);
-        if !finite(read.mean) || !finite(read.std) || read.std.is_some_and(|std| std.contains(&0.0))
+        if !finite(sidecar.mean)
+            || !finite(sidecar.std)
+            || sidecar.std.is_some_and(|std| std.contains(&0.0))
         {
-            return Err(wrong("mean and std are three numbers each, std not 0"));
+            return Err(wrong("mean and std must be three numbers each, std not 0"));
         }
-        if let Some((name, value)) = read.extra.iter().find(|(_, value)| !value.is_finite()) {
+        if let Some((name, value)) = sidecar.extra.iter().find(|(_, value)| !value.is_finite()) {
             return Err(wrong(&format!(
-                "extra.{name} is {value}; a number expected"
+                "extra.{name} is {value}; expected a finite number"
             )));
         }
-        Ok(read)
+        Ok(sidecar)
     }
 
-    /// The same without the statements that say what holds anyway: two sidecars that mean the same have one digest.
-    pub(super) fn resolved(self) -> Self {
-        fn unless<T: PartialEq>(stated: Option<T>, usual: &T) -> Option<T> {
-            stated.filter(|stated| stated != usual)
+    /// The sidecar without statements that equal the defaults, so that sidecars of the same meaning have the same digest.
+    pub(super) fn without_defaults(self) -> Self {
+        fn unless<T: PartialEq>(value: Option<T>, default: &T) -> Option<T> {
+            value.filter(|value| value != default)
         }
         Self {
             color: unless(self.color, &ChannelOrder::default()),
@@ -125,8 +126,8 @@ impl ModelSidecar {
         }
     }
 
-    /// What is stated here, and for the rest what a preset states.
-    pub(super) fn over(self, preset: &Self) -> Self {
+    /// The statements of this sidecar, and those of a preset for the missing keys.
+    pub(super) fn with_defaults(self, preset: &Self) -> Self {
         let mut extra = preset.extra.clone();
         extra.extend(self.extra);
         Self {
@@ -174,12 +175,12 @@ mod tests {
         assert_eq!(read.tile, Some(Tile::Exact(12)));
         assert_eq!(read.extra, [("exposure".to_owned(), 0.5)].into());
         assert_eq!(read.output, Some(OutputChoice::Name("enhanced".into())));
-        assert_eq!(ModelSidecar::default().over(&read), read);
+        assert_eq!(ModelSidecar::default().with_defaults(&read), read);
         let own = ModelSidecar {
             multiple: NonZeroUsize::new(4),
             ..ModelSidecar::default()
         };
-        assert_eq!(own.over(&read).multiple, NonZeroUsize::new(4));
+        assert_eq!(own.with_defaults(&read).multiple, NonZeroUsize::new(4));
     }
 
     #[test]

@@ -1,8 +1,8 @@
-//! An image in tiles, each of which sees a [`TileWindow`] of it: [`TilePlan`], and [`TiledImage`], on which they come together.
+//! Division of an image into tiles ([`TilePlan`], [`TileWindow`]), and the image made of their results ([`TiledImage`]).
 //!
-//! Each tile is seen with some context and gives its middle ("crop" tiling, as Real-ESRGAN's `tile_pad`): for a model whose
-//! pixels depend on nothing beyond the context that is exact, and no blending hides a seam. Neighbours give a few pixels
-//! twice ([`GUARD`] on either side), which must agree: where they do not, the model sees farther than was said.
+//! Each tile is enhanced with some context around it, and only its middle is used ("crop" tiling, as Real-ESRGAN's
+//! `tile_pad`). This is exact if pixels depend on nothing beyond the context; no blending hides a seam. Neighbours overlap
+//! by a few pixels ([`GUARD`] on either side). If these differ, pixels depend on more than the context.
 
 use std::fmt;
 use std::num::NonZeroUsize;
@@ -10,13 +10,13 @@ use std::str::FromStr;
 
 use crate::types::Rgb;
 
-/// What sides are tried as multiples of, where a model fails on an image's own and nobody says better.
+/// Multiples to which sides are padded, tried in this order, if sidecar and preset state none.
 pub(super) const MULTIPLES: [usize; 6] = [1, 4, 8, 12, 16, 32];
 
-/// Pixels beyond a seam that a tile gives too, for the comparison.
+/// Pixels beyond a seam that a tile contributes too, for the comparison; chosen.
 pub(super) const GUARD: usize = 2;
 
-/// A part of an image: left, top, right, bottom, the latter two exclusive; right and bottom may lie outside of it.
+/// Rectangle of an image, in pixels. `right` and `bottom` are exclusive and may lie outside the image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct TileWindow {
     pub(super) left: usize,
@@ -26,21 +26,21 @@ pub(super) struct TileWindow {
 }
 
 impl TileWindow {
-    /// Height and width.
+    /// Height and width in pixels.
     pub(super) fn size(self) -> [usize; 2] {
         [self.bottom - self.top, self.right - self.left]
     }
 }
 
-/// How an image is cut.
+/// Division of images into tiles (`--tile`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Tiling {
-    /// Into tiles where they are known to be exact and the image is large; else not at all.
+    /// Tiles if they are known to be exact and the image is large; else the whole image.
     #[default]
     Auto,
-    /// Into tiles of such a side in pixels, context included.
-    Of(NonZeroUsize),
-    /// Not at all.
+    /// Tiles of this side in pixels, context included.
+    Side(NonZeroUsize),
+    /// The whole image at once.
     Whole,
 }
 
@@ -48,7 +48,7 @@ impl fmt::Display for Tiling {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Auto => f.write_str("auto"),
-            Self::Of(side) => side.fmt(f),
+            Self::Side(side) => side.fmt(f),
             Self::Whole => f.write_str("whole"),
         }
     }
@@ -62,66 +62,66 @@ impl FromStr for Tiling {
             "auto" => Ok(Self::Auto),
             "whole" => Ok(Self::Whole),
             side => {
-                let side = side.parse().map(Self::Of);
-                side.map_err(|_| "a side in pixels, whole or auto expected".to_owned())
+                let side = side.parse().map(Self::Side);
+                side.map_err(|_| "expected a side in pixels, whole or auto".to_owned())
             }
         }
     }
 }
 
-/// A tile along one side: what is seen, and what of it is taken.
+/// One dimension of a tile: the pixels that the model gets, and those of them that are used of its output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct TileSpan {
-    pub(super) start: usize,
-    pub(super) end: usize,
-    pub(super) from: usize,
-    pub(super) to: usize,
+    pub(super) input_start: usize,
+    pub(super) input_end: usize,
+    pub(super) output_start: usize,
+    pub(super) output_end: usize,
 }
 
 impl TileWindow {
-    /// What a tile sees of the image.
-    pub(super) fn seen(row: TileSpan, column: TileSpan) -> Self {
+    /// Part of the image that the model gets for a tile.
+    pub(super) fn input_of(row: TileSpan, column: TileSpan) -> Self {
         Self {
-            left: column.start,
-            top: row.start,
-            right: column.end,
-            bottom: row.end,
+            left: column.input_start,
+            top: row.input_start,
+            right: column.input_end,
+            bottom: row.input_end,
         }
     }
 
-    /// What is taken of a tile, as a part of what it sees.
-    pub(super) fn taken(row: TileSpan, column: TileSpan) -> Self {
+    /// Part of a tile's output that is used, relative to its input.
+    pub(super) fn output_of(row: TileSpan, column: TileSpan) -> Self {
         Self {
-            left: column.from - column.start,
-            top: row.from - row.start,
-            right: column.to - column.start,
-            bottom: row.to - row.start,
+            left: column.output_start - column.input_start,
+            top: row.output_start - row.input_start,
+            right: column.output_end - column.input_start,
+            bottom: row.output_end - row.input_start,
         }
     }
 }
 
-/// The tiles of an image.
+/// All tiles of an image, by their rows and columns.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct TilePlan {
     rows: Vec<TileSpan>,
     columns: Vec<TileSpan>,
 }
 
-/// How tiles are cut.
+/// Area, size and context of tiles, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Cutting {
-    /// Height and width of what they cover.
+    /// Height and width of the area that the tiles cover.
     pub(super) area: [usize; 2],
-    /// Height and width of a tile, at most.
+    /// Largest height and width of a tile, context included.
     pub(super) tile: [usize; 2],
-    /// What is seen beyond what is taken.
+    /// Pixels around the used part that the model gets too.
     pub(super) context: usize,
-    /// Where tiles may begin: at multiples of this.
+    /// Tiles begin at multiples of this number.
     pub(super) multiple: usize,
 }
 
 impl TilePlan {
-    /// The tiles of an image; `None` where a tile is not larger than its context.
+    /// The tiles of an area; `None` if a tile is not larger than its context.
     pub(super) fn of(cut: Cutting) -> Option<Self> {
         let spans = |side: usize| spans(cut.area[side], cut.tile[side], cut.context, cut.multiple);
         Some(Self {
@@ -136,14 +136,14 @@ impl TilePlan {
         rows.flat_map(|row| self.columns.iter().map(|column| (*row, *column)))
     }
 
-    /// How many there are.
+    /// Number of tiles in rows and columns.
     pub(super) fn count(&self) -> usize {
         self.rows.len() * self.columns.len()
     }
 }
 
-/// The tiles along one side: all of one length and within the image, so that the border of a tile is that of the image, with
-/// whatever the model makes of it, or lies beyond the context.
+/// Tiles along one side, all of the same length and within the image. So each border of a tile is either the image's border
+/// or outside the used part by the context.
 fn spans(length: usize, tile: usize, context: usize, multiple: usize) -> Option<Vec<TileSpan>> {
     let tile = tile.min(length);
     let step = tile.checked_sub(2 * (context + GUARD));
@@ -156,10 +156,10 @@ fn spans(length: usize, tile: usize, context: usize, multiple: usize) -> Option<
     loop {
         let end = start + tile;
         spans.push(TileSpan {
-            start,
-            end,
-            from: if start == 0 { 0 } else { start + context },
-            to: if end == length { length } else { end - context },
+            input_start: start,
+            input_end: end,
+            output_start: if start == 0 { 0 } else { start + context },
+            output_end: if end == length { length } else { end - context },
         });
         if end == length {
             return Some(spans);
@@ -168,32 +168,32 @@ fn spans(length: usize, tile: usize, context: usize, multiple: usize) -> Option<
     }
 }
 
-/// The image as tile by tile makes it.
+/// Image that is assembled tile by tile.
 pub(super) struct TiledImage {
     rgb: Rgb,
-    /// The end of what the row of tiles above has given.
-    above: usize,
-    /// That of what the tile to the left has given.
-    left: usize,
+    /// Row at which the output of the row of tiles above ends.
+    above_end: usize,
+    /// Column at which the output of the tile to the left ends.
+    left_end: usize,
     seam: Seam,
 }
 
-/// What neighbours gave for the same pixels.
+/// Comparison of the pixels that neighbouring tiles have in common.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Seam {
-    /// Samples that both gave.
+    /// Number of samples that both tiles contain.
     pub(super) compared: usize,
-    /// Those that differ.
+    /// Number of those samples that differ.
     pub(super) differing: usize,
-    /// By how many codes at most.
-    pub(super) most: u8,
+    /// Largest difference, in codes.
+    pub(super) max_difference: u8,
 }
 
 impl Seam {
-    /// Whether tiles give what the whole image would: the same bytes, but for one in a thousand that is off by the last bit of
-    /// a float, and so by one code.
+    /// Whether the tiles agree with the whole image: the same bytes, except at most one in a thousand that differs by one
+    /// code, because of the last bit of a float.
     pub(super) fn holds(self) -> bool {
-        self.most <= 1 && self.differing * 1000 <= self.compared
+        self.max_difference <= 1 && self.differing * 1000 <= self.compared
     }
 }
 
@@ -201,42 +201,42 @@ impl TiledImage {
     pub(super) fn new([height, width]: [usize; 2]) -> Self {
         Self {
             rgb: Rgb::black(height, width),
-            above: 0,
-            left: 0,
+            above_end: 0,
+            left_end: 0,
             seam: Seam::default(),
         }
     }
 
-    /// Puts what a tile gave into its place, beside what is there already; tiles come row by row.
-    pub(super) fn put(&mut self, row: TileSpan, column: TileSpan, bytes: &[u8]) {
+    /// Adds the output of a tile and compares the overlap with earlier tiles; tiles must come row by row.
+    pub(super) fn add(&mut self, row: TileSpan, column: TileSpan, bytes: &[u8]) {
         let width = self.rgb.width();
-        if column.from == 0 {
-            self.left = 0;
+        if column.output_start == 0 {
+            self.left_end = 0;
         }
-        let lines = bytes.chunks_exact(3 * (column.to - column.from));
-        for (y, line) in (row.from..row.to).zip(lines) {
-            let start = 3 * (y * width + column.from);
-            let there = &mut self.rgb.samples_mut()[start..start + line.len()];
-            let twice = if y < self.above {
-                column.to
+        let lines = bytes.chunks_exact(3 * (column.output_end - column.output_start));
+        for (y, line) in (row.output_start..row.output_end).zip(lines) {
+            let start = 3 * (y * width + column.output_start);
+            let target = &mut self.rgb.samples_mut()[start..start + line.len()];
+            let overlap_end = if y < self.above_end {
+                column.output_end
             } else {
-                self.left.clamp(column.from, column.to)
+                self.left_end.clamp(column.output_start, column.output_end)
             };
-            let twice = 3 * (twice - column.from);
-            for (a, b) in there[..twice].iter().zip(&line[..twice]) {
+            let overlap = 3 * (overlap_end - column.output_start);
+            for (a, b) in target[..overlap].iter().zip(&line[..overlap]) {
                 self.seam.compared += 1;
                 self.seam.differing += usize::from(a != b);
-                self.seam.most = self.seam.most.max(a.abs_diff(*b));
+                self.seam.max_difference = self.seam.max_difference.max(a.abs_diff(*b));
             }
-            there[twice..].copy_from_slice(&line[twice..]);
+            target[overlap..].copy_from_slice(&line[overlap..]);
         }
-        self.left = column.to;
-        if column.to == width {
-            self.above = row.to;
+        self.left_end = column.output_end;
+        if column.output_end == width {
+            self.above_end = row.output_end;
         }
     }
 
-    /// The image, and how its seams held.
+    /// The assembled image, and the comparison of its overlaps.
     pub(super) fn finish(self) -> (Rgb, Seam) {
         (self.rgb, self.seam)
     }
@@ -258,16 +258,16 @@ mod tests {
                 prop_assert!(tile < 2 * (context + GUARD) + multiple);
                 return Ok(());
             };
-            prop_assert_eq!(spans[0].from, 0);
-            prop_assert_eq!(spans.last().unwrap().to, length);
+            prop_assert_eq!(spans[0].output_start, 0);
+            prop_assert_eq!(spans.last().unwrap().output_end, length);
             for span in &spans {
-                prop_assert_eq!(span.end - span.start, tile.min(length));
-                prop_assert!(span.start % multiple == 0 && span.end <= length);
-                prop_assert!(span.from == 0 || span.from - span.start >= context);
-                prop_assert!(span.to == length || span.end - span.to >= context);
+                prop_assert_eq!(span.input_end - span.input_start, tile.min(length));
+                prop_assert!(span.input_start % multiple == 0 && span.input_end <= length);
+                prop_assert!(span.output_start == 0 || span.output_start - span.input_start >= context);
+                prop_assert!(span.output_end == length || span.input_end - span.output_end >= context);
             }
             for pair in spans.windows(2) {
-                prop_assert!(pair[0].to >= pair[1].from + 2 * GUARD);
+                prop_assert!(pair[0].output_end >= pair[1].output_start + 2 * GUARD);
             }
         }
     }
@@ -281,23 +281,24 @@ mod tests {
             multiple: 1,
         };
         let plan = TilePlan::of(cut).unwrap();
-        // What a pixel is, and what a tile that sees its own place makes of it.
-        let made = |shift: usize| {
+        // An image tile by tile; with a shift, pixels depend on the tile's position, so that seams differ.
+        let tiled = |shift: usize| {
             let mut canvas = TiledImage::new([37, 50]);
             for (row, column) in plan.tiles() {
-                let pixels =
-                    (row.from..row.to).flat_map(|y| (column.from..column.to).map(move |x| (y, x)));
-                let byte =
-                    |(y, x): (usize, usize)| [(y * 5 + x * 3 + shift * column.start) as u8; 3];
-                canvas.put(row, column, &pixels.flat_map(byte).collect::<Vec<_>>());
+                let pixels = (row.output_start..row.output_end)
+                    .flat_map(|y| (column.output_start..column.output_end).map(move |x| (y, x)));
+                let byte = |(y, x): (usize, usize)| {
+                    [(y * 5 + x * 3 + shift * column.input_start) as u8; 3]
+                };
+                canvas.add(row, column, &pixels.flat_map(byte).collect::<Vec<_>>());
             }
             canvas.finish()
         };
-        let (image, seam) = made(0);
+        let (image, seam) = tiled(0);
         let expected = (0..37 * 50).flat_map(|i| [(i / 50 * 5 + i % 50 * 3) as u8; 3]);
         assert!(image.samples().iter().copied().eq(expected));
-        assert!(seam.holds() && seam.compared > 1000 && seam.most == 0);
-        let (_, seam) = made(1);
-        assert!(!seam.holds() && seam.most > 1, "{seam:?}");
+        assert!(seam.holds() && seam.compared > 1000 && seam.max_difference == 0);
+        let (_, seam) = tiled(1);
+        assert!(!seam.holds() && seam.max_difference > 1, "{seam:?}");
     }
 }

@@ -1,11 +1,11 @@
-//! The weights in the bytes of an ONNX model: [`Weights::find`], [`Weights::flush_subnormals`].
+//! Weights in the bytes of an ONNX model: [`Weights::find`], [`Weights::flush_subnormals`].
 //!
-//! Training with weight decay leaves weights below 2⁻¹²⁶, which are zero to every eye and cost some processors a hundred
-//! cycles each: on an Intel Xeon, Zero-DCE's published weights, a quarter of them subnormal, ran some 45 times slower with
-//! them than without; on an AMD EPYC no slower. ONNX Runtime's own switch (`session.set_denormal_as_zero`) reaches a calling
-//! thread only through the first session of a process, so the weights themselves are set to zero before a session is made;
-//! the images that Zero-DCE makes do not change by one byte.
-//! Weights in files beside the model stay as they are: those models are loaded by path, and the switch is all they get.
+//! Training with weight decay leaves subnormal weights, below 2⁻¹²⁶. They do not affect the image, but cost some processors
+//! a hundred cycles each. A quarter of Zero-DCE's published weights is subnormal: with them it ran some 45 times slower on
+//! an Intel Xeon, and no slower on an AMD EPYC. ONNX Runtime's option (`session.set_denormal_as_zero`) reaches a calling
+//! thread only through the first session of a process. So the weights are set to zero before a session is created; the
+//! images of Zero-DCE do not change by one byte.
+//! Weights in files beside the model are not changed: those models are loaded by path, and only the option acts on them.
 //!
 //! Field numbers are those of `onnx/onnx.proto` (IR version 13).
 
@@ -14,7 +14,7 @@ use std::ops::Range;
 
 use super::protobuf::{FieldValue, Malformed, fields};
 
-/// Where the 32-bit floats of a model lie, and which other files hold weights.
+/// Positions of the 32-bit floats in a model, and names of other files with weights.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(super) struct Weights {
     /// Byte ranges of little-endian 32-bit floats.
@@ -23,7 +23,7 @@ pub(super) struct Weights {
     pub(super) external: BTreeSet<String>,
 }
 
-/// The messages of an ONNX file that have weights in them.
+/// Messages of an ONNX file that may contain weights.
 #[derive(Clone, Copy)]
 enum OnnxMessage {
     Model,
@@ -36,7 +36,7 @@ enum OnnxMessage {
 }
 
 impl OnnxMessage {
-    /// The message in a field of this one; `None` where no weights can be.
+    /// Type of the message in a field; `None` if it cannot contain weights.
     fn in_field(self, number: u64) -> Option<Self> {
         match (self, number) {
             (Self::Model, 7) | (Self::Attribute, 6 | 11) => Some(Self::Graph),
@@ -53,14 +53,14 @@ impl OnnxMessage {
 }
 
 impl Weights {
-    /// Walks a `ModelProto`: its graph, subgraphs, functions and constants.
+    /// Finds the weights of a `ModelProto`: in its graph, subgraphs, functions and constants.
     ///
     /// # Errors
-    /// Where the bytes are no protobuf message, or one without a graph.
+    /// If the bytes are not a protobuf message, or one without a graph.
     pub(super) fn find(model: &[u8]) -> Result<Self, Malformed> {
         let mut weights = Self::default();
         let mut has_graph = false;
-        // A stack in place of recursion: no nesting, however deep, can overflow it.
+        // A stack instead of recursion, so that deep nesting cannot overflow the call stack.
         let mut open = vec![(OnnxMessage::Model, 0..model.len())];
         while let Some((message, range)) = open.pop() {
             if let OnnxMessage::Tensor = message {
@@ -83,7 +83,7 @@ impl Weights {
         }
     }
 
-    /// Notes where the floats of one `TensorProto` lie.
+    /// Adds the positions of the floats of one `TensorProto`, or the name of its external file.
     fn add_tensor(&mut self, model: &[u8], range: Range<usize>) -> Result<(), Malformed> {
         const FLOAT: u64 = 1;
         const EXTERNAL: u64 = 1;
@@ -109,9 +109,9 @@ impl Weights {
         Ok(())
     }
 
-    /// Sets every subnormal float of `model` to zero of its sign; returns how many there were.
+    /// Sets every subnormal float of `model` to zero with the same sign; returns their number.
     ///
-    /// `model` is the buffer that [`Weights::find`] walked.
+    /// `model` must be the buffer that was passed to [`Weights::find`].
     pub(super) fn flush_subnormals(&self, model: &mut [u8]) -> usize {
         let mut flushed = 0;
         for range in &self.floats {
@@ -129,7 +129,7 @@ impl Weights {
     }
 }
 
-/// The value of a `StringStringEntryProto` whose key is `location`.
+/// Value of a `StringStringEntryProto` if its key is `location`.
 fn location_in(model: &[u8], entry: Range<usize>) -> Result<Option<String>, Malformed> {
     let (mut key, mut value) = (None, None);
     for field in fields(model, entry) {
@@ -162,7 +162,7 @@ mod tests {
         floats.iter().flat_map(|x| x.to_le_bytes()).collect()
     }
 
-    /// A tensor of some type with its data in one field.
+    /// A tensor of the given type with its data in one field.
     fn tensor(data_type: u8, number: u8, floats: &[f32]) -> Vec<u8> {
         [&[2 << 3, data_type], field(number, &raw(floats)).as_slice()].concat()
     }
@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn external_data_is_named_and_left_alone() {
+    fn external_data_is_named_and_not_changed() {
         let entry = [field(1, b"location"), field(2, b"weights.bin")].concat();
         let offset = [field(1, b"offset"), field(2, b"0")].concat();
         let content = [
@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_model_is_refused() {
+    fn bytes_that_are_not_a_model_are_refused() {
         let cases: [&[u8]; 5] = [
             b"",
             b"hello",
@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn deep_nesting_is_walked() {
+    fn deep_nesting_is_searched() {
         // Lengths beyond 127 need longer varints than `field` writes.
         let mut graph = Vec::new();
         for _ in 0..20_000 {
@@ -254,7 +254,7 @@ mod tests {
                     length >>= 7;
                 }
                 wrapped.push(length as u8);
-                // Built back to front, so that wrapping is cheap.
+                // Built in reverse, so that wrapping is cheap.
                 graph.extend(wrapped.into_iter().rev());
             }
         }
@@ -272,7 +272,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn no_bytes_make_it_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+        fn arbitrary_bytes_do_not_make_it_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
             let mut bytes = bytes;
             if let Ok(weights) = Weights::find(&bytes) {
                 weights.flush_subnormals(&mut bytes);

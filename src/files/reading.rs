@@ -1,4 +1,4 @@
-//! Folders, text files, and those of one JSON object a line: [`entries`], [`text`], [`json_lines`].
+//! Readers of folders ([`entries`]), text files ([`text`]) and files of one JSON object a line ([`json_lines`]).
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,21 +7,21 @@ use serde::de::DeserializeOwned;
 
 use crate::error::{Error, Result};
 
-/// What lies in a folder, by name.
+/// The paths in a folder, sorted by name.
 ///
 /// # Errors
-/// With the folder.
+/// If the folder cannot be read.
 pub(crate) fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
-    let unread = |e| Error::file(folder, "read", e);
-    let entries = fs::read_dir(folder).map_err(unread)?;
+    let unreadable = |e| Error::file(folder, "read", e);
+    let entries = fs::read_dir(folder).map_err(unreadable)?;
     let mut paths = entries
-        .map(|entry| entry.map(|entry| entry.path()).map_err(unread))
+        .map(|entry| entry.map(|entry| entry.path()).map_err(unreadable))
         .collect::<Result<Vec<PathBuf>>>()?;
     paths.sort();
     Ok(paths)
 }
 
-/// Whether a path is a file that is named as an image.
+/// Whether a path is a file with the ending of an image: png, jpg or jpeg.
 pub(crate) fn is_image(path: &Path) -> bool {
     let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
     path.is_file() && ["png", "jpg", "jpeg"].iter().any(|known| ending == *known)
@@ -30,7 +30,7 @@ pub(crate) fn is_image(path: &Path) -> bool {
 /// The bytes of a file.
 ///
 /// # Errors
-/// With the file.
+/// If the file cannot be read.
 pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>> {
     fs::read(path).map_err(|e| Error::file(path, "read", e))
 }
@@ -38,23 +38,23 @@ pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>> {
 /// The text of a file.
 ///
 /// # Errors
-/// With the file.
+/// If the file cannot be read or is not UTF-8.
 pub(crate) fn text(path: &Path) -> Result<String> {
     fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))
 }
 
-/// What a file of JSON says.
+/// The value in a JSON file.
 ///
 /// # Errors
-/// With the file.
+/// If the file cannot be read or does not hold such a value.
 pub(crate) fn json<T: DeserializeOwned>(path: &Path) -> Result<T> {
     serde_json::from_str(&text(path)?).map_err(|e| Error::data(path.display(), e))
 }
 
-/// The objects of a file with their lines, counted from 1; empty lines and a byte order mark are passed over.
+/// The objects of a file with their line numbers, counted from 1; empty lines and a byte order mark are skipped.
 ///
 /// # Errors
-/// With the file and the line.
+/// If the file cannot be read or a line does not hold such an object; the error names the line.
 pub(crate) fn json_lines<T: DeserializeOwned>(path: &Path) -> Result<Vec<(usize, T)>> {
     let text = text(path)?;
     let lines = (1..).zip(text.trim_start_matches('\u{feff}').lines());

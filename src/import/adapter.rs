@@ -1,4 +1,4 @@
-//! What a kind of data set gives: [`Adapter`].
+//! The common interface to all kinds of data sets: [`Adapter`].
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -10,90 +10,89 @@ use ndarray::Array2;
 use crate::error::{Error, Result};
 use crate::labels;
 use crate::types::flag::positive;
-use crate::types::{DepthKind, Intrinsics, Labels, Rgb, SegmentName, Segmentation};
+use crate::types::{Decides, DepthKind, Intrinsics, Labels, Rgb, SegmentName, Segmentation};
 
-/// What the user says of a data set's maps and its camera.
+/// Flags that describe the maps and the camera of a data set.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Maps")]
 pub(crate) struct StatedArgs {
     /// The label space of the class maps: nyu40, nyu40-1 (from 0, 255 for void; kind nyu), nyu13, mpcat40, ade150, or a
     /// classes.json; default: what the kind has
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, value_name = "NAME|FILE", add = Decides::Pixels)]
     pub labels: Option<String>,
     /// The metres in one unit of depth PNG files: 0.001 for millimetres, 0.0002 for 1/5000 m; .npy files are in metres; default:
     /// what the kind has
-    #[arg(long, value_name = "METRES", value_parser = positive)]
+    #[arg(long, value_name = "METRES", value_parser = positive, add = Decides::Pixels)]
     pub depth_scale: Option<f64>,
     /// What depth is measured along; default: planar
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, add = Decides::Pixels)]
     pub depth_kind: Option<DepthKind>,
     /// The horizontal field of view in degrees, where the data set does not say how its camera projects; default: not known
-    #[arg(long, value_name = "DEGREES", value_parser = degrees)]
+    #[arg(long, value_name = "DEGREES", value_parser = degrees, add = Decides::Pixels)]
     pub hfov: Option<f64>,
 }
 
-/// Reads a field of view.
+/// Parses a field of view in degrees.
 fn degrees(text: &str) -> Result<f64, String> {
     let degrees = positive(text).ok().filter(|degrees| *degrees < 180.0);
     degrees.ok_or_else(|| "a number above 0 and below 180 expected".to_owned())
 }
 
-/// A frame that can be read.
+/// A frame of a data set; its maps are not read yet.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ListedFrame {
-    /// Its scene.
     pub scene: String,
-    /// Its name in the scene.
+    /// Name of the frame in its scene.
     pub frame: String,
-    /// Its time in seconds.
+    /// Time in seconds; the origin is arbitrary.
     pub time: Option<f64>,
-    /// Where its camera stands: the matrix from camera to world, row by row.
+    /// Pose of the camera: the matrix from camera to world, row by row.
     pub pose: Option<Vec<f64>>,
-    /// How its camera projects, in pixels of its image.
+    /// Intrinsics of the camera, in pixels of the image.
     pub intrinsics: Option<Intrinsics>,
-    /// The type of its room, where the data set says it.
+    /// Room type, if the data set states one.
     pub room: Option<String>,
-    /// Its image.
+    /// Path of the image.
     pub rgb: PathBuf,
-    /// The place of its other files in the adapter's own list.
+    /// Index of the frame's other files in the list of the adapter.
     pub(super) index: usize,
 }
 
-/// The maps of a frame, of its image's size.
+/// The maps of a frame, in the size of its image.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct FrameMaps {
-    /// Depth in millimetres, 0 where there is none.
+    /// Depth in millimetres; 0 for no depth.
     pub depth: Option<Array2<u32>>,
     /// Numbers of the label space.
     pub semantic: Option<Array2<u16>>,
-    /// Segments, 0 where there is none.
+    /// Numbers of segments; 0 for no segment.
     pub segments: Option<Array2<u32>>,
-    /// The type of the room, where the maps say it.
+    /// Room type, if the maps show it.
     pub room: Option<String>,
 }
 
-/// What is known of a data set without reading its maps.
+/// All that is known of a data set without reading its maps.
 #[derive(Debug, Default)]
 pub(crate) struct Listing {
-    /// Its frames, by scene and name.
+    /// The frames, sorted by scene and name.
     pub frames: Vec<ListedFrame>,
-    /// What its numbers stand for.
+    /// Meaning of the numbers in semantic maps.
     pub labels: Labels,
-    /// What is known of each scene's segments by name.
+    /// Names of segments, by scene and segment number.
     pub names: BTreeMap<String, BTreeMap<u32, SegmentName>>,
-    /// What depth is measured along.
+    /// Direction along which depth is measured.
     pub depth_kind: DepthKind,
-    /// What the segments are.
+    /// Kind of segments: instances or parts.
     pub segmentation: Segmentation,
-    /// Words that no table has, with how many things have them.
+    /// Words that no table has, with the number of objects that have them.
     pub unlisted: BTreeMap<String, usize>,
-    /// The horizontal field of view in degrees, of frames whose camera is not known.
+    /// Horizontal field of view in degrees, for frames without intrinsics.
     pub hfov: Option<f64>,
-    /// The camera of images of its own size, where nobody says another.
+    /// Default camera for images of its size.
     pub(super) sensor: Option<SizedCamera>,
 }
 
-/// A camera, and the width and height of its images.
+/// The intrinsics of a camera, and the width and height of its images.
 #[derive(Debug)]
 pub(super) struct SizedCamera {
     pub(super) size: (usize, usize),
@@ -101,8 +100,8 @@ pub(super) struct SizedCamera {
 }
 
 impl Listing {
-    /// A data set whose labels are those of mpcat40, as adapters by name write them.
-    pub(super) fn by_name(stated: &StatedArgs) -> Self {
+    /// An empty listing with the labels of mpcat40, for adapters that map names to these classes.
+    pub(super) fn of_mpcat40(stated: &StatedArgs) -> Self {
         Self {
             labels: labels::space("mpcat40").unwrap_or_default(),
             hfov: stated.hfov,
@@ -111,31 +110,31 @@ impl Listing {
     }
 }
 
-/// A kind of data set, opened.
+/// An open data set of any kind.
 pub(crate) trait Adapter: fmt::Debug + Sync {
-    /// What is known of it without reading its maps.
+    /// All that is known of the data set without reading its maps.
     fn listing(&self) -> &Listing;
 
-    /// How the camera of a frame projects, in pixels of its image.
+    /// The intrinsics of a frame's camera, in pixels of its image: from the frame, else from --hfov, else the default camera.
     fn camera(&self, frame: &ListedFrame, rgb: &Rgb) -> Option<Intrinsics> {
         let (width, height) = (rgb.width(), rgb.height());
         let Listing { hfov, sensor, .. } = self.listing();
         let stated = hfov.map(|hfov| pinhole(width, height, hfov));
-        let own = sensor
+        let default = sensor
             .as_ref()
             .filter(|sensor| sensor.size == (width, height));
-        let own = own.map(|sensor| sensor.camera);
-        frame.intrinsics.or(stated).or(own)
+        let default = default.map(|sensor| sensor.camera);
+        frame.intrinsics.or(stated).or(default)
     }
 
     /// Reads the maps of a frame; `rgb` is its image.
     ///
     /// # Errors
-    /// With the file: one that cannot be read, or is of another form or size than it should be.
+    /// With the file, if it cannot be read or has an unexpected form or size.
     fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps>;
 }
 
-/// The label space that the user names: a built-in one, or a file.
+/// The label space that --labels names: a built-in one or a file. `None` without the flag.
 pub(super) fn labels(stated: &StatedArgs) -> Result<Option<Labels>> {
     let Some(name) = &stated.labels else {
         return Ok(None);
@@ -148,12 +147,13 @@ pub(super) fn labels(stated: &StatedArgs) -> Result<Option<Labels>> {
         return labels::read(path).map(Some);
     }
     let known = labels::names().join(", ");
-    let problem = format_args!("{name:?} is neither a file none of the built-in spaces: {known}");
+    let problem =
+        format_args!("{name:?} is neither a file nor one of the built-in label spaces: {known}");
     Err(Error::usage("--labels", problem))
 }
 
-/// The numbers of mpcat40 by class.
-pub(super) fn numbers(labels: &Labels) -> BTreeMap<String, u16> {
+/// The number of each canonical class.
+pub(super) fn class_numbers(labels: &Labels) -> BTreeMap<String, u16> {
     labels
         .labels
         .iter()
@@ -161,8 +161,7 @@ pub(super) fn numbers(labels: &Labels) -> BTreeMap<String, u16> {
         .collect()
 }
 
-/// The camera of an image of such a size with such a horizontal field of view and square pixels, whose axis goes through the
-/// middle.
+/// The camera of an image with a horizontal field of view in degrees, square pixels and the optical axis in the middle.
 fn pinhole(width: usize, height: usize, hfov: f64) -> Intrinsics {
     let focal = width as f64 / 2.0 / libm::tan(hfov.to_radians() / 2.0);
     Intrinsics {

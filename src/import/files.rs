@@ -1,4 +1,4 @@
-//! Files of a folder by name, and what is read of them.
+//! Lists of files in a folder, and readers for images, maps and numbers.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -13,21 +13,21 @@ use crate::error::{Error, Result};
 use crate::files::reading::{bytes, entries, text};
 use crate::types::Rgb;
 
-/// The folders in a folder, by name.
+/// The folders in a folder, sorted by name.
 pub(super) fn folders(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut folders = entries(folder)?;
     folders.retain(|path| path.is_dir());
     Ok(folders)
 }
 
-/// The files in a folder with one of these endings, by their names without it; none where the folder is not there.
+/// The files in a folder with one of these endings, by name without the ending. Empty if the folder does not exist.
 pub(super) fn files(folder: &Path, endings: &[&str]) -> Result<BTreeMap<String, PathBuf>> {
     if !folder.is_dir() {
         return Ok(BTreeMap::new());
     }
     let mut files = BTreeMap::new();
     for path in entries(folder)?.into_iter().filter(|path| path.is_file()) {
-        let name = last(&path);
+        let name = file_name(&path);
         let lower = name.to_lowercase();
         if let Some(ending) = endings.iter().find(|ending| lower.ends_with(**ending)) {
             files.insert(name[..name.len() - ending.len()].to_owned(), path);
@@ -36,16 +36,16 @@ pub(super) fn files(folder: &Path, endings: &[&str]) -> Result<BTreeMap<String, 
     Ok(files)
 }
 
-/// The first of these folders that is there.
-pub(super) fn first(folder: &Path, names: &[&str]) -> Option<PathBuf> {
+/// The first of these folders that exists.
+pub(super) fn first_folder(folder: &Path, names: &[&str]) -> Option<PathBuf> {
     names
         .iter()
         .map(|name| folder.join(name))
         .find(|path| path.is_dir())
 }
 
-/// An image, decoded.
-pub(super) fn picture(path: &Path) -> Result<Rgb> {
+/// Reads and decodes an image.
+pub(super) fn image(path: &Path) -> Result<Rgb> {
     let bytes = bytes(path)?;
     let place = path.display().to_string();
     Picture::Encoded {
@@ -57,12 +57,12 @@ pub(super) fn picture(path: &Path) -> Result<Rgb> {
 }
 
 /// The last part of a path, as text.
-pub(super) fn last(path: &Path) -> String {
+pub(super) fn file_name(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default();
     name.to_string_lossy().into_owned()
 }
 
-/// The numbers of a PNG file of one of these forms.
+/// The numbers in a PNG file, which must have one of these sample forms.
 pub(super) fn png(path: &Path, forms: &[SampleForm]) -> Result<Array2<u16>> {
     let bytes = bytes(path)?;
     let read = || {
@@ -73,7 +73,7 @@ pub(super) fn png(path: &Path, forms: &[SampleForm]) -> Result<Array2<u16>> {
     read().map_err(|problem| Error::data(path.display(), problem))
 }
 
-/// The numbers of segments: a 16-bit grey PNG file, or a `.npy` file of integers, where one below 0 is none.
+/// The numbers of segments in a 16-bit grey PNG file or a `.npy` file of integers; numbers below 0 become 0, no segment.
 pub(super) fn segments(path: &Path) -> Result<Array2<u32>> {
     let ending = path.extension();
     if ending.is_some_and(|ending| ending.eq_ignore_ascii_case("png")) {
@@ -83,7 +83,8 @@ pub(super) fn segments(path: &Path) -> Result<Array2<u32>> {
     let read = || {
         let npy = Npy::parse(&bytes)?;
         let id = |id: i128| {
-            u32::try_from(id.max(0)).map_err(|_| format!("{id} is no number of a segment"))
+            u32::try_from(id.max(0))
+                .map_err(|_| format!("{id} is too large for the number of a segment"))
         };
         let size = npy.size;
         let ids = npy
@@ -95,16 +96,16 @@ pub(super) fn segments(path: &Path) -> Result<Array2<u32>> {
     read().map_err(|problem| Error::data(path.display(), problem))
 }
 
-/// Depth in millimetres, of the file's own size.
+/// Depth in millimetres, in the size of the file.
 pub(super) fn depth(path: &Path, scale: Option<f64>) -> Result<Array2<u32>> {
     let wrong = |problem: String| Error::data(path.display(), problem);
     let file = DepthFile::new(path.to_owned(), scale)
-        .map_err(|problem| wrong(problem + " (--depth-scale METRES says it)"))?;
+        .map_err(|problem| wrong(problem + " (--depth-scale METRES sets it)"))?;
     let bytes = bytes(path)?;
     file.decode_alone(&bytes).map_err(wrong)
 }
 
-/// Depth in millimetres, of an image's size; the scale is that of files that are not in metres.
+/// Depth in millimetres, which must have the size of the image. `scale` applies to files that are not `.npy`.
 pub(super) fn depth_of(
     path: Option<&Path>,
     scale: Option<f64>,
@@ -115,25 +116,25 @@ pub(super) fn depth_of(
     };
     let scale = scale.filter(|_| path.extension().is_some_and(|end| end != "npy"));
     let depth = depth(path, scale)?;
-    same_size(path, &depth, rgb)?;
+    check_same_size(path, &depth, rgb)?;
     Ok(Some(depth))
 }
 
-/// Refuses a map of another size than its image.
-pub(super) fn same_size<T>(path: &Path, map: &Array2<T>, rgb: &Rgb) -> Result<()> {
+/// Refuses a map whose size differs from that of its image.
+pub(super) fn check_same_size<T>(path: &Path, map: &Array2<T>, rgb: &Rgb) -> Result<()> {
     let (height, width) = map.dim();
     if (height, width) == (rgb.height(), rgb.width()) {
         return Ok(());
     }
     let problem = format_args!(
-        "{height} × {width} pixels (height × width), but its image has {} × {}; a map of labels is never scaled",
+        "{height} × {width} pixels (height × width), but its image has {} × {}; maps of labels are never scaled",
         rgb.height(),
         rgb.width()
     );
     Err(Error::data(path.display(), problem))
 }
 
-/// So many numbers of a text file.
+/// The numbers in a text file, separated by white space.
 pub(super) fn numbers(path: &Path) -> Result<Vec<f64>> {
     let words = text(path)?;
     let numbers = words

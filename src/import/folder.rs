@@ -1,17 +1,17 @@
-//! Folders of images and maps that share their names; or a folder of the common interface, taken over as it is.
+//! Folders of images and maps with the same file names.
 //!
-//! `rgb`, `depth`, `sem` and `over` (or names that other tools use), in the folder itself or in a folder for each scene.
+//! The folders are `rgb`, `depth`, `sem` and `over` (or names of other tools), in the folder itself or in one folder per scene.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, StatedArgs, labels};
-use super::files::{depth_of, files, first, folders, png, same_size, segments};
+use super::files::{check_same_size, depth_of, files, first_folder, folders, png, segments};
 use crate::dataset::raw_png::SampleForm;
 use crate::error::{Error, Result};
 use crate::types::{Labels, Rgb};
 
-/// What the folders are called: images, depth, classes, segments.
+/// Names of the folders of images, depth, classes and segments.
 const RGB: [&str; 6] = ["rgb", "image", "images", "color", "img", "RGB"];
 const DEPTH: [&str; 3] = ["depth", "depths", "Depth"];
 const CLASSES: [&str; 8] = [
@@ -39,16 +39,16 @@ pub(super) struct Folder {
     pub(super) listing: Listing,
     maps: Vec<FolderMaps>,
     depth_scale: Option<f64>,
-    /// How the numbers of the class maps are told from those of the label space.
+    /// Conversion from the numbers of the class maps to those of the label space.
     offset: NumberOffset,
 }
 
-/// How the numbers of class maps lie.
+/// Offset of the numbers of class maps from those of the label space.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum NumberOffset {
-    /// As in the label space.
+    /// The same numbers as in the label space.
     None,
-    /// One less, with 255 for void.
+    /// Numbers that are one less, with 255 for void.
     One,
 }
 
@@ -66,7 +66,7 @@ impl Folder {
             Some(labels) => labels,
             None if known.is_file() => crate::labels::read(&known)?,
             None => {
-                let problem = "which label space the numbers of its class maps belong to must be said: nyu40, nyu13, mpcat40, ade150, or a classes.json";
+                let problem = "the label space of the class maps is missing; nyu40, nyu13, mpcat40, ade150 or the path of a classes.json expected";
                 return Err(Error::usage("--labels", problem));
             }
         };
@@ -90,12 +90,12 @@ impl Folder {
             depth_scale: stated.depth_scale,
             offset,
         };
-        if first(folder, &RGB).is_some() {
+        if first_folder(folder, &RGB).is_some() {
             set.add(folder)?;
         } else {
             let nested = folder.join("scenes");
             for scene in folders(if nested.is_dir() { &nested } else { folder })? {
-                if first(&scene, &RGB).is_some() {
+                if first_folder(&scene, &RGB).is_some() {
                     set.add(&scene)?;
                 }
             }
@@ -109,7 +109,7 @@ impl Folder {
             || "scene".into(),
             |name| name.to_string_lossy().into_owned(),
         );
-        let in_any = |names: &[&str], endings: &[&str]| match first(folder, names) {
+        let in_any = |names: &[&str], endings: &[&str]| match first_folder(folder, names) {
             Some(folder) => files(&folder, endings),
             None => Ok(BTreeMap::new()),
         };
@@ -134,13 +134,13 @@ impl Folder {
                 index: self.maps.len() - 1,
             });
         }
-        let strays = depths
+        let unmatched = depths
             .into_values()
             .chain(classes.into_values())
             .chain(segments.into_values());
-        if let Some(stray) = strays.min() {
+        if let Some(map) = unmatched.min() {
             return Err(Error::data(
-                stray.display(),
+                map.display(),
                 "no image has the name of this map",
             ));
         }
@@ -155,7 +155,7 @@ impl Adapter for Folder {
 
     fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {
         let maps = &self.maps[frame.index];
-        let mut read = FrameMaps {
+        let mut result = FrameMaps {
             depth: depth_of(maps.depth.as_deref(), self.depth_scale, rgb)?,
             ..FrameMaps::default()
         };
@@ -164,17 +164,17 @@ impl Adapter for Folder {
                 path,
                 &[SampleForm::Grey8, SampleForm::Grey16, SampleForm::Palette],
             )?;
-            same_size(path, &classes, rgb)?;
+            check_same_size(path, &classes, rgb)?;
             if self.offset == NumberOffset::One {
                 classes.mapv_inplace(|id| if id == 255 { 0 } else { id + 1 });
             }
-            read.semantic = Some(classes);
+            result.semantic = Some(classes);
         }
         if let Some(path) = &maps.segments {
             let segments = segments(path)?;
-            same_size(path, &segments, rgb)?;
-            read.segments = Some(segments);
+            check_same_size(path, &segments, rgb)?;
+            result.segments = Some(segments);
         }
-        Ok(read)
+        Ok(result)
     }
 }

@@ -1,44 +1,45 @@
-//! Renders of habitat-sim: one folder a scene, with its instances named as the scene's data set names them.
+//! Renders of habitat-sim: one folder per scene, with the names of instances from the scene's data set.
 //!
-//! `<scene>/rgb/<frame>.png`, `depth/<frame>.npy` (metres) or `.png`, `semantic/<frame>.npy` or `.png` (16 bits: the numbers of
-//! instances), beside them `*.semantic.txt` (HM3D-Sem), `*.house` (Matterport3D) or `info_semantic.json` (Replica), and where
-//! frames have a time `trajectory.jsonl`, a line each: `{"frame", "t", "pose", "intrinsics"}`.
+//! A scene has `<scene>/rgb/<frame>.png`, `depth/<frame>.npy` (metres) or `.png`, and `semantic/<frame>.npy` or 16-bit `.png`
+//! (numbers of instances). Beside them lies `*.semantic.txt` (HM3D-Sem), `*.house` (Matterport3D) or `info_semantic.json`
+//! (Replica). The optional `trajectory.jsonl` has one line per frame: `{"frame", "t", "pose", "intrinsics"}`.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, StatedArgs, numbers};
-use super::files::{depth_of, files, folders, last, same_size, segments};
+use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, StatedArgs, class_numbers};
+use super::files::{check_same_size, depth_of, file_name, files, folders, segments};
 use super::{hm3d, mp3d, replica};
 use crate::error::{Error, Result};
 use crate::files::reading::{json_lines, text};
 use crate::types::{Intrinsics, Rgb, SegmentName};
 
-/// The part of the named pixels that a region must have for its room to be the frame's, in hundredths.
-const MOST_OF_FRAME: u64 = 60;
+/// Minimum share of the named pixels, in percent, that a region needs to give the frame its room type.
+const MIN_REGION_PERCENT: u64 = 60;
 
-/// The renders of a folder.
+/// An open folder of renders.
 #[derive(Debug)]
 pub(super) struct Habitat {
     listing: Listing,
-    /// Depth and semantic map of each.
+    /// Paths of the depth and semantic map of each frame.
     maps: Vec<(Option<PathBuf>, PathBuf)>,
     scenes: BTreeMap<String, SceneFiles>,
     numbers: BTreeMap<String, u16>,
     depth_scale: Option<f64>,
 }
 
-/// What a scene's own files say.
+/// Information from the annotation file of a scene.
 #[derive(Debug, Default)]
 struct SceneFiles {
+    /// Room type of each region.
     rooms: BTreeMap<i64, &'static str>,
-    /// What is added to the numbers of instances: 1 where one of them is 0, which stands for none elsewhere.
+    /// Offset added to the numbers of instances: 1 if an instance has the number 0, which means no segment here; else 0.
     shift: u32,
 }
 
-/// The instances of a scene by number.
+/// Names of the instances of a scene, by number.
 type InstanceNames = BTreeMap<u32, SegmentName>;
 
 /// A line of `trajectory.jsonl`.
@@ -54,10 +55,10 @@ impl Habitat {
     pub(super) fn open(folder: &Path, stated: &StatedArgs) -> Result<Self> {
         let listing = Listing {
             depth_kind: stated.depth_kind.unwrap_or_default(),
-            ..Listing::by_name(stated)
+            ..Listing::of_mpcat40(stated)
         };
         let mut set = Self {
-            numbers: numbers(&listing.labels),
+            numbers: class_numbers(&listing.labels),
             listing,
             maps: Vec::new(),
             scenes: BTreeMap::new(),
@@ -72,7 +73,7 @@ impl Habitat {
     }
 
     fn add(&mut self, folder: &Path) -> Result<()> {
-        let name = last(folder);
+        let name = file_name(folder);
         let (scene, names) = self.scene(folder)?;
         let images = files(&folder.join("rgb"), &[".png", ".jpg", ".jpeg"])?;
         let depths = files(&folder.join("depth"), &[".npy", ".png"])?;
@@ -102,11 +103,11 @@ impl Habitat {
         Ok(())
     }
 
-    /// Reads the one file that names a scene's instances.
+    /// Reads the file that names the instances of a scene.
     fn scene(&mut self, folder: &Path) -> Result<(SceneFiles, InstanceNames)> {
         let annotations = files(folder, &[".semantic.txt", ".house", "info_semantic.json"])?;
         let Some(path) = annotations.into_values().next() else {
-            let problem = "none of *.semantic.txt (HM3D-Sem), *.house (Matterport3D), info_semantic.json (Replica) in this folder: nothing names the instances of its maps";
+            let problem = "none of *.semantic.txt (HM3D-Sem), *.house (Matterport3D), info_semantic.json (Replica) in this folder; one of them must name the instances of the semantic maps";
             return Err(Error::data(folder.display(), problem));
         };
         let content = text(&path)?;
@@ -124,7 +125,10 @@ impl Habitat {
             (names.map_err(at_line)?, BTreeMap::new())
         };
         if names.is_empty() {
-            return Err(Error::data(path.display(), "it names no instance"));
+            return Err(Error::data(
+                path.display(),
+                "no instance is named in this file",
+            ));
         }
         let shift = u32::from(names.contains_key(&0));
         let names = names.into_iter().map(|(id, name)| (id + shift, name));
@@ -132,7 +136,7 @@ impl Habitat {
     }
 }
 
-/// The steps of a trajectory by frame; none where there is no such file.
+/// The steps of a trajectory, by frame; empty if the file does not exist.
 fn steps(path: &Path) -> Result<BTreeMap<String, TrajectoryStep>> {
     if !path.exists() {
         return Ok(BTreeMap::new());
@@ -147,13 +151,13 @@ impl Adapter for Habitat {
     }
 
     fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {
-        let (deep, semantic) = &self.maps[frame.index];
+        let (depth_path, semantic) = &self.maps[frame.index];
         let scene = &self.scenes[&frame.scene];
         let names = &self.listing.names[&frame.scene];
-        let depth = depth_of(deep.as_deref(), self.depth_scale, rgb)?;
+        let depth = depth_of(depth_path.as_deref(), self.depth_scale, rgb)?;
         let ids = segments(semantic)?;
-        same_size(semantic, &ids, rgb)?;
-        let (mut regions, mut with_region) = (BTreeMap::new(), 0_u64);
+        check_same_size(semantic, &ids, rgb)?;
+        let (mut regions, mut named) = (BTreeMap::new(), 0_u64);
         let (mut last, mut found) = (None, (0, None));
         let mut segments = ids;
         let classes = segments.mapv(|id| {
@@ -166,25 +170,25 @@ impl Adapter for Habitat {
                 );
             }
             if found.0 != 0 {
-                with_region += 1;
+                named += 1;
                 *regions.entry(found.1).or_insert(0_u64) += 1;
             }
             found.0
         });
-        if with_region == 0 {
-            let problem = "no pixel has the number of an instance that the scene names; habitat-sim renders 0 everywhere where the scene was opened without its *.scene_dataset_config.json";
+        if named == 0 {
+            let problem = "no pixel has the number of an instance that the scene names; habitat-sim writes 0 everywhere if the scene is opened without its *.scene_dataset_config.json";
             return Err(Error::data(semantic.display(), problem));
         }
         segments.mapv_inplace(|id| match id.checked_add(scene.shift) {
             Some(id) if names.contains_key(&id) => id,
             _ => 0,
         });
-        let (region, most) = regions
+        let (region, pixels) = regions
             .into_iter()
             .max_by_key(|(_, count)| *count)
             .unwrap_or((None, 0));
         let room = region.and_then(|region| scene.rooms.get(&region));
-        let room = room.filter(|_| most * 100 >= with_region * MOST_OF_FRAME);
+        let room = room.filter(|_| pixels * 100 >= named * MIN_REGION_PERCENT);
         Ok(FrameMaps {
             depth,
             semantic: Some(classes),

@@ -1,17 +1,16 @@
 //! The segments of an HM3D-Sem scene, `<scene>.semantic.txt`.
 //!
-//! As habitat-sim reads it (`src/esp/scene/HM3DSemanticScene.cpp`): the first line is `HM3D Semantic Annotations`, then one line
-//! a segment, `id,colour,"name",region`. A name may have commas, so that it is what stands between the quotes.
+//! The format is that of habitat-sim (`src/esp/scene/HM3DSemanticScene.cpp`). The first line is `HM3D Semantic Annotations`. Then
+//! there is one line per segment, `id,colour,"name",region`. A name may contain commas; it is all text between the quotes.
 
 use std::collections::BTreeMap;
 
 use crate::labels::names::class_of;
 use crate::types::SegmentName;
 
-/// The first line.
 const HEAD: &str = "HM3D Semantic Annotations";
 
-/// Segments by number; one whose name says nothing is left out.
+/// The names of segments, by number. Segments with an empty or unknown name are left out.
 pub(super) fn parse(
     text: &str,
     unlisted: &mut BTreeMap<String, usize>,
@@ -47,7 +46,7 @@ pub(super) fn parse(
             region: Some(region),
         };
         if names.insert(id, segment).is_some() {
-            return Err((number, format!("a second segment {id}")));
+            return Err((number, format!("the segment {id} is defined twice")));
         }
     }
     Ok(names)
@@ -90,7 +89,7 @@ mod tests {
             (
                 "HM3D Semantic Annotations\n1,FF,\"bed\",0\n1,FE,\"bed\",0\n",
                 3,
-                "a second segment 1",
+                "segment 1 is defined twice",
             ),
         ] {
             let (found, problem) = parse(text, &mut BTreeMap::new()).unwrap_err();

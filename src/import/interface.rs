@@ -1,4 +1,4 @@
-//! A folder of the common interface: taken over as it is, so that key frames can be chosen of it.
+//! A folder of the common interface, imported unchanged, so that key frames can be chosen from it.
 
 use std::path::Path;
 
@@ -10,14 +10,14 @@ use crate::error::{Error, Result};
 use crate::files::reading::json_lines;
 use crate::types::{DepthKind, Frame, FrameId, Rgb, Segmentation};
 
-/// The frames of a folder.
+/// An open folder of the common interface.
 #[derive(Debug)]
 pub(super) struct Interface {
     dataset: Dataset,
     listing: Listing,
 }
 
-/// What is read of a line of `frames.jsonl` beyond what the data set itself reads.
+/// The keys of a line of `frames.jsonl` that are read here in addition to [`Dataset`].
 #[derive(Deserialize)]
 struct InterfaceLine {
     scene: String,

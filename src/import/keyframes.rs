@@ -1,4 +1,4 @@
-//! Key frames, uniform in time along a trajectory: [`KeyFrames`].
+//! Choice of key frames, evenly spaced along a trajectory: [`KeyFrames`].
 
 use std::num::NonZeroUsize;
 
@@ -6,56 +6,56 @@ use clap::Args;
 
 use super::adapter::ListedFrame;
 use crate::error::{Error, Result};
+use crate::types::Decides;
 use crate::types::flag::positive;
 
-/// Which frames of each scene are taken.
+/// Flags that choose the frames of each scene.
 #[derive(Debug, Clone, Copy, Default, Args)]
 #[command(next_help_heading = "Key frames")]
 pub(crate) struct KeyFrameArgs {
     /// One frame every N seconds of a scene (DarkQA: 2); default: every frame
-    #[arg(long, value_name = "SECONDS", value_parser = positive, conflicts_with = "count")]
+    #[arg(long, value_name = "SECONDS", value_parser = positive, conflicts_with = "count", add = Decides::Trials)]
     pub every: Option<f64>,
     /// This many frames of each scene, evenly spread; default: every frame
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", add = Decides::Trials)]
     pub count: Option<NonZeroUsize>,
     /// Frames a second, where frames have no time of their own; default: not known
-    #[arg(long, value_name = "N", value_parser = positive)]
+    #[arg(long, value_name = "N", value_parser = positive, add = Decides::Trials)]
     pub fps: Option<f64>,
 }
 
 impl KeyFrameArgs {
-    /// Which frames are kept.
     #[must_use]
-    pub(crate) fn kept(&self) -> KeyFrames {
+    pub(crate) fn selection(&self) -> KeyFrames {
         match (self.every, self.count) {
             (Some(seconds), _) => KeyFrames::Seconds(seconds),
             (None, Some(count)) => KeyFrames::Count(count.get()),
-            (None, None) => KeyFrames::Frame,
+            (None, None) => KeyFrames::All,
         }
     }
 }
 
-/// Which frames of each scene are kept.
+/// The frames of each scene that are imported.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum KeyFrames {
-    /// All.
-    Frame,
-    /// One for each so many seconds, counted from the scene's first (DarkQA: 2).
+    /// All frames of the scene.
+    All,
+    /// One frame per interval of this many seconds, counted from the first frame (DarkQA: 2).
     Seconds(f64),
-    /// So many, evenly spread.
+    /// This number of frames, evenly spaced.
     Count(usize),
 }
 
-/// Keeps the key frames of each scene, in time where frames have one, else in the order of their names.
+/// Chooses the key frames of each scene. Frames are sorted by time if they have one, else by name.
 ///
-/// For each k = 0, 1, … it is the first frame at k · seconds or later, and never the same frame twice; for a count N of n
-/// frames those at k · (n − 1) / (N − 1), rounded half to even.
+/// With an interval, the k-th key frame is the first frame at k · seconds or later; no frame is chosen twice. With a count N,
+/// the key frames of n frames are those at k · (n − 1) / (N − 1), rounded half to even.
 ///
 /// # Errors
-/// Where frames have no time and one is needed.
+/// If an interval is given and a frame has no time.
 pub(crate) fn choose(
     frames: &[ListedFrame],
-    every: KeyFrames,
+    selection: KeyFrames,
     fps: Option<f64>,
 ) -> Result<Vec<ListedFrame>> {
     let mut chosen = Vec::new();
@@ -71,10 +71,10 @@ pub(crate) fn choose(
                 .partial_cmp(&b.time)
                 .unwrap_or(std::cmp::Ordering::Equal)
         });
-        match every {
-            KeyFrames::Frame => {}
-            KeyFrames::Count(count) => timed = spread(timed, count),
-            KeyFrames::Seconds(seconds) => timed = seldom(timed, seconds)?,
+        match selection {
+            KeyFrames::All => {}
+            KeyFrames::Count(count) => timed = evenly_spaced(timed, count),
+            KeyFrames::Seconds(seconds) => timed = one_per_interval(timed, seconds)?,
         }
         chosen.extend(timed);
     }
@@ -82,26 +82,26 @@ pub(crate) fn choose(
     Ok(chosen)
 }
 
-fn spread(frames: Vec<ListedFrame>, count: usize) -> Vec<ListedFrame> {
+fn evenly_spaced(frames: Vec<ListedFrame>, count: usize) -> Vec<ListedFrame> {
     let (last, gaps) = (frames.len() - 1, count.saturating_sub(1));
-    let mut places: Vec<usize> = (0..count)
+    let mut indexes: Vec<usize> = (0..count)
         .map(|k| match gaps {
             0 => 0,
             gaps => (k as f64 * last as f64 / gaps as f64).round_ties_even() as usize,
         })
         .collect();
-    places.dedup();
+    indexes.dedup();
     let mut frames: Vec<Option<ListedFrame>> = frames.into_iter().map(Some).collect();
-    places
+    indexes
         .into_iter()
-        .filter_map(|place| frames.get_mut(place)?.take())
+        .filter_map(|index| frames.get_mut(index)?.take())
         .collect()
 }
 
-fn seldom(frames: Vec<ListedFrame>, seconds: f64) -> Result<Vec<ListedFrame>> {
+fn one_per_interval(frames: Vec<ListedFrame>, seconds: f64) -> Result<Vec<ListedFrame>> {
     let untimed = |frame: &ListedFrame| {
         let problem = format_args!(
-            "the frame {}/{} has no time; --fps says how many there are in a second, --count N needs no time",
+            "the frame {}/{} has no time; state the frames per second with --fps, or use --count N, which needs no time",
             frame.scene, frame.frame
         );
         Error::usage("--every", problem)
@@ -112,7 +112,7 @@ fn seldom(frames: Vec<ListedFrame>, seconds: f64) -> Result<Vec<ListedFrame>> {
         let since = time - *start.get_or_insert(time);
         if since >= next * seconds {
             next = libm::floor(since / seconds) + 1.0;
-            // A quotient that was rounded up must not take the same moment again.
+            // If the quotient was rounded, the next limit must still be later than this frame.
             if next * seconds <= since {
                 next += 1.0;
             }
@@ -151,7 +151,7 @@ mod tests {
             .map(|(i, time)| frame("a", i, Some(time)))
             .collect();
         let chosen = choose(&frames, KeyFrames::Seconds(2.0), None).unwrap();
-        // 0, 2, then 7 for both 4 and 6, then 8.
+        // The frames at 0, 2 and 7 s (the first after 4 s and after 6 s), and at 8 s.
         assert_eq!(names(&chosen), ["000", "003", "005", "007"]);
         let mut reversed = frames.clone();
         reversed.reverse();
@@ -159,11 +159,11 @@ mod tests {
             choose(&reversed, KeyFrames::Seconds(2.0), None).unwrap(),
             chosen
         );
-        assert_eq!(choose(&frames, KeyFrames::Frame, None).unwrap().len(), 8);
+        assert_eq!(choose(&frames, KeyFrames::All, None).unwrap().len(), 8);
     }
 
     #[test]
-    fn frames_a_second_give_a_time() {
+    fn a_frame_rate_gives_frames_a_time() {
         let frames: Vec<ListedFrame> = (0..61).map(|i| frame("a", i, None)).collect();
         let chosen = choose(&frames, KeyFrames::Seconds(2.0), Some(10.0)).unwrap();
         assert_eq!(names(&chosen), ["000", "020", "040", "060"]);

@@ -1,8 +1,7 @@
 //! Adapters: other data sets → frames of the common interface.
 //!
-//! An [`Adapter`] lists the frames of a folder as one kind of data set lays it out, and reads them one by one; what it reads
-//! is in the interface's units: millimetres, numbers of a label space, segments from 1. The README beside this file shows the
-//! layouts.
+//! An [`Adapter`] lists the frames of one kind of data set and reads their maps one frame at a time. Maps have the units of the
+//! interface: millimetres, numbers of a label space, segments from 1. The README beside this file shows the layouts.
 
 mod adapter;
 mod files;
@@ -26,7 +25,7 @@ use crate::types::flag::flag_words;
 
 pub(crate) use adapter::{Adapter, FrameMaps, ListedFrame, StatedArgs};
 
-/// What lies in the folder.
+/// The kind of data set in a folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub(crate) enum DataSetKind {
     /// Renders of habitat-sim: HM3D-Sem, Matterport3D, Replica.
@@ -45,10 +44,10 @@ pub(crate) enum DataSetKind {
 
 flag_words!(DataSetKind);
 
-/// Opens a folder.
+/// Opens the folder of a data set.
 ///
 /// # Errors
-/// With the file or folder that is missing or not laid out as it should be, or the flag that must be said.
+/// With the file or folder that is missing or has another layout, or with the flag that is required.
 pub(crate) fn open(
     kind: DataSetKind,
     folder: &Path,
@@ -78,4 +77,29 @@ pub(crate) fn open(
         return Err(Error::data(folder.display(), problem));
     }
     Ok(adapter)
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::ValueEnum as _;
+
+    use super::*;
+
+    #[test]
+    fn every_kind_is_described_and_tested() {
+        let readme = include_str!("README.md");
+        let tests = include_str!("../../tests/import.rs");
+        let missing: Vec<String> = DataSetKind::value_variants()
+            .iter()
+            .map(ToString::to_string)
+            .filter(|kind| {
+                !readme.contains(&format!("\n## {kind}: "))
+                    || !tests.contains(&format!("\"{kind}\""))
+            })
+            .collect();
+        assert!(
+            missing.is_empty(),
+            "import/README.md or tests/import.rs lacks {missing:?}"
+        );
+    }
 }

@@ -1,23 +1,23 @@
 //! The segments of a Matterport3D scene, `<scene>.house`.
 //!
-//! Lines of words, by their first (Matterport `data_organization.md`): `C` a category with its class of mpcat40, `O` an object
-//! with its region and category, `R` a region with the letter of its room. `#` stands for a space in a name.
+//! The first word of a line gives its type (Matterport `data_organization.md`): `C` is a category with its class of mpcat40, `O`
+//! an object with its region and category, `R` a region with the letter of its room. `#` stands for a space in a name.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::labels::names::{UNKNOWN, overridden};
 use crate::types::SegmentName;
 
-/// What a scene says.
+/// The content of a `.house` file that is used.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct House {
-    /// Segments by number.
+    /// Names of segments, by number.
     pub(super) names: BTreeMap<u32, SegmentName>,
-    /// The rooms of regions.
+    /// Room type of each region, by its number.
     pub(super) rooms: BTreeMap<i64, &'static str>,
 }
 
-/// The rooms that the letters of regions stand for, where questions may ask about them.
+/// The room type of a region's letter; `None` if questions do not ask about such rooms.
 fn room(letter: &str) -> Option<&'static str> {
     Some(match letter {
         "a" | "t" => "bathroom",
@@ -63,10 +63,10 @@ pub(super) fn parse(text: &str, classes: &BTreeSet<String>) -> Result<House, (us
                 };
                 let index: u32 = index
                     .parse()
-                    .map_err(|_| (number, format!("{index:?} is no number of an object")))?;
+                    .map_err(|_| (number, format!("{index:?} is not the number of an object")))?;
                 let region: i64 = region
                     .parse()
-                    .map_err(|_| (number, format!("{region:?} is no number of a region")))?;
+                    .map_err(|_| (number, format!("{region:?} is not the number of a region")))?;
                 objects.push((index, region, category));
             }
             Some(&"R") => {
@@ -75,7 +75,7 @@ pub(super) fn parse(text: &str, classes: &BTreeSet<String>) -> Result<House, (us
                 };
                 let index: i64 = index
                     .parse()
-                    .map_err(|_| (number, format!("{index:?} is no number of a region")))?;
+                    .map_err(|_| (number, format!("{index:?} is not the number of a region")))?;
                 house.rooms.extend(room(letter).map(|room| (index, room)));
             }
             _ => {}
@@ -122,7 +122,7 @@ mod tests {
             parse("\nO x 1 2", &canonical())
                 .unwrap_err()
                 .1
-                .contains("no number of an object")
+                .contains("not the number of an object")
         );
     }
 }

@@ -1,8 +1,8 @@
-//! NYU Depth v2 as PNG files: folders of images, depth and labels that share their names, as [`super::folder`] reads them.
+//! NYU Depth v2 as PNG files: folders of images, depth and labels with the same file names, read by [`super::folder`].
 //!
-//! The labels are those of 40 classes (`--labels nyu40`, the default; 0 is void), of 13 (`nyu13`), or of 40 counted from 0 with
-//! 255 for void, as several tools write them (`nyu40-1`). Depth files exist in millimetres, in 1/5000 m and scaled to the
-//! range of 16 bits, so that `--depth-scale` must say which.
+//! The labels have 40 classes (`--labels nyu40`, the default; 0 is void), 13 (`nyu13`), or 40 counted from 0 with 255 for void,
+//! as several tools write them (`nyu40-1`). Depth files exist in millimetres, in 1/5000 m and scaled to the range of 16 bits,
+//! so `--depth-scale` is required.
 
 use std::path::Path;
 
@@ -22,18 +22,18 @@ const KINECT: SizedCamera = SizedCamera {
     },
 };
 
-/// The frames of a folder.
+/// Opens a folder of PNG files.
 pub(super) fn open(folder: &Path, stated: &StatedArgs) -> Result<Folder> {
     let (name, offset) = match stated.labels.as_deref() {
         None => ("nyu40", NumberOffset::None),
         Some("nyu40-1") => ("nyu40", NumberOffset::One),
         Some(name) => (name, NumberOffset::None),
     };
-    let said = StatedArgs {
+    let stated = &StatedArgs {
         labels: Some(name.to_owned()),
         ..stated.clone()
     };
-    let labels = labels(&said)?.unwrap_or_default();
+    let labels = labels(stated)?.unwrap_or_default();
     let mut set = Folder::of(folder, stated, labels, offset)?;
     set.listing.sensor = Some(KINECT);
     Ok(set)

@@ -1,8 +1,8 @@
-//! Polygons drawn as label maps: [`draw`].
+//! Rasterization of polygons into label maps: [`draw`].
 
 use ndarray::Array2;
 
-/// A closed polygon with the value of its inside; corners in pixels, the centre of the first pixel at (0, 0).
+/// A closed polygon and the value of the pixels inside. Corners are in pixels; (0, 0) is the centre of the first pixel.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Polygon<T> {
     pub(super) corners: Vec<(f64, f64)>,
@@ -10,7 +10,7 @@ pub(super) struct Polygon<T> {
 }
 
 impl<T> Polygon<T> {
-    /// Twice its area, by the shoelace formula.
+    /// Twice the area in square pixels, by the shoelace formula.
     fn size(&self) -> f64 {
         let next = self.corners.iter().cycle().skip(1);
         let cross = self
@@ -22,8 +22,8 @@ impl<T> Polygon<T> {
     }
 }
 
-/// Draws polygons, the largest first, so that what lies on or before something is not hidden by it; a pixel is inside where its
-/// centre is, by the even-odd rule.
+/// Draws polygons, the largest first, so that a large object does not hide objects on it or in front of it. A pixel is inside if
+/// its centre is, by the even-odd rule.
 pub(super) fn draw<T: Copy + Default>(
     polygons: &[Polygon<T>],
     [width, height]: [usize; 2],
@@ -47,7 +47,7 @@ pub(super) fn draw<T: Copy + Default>(
     map
 }
 
-/// Where the edges cross a row, from left to right.
+/// The columns at which the edges of a polygon cross a row, from left to right.
 fn crossings(corners: &[(f64, f64)], y: f64) -> Vec<f64> {
     let next = corners.iter().cycle().skip(1);
     let edges = corners.iter().zip(next);
@@ -65,7 +65,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn small_things_lie_on_large_ones() {
+    fn small_polygons_are_drawn_over_large_ones() {
         let square = |left: f64, side: f64, value: u8| Polygon {
             corners: vec![
                 (left, 0.0),
@@ -83,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn odd_polygons_do_no_harm() {
+    fn unusual_polygons_do_not_fail() {
         for corners in [
             vec![],
             vec![(1.0, 1.0)],

@@ -7,7 +7,7 @@ use serde::Deserialize;
 use crate::labels::names::class_of;
 use crate::types::SegmentName;
 
-/// The keys that are used.
+/// The keys of the file that are used.
 #[derive(Deserialize)]
 struct SemanticInfo {
     objects: Vec<ReplicaObject>,
@@ -19,7 +19,7 @@ struct ReplicaObject {
     class_name: String,
 }
 
-/// Segments by number; those without a class are left out.
+/// The names of segments, by number; segments without a class are left out.
 pub(super) fn parse(
     text: &str,
     unlisted: &mut BTreeMap<String, usize>,

@@ -1,9 +1,9 @@
-//! Frames of ScanNet, extracted: one folder a scene.
+//! Extracted frames of ScanNet: one folder per scene.
 //!
-//! `<scene>/color/<n>.jpg`, `depth/<n>.png` (millimetres), `pose/<n>.txt`, and either `label-filt` and `instance-filt` (ScanNet's
-//! own numbers, with `scannetv2-labels.combined.tsv` beside the scenes) or, as in frames_25k, `label` (NYU40) and `instance`
-//! (label · 1000 + number). Depth, which is smaller than colour, is taken to its pixels through both cameras; labels are never
-//! scaled. A frame whose pose is lost has `-inf` in it and is left out.
+//! A scene has `<scene>/color/<n>.jpg`, `depth/<n>.png` (millimetres), `pose/<n>.txt` and one of two kinds of label maps:
+//! `label-filt` and `instance-filt` (ScanNet's numbers, with `scannetv2-labels.combined.tsv` beside the scenes) or, as in
+//! frames_25k, `label` (NYU40) and `instance` (label · 1000 + number). Depth maps are smaller than images and are resampled
+//! with both cameras; labels are never scaled. A frame whose pose is unknown (`-inf`) is left out.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use ndarray::Array2;
 use serde::Deserialize;
 
 use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, StatedArgs};
-use super::files::{depth, files, first, folders, last, numbers, png, same_size};
+use super::files::{check_same_size, depth, file_name, files, first_folder, folders, numbers, png};
 use crate::dataset::raw_png::SampleForm;
 use crate::error::{Error, Result};
 use crate::files::reading::{json, text};
@@ -20,14 +20,14 @@ use crate::labels::names::{UNKNOWN, overridden};
 use crate::labels::{canonical, space};
 use crate::types::{Intrinsics, Label, Labels, Rgb};
 
-/// The table of ScanNet's own numbers.
+/// File name of the table of ScanNet's label numbers.
 const TABLE: &str = "scannetv2-labels.combined.tsv";
-/// Frames a second of the sensor; frames are named by their number.
+/// Frames per second of the sensor; a frame's name is its number.
 const RATE: f64 = 30.0;
-/// Metres in a unit of depth.
+/// Metres per unit of depth.
 const SCALE: f64 = 0.001;
 
-/// The frames of a folder.
+/// An open folder of scenes.
 #[derive(Debug)]
 pub(super) struct Scannet {
     listing: Listing,
@@ -40,16 +40,16 @@ struct ScannetMaps {
     depth: Option<PathBuf>,
     labels: PathBuf,
     instances: Option<PathBuf>,
-    /// The camera of depth, where it is another one.
+    /// Camera of the depth map, if its intrinsics are given.
     depth_camera: Option<Intrinsics>,
 }
 
-/// How labels and instances are numbered.
+/// Numbering of the labels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Numbering {
-    /// ScanNet's own.
+    /// The label numbers of ScanNet's table.
     Own,
-    /// NYU40.
+    /// The label numbers of NYU40.
     Nyu40,
 }
 
@@ -81,7 +81,7 @@ impl Scannet {
     }
 
     fn add(&mut self, folder: &Path, numbering: Numbering) -> Result<()> {
-        let name = last(folder);
+        let name = file_name(folder);
         check_overflow(folder, &name)?;
         let camera = |names: [String; 2]| {
             let path = names
@@ -96,9 +96,9 @@ impl Scannet {
                 format!("intrinsics_{which}.txt"),
             ])
         };
-        let (color, deep) = (of("color")?, of("depth")?);
+        let (color, depth_camera) = (of("color")?, of("depth")?);
         let room = room(&folder.join(format!("{name}.txt")))?;
-        let within = |folders: &[&str]| match first(folder, folders) {
+        let within = |folders: &[&str]| match first_folder(folder, folders) {
             Some(folder) => files(&folder, &[".png"]),
             None => Ok(BTreeMap::new()),
         };
@@ -127,7 +127,7 @@ impl Scannet {
                 depth: depths.get(&frame).cloned(),
                 labels: label.clone(),
                 instances: instances.get(&frame).cloned(),
-                depth_camera: deep,
+                depth_camera,
             });
             self.listing.frames.push(ListedFrame {
                 scene: name.clone(),
@@ -151,7 +151,7 @@ struct Aggregation {
     seg_groups: Vec<serde_json::Value>,
 }
 
-/// Refuses a scene of more objects than the 8 bits of its instance maps hold: the numbers beyond begin again at 0.
+/// Refuses a scene with more than 255 objects if its instance maps have 8 bits, because the numbers overflow to 0.
 fn check_overflow(folder: &Path, scene: &str) -> Result<()> {
     let path = folder.join(format!("{scene}.aggregation.json"));
     if !path.exists() || !folder.join("instance-filt").is_dir() {
@@ -160,14 +160,14 @@ fn check_overflow(folder: &Path, scene: &str) -> Result<()> {
     let objects = json::<Aggregation>(&path)?.seg_groups.len();
     if objects > 255 {
         let problem = format_args!(
-            "{objects} objects, but the 8 bits of instance-filt hold 255: their numbers overflow; export them with 16 bits, as frames_25k has them"
+            "{objects} objects, but the 8 bits of instance-filt hold 255: their numbers overflow; export them with 16 bits, as in frames_25k"
         );
         return Err(Error::data(path.display(), problem));
     }
     Ok(())
 }
 
-/// The label space of ScanNet's own numbers.
+/// The label space of ScanNet's label numbers.
 fn table(path: &Path) -> Result<Labels> {
     let mut reader = csv::ReaderBuilder::new()
         .delimiter(b'\t')
@@ -213,21 +213,21 @@ fn table(path: &Path) -> Result<Labels> {
         };
         labels.labels.insert(id, label);
     }
-    // Annotators wrote whatever they saw, so that whatever the table can say they could have said.
+    // Annotators used free text, so every class of the table is expressible.
     let classes = labels.labels.values().map(|label| label.canonical.clone());
     labels.expressible = classes.collect::<BTreeSet<String>>();
     Ok(labels)
 }
 
-/// The camera of a matrix of 4 × 4.
+/// The camera in a file with a 4 × 4 matrix.
 fn intrinsics(path: &Path) -> Result<Intrinsics> {
     match numbers(path)?[..] {
         [fx, _, cx, _, _, fy, cy, ..] => Ok(Intrinsics { fx, fy, cx, cy }),
-        _ => Err(Error::data(path.display(), "a matrix of 4 × 4 expected")),
+        _ => Err(Error::data(path.display(), "a 4 × 4 matrix expected")),
     }
 }
 
-/// The type of a scene, `sceneType = Bedroom / Hotel`.
+/// The room type in the file of a scene, from a line such as `sceneType = Bedroom / Hotel`.
 fn room(path: &Path) -> Result<Option<String>> {
     if !path.exists() {
         return Ok(None);
@@ -246,8 +246,8 @@ fn room(path: &Path) -> Result<Option<String>> {
     }))
 }
 
-/// Depth at the pixels of an image, from those of its own: the nearest through both cameras, or by place where they are unknown.
-fn at_pixels(depth: &Array2<u32>, rgb: &Rgb, cameras: Option<[Intrinsics; 2]>) -> Array2<u32> {
+/// Depth resampled to the pixels of an image: the nearest pixel through both cameras, or by position if a camera is unknown.
+fn resampled(depth: &Array2<u32>, rgb: &Rgb, cameras: Option<[Intrinsics; 2]>) -> Array2<u32> {
     let (height, width) = depth.dim();
     let scale = [
         width as f64 / rgb.width() as f64,
@@ -255,10 +255,10 @@ fn at_pixels(depth: &Array2<u32>, rgb: &Rgb, cameras: Option<[Intrinsics; 2]>) -
     ];
     let along = |i: usize, axis: usize| -> f64 {
         match &cameras {
-            Some([color, deep]) if axis == 0 => {
-                (i as f64 - color.cx) / color.fx * deep.fx + deep.cx
+            Some([color, depth]) if axis == 0 => {
+                (i as f64 - color.cx) / color.fx * depth.fx + depth.cx
             }
-            Some([color, deep]) => (i as f64 - color.cy) / color.fy * deep.fy + deep.cy,
+            Some([color, depth]) => (i as f64 - color.cy) / color.fy * depth.fy + depth.cy,
             None => (i as f64 + 0.5) * scale[axis] - 0.5,
         }
     };
@@ -283,13 +283,13 @@ impl Adapter for Scannet {
     fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {
         let maps = &self.maps[frame.index];
         let labels = png(&maps.labels, &[SampleForm::Grey8, SampleForm::Grey16])?;
-        same_size(&maps.labels, &labels, rgb)?;
+        check_same_size(&maps.labels, &labels, rgb)?;
         let segments = match &maps.instances {
             Some(path) => {
                 let instances = png(path, &[SampleForm::Grey8, SampleForm::Grey16])?;
-                same_size(path, &instances, rgb)?;
-                // One number for each label and instance: where 8 bits overflowed unseen, two things of different labels
-                // stay two.
+                check_same_size(path, &instances, rgb)?;
+                // Each pair of label and instance gets a number. If 8 bits overflowed, objects with different labels stay
+                // separate.
                 let mut pairs = BTreeMap::new();
                 let both = || {
                     labels
@@ -319,11 +319,11 @@ impl Adapter for Scannet {
                 let cameras = frame
                     .intrinsics
                     .zip(maps.depth_camera)
-                    .map(|(color, deep)| [color, deep]);
+                    .map(|(color, depth)| [color, depth]);
                 Some(if same {
                     depth
                 } else {
-                    at_pixels(&depth, rgb, cameras)
+                    resampled(&depth, rgb, cameras)
                 })
             }
             None => None,
@@ -342,12 +342,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn depth_goes_to_the_pixels_of_colour() {
+    fn depth_is_resampled_to_the_pixels_of_the_image() {
         let depth = Array2::from_shape_vec((1, 2), vec![7, 9]).unwrap();
         let rgb = Rgb::black(2, 4);
-        let found = at_pixels(&depth, &rgb, None);
+        let found = resampled(&depth, &rgb, None);
         assert_eq!(found.into_raw_vec_and_offset().0, [7, 7, 9, 9, 7, 7, 9, 9]);
-        // A camera of colour that sees half as wide looks at the middle of depth.
+        // A colour camera with half the field of view sees the middle of the depth map.
         let deep = Array2::from_shape_vec((1, 5), vec![1, 2, 3, 4, 5]).unwrap();
         let camera = |fx, cx| Intrinsics {
             fx,
@@ -355,13 +355,13 @@ mod tests {
             cx,
             cy: 0.0,
         };
-        let found = at_pixels(
+        let found = resampled(
             &deep,
             &Rgb::black(1, 3),
             Some([camera(2.0, 1.0), camera(2.0, 2.0)]),
         );
         assert_eq!(found.into_raw_vec_and_offset().0, [2, 3, 4]);
-        let found = at_pixels(
+        let found = resampled(
             &deep,
             &Rgb::black(1, 3),
             Some([camera(1.0, 1.0), camera(3.0, 2.0)]),

@@ -1,9 +1,9 @@
 //! SUN RGB-D as it is distributed: `<sensor>/…/<frame>/image/*.jpg`, `depth_bfx/*.png` or `depth/*.png`, `intrinsics.txt`,
 //! `scene.txt` and `annotation2Dfinal/index.json`.
 //!
-//! A depth file holds millimetres rotated left by three bits (`read3dPoints.m` of its toolbox), clamped at 8 m. The classes and
-//! segments are the polygons that annotators drew around objects, each object a segment; where they overlap the smaller one is
-//! in front.
+//! A depth file holds millimetres rotated left by three bits (`read3dPoints.m` of its toolbox), clamped at 8 m. Classes and
+//! segments come from the polygons that annotators drew around objects; each object is a segment. If polygons overlap, the
+//! smaller one is in front.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing};
-use super::files::{files, folders, last, numbers, png, same_size};
+use super::files::{check_same_size, file_name, files, folders, numbers, png};
 use super::polygons::{Polygon, draw};
 use crate::dataset::raw_png::SampleForm;
 use crate::error::{Error, Result};
@@ -22,10 +22,10 @@ use crate::labels::canonical;
 use crate::labels::names::class_of;
 use crate::types::{Intrinsics, Label, Labels, Rgb};
 
-/// What the toolbox takes for the end of the sensor's range, in millimetres.
-const MOST_DEPTH: u32 = 8_000;
+/// Maximum depth in millimetres; the toolbox clamps at the same value.
+const MAX_DEPTH: u32 = 8_000;
 
-/// The frames of a folder.
+/// An open folder of frames.
 #[derive(Debug)]
 pub(super) struct SunRgbd {
     listing: Listing,
@@ -39,7 +39,7 @@ struct SunRgbdFiles {
     annotation: PathBuf,
 }
 
-/// `index.json`, as far as it is used.
+/// The keys of `index.json` that are used.
 #[derive(Deserialize)]
 struct Index {
     frames: Vec<SunRgbdFrame>,
@@ -71,28 +71,28 @@ impl SunRgbd {
             files: Vec::new(),
             numbers: BTreeMap::new(),
         };
-        set.walk(folder, &[])?;
-        set.name()?;
+        set.find_frames(folder, &[])?;
+        set.number_words()?;
         set.listing
             .frames
             .sort_by(|a, b| (&a.scene, &a.frame).cmp(&(&b.scene, &b.frame)));
         Ok(set)
     }
 
-    /// Looks for frames in a folder and those in it; `way` leads to it.
-    fn walk(&mut self, folder: &Path, way: &[String]) -> Result<()> {
+    /// Finds the frames in a folder and its subfolders; `parents` are the names of the folders from the root to it.
+    fn find_frames(&mut self, folder: &Path, parents: &[String]) -> Result<()> {
         let annotation = folder.join("annotation2Dfinal").join("index.json");
         if folder.join("image").is_dir() && annotation.is_file() {
-            return self.add(folder, way, annotation);
+            return self.add(folder, parents, annotation);
         }
         for inner in folders(folder)? {
-            let name = last(&inner);
-            self.walk(&inner, &[way, &[name]].concat())?;
+            let name = file_name(&inner);
+            self.find_frames(&inner, &[parents, &[name]].concat())?;
         }
         Ok(())
     }
 
-    fn add(&mut self, folder: &Path, way: &[String], annotation: PathBuf) -> Result<()> {
+    fn add(&mut self, folder: &Path, parents: &[String], annotation: PathBuf) -> Result<()> {
         let Some(rgb) = files(&folder.join("image"), &[".jpg", ".jpeg", ".png"])?
             .into_values()
             .next()
@@ -117,7 +117,7 @@ impl SunRgbd {
         };
         let room = folder.join("scene.txt");
         let room = room.exists().then(|| text(&room)).transpose()?;
-        let (frame, scene) = way.split_last().map_or_else(
+        let (frame, scene) = parents.split_last().map_or_else(
             || ("frame".to_owned(), String::new()),
             |(frame, scene)| (frame.clone(), scene.join("-")),
         );
@@ -142,8 +142,8 @@ impl SunRgbd {
         Ok(())
     }
 
-    /// Gives each word of the whole data set a number: in the order of the words, so that it does not depend on that of files.
-    fn name(&mut self) -> Result<()> {
+    /// Numbers all words of the data set alphabetically, so that the numbers do not depend on the order of files.
+    fn number_words(&mut self) -> Result<()> {
         let mut words = BTreeMap::new();
         for files in &self.files {
             for object in json::<Index>(&files.annotation)?
@@ -170,14 +170,14 @@ impl SunRgbd {
             labels.labels.insert(number, label);
             self.numbers.insert(word, number);
         }
-        // Annotators wrote whatever they saw.
+        // Annotators used free text, so every class is expressible.
         labels.expressible = canonical().into_iter().collect::<BTreeSet<String>>();
         self.listing.labels = labels;
         Ok(())
     }
 }
 
-/// A name without what annotators added to tell objects apart: `chair:1`, `chair 2`.
+/// The name of an object without the suffix that annotators added to distinguish objects: `chair:1`, `chair 2`.
 fn word(name: &str) -> String {
     let name = name.split(':').next().unwrap_or_default().trim();
     name.trim_end_matches(|letter: char| letter.is_ascii_digit() || letter == '_')
@@ -185,7 +185,7 @@ fn word(name: &str) -> String {
         .to_lowercase()
 }
 
-/// A list of numbers; a single number is one, as the files have it.
+/// The numbers in a JSON array. A single number is a list of one, because the files contain both.
 fn list(value: &Value) -> Vec<f64> {
     match value {
         Value::Array(list) => list
@@ -206,8 +206,8 @@ impl Adapter for SunRgbd {
         let depth = match &files.depth {
             Some(path) => {
                 let rotated = png(path, &[SampleForm::Grey16])?;
-                same_size(path, &rotated, rgb)?;
-                Some(rotated.mapv(|value| u32::from(value.rotate_right(3)).min(MOST_DEPTH)))
+                check_same_size(path, &rotated, rgb)?;
+                Some(rotated.mapv(|value| u32::from(value.rotate_right(3)).min(MAX_DEPTH)))
             }
             None => None,
         };

@@ -1,6 +1,6 @@
-//! Dumps of AI2-THOR and ProcTHOR: one folder a scene.
+//! Dumps of AI2-THOR and ProcTHOR: one folder per scene.
 //!
-//! `<scene>/rgb/<frame>.png`, `depth/<frame>.npy` (metres), `instance/<frame>.png` (the colours of
+//! A scene has `<scene>/rgb/<frame>.png`, `depth/<frame>.npy` (metres), `instance/<frame>.png` (the colours of
 //! `event.instance_segmentation_frame`) and `colors.json`, `event.color_to_object_id` with keys like `"(12, 34, 56)"`.
 
 use std::collections::BTreeMap;
@@ -8,20 +8,20 @@ use std::path::{Path, PathBuf};
 
 use ndarray::Array2;
 
-use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, StatedArgs, numbers};
-use super::files::{depth_of, files, folders, last, picture, same_size};
+use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, StatedArgs, class_numbers};
+use super::files::{check_same_size, depth_of, file_name, files, folders, image};
 use crate::error::{Error, Result};
 use crate::files::reading::json;
 use crate::labels::names;
 use crate::types::{Rgb, SegmentName};
 
-/// The scenes of a folder.
+/// An open folder of scenes.
 #[derive(Debug)]
 pub(super) struct Thor {
     listing: Listing,
-    /// Depth and instances of each.
+    /// Paths of the depth map and the instance image of each frame.
     maps: Vec<(Option<PathBuf>, PathBuf)>,
-    /// The segment of each colour, by scene.
+    /// Segment number of each colour, by scene.
     colors: BTreeMap<String, BTreeMap<[u8; 3], u32>>,
     numbers: BTreeMap<String, u16>,
     depth_scale: Option<f64>,
@@ -29,9 +29,9 @@ pub(super) struct Thor {
 
 impl Thor {
     pub(super) fn open(folder: &Path, stated: &StatedArgs) -> Result<Self> {
-        let listing = Listing::by_name(stated);
+        let listing = Listing::of_mpcat40(stated);
         let mut set = Self {
-            numbers: numbers(&listing.labels),
+            numbers: class_numbers(&listing.labels),
             listing,
             maps: Vec::new(),
             colors: BTreeMap::new(),
@@ -46,7 +46,7 @@ impl Thor {
     }
 
     fn add(&mut self, folder: &Path) -> Result<()> {
-        let name = last(folder);
+        let name = file_name(folder);
         let (colors, names) = scene(&folder.join("colors.json"))?;
         let depths = files(&folder.join("depth"), &[".npy", ".png"])?;
         let instances = files(&folder.join("instance"), &[".png"])?;
@@ -74,7 +74,7 @@ impl Thor {
     }
 }
 
-/// The segments of colours, and their names; segments are in the order of the objects' names.
+/// The segment number of each colour, and the name of each segment. Segments are numbered by the ids of their objects.
 #[expect(clippy::type_complexity, reason = "two tables of one file")]
 fn scene(path: &Path) -> Result<(BTreeMap<[u8; 3], u32>, BTreeMap<u32, SegmentName>)> {
     let file: BTreeMap<String, String> = json(path)?;
@@ -86,7 +86,7 @@ fn scene(path: &Path) -> Result<(BTreeMap<[u8; 3], u32>, BTreeMap<u32, SegmentNa
             .collect();
         let color = parts.try_into().map_err(|_| {
             let problem = format_args!(
-                "{key:?} is no colour; three numbers expected, as in \"(12, 34, 56)\""
+                "{key:?} is not a colour; three numbers expected, as in \"(12, 34, 56)\""
             );
             Error::data(path.display(), problem)
         })?;
@@ -107,7 +107,7 @@ fn scene(path: &Path) -> Result<(BTreeMap<[u8; 3], u32>, BTreeMap<u32, SegmentNa
     Ok((colors, names))
 }
 
-/// The room of one of iTHOR's scenes, by its number.
+/// The room type of an iTHOR scene, by the number in its name.
 fn room(scene: &str) -> Option<&'static str> {
     let digits: String = scene
         .strip_prefix("FloorPlan")?
@@ -129,9 +129,9 @@ impl Adapter for Thor {
     }
 
     fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {
-        let (deep, instance) = &self.maps[frame.index];
+        let (depth_path, instance) = &self.maps[frame.index];
         let segment_of = &self.colors[&frame.scene];
-        let colors = picture(instance)?;
+        let colors = image(instance)?;
         let (pixels, _) = colors.samples().as_chunks::<3>();
         let ids: Vec<u32> = pixels
             .iter()
@@ -139,10 +139,10 @@ impl Adapter for Thor {
             .collect();
         let segments = Array2::from_shape_vec((colors.height(), colors.width()), ids);
         let segments = segments.map_err(|e| Error::data(instance.display(), e))?;
-        same_size(instance, &segments, rgb)?;
+        check_same_size(instance, &segments, rgb)?;
         if segments.iter().all(|id| *id == 0) {
             let problem =
-                "no pixel has a colour of colors.json; it must be that of the same scene and run";
+                "no pixel has a colour of colors.json; use the file of the same scene and run";
             return Err(Error::data(instance.display(), problem));
         }
         let numbers: BTreeMap<u32, u16> = self.listing.names[&frame.scene]
@@ -151,7 +151,7 @@ impl Adapter for Thor {
             .collect();
         let semantic = segments.mapv(|id| numbers.get(&id).copied().unwrap_or(0));
         Ok(FrameMaps {
-            depth: depth_of(deep.as_deref(), self.depth_scale, rgb)?,
+            depth: depth_of(depth_path.as_deref(), self.depth_scale, rgb)?,
             semantic: Some(semantic),
             segments: Some(segments),
             room: None,

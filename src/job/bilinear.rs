@@ -1,28 +1,27 @@
-//! An image in another size, as OpenCV makes it: [`bilinear`].
+//! Bilinear scaling of images, as OpenCV does it: [`bilinear`].
 
 use crate::error::Result;
 use crate::types::Rgb;
 
-/// The weight of one whole, in OpenCV's fixed point (`INTER_RESIZE_COEF_SCALE`).
+/// The weight 1.0 in OpenCV's fixed point (`INTER_RESIZE_COEF_SCALE`).
 const ONE: f32 = 2048.0;
 
-/// A sample between two of the source: the first of them, the second, and their weights.
+/// Two neighbouring samples of the source, by index, and their weights.
 #[derive(Debug, Clone, Copy)]
 struct Tap {
     at: [usize; 2],
     weights: [i32; 2],
 }
 
-/// The image with its longer side of so many pixels, smaller or larger than it was: what
-/// `cv2.resize(image, None, fx=f, fy=f)` with f = side / max(height, width) returns, without any smoothing before, so that
-/// what noise there is stays noise.
+/// The image scaled so that its longer side has `side` pixels: the result of `cv2.resize(image, None, fx=f, fy=f)` with
+/// f = side / max(height, width). The image is not smoothed before, so that its noise stays noise.
 ///
 /// The arithmetic is that of `resizeGeneric_` for 8-bit images with `INTER_LINEAR` (OpenCV 4, modules/imgproc/src/resize.cpp).
-/// Against OpenCV 5.0 it is the same bit for bit where images shrink, and off by one code in fewer than one sample of a
-/// thousand where they grow.
+/// Compared with OpenCV 5.0, images that shrink are the same bit for bit. In images that grow, fewer than one sample in a
+/// thousand differs, by one code.
 ///
 /// # Errors
-/// Never but where memory is short.
+/// Only if the result's samples do not fit into memory.
 pub fn bilinear(image: &Rgb, side: usize) -> Result<Rgb> {
     let (height, width) = (image.height(), image.width());
     if height.max(width) == side {
@@ -32,24 +31,24 @@ pub fn bilinear(image: &Rgb, side: usize) -> Result<Rgb> {
     let columns = taps(width, factor);
     let rows = taps(height, factor);
     let mut samples = Vec::with_capacity(rows.len() * columns.len() * 3);
-    // The two source rows of the last row made, by their number: the next one mostly needs one of them.
-    let mut kept = [const { (usize::MAX, Vec::new()) }; 2];
+    // The two source rows that the last row was made of, with their index. The next row mostly needs one of them again.
+    let mut cached = [const { (usize::MAX, Vec::new()) }; 2];
     for tap in &rows {
         let [above, below] = tap.at;
-        if kept[0].0 != above {
-            if kept[1].0 == above {
-                kept.swap(0, 1);
+        if cached[0].0 != above {
+            if cached[1].0 == above {
+                cached.swap(0, 1);
             } else {
-                across(image, above, &columns, &mut kept[0].1);
-                kept[0].0 = above;
+                interpolate_row(image, above, &columns, &mut cached[0].1);
+                cached[0].0 = above;
             }
         }
-        if below != above && kept[1].0 != below {
-            across(image, below, &columns, &mut kept[1].1);
-            kept[1].0 = below;
+        if below != above && cached[1].0 != below {
+            interpolate_row(image, below, &columns, &mut cached[1].1);
+            cached[1].0 = below;
         }
         let below = usize::from(below != above);
-        let pairs = kept[0].1.iter().zip(&kept[below].1);
+        let pairs = cached[0].1.iter().zip(&cached[below].1);
         samples.extend(pairs.map(|(above, below)| {
             let [first, second] = tap.weights;
             let sum = ((first * (above >> 4)) >> 16) + ((second * (below >> 4)) >> 16);
@@ -59,7 +58,7 @@ pub fn bilinear(image: &Rgb, side: usize) -> Result<Rgb> {
     Rgb::new(rows.len(), columns.len(), samples)
 }
 
-/// The height and width of an image whose longer side is scaled to so many pixels.
+/// The height and width of an image after its longer side is scaled to `side` pixels.
 #[must_use]
 pub(crate) fn size(height: usize, width: usize, side: usize) -> [usize; 2] {
     let factor = side as f64 / height.max(width) as f64;
@@ -70,28 +69,29 @@ fn scaled(length: usize, factor: f64) -> usize {
     ((length as f64 * factor).round_ties_even() as usize).max(1)
 }
 
-/// The taps along a side of `length` pixels that is scaled by a factor.
+/// The taps of each output pixel along a side of `length` pixels.
 fn taps(length: usize, factor: f64) -> Vec<Tap> {
     let count = scaled(length, factor);
     let last = length - 1;
     let tap = |index: usize| {
-        let place = ((index as f64 + 0.5) / factor - 0.5) as f32;
-        let floor = place.floor();
-        let (first, off) = match floor {
+        let position = ((index as f64 + 0.5) / factor - 0.5) as f32;
+        let floor = position.floor();
+        let (first, fraction) = match floor {
             floor if floor < 0.0 => (0, 0.0),
             floor if floor as usize >= last => (last, 0.0),
-            floor => (floor as usize, place - floor),
+            floor => (floor as usize, position - floor),
         };
         Tap {
             at: [first, (first + 1).min(last)],
-            weights: [1.0 - off, off].map(|weight| (weight * ONE).round_ties_even() as i32),
+            weights: [1.0 - fraction, fraction]
+                .map(|weight| (weight * ONE).round_ties_even() as i32),
         }
     };
     (0..count).map(tap).collect()
 }
 
-/// One row of the source at the columns of the result.
-fn across(image: &Rgb, row: usize, columns: &[Tap], out: &mut Vec<i32>) {
+/// Interpolates one row of the source at the columns of the result, into `out`.
+fn interpolate_row(image: &Rgb, row: usize, columns: &[Tap], out: &mut Vec<i32>) {
     let width = 3 * image.width();
     let line = &image.samples()[row * width..][..width];
     out.clear();
@@ -109,7 +109,7 @@ fn across(image: &Rgb, row: usize, columns: &[Tap], out: &mut Vec<i32>) {
 mod tests {
     use super::*;
 
-    /// An image of numbers without a pattern.
+    /// An image of pseudo-random samples.
     fn noise(height: usize, width: usize) -> Rgb {
         let mut state = 12_345_u32;
         let samples = (0..height * width * 3).map(|_| {
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn sides_are_opencvs() {
+    fn sizes_equal_those_of_opencv() {
         for (from, side, to) in [
             ([1080, 1920], 512, [288, 512]),
             ([968, 1296], 512, [382, 512]),
@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn pixels_are_opencvs() {
+    fn pixels_equal_those_of_opencv() {
         // cv2 5.0.0 on the same images: the sum of all samples, and the first and last ones.
         let golden = [
             (
@@ -160,8 +160,8 @@ mod tests {
             ),
         ];
         for (from, side, sum, first, last) in golden {
-            let made = bilinear(&noise(from[0], from[1]), side).unwrap();
-            let samples = made.samples();
+            let result = bilinear(&noise(from[0], from[1]), side).unwrap();
+            let samples = result.samples();
             let total: u64 = samples.iter().map(|code| u64::from(*code)).sum();
             assert_eq!(
                 (total, &samples[..6], &samples[samples.len() - 6..]),

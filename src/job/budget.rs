@@ -1,4 +1,4 @@
-//! What a run costs: [`Budget`].
+//! Cost of a run and its limit: [`Budget`].
 
 use super::models::ModelUnderTest;
 use super::money::MoneySettings;
@@ -7,28 +7,30 @@ use crate::ask::Price;
 use crate::error::{Error, Result};
 use crate::types::{ImageFacts, Record, Usage, Via};
 
-/// How many characters of English a token is, by the rule of thumb of every provider.
-const CHARACTERS: f64 = 4.0;
+/// Characters of English text per token, by the rule of thumb of every provider.
+const CHARACTERS_PER_TOKEN: f64 = 4.0;
 
-/// How many tokens a message has besides its words.
-const AROUND: f64 = 10.0;
+/// Tokens of a message besides its text and images.
+const MESSAGE_TOKENS: f64 = 10.0;
 
-/// Books what replies were charged, and says whether another question is within the means.
+/// The sum of what replies cost, and the decision whether one more question is within `--max-cost`.
 #[derive(Debug)]
 pub(crate) struct Budget {
-    /// What each model charges; `None` for those that are free or unknown.
+    /// Price of each model; `None` if it is free or unknown.
     prices: Vec<Option<Price>>,
-    most: Option<f64>,
+    /// Limit in US dollars; `None` for no limit.
+    max_cost: Option<f64>,
+    /// US dollars spent so far.
     spent: f64,
-    /// What the most expensive reply so far has cost.
+    /// Cost of the most expensive reply so far, in US dollars; `None` before the first reply.
     highest_cost: Option<f64>,
 }
 
 impl Budget {
-    /// A budget that goes on from the kept records of a run.
+    /// A budget that includes the cost of the stored records.
     ///
     /// # Errors
-    /// Where `--max-cost` is said and a model has no price: it could not be kept to.
+    /// If `--max-cost` is set and a model has no price, because the limit could not be enforced.
     pub(crate) fn new<D>(
         money: &MoneySettings,
         models: &[ModelUnderTest],
@@ -45,11 +47,11 @@ impl Budget {
             .iter()
             .zip(&prices)
             .find(|(model, price)| model.model.is_remote() && price.is_none());
-        if let (Some(_), Some((model, _))) = (money.most, unknown) {
+        if let (Some(_), Some((model, _))) = (money.max_cost, unknown) {
             return Err(Error::usage(
                 "--max-cost",
                 format_args!(
-                    "no price of {} is known as of {}; state it in a table by --prices FILE",
+                    "the price of {} is not in the table of {}; add it to a table of your own and name that with --prices FILE",
                     model.model.name(),
                     money.prices.as_of
                 ),
@@ -57,7 +59,7 @@ impl Budget {
         }
         let mut budget = Self {
             prices,
-            most: money.most,
+            max_cost: money.max_cost,
             spent: 0.0,
             highest_cost: None,
         };
@@ -69,18 +71,18 @@ impl Budget {
             let dollars = price.charged(usage);
             match record.via {
                 Via::Direct | Via::File => budget.add(dollars),
-                // It says nothing about what a request of its own costs.
+                // A batch price does not tell what a direct request costs, so it does not enter `highest_cost`.
                 Via::Batch => budget.spent += money.prices.batch * dollars,
             }
         }
         Ok(budget)
     }
 
-    /// Books a reply; where the server does not say what it charges, what is likely for a prompt and a reply of so many tokens.
-    pub(crate) fn book(&mut self, model: usize, usage: Option<Usage>, likely: f64, reply: f64) {
+    /// Adds the cost of a reply. If the server reports no usage, the cost follows from the expected tokens of prompt and reply.
+    pub(crate) fn record(&mut self, model: usize, usage: Option<Usage>, prompt: f64, reply: f64) {
         match (usage, self.prices[model]) {
             (Some(usage), _) => self.charge(model, usage),
-            (None, Some(price)) => self.add(price.of(likely, reply)),
+            (None, Some(price)) => self.add(price.of(prompt, reply)),
             (None, None) => {}
         }
     }
@@ -99,7 +101,7 @@ impl Budget {
         );
     }
 
-    /// How many tokens the prompt of a trial is likely to have: its words by their length, its images by the model's family.
+    /// Expected tokens of a trial's prompt: its text by length, its images by the model's family.
     pub(crate) fn expected_tokens<'a, I: Item>(
         &self,
         model: &ModelUnderTest,
@@ -107,11 +109,11 @@ impl Budget {
         images: impl Iterator<Item = &'a ImageFacts>,
     ) -> f64 {
         let price = self.prices[trial.model];
-        let images = images.map(|image| image_of(model, price, image.width, image.height));
-        words(&trial.prompt) + images.map(|tokens| tokens.unwrap_or(0.0)).sum::<f64>()
+        let images = images.map(|image| image_tokens(model, price, image.width, image.height));
+        text_tokens(&trial.prompt) + images.map(|tokens| tokens.unwrap_or(0.0)).sum::<f64>()
     }
 
-    /// The dollars booked so far; `None` where no model has a price.
+    /// US dollars spent so far; `None` if no model has a price.
     pub(crate) fn spent(&self) -> Option<f64> {
         self.prices
             .iter()
@@ -119,36 +121,36 @@ impl Budget {
             .then_some(self.spent)
     }
 
-    /// Whether one more question is within `--max-cost`, with so many on the way that may each turn out as expensive as
-    /// the most expensive so far. Until the first reply is booked one at a time is asked: nobody knows how much a model thinks.
+    /// Whether one more question is within `--max-cost`, if each request in flight costs as much as the most expensive reply so
+    /// far. Until the first reply, one question is asked at a time, because the length of the model's reasoning is unknown.
     pub(crate) fn can_afford(
         &self,
-        on_the_way: usize,
+        in_flight: usize,
         model: usize,
-        likely: f64,
+        prompt: f64,
         reply: f64,
     ) -> bool {
-        let (Some(most), Some(price)) = (self.most, self.prices[model]) else {
+        let (Some(max_cost), Some(price)) = (self.max_cost, self.prices[model]) else {
             return true;
         };
-        let likely = price.of(likely, reply);
+        let expected = price.of(prompt, reply);
         match self.highest_cost {
-            None => on_the_way == 0 && likely <= most,
+            None => in_flight == 0 && expected <= max_cost,
             Some(highest_cost) => {
-                self.spent + highest_cost.max(likely) * (on_the_way + 1) as f64 <= most
+                self.spent + highest_cost.max(expected) * (in_flight + 1) as f64 <= max_cost
             }
         }
     }
 }
 
-/// How many tokens the words of a prompt are likely to have.
-pub(crate) fn words(prompt: &Prompt) -> f64 {
+/// Expected tokens of a prompt's text.
+pub(crate) fn text_tokens(prompt: &Prompt) -> f64 {
     let characters = prompt.parts().map(|part| part.chars().count());
-    characters.iter().sum::<usize>() as f64 / CHARACTERS + AROUND
+    characters.iter().sum::<usize>() as f64 / CHARACTERS_PER_TOKEN + MESSAGE_TOKENS
 }
 
-/// How many tokens an image is to a model: by the table of prices, else by its family; `None` where nobody knows.
-pub(crate) fn image_of(
+/// Tokens of an image for a model: from the table of prices, else by the model's family; `None` if unknown.
+pub(crate) fn image_tokens(
     model: &ModelUnderTest,
     price: Option<Price>,
     width: usize,

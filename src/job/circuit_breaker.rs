@@ -1,4 +1,4 @@
-//! When a run ends before its plan does: [`CircuitBreaker`], [`EndReason`].
+//! Reasons to stop asking before the plan ends: [`CircuitBreaker`], [`EndReason`].
 
 use std::collections::BTreeSet;
 
@@ -8,24 +8,24 @@ use crate::error::Error;
 use crate::types::manifest::{Counts, Status};
 use crate::types::{Failure, FailureKind};
 
-/// How many trials of a model may fail before any has succeeded: the next would too.
-const AT_FIRST: usize = 5;
+/// Failed trials after which a model is stopped if none has succeeded: the next would fail, too.
+const FAILURES_AT_START: usize = 5;
 
-/// How many in a row may fail later on, at least: servers come back from shorter troubles.
-const IN_A_ROW: usize = 20;
+/// Minimum of failures in a row after which a model is stopped if a trial has succeeded: servers recover from shorter outages.
+const FAILURES_IN_A_ROW: usize = 20;
 
 /// How the asking ended.
 #[derive(Debug)]
 pub(crate) enum EndReason {
-    /// Everything was asked.
+    /// All trials of the plan were asked.
     AllAsked,
-    /// The user interrupted it.
+    /// The user or the batch system interrupted it.
     Interrupted,
     /// The next question would have gone beyond `--max-cost`.
     OverBudget,
     /// No model could be asked any further, or too much had failed.
     Stopped(Error),
-    /// One model could not be asked any further; the others were.
+    /// At least one model could not be asked any further; the others were.
     ModelStopped(Error),
 }
 
@@ -40,72 +40,75 @@ impl EndReason {
     }
 }
 
-/// What is known of one model.
+/// Successes and failures of one model so far.
 #[derive(Debug, Default)]
 struct ModelHealth {
     succeeded: bool,
-    /// Failures since the last success that the server or the way to it is to blame for.
+    /// Failures since the last success that the server or the network caused.
     outage: usize,
-    /// Requests refused before any success, by the frames or walks they were about: one may be at fault by itself.
+    /// Requests that the server refused, in the whole run.
     refusals: usize,
-    refused_places: BTreeSet<String>,
-    /// It is asked nothing more.
+    /// Frames or walks of the refused requests. A single one does not count, because it may be the cause.
+    refused_sources: BTreeSet<String>,
+    /// Whether the model is asked nothing more.
     stopped: bool,
 }
 
-/// One model that is watched.
+/// One model with its endpoint and its health.
 #[derive(Debug)]
-struct WatchedModel {
+struct ModelState {
     name: String,
-    /// Where it is asked.
-    place: String,
+    /// Name of the endpoint, for messages.
+    endpoint: String,
     health: ModelHealth,
 }
 
-/// Watches the outcomes for a reason to stop asking one model, or all.
+/// Checks each outcome for a reason to stop asking one model, or all.
 #[derive(Debug)]
 pub(crate) struct CircuitBreaker {
     max_failures: Option<usize>,
-    patience: usize,
-    models: Vec<WatchedModel>,
+    /// Failures in a row after which a model that has succeeded is stopped.
+    max_outage: usize,
+    models: Vec<ModelState>,
     failures: usize,
+    /// Whether nothing more is asked of any model.
     stopped: bool,
     end: Option<EndReason>,
 }
 
 impl CircuitBreaker {
-    /// `concurrency` requests may fail together without it meaning more than one failure.
+    /// A circuit breaker for these models. `concurrency` requests may fail together, for one cause.
     pub(crate) fn new(
         models: &[ModelUnderTest],
         concurrency: usize,
         max_failures: Option<usize>,
     ) -> Self {
-        let watched = models.iter().map(|one| WatchedModel {
-            name: one.model.name().to_owned(),
-            place: one.place().to_owned(),
+        let states = models.iter().map(|model| ModelState {
+            name: model.model.name().to_owned(),
+            endpoint: model.endpoint_name().to_owned(),
             health: ModelHealth::default(),
         });
         Self {
             max_failures,
-            patience: IN_A_ROW.max(3 * concurrency),
-            models: watched.collect(),
+            max_outage: FAILURES_IN_A_ROW.max(3 * concurrency),
+            models: states.collect(),
             failures: 0,
             stopped: false,
             end: None,
         }
     }
 
-    /// Whether nothing more is to be asked at all.
+    /// Whether nothing more is asked of any model.
     pub(crate) fn stopped(&self) -> bool {
         self.stopped
     }
 
     /// Whether a model is asked nothing more.
-    pub(crate) fn retired(&self, model: usize) -> bool {
+    pub(crate) fn is_stopped(&self, model: usize) -> bool {
         self.models[model].health.stopped
     }
 
-    /// How many trials have failed.
+    /// Number of failed trials.
     pub(crate) fn failures(&self) -> usize {
         self.failures
     }
@@ -122,8 +125,8 @@ impl CircuitBreaker {
         self.end.get_or_insert(EndReason::Interrupted);
     }
 
-    /// Takes note that nothing more is within the means.
-    pub(crate) fn spent(&mut self) {
+    /// Stops the run because one more question could exceed `--max-cost`.
+    pub(crate) fn over_budget(&mut self) {
         self.stopped = true;
         self.end.get_or_insert(EndReason::OverBudget);
     }
@@ -133,41 +136,41 @@ impl CircuitBreaker {
         (health.succeeded, health.outage) = (true, 0);
     }
 
-    /// Takes note of a failure about a frame or walk.
-    pub(crate) fn failed(&mut self, model: usize, error: &AskError, place: &str) {
+    /// Records a failure about a frame or walk.
+    pub(crate) fn failed(&mut self, model: usize, error: &AskError, source: &str) {
         if error.reach == Reach::Interrupted {
             return;
         }
         self.failures += 1;
-        let WatchedModel {
+        let ModelState {
             name,
-            place: endpoint,
+            endpoint,
             health,
         } = &mut self.models[model];
         let Failure { kind, message, .. } = &error.failure;
         match kind {
-            // The images are at fault, or what they show; the next may pass.
+            // The images or their content are the cause; the next may succeed.
             FailureKind::Image | FailureKind::Filtered => {}
             FailureKind::Request => {
                 health.refusals += 1;
-                health.refused_places.insert(place.to_owned());
+                health.refused_sources.insert(source.to_owned());
             }
             _ => health.outage += 1,
         }
-        let refused = health.refusals >= AT_FIRST && health.refused_places.len() > 1;
-        let patience = if health.succeeded {
-            self.patience
+        let refused = health.refusals >= FAILURES_AT_START && health.refused_sources.len() > 1;
+        let max_outage = if health.succeeded {
+            self.max_outage
         } else {
-            AT_FIRST
+            FAILURES_AT_START
         };
-        let hopeless = if error.reach == Reach::Endpoint {
+        let problem = if error.reach == Reach::Endpoint {
             Some(format!("{name}: {message}"))
         } else if refused && !health.succeeded {
             Some(format!(
                 "{name}: the first {} trials were all refused: {message}",
                 health.refusals
             ))
-        } else if health.outage >= patience {
+        } else if health.outage >= max_outage {
             Some(format!(
                 "{name}: {} trials in a row failed: {message}",
                 health.outage
@@ -175,19 +178,19 @@ impl CircuitBreaker {
         } else {
             None
         };
-        health.stopped |= hopeless.is_some();
-        let too_many = self.max_failures.is_some_and(|most| self.failures >= most);
+        health.stopped |= problem.is_some();
+        let too_many = self.max_failures.is_some_and(|max| self.failures >= max);
         let too_many = too_many.then(|| {
             format!(
-                "{} trials have failed (--max-failures), the last: {message}",
+                "the limit of failed trials is reached (--max-failures {}); the last: {message}",
                 self.failures
             )
         });
         let endpoint = endpoint.clone();
-        self.stopped |= too_many.is_some() || self.models.iter().all(|one| one.health.stopped);
-        if let Some(problem) = hopeless.or(too_many) {
+        self.stopped |= too_many.is_some() || self.models.iter().all(|model| model.health.stopped);
+        if let Some(problem) = problem.or(too_many) {
             let problem =
-                format!("{problem} (what was answered is kept; the same command goes on)");
+                format!("{problem} (replies so far are kept; the same command continues)");
             self.end
                 .get_or_insert(EndReason::Stopped(Error::Endpoint { endpoint, problem }));
         }
@@ -223,12 +226,12 @@ mod tests {
             failure,
             attempts: 1,
             reach,
-            refused: None,
+            refused_field: None,
         }
     }
 
-    /// Lets one of `models` fail so often over so many frames; whether it is retired then.
-    fn retired_after(kind: FailureKind, times: usize, frames: usize, succeeded: bool) -> bool {
+    /// Whether one of two models is stopped after it has failed `times` times, over `frames` frames.
+    fn stopped_after(kind: FailureKind, times: usize, frames: usize, succeeded: bool) -> bool {
         let mut breaker = breaker(2, None);
         if succeeded {
             breaker.succeeded(0);
@@ -237,30 +240,30 @@ mod tests {
             breaker.succeeded(1);
             breaker.failed(0, &error(kind, Reach::Trial), &(i % frames).to_string());
         }
-        assert!(!breaker.stopped(), "the other model goes on");
-        breaker.retired(0)
+        assert!(!breaker.stopped(), "the other model continues");
+        breaker.is_stopped(0)
     }
 
     #[test]
-    fn a_model_that_cannot_be_asked_is_retired_and_the_others_go_on() {
+    fn a_model_that_cannot_be_asked_is_stopped_and_the_others_continue() {
         use FailureKind::{Connection, Image, Request, Server};
         for kind in [Connection, Server] {
             assert!(
-                retired_after(kind, 5, 1, false),
+                stopped_after(kind, 5, 1, false),
                 "one frame is enough: {kind:?}"
             );
-            assert!(!retired_after(kind, 4, 4, false));
-            assert!(retired_after(kind, 20, 1, true) && !retired_after(kind, 19, 19, true));
+            assert!(!stopped_after(kind, 4, 4, false));
+            assert!(stopped_after(kind, 20, 1, true) && !stopped_after(kind, 19, 19, true));
         }
-        assert!(retired_after(Request, 5, 2, false));
+        assert!(stopped_after(Request, 5, 2, false));
         assert!(
-            !retired_after(Request, 9, 1, false),
-            "one frame may be at fault"
+            !stopped_after(Request, 9, 1, false),
+            "one frame may be the cause"
         );
-        assert!(!retired_after(Request, 99, 99, true), "others were taken");
+        assert!(!stopped_after(Request, 99, 99, true), "others succeeded");
         assert!(
-            !retired_after(Image, 99, 99, false),
-            "the images are at fault"
+            !stopped_after(Image, 99, 99, false),
+            "the images are the cause"
         );
     }
 
@@ -273,14 +276,14 @@ mod tests {
             }
             breaker.failed(0, &error(FailureKind::Server, Reach::Trial), &i.to_string());
         }
-        assert!(!breaker.retired(0));
+        assert!(!breaker.is_stopped(0));
     }
 
     #[test]
-    fn the_run_stops_when_no_model_is_left_or_too_much_has_failed() {
+    fn the_run_stops_when_no_model_remains_or_too_much_has_failed() {
         let mut breaker = breaker(2, None);
         breaker.failed(0, &error(FailureKind::Request, Reach::Endpoint), "a");
-        assert!(breaker.retired(0) && !breaker.stopped());
+        assert!(breaker.is_stopped(0) && !breaker.stopped());
         breaker.failed(1, &error(FailureKind::Request, Reach::Endpoint), "a");
         assert!(breaker.stopped());
 
@@ -292,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_given_up_has_not_failed() {
+    fn aborted_requests_do_not_count_as_failures() {
         let mut breaker = breaker(1, Some(1));
         breaker.failed(0, &error(FailureKind::Connection, Reach::Interrupted), "a");
         assert!(!breaker.stopped() && breaker.failures() == 0);

@@ -1,10 +1,10 @@
-//! In which conditions frames are shown: [`conditions`].
+//! The conditions in which frames are shown: [`conditions`].
 
 use crate::synthesis::LightSettings;
 use crate::types::{Condition, Degradation, Digest, EnhancerName, KindSet};
 
-/// Every condition in which a frame is shown: raw first, each enhancer after, level by level, so that a frame is developed once for
-/// all that use it.
+/// Every condition in which a frame is shown, level by level: first raw, then with each enhancer. In this order a frame is degraded
+/// once for all enhancers.
 pub(crate) fn conditions(
     light: &LightSettings,
     on: KindSet,

@@ -1,4 +1,4 @@
-//! The asynchronous side: asks about what the image pipeline has made, and keeps every reply the moment it arrives.
+//! The asynchronous part: asks about the images from the pipeline, and stores every reply when it arrives.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -23,10 +23,10 @@ use crate::error::Result;
 use crate::store::Store;
 use crate::types::{Failure, FailureKind, Finish, Reply};
 
-/// How many finished groups may wait to be asked about.
+/// Number of finished groups that may wait until they are asked about.
 const GROUPS_AHEAD: usize = 2;
 
-/// What a run is driven with.
+/// Models and settings that one phase of a run is asked with.
 pub(crate) struct Dispatcher<'a> {
     pub(crate) models: &'a [ModelUnderTest],
     pub(crate) progress: &'a Progress,
@@ -34,30 +34,30 @@ pub(crate) struct Dispatcher<'a> {
     pub(crate) timings: &'a Timings,
 }
 
-/// How far a run has come.
+/// The numbers of all trials and of those answered, in one phase.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TrialCounts {
-    /// All trials.
+    /// Number of trials, answered or not.
     pub(crate) trials: usize,
-    /// Those that have a reply.
+    /// Number of trials with a reply.
     pub(crate) answered: usize,
 }
 
-/// One trial with the stimulus that it shares.
+/// One trial, with the stimulus that its group shares.
 struct PreparedTrial<I> {
     trial: Trial<I>,
     stimulus: Arc<Stimulus>,
 }
 
-/// One trial with what came of it.
+/// One trial, with its reply or error.
 type Finished<I> = (PreparedTrial<I>, Result<Reply, AskError>);
 
 impl Dispatcher<'_> {
-    /// Asks what `make` hands out, which works on a thread of its own until nobody takes its groups any more; `stoppers`
-    /// end what it is at.
+    /// Asks about the groups that `make` sends. `make` runs on a separate thread until the channel is closed. `stoppers` end an
+    /// enhancement in progress.
     pub(crate) fn run<I: Item>(
         &self,
-        tally: TrialCounts,
+        counts: TrialCounts,
         budget: Budget,
         store: &mut Store<I::Detail>,
         stoppers: Vec<Stopper>,
@@ -67,24 +67,24 @@ impl Dispatcher<'_> {
             .enable_all()
             .build()
             .map_err(|e| unstarted(&e))?;
-        let (out, groups) = mpsc::channel(GROUPS_AHEAD);
-        let intake = ReplySink::<I> {
+        let (sender, groups) = mpsc::channel(GROUPS_AHEAD);
+        let sink = ReplySink::<I> {
             dispatcher: self,
             store,
-            bar: self.progress.trials(tally.trials, tally.answered),
+            bar: self.progress.trials(counts.trials, counts.answered),
             breaker: self.breaker(),
             budget,
             stoppers,
-            answered: tally.answered,
-            cut: TruncationCheck::default(),
+            answered: counts.answered,
+            truncation: TruncationCheck::default(),
         };
         std::thread::scope(|scope| {
-            scope.spawn(move || make(&out));
-            runtime.block_on(intake.ask(groups))
+            scope.spawn(move || make(&sender));
+            runtime.block_on(sink.ask(groups))
         })
     }
 
-    /// How many questions may be under way now.
+    /// Maximum number of requests in flight now.
     fn width(&self) -> usize {
         let widths = self.models.iter().filter_map(|model| model.model.width());
         // Models of one endpoint share its window.
@@ -100,7 +100,7 @@ impl Dispatcher<'_> {
     }
 }
 
-/// Where replies come in and are kept.
+/// Asks trials, and stores their replies.
 struct ReplySink<'a, I: Item> {
     dispatcher: &'a Dispatcher<'a>,
     store: &'a mut Store<I::Detail>,
@@ -108,12 +108,12 @@ struct ReplySink<'a, I: Item> {
     breaker: CircuitBreaker,
     budget: Budget,
     stoppers: Vec<Stopper>,
-    /// Trials with a reply, those of earlier calls included.
+    /// Number of trials with a reply, including those of earlier calls.
     answered: usize,
-    cut: TruncationCheck,
+    truncation: TruncationCheck,
 }
 
-/// Counts replies that the token limit cut before an answer: the first ones tell whether it is too low.
+/// Counts replies that the token limit cut before an answer. The first replies show whether the limit is too low.
 #[derive(Debug, Default)]
 struct TruncationCheck {
     replies: usize,
@@ -121,19 +121,19 @@ struct TruncationCheck {
 }
 
 impl TruncationCheck {
-    /// So many replies are looked at.
-    const LOOKED_AT: usize = 10;
+    /// Number of replies that are checked.
+    const CHECKED: usize = 10;
 
-    /// Takes note of a reply, and says so where most of the first were cut.
-    fn note(&mut self, reply: &Reply) {
-        if self.replies >= Self::LOOKED_AT {
+    /// Counts a reply, and warns if most of the first ones were cut.
+    fn count(&mut self, reply: &Reply) {
+        if self.replies >= Self::CHECKED {
             return;
         }
         self.replies += 1;
         self.cut += usize::from(reply.finish == Finish::Length && reply.text.trim().is_empty());
-        if self.replies == Self::LOOKED_AT && self.cut > Self::LOOKED_AT / 2 {
+        if self.replies == Self::CHECKED && self.cut > Self::CHECKED / 2 {
             tracing::warn!(
-                "{} of the first {} replies were cut at the token limit before they said anything: a reasoning model needs a larger \
+                "{} of the first {} replies were cut at the token limit before any text: a reasoning model needs a larger \
                  --max-tokens, or a lower --reasoning-effort",
                 self.cut,
                 self.replies
@@ -145,38 +145,37 @@ impl TruncationCheck {
 impl<I: Item> ReplySink<'_, I> {
     async fn ask(mut self, mut groups: Receiver<PreparedGroup<I>>) -> Result<EndReason> {
         let mut waiting = VecDeque::<PreparedTrial<I>>::new();
-        let mut asking = JoinSet::<Finished<I>>::new();
+        let mut in_flight = JoinSet::<Finished<I>>::new();
         let mut interrupt = Interrupt::listen()?;
-        let mut more = true;
+        let mut more_groups = true;
         loop {
-            while asking.len() < self.dispatcher.width()
+            while in_flight.len() < self.dispatcher.width()
                 && let Some(ready) = waiting.pop_front()
             {
                 let model = &self.dispatcher.models[ready.trial.model];
-                if self.breaker.retired(ready.trial.model) {
+                if self.breaker.is_stopped(ready.trial.model) {
                     continue;
                 }
-                let likely = self.expected_tokens(&ready);
-                let place = ready.trial.model;
+                let prompt_tokens = self.expected_tokens(&ready);
                 if !self.budget.can_afford(
-                    asking.len(),
-                    place,
-                    likely,
+                    in_flight.len(),
+                    ready.trial.model,
+                    prompt_tokens,
                     ready.trial.item.reply_tokens(),
                 ) {
                     waiting.push_front(ready);
                     break;
                 }
-                asking.spawn(send(model.clone(), ready));
+                in_flight.spawn(send(model.clone(), ready));
             }
-            if asking.is_empty() && !waiting.is_empty() {
-                self.breaker.spent();
+            if in_flight.is_empty() && !waiting.is_empty() {
+                self.breaker.over_budget();
             }
-            let through = !more && waiting.is_empty() && asking.is_empty();
-            if through || self.breaker.stopped() {
+            let all_asked = !more_groups && waiting.is_empty() && in_flight.is_empty();
+            if all_asked || self.breaker.stopped() {
                 break;
             }
-            let state = match asking.len() {
+            let state = match in_flight.len() {
                 0 => Some(TimedStep::Idle),
                 n if n >= self.dispatcher.width() => Some(TimedStep::Full),
                 _ => None,
@@ -184,69 +183,69 @@ impl<I: Item> ReplySink<'_, I> {
             let since = Instant::now();
             tokio::select! {
                 () = interrupt.next() => self.breaker.interrupted(),
-                Some(done) = asking.join_next() => {
-                    self.waited(state, since);
-                    self.keep(done)?;
+                Some(done) = in_flight.join_next() => {
+                    self.record_wait(state, since);
+                    self.store_result(done)?;
                 }
-                group = groups.recv(), if more && waiting.is_empty() => match group {
+                group = groups.recv(), if more_groups && waiting.is_empty() => match group {
                     Some(group) => {
-                        self.waited(state, since);
+                        self.record_wait(state, since);
                         waiting.extend(self.accept(group)?);
                     }
-                    None => more = false,
+                    None => more_groups = false,
                 },
             }
         }
-        // The image pipeline ends as soon as nobody waits for its groups.
+        // The image pipeline ends as soon as this channel is closed.
         drop(groups);
         if self.breaker.stopped() {
             self.stoppers.iter().for_each(Stopper::stop);
-            self.drain(asking, interrupt).await?;
+            self.drain(in_flight, interrupt).await?;
         }
         self.store.sync()?;
         Ok(self.breaker.into_end())
     }
 
-    /// Takes note of how long it waited, and in what state.
-    fn waited(&self, state: Option<TimedStep>, since: Instant) {
+    /// Adds the time waited in a state to the timings.
+    fn record_wait(&self, state: Option<TimedStep>, since: Instant) {
         if let Some(state) = state {
             self.dispatcher.timings.add(state, since.elapsed());
         }
     }
 
-    /// Waits for the requests on the wire, for they may be paid for already; a second interrupt gives them up. What
-    /// waits for its turn or for a retry is given up at once.
+    /// Waits for the requests in flight, because they may be paid for already. A second interrupt aborts them. Requests that wait
+    /// for their turn or for a retry are aborted at once.
     async fn drain(
         &mut self,
-        mut asking: JoinSet<Finished<I>>,
+        mut in_flight: JoinSet<Finished<I>>,
         mut interrupt: Interrupt,
     ) -> Result<()> {
-        if !asking.is_empty() {
-            let count = asking.len();
+        if !in_flight.is_empty() {
+            let count = in_flight.len();
             self.dispatcher.progress.say(&format!(
-                "stopping: {count} requests are in flight; interrupt again to give them up"
+                "stopping when the requests in flight ({count}) have ended; interrupt again to abort them"
             ));
         }
         for model in self.dispatcher.models {
             model.model.close();
         }
-        while !asking.is_empty() {
+        while !in_flight.is_empty() {
             tokio::select! {
-                () = interrupt.next() => asking.abort_all(),
-                Some(done) = asking.join_next() => self.keep(done)?,
+                () = interrupt.next() => in_flight.abort_all(),
+                Some(done) = in_flight.join_next() => self.store_result(done)?,
             }
         }
         Ok(())
     }
 
-    /// How many tokens the prompt of a trial is likely to have.
+    /// Expected tokens of a trial's prompt.
     fn expected_tokens(&self, ready: &PreparedTrial<I>) -> f64 {
         let model = &self.dispatcher.models[ready.trial.model];
         let images = ready.stimulus.images.iter().map(|image| image.facts());
         self.budget.expected_tokens(model, &ready.trial, images)
     }
 
-    /// Makes trials ready to be asked, or failures out of those without their images.
+    /// The trials of a group, ready to be asked. If the images could not be made, all of them fail instead.
     fn accept(&mut self, group: PreparedGroup<I>) -> Result<Vec<PreparedTrial<I>>> {
         let PreparedGroup {
             stimulus,
@@ -273,16 +272,16 @@ impl<I: Item> ReplySink<'_, I> {
             },
             attempts: 0,
             reach: Reach::Trial,
-            refused: None,
+            refused_field: None,
         };
         for ready in ready {
-            self.keep(Ok((ready, Err(error.clone()))))?;
+            self.store_result(Ok((ready, Err(error.clone()))))?;
         }
         Ok(Vec::new())
     }
 
-    /// Keeps what came of one trial.
-    fn keep(&mut self, done: Result<Finished<I>, JoinError>) -> Result<()> {
+    /// Stores the reply or the failure of one trial.
+    fn store_result(&mut self, done: Result<Finished<I>, JoinError>) -> Result<()> {
         let (ready, result) = match done {
             Ok(done) => done,
             Err(aborted) if aborted.is_cancelled() => return Ok(()),
@@ -292,8 +291,8 @@ impl<I: Item> ReplySink<'_, I> {
         match &result {
             Ok(_) => self.breaker.succeeded(trial.model),
             Err(error) => {
-                self.breaker.failed(trial.model, error, trial.item.place());
-                // Where the model itself is at fault or the run ends, the trial was never really made.
+                self.breaker.failed(trial.model, error, trial.item.source());
+                // If the endpoint is the cause or the run ends, the trial does not count as asked.
                 if error.reach != Reach::Trial {
                     return Ok(());
                 }
@@ -301,10 +300,11 @@ impl<I: Item> ReplySink<'_, I> {
         }
         if let Ok(reply) = &result {
             self.answered += 1;
-            self.cut.note(reply);
-            let (model, likely) = (ready.trial.model, self.expected_tokens(&ready));
+            self.truncation.count(reply);
+            let (model, prompt_tokens) = (ready.trial.model, self.expected_tokens(&ready));
+            let reply_tokens = ready.trial.item.reply_tokens();
             self.budget
-                .book(model, reply.usage, likely, ready.trial.item.reply_tokens());
+                .record(model, reply.usage, prompt_tokens, reply_tokens);
         }
         self.bar
             .count(self.answered, self.breaker.failures(), self.budget.spent());
@@ -317,7 +317,7 @@ impl<I: Item> ReplySink<'_, I> {
     }
 }
 
-/// Puts one question to its model.
+/// Sends one trial to its model; the trial with its reply or error.
 async fn send<I: Item>(model: ModelUnderTest, ready: PreparedTrial<I>) -> Finished<I> {
     let PreparedTrial { trial, stimulus } = &ready;
     let call = Call {

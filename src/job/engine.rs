@@ -1,4 +1,4 @@
-//! An experiment carried out: [`Job`].
+//! The engine that carries out an experiment: [`Job`].
 
 use std::collections::HashSet;
 use std::path::PathBuf;
@@ -24,15 +24,15 @@ use crate::types::{Detail as _, TrialKey};
 /// An experiment that is carried out in a run folder.
 pub(crate) struct Job<'a, E: Experiment> {
     experiment: &'a E,
-    /// The enhancement models, not yet loaded.
+    /// Files of the enhancement models, not yet loaded.
     files: Vec<ModelFile>,
-    /// Where the run lies, or will.
+    /// Run folder, which may not exist yet.
     folder: PathBuf,
     progress: &'a Progress,
 }
 
 impl<'a, E: Experiment> Job<'a, E> {
-    /// Finds the folder of the run; nothing is written.
+    /// A job in the run folder of the experiment. Nothing is written.
     pub(crate) fn new(
         experiment: &'a E,
         files: Vec<ModelFile>,
@@ -46,10 +46,10 @@ impl<'a, E: Experiment> Job<'a, E> {
         })
     }
 
-    /// Asks what is left, or says what that would take.
+    /// Asks the remaining trials, or only estimates them (`--dry-run`).
     ///
     /// # Errors
-    /// If nothing can be asked, or no further trial could succeed; what had arrived by then is kept.
+    /// If nothing can be asked, or no further trial could succeed. Replies that had arrived are kept.
     pub(crate) fn run(self) -> Result<Outcome> {
         if self.experiment.settings().money.dry_run {
             self.estimate()
@@ -58,7 +58,7 @@ impl<'a, E: Experiment> Job<'a, E> {
         }
     }
 
-    /// Writes what is left to ask as files of a Batch API, and notes their trials in the run as sent.
+    /// Writes the remaining requests as files of a Batch API, and records in the run that these trials are sent.
     ///
     /// # Errors
     /// If a model is built in, an image is larger than the endpoint takes, or a file cannot be written.
@@ -66,7 +66,7 @@ impl<'a, E: Experiment> Job<'a, E> {
         batch::export::export(self.open()?, files)
     }
 
-    /// Says what is left to ask and what it would take; sends nothing and leaves no file.
+    /// An estimate of the remaining requests and their cost. Sends nothing and writes no file.
     fn estimate(self) -> Result<Outcome> {
         let experiment = self.experiment;
         let settings = experiment.settings();
@@ -75,7 +75,7 @@ impl<'a, E: Experiment> Job<'a, E> {
         let mut plans = Vec::new();
         for phase in 0..E::PHASES.len() {
             let mut plan = Plan::new(experiment.plan(phase, &stored)?);
-            plan.leave_out(|key| answered.contains(key));
+            plan.exclude(|key| answered.contains(key));
             plans.push(plan);
         }
         let timings = Timings::default();
@@ -100,26 +100,26 @@ impl<'a, E: Experiment> Job<'a, E> {
             progress,
         } = self;
         let settings = experiment.settings();
-        let kept = store::read_manifest(&folder, DetailOf::<E>::SCHEMA)?;
-        let complete = kept
+        let stored = store::read_manifest(&folder, DetailOf::<E>::SCHEMA)?;
+        let complete = stored
             .as_ref()
-            .is_some_and(|kept| kept.status == Status::Complete);
-        // Opened before the folder is made, so that an enhancer that does not work leaves nothing behind.
+            .is_some_and(|stored| stored.status == Status::Complete);
+        // Loaded before the folder is created, so that a broken enhancer leaves no folder.
         let enhancers = if complete {
-            OpenEnhancers::later(files, &settings.loading)
+            OpenEnhancers::deferred(files, &settings.loading)
         } else {
             OpenEnhancers::load(files, &settings.loading)?
         };
-        let manifest = manifest::of(experiment, kept);
-        let mut store = Store::open(&folder, &manifest, folder::moved(&settings.place))?;
+        let manifest = manifest::of(experiment, stored);
+        let mut store = Store::open(&folder, &manifest, folder::address_change(&settings.place))?;
         store.add_questions(experiment.questions())?;
-        let there: HashSet<TrialKey> = if experiment.given().is_empty() {
+        let present: HashSet<TrialKey> = if experiment.imported_records().is_empty() {
             HashSet::new()
         } else {
             store.records()?.iter().map(|record| record.key).collect()
         };
-        for record in experiment.given() {
-            if !there.contains(&record.key) {
+        for record in experiment.imported_records() {
+            if !present.contains(&record.key) {
                 store.append(record)?;
             }
         }

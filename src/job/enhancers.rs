@@ -1,4 +1,4 @@
-//! The enhancement models of a command: `OpenEnhancers`, loaded when they are needed.
+//! The enhancement models of a command, loaded when they are needed: `OpenEnhancers`.
 
 use std::path::PathBuf;
 
@@ -8,21 +8,21 @@ use super::workers::ThreadArgs;
 use crate::enhance::{Enhancer, ModelFile, RuntimeArgs, SizeArgs};
 use crate::error::{Error, Result};
 
-/// How enhancement models are run.
+/// Flags for running enhancement models.
 #[derive(Debug, Clone, Default, Args)]
 pub(crate) struct EnhancerRunArgs {
-    /// In which size.
+    /// Size of the images and tiles that models take.
     #[command(flatten)]
     pub size: SizeArgs,
-    /// By which ONNX Runtime.
+    /// The ONNX Runtime that runs them.
     #[command(flatten)]
     pub runtime: RuntimeArgs,
-    /// On how many threads.
+    /// Number of threads that run them.
     #[command(flatten)]
     pub threads: ThreadArgs,
 }
 
-/// The enhancement models' files, each under a name of its own.
+/// The files of the enhancement models. Two files of the same name are an error.
 pub(crate) fn read(models: &[PathBuf]) -> Result<Vec<ModelFile>> {
     let mut enhancers: Vec<ModelFile> = Vec::new();
     for path in models {
@@ -39,17 +39,19 @@ pub(crate) fn read(models: &[PathBuf]) -> Result<Vec<ModelFile>> {
     Ok(enhancers)
 }
 
-/// Enhancement models, and ONNX Runtime if there are any.
+/// Enhancement models, loaded or still to be loaded.
 pub(crate) struct OpenEnhancers<'a> {
+    /// Settings to load `files` with; `None` if nothing remains to be loaded.
     settings: Option<&'a EnhancerRunArgs>,
     files: Vec<ModelFile>,
     pub(crate) enhancers: Vec<Enhancer>,
+    /// Version of ONNX Runtime; `None` if it was not opened.
     version: Option<String>,
 }
 
 impl<'a> OpenEnhancers<'a> {
-    /// The models in these files, loaded when they are taken.
-    pub(crate) fn later(files: Vec<ModelFile>, settings: &'a EnhancerRunArgs) -> Self {
+    /// The models in these files, loaded by [`Self::take`].
+    pub(crate) fn deferred(files: Vec<ModelFile>, settings: &'a EnhancerRunArgs) -> Self {
         Self {
             settings: Some(settings),
             files,
@@ -61,7 +63,7 @@ impl<'a> OpenEnhancers<'a> {
     /// The models in these files, loaded.
     ///
     /// # Errors
-    /// If ONNX Runtime is not there, or a file is no model that it runs.
+    /// If ONNX Runtime is not found, or a file is not a model that it can run.
     pub(crate) fn load(files: Vec<ModelFile>, settings: &'a EnhancerRunArgs) -> Result<Self> {
         let mut opened = Self {
             settings: None,
@@ -76,7 +78,7 @@ impl<'a> OpenEnhancers<'a> {
         for file in files {
             let enhancer = Enhancer::open(file, &runtime, settings.threads.threads)?
                 .with_tiling(settings.size.tile)
-                .with_most_side(settings.size.llie_max_side);
+                .with_max_side(settings.size.llie_max_side);
             opened.enhancers.push(enhancer);
         }
         opened.version = Some(runtime.version().to_owned());
@@ -91,7 +93,7 @@ impl<'a> OpenEnhancers<'a> {
         Ok(std::mem::take(&mut self.enhancers))
     }
 
-    /// ONNX Runtime and its version, if it was opened; for the manifest.
+    /// Name and version of ONNX Runtime for the manifest; `None` if it was not opened.
     pub(crate) fn version(&self) -> Option<(String, String)> {
         let version = self.version.clone()?;
         Some(("onnxruntime".to_owned(), version))

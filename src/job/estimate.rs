@@ -1,9 +1,9 @@
-//! What a run would take, found out without sending anything: [`estimate`].
+//! An estimate of what a run takes, without sending anything: [`estimate`].
 
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use super::budget::{Budget, image_of, words};
+use super::budget::{Budget, image_tokens, text_tokens};
 use super::experiment::{ExpectedRequest, Experiment, RecordOf};
 use super::frame_work::FrameWork;
 use super::image_pipeline::ImagePipeline;
@@ -17,19 +17,19 @@ use crate::error::Result;
 use crate::report::forecast::{CostLine, Forecast};
 use crate::types::{Condition, ImageFacts, View};
 
-/// How many sources are made into images, to know their size; of those with an enhancer one.
+/// Number of sources whose images are made to measure their size; with enhancers, only the first source.
 const SAMPLED: usize = 3;
 
-/// How long a reply takes if nothing is known of the endpoint, in seconds.
+/// Assumed time of a reply in seconds, if no reply is stored.
 const REPLY_SECONDS: f64 = 2.0;
 
-/// Bytes of a request besides its images and its words.
-const AROUND: f64 = 300.0;
+/// Bytes of a request besides its images and its text.
+const REQUEST_BYTES: f64 = 300.0;
 
 /// Bytes of base64 text for each byte of an image.
 const BASE64: f64 = 4.0 / 3.0;
 
-/// Lays out what is left to ask, with the sizes of a few images that are made for it.
+/// The remaining requests with their tokens, cost, bytes and time. A few images are made to measure their size.
 pub(crate) fn estimate<E: Experiment>(
     experiment: &E,
     plans: &[Plan<E::Item>],
@@ -38,16 +38,16 @@ pub(crate) fn estimate<E: Experiment>(
 ) -> Result<Forecast> {
     let settings = experiment.settings();
     let (money, sources) = (&settings.money, experiment.sources());
-    let to_come = plans
+    let expected = plans
         .first()
-        .map_or_else(Vec::new, |plan| experiment.to_come(&plan.sources));
-    let (mut lines, mut everyone) = (Vec::new(), Vec::new());
+        .map_or_else(Vec::new, |plan| experiment.expected_requests(&plan.sources));
+    let (mut lines, mut all_models) = (Vec::new(), Vec::new());
     for (phase, plan) in plans.iter().enumerate() {
-        let coming = if phase == 0 { &[] } else { &to_come[..] };
-        lines.extend(self::lines(experiment, phase, plan, coming));
-        everyone.extend(experiment.models(phase).iter().cloned());
+        let expected = if phase == 0 { &[] } else { &expected[..] };
+        lines.extend(self::lines(experiment, phase, plan, expected));
+        all_models.extend(experiment.models(phase).iter().cloned());
     }
-    let budget = Budget::new(money, &everyone, stored)?;
+    let budget = Budget::new(money, &all_models, stored)?;
     let sample = match plans.first() {
         Some(plan) => SampledImages::make(experiment, plan, pipeline)?,
         None => SampledImages::default(),
@@ -65,17 +65,18 @@ pub(crate) fn estimate<E: Experiment>(
             let shown = mean.map_or(0.0, |mean| mean.bytes * BASE64 * source.order.len() as f64);
             for trial in &group.trials {
                 if models[trial.model].model.is_remote() {
-                    let request = shown + trial.prompt.parts().concat().len() as f64 + AROUND;
+                    let request =
+                        shown + trial.prompt.parts().concat().len() as f64 + REQUEST_BYTES;
                     bytes += request;
                     largest_request = largest_request.max(request);
                 }
             }
             if group.condition.is_some() {
                 images += source.order.len();
-                // The frames of a walk are made side by side, a frame alone by all cores together.
+                // The frames of a walk are made in parallel, one per core. A frame alone is made by all cores together.
                 let frames = source.frames.len() as f64;
-                let side_by_side = if source.frames.len() > 1 { cores } else { 1 };
-                seconds += mean.map_or(0.0, |mean| mean.seconds * frames / side_by_side as f64);
+                let in_parallel = if source.frames.len() > 1 { cores } else { 1 };
+                seconds += mean.map_or(0.0, |mean| mean.seconds * frames / in_parallel as f64);
             }
         }
     }
@@ -85,15 +86,16 @@ pub(crate) fn estimate<E: Experiment>(
         .map(|line| line.text_tokens + line.image_tokens.unwrap_or(0.0) + line.reply_tokens)
         .sum();
     let latencies = stored.iter().filter_map(|record| record.latency_ms);
-    let (asking_seconds, pace) = waiting(experiment.server(), latencies, requests as f64, tokens);
+    let (asking_seconds, pace) =
+        asking_time(experiment.server(), latencies, requests as f64, tokens);
     let largest = sample.images.iter().max_by_key(|image| image.bytes);
     let limit = limit(settings);
     let planned: usize = plans.iter().map(|plan| plan.keys.len()).sum();
-    let left: usize = plans.iter().map(Plan::left).sum();
+    let remaining: usize = plans.iter().map(Plan::remaining).sum();
     Ok(Forecast {
         lines,
-        trials: planned + to_come.len(),
-        answered: planned - left,
+        trials: planned + expected.len(),
+        answered: planned - remaining,
         spent: budget.spent(),
         images,
         bytes,
@@ -116,12 +118,12 @@ pub(crate) fn estimate<E: Experiment>(
     })
 }
 
-/// What is left of each model of a phase that is asked over a network.
+/// The cost line of each model of a phase that is asked at an endpoint.
 fn lines<E: Experiment>(
     experiment: &E,
     phase: usize,
     plan: &Plan<E::Item>,
-    coming: &[ExpectedRequest],
+    expected: &[ExpectedRequest],
 ) -> Vec<CostLine> {
     let sources = experiment.sources();
     let models = experiment.models(phase).iter().enumerate();
@@ -136,44 +138,44 @@ fn lines<E: Experiment>(
             let own = group.trials.iter().filter(|trial| trial.model == index);
             let before = tokens.requests;
             for trial in own {
-                tokens.add(words(&trial.prompt), trial.item.reply_tokens());
+                tokens.add(text_tokens(&trial.prompt), trial.item.reply_tokens());
             }
             let source = &sources[place];
             if let (Some(_), Some(frame)) = (&group.condition, source.frames.first()) {
                 let (width, height) = experiment.recipe().scaling.of(frame.size);
-                let each = image_of(model, price, width, height);
+                let each = image_tokens(model, price, width, height);
                 let images = (source.order.len() * (tokens.requests - before)) as f64;
                 let known = tokens.image.zip(each);
-                tokens.image = known.map(|(sofar, each)| sofar + each * images);
+                tokens.image = known.map(|(sum, each)| sum + each * images);
             }
         }
-        for expected in coming.iter().filter(|expected| expected.model == index) {
-            tokens.add(expected.words, expected.reply);
+        for request in expected.iter().filter(|request| request.model == index) {
+            tokens.add(request.text_tokens, request.reply_tokens);
         }
         line(model, price, &tokens, E::PHASES[phase])
     });
     lines.filter(|line| line.requests > 0).collect()
 }
 
-/// Tokens of the requests to one model.
+/// Numbers of requests to one model and of their tokens.
 #[derive(Debug, Default)]
 struct Tokens {
     requests: usize,
-    words: f64,
+    text: f64,
     reply: f64,
-    /// Those of all images; `None` if nobody knows.
+    /// Tokens of all images; `None` if unknown.
     image: Option<f64>,
 }
 
 impl Tokens {
-    fn add(&mut self, words: f64, reply: f64) {
+    fn add(&mut self, text: f64, reply: f64) {
         self.requests += 1;
-        self.words += words;
+        self.text += text;
         self.reply += reply;
     }
 }
 
-/// What is left of one model.
+/// The cost line of one model.
 fn line(model: &ModelUnderTest, price: Option<Price>, tokens: &Tokens, phase: &str) -> CostLine {
     let requests = tokens.requests as f64;
     let longest = model
@@ -185,11 +187,11 @@ fn line(model: &ModelUnderTest, price: Option<Price>, tokens: &Tokens, phase: &s
         (_, View::Blind) => " (blind)",
         (_, View::Image) => "",
     };
-    let dollars = |reply: f64| Some(price?.of(tokens.words + tokens.image?, reply));
+    let dollars = |reply: f64| Some(price?.of(tokens.text + tokens.image?, reply));
     CostLine {
         model: format!("{}{role}", model.model.name()),
         requests: tokens.requests,
-        text_tokens: tokens.words,
+        text_tokens: tokens.text,
         image_tokens: tokens.image,
         reply_tokens: tokens.reply,
         longest_reply_tokens: longest,
@@ -198,8 +200,8 @@ fn line(model: &ModelUnderTest, price: Option<Price>, tokens: &Tokens, phase: &s
     }
 }
 
-/// How long all replies take, and what that rests on: the user's limits, and replies as slow as those kept.
-fn waiting(
+/// Seconds until all replies have arrived, and the limit that decides it: `--rpm`, `--tpm`, or the mean time of a stored reply.
+fn asking_time(
     server: Option<&Server>,
     latencies_ms: impl Iterator<Item = u64>,
     requests: f64,
@@ -208,20 +210,20 @@ fn waiting(
     let Some(server) = server else {
         return (0.0, "built-in models alone".to_owned());
     };
-    let kept: Vec<f64> = latencies_ms
+    let times: Vec<f64> = latencies_ms
         .filter(|ms| *ms > 0)
         .map(|ms| ms as f64 / 1e3)
         .collect();
-    let (each, known) = if kept.is_empty() {
+    let (each, origin) = if times.is_empty() {
         (REPLY_SECONDS, "assumed")
     } else {
-        (kept.iter().sum::<f64>() / kept.len() as f64, "as so far")
+        (times.iter().sum::<f64>() / times.len() as f64, "as so far")
     };
     let sending = &server.sending;
-    let wide = sending.concurrency.most();
+    let concurrency = sending.concurrency.most();
     let mut slowest = (
-        requests * each / wide as f64,
-        format!("{each:.1} s a reply {known}, {wide} at once"),
+        requests * each / concurrency as f64,
+        format!("{each:.1} s a reply {origin}, {concurrency} at once"),
     );
     let minutes = |number: f64, quota: Option<std::num::NonZeroU32>| {
         quota.map(|quota| 60.0 * number / f64::from(quota.get()))
@@ -238,18 +240,18 @@ fn waiting(
     slowest
 }
 
-/// The mean size and time of an image.
+/// Mean size in bytes and mean time in seconds of an image.
 #[derive(Debug, Clone, Copy)]
 struct ImageMeans {
     bytes: f64,
     seconds: f64,
 }
 
-/// Images that were made to know their size and time.
+/// Images that were made to measure their size and time.
 #[derive(Default)]
 struct SampledImages {
     images: Vec<ImageFacts>,
-    /// Sum of bytes, of seconds, and how many, by condition.
+    /// Sum of bytes, sum of seconds and number of images, by condition.
     sums: BTreeMap<Condition, (f64, f64, usize)>,
 }
 
@@ -271,7 +273,7 @@ impl SampledImages {
         for (i, (part, source, frame)) in shown.into_iter().step_by(step).enumerate() {
             let mut work = FrameWork::planned(pipeline.steps, source, frame);
             let conditions = part.conditions();
-            for condition in conditions.filter(|one| i == 0 || one.enhancer.is_none()) {
+            for condition in conditions.filter(|condition| i == 0 || condition.enhancer.is_none()) {
                 let started = Instant::now();
                 let image = pipeline.image(&mut work, condition)?;
                 let facts = image.facts();

@@ -1,4 +1,4 @@
-//! What differs between the things that are asked: [`Experiment`].
+//! The interface between the engine and what is asked: [`Experiment`].
 
 use serde_json::Value;
 
@@ -19,29 +19,29 @@ use crate::types::{Record, RunQuestion};
 /// The record of a trial of an experiment.
 pub(crate) type RecordOf<E> = Record<DetailOf<E>>;
 
-/// What an experiment adds to a record.
+/// The fields that an experiment adds to a record.
 pub(crate) type DetailOf<E> = <<E as Experiment>::Item as Item>::Detail;
 
-/// A request of a later phase that no plan can know yet.
+/// A request of a later phase that cannot be planned yet.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ExpectedRequest {
-    /// The model, by its place among those of the phase.
+    /// Index of the model among those of the phase.
     pub(crate) model: usize,
-    /// How many tokens its words are likely to have.
-    pub(crate) words: f64,
-    /// How many tokens its reply is likely to have.
-    pub(crate) reply: f64,
+    /// Expected tokens of its text.
+    pub(crate) text_tokens: f64,
+    /// Expected tokens of its reply.
+    pub(crate) reply_tokens: f64,
 }
 
-/// Something that is asked: questions with choices, or open ones with marks. Opened and checked; nothing is asked, and nothing written.
+/// Questions with choices, or open questions with marks; opened and checked. Nothing is asked or written before it is carried out.
 pub(crate) trait Experiment: Sync {
-    /// What one trial is about.
+    /// The subject of one trial.
     type Item: Item;
 
-    /// What is asked one after the other: a phase is planned when those before it have ended.
+    /// Names of the phases, in order. A phase is planned when those before it have ended.
     const PHASES: &'static [&'static str];
 
-    /// What a reply is, in words.
+    /// Description of the shortest reply, for the estimate of cost.
     const REPLY: &'static str;
 
     /// The settings that every experiment has.
@@ -52,49 +52,49 @@ pub(crate) trait Experiment: Sync {
         self.settings().ask.server.as_ref()
     }
 
-    /// What the data are called, in the name of a run folder.
+    /// Name of the data, for the name of a run folder.
     fn data(&self) -> &str;
 
-    /// The models of a phase.
+    /// Models that are asked in a phase.
     fn models(&self, phase: usize) -> &[ModelUnderTest];
 
-    /// What is shown.
+    /// All sources of the run.
     fn sources(&self) -> &[Source];
 
-    /// Where the files of the sources' frames come from.
+    /// Reader of the frames' files.
     fn frames(&self) -> &dyn Frames;
 
-    /// What decides the pixels that are sent.
+    /// Settings that decide the pixels that are sent.
     fn recipe(&self) -> &Recipe;
 
-    /// The questions, as the run keeps them.
+    /// Questions, as the run folder stores them.
     fn questions(&self) -> Vec<RunQuestion>;
 
-    /// What all trials share and no column tells apart.
+    /// Settings that all trials share and no column tells apart.
     fn identity(&self) -> Identity;
 
-    /// What each value of a column stands for.
+    /// Definition of each value of a column.
     fn columns(&self) -> Columns;
 
-    /// What decides by itself neither a reply nor an image, and may explain how a run went.
+    /// Settings that decide neither a reply nor an image, but may explain how a run went.
     fn notes(&self) -> Vec<(&'static str, Value)> {
         Vec::new()
     }
 
-    /// Records that are not asked for but given, as answers in files.
-    fn given(&self) -> &[RecordOf<Self>] {
+    /// Records from files of answers, which are not asked.
+    fn imported_records(&self) -> &[RecordOf<Self>] {
         &[]
     }
 
-    /// All trials of a phase, those that have a reply among them.
+    /// All trials of a phase, including those with a reply.
     fn plan(&self, phase: usize, stored: &[RecordOf<Self>]) -> Result<Vec<SourcePlan<Self::Item>>>;
 
-    /// Requests of later phases that no plan can know yet: marks of answers to come.
-    fn to_come(&self, _left: &[SourcePlan<Self::Item>]) -> Vec<ExpectedRequest> {
+    /// Requests of later phases that cannot be planned yet: marks of answers that have not arrived.
+    fn expected_requests(&self, _remaining: &[SourcePlan<Self::Item>]) -> Vec<ExpectedRequest> {
         Vec::new()
     }
 
-    /// Scores what a run holds, and writes its report and its manifest into its folder. It is incomplete if not all that came is scored.
+    /// Scores a run, and writes its report and manifest into its folder. The outcome is incomplete if a reply cannot be scored.
     fn report(
         &self,
         store: &Store<DetailOf<Self>>,

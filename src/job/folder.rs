@@ -1,4 +1,4 @@
-//! Where a run lies: [`find`].
+//! The folder of a run: [`find`].
 
 use std::path::{Path, PathBuf};
 
@@ -14,20 +14,20 @@ use crate::error::{Error, Result};
 use crate::store::{self, AddressChange};
 use crate::types::{Detail as _, Digest};
 
-/// The folder of runs without a name of their own.
+/// Parent of the run folders that the user does not name.
 const RESULTS: &str = "results";
 
 /// The folder of a run: the one named, else the newest of the same identity and plan, else a new one.
 pub(crate) fn find<E: Experiment>(experiment: &E) -> Result<PathBuf> {
     let settings = experiment.settings();
-    match settings.place.of(settings.shard) {
+    match settings.place.for_shard(settings.shard) {
         RunPlace::Named(path) => Ok(path),
         RunPlace::Resume(path) => match store::read_manifest(&path, DetailOf::<E>::SCHEMA)? {
             Some(_) => Ok(path),
             None => Err(Error::usage(
                 "--resume",
                 format_args!(
-                    "{}: no run in this folder; a new run takes --out",
+                    "{}: no run in this folder; --out begins a new run",
                     path.display()
                 ),
             )),
@@ -56,7 +56,7 @@ fn automatic<E: Experiment>(experiment: &E) -> Result<PathBuf> {
     }))
 }
 
-/// The models in the name of a folder.
+/// Names of the first two models, for the name of a folder.
 fn label(ask: &AskSettings) -> String {
     let models = ask.models.iter().chain(&ask.blind_models);
     let names = models.map(|name| match name {
@@ -72,15 +72,15 @@ fn label(ask: &AskSettings) -> String {
     names.join("-").chars().take(60).collect()
 }
 
-/// Whether the run may lie at another address than before: only if it is named as the one to go on with.
-pub(crate) fn moved(place: &RunPlace) -> AddressChange {
+/// Whether the endpoint may have another address than before: only with `--resume`.
+pub(crate) fn address_change(place: &RunPlace) -> AddressChange {
     match place {
         RunPlace::Resume(_) => AddressChange::Allowed,
         RunPlace::Named(_) | RunPlace::Automatic => AddressChange::Refused,
     }
 }
 
-/// Now, in UTC, to the second.
+/// The current time in UTC, to the second.
 pub(crate) fn now() -> String {
     Timestamp::now().strftime("%Y-%m-%dT%H:%M:%SZ").to_string()
 }

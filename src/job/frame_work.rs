@@ -1,4 +1,4 @@
-//! One frame on its way to an image: [`FrameWork`], and the [`ImageSteps`] that it goes through.
+//! The steps from one frame to its images: [`FrameWork`], with their shared settings [`ImageSteps`].
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -15,12 +15,12 @@ use crate::error::{Error, Result};
 use crate::synthesis::{Exposures, NoiseKey};
 use crate::types::{Condition, Degradation, Digest, EnhancerName, FrameId, Rgb};
 
-/// What every image is made with.
+/// Files, settings and timings that all images share.
 #[derive(Clone, Copy)]
 pub(crate) struct ImageSteps<'a> {
     pub(crate) frames: &'a dyn Frames,
     pub(crate) recipe: &'a Recipe,
-    /// What an image may be; `None` if all models are built in.
+    /// Largest image that the endpoint takes; `None` if all models are built in.
     pub(crate) limit: Option<ImageLimit>,
     pub(crate) timings: &'a Timings,
 }
@@ -39,10 +39,10 @@ impl ImageSteps<'_> {
             let payload = Payload::encode(&encoded, self.recipe.format, None)?;
             Ok((payload, encoded))
         })?;
-        Ok((self.within(payload)?, encoded))
+        Ok((self.checked(payload)?, encoded))
     }
 
-    fn within(&self, payload: Payload) -> Result<Arc<Payload>> {
+    fn checked(&self, payload: Payload) -> Result<Arc<Payload>> {
         if let Some(limit) = &self.limit {
             limit.check(payload.facts())?;
         }
@@ -54,20 +54,20 @@ fn longer_side(image: &Rgb) -> usize {
     image.height().max(image.width())
 }
 
-/// A frame in one condition, as far as it comes without an enhancer.
+/// A frame in one condition, before enhancement.
 pub(crate) enum StagedFrame {
-    /// As it is sent.
+    /// The image as it is sent.
     Ready(Arc<Payload>),
-    /// Still to be enhanced, and by what.
+    /// The pixels to enhance, and the enhancer.
     ToEnhance(Rgb, EnhancerName),
 }
 
-/// Cached steps of one frame: each is computed when it is first needed, and once.
+/// Cached steps of one frame. Each is computed once, when it is first needed.
 pub(crate) struct FrameWork<'a> {
     pub(crate) steps: ImageSteps<'a>,
     frame: FrameId,
     key: NoiseKey,
-    /// The digest of the file that the plan was made with.
+    /// Digest of the file when the plan was made; `None` if any file is accepted.
     planned: Option<Digest>,
     picture: Option<Picture>,
     clean: Option<Rgb>,
@@ -76,13 +76,13 @@ pub(crate) struct FrameWork<'a> {
 }
 
 impl<'a> FrameWork<'a> {
-    /// A frame of a planned source. Its file is read when it is needed, and must still be the planned one.
+    /// Work on a frame of a planned source. Its file is read when it is needed, and must still have the same digest.
     pub(crate) fn planned(steps: ImageSteps<'a>, source: &Source, frame: &SourceFrame) -> Self {
         let key = steps.recipe.noise(source, &frame.id);
         Self::new(steps, frame.id.clone(), key, Some(frame.digest))
     }
 
-    /// A frame alone, whatever its file is.
+    /// Work on a frame alone, without a check of its digest.
     pub(crate) fn of(steps: ImageSteps<'a>, frame: FrameId) -> Self {
         let key = NoiseKey::new(steps.recipe.seed, &frame);
         Self::new(steps, frame, key, None)
@@ -101,9 +101,9 @@ impl<'a> FrameWork<'a> {
         }
     }
 
-    /// The frame in a condition: as it is sent, or what the enhancer takes.
+    /// The frame in a condition: as it is sent, or as the enhancer takes it.
     pub(crate) fn stage(&mut self, condition: &Condition) -> Result<StagedFrame> {
-        if let Some(payload) = self.as_it_is(condition)? {
+        if let Some(payload) = self.unchanged_file(condition)? {
             return Ok(StagedFrame::Ready(payload));
         }
         let steps = self.steps;
@@ -114,8 +114,8 @@ impl<'a> FrameWork<'a> {
         }
     }
 
-    /// The file itself, if it is the very image that would be encoded.
-    pub(crate) fn as_it_is(&mut self, condition: &Condition) -> Result<Option<Arc<Payload>>> {
+    /// The file itself, if it is a plain PNG that can be sent as it is; else `None`.
+    pub(crate) fn unchanged_file(&mut self, condition: &Condition) -> Result<Option<Arc<Payload>>> {
         let Recipe {
             format, scaling, ..
         } = *self.steps.recipe;
@@ -132,11 +132,11 @@ impl<'a> FrameWork<'a> {
         };
         let payload = Payload::of_plain_png(bytes, side);
         payload
-            .map(|payload| self.steps.within(payload))
+            .map(|payload| self.steps.checked(payload))
             .transpose()
     }
 
-    /// The frame's file; an error if it is not the one that the plan was made with.
+    /// The frame's file; an error if its digest is not that of the plan.
     pub(crate) fn picture(&mut self) -> Result<&Picture> {
         let (steps, frame, planned) = (self.steps, &self.frame, self.planned);
         once(&mut self.picture, || {
@@ -150,7 +150,7 @@ impl<'a> FrameWork<'a> {
         })
     }
 
-    /// The frame before its light is reduced: in its own size, or scaled before that.
+    /// The clean frame: in its own size, or scaled if its light is reduced after scaling.
     pub(crate) fn clean(&mut self) -> Result<&Rgb> {
         if self.clean.is_none() {
             let ImageSteps {
@@ -158,7 +158,7 @@ impl<'a> FrameWork<'a> {
             } = self.steps;
             let picture = self.picture()?;
             let clean = timings.time(TimedStep::Decode, || picture.decode())?;
-            self.clean = Some(match (recipe.scaled, recipe.scaling) {
+            self.clean = Some(match (recipe.degraded_at, recipe.scaling) {
                 (DegradedAt::Resized, Scaling::LongerSide(side)) if longer_side(&clean) != side => {
                     bilinear(&clean, side)?
                 }
@@ -176,7 +176,7 @@ impl<'a> FrameWork<'a> {
         self.clean.is_some()
     }
 
-    /// The frame in one degradation; the last one is kept for the enhancers that follow.
+    /// The frame in one degradation. The last one is cached for the enhancers that follow.
     pub(crate) fn degraded(&mut self, how: Option<&Degradation>) -> Result<&Rgb> {
         self.clean()?;
         let Self {
@@ -193,24 +193,27 @@ impl<'a> FrameWork<'a> {
         };
         if degraded
             .as_ref()
-            .is_some_and(|(made, _)| made.as_ref() != how)
+            .is_some_and(|(cached, _)| cached.as_ref() != how)
         {
             *degraded = None;
         }
         let (_, image) = once(degraded, || {
             let reading = steps.recipe.readings.of(how)?;
             let degrade = || exposures.degrade(clean, how, key, reading);
-            Ok((how.cloned(), steps.timings.time(TimedStep::Darken, degrade)))
+            Ok((
+                how.cloned(),
+                steps.timings.time(TimedStep::Degrade, degrade),
+            ))
         })?;
         Ok(image)
     }
 }
 
-/// What is in a slot, made first if it is empty.
-fn once<T>(slot: &mut Option<T>, make: impl FnOnce() -> Result<T>) -> Result<&T> {
+/// The value in a slot; computed first if the slot is empty.
+fn once<T>(slot: &mut Option<T>, compute: impl FnOnce() -> Result<T>) -> Result<&T> {
     let value = match slot.take() {
         Some(value) => value,
-        None => make()?,
+        None => compute()?,
     };
     Ok(slot.insert(value))
 }

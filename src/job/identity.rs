@@ -1,4 +1,4 @@
-//! What a run is: what all its trials share ([`Identity`]), and what each value of a column stands for ([`Columns`]).
+//! The settings that define a run: those that all trials share ([`Identity`]), and those behind each value of a column ([`Columns`]).
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,13 +13,13 @@ use crate::synthesis::{Synthesis, version};
 use crate::types::degradation::Kind;
 use crate::types::{Degradation, Digest, ReadingName};
 
-/// What all trials of a run share and no column tells apart, by flag.
+/// Settings that all trials of a run share and no column tells apart, by flag.
 pub(crate) type Identity = BTreeMap<String, Value>;
 
-/// What each value of a column of the tables stands for: by column, by value.
+/// Definition of each value in a column of the tables, by column and value.
 pub(crate) type Columns = BTreeMap<String, BTreeMap<String, Value>>;
 
-/// What all trials share whose images are made by this recipe.
+/// Settings of this recipe that all trials share.
 pub(crate) fn images(recipe: &Recipe) -> impl Iterator<Item = (String, Value)> {
     let scaling = match recipe.scaling {
         Scaling::Never => None,
@@ -36,14 +36,14 @@ pub(crate) fn images(recipe: &Recipe) -> impl Iterator<Item = (String, Value)> {
     fields.map(|(field, value)| (field.to_owned(), value))
 }
 
-/// What the models, the enhancers and the noise of a run stand for.
+/// Definitions of the models, enhancers and light readings of a run.
 pub(crate) fn columns<'a>(
     models: impl IntoIterator<Item = &'a ModelUnderTest>,
     recipe: &Recipe,
     settings: &JobSettings,
 ) -> Columns {
     let models = models.into_iter();
-    let models = models.map(|one| (one.model.name().to_owned(), model(one)));
+    let models = models.map(|entry| (entry.model.name().to_owned(), model(entry)));
     let enhancers = recipe.enhancers.iter();
     let enhancers = enhancers.map(|(name, digest)| {
         let content = enhancer(digest, &settings.loading.size);
@@ -69,7 +69,7 @@ pub(crate) fn columns<'a>(
         .collect()
 }
 
-/// What decides the replies of a model besides the question and the images, by flag, and where it is asked.
+/// Settings that decide the replies of a model besides question and images, by flag; with the address of its endpoint.
 fn model(model: &ModelUnderTest) -> Value {
     let mut content = model.model.content();
     if let (Some(address), Some(fields)) = (&model.address, content.as_object_mut()) {
@@ -88,8 +88,8 @@ fn flag(parameter: &str) -> String {
     }
 }
 
-/// What decides the pixels that an enhancer makes. Tiles of its own choice give what the whole image does, or all but one sample in
-/// a thousand of it.
+/// Settings that decide the pixels of an enhancer. Automatic tiles are not among them: at most one sample in a thousand differs from
+/// those of the whole image.
 fn enhancer(digest: &Digest, size: &SizeArgs) -> Value {
     let tile = (size.tile != Tiling::Auto).then(|| size.tile.to_string());
     json!({
@@ -99,7 +99,7 @@ fn enhancer(digest: &Digest, size: &SizeArgs) -> Value {
     })
 }
 
-/// What a light reading is, by flag.
+/// Settings of a light reading, by flag.
 fn reading(synthesis: &Synthesis) -> Value {
     json!({
         "--amplify": synthesis.amplify,
@@ -110,7 +110,7 @@ fn reading(synthesis: &Synthesis) -> Value {
     })
 }
 
-/// What does not decide a reply, but may explain how a run went.
+/// Settings that do not decide a reply, but may explain how a run went.
 pub(crate) fn settings(job: &JobSettings) -> BTreeMap<String, Value> {
     let mut settings = vec![
         ("--concurrency", json!(job.concurrency.to_string())),
@@ -133,7 +133,7 @@ pub(crate) fn settings(job: &JobSettings) -> BTreeMap<String, Value> {
         .collect()
 }
 
-/// Where the run was made.
+/// Operating system and processor of this machine.
 pub(crate) fn platform() -> BTreeMap<String, String> {
     let facts = [
         ("system", std::env::consts::OS),

@@ -1,7 +1,7 @@
-//! Images as they are sent: [`ImagePipeline`], frame → degrade → enhance → scale → encode, for everything that is asked or written.
+//! The pipeline from a frame to images: degrade → enhance → scale → encode ([`ImagePipeline`]), for everything asked or written.
 //!
-//! A source of one frame is handed out condition by condition, a walk as a whole before the next is begun. The channel is bounded, so
-//! that memory holds the images in flight, one or two groups more, and the frame that each worker is at.
+//! The images of a frame are made condition by condition, those of a walk all at once. The channel is bounded. So memory holds only the
+//! images in flight, one or two more groups, and the frame of each worker.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -22,39 +22,39 @@ use crate::enhance::Enhancer;
 use crate::error::{Error, Result};
 use crate::types::{Condition, EnhancerName, FrameId, ImageFacts, Rgb, Thumbnail};
 
-/// Images from this size on, in bytes, are more than some servers and proxies take.
-const LARGE: usize = 5_000_000;
+/// Size in bytes above which some servers and proxies refuse an image.
+const LARGE_IMAGE: usize = 5_000_000;
 
-/// The steps from a frame to an image, with the enhancement models that take part in them.
+/// The steps from a frame to an image, with the enhancement models that they need.
 pub(crate) struct ImagePipeline<'a> {
     pub(crate) steps: ImageSteps<'a>,
     pub(crate) enhancers: Vec<Enhancer>,
 }
 
-/// A source being worked on.
+/// A source in progress.
 enum SourceWork<'a> {
     /// One frame, whose images are made when they are needed.
     Frame(Box<FrameWork<'a>>),
-    /// A walk, whose images are all there, by condition.
+    /// A walk, whose images are all made, by condition.
     Walk(BTreeMap<Condition, Vec<Arc<Payload>>>),
-    /// It cannot be shown.
-    Unseen(String),
+    /// A source whose images cannot be made, and the reason.
+    Failed(String),
 }
 
 impl<'a> ImagePipeline<'a> {
-    /// Makes what would stop a run halfway before anything is paid for: the first image of each enhancer and, if images leave the
-    /// machine, those of the largest frame without an enhancer. A warning says if these are large and nobody knows whether the
-    /// endpoint takes them.
+    /// Makes a few images before anything is paid for, to find errors that would stop a run later. These are the first image of each
+    /// enhancer and, if an endpoint is asked, those of the largest frame without an enhancer. Warns if these are large and the limit
+    /// of the endpoint is unknown.
     pub(crate) fn check<I>(&mut self, sources: &[Source], plan: &[SourcePlan<I>]) -> Result<()> {
-        self.rehearse(sources, plan)?;
+        self.try_enhancers(sources, plan)?;
         if let Some(limit) = self.steps.limit {
             warn_of_large(self.largest(sources, plan)?.as_ref(), limit);
         }
         Ok(())
     }
 
-    /// Makes the first image of each enhancer, so that one that does not work is found before anything is asked.
-    fn rehearse<I>(&mut self, sources: &[Source], plan: &[SourcePlan<I>]) -> Result<()> {
+    /// Makes the first image of each enhancer, so that a broken one is found before anything is asked.
+    fn try_enhancers<I>(&mut self, sources: &[Source], plan: &[SourcePlan<I>]) -> Result<()> {
         let mut tried = BTreeSet::new();
         for part in plan {
             let source = &sources[part.source];
@@ -73,8 +73,8 @@ impl<'a> ImagePipeline<'a> {
         Ok(())
     }
 
-    /// Makes the images of the frame with the most pixels in every condition without an enhancer, so that one that is too large
-    /// for the endpoint is found before anything is paid for; the largest of them.
+    /// The largest image of the frame with the most pixels, in the conditions without an enhancer. An image that is too large for
+    /// the endpoint is found before anything is paid for.
     pub(crate) fn largest<I>(
         &mut self,
         sources: &[Source],
@@ -90,7 +90,10 @@ impl<'a> ImagePipeline<'a> {
         };
         let mut work = FrameWork::planned(self.steps, source, frame);
         let mut largest: Option<ImageFacts> = None;
-        for condition in part.conditions().filter(|one| one.enhancer.is_none()) {
+        for condition in part
+            .conditions()
+            .filter(|condition| condition.enhancer.is_none())
+        {
             let image = self
                 .image(&mut work, condition)
                 .map_err(|e| e.at(format!("frame {} at {condition}", frame.id)))?;
@@ -105,57 +108,57 @@ impl<'a> ImagePipeline<'a> {
         Ok(largest)
     }
 
-    /// Makes the images of all sources until they are done or nobody waits for them any more.
+    /// Makes the images of all sources, until they are done or the channel is closed.
     ///
-    /// Each worker has one thread and takes frame after frame. If there is an enhancer, which has threads of its own and takes one
-    /// image at a time, or a walk, or if there are few frames, all workers share one source.
+    /// Normally each worker has one thread and works on one frame at a time. All workers share one source in three cases: with
+    /// enhancers, which have their own threads and take one image at a time; with walks; and with few frames.
     pub(crate) fn develop<I: Item>(
         mut self,
         sources: &[Source],
         plan: Vec<SourcePlan<I>>,
-        wanted: &MissingThumbnails,
+        missing: &MissingThumbnails,
         workers: &Workers,
-        out: &Sender<PreparedGroup<I>>,
+        groups: &Sender<PreparedGroup<I>>,
     ) {
-        let alone = self.enhancers.is_empty()
+        let one_source_each = self.enhancers.is_empty()
             && plan.len() >= 2 * workers.each.len()
             && plan
                 .iter()
                 .all(|part| sources[part.source].frames.len() < 2);
-        if !alone {
+        if !one_source_each {
             return workers
                 .all
-                .install(|| self.hand_out(sources, plan.into_iter(), wanted, out));
+                .install(|| self.send_groups(sources, plan.into_iter(), missing, groups));
         }
         let steps = self.steps;
         let plan = Mutex::new(plan.into_iter());
         let next = || plan.lock().unwrap_or_else(PoisonError::into_inner).next();
         std::thread::scope(|scope| {
             for worker in &workers.each {
-                let mut own = ImagePipeline {
+                let mut pipeline = ImagePipeline {
                     steps,
                     enhancers: Vec::new(),
                 };
                 scope.spawn(move || {
                     worker.install(|| {
-                        own.hand_out(sources, std::iter::from_fn(next), wanted, out);
+                        pipeline.send_groups(sources, std::iter::from_fn(next), missing, groups);
                     });
                 });
             }
         });
     }
 
-    fn hand_out<I: Item>(
+    fn send_groups<I: Item>(
         &mut self,
         sources: &[Source],
         plan: impl Iterator<Item = SourcePlan<I>>,
-        wanted: &MissingThumbnails,
-        out: &Sender<PreparedGroup<I>>,
+        missing: &MissingThumbnails,
+        groups: &Sender<PreparedGroup<I>>,
     ) {
         let timings = self.steps.timings;
-        // The error is that nobody waits for a group any more.
-        let _ = self.one_by_one(sources, plan, wanted, |group| {
-            let send = || out.blocking_send(group).is_ok();
+        // The error means that the channel is closed.
+        let _ = self.for_each_group(sources, plan, missing, |group| {
+            let send = || groups.blocking_send(group).is_ok();
             timings
                 .time(TimedStep::Waiting, send)
                 .then_some(())
@@ -163,15 +166,15 @@ impl<'a> ImagePipeline<'a> {
         });
     }
 
-    /// Makes the groups of one source after the other, and gives each to `take`.
+    /// Makes the groups of one source after another, and calls `take` with each.
     ///
     /// # Errors
-    /// The first of `take`. An image that cannot be made is noted in its group.
-    pub(crate) fn one_by_one<I: Item, X>(
+    /// The first error of `take`. If an image cannot be made, its group contains the problem.
+    pub(crate) fn for_each_group<I: Item, X>(
         &mut self,
         sources: &[Source],
         plan: impl Iterator<Item = SourcePlan<I>>,
-        wanted: &MissingThumbnails,
+        missing: &MissingThumbnails,
         mut take: impl FnMut(PreparedGroup<I>) -> Result<(), X>,
     ) -> Result<(), X> {
         for part in plan {
@@ -179,8 +182,8 @@ impl<'a> ImagePipeline<'a> {
             let conditions: Vec<&Condition> = part.conditions().collect();
             let mut work = self.begin(source, &conditions);
             for TrialGroup { condition, trials } in part.groups {
-                let made = self.group(&mut work, condition.as_ref(), source, wanted);
-                let (images, thumbnail, problem) = match made {
+                let result = self.group(&mut work, condition.as_ref(), source, missing);
+                let (images, thumbnail, problem) = match result {
                     Ok((images, thumbnail)) => (images, thumbnail, None),
                     Err(problem) => (Vec::new(), None, Some(problem.to_string())),
                 };
@@ -207,69 +210,71 @@ impl<'a> ImagePipeline<'a> {
                     let conditions = conditions.iter().map(|condition| (*condition).clone());
                     SourceWork::Walk(conditions.zip(images).collect())
                 }
-                Err(problem) => SourceWork::Unseen(problem.to_string()),
+                Err(problem) => SourceWork::Failed(problem.to_string()),
             },
         }
     }
 
-    /// The images of a group, in the order shown, and a small copy of the one in the middle if it is wanted; none if nothing is shown.
+    /// The images of a group in the order shown, with a thumbnail of the middle one if it is missing; none if nothing is shown.
     fn group(
         &mut self,
         work: &mut SourceWork<'_>,
         condition: Option<&Condition>,
         source: &Source,
-        wanted: &MissingThumbnails,
+        missing: &MissingThumbnails,
     ) -> Result<(Vec<Arc<Payload>>, Option<Thumbnail>)> {
         let Some(condition) = condition else {
             return Ok((Vec::new(), None));
         };
         let name = &source.name;
-        let wanted = wanted.lacks(name, condition);
+        let is_missing = missing.lacks(name, condition);
         match work {
             SourceWork::Frame(work) => {
-                let (image, copy) = self.image_and_copy(work, condition, wanted.then_some(name))?;
-                Ok((vec![image], copy))
+                let name = is_missing.then_some(name);
+                let (image, thumbnail) = self.image_and_thumbnail(work, condition, name)?;
+                Ok((vec![image], thumbnail))
             }
             SourceWork::Walk(images) => {
                 let images = images.remove(condition).unwrap_or_default();
-                let middle = images.get(images.len() / 2).filter(|_| wanted);
-                let copy = middle.and_then(|middle| small_copy(name, condition, middle, None));
-                Ok((images, copy))
+                let middle = images.get(images.len() / 2).filter(|_| is_missing);
+                let thumbnail =
+                    middle.and_then(|middle| try_thumbnail(name, condition, middle, None));
+                Ok((images, thumbnail))
             }
-            SourceWork::Unseen(problem) => Err(Error::data(condition, problem)),
+            SourceWork::Failed(problem) => Err(Error::data(condition, problem)),
         }
     }
 
-    /// A frame in a condition, as it is sent, and a small copy of it under this name.
-    fn image_and_copy(
+    /// A frame in a condition as it is sent, and its thumbnail if a name for it is given.
+    fn image_and_thumbnail(
         &mut self,
         work: &mut FrameWork<'_>,
         condition: &Condition,
         name: Option<&FrameId>,
     ) -> Result<(Arc<Payload>, Option<Thumbnail>)> {
         let steps = work.steps;
-        let copy = |image: &Payload, encoded: &Rgb| {
-            let copy = || small_copy(name?, condition, image, Some(encoded));
-            steps.timings.time(TimedStep::Encode, copy)
+        let thumbnail = |image: &Payload, encoded: &Rgb| {
+            let make = || try_thumbnail(name?, condition, image, Some(encoded));
+            steps.timings.time(TimedStep::Encode, make)
         };
-        if let Some(image) = work.as_it_is(condition)? {
-            // The file is decoded for its copy alone.
-            let copy = match name {
-                Some(_) => copy(&image, work.clean()?),
+        if let Some(image) = work.unchanged_file(condition)? {
+            // The file is decoded only for its thumbnail.
+            let thumbnail = match name {
+                Some(_) => thumbnail(&image, work.clean()?),
                 None => None,
             };
-            return Ok((image, copy));
+            return Ok((image, thumbnail));
         }
         let pixels = self.pixels(work, condition)?;
         let (image, encoded) = steps.payload(&pixels)?;
-        let copy = copy(&image, &encoded);
-        Ok((image, copy))
+        let thumbnail = thumbnail(&image, &encoded);
+        Ok((image, thumbnail))
     }
 
     /// The images of a source in each of these conditions, in the order shown.
     ///
     /// # Errors
-    /// If it cannot be shown, or one of its images cannot be made.
+    /// If the source cannot be shown, or one of its images cannot be made.
     pub(crate) fn images(
         &mut self,
         source: &Source,
@@ -278,9 +283,9 @@ impl<'a> ImagePipeline<'a> {
         if let Some(problem) = &source.problem {
             return Err(Error::data(&source.name, problem));
         }
-        let mut made = vec![Vec::with_capacity(source.frames.len()); conditions.len()];
+        let mut images = vec![Vec::with_capacity(source.frames.len()); conditions.len()];
         let steps = self.steps;
-        // As many at a time as there are threads: each holds a frame in its own size.
+        // One frame per thread at a time, because each holds a frame in its full size.
         for frames in source.frames.chunks(rayon::current_num_threads()) {
             let staged = frames.par_iter().map(|frame| {
                 let mut work = FrameWork::planned(steps, source, frame);
@@ -288,16 +293,16 @@ impl<'a> ImagePipeline<'a> {
                 staged.collect::<Result<Vec<StagedFrame>>>()
             });
             for staged in staged.collect::<Result<Vec<_>>>()? {
-                for (staged, made) in staged.into_iter().zip(&mut made) {
-                    made.push(self.finish(staged)?);
+                for (staged, images) in staged.into_iter().zip(&mut images) {
+                    images.push(self.finish(staged)?);
                 }
             }
         }
-        let shown = |images: Vec<Arc<Payload>>| {
+        let in_order = |images: Vec<Arc<Payload>>| {
             let order = source.order.iter();
             order.map(|place| Arc::clone(&images[*place])).collect()
         };
-        Ok(made.into_iter().map(shown).collect())
+        Ok(images.into_iter().map(in_order).collect())
     }
 
     /// A frame in a condition, as it is sent.
@@ -306,7 +311,7 @@ impl<'a> ImagePipeline<'a> {
         work: &mut FrameWork<'_>,
         condition: &Condition,
     ) -> Result<Arc<Payload>> {
-        let (image, _) = self.image_and_copy(work, condition, None)?;
+        let (image, _) = self.image_and_thumbnail(work, condition, None)?;
         Ok(image)
     }
 
@@ -343,28 +348,29 @@ impl<'a> ImagePipeline<'a> {
     }
 }
 
-/// A small copy of an image. One that cannot be made is said and left out: a picture for the report is worth no failed answer.
-fn small_copy(
+/// The thumbnail of an image, or a warning and `None`: an answer must not fail because of a picture for the report.
+fn try_thumbnail(
     name: &FrameId,
     condition: &Condition,
     image: &Payload,
     encoded: Option<&Rgb>,
 ) -> Option<Thumbnail> {
-    let copy = thumbnail(name, condition, image, encoded);
-    copy.inspect_err(|problem| {
-        tracing::warn!("no small copy of {name} at {condition} is kept: {problem}");
-    })
-    .ok()
+    let thumbnail = thumbnail(name, condition, image, encoded);
+    thumbnail
+        .inspect_err(|problem| {
+            tracing::warn!("the report has no thumbnail of {name} at {condition}: {problem}");
+        })
+        .ok()
 }
 
-/// Says so if images are large and nobody knows whether the endpoint takes them.
+/// Warns if images are large and the limit of the endpoint is unknown.
 fn warn_of_large(largest: Option<&ImageFacts>, limit: ImageLimit) {
     if let Some(image) = largest
-        && image.bytes > LARGE
+        && image.bytes > LARGE_IMAGE
         && limit == ImageLimit::UNKNOWN
     {
         tracing::warn!(
-            "images are up to {:.1} MB, {:.1} MB as sent; where the server answers 413, --max-side or --image jpeg:95 makes them smaller",
+            "images are up to {:.1} MB, {:.1} MB as sent; if the server answers 413, make them smaller with --max-side or --image jpeg:95",
             image.bytes as f64 / 1e6,
             image.bytes as f64 / 0.75e6
         );

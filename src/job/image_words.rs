@@ -1,4 +1,4 @@
-//! The flags that decide the images of a run, as they were said: a manifest keeps them, and they are read again (`ImageFlags`).
+//! The flags that decide the images of a run, as typed. A manifest stores them, and they are parsed again from there (`ImageFlags`).
 
 use std::collections::BTreeMap;
 use std::num::NonZeroU32;
@@ -14,6 +14,7 @@ use crate::dataset::{DataArgs, PixelLimit};
 use crate::enhance::SizeArgs;
 use crate::error::{Error, Result};
 use crate::synthesis::SensorArgs;
+use crate::types::Decides;
 
 /// Flags by their long names: a text, a list of texts, or `true` for a switch.
 pub(crate) type ImageWords = BTreeMap<String, Value>;
@@ -28,20 +29,20 @@ pub(crate) struct ImageFlags {
     pub(crate) limit: PixelLimit,
     #[command(flatten)]
     pub(crate) sensor: SensorArgs,
-    #[arg(long)]
+    #[arg(long, add = Decides::Trials)]
     pub(crate) llie: Vec<PathBuf>,
     #[command(flatten)]
     pub(crate) size: SizeArgs,
     #[command(flatten)]
     pub(crate) images: ImageArgs,
-    #[arg(long)]
+    #[arg(long, add = Decides::Pixels)]
     pub(crate) max_side: Option<NonZeroU32>,
     #[command(flatten)]
     pub(crate) walk: Option<Walk>,
 }
 
 impl ImageFlags {
-    /// Reads the flags of a manifest.
+    /// The flags that a manifest stores.
     pub(crate) fn read(words: &ImageWords) -> Result<Self, String> {
         let text = |value: &Value| {
             let text = value.as_str();
@@ -56,15 +57,16 @@ impl ImageFlags {
             value => vec![format!("--{flag}={}", text(value))],
         });
         Self::try_parse_from(flags)
-            .map_err(|e| format!("the flags of its images mean nothing to this version: {e}"))
+            .map_err(|e| format!("this version cannot read the image flags in its manifest: {e}"))
     }
 }
 
-/// What was said of images in a call; of flags that take several values also the default, since a later call may add to them.
+/// The image flags that were typed in a call. A flag that takes several values is included with its default, since a later call may
+/// add to it.
 ///
 /// # Errors
-/// If a value is no text that a manifest can hold.
-pub(crate) fn said(matches: &ArgMatches) -> Result<ImageWords> {
+/// If a value is not valid Unicode, so that a manifest cannot store it.
+pub(crate) fn typed_flags(matches: &ArgMatches) -> Result<ImageWords> {
     let flags = ImageFlags::command();
     let mut words = ImageWords::new();
     for argument in flags.get_arguments() {
@@ -81,7 +83,7 @@ pub(crate) fn said(matches: &ArgMatches) -> Result<ImageWords> {
         let texts = matches.get_raw(id).into_iter().flatten();
         let texts: Option<Vec<Value>> = texts.map(|text| Some(text.to_str()?.into())).collect();
         let mut texts = texts.ok_or_else(|| {
-            let problem = "cannot be kept in the manifest: it is no Unicode";
+            let problem = "cannot be stored in the manifest: the value is not valid Unicode";
             Error::usage(format!("--{flag}"), problem)
         })?;
         let value = match texts.pop() {

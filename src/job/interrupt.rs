@@ -1,8 +1,8 @@
-//! Ctrl-C, and the polite kill of a batch system.
+//! Interrupts: Ctrl-C, and SIGTERM, which batch systems send before they kill a process.
 
 use crate::error::{Error, Result};
 
-/// Listens for interrupts; while it lives, they no longer end the process by themselves.
+/// A listener for interrupts. While it exists, they do not end the process.
 #[derive(Debug)]
 pub(crate) struct Interrupt {
     #[cfg(unix)]
@@ -14,9 +14,9 @@ impl Interrupt {
         #[cfg(unix)]
         {
             use tokio::signal::unix::{SignalKind, signal};
-            let unheard = |e| Error::file("SIGTERM", "listen for", e);
+            let cannot_listen = |e| Error::file("SIGTERM", "listen for", e);
             Ok(Self {
-                terminate: signal(SignalKind::terminate()).map_err(unheard)?,
+                terminate: signal(SignalKind::terminate()).map_err(cannot_listen)?,
             })
         }
         #[cfg(not(unix))]

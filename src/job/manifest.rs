@@ -1,4 +1,4 @@
-//! The manifest of a run under way: [`of`].
+//! The manifest of a run that starts or continues: [`of`].
 
 use std::collections::BTreeMap;
 
@@ -11,17 +11,17 @@ use super::image_words::ImageWords;
 use crate::types::manifest::{Counts, RunManifest, Status};
 use crate::types::{Detail as _, Record};
 
-/// The manifest of a run; one that was kept goes on as it is, with the columns that are new.
-pub(crate) fn of<E: Experiment>(experiment: &E, kept: Option<RunManifest>) -> RunManifest {
+/// The manifest of a run. A stored one passes on its date, columns and image flags; one of a complete run all but its identity.
+pub(crate) fn of<E: Experiment>(experiment: &E, stored: Option<RunManifest>) -> RunManifest {
     let job = experiment.settings();
     let mut settings = identity::settings(job);
     let notes = experiment.notes().into_iter();
     let notes = notes.map(|(field, value)| (field.to_owned(), value));
     let notes: BTreeMap<String, Value> = notes.collect();
     settings.extend(notes.clone());
-    let mut columns = kept
+    let mut columns = stored
         .as_ref()
-        .map_or_else(Default::default, |kept| kept.columns.clone());
+        .map_or_else(Default::default, |stored| stored.columns.clone());
     for (column, values) in experiment.columns() {
         columns.entry(column).or_default().extend(values);
     }
@@ -36,32 +36,32 @@ pub(crate) fn of<E: Experiment>(experiment: &E, kept: Option<RunManifest>) -> Ru
         columns,
         shard: job.shard.is_part().then(|| job.shard.to_string()),
         settings,
-        images: job.pictures.clone(),
+        images: job.image_flags.clone(),
         counts: Counts::default(),
     };
-    let Some(mut kept) = kept else {
+    let Some(mut stored) = stored else {
         return manifest;
     };
-    let images = together(&kept.images, manifest.images);
-    if kept.status != Status::Complete {
+    let images = merged_flags(&stored.images, manifest.images);
+    if stored.status != Status::Complete {
         return RunManifest {
-            created: kept.created,
+            created: stored.created,
             images,
             ..manifest
         };
     }
-    kept.settings.extend(notes);
+    stored.settings.extend(notes);
     RunManifest {
         identity: manifest.identity,
         columns: manifest.columns,
         shard: manifest.shard,
         images,
-        ..kept
+        ..stored
     }
 }
 
-/// Notes that a run goes on, by this command and this version.
-pub(crate) fn go_on<E: Experiment>(experiment: &E, manifest: &mut RunManifest) {
+/// Records that a run continues, with the settings of this command and this version.
+pub(crate) fn mark_started<E: Experiment>(experiment: &E, manifest: &mut RunManifest) {
     manifest.status = Status::Started;
     manifest.updated = now();
     env!("CARGO_PKG_VERSION").clone_into(&mut manifest.version);
@@ -69,15 +69,15 @@ pub(crate) fn go_on<E: Experiment>(experiment: &E, manifest: &mut RunManifest) {
     manifest.settings.extend(settings);
 }
 
-/// The flags that decide the images: those said now, and of lists also what was said before.
-fn together(kept: &ImageWords, now: ImageWords) -> ImageWords {
-    let mut all = kept.clone();
+/// The image flags of this call, with the stored ones. A list has the stored values first.
+fn merged_flags(stored: &ImageWords, now: ImageWords) -> ImageWords {
+    let mut all = stored.clone();
     for (flag, value) in now {
         let value = match (all.remove(&flag), value) {
             (Some(Value::Array(mut known)), Value::Array(more)) => {
                 let more: Vec<Value> = more
                     .into_iter()
-                    .filter(|one| !known.contains(one))
+                    .filter(|value| !known.contains(value))
                     .collect();
                 known.extend(more);
                 Value::Array(known)
@@ -89,7 +89,7 @@ fn together(kept: &ImageWords, now: ImageWords) -> ImageWords {
     all
 }
 
-/// How many of these trials have a reply, and how many failed.
+/// Numbers of these trials, of those with a reply, and of those that failed.
 pub(crate) fn count<D>(trials: usize, records: &[Record<D>]) -> Counts {
     let failed = records.iter().filter(|record| record.failed()).count();
     Counts {

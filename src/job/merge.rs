@@ -1,4 +1,4 @@
-//! `merge`: the shards of a run as the one run that they are together.
+//! `merge`: joins the shards of a run into one run.
 
 use std::collections::{BTreeSet, HashMap};
 use std::fs;
@@ -14,26 +14,28 @@ use super::{Outcome, StdoutFormat, count};
 use crate::error::{Error, Result};
 use crate::store::{self, AddressChange, Store};
 use crate::types::manifest::{RunManifest, Status, differences};
-use crate::types::{ChoiceDetail, Detail, OpenDetail, Record, RunQuestion, Thumbnail, TrialKey};
+use crate::types::{
+    ChoiceDetail, Decides, Detail, OpenDetail, Record, RunQuestion, Thumbnail, TrialKey,
+};
 
 /// The flags of `merge`.
 #[derive(Debug, Args)]
 pub(crate) struct MergeArgs {
     /// The folders of the shards, or a folder that holds them
-    #[arg(value_name = "RUN", required = true)]
+    #[arg(value_name = "RUN", required = true, add = Decides::Nothing)]
     pub runs: Vec<PathBuf>,
     /// The folder of the whole run
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub out: PathBuf,
-    /// Merge what there is where shards are missing, to look at it
-    #[arg(long)]
+    /// Merge the shards that there are, even if others are missing
+    #[arg(long, add = Decides::Nothing)]
     pub partial: bool,
     /// Print the summary as JSON instead of a table
-    #[arg(long)]
+    #[arg(long, add = Decides::Nothing)]
     pub json: bool,
 }
 
-/// A shard as it lies in its folder.
+/// One shard, as read from its folder.
 struct MergePart<D> {
     shard: Shard,
     run: StoredRun<D>,
@@ -43,7 +45,7 @@ impl<D: Detail> MergePart<D> {
     fn open(folder: &Path) -> Result<Self> {
         let run = StoredRun::open(folder)?;
         let Some(shard) = run.manifest.shard.as_deref() else {
-            let problem = "the run is no shard: it was made without --shard".to_owned();
+            let problem = "the run is not a shard: it was made without --shard".to_owned();
             let path = folder.to_owned();
             return Err(Error::Run { path, problem });
         };
@@ -54,10 +56,10 @@ impl<D: Detail> MergePart<D> {
     }
 }
 
-/// Merges shards: the records of all, in the order of the questions, and the report that one run would have left.
+/// Merges shards: the records of all in the order of the questions, with the report that one run would have written.
 ///
 /// # Errors
-/// If a folder holds no shard, two hold one, one is of another run, or some are missing and that is refused.
+/// If a folder holds no shard, two folders hold the same, one is of another run, or shards are missing without `--partial`.
 pub(crate) fn merge(args: &MergeArgs) -> Result<Outcome> {
     let folders = folders(&args.runs)?;
     let kinds: Result<Vec<ExperimentKind>> = folders
@@ -67,7 +69,7 @@ pub(crate) fn merge(args: &MergeArgs) -> Result<Outcome> {
     let kinds = kinds?;
     if let Some(other) = kinds.iter().position(|kind| *kind != kinds[0]) {
         let problem = format!(
-            "questions with choices and open ones cannot be one run: {} is of the other kind",
+            "runs of questions with choices and of open questions cannot be merged: {} is of the other kind",
             folders[0].display()
         );
         let path = folders[other].clone();
@@ -90,39 +92,39 @@ fn merge_all<D: Detail + PartialEq>(
         .collect();
     let mut parts = parts?;
     parts.sort_by_key(|part| part.shard);
-    agree(&parts)?;
-    let missing = missing(&parts, args.partial)?;
-    unfinished(&parts);
-    let mut manifest = whole(&parts)?;
+    check_same_run(&parts)?;
+    let missing = count_missing(&parts, args.partial)?;
+    warn_unfinished(&parts);
+    let mut manifest = merged_manifest(&parts)?;
     let mut questions: Vec<RunQuestion> = parts
         .iter()
         .flat_map(|part| part.run.questions.clone())
         .collect();
     questions.sort_by_key(|question| question.place);
-    let (records, thumbnails) = together(parts, &questions)?;
+    let (records, thumbnails) = merged_records(parts, &questions)?;
     manifest.count(count(manifest.counts.trials, &records));
     if missing > 0 {
         manifest.status = Status::Incomplete;
     }
     let mut store = Store::<D>::open(&args.out, &manifest, AddressChange::Refused)?;
     store.write_questions(&questions)?;
-    let there: HashMap<TrialKey, Record<D>> = store
+    let present: HashMap<TrialKey, Record<D>> = store
         .records()?
         .into_iter()
         .map(|record| (record.key, record))
         .collect();
     for record in &records {
-        if there.get(&record.key) != Some(record) {
+        if present.get(&record.key) != Some(record) {
             store.append(record)?;
         }
     }
     store.sync()?;
-    let drawn: BTreeSet<_> = store::read_thumbnails(&args.out)?
+    let present: BTreeSet<_> = store::read_thumbnails(&args.out)?
         .into_iter()
         .map(|thumbnail| (thumbnail.frame, thumbnail.condition))
         .collect();
     for thumbnail in thumbnails {
-        if !drawn.contains(&(thumbnail.frame.clone(), thumbnail.condition.clone())) {
+        if !present.contains(&(thumbnail.frame.clone(), thumbnail.condition.clone())) {
             store.append_thumbnail(&thumbnail)?;
         }
     }
@@ -130,7 +132,7 @@ fn merge_all<D: Detail + PartialEq>(
     write(&store, run, StdoutFormat::of(args.json))
 }
 
-/// The folders of shards among those named and directly in them.
+/// The run folders among those named, and directly in them.
 fn folders(named: &[PathBuf]) -> Result<Vec<PathBuf>> {
     let mut folders = Vec::new();
     for path in named {
@@ -157,8 +159,8 @@ fn folders(named: &[PathBuf]) -> Result<Vec<PathBuf>> {
     Ok(folders)
 }
 
-/// Makes sure that all are shards of one run, and none is there twice.
-fn agree<D>(parts: &[MergePart<D>]) -> Result<()> {
+/// Checks that all are shards of the same run, and no shard is present twice.
+fn check_same_run<D>(parts: &[MergePart<D>]) -> Result<()> {
     let wrong = |part: &MergePart<D>, problem: String| {
         let path = part.run.folder.clone();
         Err(Error::Run { path, problem })
@@ -167,18 +169,18 @@ fn agree<D>(parts: &[MergePart<D>]) -> Result<()> {
         return Ok(());
     };
     for part in parts {
-        if part.shard.of() != first.shard.of() {
+        if part.shard.count() != first.shard.count() {
             let problem = format!(
-                "shard {} is no part of the same run as {}, which is shard {}",
+                "shard {} cannot be of the same run as {}, which is shard {}",
                 part.shard,
                 first.run.folder.display(),
                 first.shard
             );
             return wrong(part, problem);
         }
-        if let Some((field, own, there)) = difference(&part.run.manifest, &first.run.manifest) {
+        if let Some((field, own, other)) = difference(&part.run.manifest, &first.run.manifest) {
             let problem = format!(
-                "shard {} is of another run than {}: its {field} is {own}, there it is {there}",
+                "shard {} is of another run than {}: its {field} is {own}, that of the other run is {other}",
                 part.shard,
                 first.run.folder.display()
             );
@@ -190,7 +192,7 @@ fn agree<D>(parts: &[MergePart<D>]) -> Result<()> {
         None => Ok(()),
         Some(pair) => {
             let problem = format!(
-                "shard {} is there twice, also in {}; name one of them",
+                "shard {} is present twice, also in {}; name only one of them",
                 pair[1].shard,
                 pair[0].run.folder.display()
             );
@@ -199,19 +201,19 @@ fn agree<D>(parts: &[MergePart<D>]) -> Result<()> {
     }
 }
 
-/// How many shards are missing; an error that names them unless a partial merge is asked for.
-fn missing<D>(parts: &[MergePart<D>], partial: bool) -> Result<usize> {
+/// Number of missing shards; an error that names them if a partial merge is not allowed.
+fn count_missing<D>(parts: &[MergePart<D>], partial: bool) -> Result<usize> {
     let Some(first) = parts.first() else {
         return Ok(0);
     };
-    let there: BTreeSet<Shard> = parts.iter().map(|part| part.shard).collect();
-    let absent = Shard::all(first.shard.of()).filter(|shard| !there.contains(shard));
+    let present: BTreeSet<Shard> = parts.iter().map(|part| part.shard).collect();
+    let absent = Shard::all(first.shard.count()).filter(|shard| !present.contains(shard));
     let absent: Vec<String> = absent.map(|shard| shard.to_string()).collect();
     if absent.is_empty() {
         return Ok(0);
     }
     let verb = if absent.len() == 1 { " is" } else { "s are" };
-    let told = format!(
+    let problem = format!(
         "{} shard{verb} missing: {}",
         absent.len(),
         absent.join(", ")
@@ -219,15 +221,15 @@ fn missing<D>(parts: &[MergePart<D>], partial: bool) -> Result<usize> {
     if !partial {
         return Err(Error::Run {
             path: first.run.folder.clone(),
-            problem: format!("{told}; --partial merges what there is"),
+            problem: format!("{problem}; --partial merges the others"),
         });
     }
-    tracing::warn!("{told}; the summary is of what there is");
+    tracing::warn!("{problem}; the summary covers only the others");
     Ok(absent.len())
 }
 
-/// Says which shards are not done.
-fn unfinished<D>(parts: &[MergePart<D>]) {
+/// Warns about each shard that is not complete.
+fn warn_unfinished<D>(parts: &[MergePart<D>]) {
     for part in parts {
         let (status, counts) = (part.run.manifest.status, part.run.manifest.counts);
         if status != Status::Complete {
@@ -242,19 +244,19 @@ fn unfinished<D>(parts: &[MergePart<D>]) {
     }
 }
 
-/// In what two shards are of different runs: the field, and what the one and the other say.
-fn difference(one: &RunManifest, other: &RunManifest) -> Option<(String, String, String)> {
-    let identity = differences(&one.identity, &other.identity).next();
-    let identity = identity.map(|(field, own, there)| (field.to_owned(), own, there));
+/// The first difference between two manifests that makes them different runs: the field, and its value in each.
+fn difference(first: &RunManifest, other: &RunManifest) -> Option<(String, String, String)> {
+    let identity = differences(&first.identity, &other.identity).next();
+    let identity = identity.map(|(field, own, other)| (field.to_owned(), own, other));
     identity.or_else(|| {
-        let column = one.column_differences(other).into_iter().next()?;
+        let column = first.column_differences(other).into_iter().next()?;
         let field = format!("{} of the {} {}", column.field, column.column, column.value);
         Some((field, column.first, column.second))
     })
 }
 
-/// The manifest of the run that the shards are together.
-fn whole<D>(parts: &[MergePart<D>]) -> Result<RunManifest> {
+/// The manifest of the merged run.
+fn merged_manifest<D>(parts: &[MergePart<D>]) -> Result<RunManifest> {
     let manifests = parts.iter().map(|part| &part.run.manifest);
     let first = manifests.clone().next();
     let mut manifest = first
@@ -267,16 +269,22 @@ fn whole<D>(parts: &[MergePart<D>]) -> Result<RunManifest> {
             all.extend(values.clone());
         }
     }
-    let created = manifests.clone().map(|one| one.created.clone()).min();
-    let updated = manifests.clone().map(|one| one.updated.clone()).max();
+    let created = manifests
+        .clone()
+        .map(|manifest| manifest.created.clone())
+        .min();
+    let updated = manifests
+        .clone()
+        .map(|manifest| manifest.updated.clone())
+        .max();
     manifest.created = created.unwrap_or_default();
     manifest.updated = updated.unwrap_or_default();
-    manifest.counts.trials = manifests.map(|one| one.counts.trials).sum();
+    manifest.counts.trials = manifests.map(|manifest| manifest.counts.trials).sum();
     Ok(manifest)
 }
 
-/// The records of all shards in the order of the questions, and the small copies of images that one run would have kept.
-fn together<D: Detail>(
+/// The records of all shards in the order of the questions, and the thumbnails that one run would have stored.
+fn merged_records<D: Detail>(
     parts: Vec<MergePart<D>>,
     questions: &[RunQuestion],
 ) -> Result<(Vec<Record<D>>, Vec<Thumbnail>)> {
@@ -288,7 +296,7 @@ fn together<D: Detail>(
         for record in run.records {
             if let Some(other) = keys.insert(record.key, run.folder.clone()) {
                 let problem = format!(
-                    "the trial {} is in {} as well: these are not the shards of one run",
+                    "the trial {} is also in {}: these are not shards of the same run",
                     record.key,
                     other.display()
                 );
@@ -299,8 +307,8 @@ fn together<D: Detail>(
             }
             records.push(record);
         }
-        let kept = run.thumbnails.into_iter();
-        thumbnails.extend(kept.filter(|thumbnail| wanted.wants(&thumbnail.frame)));
+        let copies = run.thumbnails.into_iter();
+        thumbnails.extend(copies.filter(|thumbnail| wanted.wants(&thumbnail.frame)));
     }
     Ok((in_order(records, questions), thumbnails))
 }

@@ -1,8 +1,8 @@
 //! The engine of everything that is asked: a `Job` carries out an `Experiment`.
 //!
-//! It opens the run folder, plans phase by phase what is left to ask, has the image pipeline make the images, asks about them, keeps
-//! every reply the moment it arrives, and has the experiment score what is there. What differs between questions with choices and
-//! open ones is in their `Experiment`; money, resuming, batches, shards and images are here, once.
+//! A job opens the run folder. For each phase it plans the remaining trials, makes their images, asks about them, and stores every reply
+//! when it arrives. At the end the experiment scores the run. Differences between questions with choices and open questions are in their
+//! `Experiment`. Cost limits, resuming, batches, shards and images are here, once.
 
 pub(crate) mod batch;
 pub(crate) mod bilinear;

@@ -1,4 +1,4 @@
-//! The models of a run, as flags name them ([`ModelArgs`], [`AskSettings`]), and opened (`ModelUnderTest`).
+//! The models of a run: their flags ([`ModelArgs`]), settings ([`AskSettings`]) and the opened models (`ModelUnderTest`).
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -10,41 +10,41 @@ use strsim::damerau_levenshtein;
 
 use crate::ask::{AccessArgs, Endpoint, Model, Parameters, Remote, Script, Sending, Server, Wire};
 use crate::error::{Error, Result};
-use crate::types::{Condition, View};
+use crate::types::{Condition, Decides, View};
 
-/// Who is asked.
+/// Flags that name the models to ask.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Model")]
 pub(crate) struct ModelArgs {
     /// The model to ask, by its name at the endpoint; repeatable; built in: observer (frames with maps), random, script:FILE;
     /// default: none, one must be named
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", add = Decides::Trials)]
     pub model: Vec<ModelName>,
-    /// Show the models no image: words alone
-    #[arg(long)]
+    /// Show the models no image, only text
+    #[arg(long, add = Decides::Trials)]
     pub blind: bool,
     /// Add a text-only baseline by this model; repeatable; default: none
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", add = Decides::Trials)]
     pub blind_model: Vec<ModelName>,
 }
 
 impl ModelArgs {
-    /// Whether no model is named.
+    /// Whether neither `--model` nor `--blind-model` names a model.
     pub(crate) fn is_empty(&self) -> bool {
         self.model.is_empty() && self.blind_model.is_empty()
     }
 }
 
-/// The name of a model.
+/// A model as flags name it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum ModelName {
-    /// The built-in one that guesses.
+    /// Built-in model that guesses.
     Random,
-    /// The built-in one that looks at what the pixels still hold.
+    /// Built-in model that answers what the rules can still tell from the pixels.
     Observer,
-    /// The built-in one that answers out of a file.
+    /// Built-in model that answers from this file.
     Script(PathBuf),
-    /// One at the endpoint.
+    /// Model of this name at the endpoint.
     Remote(String),
 }
 
@@ -52,11 +52,11 @@ pub(crate) enum ModelName {
 const BUILT_IN_NAMES: [&str; 2] = ["random", "observer"];
 
 impl ModelName {
-    /// Makes sure that a model can answer an open question.
+    /// Checks that the model can answer an open question.
     ///
     /// # Errors
     /// If it can only choose.
-    pub(crate) fn answers_in_words(&self) -> Result<()> {
+    pub(crate) fn require_open_answers(&self) -> Result<()> {
         let name = match self {
             Self::Random => "random",
             Self::Observer => "observer",
@@ -70,7 +70,7 @@ impl ModelName {
 impl FromStr for ModelName {
     type Err = String;
 
-    /// Reads a name; one that is nearly a built-in model's is refused, for it would go to somebody's API.
+    /// Reads a name. One that is similar to a built-in model's is refused, because it would be sent to an endpoint.
     fn from_str(text: &str) -> Result<Self, String> {
         let text = text.trim();
         let near = |name: &&&str| damerau_levenshtein(name, &text.to_lowercase()) <= 2;
@@ -93,23 +93,23 @@ impl FromStr for ModelName {
     }
 }
 
-/// Who is asked, where, and with what key.
+/// The models to ask, their parameters and their endpoint with its key.
 #[derive(Debug)]
 pub(crate) struct AskSettings {
-    /// The models.
+    /// Models that `--model` names.
     pub models: Vec<ModelName>,
-    /// Whether they see the images.
+    /// Whether `models` see the images.
     pub view: View,
-    /// The models of the text-only baseline.
+    /// Models of the text-only baseline.
     pub blind_models: Vec<ModelName>,
     /// The endpoint; `None` if all models are built in.
     pub server: Option<Server>,
-    /// How a model is to speak; its name is set for each.
+    /// Parameters of every request; the name is set for each model.
     pub parameters: Parameters,
 }
 
 impl AskSettings {
-    /// Reads the key, if a model needs one.
+    /// The settings of these flags. The key is read if a model needs one.
     ///
     /// # Errors
     /// [`Error::Usage`] with the flag that cannot be used.
@@ -131,17 +131,17 @@ impl AskSettings {
     }
 }
 
-/// What messages call the place of models that are built in.
+/// Name of the endpoint of built-in models in messages.
 const BUILT_IN: &str = "built-in models";
 
 /// One model and whether it sees the images.
 #[derive(Debug, Clone)]
 pub(crate) struct ModelUnderTest {
     pub(crate) model: Arc<Model>,
-    /// What the model answers by, as [`Model::digest`] writes it: made once, for it enters every key.
+    /// Digest of the settings that decide the model's replies ([`Model::digest`]). Computed once, because it enters every trial key.
     pub(crate) digest: Arc<str>,
     pub(crate) view: View,
-    /// The address of its endpoint; `None` if it is built in.
+    /// Address of its endpoint; `None` if it is built in.
     pub(crate) address: Option<String>,
 }
 
@@ -156,24 +156,24 @@ impl ModelUnderTest {
         })
     }
 
-    /// Where it is asked, for messages.
-    pub(crate) fn place(&self) -> &str {
+    /// Name of its endpoint for messages: the address, or that it is built in.
+    pub(crate) fn endpoint_name(&self) -> &str {
         self.address.as_deref().unwrap_or(BUILT_IN)
     }
 }
 
-/// Opens the models that see and those that do not, none of them twice; nothing is sent. Built-in models that only one experiment
-/// has are made by `built_in`.
+/// The opened models, those that see images and those that do not. A model that is named twice is an error. Nothing is sent.
+/// `built_in` makes the built-in models that only one experiment has.
 pub(crate) fn open_all(
     ask: &AskSettings,
     built_in: impl Fn(&ModelName) -> Result<Model>,
 ) -> Result<Vec<ModelUnderTest>> {
     let server = ask.server.as_ref();
     let endpoint = endpoint(server)?;
-    let seen = ask.models.iter().map(|name| (name, ask.view));
+    let named = ask.models.iter().map(|name| (name, ask.view));
     let blind = ask.blind_models.iter().map(|name| (name, View::Blind));
     let mut models: Vec<ModelUnderTest> = Vec::new();
-    for (name, view) in seen.chain(blind) {
+    for (name, view) in named.chain(blind) {
         let model = match name {
             ModelName::Random | ModelName::Observer => built_in(name)?,
             name => open(name, endpoint.as_ref(), &ask.parameters)?,
@@ -189,7 +189,7 @@ pub(crate) fn open_all(
     Ok(models)
 }
 
-/// The models that are asked in a condition, or without images, each with its place among all.
+/// The models that are asked in a condition, or without images if it is `None`; each with its index among all.
 pub(crate) fn asked_in<'a>(
     models: &'a [ModelUnderTest],
     condition: Option<&Condition>,
@@ -199,13 +199,13 @@ pub(crate) fn asked_in<'a>(
     all.filter(|(_, model)| model.view == view).collect()
 }
 
-/// The endpoint, ready to be talked to.
+/// The opened endpoint; `None` if all models are built in.
 pub(crate) fn endpoint(server: Option<&Server>) -> Result<Option<Arc<Endpoint>>> {
     let open = |server: &Server| Endpoint::open(server.access.clone(), server.sending);
     Ok(server.map(open).transpose()?.map(Arc::new))
 }
 
-/// A model that answers in words.
+/// A model that can answer open questions, opened.
 pub(crate) fn open(
     name: &ModelName,
     endpoint: Option<&Arc<Endpoint>>,
@@ -225,16 +225,16 @@ pub(crate) fn open(
         }
         ModelName::Random | ModelName::Observer => Err(Error::usage(
             "--model",
-            "a model that answers in words expected",
+            "a model that can answer open questions expected",
         )),
     }
 }
 
-/// How requests had to differ from what was tried first, by model; for the manifest.
+/// Changes to requests that the endpoint made necessary, by model; for the manifest.
 pub(crate) fn adapted(models: &[ModelUnderTest]) -> impl Iterator<Item = (String, Value)> {
-    models.iter().filter_map(|one| {
-        let adapted = one.model.adapted();
-        let name = format!("adapted for {}", one.model.name());
+    models.iter().filter_map(|model| {
+        let adapted = model.model.adapted();
+        let name = format!("adapted for {}", model.model.name());
         (!adapted.is_empty()).then(|| (name, json!(adapted)))
     })
 }

@@ -1,4 +1,4 @@
-//! What a run may cost: [`MoneySettings`].
+//! Limits of cost and failures: [`MoneySettings`].
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -8,41 +8,41 @@ use clap::Args;
 use super::shard::Shard;
 use crate::ask::Prices;
 use crate::error::Result;
+use crate::types::Decides;
 use crate::types::flag::positive;
 
-/// When to stop.
+/// Flags of cost and of the limits that end a run.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Sending")]
 pub(crate) struct MoneyArgs {
     /// Stop when this many trials have failed; default: never
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", add = Decides::Nothing)]
     pub max_failures: Option<NonZeroUsize>,
     /// Stop before the run has cost more than this; the same command with more goes on; default: never
-    #[arg(long, value_name = "DOLLARS", value_parser = positive)]
+    #[arg(long, value_name = "DOLLARS", value_parser = positive, add = Decides::Nothing)]
     pub max_cost: Option<f64>,
     /// A TOML file of prices in place of the built-in table; default: the built-in table
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", add = Decides::Nothing)]
     pub prices: Option<PathBuf>,
     /// Send nothing: print requests, tokens, dollars, hours and bytes
-    #[arg(long)]
+    #[arg(long, add = Decides::Nothing)]
     pub dry_run: bool,
 }
 
-/// What a run may cost, and whether it is carried out.
+/// Limits of cost and failures, validated.
 #[derive(Debug)]
 pub(crate) struct MoneySettings {
-    /// What models cost.
     pub prices: Prices,
-    /// The most that this part of a run may cost, in dollars.
-    pub most: Option<f64>,
-    /// This many failed trials end the run.
+    /// Upper limit of the cost of this shard, in US dollars; `None` for no limit.
+    pub max_cost: Option<f64>,
+    /// Number of failed trials that ends the run; `None` for no limit.
     pub max_failures: Option<usize>,
-    /// Whether to say what it would take, and send nothing.
+    /// Print an estimate, and send nothing.
     pub dry_run: bool,
 }
 
 impl MoneySettings {
-    /// Reads the prices.
+    /// The limits of these flags, with the prices read.
     ///
     /// # Errors
     /// If the file of prices cannot be used.
@@ -52,7 +52,7 @@ impl MoneySettings {
                 Some(path) => Prices::load(path)?,
                 None => Prices::built_in()?,
             },
-            most: args.max_cost.map(|most| shard.part_of(most)),
+            max_cost: args.max_cost.map(|whole| shard.share_of_cost(whole)),
             max_failures: args.max_failures.map(NonZeroUsize::get),
             dry_run: args.dry_run,
         })

@@ -1,7 +1,6 @@
-//! The observer as a model: [`open`].
+//! The observer as a built-in model: [`open`].
 
-use std::collections::VecDeque;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::Arc;
 
 use crate::ask::{Call, Local, Random};
 use crate::dataset::{DataPlace, Dataset};
@@ -9,79 +8,54 @@ use crate::error::{Error, Result};
 use crate::questions::colors::Palette;
 use crate::questions::observer::{Observation, ObservedFrame, VERSION, understood};
 use crate::questions::rules::Rules;
+use crate::types::recent::Recent;
 use crate::types::{Digest, FrameId, Labels, Question};
 
-/// The name in records and tables.
+/// Name of the model in records and tables.
 pub(crate) const NAME: &str = "observer";
 
-/// So many frames and sights are kept: questions about one image come together.
-const KEPT: usize = 40;
+/// Number of cached frames and observations. A few are enough, because questions about one image follow each other.
+const CACHE_SIZE: usize = 40;
 
-/// What was made last, each for its name. One who needs what another is making waits for it.
-struct Shelf<K, V>(Mutex<VecDeque<(K, Arc<OnceLock<V>>)>>);
-
-impl<K: PartialEq, V: Clone> Shelf<K, V> {
-    fn new() -> Self {
-        Self(Mutex::new(VecDeque::new()))
-    }
-
-    fn get(&self, name: K, make: impl FnOnce() -> V) -> V {
-        let place = {
-            let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-            let found = kept.iter().find(|(known, _)| *known == name);
-            if let Some((_, place)) = found {
-                Arc::clone(place)
-            } else {
-                let place = Arc::new(OnceLock::new());
-                kept.push_back((name, Arc::clone(&place)));
-                if kept.len() > KEPT {
-                    kept.pop_front();
-                }
-                place
-            }
-        };
-        place.get_or_init(make).clone()
-    }
-}
-
-/// What the observer looks with.
+/// The data set, the rules and the caches of the observer.
 struct Observer {
     dataset: Arc<Dataset>,
     labels: Labels,
     rules: Rules,
     palette: Palette,
-    frames: Shelf<FrameId, Result<Arc<ObservedFrame>, String>>,
-    sights: Shelf<(FrameId, Digest), Result<Arc<Observation>, String>>,
+    frames: Recent<FrameId, Arc<ObservedFrame>>,
+    observations: Recent<(FrameId, Digest), Arc<Observation>>,
 }
 
 impl Observer {
-    fn watched(&self, frame: &FrameId) -> Result<Arc<ObservedFrame>, String> {
-        self.frames.get(frame.clone(), || {
-            let seen = self.dataset.frame(frame).map_err(|e| e.to_string())?;
-            ObservedFrame::new(&seen, &self.labels, &self.rules, &self.palette)
+    fn observed_frame(&self, frame: &FrameId) -> Result<Arc<ObservedFrame>, String> {
+        self.frames.get(frame, || {
+            let maps = self.dataset.frame(frame).map_err(|e| e.to_string())?;
+            ObservedFrame::new(&maps, &self.labels, &self.rules, &self.palette)
                 .map(Arc::new)
                 .map_err(|e| e.to_string())
         })
     }
 
-    fn opinion(&self, question: &Question, call: &Call<'_>) -> Result<Option<usize>, String> {
+    fn answer(&self, question: &Question, call: &Call<'_>) -> Result<Option<usize>, String> {
         let Some(image) = call.message.images.first() else {
             return Ok(None);
         };
         let frame = &question.frame;
-        let sight = self.sights.get((frame.clone(), image.facts().digest), || {
-            let watched = self.watched(frame)?;
+        let key = (frame.clone(), image.facts().digest);
+        let observation = self.observations.get(&key, || {
+            let observed = self.observed_frame(frame)?;
             let pixels = image.decode().map_err(|e| e.to_string())?;
-            Ok(Arc::new(watched.look(&pixels, &self.palette)))
+            Ok::<_, String>(Arc::new(observed.look(&pixels, &self.palette)))
         })?;
-        Ok(sight.answer(question, &self.rules))
+        Ok(observation.answer(question, &self.rules))
     }
 }
 
 /// Opens the observer of a data set.
 ///
 /// # Errors
-/// Where the frames have no maps, or a question is none of the rulebook's.
+/// If the frames have no maps, or a question is not one of the rulebook's.
 pub(crate) fn open(
     dataset: &Arc<Dataset>,
     place: &DataPlace,
@@ -96,27 +70,28 @@ pub(crate) fn open(
         ))
     })?;
     let rules = Rules::built_in()?;
-    if let Some(strange) = questions
+    if let Some(unknown) = questions
         .iter()
         .find(|question| !understood(question, &rules))
     {
         return Err(unusable(format!(
-            "the question {:?} ({:?}) is none of the rulebook's, which are all that it understands",
-            strange.id.0, strange.text
+            "the question {:?} ({:?}) is not one of the rulebook's, and the observer understands no others",
+            unknown.id.0, unknown.text
         )));
     }
     let digest = Digest::of_parts([&VERSION.to_le_bytes()[..], rules.digest().as_bytes()]);
-    let eye = Observer {
+    let observer = Observer {
         dataset: Arc::clone(dataset),
         labels,
         rules,
         palette: Palette::built_in()?,
-        frames: Shelf::new(),
-        sights: Shelf::new(),
+        frames: Recent::new(CACHE_SIZE),
+        observations: Recent::new(CACHE_SIZE),
     };
     if let Some(first) = questions.first() {
-        eye.watched(&first.frame).map_err(unusable)?;
+        observer.observed_frame(&first.frame).map_err(unusable)?;
     }
-    let opinion = Box::new(move |question: &Question, call: &Call<'_>| eye.opinion(question, call));
-    Ok(Local::new(NAME.to_owned(), digest, prior, opinion))
+    let answer =
+        Box::new(move |question: &Question, call: &Call<'_>| observer.answer(question, call));
+    Ok(Local::new(NAME.to_owned(), digest, prior, answer))
 }

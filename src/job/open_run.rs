@@ -1,4 +1,4 @@
-//! A run under way: [`OpenRun`].
+//! A run that is open for writing: [`OpenRun`].
 
 use std::collections::HashSet;
 use std::path::Path;
@@ -30,50 +30,50 @@ use crate::store::{self, Store};
 use crate::types::manifest::{Counts, RunManifest};
 use crate::types::{Record, Thumbnail, TrialKey};
 
-/// A run folder that this process alone writes to.
+/// A run folder that no other process writes to, with all that asking needs.
 pub(crate) struct OpenRun<'a, E: Experiment> {
     pub(super) experiment: &'a E,
     pub(super) progress: &'a Progress,
     pub(super) enhancers: OpenEnhancers<'a>,
     pub(super) store: Store<DetailOf<E>>,
     pub(super) manifest: RunManifest,
-    /// Every trial planned so far.
+    /// Keys of all trials planned so far, in all phases.
     pub(super) keys: HashSet<TrialKey>,
 }
 
-/// What is left of a phase.
+/// The trials of a phase that still have to be asked.
 pub(super) struct Remaining<E: Experiment> {
     pub(super) plan: Plan<E::Item>,
     pub(super) stored: Vec<RecordOf<E>>,
-    /// How many trials wait for a batch.
-    pub(super) out: usize,
+    /// Number of trials that wait for a batch, and are not in `plan`.
+    pub(super) in_batch: usize,
 }
 
 impl<E: Experiment> OpenRun<'_, E> {
-    /// Asks what is left, phase by phase.
+    /// Asks the remaining trials, phase by phase.
     pub(super) fn ask(mut self) -> Result<Outcome> {
         let mut end = EndReason::AllAsked;
         for phase in 0..E::PHASES.len() {
-            let left = self.left(phase)?;
-            self.warn_of_batches(left.out);
-            if left.plan.left() == 0 {
+            let remaining = self.remaining(phase)?;
+            self.warn_of_batches(remaining.in_batch);
+            if remaining.plan.remaining() == 0 {
                 continue;
             }
-            match self.ask_phase(phase, left)? {
+            match self.ask_phase(phase, remaining)? {
                 EndReason::AllAsked => {}
-                // What the other models have answered goes on.
+                // The next phases go on with the answers of the other models.
                 EndReason::ModelStopped(error) => end = EndReason::ModelStopped(error),
-                over => {
-                    end = over;
+                early => {
+                    end = early;
                     break;
                 }
             }
         }
         let settings = self.experiment.settings();
-        if let (EndReason::OverBudget, Some(most)) = (&end, settings.money.most) {
+        if let (EndReason::OverBudget, Some(max_cost)) = (&end, settings.money.max_cost) {
             tracing::warn!(
-                "stopped: one more question could cost more than the {} of --max-cost; the same command with more goes on",
-                money(most)
+                "stopped: one more question could exceed the {} of --max-cost; the same command with a higher limit continues",
+                money(max_cost)
             );
         }
         for phase in 0..E::PHASES.len() {
@@ -83,46 +83,51 @@ impl<E: Experiment> OpenRun<'_, E> {
         self.finish(end)
     }
 
-    /// What of a phase has no reply and waits for none.
-    pub(super) fn left(&mut self, phase: usize) -> Result<Remaining<E>> {
+    /// The trials of a phase that have no reply and wait for no batch.
+    pub(super) fn remaining(&mut self, phase: usize) -> Result<Remaining<E>> {
         let stored = self.store.records()?;
         let mut plan = Plan::new(self.experiment.plan(phase, &stored)?);
         self.keys.extend(&plan.keys);
         let answered = answered(&stored);
-        plan.leave_out(|key| answered.contains(key));
-        let sent = self.store.out_in_batches()?;
-        let out = plan.leave_out(|key| sent.contains(key));
-        Ok(Remaining { plan, stored, out })
+        plan.exclude(|key| answered.contains(key));
+        let sent = self.store.pending_in_batches()?;
+        let in_batch = plan.exclude(|key| sent.contains(key));
+        Ok(Remaining {
+            plan,
+            stored,
+            in_batch,
+        })
     }
 
-    /// Says what a Batch API has been asked and has not answered: asked here, it would be paid for twice.
-    fn warn_of_batches(&self, out: usize) {
-        if out > 0 {
+    /// Warns about trials that wait for a batch. If they were asked here as well, they would be paid for twice.
+    fn warn_of_batches(&self, in_batch: usize) {
+        if in_batch > 0 {
+            let verb = if in_batch == 1 { " is" } else { "s are" };
             tracing::warn!(
-                "{out} trials are out in a batch and are not asked here; take their replies over by batch import, or delete {} to \
-                 have them asked",
+                "{in_batch} trial{verb} waiting for a batch and not asked here; import the replies with batch import, or delete {} to \
+                 ask here",
                 self.store.folder().join(store::BATCH).display()
             );
         }
     }
 
-    fn ask_phase(&mut self, phase: usize, left: Remaining<E>) -> Result<EndReason> {
-        let Remaining { plan, stored, .. } = left;
+    fn ask_phase(&mut self, phase: usize, remaining: Remaining<E>) -> Result<EndReason> {
+        let Remaining { plan, stored, .. } = remaining;
         let experiment = self.experiment;
         let settings = experiment.settings();
         let models = experiment.models(phase);
         let budget = Budget::new(&settings.money, models, &stored)?;
-        let tally = TrialCounts {
+        let counts = TrialCounts {
             trials: plan.keys.len(),
-            answered: plan.keys.len() - plan.left(),
+            answered: plan.keys.len() - plan.remaining(),
         };
-        let shown = !plan.conditions().is_empty();
-        let enhancers = if shown {
+        let shows_images = !plan.conditions().is_empty();
+        let enhancers = if shows_images {
             self.enhancers.take()?
         } else {
             Vec::new()
         };
-        self.begin(tally, &stored)?;
+        self.begin(counts, &stored)?;
         drop(stored);
         let workers = Workers::start(settings.loading.threads.threads)?;
         let timings = Timings::default();
@@ -138,15 +143,15 @@ impl<E: Experiment> OpenRun<'_, E> {
             settings,
             timings: &timings,
         };
-        let wanted = wanted(experiment, self.store.folder())?;
+        let missing = missing_thumbnails(experiment, self.store.folder())?;
         let started = Instant::now();
         let sources = experiment.sources();
-        let end = dispatcher.run(tally, budget, &mut self.store, stoppers, |out| {
-            pipeline.develop(sources, plan.sources, &wanted, &workers, out);
+        let end = dispatcher.run(counts, budget, &mut self.store, stoppers, |groups| {
+            pipeline.develop(sources, plan.sources, &missing, &workers, groups);
         })?;
         if settings.show_timings {
             let threads = workers.each.len();
-            let line = timings.told(started.elapsed(), threads);
+            let line = timings.summary(started.elapsed(), threads);
             let line = match E::PHASES {
                 [_] => line,
                 phases => format!("{}: {line}", phases[phase]),
@@ -156,8 +161,8 @@ impl<E: Experiment> OpenRun<'_, E> {
         Ok(end)
     }
 
-    /// Notes in the manifest how many trials there are, so that a killed run says it.
-    pub(super) fn note_counts(&mut self, stored: &[RecordOf<E>]) -> Result<()> {
+    /// Writes the numbers of trials into the manifest, so that those of a killed run are known.
+    pub(super) fn write_counts(&mut self, stored: &[RecordOf<E>]) -> Result<()> {
         self.manifest.counts = Counts {
             failed: 0,
             ..self.counts(stored)
@@ -165,23 +170,23 @@ impl<E: Experiment> OpenRun<'_, E> {
         self.store.write_manifest(&self.manifest)
     }
 
-    /// Notes how much there is to ask, and says how much of it is there.
-    fn begin(&mut self, tally: TrialCounts, stored: &[RecordOf<E>]) -> Result<()> {
-        let TrialCounts { trials, answered } = tally;
-        manifest::go_on(self.experiment, &mut self.manifest);
+    /// Writes the start of a phase into the manifest, and prints how many of its trials are answered.
+    fn begin(&mut self, counts: TrialCounts, stored: &[RecordOf<E>]) -> Result<()> {
+        let TrialCounts { trials, answered } = counts;
+        manifest::mark_started(self.experiment, &mut self.manifest);
         self.manifest.platform.extend(self.enhancers.version());
-        self.note_counts(stored)?;
+        self.write_counts(stored)?;
         if answered > 0 {
             self.progress.say(&format!(
-                "{}: {answered} of {trials} trials are answered already",
+                "{}: {answered} of {trials} trials already answered",
                 self.store.folder().display()
             ));
         }
         Ok(())
     }
 
-    /// How many trials the run has: those planned, and those that were answered under an earlier command. A trial that failed and is
-    /// planned no more, because its images are others by now, does not count.
+    /// Numbers of trials of the run: those planned, and those answered under an earlier command. A failed trial that is no longer
+    /// planned, because its images have changed, does not count.
     fn counts(&self, stored: &[RecordOf<E>]) -> Counts {
         let (mut keys, mut failed) = (self.keys.clone(), 0);
         for record in stored {
@@ -198,7 +203,7 @@ impl<E: Experiment> OpenRun<'_, E> {
         }
     }
 
-    /// Scores what the run holds, and leaves the report in its folder.
+    /// Scores the run, and writes the report into its folder.
     fn finish(self, end: EndReason) -> Result<Outcome> {
         let mut run = StoredRun::of(self.store.folder(), self.manifest.clone())?;
         let counts = self.counts(&run.records);
@@ -235,21 +240,24 @@ pub(crate) fn pipeline<'a, E: Experiment>(
     }
 }
 
-/// The largest image that the endpoint takes; `None` if all models are built in.
+/// Largest image that the endpoint takes; `None` if all models are built in.
 pub(crate) fn limit(settings: &JobSettings) -> Option<ImageLimit> {
     let server = settings.ask.server.as_ref()?;
     let known = || ImageLimit::of(&server.access.base);
     Some(settings.max_image.map_or_else(known, ImageLimit::stated))
 }
 
-/// The small copies of images that a run has yet to keep.
-pub(super) fn wanted<E: Experiment>(experiment: &E, folder: &Path) -> Result<MissingThumbnails> {
-    let kept: Vec<Thumbnail> = store::read_thumbnails(folder)?;
+/// The thumbnails that a run folder does not have yet.
+pub(super) fn missing_thumbnails<E: Experiment>(
+    experiment: &E,
+    folder: &Path,
+) -> Result<MissingThumbnails> {
+    let present: Vec<Thumbnail> = store::read_thumbnails(folder)?;
     let names = experiment.sources().iter().map(|source| &source.name);
-    Ok(MissingThumbnails::new(names, kept))
+    Ok(MissingThumbnails::new(names, present))
 }
 
-/// The trials that have a reply.
+/// Keys of the trials that have a reply.
 pub(super) fn answered<D>(stored: &[Record<D>]) -> HashSet<TrialKey> {
     let answered = stored.iter().filter(|record| !record.failed());
     answered.map(|record| record.key).collect()

@@ -1,27 +1,25 @@
-//! How a command ended: [`Outcome`].
+//! The result of a command: [`Outcome`].
 
 use crate::types::manifest::Status;
 
-/// How a command ended.
+/// The status and output of a command that has ended.
 #[derive(Debug)]
 pub(crate) struct Outcome {
-    /// How far it came.
+    /// Status that decides the exit code.
     pub status: Status,
-    /// What belongs on standard output.
+    /// Text for standard output.
     pub output: String,
 }
 
-/// What standard output gets.
+/// Format of the results on standard output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum StdoutFormat {
-    /// A table.
     Table,
-    /// The summary as JSON.
     Json,
 }
 
 impl StdoutFormat {
-    /// What the switch `--json` asks for.
+    /// The format for the switch `--json`.
     #[must_use]
     pub(crate) fn of(json: bool) -> Self {
         if json { Self::Json } else { Self::Table }

@@ -1,4 +1,4 @@
-//! What is to be asked: [`Plan`].
+//! The trials to ask: [`Plan`].
 
 use std::collections::BTreeSet;
 
@@ -8,7 +8,7 @@ use crate::types::{Condition, TrialKey};
 /// All trials that share their images, or that have none.
 #[derive(Debug)]
 pub(crate) struct TrialGroup<I> {
-    /// What is shown; `None` for words alone.
+    /// Condition of the images; `None` if only text is sent.
     pub(crate) condition: Option<Condition>,
     pub(crate) trials: Vec<Trial<I>>,
 }
@@ -16,7 +16,7 @@ pub(crate) struct TrialGroup<I> {
 /// All groups about one source.
 #[derive(Debug)]
 pub(crate) struct SourcePlan<I> {
-    /// The source's place among those of the run.
+    /// Index of the source among those of the run.
     pub(crate) source: usize,
     pub(crate) groups: Vec<TrialGroup<I>>,
 }
@@ -38,46 +38,46 @@ impl<I> SourcePlan<I> {
 pub(crate) struct Plan<I> {
     /// Every trial, answered or not, source by source.
     pub(crate) keys: Vec<TrialKey>,
-    /// What is left to ask, in the same order.
+    /// Groups of the trials that remain to be asked, in the same order.
     pub(crate) sources: Vec<SourcePlan<I>>,
 }
 
 impl<I> Plan<I> {
-    /// A plan of all these trials.
+    /// A plan of all these trials, none of them answered.
     pub(crate) fn new(sources: Vec<SourcePlan<I>>) -> Self {
         let groups = sources.iter().flat_map(|source| &source.groups);
         let trials = groups.flat_map(|group| &group.trials);
         let keys = trials.map(|trial| trial.key).collect();
         let mut plan = Self { keys, sources };
-        plan.leave_out(|_| false);
+        plan.exclude(|_| false);
         plan
     }
 
-    /// Asks none of the trials that are there; how many these were.
-    pub(crate) fn leave_out(&mut self, is_there: impl Fn(&TrialKey) -> bool) -> usize {
-        let before = self.left();
+    /// Removes the trials that need not be asked; returns their number.
+    pub(crate) fn exclude(&mut self, is_excluded: impl Fn(&TrialKey) -> bool) -> usize {
+        let before = self.remaining();
         for source in &mut self.sources {
             for group in &mut source.groups {
-                group.trials.retain(|trial| !is_there(&trial.key));
+                group.trials.retain(|trial| !is_excluded(&trial.key));
             }
             source.groups.retain(|group| !group.trials.is_empty());
         }
         self.sources.retain(|source| !source.groups.is_empty());
-        before - self.left()
+        before - self.remaining()
     }
 
-    /// How many trials have no reply yet.
-    pub(crate) fn left(&self) -> usize {
+    /// Number of trials that remain to be asked.
+    pub(crate) fn remaining(&self) -> usize {
         self.sources.iter().map(SourcePlan::trials).sum()
     }
 
-    /// The conditions in which something is left to show.
+    /// The conditions of the remaining trials.
     pub(crate) fn conditions(&self) -> BTreeSet<&Condition> {
         let sources = self.sources.iter();
         sources.flat_map(SourcePlan::conditions).collect()
     }
 
-    /// The groups that are left, each with the place of its source.
+    /// The groups of the remaining trials, each with the index of its source.
     pub(crate) fn groups(&self) -> impl Iterator<Item = (usize, &TrialGroup<I>)> {
         let sources = self.sources.iter();
         sources.flat_map(|part| part.groups.iter().map(|group| (part.source, group)))

@@ -1,4 +1,4 @@
-//! The answers to open questions, as they are judged: [`predictions`].
+//! The answers to open questions, as a judge gets them: [`predictions`].
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
@@ -8,17 +8,17 @@ use crate::score::llm_match::{Protocol, shortened};
 use crate::score::subject::Subject;
 use crate::types::{OpenDetail, QuestionId, Record, Step, Via, View};
 
-/// What is known of one answer.
+/// The state of one answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum AnswerState {
-    /// Nothing yet, or nothing came.
+    /// No reply yet, or the trial failed.
     Missing,
-    /// There is none: worth nothing, not judged.
+    /// A reply without an answer: scores 0, and is not judged.
     Null,
-    /// This, as it is judged.
+    /// The text that is judged.
     Text {
         answer: Arc<str>,
-        /// Whether the protocol has cut it.
+        /// Whether the protocol has shortened it.
         cut: bool,
     },
 }
@@ -27,15 +27,15 @@ pub(crate) enum AnswerState {
 #[derive(Debug, Clone)]
 pub(crate) struct Prediction {
     pub(crate) subject: Subject,
-    /// The question's place among those of the run.
+    /// Index of the question among those of the run.
     pub(crate) question: usize,
-    /// The answer before the protocol did anything to it.
+    /// Answer before the protocol shortens it; `None` if there is none.
     pub(crate) full_answer: Option<String>,
     pub(crate) state: AnswerState,
 }
 
-/// Every answer of a run, question by question: those that were asked for, there or not, and those of files. Whoever was asked one
-/// question was asked all.
+/// Every answer of a run, question by question: those that were asked for, also if they are missing, and those from files. A subject
+/// that was asked one question was asked all.
 pub(crate) fn predictions(
     records: &[Record<OpenDetail>],
     questions: &[&QuestionId],
@@ -43,14 +43,14 @@ pub(crate) fn predictions(
 ) -> Vec<Prediction> {
     let places: HashMap<&QuestionId, usize> = questions.iter().copied().zip(0..).collect();
     let mut answers = BTreeMap::<(usize, Subject), Vec<&Record<OpenDetail>>>::new();
-    let mut asked = BTreeSet::new();
+    let mut asked_subjects = BTreeSet::new();
     for record in records
         .iter()
         .filter(|record| record.detail.step == Step::Answer)
     {
-        let subject = Subject::shown(&record.model, record.condition.as_ref());
+        let subject = Subject::new(&record.model, record.condition.as_ref());
         if record.via != Via::File {
-            asked.insert(subject.clone());
+            asked_subjects.insert(subject.clone());
         }
         if let Some(&question) = places.get(&record.question).filter(|_| !record.failed()) {
             let of_subject = answers.entry((question, subject)).or_default();
@@ -58,7 +58,7 @@ pub(crate) fn predictions(
         }
     }
     for question in 0..questions.len() {
-        for subject in &asked {
+        for subject in &asked_subjects {
             answers.entry((question, subject.clone())).or_default();
         }
     }
@@ -96,7 +96,7 @@ fn state(record: Option<&Record<OpenDetail>>, protocol: Protocol) -> (Option<Str
     (Some(full), state)
 }
 
-/// The answer in a model's reply; `None` if there is none, which is an error upstream. A reply that is null, empty or refused is no
+/// The answer in a model's reply; `None` if there is none, which is an error upstream. A reply that is null, empty or refused has no
 /// answer.
 fn full_answer(record: &Record<OpenDetail>, protocol: Protocol) -> Option<String> {
     let reply = record.reply.as_deref();

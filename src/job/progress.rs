@@ -9,26 +9,26 @@ use tracing_subscriber::fmt::MakeWriter;
 
 use crate::report::forecast::money;
 
-/// Where progress is shown: on a terminal, or nowhere.
+/// Progress bars on standard error, or nowhere if it is not a terminal.
 #[derive(Debug, Clone)]
 pub(crate) struct Progress {
     bars: MultiProgress,
 }
 
-/// Whether progress is wanted.
+/// Whether progress is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Verbosity {
-    /// Where standard error is a terminal.
+    /// Show progress if standard error is a terminal.
     Normal,
-    /// Never.
+    /// Show no progress (`--quiet`).
     Quiet,
 }
 
 impl Progress {
     /// Progress on standard error.
     #[must_use]
-    pub(crate) fn new(loudness: Verbosity) -> Self {
-        let shown = loudness == Verbosity::Normal && io::stderr().is_terminal();
+    pub(crate) fn new(verbosity: Verbosity) -> Self {
+        let shown = verbosity == Verbosity::Normal && io::stderr().is_terminal();
         let target = if shown {
             ProgressDrawTarget::stderr()
         } else {
@@ -39,19 +39,19 @@ impl Progress {
         }
     }
 
-    /// Says one line above the bars; a pipe and `--quiet` hear nothing.
+    /// Prints one line above the bars, but nothing into a pipe or with `--quiet`.
     pub(crate) fn say(&self, line: &str) {
-        // A line that cannot be shown is no reason to stop.
+        // A line that cannot be printed is no reason to stop.
         let _ = self.bars.println(line);
     }
 
-    /// Says one line above the bars to whoever listens, a pipe included.
+    /// Prints one line above the bars, also into a pipe and with `--quiet`.
     pub(crate) fn note(&self, line: &str) {
-        // A line that cannot be shown is no reason to stop.
+        // A line that cannot be printed is no reason to stop.
         let _ = writeln!(self.make_writer(), "{line}");
     }
 
-    /// A plain bar for a step of known length, gone when it is dropped.
+    /// A plain bar for a step of known length, removed when it is dropped.
     pub(crate) fn bar(&self, what: &'static str, length: usize) -> StepBar {
         let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len}");
         let bar = self
@@ -60,7 +60,7 @@ impl Progress {
         StepBar(style.map_or(bar.clone(), |style| bar.with_style(style)))
     }
 
-    /// The bar of the trials: answered, failed, rate, time left.
+    /// The bar of the trials: answered, failed, rate, remaining time.
     pub(crate) fn trials(&self, trials: usize, answered: usize) -> StepBar {
         let bar = ProgressBar::new(trials as u64).with_position(answered as u64);
         let bar = self.bars.add(bar);
@@ -75,13 +75,13 @@ impl Progress {
     }
 }
 
-/// Trials a second, with one digit behind the point.
+/// Writes the trials per second, with one decimal.
 fn rate(state: &ProgressState, out: &mut dyn fmt::Write) {
-    // A rate that cannot be shown is no reason to stop.
+    // A rate that cannot be printed is no reason to stop.
     let _ = write!(out, "{:.1}/s", state.per_sec());
 }
 
-/// A bar that goes away with its step.
+/// The bar of one step, removed when it is dropped.
 pub(crate) struct StepBar(ProgressBar);
 
 impl StepBar {
@@ -93,7 +93,7 @@ impl StepBar {
         self.0.inc(steps as u64);
     }
 
-    /// Shows how many trials are answered and how many have failed, and the dollars that went into them.
+    /// Shows the numbers of answered and failed trials, and the US dollars spent.
     pub(crate) fn count(&self, answered: usize, failed: usize, spent: Option<f64>) {
         self.0.set_position((answered + failed) as u64);
         let spent = spent.map_or(String::new(), |dollars| format!(", {}", money(dollars)));
@@ -108,7 +108,7 @@ impl Drop for StepBar {
     }
 }
 
-/// Log lines go above the bars, to standard error.
+/// Writer of log lines to standard error, above the bars.
 #[derive(Debug)]
 pub(crate) struct LogWriter(MultiProgress);
 

@@ -8,7 +8,7 @@ use crate::dataset::{DataPlace, Dataset, PixelLimit, SelectionArgs};
 use crate::error::{Error, Result};
 use crate::types::{Family, Question};
 
-/// Opens the data; where they come without questions, they are made by rule.
+/// The opened data. If they have no questions, these are made by rule.
 pub(crate) fn open_data(
     place: &DataPlace,
     selection: &SelectionArgs,
@@ -24,16 +24,16 @@ pub(crate) fn open_data(
     Ok(dataset.with_questions(questions))
 }
 
-/// The questions that are asked: of the chosen families, the first so many.
+/// The questions that are asked: the first `--limit` ones of the chosen families.
 pub(crate) fn select(dataset: &Dataset, selection: &SelectionArgs) -> Result<Vec<Question>> {
     let wanted = &selection.families;
     let all = dataset.questions().iter();
-    let there: BTreeSet<&Family> = all.clone().map(|question| &question.family).collect();
-    if let Some(missing) = wanted.iter().find(|family| !there.contains(family)) {
-        let there: Vec<&str> = there.into_iter().map(Family::name).collect();
+    let present: BTreeSet<&Family> = all.clone().map(|question| &question.family).collect();
+    if let Some(missing) = wanted.iter().find(|family| !present.contains(family)) {
+        let present: Vec<&str> = present.into_iter().map(Family::name).collect();
         let problem = format!(
             "no question of the family {missing}; there are: {}",
-            there.join(", ")
+            present.join(", ")
         );
         return Err(Error::usage("--families", problem));
     }

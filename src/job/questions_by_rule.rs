@@ -1,4 +1,4 @@
-//! The questions of data that come without: made by rule, with the rulebook and the balance that are built in.
+//! Questions for data that have none: made by rule, with the built-in rulebook and balance.
 
 use std::collections::BTreeSet;
 
@@ -15,10 +15,10 @@ use crate::questions::statistics::{FrameStatistics, measure};
 use crate::questions::{QuestionRequest, generate};
 use crate::types::{Digest, Family, FrameId, Question};
 
-/// Makes the questions, as `questions` without flags does.
+/// The questions that the command `questions` makes without flags.
 ///
 /// # Errors
-/// With the frame that cannot be measured; where nothing can be asked.
+/// If a frame cannot be measured, or the rules ask nothing.
 pub(crate) fn by_rule(dataset: &Dataset, progress: &Progress) -> Result<Vec<Question>> {
     let labels = dataset.labels().ok_or_else(|| {
         Error::data(
@@ -38,7 +38,7 @@ pub(crate) fn by_rule(dataset: &Dataset, progress: &Progress) -> Result<Vec<Ques
     });
     let frames: Vec<FrameStatistics> = frames.collect::<Result<_>>()?;
     drop(bar);
-    let order = QuestionRequest {
+    let request = QuestionRequest {
         dataset: dataset.title(),
         labels,
         rules: &rules,
@@ -48,12 +48,16 @@ pub(crate) fn by_rule(dataset: &Dataset, progress: &Progress) -> Result<Vec<Ques
         balance: BalanceMode::default(),
         rejected: BTreeSet::new(),
     };
-    let made = generate(&frames, &order, |_, _| {})?;
-    if made.asked.is_empty() {
+    let generated = generate(&frames, &request, |_, _| {})?;
+    if generated.asked.is_empty() {
         return Err(Error::data(
             dataset.name(),
-            "the rules ask nothing about these frames; `darkqa-eval questions DATA --out FILE --candidates FILE` tells why",
+            "the rules ask nothing about these frames; `darkqa-eval questions DATA --out FILE --candidates FILE` shows why",
         ));
     }
-    Ok(made.asked.into_iter().map(|asked| asked.question).collect())
+    Ok(generated
+        .asked
+        .into_iter()
+        .map(|asked| asked.question)
+        .collect())
 }

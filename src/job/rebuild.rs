@@ -1,4 +1,4 @@
-//! The images of a run, made again: `ImageRebuilder`.
+//! Rebuilding the images of a run: `ImageRebuilder`.
 
 use std::path::{Path, PathBuf};
 
@@ -18,50 +18,50 @@ use crate::enhance::{Enhancer, RuntimeArgs};
 use crate::error::{Error, Result};
 use crate::synthesis::SensorSettings;
 use crate::types::manifest::RunManifest;
-use crate::types::{Condition, Digest, FrameId};
+use crate::types::{Condition, Decides, Digest, FrameId};
 
-/// Where the data and the enhancers of a run lie by now, and how they are run.
+/// Flags for the current paths of a run's data and enhancers, and for running them.
 ///
-/// The variables are `DARKQA_MOVED_DATA` and `DARKQA_MOVED_LLIE`: what `DARKQA_DATA` says of new runs says nothing of this one.
+/// The variables are `DARKQA_MOVED_DATA` and `DARKQA_MOVED_LLIE`, because `DARKQA_DATA` is for new runs and not for this one.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct RebuildArgs {
-    /// The data, if they lie elsewhere by now; default: where they were
-    #[arg(id = "moved_data", long = "data", value_name = "DIR|FILE|rooms:…")]
+    /// The data, if they were moved; default: where they were
+    #[arg(id = "moved_data", long = "data", value_name = "DIR|FILE|rooms:…", add = Decides::Nothing)]
     pub data: Option<PathBuf>,
-    /// The enhancement models, if they lie elsewhere by now; repeatable; default: where they were
-    #[arg(id = "moved_llie", long = "llie", value_name = "FILE")]
+    /// The enhancement models, if they were moved; repeatable; default: where they were
+    #[arg(id = "moved_llie", long = "llie", value_name = "FILE", add = Decides::Nothing)]
     pub llie: Vec<PathBuf>,
-    /// By which ONNX Runtime.
+    /// The ONNX Runtime that runs enhancers.
     #[command(flatten)]
     pub runtime: RuntimeArgs,
-    /// On how many threads.
+    /// The number of threads.
     #[command(flatten)]
     pub threads: ThreadArgs,
 }
 
-/// What makes the images of a run again, as its manifest says that they were made.
+/// Rebuilds the images of a run with the settings in its manifest.
 pub(crate) struct ImageRebuilder {
-    place: FrameFolder,
+    folder: FrameFolder,
     recipe: Recipe,
     enhancers: Vec<Enhancer>,
 }
 
-/// Where the frames lie.
+/// The frames of a data set or of walks.
 enum FrameFolder {
     Frames(Dataset),
     Walks(WalkFolder, Walk),
 }
 
-/// A file of an image, as it would be sent.
+/// The file of one image, as it would be sent.
 pub(crate) struct RebuiltImage {
     pub(crate) file: Vec<u8>,
     pub(crate) digest: Digest,
-    /// What the name of such a file ends in.
+    /// Extension of the file name, without the dot.
     pub(crate) ending: &'static str,
 }
 
 impl ImageRebuilder {
-    /// Opens the data, and the enhancers of these conditions.
+    /// A rebuilder with the data and the enhancers of these conditions opened.
     pub(crate) fn open(
         args: RebuildArgs,
         manifest: &RunManifest,
@@ -74,33 +74,34 @@ impl ImageRebuilder {
         };
         if manifest.images.is_empty() {
             return Err(wrong(
-                "the run does not say how its images were made".to_owned(),
+                "the manifest of the run has no image flags, so its images cannot be made again"
+                    .to_owned(),
             ));
         }
-        let pictures = ImageFlags::read(&manifest.images).map_err(wrong)?;
-        let pictures = moved(pictures, &args).map_err(wrong)?;
+        let flags = ImageFlags::read(&manifest.images).map_err(wrong)?;
+        let flags = with_new_paths(flags, &args).map_err(wrong)?;
         let mut conditions = conditions.iter();
         let enhanced = conditions.any(|condition| condition.enhancer.is_some());
-        let models = if enhanced { &*pictures.llie } else { &[] };
+        let models = if enhanced { &*flags.llie } else { &[] };
         let files = enhancers::read(models)?;
-        let sensor = SensorSettings::resolve(&pictures.sensor)?;
-        let recipe = Recipe::new(&sensor, pictures.images.image, pictures.max_side, &files);
-        let (place, recipe) = if let Some(walk) = pictures.walk {
+        let sensor = SensorSettings::resolve(&flags.sensor)?;
+        let recipe = Recipe::new(&sensor, flags.images.image, flags.max_side, &files);
+        let (frames, recipe) = if let Some(walk) = flags.walk {
             let recipe = recipe.of_walks(&walk);
-            let folder = WalkFolder::new(&walk, pictures.limit);
+            let folder = WalkFolder::new(&walk, flags.limit);
             (FrameFolder::Walks(folder, walk), recipe)
         } else {
-            let frames = frames(&pictures.data.data)?;
-            let frames = frames.with_most_pixels(pictures.limit.max_pixels.get());
-            (FrameFolder::Frames(frames), recipe)
+            let dataset = frames(&flags.data.data)?;
+            let dataset = dataset.with_most_pixels(flags.limit.max_pixels.get());
+            (FrameFolder::Frames(dataset), recipe)
         };
         let loading = EnhancerRunArgs {
-            size: pictures.size,
+            size: flags.size,
             runtime: args.runtime,
             threads: args.threads,
         };
         Ok(Self {
-            place,
+            folder: frames,
             recipe,
             enhancers: OpenEnhancers::load(files, &loading)?.take()?,
         })
@@ -114,10 +115,10 @@ impl ImageRebuilder {
     ) -> Result<Vec<Vec<RebuiltImage>>> {
         let source = self.source(name).map_err(|e| {
             let problem =
-                format_args!("{e}; where the data lie elsewhere by now, --data says where");
+                format_args!("{e}; if the data were moved, name their folder with --data");
             Error::data(name, problem)
         })?;
-        let frames: &dyn Frames = match &self.place {
+        let frames: &dyn Frames = match &self.folder {
             FrameFolder::Frames(dataset) => dataset,
             FrameFolder::Walks(folder, _) => folder,
         };
@@ -140,7 +141,7 @@ impl ImageRebuilder {
     }
 
     fn source(&self, name: &FrameId) -> Result<Source> {
-        match &self.place {
+        match &self.folder {
             FrameFolder::Frames(dataset) => {
                 SourceFrame::inspect(dataset, name).map(Source::of_frame)
             }
@@ -149,18 +150,18 @@ impl ImageRebuilder {
     }
 }
 
-/// The same images, made of what lies elsewhere by now. The folder of walks is data, too.
-fn moved(mut pictures: ImageFlags, args: &RebuildArgs) -> Result<ImageFlags, String> {
+/// The image flags with the paths of moved data and enhancers. `--data` also replaces the folder of walks.
+fn with_new_paths(mut flags: ImageFlags, args: &RebuildArgs) -> Result<ImageFlags, String> {
     if let Some(data) = &args.data {
-        match &mut pictures.walk {
+        match &mut flags.walk {
             Some(walk) => walk.folder.clone_from(data),
-            None => pictures.data.data = place(&data.to_string_lossy())?,
+            None => flags.data.data = place(&data.to_string_lossy())?,
         }
     }
     if !args.llie.is_empty() {
-        pictures.llie.clone_from(&args.llie);
+        flags.llie.clone_from(&args.llie);
     }
-    Ok(pictures)
+    Ok(flags)
 }
 
 fn rebuilt(image: &crate::ask::Payload) -> Result<RebuiltImage> {
@@ -172,7 +173,7 @@ fn rebuilt(image: &crate::ask::Payload) -> Result<RebuiltImage> {
     })
 }
 
-/// The frames at a place; questions that come with them are ignored.
+/// The frames of a data set. Its questions are ignored.
 fn frames(place: &DataPlace) -> Result<Dataset> {
     match place {
         DataPlace::Path(path) if path.join("frames.jsonl").is_file() => Dataset::of_frames(path),

@@ -1,4 +1,4 @@
-//! What decides the pixels that are sent: [`Recipe`].
+//! The settings that decide the pixels that are sent: [`Recipe`].
 
 use std::num::NonZeroU32;
 
@@ -14,7 +14,7 @@ use crate::synthesis::{self, NoiseKey, Readings, SensorSettings, Synthesis};
 use crate::types::degradation::Kind;
 use crate::types::{Condition, Digest, EnhancerName, FrameId, Severity};
 
-/// Everything but the frame and the condition that decides an image.
+/// All settings that decide an image, except its frame and its condition.
 #[derive(Debug)]
 pub(crate) struct Recipe {
     pub(crate) seed: u64,
@@ -22,8 +22,8 @@ pub(crate) struct Recipe {
     pub(crate) format: PayloadFormat,
     pub(crate) scaling: Scaling,
     /// Whether light is reduced before or after scaling.
-    pub(crate) scaled: DegradedAt,
-    /// What one state of the camera takes.
+    pub(crate) degraded_at: DegradedAt,
+    /// The frames that share one state of the camera.
     pub(crate) camera_of: CameraOf,
     pub(crate) enhancers: Vec<(EnhancerName, Digest)>,
 }
@@ -42,7 +42,7 @@ impl Recipe {
         }
     }
 
-    /// The recipe for images of every pixel, each in its own size.
+    /// The recipe for PNG images in the size of their frames.
     pub(crate) fn lossless(sensor: &SensorSettings, files: &[ModelFile]) -> Self {
         let enhancers = files.iter();
         Self {
@@ -50,7 +50,7 @@ impl Recipe {
             readings: sensor.readings.clone(),
             format: PayloadFormat::Png,
             scaling: Scaling::Never,
-            scaled: DegradedAt::Native,
+            degraded_at: DegradedAt::Native,
             camera_of: CameraOf::Frame,
             enhancers: enhancers
                 .map(|file| (file.name().clone(), file.digest()))
@@ -62,23 +62,23 @@ impl Recipe {
     pub(crate) fn of_walks(self, walk: &Walk) -> Self {
         Self {
             scaling: walk.side,
-            scaled: walk.darkened,
+            degraded_at: walk.degraded_at,
             camera_of: walk.camera,
             ..self
         }
     }
 
-    /// What the noise of a frame is drawn from.
+    /// The key that the noise of a frame is drawn from.
     pub(crate) fn noise(&self, source: &Source, frame: &FrameId) -> NoiseKey {
         let own = NoiseKey::new(self.seed, frame);
         match self.camera_of {
             CameraOf::Frame => own,
-            CameraOf::Episode => own.taken_on(&NoiseKey::new(self.seed, &source.name)),
+            CameraOf::Episode => own.with_camera_of(&NoiseKey::new(self.seed, &source.name)),
         }
     }
 
-    /// The digest of everything that decides the images of a source in a condition, and of nothing else: a run with another seed has
-    /// other noise, but the same untouched frames and exposure drops.
+    /// The digest of all that decides the images of a source in a condition, and of nothing else. For example, the seed enters only if
+    /// the degradation is random, so exposure drops have the same digest in runs with different seeds.
     ///
     /// # Errors
     /// If the condition has a reading that the recipe lacks.
@@ -88,9 +88,9 @@ impl Recipe {
             .iter()
             .map(|frame| self.facts(source, frame, condition))
             .collect::<Result<_>>()?;
-        let shown: Vec<&ImageKeyFacts<'_>> =
-            source.order.iter().map(|place| &images[*place]).collect();
-        Digest::canonical("darkqa.images/2", &shown)
+        let in_order: Vec<&ImageKeyFacts<'_>> =
+            source.order.iter().map(|index| &images[*index]).collect();
+        Digest::canonical("darkqa.images/2", &in_order)
     }
 
     fn facts<'a>(
@@ -129,12 +129,12 @@ impl Recipe {
             }),
             format: self.format.to_string(),
             scaling: self.scaling,
-            scaled_before: (self.scaled == DegradedAt::Resized).then_some(true),
+            scaled_before: (self.degraded_at == DegradedAt::Resized).then_some(true),
         })
     }
 }
 
-/// What decides an image.
+/// All that decides an image, as it enters the digest.
 #[derive(Serialize)]
 struct ImageKeyFacts<'a> {
     picture: Digest,
@@ -142,11 +142,11 @@ struct ImageKeyFacts<'a> {
     enhancer: Option<EnhancerFacts>,
     format: String,
     scaling: Scaling,
-    /// Whether it was scaled before its light was reduced.
+    /// `Some(true)` if the frame is scaled before its light is reduced; else `None`.
     scaled_before: Option<bool>,
 }
 
-/// What decides a degraded frame besides the frame's content; seed and frame only if the kind draws random numbers.
+/// All that decides a degraded frame, except the frame's content. Seed and frame are set only if the kind is random.
 #[derive(Serialize)]
 struct DegradationFacts<'a> {
     kind: Kind,
@@ -155,7 +155,7 @@ struct DegradationFacts<'a> {
     reading: Option<&'a Synthesis>,
     seed: Option<u64>,
     frame: Option<&'a FrameId>,
-    /// The source whose frames one state of the camera takes.
+    /// Source whose frames share one state of the camera; `None` if each frame has its own.
     camera_of: Option<&'a FrameId>,
 }
 

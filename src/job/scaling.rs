@@ -1,4 +1,4 @@
-//! In what size images are sent: [`Scaling`].
+//! The size in which images are sent: [`Scaling`].
 
 use std::num::NonZeroU32;
 
@@ -7,15 +7,15 @@ use serde::Serialize;
 use super::bilinear;
 use crate::ask::Payload;
 
-/// In what size an image is sent.
+/// The size in which an image is sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Scaling {
-    /// In its own.
+    /// The size of the frame.
     Never,
-    /// Made smaller if a side is longer than this, in pixels.
+    /// Made smaller, if a side is longer than this number of pixels.
     MaxSide(NonZeroU32),
-    /// Made larger or smaller, until its longer side has this length in pixels.
+    /// Made larger or smaller, so that the longer side has this number of pixels.
     LongerSide(usize),
 }
 

@@ -1,4 +1,4 @@
-//! The settings that every experiment has: as flags say them ([`JobArgs`]), and as they are used ([`JobSettings`]).
+//! The settings that every experiment has: their flags ([`JobArgs`]) and the validated settings ([`JobSettings`]).
 
 use std::num::NonZeroU32;
 use std::path::PathBuf;
@@ -15,118 +15,117 @@ use crate::ask::{AccessArgs, Bounds, Constrain, ImageArgs, Parameters, PayloadFo
 use crate::enhance::{EnhancerArgs, ModelFile};
 use crate::error::{Error, Result};
 use crate::synthesis::{LightArgs, LightSettings};
-use crate::types::View;
+use crate::types::{Decides, View};
 
 /// The flags that every experiment has.
 #[derive(Debug, Args)]
 pub(crate) struct JobArgs {
-    /// Light.
+    /// Levels and kinds of degradation.
     #[command(flatten)]
     pub light: LightArgs,
-    /// Which images are enhanced, and by what.
+    /// Enhancers, and the images they are for.
     #[command(flatten)]
     pub enhancers: EnhancerArgs,
-    /// How enhancers are run.
+    /// Running of the enhancers.
     #[command(flatten)]
     pub loading: EnhancerRunArgs,
-    /// Who is asked.
+    /// Models that are asked.
     #[command(flatten)]
     pub models: ModelArgs,
-    /// How the models are to speak.
+    /// Parameters of the models.
     #[command(flatten)]
     pub parameters: Parameters,
-    /// Where they are asked.
+    /// Endpoint and its key.
     #[command(flatten)]
     pub access: AccessArgs,
-    /// How requests are sent.
+    /// Concurrency, timeouts, retries and rate limits.
     #[command(flatten)]
     pub sending: Sending,
-    /// How images are sent.
+    /// Format and size of images.
     #[command(flatten)]
     pub images: ImageArgs,
-    /// What it may cost.
+    /// Limits of cost and failures.
     #[command(flatten)]
     pub money: MoneyArgs,
-    /// How it is spread over processes.
+    /// Shard of this process, and timings.
     #[command(flatten)]
     pub scale: ScaleArgs,
-    /// What is left behind.
+    /// Run folder and output.
     #[command(flatten)]
     pub output: OutputArgs,
-    /// The flags that decide the images, as they were said.
+    /// Flags that decide the images, as typed.
     #[arg(skip)]
-    pub pictures: ImageWords,
+    pub image_flags: ImageWords,
 }
 
-/// How a job is spread over processes.
+/// Flags that distribute a job over processes.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Scale")]
 pub(crate) struct ScaleArgs {
     /// Do one of N parts, by frames or walks: I/N; auto/N or auto as the batch system says (Slurm arrays, indexed Kubernetes jobs);
     /// none for everything. --rpm, --tpm and --max-cost are for all parts together; default: auto in a Slurm array, else none
-    #[arg(long, value_name = "I/N|auto/N|auto|none")]
+    #[arg(long, value_name = "I/N|auto/N|auto|none", add = Decides::Trials)]
     pub shard: Option<String>,
-    /// Say at the end where the time went, what binds and what would help
-    #[arg(long)]
+    /// Print at the end how long each step took, what limits the speed and what would help
+    #[arg(long, add = Decides::Nothing)]
     pub timings: bool,
 }
 
-/// What is left behind.
+/// Flags of the run folder and of the output.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Output")]
 pub(crate) struct OutputArgs {
     /// The run folder; default: results/TIME-MODEL-DATA-HASH, found again by the same command
-    #[arg(long, value_name = "DIR", conflicts_with = "resume")]
+    #[arg(long, value_name = "DIR", conflicts_with = "resume", add = Decides::Nothing)]
     pub out: Option<PathBuf>,
-    /// Go on with the run in this folder; takes the same flags as the run had; default: none
-    #[arg(long, value_name = "DIR")]
+    /// Continue the run in this folder; takes the same flags as the run had; default: none
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub resume: Option<PathBuf>,
     /// Print the summary as JSON instead of a table
-    #[arg(long)]
+    #[arg(long, add = Decides::Nothing)]
     pub json: bool,
 }
 
-/// The settings that every experiment has, validated. Files, environment and keys are read when they are made, and nowhere later.
+/// The settings that every experiment has, validated. Files, environment and keys are read for them and nowhere later.
 #[derive(Debug)]
 pub(crate) struct JobSettings {
-    /// What is done to frames.
+    /// Levels and kinds of degradation.
     pub light: LightSettings,
-    /// Which images are enhanced, and by what.
+    /// Enhancers, and the images they are for.
     pub enhancers: EnhancerArgs,
-    /// How enhancers are run.
+    /// Running of the enhancers.
     pub loading: EnhancerRunArgs,
-    /// Who is asked.
+    /// Models that are asked, and their endpoint.
     pub ask: AskSettings,
-    /// The file format of images.
     pub format: PayloadFormat,
-    /// The longest side of an image as sent, in pixels; `None` for as it is.
+    /// Longest side of an image as sent, in pixels; `None` for no limit.
     pub max_side: Option<NonZeroU32>,
-    /// The largest file of an image in bytes; `None` for what is known of the endpoint.
+    /// Largest file of an image, in bytes; `None` for the known limit of the endpoint.
     pub max_image: Option<usize>,
-    /// How many requests are in flight at once.
+    /// Bounds of the number of requests in flight.
     pub concurrency: Bounds,
-    /// What it may cost.
+    /// Limits of cost and failures.
     pub money: MoneySettings,
-    /// Which part of the whole this is.
+    /// Part of the run that this process does.
     pub shard: Shard,
     /// Print at the end how long each step took.
     pub show_timings: bool,
-    /// Where the run is kept.
+    /// Folder of the run.
     pub place: RunPlace,
-    /// What standard output gets.
+    /// Format of the results on standard output.
     pub show: StdoutFormat,
-    /// The flags that decide the images, as they were said.
-    pub pictures: ImageWords,
+    /// Flags that decide the images, as typed.
+    pub image_flags: ImageWords,
 }
 
-/// What one experiment has of the settings of models and others have not.
+/// Settings that not every experiment has.
 #[derive(Debug, Default)]
 pub(crate) struct ExperimentSettings {
-    /// What the server lets the model say.
+    /// Constraint on the replies that the server enforces.
     pub constrain: Constrain,
-    /// What the server's sampling starts from.
+    /// Seed of the server's sampling; `None` if none is sent.
     pub sampling_seed: Option<u64>,
-    /// The longest side of an image as sent, in pixels.
+    /// Longest side of an image as sent, in pixels; `None` for no limit.
     pub max_side: Option<NonZeroU32>,
 }
 
@@ -136,15 +135,15 @@ impl JobSettings {
         self.ask.view == View::Image && !self.ask.models.is_empty()
     }
 
-    /// The enhancement models' files, read, and ONNX Runtime found: before anything that takes time. A run that is there already may
-    /// need no runtime any more.
+    /// The files of the enhancement models. ONNX Runtime is opened, too, so that an error is found before anything that takes time. An
+    /// existing run may not need the runtime any more.
     pub(crate) fn enhancers(&self) -> Result<Vec<ModelFile>> {
         let files = enhancers::read(&self.enhancers.llie)?;
-        let is_there = match &self.place {
+        let exists = match &self.place {
             RunPlace::Automatic => false,
             RunPlace::Named(path) | RunPlace::Resume(path) => path.exists(),
         };
-        if !files.is_empty() && !is_there {
+        if !files.is_empty() && !exists {
             self.loading.runtime.search().open()?;
         }
         Ok(files)
@@ -153,7 +152,7 @@ impl JobSettings {
 
 impl JobArgs {
     /// The error for a call that names no model.
-    pub(crate) fn nameless(&self) -> Error {
+    pub(crate) fn no_model_error(&self) -> Error {
         let remedy = if self.output.resume.is_some() {
             "--resume takes the same flags as the run had, the model's name among them"
         } else {
@@ -163,19 +162,19 @@ impl JobArgs {
         Error::usage("--model", format_args!("no model is named: {remedy}"))
     }
 
-    /// Looks at the files and variables that the flags name.
+    /// The settings of these flags. Files and variables that they name are read.
     ///
     /// # Errors
     /// [`Error::Usage`] with the flag that cannot be used.
-    pub(crate) fn resolve(self, own: &ExperimentSettings) -> Result<JobSettings> {
+    pub(crate) fn resolve(self, experiment: &ExperimentSettings) -> Result<JobSettings> {
         let shard = Shard::resolve(self.scale.shard.as_deref(), |name| std::env::var(name).ok())?;
         let sending = Sending {
             quota: shard.quota(self.sending.quota),
             ..self.sending
         };
         let parameters = Parameters {
-            constrain: own.constrain,
-            seed: own.sampling_seed,
+            constrain: experiment.constrain,
+            seed: experiment.sampling_seed,
             ..self.parameters
         };
         // A dry run sends nothing, so it needs no key.
@@ -190,7 +189,7 @@ impl JobArgs {
             enhancers: self.enhancers,
             loading: self.loading,
             format: self.images.image,
-            max_side: own.max_side,
+            max_side: experiment.max_side,
             max_image: sending
                 .max_image
                 .map(|megabytes| (megabytes * 1e6) as usize),
@@ -200,17 +199,17 @@ impl JobArgs {
             show_timings: self.scale.timings,
             show: StdoutFormat::of(self.output.json),
             place: RunPlace::from(self.output),
-            pictures: self.pictures,
+            image_flags: self.image_flags,
         })
     }
 }
 
-/// Where the run is kept.
+/// The choice of the run folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum RunPlace {
-    /// The folder of the same command, else a new one.
+    /// Folder of the same command, else a new one.
     Automatic,
-    /// This folder.
+    /// This folder, which may be new.
     Named(PathBuf),
     /// This folder, which must hold a run.
     Resume(PathBuf),
@@ -227,9 +226,9 @@ impl From<OutputArgs> for RunPlace {
 }
 
 impl RunPlace {
-    /// Where a part of a run is kept: in a folder of its own within that of the whole.
+    /// The choice for a shard: a subfolder of the whole run's folder.
     #[must_use]
-    pub(crate) fn of(&self, shard: Shard) -> Self {
+    pub(crate) fn for_shard(&self, shard: Shard) -> Self {
         match self {
             Self::Named(path) if shard.is_part() => Self::Named(path.join(shard.folder())),
             Self::Resume(path) if shard.is_part() => Self::Resume(path.join(shard.folder())),

@@ -1,4 +1,4 @@
-//! Which part of a job a process does: [`Shard`], and the questions of it: `part`.
+//! Parts of a job for several processes: [`Shard`], and its questions: `part`.
 
 use std::collections::HashMap;
 use std::fmt;
@@ -8,68 +8,66 @@ use std::str::FromStr;
 use crate::ask::Quota;
 use crate::error::{Error, Result};
 
-/// One of several parts of an evaluation, by frames: those whose place among all, counted from 0, leaves `index` when divided by
-/// `of`. A frame is in one part with all its conditions and questions.
+/// One of several parts of a run. It contains the sources whose position, counted from 0, has the remainder `index` when divided by
+/// `count`. A source is in one shard, with all its conditions and questions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Shard {
-    /// Which, from 0.
+    /// Index of the shard, from 0.
     index: u32,
-    /// Of how many.
-    of: NonZeroU32,
+    count: NonZeroU32,
 }
 
 impl Shard {
-    /// All of it.
+    /// The only shard of a run that is not divided.
     pub(crate) const WHOLE: Self = Self {
         index: 0,
-        of: NonZeroU32::MIN,
+        count: NonZeroU32::MIN,
     };
 
-    /// Whether there are others.
+    /// Whether there are other shards.
     #[must_use]
     pub(crate) fn is_part(self) -> bool {
-        self.of.get() > 1
+        self.count.get() > 1
     }
 
-    /// How many there are.
     #[must_use]
-    pub(crate) fn of(self) -> NonZeroU32 {
-        self.of
+    pub(crate) fn count(self) -> NonZeroU32 {
+        self.count
     }
 
-    /// Each of so many.
-    pub(crate) fn all(of: NonZeroU32) -> impl Iterator<Item = Self> {
-        (0..of.get()).map(move |index| Self { index, of })
+    /// All shards of a run with `count` of them.
+    pub(crate) fn all(count: NonZeroU32) -> impl Iterator<Item = Self> {
+        (0..count.get()).map(move |index| Self { index, count })
     }
 
-    /// Whether the frame at a place is in it.
+    /// Whether the shard contains the source at a position.
     #[must_use]
-    pub(crate) fn has(self, place: usize) -> bool {
-        place as u64 % u64::from(self.of.get()) == u64::from(self.index)
+    pub(crate) fn has(self, position: usize) -> bool {
+        position as u64 % u64::from(self.count.get()) == u64::from(self.index)
     }
 
-    /// Its share of a number that all parts have together: the shares sum to it, but that none is 0.
+    /// The shard's share of a whole number. The shares sum to it, except that each is at least 1.
     #[must_use]
     pub(crate) fn share(self, whole: NonZeroU32) -> NonZeroU32 {
-        let (of, whole) = (self.of.get(), whole.get());
-        let share = whole / of + u32::from(self.index < whole % of);
+        let (count, whole) = (self.count.get(), whole.get());
+        let share = whole / count + u32::from(self.index < whole % count);
         NonZeroU32::new(share).unwrap_or(NonZeroU32::MIN)
     }
 
-    /// Its share of a sum of money.
+    /// The shard's share of a cost.
     #[must_use]
-    pub(crate) fn part_of(self, sum: f64) -> f64 {
-        sum / f64::from(self.of.get())
+    pub(crate) fn share_of_cost(self, whole: f64) -> f64 {
+        whole / f64::from(self.count.get())
     }
 
-    /// The name of its folder among those of the other parts.
+    /// Name of the shard's folder within that of the run.
     #[must_use]
     pub(crate) fn folder(self) -> String {
-        let digits = self.of.to_string().len();
-        format!("shard-{:0digits$}-of-{}", self.index + 1, self.of)
+        let digits = self.count.to_string().len();
+        format!("shard-{:0digits$}-of-{}", self.index + 1, self.count)
     }
 
-    /// Its share of what may be sent in a minute.
+    /// The shard's share of the requests and tokens per minute.
     pub(super) fn quota(self, whole: Quota) -> Quota {
         Quota {
             requests: whole.requests.map(|requests| self.share(requests)),
@@ -77,25 +75,25 @@ impl Shard {
         }
     }
 
-    /// What `--shard` says, or the batch system if nothing is said: `2/4`, `auto/4`, `auto`, `none`.
+    /// The shard that `--shard` names (`2/4`, `auto/4`, `auto`, `none`). Without the flag, that of the batch system.
     ///
     /// # Errors
-    /// If it is no such part, or the batch system does not say enough.
+    /// If there is no such shard, or the batch system does not set all variables that are needed.
     pub(super) fn resolve(
-        said: Option<&str>,
+        flag: Option<&str>,
         variable: impl Fn(&str) -> Option<String>,
     ) -> Result<Self> {
         let system = BatchSystem::of(&variable)?;
-        match (said, system) {
+        match (flag, system) {
             (Some("none"), _) | (None, None) => Ok(Self::WHOLE),
             (Some("auto"), system) => {
-                let system = system.ok_or_else(|| wrong(NO_SYSTEM))?;
+                let system = system.ok_or_else(|| usage_error(NO_SYSTEM))?;
                 system.shard(None)
             }
             (Some(text), system) => match text.split_once('/') {
-                Some(("auto", of)) => {
-                    let system = system.ok_or_else(|| wrong(NO_SYSTEM))?;
-                    system.shard(Some(number(of, text)?))
+                Some(("auto", count)) => {
+                    let system = system.ok_or_else(|| usage_error(NO_SYSTEM))?;
+                    system.shard(Some(number(count, text)?))
                 }
                 _ => text.parse(),
             },
@@ -111,8 +109,8 @@ impl Shard {
         }
     }
 
-    fn new(index: u32, of: NonZeroU32) -> Option<Self> {
-        (index < of.get()).then_some(Self { index, of })
+    fn new(index: u32, count: NonZeroU32) -> Option<Self> {
+        (index < count.get()).then_some(Self { index, count })
     }
 }
 
@@ -120,23 +118,23 @@ impl FromStr for Shard {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
-        let (index, of) = text.split_once('/').ok_or_else(|| none_of_them(text))?;
-        let (index, of) = (number(index, text)?, number(of, text)?);
-        Self::new(index.get() - 1, of).ok_or_else(|| none_of_them(text))
+        let (index, count) = text.split_once('/').ok_or_else(|| not_a_shard(text))?;
+        let (index, count) = (number(index, text)?, number(count, text)?);
+        Self::new(index.get() - 1, count).ok_or_else(|| not_a_shard(text))
     }
 }
 
 impl fmt::Display for Shard {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}/{}", self.index + 1, self.of)
+        write!(f, "{}/{}", self.index + 1, self.count)
     }
 }
 
-/// The questions about the sources of a shard, which are dealt out one by one in the order in which they are first asked about;
-/// `source` names that of a question.
+/// The questions about the sources of a shard. Sources are assigned to the shards in turn, in the order of their first question.
+/// `source` returns the source of a question.
 ///
 /// # Errors
-/// If none is left.
+/// If the shard has no question.
 pub(crate) fn part<Q>(
     questions: Vec<Q>,
     shard: Shard,
@@ -145,18 +143,18 @@ pub(crate) fn part<Q>(
     if !shard.is_part() {
         return Ok(questions);
     }
-    let mut places = HashMap::<String, usize>::new();
+    let mut positions = HashMap::<String, usize>::new();
     for question in &questions {
-        let next = places.len();
-        places.entry(source(question)).or_insert(next);
+        let next = positions.len();
+        positions.entry(source(question)).or_insert(next);
     }
     let own = questions.into_iter();
-    let own = own.filter(|question| shard.has(places[&source(question)]));
+    let own = own.filter(|question| shard.has(positions[&source(question)]));
     let own: Vec<Q> = own.collect();
     if own.is_empty() {
         let problem = format!(
-            "{shard} is empty: there are {} frames or walks; as many parts at most expected",
-            places.len()
+            "{shard} is empty: there are {} frames or walks; use at most as many shards",
+            positions.len()
         );
         return Err(Error::usage("--shard", problem));
     }
@@ -166,26 +164,26 @@ pub(crate) fn part<Q>(
 const NO_SYSTEM: &str = "auto is for a task of a Slurm array (SLURM_ARRAY_TASK_ID) or a pod of an indexed Kubernetes job \
                          (JOB_COMPLETION_INDEX), and this is neither";
 
-fn wrong(problem: impl fmt::Display) -> Error {
+fn usage_error(problem: impl fmt::Display) -> Error {
     Error::usage("--shard", problem)
 }
 
-fn none_of_them(text: &str) -> Error {
-    wrong(format_args!(
+fn not_a_shard(text: &str) -> Error {
+    usage_error(format_args!(
         "{text:?}; a part expected, as 2/4, or auto, auto/4, none"
     ))
 }
 
 fn number(text: &str, whole: &str) -> Result<NonZeroU32> {
-    text.trim().parse().map_err(|_| none_of_them(whole))
+    text.trim().parse().map_err(|_| not_a_shard(whole))
 }
 
-/// What a batch system says of a process.
+/// The batch system that started this process, with its variables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum BatchSystem {
-    /// A task of a job array.
-    Slurm { index: u32, of: NonZeroU32 },
-    /// A pod of an indexed job, which is not told how many there are.
+    /// A task of a job array: its index from 0, and the number of tasks.
+    Slurm { index: u32, count: NonZeroU32 },
+    /// A pod of an indexed job: its index from 0. The number of pods is in no variable.
     Kubernetes { index: u32 },
 }
 
@@ -195,43 +193,45 @@ impl BatchSystem {
             let parse = |text: String| {
                 text.trim()
                     .parse()
-                    .map_err(|_| Error::usage(name, format_args!("{text:?} is no number")))
+                    .map_err(|_| Error::usage(name, format_args!("{text:?} is not a number")))
             };
             variable(name).map(parse).transpose()
         };
         if let Some(id) = value("SLURM_ARRAY_TASK_ID")? {
             let first = value("SLURM_ARRAY_TASK_MIN")?.unwrap_or(id);
             let step = value("SLURM_ARRAY_TASK_STEP")?.unwrap_or(1).max(1);
-            let of = value("SLURM_ARRAY_TASK_COUNT")?.unwrap_or(1);
+            let count = value("SLURM_ARRAY_TASK_COUNT")?.unwrap_or(1);
             return Ok(Some(Self::Slurm {
                 index: id.saturating_sub(first) / step,
-                of: NonZeroU32::new(of).unwrap_or(NonZeroU32::MIN),
+                count: NonZeroU32::new(count).unwrap_or(NonZeroU32::MIN),
             }));
         }
         let index = value("JOB_COMPLETION_INDEX")?;
         Ok(index.map(|index| Self::Kubernetes { index }))
     }
 
-    /// Its shard of so many, where that is said.
-    fn shard(self, said: Option<NonZeroU32>) -> Result<Shard> {
-        let (index, of) = match (self, said) {
-            (Self::Slurm { of, .. }, Some(said)) if of != said => {
-                return Err(wrong(format_args!(
-                    "the Slurm array has {of} tasks, not {said}: name the part itself, as --shard 2/{said}"
+    /// The shard of this process. `parts` is the number of shards, if `--shard auto/N` sets it.
+    fn shard(self, parts: Option<NonZeroU32>) -> Result<Shard> {
+        let (index, count) = match (self, parts) {
+            (Self::Slurm { count, .. }, Some(parts)) if count != parts => {
+                return Err(usage_error(format_args!(
+                    "the Slurm array has {count} tasks, not {parts}: name the shard itself, as --shard 2/{parts}"
                 )));
             }
-            (Self::Slurm { index, of }, _) | (Self::Kubernetes { index }, Some(of)) => (index, of),
+            (Self::Slurm { index, count }, _) | (Self::Kubernetes { index }, Some(count)) => {
+                (index, count)
+            }
             (Self::Kubernetes { .. }, None) => {
-                return Err(wrong(
-                    "JOB_COMPLETION_INDEX says that this is a pod of an indexed job, and not of how many: --shard auto/N does, and \
-                     --shard none does everything in each",
+                return Err(usage_error(
+                    "JOB_COMPLETION_INDEX is the index of this pod, but the number of pods is unknown: set it with --shard auto/N, or \
+                     do everything in each pod with --shard none",
                 ));
             }
         };
-        Shard::new(index, of).ok_or_else(|| {
-            wrong(format_args!(
-                "{self} is beyond the {of} parts: {} from 0 on expected",
-                of.get()
+        Shard::new(index, count).ok_or_else(|| {
+            usage_error(format_args!(
+                "{self} is beyond the {count} parts: an index from 0 to {} expected",
+                count.get() - 1
             ))
         })
     }
@@ -240,7 +240,9 @@ impl BatchSystem {
 impl fmt::Display for BatchSystem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Slurm { index, of } => write!(f, "task {} of a Slurm array of {of}", index + 1),
+            Self::Slurm { index, count } => {
+                write!(f, "task {} of a Slurm array of {count}", index + 1)
+            }
             Self::Kubernetes { index } => {
                 write!(f, "pod {index} of an indexed Kubernetes job")
             }
@@ -252,7 +254,7 @@ impl fmt::Display for BatchSystem {
 mod tests {
     use super::*;
 
-    fn said(text: Option<&str>, variables: &[(&str, &str)]) -> Result<Shard> {
+    fn resolved(text: Option<&str>, variables: &[(&str, &str)]) -> Result<Shard> {
         Shard::resolve(text, |name| {
             let mut variables = variables.iter();
             let found = variables.find(|(known, _)| *known == name);
@@ -268,9 +270,9 @@ mod tests {
     ];
 
     #[test]
-    fn parts_are_read_from_the_flag_and_the_batch_system() {
+    fn shards_are_read_from_the_flag_and_the_batch_system() {
         let pod = [("JOB_COMPLETION_INDEX", "2")];
-        for (text, variables, due) in [
+        for (text, variables, expected) in [
             (None, &[][..], "1/1"),
             (Some("2/4"), &[], "2/4"),
             (Some("4/4"), &TASK, "4/4"),
@@ -280,10 +282,11 @@ mod tests {
             (Some("auto/4"), &TASK, "3/4"),
             (Some("auto/8"), &pod, "3/8"),
             (Some("none"), &pod, "1/1"),
-            // An array of one task does all of it.
+            // An array of one task does everything.
             (None, &[("SLURM_ARRAY_TASK_ID", "7")], "1/1"),
         ] {
-            assert_eq!(said(text, variables).unwrap().to_string(), due, "{text:?}");
+            let shard = resolved(text, variables).unwrap();
+            assert_eq!(shard.to_string(), expected, "{text:?}");
         }
         for (text, variables, says) in [
             (Some("0/4"), &[][..], "a part expected, as 2/4"),
@@ -294,17 +297,18 @@ mod tests {
             (Some("auto/3"), &TASK, "has 4 tasks, not 3"),
             (None, &pod, "--shard auto/N"),
         ] {
-            let error = said(text, variables).unwrap_err().to_string();
+            let error = resolved(text, variables).unwrap_err().to_string();
             assert!(error.contains(says), "{text:?}: {error}");
         }
     }
 
     #[test]
-    fn every_place_is_in_one_part_and_shares_sum_up() {
-        let of = NonZeroU32::new(3).unwrap();
-        let parts: Vec<Shard> = (0..3).map(|i| Shard::new(i, of).unwrap()).collect();
-        for place in 0..20 {
-            assert_eq!(parts.iter().filter(|part| part.has(place)).count(), 1);
+    fn every_position_is_in_one_shard_and_shares_sum_up() {
+        let count = NonZeroU32::new(3).unwrap();
+        let parts: Vec<Shard> = (0..3).map(|i| Shard::new(i, count).unwrap()).collect();
+        for position in 0..20 {
+            let shards = parts.iter().filter(|part| part.has(position));
+            assert_eq!(shards.count(), 1);
         }
         let whole = NonZeroU32::new(500).unwrap();
         let shares = parts.iter().map(|part| part.share(whole).get());

@@ -1,4 +1,4 @@
-//! What is shown together: [`Source`], read once before anything is asked.
+//! The frames that are shown together: [`Source`], read once before anything is asked.
 
 use std::collections::BTreeMap;
 
@@ -9,9 +9,9 @@ use crate::dataset::{Dataset, Picture};
 use crate::error::{Error, Result};
 use crate::types::{Digest, FrameId, Question};
 
-/// Where the files of frames come from.
+/// A reader of frames' files.
 pub(crate) trait Frames: Sync {
-    /// The file of a frame, not yet decoded.
+    /// The file of a frame, which is not decoded.
     fn picture(&self, frame: &FrameId) -> Result<Picture>;
 }
 
@@ -24,16 +24,16 @@ impl Frames for Dataset {
 /// One frame of a source.
 #[derive(Debug, Clone)]
 pub(crate) struct SourceFrame {
-    /// Its name, which its noise is drawn from.
+    /// Name of the frame. Its noise is drawn from it.
     pub(crate) id: FrameId,
-    /// The digest of its file.
+    /// Digest of the file.
     pub(crate) digest: Digest,
-    /// Its width and height, in pixels.
+    /// Width and height, in pixels.
     pub(crate) size: (u32, u32),
 }
 
 impl SourceFrame {
-    /// Reads a frame's file and checks that it is an image.
+    /// The frame of this name. Its file is read, and must be an image.
     pub(crate) fn inspect(frames: &dyn Frames, id: &FrameId) -> Result<Self> {
         let picture = frames.picture(id)?;
         Ok(Self {
@@ -44,21 +44,21 @@ impl SourceFrame {
     }
 }
 
-/// What is shown together: one frame, or the frames of a walk.
+/// The frames that are shown together: one frame, or those of a walk.
 #[derive(Debug)]
 pub(crate) struct Source {
-    /// The name of the frame or of the walk.
+    /// Name of the frame or of the walk.
     pub(crate) name: FrameId,
-    /// Each of its frames once; none if nobody sees it or it cannot be shown.
+    /// Each of its frames once; none if only blind models are asked, or it cannot be shown.
     pub(crate) frames: Vec<SourceFrame>,
-    /// Which of them is shown at each place: one more than once if a walk has fewer frames than are shown.
+    /// Indices into `frames`, in the order shown. A frame is repeated if a walk has fewer frames than are shown.
     pub(crate) order: Vec<usize>,
-    /// Why it cannot be shown; `None` if it can.
+    /// Reason why it cannot be shown; `None` if it can.
     pub(crate) problem: Option<String>,
 }
 
 impl Source {
-    /// A frame alone.
+    /// A source of a single frame.
     pub(crate) fn of_frame(frame: SourceFrame) -> Self {
         Self {
             name: frame.id.clone(),
@@ -68,7 +68,7 @@ impl Source {
         }
     }
 
-    /// A source that nobody sees.
+    /// A source without frames, for blind models.
     pub(crate) fn unseen(name: FrameId) -> Self {
         Self {
             name,
@@ -78,14 +78,14 @@ impl Source {
         }
     }
 
-    /// The frame in the middle of a walk; the only one of a frame.
+    /// The frame in the middle, or the only one; `None` without frames.
     pub(crate) fn middle(&self) -> Option<&SourceFrame> {
         self.frames.get(self.frames.len() / 2)
     }
 
-    /// The digest of each frame shown, in the order shown.
+    /// The digest of all frames in the order shown; for a single frame, that of its file.
     pub(crate) fn digest(&self) -> Digest {
-        let shown = self.order.iter().map(|place| &self.frames[*place].digest);
+        let shown = self.order.iter().map(|index| &self.frames[*index].digest);
         let digests: Vec<&Digest> = shown.collect();
         match digests[..] {
             [only] => *only,
@@ -94,19 +94,19 @@ impl Source {
     }
 }
 
-/// The frames that questions are about, in the order in which they are first asked about.
+/// The first question about each frame, in the order of the questions.
 pub(crate) fn first_asked(questions: &[Question]) -> Vec<&Question> {
-    let mut seen = BTreeMap::new();
+    let mut first = BTreeMap::new();
     for (place, question) in questions.iter().enumerate() {
-        seen.entry(&question.frame).or_insert((place, question));
+        first.entry(&question.frame).or_insert((place, question));
     }
-    let mut first: Vec<(usize, &Question)> = seen.into_values().collect();
+    let mut first: Vec<(usize, &Question)> = first.into_values().collect();
     first.sort_by_key(|(place, _)| *place);
     first.into_iter().map(|(_, question)| question).collect()
 }
 
-/// Reads every image that is asked about once: a missing or broken one is found before anything is paid for, and its content
-/// enters the keys of its trials.
+/// The sources of all frames with a question. Each file is read once. So a missing or broken one is found before anything is paid
+/// for, and its content enters the keys of its trials.
 pub(crate) fn inspect_all(
     dataset: &Dataset,
     questions: &[Question],

@@ -1,4 +1,4 @@
-//! Runs as they lie in their folders: [`StoredRun`], and [`AnyRun`] of whatever was asked.
+//! Runs as read from their folders: [`StoredRun`], and [`AnyRun`] for either kind of experiment.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use crate::store;
 use crate::types::manifest::RunManifest;
 use crate::types::{ChoiceDetail, Detail, OpenDetail, QuestionId, Record, RunQuestion, Thumbnail};
 
-/// A run as it lies in its folder.
+/// A run as read from its folder.
 pub(crate) struct StoredRun<D> {
     pub(crate) folder: PathBuf,
     pub(crate) manifest: RunManifest,
@@ -21,13 +21,13 @@ impl<D: Detail> StoredRun<D> {
     /// Reads a run folder.
     ///
     /// # Errors
-    /// If it holds no run of such records.
+    /// If the folder holds no run with records of this kind.
     pub(crate) fn open(folder: &Path) -> Result<Self> {
         let manifest = store::read_manifest(folder, D::SCHEMA)?;
         Self::of(folder, manifest.ok_or_else(|| no_run(folder))?)
     }
 
-    /// Reads the rest of a run folder, whose manifest is this.
+    /// Reads everything in a run folder except `manifest`.
     pub(crate) fn of(folder: &Path, manifest: RunManifest) -> Result<Self> {
         let questions = store::read_questions(folder)?;
         Ok(Self {
@@ -39,7 +39,7 @@ impl<D: Detail> StoredRun<D> {
         })
     }
 
-    /// What the run is called: its folder's own name.
+    /// Name of the run: that of its folder.
     pub(crate) fn name(&self) -> String {
         name(&self.folder)
     }
@@ -58,52 +58,48 @@ pub(crate) fn in_order<D: Detail>(
         .map(|record| (place(&record), record))
         .collect();
     ordered.sort_by(|(place, record), (other_place, other)| {
-        let asked = |record: &Record<D>| (record.detail.repeat(), record.key);
-        (place, &record.condition, &record.model, asked(record)).cmp(&(
+        let trial = |record: &Record<D>| (record.detail.repeat(), record.key);
+        (place, &record.condition, &record.model, trial(record)).cmp(&(
             other_place,
             &other.condition,
             &other.model,
-            asked(other),
+            trial(other),
         ))
     });
     ordered.into_iter().map(|(_, record)| record).collect()
 }
 
-/// What a run in this folder is called: the folder's own name.
+/// Name of the run in this folder: that of the folder.
 pub(crate) fn name(folder: &Path) -> String {
     let whole = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
     let name = whole.file_name().unwrap_or(whole.as_os_str());
     name.to_string_lossy().into_owned()
 }
 
-/// A run, by what was asked in it. The one place that tells experiments apart by the schema of their folders.
+/// A run of either experiment. Only this module tells experiments apart by the schema of their folders.
 pub(crate) enum AnyRun {
-    /// Questions with choices.
     Choice(StoredRun<ChoiceDetail>),
-    /// Open questions.
     Open(StoredRun<OpenDetail>),
 }
 
-/// What was asked in a run.
+/// The kind of questions in a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ExperimentKind {
-    /// Questions with choices.
     Choice,
-    /// Open questions.
     Open,
 }
 
 impl ExperimentKind {
-    /// What was asked in the run of a folder.
+    /// The kind of questions in the run of a folder.
     ///
     /// # Errors
-    /// If there is no run in it, or one of another version.
+    /// If the folder holds no run, or one of another version.
     pub(crate) fn of(folder: &Path) -> Result<Self> {
         let schema = store::schema(folder)?.ok_or_else(|| no_run(folder))?;
         if schema == OpenDetail::SCHEMA {
             return Ok(Self::Open);
         }
-        // Says what is wrong with any other schema.
+        // Returns the error about any other schema.
         store::read_manifest(folder, ChoiceDetail::SCHEMA)?;
         Ok(Self::Choice)
     }
@@ -113,7 +109,7 @@ impl AnyRun {
     /// Reads a run folder.
     ///
     /// # Errors
-    /// If it holds no run.
+    /// If the folder holds no run.
     pub(crate) fn open(folder: &Path) -> Result<Self> {
         Ok(match ExperimentKind::of(folder)? {
             ExperimentKind::Choice => Self::Choice(StoredRun::open(folder)?),
@@ -126,7 +122,7 @@ impl StoredRun<ChoiceDetail> {
     /// Reads a run of questions with choices.
     ///
     /// # Errors
-    /// If it holds none; a run of open questions is refused with what to do `instead`.
+    /// If the folder holds no run, or one of open questions. That error tells the user what to do `instead`.
     pub(crate) fn of_choices(folder: &Path, instead: &str) -> Result<Self> {
         match AnyRun::open(folder)? {
             AnyRun::Choice(run) => Ok(run),
@@ -138,10 +134,10 @@ impl StoredRun<ChoiceDetail> {
     }
 }
 
-/// The manifest of the run in a folder, whatever was asked in it.
+/// The manifest of the run in a folder, of either experiment.
 ///
 /// # Errors
-/// If it holds no run.
+/// If the folder holds no run.
 pub(crate) fn manifest(folder: &Path) -> Result<RunManifest> {
     let schema = match ExperimentKind::of(folder)? {
         ExperimentKind::Choice => ChoiceDetail::SCHEMA,

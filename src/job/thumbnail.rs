@@ -1,4 +1,4 @@
-//! Small copies of the images that were sent, for the report: [`thumbnail`], and which of them are still [`MissingThumbnails`].
+//! Small copies of the images that were sent, for the report: [`thumbnail`], and those not made yet: [`MissingThumbnails`].
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -8,60 +8,62 @@ use crate::ask::{Payload, PayloadFormat};
 use crate::error::{Error, Result};
 use crate::types::{Condition, Digest, FrameId, Rgb, Thumbnail};
 
-/// Copies of so many frames are kept, so that a report stays small whatever the run's size.
-const MOST_FRAMES: usize = 48;
-/// The longest side of a copy, in pixels.
+/// Maximum number of frames with thumbnails, so that the report of a large run stays small; chosen.
+const MAX_FRAMES: usize = 48;
+/// Longest side of a small copy, in pixels; chosen.
 const SIDE: u32 = 240;
-/// The side of the crop, in pixels.
+/// Side of the crop, in pixels; chosen.
 const CROP: usize = 96;
-/// The format of both.
+/// Format of the small copy and of the crop.
 const FORMAT: &str = "jpeg:72";
 
-/// The copies that a run has yet to keep.
+/// The thumbnails that a run folder does not have yet.
 #[derive(Debug, Default)]
 pub(crate) struct MissingThumbnails {
     frames: BTreeSet<FrameId>,
-    there: BTreeSet<(FrameId, Condition)>,
+    present: BTreeSet<(FrameId, Condition)>,
 }
 
 impl MissingThumbnails {
-    /// Those of all frames where there are few, else of those with the lowest digests, whatever the order or shard in which
-    /// they come; but for those that are there.
+    /// The missing thumbnails of all frames or, if there are too many, of those with the lowest digests. This choice does not
+    /// depend on order or shards.
     pub(crate) fn new<'a>(
         frames: impl IntoIterator<Item = &'a FrameId>,
-        there: Vec<Thumbnail>,
+        present: Vec<Thumbnail>,
     ) -> Self {
         let frames: BTreeSet<&FrameId> = frames.into_iter().collect();
         let mut ranked: Vec<&FrameId> = frames.into_iter().collect();
         ranked.sort_by_cached_key(|frame| *Digest::of(frame.0.as_bytes()).as_bytes());
-        let there = there.into_iter().map(|kept| (kept.frame, kept.condition));
+        let present = present
+            .into_iter()
+            .map(|thumbnail| (thumbnail.frame, thumbnail.condition));
         Self {
-            frames: ranked.into_iter().take(MOST_FRAMES).cloned().collect(),
-            there: there.collect(),
+            frames: ranked.into_iter().take(MAX_FRAMES).cloned().collect(),
+            present: present.collect(),
         }
     }
 
-    /// Whether copies of a frame are wanted at all.
+    /// Whether a frame has thumbnails in the report.
     pub(crate) fn wants(&self, frame: &FrameId) -> bool {
         self.frames.contains(frame)
     }
 
-    /// Whether a copy of a frame in a condition is wanted and not yet there.
+    /// Whether the thumbnail of a frame in a condition is wanted and missing.
     pub(crate) fn lacks(&self, frame: &FrameId, condition: &Condition) -> bool {
-        self.wants(frame) && !self.there.contains(&(frame.clone(), condition.clone()))
+        self.wants(frame) && !self.present.contains(&(frame.clone(), condition.clone()))
     }
 }
 
-/// A small copy of an image as it was sent, and the middle of it: raw dark images with the light given back that the level
-/// has taken, all others as they are. Where the pixels that were encoded are at hand, a PNG is not decoded for it.
+/// A small copy of an image as it was sent, and a crop of its middle. The crop of a degraded image without an enhancer is amplified by
+/// the light that the level has taken; other crops are unchanged. With the `encoded` pixels, a PNG need not be decoded.
 pub(crate) fn thumbnail(
     frame: &FrameId,
     condition: &Condition,
     sent: &Payload,
     encoded: Option<&Rgb>,
 ) -> Result<Thumbnail> {
-    let image = sent.seen(encoded)?;
-    let stops = match condition.enhancer {
+    let image = sent.received(encoded)?;
+    let ev = match condition.enhancer {
         None => condition
             .degradation
             .as_ref()
@@ -70,7 +72,7 @@ pub(crate) fn thumbnail(
     };
     let jpeg: PayloadFormat = FORMAT
         .parse()
-        .map_err(|e| Error::data("the format of small copies", e))?;
+        .map_err(|e| Error::data("the format of thumbnails", e))?;
     let url = |image: &Rgb| -> Result<String> {
         let url = Payload::encode(image, jpeg, None)?.data_url();
         Ok(String::from_utf8_lossy(&url).into_owned())
@@ -80,13 +82,13 @@ pub(crate) fn thumbnail(
         condition: condition.clone(),
         image: sent.facts().digest,
         small: url(&*small(&image)?)?,
-        crop: url(&middle(&image, stops)?)?,
-        stops,
+        crop: url(&middle(&image, ev)?)?,
+        stops: ev,
     })
 }
 
-/// The image with its longer side at most [`SIDE`], each pixel the mean of those that it stands for: four times as fast as
-/// `image::imageops::thumbnail`.
+/// The image with a longer side of at most [`SIDE`] pixels. Each pixel is the mean of those that it replaces. This is four times as
+/// fast as `image::imageops::thumbnail`.
 fn small(image: &Rgb) -> Result<Cow<'_, Rgb>> {
     let (height, width) = (image.height(), image.width());
     let fitted = Payload::fitted(width as u32, height as u32, NonZeroU32::new(SIDE));
@@ -117,11 +119,11 @@ fn small(image: &Rgb) -> Result<Cow<'_, Rgb>> {
     Rgb::new(rows, columns, samples).map(Cow::Owned)
 }
 
-/// The middle of an image, its linear light (gamma 2.2) amplified by so many EV.
-fn middle(image: &Rgb, stops: f32) -> Result<Rgb> {
+/// The middle of an image, with its linear light (gamma 2.2) amplified by `ev`.
+fn middle(image: &Rgb, ev: f32) -> Result<Rgb> {
     let (height, width) = (image.height().min(CROP), image.width().min(CROP));
     let (top, left) = ((image.height() - height) / 2, (image.width() - width) / 2);
-    let scale = libm::exp2(f64::from(stops) / 2.2);
+    let scale = libm::exp2(f64::from(ev) / 2.2);
     let amplified: [u8; 256] =
         std::array::from_fn(|code| (code as f64 * scale).round().min(255.0) as u8);
     let rows = (top..top + height).flat_map(|row| {
@@ -140,13 +142,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn small_is_the_mean_of_what_it_stands_for() {
+    fn a_small_pixel_is_the_mean_of_those_it_replaces() {
         let mut image = Rgb::black(3, 480);
         for (i, pixel) in image.samples_mut().chunks_exact_mut(3).enumerate() {
             let (row, column) = (i / 480, i % 480);
             pixel.fill((10 * row + 3 * (column % 2) + column / 4) as u8);
         }
-        // 240 × 2: the first row stands for one of the image's, the second for two.
+        // 240 × 2: the first row replaces one row of the image, the second two.
         let copy = small(&image).unwrap();
         assert_eq!((copy.height(), copy.width()), (2, 240));
         let at = |row: usize, column: usize| copy.samples()[(row * 240 + column) * 3];
@@ -156,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn copies_are_of_the_image_as_it_was_sent() {
+    fn thumbnails_show_the_image_as_it_was_sent() {
         let samples = (0..300 * 400 * 3_u64).map(|i| (i * i % 251) as u8);
         let image = Rgb::new(300, 400, samples.collect()).unwrap();
         let (frame, condition) = (FrameId("f".into()), "L3-ev".parse().unwrap());
@@ -174,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn the_middle_is_shown_in_the_light_it_had() {
+    fn the_middle_is_amplified_by_the_light_that_was_taken() {
         let mut image = Rgb::black(100, 200);
         image.samples_mut().fill(10);
         let crop = middle(&image, 2.2).unwrap();

@@ -1,32 +1,32 @@
-//! Where the time of a run goes: [`Timings`].
+//! The time that each step of a run takes: [`Timings`].
 
 use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// What a thread of the darkroom does, or what the asking waits for.
+/// A step of the image pipeline, or a state in which requests wait.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum TimedStep {
-    /// A file is read and decoded.
+    /// Reading and decoding of a file.
     Decode,
-    /// Light is taken.
-    Darken,
-    /// An enhancement model works.
+    /// Reduction of light and addition of noise.
+    Degrade,
+    /// Enhancement by a model.
     Enhance,
-    /// An image is encoded.
+    /// Scaling and encoding of an image.
     Encode,
-    /// An image waits until it is asked about.
+    /// Images wait until they are asked about.
     Waiting,
-    /// Nothing is on the wire, for there is no image to ask about.
+    /// No request is in flight, because no image is ready.
     Idle,
-    /// As much is on the wire as may be.
+    /// As many requests are in flight as allowed.
     Full,
 }
 
 impl TimedStep {
     const ALL: [(Self, &str); 7] = [
         (Self::Decode, "decode"),
-        (Self::Darken, "darken"),
+        (Self::Degrade, "degrade"),
         (Self::Enhance, "enhance"),
         (Self::Encode, "encode"),
         (Self::Waiting, "waiting"),
@@ -35,19 +35,19 @@ impl TimedStep {
     ];
 }
 
-/// The time that went into each step, summed over threads.
+/// Time of each step, summed over threads.
 #[derive(Debug, Default)]
 pub(crate) struct Timings {
     nanoseconds: [AtomicU64; TimedStep::ALL.len()],
 }
 
 impl Timings {
-    /// Does something, and counts its time.
-    pub(crate) fn time<T>(&self, step: TimedStep, act: impl FnOnce() -> T) -> T {
+    /// The result of `action`, whose time is added to a step.
+    pub(crate) fn time<T>(&self, step: TimedStep, action: impl FnOnce() -> T) -> T {
         let started = Instant::now();
-        let done = act();
+        let result = action();
         self.add(step, started.elapsed());
-        done
+        result
     }
 
     pub(crate) fn add(&self, step: TimedStep, time: Duration) {
@@ -58,8 +58,8 @@ impl Timings {
         self.nanoseconds[step as usize].load(Ordering::Relaxed) as f64 / 1e9
     }
 
-    /// What bound a run that took so long on so many threads, in one line.
-    pub(crate) fn told(&self, took: Duration, threads: usize) -> String {
+    /// One line with the time of each step, and what limited the speed of a run of this duration on `threads` threads.
+    pub(crate) fn summary(&self, took: Duration, threads: usize) -> String {
         TimingsText {
             timings: self,
             took: took.as_secs_f64(),
@@ -82,16 +82,16 @@ impl fmt::Display for TimingsText<'_> {
             took,
             threads,
         } = *self;
-        let making = [
+        let image_steps = [
             TimedStep::Decode,
-            TimedStep::Darken,
+            TimedStep::Degrade,
             TimedStep::Enhance,
             TimedStep::Encode,
         ];
-        let busy: f64 = making.iter().map(|step| timings.seconds(*step)).sum();
+        let busy: f64 = image_steps.iter().map(|step| timings.seconds(*step)).sum();
         write!(f, "timings: {took:.1} s; images:")?;
         for (step, name) in TimedStep::ALL {
-            if making.contains(&step) {
+            if image_steps.contains(&step) {
                 write!(f, " {name} {:.1} s,", timings.seconds(step))?;
             }
         }
@@ -101,27 +101,27 @@ impl fmt::Display for TimingsText<'_> {
         );
         write!(
             f,
-            " {:.0} % of {threads} threads; they waited {:.1} s for requests; requests: none on the wire {idle:.1} s, all that may be \
+            " {:.0} % of {threads} threads; they waited {:.1} s for requests; requests: none in flight {idle:.1} s, as many as allowed \
              {full:.1} s; ",
             100.0 * busy / (took * threads as f64).max(1e-9),
             timings.seconds(TimedStep::Waiting)
         )?;
-        let slowest = making
+        let slowest = image_steps
             .into_iter()
             .max_by(|a, b| timings.seconds(*a).total_cmp(&timings.seconds(*b)));
         f.write_str(match slowest {
             _ if full > idle && full > took / 4.0 => {
-                "the endpoint binds: more --concurrency, or a faster endpoint, would help"
+                "the endpoint limits the speed: more --concurrency, or a faster endpoint, would help"
             }
-            _ if idle < took / 4.0 => "nothing binds much",
+            _ if idle < took / 4.0 => "nothing limits the speed much",
             Some(TimedStep::Enhance) => {
-                "making images binds, enhancement most: more cores, --shard over machines or --llie-max-side would help"
+                "making images limits the speed, enhancement most: more cores, --shard over machines or --llie-max-side would help"
             }
             Some(TimedStep::Encode) => {
-                "making images binds, encoding most: more cores, --shard over machines, or smaller images (--max-side, --image \
+                "making images limits the speed, encoding most: more cores, --shard over machines, or smaller images (--max-side, --image \
                  jpeg:95) would help"
             }
-            _ => "making images binds: more cores or --shard over machines would help",
+            _ => "making images limits the speed: more cores or --shard over machines would help",
         })
     }
 }
@@ -131,16 +131,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_line_says_what_binds() {
+    fn the_summary_names_what_limits_the_speed() {
         let second = Duration::from_secs;
-        let told = |steps: &[(TimedStep, u64)]| {
+        let summary = |steps: &[(TimedStep, u64)]| {
             let timings = Timings::default();
             for (step, seconds) in steps {
                 timings.add(*step, second(*seconds));
             }
-            timings.told(second(10), 2)
+            timings.summary(second(10), 2)
         };
-        let line = told(&[
+        let line = summary(&[
             (TimedStep::Encode, 12),
             (TimedStep::Decode, 6),
             (TimedStep::Idle, 9),
@@ -150,12 +150,13 @@ mod tests {
             "{line}"
         );
         assert!(line.contains("encoding most"), "{line}");
-        assert!(told(&[(TimedStep::Full, 9)]).contains("the endpoint binds"));
+        assert!(summary(&[(TimedStep::Full, 9)]).contains("the endpoint limits the speed"));
         assert!(
-            told(&[(TimedStep::Enhance, 9), (TimedStep::Idle, 5)]).contains("enhancement most")
+            summary(&[(TimedStep::Enhance, 9), (TimedStep::Idle, 5)]).contains("enhancement most")
         );
         assert!(
-            told(&[(TimedStep::Encode, 1), (TimedStep::Idle, 1)]).contains("nothing binds much")
+            summary(&[(TimedStep::Encode, 1), (TimedStep::Idle, 1)])
+                .contains("nothing limits the speed much")
         );
     }
 }

@@ -1,4 +1,4 @@
-//! What is asked, one at a time: a [`Trial`] of an [`Item`], about a [`Stimulus`].
+//! One request: a [`Trial`] of an [`Item`], about a [`Stimulus`].
 
 use std::sync::Arc;
 
@@ -9,24 +9,24 @@ use crate::ask::{Message, Payload, Query};
 use crate::error::Result;
 use crate::types::{Condition, Detail, Digest, QuestionId, Record, Thumbnail, TrialKey};
 
-/// What a trial is about: a question with choices, an open one, or an answer that is to be judged.
+/// The subject of a trial: a question with choices, an open question, or an answer to judge.
 pub(crate) trait Item: Clone + Send + Sync + 'static {
-    /// What is kept of it.
+    /// The fields that it adds to a record.
     type Detail: Detail;
 
-    /// How many tokens a reply is likely to have.
+    /// Expected tokens of a reply.
     fn reply_tokens(&self) -> f64;
 
-    /// The question, as built-in models know it.
+    /// The question, in the form for built-in models.
     fn query(&self) -> Query<'_>;
 
-    /// The frame or walk that its images are of: where refusals are about one alone, it may be at fault by itself.
-    fn place(&self) -> &str;
+    /// Name of the frame or walk of its images. If a server refuses only requests about one source, that source may be the cause.
+    fn source(&self) -> &str;
 
-    /// How many times the same question was put before.
+    /// Number of earlier trials with the same question.
     fn turn(&self) -> u32;
 
-    /// The record of a trial for a model before anything came of it.
+    /// The record of a trial for a model, without an outcome.
     fn blank(trial: &Trial<Self>, stimulus: &Stimulus, model: &str) -> Record<Self::Detail>;
 }
 
@@ -34,29 +34,29 @@ pub(crate) trait Item: Clone + Send + Sync + 'static {
 #[derive(Debug, Clone)]
 pub(crate) struct Trial<I> {
     pub(crate) key: TrialKey,
-    /// The model, by its place among those of the phase.
+    /// Index of the model among those of the phase.
     pub(crate) model: usize,
     pub(crate) prompt: Prompt,
     pub(crate) item: I,
 }
 
-/// Everything that decides a reply, as it enters the key of a trial. Built-in models answer by the names of question and condition,
-/// so these decide it, too.
+/// All that decides a reply, as it enters the key of a trial. Question and condition are included, because built-in models answer by
+/// their names.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(crate) struct KeyFacts<'a> {
     model: &'a str,
-    /// What the model answers by.
+    /// Digest of the settings that decide the model's replies.
     parameters: &'a str,
     question: &'a QuestionId,
     before: &'a str,
     behind: Option<&'a str>,
-    /// The choices in the order shown; `None` if the answer is open.
+    /// Choices in the order shown; `None` for an open question.
     choices: Option<&'a [String]>,
-    /// How many times the same was asked before; `None` the first time.
+    /// Number of earlier trials with the same question; `None` for the first.
     repeat: Option<u32>,
-    /// `None` if nothing is shown.
+    /// Condition of the images; `None` if only text is sent.
     condition: Option<&'a Condition>,
-    /// The digest of all that decides the images.
+    /// Digest of all that decides the images; `None` if only text is sent.
     image: Option<Digest>,
 }
 
@@ -82,7 +82,7 @@ impl<'a> KeyFacts<'a> {
         }
     }
 
-    /// The facts of a question with these choices, in the order shown, that was asked so many times before.
+    /// The facts of a question with these choices in the order shown, asked `repeat` times before.
     pub(crate) fn with_choices(self, choices: &'a [String], repeat: u32) -> Self {
         Self {
             choices: Some(choices),
@@ -91,30 +91,31 @@ impl<'a> KeyFacts<'a> {
         }
     }
 
-    /// The key of the trial.
+    /// The digest of all these facts, which is the key of the trial.
     pub(crate) fn key(&self) -> Result<TrialKey> {
         Digest::canonical("darkqa.trial/2", self).map(Into::into)
     }
 }
 
-/// The words of a trial.
+/// The text of a trial.
 #[derive(Debug, Clone)]
 pub(crate) struct Prompt {
+    /// Text before the images.
     pub(crate) before: Arc<str>,
-    /// Those behind the images, where there are any.
+    /// Text after the images; `None` if there is none.
     pub(crate) behind: Option<Arc<str>>,
 }
 
 impl Prompt {
-    /// Words alone, or before all images.
-    pub(crate) fn of(words: Arc<str>) -> Self {
+    /// A prompt whose whole text is before the images.
+    pub(crate) fn of(text: Arc<str>) -> Self {
         Self {
-            before: words,
+            before: text,
             behind: None,
         }
     }
 
-    /// The words of both parts.
+    /// The text before and after the images; the second is empty if there is none.
     pub(crate) fn parts(&self) -> [&str; 2] {
         [&self.before, self.behind.as_deref().unwrap_or_default()]
     }
@@ -129,10 +130,10 @@ impl Prompt {
     }
 }
 
-/// What the trials of one group show; by default nothing.
+/// The images that the trials of one group share; by default none.
 #[derive(Debug, Default)]
 pub(crate) struct Stimulus {
-    /// `None` where nothing is shown.
+    /// Condition of the images; `None` without images.
     pub(crate) condition: Option<Condition>,
     pub(crate) images: Vec<Arc<Payload>>,
 }
@@ -140,11 +141,11 @@ pub(crate) struct Stimulus {
 /// A stimulus with its trials, as the image pipeline hands it out.
 #[derive(Debug)]
 pub(crate) struct PreparedGroup<I> {
-    /// Without its images where one could not be made.
+    /// Images of the group; none if one of them could not be made.
     pub(crate) stimulus: Stimulus,
     pub(crate) trials: Vec<Trial<I>>,
-    /// Why the images could not be made.
+    /// Reason why the images could not be made; else `None`.
     pub(crate) problem: Option<String>,
-    /// A small copy for the report, where one is wanted.
+    /// Thumbnail for the report; `None` if it is not wanted or exists already.
     pub(crate) thumbnail: Option<Thumbnail>,
 }

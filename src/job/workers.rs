@@ -6,24 +6,25 @@ use clap::Args;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::error::{Error, Result};
+use crate::types::Decides;
 use crate::types::flag::threads;
 
-/// How many threads make images.
+/// Flag of the number of threads that make images.
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub(crate) struct ThreadArgs {
-    /// Threads of synthesis, enhancement and reading, 1024 at most; default: all cores
-    #[arg(long, value_name = "N", value_parser = threads, help_heading = "Scale")]
+    /// Threads for synthesis, enhancement and reading, 1024 at most; default: all cores
+    #[arg(long, value_name = "N", value_parser = threads, help_heading = "Scale", add = Decides::Nothing)]
     pub threads: Option<NonZeroUsize>,
 }
 
-/// The same threads twice: all of them for one source, and each for a source of its own.
+/// The threads, twice: one pool of all for a shared source, and one pool of a single thread for each source of its own.
 pub(crate) struct Workers {
     pub(crate) all: ThreadPool,
     pub(crate) each: Vec<ThreadPool>,
 }
 
 impl Workers {
-    /// This many threads; one a core if no number is given.
+    /// Workers with this many threads; one per core if it is `None`.
     ///
     /// # Errors
     /// If the operating system refuses to start them.
@@ -37,7 +38,7 @@ impl Workers {
     }
 }
 
-/// This many threads; one a core if no number is given.
+/// A pool of this many threads; one per core if it is `None`.
 ///
 /// # Errors
 /// If the operating system refuses to start them.

@@ -1,4 +1,4 @@
-//! Label spaces that data sets share, by name: [`space`]; and a data set's own, `classes.json`: `read`.
+//! Built-in label spaces, by name: [`space`]; custom label spaces, in `classes.json`: `read`.
 
 pub(crate) mod names;
 
@@ -14,7 +14,7 @@ use crate::types::{Label, Labels};
 /// The schema of `classes.json`.
 const SCHEMA: &str = "darkqa.classes/1";
 
-/// The spaces that are built in, their tables, and their numbers for nothing.
+/// The built-in label spaces: name, table and void numbers.
 const SPACES: [(&str, &str, &[u16]); 4] = [
     ("ade150", include_str!("ade150.tsv"), &[0]),
     ("mpcat40", include_str!("mpcat40.tsv"), &[0, 41]),
@@ -22,13 +22,13 @@ const SPACES: [(&str, &str, &[u16]); 4] = [
     ("nyu40", include_str!("nyu40.tsv"), &[0]),
 ];
 
-/// The names of the built-in spaces.
+/// The names of the built-in label spaces.
 #[must_use]
 pub(crate) fn names() -> Vec<&'static str> {
     SPACES.iter().map(|(name, ..)| *name).collect()
 }
 
-/// A built-in label space by its name.
+/// A built-in label space by name; `None` if the name is unknown.
 #[must_use]
 pub fn space(name: &str) -> Option<Labels> {
     let (_, table, void) = SPACES.iter().find(|(known, ..)| *known == name)?;
@@ -54,13 +54,13 @@ pub fn space(name: &str) -> Option<Labels> {
     })
 }
 
-/// The canonical classes, those of mpcat40 without `void` and `unlabeled`.
+/// The canonical classes: those of mpcat40 without `void` and `unlabeled`.
 #[must_use]
 pub(crate) fn canonical() -> BTreeSet<String> {
     space("mpcat40").map_or_else(BTreeSet::new, |labels| labels.expressible)
 }
 
-/// `classes.json`.
+/// The content of `classes.json`.
 #[derive(Debug, Serialize, Deserialize)]
 struct ClassesFile {
     schema: String,
@@ -78,7 +78,7 @@ struct ClassEntry {
     id: u16,
     name: String,
     canonical: String,
-    /// Whether the absence of the canonical class from a map means that there is none in the picture.
+    /// Whether absence of the canonical class from a map means that the image shows no such object.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     expressible: Option<bool>,
 }
@@ -86,11 +86,11 @@ struct ClassEntry {
 /// Reads a `classes.json`: `{"schema": "darkqa.classes/1", "space", "void_ids": [0], "classes": [{"id", "name",
 /// "canonical", "expressible"}]}`.
 ///
-/// A canonical class is expressible where one of its labels says so; where no label of the file says anything, by what is
-/// known of the space of that name, else where it has a label at all.
+/// A canonical class is expressible if one of its labels is marked so. If no label of the file has such a mark, the built-in
+/// space of the same name decides. Without such a space, every class with a label is expressible.
 ///
 /// # Errors
-/// With the file: broken JSON, another schema, a number twice, a canonical class that mpcat40 has not.
+/// With the file, for invalid JSON, another schema, a repeated number, or a canonical class that mpcat40 does not have.
 pub(super) fn read(path: &Path) -> Result<Labels> {
     let file: ClassesFile = reading::json(path)?;
     file.labels()
@@ -118,7 +118,7 @@ impl ClassesFile {
             } = class;
             if !known.contains(&canonical) {
                 return Err(format!(
-                    "class {id} ({name:?}) is said to be {canonical:?}, which mpcat40 has not; one of {} expected",
+                    "class {id} ({name:?}) has the canonical class {canonical:?}, which mpcat40 does not have; one of {} expected",
                     known.into_iter().collect::<Vec<_>>().join(", ")
                 ));
             }
@@ -142,7 +142,7 @@ impl ClassesFile {
     }
 }
 
-/// A label space as `classes.json`.
+/// The text of `classes.json` for a label space.
 pub(super) fn json(labels: &Labels) -> String {
     let classes = labels.labels.iter().map(|(&id, label)| ClassEntry {
         id,
@@ -157,7 +157,7 @@ pub(super) fn json(labels: &Labels) -> String {
         void_ids: labels.void.iter().copied().collect(),
         classes: classes.collect(),
     };
-    // A tree of names and numbers always has a text.
+    // Serialization of names and numbers cannot fail.
     serde_json::to_string_pretty(&file).unwrap_or_default() + "\n"
 }
 
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn the_built_in_spaces_are_whole() {
+    fn the_built_in_spaces_are_complete() {
         let sizes = [150, 40, 13, 40];
         for (name, size) in names().into_iter().zip(sizes) {
             let labels = space(name).unwrap();
@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_space_cannot_say_is_known() {
+    fn classes_that_a_space_cannot_express_are_known() {
         let nyu13 = space("nyu13").unwrap().expressible;
         for class in ["sink", "toilet", "cabinet", "tv_monitor"] {
             assert!(!nyu13.contains(class), "{class}");
@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_without_a_word_on_it_is_read_by_its_space() {
+    fn a_file_without_expressible_marks_is_read_by_its_space() {
         let class = |id: u16, canonical: &str, more: &str| {
             format!(r#"{{"id":{id},"name":"x","canonical":"{canonical}"{more}}}"#)
         };
@@ -222,11 +222,11 @@ mod tests {
         };
         assert_eq!(read(&file("nyu40", &bare)), ["chair"]);
         assert_eq!(read(&file("mine", &bare)), ["appliances", "chair"]);
-        let said = [
+        let marked = [
             class(24, "appliances", r#","expressible":true"#),
             class(5, "chair", ""),
         ];
-        assert_eq!(read(&file("nyu40", &said)), ["appliances"]);
+        assert_eq!(read(&file("nyu40", &marked)), ["appliances"]);
     }
 
     #[test]
@@ -236,7 +236,7 @@ mod tests {
             (r#"{"schema":"x","space":"","classes":[]}"#, "schema \"x\""),
             (
                 r#"{"schema":"darkqa.classes/1","space":"","classes":[{"id":1,"name":"a","canonical":"desk"}]}"#,
-                "class 1 (\"a\") is said to be \"desk\"",
+                "class 1 (\"a\") has the canonical class \"desk\"",
             ),
             (
                 r#"{"schema":"darkqa.classes/1","space":"","classes":[{"id":1,"name":"a","canonical":"bed"},{"id":1,"name":"b","canonical":"bed"}]}"#,

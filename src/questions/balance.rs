@@ -1,4 +1,4 @@
-//! Evening out the answers, so that a model that sees nothing gains nothing by habit: `balance`.
+//! Balancing of the answers, so that a model cannot score by always giving the most common one: `balance`.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,39 +9,39 @@ use super::rules::BalanceRule;
 use crate::types::flag::flag_words;
 use crate::types::{Digest, Family};
 
-/// How far the answers are evened out.
+/// How far the answers are balanced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum BalanceMode {
-    /// Not at all: Algorithm 1 to the letter.
+    /// No balancing, as in the paper's Algorithm 1.
     None,
-    /// As many yes as no of each class and activity, but for one.
+    /// Numbers of yes and no differ by at most 1 for each class and activity.
     #[default]
     Binary,
-    /// And no room and no colour is too large a share of the answers.
+    /// As binary, and no room type or colour exceeds its share of the answers.
     Full,
 }
 
 flag_words!(BalanceMode);
 
-/// What stays, and what does not.
+/// The questions after balancing.
 pub(super) struct BalancedSet {
     pub(super) asked: Vec<GeneratedQuestion>,
     /// The family of each question that was dropped.
     pub(super) dropped: Vec<Family>,
-    /// Answers that stayed too frequent.
+    /// Warnings: a family has too few different answers to balance them.
     pub(super) uneven: Vec<String>,
 }
 
-/// Drops questions until the answers are even. Which of several go is decided by the digest of their names.
+/// Drops questions until the answers are balanced. The digests of the ids decide which of several are dropped.
 pub(super) fn balance(
     asked: Vec<GeneratedQuestion>,
-    how: BalanceMode,
+    mode: BalanceMode,
     rule: &BalanceRule,
 ) -> BalancedSet {
     let mut dropped: BTreeSet<usize> = BTreeSet::new();
     let mut uneven = Vec::new();
     if rule.max_repeat > 0 {
-        for (_, list) in groups(&asked, &dropped, |asked| Some(asked.said())) {
+        for (_, list) in groups(&asked, &dropped, |asked| Some(asked.repeat_key())) {
             dropped.extend(list.into_iter().skip(rule.max_repeat));
         }
     }
@@ -53,7 +53,7 @@ pub(super) fn balance(
             }
         }
     }
-    if how != BalanceMode::None {
+    if mode != BalanceMode::None {
         let binary = |asked: &GeneratedQuestion| {
             let family = &asked.question.family;
             matches!(family, Family::Affordance | Family::Presence)
@@ -62,30 +62,31 @@ pub(super) fn balance(
         for (_, list) in groups(&asked, &dropped, binary) {
             let truth = |i: &usize| asked[*i].question.choices.truth();
             let (yes, no): (Vec<usize>, Vec<usize>) = list.into_iter().partition(|i| truth(i) == 0);
-            let most = yes.len().min(no.len()) + 1;
-            dropped.extend(yes.into_iter().skip(most));
-            dropped.extend(no.into_iter().skip(most));
+            let max = yes.len().min(no.len()) + 1;
+            dropped.extend(yes.into_iter().skip(max));
+            dropped.extend(no.into_iter().skip(max));
         }
     }
-    if how == BalanceMode::Full {
+    if mode == BalanceMode::Full {
         uneven = cap_shares(&asked, &mut dropped, rule);
     }
     let families = dropped
         .iter()
         .map(|i| asked[*i].question.family.clone())
         .collect();
-    let kept = asked
+    let remaining = asked
         .into_iter()
         .enumerate()
         .filter(|(i, _)| !dropped.contains(i));
     BalancedSet {
-        asked: kept.map(|(_, asked)| asked).collect(),
+        asked: remaining.map(|(_, asked)| asked).collect(),
         dropped: families,
         uneven,
     }
 }
 
-/// Drops rooms and colours that are too large a share of the answers; what cannot be made even, in words.
+/// Drops questions whose room type or colour exceeds its share of the answers. Returns a warning for each family that cannot
+/// be balanced.
 fn cap_shares(
     asked: &[GeneratedQuestion],
     dropped: &mut BTreeSet<usize>,
@@ -101,15 +102,15 @@ fn cap_shares(
         };
         let lists = groups(asked, dropped, answer);
         match caps(&lists, share) {
-            Some(most) => {
-                let beyond = lists
+            Some(max) => {
+                let surplus = lists
                     .into_values()
-                    .flat_map(|list| list.into_iter().skip(most));
-                dropped.extend(beyond);
+                    .flat_map(|list| list.into_iter().skip(max));
+                dropped.extend(surplus);
             }
             None if lists.is_empty() => {}
             None => uneven.push(format!(
-                "{family}: {} answers cannot be made even to {} % each",
+                "{family}: too few different answers ({}) to limit each to {} % of the questions",
                 lists.len(),
                 share / 10_000
             )),
@@ -118,7 +119,7 @@ fn cap_shares(
     uneven
 }
 
-/// The questions that are left by key, each list in the order of its names' digests.
+/// Indexes of the remaining questions by key, each list sorted by the digests of the ids.
 fn groups<K: Ord>(
     asked: &[GeneratedQuestion],
     dropped: &BTreeSet<usize>,
@@ -136,20 +137,20 @@ fn groups<K: Ord>(
     groups
 }
 
-/// How many of each answer stay, so that none is more than a share of all; as many as can be. `None` where there are too few
-/// answers for that.
+/// The maximum number of questions for each answer that keeps every answer within its share of all. `None` if there are too
+/// few different answers.
 fn caps(lists: &BTreeMap<String, Vec<usize>>, share_ppm: u64) -> Option<usize> {
     let total: usize = lists.values().map(Vec::len).sum();
-    let kept = |most: usize| -> usize { lists.values().map(|list| list.len().min(most)).sum() };
+    let remaining = |max: usize| -> usize { lists.values().map(|list| list.len().min(max)).sum() };
     (1..=total)
         .rev()
         .map(|all| (all, (all as u64 * share_ppm / 1_000_000) as usize))
-        .find(|(all, most)| *most > 0 && kept(*most) >= *all)
-        .map(|(_, most)| most)
+        .find(|(all, max)| *max > 0 && remaining(*max) >= *all)
+        .map(|(_, max)| max)
 }
 
-/// Whether a question occurs in enough scenes, with answers that differ enough: their entropy over that of the answers that are
-/// possible (EmbodiedQA, `entropy_based_filtering.py`).
+/// Whether a question occurs in enough scenes and its answers differ enough: their entropy, relative to the entropy of
+/// uniform answers (EmbodiedQA, `entropy_based_filtering.py`).
 fn varied(asked: &[GeneratedQuestion], list: &[usize], rule: &BalanceRule) -> bool {
     let scenes: BTreeSet<&str> = list.iter().map(|i| asked[*i].scene.as_str()).collect();
     if scenes.len() < rule.least_scenes {
@@ -205,38 +206,39 @@ mod tests {
             .clone()
     }
 
-    fn count(kept: &[GeneratedQuestion], about: &str, answer: &str) -> usize {
-        kept.iter()
+    fn count(questions: &[GeneratedQuestion], about: &str, answer: &str) -> usize {
+        questions
+            .iter()
             .filter(|asked| asked.about == about && asked.answer() == answer)
             .count()
     }
 
     #[test]
-    fn yes_and_no_are_even_but_for_one() {
+    fn yes_and_no_differ_by_at_most_one() {
         let list = |family: &Family| {
             let chairs = (0..9).map(|i| asked(i, family.clone(), "chair", usize::from(i >= 7)));
             let beds = (9..12).map(|i| asked(i, family.clone(), "bed", 1));
             chairs.chain(beds).collect::<Vec<_>>()
         };
-        let kept = balance(list(&Family::Presence), BalanceMode::Binary, &rule());
+        let balanced = balance(list(&Family::Presence), BalanceMode::Binary, &rule());
         assert_eq!(
             (
-                count(&kept.asked, "chair", "yes"),
-                count(&kept.asked, "chair", "no")
+                count(&balanced.asked, "chair", "yes"),
+                count(&balanced.asked, "chair", "no")
             ),
             (3, 2)
         );
-        assert_eq!((kept.asked.len(), kept.dropped.len()), (6, 6));
+        assert_eq!((balanced.asked.len(), balanced.dropped.len()), (6, 6));
         let mut reversed = list(&Family::Presence);
         reversed.reverse();
         let mut other = balance(reversed, BalanceMode::Binary, &rule()).asked;
         other.reverse();
-        assert_eq!(other, kept.asked);
-        for (family, how) in [
+        assert_eq!(other, balanced.asked);
+        for (family, mode) in [
             (Family::Presence, BalanceMode::None),
             (Family::Color, BalanceMode::Binary),
         ] {
-            assert_eq!(balance(list(&family), how, &rule()).asked.len(), 12);
+            assert_eq!(balance(list(&family), mode, &rule()).asked.len(), 12);
         }
     }
 
@@ -254,9 +256,9 @@ mod tests {
             color_share_ppm: 500_000,
             ..rule()
         };
-        let kept = balance(list.clone(), BalanceMode::Full, &half);
+        let balanced = balance(list.clone(), BalanceMode::Full, &half);
         assert_eq!(
-            (count(&kept.asked, "sofa", "yes"), kept.asked.len()),
+            (count(&balanced.asked, "sofa", "yes"), balanced.asked.len()),
             (20, 40)
         );
         let fifth = balance(list, BalanceMode::Full, &rule());
@@ -264,20 +266,20 @@ mod tests {
     }
 
     #[test]
-    fn repeats_and_habits_go() {
+    fn repeats_and_questions_with_one_usual_answer_are_dropped() {
         let list: Vec<GeneratedQuestion> = (0..30)
             .map(|i| asked(i, Family::Color, "sofa", usize::from(i < 3)))
             .collect();
-        let most = BalanceRule {
+        let few = BalanceRule {
             max_repeat: 2,
             ..rule()
         };
         // Five scenes; three of the thirty answers are "no", each in its own scene.
         assert_eq!(
-            balance(list.clone(), BalanceMode::None, &most).asked.len(),
+            balance(list.clone(), BalanceMode::None, &few).asked.len(),
             13
         );
-        for (ppm, kept) in [(200_000, 30), (500_000, 0)] {
+        for (ppm, expected) in [(200_000, 30), (500_000, 0)] {
             let varied = BalanceRule {
                 least_entropy_ppm: ppm,
                 ..rule()
@@ -286,7 +288,7 @@ mod tests {
                 balance(list.clone(), BalanceMode::None, &varied)
                     .asked
                     .len(),
-                kept,
+                expected,
                 "{ppm}"
             );
         }

@@ -3,21 +3,21 @@
 use serde_json::json;
 
 use super::reason::Reason;
-use super::rule_context::{Candidate, RuleContext, RuleResult, falls};
+use super::rule_context::{Candidate, RuleContext, RuleResult, rejected};
 use super::rules::{ClassFlag, GapScope};
 use super::statistics::{Segment, SegmentDepth};
 use crate::types::Family;
 
-/// The one candidate of a frame.
-pub(super) fn candidates(survey: &RuleContext<'_>) -> Vec<RuleResult> {
-    let verdict = claim(survey);
-    vec![verdict.unwrap_or_else(|reason| falls(Family::Closest, "", None, reason))]
+/// The single candidate of a frame.
+pub(super) fn candidates(context: &RuleContext<'_>) -> Vec<RuleResult> {
+    let result = candidate(context);
+    vec![result.unwrap_or_else(|reason| rejected(Family::Closest, "", None, reason))]
 }
 
 type NearObject<'a> = (&'a Segment, SegmentDepth);
 
-fn claim(survey: &RuleContext<'_>) -> Result<RuleResult, Reason> {
-    let (book, statistics) = (survey.book, survey.statistics);
+fn candidate(context: &RuleContext<'_>) -> Result<RuleResult, Reason> {
+    let (book, statistics) = (context.book, context.statistics);
     let depth = statistics.depth.as_ref().ok_or(Reason::NoDepth)?;
     let measure = &book.measure;
     if !(measure.least_median_depth_mm..=measure.most_median_depth_mm).contains(&depth.median) {
@@ -29,7 +29,7 @@ fn claim(survey: &RuleContext<'_>) -> Result<RuleResult, Reason> {
     }
     let mut objects: Vec<NearObject<'_>> = statistics
         .evidence(book)
-        .filter(|segment| eligible(survey, segment))
+        .filter(|segment| eligible(context, segment))
         .filter_map(|segment| Some((segment, segment.measured(book)?)))
         .collect();
     objects.sort_by_key(|(segment, depth)| (depth.median, segment.id));
@@ -45,12 +45,12 @@ fn claim(survey: &RuleContext<'_>) -> Result<RuleResult, Reason> {
     if classes.len() < 2 {
         return Err(Reason::Few);
     }
-    apart(survey, &objects, *first, *second)?;
-    rivals(survey, &objects, first.1.p10, second.1.median)?;
+    check_gap(context, &objects, *first, *second)?;
+    check_rivals(context, &objects, first.1.p10, second.1.median)?;
 
     let winner = classes[0];
     classes.truncate(book.closest.choices);
-    survey.picker.shuffle("closest", &mut classes);
+    context.picker.shuffle("closest", &mut classes);
     let truth = classes
         .iter()
         .position(|class| *class == winner)
@@ -60,7 +60,7 @@ fn claim(survey: &RuleContext<'_>) -> Result<RuleResult, Reason> {
         .map(|class| book.name(class).to_owned())
         .collect();
     let segments: Vec<&Segment> = objects.iter().map(|(segment, _)| *segment).collect();
-    Ok(survey.rests(
+    Ok(context.viable(
         Candidate {
             family: Family::Closest,
             about: winner.to_owned(),
@@ -77,7 +77,7 @@ fn claim(survey: &RuleContext<'_>) -> Result<RuleResult, Reason> {
     ))
 }
 
-/// The classes, nearest first.
+/// The different classes, nearest first.
 fn classes<'a>(objects: &[NearObject<'a>]) -> Vec<&'a str> {
     let mut classes: Vec<&str> = Vec::new();
     for (segment, _) in objects {
@@ -89,15 +89,16 @@ fn classes<'a>(objects: &[NearObject<'a>]) -> Vec<&'a str> {
 }
 
 /// Whether a segment may be offered.
-fn eligible(survey: &RuleContext<'_>, segment: &Segment) -> bool {
-    let book = survey.book;
+fn eligible(context: &RuleContext<'_>, segment: &Segment) -> bool {
+    let book = context.book;
     book.is(&segment.class, ClassFlag::Asked)
         && !book.is(&segment.class, ClassFlag::Structural)
         && !segment.flat(book)
-        && survey.statistics.area(segment) >= book.closest.area_ppm
+        && context.statistics.area(segment) >= book.closest.area_ppm
 }
 
-/// How much nearer the near end of the first is than that of any other that competes with it.
+/// The distance in mm from the first object's 10 % depth quantile to the smallest one of the others. `None` if another is
+/// nearer or there is none.
 fn near_gap(objects: &[NearObject<'_>], first: NearObject<'_>) -> Option<u32> {
     let others = objects
         .iter()
@@ -106,14 +107,14 @@ fn near_gap(objects: &[NearObject<'_>], first: NearObject<'_>) -> Option<u32> {
     nearest.checked_sub(first.1.p10)
 }
 
-/// The first must be clearly nearer than the second, and nobody's near end nearer than its own.
-fn apart(
-    survey: &RuleContext<'_>,
+/// Checks that the first object is clearly nearer than the second, and that no other object's 10 % quantile is nearer.
+fn check_gap(
+    context: &RuleContext<'_>,
     objects: &[NearObject<'_>],
     first: NearObject<'_>,
     second: NearObject<'_>,
 ) -> Result<(), Reason> {
-    let rule = &survey.book.closest;
+    let rule = &context.book.closest;
     let (near, far) = (u64::from(first.1.median), u64::from(second.1.median));
     let gap = far - near;
     if gap < rule.gap_mm.into() || gap * 1_000_000 < near * rule.gap_ppm {
@@ -130,19 +131,21 @@ fn apart(
     }
 }
 
-/// Nothing that is not offered may be nearer than the second, nor reach nearer than the first.
-fn rivals(
-    survey: &RuleContext<'_>,
+/// Checks the objects that are not offered: none may be nearer than the second, or have a 10 % quantile nearer than the
+/// first's.
+fn check_rivals(
+    context: &RuleContext<'_>,
     objects: &[NearObject<'_>],
     nearest: u32,
     second: u32,
 ) -> Result<(), Reason> {
-    let (book, statistics) = (survey.book, survey.statistics);
-    let harmless =
+    let (book, statistics) = (context.book, context.statistics);
+    let background_class =
         |class: &str| book.is(class, ClassFlag::Structural) || book.is(class, ClassFlag::Flat);
     for segment in &statistics.segments {
-        // What has several classes may be anything.
-        let background = (harmless(&segment.class) || segment.flat(book)) && !segment.mixed(book);
+        // A segment of several classes may be any object.
+        let background =
+            (background_class(&segment.class) || segment.flat(book)) && !segment.mixed(book);
         if background || objects.iter().any(|(object, _)| object.id == segment.id) {
             continue;
         }
@@ -161,7 +164,7 @@ fn rivals(
     let loose = statistics
         .loose
         .iter()
-        .filter(|(class, _)| !harmless(class));
+        .filter(|(class, _)| !background_class(class));
     let loose: u64 = loose.map(|(_, pixels)| pixels).sum();
     if statistics.ppm(loose) >= book.closest.rival_ppm {
         return Err(Reason::Rival);

@@ -4,43 +4,43 @@ use serde_json::json;
 
 use super::colors::{Color, Palette};
 use super::reason::Reason;
-use super::rule_context::{Candidate, RuleContext, RuleResult, falls};
+use super::rule_context::{Candidate, RuleContext, RuleResult, rejected};
 use super::rules::{ClassFlag, ColorChoices, ColorRule};
 use super::statistics::{Segment, ppm};
 use crate::types::Family;
 
-/// Every segment of a class whose colour may be asked.
-pub(super) fn candidates(survey: &RuleContext<'_>, palette: &Palette) -> Vec<RuleResult> {
-    let segments = survey.statistics.segments.iter();
-    let colored = segments.filter(|segment| survey.book.is(&segment.class, ClassFlag::Color));
+/// One candidate for every segment of a class whose colour may be asked.
+pub(super) fn candidates(context: &RuleContext<'_>, palette: &Palette) -> Vec<RuleResult> {
+    let segments = context.statistics.segments.iter();
+    let colored = segments.filter(|segment| context.book.is(&segment.class, ClassFlag::Color));
     colored
         .map(|segment| {
-            let verdict = claim(survey, segment, palette);
-            verdict.unwrap_or_else(|reason| falls(Family::Color, &segment.class, None, reason))
+            let result = candidate(context, segment, palette);
+            result.unwrap_or_else(|reason| rejected(Family::Color, &segment.class, None, reason))
         })
         .collect()
 }
 
-fn claim(
-    survey: &RuleContext<'_>,
+fn candidate(
+    context: &RuleContext<'_>,
     segment: &Segment,
     palette: &Palette,
 ) -> Result<RuleResult, Reason> {
-    let rule = &survey.book.color;
-    if let Some(reason) = survey.statistics.disqualified(segment, survey.book) {
+    let rule = &context.book.color;
+    if let Some(reason) = context.statistics.disqualified(segment, context.book) {
         return Err(reason);
     }
-    if survey.statistics.area(segment) < rule.area_ppm || segment.core < rule.eroded_px {
+    if context.statistics.area(segment) < rule.area_ppm || segment.core < rule.eroded_px {
         return Err(Reason::Small);
     }
-    if !alone(survey, segment) {
+    if !unique(context, segment) {
         return Err(Reason::NotUnique);
     }
-    let color = named(segment, rule, palette)?;
-    let (choices, truth) = offered(survey, color).ok_or(Reason::NotOffered)?;
+    let color = dominant_color(segment, rule, palette)?;
+    let (choices, truth) = offered(context, color).ok_or(Reason::NotOffered)?;
     let (_, most, next, none) = segment.leading_color();
     let share = |part| ppm(part, segment.core);
-    let more = json!({
+    let evidence = json!({
         "core_px": segment.core,
         "dominant_ppm": share(most),
         "second_ppm": share(next),
@@ -49,24 +49,24 @@ fn claim(
     });
     let text = rule
         .text
-        .replace("{object}", survey.book.name(&segment.class));
-    Ok(survey.rests(
+        .replace("{object}", context.book.name(&segment.class));
+    Ok(context.viable(
         Candidate {
             family: Family::Color,
             about: segment.class.clone(),
             text,
             choices,
             truth,
-            evidence: more,
+            evidence,
         },
         &[segment],
     ))
 }
 
-/// Whether a segment is the only one of its class that a person would see; pixels of the class outside of all segments are
-/// another one.
-fn alone(survey: &RuleContext<'_>, segment: &Segment) -> bool {
-    let (statistics, least) = (survey.statistics, survey.book.color.lone_ppm);
+/// Whether a segment is the only visible one of its class. Pixels of the class outside of all segments count as another
+/// segment.
+fn unique(context: &RuleContext<'_>, segment: &Segment) -> bool {
+    let (statistics, least) = (context.statistics, context.book.color.lone_ppm);
     let others = statistics.segments.iter().filter(|other| {
         other.class == segment.class && other.id != segment.id && statistics.area(other) >= least
     });
@@ -74,8 +74,8 @@ fn alone(survey: &RuleContext<'_>, segment: &Segment) -> bool {
     others.count() == 0 && statistics.ppm(loose) < least
 }
 
-/// The one colour that a person would name.
-fn named(segment: &Segment, rule: &ColorRule, palette: &Palette) -> Result<Color, Reason> {
+/// The colour of a segment, if one colour clearly dominates.
+fn dominant_color(segment: &Segment, rule: &ColorRule, palette: &Palette) -> Result<Color, Reason> {
     let (color, most, next, none) = segment.leading_color();
     let share = |part| ppm(part, segment.core);
     let color = color.ok_or(Reason::Nameless)?;
@@ -95,9 +95,9 @@ fn named(segment: &Segment, rule: &ColorRule, palette: &Palette) -> Result<Color
     Ok(color)
 }
 
-/// The colours that are offered, and which of them is true.
-fn offered(survey: &RuleContext<'_>, truth: Color) -> Option<(Vec<String>, usize)> {
-    let rule = &survey.book.color;
+/// The colours that are offered, and the index of the true one; `None` if it is not among them.
+fn offered(context: &RuleContext<'_>, truth: Color) -> Option<(Vec<String>, usize)> {
+    let rule = &context.book.color;
     let mut colors = match rule.candidates {
         ColorChoices::All11 => Color::ALL.to_vec(),
         ColorChoices::Fixed8 => rule.fixed8.clone(),
@@ -111,7 +111,7 @@ fn offered(survey: &RuleContext<'_>, truth: Color) -> Option<(Vec<String>, usize
                 .into_iter()
                 .filter(|color| *color != truth && !near(*color));
             let mut others: Vec<Color> = others.collect();
-            survey.picker.shuffle("color", &mut others);
+            context.picker.shuffle("color", &mut others);
             others.truncate(4);
             others.push(truth);
             others

@@ -1,10 +1,10 @@
-//! What names a colour: a tree over CIELAB, from which the table of [`super::colors`] is made.
+//! The decision tree over CIELAB that names colours; it generates the table of [`super::colors`].
 //!
-//! The bounds were set by eye on photographs of rooms: what people call by one name has it, what they disagree on has none.
+//! The bounds were set by eye on photographs of rooms. A colour on whose name people disagree has no name.
 
 use super::colors::Color;
 
-/// The name of an sRGB colour, where people agree on one.
+/// The name of an sRGB colour; `None` if people do not agree on one.
 pub(super) fn name(rgb: [u8; 3]) -> Option<Color> {
     let [lightness, a, b] = lab(rgb);
     let chroma = libm::hypot(a, b);
@@ -67,7 +67,7 @@ fn chromatic(lightness: f64, chroma: f64, hue: f64) -> Option<Color> {
     }
 }
 
-/// CIELAB of an sRGB colour, white point D65 (CIE 15; the matrix is that of ITU-R BT.709's primaries).
+/// CIELAB of an sRGB colour with white point D65 (CIE 15; matrix of the primaries of ITU-R BT.709).
 fn lab(rgb: [u8; 3]) -> [f64; 3] {
     let [red, green, blue] = rgb.map(|code| {
         let value = f64::from(code) / 255.0;

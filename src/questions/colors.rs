@@ -1,18 +1,19 @@
 //! The names of colours: [`Color`], and [`Palette`], which names every 8-bit sRGB colour by a table.
 //!
-//! The names are the eleven basic terms of Berlin and Kay (1969). The table has one name for each 8 × 8 × 8 block of codes, so
-//! that no floating-point number decides an answer. It comes from the tree in `color_tree.rs` over CIELAB, which a test makes
-//! again; where neighbouring names overlap (beige, teal, the greys between grey and white) it has none, and asks nothing.
+//! The names are the eleven basic terms of Berlin and Kay (1969). The table has one name for each 8 × 8 × 8 block of codes,
+//! so that no floating-point number decides an answer. The decision tree over CIELAB in `color_tree.rs` generates it, and a
+//! test checks that. Where neighbouring names overlap (beige, teal, light greys), a colour has no name, and no
+//! question about it is asked.
 
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 use crate::types::Digest;
 
-/// The table that is built in: a line for each red and green, a letter for each blue.
+/// The built-in table: one line for each pair of red and green, one letter for each blue.
 const BUILT_IN: &str = include_str!("colors.txt");
 
-/// Blocks along each channel.
+/// Number of blocks along each channel.
 const SIDE: usize = 32;
 
 /// A basic colour term.
@@ -33,7 +34,7 @@ pub enum Color {
 }
 
 impl Color {
-    /// All of them, in the order in which they are offered.
+    /// All terms, in the order in which they are offered as choices.
     pub const ALL: [Self; 11] = [
         Self::Black,
         Self::Grey,
@@ -48,7 +49,7 @@ impl Color {
         Self::Brown,
     ];
 
-    /// The name, as `black`.
+    /// The name in lower case, such as `black`.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -66,7 +67,7 @@ impl Color {
         }
     }
 
-    /// The letter in a table.
+    /// The letter that stands for the colour in a table.
     fn letter(self) -> u8 {
         match self {
             Self::Black => b'k',
@@ -84,32 +85,32 @@ impl Color {
     }
 }
 
-/// How many bins a histogram of names has: the eleven terms, and none.
+/// Number of bins of a histogram of names: the eleven terms and one for colours without a name.
 pub(crate) const BINS: usize = 12;
-/// The bin of what has no name.
+/// Bin of the colours without a name.
 pub(crate) const NONE: usize = 11;
 
-/// The name of every colour.
+/// A table that names every 8-bit sRGB colour.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Palette {
-    /// The bin of each block, red first.
+    /// Bin of each block; red is the slowest index.
     bins: Vec<u8>,
 }
 
 impl Palette {
-    /// The table that is built in.
+    /// Returns the built-in table.
     ///
     /// # Errors
-    /// None: a test reads the very same text.
+    /// Never: a test parses the same text.
     pub fn built_in() -> Result<Self> {
         Self::parse(BUILT_IN)
     }
 
     /// Reads a table: 1,024 lines (red, then green) of 32 letters (blue), each `k` black, `a` grey, `w` white, `r` red, `o`
-    /// orange, `y` yellow, `g` green, `b` blue, `p` purple, `i` pink, `n` brown, `.` none; lines with `#` are left out.
+    /// orange, `y` yellow, `g` green, `b` blue, `p` purple, `i` pink, `n` brown, `.` no name. Lines with `#` are ignored.
     ///
     /// # Errors
-    /// [`Error::Data`] where it is anything else.
+    /// [`Error::Data`] if the text has another form.
     pub fn parse(text: &str) -> Result<Self> {
         let wrong = |problem: String| Error::data("colour table", problem);
         let lines: Vec<&str> = text.lines().filter(|line| !line.starts_with('#')).collect();
@@ -136,7 +137,10 @@ impl Palette {
                     (_, Some(color)) => color as u8,
                     (_, None) => {
                         let letter = char::from(letter);
-                        return Err(wrong(format!("row {}: {letter:?} is no colour", i + 1)));
+                        return Err(wrong(format!(
+                            "row {}: {letter:?} is not a colour letter",
+                            i + 1
+                        )));
                     }
                 };
             }
@@ -144,20 +148,20 @@ impl Palette {
         Ok(Self { bins })
     }
 
-    /// The bin of a colour.
+    /// The bin of a colour, from 0 to 11.
     #[must_use]
     pub fn bin(&self, [red, green, blue]: [u8; 3]) -> usize {
         let block = |channel: u8| usize::from(channel >> 3);
         self.bins[(block(red) * SIDE + block(green)) * SIDE + block(blue)].into()
     }
 
-    /// The name of a colour, where it has one.
+    /// The name of a colour; `None` if people do not agree on one.
     #[must_use]
     pub fn color(&self, rgb: [u8; 3]) -> Option<Color> {
         Color::ALL.get(self.bin(rgb)).copied()
     }
 
-    /// The content of the table.
+    /// The digest of the bins; comments of the table do not change it.
     #[must_use]
     pub fn digest(&self) -> Digest {
         Digest::of(&self.bins[..])
@@ -175,8 +179,8 @@ mod tests {
     use super::super::color_tree;
     use super::*;
 
-    /// The table that the tree makes.
-    fn made() -> String {
+    /// The table that the tree generates.
+    fn generated() -> String {
         let mut text = String::from(
             "# The name of every sRGB colour, one letter for each 8 x 8 x 8 block of codes; see colors.rs.\n",
         );
@@ -194,9 +198,9 @@ mod tests {
     }
 
     #[test]
-    fn the_table_is_what_the_tree_makes() {
+    fn the_table_is_what_the_tree_generates() {
         assert!(
-            made() == BUILT_IN,
+            generated() == BUILT_IN,
             "remake it: cargo test remake_the_table -- --ignored"
         );
     }
@@ -205,7 +209,7 @@ mod tests {
     #[ignore = "writes src/questions/colors.txt"]
     fn remake_the_table() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/src/questions/colors.txt");
-        std::fs::write(path, made()).unwrap();
+        std::fs::write(path, generated()).unwrap();
     }
 
     #[test]
@@ -237,7 +241,7 @@ mod tests {
 
     #[test]
     fn the_table_is_pinned() {
-        // Another table makes other answers: version the rules with it.
+        // Another table gives other answers: change the version of the rules with it.
         let digest = Palette::built_in().unwrap().digest().to_string();
         assert_eq!(&digest[..16], "c8406c9facdd6ee5");
     }
@@ -245,11 +249,11 @@ mod tests {
     #[test]
     fn broken_tables_say_what_is_wrong() {
         let cut = BUILT_IN.lines().take(9).collect::<Vec<_>>().join("\n");
-        let strange = BUILT_IN.replacen("\nk", "\nz", 1);
+        let unknown_letter = BUILT_IN.replacen("\nk", "\nz", 1);
         let short = BUILT_IN.replacen("kkkk", "kkk", 1);
         for (text, says) in [
             (cut, "8 lines"),
-            (strange, "'z' is no"),
+            (unknown_letter, "'z' is not a colour letter"),
             (short, "31 letters"),
         ] {
             let error = Palette::parse(&text).unwrap_err().to_string();

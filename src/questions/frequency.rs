@@ -1,19 +1,19 @@
-//! What is common in which rooms: [`Frequency`].
+//! Classes that are common in each type of room: [`Frequency`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::rules::{ClassFlag, RuleBook};
 use super::statistics::FrameStatistics;
 
-/// In how many frames each asked class is well seen, by room and scene.
+/// Number of frames in which each asked class is evidence, by room type and scene.
 #[derive(Debug, Default)]
 pub(crate) struct Frequency {
-    /// By room, then by scene; the room `""` is all frames.
+    /// Counts by room type, scene and class. The room type `""` stands for all frames.
     counts: BTreeMap<String, BTreeMap<String, BTreeMap<String, u64>>>,
 }
 
 impl Frequency {
-    /// Counts a frame.
+    /// Counts the classes of a frame.
     pub(crate) fn add(
         &mut self,
         statistics: &FrameStatistics,
@@ -34,22 +34,17 @@ impl Frequency {
         }
     }
 
-    /// The classes that may be expected in a room of a scene: the `most` commonest of that room in other scenes; where there
-    /// is no such room elsewhere, of all frames. `None` where fewer than `most` classes are seen there: too little to tell.
+    /// The classes to expect in a room of a scene: the `max` most common ones in such rooms of other scenes. If no other scene
+    /// has such a room, all frames count. `None` if fewer than `max` classes occur, which is too little evidence.
     #[must_use]
-    pub(crate) fn expected(
-        &self,
-        room: &str,
-        scene: &str,
-        most: usize,
-    ) -> Option<BTreeSet<String>> {
+    pub(crate) fn expected(&self, room: &str, scene: &str, max: usize) -> Option<BTreeSet<String>> {
         let elsewhere = self.total(room, Some(scene));
         let counts = if elsewhere.is_empty() {
             self.total("", None)
         } else {
             elsewhere
         };
-        if counts.len() < most {
+        if counts.len() < max {
             return None;
         }
         let mut ranked: Vec<(&str, u64)> = counts.into_iter().collect();
@@ -57,16 +52,16 @@ impl Frequency {
         Some(
             ranked
                 .into_iter()
-                .take(most)
+                .take(max)
                 .map(|(class, _)| class.to_owned())
                 .collect(),
         )
     }
 
-    fn total(&self, room: &str, but: Option<&str>) -> BTreeMap<&str, u64> {
+    fn total(&self, room: &str, except: Option<&str>) -> BTreeMap<&str, u64> {
         let mut total = BTreeMap::new();
         let scenes = self.counts.get(room).into_iter().flatten();
-        for (_, counts) in scenes.filter(|(scene, _)| Some(scene.as_str()) != but) {
+        for (_, counts) in scenes.filter(|(scene, _)| Some(scene.as_str()) != except) {
             for (class, count) in counts {
                 *total.entry(class.as_str()).or_insert(0) += count;
             }

@@ -17,184 +17,184 @@ use super::{affordance, closest, color, presence, room_type};
 use crate::error::Result;
 use crate::types::{Choices, Digest, Family, FrameId, Labels, Question, QuestionId};
 
-/// What is asked for.
+/// The settings of one generation of questions.
 #[derive(Debug, Clone)]
 pub struct QuestionRequest<'a> {
-    /// The data set's name.
+    /// Name of the data set; it enters the ids of questions.
     pub dataset: &'a str,
-    /// What its numbers stand for.
+    /// Meaning of the numbers in the class maps.
     pub labels: &'a Labels,
-    /// The rulebook.
+    /// The rulebook with its digests.
     pub rules: &'a Rules,
-    /// The names of colours.
+    /// The table that names colours.
     pub palette: &'a Palette,
-    /// The families that are wanted.
+    /// The families to ask; families outside the paper are ignored.
     pub families: BTreeSet<Family>,
-    /// Who says what room a frame shows.
+    /// Source of a frame's room type.
     pub room_source: RoomSource,
-    /// How the answers are evened out.
+    /// How far the answers are balanced.
     pub balance: BalanceMode,
-    /// The questions that a person has rejected.
+    /// Ids of the questions that a person has rejected.
     pub rejected: BTreeSet<QuestionId>,
 }
 
-/// Why a question that holds is not asked.
+/// Why a viable question is not asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum OmissionReason {
-    /// Another one of its family is asked of the frame.
+    /// Another question of the same family is asked of the frame.
     NotChosen,
-    /// A person has rejected it.
+    /// A person has rejected the question.
     Rejected,
-    /// Its answer would be too frequent.
+    /// The answer would be too frequent.
     Unbalanced,
 }
 
-/// What became of all candidates of a family.
+/// Numbers of a family's candidates, by outcome.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct FamilyCounts {
-    /// Those that hold.
+    /// Number of candidates that the rules accept: `asked` plus all of `omitted`.
     pub viable: u64,
-    /// Those that are asked.
+    /// Number of questions that are asked.
     pub asked: u64,
-    /// Those that hold and are not asked.
-    pub left: BTreeMap<OmissionReason, u64>,
-    /// Those that do not hold.
-    pub fallen: BTreeMap<Reason, u64>,
+    /// Number of viable candidates that are not asked, by reason.
+    pub omitted: BTreeMap<OmissionReason, u64>,
+    /// Number of candidates that the rules reject, by reason.
+    pub rejections: BTreeMap<Reason, u64>,
 }
 
 impl FamilyCounts {
-    /// Those that hold, all counted.
-    fn sift(&mut self, verdicts: Vec<RuleResult>) -> Vec<Candidate> {
-        let mut claims = Vec::new();
-        for verdict in verdicts {
-            match verdict {
-                RuleResult::Holds(claim) => claims.push(claim),
-                RuleResult::Falls(fallen) => *self.fallen.entry(fallen.reason).or_insert(0) += 1,
+    /// Counts all results and returns the viable candidates.
+    fn add(&mut self, results: Vec<RuleResult>) -> Vec<Candidate> {
+        let mut candidates = Vec::new();
+        for result in results {
+            match result {
+                RuleResult::Viable(candidate) => candidates.push(candidate),
+                RuleResult::Rejected(rejection) => {
+                    *self.rejections.entry(rejection.reason).or_insert(0) += 1;
+                }
             }
         }
-        self.viable += claims.len() as u64;
-        claims
+        self.viable += candidates.len() as u64;
+        candidates
     }
 
-    fn leave(&mut self, why: OmissionReason, count: u64) {
+    fn omit(&mut self, reason: OmissionReason, count: u64) {
         if count > 0 {
-            *self.left.entry(why).or_insert(0) += count;
+            *self.omitted.entry(reason).or_insert(0) += count;
         }
     }
 }
 
-/// What came of the frames.
+/// The questions about a set of frames, with counts of all candidates.
 #[derive(Debug, Default)]
 pub struct Generated {
-    /// The questions, by scene, frame and family.
+    /// The questions, sorted by scene, frame and family.
     pub asked: Vec<GeneratedQuestion>,
-    /// What became of the candidates, by family.
-    pub tallies: BTreeMap<Family, FamilyCounts>,
-    /// What each frame says of its room, in the order of the frames.
+    /// Numbers of candidates by outcome, for each family.
+    pub counts: BTreeMap<Family, FamilyCounts>,
+    /// The signs of each frame's room, sorted by scene and frame.
     pub rooms: Vec<(FrameId, RoomSigns)>,
     /// Frames that are too dark to ask anything about.
     pub dark: Vec<FrameId>,
-    /// Answers that stayed too frequent, since there are too few others.
+    /// Warnings: a family has too few different answers to balance them.
     pub uneven: Vec<String>,
 }
 
-/// Makes the questions about frames; `explain` is told of every candidate.
+/// Generates the questions about frames and calls `explain` for every candidate.
 ///
-/// At most one question of a family is asked of a frame, as `Rule_k: (Φ_f, r_f) → (q, a)` of the paper returns one pair. The
-/// frames are taken by scene and name, whatever their order here.
+/// At most one question of a family is asked of a frame, because `Rule_k: (Φ_f, r_f) → (q, a)` of the paper returns one
+/// pair. The frames are sorted by scene and name first, so their order does not matter.
 ///
 /// # Errors
-/// Where a rulebook makes choices that are none, as two of one name.
+/// If a rulebook gives a question invalid choices, such as the same name twice.
 pub fn generate(
     frames: &[FrameStatistics],
-    order: &QuestionRequest<'_>,
+    request: &QuestionRequest<'_>,
     mut explain: impl FnMut(&FrameId, &RuleResult),
 ) -> Result<Generated> {
-    let book = order.rules.book();
+    let book = request.rules.book();
     let mut frames: Vec<&FrameStatistics> = frames.iter().collect();
     frames.sort_by(|a, b| (&a.scene, &a.frame).cmp(&(&b.scene, &b.frame)));
-    let mut made = Generated::default();
+    let mut generated = Generated::default();
     let (dark, light): (Vec<_>, Vec<_>) = frames
         .into_iter()
         .partition(|frame| frame.luma[1] < book.measure.dark_luma);
-    made.dark = dark.into_iter().map(|frame| frame.frame.clone()).collect();
+    generated.dark = dark.into_iter().map(|frame| frame.frame.clone()).collect();
 
     let mut frequency = Frequency::default();
     let rooms: Vec<(RoomSigns, Option<String>)> = light
         .iter()
         .map(|frame| {
             let signs = classify(frame, book);
-            let room = room(frame, &signs, order.room_source, book);
+            let room = room(frame, &signs, request.room_source, book);
             frequency.add(frame, room.as_deref(), book);
             (signs, room)
         })
         .collect();
 
-    let mut running = AnswerCounts::default();
+    let mut answer_counts = AnswerCounts::default();
     for (frame, (signs, room)) in light.iter().zip(&rooms) {
-        let survey = RuleContext {
+        let context = RuleContext {
             book,
-            labels: order.labels,
+            labels: request.labels,
             statistics: frame,
             signs,
             room: room.as_deref(),
             frequency: &frequency,
             picker: Picker {
                 seed: book.seed,
-                dataset: order.dataset,
+                dataset: request.dataset,
                 frame: &frame.frame,
             },
         };
-        let families = order.families.iter();
+        let families = request.families.iter();
         for family in families.filter(|family| Family::PAPER.contains(family)) {
-            let verdicts = verdicts(family, &survey, order.palette);
-            let tally = made.tallies.entry(family.clone()).or_default();
-            for verdict in &verdicts {
-                explain(&frame.frame, verdict);
+            let results = apply_rules(family, &context, request.palette);
+            let counts = generated.counts.entry(family.clone()).or_default();
+            for result in &results {
+                explain(&frame.frame, result);
             }
-            let claims = tally.sift(verdicts);
-            let spare = claims.len().saturating_sub(1) as u64;
-            let Some(claim) = running.choose(claims, &survey) else {
+            let candidates = counts.add(results);
+            let others = candidates.len().saturating_sub(1) as u64;
+            let Some(candidate) = answer_counts.choose(candidates, &context) else {
                 continue;
             };
-            tally.leave(OmissionReason::NotChosen, spare);
-            let asked = ask(claim, frame, order)?;
-            if order.rejected.contains(&asked.question.id) {
-                tally.leave(OmissionReason::Rejected, 1);
+            counts.omit(OmissionReason::NotChosen, others);
+            let asked = question(candidate, frame, request)?;
+            if request.rejected.contains(&asked.question.id) {
+                counts.omit(OmissionReason::Rejected, 1);
             } else {
-                made.asked.push(asked);
+                generated.asked.push(asked);
             }
         }
     }
-    let seen = light.iter().zip(rooms);
-    made.rooms = seen
+    let classified = light.iter().zip(rooms);
+    generated.rooms = classified
         .map(|(frame, (signs, _))| (frame.frame.clone(), signs))
         .collect();
-    Ok(finish(made, order))
+    Ok(finish(generated, request))
 }
 
-/// Evens out the answers, and counts.
-fn finish(mut made: Generated, order: &QuestionRequest<'_>) -> Generated {
-    let kept = balance(
-        std::mem::take(&mut made.asked),
-        order.balance,
-        &order.rules.book().balance,
+/// Balances the answers and completes the counts.
+fn finish(mut generated: Generated, request: &QuestionRequest<'_>) -> Generated {
+    let balanced = balance(
+        std::mem::take(&mut generated.asked),
+        request.balance,
+        &request.rules.book().balance,
     );
-    for family in kept.dropped {
-        let tally = made.tallies.entry(family).or_default();
-        tally.leave(OmissionReason::Unbalanced, 1);
+    for family in balanced.dropped {
+        let counts = generated.counts.entry(family).or_default();
+        counts.omit(OmissionReason::Unbalanced, 1);
     }
-    for asked in &kept.asked {
-        made.tallies
-            .entry(asked.question.family.clone())
-            .or_default()
-            .asked += 1;
+    for asked in &balanced.asked {
+        let counts = generated.counts.entry(asked.question.family.clone());
+        counts.or_default().asked += 1;
     }
-    (made.asked, made.uneven) = (kept.asked, kept.uneven);
-    made
+    (generated.asked, generated.uneven) = (balanced.asked, balanced.uneven);
+    generated
 }
 
-/// The room that questions go by.
+/// The room type that the rules use for a frame; `None` if it is unknown.
 fn room(
     frame: &FrameStatistics,
     signs: &RoomSigns,
@@ -207,7 +207,7 @@ fn room(
     }
 }
 
-/// The room that a person has stated, where questions ask about such a room.
+/// The room type that the data set states for a frame; `None` if questions do not ask about such rooms.
 #[must_use]
 pub(crate) fn stated(frame: &FrameStatistics, book: &RuleBook) -> Option<String> {
     let stated = frame
@@ -222,97 +222,104 @@ pub(crate) fn stated(frame: &FrameStatistics, book: &RuleBook) -> Option<String>
         .cloned()
 }
 
-fn verdicts(family: &Family, survey: &RuleContext<'_>, palette: &Palette) -> Vec<RuleResult> {
+fn apply_rules(family: &Family, context: &RuleContext<'_>, palette: &Palette) -> Vec<RuleResult> {
     match family {
-        Family::RoomType => room_type::candidates(survey),
-        Family::Affordance => affordance::candidates(survey),
-        Family::Presence => presence::candidates(survey),
-        Family::Color => color::candidates(survey, palette),
-        Family::Closest => closest::candidates(survey),
+        Family::RoomType => room_type::candidates(context),
+        Family::Affordance => affordance::candidates(context),
+        Family::Presence => presence::candidates(context),
+        Family::Color => color::candidates(context, palette),
+        Family::Closest => closest::candidates(context),
         Family::Other(_) => Vec::new(),
     }
 }
 
-/// How often each answer has been chosen so far, by family and subject.
+/// Numbers of yes and no answers chosen so far, by family and subject.
 #[derive(Default)]
 struct AnswerCounts(BTreeMap<(Family, String), [u64; 2]>);
 
 impl AnswerCounts {
-    /// Chooses one of a family's claims.
+    /// Chooses one of a family's candidates.
     ///
-    /// Of yes and no, the side is picked where both can be had. Of the claims of one side, the one whose subject lacks that
-    /// side most, then the one whose subject was asked about least, then the one that is picked.
-    fn choose(&mut self, claims: Vec<Candidate>, survey: &RuleContext<'_>) -> Option<Candidate> {
-        let family = claims.first()?.family.clone();
+    /// For yes-no families, the answer is picked first, if both are possible. Among the candidates with this answer, the
+    /// subject that lacks it most comes first, then the subject asked about least. A pick decides the rest.
+    fn choose(
+        &mut self,
+        candidates: Vec<Candidate>,
+        context: &RuleContext<'_>,
+    ) -> Option<Candidate> {
+        let family = candidates.first()?.family.clone();
         let binary = matches!(family, Family::Affordance | Family::Presence);
         if !binary {
-            let chosen = survey.picker.pick(family.name(), "candidate", claims.len());
-            return claims.into_iter().nth(chosen);
+            let chosen = context
+                .picker
+                .pick(family.name(), "candidate", candidates.len());
+            return candidates.into_iter().nth(chosen);
         }
-        let side = survey.picker.pick(family.name(), "polarity", 2);
-        let (wanted, others): (Vec<Candidate>, Vec<Candidate>) =
-            claims.into_iter().partition(|claim| claim.truth == side);
-        let side = if wanted.is_empty() { others } else { wanted };
-        let rank = |claim: &Candidate| {
-            let counts = self.0.get(&(family.clone(), claim.about.clone()));
+        let answer = context.picker.pick(family.name(), "polarity", 2);
+        let (wanted, others): (Vec<Candidate>, Vec<Candidate>) = candidates
+            .into_iter()
+            .partition(|candidate| candidate.truth == answer);
+        let eligible = if wanted.is_empty() { others } else { wanted };
+        let rank = |candidate: &Candidate| {
+            let counts = self.0.get(&(family.clone(), candidate.about.clone()));
             let counts = counts.copied().unwrap_or_default();
-            let (own, other) = (counts[claim.truth], counts[1 - claim.truth]);
-            let bits = survey.picker.bits(family.name(), &claim.about);
+            let (own, other) = (counts[candidate.truth], counts[1 - candidate.truth]);
+            let bits = context.picker.bits(family.name(), &candidate.about);
             (i128::from(own) - i128::from(other), own + other, bits)
         };
-        let chosen = side.into_iter().min_by_key(rank)?;
+        let chosen = eligible.into_iter().min_by_key(rank)?;
         let counts = self.0.entry((family, chosen.about.clone())).or_default();
         counts[chosen.truth] += 1;
         Some(chosen)
     }
 }
 
-/// A claim as a question.
-fn ask(
-    claim: Candidate,
+/// The question that a candidate becomes, with the digests of the rules in its evidence.
+fn question(
+    candidate: Candidate,
     frame: &FrameStatistics,
-    order: &QuestionRequest<'_>,
+    request: &QuestionRequest<'_>,
 ) -> Result<GeneratedQuestion> {
-    let id = id(&claim, frame, order.dataset);
-    let mut evidence = claim.evidence;
+    let id = id(&candidate, frame, request.dataset);
+    let mut evidence = candidate.evidence;
     let rules = json!({
-        "version": order.rules.book().version,
-        "digest": order.rules.digest(),
-        "colors": order.palette.digest(),
+        "version": request.rules.book().version,
+        "digest": request.rules.digest(),
+        "colors": request.palette.digest(),
     });
     if let Some(evidence) = evidence.as_object_mut() {
-        evidence.insert("about".to_owned(), json!(claim.about));
+        evidence.insert("about".to_owned(), json!(candidate.about));
         evidence.insert("scene".to_owned(), json!(frame.scene));
         evidence.insert("rules".to_owned(), rules);
     }
-    let choices = Choices::new(claim.choices, claim.truth).map_err(|e| e.at("rules"))?;
+    let choices = Choices::new(candidate.choices, candidate.truth).map_err(|e| e.at("rules"))?;
     let question = Question {
         id,
         frame: frame.frame.clone(),
-        family: claim.family,
-        text: claim.text,
+        family: candidate.family,
+        text: candidate.text,
         choices,
         evidence: Value::clone(&evidence),
     };
     Ok(GeneratedQuestion {
         question,
-        about: claim.about,
+        about: candidate.about,
         scene: frame.scene.clone(),
     })
 }
 
-/// The name of a question: its family, and the content of all that is asked, so that another place in the file, other evidence
-/// or another rulebook that asks the same changes nothing.
-fn id(claim: &Candidate, frame: &FrameStatistics, dataset: &str) -> QuestionId {
+/// The id of a question: the family and a digest of all that is asked. It does not change with the place in the file, the
+/// evidence, or a rulebook that asks the same question.
+fn id(candidate: &Candidate, frame: &FrameStatistics, dataset: &str) -> QuestionId {
     let head = [
         dataset,
         &frame.scene,
         &frame.frame.0,
-        claim.family.name(),
-        &claim.text,
+        candidate.family.name(),
+        &candidate.text,
     ];
-    let choices = claim.choices.iter().map(String::as_str);
-    let parts = head.into_iter().chain(choices).chain([claim.answer()]);
+    let choices = candidate.choices.iter().map(String::as_str);
+    let parts = head.into_iter().chain(choices).chain([candidate.answer()]);
     let digest = Digest::of_parts(parts.map(str::as_bytes)).to_string();
-    QuestionId(format!("{}-{}", claim.family, &digest[..16]))
+    QuestionId(format!("{}-{}", candidate.family, &digest[..16]))
 }

@@ -1,9 +1,9 @@
 //! Stage 2a, WORDS: frames → questions, by rule (DarkQA, arXiv 2512.24985, Algorithm 1).
 //!
-//! First each frame is measured ([`statistics`]), by integers alone; then the rules ([`rules`], `rules.toml`) see what was
-//! measured and nothing else: what room it is ([`room`]), then one file a family. [`generate()`] is the door. There is no
-//! random state: what has to be picked is a function of the frame's name ([`pick`]), and nothing depends on the order in which
-//! frames come.
+//! First each frame is measured ([`statistics`]), with integers only. The rules ([`rules`], `rules.toml`) see only these
+//! measurements. They find the type of room ([`room`]) and then the questions, one file per family. [`generate()`] is the
+//! entry point. There is no random state: a pick is a function of the frame's name ([`pick`]), so the order of the frames
+//! does not matter.
 
 mod affordance;
 pub(crate) mod balance;

@@ -1,26 +1,25 @@
-//! Choices that look random and are a function of where they are made: [`Picker`].
+//! Picks that look random but depend only on the frame and the purpose: [`Picker`].
 
 use crate::types::{Digest, FrameId};
 
-/// The first word of all that is picked; another one would be another benchmark.
+/// Prefix of every digest; changing it changes all questions.
 const DOMAIN: &[u8] = b"darkqa-eval questions 1";
 
 /// Picks for one frame.
 ///
-/// There is no state: a pick is the BLAKE3 digest of seed, data set, scene, frame and purpose, scaled to the range. So the
-/// order in which frames come changes nothing.
+/// There is no state: a pick is the BLAKE3 digest of seed, data set, frame, family and purpose, scaled to the range. So the
+/// order of the frames does not matter.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Picker<'a> {
-    /// The rulebook's.
+    /// Seed of the rulebook.
     pub seed: u64,
-    /// The data set's name.
+    /// Name of the data set.
     pub dataset: &'a str,
-    /// The frame.
     pub frame: &'a FrameId,
 }
 
 impl Picker<'_> {
-    /// The 64 bits of a purpose.
+    /// The first 64 bits of the digest for a purpose.
     #[must_use]
     pub(crate) fn bits(&self, family: &str, purpose: &str) -> u64 {
         let seed = self.seed.to_le_bytes();
@@ -40,13 +39,13 @@ impl Picker<'_> {
             .fold(0, |bits, byte| (bits << 8) | u64::from(*byte))
     }
 
-    /// A number below `count`, which is above 0.
+    /// A number from 0 to `count` − 1; `count` must be above 0.
     #[must_use]
     pub(crate) fn pick(&self, family: &str, purpose: &str, count: usize) -> usize {
         ((u128::from(self.bits(family, purpose)) * count as u128) >> 64) as usize
     }
 
-    /// Shuffles, each order as likely as any other (Fisher and Yates).
+    /// Shuffles a list; all orders are equally likely (Fisher and Yates).
     pub(crate) fn shuffle<T>(&self, family: &str, list: &mut [T]) {
         for last in (1..list.len()).rev() {
             let other = self.pick(family, &format!("shuffle {last}"), last + 1);
@@ -75,7 +74,7 @@ mod tests {
             picker.shuffle("closest", &mut list);
             *orders.entry(list).or_insert(0) += 1;
         }
-        // 1,000 each, deviation 29.
+        // Expected: 1,000 each, with a standard deviation of 29.
         assert!(
             counts.iter().all(|count| (880..1120).contains(count)),
             "{counts:?}"

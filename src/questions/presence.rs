@@ -5,56 +5,62 @@ use std::collections::BTreeSet;
 use serde_json::json;
 
 use super::reason::Reason;
-use super::rule_context::{Candidate, RuleContext, RuleResult, falls, yes_no};
+use super::rule_context::{Candidate, RuleContext, RuleResult, rejected, yes_no};
 use super::rules::{ClassFlag, PresenceRule};
 use super::statistics::{Segment, ppm};
 use crate::types::Family;
 
-/// Yes and no for every asked class.
-pub(super) fn candidates(survey: &RuleContext<'_>) -> Vec<RuleResult> {
-    let rule = &survey.book.presence;
-    let expected = survey.room.and_then(|room| {
-        survey
+/// One candidate for every asked class: yes if it has a pixel in the frame, else no.
+pub(super) fn candidates(context: &RuleContext<'_>) -> Vec<RuleResult> {
+    let rule = &context.book.presence;
+    let expected = context.room.and_then(|room| {
+        context
             .frequency
-            .expected(room, &survey.statistics.scene, rule.frequent)
+            .expected(room, &context.statistics.scene, rule.frequent)
     });
-    let classes = survey.book.class.iter();
+    let classes = context.book.class.iter();
     let asked = classes.filter(|(_, class)| class.flags.contains(&ClassFlag::Asked));
     asked
         .map(|(class, _)| {
-            let present = survey.statistics.of_class(class) > 0;
-            let verdict = if present {
-                yes(survey, class)
+            let present = context.statistics.of_class(class) > 0;
+            let result = if present {
+                yes(context, class)
             } else {
-                no(survey, class, expected.as_ref())
+                no(context, class, expected.as_ref())
             };
-            verdict.unwrap_or_else(|reason| falls(Family::Presence, class, Some(present), reason))
+            result.unwrap_or_else(|reason| rejected(Family::Presence, class, Some(present), reason))
         })
         .collect()
 }
 
-/// Yes: the best segment of the class is large, pure and whole.
-fn yes(survey: &RuleContext<'_>, class: &str) -> Result<RuleResult, Reason> {
-    let rule = &survey.book.presence;
-    let segments = survey.statistics.segments.iter();
+/// Yes: one segment of the class is large enough, of one class and not cut by the border.
+fn yes(context: &RuleContext<'_>, class: &str) -> Result<RuleResult, Reason> {
+    let rule = &context.book.presence;
+    let segments = context.statistics.segments.iter();
     let mut segments: Vec<&Segment> = segments.filter(|segment| segment.class == class).collect();
     segments.sort_by_key(|segment| (std::cmp::Reverse(segment.area), segment.id));
     let flaws: Vec<Option<Reason>> = segments
         .iter()
-        .map(|segment| flaw(survey, segment, rule))
+        .map(|segment| flaw(context, segment, rule))
         .collect();
     match flaws.iter().position(Option::is_none) {
-        Some(found) => Ok(claim(survey, class, 0, &segments[found..=found], json!({}))),
-        // The largest says why; where none is listed, all are tiny.
+        Some(found) => Ok(candidate(
+            context,
+            class,
+            0,
+            &segments[found..=found],
+            json!({}),
+        )),
+        // The reason is that of the largest segment. If none is listed, all are tiny.
         None => Err(flaws.first().copied().flatten().unwrap_or(Reason::Small)),
     }
 }
 
-fn flaw(survey: &RuleContext<'_>, segment: &Segment, rule: &PresenceRule) -> Option<Reason> {
-    if let Some(reason) = survey.statistics.disqualified(segment, survey.book) {
+fn flaw(context: &RuleContext<'_>, segment: &Segment, rule: &PresenceRule) -> Option<Reason> {
+    if let Some(reason) = context.statistics.disqualified(segment, context.book) {
         return Some(reason);
     }
-    let area = survey.statistics.area(segment);
+    let area = context.statistics.area(segment);
     if area < rule.area_ppm {
         Some(Reason::Small)
     } else if ppm(segment.pure, segment.area) < rule.purity_ppm {
@@ -68,20 +74,20 @@ fn flaw(survey: &RuleContext<'_>, segment: &Segment, rule: &PresenceRule) -> Opt
     }
 }
 
-/// No: not a pixel of the class or of what may be taken for it, in a frame where that says something, of a thing that might
-/// well be there.
+/// No: the class and the classes that may be mistaken for it have no pixel, absence can be shown in this frame, and the class
+/// is common in such rooms.
 fn no(
-    survey: &RuleContext<'_>,
+    context: &RuleContext<'_>,
     class: &str,
     expected: Option<&BTreeSet<String>>,
 ) -> Result<RuleResult, Reason> {
-    if !survey.labels.expressible.contains(class) {
+    if !context.labels.expressible.contains(class) {
         return Err(Reason::Inexpressible);
     }
-    if let Some(reason) = survey.open_world() {
+    if let Some(reason) = context.absence_blocker() {
         return Err(reason);
     }
-    let groups = survey
+    let groups = context
         .book
         .confusable
         .iter()
@@ -90,8 +96,8 @@ fn no(
         group
             .classes
             .iter()
-            .any(|other| survey.statistics.of_class(other) > 0)
-            || survey
+            .any(|other| context.statistics.of_class(other) > 0)
+            || context
                 .statistics
                 .words
                 .keys()
@@ -103,33 +109,33 @@ fn no(
     if expected.is_some_and(|expected| !expected.contains(class)) {
         return Err(Reason::Implausible);
     }
-    let more = json!({
+    let evidence = json!({
         "pixels": 0,
-        "void_ppm": survey.statistics.ppm(survey.statistics.effective_void),
-        "mirror_ppm": survey.statistics.ppm(survey.statistics.of_class("mirror")),
+        "void_ppm": context.statistics.ppm(context.statistics.effective_void),
+        "mirror_ppm": context.statistics.ppm(context.statistics.of_class("mirror")),
         "confusable": groups.flat_map(|group| &group.classes).collect::<BTreeSet<_>>(),
     });
-    Ok(claim(survey, class, 1, &[], more))
+    Ok(candidate(context, class, 1, &[], evidence))
 }
 
-fn claim(
-    survey: &RuleContext<'_>,
+fn candidate(
+    context: &RuleContext<'_>,
     class: &str,
     truth: usize,
     segments: &[&Segment],
-    more: serde_json::Value,
+    evidence: serde_json::Value,
 ) -> RuleResult {
-    let book = survey.book;
+    let book = context.book;
     let text = book.presence.text.replace("{article}", book.article(class));
     let text = text.replace("{object}", book.name(class));
-    survey.rests(
+    context.viable(
         Candidate {
             family: Family::Presence,
             about: class.to_owned(),
             text,
             choices: yes_no(),
             truth,
-            evidence: more,
+            evidence,
         },
         segments,
     )

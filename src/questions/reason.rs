@@ -1,4 +1,4 @@
-//! Why a candidate is not asked: [`Reason`].
+//! The reasons why a candidate cannot be asked: [`Reason`].
 
 use serde::{Deserialize, Serialize};
 
@@ -6,64 +6,64 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reason {
-    /// The frame has no room.
+    /// The room type of the frame is unknown.
     NoRoom,
     /// Too little of the frame is labelled.
     Unlabelled,
-    /// Too little is seen: a bare wall is no room.
+    /// Too few objects are visible: a bare wall does not show a type of room.
     Bare,
-    /// The frame's room is not the one that the answer needs.
+    /// The answer needs another type of room.
     OtherRoom,
-    /// What makes the answer true is not seen well enough.
+    /// The objects that make the answer true are not visible well enough.
     Unseen,
-    /// What the answer denies, or what would do at a pinch, is seen.
+    /// An object that the answer denies, or a substitute for it, is visible.
     Seen,
-    /// Too large a part of the frame has no label, so that anything may hide there.
+    /// Too large a part of the frame has no label; any object may be there.
     Void,
-    /// A mirror shows what is elsewhere.
+    /// A large mirror shows objects that are elsewhere.
     Mirror,
-    /// The data set has no label for it, so that it may hide under another.
+    /// The data set has no label for the class; it may be part of another label.
     Inexpressible,
-    /// Something is seen that may be taken for it.
+    /// An object that may be mistaken for it is visible.
     Confusable,
-    /// It is rare in such rooms: the answer would be guessed without looking.
+    /// The class is rare in such rooms, so the answer could be guessed without the image.
     Implausible,
-    /// Its segment is in another room.
+    /// The segment is in another room.
     Elsewhere,
-    /// Its segment has several classes.
+    /// The segment contains several classes.
     Mixed,
-    /// Its word is not what its class is called.
+    /// The word of the segment does not fit its class in plain English, such as a dog bed in the class bed.
     Unlike,
-    /// Its segment is too small.
+    /// The area of the segment is too small.
     Small,
-    /// Its segment is too thin.
+    /// The segment is too thin.
     Thin,
-    /// Its segment is cut by the frame's border.
+    /// The border of the frame cuts the segment.
     Cut,
-    /// There are several of its class.
+    /// The frame has several objects of the class.
     NotUnique,
-    /// It is over-exposed.
+    /// Too many pixels are over-exposed.
     Bright,
-    /// It is crushed to black.
+    /// Too many pixels are black.
     Crushed,
-    /// No colour dominates.
+    /// No colour dominates the object.
     Motley,
-    /// Its colour has no name that people agree on.
+    /// People do not agree on a name for the colour.
     Nameless,
-    /// Its colour is none of those offered.
+    /// The colour is not one of the choices.
     NotOffered,
     /// The frame has no depth.
     NoDepth,
-    /// The frame's depths are none of a room: its scale is wrong.
+    /// The median depth does not fit a room: the scale of the depth is wrong.
     Scale,
     /// Fewer than two objects, or objects of one class only.
     Few,
-    /// The two nearest are too near to each other.
+    /// The depths of the two nearest objects differ too little.
     Gap,
-    /// The nearest by its median is not the nearest by its near end.
+    /// The object with the smallest median depth does not have the smallest 10 % quantile.
     Disputed,
-    /// Something that is not offered may be nearer.
+    /// An object that is not offered may be nearer.
     Rival,
-    /// Something large has no depth.
+    /// A large object has no depth.
     Unmeasured,
 }

@@ -1,4 +1,4 @@
-//! ClassifyRoom of the paper's Algorithm 1: what type of room a frame shows, [`classify`].
+//! ClassifyRoom of the paper's Algorithm 1: the type of room that a frame shows, [`classify`].
 
 use std::collections::BTreeMap;
 
@@ -7,46 +7,46 @@ use serde::{Deserialize, Serialize};
 use super::rules::{Clue, Contest, RuleBook, Sign};
 use super::statistics::{FrameStatistics, Segment};
 
-/// What a frame says of its room.
+/// The evidence in a frame for each type of room, and the resulting type.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RoomSigns {
-    /// The scores of all rooms that anything speaks for.
+    /// Score of each room type: the sum of the weights of its clues. Room types without a clue are left out.
     pub scores: BTreeMap<String, u32>,
-    /// The segments that speak for each, by number.
+    /// Numbers of the segments that are evidence for each room type.
     pub segments: BTreeMap<String, Vec<u32>>,
-    /// The room, or why there is none.
+    /// The room type, or why there is none.
     pub room: Result<String, NoRoom>,
 }
 
-/// Why a frame has no room.
+/// Why a frame has no room type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum NoRoom {
-    /// Nothing speaks for any.
+    /// No clue of the rulebook holds.
     NoSigns,
-    /// What speaks for the first is too little.
+    /// The highest score is too low.
     Weak,
-    /// Two contend, and neither wins.
+    /// Two or more room types have similar scores, and none wins.
     Contested,
-    /// The room is none that questions ask about.
+    /// Questions do not ask about the winning room type.
     NotAsked,
 }
 
-/// Who says what room it is.
+/// Source of a frame's room type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
 pub enum RoomSource {
-    /// What is seen of it, as in the paper.
+    /// The objects visible in the frame, as in the paper.
     #[default]
     Signature,
-    /// A person, in the data set.
+    /// The room that the data set states.
     Stated,
 }
 
-/// Classifies the room of a frame by what is seen in it.
+/// Classifies the room of a frame by the objects visible in it.
 ///
-/// Each clue of the rulebook counts once. The first room by score wins where it has enough and no other contends; of two
-/// that contend, one wins by one of the rulebook's contests, or where the other is small and far behind: a room seen through
-/// a door.
+/// Each clue of the rulebook counts once. The room type with the highest score wins if the score is high enough and no other
+/// type is a rival. Against a single rival, one of the two wins by a contest of the rulebook. One also wins if the other is
+/// small and far behind, because that is a room seen through a door.
 #[must_use]
 pub(crate) fn classify(statistics: &FrameStatistics, book: &RuleBook) -> RoomSigns {
     let signs = Signs::of(statistics, book);
@@ -75,7 +75,7 @@ pub(crate) fn classify(statistics: &FrameStatistics, book: &RuleBook) -> RoomSig
     }
 }
 
-/// What is seen, by token.
+/// The segments that are evidence, by token.
 struct Signs<'a> {
     statistics: &'a FrameStatistics,
     book: &'a RuleBook,
@@ -95,7 +95,7 @@ impl<'a> Signs<'a> {
         }
     }
 
-    /// The segments by which a clue holds.
+    /// The segments that make a clue hold; `None` if it does not hold.
     fn holds(&self, clue: &Clue) -> Option<Vec<&'a Segment>> {
         if clue
             .unseen
@@ -117,8 +117,8 @@ impl<'a> Signs<'a> {
             .iter()
             .filter(|segment| self.statistics.area(segment) >= sign.area_ppm);
         let large: Vec<&Segment> = large.copied().collect();
-        let many = large.len() >= sign.least && sign.most.is_none_or(|most| large.len() <= most);
-        many.then_some(large)
+        let enough = large.len() >= sign.least && sign.most.is_none_or(|most| large.len() <= most);
+        enough.then_some(large)
     }
 
     fn area(&self, token: &str) -> u64 {
@@ -139,16 +139,16 @@ impl<'a> Signs<'a> {
                 .any(|token| self.statistics.shows(token, self.book))
     }
 
-    /// Whether the second room is seen through a door: all of it small and far behind the first.
+    /// Whether the second room is seen through a door: its segments are small and all far behind the first's.
     fn behind(&self, first: &[u32], second: &[u32]) -> bool {
         let rule = &self.book.doorway;
-        let of = |ids: &[u32]| -> Vec<&Segment> {
+        let listed = |ids: &[u32]| -> Vec<&Segment> {
             let segments = self.statistics.segments.iter();
             segments
                 .filter(|segment| ids.contains(&segment.id))
                 .collect()
         };
-        let (first, second) = (of(first), of(second));
+        let (first, second) = (listed(first), listed(second));
         let area = |list: &[&Segment]| -> u64 { list.iter().map(|segment| segment.area).sum() };
         let medians = |list: &[&Segment]| -> Option<Vec<u64>> {
             let medians = list
@@ -173,7 +173,7 @@ fn winner(
     segments: &BTreeMap<String, Vec<u32>>,
 ) -> Result<String, NoRoom> {
     let rule = &signs.book.room;
-    let place = |room: &str| {
+    let position = |room: &str| {
         rule.order
             .iter()
             .position(|other| other == room)
@@ -181,18 +181,18 @@ fn winner(
     };
     let mut ranked: Vec<(&String, u32)> =
         scores.iter().map(|(room, score)| (room, *score)).collect();
-    ranked.sort_by_key(|(room, score)| (std::cmp::Reverse(*score), place(room), *room));
+    ranked.sort_by_key(|(room, score)| (std::cmp::Reverse(*score), position(room), *room));
     let Some(&(first, score)) = ranked.first() else {
         return Err(NoRoom::NoSigns);
     };
     if score < rule.least_score {
         return Err(NoRoom::Weak);
     }
-    let contends = |other: u32| other >= rule.least_score || score - other < rule.least_lead;
+    let is_rival = |other: u32| other >= rule.least_score || score - other < rule.least_lead;
     let rivals: Vec<(&String, u32)> = ranked[1..]
         .iter()
         .copied()
-        .filter(|(_, other)| contends(*other))
+        .filter(|(_, other)| is_rival(*other))
         .collect();
     let [(second, other)] = rivals[..] else {
         return if rivals.is_empty() {
@@ -204,8 +204,8 @@ fn winner(
     for contest in &signs.book.contest {
         let pair = [(first, second, score), (second, first, other)];
         for (winner, loser, score) in pair {
-            let theirs = contest.winner == *winner && contest.loser == *loser;
-            if theirs && score >= rule.least_score && signs.wins(contest, score) {
+            let applies = contest.winner == *winner && contest.loser == *loser;
+            if applies && score >= rule.least_score && signs.wins(contest, score) {
                 return Ok(winner.clone());
             }
         }

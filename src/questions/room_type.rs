@@ -3,21 +3,21 @@
 use serde_json::json;
 
 use super::reason::Reason;
-use super::rule_context::{Candidate, RuleContext, RuleResult, falls};
+use super::rule_context::{Candidate, RuleContext, RuleResult, rejected};
 use super::rules::ClassFlag;
 use super::statistics::Segment;
 use crate::types::Family;
 
-/// The one candidate of a frame.
-pub(super) fn candidates(survey: &RuleContext<'_>) -> Vec<RuleResult> {
-    let (book, statistics) = (survey.book, survey.statistics);
+/// The single candidate of a frame.
+pub(super) fn candidates(context: &RuleContext<'_>) -> Vec<RuleResult> {
+    let (book, statistics) = (context.book, context.statistics);
     let rule = &book.room_type;
-    let fall = |reason| vec![falls(Family::RoomType, "", None, reason)];
-    let Some(room) = survey.room else {
-        return fall(Reason::NoRoom);
+    let reject = |reason| vec![rejected(Family::RoomType, "", None, reason)];
+    let Some(room) = context.room else {
+        return reject(Reason::NoRoom);
     };
     if statistics.ppm(statistics.pixels() - statistics.void) < rule.labelled_ppm {
-        return fall(Reason::Unlabelled);
+        return reject(Reason::Unlabelled);
     }
     let asked: Vec<&Segment> = statistics
         .evidence(book)
@@ -27,22 +27,22 @@ pub(super) fn candidates(survey: &RuleContext<'_>) -> Vec<RuleResult> {
         .iter()
         .any(|segment| statistics.area(segment) >= rule.large_ppm);
     if asked.len() < rule.least_asked && !large {
-        return fall(Reason::Bare);
+        return reject(Reason::Bare);
     }
     let rooms = &book.room.order;
     let Some(truth) = rooms.iter().position(|other| other == room) else {
-        return fall(Reason::NoRoom);
+        return reject(Reason::NoRoom);
     };
-    let more = json!({ "scores": survey.signs.scores });
-    vec![survey.rests(
+    let evidence = json!({ "scores": context.signs.scores });
+    vec![context.viable(
         Candidate {
             family: Family::RoomType,
             about: String::new(),
             text: rule.text.clone(),
             choices: rooms.clone(),
             truth,
-            evidence: more,
+            evidence,
         },
-        &survey.signs_of(room),
+        &context.signs_of(room),
     )]
 }

@@ -1,4 +1,4 @@
-//! All that the rules see of a frame, [`RuleContext`]; and what they say of it, [`RuleResult`].
+//! The input of the rules for one frame, [`RuleContext`], and their output, [`RuleResult`].
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -11,126 +11,119 @@ use super::rules::RuleBook;
 use super::statistics::{FrameStatistics, Segment};
 use crate::types::{Family, Labels, Question};
 
-/// What the rules see of a frame.
+/// All that the rules see of a frame.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RuleContext<'a> {
-    /// The rulebook.
     pub book: &'a RuleBook,
-    /// The label space.
     pub labels: &'a Labels,
-    /// What was measured.
     pub statistics: &'a FrameStatistics,
-    /// What the frame says of its room.
     pub signs: &'a RoomSigns,
-    /// The room that questions go by.
+    /// Room type of the frame, from `signs` or from the data set; `None` if it is unknown.
     pub room: Option<&'a str>,
-    /// What is common where.
+    /// Classes that are common in each type of room.
     pub frequency: &'a Frequency,
-    /// What is picked among equals.
+    /// Picks among candidates that are equally good.
     pub picker: Picker<'a>,
 }
 
 /// A question that may be asked of a frame, with its one true answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Candidate {
-    /// Its kind.
     pub family: Family,
-    /// What it is about: a class, an activity, or nothing.
+    /// Subject of the question: a class or an activity; empty for the room type.
     pub about: String,
-    /// In words.
     pub text: String,
-    /// What is offered.
+    /// The choices in the order in which they are offered.
     pub choices: Vec<String>,
-    /// The index of the true one.
+    /// Index of the true choice.
     pub truth: usize,
-    /// What makes it true.
+    /// JSON object of the measurements that make the answer true.
     pub evidence: Value,
 }
 
 impl Candidate {
-    /// The true answer.
+    /// The text of the true choice.
     #[must_use]
     pub fn answer(&self) -> &str {
         self.choices.get(self.truth).map_or("", String::as_str)
     }
 }
 
-/// A question that is asked, with what it is about.
+/// A question that is asked, with its subject and scene.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct GeneratedQuestion {
-    /// The question.
+    /// The question, with its id, choices and evidence.
     pub question: Question,
-    /// What it is about: a class, an activity, or nothing.
+    /// Subject of the question: a class or an activity; empty for the room type.
     pub about: String,
-    /// The scene of its frame.
+    /// Scene of the frame.
     pub scene: String,
 }
 
 impl GeneratedQuestion {
-    /// The true answer.
+    /// The text of the true choice.
     #[must_use]
     pub fn answer(&self) -> &str {
         &self.question.choices.texts()[self.question.choices.truth()]
     }
 
-    /// Its scene, its words and its answer: two with the same say the same.
-    pub(super) fn said(&self) -> [String; 3] {
+    /// The scene, the text and the answer; two questions that share all three repeat each other.
+    pub(super) fn repeat_key(&self) -> [String; 3] {
         [&*self.scene, &*self.question.text, self.answer()].map(str::to_owned)
     }
 }
 
-/// What a rule says of a candidate.
+/// The result of a rule for one candidate.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum RuleResult {
-    /// It can be asked.
-    Holds(Candidate),
-    /// It cannot.
-    Falls(Rejection),
+    /// The question can be asked.
+    Viable(Candidate),
+    /// The question cannot be asked, for the reason given.
+    Rejected(Rejection),
 }
 
 /// A candidate that cannot be asked.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Rejection {
-    /// The family it was of.
     pub family: Family,
-    /// What it would have been about.
+    /// Subject of the question: a class or an activity; may be empty.
     pub about: String,
-    /// The answer it would have had, where that was one of yes and no.
+    /// The answer it would have had, "yes" or "no"; `None` for other families.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub answer: Option<String>,
-    /// Why not.
+    /// Why the question cannot be asked.
     pub reason: Reason,
 }
 
 impl RuleContext<'_> {
-    /// A claim that rests on these segments.
-    pub(super) fn rests(&self, mut claim: Candidate, segments: &[&Segment]) -> RuleResult {
-        let list: Vec<Value> = segments.iter().map(|segment| self.show(segment)).collect();
-        if let Some(evidence) = claim.evidence.as_object_mut() {
+    /// A viable candidate, with these segments added to its evidence.
+    pub(super) fn viable(&self, mut candidate: Candidate, segments: &[&Segment]) -> RuleResult {
+        let list: Vec<Value> = segments.iter().map(|segment| self.json(segment)).collect();
+        if let Some(evidence) = candidate.evidence.as_object_mut() {
             evidence.insert("segments".to_owned(), json!(list));
         }
-        RuleResult::Holds(claim)
+        RuleResult::Viable(candidate)
     }
 
-    /// What of a segment a person needs to check it.
-    fn show(&self, segment: &Segment) -> Value {
-        let mut shown = json!({
+    /// What a person needs to check a segment, as JSON.
+    fn json(&self, segment: &Segment) -> Value {
+        let mut json = json!({
             "id": segment.id,
             "class": segment.class,
             "word": segment.word,
             "area_ppm": self.statistics.area(segment),
             "bbox": segment.bbox,
         });
-        if let (Some(depth), Some(shown)) = (segment.depth, shown.as_object_mut()) {
-            shown.insert(
+        if let (Some(depth), Some(json)) = (segment.depth, json.as_object_mut()) {
+            json.insert(
                 "depth_mm".to_owned(),
                 json!([depth.p10, depth.median, depth.p90]),
             );
         }
-        shown
+        json
     }
 
-    /// The segments that speak for a room.
+    /// The segments that are evidence for a room type.
     pub(super) fn signs_of(&self, room: &str) -> Vec<&Segment> {
         let signs = self.signs.segments.get(room);
         let segments = self.statistics.segments.iter();
@@ -139,8 +132,8 @@ impl RuleContext<'_> {
             .collect()
     }
 
-    /// What keeps anything from being said to be absent.
-    pub(super) fn open_world(&self) -> Option<Reason> {
+    /// Why nothing in this frame can be called absent; `None` if absence can be shown.
+    pub(super) fn absence_blocker(&self) -> Option<Reason> {
         let rule = &self.book.closed_world;
         if self.statistics.ppm(self.statistics.effective_void) > rule.void_ppm {
             Some(Reason::Void)
@@ -151,21 +144,21 @@ impl RuleContext<'_> {
         }
     }
 
-    /// Whether the data set's labels can say that there is none of a token: a class must be expressible, and a word's class
-    /// is not known.
+    /// Whether the labels of the data set can show that a token is absent. A class must be expressible; a token that is a word
+    /// always passes, because its class is unknown.
     pub(super) fn expressible(&self, token: &str) -> bool {
         !self.book.class.contains_key(token) || self.labels.expressible.contains(token)
     }
 }
 
-/// A candidate that cannot be asked.
-pub(super) fn falls(
+/// The result for a candidate that cannot be asked; `answer` is true for "yes".
+pub(super) fn rejected(
     family: Family,
     about: &str,
     answer: Option<bool>,
     reason: Reason,
 ) -> RuleResult {
-    RuleResult::Falls(Rejection {
+    RuleResult::Rejected(Rejection {
         family,
         about: about.to_owned(),
         answer: answer.map(|yes| YES_NO[usize::from(!yes)].to_owned()),
@@ -173,10 +166,10 @@ pub(super) fn falls(
     })
 }
 
-/// The choices of a question that is answered by yes or no.
+/// The choices of a yes-no question, in the order in which they are offered.
 pub(crate) const YES_NO: [&str; 2] = ["yes", "no"];
 
-/// The choices of a question that is answered by yes or no.
+/// [`YES_NO`] as owned strings.
 pub(super) fn yes_no() -> Vec<String> {
     YES_NO.map(str::to_owned).to_vec()
 }

@@ -1,4 +1,4 @@
-//! What a set of questions is like, as the paper's figure of its statistics and more: [`QuestionSummary`].
+//! Statistics of a set of questions: those of the paper's figure and more, [`QuestionSummary`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,128 +14,122 @@ use crate::types::{Digest, Family};
 /// The schema of the summary as JSON.
 const SCHEMA: &str = "darkqa.questions/1";
 
-/// What a set of questions is like. Shares are pairs of counts.
+/// Statistics of a set of questions. Shares are given as pairs of counts.
 #[derive(Debug, Serialize)]
 pub(crate) struct QuestionSummary {
     schema: &'static str,
-    /// The data set's name for itself.
     pub dataset: String,
-    /// The content of the rulebook.
+    /// Digest of the rulebook.
     pub rules: Digest,
-    /// The content of the table of colours.
+    /// Digest of the colour table.
     pub colors: Digest,
-    /// The version of the rulebook.
     pub rules_version: String,
-    /// How the answers were evened out.
+    /// How far the answers were balanced: none, binary or full.
     pub balance: String,
-    /// Scenes.
     pub scenes: usize,
-    /// Frames that were measured.
+    /// Number of frames that were measured.
     pub frames: usize,
-    /// Frames that could not be.
+    /// Number of frames that could not be measured.
     pub failed: usize,
-    /// Frames that are too dark.
+    /// Number of frames that are too dark to ask about.
     pub dark: usize,
-    /// All questions.
     pub questions: usize,
-    /// What became of the candidates, by family.
+    /// Numbers of candidates by outcome, for each family.
     pub candidates: BTreeMap<Family, CandidateCounts>,
-    /// Frames by how many questions are asked of them.
+    /// Number of frames by the number of questions asked of a frame.
     pub per_frame: BTreeMap<usize, usize>,
-    /// Questions by family and answer.
+    /// Number of questions by family and answer.
     pub answers: BTreeMap<Family, BTreeMap<String, usize>>,
-    /// Questions by their words.
+    /// Number of questions by text.
     pub texts: BTreeMap<String, usize>,
-    /// Questions by how many choices they have.
+    /// Number of questions by the number of choices.
     pub choices: BTreeMap<usize, usize>,
-    /// Yes and no by what is asked about, of the families that are answered so.
+    /// Numbers of yes and no answers by subject, for the yes-no families.
     pub polarity: BTreeMap<Family, BTreeMap<String, [usize; 2]>>,
-    /// What of each class there is.
+    /// Pixels, segments, frames and questions of each class.
     pub classes: BTreeMap<String, ClassCoverage>,
-    /// Frames and questions about rooms by room.
+    /// Frames and questions of each room type.
     pub rooms: BTreeMap<String, RoomCoverage>,
-    /// Frames whose room is stated and seen, and those of them where both say the same.
+    /// Number of frames whose room type is both stated and classified, and number of those where both agree.
     pub room_agreement: [usize; 2],
-    /// Gaps between the two nearest objects, by 250 mm.
+    /// Number of questions by the gap between the two nearest objects, in mm, rounded down to a multiple of 250.
     pub gaps: BTreeMap<u64, usize>,
-    /// Questions that say the same as another of their scene: the same words, the same answer.
+    /// Number of questions that repeat another one of their scene: same text, same answer.
     pub repeats: usize,
-    /// Numbers of maps that the label space has not, by pixels.
+    /// Number of pixels of each map number that the label space does not have.
     pub unknown: BTreeMap<u16, u64>,
-    /// What answering without looking would score, by family and, under "all", over all.
+    /// Scores of answering without the image, by family; "all" is the total.
     pub baselines: BTreeMap<String, Baselines>,
 }
 
-/// What became of the candidates of a family.
+/// Numbers of a family's candidates, by outcome.
 #[derive(Debug, Default, Serialize)]
 pub(crate) struct CandidateCounts {
-    /// Those that hold.
+    /// Number of candidates that the rules accept.
     pub viable: u64,
-    /// Those that are asked.
     pub asked: u64,
-    /// Those that hold and were not the one of their frame.
+    /// Number of viable candidates of frames that are asked another question of the family.
     pub not_chosen: u64,
-    /// Those that a person has rejected.
+    /// Number of questions that a person has rejected.
     pub rejected: u64,
-    /// Those whose answer would be too frequent.
+    /// Number of questions dropped because their answer would be too frequent.
     pub unbalanced: u64,
-    /// Those that do not hold, by reason.
+    /// Number of candidates that the rules reject, by reason.
     pub fallen: BTreeMap<Reason, u64>,
 }
 
-/// What of a class there is.
+/// Amounts of one class in a set of frames and questions.
 #[derive(Debug, Default, Serialize)]
 pub(crate) struct ClassCoverage {
-    /// Pixels.
+    /// Number of pixels over all frames.
     pub pixels: u64,
-    /// Segments that are not tiny.
+    /// Number of segments, without the tiny ones.
     pub segments: u64,
-    /// Frames that show it.
+    /// Number of frames that show the class.
     pub frames: u64,
-    /// Questions that are about it.
+    /// Number of questions about the class.
     pub questions: u64,
 }
 
-/// What of a room there is.
+/// Amounts of one room type in a set of frames and questions.
 #[derive(Debug, Default, Serialize)]
 pub(crate) struct RoomCoverage {
-    /// Frames that show it.
+    /// Number of frames that show this type of room.
     pub frames: usize,
-    /// Questions whose answer it is.
+    /// Number of room-type questions with this answer.
     pub questions: usize,
 }
 
-/// What answering without looking would score: right answers, or their expectation, out of the questions.
+/// Scores of answering without the image, as numbers of right answers or their expected values.
 #[derive(Debug, Default, Serialize)]
 pub(crate) struct Baselines {
-    /// Questions.
     pub questions: usize,
-    /// The expected right answers of a uniform guess.
+    /// Expected number of right answers of a uniform guess.
     pub chance: f64,
-    /// Those of the commonest answer of the family.
+    /// Number of right answers if the most common answer of the family is always given.
     pub majority: usize,
-    /// Those of the commonest answer to the same words in other scenes, else of the family there, else a guess: what a model
-    /// can know that has seen such questions and not the image.
+    /// Number of right answers with the most common answer to the same text in other scenes; else of the family there; else
+    /// of a guess. A model can know this from such questions, without the image.
     pub prior: f64,
 }
 
 impl QuestionSummary {
-    /// What came of the frames; `failed` of them could not be measured.
+    /// The statistics of generated questions; `failed` is the number of frames that could not be measured.
     #[must_use]
     pub(crate) fn new(
         frames: &[FrameStatistics],
-        made: &Generated,
-        order: &QuestionRequest<'_>,
+        generated: &Generated,
+        request: &QuestionRequest<'_>,
         failed: usize,
     ) -> Self {
-        let asked = &made.asked;
+        let asked = &generated.asked;
         let mut summary = Self {
             schema: SCHEMA,
-            dataset: order.dataset.to_owned(),
-            rules: order.rules.digest(),
-            colors: order.palette.digest(),
-            rules_version: order.rules.book().version.clone(),
-            balance: order.balance.to_string(),
+            dataset: request.dataset.to_owned(),
+            rules: request.rules.digest(),
+            colors: request.palette.digest(),
+            rules_version: request.rules.book().version.clone(),
+            balance: request.balance.to_string(),
             scenes: frames
                 .iter()
                 .map(|frame| &frame.scene)
@@ -143,12 +137,12 @@ impl QuestionSummary {
                 .len(),
             frames: frames.len(),
             failed,
-            dark: made.dark.len(),
+            dark: generated.dark.len(),
             questions: asked.len(),
-            candidates: made
-                .tallies
+            candidates: generated
+                .counts
                 .iter()
-                .map(|(family, tally)| (family.clone(), CandidateCounts::of(tally)))
+                .map(|(family, counts)| (family.clone(), CandidateCounts::of(counts)))
                 .collect(),
             per_frame: BTreeMap::new(),
             answers: BTreeMap::new(),
@@ -156,8 +150,8 @@ impl QuestionSummary {
             choices: count(asked, |asked| asked.question.choices.len()),
             polarity: BTreeMap::new(),
             classes: coverage(frames, asked),
-            rooms: rooms(made),
-            room_agreement: room_agreement(frames, made, order.rules.book()),
+            rooms: rooms(generated),
+            room_agreement: room_agreement(frames, generated, request.rules.book()),
             gaps: BTreeMap::new(),
             repeats: 0,
             unknown: BTreeMap::new(),
@@ -172,14 +166,14 @@ impl QuestionSummary {
             }
         }
         for asked in asked {
-            summary.take(asked);
+            summary.add(asked);
         }
-        let same = count(asked, GeneratedQuestion::said);
-        summary.repeats = same.values().map(|count| count - 1).sum();
+        let by_content = count(asked, GeneratedQuestion::repeat_key);
+        summary.repeats = by_content.values().map(|count| count - 1).sum();
         summary
     }
 
-    fn take(&mut self, asked: &GeneratedQuestion) {
+    fn add(&mut self, asked: &GeneratedQuestion) {
         let question = &asked.question;
         let answers = self.answers.entry(question.family.clone()).or_default();
         *answers.entry(asked.answer().to_owned()).or_insert(0) += 1;
@@ -204,15 +198,15 @@ impl QuestionSummary {
 }
 
 impl CandidateCounts {
-    fn of(tally: &FamilyCounts) -> Self {
-        let left = |why| tally.left.get(&why).copied().unwrap_or(0);
+    fn of(counts: &FamilyCounts) -> Self {
+        let omitted = |reason| counts.omitted.get(&reason).copied().unwrap_or(0);
         Self {
-            viable: tally.viable,
-            asked: tally.asked,
-            not_chosen: left(OmissionReason::NotChosen),
-            rejected: left(OmissionReason::Rejected),
-            unbalanced: left(OmissionReason::Unbalanced),
-            fallen: tally.fallen.clone(),
+            viable: counts.viable,
+            asked: counts.asked,
+            not_chosen: omitted(OmissionReason::NotChosen),
+            rejected: omitted(OmissionReason::Rejected),
+            unbalanced: omitted(OmissionReason::Unbalanced),
+            fallen: counts.rejections.clone(),
         }
     }
 }
@@ -228,7 +222,7 @@ fn count<'a, K: Ord>(
     counts
 }
 
-/// The right answers to expect of guesses, by how many choices there are.
+/// Expected number of right answers of uniform guesses, from the numbers of questions by number of choices.
 fn chance(sizes: &BTreeMap<usize, usize>) -> f64 {
     let right = sizes
         .iter()
@@ -263,9 +257,13 @@ fn coverage(
     classes
 }
 
-/// Frames whose room is stated and seen, and those of them where both say the same.
-fn room_agreement(frames: &[FrameStatistics], made: &Generated, book: &RuleBook) -> [usize; 2] {
-    let signs: BTreeMap<_, _> = made
+/// Number of frames whose room type is both stated and classified, and number of those where both agree.
+fn room_agreement(
+    frames: &[FrameStatistics],
+    generated: &Generated,
+    book: &RuleBook,
+) -> [usize; 2] {
+    let signs: BTreeMap<_, _> = generated
         .rooms
         .iter()
         .map(|(name, signs)| (name, signs))
@@ -273,18 +271,18 @@ fn room_agreement(frames: &[FrameStatistics], made: &Generated, book: &RuleBook)
     let mut agreement = [0, 0];
     for frame in frames {
         let signs = signs.get(&frame.frame);
-        let seen = signs.and_then(|signs| signs.room.as_ref().ok());
-        if let (Some(seen), Some(stated)) = (seen, stated(frame, book)) {
+        let classified = signs.and_then(|signs| signs.room.as_ref().ok());
+        if let (Some(classified), Some(stated)) = (classified, stated(frame, book)) {
             agreement[0] += 1;
-            agreement[1] += usize::from(*seen == stated);
+            agreement[1] += usize::from(*classified == stated);
         }
     }
     agreement
 }
 
-fn rooms(made: &Generated) -> BTreeMap<String, RoomCoverage> {
+fn rooms(generated: &Generated) -> BTreeMap<String, RoomCoverage> {
     let mut rooms: BTreeMap<String, RoomCoverage> = BTreeMap::new();
-    for room in made
+    for room in generated
         .rooms
         .iter()
         .filter_map(|(_, signs)| signs.room.as_ref().ok())
@@ -323,24 +321,24 @@ fn baselines(asked: &[GeneratedQuestion]) -> BTreeMap<String, Baselines> {
     all
 }
 
-/// How many questions the commonest answer in other scenes gets right: to the same words, else of the family, else a guess.
+/// The value of [`Baselines::prior`] for the questions of one family.
 fn prior(list: &[&GeneratedQuestion]) -> f64 {
-    // By words, then by answer: how many in each scene. No words are those of all.
-    let mut seen: BTreeMap<&str, BTreeMap<&str, BTreeMap<&str, usize>>> = BTreeMap::new();
+    // Counts by text, answer and scene. The empty text stands for all questions of the family.
+    let mut counts: BTreeMap<&str, BTreeMap<&str, BTreeMap<&str, usize>>> = BTreeMap::new();
     for asked in list {
-        for words in ["", &asked.question.text] {
-            let scenes = seen
-                .entry(words)
+        for text in ["", &asked.question.text] {
+            let scenes = counts
+                .entry(text)
                 .or_default()
                 .entry(asked.answer())
                 .or_default();
             *scenes.entry(&asked.scene).or_insert(0) += 1;
         }
     }
-    let commonest = |words: &str, but: &str| {
-        let counts = seen.get(words).into_iter().flatten();
-        let counts = counts.map(|(answer, scenes)| {
-            let others = scenes.iter().filter(|(scene, _)| **scene != but);
+    let most_common = |text: &str, except: &str| {
+        let answers = counts.get(text).into_iter().flatten();
+        let counts = answers.map(|(answer, scenes)| {
+            let others = scenes.iter().filter(|(scene, _)| **scene != except);
             (*answer, others.map(|(_, count)| count).sum::<usize>())
         });
         let best = counts.filter(|(_, count)| *count > 0);
@@ -349,7 +347,8 @@ fn prior(list: &[&GeneratedQuestion]) -> f64 {
     };
     let (mut right, mut guesses) = (0_usize, BTreeMap::<usize, usize>::new());
     for asked in list {
-        match commonest(&asked.question.text, &asked.scene).or_else(|| commonest("", &asked.scene))
+        match most_common(&asked.question.text, &asked.scene)
+            .or_else(|| most_common("", &asked.scene))
         {
             Some(answer) => right += usize::from(answer == asked.answer()),
             None => *guesses.entry(asked.question.choices.len()).or_insert(0) += 1,

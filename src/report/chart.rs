@@ -1,8 +1,8 @@
-//! Lines over darkness, panel by panel, as SVG: [`Chart`].
+//! Charts of lines over the levels, in panels, as SVG: [`Chart`].
 //!
-//! Lines differ by colour (Okabe and Ito 2008, which people of any colour vision tell apart), by dash and by mark, so that
-//! they are told apart without colour, too. What is drawn in `INK`, `GRID` and `PAPER` a page may draw in the colours
-//! of its own theme.
+//! Lines differ by colour (Okabe and Ito 2008, distinguishable with any colour vision), and also by dash and marker, so that
+//! they can be distinguished without colour. A page may replace the colours `INK`, `GRID` and `BACKGROUND` by those of its
+//! theme.
 
 use plotters::coord::Shift;
 use plotters::element::DashedPathElement;
@@ -15,14 +15,14 @@ use crate::score::estimate::Estimate;
 use crate::types::AxisLevel;
 use crate::types::degradation::Axis;
 
-/// Axes and words.
+/// Colour of axes and text.
 const INK: RGBColor = RGBColor(34, 34, 34);
-/// Lines that help the eye.
+/// Colour of grid lines.
 pub(super) const GRID: RGBColor = RGBColor(221, 221, 221);
-/// The ground.
-pub(super) const PAPER: RGBColor = RGBColor(255, 255, 255);
+/// Colour of the background.
+pub(super) const BACKGROUND: RGBColor = RGBColor(255, 255, 255);
 
-/// Okabe and Ito's colours but for yellow, which is faint on white.
+/// Okabe and Ito's colours without yellow, which is faint on white; grey is added.
 const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -33,28 +33,28 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(110, 110, 110),
 ];
 
-/// Lengths of dash and gap in pixels; the first is drawn through.
+/// Lengths of dash and gap in pixels; the first style is a solid line.
 const DASHES: [(i32, i32); 4] = [(0, 0), (9, 5), (2, 4), (14, 4)];
 
-/// The size of a panel in pixels, with its words.
+/// Width and height of a panel in pixels, with its labels.
 const PANEL: (i32, i32) = (400, 300);
-/// The space of a panel about its axes: left, top, right, bottom.
+/// Margins of a panel around its axes in pixels: left, top, right, bottom.
 const MARGIN: [i32; 4] = [52, 34, 14, 58];
-/// The height of a line of words.
+/// Height of a line of text in pixels.
 const ROW: i32 = 20;
 
 /// One figure of a report.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Figure {
-    /// Its name in files.
+    /// Name of the figure in files.
     pub name: &'static str,
-    /// What it shows.
+    /// Caption on the page.
     pub caption: String,
-    /// The drawing.
+    /// The figure as SVG.
     pub svg: String,
 }
 
-/// Figures as files.
+/// Figures as files: name and contents.
 pub(super) fn files(figures: Vec<Figure>) -> impl Iterator<Item = (String, Vec<u8>)> {
     figures.into_iter().map(|figure| {
         let name = format!("figures/{}.svg", figure.name);
@@ -62,7 +62,7 @@ pub(super) fn files(figures: Vec<Figure>) -> impl Iterator<Item = (String, Vec<u
     })
 }
 
-/// How a line looks: the same number is the same look in every figure of a report.
+/// Colour, dash and marker of a line. The same number gives the same style in every figure of a report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct LineStyle(pub usize);
 
@@ -76,55 +76,52 @@ impl LineStyle {
     }
 }
 
-/// What stands in a panel.
+/// Data of a line in a panel.
 #[derive(Debug, Clone)]
 pub(crate) enum PanelContent {
-    /// Points over exposure drops, with the band of their intervals.
+    /// Points over the levels, with a band of their intervals.
     Curve(Vec<(AxisLevel, Estimate)>),
-    /// A level that holds in whatever light.
+    /// A share that is the same at all levels.
     Flat(f64),
 }
 
 /// One line of a panel.
 #[derive(Debug, Clone)]
 pub(crate) struct PlotLine {
-    /// What the legend calls it; lines of one name are one entry.
+    /// Name in the legend. Lines with the same name share one entry.
     pub name: String,
-    /// How it looks.
-    pub look: LineStyle,
-    /// Where it runs.
-    pub shape: PanelContent,
+    pub style: LineStyle,
+    pub content: PanelContent,
 }
 
-/// One panel.
+/// One panel of a chart.
 #[derive(Debug, Clone)]
 pub(crate) struct Panel {
-    /// What it shows, with its n.
+    /// Title, with the number of questions.
     pub title: String,
-    /// Its lines.
     pub lines: Vec<PlotLine>,
 }
 
 /// A figure of panels with one legend.
 #[derive(Debug, Clone)]
 pub(crate) struct Chart {
-    /// What is on the vertical axis, with its unit.
+    /// Title of the vertical axis, with its unit.
     pub measure: &'static str,
     /// The panels, row by row.
     pub panels: Vec<Panel>,
-    /// How many stand in a row.
+    /// Number of panels in a row.
     pub columns: usize,
-    /// What holds for all of it.
+    /// Note below the legend.
     pub note: String,
 }
 
 pub(super) type FigureArea<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 impl Chart {
-    /// Draws the figure.
+    /// The chart as SVG.
     ///
     /// # Errors
-    /// Where it cannot be drawn.
+    /// If the chart cannot be drawn.
     pub(crate) fn svg(&self) -> Result<String> {
         let columns = self.columns.clamp(1, self.panels.len().max(1));
         let rows = self.panels.len().div_ceil(columns) as i32;
@@ -141,7 +138,7 @@ impl Chart {
         Ok(svg)
     }
 
-    /// The first line of each name, and where it stands below the panels.
+    /// The first line of each name, with its position below the panels in pixels.
     fn legend(&self, width: i32) -> Vec<(&PlotLine, (i32, i32))> {
         let mut entries: Vec<(&PlotLine, (i32, i32))> = Vec::new();
         let (mut x, mut y) = (12, 4);
@@ -167,7 +164,7 @@ impl Chart {
         legend: &[(&PlotLine, (i32, i32))],
     ) -> Result<(), String> {
         let failed = |e: DrawingAreaErrorKind<_>| e.to_string();
-        root.fill(&PAPER).map_err(failed)?;
+        root.fill(&BACKGROUND).map_err(failed)?;
         for (index, panel) in self.panels.iter().enumerate() {
             let corner = (
                 (index % columns) as i32 * PANEL.0,
@@ -182,28 +179,33 @@ impl Chart {
         let top = rows * PANEL.1;
         for (line, (x, y)) in legend {
             let (x, y) = (*x, top + *y + ROW / 2);
-            stroke(root, line.look, flat(&line.shape), &[(x, y), (x + 34, y)])?;
-            if matches!(line.shape, PanelContent::Curve(_)) {
-                mark(root, line.look, (x + 17, y))?;
+            draw_line(
+                root,
+                line.style,
+                is_flat(&line.content),
+                &[(x, y), (x + 34, y)],
+            )?;
+            if matches!(line.content, PanelContent::Curve(_)) {
+                draw_marker(root, line.style, (x + 17, y))?;
             }
-            words(root, &line.name, (x + 42, y), 13, LEFT)?;
+            draw_text(root, &line.name, (x + 42, y), 13, LEFT)?;
         }
         let last = legend.last().map_or(top, |(_, (_, y))| top + y + ROW);
-        words(root, &self.note, (12, last + 12), 12, LEFT)?;
+        draw_text(root, &self.note, (12, last + 12), 12, LEFT)?;
         root.present().map_err(failed)
     }
 }
 
-fn flat(shape: &PanelContent) -> bool {
-    matches!(shape, PanelContent::Flat(_))
+fn is_flat(content: &PanelContent) -> bool {
+    matches!(content, PanelContent::Flat(_))
 }
 
-/// Words to the right of their place, to the left of it, and below it.
+/// Anchors for text to the right of its place, to the left of it, and below it.
 pub(super) const LEFT: (HPos, VPos) = (HPos::Left, VPos::Center);
 pub(super) const RIGHT: (HPos, VPos) = (HPos::Right, VPos::Center);
 pub(super) const BELOW: (HPos, VPos) = (HPos::Center, VPos::Top);
 
-/// Where a panel's axes are.
+/// Position of a panel's axes in pixels, and the levels on them.
 struct AxisFrame {
     left: i32,
     top: i32,
@@ -217,7 +219,7 @@ impl AxisFrame {
         let mut levels: Vec<AxisLevel> = panel
             .lines
             .iter()
-            .flat_map(|line| match &line.shape {
+            .flat_map(|line| match &line.content {
                 PanelContent::Curve(points) => points.iter().map(|(level, _)| *level).collect(),
                 PanelContent::Flat(_) => Vec::new(),
             })
@@ -233,15 +235,15 @@ impl AxisFrame {
         }
     }
 
-    /// Drops are drawn to scale: the step from L3 to L4 is 1.5 EV and looks it.
+    /// Horizontal position of a level. The axis is to scale in the unit of the levels.
     fn x(&self, level: AxisLevel) -> i32 {
         let darkest = self.levels.last().copied().unwrap_or(AxisLevel::L0);
-        let (drop, most) = (level.value() as f32, darkest.value() as f32);
-        let share = if most > 0.0 { drop / most } else { 0.5 };
+        let (drop, max_drop) = (level.value() as f32, darkest.value() as f32);
+        let share = if max_drop > 0.0 { drop / max_drop } else { 0.5 };
         self.left + 10 + ((self.width - 20) as f32 * share).round() as i32
     }
 
-    /// What stands under the levels.
+    /// Title of the horizontal axis.
     fn axis_title(&self) -> String {
         let axis = self.levels.iter().find_map(|level| level.axis());
         let Axis { title, unit } = axis.unwrap_or(Axis::LIGHT);
@@ -257,44 +259,44 @@ impl AxisFrame {
         for step in 0..=5 {
             let share = f64::from(step) / 5.0;
             let y = self.y(share);
-            path(root, &[(self.left, y), (right, y)], GRID.stroke_width(1))?;
+            draw_path(root, &[(self.left, y), (right, y)], GRID.stroke_width(1))?;
             let label = (step * 20).to_string();
-            words(root, &label, (self.left - 6, y), 12, RIGHT)?;
+            draw_text(root, &label, (self.left - 6, y), 12, RIGHT)?;
         }
         let bottom = self.top + self.height;
-        path(
+        draw_path(
             root,
             &[(self.left, bottom), (right, bottom)],
             INK.stroke_width(1),
         )?;
         for level in &self.levels {
             let x = self.x(*level);
-            path(root, &[(x, bottom), (x, bottom + 4)], INK.stroke_width(1))?;
+            draw_path(root, &[(x, bottom), (x, bottom + 4)], INK.stroke_width(1))?;
             let drop = level.value();
-            words(root, &level.to_string(), (x, bottom + 7), 12, BELOW)?;
-            words(root, &drop.to_string(), (x, bottom + 22), 11, BELOW)?;
+            draw_text(root, &level.to_string(), (x, bottom + 7), 12, BELOW)?;
+            draw_text(root, &drop.to_string(), (x, bottom + 22), 11, BELOW)?;
         }
         let middle = self.left + self.width / 2;
-        words(root, &self.axis_title(), (middle, bottom + 38), 12, BELOW)?;
-        words(
+        draw_text(root, &self.axis_title(), (middle, bottom + 38), 12, BELOW)?;
+        draw_text(
             root,
             &panel.title,
             (self.left - 40, self.top - 26),
             14,
             (HPos::Left, VPos::Top),
         )?;
-        let turned = style(12, BELOW).transform(FontTransform::Rotate270);
+        let rotated = text_style(12, BELOW).transform(FontTransform::Rotate270);
         let place = (self.left - 48, self.top + self.height / 2);
-        root.draw(&Text::new(measure.to_owned(), place, turned))
+        root.draw(&Text::new(measure.to_owned(), place, rotated))
             .map_err(|e| e.to_string())
     }
 
     fn line(&self, root: &FigureArea<'_>, line: &PlotLine) -> Result<(), String> {
-        let points = match &line.shape {
+        let points = match &line.content {
             PanelContent::Flat(share) => {
                 let y = self.y(*share);
                 let ends = [(self.left, y), (self.left + self.width, y)];
-                return stroke(root, line.look, true, &ends);
+                return draw_line(root, line.style, true, &ends);
             }
             PanelContent::Curve(points) => points,
         };
@@ -306,20 +308,20 @@ impl AxisFrame {
             .rev()
             .map(|(level, at)| (self.x(*level), self.y(at.low)));
         let band: Vec<(i32, i32)> = upper.chain(lower).collect();
-        root.draw(&Polygon::new(band, line.look.colour().mix(0.14)))
+        root.draw(&Polygon::new(band, line.style.colour().mix(0.14)))
             .map_err(|e| e.to_string())?;
         let middle = points
             .iter()
             .map(|(level, at)| (self.x(*level), self.y(at.value)));
         let middle: Vec<(i32, i32)> = middle.collect();
-        stroke(root, line.look, false, &middle)?;
+        draw_line(root, line.style, false, &middle)?;
         middle
             .into_iter()
-            .try_for_each(|place| mark(root, line.look, place))
+            .try_for_each(|place| draw_marker(root, line.style, place))
     }
 }
 
-pub(super) fn path(
+pub(super) fn draw_path(
     root: &FigureArea<'_>,
     points: &[(i32, i32)],
     style: ShapeStyle,
@@ -328,40 +330,40 @@ pub(super) fn path(
         .map_err(|e| e.to_string())
 }
 
-/// A line in its look; a flat one is thinner, and always broken.
-fn stroke(
+/// Draws a line in its style. A flat line is thinner and always dashed.
+fn draw_line(
     root: &FigureArea<'_>,
-    look: LineStyle,
-    flat: bool,
+    style: LineStyle,
+    is_flat: bool,
     points: &[(i32, i32)],
 ) -> Result<(), String> {
-    let style = look.colour().stroke_width(if flat { 1 } else { 2 });
-    let dash = match look.dash() {
-        (0, _) if flat => (6, 4),
+    let stroke = style.colour().stroke_width(if is_flat { 1 } else { 2 });
+    let dash = match style.dash() {
+        (0, _) if is_flat => (6, 4),
         dash => dash,
     };
     if dash.0 == 0 {
-        return path(root, points, style);
+        return draw_path(root, points, stroke);
     }
     root.draw(&DashedPathElement::new(
         points.to_vec(),
         dash.0,
         dash.1,
-        style,
+        stroke,
     ))
     .map_err(|e| e.to_string())
 }
 
-/// The mark of a look at a place.
-fn mark(root: &FigureArea<'_>, look: LineStyle, (x, y): (i32, i32)) -> Result<(), String> {
-    let (fill, open) = (look.colour().filled(), look.colour().stroke_width(2));
-    let drawn = match look.0 % 6 {
+/// Draws the marker of a style at a place.
+fn draw_marker(root: &FigureArea<'_>, style: LineStyle, (x, y): (i32, i32)) -> Result<(), String> {
+    let (fill, open) = (style.colour().filled(), style.colour().stroke_width(2));
+    let drawn = match style.0 % 6 {
         0 => root.draw(&Circle::new((x, y), 4, fill)),
         1 => root.draw(&Rectangle::new([(x - 4, y - 4), (x + 4, y + 4)], fill)),
         2 => root.draw(&TriangleMarker::new((x, y), 5, fill)),
         3 => {
             let corners = vec![(x, y - 5), (x + 5, y), (x, y + 5), (x - 5, y)];
-            root.draw(&Polygon::new(corners, look.colour()))
+            root.draw(&Polygon::new(corners, style.colour()))
         }
         4 => root.draw(&Cross::new((x, y), 4, open)),
         _ => root.draw(&Circle::new((x, y), 4, open)),
@@ -369,20 +371,20 @@ fn mark(root: &FigureArea<'_>, look: LineStyle, (x, y): (i32, i32)) -> Result<()
     drawn.map_err(|e| e.to_string())
 }
 
-fn style(size: u32, (across, down): (HPos, VPos)) -> TextStyle<'static> {
+fn text_style(size: u32, (across, down): (HPos, VPos)) -> TextStyle<'static> {
     let font = ("sans-serif", size).into_font();
     TextStyle::from(font)
         .color(&INK)
         .pos(Pos::new(across, down))
 }
 
-pub(super) fn words(
+pub(super) fn draw_text(
     root: &FigureArea<'_>,
     text: &str,
     place: (i32, i32),
     size: u32,
     anchor: (HPos, VPos),
 ) -> Result<(), String> {
-    root.draw(&Text::new(text.to_owned(), place, style(size, anchor)))
+    root.draw(&Text::new(text.to_owned(), place, text_style(size, anchor)))
         .map_err(|e| e.to_string())
 }

@@ -1,4 +1,4 @@
-//! Tables as CSV: [`files`]. Every number has all its digits.
+//! Tables as CSV: [`files`]. Numbers are written with all their digits.
 
 use serde::{Serialize, Serializer};
 
@@ -6,19 +6,16 @@ use super::table::{Table, TableCell};
 use super::tables::SUMMARY;
 use crate::error::{Error, Result};
 
-/// One field of a row; its number has as many digits as it takes to read it again.
+/// One field of a row. A number has as many digits as are needed to read it back without loss.
 #[derive(Debug, Clone, Copy, Serialize)]
 #[serde(untagged)]
 pub(super) enum CsvField<'a> {
-    /// There is nothing.
     None,
-    /// Words.
     Text(&'a str),
-    /// A whole number.
     Count(usize),
     /// A number as JSON writes it: `1.0`.
     Number(f64),
-    /// A number without a needless point: `1`, or `inf`.
+    /// A number without a decimal point if it is an integer: `1`. Infinity is `inf`.
     #[serde(serialize_with = "plain")]
     Plain(f64),
 }
@@ -31,7 +28,7 @@ fn plain<S: Serializer>(number: &f64, serializer: S) -> Result<S::Ok, S::Error> 
     serializer.collect_str(number)
 }
 
-/// The fields of a cell, as many as its column has names.
+/// The fields of a cell: one for each name of its column.
 pub(super) fn fields(cell: &TableCell, names: usize) -> impl Iterator<Item = CsvField<'_>> {
     let mut fields = [CsvField::None; 4];
     match cell {
@@ -56,7 +53,7 @@ pub(super) fn fields(cell: &TableCell, names: usize) -> impl Iterator<Item = Csv
     fields.into_iter().take(names)
 }
 
-/// Every table with columns for it, by file name; tables of one name are one file, and one without a row is none.
+/// CSV files by name, of all tables that have CSV columns and at least one row. Tables of one name share one file.
 ///
 /// # Errors
 /// If one cannot be written.
@@ -71,28 +68,28 @@ pub(super) fn files(tables: &[Table]) -> Result<Vec<(String, Vec<u8>)>> {
     Ok(files)
 }
 
-/// Tables of the same columns as one file: a header and rows. Nothing if there is no row or no column.
+/// Tables with the same columns as one file: a header and rows. Empty if there is no row or no column.
 ///
 /// # Errors
-/// If it cannot be written.
+/// If the file cannot be written.
 pub(super) fn csv(parts: &[Table]) -> Result<Vec<u8>> {
     let failed = |e: ::csv::Error| Error::data("CSV", e);
     let mut file = ::csv::Writer::from_writer(Vec::new());
-    let mut is_begun = false;
+    let mut has_header = false;
     for table in parts {
         let names = table.columns.iter().flat_map(|column| &column.heads.csv);
         for row in &table.rows {
             if names.clone().next().is_none() {
                 break;
             }
-            if !is_begun {
+            if !has_header {
                 file.write_record(names.clone()).map_err(failed)?;
-                is_begun = true;
+                has_header = true;
             }
             let cells = table.cells(row);
             let fields = cells.flat_map(|(column, cell)| fields(cell, column.heads.csv.len()));
             let fields = fields.map(|field| match field {
-                // The summary is written by the same rules in both of its files.
+                // `summary.csv` and `summary.json` write numbers in the same way.
                 CsvField::Number(number) if table.name != SUMMARY => CsvField::Plain(number),
                 field => field,
             });

@@ -1,4 +1,4 @@
-//! What a run would take, before it is begun: [`Forecast`].
+//! The estimated tokens, costs and time of a run before it starts: [`Forecast`].
 
 use std::fmt::Write;
 
@@ -9,61 +9,61 @@ use super::table::TableBuilder;
 use super::terminal;
 use crate::error::{Error, Result};
 
-/// What is left to ask of one model.
+/// Estimate of the requests that are left for one model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct CostLine {
-    /// The model, with how it is asked where that is without images.
+    /// The model, with a remark if it is asked without images.
     pub model: String,
-    /// Requests left.
+    /// Number of requests left.
     pub requests: usize,
-    /// Tokens of the words of all prompts.
+    /// Text tokens of all prompts.
     pub text_tokens: f64,
-    /// Tokens of all images; `None` where nobody knows how the model counts them.
+    /// Tokens of all images; `None` if it is not known how the model counts them.
     pub image_tokens: Option<f64>,
     /// Tokens of all replies if each is short: a letter, a mark, a sentence.
     pub reply_tokens: f64,
     /// Tokens of all replies if each is as long as `--max-tokens` allows; `None` without a limit.
     pub longest_reply_tokens: Option<f64>,
-    /// Dollars if each reply is short; `None` where no price is known.
+    /// Cost in dollars if each reply is short; `None` if no price is known.
     pub dollars: Option<f64>,
-    /// Dollars if each reply is as long as `--max-tokens` allows.
+    /// Cost in dollars if each reply is as long as `--max-tokens` allows.
     pub most_dollars: Option<f64>,
 }
 
-/// What a run would take.
+/// Estimate of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Forecast {
-    /// What is left by model.
+    /// Requests left, by model.
     pub lines: Vec<CostLine>,
-    /// Trials in all.
+    /// Number of all trials.
     pub trials: usize,
-    /// Trials with a reply.
+    /// Number of trials with a reply.
     pub answered: usize,
-    /// What the replies so far were charged, in dollars; `None` where no price is known.
+    /// Cost of the replies so far in dollars; `None` if no price is known.
     pub spent: Option<f64>,
-    /// Images to be made.
+    /// Number of images to be made.
     pub images: usize,
-    /// Bytes to be sent, images as base64.
+    /// Number of bytes to be sent, with images as base64.
     pub bytes: f64,
-    /// Bytes of the largest image file among those made to find out.
+    /// Size of the largest sampled image file in bytes.
     pub largest_image: usize,
-    /// How many images were made to find out.
+    /// Number of images that were made as a sample.
     pub sampled: usize,
-    /// What is wrong with the largest image, where the endpoint does not take it.
+    /// Why the endpoint does not accept the largest image; `None` if it does.
     pub too_large: Option<String>,
-    /// Seconds of this machine to make all images.
+    /// Time to make all images on this machine, in seconds.
     pub making_seconds: f64,
-    /// Seconds of waiting for all replies.
+    /// Time of waiting for all replies, in seconds.
     pub asking_seconds: f64,
-    /// What the waiting rests on.
+    /// Basis of the waiting time, in words.
     pub pace: String,
-    /// The day of the prices, and where they come from.
+    /// Date and source of the prices.
     pub prices: String,
-    /// What the Batch API charges, as a share of the price.
+    /// Charge of the Batch API as a share of the price.
     pub batch: f64,
-    /// What the shortest reply is taken to be, in words.
+    /// Length of the shortest reply that is assumed, in words.
     pub reply: &'static str,
-    /// The size of the largest request in bytes, where requests hold many images.
+    /// Size of the largest request in bytes, if requests hold many images.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub largest_request: Option<f64>,
 }
@@ -75,7 +75,7 @@ pub(crate) fn json(forecast: &Forecast) -> Result<String> {
         .map_err(|e| Error::data("the estimate", e))
 }
 
-/// The forecast for people.
+/// The forecast as text for the terminal.
 #[must_use]
 pub(crate) fn render(forecast: &Forecast) -> String {
     let table = TableBuilder::new("estimate", &forecast.lines)
@@ -95,7 +95,7 @@ pub(crate) fn render(forecast: &Forecast) -> String {
         .column(Count, "terminal dollars", |line| {
             between(line.dollars, line.most_dollars, &money)
         })
-        .made();
+        .build();
     let table = terminal::table(&[table]);
     let Forecast {
         trials,
@@ -124,11 +124,11 @@ pub(crate) fn render(forecast: &Forecast) -> String {
         100.0 * forecast.batch
     );
     if forecast.lines.iter().any(|line| line.dollars.is_none()) {
-        text.push_str("unknown: a table of --prices FILE can state the price of a model and its image-tokens\n");
+        text.push_str("unknown: state the price of a model and its image-tokens in a table of --prices FILE\n");
     }
     let _ = writeln!(
         text,
-        "to send: {} in {images} images, the largest {:.2} MB ({sampled} made to find out)",
+        "to send: {} with {images} images, the largest {:.2} MB (of {sampled} made as a sample)",
         bytes(forecast.bytes),
         forecast.largest_image as f64 / 1e6
     );
@@ -137,29 +137,30 @@ pub(crate) fn render(forecast: &Forecast) -> String {
     }
     let _ = writeln!(
         text,
-        "time: {} of waiting ({pace}), {} of making images beside it",
+        "time: {} of waiting ({pace}), {} of making images in parallel",
         hours(forecast.asking_seconds),
         hours(forecast.making_seconds)
     );
     if let Some(problem) = &forecast.too_large {
-        let _ = writeln!(text, "the run would not begin: {problem}");
+        let _ = writeln!(text, "the run would not start: {problem}");
     }
     text
 }
 
-/// A whole number in groups of three.
+/// A number rounded to an integer, with digits in groups of three.
 fn count(number: f64) -> String {
     let digits = format!("{number:.0}");
-    let mut out = String::new();
+    let mut grouped = String::new();
     for (i, digit) in digits.chars().enumerate() {
         if i > 0 && (digits.len() - i) % 3 == 0 {
-            out.push(',');
+            grouped.push(',');
         }
-        out.push(digit);
+        grouped.push(digit);
     }
-    out
+    grouped
 }
 
+/// A range of values as text; one value if both are shown alike.
 fn between(low: Option<f64>, high: Option<f64>, show: &dyn Fn(f64) -> String) -> String {
     match (low, high) {
         (None, _) => "unknown".to_owned(),
@@ -170,7 +171,7 @@ fn between(low: Option<f64>, high: Option<f64>, show: &dyn Fn(f64) -> String) ->
     }
 }
 
-/// Dollars, with as many digits as say something.
+/// An amount in dollars: two digits, or four below one dollar.
 #[must_use]
 pub(crate) fn money(dollars: f64) -> String {
     if dollars > 0.0 && dollars < 0.995 {
@@ -200,7 +201,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_read_well() {
+    fn numbers_are_easy_to_read() {
         assert_eq!(count(1_234_567.4), "1,234,567");
         assert_eq!(count(999.0), "999");
         assert_eq!(between(Some(0.5), Some(12.0), &money), "$0.5000 – $12.00");

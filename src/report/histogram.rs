@@ -4,31 +4,31 @@ use plotters::prelude::*;
 
 use crate::error::{Error, Result};
 
-/// The least share that is drawn.
-const LEAST: f64 = 1e-7;
+/// Minimum share that is drawn.
+const MIN_SHARE: f64 = 1e-7;
 
 /// One line of the figure.
 #[derive(Debug, Clone)]
 pub(crate) struct HistogramLine {
-    /// What it is called.
+    /// Name in the legend.
     pub name: String,
     /// Differences of 8-bit codes with their shares.
     pub shares: Vec<(i32, f64)>,
 }
 
-/// The shares of residuals by their size in codes. A gap in a line is a residual that does not occur.
+/// Shares of residuals by their size in 8-bit codes. A gap in a line is a residual that does not occur.
 ///
 /// # Errors
-/// Where the figure cannot be drawn.
+/// If the figure cannot be drawn.
 pub(crate) fn histogram(title: &str, lines: &[HistogramLine]) -> Result<String> {
     let failed = |e: String| Error::data("figure", e);
-    let reach = lines
+    let max_difference = lines
         .iter()
         .flat_map(|line| &line.shares)
-        .filter(|(_, share)| *share > LEAST)
+        .filter(|(_, share)| *share > MIN_SHARE)
         .map(|(difference, _)| difference.abs())
         .max()
-        .map_or(8, |reach| reach.max(8));
+        .map_or(8, |max_difference| max_difference.max(8));
     let mut svg = String::new();
     {
         let root = SVGBackend::with_string(&mut svg, (900, 520)).into_drawing_area();
@@ -38,7 +38,10 @@ pub(crate) fn histogram(title: &str, lines: &[HistogramLine]) -> Result<String> 
             .margin(12)
             .x_label_area_size(44)
             .y_label_area_size(70)
-            .build_cartesian_2d(-reach..reach, (LEAST..1.0).log_scale())
+            .build_cartesian_2d(
+                -max_difference..max_difference,
+                (MIN_SHARE..1.0).log_scale(),
+            )
             .map_err(|e| failed(e.to_string()))?;
         chart
             .configure_mesh()
@@ -51,9 +54,9 @@ pub(crate) fn histogram(title: &str, lines: &[HistogramLine]) -> Result<String> 
             .map_err(|e| failed(e.to_string()))?;
         let colours = [BLACK, RED, BLUE, GREEN];
         for (line, colour) in lines.iter().zip(colours.into_iter().cycle()) {
-            let runs = line
-                .shares
-                .split(|(difference, share)| *share <= LEAST || difference.abs() > reach);
+            let runs = line.shares.split(|(difference, share)| {
+                *share <= MIN_SHARE || difference.abs() > max_difference
+            });
             for (index, run) in runs.filter(|run| !run.is_empty()).enumerate() {
                 let points = run.iter().copied();
                 let drawn = chart
@@ -64,7 +67,7 @@ pub(crate) fn histogram(title: &str, lines: &[HistogramLine]) -> Result<String> 
                         PathElement::new(vec![(x, y), (x + 18, y)], colour.stroke_width(2))
                     });
                 }
-                // A residual between two that do not occur is a point, which no line shows.
+                // A residual between two that do not occur is drawn as a dot, because a line of one point is invisible.
                 if run.len() == 1 {
                     let dots = points.map(|point| Circle::new(point, 3, colour.filled()));
                     chart.draw_series(dots).map_err(|e| failed(e.to_string()))?;

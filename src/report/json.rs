@@ -1,4 +1,4 @@
-//! `summary.json`: what the run is, and the rows of `summary.csv`: `document`.
+//! `summary.json`: a head about the run, and the rows of `summary.csv`.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::types::UnreadReason;
 use crate::types::manifest::RunManifest;
 
-/// A head with the rows of a table, each under the names of its columns.
+/// A head, and the rows of a table as objects with the column names as keys.
 #[derive(Serialize)]
 struct Document<'a, H> {
     #[serde(flatten)]
@@ -39,17 +39,17 @@ impl Serialize for Named<'_> {
     }
 }
 
-/// A head and a table as one document.
+/// A head and a table as one JSON document.
 ///
 /// # Errors
-/// If it cannot be written.
+/// If the document cannot be written.
 pub(super) fn document(head: impl Serialize, rows: &Table) -> Result<String> {
     serde_json::to_string_pretty(&Document { head, rows })
         .map(|text| text + "\n")
         .map_err(|e| Error::data("summary.json", e))
 }
 
-/// What stands above the rows of an evaluation.
+/// The head of the summary of an evaluation.
 #[derive(Serialize)]
 struct Head<'a> {
     schema: &'static str,
@@ -62,26 +62,26 @@ struct Head<'a> {
     unread: &'a BTreeMap<UnreadReason, usize>,
 }
 
-/// A run among several.
+/// One of several runs.
 #[derive(Serialize)]
 struct ComparedRun<'a> {
     folder: &'a Path,
     run: &'a RunManifest,
 }
 
-/// What a document is about.
+/// The runs that a summary is about.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum RunList<'a> {
-    /// A run, with its folder if the document is not itself in there.
+    /// One run, with its folder if the summary is not stored there.
     One(&'a RunManifest, Option<&'a Path>),
-    /// Several, each with its folder.
+    /// Several runs, each with its folder.
     Several(&'a [(&'a RunManifest, &'a Path)]),
 }
 
-/// The summary of runs as JSON; `unread` counts why replies could not be read.
+/// The summary of runs as JSON; `unread` holds counts of unreadable replies by reason.
 ///
 /// # Errors
-/// If it cannot be written.
+/// If the document cannot be written.
 pub(crate) fn summary(
     tables: &[Table],
     unread: &BTreeMap<UnreadReason, usize>,

@@ -1,4 +1,4 @@
-//! Numbers over the levels, a line a series: [`Ladder`], and the columns of its table.
+//! Cells by series and level: [`Ladder`], and the columns of its table.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,7 +8,7 @@ use super::words::light;
 use crate::score::subject::Subject;
 use crate::types::{AxisLevel, EnhancerName, KindReading, View};
 
-/// A model in one variant, raw or enhanced.
+/// A model in one variant, raw or with one enhancer.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Series<'a> {
     pub(super) model: &'a str,
@@ -25,23 +25,23 @@ impl<'a> Series<'a> {
         }
     }
 
-    /// The variant in words, with its enhancer.
+    /// The variant and the enhancer in words.
     pub(super) fn light(&self) -> String {
         light(self.variant, self.enhancer)
     }
 }
 
-/// The numbers of one series by level.
+/// The cells of one series by level.
 pub(super) type SeriesByLevel<'a, C> = BTreeMap<AxisLevel, &'a C>;
 
-/// The numbers of all subjects.
+/// The cells of all subjects.
 pub(super) struct Ladder<'a, C> {
     /// The levels of all series.
     pub(super) levels: BTreeSet<AxisLevel>,
-    /// The numbers of models that see.
+    /// Cells of models with images.
     pub(super) series: BTreeMap<Series<'a>, SeriesByLevel<'a, C>>,
-    /// The numbers without a level: those of models without images, and of guessing.
-    pub(super) floors: Vec<(&'a Subject, &'a C)>,
+    /// Cells without a level: models without images, and chance.
+    pub(super) without_level: Vec<(&'a Subject, &'a C)>,
 }
 
 impl<'a, C> Ladder<'a, C> {
@@ -49,7 +49,7 @@ impl<'a, C> Ladder<'a, C> {
         let mut ladder = Self {
             levels: BTreeSet::new(),
             series: BTreeMap::new(),
-            floors: Vec::new(),
+            without_level: Vec::new(),
         };
         for (subject, cell) in cells {
             match (subject.view, subject.level) {
@@ -58,47 +58,50 @@ impl<'a, C> Ladder<'a, C> {
                     let series = ladder.series.entry(Series::of(subject));
                     series.or_default().insert(level, cell);
                 }
-                _ => ladder.floors.push((subject, cell)),
+                _ => ladder.without_level.push((subject, cell)),
             }
         }
         ladder
     }
 
-    /// Each series begins with the lit frames of its model, which are a series of their own only if there is no other.
-    pub(super) fn with_lit(mut self) -> Self {
-        let is_lit = |series: &Series<'_>| series.variant.kind.is_none();
-        let (lit, mut dark): (BTreeMap<_, _>, BTreeMap<_, _>) = self
+    /// Adds the cells of the clean frames to every series of the same model. They stay a separate series only if the model has
+    /// no other.
+    pub(super) fn with_clean(mut self) -> Self {
+        let is_clean = |series: &Series<'_>| series.variant.kind.is_none();
+        let (clean, mut degraded): (BTreeMap<_, _>, BTreeMap<_, _>) = self
             .series
             .into_iter()
-            .partition(|(series, _)| is_lit(series));
-        for (series, steps) in lit {
-            let own = dark.iter_mut();
-            let mut own = own
+            .partition(|(series, _)| is_clean(series));
+        for (series, cells) in clean {
+            let same_model = degraded.iter_mut();
+            let mut same_model = same_model
                 .filter(|(other, _)| other.model == series.model)
                 .peekable();
-            if own.peek().is_some() {
-                own.for_each(|(_, other)| other.extend(&steps));
+            if same_model.peek().is_some() {
+                same_model.for_each(|(_, other)| other.extend(&cells));
             } else {
-                dark.insert(series, steps);
+                degraded.insert(series, cells);
             }
         }
-        self.series = dark;
+        self.series = degraded;
         self
     }
 
-    /// A table with a row a series and, on the page and in LaTeX, a row a subject without a level; and a column a level.
-    pub(super) fn layout(
+    /// A table with a row for each series and a column for each level. The page and LaTeX also have a row for each subject
+    /// without a level.
+    pub(super) fn table(
         &'a self,
         name: &'static str,
         cell: impl Fn(Option<&C>) -> TableCell,
     ) -> TableBuilder<LadderRow<'a, C>> {
         let series = self.series.iter();
-        let series = series.map(|(series, steps)| LadderRow::Series(series, steps));
-        let floors = self.floors.iter();
-        let floors = floors.map(|&(subject, cell)| LadderRow::Floor(subject, cell));
-        let mut layout = TableBuilder::new(name, series.chain(floors))
+        let series = series.map(|(series, cells)| LadderRow::Series(series, cells));
+        let without_level = self.without_level.iter();
+        let without_level =
+            without_level.map(|&(subject, cell)| LadderRow::WithoutLevel(subject, cell));
+        let mut table = TableBuilder::new(name, series.chain(without_level))
             .hide(TableFormat::Terminal, |line| {
-                matches!(line, LadderRow::Floor(..))
+                matches!(line, LadderRow::WithoutLevel(..))
             })
             .column(Text, "page model | terminal model", |line| {
                 line.model().to_owned()
@@ -107,71 +110,71 @@ impl<'a, C> Ladder<'a, C> {
             .column(Text, "latex Model", LadderRow::label)
             .column(Text, "latex Light", |line| match line {
                 LadderRow::Series(series, _) => TableCell::from(series.light()),
-                LadderRow::Floor(..) => TableCell::Blank,
+                LadderRow::WithoutLevel(..) => TableCell::Blank,
             });
-        for (place, level) in self.levels.iter().enumerate() {
+        for (index, level) in self.levels.iter().enumerate() {
             let names = format!("page {level} | terminal {level} | latex {level}");
-            layout = layout.column(ColumnKind::Accuracy, &*names, |line| match line {
-                LadderRow::Series(_, steps) => cell(steps.get(level).copied()),
-                LadderRow::Floor(_, floor) if place == 0 => cell(Some(floor)),
-                LadderRow::Floor(..) => TableCell::Blank,
+            table = table.column(ColumnKind::Accuracy, &*names, |line| match line {
+                LadderRow::Series(_, cells) => cell(cells.get(level).copied()),
+                LadderRow::WithoutLevel(_, number) if index == 0 => cell(Some(number)),
+                LadderRow::WithoutLevel(..) => TableCell::Blank,
             });
         }
         if self.levels.is_empty() {
-            layout = layout.column(ColumnKind::Accuracy, "page", |line| match line {
-                LadderRow::Floor(_, floor) => cell(Some(floor)),
+            table = table.column(ColumnKind::Accuracy, "page", |line| match line {
+                LadderRow::WithoutLevel(_, number) => cell(Some(number)),
                 LadderRow::Series(..) => TableCell::Blank,
             });
         }
-        layout
+        table
     }
 }
 
-/// A row of a ladder's table.
+/// A row of the table.
 pub(super) enum LadderRow<'a, C> {
-    /// A series with its numbers by level.
+    /// A series with its cells by level.
     Series(&'a Series<'a>, &'a SeriesByLevel<'a, C>),
-    /// A subject without a level, and its number.
-    Floor(&'a Subject, &'a C),
+    /// A subject without a level, and its cell.
+    WithoutLevel(&'a Subject, &'a C),
 }
 
 impl<C> LadderRow<'_, C> {
     fn model(&self) -> &str {
         match self {
             Self::Series(series, _) => series.model,
-            Self::Floor(subject, _) => &subject.model,
+            Self::WithoutLevel(subject, _) => &subject.model,
         }
     }
 
     fn light(&self) -> String {
         match self {
             Self::Series(series, _) => series.light(),
-            Self::Floor(subject, _) if subject.view.is_none() => "guessing".to_owned(),
-            Self::Floor(..) => "without images".to_owned(),
+            Self::WithoutLevel(subject, _) if subject.view.is_none() => "guessing".to_owned(),
+            Self::WithoutLevel(..) => "without images".to_owned(),
         }
     }
 
-    /// The model; with what it lacks in the same cell.
+    /// The model, with "without images" in the same cell if it saw none.
     pub(super) fn label(&self) -> String {
         match self {
-            Self::Floor(subject, _) if subject.view.is_some() => {
+            Self::WithoutLevel(subject, _) if subject.view.is_some() => {
                 format!("{} without images", subject.model)
             }
             _ => self.model().to_owned(),
         }
     }
 
-    /// A count over all levels of a series.
+    /// Sum of a count over all levels of a series; 0 for a subject without a level.
     pub(super) fn sum(&self, count: impl Fn(&C) -> usize) -> usize {
-        self.steps().map(count).sum()
+        self.cells().map(count).sum()
     }
 
-    /// The numbers of a series.
-    pub(super) fn steps(&self) -> impl Iterator<Item = &C> + Clone {
-        let steps = match self {
-            Self::Series(_, steps) => Some(*steps),
-            Self::Floor(..) => None,
+    /// The cells of a series; none for a subject without a level.
+    pub(super) fn cells(&self) -> impl Iterator<Item = &C> + Clone {
+        let cells = match self {
+            Self::Series(_, cells) => Some(*cells),
+            Self::WithoutLevel(..) => None,
         };
-        steps.into_iter().flat_map(|steps| steps.values().copied())
+        cells.into_iter().flat_map(|cells| cells.values().copied())
     }
 }

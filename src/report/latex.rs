@@ -1,4 +1,4 @@
-//! Tables for a paper, as LaTeX with booktabs: [`tables`].
+//! Tables as LaTeX with booktabs: [`tables`].
 
 use std::fmt::Write;
 
@@ -7,19 +7,19 @@ use super::words::{percent, points, words};
 use crate::score::comparison::Significance;
 use crate::score::estimate::Estimate;
 
-/// All tables that have a caption for it.
+/// All tables that have a LaTeX caption; `head` names them in the first comment line.
 #[must_use]
 pub(super) fn tables(head: &str, tables: &[Table]) -> String {
     let mut text = format!("% {head} of darkqa-eval; \\usepackage{{booktabs}} in the preamble.\n");
-    for one in tables {
-        if let Some(caption) = &one.latex {
-            text += &table(caption, one);
+    for entry in tables {
+        if let Some(caption) = &entry.latex {
+            text += &table(caption, entry);
         }
     }
     text
 }
 
-/// Escapes what LaTeX reads as its own.
+/// Text with the special characters of LaTeX escaped.
 pub(super) fn escaped(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for c in text.chars() {
@@ -44,7 +44,7 @@ pub(super) fn escaped(text: &str) -> String {
 fn table(caption: &str, table: &Table) -> String {
     let named = |column: &&Column| column.heads.latex.is_some();
     let columns = table.columns.iter().filter(named);
-    let sides = columns.clone().map(|column| match column.kind {
+    let alignments = columns.clone().map(|column| match column.kind {
         ColumnKind::Text | ColumnKind::Significance => 'l',
         _ => 'r',
     });
@@ -52,28 +52,28 @@ fn table(caption: &str, table: &Table) -> String {
     let line = |cells: Vec<String>| format!("    {} \\\\\n", cells.join(" & "));
     let mut text = String::from("\n\\begin{table}\n  \\centering\n");
     let _ = writeln!(text, "  \\caption{{{caption}}}");
-    let sides: String = sides.collect();
-    let _ = writeln!(text, "  \\begin{{tabular}}{{{sides}}}\n    \\toprule");
+    let alignments: String = alignments.collect();
+    let _ = writeln!(text, "  \\begin{{tabular}}{{{alignments}}}\n    \\toprule");
     text += &line(heads.collect());
     text += "    \\midrule\n";
     for row in table.rows_in(TableFormat::Latex) {
         let cells = table.cells(row).filter(|(column, _)| named(column));
         text += &line(
             cells
-                .map(|(column, cell)| shown(column.kind, cell))
+                .map(|(column, cell)| cell_text(column.kind, cell))
                 .collect(),
         );
     }
     text + "    \\bottomrule\n  \\end{tabular}\n\\end{table}\n"
 }
 
-/// A share with half of its interval.
+/// A share in percent with half of its interval.
 fn half(share: Estimate) -> String {
     let half = percent((share.high - share.low) / 2.0);
     format!("{} {{\\scriptsize$\\pm${half}}}", percent(share.value))
 }
 
-fn shown(kind: ColumnKind, cell: &TableCell) -> String {
+fn cell_text(kind: ColumnKind, cell: &TableCell) -> String {
     match (kind, cell) {
         (_, TableCell::Absent | TableCell::Missing) => "--".to_owned(),
         (_, TableCell::Below(share)) => format!("\\underline{{{}}}", half(*share)),
@@ -95,7 +95,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_name_breaks_a_table() {
+    fn special_characters_are_escaped() {
         assert_eq!(
             escaped("50% a_b & {c} \\ ^~#$ −1 <"),
             "50\\% a\\_b \\& \\{c\\} \\textbackslash{} \\textasciicircum{}\\textasciitilde{}\\#\\$ $-$1 $<$"

@@ -1,4 +1,4 @@
-//! Stage 7, SHOW: from the records alone; and [`sheet`], figures of pictures that are handed in.
+//! Stage 7, SHOW: reports from the records alone, and [`sheet`], figures of images that the caller passes in.
 
 pub(crate) mod chart;
 mod csv;

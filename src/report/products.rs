@@ -1,4 +1,4 @@
-//! Every file of a report: [`products`].
+//! All files of a report: [`products`].
 
 use super::figures::figures;
 use super::page::{PageInputs, page};
@@ -8,20 +8,20 @@ use super::{chart, csv, latex};
 use crate::error::Result;
 use crate::score::findings::Findings;
 
-/// The files of a report by name: the numbers as CSV, the main tables as LaTeX, the figures as SVG, and the page.
+/// Files of a report by name: numbers as CSV, the main tables as LaTeX, figures as SVG, and the HTML page.
 ///
 /// # Errors
-/// If one cannot be made.
+/// If a file cannot be made.
 pub fn products<'a>(
     findings: &'a Findings<'a>,
     tables: &[Table],
-    shown: &PageInputs<'a>,
+    inputs: &PageInputs<'a>,
 ) -> Result<Vec<(String, Vec<u8>)>> {
     let figures = figures(findings)?;
-    let page = page(findings, tables, &figures, shown)?;
-    let mut files = numbers(tables, "Tables")?;
+    let page = page(findings, tables, &figures, inputs)?;
+    let mut files = table_files(tables, "Tables")?;
     files.extend(chart::files(figures));
-    if let Some(samples) = samples(shown.thumbnails) {
+    if let Some(samples) = samples(inputs.thumbnails) {
         files.push((
             "figures/samples.svg".to_owned(),
             figure(&samples).into_bytes(),
@@ -31,13 +31,13 @@ pub fn products<'a>(
     Ok(files)
 }
 
-/// The tables as CSV and LaTeX.
-pub(super) fn numbers(tables: &[Table], head: &str) -> Result<Vec<(String, Vec<u8>)>> {
+/// The tables as CSV files and one LaTeX file; `head` names them in the latter.
+pub(super) fn table_files(tables: &[Table], head: &str) -> Result<Vec<(String, Vec<u8>)>> {
     let mut files = csv::files(tables)?;
     let tables = latex::tables(head, tables);
     files.push(("tables.tex".to_owned(), tables.into_bytes()));
     Ok(files)
 }
 
-/// The name of the page.
+/// File name of the HTML page.
 pub(crate) const PAGE: &str = "report.html";

@@ -1,27 +1,27 @@
-//! What models said, as a page can show it: [`readable`].
+//! Replies of models as text that a page can show: [`readable`].
 
 use std::fmt::Write;
 
-/// The most characters of a text that are shown.
-const MOST: usize = 4_000;
+/// Maximum number of characters of a text on a page.
+const MAX_CHARS: usize = 4_000;
 
-/// A text with its hidden signs written out as ⟨U+202E⟩: controls, and what turns the direction of text or shows nothing. One that
-/// is longer than a page has room for is cut, and says so.
+/// A text in which hidden characters are written as ⟨U+202E⟩: controls, direction marks and invisible characters. A text of
+/// more than [`MAX_CHARS`] characters is cut, with a note at its end.
 #[must_use]
 pub(super) fn readable(text: &str) -> String {
-    let mut shown = String::with_capacity(text.len().min(MOST));
-    for c in text.chars().take(MOST) {
+    let mut visible = String::with_capacity(text.len().min(MAX_CHARS));
+    for c in text.chars().take(MAX_CHARS) {
         if is_hidden(c) {
-            let _ = write!(shown, "⟨U+{:04X}⟩", u32::from(c));
+            let _ = write!(visible, "⟨U+{:04X}⟩", u32::from(c));
         } else {
-            shown.push(c);
+            visible.push(c);
         }
     }
     let all = text.chars().count();
-    if all > MOST {
-        let _ = write!(shown, " … ({all} characters, cut here)");
+    if all > MAX_CHARS {
+        let _ = write!(visible, " … ({all} characters, cut here)");
     }
-    shown
+    visible
 }
 
 fn is_hidden(c: char) -> bool {
@@ -38,9 +38,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn hidden_signs_are_written_out_and_long_texts_cut() {
+    fn hidden_characters_are_written_out_and_long_texts_cut() {
         assert_eq!(readable("a\u{202e}b\u{0}\n"), "a⟨U+202E⟩b⟨U+0000⟩\n");
-        let long = readable(&"ü".repeat(MOST + 1));
+        let long = readable(&"ü".repeat(MAX_CHARS + 1));
         assert!(long.ends_with("ü … (4001 characters, cut here)"));
     }
 }

@@ -1,4 +1,4 @@
-//! What a comparison with real pairs shows: [`RealismSummary`], and the files and figures beside it.
+//! Report of a comparison with real pairs: [`RealismSummary`], its files and its figures.
 
 use serde::Serialize;
 
@@ -8,38 +8,39 @@ use super::sheet::{self, CropRow};
 use super::table::ColumnKind::{Count, Number, Text};
 use super::table::TableBuilder;
 use super::terminal;
+use super::words::counted;
 use crate::error::{Error, Result};
 use crate::score::realism::mean::Mean;
 use crate::score::realism::residual::{Bins, EmptyBins, Residuals};
 use crate::score::realism::{ImageComparison, PairComparison};
 use crate::types::Rgb;
 
-/// All pairs together.
+/// Summary over all pairs.
 #[derive(Debug, Serialize)]
 pub(crate) struct RealismSummary {
     pairs: usize,
     #[serde(flatten)]
     source: ComparedData,
-    /// The rule of the divergence.
+    /// Bins and rule for empty bins of the divergence, in words.
     kl_rule: String,
-    /// The other rule about empty bins, where it matters.
+    /// The same with the other rule for empty bins; `None` for bins that are never empty.
     kl_other_rule: Option<String>,
-    /// The mean exposure drop in EV.
+    /// Mean exposure drop in EV.
     drop: Mean,
     exposure: MethodRow,
     noise: MethodRow,
     clean_psnr: Mean,
-    /// A line for each pair.
+    /// A line of text for each pair.
     #[serde(skip)]
     by_pair: Vec<String>,
 }
 
-/// By which rules residuals are compared.
+/// The rules by which residuals are compared.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ResidualRules {
-    /// The bins.
+    /// Bins of the histograms.
     pub bins: Bins,
-    /// What is done about empty ones.
+    /// Rule for empty bins.
     pub empty: EmptyBins,
 }
 
@@ -52,23 +53,23 @@ impl ResidualRules {
     }
 }
 
-/// What was compared.
+/// The data and settings of a comparison.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct ComparedData {
-    /// The seed of the noise.
+    /// Seed of the noise.
     pub seed: u64,
-    /// The choices of the synthesis.
+    /// Settings of the synthesis.
     pub synthesis: serde_json::Value,
-    /// Images without a partner.
+    /// Number of images without a partner.
     pub unmatched: usize,
-    /// Pairs that could not be compared.
+    /// Number of pairs that could not be compared.
     pub failed: usize,
 }
 
-/// One pair in a line, exposure drop alone before noise.
+/// The numbers of one pair as a line of text, exposure drop alone first.
 fn line(pair: &PairComparison) -> String {
-    let [ev, noise] = [&pair.exposure, &pair.noise].map(|measured| {
-        let (psnr, ssim, kl) = (measured.psnr, measured.ssim, measured.kl.nats);
+    let [ev, noise] = [&pair.exposure, &pair.noise].map(|comparison| {
+        let (psnr, ssim, kl) = (comparison.psnr, comparison.ssim, comparison.kl.nats);
         format!("PSNR {psnr:.2} SSIM {ssim:.4} D_KL {kl:.3}")
     });
     format!(
@@ -77,24 +78,21 @@ fn line(pair: &PairComparison) -> String {
     )
 }
 
-/// One way to make the dark images.
+/// Means over pairs for one way of making the low-light images.
 #[derive(Debug, Serialize)]
 struct MethodRow {
     psnr: Mean,
     ssim: Mean,
     kl: Mean,
     kl_other: Mean,
-    /// Bins that are empty on the synthetic side alone, mean over pairs.
+    /// Number of bins that are empty on the synthetic side only.
     empty_bins: Mean,
 }
 
 impl MethodRow {
-    fn of(
-        compared: &[&PairComparison],
-        of: fn(&PairComparison) -> &ImageComparison,
-    ) -> Option<Self> {
+    fn of(pairs: &[&PairComparison], of: fn(&PairComparison) -> &ImageComparison) -> Option<Self> {
         let mean = |number: fn(&ImageComparison) -> f64| {
-            let numbers: Vec<f64> = compared.iter().map(|pair| number(of(pair))).collect();
+            let numbers: Vec<f64> = pairs.iter().map(|pair| number(of(pair))).collect();
             Mean::of(&numbers)
         };
         Some(Self {
@@ -108,61 +106,61 @@ impl MethodRow {
 }
 
 impl RealismSummary {
-    /// Takes the means over all pairs.
+    /// Means over all pairs.
     ///
     /// # Errors
-    /// Where there is none.
+    /// If there is no pair.
     pub(crate) fn new(
         rules: ResidualRules,
         source: ComparedData,
-        compared: &[&PairComparison],
+        pairs: &[&PairComparison],
     ) -> Result<Self> {
         let mean = |number: fn(&PairComparison) -> f64| {
-            let numbers: Vec<f64> = compared.iter().map(|pair| number(pair)).collect();
+            let numbers: Vec<f64> = pairs.iter().map(|pair| number(pair)).collect();
             Mean::of(&numbers)
         };
         let summary = || {
             Some(Self {
-                pairs: compared.len(),
+                pairs: pairs.len(),
                 kl_rule: rules.named(rules.empty),
                 kl_other_rule: (rules.bins == Bins::Fu).then(|| rules.named(rules.empty.other())),
                 drop: mean(|pair| f64::from(pair.drop))?,
-                exposure: MethodRow::of(compared, |pair| &pair.exposure)?,
-                noise: MethodRow::of(compared, |pair| &pair.noise)?,
+                exposure: MethodRow::of(pairs, |pair| &pair.exposure)?,
+                noise: MethodRow::of(pairs, |pair| &pair.noise)?,
                 clean_psnr: mean(|pair| pair.clean_psnr)?,
                 source,
-                by_pair: compared.iter().map(|pair| line(pair)).collect(),
+                by_pair: pairs.iter().map(|pair| line(pair)).collect(),
             })
         };
         summary().ok_or_else(|| Error::data("pairs", "none of them could be compared"))
     }
 
-    /// As JSON.
+    /// The summary as JSON.
     #[must_use]
     pub(crate) fn json(&self) -> String {
         format!("{:#}\n", serde_json::json!(self))
     }
 
-    /// The paper's table, with intervals, and with the rules of its numbers below it.
+    /// The paper's table with intervals, and notes on the rules of its numbers below it.
     #[must_use]
     pub(crate) fn table(&self) -> String {
-        let ways = [
+        let variants = [
             ("exposure drop alone", &self.exposure),
             ("with sensor noise", &self.noise),
         ];
-        let mut layout = TableBuilder::new("realism", ways)
+        let mut layout = TableBuilder::new("realism", variants)
             .column(Text, "terminal", |(name, _)| *name)
-            .column(Text, "terminal PSNR dB", |(_, row)| shown(&row.psnr, 2))
-            .column(Text, "terminal SSIM", |(_, row)| shown(&row.ssim, 4))
-            .column(Text, "terminal D_KL", |(_, row)| shown(&row.kl, 3))
+            .column(Text, "terminal PSNR dB", |(_, row)| mean_text(&row.psnr, 2))
+            .column(Text, "terminal SSIM", |(_, row)| mean_text(&row.ssim, 4))
+            .column(Text, "terminal D_KL", |(_, row)| mean_text(&row.kl, 3))
             .column(Text, "terminal bins empty", |(_, row)| {
-                shown(&row.empty_bins, 1)
+                mean_text(&row.empty_bins, 1)
             });
         if self.kl_other_rule.is_some() {
             let name = "terminal D_KL (other rule)";
-            layout = layout.column(Text, name, |(_, row)| shown(&row.kl_other, 3));
+            layout = layout.column(Text, name, |(_, row)| mean_text(&row.kl_other, 3));
         }
-        let table = terminal::table(&[layout.made()]);
+        let table = terminal::table(&[layout.build()]);
         let title = format!(
             "Synthetic against real low light, {} pairs: mean ± half of the 95 % interval (Student's t)",
             self.pairs
@@ -170,7 +168,7 @@ impl RealismSummary {
         format!("{title}\n{table}{}\n", self.notes().join("\n"))
     }
 
-    /// What stands below the table: the rules of its numbers, and each pair.
+    /// The notes below the table: the rules of its numbers, and a line for each pair.
     fn notes(&self) -> Vec<String> {
         let ComparedData {
             unmatched, failed, ..
@@ -182,25 +180,26 @@ impl RealismSummary {
         let other = self.kl_other_rule.iter();
         notes.extend(other.map(|rule| format!("other rule: {rule}")));
         notes.push(
-            "exposure drop alone has no residual: its D_KL tells of the rule, not of noise"
-                .to_owned(),
+            "exposure drop alone has no residual: its D_KL shows the rule, not noise".to_owned(),
         );
         notes.push(format!(
             "drop {} EV; PSNR of the sensor branch without noise {} dB",
-            shown(&self.drop, 3),
-            shown(&self.clean_psnr, 2)
+            mean_text(&self.drop, 3),
+            mean_text(&self.clean_psnr, 2)
         ));
         notes.extend(self.by_pair.iter().cloned());
         if failed > 0 || unmatched > 0 {
             notes.push(format!(
-                "{failed} pairs failed, {unmatched} images without a partner"
+                "{} failed, {} without a partner",
+                counted(failed, "pair"),
+                counted(unmatched, "image")
             ));
         }
         notes
     }
 }
 
-fn shown(mean: &Mean, digits: usize) -> String {
+fn mean_text(mean: &Mean, digits: usize) -> String {
     if mean.value.is_infinite() {
         return "∞".to_owned();
     }
@@ -210,26 +209,31 @@ fn shown(mean: &Mean, digits: usize) -> String {
     }
 }
 
-/// A row a pair and way of making it.
-pub(crate) fn pairs(compared: &[&PairComparison]) -> Result<Vec<u8>> {
-    let rows = compared.iter().flat_map(|pair| {
-        [("ev", &pair.exposure), ("noise", &pair.noise)].map(|(way, made)| (*pair, way, made))
+/// CSV file with a row for each pair and each way of making its image.
+pub(crate) fn pairs(pairs: &[&PairComparison]) -> Result<Vec<u8>> {
+    let rows = pairs.iter().flat_map(|pair| {
+        [("ev", &pair.exposure), ("noise", &pair.noise)]
+            .map(|(variant, comparison)| (*pair, variant, comparison))
     });
     let table = TableBuilder::new("pairs", rows)
         .column(Text, "csv pair", |(pair, _, _)| pair.pair.clone())
         .column(Text, "csv drop", |(pair, _, _)| pair.drop.to_string())
-        .column(Text, "csv variant", |(_, way, _)| *way)
-        .column(Number, "csv psnr", |(_, _, made)| made.psnr)
-        .column(Number, "csv ssim", |(_, _, made)| made.ssim)
-        .column(Number, "csv kl", |(_, _, made)| made.kl.nats)
-        .column(Number, "csv kl_other", |(_, _, made)| made.kl_other.nats)
-        .column(Count, "csv empty_bins", |(_, _, made)| made.kl.empty)
+        .column(Text, "csv variant", |(_, variant, _)| *variant)
+        .column(Number, "csv psnr", |(_, _, comparison)| comparison.psnr)
+        .column(Number, "csv ssim", |(_, _, comparison)| comparison.ssim)
+        .column(Number, "csv kl", |(_, _, comparison)| comparison.kl.nats)
+        .column(Number, "csv kl_other", |(_, _, comparison)| {
+            comparison.kl_other.nats
+        })
+        .column(Count, "csv empty_bins", |(_, _, comparison)| {
+            comparison.kl.empty
+        })
         .column(Number, "csv clean_psnr", |(pair, _, _)| pair.clean_psnr)
-        .made();
+        .build();
     csv(&[table])
 }
 
-/// The spread of real and synthetic residuals by clean code.
+/// CSV file with the mean and standard deviation of real and synthetic residuals by clean code.
 pub(crate) fn by_code(residuals: &[Residuals; 2]) -> Result<Vec<u8>> {
     let [real, noise] = residuals;
     let table = TableBuilder::new("residuals", real.by_code().zip(noise.by_code()))
@@ -239,11 +243,11 @@ pub(crate) fn by_code(residuals: &[Residuals; 2]) -> Result<Vec<u8>> {
         .column(Number, "csv real_std", |((_, _, real), _)| real[1])
         .column(Number, "csv noise_mean", |(_, (_, _, noise))| noise[0])
         .column(Number, "csv noise_std", |(_, (_, _, noise))| noise[1])
-        .made();
+        .build();
     csv(&[table])
 }
 
-/// Both residual histograms.
+/// Figure of the histograms of real and synthetic residuals.
 pub(crate) fn figure([real, noise]: &[Residuals; 2]) -> Result<String> {
     let line = |name: &str, residuals: &Residuals| HistogramLine {
         name: name.to_owned(),
@@ -256,14 +260,14 @@ pub(crate) fn figure([real, noise]: &[Residuals; 2]) -> Result<String> {
     histogram("Residuals over the dropped clean image, all pairs", &lines)
 }
 
-/// Crops of the first pairs, in the light of the image that they were made from.
+/// Crops of pairs, brightened by the exposure drop of each pair.
 #[must_use]
 pub(crate) fn crops<'a>(pairs: impl Iterator<Item = (&'a PairComparison, &'a [Rgb; 3])>) -> Rgb {
     let rows: Vec<CropRow<'_>> = pairs
-        .map(|(compared, images)| CropRow {
-            name: format!("{} (drop {:.2} EV)", compared.pair, compared.drop),
+        .map(|(pair, images)| CropRow {
+            name: format!("{} (drop {:.2} EV)", pair.pair, pair.drop),
             images: images.iter().collect(),
-            amplified: f64::from(compared.drop).exp2(),
+            amplified: f64::from(pair.drop).exp2(),
         })
         .collect();
     sheet::crops(&["real", "exposure drop alone", "with sensor noise"], &rows)

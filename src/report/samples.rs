@@ -1,4 +1,4 @@
-//! The first frames over the levels, as small pictures: [`samples`], and as a figure: [`figure`].
+//! Thumbnails of the first frames by level, for the page ([`samples`]) and as a figure ([`figure`]).
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -27,10 +27,10 @@ struct SampleImage {
     alt: String,
 }
 
-/// How many frames are shown as samples.
-const SAMPLES: usize = 3;
+/// Maximum number of frames that are shown.
+const MAX_FRAMES: usize = 3;
 
-/// The first frames over the levels: exposure drop, noise, and each enhancer.
+/// The first frames by level, with a row for each variant and enhancer; `None` without thumbnails.
 pub(super) fn samples(thumbnails: &[Thumbnail]) -> Option<SamplePage> {
     let mut frames: Vec<&FrameId> = thumbnails
         .iter()
@@ -51,22 +51,22 @@ pub(super) fn samples(thumbnails: &[Thumbnail]) -> Option<SamplePage> {
         lines
     };
     let mut rows = Vec::new();
-    for frame in frames.into_iter().take(SAMPLES) {
+    for frame in frames.into_iter().take(MAX_FRAMES) {
         for (variant, enhancer) in &lines {
-            let of = |condition: &Condition, at: AxisLevel| {
+            let is_shown = |condition: &Condition, at: AxisLevel| {
                 condition.level() == at
                     && (condition.kind_reading() == *variant
                         && condition.enhancer.as_ref() == *enhancer
                         || at == AxisLevel::L0 && enhancer.is_none())
             };
             let images = levels.iter().map(|at| {
-                let mut here = thumbnails
+                let mut of_frame = thumbnails
                     .iter()
                     .filter(|thumbnail| thumbnail.frame == *frame);
-                let found = here.find(|thumbnail| of(&thumbnail.condition, *at))?;
+                let thumbnail = of_frame.find(|thumbnail| is_shown(&thumbnail.condition, *at))?;
                 Some(SampleImage {
-                    url: found.small.clone(),
-                    alt: format!("{} at {}", frame, found.condition),
+                    url: thumbnail.small.clone(),
+                    alt: format!("{} at {}", frame, thumbnail.condition),
                 })
             });
             rows.push(SampleRow {
@@ -75,23 +75,23 @@ pub(super) fn samples(thumbnails: &[Thumbnail]) -> Option<SamplePage> {
             });
         }
     }
-    // The untouched frames stand on the axis of the others.
+    // The clean frames are on the axis of the degraded ones.
     let axis = levels.iter().find_map(|level| level.axis());
     let unit = axis.unwrap_or(Axis::LIGHT).unit;
-    let named = levels
+    let level_names = levels
         .iter()
         .map(|level| format!("{level}, {} {unit}", level.value()));
     (!rows.is_empty()).then(|| SamplePage {
-        levels: named.collect(),
+        levels: level_names.collect(),
         rows,
     })
 }
 
-/// The width and height of a picture of the figure, and of what stands beside and above them, in pixels.
+/// Width and height of an image in the figure, and width of the names and height of the levels, in pixels.
 const CELL: [usize; 2] = [200, 150];
 const HEAD: [usize; 2] = [180, 28];
 
-/// The samples as a figure of their own, the pictures within it.
+/// The samples as one SVG, with the images embedded.
 pub(super) fn figure(samples: &SamplePage) -> String {
     let size = [
         HEAD[0] + samples.levels.len() * (CELL[0] + 4),
@@ -111,10 +111,10 @@ pub(super) fn figure(samples: &SamplePage) -> String {
     }
     for (index, row) in samples.rows.iter().enumerate() {
         let y = HEAD[1] + index * (CELL[1] + 4);
-        for (line, words) in row.name.split(", ").enumerate() {
+        for (line, part) in row.name.split(", ").enumerate() {
             let baseline = y + CELL[1] / 2 + line * 18;
-            let words = escaped(words);
-            let _ = writeln!(svg, "<text x=\"8\" y=\"{baseline}\">{words}</text>");
+            let part = escaped(part);
+            let _ = writeln!(svg, "<text x=\"8\" y=\"{baseline}\">{part}</text>");
         }
         for (column, image) in row.images.iter().enumerate() {
             let x = HEAD[0] + column * (CELL[0] + 4);
@@ -130,7 +130,7 @@ pub(super) fn figure(samples: &SamplePage) -> String {
     svg + "</svg>\n"
 }
 
-/// Escapes what XML reads as its own.
+/// Text with the special characters of XML escaped.
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
@@ -143,7 +143,7 @@ mod tests {
     use crate::types::Digest;
 
     #[test]
-    fn each_line_has_its_pictures_and_no_name_breaks_the_figure() {
+    fn each_row_has_its_images_and_names_are_escaped() {
         let thumbnail = |condition: &str| Thumbnail {
             frame: FrameId("a<b>&c".into()),
             condition: condition.parse().unwrap(),
@@ -152,8 +152,8 @@ mod tests {
             crop: String::new(),
             stops: 0.0,
         };
-        let kept = ["L0", "L3-ev", "L3-noise", "L3-noise+lift"].map(thumbnail);
-        let samples = samples(&kept).unwrap();
+        let thumbnails = ["L0", "L3-ev", "L3-noise", "L3-noise+lift"].map(thumbnail);
+        let samples = samples(&thumbnails).unwrap();
         let urls = |row: &SampleRow| -> Vec<String> {
             let urls = row
                 .images

@@ -1,4 +1,4 @@
-//! The page on which people answer what the models were asked: [`page`].
+//! The page on which people answer the questions of the models: [`page`].
 
 use serde::Serialize;
 
@@ -6,49 +6,51 @@ use super::script::embedded;
 use crate::error::Result;
 use crate::types::Digest;
 
-/// The page, with a place for the questions.
+/// The template of the page.
 const PAGE: &str = include_str!("study.html");
-/// The place.
-const PLACE: &str = "/*STUDY*/null";
+/// The text in the template that the questions replace.
+const PLACEHOLDER: &str = "/*STUDY*/null";
 
-/// A question as the page asks it; the true choice is not in it.
+/// A question as the page asks it, without the true choice.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct StudyQuestion {
-    /// Its name.
+    /// Id of the question.
     pub id: String,
-    /// The number of its frame or walk.
+    /// Number of its frame or walk.
     pub frame: usize,
-    /// The question in words.
+    /// Text of the question.
     pub text: String,
-    /// The choices in the order shown; none where the answer is open.
+    /// Choices in the order shown; empty for an open question.
     pub choices: Vec<String>,
-    /// The frame or walk in each condition, in one order for all.
+    /// The frame or walk in each condition, in the same order for all questions.
     pub shots: Vec<StudyImage>,
 }
 
-/// A frame or a walk in a condition.
+/// A frame or walk in one condition.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct StudyImage {
-    /// What was done to it; told to the file of answers, not to the person.
+    /// The condition. The page writes it to the file of answers, but does not show it.
     pub condition: String,
-    /// Where the images are, from the page: one of a frame, all of a walk.
+    /// Paths of the images relative to the page: one for a frame, all for a walk.
     pub images: Vec<String>,
 }
 
-/// All that the page is told.
+/// The data of the page.
 #[derive(Serialize)]
 struct StudyPage<'a> {
-    /// Under which the browser keeps answers until they are saved.
+    /// Digest of ids and image paths. The browser stores answers under it until they are saved.
     set: Digest,
     items: &'a [StudyQuestion],
 }
 
-/// One file that asks a person by number: each frame or walk in one condition alone, which goes on by one from person to person, so
-/// that as many people as there are conditions see every image once. Choices are taken from the keyboard and saved as lines
-/// of JSON, open answers as an array that `openeqa --answers` takes.
+/// The page as one HTML file.
+///
+/// Each person has a number and sees each frame or walk in one condition. The condition moves on by one from person to person,
+/// so that n people see every image once if there are n conditions. Choices are taken from the keyboard and saved as lines of
+/// JSON; open answers are saved as an array for `openeqa --answers`.
 ///
 /// # Errors
-/// Where the questions cannot be written.
+/// If the questions cannot be written.
 pub(crate) fn page(items: &[StudyQuestion]) -> Result<String> {
     let names = items.iter().flat_map(|item| {
         let images = item.shots.iter().flat_map(|shot| &shot.images);
@@ -56,7 +58,7 @@ pub(crate) fn page(items: &[StudyQuestion]) -> Result<String> {
         std::iter::once(item.id.as_bytes()).chain(shots)
     });
     let set = Digest::of_parts(names);
-    Ok(PAGE.replacen(PLACE, &embedded(&StudyPage { set, items })?, 1))
+    Ok(PAGE.replacen(PLACEHOLDER, &embedded(&StudyPage { set, items })?, 1))
 }
 
 #[cfg(test)]
@@ -64,8 +66,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_page_asks_and_does_not_tell() {
-        let asked = StudyQuestion {
+    fn the_page_does_not_contain_the_true_choice() {
+        let question = StudyQuestion {
             id: "q".into(),
             frame: 0,
             text: "</script>?".into(),
@@ -75,8 +77,8 @@ mod tests {
                 images: vec!["images/0.png".into()],
             }],
         };
-        let page = page(&[asked]).unwrap();
-        assert!(!page.contains(PLACE) && !page.contains("truth"));
+        let page = page(&[question]).unwrap();
+        assert!(!page.contains(PLACEHOLDER) && !page.contains("truth"));
         assert_eq!(page.matches("</script").count(), 1);
     }
 }

@@ -1,39 +1,38 @@
-//! One table of a report: [`Table`], its [`Column`]s and [`TableCell`]s. It holds numbers; how they look is the work of what
-//! writes it: `csv`, `json`, `latex`, `page` and `terminal`.
+//! One table of a report: [`Table`], its [`Column`]s and [`TableCell`]s. It holds numbers. The modules that write it format
+//! them: `csv`, `json`, `latex`, `page` and `terminal`.
 
 use crate::score::comparison::Significance;
 use crate::score::curve::Threshold;
 use crate::score::estimate::Estimate;
 
-/// A table. What it has no title for, it does not stand in.
+/// A table of numbers. A format for which it has no title leaves it out.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
-    /// The name of its CSV file without the ending. Tables of one name are parts of one file.
+    /// Name of its CSV file without the extension. Tables with the same name are parts of one file.
     pub name: &'static str,
-    /// The section of the page in which it stands.
+    /// Id of its section of the page; empty if the page does not show it.
     pub section: &'static str,
-    /// The caption on the page.
+    /// Caption on the page.
     pub caption: String,
-    /// Whether the page shows it on request only. Long tables always are so.
+    /// Whether the page shows it only on request. Long tables are always folded.
     pub is_folded: bool,
-    /// The line above it in the terminal; empty for none. Tables of one name and heading are printed as one.
+    /// Line above it in the terminal, which may be empty; `None` if it is not printed. Tables with the same name and heading are
+    /// printed as one.
     pub heading: Option<String>,
     /// Lines below it in the terminal.
     pub notes: Vec<String>,
-    /// The caption in LaTeX, as LaTeX.
+    /// Caption in LaTeX syntax; `None` if it is not written as LaTeX.
     pub latex: Option<String>,
-    /// The columns.
     pub columns: Vec<Column>,
-    /// The rows.
     pub rows: Vec<TableRow>,
 }
 
-/// A row.
+/// A row of a table.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TableRow {
     /// A cell for each column.
     pub cells: Vec<TableCell>,
-    /// What leaves it out.
+    /// Formats that leave the row out.
     pub hidden_in: Vec<TableFormat>,
 }
 
@@ -47,49 +46,44 @@ impl TableRow {
     }
 }
 
-/// What a row can be left out of.
+/// A format that can leave rows out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TableFormat {
-    /// The table at the end of a run.
     Terminal,
-    /// The HTML page.
     Page,
-    /// `tables.tex`.
     Latex,
 }
 
-/// A column: what it holds, and its name in each format.
+/// A column: kind of its cells, and its names in each format.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Column {
-    /// What it holds.
     pub kind: ColumnKind,
-    /// Its names.
     pub heads: ColumnHeads,
 }
 
-/// The names of a column. A format for which it has none leaves it out.
+/// The names of a column by format. A format without a name leaves the column out.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ColumnHeads {
-    /// In CSV and JSON. Of several names an estimate fills the first with its value, then the ends of its interval, then n.
+    /// Names in CSV and JSON. With several names, an estimate fills them with its value, the ends of its interval, and n.
     pub csv: Vec<String>,
-    /// In the terminal. Of two names a difference fills the first with its value and the second with its interval.
+    /// Names in the terminal. With two names, a difference fills them with its value and its interval.
     pub terminal: Vec<String>,
-    /// On the page.
+    /// Name on the page, which may be empty.
     pub page: Option<String>,
-    /// In LaTeX, as LaTeX.
+    /// Name in LaTeX syntax.
     pub latex: Option<String>,
 }
 
-/// What a column holds.
+/// Kind of the cells of a column. It decides how numbers are formatted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ColumnKind {
-    /// Words.
+    /// Text, left aligned.
     Text,
     /// A number of things.
     Count,
-    /// A number of things that should not be.
+    /// A number of failures, which the page highlights if it is not 0.
     Failures,
-    /// A plain number; two digits where it is shown to people.
+    /// A plain number; two decimals except in files.
     Number,
     /// A share in percent.
     Percent,
@@ -99,48 +93,48 @@ pub enum ColumnKind {
     Accuracy,
     /// A difference of shares in percentage points with its interval.
     Points,
-    /// A number with its interval, two digits.
+    /// A number with its interval, with two decimals.
     Ratio,
     /// A darkness threshold in EV with its interval.
     Threshold,
-    /// A p-value.
+    /// A p-value with three decimals.
     P,
-    /// What a comparison shows.
+    /// Result of a significance test.
     Significance,
 }
 
-/// What stands in a cell.
+/// Content of a cell.
 #[derive(Debug, Clone, PartialEq)]
 pub enum TableCell {
-    /// Nothing belongs here.
+    /// The cell has no content by design.
     Blank,
-    /// What the cell is about was not asked.
+    /// The question of the cell was not asked.
     Absent,
-    /// There is no number: nothing came that can be counted.
+    /// There is no number, because no reply can be counted.
     Missing,
-    /// Words.
+    /// Text of any length.
     Text(String),
     /// A number of things.
     Count(usize),
-    /// A plain number.
+    /// A number without an interval.
     Number(f64),
     /// A number with its interval.
     Estimate(Estimate),
-    /// One that is below that of a model without images.
+    /// An accuracy below that of a model without images.
     Below(Estimate),
-    /// What guessing comes to.
+    /// Expected accuracy of guessing.
     Guess(Estimate),
-    /// One in the strict reading, and its value in the lenient one.
+    /// Accuracy in the strict reading, and its value in the lenient reading.
     Strict(Estimate, f64),
-    /// One and by how much it differs from that on the lit frames, if that is known.
+    /// A score, and its difference from the score on the clean frames, if that is known.
     Changed(Estimate, Option<f64>),
-    /// A threshold, and the drop of the darkest level.
+    /// A threshold, and the exposure drop of the darkest level, in EV.
     Threshold(Threshold, f64),
-    /// What a comparison shows.
+    /// Result of a significance test.
     Significance(Significance),
 }
 
-/// Makes a cell of what a variant holds.
+/// Conversions of values into the cells that hold them.
 macro_rules! cell_from {
     ($($type:ty => $variant:ident,)*) => {$(
         impl From<$type> for TableCell {
@@ -166,17 +160,17 @@ impl<C: Into<Self>> From<Option<C>> for TableCell {
     }
 }
 
-/// Names by format, as `csv low high | terminal difference, 95 % interval | page difference [95 %]`: those of CSV are parted
-/// by a space, those of the terminal by a comma.
+/// Names by format, for example `csv low high | terminal difference, 95 % interval | page difference [95 %]`. Names for CSV are
+/// separated by a space, names for the terminal by a comma.
 impl From<&str> for ColumnHeads {
     fn from(names: &str) -> Self {
         let mut heads = Self::default();
         for part in names.split(" | ") {
             let (format, name) = part.split_once(' ').unwrap_or((part, ""));
-            let parted = |by: &str| name.split(by).map(str::to_owned).collect();
+            let split_by = |by: &str| name.split(by).map(str::to_owned).collect();
             match format {
-                "csv" => heads.csv = parted(" "),
-                "terminal" => heads.terminal = parted(", "),
+                "csv" => heads.csv = split_by(" "),
+                "terminal" => heads.terminal = split_by(", "),
                 "page" => heads.page = Some(name.to_owned()),
                 _ => heads.latex = Some(name.to_owned()),
             }
@@ -185,7 +179,7 @@ impl From<&str> for ColumnHeads {
     }
 }
 
-/// A table in the making: columns are added one by one, and each makes its cells from the items, one a row.
+/// Builder of a table from items, one for each row. Columns are added one by one, and each computes its cells from the items.
 pub(super) struct TableBuilder<T> {
     table: Table,
     items: Vec<T>,
@@ -208,14 +202,14 @@ impl<T> TableBuilder<T> {
         Self { table, items }
     }
 
-    /// Puts it in a section of the page.
+    /// Section of the page, and caption there.
     pub(super) fn page(mut self, section: &'static str, caption: &str) -> Self {
         self.table.section = section;
         caption.clone_into(&mut self.table.caption);
         self
     }
 
-    /// Adds a column.
+    /// Adds a column; `cell` computes the cell of an item.
     pub(super) fn column<C: Into<TableCell>>(
         mut self,
         kind: ColumnKind,
@@ -230,7 +224,7 @@ impl<T> TableBuilder<T> {
         self
     }
 
-    /// Leaves rows out of a format.
+    /// Hides the rows of some items in a format.
     pub(super) fn hide(mut self, format: TableFormat, is_hidden: impl Fn(&T) -> bool) -> Self {
         for (row, item) in self.table.rows.iter_mut().zip(&self.items) {
             if is_hidden(item) {
@@ -241,13 +235,13 @@ impl<T> TableBuilder<T> {
     }
 
     /// The table with all its columns.
-    pub(super) fn made(self) -> Table {
+    pub(super) fn build(self) -> Table {
         self.table
     }
 }
 
 impl Table {
-    /// The rows of a format.
+    /// The rows that a format shows.
     pub(super) fn rows_in(&self, format: TableFormat) -> impl Iterator<Item = &TableRow> {
         let rows = self.rows.iter();
         rows.filter(move |row| !row.hidden_in.contains(&format))
@@ -279,14 +273,14 @@ mod tests {
     }
 
     #[test]
-    fn cells_stand_below_their_columns_and_rows_can_be_left_out() {
+    fn cells_belong_to_their_columns_and_rows_can_be_hidden() {
         let table = TableBuilder::new("t", [1_usize, 2])
             .column(ColumnKind::Count, "csv n", |n| *n)
             .column(ColumnKind::Text, "page word", |n| {
                 (*n == 1).then_some("one")
             })
             .hide(TableFormat::Page, |n| *n == 2)
-            .made();
+            .build();
         assert_eq!(
             table.rows[0].cells,
             [TableCell::Count(1), TableCell::from("one")]

@@ -1,4 +1,4 @@
-//! The HTML of a page from its template: [`filled`].
+//! HTML pages from templates: [`filled`].
 
 use minijinja::value::Serde;
 use minijinja::{AutoEscape, Environment};
@@ -6,22 +6,22 @@ use serde::Serialize;
 
 use crate::error::{Error, Result};
 
-/// What several pages have in common, by the place that it takes.
+/// Parts that several pages share, each with its placeholder in the templates.
 const PARTS: [(&str, &str); 2] = [
     ("<!-- figures -->", include_str!("page/figures.html")),
     ("<!-- tables -->", include_str!("page/tables.html")),
 ];
 
-/// A template with its values; each is escaped as HTML.
+/// The HTML of a template with its values, which are escaped.
 ///
 /// # Errors
-/// Where the template cannot be filled.
+/// If the template cannot be filled.
 pub(super) fn filled(template: &str, values: impl Serialize) -> Result<String> {
     let failed = |e: &dyn std::fmt::Display| Error::data("report.html", e);
     let whole = PARTS
         .iter()
-        .fold(template.to_owned(), |text, (place, part)| {
-            text.replace(place, part)
+        .fold(template.to_owned(), |text, (placeholder, part)| {
+            text.replace(placeholder, part)
         });
     let mut environment = Environment::new();
     environment.set_auto_escape_callback(|_| AutoEscape::Html);

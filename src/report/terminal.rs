@@ -1,4 +1,4 @@
-//! Tables in the terminal: `render`.
+//! Tables as text for the terminal: [`render`].
 
 use std::fmt::Write;
 use std::path::Path;
@@ -10,7 +10,7 @@ use super::table::{Column, ColumnKind, Table, TableCell, TableFormat};
 use super::words::{half, percent, points, reach, stops, words};
 use crate::types::manifest::{Counts, RunManifest, Status};
 
-/// The lenient figure in brackets if it is not the strict one.
+/// The lenient number in brackets if it differs from the strict one; otherwise empty.
 pub(super) fn differing(strict: &str, lenient: &str) -> String {
     if strict == lenient {
         String::new()
@@ -19,7 +19,7 @@ pub(super) fn differing(strict: &str, lenient: &str) -> String {
     }
 }
 
-/// A cell in the words of the terminal, one for each name of its column.
+/// A cell as text for the terminal: one text for each name of its column.
 pub(super) fn texts(kind: ColumnKind, cell: &TableCell) -> Vec<String> {
     match (kind, cell) {
         (ColumnKind::Points, TableCell::Estimate(e)) => {
@@ -39,7 +39,7 @@ pub(super) fn texts(kind: ColumnKind, cell: &TableCell) -> Vec<String> {
     }
 }
 
-/// All tables that have a heading, each with it and with its notes.
+/// All tables that have a heading, each with its heading and notes.
 #[must_use]
 pub(super) fn render(tables: &[Table]) -> String {
     let mut text = String::new();
@@ -59,26 +59,26 @@ pub(super) fn render(tables: &[Table]) -> String {
     text
 }
 
-/// Tables of the same columns as one; nothing without a row.
+/// Tables with the same columns as one table; empty without a row.
 #[must_use]
 pub(super) fn table(parts: &[Table]) -> String {
-    let mut drawn = comfy_table::Table::new();
-    drawn.load_style(UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none()));
+    let mut grid = comfy_table::Table::new();
+    grid.load_style(UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none()));
     let columns = parts.iter().take(1).flat_map(|table| &table.columns);
     let names = columns.clone().flat_map(|column| &column.heads.terminal);
-    drawn.set_header(names);
+    grid.set_header(names);
     for table in parts {
         for row in table.rows_in(TableFormat::Terminal) {
             let cells = table.cells(row);
             let cells = cells.filter(|(column, _)| !column.heads.terminal.is_empty());
-            drawn.add_row(cells.flat_map(|(column, cell)| texts(column.kind, cell)));
+            grid.add_row(cells.flat_map(|(column, cell)| texts(column.kind, cell)));
         }
     }
-    if drawn.row_count() == 0 {
+    if grid.row_count() == 0 {
         return String::new();
     }
     let kinds = columns.flat_map(|Column { kind, heads }| vec![kind; heads.terminal.len()]);
-    for (column, kind) in drawn.column_iter_mut().zip(kinds) {
+    for (column, kind) in grid.column_iter_mut().zip(kinds) {
         if matches!(
             kind,
             ColumnKind::Count
@@ -90,10 +90,10 @@ pub(super) fn table(parts: &[Table]) -> String {
             column.set_cell_alignment(CellAlignment::Right);
         }
     }
-    format!("{drawn}\n")
+    format!("{grid}\n")
 }
 
-/// What stands at the end of an evaluation: how far each run has come if it is not complete, the tables, the runs' folders.
+/// The text at the end of an evaluation: the progress of incomplete runs, the tables, and the folders of the runs.
 #[must_use]
 pub(crate) fn evaluation(tables: &[Table], runs: &[(&RunManifest, &Path)]) -> String {
     let mut text = String::new();
@@ -112,7 +112,7 @@ pub(crate) fn evaluation(tables: &[Table], runs: &[(&RunManifest, &Path)]) -> St
     text + &render(rest)
 }
 
-/// How far a run has come if it is not complete.
+/// A line with the progress of a run; empty if the run is complete.
 pub(super) fn progress(run: &RunManifest, what: &str) -> String {
     let Counts {
         trials,

@@ -1,11 +1,11 @@
-//! Names and numbers in words: [`light`], [`family`], [`percent`] and others, and [`words`] of any cell.
+//! Names and numbers as text: [`light`], [`family`], [`percent`] and others, and [`words`] for any cell.
 
 use super::table::{ColumnKind, TableCell};
 use crate::score::estimate::Estimate;
 use crate::score::subject::Subject;
 use crate::types::{EnhancerName, Family, KindReading};
 
-/// A variant in words, with what mended it.
+/// A variant in words, with its enhancer.
 pub(super) fn light(variant: &KindReading, enhancer: Option<&EnhancerName>) -> String {
     let variant = variant.title();
     match enhancer {
@@ -14,7 +14,7 @@ pub(super) fn light(variant: &KindReading, enhancer: Option<&EnhancerName>) -> S
     }
 }
 
-/// A family in words: the paper's five by their names, others as they are.
+/// A family in words: the paper's names for its five families, other families by their own names.
 pub(super) fn family(family: Option<&Family>) -> &str {
     match family {
         None => "all families",
@@ -27,17 +27,23 @@ pub(super) fn family(family: Option<&Family>) -> &str {
     }
 }
 
-/// A subject in words: its model and what it was shown.
+/// A subject in words: its model and condition.
 pub(super) fn name(subject: &Subject) -> String {
     format!("{} {}", subject.model, subject.condition())
 }
 
-/// A share in percent, with one digit.
+/// A number of things: `1 pair`, `2 pairs`.
+pub(super) fn counted(number: usize, noun: &str) -> String {
+    let ending = if number == 1 { "" } else { "s" };
+    format!("{number} {noun}{ending}")
+}
+
+/// A share in percent, with one decimal.
 pub(super) fn percent(share: f64) -> String {
     format!("{:.1}", 100.0 * share)
 }
 
-/// A difference of shares in percentage points, with its sign.
+/// A difference of shares in percentage points, with its sign and one decimal.
 pub(super) fn points(difference: f64) -> String {
     let text = format!("{:+.1}", 100.0 * difference);
     match &*text {
@@ -46,7 +52,7 @@ pub(super) fn points(difference: f64) -> String {
     }
 }
 
-/// A p-value: three digits, or that it is below them.
+/// A p-value with three decimals, or "< 0.001".
 pub(super) fn p(value: f64) -> String {
     if value < 0.001 {
         "< 0.001".to_owned()
@@ -55,7 +61,7 @@ pub(super) fn p(value: f64) -> String {
     }
 }
 
-/// An interval of exposure drops in EV; one that lies beyond the darkest level as a whole is none.
+/// An interval of exposure drops in EV; "–" if all of it lies beyond the darkest level.
 pub(super) fn reach(low: f64, high: f64, darkest: f64) -> String {
     if low.is_infinite() {
         "–".to_owned()
@@ -64,7 +70,7 @@ pub(super) fn reach(low: f64, high: f64, darkest: f64) -> String {
     }
 }
 
-/// An exposure drop in EV; beyond the darkest level that was asked it is more than that.
+/// An exposure drop in EV; "> " and the darkest level asked if it lies beyond that.
 pub(super) fn stops(value: f64, darkest: f64) -> String {
     if value.is_infinite() {
         format!("> {darkest}")
@@ -79,7 +85,7 @@ pub(super) fn half(share: Estimate) -> String {
     format!("{} ±{half}", percent(share.value))
 }
 
-/// A cell as people read it.
+/// A cell as text for people.
 pub(super) fn words(kind: ColumnKind, cell: &TableCell) -> String {
     match cell {
         TableCell::Blank | TableCell::Absent => String::new(),
@@ -98,7 +104,7 @@ pub(super) fn words(kind: ColumnKind, cell: &TableCell) -> String {
             let reach = reach(threshold.low, threshold.high, *darkest);
             format!("{} [{reach}]", stops(threshold.value, *darkest))
         }
-        TableCell::Significance(verdict) => verdict.word().to_owned(),
+        TableCell::Significance(significance) => significance.word().to_owned(),
     }
 }
 

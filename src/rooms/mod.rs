@@ -8,7 +8,6 @@
 mod bvh;
 mod camera;
 mod dice;
-mod frame_cache;
 mod furniture;
 mod kinds;
 mod light;
@@ -30,13 +29,13 @@ use clap::Args;
 use ndarray::Array2;
 
 use self::dice::Dice;
-use self::frame_cache::FrameCache;
 use self::kinds::RoomKind;
 use self::plan::FloorPlan;
 use self::viewpoint::Height;
 use crate::error::{Error, Result};
 use crate::labels;
-use crate::types::{DepthKind, Digest, Frame, FrameId, Labels, SegmentName, Segmentation};
+use crate::types::recent::Recent;
+use crate::types::{Decides, DepthKind, Digest, Frame, FrameId, Labels, SegmentName, Segmentation};
 
 /// The version of the generator. Any change of a pixel or a name needs another version.
 pub const VERSION: u32 = 1;
@@ -44,17 +43,28 @@ pub const VERSION: u32 = 1;
 /// The label space of the semantic maps.
 const SPACE: &str = "mpcat40";
 
+/// The maximum size of the frame cache in bytes (chosen). A frame is drawn for its image, and not again for its maps.
+const CACHE_BYTES: usize = 104 << 20;
+
+/// The bytes per pixel: three for colour, four for depth, two for the class, four for the segment.
+const BYTES_PER_PIXEL: usize = 13;
+
+/// The number of frames of a size that fit into the cache; at least one.
+fn cached_frames([width, height]: [usize; 2]) -> usize {
+    (CACHE_BYTES / (width * height * BYTES_PER_PIXEL).max(1)).max(1)
+}
+
 /// The settings of the rooms, as `frames=48,seed=7,size=1280x720`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Args)]
 pub struct Rooms {
     /// The number of frames, two of each room
-    #[arg(long, value_name = "N", value_parser = frames, default_value = "48")]
+    #[arg(long, value_name = "N", value_parser = frames, default_value = "48", add = Decides::Trials)]
     pub frames: usize,
     /// The seed of the rooms
-    #[arg(long, value_name = "N", default_value_t = 7)]
+    #[arg(long, value_name = "N", default_value_t = 7, add = Decides::Pixels)]
     pub seed: u64,
     /// Width and height in pixels
-    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size, default_value = "640x480")]
+    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size, default_value = "640x480", add = Decides::Pixels)]
     pub size: [usize; 2],
 }
 
@@ -89,7 +99,7 @@ impl fmt::Display for Rooms {
 pub struct Room {
     rooms: Rooms,
     index: usize,
-    cache: Arc<FrameCache>,
+    cache: Arc<Recent<usize, Arc<Frame>>>,
 }
 
 /// The ground truth of a frame, for checking questions.
@@ -171,7 +181,7 @@ impl Rooms {
 
     /// The frames with their ids. Nothing is drawn yet.
     pub fn all(self) -> impl Iterator<Item = (FrameId, Room)> {
-        let cache = Arc::new(FrameCache::default());
+        let cache = Arc::new(Recent::new(cached_frames(self.size)));
         (0..self.frames).map(move |index| {
             let room = Room {
                 rooms: self,
@@ -281,7 +291,8 @@ impl Room {
     /// # Errors
     /// If a map has another size than the image, which cannot happen.
     pub fn frame(&self) -> Result<Arc<Frame>> {
-        self.cache.frame(self.index, || self.draw())
+        let draw = || self.draw().map(Arc::new);
+        self.cache.get(&self.index, draw)
     }
 
     fn draw(&self) -> Result<Frame> {
@@ -375,7 +386,7 @@ mod tests {
     }
 
     #[test]
-    fn the_cache_drops_the_oldest_frames() {
+    fn a_room_is_drawn_once() {
         let rooms = Rooms {
             frames: 2,
             seed: 1,
@@ -384,24 +395,8 @@ mod tests {
         let all: Vec<Room> = rooms.all().map(|(_, room)| room).collect();
         let first = all[0].frame().unwrap();
         assert!(Arc::ptr_eq(&first, &all[0].frame().unwrap()));
-        let cache = FrameCache::default();
-        let big = Frame {
-            rgb: crate::types::Rgb::black(2000, 3000),
-            ..first.as_ref().clone()
-        };
-        for index in 0..5 {
-            cache.frame(index, || Ok(big.clone())).unwrap();
-        }
-        // 78 MB each: only the last one fits.
-        let mut drawn = 0;
-        for index in [4, 3] {
-            let draw = || {
-                drawn += 1;
-                Ok(big.clone())
-            };
-            cache.frame(index, draw).unwrap();
-        }
-        assert_eq!(drawn, 1);
+        let sizes = [[640, 480], [3000, 2000], [4000, 4000]];
+        assert_eq!(sizes.map(cached_frames), [27, 1, 1]);
     }
 
     #[test]

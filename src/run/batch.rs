@@ -10,19 +10,19 @@ use crate::job::report::{choice, open};
 use crate::job::stored::{ExperimentKind, StoredRun, manifest};
 use crate::job::{Outcome, StdoutFormat, count};
 use crate::store::{AddressChange, Store};
-use crate::types::{ChoiceDetail, Detail, OpenDetail};
+use crate::types::{ChoiceDetail, Decides, Detail, OpenDetail};
 
 /// The flags of `batch import`.
 #[derive(Debug, Args)]
 pub(crate) struct BatchImportArgs {
     /// The folder of the run that the batch was exported from
-    #[arg(value_name = "RUN")]
+    #[arg(value_name = "RUN", add = Decides::Nothing)]
     pub run: PathBuf,
     /// The output files and error files of the Batch API, in any order
-    #[arg(value_name = "FILE", required = true)]
+    #[arg(value_name = "FILE", required = true, add = Decides::Nothing)]
     pub files: Vec<PathBuf>,
     /// Print the summary as JSON instead of a table
-    #[arg(long)]
+    #[arg(long, add = Decides::Nothing)]
     pub json: bool,
 }
 

@@ -13,6 +13,7 @@ use crate::files::write;
 use crate::job::Outcome;
 use crate::job::enhancers::{EnhancerRunArgs, OpenEnhancers};
 use crate::job::progress::Progress;
+use crate::types::Decides;
 use crate::types::manifest::Status;
 
 /// The flags of `enhance`.
@@ -20,22 +21,22 @@ use crate::types::manifest::Status;
 pub(crate) struct EnhanceArgs {
     /// The model as ONNX, or PRESET:FILE (zero-dce, zero-dce++, ruas-lol, ruas-upe, retinexformer, darkir, sci, iat,
     /// pairlie, enlightengan)
-    #[arg(value_name = "MODEL")]
+    #[arg(value_name = "MODEL", add = Decides::Trials)]
     pub model: PathBuf,
     /// Images (PNG, JPEG) and folders of frames
-    #[arg(value_name = "INPUT", required_unless_present = "describe")]
+    #[arg(value_name = "INPUT", required_unless_present = "describe", add = Decides::Pixels)]
     pub inputs: Vec<PathBuf>,
     /// Where the enhanced images go, as PNG under their own names; default: nowhere, with --describe
-    #[arg(long, value_name = "DIR", required_unless_present = "describe")]
+    #[arg(long, value_name = "DIR", required_unless_present = "describe", add = Decides::Nothing)]
     pub out: Option<PathBuf>,
     /// Print how the model's input and output are read, and why; enhances nothing
-    #[arg(long, conflicts_with_all = ["inputs", "out"])]
+    #[arg(long, conflicts_with_all = ["inputs", "out"], add = Decides::Nothing)]
     pub describe: bool,
     /// The flags for running enhancers.
     #[command(flatten)]
     pub loading: EnhancerRunArgs,
     /// Replace images that exist already
-    #[arg(long, help_heading = "Output")]
+    #[arg(long, help_heading = "Output", add = Decides::Nothing)]
     pub force: bool,
     /// The maximum size of an image.
     #[command(flatten)]

@@ -18,6 +18,7 @@ use crate::import::{Adapter, DataSetKind, FrameMaps, ListedFrame, StatedArgs, op
 use crate::job::Outcome;
 use crate::job::progress::Progress;
 use crate::job::workers::{ThreadArgs, pool};
+use crate::types::Decides;
 use crate::types::manifest::Status;
 
 /// Plausible median depths of a frame in millimetres (chosen). Outside this range the scale is wrong, or it shows a wall.
@@ -30,16 +31,16 @@ const NAMED: usize = 12;
 #[derive(Debug, Args)]
 pub(crate) struct ImportArgs {
     /// The kind of data set in --src
-    #[arg(value_name = "KIND", value_enum)]
+    #[arg(value_name = "KIND", value_enum, add = Decides::Pixels)]
     pub kind: DataSetKind,
     /// The data set, laid out as src/import/README.md shows
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", add = Decides::Pixels)]
     pub src: PathBuf,
     /// Where the frames go, in the common interface
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub out: PathBuf,
     /// The name the data set gives itself; questions are named by it; default: the kind
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", add = Decides::Reply)]
     pub name: Option<String>,
     /// Facts about the maps that the data set does not state.
     #[command(flatten)]
@@ -48,7 +49,7 @@ pub(crate) struct ImportArgs {
     #[command(flatten)]
     pub key_frames: KeyFrameArgs,
     /// Write into a folder that holds frames already
-    #[arg(long, help_heading = "Output")]
+    #[arg(long, help_heading = "Output", add = Decides::Nothing)]
     pub force: bool,
     /// The maximum size of an image.
     #[command(flatten)]
@@ -75,7 +76,7 @@ pub(crate) fn import(args: &ImportArgs, progress: &Progress) -> Result<Outcome> 
     let adapter = open(args.kind, &args.src, &args.stated)?;
     let frames = choose(
         &adapter.listing().frames,
-        args.key_frames.kept(),
+        args.key_frames.selection(),
         args.key_frames.fps,
     )?;
     let workers = pool(args.threads.threads)?;

@@ -27,7 +27,7 @@ use crate::score::realism::{ImageComparison, PairComparison, exposure_drop, psnr
 use crate::synthesis::noise::Term;
 use crate::synthesis::{Negative, NoiseKey, SensorArgs, SensorSettings, expose_by};
 use crate::types::manifest::Status;
-use crate::types::{FrameId, Rgb};
+use crate::types::{Decides, FrameId, Rgb};
 
 /// The maximum number of pairs whose crops are shown (chosen).
 const MOST_CROPS: usize = 8;
@@ -43,32 +43,31 @@ pub(crate) struct RealismArgs {
     #[arg(
         value_name = "PAIRS",
         required_unless_present = "normal",
-        conflicts_with = "normal"
-    )]
+        conflicts_with = "normal", add = Decides::Pixels)]
     pub pairs: Option<PathBuf>,
     /// The images in normal light, if they lie elsewhere; default: in PAIRS
-    #[arg(long, value_name = "DIR", requires = "low")]
+    #[arg(long, value_name = "DIR", requires = "low", add = Decides::Pixels)]
     pub normal: Option<PathBuf>,
     /// The images in low light, of the same names; default: in PAIRS
-    #[arg(long, value_name = "DIR", requires = "normal")]
+    #[arg(long, value_name = "DIR", requires = "normal", add = Decides::Pixels)]
     pub low: Option<PathBuf>,
     /// The exposure drop of every pair in EV, -20 to 20; default: estimated for each from its mean light
-    #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = drop_ev)]
+    #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = drop_ev, add = Decides::Pixels)]
     pub ev: Option<f32>,
     /// The bins of the residuals' divergence
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, add = Decides::Nothing)]
     pub kl_bins: Bins,
     /// What is done about empty bins of fu; both are shown
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, add = Decides::Nothing)]
     pub kl_empty: EmptyBins,
     /// The sensor and its noise.
     #[command(flatten)]
     pub sensor: SensorArgs,
     /// Where the numbers by pair, the summary and the figures go; default: nowhere
-    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    #[arg(long, value_name = "DIR", help_heading = "Output", add = Decides::Nothing)]
     pub out: Option<PathBuf>,
     /// Print the summary as JSON instead of a table
-    #[arg(long, help_heading = "Output")]
+    #[arg(long, help_heading = "Output", add = Decides::Nothing)]
     pub json: bool,
     /// The maximum size of an image.
     #[command(flatten)]
@@ -184,7 +183,8 @@ fn compare(
     let state = synthesis.state_by(&key, f64::from(drop));
     let take = |terms: &[Term]| {
         let (amplify, tone) = (synthesis.amplify, synthesis.tone);
-        Negative::taken(&normal, &key, &state, amplify, tone, terms).develop_by(f64::from(drop))
+        Negative::with_state(&normal, &key, &state, amplify, tone, terms)
+            .develop_by(f64::from(drop))
     };
     let (noise, clean) = (take(&Term::ALL), take(&[]));
     let residuals = [&real, &noise, &exposure].map(|image| Residuals::of(image, &exposure));

@@ -15,19 +15,19 @@ use crate::job::progress::Progress;
 use crate::job::workers::{ThreadArgs, pool};
 use crate::rooms::{self, Room, Rooms};
 use crate::types::manifest::Status;
-use crate::types::{FrameId, Labels};
+use crate::types::{Decides, FrameId, Labels};
 
 /// The flags of `rooms`.
 #[derive(Debug, Args)]
 pub(crate) struct RoomsArgs {
     /// Where the frames go, in the common interface
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub out: PathBuf,
     /// The rooms to make.
     #[command(flatten)]
     pub rooms: Rooms,
     /// Write into a folder that holds frames already
-    #[arg(long)]
+    #[arg(long, add = Decides::Nothing)]
     pub force: bool,
     /// The number of threads.
     #[command(flatten)]

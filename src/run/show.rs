@@ -14,22 +14,22 @@ use crate::job::rebuild::{ImageRebuilder, RebuildArgs, RebuiltImage};
 use crate::job::stored::AnyRun;
 use crate::types::manifest::{RunManifest, Status};
 use crate::types::question::letter;
-use crate::types::{self, Condition, Digest, FrameId, OpenDetail, Record, RunQuestion};
+use crate::types::{self, Condition, Decides, Digest, FrameId, OpenDetail, Record, RunQuestion};
 
 /// The flags of `show`.
 #[derive(Debug, Args)]
 pub(crate) struct ShowArgs {
     /// The folder of a run
-    #[arg(value_name = "RUN")]
+    #[arg(value_name = "RUN", add = Decides::Nothing)]
     pub run: PathBuf,
     /// The id of a question
-    #[arg(value_name = "ITEM")]
+    #[arg(value_name = "ITEM", add = Decides::Nothing)]
     pub item: String,
     /// Only these conditions, as L3-noise+zerodce; repeatable; default: all that it was asked in
-    #[arg(long, value_name = "CONDITION")]
+    #[arg(long, value_name = "CONDITION", add = Decides::Nothing)]
     pub condition: Vec<Condition>,
     /// Where the images go; default: shown in the folder of the run
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub out: Option<PathBuf>,
     /// Where the data and enhancers are now.
     #[command(flatten)]

@@ -12,31 +12,30 @@ use super::health::Health;
 use super::subject::{CHANCE, Subject};
 use crate::types::{Family, KindReading, QuestionId, UnreadReason};
 
-/// The accuracy of one subject on one family, in one reading.
+/// Accuracy of one subject on one family in one reading.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AccuracyCell {
-    /// What it is about.
     #[serde(flatten)]
     pub subject: Subject,
-    /// The family; `None` for all together.
+    /// Question family; `None` for all families together.
     pub family: Option<Family>,
     /// How the replies were read.
     pub mode: ReadingMode,
-    /// Replies that named the true choice.
+    /// Number of replies that named the true choice.
     pub right: usize,
-    /// Replies in which no choice could be read: they count as wrong.
+    /// Number of replies in which no choice could be read. They count as wrong.
     pub unparsed: usize,
-    /// Trials without a reply: they do not count.
+    /// Number of trials without a reply. They are not scored.
     pub failed: usize,
-    /// The share of right ones among the replies; `None` where none came.
+    /// Share of right replies among all replies; `None` if there is no reply.
     pub accuracy: Option<Estimate>,
-    /// The share of questions answered rightly every time, where some were asked more than once: in every order of their
-    /// choices (MMBench's circular evaluation, Liu et al. 2023, arXiv:2307.06281, section 4.2) and every repeat.
+    /// Share of questions answered correctly every time: in every order of the choices (MMBench's circular evaluation,
+    /// Liu et al. 2023, arXiv:2307.06281, section 4.2) and in every repeat. `None` if each question was asked once.
     pub always: Option<Estimate>,
 }
 
 impl AccuracyCell {
-    /// How many replies stand behind the accuracy.
+    /// Number of replies behind the accuracy.
     #[must_use]
     pub fn replies(&self) -> usize {
         self.accuracy.map_or(0, |accuracy| accuracy.n)
@@ -46,14 +45,13 @@ impl AccuracyCell {
 /// All cells of a run, ordered by subject, family and reading.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AccuracySummary {
-    /// The cells.
     pub cells: Vec<AccuracyCell>,
-    /// Why replies were unparsed in the strict reading, and how many.
+    /// Number of replies that the strict reading could not read, by reason.
     pub unread: BTreeMap<UnreadReason, usize>,
 }
 
 impl AccuracySummary {
-    /// The cells of a family in one reading; of `None` those of all families together.
+    /// Cells of a family in one reading. `None` selects the cells of all families together.
     pub fn of<'s>(
         &'s self,
         family: Option<&'s Family>,
@@ -63,7 +61,7 @@ impl AccuracySummary {
         cells.filter(move |cell| cell.mode == mode && cell.family.as_ref() == family)
     }
 
-    /// The cell of a subject.
+    /// Cell of a subject, family and reading, if there is one.
     #[must_use]
     pub fn cell(
         &self,
@@ -77,7 +75,7 @@ impl AccuracySummary {
     }
 }
 
-/// Scores the items of a run; `health` is that of its subjects, and `questions` are what it asks, for the chance line.
+/// Accuracies of a run. `health` belongs to its subjects; `questions` are all that it asks, for the chance line.
 #[must_use]
 pub(crate) fn summarize(
     grid: &Grid<'_>,
@@ -94,18 +92,18 @@ pub(crate) fn summarize(
     }
     // A family that a subject was not asked about has no cell.
     cells.retain(|cell| cell.accuracy.is_some() || cell.failed > 0);
-    cells.extend(guesses(&questions));
+    cells.extend(chance_cells(&questions));
     AccuracySummary {
         cells,
         unread: unread(health),
     }
 }
 
-/// Why replies could not be read, in the strict reading.
+/// Counts of unreadable replies by reason, in the strict reading.
 fn unread(health: &[Health]) -> BTreeMap<UnreadReason, usize> {
     let mut unread = BTreeMap::new();
-    for (why, count) in health.iter().flat_map(|health| &health.unread) {
-        *unread.entry(*why).or_default() += count;
+    for (reason, count) in health.iter().flat_map(|health| &health.unread) {
+        *unread.entry(*reason).or_default() += count;
     }
     unread
 }
@@ -117,9 +115,9 @@ fn cell(
     mode: ReadingMode,
 ) -> AccuracyCell {
     let (mut unparsed, mut failed) = (0, 0);
-    for (_, mark) in grid.of_family(subject, family) {
-        failed += usize::from(mark == TrialResult::Failed);
-        unparsed += usize::from(mark.reading(mode) == Some(None));
+    for (_, result) in grid.of_family(subject, family) {
+        failed += usize::from(result == TrialResult::Failed);
+        unparsed += usize::from(result.reading(mode) == Some(None));
     }
     let counts = grid.counts(subject, family, mode);
     AccuracyCell {
@@ -134,7 +132,7 @@ fn cell(
     }
 }
 
-/// The share of questions that were answered rightly every time; `None` where all were asked once.
+/// Share of questions answered correctly every time; `None` if each question was asked once.
 fn always(
     grid: &Grid<'_>,
     subject: usize,
@@ -143,8 +141,8 @@ fn always(
 ) -> Option<Estimate> {
     // Items of a question stand together.
     let mut questions = BTreeMap::<(u32, &QuestionId), ClusterCount>::new();
-    for (item, mark) in grid.of_family(subject, family) {
-        if let Some(chosen) = mark.reading(mode) {
+    for (item, result) in grid.of_family(subject, family) {
+        if let Some(chosen) = result.reading(mode) {
             let count = questions
                 .entry((item.cluster, &item.record.question))
                 .or_default();
@@ -164,14 +162,15 @@ fn always(
     Estimate::clustered(&clusters)
 }
 
-fn guesses(questions: &[OfferedChoices]) -> Vec<AccuracyCell> {
+/// The chance line: a cell for each family and reading, with the accuracy of a uniform guess.
+fn chance_cells(questions: &[OfferedChoices]) -> Vec<AccuracyCell> {
     let families: BTreeSet<&Family> = questions.iter().map(|question| &question.family).collect();
     let groups = std::iter::once(None).chain(families.into_iter().map(Some));
     let cells = groups.flat_map(|family| {
-        let asked = questions
+        let of_family = questions
             .iter()
             .filter(|question| family.is_none_or(|family| question.family == *family));
-        let accuracy = chance(asked);
+        let accuracy = chance(of_family);
         ReadingMode::ALL.map(|mode| AccuracyCell {
             subject: Subject {
                 model: CHANCE.to_owned(),

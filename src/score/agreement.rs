@@ -7,21 +7,20 @@ use super::estimate::Estimate;
 use super::grid::{ClusterCount, Grid};
 use super::subject::Subject;
 
-/// Two models in one condition, in the strict reading.
+/// Agreement of two models in one condition, in the strict reading.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Agreement {
-    /// The one.
     pub first: Subject,
-    /// The other.
     pub second: Subject,
-    /// The share of items to which both gave the same answer.
+    /// Share of items to which both models gave the same answer.
     pub same: Estimate,
-    /// Cohen's κ of being right: 0 where the two err independently, 1 where they err on the same items ("error
-    /// consistency", Geirhos et al. 2020, arXiv:2006.16736); `None` where one of them is always right or always wrong.
+    /// Cohen's κ of being right: 0 if the two err independently, 1 if they err on the same items ("error consistency",
+    /// Geirhos et al. 2020, arXiv:2006.16736). `None` if one of them is always right or always wrong.
     pub kappa: Option<Estimate>,
 }
 
-/// Of the items of a cluster that both replied to: all, those that both, the first, the second got right.
+/// Counts over the items of a cluster to which both models replied: all, and those that both, the first or the second got
+/// right.
 #[derive(Debug, Clone, Copy, Default)]
 struct AgreementCounts {
     all: f32,
@@ -30,7 +29,7 @@ struct AgreementCounts {
     second: f32,
 }
 
-/// Every pair of models in every condition.
+/// Agreement of every pair of models in every condition.
 #[must_use]
 pub(crate) fn agreements(grid: &Grid<'_>, draws: &Resamples) -> Vec<Agreement> {
     let pairs = pairs(grid, ComparisonKind::Model).into_iter();
@@ -41,9 +40,9 @@ pub(crate) fn agreements(grid: &Grid<'_>, draws: &Resamples) -> Vec<Agreement> {
 
 fn agreement(grid: &Grid<'_>, draws: &Resamples, first: usize, second: usize) -> Option<Agreement> {
     let mut same = vec![ClusterCount::default(); grid.clusters];
-    let mut rights = vec![AgreementCounts::default(); grid.clusters];
+    let mut counts = vec![AgreementCounts::default(); grid.clusters];
     for (index, item) in grid.items.iter().enumerate() {
-        let reading = |subject| grid.mark(subject, index).reading(ReadingMode::Strict);
+        let reading = |subject| grid.result(subject, index).reading(ReadingMode::Strict);
         let (Some(a), Some(b)) = (reading(first), reading(second)) else {
             continue;
         };
@@ -51,16 +50,16 @@ fn agreement(grid: &Grid<'_>, draws: &Resamples, first: usize, second: usize) ->
         same[cluster].replies += 1;
         same[cluster].right += u32::from(a.is_some() && a == b);
         let (a, b) = (item.is_right(a), item.is_right(b));
-        let share = |truth: bool| f32::from(u8::from(truth));
-        let cluster = &mut rights[cluster];
+        let one_if = |right: bool| f32::from(u8::from(right));
+        let cluster = &mut counts[cluster];
         cluster.all += 1.0;
-        cluster.both += share(a && b);
-        cluster.first += share(a);
-        cluster.second += share(b);
+        cluster.both += one_if(a && b);
+        cluster.first += one_if(a);
+        cluster.second += one_if(b);
     }
     let same = Estimate::clustered(&same)?;
     let total =
-        |of: fn(&AgreementCounts) -> f32| rights.iter().map(|rights| f64::from(of(rights))).sum();
+        |of: fn(&AgreementCounts) -> f32| counts.iter().map(|counts| f64::from(of(counts))).sum();
     let value = kappa(
         total(|r| r.all),
         total(|r| r.both),
@@ -69,7 +68,7 @@ fn agreement(grid: &Grid<'_>, draws: &Resamples, first: usize, second: usize) ->
     );
     let interval = || {
         let sums = |of: fn(&AgreementCounts) -> f32| {
-            draws.sums(&rights.iter().map(of).collect::<Vec<_>>())
+            draws.sums(&counts.iter().map(of).collect::<Vec<_>>())
         };
         let (all, both) = (sums(|r| r.all), sums(|r| r.both));
         let (first, second) = (sums(|r| r.first), sums(|r| r.second));
@@ -92,14 +91,13 @@ fn agreement(grid: &Grid<'_>, draws: &Resamples, first: usize, second: usize) ->
     })
 }
 
-/// Cohen's κ of two yes-or-no marks (Cohen 1960, Educ. Psychol. Meas. 20:37); `None` where one of them
-/// does not vary.
+/// Cohen's κ of two binary ratings (Cohen 1960, Educ. Psychol. Meas. 20:37); `None` if one of them does not vary.
 fn kappa(all: f64, both: f64, first: f64, second: f64) -> Option<f64> {
     let (a, b) = (first / all, second / all);
-    let seen = (all - first - second + 2.0 * both) / all;
-    let luck = a * b + (1.0 - a) * (1.0 - b);
+    let observed = (all - first - second + 2.0 * both) / all;
+    let expected = a * b + (1.0 - a) * (1.0 - b);
     let varies = |share: f64| share > 0.0 && share < 1.0;
-    (varies(a) && varies(b)).then(|| (seen - luck) / (1.0 - luck))
+    (varies(a) && varies(b)).then(|| (observed - expected) / (1.0 - expected))
 }
 
 #[cfg(test)]

@@ -8,28 +8,28 @@ use rand_distr::{Distribution as _, Uniform};
 
 use super::student::student;
 
-/// How many times the clusters are drawn.
+/// Number of bootstrap draws (chosen).
 const DRAWS: usize = 2000;
-/// The seed of the draws: the same records have the same intervals.
+/// Seed of the draws (chosen). It is fixed, so that the same records give the same intervals.
 const SEED: u64 = 0x6461_726b_7161;
 
-/// Draws of all clusters with replacement, the same for every number, so that differences are paired.
+/// Draws of all clusters with replacement. Every statistic uses the same draws, so that differences are paired.
 #[derive(Debug)]
 pub struct Resamples {
     clusters: usize,
-    /// How often each cluster is in each draw, draw by draw.
+    /// Number of times that each cluster occurs in each draw, draw by draw.
     times: Vec<u8>,
 }
 
 impl Resamples {
-    /// Draws so many clusters.
+    /// Bootstrap draws over `clusters` clusters.
     #[must_use]
     pub fn new(clusters: usize) -> Self {
         let mut times = vec![0_u8; DRAWS * clusters];
-        if let Ok(any) = Uniform::new(0, clusters as u64) {
+        if let Ok(uniform) = Uniform::new(0, clusters as u64) {
             let mut random = SplitMix(SEED);
             for draw in times.chunks_mut(clusters) {
-                for cluster in any.sample_iter(&mut random).take(clusters) {
+                for cluster in uniform.sample_iter(&mut random).take(clusters) {
                     let times = &mut draw[cluster as usize];
                     *times = times.saturating_add(1);
                 }
@@ -38,13 +38,17 @@ impl Resamples {
         Self { clusters, times }
     }
 
-    /// The sum of a number over the clusters of each draw.
+    /// Sum over the clusters of each draw; `by_cluster` holds one number for each cluster.
     ///
     /// # Panics
-    /// Where there is not one number for each cluster.
+    /// If the length of `by_cluster` is not the number of clusters.
     #[must_use]
     pub fn sums(&self, by_cluster: &[f32]) -> Vec<f64> {
-        assert_eq!(by_cluster.len(), self.clusters, "a number for each cluster");
+        assert_eq!(
+            by_cluster.len(),
+            self.clusters,
+            "one number for each cluster"
+        );
         let draws = self.times.chunks(self.clusters.max(1));
         let sum = |times: &[u8]| -> f64 {
             // Sums of counts are whole and small: exact in single precision up to 2²⁴.
@@ -61,9 +65,10 @@ impl Resamples {
         draws.map(sum).collect()
     }
 
-    /// The 95 % interval of a number from its values in the draws: percentiles, set out to the width of Student's
-    /// distribution for few clusters (Hesterberg 2015, Am. Stat. 69:371, section 5.3, "expanded percentile"). Values may be
-    /// infinite.
+    /// The 95 % interval of a statistic from its values in the draws, which may be infinite.
+    ///
+    /// The ends are percentiles, widened for few clusters by Student's distribution (Hesterberg 2015, Am. Stat. 69:371,
+    /// section 5.3, "expanded percentile").
     #[must_use]
     pub fn interval(&self, mut values: Vec<f64>) -> [f64; 2] {
         if values.is_empty() {
@@ -83,7 +88,7 @@ impl Resamples {
     }
 }
 
-/// The generator SplitMix64 (Steele, Lea and Flood 2014, OOPSLA, figure 13), for a distribution of `rand_distr` to draw from.
+/// The random generator SplitMix64 (Steele, Lea and Flood 2014, OOPSLA, figure 13), for the distributions of `rand_distr`.
 struct SplitMix(u64);
 
 impl TryRng for SplitMix {
@@ -114,7 +119,7 @@ mod tests {
 
     #[test]
     fn draws_are_those_of_the_generator() {
-        // The first numbers of the reference implementation (Vigna, splitmix64.c) from the seed 1234567.
+        // The first numbers of the reference implementation (Vigna, splitmix64.c) with seed 1234567.
         let mut random = SplitMix(1_234_567);
         let first = [random.next_u64(), random.next_u64()];
         assert_eq!(
@@ -124,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn every_draw_has_as_many_clusters() {
+    fn every_draw_has_all_its_clusters() {
         let draws = Resamples::new(37);
         let sums = draws.sums(&[1.0; 37]);
         assert_eq!(sums.len(), DRAWS);
@@ -134,7 +139,7 @@ mod tests {
 
     #[test]
     fn the_interval_of_a_mean_is_students() {
-        // 30 numbers: the deviation of their mean is known.
+        // The standard error of the mean of 30 numbers is known.
         let numbers: Vec<f32> = (0..30_u8).map(f32::from).collect();
         let draws = Resamples::new(30);
         let means: Vec<f64> = draws.sums(&numbers).iter().map(|sum| sum / 30.0).collect();

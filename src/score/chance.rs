@@ -1,14 +1,14 @@
-//! What guessing would score.
+//! The accuracy of guessing: [`chance`].
 
 use super::estimate::Estimate;
 use crate::types::{Family, Question};
 
-/// What a question offers.
+/// Family of a question and the number of its choices.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct OfferedChoices {
-    /// Its family.
+    /// Family of the question.
     pub family: Family,
-    /// How many choices it has.
+    /// Number of its choices.
     pub choices: usize,
 }
 
@@ -21,9 +21,9 @@ impl From<&Question> for OfferedChoices {
     }
 }
 
-/// The exact accuracy of a uniform guess: the mean of 1 / number of choices (DarkQA, section IV); `None` of no questions.
+/// The exact accuracy of a uniform guess: the mean of 1 / number of choices (DarkQA, section IV). `None` without questions.
 ///
-/// Summed over counts of choices, so that the order of the questions cannot change a digit.
+/// The sum runs over the numbers of choices, so that the order of the questions cannot change a digit.
 pub(crate) fn chance<'a>(
     questions: impl IntoIterator<Item = &'a OfferedChoices>,
 ) -> Option<Estimate> {
@@ -51,7 +51,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_the_mean_of_one_over_the_choices() {
+    fn chance_is_the_mean_of_one_over_the_choices() {
         let questions = [question(2), question(4), question(2)];
         assert_eq!(chance(&questions).unwrap(), Estimate::exact(1.25 / 3.0, 3));
         assert_eq!(chance([]), None);

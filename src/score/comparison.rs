@@ -1,4 +1,4 @@
-//! Every difference that is of interest, with its test: [`Comparison`].
+//! Paired differences between subjects, with their tests: [`Comparison`].
 
 use std::collections::BTreeMap;
 
@@ -10,23 +10,23 @@ use super::subject::Subject;
 use crate::types::{AxisLevel, Family, KindReading, View};
 use rayon::prelude::*;
 
-/// What is compared with what.
+/// The two sides of a comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ComparisonKind {
-    /// A dark level with L0: what darkness costs.
+    /// A degraded level against L0, without an enhancer.
     Level,
-    /// Sensor noise with exposure drop alone, at one level.
+    /// Sensor noise against exposure drop alone, at the same level.
     Variant,
-    /// Enhanced with raw, at one level and variant.
+    /// Enhanced against raw, at the same level and variant.
     Enhancer,
-    /// A model with another, in one condition.
+    /// One model against another in the same condition.
     Model,
-    /// A model that sees with one that has the words alone.
+    /// A model with images against a model without.
     Blind,
 }
 
 impl ComparisonKind {
-    /// All, in the order of the tables.
+    /// All kinds in the order of the tables.
     pub const ALL: [Self; 5] = [
         Self::Level,
         Self::Variant,
@@ -35,7 +35,7 @@ impl ComparisonKind {
         Self::Blind,
     ];
 
-    /// The name in files.
+    /// The name of the kind in CSV files.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -48,19 +48,19 @@ impl ComparisonKind {
     }
 }
 
-/// What a comparison shows at the 5 % level, after Holm's correction.
+/// Result of a comparison at the 5 % level, after Holm's correction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Significance {
-    /// The first is better.
+    /// The first subject is better.
     Better,
-    /// The first is worse.
+    /// The first subject is worse.
     Worse,
-    /// Nothing is shown; which is not to say that they are the same.
+    /// No significant difference. This does not show that the two are equal.
     Tied,
 }
 
 impl Significance {
-    /// The word in tables.
+    /// The word for the result in tables.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
@@ -71,27 +71,24 @@ impl Significance {
     }
 }
 
-/// One subject against another on the items that both replied to, in the strict reading.
+/// One subject against another on the items to which both replied, in the strict reading.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
-    /// What is compared.
     pub kind: ComparisonKind,
-    /// The first: the darker, the noisy, the enhanced, the one that sees.
+    /// The first side: the degraded, the noisy, the enhanced, or the one with images.
     pub first: Subject,
-    /// What it is held against.
+    /// The second side, to which the first is compared.
     pub second: Subject,
-    /// The family; `None` for all.
+    /// Question family; `None` for all families together.
     pub family: Option<Family>,
-    /// The numbers.
     pub paired: PairedComparison,
-    /// The p-value after Holm's correction over all comparisons of this kind and these models, so that another model in the
-    /// report changes no verdict; those by family are corrected among themselves.
+    /// p-value after Holm's correction over all comparisons of this kind and these models. Another model in the report
+    /// therefore changes no result. Comparisons by family are corrected separately.
     pub holm: f64,
-    /// What that shows.
-    pub verdict: Significance,
+    pub significance: Significance,
 }
 
-/// All comparisons of a grid, by kind, family and subjects.
+/// All comparisons of a grid, ordered by kind, family and subjects.
 #[must_use]
 pub(crate) fn comparisons(grid: &Grid<'_>) -> Vec<Comparison> {
     let families = grid.groups();
@@ -112,32 +109,35 @@ pub(crate) fn comparisons(grid: &Grid<'_>) -> Vec<Comparison> {
                 family: family.cloned(),
                 paired: PairedComparison::new(grid, first, second, family, ReadingMode::Strict)?,
                 holm: 1.0,
-                verdict: Significance::Tied,
+                significance: Significance::Tied,
             })
         });
     corrected(paired.collect())
 }
 
-/// The comparisons with their verdicts, after Holm's correction within each set of them.
+/// The comparisons with their significance, after Holm's correction within each set.
 fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
     let mut sets = BTreeMap::<_, Vec<usize>>::new();
-    for (index, one) in all.iter().enumerate() {
-        let models = (one.first.model.clone(), one.second.model.clone());
-        let set = (one.kind, one.family.is_some(), models);
+    for (index, comparison) in all.iter().enumerate() {
+        let models = (
+            comparison.first.model.clone(),
+            comparison.second.model.clone(),
+        );
+        let set = (comparison.kind, comparison.family.is_some(), models);
         sets.entry(set).or_default().push(index);
     }
     for set in sets.into_values() {
         let values: Vec<f64> = set.iter().map(|index| all[*index].paired.p).collect();
         for (index, holm) in set.into_iter().zip(holm(&values)) {
-            let one = &mut all[index];
-            one.holm = holm;
-            one.verdict = verdict(one.paired.difference.value, holm);
+            let comparison = &mut all[index];
+            comparison.holm = holm;
+            comparison.significance = significance(comparison.paired.difference.value, holm);
         }
     }
     all
 }
 
-fn verdict(difference: f64, p: f64) -> Significance {
+fn significance(difference: f64, p: f64) -> Significance {
     if p >= 0.05 {
         Significance::Tied
     } else if difference > 0.0 {
@@ -152,13 +152,13 @@ pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)
     let mut pairs = Vec::new();
     for (index, subject) in grid.subjects.iter().enumerate() {
         let against: Vec<usize> = match kind {
-            // Darkness is what raw images show; what an enhancer leaves of it is read from the curves.
+            // Only raw images show what darkness costs. The curves show how much of it an enhancer recovers.
             ComparisonKind::Level
                 if subject.variant.kind.is_some() && subject.enhancer.is_none() =>
             {
-                let light =
+                let clean =
                     Subject::seeing(&subject.model, AxisLevel::L0, &KindReading::NONE, None);
-                grid.find(&light).into_iter().collect()
+                grid.find(&clean).into_iter().collect()
             }
             ComparisonKind::Variant => match subject
                 .variant
@@ -166,8 +166,8 @@ pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)
                 .and_then(crate::types::degradation::Kind::base)
             {
                 None => Vec::new(),
-                // The same level of the kind that it adds something to, which has no readings.
-                base => one(grid, subject, |other| {
+                // The same level of the base kind, which has no light readings.
+                base => changed(grid, subject, |other| {
                     other.variant = KindReading {
                         kind: base,
                         reading: None,
@@ -175,7 +175,7 @@ pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)
                 }),
             },
             ComparisonKind::Enhancer if subject.enhancer.is_some() => {
-                one(grid, subject, |other| other.enhancer = None)
+                changed(grid, subject, |other| other.enhancer = None)
             }
             ComparisonKind::Model => later_models(grid, index),
             ComparisonKind::Blind if subject.view == Some(View::Image) => blind(grid, subject),
@@ -186,37 +186,37 @@ pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)
     pairs
 }
 
-/// The subject that is another but for a change, where there is one.
-fn one(grid: &Grid<'_>, subject: &Subject, change: impl FnOnce(&mut Subject)) -> Vec<usize> {
+/// The subject that differs from `subject` by a change only, if the grid has it.
+fn changed(grid: &Grid<'_>, subject: &Subject, change: impl FnOnce(&mut Subject)) -> Vec<usize> {
     let mut other = subject.clone();
     change(&mut other);
     grid.find(&other).into_iter().collect()
 }
 
-/// Other models in the same condition, each pair once.
+/// Later models of the grid in the same condition, so that each pair occurs once.
 fn later_models(grid: &Grid<'_>, index: usize) -> Vec<usize> {
     let subject = &grid.subjects[index];
     let later = grid.subjects.iter().enumerate().skip(index + 1);
-    let light = |of: &Subject| (of.view, of.level, of.variant.clone(), of.enhancer.clone());
+    let condition = |of: &Subject| (of.view, of.level, of.variant.clone(), of.enhancer.clone());
     later
-        .filter(|(_, other)| other.model != subject.model && light(other) == light(subject))
+        .filter(|(_, other)| other.model != subject.model && condition(other) == condition(subject))
         .map(|(other, _)| other)
         .collect()
 }
 
-/// The same model without images; all models without images where it was never asked so.
+/// The same model without images; if it was never asked so, all models without images.
 fn blind(grid: &Grid<'_>, subject: &Subject) -> Vec<usize> {
     let all = || {
         let subjects = grid.subjects.iter().enumerate();
         subjects.filter(|(_, other)| other.view == Some(View::Blind))
     };
-    let own: Vec<usize> = all()
+    let same_model: Vec<usize> = all()
         .filter(|(_, other)| other.model == subject.model)
         .map(|(index, _)| index)
         .collect();
-    if own.is_empty() {
+    if same_model.is_empty() {
         all().map(|(index, _)| index).collect()
     } else {
-        own
+        same_model
     }
 }

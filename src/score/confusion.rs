@@ -1,4 +1,4 @@
-//! Answers given against the true ones: [`Confusion`], and what it tells of hallucination and collapse.
+//! Answers given against true answers: [`Confusion`], [`Hallucination`] and [`Collapse`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,23 +8,21 @@ use super::grid::{ClusterCount, Grid};
 use super::subject::Subject;
 use crate::types::Family;
 
-/// A family with more different answers than this has no table of them.
-const MOST_LABELS: usize = 26;
+/// Maximum number of different answers of a family that gets a confusion table.
+const MAX_LABELS: usize = 26;
 
-/// The answers of one subject to one family, in the strict reading.
+/// Confusion table of one subject on one family, in the strict reading.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Confusion {
-    /// Whose.
     pub subject: Subject,
-    /// The family.
     pub family: Family,
-    /// The different answers, in order.
+    /// The different answers, sorted.
     pub labels: Vec<String>,
-    /// By true answer, then by the answer given; the last column counts replies without a readable answer.
+    /// Number of replies by true answer, then by answer given. The last column counts replies without a readable answer.
     pub counts: Vec<Vec<usize>>,
 }
 
-/// The confusions of every subject, for families of few different answers.
+/// Confusion tables of every subject, for families with at most [`MAX_LABELS`] different answers.
 #[must_use]
 pub(crate) fn confusions(grid: &Grid<'_>) -> Vec<Confusion> {
     let mut all = Vec::new();
@@ -36,7 +34,7 @@ pub(crate) fn confusions(grid: &Grid<'_>) -> Vec<Confusion> {
         let labels: BTreeSet<&str> = items
             .flat_map(|item| item.record.detail.choices.iter().map(String::as_str))
             .collect();
-        if labels.len() > MOST_LABELS {
+        if labels.len() > MAX_LABELS {
             continue;
         }
         let labels: Vec<String> = labels.into_iter().map(str::to_owned).collect();
@@ -57,76 +55,77 @@ pub(crate) fn confusions(grid: &Grid<'_>) -> Vec<Confusion> {
 
 fn counts(grid: &Grid<'_>, subject: usize, family: &Family, labels: &[String]) -> Vec<Vec<usize>> {
     let mut counts = vec![vec![0; labels.len() + 1]; labels.len()];
-    for (item, mark) in grid.of_family(subject, Some(family)) {
-        let Some(chosen) = mark.reading(ReadingMode::Strict) else {
+    for (item, result) in grid.of_family(subject, Some(family)) {
+        let Some(chosen) = result.reading(ReadingMode::Strict) else {
             continue;
         };
-        let place = |index: usize| {
+        let position = |index: usize| {
             let text = item.record.detail.choices.get(index)?;
             labels.binary_search(text).ok()
         };
-        if let Some(truth) = place(item.record.detail.truth) {
-            let given = chosen.and_then(|index| place(usize::from(index)));
-            counts[truth][given.unwrap_or(labels.len())] += 1;
+        if let Some(truth) = position(item.record.detail.truth) {
+            let predicted = chosen.and_then(|index| position(usize::from(index)));
+            counts[truth][predicted.unwrap_or(labels.len())] += 1;
         }
     }
     counts
 }
 
-/// How the answers given are spread, beside the true ones: a model that no longer sees says the same to everything.
+/// Distribution of the answers given, compared with the true answers. A model that no longer sees gives the same answer
+/// to everything.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Collapse {
     /// The answer given most often.
     pub top: String,
-    /// Its share of all replies.
+    /// Share of that answer among all replies.
     pub share: f64,
-    /// How often it is the true answer, as a share of the same replies.
+    /// Share of the same replies for which that answer is true.
     pub truth: f64,
-    /// The entropy of the answers given, in bits, over replies with a readable answer.
+    /// Entropy of the answers given, in bits, over replies with a readable answer.
     pub entropy: f64,
-    /// The entropy of the true answers, in bits, over all replies.
+    /// Entropy of the true answers, in bits, over all replies.
     pub true_entropy: f64,
-    /// How many replies.
+    /// Number of replies, readable or not.
     pub n: usize,
 }
 
 impl Confusion {
-    /// How often each answer was given, and how often it was true.
+    /// For each answer, the number of times it was given and the number of times it was true.
     #[must_use]
     pub fn shares(&self) -> Vec<(usize, usize)> {
-        let given = |label: usize| self.counts.iter().map(|row| row[label]).sum();
+        let predicted = |label: usize| self.counts.iter().map(|row| row[label]).sum();
         let labels = self.counts.iter().enumerate();
         labels
-            .map(|(label, row)| (given(label), row.iter().sum()))
+            .map(|(label, row)| (predicted(label), row.iter().sum()))
             .collect()
     }
 
-    /// How far the answers have fallen together; `None` where no answer could be read.
+    /// Collapse of the answers; `None` if no answer could be read.
     #[must_use]
     pub fn collapse(&self) -> Option<Collapse> {
         let shares = self.shares();
         let n: usize = shares.iter().map(|(_, truth)| truth).sum();
-        // Of equals the first by name.
-        let (top, (given, truth)) = shares
+        // Of several most frequent answers, the first by name.
+        let (top, (predicted, truth)) = shares
             .iter()
             .enumerate()
             .rev()
-            .max_by_key(|(_, (given, _))| *given)?;
-        if *given == 0 {
+            .max_by_key(|(_, (predicted, _))| *predicted)?;
+        if *predicted == 0 {
             return None;
         }
         Some(Collapse {
             top: self.labels[top].clone(),
-            share: *given as f64 / n as f64,
+            share: *predicted as f64 / n as f64,
             truth: *truth as f64 / n as f64,
-            entropy: entropy(shares.iter().map(|(given, _)| *given)),
+            entropy: entropy(shares.iter().map(|(predicted, _)| *predicted)),
             true_entropy: entropy(shares.iter().map(|(_, truth)| *truth)),
             n,
         })
     }
 }
 
-/// Shannon's entropy of counts, in bits.
+/// Shannon entropy of counts, in bits.
 fn entropy(counts: impl Iterator<Item = usize> + Clone) -> f64 {
     let all: usize = counts.clone().sum();
     let terms = counts.filter(|count| *count > 0).map(|count| {
@@ -136,19 +135,18 @@ fn entropy(counts: impl Iterator<Item = usize> + Clone) -> f64 {
     terms.sum()
 }
 
-/// How often a model sees what is not there, and overlooks what is.
+/// Rates at which a subject reports absent objects and overlooks present ones.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hallucination {
-    /// Whose.
     pub subject: Subject,
-    /// The share of "yes" among replies to questions whose truth is "no".
+    /// Share of "yes" among replies to questions whose truth is "no".
     pub false_positive: Option<Estimate>,
-    /// The share of "no" among replies to questions whose truth is "yes".
+    /// Share of "no" among replies to questions whose truth is "yes".
     pub false_negative: Option<Estimate>,
 }
 
-/// The hallucination of every subject on the questions whether an object is there (DarkQA, section IV); replies without a
-/// readable answer are among the replies, and are neither.
+/// Hallucination of every subject on presence questions (DarkQA, section IV). Replies without a readable answer count as
+/// replies, but as neither "yes" nor "no".
 #[must_use]
 pub(crate) fn hallucinations(grid: &Grid<'_>) -> Vec<Hallucination> {
     let subjects = grid.subjects.iter().enumerate();
@@ -162,21 +160,22 @@ pub(crate) fn hallucinations(grid: &Grid<'_>) -> Vec<Hallucination> {
         .collect()
 }
 
-fn rate(grid: &Grid<'_>, subject: usize, truth: &str, said: &str) -> Option<Estimate> {
+/// Share of `answer` among replies to presence questions whose true answer is `truth`.
+fn rate(grid: &Grid<'_>, subject: usize, truth: &str, answer: &str) -> Option<Estimate> {
     let mut clusters = BTreeMap::<u32, ClusterCount>::new();
-    for (item, mark) in grid.of_family(subject, Some(&Family::Presence)) {
+    for (item, result) in grid.of_family(subject, Some(&Family::Presence)) {
         let choices = &item.record.detail.choices;
         let is = |index: usize, text: &str| {
             choices
                 .get(index)
                 .is_some_and(|choice| choice.eq_ignore_ascii_case(text))
         };
-        if let Some(chosen) = mark.reading(ReadingMode::Strict)
+        if let Some(chosen) = result.reading(ReadingMode::Strict)
             && is(item.record.detail.truth, truth)
         {
             let count = clusters.entry(item.cluster).or_default();
             count.replies += 1;
-            count.right += u32::from(chosen.is_some_and(|index| is(usize::from(index), said)));
+            count.right += u32::from(chosen.is_some_and(|index| is(usize::from(index), answer)));
         }
     }
     let counts: Vec<ClusterCount> = clusters.into_values().collect();

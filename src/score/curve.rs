@@ -1,4 +1,4 @@
-//! Accuracy over darkness as a whole: [`Curve`], with its threshold and area.
+//! Summaries of accuracy over all levels: [`Curve`], with its darkness threshold and area.
 
 use super::bootstrap::Resamples;
 use super::choice::ReadingMode;
@@ -7,66 +7,64 @@ use super::grid::{ClusterCount, Grid, TrialResult};
 use super::subject::Subject;
 use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
 
-/// The exposure drop at which a model's accuracy is half-way between that in the light and chance.
+/// Exposure drop, in EV, at which a model's accuracy is half-way between that at L0 and chance, with a 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Threshold {
-    /// In EV; infinite where the darkest level is still above it.
+    /// The threshold; infinite if accuracy at the darkest level is still above half-way.
     pub value: f64,
-    /// The lower end of its 95 % interval.
+    /// Lower end of the interval; it may be infinite too.
     pub low: f64,
-    /// The upper end; infinite where that is beyond the darkest level.
+    /// Upper end of the interval; infinite if it lies beyond the darkest level.
     pub high: f64,
 }
 
-/// One model in one variant, raw or enhanced, over the levels.
+/// Summary of one model over all levels, in one variant, raw or with one enhancer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
-    /// The model.
     pub model: String,
-    /// The variant.
     pub variant: KindReading,
-    /// The enhancer; `None` for raw.
+    /// Enhancer; `None` for raw images.
     pub enhancer: Option<EnhancerName>,
-    /// The family; `None` for all.
+    /// Question family; `None` for all families together.
     pub family: Option<Family>,
-    /// The darkest level of it.
+    /// The darkest level asked.
     pub darkest: AxisLevel,
-    /// The darkness threshold; `None` where the accuracy in the light is not above chance, so that there is nothing to lose.
+    /// Darkness threshold; `None` if accuracy at L0 is not above chance, so that nothing can be lost.
     pub threshold: Option<Threshold>,
-    /// The mean accuracy from L0 to the darkest level, by the trapezoid rule over EV; `n` is the replies.
+    /// Mean accuracy from L0 to the darkest level, by the trapezoid rule over EV. Its `n` is the number of replies.
     pub area: Estimate,
 }
 
-/// The line of one model in one variant, raw or enhanced.
+/// The points of one curve: one model in one variant, raw or with one enhancer.
 pub(super) struct CurvePoints {
     pub(super) model: String,
     pub(super) variant: KindReading,
     pub(super) enhancer: Option<EnhancerName>,
-    /// Its levels, lightest first, with the index of the subject of each; L0 is the untouched frame for all.
+    /// Levels in increasing severity, with the index of the subject at each. L0 is the clean frame for every curve.
     pub(super) subjects: Vec<(AxisLevel, usize)>,
 }
 
 impl CurvePoints {
-    /// The lines of a grid of which L0 and a darker level were asked.
+    /// All curves of a grid that have L0 and at least one degraded level.
     pub(super) fn all(grid: &Grid<'_>) -> Vec<Self> {
-        let dark = grid.subjects.iter().filter(|subject| {
+        let degraded = grid.subjects.iter().filter(|subject| {
             subject.view == Some(View::Image) && subject.variant != KindReading::NONE
         });
-        let mut lines: Vec<(&str, &KindReading, Option<&EnhancerName>)> = dark
+        let mut keys: Vec<(&str, &KindReading, Option<&EnhancerName>)> = degraded
             .map(|subject| (&*subject.model, &subject.variant, subject.enhancer.as_ref()))
             .collect();
-        lines.sort_unstable();
-        lines.dedup();
-        let points = lines.into_iter().map(|(model, variant, enhancer)| {
-            let of_line = |subject: &Subject| {
+        keys.sort_unstable();
+        keys.dedup();
+        let points = keys.into_iter().map(|(model, variant, enhancer)| {
+            let on_curve = |subject: &Subject| {
                 subject.view == Some(View::Image)
                     && subject.model == model
                     && (subject.level == Some(AxisLevel::L0) && subject.enhancer.is_none()
                         || subject.variant == *variant && subject.enhancer.as_ref() == enhancer)
             };
             let subjects = grid.subjects.iter().enumerate();
-            let of_line = subjects.filter(|(_, subject)| of_line(subject));
-            let mut subjects: Vec<(AxisLevel, usize)> = of_line
+            let on_curve = subjects.filter(|(_, subject)| on_curve(subject));
+            let mut subjects: Vec<(AxisLevel, usize)> = on_curve
                 .filter_map(|(index, subject)| Some((subject.level?, index)))
                 .collect();
             subjects.sort_unstable();
@@ -82,15 +80,15 @@ impl CurvePoints {
             .collect()
     }
 
-    /// The severities of the levels, in the unit of their axis; 0 at L0.
+    /// Severities of the levels in the unit of their axis; 0 at L0.
     fn drops(&self) -> Vec<f64> {
         let subjects = self.subjects.iter();
         subjects.map(|(level, _)| level.value()).collect()
     }
 }
 
-/// All curves of a grid: of each model, in each variant, raw and with each enhancer, of which L0 and a darker level were
-/// asked.
+/// All curves of a grid: each model in each variant, raw and with each enhancer. A curve needs L0 and at least one degraded
+/// level.
 #[must_use]
 pub fn curves(grid: &Grid<'_>, draws: &Resamples, family: Option<&Family>) -> Vec<Curve> {
     CurvePoints::all(grid)
@@ -122,12 +120,12 @@ fn curve(
     let guesses = guesses(grid, points.subjects[0].1, family);
     let chance = guesses.iter().map(|x| f64::from(*x)).sum::<f64>() / replies[0];
     let resampled = DrawnCurves::new(draws, &counts, &guesses);
-    let within = |value: f64, drawn: Vec<f64>| {
+    let with_interval = |value: f64, drawn: Vec<f64>| {
         let [low, high] = draws.interval(drawn);
         [value, low.min(value), high.max(value)]
     };
     let threshold = above_chance(&counts[0], chance).then(|| {
-        let [value, low, high] = within(
+        let [value, low, high] = with_interval(
             threshold(&drops, &values, &replies, chance),
             resampled.draws(|values, weights, chance| threshold(&drops, values, weights, chance)),
         );
@@ -144,23 +142,23 @@ fn curve(
     })
 }
 
-/// Whether the light is more than guessing: the interval of the accuracy at L0 lies above chance.
-fn above_chance(light: &[ClusterCount], chance: f64) -> bool {
-    Estimate::clustered(light).is_some_and(|estimate| estimate.low > chance)
+/// True if the interval of the accuracy at L0 lies above chance.
+fn above_chance(clean: &[ClusterCount], chance: f64) -> bool {
+    Estimate::clustered(clean).is_some_and(|estimate| estimate.low > chance)
 }
 
-/// What guessing would get right of the replies at L0, by cluster.
-fn guesses(grid: &Grid<'_>, light: usize, family: Option<&Family>) -> Vec<f32> {
+/// Expected number of right guesses among the replies at L0, by cluster.
+fn guesses(grid: &Grid<'_>, clean: usize, family: Option<&Family>) -> Vec<f32> {
     let mut guesses = vec![0.0_f32; grid.clusters];
-    for (item, mark) in grid.of_family(light, family) {
-        if let TrialResult::Read { .. } = mark {
+    for (item, result) in grid.of_family(clean, family) {
+        if let TrialResult::Read { .. } = result {
             guesses[item.cluster as usize] += 1.0 / item.record.detail.choices.len() as f32;
         }
     }
     guesses
 }
 
-/// A curve in every draw of the clusters.
+/// A curve in every bootstrap draw.
 struct DrawnCurves {
     /// Right answers and replies of each level, by draw.
     levels: Vec<[Vec<f64>; 2]>,
@@ -186,10 +184,10 @@ impl DrawnCurves {
         }
     }
 
-    /// A number in each draw, from the accuracies, the replies and chance; draws that leave a level without a reply are
-    /// passed over.
+    /// The value of `number` in each draw, from the accuracies, the replies and chance. Draws in which a level has no reply
+    /// are skipped.
     fn draws(&self, number: impl Fn(&[f64], &[f64], f64) -> f64) -> Vec<f64> {
-        let mut made = Vec::with_capacity(self.guesses.len());
+        let mut numbers = Vec::with_capacity(self.guesses.len());
         let (mut values, mut weights) = (Vec::new(), Vec::new());
         for (draw, guesses) in self.guesses.iter().enumerate() {
             values.clear();
@@ -199,22 +197,23 @@ impl DrawnCurves {
                 weights.push(replies[draw]);
             }
             if !weights.contains(&0.0) {
-                made.push(number(&values, &weights, guesses / weights[0]));
+                numbers.push(number(&values, &weights, guesses / weights[0]));
             }
         }
-        made
+        numbers
     }
 }
 
-/// The drop at which accuracies that never rise, fitted to these (pool adjacent violators, Ayer et al. 1955), cross the
-/// middle between the first and chance, by lines between the levels; infinite where they do not, 0 where the first is not
-/// above chance.
+/// Exposure drop at which the accuracies cross the middle between the first one and chance.
+///
+/// The accuracies are first fitted by values that never rise (pool adjacent violators, Ayer et al. 1955), with straight
+/// lines between the levels. Infinite if they do not cross; 0 if the first accuracy is not above chance.
 fn threshold(drops: &[f64], values: &[f64], weights: &[f64], chance: f64) -> f64 {
     if values[0] <= chance {
         return 0.0;
     }
     let middle = f64::midpoint(values[0], chance);
-    let fitted = falling(values, weights);
+    let fitted = non_increasing(values, weights);
     for (pair, drop) in fitted.windows(2).zip(drops.windows(2)) {
         let ([above, below], [near, far]) = ([pair[0], pair[1]], [drop[0], drop[1]]);
         if below <= middle {
@@ -228,17 +227,17 @@ fn threshold(drops: &[f64], values: &[f64], weights: &[f64], chance: f64) -> f64
     f64::INFINITY
 }
 
-/// The weighted least-squares fit that never rises.
-fn falling(values: &[f64], weights: &[f64]) -> Vec<f64> {
+/// Weighted least-squares fit by values that never rise.
+fn non_increasing(values: &[f64], weights: &[f64]) -> Vec<f64> {
     let mut blocks: Vec<(f64, f64, usize)> = Vec::new();
     for (value, weight) in values.iter().zip(weights) {
         let mut block = (*value, *weight, 1);
-        while let Some(&(before, heavy, length)) = blocks.last()
-            && before < block.0
+        while let Some(&(block_value, block_weight, length)) = blocks.last()
+            && block_value < block.0
         {
             blocks.pop();
-            let sum = heavy + block.1;
-            let mean = (before * heavy + block.0 * block.1) / sum;
+            let sum = block_weight + block.1;
+            let mean = (block_value * block_weight + block.0 * block.1) / sum;
             block = (mean, sum, length + block.2);
         }
         blocks.push(block);
@@ -249,13 +248,15 @@ fn falling(values: &[f64], weights: &[f64]) -> Vec<f64> {
     fitted.collect()
 }
 
-/// The mean height of the curve by the trapezoid rule, as a mean of scores: each level has its share of the width, so that a
-/// cluster's score is its right answers at each level, weighted, over its replies there.
+/// Mean height of the curve by the trapezoid rule, computed as a mean of scores.
+///
+/// Each level is weighted by its share of the width. A cluster's score is its weighted number of right answers divided by
+/// its weighted number of replies.
 fn area(drops: &[f64], counts: &[Vec<ClusterCount>], replies: &[f64]) -> Option<Estimate> {
     let weights = widths(drops);
     let levels = counts.iter().zip(replies).zip(&weights);
     let mut sums = vec![(0.0, 0.0); counts.first()?.len()];
-    // Levels may differ in replies: each is brought to the first one's number.
+    // Levels may differ in their number of replies, so each is scaled to that of the first level.
     for ((counts, replies_here), weight) in levels {
         let scale = weight * replies[0] / replies_here;
         for (sum, count) in sums.iter_mut().zip(counts) {
@@ -271,7 +272,7 @@ fn area(drops: &[f64], counts: &[Vec<ClusterCount>], replies: &[f64]) -> Option<
     )
 }
 
-/// The share of each level in the mean height of a curve of straight lines.
+/// Weight of each level in the mean height of a curve of straight lines.
 fn widths(drops: &[f64]) -> Vec<f64> {
     let last = drops.len() - 1;
     let whole = drops[last] - drops[0];
@@ -296,9 +297,9 @@ mod tests {
         assert!((at([0.9, 0.9, 0.8, 0.7, 0.5, 0.3]) - 6.75).abs() < 1e-12);
         assert!(at([0.9, 0.9, 0.9, 0.9, 0.8, 0.7]).is_infinite());
         assert!(at([0.3, 0.3, 0.3, 0.3, 0.3, 0.3]).abs() < 1e-12);
-        // A dip that is made good again does not count: pooled, levels 4 and 5 are at 0.65.
+        // A dip with a recovery does not count: pooled, levels 4 and 5 are at 0.65.
         assert!((at([0.9, 0.9, 0.9, 0.5, 0.8, 0.3]) - (7.5 + 0.05 / 0.35 * 1.5)).abs() < 1e-12);
-        // At once.
+        // All is lost at the first step.
         assert!((at([0.9, 0.3, 0.3, 0.3, 0.3, 0.3]) - 1.0).abs() < 1e-12);
     }
 
@@ -311,9 +312,9 @@ mod tests {
             rights.map(level).to_vec()
         };
         let area = |rights| area(&[0.0, 2.0, 9.0], &counts(rights), &[40.0; 3]).unwrap();
-        // From 1 to a half over 2 EV, then a half over 7.
+        // From 1 to 0.5 over 2 EV, then 0.5 over 7 EV.
         assert!((area([4, 2, 2]).value - (1.5 + 3.5) / 9.0).abs() < 1e-12);
-        // Never wrong is not certain to be never wrong.
+        // Without any wrong reply the interval still has a width.
         let all = area([4, 4, 4]);
         assert!(
             all.value > 0.999 && all.low > 0.8 && all.low < 0.95,
@@ -323,9 +324,9 @@ mod tests {
 
     #[test]
     fn the_fit_never_rises_and_keeps_the_mean() {
-        let fitted = falling(&[0.5, 0.9, 0.2, 0.4], &[1.0, 3.0, 1.0, 1.0]);
-        for (fitted, due) in fitted.iter().zip([0.8, 0.8, 0.3, 0.3]) {
-            assert!((fitted - due).abs() < 1e-12);
+        let fitted = non_increasing(&[0.5, 0.9, 0.2, 0.4], &[1.0, 3.0, 1.0, 1.0]);
+        for (fitted, expected) in fitted.iter().zip([0.8, 0.8, 0.3, 0.3]) {
+            assert!((fitted - expected).abs() < 1e-12);
         }
     }
 }

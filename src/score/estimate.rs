@@ -8,26 +8,26 @@ use super::student::student;
 /// The 97.5 % quantile of the standard normal distribution, for 95 % intervals.
 const Z: f64 = 1.959_963_984_540_054;
 
-/// How alike the replies of one cluster are taken to be where all of them are right, or none, so that the records cannot
-/// say: an intraclass correlation that is high for questions about one frame, which keeps the interval honest.
+/// Intraclass correlation that is assumed if all replies are right, or none, so that the records cannot show it (chosen).
+/// The value is high for questions about one frame, so that the interval is not too narrow.
 const UNKNOWN_CORRELATION: f64 = 0.2;
 
 /// A share, or a difference of shares, with its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
-    /// The number itself.
+    /// The share or difference itself.
     pub value: f64,
-    /// The lower end of the interval.
+    /// Lower end of the interval.
     pub low: f64,
-    /// The upper end of the interval.
+    /// Upper end of the interval.
     pub high: f64,
-    /// How many trials it rests on.
+    /// Number of trials that it is computed from.
     pub n: usize,
 }
 
 impl Estimate {
-    /// The share of `right` among `n` independent trials with Wilson's score interval (Wilson 1927, J. Am. Stat. Assoc.
-    /// 22:209); `None` of no trials.
+    /// Share of `right` among `n` independent trials, with Wilson's score interval (Wilson 1927, J. Am. Stat. Assoc.
+    /// 22:209). `None` without trials.
     #[must_use]
     pub fn share(right: usize, n: usize) -> Option<Self> {
         if n == 0 || right > n {
@@ -37,49 +37,50 @@ impl Estimate {
         Some(Self::wilson(value, n as f64, Z, n))
     }
 
-    /// The share of right replies in clusters; `None` of no replies.
+    /// Share of right replies in clusters; `None` without replies.
     ///
-    /// Wilson's interval at the effective number of replies n / d, where the design effect d ≥ 1 is the variance of the
-    /// share between clusters (linearised, times C / (C − 1) for C clusters) over that of independent replies, and with
-    /// Student's quantile of C − 1 degrees of freedom in place of the normal one (Dean and Pagano 2015, J. Surv. Stat.
-    /// Methodol. 3:484, find it the best of seven for clustered shares). With one reply a cluster it is Wilson's own. Where
-    /// all replies are right, or none, d is 1 + 0.2 (m − 1) for clusters of m replies (Kish 1965, section 5.4).
+    /// The interval is Wilson's at the effective number of replies n / d. The design effect d ≥ 1 is the variance of the
+    /// share between clusters (linearised, times C / (C − 1) for C clusters) over that of independent replies. Student's
+    /// quantile of C − 1 degrees of freedom replaces the normal one. Dean and Pagano 2015 (J. Surv. Stat. Methodol. 3:484)
+    /// find this interval the best of seven for clustered shares. With one reply per cluster it is Wilson's own. If all
+    /// replies are right, or none, d is 1 + 0.2 (m − 1) for clusters of m replies (Kish 1965, section 5.4).
     #[must_use]
     pub fn clustered(counts: &[ClusterCount]) -> Option<Self> {
-        let there = counts.iter().filter(|count| count.replies > 0);
-        let n: usize = there.clone().map(|count| count.replies as usize).sum();
-        if there.clone().all(|count| count.replies == 1) || there.clone().count() == 1 {
-            return Self::share(there.map(|count| count.right as usize).sum(), n);
+        let answered = counts.iter().filter(|count| count.replies > 0);
+        let n: usize = answered.clone().map(|count| count.replies as usize).sum();
+        if answered.clone().all(|count| count.replies == 1) || answered.clone().count() == 1 {
+            return Self::share(answered.map(|count| count.right as usize).sum(), n);
         }
-        let sums = there.map(|count| (f64::from(count.right), f64::from(count.replies)));
+        let sums = answered.map(|count| (f64::from(count.right), f64::from(count.replies)));
         Self::scored(&sums.collect::<Vec<_>>(), 1.0, n)
     }
 
-    /// The same for scores between 0 and 1 in place of right and wrong: `sums` holds, for each cluster, the sum of its scores
-    /// and their number. Scores that are means of several replies may count for up to `most` independent replies each. `n` is
-    /// what the estimate is said to rest on.
+    /// The same for scores between 0 and 1 instead of right and wrong.
+    ///
+    /// `sums` holds, for each cluster, the sum of its scores and their number. A score may count for up to `max_weight`
+    /// independent replies, as the mean of several replies does. `n` is stored as the estimate's number of trials.
     #[must_use]
-    pub(super) fn scored(sums: &[(f64, f64)], most: f64, n: usize) -> Option<Self> {
+    pub(super) fn scored(sums: &[(f64, f64)], max_weight: f64, n: usize) -> Option<Self> {
         let all: f64 = sums.iter().map(|(_, n)| n).sum();
         if all <= 0.0 {
             return None;
         }
         let c = sums.len() as f64;
         let value = (sums.iter().map(|(sum, _)| sum).sum::<f64>() / all).clamp(0.0, 1.0);
-        let independent = value * (1.0 - value) / all;
-        let spread = independent > 1e-12 && sums.len() > 1;
-        let effect = if spread {
-            let off = |(sum, n): &(f64, f64)| (sum - value * n) * (sum - value * n);
-            let between: f64 = sums.iter().map(off).sum();
-            c / (c - 1.0) * between / (all * all) / independent
+        let binomial_variance = value * (1.0 - value) / all;
+        let has_spread = binomial_variance > 1e-12 && sums.len() > 1;
+        let design_effect = if has_spread {
+            let squared_error = |(sum, n): &(f64, f64)| (sum - value * n) * (sum - value * n);
+            let between: f64 = sums.iter().map(squared_error).sum();
+            c / (c - 1.0) * between / (all * all) / binomial_variance
         } else {
             let squares: f64 = sums.iter().map(|(_, n)| n * n).sum();
             1.0 + UNKNOWN_CORRELATION * (squares / all - 1.0)
         };
-        let effective = all / effect.max(1.0 / most);
-        // Where clusters spread no more than they are taken to at least, nothing was estimated that Student's quantile allows for.
-        let least = if spread { 1.0 / most } else { 1.0 };
-        let quantile = if sums.len() > 1 && effect > least {
+        let effective = all / design_effect.max(1.0 / max_weight);
+        // At the minimum design effect no variance was estimated, so Student's quantile is not needed.
+        let min_effect = if has_spread { 1.0 / max_weight } else { 1.0 };
+        let quantile = if sums.len() > 1 && design_effect > min_effect {
             student(sums.len() - 1)
         } else {
             Z
@@ -87,6 +88,7 @@ impl Estimate {
         Some(Self::wilson(value, effective, quantile, n))
     }
 
+    /// Wilson's score interval about `value` for `count` effective replies.
     fn wilson(value: f64, count: f64, quantile: f64, n: usize) -> Self {
         let square = quantile * quantile;
         let scale = 1.0 + square / count;
@@ -101,7 +103,7 @@ impl Estimate {
         }
     }
 
-    /// A share that is known exactly.
+    /// A share that is known exactly: the interval is the value itself.
     #[must_use]
     pub fn exact(value: f64, n: usize) -> Self {
         Self {
@@ -146,10 +148,10 @@ mod tests {
     }
 
     #[test]
-    fn replies_that_go_together_count_for_fewer() {
+    fn correlated_replies_count_for_fewer() {
         let share = |pairs: &[(u32, u32)]| Estimate::clustered(&counts(pairs)).unwrap();
         let width = |estimate: Estimate| estimate.high - estimate.low;
-        // Half of eighty: every cluster half right, or each all right or all wrong.
+        // 40 of 80 are right: half of every cluster, or all or none of each cluster.
         let (spread, clumped) = (
             share(&[(2, 4); 20]),
             share(&[[(4, 4); 10], [(0, 4); 10]].concat()),
@@ -158,13 +160,13 @@ mod tests {
         let independent = Estimate::share(40, 80).unwrap();
         assert!(width(spread) >= width(independent) && width(spread) < 1.1 * width(independent));
         assert!(width(clumped) > 1.9 * width(independent));
-        // One reply a cluster is Wilson's own; empty clusters are none.
+        // One reply per cluster gives Wilson's own interval; empty clusters are ignored.
         let single = [vec![(1, 1); 15], vec![(0, 1); 133], vec![(0, 0); 9]].concat();
         assert_eq!(
             Estimate::clustered(&counts(&single)),
             Estimate::share(15, 148)
         );
-        // Nothing went wrong: less sure than as many independent replies.
+        // All replies are right: the interval is wider than for the same number of independent replies.
         let (all, alone) = (share(&[(4, 4); 20]), Estimate::share(80, 80).unwrap());
         assert!(all.low < alone.low && all.low > 0.85, "{all:?}");
         assert_eq!(Estimate::clustered(&[]), None);

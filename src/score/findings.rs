@@ -1,4 +1,4 @@
-//! All that records say: [`Findings`].
+//! All results of a run: [`Findings`].
 
 use std::collections::BTreeMap;
 
@@ -10,50 +10,50 @@ use super::cluster::{ClusterUnit, Clusters};
 use super::comparison::{Comparison, ComparisonKind, comparisons};
 use super::confusion::{Confusion, Hallucination, confusions, hallucinations};
 use super::curve::{Curve, curves};
-use super::flips::{FirstFailure, falls};
+use super::flips::{FirstFailure, first_failures};
 use super::grid::Grid;
 use super::health::{Health, healths};
 use super::subject::Subject;
 use crate::types::{Family, FrameId, Record};
 
-/// All that records say.
+/// All results that are computed from the records of a run.
 #[derive(Debug)]
 pub struct Findings<'a> {
-    /// The records, laid out.
+    /// The records by subject and item.
     pub grid: Grid<'a>,
-    /// What is taken as independent.
+    /// The unit that is treated as independent.
     pub unit: ClusterUnit,
-    /// The accuracies.
+    /// Accuracies by subject, family and reading.
     pub summary: AccuracySummary,
-    /// What became of the trials besides.
+    /// Counts of replies, unreadable replies and failures of each subject.
     pub health: Vec<Health>,
-    /// Differences.
+    /// Paired differences between subjects.
     pub comparisons: Vec<Comparison>,
-    /// Thresholds and areas, of all families together and of each.
+    /// Thresholds and areas, for all families together and for each family.
     pub curves: Vec<Curve>,
-    /// Answers against truths.
+    /// Answers given against true answers.
     pub confusions: Vec<Confusion>,
-    /// False positives and negatives.
+    /// Rates of false positives and false negatives.
     pub hallucinations: Vec<Hallucination>,
-    /// Where items fail first.
-    pub falls: Vec<FirstFailure>,
-    /// How far models agree.
+    /// First level at which each item is answered wrongly, by curve.
+    pub first_failures: Vec<FirstFailure>,
+    /// Agreement of models in each condition.
     pub agreements: Vec<Agreement>,
 }
 
 impl<'a> Findings<'a> {
-    /// Finds all; `scenes` holds the scene of each frame where it is known, `questions` what was to be asked, for the chance
-    /// line.
+    /// Results of the records. `scenes` holds the scene of each frame for which it is known; `questions` are all questions
+    /// of the run, for the chance line.
     #[must_use]
     pub fn new(
         records: &'a [Record],
         scenes: &BTreeMap<FrameId, String>,
         questions: impl IntoIterator<Item = OfferedChoices>,
     ) -> Self {
-        let asked = records
+        let pairs = records
             .iter()
             .map(|record| (&record.question, &record.detail.frame));
-        let clusters = Clusters::new(asked, scenes);
+        let clusters = Clusters::new(pairs, scenes);
         let grid = Grid::new(records, &clusters);
         let draws = Resamples::new(clusters.count());
         let health = healths(&grid);
@@ -69,20 +69,20 @@ impl<'a> Findings<'a> {
                 .collect(),
             confusions: confusions(&grid),
             hallucinations: hallucinations(&grid),
-            falls: falls(&grid),
+            first_failures: first_failures(&grid),
             agreements: agreements(&grid, &draws),
             grid,
         }
     }
 
-    /// Whether a subject falls below a model without images: its own, where it was asked so.
+    /// Whether a subject is less accurate than the same model without images, or than any such model if its own was not asked.
     #[must_use]
     pub fn below_blind(&self, subject: &Subject, family: Option<&Family>) -> bool {
-        self.comparisons.iter().any(|one| {
-            one.kind == ComparisonKind::Blind
-                && one.family.as_ref() == family
-                && one.first == *subject
-                && one.paired.difference.value < 0.0
+        self.comparisons.iter().any(|comparison| {
+            comparison.kind == ComparisonKind::Blind
+                && comparison.family.as_ref() == family
+                && comparison.first == *subject
+                && comparison.paired.difference.value < 0.0
         })
     }
 }

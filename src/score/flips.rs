@@ -1,28 +1,26 @@
-//! Where an item is lost: [`FirstFailure`].
+//! The level at which an item is first answered wrongly: [`FirstFailure`].
 
 use super::choice::ReadingMode;
 use super::curve::CurvePoints;
 use super::grid::Grid;
 use crate::types::{AxisLevel, EnhancerName, KindReading};
 
-/// One model in one variant, raw or enhanced: at which level its items fail first.
+/// First failing level of each item, for one model in one variant, raw or with one enhancer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FirstFailure {
-    /// The model.
     pub model: String,
-    /// The variant.
     pub variant: KindReading,
-    /// The enhancer; `None` for raw.
+    /// Enhancer; `None` for raw images.
     pub enhancer: Option<EnhancerName>,
-    /// By item of the grid: the first level at which it is not answered rightly; `None` where it never fails, or a level
-    /// before has no reply.
+    /// For each item of the grid, the first level at which it is not answered correctly. `None` if it never fails, or if a
+    /// level before that has no reply.
     pub first: Vec<Option<AxisLevel>>,
 }
 
-/// Where items fail first, for every curve of a grid.
+/// First failing levels for every curve of a grid.
 #[must_use]
-pub(crate) fn falls(grid: &Grid<'_>) -> Vec<FirstFailure> {
-    let lines = CurvePoints::all(grid).into_iter().map(|points| {
+pub(crate) fn first_failures(grid: &Grid<'_>) -> Vec<FirstFailure> {
+    let curves = CurvePoints::all(grid).into_iter().map(|points| {
         let first = (0..grid.items.len()).map(|item| first_failing(grid, &points, item));
         FirstFailure {
             first: first.collect(),
@@ -31,12 +29,12 @@ pub(crate) fn falls(grid: &Grid<'_>) -> Vec<FirstFailure> {
             enhancer: points.enhancer,
         }
     });
-    lines.collect()
+    curves.collect()
 }
 
 fn first_failing(grid: &Grid<'_>, points: &CurvePoints, item: usize) -> Option<AxisLevel> {
     for &(level, subject) in &points.subjects {
-        let chosen = grid.mark(subject, item).reading(ReadingMode::Strict)?;
+        let chosen = grid.result(subject, item).reading(ReadingMode::Strict)?;
         if !grid.items[item].is_right(chosen) {
             return Some(level);
         }

@@ -1,4 +1,4 @@
-//! Records laid out for counting: every subject by every item, as a [`Grid`].
+//! Records as a table of every subject by every item: [`Grid`].
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -7,26 +7,26 @@ use super::cluster::Clusters;
 use super::subject::Subject;
 use crate::types::{AnswerReading, Family, QuestionId, Record, TrialOutcome};
 
-/// What came of one item for one subject.
+/// Result of one item for one subject.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TrialResult {
-    /// It was not asked.
+    /// The item was not asked.
     Absent,
-    /// No reply came.
+    /// The trial failed: there is no reply.
     Failed,
-    /// A reply came; each reading is the index of a choice, or nothing where none could be read.
+    /// There is a reply. Each reading is the index of a choice, or `None` if no choice could be read.
     Read {
-        /// The strict reading.
+        /// Choice in the strict reading.
         strict: Option<u8>,
-        /// The lenient one.
+        /// Choice in the lenient reading.
         lenient: Option<u8>,
     },
 }
 
 impl TrialResult {
-    /// The reading in one mode; `None` where no reply came.
+    /// The reading in one mode; `None` if there is no reply, `Some(None)` if no choice could be read.
     #[must_use]
-    #[expect(clippy::option_option, reason = "no reply came, or none could be read")]
+    #[expect(clippy::option_option, reason = "no reply, or no readable choice")]
     pub fn reading(self, mode: ReadingMode) -> Option<Option<u8>> {
         match (self, mode) {
             (Self::Absent | Self::Failed, _) => None,
@@ -36,67 +36,68 @@ impl TrialResult {
     }
 }
 
-/// One question in one order of its choices, asked the n-th time.
+/// One question in one order of its choices and one repeat.
 #[derive(Debug, Clone, Copy)]
 pub struct GridItem<'a> {
-    /// A record of it: its question, frame, family, choices and truth.
+    /// A record of the item, for its question, frame, family, choices and truth.
     pub record: &'a Record,
-    /// The cluster of its frame.
+    /// Index of its cluster.
     pub cluster: u32,
 }
 
 impl GridItem<'_> {
-    /// Whether a reading is the true choice.
+    /// Whether a reading is the true choice of the item.
     #[must_use]
     pub fn is_right(&self, chosen: Option<u8>) -> bool {
         chosen.map(usize::from) == Some(self.record.detail.truth)
     }
 
-    /// Whether it is of a family; of `None` all are.
+    /// Whether the item belongs to a family; always true for `None`.
     #[must_use]
     pub fn is_of(&self, family: Option<&Family>) -> bool {
         family.is_none_or(|family| self.record.detail.family == *family)
     }
 }
 
-/// Every subject by every item.
+/// Results of every subject on every item.
 #[derive(Debug)]
 pub struct Grid<'a> {
-    /// Who was asked in which light, in order.
+    /// Subjects (model and condition), sorted.
     pub subjects: Vec<Subject>,
-    /// What was asked, by frame, question, order of choices and turn.
+    /// Items, sorted by frame, question, repeat and order of choices.
     pub items: Vec<GridItem<'a>>,
-    /// How many clusters the items are in.
+    /// Number of clusters of all items.
     pub clusters: usize,
-    marks: Vec<TrialResult>,
-    source: &'a [Record],
-    /// Where each mark's record is in the source; [`u32::MAX`] where there is none.
-    places: Vec<u32>,
+    /// Results, subject by subject.
+    results: Vec<TrialResult>,
+    records: &'a [Record],
+    /// Index in `records` of the record behind each result; [`u32::MAX`] if there is none.
+    record_indices: Vec<u32>,
 }
 
-/// How many replies a cluster holds, and how many of them are right.
+/// Numbers of replies and of right replies in a cluster.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ClusterCount {
-    /// Right ones.
+    /// Number of right replies.
     pub right: u32,
-    /// All.
+    /// Number of replies, right or wrong.
     pub replies: u32,
 }
 
 impl<'a> Grid<'a> {
-    /// Lays records out; of two for the same subject and item the later one counts. Records of frames without a cluster are
-    /// left out.
+    /// Table of records. Of two records for the same subject and item, the later one counts. Records of frames without a
+    /// cluster are ignored.
     #[must_use]
     pub fn new(records: &'a [Record], clusters: &Clusters) -> Self {
         let mut subjects = BTreeMap::<Subject, usize>::new();
-        let mut numbers = HashMap::<(&QuestionId, &[String], u32), usize>::new();
+        let mut item_indices = HashMap::<(&QuestionId, &[String], u32), usize>::new();
         let mut items: Vec<GridItem<'a>> = Vec::new();
         for record in records {
             let Some(cluster) = clusters.of(&record.detail.frame, &record.question) else {
                 continue;
             };
             subjects.entry(Subject::of(record)).or_default();
-            numbers.entry(key(record)).or_insert_with(|| {
+            item_indices.entry(key(record)).or_insert_with(|| {
                 items.push(GridItem { record, cluster });
                 items.len() - 1
             });
@@ -104,64 +105,65 @@ impl<'a> Grid<'a> {
         for (number, (_, index)) in subjects.iter_mut().enumerate() {
             *index = number;
         }
-        items.sort_by(|a, b| place(a.record).cmp(&place(b.record)));
+        items.sort_by(|a, b| sort_key(a.record).cmp(&sort_key(b.record)));
         for (index, item) in items.iter().enumerate() {
-            numbers.insert(key(item.record), index);
+            item_indices.insert(key(item.record), index);
         }
         let size = subjects.len() * items.len();
-        let (mut marks, mut places) = (vec![TrialResult::Absent; size], vec![u32::MAX; size]);
+        let (mut results, mut record_indices) =
+            (vec![TrialResult::Absent; size], vec![u32::MAX; size]);
         for (index, record) in records.iter().enumerate() {
             let (subject, item) = (
                 subjects.get(&Subject::of(record)),
-                numbers.get(&key(record)),
+                item_indices.get(&key(record)),
             );
             if let (Some(subject), Some(item)) = (subject, item) {
-                let at = subject * items.len() + item;
-                marks[at] = mark(record);
-                places[at] = index as u32;
+                let cell = subject * items.len() + item;
+                results[cell] = result(record);
+                record_indices[cell] = index as u32;
             }
         }
         Self {
             subjects: subjects.into_keys().collect(),
             items,
             clusters: clusters.count(),
-            marks,
-            source: records,
-            places,
+            results,
+            records,
+            record_indices,
         }
     }
 
-    /// What came of an item for a subject, by their indices.
+    /// Result of an item for a subject, by their indices.
     #[must_use]
-    pub fn mark(&self, subject: usize, item: usize) -> TrialResult {
-        self.marks[subject * self.items.len() + item]
+    pub fn result(&self, subject: usize, item: usize) -> TrialResult {
+        self.results[subject * self.items.len() + item]
     }
 
-    /// The record behind a mark; `None` where the item was not asked.
+    /// The record behind a result; `None` if the item was not asked.
     #[must_use]
     pub fn record(&self, subject: usize, item: usize) -> Option<&'a Record> {
-        let place = self.places[subject * self.items.len() + item];
-        self.source.get(place as usize)
+        let index = self.record_indices[subject * self.items.len() + item];
+        self.records.get(index as usize)
     }
 
-    /// The index of a subject.
+    /// Index of a subject, if the grid has it.
     #[must_use]
     pub fn find(&self, subject: &Subject) -> Option<usize> {
         self.subjects.binary_search(subject).ok()
     }
 
-    /// The items of a family with what came of each for a subject.
+    /// Items of a family, each with its result for a subject.
     pub fn of_family<'s>(
         &'s self,
         subject: usize,
         family: Option<&'s Family>,
     ) -> impl Iterator<Item = (&'s GridItem<'a>, TrialResult)> + 's {
-        let marks = &self.marks[subject * self.items.len()..(subject + 1) * self.items.len()];
-        let all = self.items.iter().zip(marks.iter().copied());
+        let results = &self.results[subject * self.items.len()..(subject + 1) * self.items.len()];
+        let all = self.items.iter().zip(results.iter().copied());
         all.filter(move |(item, _)| item.is_of(family))
     }
 
-    /// Right answers and replies of a subject by cluster.
+    /// Numbers of right replies and of replies of a subject, by cluster.
     #[must_use]
     pub fn counts(
         &self,
@@ -170,8 +172,8 @@ impl<'a> Grid<'a> {
         mode: ReadingMode,
     ) -> Vec<ClusterCount> {
         let mut counts = vec![ClusterCount::default(); self.clusters];
-        for (item, mark) in self.of_family(subject, family) {
-            if let Some(chosen) = mark.reading(mode) {
+        for (item, result) in self.of_family(subject, family) {
+            if let Some(chosen) = result.reading(mode) {
                 let count = &mut counts[item.cluster as usize];
                 count.replies += 1;
                 count.right += u32::from(item.is_right(chosen));
@@ -180,7 +182,7 @@ impl<'a> Grid<'a> {
         counts
     }
 
-    /// The families asked about, in order.
+    /// The families of the items, sorted.
     #[must_use]
     pub fn families(&self) -> Vec<&'a Family> {
         let families: BTreeSet<&Family> = self
@@ -191,7 +193,7 @@ impl<'a> Grid<'a> {
         families.into_iter().collect()
     }
 
-    /// What is counted by itself: all families together, then each.
+    /// The groups that are counted separately: all families together (`None`), then each family.
     #[must_use]
     pub fn groups(&self) -> Vec<Option<&'a Family>> {
         let families = self.families().into_iter().map(Some);
@@ -199,6 +201,7 @@ impl<'a> Grid<'a> {
     }
 }
 
+/// What identifies an item: question, order of choices and repeat.
 fn key(record: &Record) -> (&QuestionId, &[String], u32) {
     (
         &record.question,
@@ -207,8 +210,8 @@ fn key(record: &Record) -> (&QuestionId, &[String], u32) {
     )
 }
 
-/// What items are ordered by.
-fn place(record: &Record) -> impl Ord + '_ {
+/// Sort key of items.
+fn sort_key(record: &Record) -> impl Ord + '_ {
     (
         &record.detail.frame,
         &record.question,
@@ -217,7 +220,7 @@ fn place(record: &Record) -> impl Ord + '_ {
     )
 }
 
-fn mark(record: &Record) -> TrialResult {
+fn result(record: &Record) -> TrialResult {
     let chosen = |reading: AnswerReading| {
         let index = reading.chosen?;
         Some(index.min(usize::from(u8::MAX)) as u8)

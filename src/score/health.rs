@@ -1,4 +1,4 @@
-//! What became of the trials of each subject, besides right and wrong: [`Health`].
+//! Counts of replies, unreadable replies and failures of each subject: [`Health`].
 
 use std::collections::BTreeMap;
 
@@ -7,26 +7,25 @@ use super::grid::{Grid, TrialResult};
 use super::subject::Subject;
 use crate::types::{FailureKind, Record, UnreadReason};
 
-/// What became of the trials of one subject.
+/// Counts of replies, unreadable replies and failures of one subject.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Health {
-    /// Whose.
     pub subject: Subject,
-    /// Trials with a reply.
+    /// Number of trials with a reply.
     pub replies: usize,
-    /// Replies in which the strict reading found a choice.
+    /// Number of replies in which the strict reading found a choice.
     pub read: usize,
-    /// Replies in which only the lenient reading found one.
+    /// Number of replies in which only the lenient reading found a choice.
     pub lenient_only: usize,
-    /// Why the strict reading found none, and how often.
+    /// Number of replies in which the strict reading found no choice, by reason.
     pub unread: BTreeMap<UnreadReason, usize>,
-    /// Why no reply came, and how often.
+    /// Number of trials without a reply, by kind of failure.
     pub failed: BTreeMap<FailureKind, usize>,
 }
 
 impl Health {
-    fn count(&mut self, mark: TrialResult, record: &Record) {
-        let Some(strict) = mark.reading(ReadingMode::Strict) else {
+    fn count(&mut self, result: TrialResult, record: &Record) {
+        let Some(strict) = result.reading(ReadingMode::Strict) else {
             if let Some(failure) = &record.failure {
                 *self.failed.entry(failure.kind).or_default() += 1;
             }
@@ -34,28 +33,28 @@ impl Health {
         };
         self.replies += 1;
         self.read += usize::from(strict.is_some());
-        let lenient = mark.reading(ReadingMode::Lenient).flatten();
+        let lenient = result.reading(ReadingMode::Lenient).flatten();
         self.lenient_only += usize::from(strict.is_none() && lenient.is_some());
-        if let Some(why) = record.detail.strict.and_then(|reading| reading.why) {
-            *self.unread.entry(why).or_default() += 1;
+        if let Some(reason) = record.detail.strict.and_then(|reading| reading.why) {
+            *self.unread.entry(reason).or_default() += 1;
         }
     }
 
-    /// How many trials have no reply.
+    /// Number of trials without a reply.
     #[must_use]
     pub fn failures(&self) -> usize {
         self.failed.values().sum()
     }
 
-    /// How often a reply could not be read for one of these reasons.
+    /// Number of replies that could not be read for one of these reasons.
     #[must_use]
     pub fn unread_for(&self, reasons: &[UnreadReason]) -> usize {
-        let count = |why| self.unread.get(why).copied().unwrap_or(0);
+        let count = |reason| self.unread.get(reason).copied().unwrap_or(0);
         reasons.iter().map(count).sum()
     }
 }
 
-/// The health of every subject, in their order.
+/// Health of every subject, in the order of the grid.
 #[must_use]
 pub(crate) fn healths(grid: &Grid<'_>) -> Vec<Health> {
     let subjects = grid.subjects.iter().enumerate();
@@ -70,7 +69,7 @@ pub(crate) fn healths(grid: &Grid<'_>) -> Vec<Health> {
         };
         for item in 0..grid.items.len() {
             if let Some(record) = grid.record(index, item) {
-                health.count(grid.mark(index, item), record);
+                health.count(grid.result(index, item), record);
             }
         }
         health

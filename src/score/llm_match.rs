@@ -1,25 +1,25 @@
-//! LLM-Match, OpenEQA's score of open answers by a judging model (Majumdar et al. 2024, CVPR, section 4): what is done to an
-//! answer before, how a mark is read, and what marks come to. After `facebookresearch/open-eqa` at cfa3fce.
+//! LLM-Match, OpenEQA's score of open answers by a judge model (Majumdar et al. 2024, CVPR, section 4): preparation of an
+//! answer, reading of a mark, and points of a mark. It follows `facebookresearch/open-eqa` at cfa3fce.
 
 use clap::ValueEnum;
 
 use crate::types::flag::flag_words;
 
-/// How answers are judged and a judge's reply is read.
+/// The rules by which answers are judged and a judge's reply is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Protocol {
-    /// Answers [`shortened`], marks read as by upstream's `parse_score`, character for character.
+    /// Text after the last full stop of an answer is cut off; marks are read exactly as by upstream's `parse_score`.
     Upstream,
-    /// Answers whole; marks the same, and those with space, a full stop, emphasis or a fraction of five about them.
+    /// Answers stay whole; a mark may also have spaces, a full stop, emphasis or "/5" around it.
     Tolerant,
 }
 
 flag_words!(Protocol);
 
-/// An answer as it is judged: what follows its last full stop is cut off, where something does (`evaluate-predictions.py`).
+/// An answer as upstream judges it: text after the last full stop is cut off (`evaluate-predictions.py`).
 ///
-/// It is meant for sentences that the token limit has cut; it also makes "about 1." of "about 1.5 meters". An answer without a
-/// full stop, or with nothing behind it, stays.
+/// The rule is meant for sentences that were truncated at the token limit; it also turns "about 1.5 meters" into "about 1.".
+/// An answer without a full stop, or with nothing after it, stays whole.
 #[must_use]
 pub(crate) fn shortened(answer: &str) -> &str {
     match answer.rfind('.') {
@@ -28,8 +28,8 @@ pub(crate) fn shortened(answer: &str) -> &str {
     }
 }
 
-/// The mark in a judge's reply; `None` where there is none. Upstream takes any whole number, which [`points`] brings between 1
-/// and 5; the tolerant reading takes 1 to 5 alone.
+/// The mark in a judge's reply; `None` if there is none. The upstream reading accepts any integer, which [`points`] clips to
+/// 1 to 5; the tolerant reading accepts only 1 to 5.
 #[must_use]
 pub(crate) fn mark(reply: &str, protocol: Protocol) -> Option<i64> {
     upstream(reply).or_else(|| match protocol {
@@ -38,42 +38,42 @@ pub(crate) fn mark(reply: &str, protocol: Protocol) -> Option<i64> {
     })
 }
 
-/// `output.isdigit()`, else what stands behind the first "Your mark:" on its line.
+/// Upstream's reading: `output.isdigit()`, else the rest of the line after the first "Your mark:".
 fn upstream(reply: &str) -> Option<i64> {
     const CUE: &str = "Your mark:";
     if !reply.is_empty() && reply.bytes().all(|byte| byte.is_ascii_digit()) {
         return reply.parse().ok();
     }
-    let behind = &reply[reply.find(CUE)? + CUE.len()..];
-    let line = behind.split('\n').next().unwrap_or(behind);
+    let after_cue = &reply[reply.find(CUE)? + CUE.len()..];
+    let line = after_cue.split('\n').next().unwrap_or(after_cue);
     line.trim().parse().ok()
 }
 
-/// One digit from 1 to 5 alone, or behind a cue, with marks of writing about it.
+/// The tolerant reading: one digit from 1 to 5, alone or after a cue word, with punctuation or emphasis around it.
 fn tolerant(reply: &str) -> Option<i64> {
     let lower = reply.to_lowercase();
-    let behind = ["your mark", "mark", "score", "rating"]
+    let after_cue = ["your mark", "mark", "score", "rating"]
         .iter()
         .find_map(|cue| Some(&lower[lower.rfind(cue)? + cue.len()..]))
         .unwrap_or(&lower);
-    let dressing = |c: char| c.is_whitespace() || "*_`:=\"'().[]".contains(c);
-    let bare = behind.trim_matches(dressing);
-    let bare = bare
+    let is_decoration = |c: char| c.is_whitespace() || "*_`:=\"'().[]".contains(c);
+    let digits = after_cue.trim_matches(is_decoration);
+    let digits = digits
         .strip_prefix("is ")
-        .unwrap_or(bare)
-        .trim_matches(dressing);
-    let bare = bare
+        .unwrap_or(digits)
+        .trim_matches(is_decoration);
+    let digits = digits
         .strip_suffix("/5")
-        .or_else(|| bare.strip_suffix(" out of 5"))
-        .unwrap_or(bare)
-        .trim_matches(dressing);
-    match bare.as_bytes() {
+        .or_else(|| digits.strip_suffix(" out of 5"))
+        .unwrap_or(digits)
+        .trim_matches(is_decoration);
+    match digits.as_bytes() {
         [digit @ b'1'..=b'5'] => Some(i64::from(digit - b'0')),
         _ => None,
     }
 }
 
-/// What one item is worth, between 0 and 1: (clip(mark, 1, 5) − 1) / 4; an answer that was not given is worth 0, unjudged.
+/// Points of one item, between 0 and 1: (clip(mark, 1, 5) − 1) / 4. A null answer (`None`) has 0 points without a judge.
 #[must_use]
 pub(crate) fn points(mark: Option<i64>) -> f64 {
     mark.map_or(0.0, |mark| (mark.clamp(1, 5) - 1) as f64 / 4.0)
@@ -121,7 +121,7 @@ mod tests {
             assert_eq!(mark(reply, Protocol::Upstream), upstream, "{reply:?}");
             assert_eq!(mark(reply, Protocol::Tolerant), tolerant, "{reply:?}");
         }
-        // Upstream takes whatever number there is, and clips it.
+        // Upstream accepts any integer and clips it.
         assert_eq!(mark("17", Protocol::Upstream), Some(17));
         assert_eq!(mark("Your mark: -3", Protocol::Upstream), Some(-3));
     }

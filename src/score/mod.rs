@@ -1,16 +1,16 @@
-//! Stage 5, JUDGE: a reply → a choice; records → numbers.
+//! Stage 5, JUDGE: from a reply to a choice, and from records to numbers.
 //!
-//! [`findings`] is the door to what records say: it lays them out as a [`grid`], and takes from there the accuracies
-//! ([`accuracy`]), every difference that is of interest ([`comparison`]), the curves over darkness ([`curve`]), the answers
-//! given against the true ones ([`confusion`]) and how far models agree ([`agreement`]).
+//! [`findings`] is the entry point. It arranges the records as a [`grid`] and computes from it the accuracies
+//! ([`accuracy`]), the paired differences ([`comparison`]), the curves over the levels ([`curve`]), the answers given
+//! against the true ones ([`confusion`]) and the agreement of models ([`agreement`]).
 //!
-//! How sure a number is comes from the clusters ([`cluster`]) in one of three ways, each chosen because its 95 % intervals
-//! hold the truth 93 to 97 times in a hundred in simulation (`tests/statistics.rs`), which the plain percentile bootstrap
-//! does not below some 50 clusters or near 0 and 1:
+//! Intervals come from the clusters ([`cluster`]) in one of three ways. Each was chosen because its 95 % intervals hold the
+//! truth 93 to 97 times in a hundred in simulation (`tests/statistics.rs`). The plain percentile bootstrap does not do so
+//! with fewer than about 50 clusters, or near 0 and 1.
 //!
 //! - shares: Wilson's score interval at the clusters' effective number of replies ([`estimate::Estimate::clustered`]);
 //! - differences: Bonett and Price's adjusted interval with the clusters' variance ([`paired`]), and an exact test;
-//! - whatever is computed from many shares (thresholds, areas, κ): the cluster bootstrap ([`bootstrap`]).
+//! - numbers that are computed from many shares (thresholds, areas, κ): the cluster bootstrap ([`bootstrap`]).
 
 pub(crate) mod accuracy;
 pub(crate) mod agreement;

@@ -1,4 +1,4 @@
-//! Two subjects on the same items: [`PairedComparison`].
+//! Comparison of two subjects on the same items: [`PairedComparison`].
 
 use super::choice::ReadingMode;
 use super::estimate::Estimate;
@@ -7,26 +7,26 @@ use super::significance::{mcnemar, sign_flip};
 use super::student::student;
 use crate::types::Family;
 
-/// How one subject does against another on the items that both replied to.
+/// Accuracy of one subject against another on the items to which both replied.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairedComparison {
-    /// The accuracy of the first.
+    /// Accuracy of the first subject.
     pub first: f64,
-    /// The accuracy of the second.
+    /// Accuracy of the second subject.
     pub second: f64,
-    /// First less second, with its interval; `n` is the pairs.
+    /// Accuracy of the first minus that of the second. Its `n` is the number of pairs.
     pub difference: Estimate,
-    /// Items that only the first got right.
+    /// Number of items that only the first subject got right.
     pub gained: usize,
-    /// Items that only the second got right.
+    /// Number of items that only the second subject got right.
     pub lost: usize,
-    /// McNemar's exact p-value, which takes items as independent.
+    /// McNemar's exact p-value, which treats items as independent.
     pub mcnemar: f64,
-    /// The exact p-value of swapping the two in whole clusters.
+    /// Exact p-value of swapping the two subjects in whole clusters.
     pub p: f64,
 }
 
-/// The pairs of a cluster.
+/// Counts of the pairs of a cluster.
 #[derive(Debug, Clone, Copy, Default)]
 struct ClusterPairs {
     all: i64,
@@ -35,14 +35,14 @@ struct ClusterPairs {
 }
 
 impl ClusterPairs {
-    /// The sum of their differences, and their number.
+    /// The sum of the differences of the pairs, and the number of pairs.
     fn net(&self) -> (f64, f64) {
         ((self.gained - self.lost) as f64, self.all as f64)
     }
 }
 
 impl PairedComparison {
-    /// Pairs two subjects by item; `None` where no item has a reply of both.
+    /// Comparison of two subjects, by their indices in the grid; `None` if no item has a reply of both.
     #[must_use]
     pub fn new(
         grid: &Grid<'_>,
@@ -57,7 +57,7 @@ impl PairedComparison {
             if !item.is_of(family) {
                 continue;
             }
-            let reading = |subject| grid.mark(subject, index).reading(mode);
+            let reading = |subject| grid.result(subject, index).reading(mode);
             let (Some(a), Some(b)) = (reading(first), reading(second)) else {
                 continue;
             };
@@ -91,20 +91,25 @@ impl PairedComparison {
     }
 }
 
-/// The difference with its interval: that of Bonett and Price (2012, J. Educ. Behav. Stat. 37:479), which adds one pair in
-/// each direction so that few or no discordant pairs do not look like certainty; with the variance between clusters in place
-/// of that of independent pairs, and Student's quantile. `clusters` holds, for each, the sum of its pairs' differences (of
-/// scores between 0 and 1) and their number; `n` is the number of all pairs.
+/// The difference with the interval of Bonett and Price (2012, J. Educ. Behav. Stat. 37:479).
+///
+/// It adds one pair in each direction, so that few or no discordant pairs do not look like certainty. Here the variance
+/// between clusters replaces that of independent pairs, and Student's quantile the normal one. `clusters` holds, for each
+/// cluster, the sum of the differences of its pairs (of scores between 0 and 1) and their number; `n` is the number of all
+/// pairs.
 pub(super) fn difference(clusters: &[(f64, f64)], n: usize) -> Estimate {
     let (all, c) = (n as f64, clusters.len() as f64);
     let sum: f64 = clusters.iter().map(|(net, _)| net).sum();
     let value = sum / all;
-    let off = |(net, pairs): &(f64, f64)| net - value * pairs;
-    let between: f64 = clusters.iter().map(|pairs| off(pairs) * off(pairs)).sum();
+    let deviation = |(net, pairs): &(f64, f64)| net - value * pairs;
+    let between: f64 = clusters
+        .iter()
+        .map(|pairs| deviation(pairs) * deviation(pairs))
+        .sum();
     let variance = if clusters.len() > 1 {
         c / (c - 1.0) * between
     } else {
-        // One cluster tells nothing of the spread between them: the whole range.
+        // One cluster shows no spread between clusters: the interval is the whole range.
         f64::INFINITY
     };
     let half = student(clusters.len() - 1) * (variance + 2.0).sqrt() / (all + 2.0);
@@ -135,22 +140,22 @@ mod tests {
     fn independent_pairs_give_bonett_and_prices_interval() {
         // 100 pairs, 12 gained and 4 lost: (8 ± z √(Σd² − …)) / 102 with the unadjusted variance of d.
         let pairs = [vec![(1, 1, 0); 12], vec![(1, 0, 1); 4], vec![(1, 0, 0); 84]].concat();
-        let made = estimate(&pairs);
+        let interval = estimate(&pairs);
         let variance = 100.0 / 99.0 * (16.0 - 100.0 * 0.08 * 0.08) + 2.0;
         let half = student(99) * f64::sqrt(variance) / 102.0;
-        assert!((made.value - 0.08).abs() < 1e-12);
-        assert!((made.low - (8.0 / 102.0 - half)).abs() < 1e-12);
-        assert!((made.high - (8.0 / 102.0 + half)).abs() < 1e-12);
+        assert!((interval.value - 0.08).abs() < 1e-12);
+        assert!((interval.low - (8.0 / 102.0 - half)).abs() < 1e-12);
+        assert!((interval.high - (8.0 / 102.0 + half)).abs() < 1e-12);
     }
 
     #[test]
     fn no_difference_is_not_certainty() {
-        let made = estimate(&[(4, 0, 0); 20]);
+        let interval = estimate(&[(4, 0, 0); 20]);
         assert!(
-            made.value.abs() < 1e-12 && made.low < -0.02 && made.high > 0.02,
-            "{made:?}"
+            interval.value.abs() < 1e-12 && interval.low < -0.02 && interval.high > 0.02,
+            "{interval:?}"
         );
-        let one = estimate(&[(4, 1, 0)]);
-        assert_eq!((one.low, one.high), (-1.0, 1.0));
+        let single = estimate(&[(4, 1, 0)]);
+        assert_eq!((single.low, single.high), (-1.0, 1.0));
     }
 }

@@ -1,4 +1,4 @@
-//! What a reply says, as it is entered in the record of its trial.
+//! Reading of a reply into the record of its trial, for both experiments.
 
 use super::choice::readings;
 use super::llm_match::{Protocol, mark};
@@ -11,7 +11,7 @@ impl Detail for ChoiceDetail {
 
     const SCHEMA: &'static str = "darkqa.run/2";
 
-    /// Enters both readings of a reply and the outcome, which is the strict one's.
+    /// Stores both readings of a reply, and the outcome, which follows from the strict reading.
     fn read(&mut self, reply: &Reply) -> Result<()> {
         let choices = Choices::new(self.choices.clone(), self.truth)?;
         let (strict, lenient) = readings(reply, &choices);
@@ -39,7 +39,7 @@ impl Detail for OpenDetail {
 
     const SCHEMA: &'static str = "darkqa.openeqa/2";
 
-    /// Enters the mark that both protocols read in a judge's reply.
+    /// Stores the marks that the two protocols read in a judge's reply.
     fn read(&mut self, reply: &Reply) -> Result<()> {
         if self.step == Step::Mark {
             self.upstream = mark(&reply.text, Protocol::Upstream);

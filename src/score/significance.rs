@@ -1,23 +1,23 @@
-//! Whether a difference is more than luck: [`mcnemar`], [`sign_flip`] and [`holm`].
+//! Tests of paired differences: [`mcnemar`] and [`sign_flip`], and the correction [`holm`].
 
-/// The exact two-sided p-value of McNemar's test: `gained` and `lost` are the pairs of which only one is right (McNemar 1947,
-/// Psychometrika 12:153; exact as the binomial sign test).
+/// Exact two-sided p-value of McNemar's test (McNemar 1947, Psychometrika 12:153; exact as the binomial sign test).
 ///
-/// It takes pairs as independent; [`sign_flip`] does not.
+/// `gained` and `lost` are the numbers of pairs of which only one side is right. The test treats pairs as independent;
+/// [`sign_flip`] does not.
 #[must_use]
 pub(crate) fn mcnemar(gained: usize, lost: usize) -> f64 {
-    let few = gained.min(lost);
+    let smaller = gained.min(lost);
     let masses = binomial(gained + lost);
-    let tail: f64 = masses.iter().take(few + 1).sum();
+    let tail: f64 = masses.iter().take(smaller + 1).sum();
     (2.0 * tail).min(1.0)
 }
 
-/// The exact two-sided p-value of the hypothesis that in every cluster the two sides could as well be swapped: the share
-/// of the 2ᶜ swaps whose total difference is at least as far from 0 as the one seen.
+/// Exact two-sided p-value of the hypothesis that the two sides can be swapped in every cluster: the share of the 2ᶜ swaps
+/// whose total difference is at least as far from 0 as the observed one.
 ///
-/// `differences` holds, for each cluster, the pairs gained less those lost. With one pair a cluster it is McNemar's exact
-/// test; with more it keeps its size where pairs of a cluster go together, which McNemar's does not (the permutation form of
-/// Durkalski et al. 2003, Stat. Med. 22:2417).
+/// `differences` holds, for each cluster, the pairs gained minus the pairs lost. With one pair per cluster it is McNemar's
+/// exact test. With more it keeps its size if pairs of a cluster are correlated, which McNemar's test does not (the
+/// permutation form of Durkalski et al. 2003, Stat. Med. 22:2417).
 #[must_use]
 pub(crate) fn sign_flip(differences: &[i64]) -> f64 {
     let total = differences.iter().sum::<i64>().unsigned_abs() as usize;
@@ -27,23 +27,23 @@ pub(crate) fn sign_flip(differences: &[i64]) -> f64 {
         .filter(|size| *size > 0)
         .collect();
     sizes.sort_unstable();
-    // The distribution of the sum of those that keep their sign: it is k where the whole is 2k − all.
+    // The distribution of the sum k of the sizes with positive sign; the total difference is then 2k − max_total.
     let mut masses = vec![1.0];
     let mut rest = &sizes[..];
     while let Some(&size) = rest.first() {
-        let same = rest.partition_point(|other| *other == size);
-        masses = convolved(&masses, &binomial(same), size);
-        rest = &rest[same..];
+        let repeats = rest.partition_point(|other| *other == size);
+        masses = convolved(&masses, &binomial(repeats), size);
+        rest = &rest[repeats..];
     }
-    let all: usize = sizes.iter().sum();
-    let far = masses
+    let max_total: usize = sizes.iter().sum();
+    let extreme = masses
         .iter()
         .enumerate()
-        .filter(|(kept, _)| (2 * kept).abs_diff(all) >= total);
-    far.map(|(_, mass)| mass).sum::<f64>().min(1.0)
+        .filter(|(positive, _)| (2 * positive).abs_diff(max_total) >= total);
+    extreme.map(|(_, mass)| mass).sum::<f64>().min(1.0)
 }
 
-/// The masses of a sum of two numbers, the second in steps of `step`.
+/// Probability masses of a sum of two numbers, the second in steps of `step`.
 fn convolved(masses: &[f64], second: &[f64], step: usize) -> Vec<f64> {
     let mut sum = vec![0.0; masses.len() + (second.len() - 1) * step];
     for (index, weight) in second.iter().enumerate().filter(|(_, w)| **w > 0.0) {
@@ -55,13 +55,13 @@ fn convolved(masses: &[f64], second: &[f64], step: usize) -> Vec<f64> {
     sum
 }
 
-/// The masses of a binomial distribution of `n` fair coins; those below 10⁻⁴⁰ are 0.
+/// Probability masses of the number of heads among `n` fair coins. Masses below 10⁻⁴⁰ are 0 for n above 1000.
 fn binomial(n: usize) -> Vec<f64> {
-    const LEAST: f64 = 1e-40;
-    let whole = libm::lgamma(n as f64 + 1.0);
-    let half = n as f64 * std::f64::consts::LN_2;
+    const MIN_MASS: f64 = 1e-40;
+    let log_factorial = libm::lgamma(n as f64 + 1.0);
+    let log_outcomes = n as f64 * std::f64::consts::LN_2;
     if n <= 1000 {
-        // 2⁻¹⁰⁰⁰ is still a number, so that the recurrence is exact to rounding.
+        // 2⁻¹⁰⁰⁰ is not rounded to 0, so that the recurrence is exact up to rounding.
         let mut masses = Vec::with_capacity(n + 1);
         let mut mass = libm::exp2(-(n as f64));
         for k in 0..=n {
@@ -71,15 +71,18 @@ fn binomial(n: usize) -> Vec<f64> {
         return masses;
     }
     let mass = |k: usize| {
-        let log = whole - libm::lgamma(k as f64 + 1.0) - libm::lgamma((n - k) as f64 + 1.0) - half;
+        let log = log_factorial
+            - libm::lgamma(k as f64 + 1.0)
+            - libm::lgamma((n - k) as f64 + 1.0)
+            - log_outcomes;
         let mass = libm::exp(log);
-        if mass < LEAST { 0.0 } else { mass }
+        if mass < MIN_MASS { 0.0 } else { mass }
     };
     (0..=n).map(mass).collect()
 }
 
-/// Holm's adjusted p-values (Holm 1979, Scand. J. Stat. 6:65), in the order given: below 0.05 they are significant with
-/// the chance of any false alarm among them held at 5 %.
+/// Holm's adjusted p-values (Holm 1979, Scand. J. Stat. 6:65), in the order of `values`. If those below 0.05 are called
+/// significant, the probability of any false positive among them is at most 5 %.
 #[must_use]
 pub(crate) fn holm(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
@@ -123,10 +126,10 @@ mod tests {
     #[test]
     fn mcnemar_is_the_sign_test() {
         // scipy 1.17.1, binomtest(b, b + c).pvalue.
-        for (gained, lost, due) in GOLDEN_MCNEMAR {
+        for (gained, lost, expected) in GOLDEN_MCNEMAR {
             let p = mcnemar(gained, lost);
             assert!(
-                (p - due).abs() < 1e-9 && (p / due - 1.0).abs() < 1e-9,
+                (p - expected).abs() < 1e-9 && (p / expected - 1.0).abs() < 1e-9,
                 "{gained} {lost}: {p}"
             );
             assert!((p - mcnemar(lost, gained)).abs() < 1e-15);
@@ -146,7 +149,7 @@ mod tests {
         ] {
             let total: i64 = differences.iter().sum();
             let n = differences.len();
-            let far = (0..1_u32 << n).filter(|signs| {
+            let extreme = (0..1_u32 << n).filter(|signs| {
                 let sum: i64 = (0..n)
                     .map(|i| {
                         if signs >> i & 1 == 0 {
@@ -158,9 +161,9 @@ mod tests {
                     .sum();
                 sum.abs() >= total.abs()
             });
-            let due = far.count() as f64 / f64::from(1_u32 << n);
+            let expected = extreme.count() as f64 / f64::from(1_u32 << n);
             assert!(
-                (sign_flip(&differences) - due).abs() < 1e-12,
+                (sign_flip(&differences) - expected).abs() < 1e-12,
                 "{differences:?}"
             );
         }
@@ -170,8 +173,8 @@ mod tests {
     fn holm_steps_down() {
         // statsmodels 0.15.0, multipletests(method="holm").
         let adjusted = holm(&GOLDEN_HOLM.map(|(p, _)| p));
-        for (adjusted, (p, due)) in adjusted.iter().zip(GOLDEN_HOLM) {
-            assert!((adjusted - due).abs() < 1e-9, "{p}");
+        for (adjusted, (p, expected)) in adjusted.iter().zip(GOLDEN_HOLM) {
+            assert!((adjusted - expected).abs() < 1e-9, "{p}");
         }
         assert!(holm(&[]).is_empty());
     }

@@ -1,37 +1,37 @@
-//! What a cell of a table is about: [`Subject`].
+//! A model in a condition: [`Subject`].
 
 use serde::Serialize;
 
 use crate::types::{AxisLevel, Condition, EnhancerName, KindReading, Record, View};
 
-/// The name under which guessing stands among the models.
+/// The model name of the chance line.
 pub(crate) const CHANCE: &str = "chance";
 
-/// What a cell of a table is about.
+/// A model in a condition; every cell of a table belongs to one.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub struct Subject {
-    /// The model, or [`CHANCE`].
+    /// Name of the model, or [`CHANCE`].
     pub model: String,
-    /// Whether it saw the images; `None` for chance.
+    /// Whether the model saw images; `None` for chance.
     pub view: Option<View>,
-    /// How far they were degraded; `None` where none was seen.
+    /// Level of degradation; `None` if the model saw no image.
     pub level: Option<AxisLevel>,
-    /// The kind of degradation, in its light reading.
+    /// Kind of degradation with its light reading.
     pub variant: KindReading,
-    /// What mended them; `None` for raw.
+    /// Enhancer; `None` for raw images.
     pub enhancer: Option<EnhancerName>,
 }
 
 impl Subject {
-    /// Whom a record is of.
+    /// The subject of a record.
     #[must_use]
     pub fn of(record: &Record) -> Self {
-        Self::shown(&record.model, record.condition.as_ref())
+        Self::new(&record.model, record.condition.as_ref())
     }
 
-    /// Whoever answers under a name, and what was shown; `None` where nothing was.
+    /// A model in a condition; without images if the condition is `None`.
     #[must_use]
-    pub fn shown(model: &str, condition: Option<&Condition>) -> Self {
+    pub fn new(model: &str, condition: Option<&Condition>) -> Self {
         Self {
             model: model.to_owned(),
             view: Some(condition.map_or(View::Blind, |_| View::Image)),
@@ -41,7 +41,7 @@ impl Subject {
         }
     }
 
-    /// What it is shown, as `L3-noise+zerodce`, or `blind`.
+    /// The condition as text, for example `L3-noise+zerodce`; `blind` without images.
     #[must_use]
     pub fn condition(&self) -> String {
         let Some(level) = self.level else {
@@ -55,7 +55,7 @@ impl Subject {
         format!("{level}{variant}{}", enhancer.unwrap_or_default())
     }
 
-    /// A model that sees, at a level of a variant, raw or enhanced; L0 is the untouched frame of every variant and enhancer.
+    /// A model with images, at a level of a variant, raw or enhanced. L0 is the clean frame of every variant and enhancer.
     #[must_use]
     pub fn seeing(
         model: &str,
@@ -63,17 +63,17 @@ impl Subject {
         variant: &KindReading,
         enhancer: Option<&EnhancerName>,
     ) -> Self {
-        let light = level == AxisLevel::L0;
+        let is_clean = level == AxisLevel::L0;
         Self {
             model: model.to_owned(),
             view: Some(View::Image),
             level: Some(level),
-            variant: if light {
+            variant: if is_clean {
                 KindReading::NONE
             } else {
                 variant.clone()
             },
-            enhancer: enhancer.filter(|_| !light).cloned(),
+            enhancer: enhancer.filter(|_| !is_clean).cloned(),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! A run folder: what it holds, and whether it is the one that is asked for.
+//! The files of a run folder, and the check that a folder belongs to the requested run.
 
 use std::collections::HashMap;
 use std::ffi::OsStr;
@@ -17,35 +17,36 @@ pub(super) const RECORDS: &str = "records.jsonl";
 pub(super) const QUESTIONS: &str = "questions.jsonl";
 /// Small copies of images that were sent.
 pub(super) const THUMBNAILS: &str = "thumbnails.jsonl";
-/// Whether a kept run may go on at another address of its endpoint.
+
+/// Whether a stored run may continue at another address of its endpoint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum AddressChange {
-    /// It may: the user has named this run as the one to go on with, and says so that it is the same model.
+    /// Accept the new address: the user named this run (`--resume`), which states that it is the same model.
     Allowed,
-    /// It may not: another server may serve another model by the same name.
+    /// Refuse it: a different server may serve a different model under the same name.
     Refused,
 }
 
-/// The field of a run's identity that holds the address.
+/// The field of a model's entry in the manifest that holds the address.
 const ADDRESS: &str = "--base-url";
 
-/// Writes a file into a folder, whole or not at all; one that already says this is left as it is.
+/// Writes a file into a folder, completely or not at all; a file with the same content is left untouched.
 pub(super) fn write(folder: &Path, name: &str, content: &[u8]) -> Result<()> {
-    if fs::read(folder.join(name)).is_ok_and(|there| there == content) {
+    if fs::read(folder.join(name)).is_ok_and(|existing| existing == content) {
         return Ok(());
     }
     files::write_synced(&folder.join(name), content)
 }
 
 pub(super) fn write_manifest(folder: &Path, manifest: &RunManifest) -> Result<()> {
-    let unwritten = |e: serde_json::Error| Error::file(folder.join(MANIFEST), "write", e.into());
-    let mut text = serde_json::to_vec_pretty(manifest).map_err(unwritten)?;
+    let unwritable = |e: serde_json::Error| Error::file(folder.join(MANIFEST), "write", e.into());
+    let mut text = serde_json::to_vec_pretty(manifest).map_err(unwritable)?;
     text.push(b'\n');
     write(folder, MANIFEST, &text)
 }
 
-/// What a run folder holds: the last record of each trial, in the order of their first; a last line that was cut off while it
-/// was written is passed over.
+/// The last record of each trial in a run folder, in the order of each trial's first record. An incomplete last line is
+/// skipped.
 pub(crate) fn read_records<D: Detail>(folder: &Path) -> Result<Vec<Record<D>>> {
     let mut latest = HashMap::<TrialKey, usize>::new();
     let mut records: Vec<Record<D>> = Vec::new();
@@ -60,12 +61,12 @@ pub(crate) fn read_records<D: Detail>(folder: &Path) -> Result<Vec<Record<D>>> {
     Ok(records)
 }
 
-/// The questions of a run; none where it was made by a version that kept none.
+/// The questions of a run; none if an earlier version made it, which did not store them.
 pub(crate) fn read_questions(folder: &Path) -> Result<Vec<RunQuestion>> {
     lines(&folder.join(QUESTIONS))
 }
 
-/// The small copies of images of a run; none where it kept none.
+/// The small copies of images of a run; none if the run has no such file.
 pub(crate) fn read_thumbnails(folder: &Path) -> Result<Vec<Thumbnail>> {
     lines(&folder.join(THUMBNAILS))
 }
@@ -85,18 +86,18 @@ pub(crate) fn find(base: &Path, hash: &str) -> Option<PathBuf> {
         .max()
 }
 
-/// The schema of the run in a folder; `None` where there is none.
+/// The schema of the run in a folder; `None` if the folder has no manifest.
 ///
 /// # Errors
-/// Where its manifest cannot be read.
+/// If the manifest cannot be read.
 pub(crate) fn schema(folder: &Path) -> Result<Option<String>> {
     Ok(any_manifest(folder)?.map(|manifest| manifest.schema))
 }
 
-/// The manifest of a run folder; `None` where there is none.
+/// The manifest of a run folder; `None` if there is none.
 ///
 /// # Errors
-/// Where it cannot be read, or is that of a run with other records than those of `schema`.
+/// If it cannot be read, or if its schema is not `schema`.
 pub(crate) fn read_manifest(folder: &Path, schema: &str) -> Result<Option<RunManifest>> {
     let Some(manifest) = any_manifest(folder)? else {
         return Ok(None);
@@ -104,18 +105,18 @@ pub(crate) fn read_manifest(folder: &Path, schema: &str) -> Result<Option<RunMan
     if manifest.schema == schema {
         return Ok(Some(manifest));
     }
-    let problem = refusal(&manifest.schema, schema, &manifest.version);
+    let problem = schema_problem(&manifest.schema, schema, &manifest.version);
     let path = folder.join(MANIFEST);
     Err(Error::Run { path, problem })
 }
 
-/// Why a run of one schema is not taken where another is expected.
-fn refusal(found: &str, expected: &str, version: &str) -> String {
+/// The error text for a run with another schema than expected.
+fn schema_problem(found: &str, expected: &str, version: &str) -> String {
     let parts = |schema: &str| -> Option<(String, u32)> {
         let (name, number) = schema.rsplit_once('/')?;
         Some((name.to_owned(), number.parse().ok()?))
     };
-    // The number is that of the program's version: it rises for runs of all kinds at once.
+    // All kinds of runs share one schema number, which rises with the program's version.
     let newest = parts(expected).map_or(0, |(_, number)| number);
     match parts(found) {
         Some((name, number)) if KINDS.contains(&&*name) && number < newest => format!(
@@ -155,29 +156,31 @@ fn any_manifest(folder: &Path) -> Result<Option<RunManifest>> {
         })
 }
 
-/// Makes sure that a kept run is the one now asked for: the same identity, and every known value of a column what it was.
-pub(super) fn agree(
+/// Checks that a stored run is the requested one: the same identity, the same shard, and the same meaning of every column
+/// value that both have.
+pub(super) fn check_same_run(
     folder: &Path,
-    kept: &RunManifest,
-    now: &RunManifest,
-    moved: AddressChange,
+    stored: &RunManifest,
+    requested: &RunManifest,
+    address_change: AddressChange,
 ) -> Result<()> {
     let wrong = |problem: String| {
         let path = folder.to_owned();
         Err(Error::Run { path, problem })
     };
-    if let Some((field, before, after)) = differences(&kept.identity, &now.identity).next() {
+    if let Some((field, before, after)) = differences(&stored.identity, &requested.identity).next()
+    {
         return wrong(format!(
             "this run has another {field}: it was {before}, now it is {after}; use another --out, or the same {field}"
         ));
     }
-    if kept.shard != now.shard {
-        let [before, after] = [kept, now].map(|run| run.shard.as_deref().unwrap_or("none"));
+    if stored.shard != requested.shard {
+        let [before, after] = [stored, requested].map(|run| run.shard.as_deref().unwrap_or("none"));
         return wrong(format!(
             "this run has another --shard: it was {before}, now it is {after}; use another --out, or the same --shard"
         ));
     }
-    for difference in kept.column_differences(now) {
+    for difference in stored.column_differences(requested) {
         let ColumnDifference {
             column,
             value,
@@ -185,12 +188,14 @@ pub(super) fn agree(
             first: before,
             second: after,
         } = difference;
-        let address = field == ADDRESS;
-        if address && moved == AddressChange::Allowed {
-            tracing::warn!("{value} was asked at {before} in this run; it goes on at {after}");
+        let is_address = field == ADDRESS;
+        if is_address && address_change == AddressChange::Allowed {
+            tracing::warn!(
+                "{value} was asked at {before} in this run; from now on it is asked at {after}"
+            );
             continue;
         }
-        let hint = if address {
+        let hint = if is_address {
             " (the same model at another address: --resume)"
         } else {
             ""
@@ -203,11 +208,11 @@ pub(super) fn agree(
     Ok(())
 }
 
-/// Makes a new folder, or takes an empty one, and marks it as a run before anything else lies in it.
-pub(super) fn claim(folder: &Path, manifest: &RunManifest) -> Result<()> {
+/// Creates a run in a new or empty folder: writes the manifest before any other file.
+pub(super) fn create_run(folder: &Path, manifest: &RunManifest) -> Result<()> {
     fs::create_dir_all(folder).map_err(|e| Error::file(folder, "create", e))?;
     let mut inside = fs::read_dir(folder).map_err(|e| Error::file(folder, "read", e))?;
-    // What a process killed in the midst of writing has left is nobody's.
+    // Unfinished files of a killed process do not count.
     if inside.any(|entry| entry.is_ok_and(|entry| !is_unfinished(&entry.file_name()))) {
         let problem = "the folder is not empty and holds no run; use another --out".to_owned();
         return Err(Error::Run {

@@ -1,4 +1,4 @@
-//! Files of one JSON object a line, which a killed process may leave with half of its last one.
+//! Files of one JSON object a line. A killed process may leave the last line incomplete.
 
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom, Write};
@@ -10,7 +10,7 @@ use serde::de::DeserializeOwned;
 use crate::error::{Error, Result};
 use crate::types::{Detail, Record, RunQuestion, Thumbnail};
 
-/// Appends lines to a file that is made where it does not exist.
+/// Appends lines to a file, which is created if it does not exist.
 pub(super) fn append<T: Serialize>(path: &Path, values: &[T]) -> Result<File> {
     let lines = json_lines(path, values)?;
     let file = OpenOptions::new()
@@ -19,7 +19,7 @@ pub(super) fn append<T: Serialize>(path: &Path, values: &[T]) -> Result<File> {
         .create(true)
         .open(path);
     let written = file.and_then(|mut file| {
-        mend(path, &file).map_err(std::io::Error::other)?;
+        repair(path, &file).map_err(std::io::Error::other)?;
         file.write_all(&lines)?;
         Ok(file)
     });
@@ -36,14 +36,14 @@ pub(super) fn json_lines<T: Serialize>(path: &Path, values: &[T]) -> Result<Vec<
     Ok(lines)
 }
 
-/// The whole lines of a file of records, or of what else a run keeps; none where there is no such file.
+/// The complete lines of a file of a run; none if there is no such file.
 pub(super) fn lines<T: StoredLine>(path: &Path) -> Result<Vec<T>> {
     let file = match File::open(path) {
         Ok(file) => file,
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
         Err(e) => return Err(Error::file(path, "read", e)),
     };
-    let mut records = Vec::new();
+    let mut values = Vec::new();
     let mut file = BufReader::new(file);
     let mut line = Vec::new();
     for number in 1.. {
@@ -53,7 +53,7 @@ pub(super) fn lines<T: StoredLine>(path: &Path) -> Result<Vec<T>> {
         if line.pop() != Some(b'\n') {
             break;
         }
-        records.push(serde_json::from_slice(&line).map_err(|e| {
+        values.push(serde_json::from_slice(&line).map_err(|e| {
             let problem = format!(
                 "not {}: {e}; restore the file, or use another --out",
                 T::WHAT
@@ -61,12 +61,12 @@ pub(super) fn lines<T: StoredLine>(path: &Path) -> Result<Vec<T>> {
             Error::line(path, number, problem)
         })?);
     }
-    Ok(records)
+    Ok(values)
 }
 
-/// What a line of a run's files holds.
+/// The content of one line in a file of a run.
 pub(super) trait StoredLine: DeserializeOwned {
-    /// What it is called.
+    /// The name in error messages, with its article.
     const WHAT: &str;
 }
 
@@ -82,30 +82,30 @@ impl StoredLine for Thumbnail {
     const WHAT: &str = "a thumbnail";
 }
 
-/// Cuts a torn last line off: what stands after the last line end.
-pub(super) fn mend(path: &Path, mut file: &File) -> Result<()> {
+/// Cuts off an incomplete last line: everything after the last line end.
+pub(super) fn repair(path: &Path, mut file: &File) -> Result<()> {
     const STEP: u64 = 64 * 1024;
-    let unread = |e| Error::file(path, "read", e);
-    let length = file.metadata().map_err(unread)?.len();
-    let (mut end, mut whole) = (length, 0);
-    while end > 0 && whole == 0 {
+    let unreadable = |e| Error::file(path, "read", e);
+    let length = file.metadata().map_err(unreadable)?.len();
+    let (mut end, mut complete) = (length, 0);
+    while end > 0 && complete == 0 {
         let start = end.saturating_sub(STEP);
         let mut chunk = vec![0; (end - start) as usize];
-        file.seek(SeekFrom::Start(start)).map_err(unread)?;
-        file.read_exact(&mut chunk).map_err(unread)?;
-        whole = chunk
+        file.seek(SeekFrom::Start(start)).map_err(unreadable)?;
+        file.read_exact(&mut chunk).map_err(unreadable)?;
+        complete = chunk
             .iter()
             .rposition(|&byte| byte == b'\n')
             .map_or(0, |at| start + at as u64 + 1);
         end = start;
     }
-    if whole == length {
+    if complete == length {
         return Ok(());
     }
     tracing::warn!(
-        "{}: the last line was cut off while it was written; that trial is asked again",
+        "{}: the last line was incomplete and has been removed; its trial is asked again",
         path.display()
     );
-    file.set_len(whole)
+    file.set_len(complete)
         .map_err(|e| Error::file(path, "write", e))
 }

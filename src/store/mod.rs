@@ -1,8 +1,8 @@
-//! Stage 6, KEEP: `results/<run>/`.
+//! Stage 6, store: the run folder `results/<run>/`.
 //!
-//! `records.jsonl` is the truth: one line a trial, appended and handed to the operating system the moment a reply has
-//! arrived, so that a killed run loses nothing. `manifest.json` says what the run is, `questions.jsonl` what it asks, and
-//! `thumbnails.jsonl` has small copies of the images it showed; everything else is made again from these.
+//! `records.jsonl` is the source of truth: one line a trial, appended and handed to the operating system as soon as a reply
+//! arrives, so that a killed run loses nothing. `manifest.json` describes the run, `questions.jsonl` has its questions, and
+//! `thumbnails.jsonl` small copies of its images. All other files are made again from these.
 
 mod folder;
 mod lines;
@@ -20,22 +20,23 @@ use crate::types::{
     ChoiceDetail, Detail, QuestionId, Record, RunQuestion, Thumbnail, TrialKey, Via,
 };
 
-use folder::{QUESTIONS, RECORDS, THUMBNAILS, agree, claim, write, write_manifest};
-use lines::{append, json_lines, lines, mend};
+use folder::{QUESTIONS, RECORDS, THUMBNAILS, check_same_run, create_run, write, write_manifest};
+use lines::{append, json_lines, lines, repair};
 
 pub(crate) use folder::{
     AddressChange, find, read_manifest, read_questions, read_records, read_thumbnails, schema,
 };
 
-/// The folder of batches in a run.
+/// The subfolder of a run for Batch API files.
 pub(crate) const BATCH: &str = "batch";
 /// The trials that were sent in batches.
 const TRIALS: &str = "trials.jsonl";
 
-/// How often records are forced to the disk itself: what a power cut, not a killed process, may cost.
+/// The interval at which records are forced to the disk: the most that a power cut may lose. A killed process loses nothing.
+/// Chosen.
 const SYNC_EVERY: Duration = Duration::from_secs(2);
 
-/// An open run folder, held by this process alone.
+/// An open run folder, locked by this process.
 #[derive(Debug)]
 pub(crate) struct Store<D = ChoiceDetail> {
     folder: PathBuf,
@@ -45,21 +46,21 @@ pub(crate) struct Store<D = ChoiceDetail> {
 }
 
 impl<D: Detail> Store<D> {
-    /// Opens a run folder, which is made where it does not exist.
+    /// Opens a run folder, which is created if it does not exist.
     ///
-    /// A last line that was cut off while it was written is taken away, so that the next one begins a line.
+    /// An incomplete last line is removed, so that the next record begins on a new line.
     ///
     /// # Errors
-    /// Where the folder holds something else, another run (the message names the flag that differs), a broken record, or
-    /// is held by another process.
+    /// If the folder holds other files or another run (the message names the flag that differs), or if another process has
+    /// locked it.
     pub(crate) fn open(
         folder: &Path,
         manifest: &RunManifest,
-        moved: AddressChange,
+        address_change: AddressChange,
     ) -> Result<Self> {
         match read_manifest(folder, D::SCHEMA)? {
-            Some(kept) => agree(folder, &kept, manifest, moved)?,
-            None => claim(folder, manifest)?,
+            Some(stored) => check_same_run(folder, &stored, manifest, address_change)?,
+            None => create_run(folder, manifest)?,
         }
         let path = folder.join(RECORDS);
         let records = OpenOptions::new()
@@ -77,7 +78,7 @@ impl<D: Detail> Store<D> {
             },
             TryLockError::Error(e) => Error::file(&path, "lock", e),
         })?;
-        mend(&path, &records)?;
+        repair(&path, &records)?;
         Ok(Self {
             folder: folder.to_owned(),
             records,
@@ -86,12 +87,12 @@ impl<D: Detail> Store<D> {
         })
     }
 
-    /// What the run holds: the last record of each trial, in the order of their first.
+    /// The last record of each trial, in the order of each trial's first record.
     pub(crate) fn records(&self) -> Result<Vec<Record<D>>> {
         read_records(&self.folder)
     }
 
-    /// Takes note that these trials are out in a batch.
+    /// Appends trials that are sent in a batch to the list of such trials.
     pub(crate) fn append_to_batch(&mut self, records: &[Record<D>]) -> Result<()> {
         let path = self.folder.join(BATCH).join(TRIALS);
         append(&path, records)?
@@ -99,7 +100,7 @@ impl<D: Detail> Store<D> {
             .map_err(|e| Error::file(&path, "write", e))
     }
 
-    /// Keeps a small copy of an image.
+    /// Appends a small copy of an image.
     pub(crate) fn append_thumbnail(&mut self, thumbnail: &Thumbnail) -> Result<()> {
         append(
             &self.folder.join(THUMBNAILS),
@@ -108,36 +109,36 @@ impl<D: Detail> Store<D> {
         .map(drop)
     }
 
-    /// Keeps the questions of the run, these and those that it had, in the order of the data.
+    /// Writes the questions of the run, new and stored ones, in the order of the data.
     ///
     /// # Errors
-    /// If one that it had is another by now: other words, choices, answer or image.
+    /// If a stored question now has other words, choices, another answer or image.
     pub(crate) fn add_questions(&self, mut questions: Vec<RunQuestion>) -> Result<()> {
         let ids = questions.iter().map(|question| question.id.clone());
         let places: HashMap<QuestionId, usize> = ids.zip(0..).collect();
-        for known in read_questions(&self.folder)? {
-            let Some(&place) = places.get(&known.id) else {
-                questions.push(known);
+        for stored in read_questions(&self.folder)? {
+            let Some(&place) = places.get(&stored.id) else {
+                questions.push(stored);
                 continue;
             };
-            let now = &mut questions[place];
-            if !known.is_same(now) {
+            let question = &mut questions[place];
+            if !stored.is_same(question) {
                 let problem = format!(
-                    "the question {} is another in this run: other --data or --questions have changed its words, choices, answer or \
-                     image; use another --out",
-                    known.id
+                    "the question {} is not the one stored in this run: --data or --questions give it other words, choices, another \
+                     answer or image; use another --out",
+                    stored.id
                 );
                 let path = self.folder.clone();
                 return Err(Error::Run { path, problem });
             }
-            // Who asks blind models alone has not looked at the image.
-            now.image = now.image.or(known.image);
+            // A run of blind models alone does not read the image.
+            question.image = question.image.or(stored.image);
         }
         questions.sort_by_key(|question| question.place);
         self.write_questions(&questions)
     }
 
-    /// Keeps the questions of the run.
+    /// Replaces the stored questions of the run.
     pub(crate) fn write_questions(&self, questions: &[RunQuestion]) -> Result<()> {
         self.write(
             QUESTIONS,
@@ -145,40 +146,39 @@ impl<D: Detail> Store<D> {
         )
     }
 
-    /// The trials that were sent in batches, as they were before anything came of them, each as often as it was sent.
-    pub(crate) fn batched(&self) -> Result<Vec<Record<D>>> {
+    /// The trials that were sent in batches, without replies; a trial that was sent again is in the list again.
+    pub(crate) fn batch_trials(&self) -> Result<Vec<Record<D>>> {
         lines(&self.folder.join(BATCH).join(TRIALS))
     }
 
-    /// The trials that are out in a batch: sent more often than a reply or a failure of theirs was taken over.
-    pub(crate) fn out_in_batches(&self) -> Result<BTreeSet<TrialKey>> {
-        let mut out = HashMap::<TrialKey, usize>::new();
-        for record in self.batched()? {
-            *out.entry(record.key).or_default() += 1;
+    /// The trials whose batch has no result yet: they have no reply, and were sent more often than they failed.
+    pub(crate) fn pending_in_batches(&self) -> Result<BTreeSet<TrialKey>> {
+        let mut pending = HashMap::<TrialKey, usize>::new();
+        for record in self.batch_trials()? {
+            *pending.entry(record.key).or_default() += 1;
         }
-        if out.is_empty() {
+        if pending.is_empty() {
             return Ok(BTreeSet::new());
         }
         for record in lines::<Record<D>>(&self.folder.join(RECORDS))? {
             if !record.failed() {
-                out.remove(&record.key);
+                pending.remove(&record.key);
             } else if record.via == Via::Batch
-                && let Some(times) = out.get_mut(&record.key)
+                && let Some(times) = pending.get_mut(&record.key)
             {
                 *times = times.saturating_sub(1);
             }
         }
-        let out = out.into_iter().filter(|(_, times)| *times > 0);
-        Ok(out.map(|(key, _)| key).collect())
+        let pending = pending.into_iter().filter(|(_, times)| *times > 0);
+        Ok(pending.map(|(key, _)| key).collect())
     }
 
-    /// The run folder.
     #[must_use]
     pub(crate) fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// Appends one record: once this returns, killing the process cannot lose it.
+    /// Appends one record. After this returns, a killed process cannot lose it.
     pub(crate) fn append(&mut self, record: &Record<D>) -> Result<()> {
         let path = || self.folder.join(RECORDS);
         let mut line =
@@ -202,12 +202,11 @@ impl<D: Detail> Store<D> {
             .map_err(|e| Error::file(self.folder.join(RECORDS), "write", e))
     }
 
-    /// Writes the manifest.
     pub(crate) fn write_manifest(&self, manifest: &RunManifest) -> Result<()> {
         write_manifest(&self.folder, manifest)
     }
 
-    /// Writes a file into the run folder, whole or not at all; one that already says this is left as it is.
+    /// Writes a file into the run folder, completely or not at all; a file with the same content is left untouched.
     pub(crate) fn write(&self, name: &str, content: &[u8]) -> Result<()> {
         write(&self.folder, name, content)
     }

@@ -45,9 +45,9 @@ fn record(name: &str, outcome: TrialOutcome) -> Record {
 }
 
 #[test]
-fn runs_of_other_versions_are_refused_by_what_they_are() {
+fn a_run_of_another_schema_is_refused_with_its_reason() {
     let base = tempfile::tempdir().unwrap();
-    for (schema, says) in [
+    for (schema, expected) in [
         (
             "darkqa.run/1",
             "made by an earlier version of darkqa-eval (0",
@@ -63,12 +63,12 @@ fn runs_of_other_versions_are_refused_by_what_they_are() {
         };
         write_manifest(base.path(), &manifest).unwrap();
         let error = read_manifest(base.path(), ChoiceDetail::SCHEMA).unwrap_err();
-        assert!(error.to_string().contains(says), "{error}");
+        assert!(error.to_string().contains(expected), "{error}");
     }
 }
 
 #[test]
-fn records_come_back_the_last_of_each_trial() {
+fn only_the_last_record_of_each_trial_is_read() {
     let base = tempfile::tempdir().unwrap();
     let folder = base.path().join("run");
     let mut store = Store::open(&folder, &manifest(0), AddressChange::Refused).unwrap();
@@ -81,12 +81,12 @@ fn records_come_back_the_last_of_each_trial() {
         store.append(&record(name, outcome)).unwrap();
     }
     drop(store);
-    let kept = Store::open(&folder, &manifest(0), AddressChange::Refused)
+    let records = Store::open(&folder, &manifest(0), AddressChange::Refused)
         .unwrap()
         .records()
         .unwrap();
     assert_eq!(
-        kept,
+        records,
         [
             record("a", TrialOutcome::Wrong),
             record("b", TrialOutcome::Right)
@@ -95,7 +95,7 @@ fn records_come_back_the_last_of_each_trial() {
 }
 
 #[test]
-fn a_torn_line_is_cut_and_a_broken_one_is_named() {
+fn an_incomplete_last_line_is_removed_and_a_broken_line_is_an_error() {
     let base = tempfile::tempdir().unwrap();
     let mut store = Store::open(base.path(), &manifest(0), AddressChange::Refused).unwrap();
     store.append(&record("a", TrialOutcome::Right)).unwrap();
@@ -105,10 +105,10 @@ fn a_torn_line_is_cut_and_a_broken_one_is_named() {
     assert_eq!(store.records().unwrap().len(), 1);
     store.append(&record("b", TrialOutcome::Right)).unwrap();
     drop(store);
-    let kept = Store::open(base.path(), &manifest(0), AddressChange::Refused)
+    let records = Store::open(base.path(), &manifest(0), AddressChange::Refused)
         .unwrap()
         .records();
-    assert_eq!(kept.unwrap().len(), 2);
+    assert_eq!(records.unwrap().len(), 2);
     let path = base.path().join(RECORDS);
     let text = fs::read_to_string(&path).unwrap();
     fs::write(&path, text.replacen("{\"key\"", "{\"kex\"", 1)).unwrap();
@@ -121,7 +121,7 @@ fn a_torn_line_is_cut_and_a_broken_one_is_named() {
 }
 
 #[test]
-fn another_run_is_refused_by_the_flag_that_differs() {
+fn another_run_is_refused_and_the_flag_that_differs_is_named() {
     let base = tempfile::tempdir().unwrap();
     drop(Store::open(base.path(), &manifest(0), AddressChange::Refused).unwrap());
     let error = Store::open(base.path(), &manifest(7), AddressChange::Refused)
@@ -134,19 +134,19 @@ fn another_run_is_refused_by_the_flag_that_differs() {
 }
 
 #[test]
-fn a_run_is_held_by_one_process_and_a_strange_folder_is_left_alone() {
+fn a_run_is_locked_by_one_process_and_a_folder_with_other_files_is_refused() {
     let base = tempfile::tempdir().unwrap();
-    let _held = Store::open(base.path(), &manifest(0), AddressChange::Refused).unwrap();
+    let _lock = Store::open(base.path(), &manifest(0), AddressChange::Refused).unwrap();
     assert!(
         Store::open(base.path(), &manifest(0), AddressChange::Refused)
             .unwrap_err()
             .to_string()
             .contains("another process")
     );
-    let strange = tempfile::tempdir().unwrap();
-    fs::write(strange.path().join("thesis.tex"), "").unwrap();
+    let other = tempfile::tempdir().unwrap();
+    fs::write(other.path().join("thesis.tex"), "").unwrap();
     assert!(
-        Store::open(strange.path(), &manifest(0), AddressChange::Refused)
+        Store::open(other.path(), &manifest(0), AddressChange::Refused)
             .unwrap_err()
             .to_string()
             .contains("not empty")
@@ -154,7 +154,7 @@ fn a_run_is_held_by_one_process_and_a_strange_folder_is_left_alone() {
 }
 
 #[test]
-fn a_run_goes_on_at_another_address_where_it_is_named() {
+fn a_run_continues_at_another_address_only_if_allowed() {
     let at = |address: &str| {
         let mut manifest = manifest(0);
         let model = [("m".to_owned(), serde_json::json!({ "--base-url": address }))];
@@ -169,7 +169,7 @@ fn a_run_goes_on_at_another_address_where_it_is_named() {
 }
 
 #[test]
-fn what_a_killed_process_left_unfinished_is_in_nobodys_way() {
+fn unfinished_files_of_a_killed_process_do_not_matter() {
     let base = tempfile::tempdir().unwrap();
     fs::write(base.path().join(".manifest.json.part"), "{").unwrap();
     assert!(Store::open(base.path(), &manifest(0), AddressChange::Refused).is_ok());

@@ -1,10 +1,10 @@
-//! The sensor's picture: one sample a site under a mosaic of red, green and blue filters ([`Bayer`]).
+//! RAW images: one sample per sensor site, under a mosaic of red, green and blue filters ([`Bayer`]).
 
 use rayon::prelude::*;
 
 use super::lanes::{LANES, Lanes};
 
-/// The four colour planes of an RGGB mosaic, each of half the height and half the width.
+/// Colour plane of an RGGB mosaic: every second row and every second column of the sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Plane {
     /// Red: even rows, even columns.
@@ -18,20 +18,20 @@ pub(crate) enum Plane {
 }
 
 impl Plane {
-    /// All four, in the order in which per-plane numbers are listed.
+    /// All four planes, in the order in which per-plane numbers are listed.
     pub(crate) const ALL: [Self; 4] = [Self::R, Self::Gr, Self::Gb, Self::B];
 
-    /// The plane of a sensor site.
+    /// Plane of the site at a sensor row and column.
     #[must_use]
     pub(crate) fn at(row: usize, column: usize) -> Self {
         Self::ALL[2 * (row & 1) + (column & 1)]
     }
 }
 
-/// A RAW image: even height × even width, black 0 and white 1.
+/// RAW image of even height and even width; black is 0, white is 1.
 ///
-/// The sites of a row lie plane by plane, even columns before odd ones, each plane filled up to a whole number of lanes
-/// and one: so that what works on a plane works on whole lanes, and finds the neighbour beyond the edge.
+/// Each row is stored plane by plane, the even columns before the odd ones. A plane is padded to a whole number of lanes,
+/// so that kernels work on whole lanes. One more sample holds the neighbour beyond the edge.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bayer {
     height: usize,
@@ -40,7 +40,7 @@ pub struct Bayer {
 }
 
 impl Bayer {
-    /// A black image that covers `height` × `width` pixels: odd sizes, and zero, go up to the next even one.
+    /// A black image that covers `height` × `width` pixels; odd sizes and zero are rounded up to the next even size.
     #[must_use]
     pub fn covering(height: usize, width: usize) -> Self {
         let [height, width] = [height, width].map(|size| size.max(1).next_multiple_of(2));
@@ -51,32 +51,32 @@ impl Bayer {
         }
     }
 
-    /// The height in sensor rows.
+    /// Height in sensor rows.
     #[must_use]
     pub fn height(&self) -> usize {
         self.height
     }
 
-    /// The width in sensor columns.
+    /// Width in sensor columns.
     #[must_use]
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// The sample at a site.
+    /// The sample at a site, black 0 and white 1.
     ///
     /// # Panics
-    /// Where there is no such site.
+    /// If the site is outside the image.
     #[must_use]
     pub fn sample(&self, row: usize, column: usize) -> f32 {
         assert!(column < self.width, "column {column} of {}", self.width);
         self.sites(row).planes[column % 2][column / 2 + column % 2]
     }
 
-    /// The sites of a row, to be read.
+    /// Read access to the sites of a row.
     ///
     /// # Panics
-    /// Where there is no such row.
+    /// If the row is outside the image.
     #[must_use]
     pub(super) fn sites(&self, row: usize) -> Sites<'_> {
         let stride = stride(self.width);
@@ -86,14 +86,14 @@ impl Bayer {
         }
     }
 
-    /// All rows, to be changed in parallel.
+    /// Write access to all rows, as a parallel iterator.
     pub fn lines_mut(&mut self) -> impl IndexedParallelIterator<Item = RawRow<'_>> {
         let width = self.width;
         let lines = self.samples.par_chunks_mut(2 * stride(width));
         lines.map(move |samples| RawRow { width, samples })
     }
 
-    /// A row, to be changed.
+    /// Write access to one row.
     pub(super) fn line_mut(&mut self, row: usize) -> RawRow<'_> {
         let (width, size) = (self.width, 2 * stride(self.width));
         RawRow {
@@ -103,20 +103,20 @@ impl Bayer {
     }
 }
 
-/// The samples that a plane takes in a row: whole lanes, and one for the neighbour beyond the edge.
+/// Samples of one plane in a row: whole lanes, and one sample for the neighbour beyond the edge.
 fn stride(width: usize) -> usize {
     (width / 2).next_multiple_of(LANES) + 1
 }
 
-/// The sites of one row. A plane's neighbour beyond the edge is its own last site: that of the even columns follows it,
-/// that of the odd ones goes before it.
+/// Sites of one row. Beyond the edge, a plane repeats its last site: the even columns at the end of the plane, the odd
+/// columns at its beginning.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sites<'a> {
-    /// Column 2i at i.
+    /// Even and odd columns: column 2i is at `[0][i]`, column 2i + 1 at `[1][i + 1]`.
     pub(super) planes: [&'a [f32]; 2],
 }
 
-/// One row of a RAW image, to be changed.
+/// Write access to one row of a RAW image.
 #[derive(Debug)]
 pub struct RawRow<'a> {
     width: usize,
@@ -124,7 +124,7 @@ pub struct RawRow<'a> {
 }
 
 impl RawRow<'_> {
-    /// The plane of the even columns and that of the odd ones, in whole lanes: what lies beyond the width is never seen.
+    /// The planes of the even and of the odd columns in whole lanes; samples beyond the width are never used.
     pub fn planes(&mut self) -> [&mut [Lanes<f32>]; 2] {
         let (even, odd) = self.samples.split_at_mut(stride(self.width));
         [
@@ -133,19 +133,19 @@ impl RawRow<'_> {
         ]
     }
 
-    /// Repeats each plane's last site beyond the edge: to be called when the row is done.
-    pub fn seal(&mut self) {
+    /// Repeats each plane's last site beyond the edge; to be called after the last change of the row.
+    pub fn repeat_edges(&mut self) {
         let (n, stride) = (self.width / 2, stride(self.width));
         self.samples[n] = self.samples[n - 1];
         self.samples[stride] = self.samples[stride + 1];
     }
 }
 
-/// The colours of the even and of the odd columns of a row, channel by channel.
+/// Colours of the even and of the odd columns of a row, channel by channel.
 pub(super) type Colours = [[Lanes<f32>; 3]; 2];
 
-/// Interpolates the `index`-th lanes of a row bilinearly, each plane replicated beyond its edges, from the rows above,
-/// here and below.
+/// Interpolates the `index`-th lanes of a row bilinearly from the rows above, here and below. Planes are replicated beyond
+/// their edges.
 #[inline(always)]
 pub(super) fn demosaic(
     [above, here, below]: [Sites<'_>; 3],
@@ -161,23 +161,23 @@ pub(super) fn demosaic(
     let ([above_o_left, above_o], [below_o_left, below_o]) = (above.odd(index), below.odd(index));
     if row.is_multiple_of(2) {
         even[0].copy_from_slice(e);
-        four(o_left, o, above_e, below_e, &mut even[1]);
-        four(above_o_left, above_o, below_o_left, below_o, &mut even[2]);
-        two(e, e_right, &mut odd[0]);
+        mean_of_four(o_left, o, above_e, below_e, &mut even[1]);
+        mean_of_four(above_o_left, above_o, below_o_left, below_o, &mut even[2]);
+        mean_of_two(e, e_right, &mut odd[0]);
         odd[1].copy_from_slice(o);
-        two(above_o, below_o, &mut odd[2]);
+        mean_of_two(above_o, below_o, &mut odd[2]);
     } else {
-        two(above_e, below_e, &mut even[0]);
+        mean_of_two(above_e, below_e, &mut even[0]);
         even[1].copy_from_slice(e);
-        two(o_left, o, &mut even[2]);
-        four(above_e, above_e_right, below_e, below_e_right, &mut odd[0]);
-        four(e, e_right, above_o, below_o, &mut odd[1]);
+        mean_of_two(o_left, o, &mut even[2]);
+        mean_of_four(above_e, above_e_right, below_e, below_e_right, &mut odd[0]);
+        mean_of_four(e, e_right, above_o, below_o, &mut odd[1]);
         odd[2].copy_from_slice(o);
     }
 }
 
 impl<'a> Sites<'a> {
-    /// Lanes of the even columns, and of their right neighbours in the plane.
+    /// Lanes of the even columns, and lanes of their right neighbours in the plane.
     #[inline(always)]
     fn even(self, index: usize) -> [&'a Lanes<f32>; 2] {
         let plane = self.planes[0];
@@ -187,7 +187,7 @@ impl<'a> Sites<'a> {
         ]
     }
 
-    /// Lanes of the left neighbours of the odd columns in the plane, and of those themselves.
+    /// Lanes of the left neighbours of the odd columns in the plane, and lanes of the odd columns.
     #[inline(always)]
     fn odd(self, index: usize) -> [&'a Lanes<f32>; 2] {
         let plane = self.planes[1];
@@ -198,17 +198,21 @@ impl<'a> Sites<'a> {
     }
 }
 
-/// The mean of two.
 #[inline(always)]
-fn two(a: &Lanes<f32>, b: &Lanes<f32>, mean: &mut Lanes<f32>) {
+fn mean_of_two(a: &Lanes<f32>, b: &Lanes<f32>, mean: &mut Lanes<f32>) {
     for i in 0..LANES {
         mean[i] = (a[i] + b[i]) * 0.5;
     }
 }
 
-/// The mean of four.
 #[inline(always)]
-fn four(a: &Lanes<f32>, b: &Lanes<f32>, c: &Lanes<f32>, d: &Lanes<f32>, mean: &mut Lanes<f32>) {
+fn mean_of_four(
+    a: &Lanes<f32>,
+    b: &Lanes<f32>,
+    c: &Lanes<f32>,
+    d: &Lanes<f32>,
+    mean: &mut Lanes<f32>,
+) {
     for i in 0..LANES {
         mean[i] = (a[i] + b[i] + c[i] + d[i]) * 0.25;
     }
@@ -226,7 +230,7 @@ mod tests {
                     *sample = value(row, 2 * i + parity);
                 }
             }
-            line.seal();
+            line.repeat_edges();
         });
         bayer
     }
@@ -276,8 +280,8 @@ mod tests {
         }
     }
 
-    /// Written from the definition: each pixel's channel is the mean of the nearest sites of that colour, sites beyond
-    /// an edge being the plane's last one.
+    /// Direct form of the definition: each channel of a pixel is the mean of the nearest sites of that colour. Beyond an
+    /// edge, the plane's last site is repeated.
     #[test]
     fn pixels_are_means_of_their_neighbours() {
         let (height, width) = (6, 132);
@@ -295,7 +299,7 @@ mod tests {
         for (row, pixels) in found.iter().enumerate() {
             for (column, pixel) in pixels.iter().enumerate() {
                 let mut sums = [[0.0f32; 2]; 3];
-                // The site itself where it has the colour; else those at the smallest distance.
+                // The site itself if it has the colour, else the sites at the smallest distance.
                 for (colour, sum) in sums.iter_mut().enumerate() {
                     for distance in 0..=2isize {
                         for (down, right) in (-1..=1).flat_map(|d| (-1..=1).map(move |r| (d, r))) {
@@ -313,8 +317,8 @@ mod tests {
                         }
                     }
                 }
-                let due = sums.map(|[sum, n]| (sum / n).to_bits());
-                assert_eq!(pixel.map(f32::to_bits), due, "{row}, {column}");
+                let expected = sums.map(|[sum, n]| (sum / n).to_bits());
+                assert_eq!(pixel.map(f32::to_bits), expected, "{row}, {column}");
             }
         }
     }

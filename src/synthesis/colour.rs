@@ -1,9 +1,9 @@
-//! Colour of a sensor against colour of a display: [`Matrix`], [`rgb_to_camera`].
+//! Conversion between display colours and camera colours: [`Matrix`], [`rgb_to_camera`].
 
-/// A 3 × 3 colour matrix, row by row; it maps a column of red, green, blue.
+/// 3 × 3 colour matrix, row by row; it is applied to a column of red, green, blue.
 pub(crate) type Matrix = [[f64; 3]; 3];
 
-/// XYZ → camera of four cameras of the Darmstadt Noise Dataset (Brooks et al. 2019, `random_ccm`).
+/// XYZ → camera, for the four cameras of the Darmstadt Noise Dataset (Brooks et al. 2019, `random_ccm`).
 const XYZ_TO_CAMERA: [Matrix; 4] = [
     [
         [1.0234, -0.2969, -0.2266],
@@ -34,9 +34,9 @@ const SRGB_TO_XYZ: Matrix = [
     [0.0193339, 0.1191920, 0.9503041],
 ];
 
-/// Linear sRGB → camera of a mix of the four cameras, its rows summing to 1 so that grey stays grey (Brooks et al. 2019).
+/// Linear sRGB → camera, for a mix of the four cameras. Its rows sum to 1, so that grey stays grey (Brooks et al. 2019).
 ///
-/// `weights` are non-negative and not all zero; their sum does not matter.
+/// `weights` must be non-negative and not all zero; their sum does not matter.
 #[must_use]
 pub(crate) fn rgb_to_camera(weights: [f64; 4]) -> Matrix {
     let total: f64 = weights.iter().sum();
@@ -54,7 +54,7 @@ pub(crate) fn rgb_to_camera(weights: [f64; 4]) -> Matrix {
     })
 }
 
-/// The inverse, by cofactors. The matrices of [`rgb_to_camera`] are far from singular.
+/// Inverse of a matrix, by cofactors. The matrices of [`rgb_to_camera`] are far from singular.
 #[must_use]
 pub(crate) fn inverse(matrix: &Matrix) -> Matrix {
     let [a, b, c] = *matrix;
@@ -112,9 +112,9 @@ mod tests {
         }
     }
 
-    /// The figures of an independent implementation.
+    /// Expected values from an independent implementation.
     #[test]
-    fn mixes_are_those_of_the_cameras() {
+    fn mixes_have_the_expected_matrices() {
         let mean = [
             [0.6460054538, 0.2714313899, 0.0825631563],
             [0.0825578502, 0.7557543488, 0.161687801],
@@ -125,10 +125,13 @@ mod tests {
             [0.0815851812, 0.7259717238, 0.192443095],
             [0.0112382471, 0.2211703924, 0.7675913605],
         ];
-        for (weights, due) in [([3.0; 4], mean), ([1.0, 2.0, 3.0, 4.0], uneven)] {
+        for (weights, expected) in [([3.0; 4], mean), ([1.0, 2.0, 3.0, 4.0], uneven)] {
             let found = rgb_to_camera(weights);
-            for (found, due) in found.iter().flatten().zip(due.iter().flatten()) {
-                assert!((found - due).abs() < 1e-9, "{found} against {due}");
+            for (found, expected) in found.iter().flatten().zip(expected.iter().flatten()) {
+                assert!(
+                    (found - expected).abs() < 1e-9,
+                    "{found} against {expected}"
+                );
             }
         }
     }

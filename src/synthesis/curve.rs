@@ -1,11 +1,11 @@
 //! Curves between sRGB codes and linear light, and their inverses.
 //!
-//! Every transcendental function is `libm`'s, so that the results are the same bits on every machine.
+//! Every transcendental function comes from `libm`, so that the results are the same bits on every machine.
 
-/// The exponent that stands for the sRGB curve (DarkQA, eqs. 1 and 3).
+/// Exponent that approximates the sRGB curve (DarkQA, eqs. 1 and 3).
 pub(crate) const GAMMA: f64 = 2.2;
 
-/// The floor below the powers (DarkQA, ε of eq. 1).
+/// Smallest base of the powers (DarkQA, ε of eq. 1).
 pub(crate) const FLOOR: f64 = 1e-8;
 
 /// Linear light of a display value in [0, 1] (DarkQA, eq. 1).
@@ -27,16 +27,16 @@ pub(crate) fn inverse_smoothstep(display: f64) -> f64 {
     0.5 - libm::sin(libm::asin(1.0 - 2.0 * display) / 3.0)
 }
 
-/// The factor 2^−ΔEV by which light falls (DarkQA, eq. 2).
+/// Factor 2^−ΔEV on linear light (DarkQA, eq. 2).
 #[cfg(test)]
 #[must_use]
-pub(crate) fn light_left(drop_ev: f64) -> f64 {
+pub(crate) fn light_factor(drop_ev: f64) -> f64 {
     libm::exp2(-drop_ev)
 }
 
-/// The factor 2^(−ΔEV/2.2) by which display values fall: the exposure drop behind the gamma (DarkQA, eqs. 2 and 3).
+/// Factor 2^(−ΔEV/2.2) on display values: the exposure drop after gamma compression (DarkQA, eqs. 2 and 3).
 #[must_use]
-pub(crate) fn display_left(drop_ev: f64) -> f64 {
+pub(crate) fn display_factor(drop_ev: f64) -> f64 {
     libm::exp2(-drop_ev / GAMMA)
 }
 
@@ -47,9 +47,9 @@ pub(crate) fn smoothstep(display: f32) -> f32 {
     display * display * (3.0 - 2.0 * display)
 }
 
-/// The nearest 8-bit code of a display value; values outside [0, 1] take the nearest end.
+/// The nearest 8-bit code of a display value, which is clamped to [0, 1].
 ///
-/// Rounding, not truncation: that would add half a code of bias, 7 % of a grey at L5.
+/// It rounds, because truncation would add a bias of half a code, 7 % of a grey at L5.
 #[cfg(test)]
 #[must_use]
 pub(crate) fn to_code(display: f64) -> u8 {
@@ -61,7 +61,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn gamma_goes_there_and_back() {
+    fn gamma_expansion_and_compression_are_inverse() {
         for code in 1..=255u8 {
             let x = f64::from(code) / 255.0;
             assert!((gamma_compress(gamma_expand(x)) - x).abs() < 1e-14);
@@ -79,7 +79,7 @@ mod tests {
         }
     }
 
-    /// The greys of the clean chain without a forward tone curve.
+    /// Greys of the sensor branch before the drop, without noise and without a forward tone curve.
     #[test]
     fn shadows_are_lifted_by_the_inverse_tone_curve() {
         for (code, lifted) in [(0.0, 0.06), (16.0, 38.91), (64.0, 83.41), (192.0, 172.35)] {

@@ -1,4 +1,4 @@
-//! The exposure branch: less light and nothing else.
+//! The exposure branch: less light, without noise.
 
 use rayon::prelude::*;
 
@@ -6,68 +6,74 @@ use super::curve;
 use super::lanes::{Isa, Kernel};
 use crate::types::{Rgb, Severity};
 
-/// The version of the exposure branch: raised whenever a pixel changes.
+/// Version of the exposure branch, raised whenever a pixel changes.
 pub(crate) const VERSION: u32 = 1;
 
-/// Samples that one thread takes at a time.
-const PART: usize = 1 << 16;
+/// Samples that one thread processes at a time; chosen.
+const CHUNK: usize = 1 << 16;
 
-/// Adding it to a number from 0 to 255 leaves the nearest whole number in the lowest byte.
+/// 2^23: adding it to a number from 0 to 255 leaves the nearest whole number in the lowest byte.
 const ROUND: f32 = 8_388_608.0;
 
-/// The image under an exposure drop, without noise (DarkQA, eqs. 1–3): each code through the [`table`].
+/// The image after an exposure drop, without noise (DarkQA, eqs. 1–3): each code is looked up in the [`table`].
 #[must_use]
 pub fn expose(clean: &Rgb, drop: Severity) -> Rgb {
     let table = table(drop);
     let codes: [u8; 256] = std::array::from_fn(|code| code as u8);
     let mut scaled = [0; 256];
-    let left = curve::display_left(drop.value()) as f32;
+    let factor = curve::display_factor(drop.value()) as f32;
     let isa = Isa::best();
     isa.run(Scale {
         clean: &codes,
-        left,
+        factor,
         codes: &mut scaled,
     });
-    // Scaling is faster; single precision misses a tie of some drops, none of the paper's.
+    // Scaling is faster. For some drops, but not for the paper's, single precision rounds a tie differently.
     if scaled == table {
         return expose_by(clean, drop.value());
     }
-    let mut dark = clean.clone();
-    for part in dark.samples_mut() {
-        *part = table[usize::from(*part)];
+    let mut degraded = clean.clone();
+    for sample in degraded.samples_mut() {
+        *sample = table[usize::from(*sample)];
     }
-    dark
+    degraded
 }
 
-/// The image after any exposure drop in EV, without noise; ties between codes fall as single precision has them.
+/// The image after any exposure drop in EV, without noise; ties between codes are rounded as in single precision.
 #[must_use]
 pub(crate) fn expose_by(clean: &Rgb, drop_ev: f64) -> Rgb {
-    let mut dark = Rgb::black(clean.height(), clean.width());
-    expose_into(clean, drop_ev, &mut dark);
-    dark
+    let mut degraded = Rgb::black(clean.height(), clean.width());
+    expose_into(clean, drop_ev, &mut degraded);
+    degraded
 }
 
-/// The same into an image of the same size.
+/// Writes the image after an exposure drop into `degraded`, an image of the same size.
 ///
-/// As (2^−ΔEV · x^2.2)^(1/2.2) is 2^(−ΔEV/2.2) · x, the drop is a factor on the codes.
+/// The drop is a factor on the codes, because (2^−ΔEV · x^2.2)^(1/2.2) is 2^(−ΔEV/2.2) · x.
 ///
 /// # Panics
-/// Where the sizes differ.
-pub fn expose_into(clean: &Rgb, drop_ev: f64, dark: &mut Rgb) {
+/// If the sizes differ.
+pub fn expose_into(clean: &Rgb, drop_ev: f64, degraded: &mut Rgb) {
     assert_eq!(
         (clean.height(), clean.width()),
-        (dark.height(), dark.width())
+        (degraded.height(), degraded.width())
     );
-    let (left, isa) = (curve::display_left(drop_ev) as f32, Isa::best());
-    let parts = dark.samples_mut().par_chunks_mut(PART);
-    parts
-        .zip(clean.samples().par_chunks(PART))
-        .for_each(|(codes, clean)| isa.run(Scale { clean, left, codes }));
+    let (factor, isa) = (curve::display_factor(drop_ev) as f32, Isa::best());
+    let chunks = degraded.samples_mut().par_chunks_mut(CHUNK);
+    chunks
+        .zip(clean.samples().par_chunks(CHUNK))
+        .for_each(|(codes, clean)| {
+            isa.run(Scale {
+                clean,
+                factor,
+                codes,
+            })
+        });
 }
 
 struct Scale<'a> {
     clean: &'a [u8],
-    left: f32,
+    factor: f32,
     codes: &'a mut [u8],
 }
 
@@ -75,29 +81,30 @@ impl Kernel for Scale<'_> {
     #[inline(always)]
     fn run(self) {
         for (code, clean) in self.codes.iter_mut().zip(self.clean) {
-            let dark = f32::from(*clean) * self.left;
-            let dark = if dark < 255.0 { dark } else { 255.0 };
-            *code = (dark + ROUND).to_bits() as u8;
+            let scaled = f32::from(*clean) * self.factor;
+            let scaled = if scaled < 255.0 { scaled } else { 255.0 };
+            *code = (scaled + ROUND).to_bits() as u8;
         }
     }
 }
 
-/// Added before rounding, so that an exact tie goes up whatever the last bit of a power: at whole multiples of 2.2 EV the
-/// factor is a power of two. The nearest tie elsewhere is 1.4e-6 away (measured over all 1600 drops).
+/// Added before rounding, so that an exact tie is rounded up whatever the last bit of the power is. Exact ties occur at
+/// multiples of 2.2 EV, whose factor is a power of two. Elsewhere the nearest tie is 1.4e-6 away (measured over all 1600
+/// drops).
 const TIE: f64 = 1e-9;
 
-/// The code that each 8-bit code becomes: floor(2^(−ΔEV/2.2) · code + ½), ties up.
+/// Code after the drop for each 8-bit code: floor(2^(−ΔEV/2.2) · code + ½); ties are rounded up.
 #[must_use]
 pub(crate) fn table(drop: Severity) -> [u8; 256] {
-    let left = curve::display_left(drop.value());
-    std::array::from_fn(|code| (code as f64 * left + 0.5 + TIE).floor() as u8)
+    let factor = curve::display_factor(drop.value());
+    std::array::from_fn(|code| (code as f64 * factor + 0.5 + TIE).floor() as u8)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// CRC-32 as PNG has it: reflected, polynomial 0xEDB88320.
+    /// CRC-32 as in PNG: reflected, polynomial 0xEDB88320.
     fn crc32(bytes: &[u8]) -> u32 {
         let mut crc = u32::MAX;
         for byte in bytes {
@@ -112,8 +119,8 @@ mod tests {
     struct Case {
         level: Severity,
         distinct: usize,
-        first_light: usize,
-        /// At 32, 64, 96, 128, 160, 192, 224 and 255.
+        first_nonzero: usize,
+        /// Codes after the drop for 32, 64, 96, 128, 160, 192, 224 and 255.
         entries: [u8; 8],
         sum: u32,
         crc: u32,
@@ -123,7 +130,7 @@ mod tests {
         Case {
             level: Severity::L1,
             distinct: 137,
-            first_light: 1,
+            first_nonzero: 1,
             entries: [17, 34, 51, 68, 85, 102, 119, 136],
             sum: 17383,
             crc: 0xbf6b_89db,
@@ -131,7 +138,7 @@ mod tests {
         Case {
             level: Severity::L2,
             distinct: 73,
-            first_light: 2,
+            first_nonzero: 2,
             entries: [9, 18, 27, 36, 45, 54, 64, 72],
             sum: 9256,
             crc: 0x32e9_6a7f,
@@ -139,7 +146,7 @@ mod tests {
         Case {
             level: Severity::L3,
             distinct: 40,
-            first_light: 4,
+            first_nonzero: 4,
             entries: [5, 10, 14, 19, 24, 29, 34, 39],
             sum: 4929,
             crc: 0xb92f_c0e1,
@@ -147,7 +154,7 @@ mod tests {
         Case {
             level: Severity::L4,
             distinct: 25,
-            first_light: 6,
+            first_nonzero: 6,
             entries: [3, 6, 9, 12, 15, 18, 21, 24],
             sum: 3072,
             crc: 0x9680_e44d,
@@ -155,7 +162,7 @@ mod tests {
         Case {
             level: Severity::L5,
             distinct: 16,
-            first_light: 9,
+            first_nonzero: 9,
             entries: [2, 4, 6, 8, 9, 11, 13, 15],
             sum: 1917,
             crc: 0xc59b_9430,
@@ -175,14 +182,14 @@ mod tests {
             assert_eq!(distinct.len(), case.distinct, "{level:?}");
             assert!(table.is_sorted(), "{level:?}");
             let first = table.iter().position(|code| *code > 0);
-            assert_eq!(first, Some(case.first_light), "{level:?}");
+            assert_eq!(first, Some(case.first_nonzero), "{level:?}");
             let sum: u32 = table.iter().map(|code| u32::from(*code)).sum();
             assert_eq!(sum, case.sum, "{level:?}");
             assert_eq!(crc32(&table), case.crc, "{level:?}");
         }
     }
 
-    /// Whole numbers of EV, halves between codes (2.2 and 11 EV), and every table there is.
+    /// Whole numbers of EV, exact ties between codes (2.2 and 11 EV), and all 1600 tables.
     #[test]
     fn tables_of_any_drop_are_exact() {
         let entries = [
@@ -194,10 +201,10 @@ mod tests {
             (1400, [0, 1, 1, 2, 2, 2, 3, 3], 0xb741_6698),
             (1600, [0, 0, 1, 1, 1, 1, 1, 2], 0xa670_34d3),
         ];
-        for (hundredths, due, crc) in entries {
+        for (hundredths, expected, crc) in entries {
             let table = table(Severity::hundredths(hundredths));
             let found = [32, 64, 96, 128, 160, 192, 224, 255].map(|code: usize| table[code]);
-            assert_eq!(found, due, "{hundredths}");
+            assert_eq!(found, expected, "{hundredths}");
             assert_eq!(crc32(&table), crc, "{hundredths}");
         }
         let all: Vec<u8> = (1..=1600)
@@ -206,24 +213,24 @@ mod tests {
         assert_eq!(crc32(&all), 0x2f73_04d1);
     }
 
-    /// The tables of the paper's levels are its own steps, one by one.
+    /// For the paper's levels, the tables equal the paper's steps done one by one.
     #[test]
     fn the_papers_steps_give_the_papers_tables() {
         for level in Severity::LADDER {
-            let left = curve::light_left(level.value());
+            let factor = curve::light_factor(level.value());
             let by_steps: [u8; 256] = std::array::from_fn(|code| {
                 let linear = curve::gamma_expand(code as f64 / 255.0);
-                curve::to_code(curve::gamma_compress(left * linear))
+                curve::to_code(curve::gamma_compress(factor * linear))
             });
             assert_eq!(table(level), by_steps, "{level}");
         }
     }
 
     #[test]
-    fn a_darker_level_is_nowhere_lighter() {
+    fn a_higher_level_is_nowhere_brighter() {
         for pair in Severity::LADDER.windows(2) {
-            let (light, dark) = (table(pair[0]), table(pair[1]));
-            assert!(light.iter().zip(dark).all(|(l, d)| d <= *l));
+            let (lower, higher) = (table(pair[0]), table(pair[1]));
+            assert!(lower.iter().zip(higher).all(|(low, high)| high <= *low));
         }
     }
 
@@ -235,9 +242,9 @@ mod tests {
             .chain([220, 440, 1333].map(Severity::hundredths))
         {
             let table = table(level);
-            let dark = expose(&clean, level);
-            for (clean, dark) in clean.samples().iter().zip(dark.samples()) {
-                assert_eq!(table[usize::from(*clean)], *dark, "{level:?}");
+            let degraded = expose(&clean, level);
+            for (clean, degraded) in clean.samples().iter().zip(degraded.samples()) {
+                assert_eq!(table[usize::from(*clean)], *degraded, "{level:?}");
             }
         }
         let brighter = expose_by(&clean, -2.0);

@@ -9,43 +9,43 @@ use super::reading::Synthesis;
 use crate::types::degradation::Kind;
 use crate::types::{Degradation, ReadingName, Rgb};
 
-/// Makes the degraded images of one frame, and keeps the [`Negative`] of each light reading for the levels that it serves.
+/// The degraded images of one frame, with a cache of one [`Negative`] for each light reading.
 #[derive(Debug, Default)]
 pub struct Exposures(BTreeMap<ReadingName, Negative>);
 
 impl Exposures {
-    /// The frame under a degradation, as [`degrade`](super::degrade) gives it. `synthesis` is the content of the
-    /// degradation's reading; frame, key and contents must be the same in each call.
+    /// The frame after a degradation, as [`degrade`](super::degrade) gives it. `synthesis` is the content of the
+    /// degradation's light reading. Frame, key and contents must be the same in each call.
     #[must_use]
     pub fn degrade(
         &mut self,
         clean: &Rgb,
-        how: Option<&Degradation>,
+        degradation: Option<&Degradation>,
         key: &NoiseKey,
         synthesis: &Synthesis,
     ) -> Rgb {
-        let Some(how) = how else {
+        let Some(degradation) = degradation else {
             return clean.clone();
         };
-        let severity = how.severity();
-        match how.kind() {
+        let severity = degradation.severity();
+        match degradation.kind() {
             Kind::Exposure => expose(clean, severity),
             Kind::Sensor => {
-                let reading = how.reading().cloned().unwrap_or(ReadingName::PAPER);
-                let kept = self.0.remove(&reading);
-                let kept = kept.filter(|kept| kept.serves(severity));
+                let reading = degradation.reading().cloned().unwrap_or(ReadingName::PAPER);
+                let cached = self.0.remove(&reading);
+                let cached = cached.filter(|negative| negative.serves(severity));
                 let negative =
-                    kept.unwrap_or_else(|| Negative::new(clean, key, synthesis, severity));
-                let dark = negative.develop(severity);
+                    cached.unwrap_or_else(|| Negative::new(clean, key, synthesis, severity));
+                let degraded = negative.develop(severity);
                 self.0.insert(reading, negative);
-                dark
+                degraded
             }
         }
     }
 }
 
-/// The version of a kind: raised whenever one of its pixels changes, so that no result of an older one is taken for its
-/// own.
+/// Version of a kind of degradation, raised whenever one of its pixels changes, so that results of an older version are
+/// not reused.
 #[must_use]
 pub(crate) fn version(kind: Kind) -> u32 {
     match kind {
@@ -54,7 +54,7 @@ pub(crate) fn version(kind: Kind) -> u32 {
     }
 }
 
-/// Whether random numbers enter, so that seed and frame decide the pixels too.
+/// Whether a kind draws random numbers, so that the pixels depend on seed and frame name too.
 #[must_use]
 pub(crate) fn is_random(kind: Kind) -> bool {
     match kind {

@@ -1,8 +1,8 @@
 //! RAW → sRGB: the simple image processing of the paper, as a `Developer`.
 //!
-//! White balance and brightness gains, clip; bilinear demosaic; camera → sRGB, clip; exposure drop; gamma compression; 8
-//! bit. As (2^−ΔEV · x)^(1/2.2) is 2^(−ΔEV/2.2) · x^(1/2.2), all up to the gamma is done once for all levels, and the drop
-//! is a factor behind it.
+//! The steps: white balance and brightness gains, clip; bilinear demosaic; camera → sRGB, clip; exposure drop; gamma
+//! compression; 8 bit. Because (2^−ΔEV · x)^(1/2.2) is 2^(−ΔEV/2.2) · x^(1/2.2), the drop is applied as a factor after the
+//! gamma, and all before it is done once for all levels.
 
 use std::sync::LazyLock;
 
@@ -13,21 +13,21 @@ use super::lanes::{Isa, Kernel, LANES, Lanes};
 use super::piecewise::Piecewise;
 use super::reading::Tone;
 
-/// Gamma compression of light from 2⁻³¹ up; below 10⁻⁸ it is that of 10⁻⁸.
+/// Gamma compression of light from 2⁻³¹ up; light below 10⁻⁸ is treated as 10⁻⁸.
 static GAMMA: LazyLock<Piecewise> = LazyLock::new(|| Piecewise::new(-31, curve::gamma_compress));
 
-/// The least light in the table: black, and 0 at every level.
+/// Smallest light in the table, 2⁻³¹: black, which is code 0 at every level.
 const DARKEST: f32 = 1.0 / 2_147_483_648.0;
 
-/// Adding it to a number from 0 to 255 leaves the nearest whole number in the lowest byte.
+/// 2^23: adding it to a number from 0 to 255 leaves the nearest whole number in the lowest byte.
 const ROUND: f32 = 8_388_608.0;
 
 /// Image processing of one camera, ready for any row.
 #[derive(Debug)]
 pub(super) struct Developer {
-    /// The gains of each plane.
+    /// Gain of each Bayer plane: white balance times brightness.
     gains: [f32; 4],
-    /// Camera → linear sRGB.
+    /// Matrix from camera colours to linear sRGB.
     matrix: [[f32; 3]; 3],
     tone: Tone,
     isa: Isa,
@@ -44,7 +44,7 @@ impl Developer {
         }
     }
 
-    /// White balance and brightness gains on a sensor row, clipped to [0, 1].
+    /// Multiplies a sensor row by the white-balance and brightness gains and clips it to [0, 1].
     pub(super) fn balance(&self, row: usize, line: &mut RawRow<'_>) {
         for (parity, samples) in line.planes().into_iter().enumerate() {
             let gain = self.gains[Plane::at(row, parity) as usize];
@@ -52,31 +52,31 @@ impl Developer {
         }
     }
 
-    /// The display values in [0, 1] of a row of pixels as they would be without an exposure drop, red, green, blue by
-    /// turns. `values` may be shorter than the row.
+    /// Writes the display values in [0, 1] of a row of pixels before the exposure drop, as red, green, blue of each pixel.
+    /// `values` may be shorter than the row.
     ///
-    /// `at` is the row's place in `balanced`, whose first row is the sensor's `first`: rows beyond the image mirror at its
-    /// last ones, those beyond a part of it must be there.
-    pub(super) fn display(&self, balanced: &Bayer, at: usize, values: &mut [f32]) {
+    /// `row` is an index into `balanced`. The first and last row are mirrored; if `balanced` is a part of an image, it must
+    /// also contain the rows next to those asked for.
+    pub(super) fn display(&self, balanced: &Bayer, row: usize, values: &mut [f32]) {
         let last = balanced.height() - 1;
         let rows = [
-            if at == 0 { 1 } else { at - 1 },
-            at,
-            if at == last { at - 1 } else { at + 1 },
+            if row == 0 { 1 } else { row - 1 },
+            row,
+            if row == last { row - 1 } else { row + 1 },
         ];
         self.isa.run(Display {
             developer: self,
             rows: rows.map(|row| balanced.sites(row)),
-            row: at,
+            row,
             values,
         });
     }
 
-    /// The 8-bit codes of display values after an exposure drop.
+    /// Writes the 8-bit codes of display values after an exposure drop.
     pub(super) fn encode(&self, display: &[f32], drop_ev: f64, codes: &mut [u8]) {
         self.isa.run(Encode {
             display,
-            left: curve::display_left(drop_ev) as f32,
+            factor: curve::display_factor(drop_ev) as f32,
             tone: self.tone,
             codes,
         });
@@ -92,21 +92,21 @@ impl Kernel for WhiteBalance<'_> {
     #[inline(always)]
     fn run(self) {
         for sample in self.samples.as_flattened_mut() {
-            *sample = unit(*sample * self.gain);
+            *sample = clip(*sample * self.gain);
         }
     }
 }
 
 /// Clips to [0, 1].
 #[inline(always)]
-fn unit(x: f32) -> f32 {
+fn clip(x: f32) -> f32 {
     let x = if x > 0.0 { x } else { 0.0 };
     if x < 1.0 { x } else { 1.0 }
 }
 
 struct Display<'a> {
     developer: &'a Developer,
-    /// Above, here and below.
+    /// The rows above, at and below `row`.
     rows: [Sites<'a>; 3],
     row: usize,
     values: &'a mut [f32],
@@ -119,7 +119,7 @@ impl Kernel for Display<'_> {
         let mut colours = [[[0.0; LANES]; 3]; 2];
         for (index, values) in self.values.chunks_mut(6 * LANES).enumerate() {
             bayer::demosaic(self.rows, self.row, index, &mut colours);
-            self.developer.light(&mut colours);
+            self.developer.to_linear_srgb(&mut colours);
             let [even, odd] = &colours;
             for (lane, values) in values.chunks_mut(6).enumerate().take(LANES) {
                 let (even, odd) = (even.each_ref(), odd.each_ref());
@@ -152,21 +152,21 @@ impl Kernel for Display<'_> {
 }
 
 impl Developer {
-    /// Turns colours in camera space into linear sRGB, in [`DARKEST`] to 1.
+    /// Converts camera colours to linear sRGB, clipped to [`DARKEST`] to 1.
     #[inline(always)]
-    fn light(&self, colours: &mut bayer::Colours) {
+    fn to_linear_srgb(&self, colours: &mut bayer::Colours) {
         let [red, green, blue] = self.matrix;
         for [r, g, b] in colours {
             for i in 0..LANES {
                 let camera = [r[i], g[i], b[i]];
-                let through = |row: [f32; 3]| {
+                let product = |row: [f32; 3]| {
                     let x = row[0] * camera[0] + row[1] * camera[1] + row[2] * camera[2];
                     let x = if x > DARKEST { x } else { DARKEST };
                     if x < 1.0 { x } else { 1.0 }
                 };
-                r[i] = through(red);
-                g[i] = through(green);
-                b[i] = through(blue);
+                r[i] = product(red);
+                g[i] = product(green);
+                b[i] = product(blue);
             }
         }
     }
@@ -174,8 +174,8 @@ impl Developer {
 
 struct Encode<'a> {
     display: &'a [f32],
-    /// What the drop leaves of a display value.
-    left: f32,
+    /// Factor of the exposure drop on display values.
+    factor: f32,
     tone: Tone,
     codes: &'a mut [u8],
 }
@@ -186,15 +186,15 @@ impl Kernel for Encode<'_> {
         let codes = self.codes.iter_mut().zip(self.display);
         if self.tone == Tone::AfterEv {
             for (code, value) in codes {
-                let dark = curve::smoothstep(unit(value * self.left));
-                *code = (dark * 255.0 + ROUND).to_bits() as u8;
+                let display = curve::smoothstep(clip(value * self.factor));
+                *code = (display * 255.0 + ROUND).to_bits() as u8;
             }
         } else {
-            let scale = 255.0 * self.left;
+            let scale = 255.0 * self.factor;
             for (code, value) in codes {
-                let dark = value * scale;
-                let dark = if dark < 255.0 { dark } else { 255.0 };
-                *code = (dark + ROUND).to_bits() as u8;
+                let scaled = value * scale;
+                let scaled = if scaled < 255.0 { scaled } else { 255.0 };
+                *code = (scaled + ROUND).to_bits() as u8;
             }
         }
     }
@@ -210,27 +210,27 @@ mod tests {
         Developer::new(&median(), tone, Isa::best())
     }
 
-    /// Against the paper's own order of operations, but where light lies on the very edge between two codes.
+    /// Comparison with the paper's order of operations, except where light lies on the edge between two codes.
     #[test]
     fn codes_are_the_papers_formula() {
         for level in Severity::LADDER {
-            let left = curve::light_left(level.value());
+            let factor = curve::light_factor(level.value());
             let light: Vec<f32> = (0..=300_000).map(|step| step as f32 / 300_000.0).collect();
             let display: Vec<f32> = light.iter().map(|x| GAMMA.at(x.max(DARKEST))).collect();
             let mut codes = vec![0; light.len()];
             developer(Tone::None).encode(&display, level.value(), &mut codes);
             for (light, code) in light.iter().zip(codes) {
-                let due = curve::gamma_compress(left * f64::from(*light));
-                let edge = (due * 255.0 + 0.5).fract();
+                let expected = curve::gamma_compress(factor * f64::from(*light));
+                let edge = (expected * 255.0 + 0.5).fract();
                 if edge > 1e-3 && edge < 1.0 - 1e-3 {
-                    assert_eq!(code, curve::to_code(due), "{level:?} at {light}");
+                    assert_eq!(code, curve::to_code(expected), "{level:?} at {light}");
                 }
             }
         }
     }
 
     #[test]
-    fn codes_have_their_ends() {
+    fn black_and_white_have_the_expected_codes() {
         let ends = Severity::LADDER.map(|level| {
             let mut codes = [7; 2];
             let display = [GAMMA.at(DARKEST), GAMMA.at(1.0)];
@@ -252,16 +252,16 @@ mod tests {
                 plane[0][..2].copy_from_slice(&[0.1, if row == 0 { -0.1 } else { 0.9 }]);
             }
             developer(Tone::None).balance(row, &mut line);
-            line.seal();
+            line.repeat_edges();
         }
-        let due = [
+        let expected = [
             [0.1 * 2.15 * 1.25, 0.1 * 1.25, 0.0, 0.0],
             [0.1 * 1.25, 0.1 * 1.7 * 1.25, 1.0, 1.0],
         ];
-        for (row, due) in due.iter().enumerate() {
-            for (column, due) in due.iter().enumerate() {
+        for (row, expected) in expected.iter().enumerate() {
+            for (column, expected) in expected.iter().enumerate() {
                 let found = raw.sample(row, column);
-                assert!((found - due).abs() < 1e-6, "{row}, {column}: {found}");
+                assert!((found - expected).abs() < 1e-6, "{row}, {column}: {found}");
             }
         }
     }

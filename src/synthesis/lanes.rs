@@ -1,25 +1,26 @@
-//! Many samples at once: [`Lanes`], and the instruction set that a [`Kernel`] over them is compiled for.
+//! Batches of samples ([`Lanes`]), and the instruction sets that a [`Kernel`] over them is compiled for.
 //!
-//! Kernels are plain loops over arrays, which the compiler turns into vector instructions. Every operation in them is one
-//! of IEEE 754's (no fused multiplication and addition, no reordering) or one on integers, so that each instruction set
-//! gives the same bits; tests hold them to it.
+//! Kernels are plain loops over arrays, which the compiler turns into vector instructions. They use only operations of
+//! IEEE 754 (no fused multiply-add, no reordering) and of integers. So each instruction set gives the same bits, which
+//! tests check.
 
-/// The number of samples that a kernel works on at once.
+/// Samples that a kernel processes at once.
 pub(crate) const LANES: usize = 64;
 
-/// One number a sample.
+/// Batch of [`LANES`] numbers, one per sample.
 pub(crate) type Lanes<T> = [T; LANES];
 
-/// Work that is compiled once for each [`Isa`].
+/// A computation that is compiled once for each [`Isa`].
 pub(crate) trait Kernel {
-    /// Does it. Must be `#[inline(always)]`, as must be all that it calls: inlined code takes the caller's instructions.
+    /// Does the computation. This and all that it calls must be `#[inline(always)]`: only inlined code is compiled for the
+    /// caller's instruction set.
     fn run(self);
 }
 
-/// An instruction set.
+/// Instruction set that kernels are compiled for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Isa {
-    /// What every machine of the architecture has.
+    /// Instructions that every machine of the architecture has.
     Baseline,
     /// x86-64 with 256-bit vectors.
     #[cfg(target_arch = "x86_64")]
@@ -30,10 +31,10 @@ pub(crate) enum Isa {
 }
 
 impl Isa {
-    /// Those that this machine has, the best last.
+    /// Instruction sets of this machine, the best last.
     #[cfg(test)]
     #[must_use]
-    pub(crate) fn present() -> Vec<Self> {
+    pub(crate) fn available() -> Vec<Self> {
         [
             Some(Self::Baseline),
             #[cfg(target_arch = "x86_64")]
@@ -46,7 +47,7 @@ impl Isa {
         .collect()
     }
 
-    /// The best that this machine has.
+    /// Best instruction set of this machine.
     #[must_use]
     pub(crate) fn best() -> Self {
         #[cfg(target_arch = "x86_64")]
@@ -58,7 +59,7 @@ impl Isa {
         Self::Baseline
     }
 
-    /// Runs a kernel with these instructions, or with the baseline's where the machine lacks them.
+    /// Runs a kernel with this instruction set, or with the baseline if the machine does not have it.
     #[expect(unsafe_code, reason = "only the check before it makes the call sound")]
     pub(crate) fn run(self, kernel: impl Kernel) {
         match self {

@@ -1,4 +1,4 @@
-//! Less light: a clean frame as a camera would have taken it in the dark. [`degrade`] is the door.
+//! Degraded versions of a clean frame, as a camera would take it in less light. [`degrade`] is the entry point.
 //!
 //! ```text
 //! Exposure   sRGB ─ gamma ─ × 2^−ΔEV ─ gamma⁻¹ ─ 8 bit                            a table of 256 codes
@@ -7,14 +7,14 @@
 //!            Negative ─ demosaic ─ camera → sRGB ─ × 2^−ΔEV ─ gamma⁻¹ ─ 8 bit     for each level
 //! ```
 //!
-//! The sensor branch has no forward tone curve, as the paper lists none. Its clean chain is therefore brighter in the
-//! shadows than the exposure branch (grey 16 becomes 39 before the drop, 192 becomes 172), and the two branches differ
-//! in contrast as well as in noise.
+//! The sensor branch has no forward tone curve, because the paper lists none. Before the drop, its shadows are therefore
+//! brighter than those of the exposure branch (grey 16 becomes 39, 192 becomes 172). So the two branches differ in
+//! contrast as well as in noise.
 //!
-//! The result is a function of the arguments and of [`VERSION`] alone. Threads, order and machine do not enter: random
-//! numbers are addressed by where they are used (see [`random`]), powers and logarithms are `libm`'s and stand in tables
-//! (see [`piecewise`]), and everything else is IEEE sums, products, quotients and square roots in a fixed order. The
-//! camera's state is computed in double precision, samples in single, many at once (see [`lanes`]).
+//! The result depends only on the arguments and on [`VERSION`], not on threads, order or machine. Random numbers are
+//! addressed by where they are used (see [`random`]). Powers and logarithms come from `libm` and are tabulated (see
+//! [`piecewise`]). All else is IEEE sums, products, quotients and square roots in a fixed order. The camera's state is
+//! computed in double precision, samples in single precision, many at once (see [`lanes`]).
 
 #![expect(
     clippy::inline_always,
@@ -51,22 +51,22 @@ pub(crate) use settings::{LightArgs, LightSettings, SensorArgs, SensorSettings};
 
 use crate::types::{Degradation, Rgb};
 
-/// The version of the sensor branch: raised whenever a pixel changes, so that no result of an older one is taken for its
-/// own. The exposure branch has [its own](exposure::VERSION).
+/// Version of the sensor branch, raised whenever a pixel changes, so that results of an older version are not reused.
+/// The exposure branch has [another](exposure::VERSION).
 pub const VERSION: u32 = 2;
 
-/// The frame under a degradation.
+/// The frame after a degradation; without one, the frame itself.
 ///
 /// `synthesis` is the content of the degradation's light reading. For several degradations of one frame, [`Exposures`] gives
-/// the same images for less work.
+/// the same images with less work.
 #[must_use]
 pub fn degrade(
     clean: &Rgb,
-    how: Option<&Degradation>,
+    degradation: Option<&Degradation>,
     key: &NoiseKey,
     synthesis: &Synthesis,
 ) -> Rgb {
-    Exposures::default().degrade(clean, how, key, synthesis)
+    Exposures::default().degrade(clean, degradation, key, synthesis)
 }
 
 #[cfg(test)]

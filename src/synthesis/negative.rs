@@ -1,4 +1,4 @@
-//! A frame as the sensor took it: a [`Negative`], developed at any level that it serves; or a whole [`ladder`] at once.
+//! The noisy RAW image of a frame, [`Negative`], which is developed at any level; or all levels at once, [`ladder`].
 
 use rayon::prelude::*;
 
@@ -12,36 +12,36 @@ use super::reading::{Amplify, Coupling, Draws, Synthesis, Tone};
 use super::unprocess::Unprocess;
 use crate::types::{Rgb, Severity};
 
-/// Rows of a band: it and its neighbours' edges stay in a core's cache from RAW to code.
+/// Rows of a band, which is processed from RAW to codes within a core's cache; chosen.
 const BAND: usize = 32;
 
-/// One noisy RAW image: camera and noise are drawn once, and shared by the levels made from it.
+/// Noisy RAW image of a frame. Camera and noise are drawn once and shared by all levels developed from it.
 ///
-/// So the levels differ in light alone; each has the distribution that draws of its own would give it.
+/// So the levels differ in light alone. Each level has the same distribution as with separate draws.
 #[derive(Debug)]
 pub struct Negative {
     developer: Developer,
     balanced: Bayer,
-    /// The one level that it serves; `None` for all.
-    only: Option<Severity>,
-    /// Height and width of the frame.
+    /// The only level that may be developed from it; `None` for all levels.
+    only_level: Option<Severity>,
+    /// Height and width of the frame, in pixels.
     size: [usize; 2],
 }
 
 impl Negative {
-    /// Takes `clean` for a level, with camera and noise drawn from the key.
+    /// The negative of `clean` for a level, with camera and noise drawn from the key.
     #[must_use]
     pub fn new(clean: &Rgb, key: &NoiseKey, synthesis: &Synthesis, severity: Severity) -> Self {
-        let shot = Capture::new(key, synthesis, severity, Isa::best());
+        let capture = Capture::new(key, synthesis, severity, Isa::best());
         Self {
-            only: (!synthesis.shares_negative()).then_some(severity),
-            ..Self::of(clean, shot)
+            only_level: (!synthesis.shares_negative()).then_some(severity),
+            ..Self::of(clean, capture)
         }
     }
 
-    /// Takes `clean` with a camera in a given state, and with the given terms of noise.
+    /// The negative of `clean` for a camera in the given state and with the given terms of noise, for all levels.
     #[must_use]
-    pub fn taken(
+    pub fn with_state(
         clean: &Rgb,
         key: &NoiseKey,
         state: &CameraState,
@@ -53,23 +53,23 @@ impl Negative {
         Self::of(clean, Capture::with(key, state, amplify, tone, terms, isa))
     }
 
-    fn of(clean: &Rgb, shot: Capture) -> Self {
+    fn of(clean: &Rgb, capture: Capture) -> Self {
         let (height, width) = (clean.height(), clean.width());
         let mut balanced = Bayer::covering(height, width);
         let lines = balanced.lines_mut().enumerate();
-        lines.for_each(|(row, mut line)| shot.take(clean, row, &mut line));
+        lines.for_each(|(row, mut line)| capture.capture_row(clean, row, &mut line));
         Self {
-            developer: shot.developer,
+            developer: capture.developer,
             balanced,
-            only: None,
+            only_level: None,
             size: [height, width],
         }
     }
 
-    /// Whether it is the negative of a level.
+    /// Whether a level may be developed from this negative.
     #[must_use]
     pub fn serves(&self, severity: Severity) -> bool {
-        self.only.is_none_or(|only| only == severity)
+        self.only_level.is_none_or(|only| only == severity)
     }
 
     /// The sRGB image at a level.
@@ -82,8 +82,8 @@ impl Negative {
     #[must_use]
     pub fn develop_by(&self, drop_ev: f64) -> Rgb {
         let [height, width] = self.size;
-        let mut dark = Rgb::black(height, width);
-        let rows = dark.samples_mut().par_chunks_mut(3 * width).enumerate();
+        let mut degraded = Rgb::black(height, width);
+        let rows = degraded.samples_mut().par_chunks_mut(3 * width).enumerate();
         rows.for_each_init(
             || vec![0.0; 3 * width],
             |display, (row, codes)| {
@@ -91,37 +91,37 @@ impl Negative {
                 self.developer.encode(display, drop_ev, codes);
             },
         );
-        dark
+        degraded
     }
 }
 
-/// The images of a frame at several levels, each in the image of that place in `dark`, of the frame's size.
+/// Develops a frame at several levels: `images[i]`, of the frame's size, receives the image at `levels[i]`.
 ///
-/// They are those of [`Negative::develop`]; made together, they cost less time and memory.
+/// The images equal those of [`Negative::develop`]; together they take less time and memory.
 ///
 /// # Panics
-/// Where an image is of another size, or there are more levels than images.
+/// If an image has another size, or there are more levels than images.
 pub fn ladder(
     clean: &Rgb,
     key: &NoiseKey,
     synthesis: &Synthesis,
     levels: &[Severity],
-    dark: &mut [Rgb],
+    images: &mut [Rgb],
 ) {
     let isa = Isa::best();
     if synthesis.shares_negative() {
         if let Some(level) = levels.first() {
-            Capture::new(key, synthesis, *level, isa).develop(clean, levels, dark);
+            Capture::new(key, synthesis, *level, isa).develop(clean, levels, images);
         }
     } else {
-        for (level, dark) in levels.iter().zip(dark) {
-            let shot = Capture::new(key, synthesis, *level, isa);
-            shot.develop(clean, &[*level], std::slice::from_mut(dark));
+        for (level, image) in levels.iter().zip(images) {
+            let capture = Capture::new(key, synthesis, *level, isa);
+            capture.develop(clean, &[*level], std::slice::from_mut(image));
         }
     }
 }
 
-/// One press of the shutter: a camera's state with its noise, ready for any row.
+/// One exposure of the sensor: camera state and noise, ready for any row.
 struct Capture {
     unprocess: Unprocess,
     noise: Noise,
@@ -154,27 +154,27 @@ impl Capture {
         }
     }
 
-    /// A sensor row, noisy and balanced.
-    fn take(&self, clean: &Rgb, row: usize, line: &mut super::bayer::RawRow<'_>) {
-        self.unprocess.act(clean, row, line);
-        self.noise.act(row, line);
+    /// Fills a sensor row with the frame's samples, noisy and white-balanced.
+    fn capture_row(&self, clean: &Rgb, row: usize, line: &mut super::bayer::RawRow<'_>) {
+        self.unprocess.fill(clean, row, line);
+        self.noise.apply(row, line);
         self.developer.balance(row, line);
-        line.seal();
+        line.repeat_edges();
     }
 
-    /// Develops the levels band by band.
-    fn develop(&self, clean: &Rgb, levels: &[Severity], dark: &mut [Rgb]) {
+    /// Develops all levels band by band.
+    fn develop(&self, clean: &Rgb, levels: &[Severity], images: &mut [Rgb]) {
         let (height, width) = (clean.height(), clean.width());
         let mut bands: Vec<Vec<&mut [u8]>> = Vec::new();
         bands.resize_with(height.div_ceil(BAND), Vec::new);
-        for image in &mut dark[..levels.len()] {
+        for image in &mut images[..levels.len()] {
             assert_eq!((image.height(), image.width()), (height, width));
             let parts = image.samples_mut().chunks_mut(BAND * 3 * width);
             for (band, part) in bands.iter_mut().zip(parts) {
                 band.push(part);
             }
         }
-        // A band has two rows more on either side, so that it begins with a red one; at the image's edges they are none.
+        // A band has two more rows on each side, except at the image's edges. Two, so that it begins with a row of red sites.
         let scratch = || (Bayer::covering(BAND + 4, width), vec![0.0; 3 * width]);
         bands.into_par_iter().enumerate().for_each_init(
             scratch,
@@ -187,7 +187,7 @@ impl Capture {
                     *raw = Bayer::covering(end + lead - first, width);
                 }
                 for at in lead.saturating_sub(1)..raw.height().min(lead + rows + 1) {
-                    self.take(clean, first + at - lead, &mut raw.line_mut(at));
+                    self.capture_row(clean, first + at - lead, &mut raw.line_mut(at));
                 }
                 for row in 0..rows {
                     self.developer.display(raw, lead + row, display);
@@ -202,13 +202,13 @@ impl Capture {
 }
 
 impl Synthesis {
-    /// The camera of the frame that `key` belongs to, as it is at a level.
+    /// State of the camera of the frame that `key` belongs to, at a level.
     #[must_use]
     pub fn state(&self, key: &NoiseKey, severity: Severity) -> CameraState {
         self.state_by(key, severity.value())
     }
 
-    /// The same as it is after any exposure drop; light that is not lost is no reason to amplify.
+    /// State of the camera after any exposure drop. With [`Coupling::Photon`], a negative drop has the ratio 1.
     #[must_use]
     pub fn state_by(&self, key: &NoiseKey, drop_ev: f64) -> CameraState {
         let drawn = CameraState::draw(key, &self.camera);
@@ -221,7 +221,7 @@ impl Synthesis {
         }
     }
 
-    /// Whether all levels of a frame are made from one negative.
+    /// Whether all levels of a frame are developed from one negative.
     #[must_use]
     pub fn shares_negative(&self) -> bool {
         self.draws == Draws::Shared && self.coupling == Coupling::Independent
@@ -233,16 +233,16 @@ mod tests {
     use super::*;
     use crate::types::FrameId;
 
-    /// Dark, bright and in between, so that every way through the samplers is taken.
+    /// Dark, bright and medium samples, so that every branch of the samplers is reached.
     fn clean() -> Rgb {
         let samples = (0..40 * 150 * 3).map(|i: u32| (i.wrapping_mul(2_654_435_761) >> 24) as u8);
         Rgb::new(40, 150, samples.collect()).unwrap()
     }
 
-    /// No instruction set changes a byte: not of the exposure branch, and not of the sensor branch at any gain or ratio.
+    /// No instruction set changes a byte of the sensor branch, at any gain or ratio.
     #[test]
-    fn instructions_do_not_enter() {
-        let sets = Isa::present();
+    fn the_instruction_set_does_not_change_the_image() {
+        let sets = Isa::available();
         let clean = clean();
         let key = NoiseKey::new(9, &FrameId("isa".to_owned()));
         let choices = [
@@ -259,10 +259,10 @@ mod tests {
             };
             for (amplify, tone) in choices {
                 let develop = |isa: &Isa| {
-                    let shot = Capture::with(&key, &state, amplify, tone, &Term::ALL, *isa);
-                    let mut dark = Severity::LADDER.map(|_| Rgb::black(40, 150));
-                    shot.develop(&clean, &Severity::LADDER, &mut dark);
-                    dark
+                    let capture = Capture::with(&key, &state, amplify, tone, &Term::ALL, *isa);
+                    let mut images = Severity::LADDER.map(|_| Rgb::black(40, 150));
+                    capture.develop(&clean, &Severity::LADDER, &mut images);
+                    images
                 };
                 let baseline = develop(&Isa::Baseline);
                 for isa in &sets {

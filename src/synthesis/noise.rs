@@ -1,11 +1,10 @@
-//! The noise of a sensor in four terms: [`shot`], [`read`], [`row`] and [`quantisation`]; [`add`] puts them together.
+//! Sensor noise in four terms: [`shot`], [`read`], [`row`] and [`quantisation`]; [`add`] combines them.
 //!
-//! The terms work in ADU on the sites of one Bayer plane in one sensor row, and take their numbers from the bits that
-//! belong to those sites.
+//! The terms work in ADU on the sites of one Bayer plane in one sensor row, and draw from the random bits of those sites.
 //!
-//! By the paper's wording the ratio r belongs to the shot noise alone ("reduce the signal by r, add Poisson noise,
-//! amplify back by r"), and read, row and quantisation noise act on the amplified signal. ELD lets all four act on the
-//! attenuated one. [`Amplify`] chooses.
+//! In the paper's words, the ratio r belongs to the shot noise alone ("reduce the signal by r, add Poisson noise, amplify
+//! back by r"): read, row and quantisation noise are added to the amplified signal. In ELD all four are added to the
+//! attenuated signal. [`Amplify`] chooses between the two.
 
 use rayon::prelude::*;
 
@@ -20,31 +19,31 @@ use super::reading::Amplify;
 /// One term of the noise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Term {
-    /// Photon shot noise.
+    /// Photon shot noise: Poisson-distributed electrons.
     Shot,
-    /// Read noise.
+    /// Read noise: Tukey-λ distributed, with an offset for each plane.
     Read,
-    /// Row noise.
+    /// Row noise: one normal number for each sensor row.
     Row,
-    /// Quantisation noise.
+    /// Quantisation noise: uniform within one ADU.
     Quantisation,
 }
 
 impl Term {
-    /// All four, in the order in which they act.
+    /// All four terms, in the order in which they are added.
     pub const ALL: [Self; 4] = [Self::Shot, Self::Read, Self::Row, Self::Quantisation];
 }
 
-/// Adds the given terms to a RAW image (DarkQA, N₄ ∘ N₃ ∘ N₂ ∘ N₁). Leaving one out changes no draw of the others.
+/// Adds the given terms to a RAW image (DarkQA, N₄ ∘ N₃ ∘ N₂ ∘ N₁). Leaving out a term does not change the others' draws.
 pub fn add(raw: &mut Bayer, state: &CameraState, key: &NoiseKey, amplify: Amplify, terms: &[Term]) {
     let noise = Noise::new(state, key, amplify, terms, Isa::best());
     raw.lines_mut().enumerate().for_each(|(row, mut line)| {
-        noise.act(row, &mut line);
-        line.seal();
+        noise.apply(row, &mut line);
+        line.repeat_edges();
     });
 }
 
-/// Photon shot noise on the attenuated signal y: K · Poisson(y / K), of mean y and variance K · y.
+/// Photon shot noise on the attenuated signal y: K · Poisson(y / K), with mean y and variance K · y.
 #[inline(always)]
 pub(crate) fn shot(adu: &mut Lanes<f32>, gain: f32, words: [&Lanes<u32>; 2]) {
     for y in adu.iter_mut() {
@@ -56,7 +55,7 @@ pub(crate) fn shot(adu: &mut Lanes<f32>, gain: f32, words: [&Lanes<u32>; 2]) {
     }
 }
 
-/// Read noise: σ_TL · Q_λ(u) and the offset of the plane (Wei et al. 2021).
+/// Read noise: σ_TL · Q_λ(u) plus the offset of the plane (Wei et al. 2021).
 #[inline(always)]
 pub(crate) fn read(
     adu: &mut Lanes<f32>,
@@ -71,7 +70,7 @@ pub(crate) fn read(
     }
 }
 
-/// Row noise: one number of N(0, σ_r²) for the whole sensor row, that is for both of its planes (Wei et al. 2021).
+/// Row noise: one number of N(0, σ_r²) for a whole sensor row, that is for both of its planes (Wei et al. 2021).
 #[must_use]
 pub(crate) fn row(deviation: f64, stream: Stream, row: usize) -> f32 {
     (deviation * stream.at(Site::new(row, 0)).normal()) as f32
@@ -85,20 +84,20 @@ pub(crate) fn quantisation(adu: &mut Lanes<f32>, words: &Lanes<u32>) {
     }
 }
 
-/// The noise of one frame, ready to act on any of its rows.
+/// Noise of one frame, ready for any of its rows.
 #[derive(Debug)]
 pub(super) struct Noise {
     amplify: Amplify,
-    /// White in ADU over the attenuation r: what a full sample is when the shot noise acts.
+    /// Value of white in ADU, divided by r: the scale of the samples when the shot noise is added.
     attenuated: f32,
     ratio: f32,
     adu_range: f32,
-    /// The system gain K, where there is shot noise.
+    /// System gain K, in ADU per electron; `None` without shot noise.
     shot: Option<f32>,
-    /// Scale and quantile function, where there is read noise.
+    /// Scale in ADU and quantile function; `None` without read noise.
     read: Option<(f32, Quantile)>,
     bias: [f32; 4],
-    /// Deviation and numbers, where there is row noise.
+    /// Standard deviation in ADU and random stream; `None` without row noise.
     row: Option<(f64, Stream)>,
     quantisation: bool,
     field: Stream,
@@ -132,8 +131,8 @@ impl Noise {
         }
     }
 
-    /// Acts on a sensor row.
-    pub(super) fn act(&self, at: usize, line: &mut RawRow<'_>) {
+    /// Scales a sensor row to ADU, adds the noise and scales it back.
+    pub(super) fn apply(&self, at: usize, line: &mut RawRow<'_>) {
         let row_offset = match self.row {
             Some((deviation, stream)) => row(deviation, stream, at),
             None => 0.0,
@@ -150,7 +149,7 @@ impl Noise {
     }
 }
 
-/// The sites of one plane in one row, under the noise.
+/// Sites of one plane in one row, with the noise to add.
 struct PlaneRow<'a> {
     noise: &'a Noise,
     /// Row and first column.
@@ -166,14 +165,15 @@ impl Kernel for PlaneRow<'_> {
         let [row, first] = self.site;
         for (index, samples) in self.samples.iter_mut().enumerate() {
             let site = Site::new(row, first + 2 * LANES * index);
-            self.noise.over(samples, site, self.offset, self.row_offset);
+            self.noise
+                .apply_to_lanes(samples, site, self.offset, self.row_offset);
         }
     }
 }
 
 impl Noise {
     #[inline(always)]
-    fn over(&self, adu: &mut Lanes<f32>, first: Site, offset: f32, row_offset: f32) {
+    fn apply_to_lanes(&self, adu: &mut Lanes<f32>, first: Site, offset: f32, row_offset: f32) {
         let field = self.field.field(first);
         scale(adu, self.attenuated);
         if let Some(gain) = self.shot {
@@ -215,7 +215,7 @@ mod tests {
         NoiseKey::new(21, &FrameId("noise".to_owned()))
     }
 
-    /// A grey RAW image under some terms, row by row.
+    /// A grey RAW image with the given terms of noise, row by row.
     fn noisy(state: &CameraState, amplify: Amplify, terms: &[Term]) -> Vec<Vec<f32>> {
         let mut raw = Bayer::covering(8, 12);
         raw.lines_mut().for_each(|mut line| {
@@ -247,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn row_noise_is_one_number_a_row() {
+    fn row_noise_is_one_number_per_row() {
         let rows = noisy(&median(), Amplify::ShotOnly, &[Term::Row]);
         for row in &rows {
             assert!(row.iter().all(|y| y.to_bits() == row[0].to_bits()));
@@ -255,9 +255,9 @@ mod tests {
         assert!(rows.windows(2).all(|pair| pair[0] != pair[1]));
     }
 
-    /// The difference that a term makes is the same whatever the other terms are.
+    /// The difference that a term makes does not depend on the other terms.
     #[test]
-    fn switching_a_term_off_leaves_the_others_as_they_were() {
+    fn leaving_out_a_term_does_not_change_the_others() {
         for amplify in [Amplify::ShotOnly, Amplify::All] {
             let noisy = |terms: &[Term]| noisy(&median(), amplify, terms).concat();
             let difference = |with: &[f32], without: &[f32]| -> Vec<f32> {
@@ -268,26 +268,26 @@ mod tests {
                     .into_iter()
                     .filter(|other| *other != term)
                     .collect();
-                let in_company = difference(&noisy(&Term::ALL), &noisy(&others));
+                let with_others = difference(&noisy(&Term::ALL), &noisy(&others));
                 let alone = difference(&noisy(&[term]), &noisy(&[]));
-                for (a, b) in in_company.iter().zip(&alone) {
+                for (a, b) in with_others.iter().zip(&alone) {
                     assert!((a - b).abs() < 1e-6, "{term:?}");
                 }
             }
         }
     }
 
-    /// The paper's wording against ELD's: by r, the terms after the shot noise are all that differs.
+    /// With `all`, the terms after the shot noise are r times larger than with `shot-only`; the shot noise is the same.
     #[test]
-    fn the_ratio_amplifies_what_it_is_told_to() {
+    fn the_ratio_amplifies_the_chosen_terms() {
         let state = median();
         let after = [Term::Read, Term::Row, Term::Quantisation];
         let clean = noisy(&state, Amplify::All, &[]).concat();
-        let [by_wording, amplified] = [Amplify::ShotOnly, Amplify::All]
+        let [shot_only, all] = [Amplify::ShotOnly, Amplify::All]
             .map(|amplify| noisy(&state, amplify, &after).concat());
-        for ((clean, little), much) in clean.iter().zip(&by_wording).zip(&amplified) {
+        for ((clean, shot_only), all) in clean.iter().zip(&shot_only).zip(&all) {
             let ratio = state.ratio as f32;
-            assert!(((little - clean) * ratio - (much - clean)).abs() < 2e-4);
+            assert!(((shot_only - clean) * ratio - (all - clean)).abs() < 2e-4);
         }
         let shot = [Amplify::ShotOnly, Amplify::All]
             .map(|amplify| noisy(&state, amplify, &[Term::Shot]).concat());

@@ -1,22 +1,22 @@
-//! A function of a positive number as a table of straight pieces: [`Piecewise`].
+//! Piecewise linear approximation of a function of a positive number: [`Piecewise`].
 
-/// Pieces in each octave.
+/// Pieces per octave, a power of two; chosen.
 const PIECES: usize = 128;
-/// The bits of a single-precision number below those that name its piece.
+/// Low bits of a single-precision number that give its position within a piece.
 const WITHIN: u32 = 23 - PIECES.ilog2();
-/// The octaves of a table.
+/// Octaves that a table covers.
 const OCTAVES: usize = 32;
 
-/// A function over 32 octaves of its argument, in straight pieces of 1/128 octave's base.
+/// Function over 32 octaves of its argument, as 128 straight pieces per octave.
 ///
-/// The pieces are equally wide within an octave, so that they narrow towards zero as fast as the argument does: a curve
-/// that goes as a logarithm or a power has the same relative accuracy everywhere, its steep end included. The chord of a
-/// piece stands off by at most f″(x) x² / 8 · 2⁻¹⁴: 8·10⁻⁶ for a logarithm.
+/// The pieces of an octave have equal width, so that the width shrinks with the argument. A curve like a logarithm or a
+/// power therefore has the same relative accuracy everywhere, also at its steep end. The error of a piece is at most
+/// f″(x) x² / 8 · 2⁻¹⁴: 8·10⁻⁶ for a logarithm.
 #[derive(Debug, Clone)]
 pub(crate) struct Piecewise {
-    /// The piece that the lower end of the domain begins, as the upper bits of that number.
+    /// Upper bits of the lower end of the domain, where the first piece begins.
     first: u32,
-    /// Value at the beginning of each piece, and its rise to the next in units of the last place.
+    /// Value at the beginning of each piece, and its increase per unit in the last place of the argument.
     pieces: Box<[[f32; 2]; OCTAVES * PIECES]>,
 }
 
@@ -43,11 +43,11 @@ impl Piecewise {
             first: ((exponent + 127) as u32) << PIECES.ilog2(),
             pieces: pieces
                 .try_into()
-                .unwrap_or_else(|_| unreachable!("its length is that")),
+                .unwrap_or_else(|_| unreachable!("the length is OCTAVES * PIECES")),
         }
     }
 
-    /// The function at `x`, which lies in the domain.
+    /// The function at `x`, which must be in the domain.
     #[inline(always)]
     #[must_use]
     pub(crate) fn at(&self, x: f32) -> f32 {
@@ -63,7 +63,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_logarithm_is_kept_over_all_octaves() {
+    fn a_logarithm_is_accurate_over_all_octaves() {
         let table = Piecewise::new(-20, f64::ln);
         for step in 0..100_000 {
             let x = f32::exp2(-20.0 + 31.999 * step as f32 / 100_000.0);

@@ -1,39 +1,39 @@
-//! Poisson numbers from two words of 32 random bits each: [`lanes`].
+//! Poisson numbers, each from two words of 32 random bits: [`lanes`].
 //!
-//! A mean below 48 is split into a multiple of ½ and a rest, whose Poisson numbers add up to one of their sum: the first
-//! is looked up in Walker's alias table of that mean, the second counted. From 48 on the quantile function is expanded
-//! about the normal one. The whole distribution is exact to 2⁻³² below 48; above it is off by 5·10⁻⁶ in total variation
-//! at 48, and by less with every larger mean (χ² would see it after 10⁹ draws).
+//! A mean below 48 is split into a multiple of ½ and a rest. The sum of their Poisson numbers is a Poisson number of the
+//! mean: the first is looked up in Walker's alias table, the second is counted. From 48 on, the quantile function is
+//! expanded about the normal one. Below 48 the distribution is exact to 2⁻³². At 48 its total variation error is 5·10⁻⁶,
+//! and less for larger means (a χ² test would detect it after 10⁹ draws).
 
 use std::sync::LazyLock;
 
 use super::lanes::{LANES, Lanes};
 use super::quantile::NORMAL;
 
-/// The mean from which the expansion serves.
+/// Smallest mean for which the expansion is used.
 const EXPANDED_FROM: f32 = 48.0;
-/// The tables of the multiples of ½ below it, filled up to a power of two.
+/// Alias tables: one for each multiple of ½ below 48, padded to a power of two.
 const TABLES: usize = 128;
-/// The numbers 0 to 127 have a slot each in every table.
+/// Slots of a table: one for each number from 0 to 127.
 const SLOTS: usize = 128;
 const SLOT_BITS: u32 = SLOTS.ilog2();
-/// The bits that say where in its slot a word falls.
-const PLACE_BITS: u32 = 32 - SLOT_BITS;
+/// Bits of a word that give its position within a slot.
+const POSITION_BITS: u32 = 32 - SLOT_BITS;
 
 /// 1.5 · 2^23: adding it to a number within ±2^22 leaves the nearest whole number in the lower bits.
 const ROUND: f32 = 12_582_912.0;
 
-/// Poisson numbers of the given means (from 0 to 2·10⁶), each from two words.
+/// Replaces means (from 0 to 2·10⁶) by Poisson numbers, each drawn from two words.
 #[inline(always)]
 pub(crate) fn lanes(means: &mut Lanes<f32>, words: [&Lanes<u32>; 2]) {
-    let (mut least, mut most) = (f32::INFINITY, 0.0_f32);
+    let (mut min, mut max) = (f32::INFINITY, 0.0_f32);
     for mean in means.iter() {
-        least = if *mean < least { *mean } else { least };
-        most = if *mean > most { *mean } else { most };
+        min = if *mean < min { *mean } else { min };
+        max = if *mean > max { *mean } else { max };
     }
-    if most < EXPANDED_FROM {
+    if max < EXPANDED_FROM {
         *means = split(means, words);
-    } else if least >= EXPANDED_FROM {
+    } else if min >= EXPANDED_FROM {
         *means = expanded(means, words[0]);
     } else {
         let (small, large) = (split(means, words), expanded(means, words[0]));
@@ -47,7 +47,7 @@ pub(crate) fn lanes(means: &mut Lanes<f32>, words: [&Lanes<u32>; 2]) {
     }
 }
 
-/// Means below [`EXPANDED_FROM`]; any larger one gives a number without meaning.
+/// Poisson numbers for means below [`EXPANDED_FROM`]; results for larger means are meaningless.
 #[inline(always)]
 fn split(means: &Lanes<f32>, [words, rest_words]: [&Lanes<u32>; 2]) -> Lanes<f32> {
     let tables = &ALIAS_TABLES[..TABLES * SLOTS];
@@ -59,22 +59,22 @@ fn split(means: &Lanes<f32>, [words, rest_words]: [&Lanes<u32>; 2]) -> Lanes<f32
         } else {
             0.0
         };
-        // The multiple of ½ below or at the mean; on a tie it may be the one ½ below, which serves as well.
+        // The largest multiple of ½ up to the mean. On a tie it may be ½ less, which is correct too.
         let twice = (2.0 * mean - 0.5) + ROUND;
         rests[i] = mean - 0.5 * (twice - ROUND);
         entries[i] =
-            ((twice.to_bits() & (TABLES as u32 - 1)) << SLOT_BITS) | (words[i] >> PLACE_BITS);
+            ((twice.to_bits() & (TABLES as u32 - 1)) << SLOT_BITS) | (words[i] >> POSITION_BITS);
     }
     for entry in &mut entries {
         *entry = tables[*entry as usize % (TABLES * SLOTS)];
     }
     let mut numbers = [0.0; LANES];
-    let mut long = false;
+    let mut any_beyond_3 = false;
     for i in 0..LANES {
-        let place = words[i] & ((1 << PLACE_BITS) - 1);
-        let slot = words[i] >> PLACE_BITS;
+        let position = words[i] & ((1 << POSITION_BITS) - 1);
+        let slot = words[i] >> POSITION_BITS;
         let alias = entries[i] & (SLOTS as u32 - 1);
-        let number = if place < entries[i] >> SLOT_BITS {
+        let number = if position < entries[i] >> SLOT_BITS {
             slot
         } else {
             alias
@@ -85,9 +85,9 @@ fn split(means: &Lanes<f32>, [words, rest_words]: [&Lanes<u32>; 2]) -> Lanes<f32
             + step(uniform < at_least_1(rest))
             + step(uniform < at_least_2(rest))
             + step(uniform < at_least_3(rest));
-        long |= uniform < bound_of_4(rest);
+        any_beyond_3 |= uniform < bound_of_4(rest);
     }
-    if long {
+    if any_beyond_3 {
         for i in 0..LANES {
             let uniform = upper_uniform(rest_words[i]);
             if uniform < bound_of_4(rests[i]) {
@@ -103,13 +103,13 @@ fn step(condition: bool) -> f32 {
     if condition { 1.0 } else { 0.0 }
 }
 
-/// A number uniform in (0, 1) with all its digits where it is small.
+/// Uniform number in (0, 1), with full precision for small values.
 #[inline(always)]
 fn upper_uniform(word: u32) -> f32 {
     ((word >> 1).cast_signed() as f32 + 0.5) * (1.0 / 2_147_483_648.0)
 }
 
-/// P(N ≥ 1) of a mean x ≤ ½: the sum over j of (−1)^(j−k) C(j − 1, k − 1) x^j / j! with k = 1, to 10⁻⁶ of itself.
+/// P(N ≥ 1) of a mean x ≤ ½: the sum over j of (−1)^(j−k) C(j − 1, k − 1) x^j / j! with k = 1, to a relative error of 10⁻⁶.
 #[inline(always)]
 fn at_least_1(x: f32) -> f32 {
     x * (1.0
@@ -139,13 +139,13 @@ fn at_least_3(x: f32) -> f32 {
                 + x * (1.0 / 20.0 + x * (-1.0 / 72.0 + x * (1.0 / 336.0 + x * (-1.0 / 1920.0))))))
 }
 
-/// What P(N ≥ 4) is below: x⁴ / 4!.
+/// Upper bound of P(N ≥ 4): x⁴ / 4!.
 #[inline(always)]
 fn bound_of_4(x: f32) -> f32 {
     (x * x) * (x * x) * (1.0 / 24.0)
 }
 
-/// How many more than 3: the k from 4 on with `uniform` < P(N ≥ k).
+/// Excess over 3: the number of k from 4 on with `uniform` < P(N ≥ k).
 fn beyond_3(mean: f64, uniform: f64) -> f32 {
     let mut term = libm::exp(-mean) * mean * mean * mean / 6.0;
     let mut count = 0.0_f32;
@@ -165,7 +165,7 @@ fn beyond_3(mean: f64, uniform: f64) -> f32 {
     count
 }
 
-/// Means from [`EXPANDED_FROM`] on: the quantile function to the order 1/λ about the normal quantile w,
+/// Poisson numbers for means from [`EXPANDED_FROM`] on: the quantile function to order 1/λ about the normal quantile w,
 /// λ + √λ w + (w² + 2)/6 − (w³ + 2w)/(72 √λ) + (w⁴/270 + 7w²/810 − 8/405)/λ, rounded down (Giles, "Algorithm 955:
 /// approximation of the inverse Poisson cumulative distribution function", ACM TOMS 42, 2016).
 #[inline(always)]
@@ -189,8 +189,8 @@ fn expanded(means: &Lanes<f32>, words: &Lanes<u32>) -> Lanes<f32> {
     numbers
 }
 
-/// For each multiple of ½, slots of equal width for the numbers 0 to 127: the lower part of a slot is its own number's,
-/// the rest another's. An entry is the width of the lower part, then 7 bits of the other number.
+/// For each multiple of ½, slots of equal width for the numbers 0 to 127. The lower part of a slot stands for its own
+/// number, the rest for another, the alias. An entry is the width of the lower part, followed by 7 bits of the alias.
 static ALIAS_TABLES: LazyLock<Vec<u32>> = LazyLock::new(|| {
     let mut tables = vec![0; TABLES * SLOTS];
     for (index, table) in tables.as_chunks_mut::<SLOTS>().0.iter_mut().enumerate() {
@@ -201,9 +201,9 @@ static ALIAS_TABLES: LazyLock<Vec<u32>> = LazyLock::new(|| {
     tables
 });
 
-/// Walker's table of a mean, in Vose's way, in whole numbers: probabilities are multiples of 2⁻³² that sum to 1.
+/// Walker's alias table for a mean, built by Vose's method in integers: probabilities are multiples of 2⁻³² that sum to 1.
 fn alias_table(mean: f64) -> [u32; SLOTS] {
-    const WIDTH: u64 = 1 << PLACE_BITS;
+    const WIDTH: u64 = 1 << POSITION_BITS;
     let mut probability = libm::exp(-mean);
     let mut parts: [u64; SLOTS] = std::array::from_fn(|number| {
         if number > 0 {
@@ -211,21 +211,21 @@ fn alias_table(mean: f64) -> [u32; SLOTS] {
         }
         libm::round(libm::ldexp(probability, 32)) as u64
     });
-    // What rounding left over goes to the likeliest number.
-    let left = (1_u64 << 32).wrapping_sub(parts.iter().sum());
+    // The remainder of rounding goes to the most probable number.
+    let remainder = (1_u64 << 32).wrapping_sub(parts.iter().sum());
     let mode = mean as usize;
-    parts[mode] = parts[mode].wrapping_add(left);
+    parts[mode] = parts[mode].wrapping_add(remainder);
 
-    // A full slot is its own number's whole: its other number is itself.
+    // A full slot stands for its own number alone: its alias is itself.
     let mut table: [u32; SLOTS] = std::array::from_fn(|slot| slot as u32);
     let (mut small, mut large): (Vec<_>, Vec<_>) =
         (0..SLOTS).partition(|slot| parts[*slot] < WIDTH);
-    while let (Some(slot), Some(giver)) = (small.pop(), large.last().copied()) {
-        table[slot] = ((parts[slot] as u32) << SLOT_BITS) | giver as u32;
-        parts[giver] -= WIDTH - parts[slot];
-        if parts[giver] < WIDTH {
+    while let (Some(slot), Some(donor)) = (small.pop(), large.last().copied()) {
+        table[slot] = ((parts[slot] as u32) << SLOT_BITS) | donor as u32;
+        parts[donor] -= WIDTH - parts[slot];
+        if parts[donor] < WIDTH {
             large.pop();
-            small.push(giver);
+            small.push(donor);
         }
     }
     table

@@ -1,4 +1,4 @@
-//! Distributions that are symmetric about zero, drawn by their quantile functions: [`Quantile`].
+//! Distributions symmetric about zero, sampled by their quantile functions: [`Quantile`].
 
 use std::sync::LazyLock;
 
@@ -8,30 +8,30 @@ use super::piecewise::Piecewise;
 /// The largest single-precision number below 2^31.
 const LAST: f32 = 2_147_483_520.0;
 
-/// A quantile function with Q(1 − u) = −Q(u), tabulated on the lower half, u = (m + ½) · 2⁻³² for m below 2^31.
+/// Quantile function with Q(1 − u) = −Q(u), tabulated on the lower half, u = (m + ½) · 2⁻³² for m below 2^31.
 ///
-/// Its tails go out to u = 2⁻³³.
+/// The smallest u is 2⁻³³.
 #[derive(Debug, Clone)]
 pub(crate) struct Quantile(Piecewise);
 
-/// That of the standard normal distribution.
+/// Quantile function of the standard normal distribution.
 pub(crate) static NORMAL: LazyLock<Quantile> = LazyLock::new(|| Quantile::new(standard_normal));
 
 impl Quantile {
-    /// Tabulates a quantile function, given for u in (0, ½].
+    /// Tabulates a quantile function, which is called for u in (0, ½].
     #[must_use]
     pub(crate) fn new(function: impl Fn(f64) -> f64) -> Self {
         let cell = libm::ldexp(1.0, -32);
         Self(Piecewise::new(-1, |place| function(place * cell)))
     }
 
-    /// That of Tukey's λ distribution of a shape.
+    /// Quantile function of Tukey's λ distribution, with shape λ.
     #[must_use]
     pub(crate) fn tukey_lambda(shape: f64) -> Self {
         Self::new(|u| tukey_lambda(u, shape))
     }
 
-    /// The quantile that 32 random bits name: the sign, and 31 bits of u.
+    /// The quantile of 32 random bits: one for the sign, 31 for u.
     #[inline(always)]
     #[must_use]
     pub(crate) fn at(&self, word: u32) -> f32 {
@@ -40,7 +40,7 @@ impl Quantile {
         f32::from_bits(lower.to_bits() ^ (word & 0x8000_0000))
     }
 
-    /// The quantiles of many words.
+    /// The quantiles of a batch of words.
     #[inline(always)]
     #[must_use]
     pub(crate) fn lanes(&self, words: &Lanes<u32>) -> Lanes<f32> {
@@ -55,7 +55,7 @@ impl Quantile {
 /// The quantile function of Tukey's λ distribution, (u^λ − (1 − u)^λ) / λ and ln u − ln(1 − u) at λ = 0, for u in the
 /// open interval (0, 1).
 ///
-/// Written as a difference of exp(λ ln u) − 1, which keeps its digits for every λ near 0.
+/// It is computed as a difference of exp(λ ln u) − 1, which stays accurate for every λ near 0.
 #[must_use]
 pub(crate) fn tukey_lambda(u: f64, shape: f64) -> f64 {
     let (below, above) = (libm::log(u), libm::log1p(-u));
@@ -70,7 +70,7 @@ pub(crate) fn tukey_lambda(u: f64, shape: f64) -> f64 {
 fn standard_normal(u: f64) -> f64 {
     let density = |z: f64| libm::exp(-0.5 * z * z) / (2.0 * std::f64::consts::PI).sqrt();
     let distribution = |z: f64| 0.5 * libm::erfc(-z / std::f64::consts::SQRT_2);
-    // ln Φ is concave: from the left of the root, Newton's steps on it never overshoot and soon double their digits.
+    // ln Φ is concave: from the left of the root, Newton's steps on it never overshoot and soon converge quadratically.
     let mut z = -(-2.0 * libm::log(u)).sqrt();
     for _ in 0..60 {
         let step = libm::log(distribution(z) / u) * distribution(z) / density(z);
@@ -99,18 +99,18 @@ mod tests {
             2.0,
         ] {
             for u in u {
-                let due = (f64::powf(u, shape) - f64::powf(1.0 - u, shape)) / shape;
+                let expected = (f64::powf(u, shape) - f64::powf(1.0 - u, shape)) / shape;
                 let found = tukey_lambda(u, shape);
                 assert!(
-                    (found - due).abs() < 1e-12 * due.abs().max(1.0),
+                    (found - expected).abs() < 1e-12 * expected.abs().max(1.0),
                     "λ {shape}, u {u}"
                 );
             }
         }
         for u in u {
-            let due = (u / (1.0 - u)).ln();
-            assert!((tukey_lambda(u, 0.0) - due).abs() < 1e-12 * due.abs().max(1.0));
-            assert!((tukey_lambda(u, 1e-12) - due).abs() < 1e-9 * due.abs().max(1.0));
+            let expected = (u / (1.0 - u)).ln();
+            assert!((tukey_lambda(u, 0.0) - expected).abs() < 1e-12 * expected.abs().max(1.0));
+            assert!((tukey_lambda(u, 1e-12) - expected).abs() < 1e-9 * expected.abs().max(1.0));
         }
     }
 
@@ -128,7 +128,7 @@ mod tests {
         }
     }
 
-    /// The table against the function, at words all over the range and at both ends of it.
+    /// Comparison of table and function at words over the whole range and at both of its ends.
     #[test]
     fn tables_follow_their_functions() {
         type Function = Box<dyn Fn(f64) -> f64>;
@@ -141,12 +141,12 @@ mod tests {
             for octave in 0..31 {
                 for step in 0..1000_u64 {
                     let place = ((1 << octave) * (1000 + step) / 1000) as u32;
-                    let due = function((f64::from(place) + 0.5) * f64::exp2(-32.0));
+                    let expected = function((f64::from(place) + 0.5) * f64::exp2(-32.0));
                     let [lower, upper] =
                         [place, place | 1 << 31].map(|word| f64::from(table.at(word)));
                     assert!(
-                        (lower - due).abs() < 1e-5 + 3e-6 * due.abs(),
-                        "{place}: {lower}, {due}"
+                        (lower - expected).abs() < 1e-5 + 3e-6 * expected.abs(),
+                        "{place}: {lower}, {expected}"
                     );
                     assert!((lower + upper).abs() < f64::EPSILON);
                 }

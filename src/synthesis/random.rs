@@ -1,7 +1,7 @@
-//! Where every random number of the synthesis comes from: [`NoiseKey`], [`Stream`], [`Site`].
+//! Random numbers of the synthesis: [`NoiseKey`], [`Stream`], [`Site`].
 //!
-//! A draw is a pure function of (seed, frame, component, sensor row, sensor column, number of the draw): there is no
-//! state that threads or order could change. The generator is Philox4x32-10 (Salmon et al., "Parallel random numbers:
+//! A draw is a pure function of (seed, frame, component, sensor row, sensor column, index of the draw): there is no state
+//! that threads or order could change. The generator is Philox4x32-10 (Salmon et al., "Parallel random numbers:
 //! as easy as 1, 2, 3", SC 2011), which passes BigCrush on plain counters; its key is taken from a BLAKE3 digest.
 
 use std::convert::Infallible;
@@ -15,11 +15,11 @@ use super::lanes::{LANES, Lanes};
 use crate::types::degradation::Kind;
 use crate::types::{Digest, FrameId, Severity};
 
-/// What a frame's noise is drawn from: the run's seed and the frame's name.
+/// Key of a frame's random numbers, made from the run's seed and the frame's name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NoiseKey {
     noise: Digest,
-    /// What the state of the camera is drawn from: the same, but where one camera took several frames.
+    /// Key of the camera's state; differs from `noise` if one camera took several frames.
     camera: Digest,
 }
 
@@ -39,17 +39,18 @@ impl NoiseKey {
         }
     }
 
-    /// The key of the same frame as the camera took it that took all frames of a walk: noise of its own, but the state of the
-    /// camera drawn from the walk's key.
+    /// The key of the same frame, taken with the camera of a walk: the noise of this frame, but the camera's state from the
+    /// walk's key.
     #[must_use]
-    pub fn taken_on(self, walk: &Self) -> Self {
+    pub fn with_camera_of(self, walk: &Self) -> Self {
         Self {
             camera: walk.camera,
             ..self
         }
     }
 
-    /// The key of the same frame at one severity, for noise of its own. What enters is the label: `L3`, or `E3.3`.
+    /// The key of the same frame for one severity, so that its noise differs from that of others. It depends on the label,
+    /// `L3` or `E3.3`.
     #[must_use]
     pub fn at(&self, severity: Severity) -> Self {
         let level = Kind::Sensor.label(severity);
@@ -60,14 +61,14 @@ impl NoiseKey {
         }
     }
 
-    /// The numbers of one component, unrelated to those of every other.
+    /// The random numbers of one component, independent of those of the others.
     #[must_use]
     pub fn stream(&self, component: Component) -> Stream {
-        let of = match component {
+        let key = match component {
             Component::Camera => self.camera,
             Component::Row | Component::RandomField => self.noise,
         };
-        let digest = Digest::of_parts([of.as_bytes(), component.name().as_bytes()]);
+        let digest = Digest::of_parts([key.as_bytes(), component.name().as_bytes()]);
         let [low, high] = [0, 4].map(|at| {
             let mut word = [0; 4];
             word.copy_from_slice(&digest.as_bytes()[at..at + 4]);
@@ -77,19 +78,19 @@ impl NoiseKey {
     }
 }
 
-/// What a number is drawn for.
+/// Purpose of random numbers; each has another stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Component {
     /// The state of the camera.
     Camera,
-    /// Row noise.
+    /// Row noise: one number per sensor row.
     Row,
-    /// What each site draws for itself: see [`RandomField`].
+    /// Numbers of each sensor site: see [`RandomField`].
     RandomField,
 }
 
 impl Component {
-    /// The name that enters the key: a component may be added or moved without changing the draws of the others.
+    /// Name that enters the stream's key, so that adding or moving a component does not change the others' draws.
     fn name(self) -> &'static str {
         match self {
             Self::Camera => "camera",
@@ -99,18 +100,18 @@ impl Component {
     }
 }
 
-/// The 32 random bits that sites of one sensor row have for each use, by lane.
+/// Words of 32 random bits for [`LANES`] sites of one sensor row, one word per site and use.
 #[derive(Debug, Clone)]
 pub struct RandomField {
-    /// Shot noise: two words.
+    /// Two words per site for shot noise.
     pub shot: [Lanes<u32>; 2],
-    /// Read noise.
+    /// One word per site for read noise.
     pub read: Lanes<u32>,
-    /// Quantisation noise.
+    /// One word per site for quantisation noise.
     pub quantisation: Lanes<u32>,
 }
 
-/// A place on the sensor. Row and column name the Bayer plane and the place in it, and are named by them.
+/// Row and column on the sensor, which also determine the Bayer plane and the position in it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Site {
     row: u32,
@@ -129,12 +130,12 @@ impl Site {
     }
 }
 
-/// The random numbers of one component of one frame, addressed by site and by the number of the draw there.
+/// Random numbers of one component of one frame, addressed by site and by the index of the draw.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stream([u32; 2]);
 
 impl Stream {
-    /// Four words of 32 random bits.
+    /// Four words of 32 random bits for the `draw`-th draw at a site.
     #[inline(always)]
     #[must_use]
     pub fn words(self, site: Site, draw: u32) -> [u32; 4] {
@@ -162,7 +163,7 @@ impl Stream {
         field
     }
 
-    /// The words of one site, one after the other, for a distribution of `rand_distr` to draw from.
+    /// The words of one site as a generator for the distributions of `rand_distr`.
     #[must_use]
     pub fn at(self, site: Site) -> SiteWords {
         SiteWords {
@@ -173,7 +174,7 @@ impl Stream {
     }
 }
 
-/// The words of one site, draw by draw: what is not drawn for every site of the sensor is drawn from them.
+/// Generator of the words of one site, for numbers that are not drawn for every site of the sensor.
 #[derive(Debug, Clone)]
 pub struct SiteWords {
     stream: Stream,
@@ -182,7 +183,7 @@ pub struct SiteWords {
 }
 
 impl SiteWords {
-    /// A standard normal number (Box and Muller 1958), of one draw.
+    /// A standard normal number (Box and Muller 1958), from the four words of one draw.
     pub fn normal(&mut self) -> f64 {
         let [radius, angle]: [f64; 2] = [Open01.sample(self), Open01.sample(self)];
         (-2.0 * libm::log(radius)).sqrt() * libm::cos(2.0 * PI * angle)
@@ -234,7 +235,7 @@ mod tests {
         NoiseKey::new(seed, &FrameId(frame.to_owned()))
     }
 
-    /// The known answers that come with Random123, the authors' own library.
+    /// The known answers that come with Random123, the authors' library.
     #[test]
     fn philox_gives_the_known_answers() {
         let cases = [
@@ -259,8 +260,8 @@ mod tests {
         }
     }
 
-    /// The middle of one of 2^52 equal cells of (0, 1), in which both u and 1 − u are exact: with 53 bits, half a cell less
-    /// than 1 would round to 1, where the quantile functions are infinite.
+    /// Uniform numbers are middles of 2^52 equal cells of (0, 1), so that both u and 1 − u are exact. With 53 bits, the last
+    /// one would round to 1, where the quantile functions are infinite.
     #[test]
     fn unit_numbers_are_the_middles_of_cells() {
         let stream = key(5, "frame").stream(Component::Camera);
@@ -276,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn seed_frame_and_component_each_name_another_stream() {
+    fn seed_frame_and_component_each_give_another_stream() {
         let first = key(7, "a").stream(Component::RandomField);
         assert_eq!(first, key(7, "a").stream(Component::RandomField));
         assert_ne!(first, key(8, "a").stream(Component::RandomField));
@@ -284,8 +285,8 @@ mod tests {
         assert_ne!(first, key(7, "a").stream(Component::Row));
     }
 
-    /// Every bit of both words is even-handed over neighbouring sites, and flips half the bits of the next site,
-    /// row or draw (5 sigma).
+    /// Each bit of the words is 1 for half of the sites, and words of neighbouring sites, rows, draws or uses differ in half
+    /// of their bits (5 sigma).
     #[test]
     fn bits_are_even_and_neighbours_unrelated() {
         let stream = key(1, "frame").stream(Component::RandomField);
@@ -334,7 +335,7 @@ mod tests {
         }
     }
 
-    /// χ² over 64 × 64 cells of a number and its right neighbour's: uniform, and independent.
+    /// χ² test over 64 × 64 cells of a number and its right neighbour: they are uniform and independent.
     #[test]
     fn pairs_of_neighbours_fill_the_square_evenly() {
         const CELLS: usize = 64;

@@ -1,4 +1,5 @@
-//! How the paper's noise is understood: [`Synthesis`], its named contents [`LightReading`], and those of a run, [`Readings`].
+//! Light readings, ways to understand the paper's noise model: [`Synthesis`], its named contents [`LightReading`], and those
+//! of a run, [`Readings`].
 
 use std::collections::BTreeMap;
 
@@ -10,22 +11,22 @@ use crate::error::{Error, Result};
 use crate::types::flag::flag_words;
 use crate::types::{Degradation, ReadingName};
 
-/// How the sensor branch is made. The default is the paper to the letter.
+/// Choices that define the sensor branch. The default follows the paper to the letter.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Synthesis {
-    /// What the ratio r amplifies.
+    /// Noise terms that the ratio r amplifies.
     pub amplify: Amplify,
-    /// Where a forward tone curve stands.
+    /// Position of a forward tone curve.
     pub tone: Tone,
-    /// What the levels of a frame share.
+    /// Random draws that the levels of a frame share.
     pub draws: Draws,
-    /// What the ratio r depends on.
+    /// Quantity that the ratio r depends on.
     pub coupling: Coupling,
-    /// The distribution that each frame's camera is drawn from.
+    /// Distribution that each frame's camera is drawn from.
     pub camera: CameraModel,
 }
 
-/// A way to understand the paper's noise that has a name.
+/// A named way to understand the paper's noise model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum LightReading {
     /// The DarkQA paper to the letter.
@@ -33,17 +34,17 @@ pub enum LightReading {
     Paper,
     /// The ratio amplifies all noise, as in ELD (Wei et al. 2020).
     Eld,
-    /// The ratio is 2^ΔEV: photons fall with the level, read noise does not grow.
+    /// The ratio is 2^ΔEV: photons decrease with the level, read noise does not increase.
     Level,
-    /// What physics says: all noise is amplified, light lost is photons lost, the tone curve is put back.
+    /// As in physics: all noise is amplified, less light means fewer photons, and the tone curve is applied again.
     Physical,
 }
 
 impl LightReading {
-    /// All readings, in the order of tables.
+    /// All readings, in the order in which tables list them.
     pub const ALL: [Self; 4] = [Self::Paper, Self::Eld, Self::Level, Self::Physical];
 
-    /// The name in conditions.
+    /// Name in conditions, as `eld` in `L3-noise@eld`.
     #[must_use]
     pub fn name(self) -> ReadingName {
         match self {
@@ -56,7 +57,7 @@ impl LightReading {
 }
 
 impl Synthesis {
-    /// The choices of a reading, with any camera.
+    /// The choices of a named reading, with the given camera.
     #[must_use]
     pub fn of(reading: LightReading, camera: CameraModel) -> Self {
         let (amplify, tone, coupling) = match reading {
@@ -74,7 +75,7 @@ impl Synthesis {
         }
     }
 
-    /// The name of these choices: that of the reading which they match, whatever the camera, else `custom`.
+    /// Name of the reading that has these choices, whatever the camera; `custom` if there is none.
     #[must_use]
     pub fn name(&self) -> ReadingName {
         let mut readings = LightReading::ALL.into_iter();
@@ -83,7 +84,7 @@ impl Synthesis {
     }
 }
 
-/// The light readings of a run, by name; at least one.
+/// Light readings of a run by name; at least one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(transparent)]
 pub(crate) struct Readings(BTreeMap<ReadingName, Synthesis>);
@@ -101,7 +102,7 @@ impl From<Synthesis> for Readings {
 }
 
 impl Readings {
-    /// Several named readings, with one camera; `paper` alone of an empty list.
+    /// Several named readings with one camera; `paper` alone for an empty list.
     #[must_use]
     pub(crate) fn named(readings: &[LightReading], camera: &CameraModel) -> Self {
         let contents = readings.iter();
@@ -114,49 +115,49 @@ impl Readings {
         Self(contents)
     }
 
-    /// The names with the contents, `paper` first.
+    /// Names and contents of the readings, `paper` first.
     pub(crate) fn iter(&self) -> impl Iterator<Item = (&ReadingName, &Synthesis)> {
         self.0.iter()
     }
 
-    /// The content that a degradation is made by: that of its reading; of a kind without readings any, for it has no part
-    /// in the pixels.
+    /// Content of a degradation's light reading. For a kind without readings it is any of them, because the pixels do not
+    /// depend on it.
     ///
     /// # Errors
-    /// If the run does not know the reading.
-    pub(crate) fn of(&self, how: Option<&Degradation>) -> Result<&Synthesis> {
-        let content = match how.and_then(Degradation::reading) {
+    /// If the run does not have the reading.
+    pub(crate) fn of(&self, degradation: Option<&Degradation>) -> Result<&Synthesis> {
+        let content = match degradation.and_then(Degradation::reading) {
             None => self.0.values().next(),
             Some(name) => self.0.get(name),
         };
         content.ok_or_else(|| {
             let names: Vec<&str> = self.0.keys().map(ReadingName::as_str).collect();
             let problem = format_args!(
-                "{} is not made by the readings {}; name its reading in --profile",
-                how.map_or("L0".to_owned(), ToString::to_string),
+                "{} needs a light reading that is not among those of --profile ({}); add it there",
+                degradation.map_or("L0".to_owned(), ToString::to_string),
                 names.join(", ")
             );
             Error::usage("--profile", problem)
         })
     }
 
-    /// The content of the one reading.
+    /// The content of the only reading.
     ///
     /// # Errors
-    /// If there are several, where a command takes one.
+    /// If there are several.
     pub(crate) fn only(&self) -> Result<&Synthesis> {
         let mut contents = self.0.values();
         match (contents.next(), contents.next()) {
-            (Some(one), None) => Ok(one),
+            (Some(content), None) => Ok(content),
             _ => Err(Error::usage(
                 "--profile",
-                "one light reading at a time is taken here",
+                "this command takes one light reading",
             )),
         }
     }
 }
 
-/// What the ratio r amplifies.
+/// Noise terms that the ratio r amplifies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Amplify {
@@ -167,38 +168,38 @@ pub enum Amplify {
     All,
 }
 
-/// Where a forward tone curve, 3x² − 2x³, stands in the way back to sRGB.
+/// Position of a forward tone curve, 3x² − 2x³, on the way back to sRGB.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Tone {
     /// Nowhere, as the paper lists none.
     #[default]
     None,
-    /// Before the exposure drop: the clean chain is the exposure branch on greys.
+    /// Before the exposure drop: without noise, greys are as in the exposure branch.
     BeforeEv,
-    /// After it, as a camera would: it crushes the darkest levels.
+    /// After the exposure drop, as in a camera: it crushes the darkest levels.
     AfterEv,
 }
 
-/// What the five levels of a frame share.
+/// Random draws that the levels of a frame share.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Draws {
     /// The camera and the noise field: levels differ in light alone.
     #[default]
     Shared,
-    /// The camera alone: each level has a noise field of its own.
+    /// The camera alone: each level has another noise field.
     Fresh,
 }
 
-/// What the ratio r depends on.
+/// Quantity that the ratio r depends on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Coupling {
-    /// Nothing: it is drawn once a frame (DarkQA).
+    /// Nothing: it is drawn once per frame (DarkQA).
     #[default]
     Independent,
-    /// The level: r = 2^ΔEV, so that light lost is photons lost.
+    /// The level: r = 2^ΔEV, so that less light means fewer photons.
     Photon,
 }
 
@@ -247,10 +248,12 @@ mod tests {
     #[test]
     fn a_reading_that_the_run_lacks_is_named() {
         let readings = Readings::named(&[LightReading::Paper], &CameraModel::default());
-        let how: Degradation = "L3-noise@eld".parse().unwrap();
-        let error = readings.of(Some(&how)).unwrap_err().to_string();
+        let degradation: Degradation = "L3-noise@eld".parse().unwrap();
+        let error = readings.of(Some(&degradation)).unwrap_err().to_string();
         assert!(
-            error.contains("L3-noise@eld is not made by the readings paper"),
+            error.contains(
+                "L3-noise@eld needs a light reading that is not among those of --profile (paper)"
+            ),
             "{error}"
         );
         assert!(readings.of(None).is_ok());

@@ -1,4 +1,5 @@
-//! How dark it gets and how noise is made, as flags say it ([`LightArgs`], [`SensorArgs`]), and as it is used ([`LightSettings`], [`SensorSettings`]).
+//! Levels, kinds and noise of degradations: as flags ([`LightArgs`], [`SensorArgs`]) and resolved ([`LightSettings`],
+//! [`SensorSettings`]).
 
 use std::fs;
 use std::path::Path;
@@ -10,17 +11,17 @@ use super::reading::{Amplify, Coupling, Draws, LightReading, Readings, Synthesis
 use super::{Calibration, CameraModel, Sampling};
 use crate::error::{Error, Result};
 use crate::types::degradation::Kind;
-use crate::types::{AxisLevel, Degradation, KindSet, ReadingName, Severity};
+use crate::types::{AxisLevel, Decides, Degradation, KindSet, ReadingName, Severity};
 
 /// The levels and kinds of degradation.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Light")]
 pub(crate) struct LightArgs {
     /// Levels, as L0-L5 or L0,L3, and exposure drops in EV up to 16, as L0,3.3
-    #[arg(long, value_name = "LEVELS", default_value = "L0-L5")]
+    #[arg(long, value_name = "LEVELS", default_value = "L0-L5", add = Decides::Trials)]
     pub levels: Levels,
     /// Which of the paired variants: ev (exposure drop alone), noise (with sensor noise), both
-    #[arg(long, value_name = "ev|noise|both", default_value_t = KindSet::BOTH)]
+    #[arg(long, value_name = "ev|noise|both", default_value_t = KindSet::BOTH, add = Decides::Trials)]
     pub variant: KindSet,
     /// The sensor and its noise.
     #[command(flatten)]
@@ -32,10 +33,10 @@ pub(crate) struct LightArgs {
 #[command(next_help_heading = "Light")]
 pub(crate) struct SensorArgs {
     /// The seed of all random draws
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, add = Decides::Pixels)]
     pub seed: u64,
-    /// Light readings, how the paper's noise is understood, one or several as paper,eld; flags beside one go before its parts and
-    /// make it custom
+    /// Light readings, ways to understand the paper's noise, one or several as paper,eld; the four flags below replace choices
+    /// of a single reading and make it custom
     ///
     /// Conditions with noise carry the reading's name, as L3-noise@physical; that of paper is bare, L3-noise.
     #[arg(
@@ -43,46 +44,45 @@ pub(crate) struct SensorArgs {
         value_name = "LIST",
         value_enum,
         value_delimiter = ',',
-        default_value = "paper"
-    )]
+        default_value = "paper", add = Decides::Trials)]
     pub profile: Vec<Profile>,
     /// What the light ratio r amplifies; default: as --profile says, shot-only in paper
     ///
     /// It is the choice that matters most. At grey 128, L1, K 0.77 and r 200, read, row and quantisation noise add 0.03, 0
-    /// and 0 codes of deviation by the wording, and 9–19, 1–3 and 1–2 codes with all. The wording is the default because
-    /// it is what the paper says, and because the paper's comparison with real images fits the weaker noise.
-    #[arg(long, value_enum)]
+    /// and 0 codes of deviation with shot-only, and 9–19, 1–3 and 1–2 codes with all. shot-only is the default because it is
+    /// what the paper says, and because the paper's comparison with real images fits the weaker noise.
+    #[arg(long, value_enum, add = Decides::Pixels)]
     pub amplify: Option<Amplify>,
     /// Where a forward tone curve stands; default: as --profile says, none in paper
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, add = Decides::Pixels)]
     pub tone: Option<Tone>,
     /// Whether the levels of a frame are developed from one noisy RAW image or each from its own; default: as --profile says, shared
     /// in paper
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, add = Decides::Pixels)]
     pub draws: Option<Draws>,
     /// What the light ratio r depends on; default: as --profile says, independent in paper
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, add = Decides::Pixels)]
     pub coupling: Option<Coupling>,
     /// The sensor: sony-a7s2, nikon-d850, canon-eos-5d4, canon-eos-70d, canon-eos-700d, or a TOML file of a calibration
-    #[arg(long, value_name = "NAME|FILE", default_value = "sony-a7s2")]
+    #[arg(long, value_name = "NAME|FILE", default_value = "sony-a7s2", add = Decides::Pixels)]
     pub camera: String,
     /// Pin the system gain K of the sensor, in ADU per electron; default: log-uniform in the camera's range (0.1–6 for
     /// sony-a7s2) for each image
-    #[arg(long, value_name = "K")]
+    #[arg(long, value_name = "K", add = Decides::Pixels)]
     pub gain: Option<f64>,
     /// Pin the light ratio r of the sensor noise; default: uniform in 100–300 for each image
-    #[arg(long, value_name = "R")]
+    #[arg(long, value_name = "R", add = Decides::Pixels)]
     pub ratio: Option<f64>,
     /// Take the middle of every distribution for each image, instead of a draw
-    #[arg(long)]
+    #[arg(long, add = Decides::Pixels)]
     pub fixed: bool,
 }
 
-/// Levels, the lightest first, none twice.
+/// Levels in ascending order of degradation, without duplicates.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Levels(pub Vec<AxisLevel>);
 
-/// Light readings by name.
+/// Word of `--profile`: a light reading or all of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Profile {
     /// DarkQA to the letter
@@ -93,7 +93,7 @@ pub(crate) enum Profile {
     Level,
     /// --amplify all --tone before-ev --coupling photon
     Physical,
-    /// All four, beside each other
+    /// All four, side by side
     All,
 }
 
@@ -109,28 +109,28 @@ impl Profile {
     }
 }
 
-/// What is done to frames.
+/// Degradations that a run applies to its frames.
 #[derive(Debug)]
 pub(crate) struct LightSettings {
-    /// The levels, lightest first, none twice.
+    /// Levels in ascending order of degradation, without duplicates.
     pub levels: Vec<AxisLevel>,
-    /// The kinds of degradation at all levels but L0.
+    /// Kinds of degradation at all levels except L0.
     pub variants: KindSet,
-    /// What takes the noisy images.
+    /// Settings of the sensor branch.
     pub sensor: SensorSettings,
 }
 
-/// What takes the noisy images.
+/// Settings of the sensor branch, which makes the noisy images.
 #[derive(Debug)]
 pub(crate) struct SensorSettings {
-    /// The seed of all random draws.
+    /// Seed of all random draws.
     pub seed: u64,
-    /// The light readings of the sensor branch.
+    /// Light readings that noisy images are made in.
     pub readings: Readings,
 }
 
 impl LightSettings {
-    /// Reads the camera's file, if one is named.
+    /// Resolves the flags; reads the camera's file if `--camera` names one.
     ///
     /// # Errors
     /// [`Error::Usage`] with the flag that cannot be used.
@@ -142,7 +142,7 @@ impl LightSettings {
         })
     }
 
-    /// What is done to each frame, level by level: each kind, in each light reading if it has readings; `None` is L0.
+    /// Degradations of each frame, level by level: each kind, in each light reading if it has readings; `None` is L0.
     pub(crate) fn degradations(&self) -> Vec<Option<Degradation>> {
         let mut all = Vec::new();
         for level in &self.levels {
@@ -158,10 +158,10 @@ impl LightSettings {
                 } else {
                     vec![None]
                 };
-                let made = readings
+                let degradations = readings
                     .into_iter()
                     .filter_map(|reading| Degradation::new(kind, severity, reading).ok());
-                all.extend(made.map(Some));
+                all.extend(degradations.map(Some));
             }
         }
         all
@@ -169,7 +169,7 @@ impl LightSettings {
 }
 
 impl SensorSettings {
-    /// Reads the camera's file, if one is named.
+    /// Resolves the flags; reads the camera's file if `--camera` names one.
     ///
     /// # Errors
     /// [`Error::Usage`] with the flag that cannot be used.
@@ -181,7 +181,7 @@ impl SensorSettings {
     }
 }
 
-/// The readings of `--profile`; one alone with the parts that stand beside it.
+/// The readings of `--profile`; for a single one, with the choices of the other flags.
 fn readings(args: &SensorArgs) -> Result<Readings> {
     let profiles = args.profile.iter();
     let mut chosen: Vec<LightReading> = Vec::new();
@@ -194,39 +194,40 @@ fn readings(args: &SensorArgs) -> Result<Readings> {
     if let [reading] = chosen[..] {
         return synthesis(args, Synthesis::of(reading, camera)).map(Readings::from);
     }
-    let parts = [
+    let choices = [
         ("--amplify", args.amplify.is_some()),
         ("--tone", args.tone.is_some()),
         ("--draws", args.draws.is_some()),
         ("--coupling", args.coupling.is_some()),
     ];
-    if let Some((flag, _)) = parts.into_iter().find(|(_, said)| *said) {
-        let problem = "beside several profiles it would make them the same; name one profile";
+    if let Some((flag, _)) = choices.into_iter().find(|(_, is_set)| *is_set) {
+        let problem = "cannot be combined with several profiles; name one in --profile";
         return Err(Error::usage(flag, problem));
     }
-    let by_light =
-        |of: &&LightReading| Synthesis::of(**of, camera.clone()).coupling == Coupling::Photon;
+    let by_light = |reading: &&LightReading| {
+        Synthesis::of(**reading, camera.clone()).coupling == Coupling::Photon
+    };
     if args.ratio.is_some()
         && let Some(reading) = chosen.iter().find(by_light)
     {
         let name = reading.name();
-        let problem = format!("the ratio of {name} is 2^EV; leave out one of the two");
+        let problem = format!("the ratio of {name} is 2^EV; leave out --ratio or {name}");
         return Err(Error::usage("--ratio", problem));
     }
     Ok(Readings::named(&chosen, &camera))
 }
 
-/// A reading with the parts that are said beside it.
-fn synthesis(args: &SensorArgs, of: Synthesis) -> Result<Synthesis> {
+/// A reading's choices, each replaced if its flag is set.
+fn synthesis(args: &SensorArgs, reading: Synthesis) -> Result<Synthesis> {
     let synthesis = Synthesis {
-        amplify: args.amplify.unwrap_or(of.amplify),
-        tone: args.tone.unwrap_or(of.tone),
-        draws: args.draws.unwrap_or(of.draws),
-        coupling: args.coupling.unwrap_or(of.coupling),
-        camera: of.camera,
+        amplify: args.amplify.unwrap_or(reading.amplify),
+        tone: args.tone.unwrap_or(reading.tone),
+        draws: args.draws.unwrap_or(reading.draws),
+        coupling: args.coupling.unwrap_or(reading.coupling),
+        camera: reading.camera,
     };
     if synthesis.coupling == Coupling::Photon && args.ratio.is_some() {
-        let problem = "with --coupling photon the ratio is 2^EV; leave out one of the two";
+        let problem = "with --coupling photon, or a profile that has it, the ratio is 2^EV; leave out --ratio";
         return Err(Error::usage("--ratio", problem));
     }
     Ok(synthesis)
@@ -252,21 +253,21 @@ fn camera(args: &SensorArgs) -> Result<CameraModel> {
     Ok(camera)
 }
 
-/// Whether a file is meant: what ends as one, or lies in a folder, is no name of a camera.
+/// Whether `--camera` is a file: it has an extension or a folder, which names of cameras do not have.
 fn is_file(path: &Path) -> bool {
     path.extension().is_some() || path.components().count() > 1
 }
 
-/// The most levels of a run.
-const MOST_LEVELS: usize = 200;
+/// Maximum number of levels of a run; chosen.
+const MAX_LEVELS: usize = 200;
 
-/// The kind whose names levels of light have.
+/// Kind whose labels (L1 to L5) the light levels have.
 const LIGHT: Kind = Kind::ALL[0];
 
 impl FromStr for Levels {
     type Err = String;
 
-    /// Reads `L0-L5`, `L0,L3` or numbers of EV, in any order, none twice.
+    /// Parses `L0-L5`, `L0,L3` or numbers of EV, in any order; sorts them and removes duplicates.
     fn from_str(text: &str) -> Result<Self, String> {
         let mut levels = Vec::new();
         for part in text.split(',').map(str::trim) {
@@ -277,11 +278,11 @@ impl FromStr for Levels {
             let (first, last) = (level(first.trim())?, level(last.trim())?);
             if !part.to_ascii_uppercase().starts_with('L') {
                 return Err(format!(
-                    "{part:?} is no range; levels are L0-L5, numbers of EV stand alone, as {first},{last}"
+                    "{part:?} is not a range; write levels as L0-L5 and numbers of EV one by one, as {first},{last}"
                 ));
             }
             if first > last {
-                return Err(format!("{part:?} runs backwards; {last}-{first} is meant?"));
+                return Err(format!("{part:?} runs backwards; write {last}-{first}"));
             }
             let named = LIGHT.ladder().iter();
             let named = named.map(|severity| AxisLevel::new(LIGHT, *severity));
@@ -290,9 +291,9 @@ impl FromStr for Levels {
         }
         levels.sort_unstable();
         levels.dedup();
-        if levels.len() > MOST_LEVELS {
+        if levels.len() > MAX_LEVELS {
             return Err(format!(
-                "{} levels; {MOST_LEVELS} is the most",
+                "{} levels; at most {MAX_LEVELS} are possible",
                 levels.len()
             ));
         }
@@ -300,7 +301,7 @@ impl FromStr for Levels {
     }
 }
 
-/// One level: a name, or a number of EV.
+/// Parses one level: a name, or a number of EV.
 fn level(text: &str) -> Result<AxisLevel, String> {
     let number = text.starts_with(|c: char| c.is_ascii_digit());
     if text.eq_ignore_ascii_case("L0") || number && text.parse::<f64>() == Ok(0.0) {
@@ -313,7 +314,10 @@ fn level(text: &str) -> Result<AxisLevel, String> {
     };
     let severity = severity.map_err(|e| e.to_string())?;
     if severity > LIGHT.largest() {
-        return Err(format!("{text} EV is above {}", LIGHT.largest()));
+        return Err(format!(
+            "{text} EV is above {}, the maximum",
+            LIGHT.largest()
+        ));
     }
     Ok(AxisLevel::new(LIGHT, severity))
 }
@@ -336,21 +340,21 @@ mod tests {
             names("L4-L5,3.30,6,0,E11"),
             ["L0", "E3.3", "L3", "L4", "L5", "E11"]
         );
-        for (wrong, says) in [
+        for (wrong, part) in [
             ("L6", "\"L6\" is none of"),
             ("", "\"\" is none of"),
             ("L3-L1", "runs backwards"),
-            ("0-5", "is no range"),
+            ("0-5", "is not a range"),
             ("3.333", "two decimals"),
             ("16.5", "above 16"),
             ("-2", "none of"),
         ] {
             let error = wrong.parse::<Levels>().unwrap_err();
-            assert!(error.contains(says), "{error}");
+            assert!(error.contains(part), "{error}");
         }
     }
 
-    /// The sensor that these words say.
+    /// The sensor settings of these command-line words.
     fn sensor(words: &[&str]) -> Result<SensorSettings> {
         let command = SensorArgs::augment_args(clap::Command::new("sensor"));
         let words = std::iter::once("sensor").chain(words.iter().copied());
@@ -360,7 +364,7 @@ mod tests {
     }
 
     #[test]
-    fn profiles_are_a_list_and_parts_stand_beside_one() {
+    fn profiles_are_a_list_and_flags_change_a_single_one() {
         let names = |words: &[&str]| -> Result<Vec<String>> {
             let readings = sensor(words)?.readings;
             Ok(readings.iter().map(|(name, _)| name.to_string()).collect())
@@ -376,10 +380,10 @@ mod tests {
         ] {
             assert_eq!(names(words).unwrap(), expected, "{words:?}");
         }
-        for (words, says) in [
+        for (words, part) in [
             (
                 &["--profile=paper,eld", "--tone=none"][..],
-                "--tone: beside several profiles",
+                "--tone: cannot be combined with several profiles",
             ),
             (
                 &["--profile=paper,physical", "--ratio=200"],
@@ -392,17 +396,17 @@ mod tests {
             (&["--profile=papre"], "invalid value 'papre'"),
             (
                 &["--camera=leica"],
-                "--camera: \"leica\" is none of sony-a7s2",
+                "--camera: \"leica\" is not one of sony-a7s2",
             ),
             (&["--camera=no/such.toml"], "no/such.toml"),
         ] {
             let error = names(words).unwrap_err().to_string();
-            assert!(error.contains(says), "{words:?}: {error}");
+            assert!(error.contains(part), "{words:?}: {error}");
         }
     }
 
     #[test]
-    fn a_flag_goes_before_its_part_of_the_profile() {
+    fn a_flag_replaces_the_choice_of_the_profile() {
         let readings = sensor(&["--profile=physical", "--tone=none"])
             .unwrap()
             .readings;

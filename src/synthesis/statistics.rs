@@ -1,4 +1,4 @@
-//! Each noise term against theory and against `rand_distr`, over ten million draws; over a billion where asked for:
+//! Comparison of each noise term with theory and with `rand_distr`, over ten million draws; over a billion with
 //! `cargo test --release -- --ignored draws`.
 
 use rand_distr::Distribution;
@@ -15,15 +15,15 @@ use crate::types::FrameId;
 const TEN_MILLION: usize = 10_000_000;
 const BILLION: usize = 1_000_000_000;
 
-/// Standard errors that nothing may be off by.
+/// Largest deviation that passes, in standard errors; chosen.
 const BOUND: f64 = 4.0;
 
 fn stream(component: Component) -> Stream {
     NoiseKey::new(21, &FrameId("noise".to_owned())).stream(component)
 }
 
-/// What `tally` makes of `n` draws (rounded up to whole lanes), a thousand lanes at a time, summed.
-fn over(n: usize, bins: usize, tally: impl Fn(&RandomField, &mut [u64]) + Sync) -> Vec<u64> {
+/// Sum of the counts that `tally` makes of `n` draws (rounded up to whole batches), a thousand batches at a time.
+fn tallied(n: usize, bins: usize, tally: impl Fn(&RandomField, &mut [u64]) + Sync) -> Vec<u64> {
     let field = stream(Component::RandomField);
     let rows = n.div_ceil(1000 * LANES);
     let row = |row: usize| {
@@ -45,7 +45,7 @@ fn over(n: usize, bins: usize, tally: impl Fn(&RandomField, &mut [u64]) + Sync) 
 
 fn poisson_counts(mean: f64, n: usize) -> Vec<u64> {
     let bins = (mean + 14.0 * mean.sqrt() + 30.0) as usize;
-    over(n, bins, |field, counts| {
+    tallied(n, bins, |field, counts| {
         let mut numbers = [mean as f32; LANES];
         poisson::lanes(&mut numbers, [&field.shot[0], &field.shot[1]]);
         for number in numbers {
@@ -60,24 +60,24 @@ fn poisson_probability(mean: f64, count: usize) -> f64 {
     libm::exp(count * libm::log(mean) - mean - libm::lgamma(count + 1.0))
 }
 
-/// χ² of observed against expected counts in cells of at least 20 expected, as standard deviations off its mean.
-fn surprise(observed: &[u64], expected: impl Fn(usize) -> f64) -> f64 {
+/// χ² of observed counts, in standard deviations from its mean; cells have an expected count of at least 20.
+fn chi_square(observed: &[u64], expected: impl Fn(usize) -> f64) -> f64 {
     let (mut chi, mut cells) = (0.0, 0.0);
-    let (mut seen, mut due) = (0.0, 0.0);
+    let (mut found, mut expected_sum) = (0.0, 0.0);
     for (index, count) in observed.iter().enumerate() {
-        seen += *count as f64;
-        due += expected(index);
-        if due >= 20.0 {
-            chi += (seen - due) * (seen - due) / due;
+        found += *count as f64;
+        expected_sum += expected(index);
+        if expected_sum >= 20.0 {
+            chi += (found - expected_sum) * (found - expected_sum) / expected_sum;
             cells += 1.0;
-            (seen, due) = (0.0, 0.0);
+            (found, expected_sum) = (0.0, 0.0);
         }
     }
     let freedom = f64::max(cells - 1.0, 1.0);
     (chi - freedom) / f64::sqrt(2.0 * freedom)
 }
 
-/// Mean and variance of counted numbers.
+/// Mean and variance of numbers, given by the counts of their bins.
 fn moments(counts: &[u64], at: impl Fn(usize) -> f64) -> [f64; 2] {
     let n = counts.iter().sum::<u64>() as f64;
     let sum = |f: &dyn Fn(f64) -> f64| {
@@ -90,7 +90,7 @@ fn moments(counts: &[u64], at: impl Fn(usize) -> f64) -> [f64; 2] {
     [mean, sum(&|x| (x - mean) * (x - mean)) / n]
 }
 
-/// Means on either side of every seam of the sampler: the halves, the expansion, the ranges of K and r.
+/// Means on both sides of every boundary of the sampler: the halves, the expansion, the ranges of K and r.
 const MEANS: [f64; 16] = [
     0.01, 0.1, 0.3, 0.5, 0.999, 1.75, 4.2, 9.99, 15.5, 31.25, 47.98, 48.0, 64.0, 120.5, 200.0,
     1587.1,
@@ -98,11 +98,11 @@ const MEANS: [f64; 16] = [
 
 fn poissons_are_poissons(n: usize) {
     for mean in MEANS {
-        // What reaches the sampler is single precision.
+        // The sampler takes single precision.
         let mean = f64::from(mean as f32);
         let counts = poisson_counts(mean, n);
         let n = counts.iter().sum::<u64>() as f64;
-        let off = surprise(&counts, |count| n * poisson_probability(mean, count));
+        let off = chi_square(&counts, |count| n * poisson_probability(mean, count));
         assert!(off.abs() < BOUND, "mean {mean}: χ² is {off} deviations off");
         let [found, variance] = moments(&counts, |count| count as f64);
         let off = (found - mean) / f64::sqrt(mean / n);
@@ -129,7 +129,7 @@ fn a_billion_draws_of_shot_noise_are_poissons() {
     poissons_are_poissons(BILLION);
 }
 
-/// Random numbers for another sampler.
+/// Random number generator for the samplers of `rand_distr`, with the index of the next draw.
 struct OtherSampler(Stream, usize);
 
 impl rand::TryRng for OtherSampler {
@@ -153,8 +153,8 @@ impl rand::TryRng for OtherSampler {
     }
 }
 
-/// χ² of two histograms of equal size, as standard deviations off its mean.
-fn difference(ours: &[u64], theirs: &[u64]) -> f64 {
+/// χ² of two histograms of equal size, in standard deviations from its mean.
+fn chi_square_of_two(ours: &[u64], theirs: &[u64]) -> f64 {
     let (mut chi, mut cells) = (0.0, 0.0);
     for (a, b) in ours.iter().zip(theirs) {
         let [a, b] = [*a as f64, *b as f64];
@@ -179,20 +179,20 @@ fn an_independent_sampler_agrees() {
         {
             theirs[number as usize] += 1;
         }
-        let off = difference(&ours, &theirs);
+        let off = chi_square_of_two(&ours, &theirs);
         assert!(off.abs() < BOUND, "mean {mean}: {off}");
     }
 }
 
 #[test]
-fn shot_noise_keeps_the_mean_and_has_k_times_its_variance() {
+fn shot_noise_keeps_the_mean_and_its_variance_is_k_times_the_mean() {
     for (gain, y) in [
         (0.1_f32, 28.57_f32),
         (1.0, 14.28),
         (6.0, 9.52),
         (0.1, 158.71),
     ] {
-        let counts = over(1_000_000, 4000, |field, counts| {
+        let counts = tallied(1_000_000, 4000, |field, counts| {
             let mut adu = [y; LANES];
             noise::shot(&mut adu, gain, [&field.shot[0], &field.shot[1]]);
             for z in adu {
@@ -216,10 +216,10 @@ fn shot_noise_keeps_the_mean_and_has_k_times_its_variance() {
     }
 }
 
-/// Every shape of the five calibrated cameras' tables, in seventieths.
+/// All shapes λ of the five calibrated cameras, in units of 1/70.
 const SHAPES: [f64; 11] = [-10.0, -9.0, -8.0, -6.0, -4.0, -3.0, 0.0, 3.0, 4.0, 8.0, 9.0];
 
-/// The tails are the point of the distribution: the counts below its quantiles are those of the closed form.
+/// The counts below each quantile are those of the closed form, also in the tails.
 fn read_noise_has_its_quantiles(n: usize) {
     let lower = [1e-5, 1e-4, 1e-3, 0.01, 0.05, 0.1, 0.25, 0.4, 0.5];
     let upper = lower.iter().rev().skip(1).map(|u| 1.0 - u);
@@ -230,7 +230,7 @@ fn read_noise_has_its_quantiles(n: usize) {
             .iter()
             .map(|u| tukey_lambda(*u, shape) as f32)
             .collect();
-        let counts = over(n, levels.len() + 1, |field, counts| {
+        let counts = tallied(n, levels.len() + 1, |field, counts| {
             let mut adu = [0.0; LANES];
             noise::read(&mut adu, 1.0, &table, 0.0, &field.read);
             for x in adu {
@@ -258,13 +258,13 @@ fn a_billion_draws_of_read_noise_have_its_quantiles() {
     read_noise_has_its_quantiles(BILLION);
 }
 
-/// The sum of lanes of single precision, in double.
+/// Sum and sum of squares of a batch, in double precision.
 fn sums(numbers: &Lanes<f32>) -> [f64; 2] {
     let numbers = || numbers.iter().map(|x| f64::from(*x));
     [numbers().sum(), numbers().map(|x| x * x).sum()]
 }
 
-/// Spread at both ends and in the middle of the paper's range of K, with an offset.
+/// Spread and offset at both ends and in the middle of the paper's range of K.
 #[test]
 fn read_noise_has_its_spread_and_its_offset() {
     // λ, σ_TL, standard deviation, excess kurtosis.
@@ -294,7 +294,7 @@ fn read_noise_has_its_spread_and_its_offset() {
         );
         let variance = squares / n - mean * mean;
         let spread = f64::sqrt((kurtosis + 2.0) / n);
-        // The deviations above are given to four digits.
+        // The deviations above have four digits.
         let off = variance / (deviation * deviation) - 1.0;
         assert!(
             off.abs() < BOUND * spread + 2e-4,
@@ -304,7 +304,7 @@ fn read_noise_has_its_spread_and_its_offset() {
 }
 
 #[test]
-fn row_noise_is_normal_and_unrelated_between_rows() {
+fn row_noise_is_normal_and_uncorrelated_between_rows() {
     let deviation = 0.6;
     let stream = stream(Component::Row);
     let rows: Vec<f64> = (0..TEN_MILLION)
@@ -313,9 +313,11 @@ fn row_noise_is_normal_and_unrelated_between_rows() {
         .collect();
     let n = rows.len() as f64;
     // Mean, variance, skewness and fourth moment; the variances of these sample moments are 1, 2, 15 and 96 over n.
-    for (power, due, variance) in [(1, 0.0, 1.0), (2, 1.0, 2.0), (3, 0.0, 15.0), (4, 3.0, 96.0)] {
+    for (power, expected, variance) in
+        [(1, 0.0, 1.0), (2, 1.0, 2.0), (3, 0.0, 15.0), (4, 3.0, 96.0)]
+    {
         let moment = rows.iter().map(|z| z.powi(power)).sum::<f64>() / n;
-        let off = (moment - due) / f64::sqrt(variance / n);
+        let off = (moment - expected) / f64::sqrt(variance / n);
         assert!(off.abs() < BOUND, "moment {power}: {off} errors off");
     }
     for lag in [1, 2, 3, 16] {
@@ -335,12 +337,12 @@ fn row_noise_is_normal_and_unrelated_between_rows() {
             .sample_iter(words)
             .take(1_000_000),
     );
-    assert!(difference(&ours, &theirs).abs() < BOUND);
+    assert!(chi_square_of_two(&ours, &theirs).abs() < BOUND);
 }
 
 #[test]
 fn quantisation_noise_is_uniform_within_half_a_step() {
-    let counts = over(TEN_MILLION, 1000, |field, counts| {
+    let counts = tallied(TEN_MILLION, 1000, |field, counts| {
         let mut adu = [0.0; LANES];
         noise::quantisation(&mut adu, &field.quantisation);
         for y in adu {
@@ -349,15 +351,15 @@ fn quantisation_noise_is_uniform_within_half_a_step() {
         }
     });
     let n = counts.iter().sum::<u64>() as f64;
-    assert!(surprise(&counts, |_| n / 1000.0).abs() < BOUND);
+    assert!(chi_square(&counts, |_| n / 1000.0).abs() < BOUND);
     let [mean, variance] = moments(&counts, |bin| (bin as f64 + 0.5) / 1000.0 - 0.5);
     assert!(mean.abs() < BOUND * f64::sqrt(1.0 / 12.0 / n));
     assert!((variance * 12.0 - 1.0).abs() < BOUND * f64::sqrt(0.8 / n) + 1e-6);
 }
 
-/// Shot, read and quantisation noise share a block of the generator: their numbers must not be related.
+/// Shot, read and quantisation noise share a block of the generator: their numbers must not be correlated.
 #[test]
-fn terms_of_one_site_are_unrelated() {
+fn terms_of_one_site_are_uncorrelated() {
     let state = median();
     let table = Quantile::tukey_lambda(state.read_shape);
     let field = stream(Component::RandomField);

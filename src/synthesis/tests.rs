@@ -1,4 +1,4 @@
-//! The whole pipeline: its figures, and that nothing but its arguments decides a pixel.
+//! Tests of the whole pipeline: its figures, and that pixels depend on its arguments alone.
 
 use super::camera::tests::median;
 use super::noise::Term;
@@ -48,14 +48,14 @@ fn statistics(image: &Rgb) -> [[f64; 2]; 3] {
 }
 
 #[test]
-fn the_untouched_level_is_untouched() {
+fn without_a_degradation_the_frame_is_unchanged() {
     let clean = ramps(5, 7);
     let same = degrade(&clean, None, &key(1, "a"), &Synthesis::default());
     assert_eq!(same, clean);
 }
 
 #[test]
-fn one_negative_gives_what_the_door_gives() {
+fn one_negative_gives_the_images_of_degrade() {
     let (clean, key, paper) = (ramps(10, 14), key(1, "a"), Synthesis::default());
     let negative = Negative::new(&clean, &key, &paper, Severity::L1);
     for level in Severity::LADDER {
@@ -66,7 +66,7 @@ fn one_negative_gives_what_the_door_gives() {
     }
 }
 
-/// A change of these bytes is a change of every result: it must raise [`VERSION`].
+/// A change of these bytes changes every result, so it must raise [`VERSION`].
 #[test]
 fn bytes_are_those_of_this_version() {
     let clean = ramps(48, 63);
@@ -94,7 +94,7 @@ fn bytes_are_those_of_this_version() {
     );
 }
 
-/// The same for the choices beside the default, another camera among them.
+/// The bytes of choices other than the default, including another camera.
 #[test]
 fn bytes_of_every_choice_are_those_of_this_version() {
     let clean = ramps(37, 130);
@@ -110,15 +110,15 @@ fn bytes_of_every_choice_are_those_of_this_version() {
     ];
     let mut bytes = Vec::new();
     for synthesis in &choices {
-        let mut dark = Severity::LADDER.map(|_| Rgb::black(37, 130));
+        let mut images = Severity::LADDER.map(|_| Rgb::black(37, 130));
         ladder(
             &clean,
             &key(20, "frame"),
             synthesis,
             &Severity::LADDER,
-            &mut dark,
+            &mut images,
         );
-        for image in &dark {
+        for image in &images {
             bytes.extend_from_slice(image.samples());
         }
     }
@@ -128,7 +128,7 @@ fn bytes_of_every_choice_are_those_of_this_version() {
 }
 
 #[test]
-fn threads_do_not_enter() {
+fn the_number_of_threads_does_not_change_the_image() {
     let develop = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
         pool.build().unwrap().install(|| {
@@ -141,17 +141,17 @@ fn threads_do_not_enter() {
             Severity::LADDER.map(|level| negative.develop(level))
         })
     };
-    let one = develop(1);
+    let single = develop(1);
     for threads in [2, 5] {
-        assert_eq!(one, develop(threads));
+        assert_eq!(single, develop(threads));
     }
 }
 
 #[test]
-fn seed_and_frame_enter() {
+fn seed_and_frame_change_the_image() {
     let clean = flat(128, 64);
     let take = |seed, frame| {
-        let negative = Negative::taken(
+        let negative = Negative::with_state(
             &clean,
             &key(seed, frame),
             &median(),
@@ -183,12 +183,12 @@ fn every_size_is_kept() {
     ] {
         let clean = ramps(height, width);
         let how = sensor(Severity::L2);
-        let dark = degrade(&clean, Some(&how), &key(1, "a"), &Synthesis::default());
-        assert_eq!((dark.height(), dark.width()), (height, width));
+        let degraded = degrade(&clean, Some(&how), &key(1, "a"), &Synthesis::default());
+        assert_eq!((degraded.height(), degraded.width()), (height, width));
     }
 }
 
-/// Published figures of flat greys under the median camera: mean and deviation of red, green and blue.
+/// Published figures of flat greys for the fixed camera: mean and deviation of red, green and blue.
 #[test]
 fn flat_greys_have_their_figures() {
     let cases = [
@@ -197,9 +197,9 @@ fn flat_greys_have_their_figures() {
         (128, Severity::L5, [[7.3, 1.7], [7.4, 1.1], [7.4, 1.3]]),
         (32, Severity::L3, [[7.5, 4.4], [7.9, 3.2], [7.7, 3.6]]),
     ];
-    for (code, level, due) in cases {
+    for (code, level, expected) in cases {
         let clean = flat(code, 512);
-        let negative = Negative::taken(
+        let negative = Negative::with_state(
             &clean,
             &key(4, "flat"),
             &median(),
@@ -208,16 +208,16 @@ fn flat_greys_have_their_figures() {
             &Term::ALL,
         );
         let found = statistics(&negative.develop(level));
-        for (found, due) in found.iter().flatten().zip(due.iter().flatten()) {
-            let close = (found - due).abs() < 0.01 * due + 0.07;
-            assert!(close, "grey {code}, {level:?}: {found} against {due}");
+        for (found, expected) in found.iter().flatten().zip(expected.iter().flatten()) {
+            let close = (found - expected).abs() < 0.01 * expected + 0.07;
+            assert!(close, "grey {code}, {level:?}: {found} against {expected}");
         }
     }
 }
 
 #[test]
 fn noise_shrinks_with_the_light() {
-    let negative = Negative::taken(
+    let negative = Negative::with_state(
         &flat(128, 256),
         &key(5, "a"),
         &median(),
@@ -225,14 +225,14 @@ fn noise_shrinks_with_the_light() {
         Tone::None,
         &Term::ALL,
     );
-    let [light, dark] = [Severity::L1, Severity::L2]
+    let [lower, higher] = [Severity::L1, Severity::L2]
         .map(|level| statistics(&negative.develop(level)).map(|[_, deviation]| deviation));
-    for (light, dark) in light.iter().zip(dark) {
-        assert!((dark / light * f64::exp2(2.0 / 2.2) - 1.0).abs() < 0.02);
+    for (lower, higher) in lower.iter().zip(higher) {
+        assert!((higher / lower * f64::exp2(2.0 / 2.2) - 1.0).abs() < 0.02);
     }
 }
 
-/// Without noise, grey and white fall as they do in the exposure branch.
+/// Without noise, grey and white become as dark as in the exposure branch.
 #[test]
 fn without_noise_a_mid_grey_and_white_are_the_exposure_branchs() {
     for code in [128, 255] {
@@ -240,12 +240,12 @@ fn without_noise_a_mid_grey_and_white_are_the_exposure_branchs() {
         for seed in 0..20 {
             let key = key(seed, "a");
             let state = CameraState::draw(&key, &CameraModel::default());
-            // A brightness gain below 1 leaves no headroom for white.
+            // With a brightness gain below 1, white cannot be reached.
             if code == 255 && state.rgb_gain < 1.0 {
                 continue;
             }
             let negative =
-                Negative::taken(&clean, &key, &state, Amplify::ShotOnly, Tone::None, &[]);
+                Negative::with_state(&clean, &key, &state, Amplify::ShotOnly, Tone::None, &[]);
             for level in Severity::LADDER {
                 assert_eq!(
                     negative.develop(level),
@@ -257,16 +257,16 @@ fn without_noise_a_mid_grey_and_white_are_the_exposure_branchs() {
     }
 }
 
-/// Undoing what the paper leaves undone (the tone curve) brings a grey ramp back.
+/// With the tone curve, which the paper leaves out, a grey ramp comes back unchanged.
 #[test]
-fn a_grey_ramp_returns_from_the_sensor() {
+fn a_grey_ramp_comes_back_from_the_sensor_branch() {
     let samples = (0..4 * 256).flat_map(|i| [(i % 256) as u8; 3]).collect();
     let clean = Rgb::new(4, 256, samples).unwrap();
     for seed in 0..20 {
         let state = CameraState::draw(&key(seed, "a"), &CameraModel::default());
         let tone = Tone::BeforeEv;
         let key = key(seed, "a");
-        let negative = Negative::taken(&clean, &key, &state, Amplify::ShotOnly, tone, &[]);
+        let negative = Negative::with_state(&clean, &key, &state, Amplify::ShotOnly, tone, &[]);
         let back = negative.develop_by(0.0);
         for (column, codes) in back.samples().chunks(3).enumerate() {
             for code in codes {
@@ -279,35 +279,39 @@ fn a_grey_ramp_returns_from_the_sensor() {
     }
 }
 
-/// The tone curve before the drop gives the exposure branch on greys; behind it, that of the dark image.
+/// Before the drop, the tone curve gives the greys of the exposure branch; after it, it is applied to the degraded image.
 #[test]
-fn the_tone_curve_stands_where_it_is_told_to() {
+fn the_tone_curve_is_applied_where_it_is_set() {
     let clean = flat(100, 4);
     let develop = |tone| {
-        let negative = Negative::taken(&clean, &key(1, "a"), &median(), Amplify::All, tone, &[]);
+        let negative =
+            Negative::with_state(&clean, &key(1, "a"), &median(), Amplify::All, tone, &[]);
         negative.develop(Severity::L1)
     };
     assert_eq!(develop(Tone::BeforeEv), expose(&clean, Severity::L1));
-    let dark = f64::from(develop(Tone::None).samples()[0]) / 255.0;
+    let degraded = f64::from(develop(Tone::None).samples()[0]) / 255.0;
     let after = develop(Tone::AfterEv).samples()[0];
-    let due = dark * dark * (3.0 - 2.0 * dark) * 255.0;
-    assert!((f64::from(after) - due).abs() < 1.0, "{after} for {due}");
+    let expected = degraded * degraded * (3.0 - 2.0 * degraded) * 255.0;
+    assert!(
+        (f64::from(after) - expected).abs() < 1.0,
+        "{after} for {expected}"
+    );
 }
 
-/// Light lost is photons lost: the signal over the noise falls with the level as it does not where r is drawn.
+/// With `photon`, less light means fewer photons: the ratio grows with the level. In the paper's reading it does not.
 #[test]
 fn coupling_makes_the_ratio_the_drop() {
     let physical = Synthesis::of(LightReading::Physical, CameraModel::default());
     let ratios = Severity::LADDER.map(|level| physical.state(&key(1, "a"), level).ratio);
-    for (found, due) in ratios.iter().zip([4.0, 16.0, 64.0, 181.02, 512.0]) {
-        assert!((found - due).abs() < 0.01, "{found}");
+    for (found, expected) in ratios.iter().zip([4.0, 16.0, 64.0, 181.02, 512.0]) {
+        assert!((found - expected).abs() < 0.01, "{found}");
     }
     let paper = Synthesis::default();
     let state = |level| paper.state(&key(1, "a"), level);
     assert_eq!(state(Severity::L1), state(Severity::L5));
 }
 
-/// Every way to make a frame's ladder gives the images of its negatives, for every size and set of instructions.
+/// [`ladder`] gives the images of the single negatives, for every size and every choice of draws.
 #[test]
 fn ladders_are_their_negatives() {
     let settings = [
@@ -322,14 +326,14 @@ fn ladders_are_their_negatives() {
     for (height, width) in [(1, 1), (2, 3), (33, 130), (64, 129), (67, 300)] {
         let (clean, key) = (ramps(height, width), key(6, "a"));
         for synthesis in &settings {
-            let mut dark = Severity::LADDER.map(|_| Rgb::black(height, width));
-            ladder(&clean, &key, synthesis, &Severity::LADDER, &mut dark);
-            for (level, dark) in Severity::LADDER.into_iter().zip(&dark) {
+            let mut images = Severity::LADDER.map(|_| Rgb::black(height, width));
+            ladder(&clean, &key, synthesis, &Severity::LADDER, &mut images);
+            for (level, image) in Severity::LADDER.into_iter().zip(&images) {
                 let negative = Negative::new(&clean, &key, synthesis, level);
                 assert!(negative.serves(level));
                 assert_eq!(
                     negative.develop(level),
-                    *dark,
+                    *image,
                     "{height} × {width}, {level:?}"
                 );
             }
@@ -338,7 +342,7 @@ fn ladders_are_their_negatives() {
 }
 
 #[test]
-fn fresh_draws_are_each_levels_own() {
+fn fresh_draws_differ_between_levels() {
     let fresh = Synthesis {
         draws: Draws::Fresh,
         ..Synthesis::default()
@@ -353,9 +357,35 @@ fn fresh_draws_are_each_levels_own() {
 }
 
 #[test]
-fn a_state_can_be_written_down() {
+fn a_state_is_serialised_with_all_its_numbers() {
     let state = serde_json::to_value(median()).unwrap();
     assert_eq!(state["ratio"], 200.0);
     assert_eq!(state["bias"].as_array().map(Vec::len), Some(4));
     assert_eq!(state["rgb_to_camera"][2].as_array().map(Vec::len), Some(3));
+}
+
+#[test]
+fn every_kind_of_degradation_is_made_described_and_tested() {
+    use crate::types::degradation::Kind;
+    use crate::types::{Degradation, FrameId, Rgb};
+
+    let clean = Rgb::new(4, 4, vec![200; 48]).unwrap();
+    let key = super::NoiseKey::new(0, &FrameId("a".to_owned()));
+    let described = include_str!("../../results/README.md");
+    let tested = include_str!("../../tests/synthesize.rs");
+    let mut missing = Vec::new();
+    for kind in Kind::ALL {
+        let how = Degradation::new(kind, kind.ladder()[2], None).unwrap();
+        if super::degrade(&clean, Some(&how), &key, &super::Synthesis::default()) == clean {
+            missing.push(format!("{kind:?} changes no pixel"));
+        }
+        let word = kind.word();
+        if !described.contains(&format!("`{word}`")) {
+            missing.push(format!("{word} in results/README.md"));
+        }
+        if !tested.contains(&format!("-{word}")) {
+            missing.push(format!("L…-{word} in tests/synthesize.rs"));
+        }
+    }
+    assert!(missing.is_empty(), "{missing:?}");
 }

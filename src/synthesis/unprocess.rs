@@ -10,7 +10,7 @@ use super::curve;
 use super::lanes::{Isa, Kernel, LANES, Lanes};
 use crate::types::Rgb;
 
-/// The RAW image, without noise, of which a camera in this state would have made `clean`.
+/// The noise-free RAW image from which a camera in this state would make `clean`.
 ///
 /// An odd height or width is made even by repeating the last row or column.
 #[must_use]
@@ -18,32 +18,32 @@ pub fn unprocess(clean: &Rgb, state: &CameraState) -> Bayer {
     let unprocess = Unprocess::new(state, Isa::best());
     let mut raw = Bayer::covering(clean.height(), clean.width());
     raw.lines_mut().enumerate().for_each(|(row, mut line)| {
-        unprocess.act(clean, row, &mut line);
-        line.seal();
+        unprocess.fill(clean, row, &mut line);
+        line.repeat_edges();
     });
     raw
 }
 
-/// The scene light of each 8-bit code: inverse tone curve, then gamma expansion.
+/// Linear light of each 8-bit code: inverse tone curve, then gamma expansion.
 static LINEAR_LIGHT: LazyLock<[f32; 256]> = LazyLock::new(|| {
     std::array::from_fn(|code| {
         curve::gamma_expand(curve::inverse_smoothstep(code as f64 / 255.0)) as f32
     })
 });
 
-/// The way back to RAW of one camera, ready for any row.
+/// Conversion of pixels to RAW for one camera, ready for any row.
 #[derive(Debug)]
 pub(super) struct Unprocess {
     filters: [Filter; 4],
     isa: Isa,
 }
 
-/// What the sites of one plane see.
+/// Conversion of linear sRGB to the samples of one plane.
 #[derive(Debug, Clone, Copy)]
 struct Filter {
-    /// Linear sRGB → the plane's channel of camera space.
+    /// Weights of red, green and blue in the plane's camera channel.
     channel: [f32; 3],
-    /// Linear sRGB → the mean of the camera's channels.
+    /// Weights of red, green and blue in the mean of the camera's channels.
     grey: [f32; 3],
     /// 1 / (white balance · brightness).
     inverse_gain: f32,
@@ -69,7 +69,7 @@ impl Unprocess {
     }
 
     /// Fills a sensor row from the pixels of `clean`.
-    pub(super) fn act(&self, clean: &Rgb, row: usize, line: &mut RawRow<'_>) {
+    pub(super) fn fill(&self, clean: &Rgb, row: usize, line: &mut RawRow<'_>) {
         let width = clean.width();
         let pixels = clean.samples()[row.min(clean.height() - 1) * width * 3..]
             .as_chunks::<3>()
@@ -85,7 +85,7 @@ impl Unprocess {
     }
 }
 
-/// The sites of one plane in one row, and the pixels that they lie under.
+/// Sites of one plane in one row, with the pixels of that row.
 struct PlaneRow<'a> {
     filter: Filter,
     pixels: &'a [[u8; 3]],
@@ -102,7 +102,7 @@ impl Kernel for PlaneRow<'_> {
             let first = (2 * LANES * index).min(self.pixels.len() - 1);
             let pixels = &self.pixels[first..];
             if pixels.len() >= 2 * LANES {
-                // The usual case, without a look at the edge for each pixel.
+                // The usual case: all pixels are inside the image, so the edge is not checked for each of them.
                 for (lane, pair) in pixels.as_chunks::<2>().0[..LANES].iter().enumerate() {
                     for channel in 0..3 {
                         light[channel][lane] = linear[usize::from(pair[self.parity][channel])];
@@ -116,22 +116,22 @@ impl Kernel for PlaneRow<'_> {
                     }
                 }
             }
-            *samples = self.filter.behind(&light);
+            *samples = self.filter.samples(&light);
         }
     }
 }
 
 impl Filter {
-    /// What sites see of colours in linear sRGB: white balance and brightness undone, clipped to [0, 1].
+    /// Samples of colours in linear sRGB: white balance and brightness are undone, and the result is clipped to [0, 1].
     ///
-    /// Highlights are preserved: from a grey of 0.9 to 1 the gains fade to 1, so that white stays white (Brooks et al.
+    /// Highlights are preserved: between a grey of 0.9 and 1 the gain goes to 1, so that white stays white (Brooks et al.
     /// 2019, `safe_invert_gains`).
     #[inline(always)]
-    fn behind(&self, [red, green, blue]: &[Lanes<f32>; 3]) -> Lanes<f32> {
+    fn samples(&self, [red, green, blue]: &[Lanes<f32>; 3]) -> Lanes<f32> {
         let mut samples = [0.0; LANES];
         for i in 0..LANES {
-            let through = |row: [f32; 3]| row[0] * red[i] + row[1] * green[i] + row[2] * blue[i];
-            let above = (through(self.grey) - 0.9) * 10.0;
+            let product = |row: [f32; 3]| row[0] * red[i] + row[1] * green[i] + row[2] * blue[i];
+            let above = (product(self.grey) - 0.9) * 10.0;
             let highlight = if above > 0.0 { above } else { 0.0 };
             let mask = highlight * highlight;
             let faded = mask + (1.0 - mask) * self.inverse_gain;
@@ -140,7 +140,7 @@ impl Filter {
             } else {
                 self.inverse_gain
             };
-            let sample = through(self.channel) * gain;
+            let sample = product(self.channel) * gain;
             let sample = if sample > 0.0 { sample } else { 0.0 };
             samples[i] = if sample < 1.0 { sample } else { 1.0 };
         }

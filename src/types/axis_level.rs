@@ -1,22 +1,22 @@
-//! What the columns `level` and `variant` of tables hold: [`AxisLevel`] and [`KindReading`].
+//! The values of the columns `level` and `variant` of tables: [`AxisLevel`] and [`KindReading`].
 
 use std::fmt;
 
 use super::degradation::{Axis, Degradation, Kind, ReadingName, Severity};
 use super::words::written_as_text;
 
-/// A place on the axis of a curve: L0, the untouched frame, or a severity; the same for all kinds of one axis.
+/// A point on the axis of a curve: L0 (the untouched frame) or a severity. All kinds of one axis share their points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct AxisLevel(Option<(Severity, Kind)>);
 
 impl AxisLevel {
-    /// The untouched frame, at the beginning of every axis.
+    /// The untouched frame, the first point of every axis.
     pub const L0: Self = Self(None);
 
     /// The level of a severity of a kind.
     #[must_use]
     pub fn new(kind: Kind, severity: Severity) -> Self {
-        // The first kind of an axis stands for all of it.
+        // The first kind of an axis represents all kinds of that axis.
         let mut kinds = Kind::ALL.into_iter();
         let first = kinds.find(|other| other.axis() == kind.axis());
         Self(Some((severity, first.unwrap_or(kind))))
@@ -28,13 +28,13 @@ impl AxisLevel {
         self.0.map(|(severity, _)| severity)
     }
 
-    /// The axis; `None` for L0, which is on all of them.
+    /// The axis; `None` for L0, which is on all axes.
     #[must_use]
     pub fn axis(self) -> Option<Axis> {
         self.0.map(|(_, kind)| kind.axis())
     }
 
-    /// The distance from L0 in the axis' unit.
+    /// The distance from L0 in the unit of the axis.
     #[must_use]
     pub fn value(self) -> f64 {
         self.severity().map_or(0.0, Severity::value)
@@ -56,7 +56,7 @@ impl fmt::Display for AxisLevel {
     }
 }
 
-/// A kind of degradation in one light reading, at any severity: what the levels of a curve have in common.
+/// A kind of degradation in one light reading, at any severity: the levels of one curve share it.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct KindReading {
     /// The kind; `None` for untouched frames.
@@ -66,19 +66,19 @@ pub struct KindReading {
 }
 
 impl KindReading {
-    /// Untouched frames.
+    /// The value for untouched frames: no kind and no reading.
     pub const NONE: Self = Self {
         kind: None,
         reading: None,
     };
 
-    /// The word of the kind, or `none`.
+    /// The kind's word in files and flags, or `none`.
     #[must_use]
     pub fn word(&self) -> &'static str {
         self.kind.map_or("none", Kind::word)
     }
 
-    /// The name in captions: `with noise`; with the reading if that is not the paper's.
+    /// The name in captions, as `with noise`; with the light reading if it is not the paper's.
     #[must_use]
     pub fn title(&self) -> String {
         let kind = self.kind.map_or("untouched", Kind::title);

@@ -1,29 +1,29 @@
-//! The one JSON text of a value, for digests: [`canonical`].
+//! The canonical JSON text of a value, for digests: [`canonical`].
 
 use ciborium::Value as Content;
 use serde::Serialize;
 use serde::ser::Error as _;
 use serde_json::{Error, Value};
 
-/// The compact JSON of a value, with keys sorted, and `null`s and absent fields left out at every depth, so that a field that
-/// is added to a type and is `None` changes nothing.
+/// The compact JSON of a value: keys are sorted, and `null`s and absent fields are left out at every depth. A new field that
+/// is `None` therefore changes no digest.
 ///
-/// Floats are written by serde_json's shortest form that reads back; an `f32` as the `f64` that its shortest decimal names.
+/// Floats are written in the shortest form that reads back (serde_json); an `f32` is written as its shortest decimal.
 ///
 /// # Errors
-/// If a number is infinite or not a number, or a key is no text.
+/// If a number is infinite or NaN, or a key is not a text.
 pub(super) fn canonical(value: &impl Serialize) -> Result<String, Error> {
     let content = Content::serialized(value).map_err(Error::custom)?;
     if !is_finite(&content) {
         return Err(Error::custom("a number in a digest is not finite"));
     }
-    // A `serde_json::Map` is sorted by its keys.
+    // A `serde_json::Map` is sorted by key.
     let mut value = serde_json::from_str(&serde_json::to_string(value)?)?;
-    leave_nulls_out(&mut value);
+    remove_nulls(&mut value);
     serde_json::to_string(&value)
 }
 
-/// Whether all numbers are finite; JSON has `null` for those that are not.
+/// Whether all numbers are finite; serde_json would write `null` for the others.
 fn is_finite(content: &Content) -> bool {
     match content {
         Content::Float(number) => number.is_finite(),
@@ -33,12 +33,12 @@ fn is_finite(content: &Content) -> bool {
     }
 }
 
-fn leave_nulls_out(value: &mut Value) {
+fn remove_nulls(value: &mut Value) {
     match value {
-        Value::Array(items) => items.iter_mut().for_each(leave_nulls_out),
+        Value::Array(items) => items.iter_mut().for_each(remove_nulls),
         Value::Object(map) => {
             map.retain(|_, value| !value.is_null());
-            map.values_mut().for_each(leave_nulls_out);
+            map.values_mut().for_each(remove_nulls);
         }
         _ => {}
     }
@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_text_is_an_error() {
+    fn a_value_without_a_json_text_is_an_error() {
         for number in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             assert!(canonical(&[Some(number)]).is_err());
             assert!(canonical(&(number as f32)).is_err());
@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn a_narrow_number_is_the_decimal_that_it_is_written_as() {
+    fn an_f32_is_written_as_its_shortest_decimal() {
         for number in [0.1_f32, 3.3, 1e-7, 16_777_216.0, f32::MAX] {
             let wide: f64 = number.to_string().parse().unwrap();
             assert_eq!(canonical(&number).unwrap(), canonical(&wide).unwrap());

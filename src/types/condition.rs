@@ -1,4 +1,4 @@
-//! What a model is shown: [`Condition`] = degradation × enhancer.
+//! The state in which a frame is shown to a model: [`Condition`] = degradation × enhancer.
 
 use std::fmt;
 use std::str::FromStr;
@@ -10,26 +10,26 @@ use super::degradation::Degradation;
 use super::words::as_text;
 use crate::error::Error;
 
-/// The name of an enhancement model as it stands in tables and records: letters, digits, `_`, `-` and `.`.
+/// The name of an enhancement model in tables and records: letters, digits, `_`, `-` and `.`.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 pub struct EnhancerName(String);
 
 impl EnhancerName {
-    /// Checks a name: not empty, and of letters, digits, `_`, `-` and `.` alone.
+    /// Checks a name: it must not be empty and may only have letters, digits, `_`, `-` and `.`.
     pub fn new(name: &str) -> Result<Self, Error> {
         let fits = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
         if name.is_empty() || !name.chars().all(fits) {
             return Err(Error::usage(
                 "--llie",
                 format_args!(
-                    "{name:?} is no name for an enhancer: letters, digits, '_', '-' and '.' only; rename the file"
+                    "{name:?} is not a valid name of an enhancer: only letters, digits, '_', '-' and '.' are allowed; rename the file"
                 ),
             ));
         }
         Ok(Self(name.to_owned()))
     }
 
-    /// The name.
+    /// The name as a string slice.
     #[must_use]
     pub fn as_str(&self) -> &str {
         &self.0
@@ -42,19 +42,19 @@ impl fmt::Display for EnhancerName {
     }
 }
 
-/// One way in which a frame is shown: degraded or not, enhanced or not.
+/// A degradation with or without an enhancer: the state in which a frame is shown.
 ///
-/// Its name is `LABEL-KIND[@READING][+ENHANCER]`, or `L0[+ENHANCER]`; `&` is reserved for several degradations in a row.
+/// The name is `LABEL-KIND[@READING][+ENHANCER]` or `L0[+ENHANCER]`; `&` is reserved for several degradations in sequence.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Condition {
-    /// What was done to the frame; `None` for L0, the untouched frame.
+    /// The degradation of the frame; `None` for L0, the untouched frame.
     pub degradation: Option<Degradation>,
-    /// The enhancer; `None` for raw.
+    /// The enhancer; `None` if the image is not enhanced.
     pub enhancer: Option<EnhancerName>,
 }
 
 impl Condition {
-    /// The untouched frame.
+    /// The untouched frame without an enhancer.
     pub const L0: Self = Self {
         degradation: None,
         enhancer: None,
@@ -69,13 +69,13 @@ impl Condition {
         }
     }
 
-    /// The column `level`.
+    /// The value of the column `level`.
     #[must_use]
     pub fn level(&self) -> AxisLevel {
         self.degradation.as_ref().into()
     }
 
-    /// The column `variant`, with the light reading.
+    /// The value of the column `variant`: the kind with its light reading.
     #[must_use]
     pub fn kind_reading(&self) -> KindReading {
         self.degradation.as_ref().into()
@@ -143,31 +143,31 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_condition_is_refused() {
+    fn a_text_that_is_not_a_condition_is_refused() {
         let cases = [
-            ("L3-noise+", "no name for an enhancer"),
-            ("L3-noise+a b", "no name for an enhancer"),
-            ("L3-noise+a+b", "no name for an enhancer"),
-            ("L0-ev", "none of L0"),
-            ("L6-ev", "none of L0"),
+            ("L3-noise+", "not a valid name of an enhancer"),
+            ("L3-noise+a b", "not a valid name of an enhancer"),
+            ("L3-noise+a+b", "not a valid name of an enhancer"),
+            ("L0-ev", "not one of L0"),
+            ("L6-ev", "not one of L0"),
             ("L3", "not of that form"),
             ("", "not of that form"),
             ("L3-raw", "\"raw\""),
             ("L3-noise-x", "\"noise-x\""),
             ("L3-ev@eld", "no light readings; write L3-ev"),
             ("L3-noise@paper", "without its name"),
-            ("L3-noise@", "no name of a light reading"),
-            ("L3-noise@a&b", "no name of a light reading"),
+            ("L3-noise@", "not a valid name of a light reading"),
+            ("L3-noise@a&b", "not a valid name of a light reading"),
             ("E6-noise", "is written L3"),
             ("E3.30-ev", "is written E3.3"),
             ("E3.333-ev", "two decimals"),
             ("E0-ev", "0 or too large"),
             ("E16.01-ev", "above E16"),
-            ("E1e1-ev", "no decimal number"),
+            ("E1e1-ev", "not a decimal number"),
         ];
-        for (text, says) in cases {
+        for (text, expected) in cases {
             let error = text.parse::<Condition>().unwrap_err().to_string();
-            assert!(error.contains(says), "{text}: {error}");
+            assert!(error.contains(expected), "{text}: {error}");
         }
     }
 

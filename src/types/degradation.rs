@@ -1,4 +1,4 @@
-//! What was done to a frame: [`Degradation`]; and the registry of its kinds: [`Kind`].
+//! The degradation of a frame, [`Degradation`], and the list of its kinds, [`Kind`].
 
 use std::borrow::Cow;
 use std::fmt;
@@ -10,22 +10,22 @@ pub(crate) use super::severity::{Axis, Severity};
 use super::words::written_as_text;
 use crate::error::Error;
 
-/// What is in the way of a frame: a kind of degradation at one severity, in one light reading if the kind has readings.
+/// A kind of degradation at one severity, in one light reading if the kind has readings.
 ///
-/// The untouched frame, L0, is no degradation: it is `None` of an `Option`.
+/// The untouched frame, L0, is not a degradation: it is the `None` of an `Option`.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Degradation {
-    // The order of the fields is the order of degradations: by severity first.
+    // The derived order compares fields from top to bottom, so the severity comes first.
     severity: Severity,
     kind: Kind,
     reading: Option<ReadingName>,
 }
 
 impl Degradation {
-    /// A degradation; of a kind with readings and without a name, it is in the reading `paper`.
+    /// A degradation; if the kind has readings and none is named, the reading is `paper`.
     ///
     /// # Errors
-    /// If the severity is beyond what the kind takes, or a reading is named for a kind that has none.
+    /// If the severity is above the maximum of the kind, or a reading is named for a kind that has none.
     pub fn new(
         kind: Kind,
         severity: Severity,
@@ -57,7 +57,7 @@ impl Degradation {
         })
     }
 
-    /// The kind.
+    /// The kind of degradation, as exposure drop or noise.
     #[must_use]
     pub fn kind(&self) -> Kind {
         self.kind
@@ -75,7 +75,7 @@ impl Degradation {
         self.reading.as_ref()
     }
 
-    /// The severity as it is named: `L3`, or `E3.3` for 3.3 EV.
+    /// The name of the severity: `L3`, or `E3.3` for 3.3 EV.
     #[must_use]
     pub fn label(&self) -> String {
         self.kind.label(self.severity)
@@ -117,13 +117,13 @@ impl FromStr for Degradation {
     }
 }
 
-/// A kind of degradation. A new one is described in this `impl` and made in [`synthesis`](crate::synthesis); nothing else
-/// lists them.
+/// A kind of degradation. A new kind is described in this `impl` and implemented in [`synthesis`](crate::synthesis); no other
+/// place lists the kinds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Kind {
-    /// Less light and nothing else.
+    /// Less light, without noise.
     Exposure,
-    /// Less light, with the noise of a sensor.
+    /// Less light, with sensor noise.
     Sensor,
 }
 
@@ -157,7 +157,7 @@ impl Kind {
         }
     }
 
-    /// The severities of the paper; what is asked if nobody says otherwise.
+    /// The severities of the paper, which are the default.
     #[must_use]
     pub fn ladder(self) -> &'static [Severity] {
         match self {
@@ -165,28 +165,28 @@ impl Kind {
         }
     }
 
-    /// The largest severity.
+    /// The maximum severity, in the kind's unit.
     #[must_use]
     pub fn largest(self) -> Severity {
         match self {
-            // Fewer than three of 256 codes are left there.
+            // There fewer than three of the 256 codes are left.
             Self::Exposure | Self::Sensor => Severity::hundredths(1600),
         }
     }
 
-    /// Whether the kind can be understood in several ways: by light readings.
+    /// Whether the kind has light readings: several ways to understand it.
     #[must_use]
     pub fn has_readings(self) -> bool {
         self == Self::Sensor
     }
 
-    /// The kind that this one adds something to, and is compared with.
+    /// The kind that this one extends and is compared with: noise extends the exposure drop.
     #[must_use]
     pub fn base(self) -> Option<Self> {
         (self == Self::Sensor).then_some(Self::Exposure)
     }
 
-    /// The light that a small copy of a degraded image is given back, in EV; 0 for a kind that takes no light.
+    /// The gain that brightens a small copy of a degraded image, in EV; 0 for a kind that does not reduce the light.
     #[must_use]
     pub fn relight(self, severity: Severity) -> f32 {
         match self {
@@ -194,20 +194,20 @@ impl Kind {
         }
     }
 
-    /// The name of a severity: `L1` to `L5` for the paper's drops of light, else `E3.3`.
+    /// The name of a severity: `L1` to `L5` for the exposure drops of the paper, otherwise as `E3.3`.
     #[must_use]
     pub fn label(self, severity: Severity) -> String {
-        let place = self.ladder().iter().position(|named| *named == severity);
-        match place {
-            Some(place) => format!("L{}", place + 1),
+        let index = self.ladder().iter().position(|named| *named == severity);
+        match index {
+            Some(index) => format!("L{}", index + 1),
             None => format!("E{severity}"),
         }
     }
 
-    /// The severity of a name.
+    /// The severity with a name, as `L3` or `E3.3`.
     ///
     /// # Errors
-    /// If it is no name of a severity, or a severity that has another name.
+    /// If no severity has the name, or if the severity has another name: `E6` is `L3`.
     pub fn severity(self, label: &str) -> Result<Severity, Error> {
         let wrong = |problem: String| Error::usage("level", problem);
         let upper = label.to_ascii_uppercase();
@@ -220,13 +220,13 @@ impl Kind {
         }
         let Some(number) = upper.strip_prefix('E') else {
             return Err(wrong(format!(
-                "{label:?} is none of L0, L1, L2, L3, L4, L5, nor of the form E3.3"
+                "{label:?} is not one of L0, L1, L2, L3, L4, L5 and not of the form E3.3"
             )));
         };
         let severity = number.parse::<Severity>()?;
         if self.label(severity) != upper {
-            let due = self.label(severity);
-            return Err(wrong(format!("{label:?} is written {due}")));
+            let expected = self.label(severity);
+            return Err(wrong(format!("{label:?} is written {expected}")));
         }
         if severity > self.largest() {
             return Err(wrong(format!("{label:?} is above E{}", self.largest())));
@@ -234,7 +234,7 @@ impl Kind {
         Ok(severity)
     }
 
-    /// The kind of a [word](Self::word).
+    /// The kind with this [word](Self::word).
     #[must_use]
     pub fn of_word(word: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.word() == word)
@@ -254,24 +254,24 @@ written_as_text!(Kind);
 pub struct ReadingName(Cow<'static, str>);
 
 impl ReadingName {
-    /// The paper to the letter: the reading that is written without its name.
+    /// The paper's noise model exactly as printed; conditions leave this name out.
     pub const PAPER: Self = Self(Cow::Borrowed("paper"));
-    /// Choices that match no named reading.
+    /// Settings that match no named reading.
     pub const CUSTOM: Self = Self(Cow::Borrowed("custom"));
 
     /// Checks a name.
     ///
     /// # Errors
-    /// If it is empty or holds other characters.
+    /// If it is empty or has other characters.
     pub fn new(name: &str) -> Result<Self, Error> {
         let fits = |c: char| c.is_ascii_alphanumeric() || "_.-".contains(c);
         if name.is_empty() || !name.chars().all(fits) {
             let problem = format_args!(
-                "{name:?} is no name of a light reading: letters, digits, '_', '.' and '-' only"
+                "{name:?} is not a valid name of a light reading: only letters, digits, '_', '.' and '-' are allowed"
             );
             return Err(Error::usage("reading", problem));
         }
-        // Most records are in the paper's reading: its name costs no memory.
+        // Most records have the paper's reading: its name is not allocated.
         Ok(if name == Self::PAPER.as_str() {
             Self::PAPER
         } else {
@@ -279,12 +279,12 @@ impl ReadingName {
         })
     }
 
-    /// A name that is known to be right.
+    /// A name that needs no check.
     pub(crate) const fn of(name: &'static str) -> Self {
         Self(Cow::Borrowed(name))
     }
 
-    /// The name.
+    /// The name as a string slice.
     #[must_use]
     pub fn as_str(&self) -> &str {
         &self.0
@@ -292,10 +292,10 @@ impl ReadingName {
 }
 
 impl Ord for ReadingName {
-    /// `paper` first, the others by the alphabet.
+    /// `paper` first, then in alphabetical order.
     fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        let place = |name: &Self| *name != Self::PAPER;
-        (place(self), &self.0).cmp(&(place(other), &other.0))
+        let is_other = |name: &Self| *name != Self::PAPER;
+        (is_other(self), &self.0).cmp(&(is_other(other), &other.0))
     }
 }
 

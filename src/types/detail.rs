@@ -1,4 +1,4 @@
-//! What an experiment adds to the record of a trial: [`ChoiceDetail`], [`OpenDetail`].
+//! The fields that an experiment adds to the record of a trial: [`ChoiceDetail`], [`OpenDetail`].
 
 use serde::{Deserialize, Serialize};
 
@@ -10,8 +10,8 @@ use super::record::{Failure, Record, Via, View};
 use super::reply::{Finish, Usage};
 use super::trial_key::TrialKey;
 
-/// Declares a detail, and the line of a record with it. serde's `flatten` would read lines a quarter more slowly: it keeps
-/// every field aside until it knows whose it is (best of seven times 200,000 lines: 4.1 µs a line instead of 3.2).
+/// Declares a detail, and the line of a record with it. serde's `flatten` would take a quarter more time to read a line,
+/// because it buffers every field (best of seven times 200,000 lines: 4.1 µs a line instead of 3.2).
 macro_rules! details {
     ($(#[$about:meta])* $name:ident, $line:ident { $($(#[$meta:meta])* $field:ident: $type:ty,)+ }) => {
         $(#[$about])*
@@ -76,12 +76,12 @@ details! {
         choices: Vec<String>,
         /// The index of the true choice.
         truth: usize,
-        /// How many times the same was asked before; left out of the file where it is the first.
+        /// How many times the same question was asked before; not in the file if 0.
         #[serde(default, skip_serializing_if = "is_first")]
         repeat: u32,
-        /// The strict reading of the reply; `None` where it failed.
+        /// The strict reading of the reply; `None` if no reply came.
         strict: Option<AnswerReading>,
-        /// The lenient reading of the reply; `None` where it failed.
+        /// The lenient reading of the reply; `None` if no reply came.
         lenient: Option<AnswerReading>,
         /// How the trial ended.
         outcome: TrialOutcome,
@@ -96,29 +96,29 @@ fn is_first(repeat: &u32) -> bool {
 }
 
 details! {
-    /// An open question, or an answer to it that was put to a judge.
+    /// An open question, or an answer to it that a judge marks.
     OpenDetail, OpenLine {
-        /// What the model was asked for.
+        /// The task of the model: an answer, or a mark for an answer.
         step: Step,
         /// The walk of the question.
         episode: String,
         /// The category of the question.
         category: String,
-        /// Who of several people gave the answer; left out of the file where nobody is named.
+        /// The name of the person who answered, of several; not in the file if nobody is named.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         person: Option<String>,
-        /// The answer as it was put to the judge; `None` in answers.
+        /// The answer that the judge was shown; `None` in records of answers.
         judged: Option<String>,
-        /// The mark as upstream's program reads it; `None` in answers, and where it reads none.
+        /// The mark as upstream's program reads it; `None` in records of answers, and if it reads no mark.
         upstream: Option<i64>,
-        /// The mark in the tolerant reading.
+        /// The mark as the tolerant protocol reads it; `None` as for `upstream`.
         tolerant: Option<i64>,
-        /// The frames as they were sent.
+        /// The frames that were sent.
         images: Option<WalkFacts>,
     }
 }
 
-/// What a model was asked for.
+/// The task of a model: an answer to a question, or a mark for an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Step {
@@ -128,43 +128,43 @@ pub enum Step {
     Mark,
 }
 
-/// The frames of a walk as they were sent together.
+/// The frames of a walk that were sent in one request.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct WalkFacts {
-    /// How many images, repeated ones included.
+    /// The number of images, repeated ones included.
     pub images: usize,
-    /// The size of all files together, in bytes.
+    /// The total size of the files, in bytes.
     pub bytes: usize,
-    /// The digest of the files' digests, in order.
+    /// The digest of the digests of the files, in order.
     pub digest: Digest,
-    /// The width of the first, in pixels.
+    /// The width of the first image, in pixels.
     pub width: usize,
-    /// The height of the first, in pixels.
+    /// The height of the first image, in pixels.
     pub height: usize,
-    /// `png` or `jpeg`.
+    /// The file format: `png` or `jpeg`.
     pub format: String,
 }
 
-/// How a trial ended, by the strict reading.
+/// The result of a trial in the strict reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum TrialOutcome {
-    /// The true choice.
+    /// The model named the true choice.
     Right,
-    /// Another choice.
+    /// The model named a false choice.
     Wrong,
-    /// A reply without a readable choice: scored wrong, counted apart.
+    /// A reply without a readable choice: scored as wrong, counted separately.
     Unparsed,
     /// No reply: not scored, asked again on resume.
     Failed,
 }
 
-/// What is read from a reply in one way, strict or lenient.
+/// The answer that the strict or the lenient reading finds in a reply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct AnswerReading {
-    /// The index of the choice.
+    /// The index of the choice; `None` if none was read.
     pub chosen: Option<usize>,
-    /// Why there is none.
+    /// The reason why no choice was read; `None` if one was.
     pub why: Option<UnreadReason>,
 }
 
@@ -183,17 +183,17 @@ impl From<Answer> for AnswerReading {
     }
 }
 
-/// The image as it was sent.
+/// Size, format and digest of an image as it was sent.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ImageFacts {
     /// The digest of the encoded file.
     pub digest: Digest,
-    /// Its size in bytes.
+    /// The size of the encoded file, in bytes.
     pub bytes: usize,
-    /// Its width in pixels.
+    /// The width in pixels.
     pub width: usize,
-    /// Its height in pixels.
+    /// The height in pixels.
     pub height: usize,
-    /// `png` or `jpeg`.
+    /// The file format: `png` or `jpeg`.
     pub format: String,
 }

@@ -1,4 +1,4 @@
-//! The content of something in 32 bytes: [`Digest`].
+//! A hash of 32 bytes that identifies a content: [`Digest`].
 
 use std::fmt;
 use std::str::FromStr;
@@ -20,11 +20,11 @@ impl Digest {
         Self(*blake3::hash(bytes).as_bytes())
     }
 
-    /// The digest of a value as canonical JSON: keys sorted, nulls and absent fields left out at every depth. `domain` says
-    /// what is digested and how, as `darkqa.trial/2`, so that equal values of two kinds have two digests.
+    /// The digest of a value as canonical JSON: keys sorted, nulls and absent fields left out at every depth. `domain` names
+    /// the kind of value and its version, as `darkqa.trial/2`, so that equal values of two kinds have different digests.
     ///
     /// # Errors
-    /// If a number in it is infinite or not a number, or a map has keys that are no text.
+    /// If a number in it is infinite or NaN, or a key of a map is not a text.
     pub fn canonical(domain: &'static str, value: &impl Serialize) -> Result<Self, Error> {
         let text = canonical(value).map_err(|e| Error::data(domain, e))?;
         let mut hasher = blake3::Hasher::new();
@@ -33,7 +33,7 @@ impl Digest {
         Ok(Self(*hasher.finalize().as_bytes()))
     }
 
-    /// The digest of several parts in order, each with its length, so that no two lists of parts fall together.
+    /// The digest of several parts in order. Each part's length is hashed too, so that no two lists have the same input.
     pub fn of_parts<'a>(parts: impl IntoIterator<Item = &'a [u8]>) -> Self {
         let mut hasher = blake3::Hasher::new();
         for part in parts {
@@ -44,7 +44,7 @@ impl Digest {
         Self(*hasher.finalize().as_bytes())
     }
 
-    /// The 32 bytes.
+    /// The digest as 32 bytes.
     #[must_use]
     pub fn as_bytes(&self) -> &[u8; 32] {
         &self.0
@@ -85,9 +85,9 @@ mod tests {
             Digest::canonical(domain, &std::collections::BTreeMap::from([("a", value)])).unwrap()
         };
         let value = [Some(1), None];
-        let one = digest("darkqa.test/1", value);
-        assert_eq!(one, Digest::of(b"darkqa.test/1\0{\"a\":[1,null]}"));
-        assert_ne!(one, digest("darkqa.test/2", value));
+        let first = digest("darkqa.test/1", value);
+        assert_eq!(first, Digest::of(b"darkqa.test/1\0{\"a\":[1,null]}"));
+        assert_ne!(first, digest("darkqa.test/2", value));
         assert!(Digest::canonical("darkqa.test/1", &f32::NAN).is_err());
     }
 }

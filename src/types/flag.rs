@@ -1,6 +1,6 @@
-//! Values of flags that are numbers or words: parsers with their limits, and `flag_words`.
+//! Parsers for flags whose values are numbers or words, and the macro `flag_words`.
 //!
-//! An error says what is expected and not of which flag: the command line adds the name.
+//! An error says which value is expected; the command line adds the name of the flag.
 
 use std::fmt;
 use std::num::NonZeroUsize;
@@ -10,13 +10,13 @@ use clap::ValueEnum;
 
 use crate::error::{self, Error};
 
-/// The maximum of `--threads`: more than any machine has use for, fewer than stop one.
+/// The maximum of `--threads`; chosen: more than any machine needs, and few enough not to exhaust one.
 const MAX_THREADS: usize = 1024;
 
 /// Reads a finite number above 0.
 ///
 /// # Errors
-/// With what is expected.
+/// The text says which value is expected.
 pub(crate) fn positive(text: &str) -> Result<f64, String> {
     let value = text.trim().parse().ok();
     let value = value.filter(|value: &f64| value.is_finite() && *value > 0.0);
@@ -26,7 +26,7 @@ pub(crate) fn positive(text: &str) -> Result<f64, String> {
 /// Reads a duration above 0, in seconds.
 ///
 /// # Errors
-/// With what is expected.
+/// The text says which value is expected.
 pub(crate) fn seconds(text: &str) -> Result<Duration, String> {
     let duration = positive(text)
         .ok()
@@ -38,24 +38,24 @@ pub(crate) fn seconds(text: &str) -> Result<Duration, String> {
 /// Reads a number of threads.
 ///
 /// # Errors
-/// With what is expected.
+/// The text says which value is expected.
 pub(crate) fn threads(text: &str) -> Result<NonZeroUsize, String> {
     let threads = text.trim().parse().ok();
     let threads = threads.filter(|threads: &NonZeroUsize| threads.get() <= MAX_THREADS);
     threads.ok_or_else(|| format!("a number from 1 to {MAX_THREADS} expected"))
 }
 
-/// Writes the word of an enum's value on the command line.
+/// Writes an enum's value as its word on the command line.
 pub(crate) fn write_word(value: &impl ValueEnum, f: &mut fmt::Formatter<'_>) -> fmt::Result {
     value
         .to_possible_value()
         .map_or(Ok(()), |value| f.pad(value.get_name()))
 }
 
-/// Reads the word of an enum's value, as a manifest keeps it.
+/// Reads an enum's value from its word, as a manifest stores it.
 ///
 /// # Errors
-/// If it is no such word.
+/// If no value of the enum has this word.
 pub(crate) fn read_word<T: ValueEnum>(word: &str) -> error::Result<T> {
     T::from_str(word, false).map_err(|_| {
         let values = T::value_variants().iter();
@@ -67,7 +67,7 @@ pub(crate) fn read_word<T: ValueEnum>(word: &str) -> error::Result<T> {
     })
 }
 
-/// Has enums written as their words on the command line.
+/// Implements `Display` for enums: the word of the value on the command line.
 macro_rules! flag_words {
     ($($type:ty),+ $(,)?) => {
         $(impl std::fmt::Display for $type {

@@ -1,4 +1,4 @@
-//! What is seen: [`Frame`], [`FrameId`], [`Rgb`].
+//! Images and their maps: [`Frame`], [`FrameId`], [`Rgb`].
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -15,17 +15,19 @@ use crate::error::Error;
 pub struct FrameId(pub String);
 
 impl FrameId {
-    /// The name without the ending of an image file, where it has one.
+    /// The name without the ending of an image file, if it has one.
     #[must_use]
     pub fn bare(&self) -> &str {
-        let image = |ending: &str| {
+        let is_image = |ending: &str| {
             let endings = ["png", "jpg", "jpeg"];
             endings
                 .iter()
                 .any(|known| ending.eq_ignore_ascii_case(known))
         };
         match self.0.rsplit_once('.') {
-            Some((bare, ending)) if image(ending) && !bare.is_empty() && !bare.ends_with('/') => {
+            Some((bare, ending))
+                if is_image(ending) && !bare.is_empty() && !bare.ends_with('/') =>
+            {
                 bare
             }
             _ => &self.0,
@@ -47,7 +49,7 @@ impl Rgb {
     /// Takes height × width × 3 samples, row by row, red first.
     ///
     /// # Errors
-    /// Where the number of samples is not `height * width * 3`, or is zero.
+    /// If the number of samples is not `height * width * 3`, or is zero.
     pub fn new(height: usize, width: usize, samples: Vec<u8>) -> Result<Self, Error> {
         let found = samples.len();
         let expected = height
@@ -58,7 +60,7 @@ impl Rgb {
         array.map(Self).ok_or_else(|| {
             Error::data(
                 "image",
-                format_args!("{found} samples are no {height} × {width} RGB image"),
+                format_args!("{found} samples do not make a {height} × {width} RGB image"),
             )
         })
     }
@@ -87,7 +89,7 @@ impl Rgb {
         self.0.as_slice().unwrap_or_default()
     }
 
-    /// The samples, to be changed in place.
+    /// The samples, to change them in place.
     #[must_use]
     pub fn samples_mut(&mut self) -> &mut [u8] {
         self.0.as_slice_mut().unwrap_or_default()
@@ -100,34 +102,34 @@ impl fmt::Debug for Rgb {
     }
 }
 
-/// One view of a scene: an image and, where the data set has them, its maps of the same height and width.
+/// One view of a scene: an image and, if the data set has them, its maps of the same height and width.
 #[derive(Debug, Clone)]
 pub struct Frame {
-    /// Its name.
+    /// The name of the frame, unique in its data set.
     pub id: FrameId,
-    /// The scene it is a view of; empty where the data set says nothing of scenes.
+    /// The scene of the frame; empty if the data set names no scenes.
     pub scene: String,
-    /// The image.
+    /// The pixels of the image, 8-bit sRGB.
     pub rgb: Rgb,
-    /// Depth in millimetres, 0 where there is none.
+    /// The depth of each pixel in millimetres, 0 where it is unknown.
     pub depth: Option<Array2<u32>>,
-    /// What depth is measured along.
+    /// The direction along which depth is measured.
     pub depth_kind: DepthKind,
-    /// How the camera projects; `None` where the data set does not say.
+    /// The camera's projection; `None` if the data set does not state it.
     pub intrinsics: Option<Intrinsics>,
-    /// The class of each pixel, an id of the data set's own classes.
+    /// The class of each pixel, as a number in the data set's label space.
     pub semantic: Option<Array2<u16>>,
-    /// The segment of each pixel, 0 where there is none.
+    /// The segment of each pixel, 0 for none.
     pub segments: Option<Array2<u32>>,
-    /// What the segments are.
+    /// Whether a segment is an object or a part of one.
     pub segmentation: Segmentation,
-    /// What is known of the segments of the scene by name.
+    /// The names of the scene's segments, by segment; some may be missing.
     pub names: Arc<BTreeMap<u32, SegmentName>>,
-    /// The type of the room, where a person has said it.
+    /// The type of the room; `None` if the data set does not state it.
     pub room: Option<String>,
 }
 
-/// What a depth is measured along.
+/// The direction along which depth is measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "snake_case")]
 pub enum DepthKind {
@@ -138,27 +140,27 @@ pub enum DepthKind {
     Euclid,
 }
 
-/// What the segments of a map are.
+/// The meaning of a segment in a map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Segmentation {
-    /// Objects: one segment each.
+    /// Each object is one segment.
     #[default]
     Instances,
-    /// Parts of objects, as superpixels are: neighbours of one class belong together.
+    /// A segment is a part of an object, as superpixels are: neighbours of one class belong together.
     Parts,
 }
 
-/// A pinhole camera, in pixels; the centre of the first pixel is (0, 0).
+/// A pinhole camera; all values are in pixels, and (0, 0) is the centre of the first pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Intrinsics {
-    /// The focal length along a row.
+    /// The focal length along a row, in pixels.
     pub fx: f64,
-    /// The focal length along a column.
+    /// The focal length along a column, in pixels.
     pub fy: f64,
-    /// The optical axis along a row.
+    /// The position of the optical axis along a row, in pixels.
     pub cx: f64,
-    /// The optical axis along a column.
+    /// The position of the optical axis along a column, in pixels.
     pub cy: f64,
 }
 
@@ -167,7 +169,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn endings_of_images_are_no_part_of_a_name() {
+    fn the_ending_of_an_image_file_is_not_part_of_the_name() {
         for (name, bare) in [
             ("a/b.PNG", "a/b"),
             ("a.b.jpeg", "a.b"),

@@ -1,11 +1,11 @@
-//! A choice among kinds of degradation: [`KindSet`].
+//! A set of kinds of degradation: [`KindSet`].
 
 use std::fmt;
 use std::str::FromStr;
 
 use super::degradation::Kind;
 
-/// A set of kinds that is not empty.
+/// A set of at least one kind of degradation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct KindSet(u16);
 
@@ -13,16 +13,16 @@ impl KindSet {
     /// The two kinds of the paper, `both`.
     pub const BOTH: Self = Self(1 << Kind::Exposure as u16 | 1 << Kind::Sensor as u16);
 
-    /// Sensor noise, which enhancers are shown if nobody says otherwise.
+    /// Sensor noise, the default input of enhancers.
     pub const NOISE: Self = Self(1 << Kind::Sensor as u16);
 
-    /// One kind alone.
+    /// The set of a single kind.
     #[must_use]
     pub fn only(kind: Kind) -> Self {
         Self(1 << kind as u16)
     }
 
-    /// Whether a kind is among them.
+    /// Whether the set includes a kind.
     #[must_use]
     pub fn includes(self, kind: Kind) -> bool {
         self.0 & Self::only(kind).0 != 0
@@ -60,7 +60,7 @@ impl FromStr for KindSet {
                 .ok_or_else(|| format!("{word:?} is not one of {words}, both"))
         });
         kinds
-            .reduce(|all, one| Ok(Self(all?.0 | one?.0)))
+            .reduce(|set, kind| Ok(Self(set?.0 | kind?.0)))
             .unwrap_or(Ok(Self::BOTH))
     }
 }

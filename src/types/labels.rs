@@ -1,4 +1,4 @@
-//! What the numbers of a frame's maps stand for: [`Labels`], [`SegmentName`].
+//! The meaning of the numbers in a frame's maps: [`Labels`], [`SegmentName`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,31 +6,31 @@ use serde::{Deserialize, Serialize};
 
 use super::digest::Digest;
 
-/// What one number of a semantic map stands for.
+/// The class that one number of a semantic map stands for.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Label {
-    /// The data set's own word, as `night stand`.
+    /// The name in the data set, as `night stand`.
     pub name: String,
-    /// The class of the canonical label space (mpcat40) that it belongs to, as `chest_of_drawers`.
+    /// The class in the canonical label space (mpcat40), as `chest_of_drawers`.
     pub canonical: String,
 }
 
-/// The label space of a data set: its numbers, its words, and the canonical classes they belong to.
+/// The label space of a data set: its numbers and names, with their canonical classes.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Labels {
-    /// Its name, as `nyu40`.
+    /// The name of the label space, as `nyu40`.
     pub space: String,
-    /// The numbers that stand for nothing: unlabelled pixels.
+    /// The numbers of unlabelled pixels.
     pub void: BTreeSet<u16>,
-    /// What each number stands for.
+    /// The class of each number.
     pub labels: BTreeMap<u16, Label>,
-    /// The canonical classes whose absence from a map means that there is none in the picture. A class without a label of
-    /// its own may hide under a catch-all, as sinks do under the `objects` of NYU13.
+    /// The canonical classes that are absent from an image if they are absent from its map. A class without its own label may
+    /// be labelled with a general class, as sinks are labelled `objects` in NYU13.
     pub expressible: BTreeSet<String>,
 }
 
 impl Labels {
-    /// The content of the whole space.
+    /// The digest of the numbers, names and canonical classes; the space's name is not in it.
     #[must_use]
     pub fn digest(&self) -> Digest {
         let numbers = self.void.iter().map(|id| vec![id.to_string()]);
@@ -50,14 +50,14 @@ impl Labels {
     }
 }
 
-/// What is known of one segment by name.
+/// The name and class of one segment.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SegmentName {
-    /// The data set's own word, as `kitchen cabinet`.
+    /// The name in the data set, as `kitchen cabinet`.
     pub name: String,
     /// The canonical class, as `cabinet`.
     pub canonical: String,
-    /// The region (room) of the scene that it stands in, where that is known.
+    /// The region (room) of the scene that the segment is in; `None` if unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub region: Option<i64>,
 }

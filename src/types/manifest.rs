@@ -1,4 +1,4 @@
-//! What a run is: [`RunManifest`].
+//! The description of a run: [`RunManifest`].
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -6,11 +6,11 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// How far a run has come.
+/// The progress of a run, and how it ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
-    /// Under way, or killed.
+    /// Running, or killed while it ran.
     Started,
     /// Every trial has a reply.
     Complete,
@@ -18,7 +18,7 @@ pub enum Status {
     Incomplete,
     /// Interrupted by the user.
     Cancelled,
-    /// Stopped by an error that every further trial would meet.
+    /// Stopped by an error that would fail every further trial.
     Stopped,
 }
 
@@ -28,51 +28,50 @@ impl fmt::Display for Status {
     }
 }
 
-/// How many trials a run has, and what became of them.
+/// The number of trials of a run, and of those with and without a reply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Counts {
-    /// All.
+    /// The number of all trials.
     pub trials: usize,
-    /// With a reply.
+    /// The number of trials with a reply.
     pub answered: usize,
-    /// Without one, after all retries.
+    /// The number of trials without a reply after all retries.
     pub failed: usize,
 }
 
-/// The fields in which two identities differ, each with what the one says and what the other says; `unset` where it says nothing.
+/// The fields in which two identities differ, with both values as text; a missing value is `unset`.
 pub(crate) fn differences<'a>(
     one: &'a BTreeMap<String, Value>,
     other: &'a BTreeMap<String, Value>,
 ) -> impl Iterator<Item = (&'a str, String, String)> {
     let fields: BTreeSet<&String> = one.keys().chain(other.keys()).collect();
-    let said = |identity: &BTreeMap<String, Value>, field: &String| {
+    let text = |identity: &BTreeMap<String, Value>, field: &String| {
         let value = identity.get(field);
         value.map_or("unset".to_owned(), ToString::to_string)
     };
     fields.into_iter().filter_map(move |field| {
-        let (first, second) = (said(one, field), said(other, field));
+        let (first, second) = (text(one, field), text(other, field));
         (first != second).then_some((field.as_str(), first, second))
     })
 }
 
-/// A value of a column that two runs hold and that stands for different things: the value, the field in which they differ, and what
-/// the one says and what the other says.
+/// A value of a column with different meanings in two runs: the field that differs, and what it is in each run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ColumnDifference<'a> {
     /// The column, as `model`.
     pub column: &'a str,
     /// The value, as `gpt-4o`.
     pub value: &'a str,
-    /// The flag.
+    /// The flag that differs, as `--base-url`.
     pub field: String,
-    /// What the first says.
+    /// The flag's value in the first run, or `unset`.
     pub first: String,
-    /// What the second says.
+    /// The flag's value in the second run, or `unset`.
     pub second: String,
 }
 
 impl RunManifest {
-    /// Takes note of what became of the trials: the run is complete if all of them have a reply.
+    /// Sets the counts and the status: the run is complete if all trials have a reply.
     pub fn count(&mut self, counts: Counts) {
         self.counts = counts;
         self.status = if counts.answered == counts.trials {
@@ -82,21 +81,21 @@ impl RunManifest {
         };
     }
 
-    /// The values of columns that both hold and that do not stand for the same.
+    /// The column values that both runs have with different meanings.
     #[must_use]
     pub fn column_differences<'a>(&'a self, other: &'a Self) -> Vec<ColumnDifference<'a>> {
         let mut found = Vec::new();
         for (column, values) in &self.columns {
-            for (value, own) in values {
-                let there = other
+            for (value, first) in values {
+                let second = other
                     .columns
                     .get(column)
                     .and_then(|values| values.get(value));
-                let Some(there) = there else {
+                let Some(second) = second else {
                     continue;
                 };
-                let [one, two] = [own, there].map(fields);
-                found.extend(differences(&one, &two).map(|(field, first, second)| {
+                let [first, second] = [first, second].map(fields);
+                found.extend(differences(&first, &second).map(|(field, first, second)| {
                     ColumnDifference {
                         column,
                         value,
@@ -111,43 +110,43 @@ impl RunManifest {
     }
 }
 
-/// The fields of an object; those without a value are left out.
+/// The fields of an object that are not null.
 fn fields(object: &Value) -> BTreeMap<String, Value> {
     let fields = object.as_object().into_iter().flatten();
-    let said = fields.filter(|(_, value)| !value.is_null());
-    said.map(|(field, value)| (field.clone(), value.clone()))
+    let set = fields.filter(|(_, value)| !value.is_null());
+    set.map(|(field, value)| (field.clone(), value.clone()))
         .collect()
 }
 
 /// The content of `manifest.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunManifest {
-    /// That of its records: [`Detail::SCHEMA`](super::Detail::SCHEMA).
+    /// The schema of the run's records: [`Detail::SCHEMA`](super::Detail::SCHEMA).
     pub schema: String,
-    /// How far it has come.
+    /// The progress of the run.
     pub status: Status,
     /// The version of this program.
     pub version: String,
-    /// When it began, in UTC.
+    /// The time when the run was created, in UTC.
     pub created: String,
-    /// When it was last written, in UTC.
+    /// The time when the manifest was last written, in UTC.
     pub updated: String,
-    /// The platform and the libraries that touched the pixels.
+    /// The platform, and the versions of the libraries that process pixels.
     pub platform: BTreeMap<String, String>,
-    /// What all trials share and no column tells apart, by flag: a run is only resumed with the same.
+    /// The settings that all trials share and no column shows, by flag. A run can only be resumed with the same identity.
     pub identity: BTreeMap<String, Value>,
-    /// What each value of a column of the tables stands for, by column and value: models, enhancers, light readings. A value may be
-    /// added to a run; one that it holds stays what it was.
+    /// The meaning of each value in a column of the tables, by column and value: models, enhancers, light readings. A run may
+    /// get further values; the meaning of an existing value never changes.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub columns: BTreeMap<String, BTreeMap<String, Value>>,
-    /// Which part of an evaluation it is, as `2/4`; `None` for all of it.
+    /// The part of an evaluation, as `2/4`; `None` for the whole evaluation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shard: Option<String>,
-    /// What does not: concurrency, timeouts.
+    /// The settings that change no reply: concurrency, timeouts.
     pub settings: BTreeMap<String, Value>,
-    /// The flags that decide the images, as they were said; empty in runs of versions that kept none.
+    /// The flags that decide the images, as the user wrote them; empty in runs of earlier versions.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub images: BTreeMap<String, Value>,
-    /// How many trials.
+    /// The number of trials, answered and failed.
     pub counts: Counts,
 }

@@ -1,8 +1,9 @@
-//! The shared vocabulary: no input or output, no pixel mathematics.
+//! The types that all rooms share, without input, output or pixel arithmetic.
 
 pub(crate) mod axis_level;
 mod canonical;
 pub(crate) mod condition;
+pub(crate) mod decides;
 pub(crate) mod degradation;
 pub(crate) mod detail;
 pub(crate) mod digest;
@@ -12,6 +13,7 @@ pub(crate) mod kind_set;
 pub(crate) mod labels;
 pub(crate) mod manifest;
 pub(crate) mod question;
+pub(crate) mod recent;
 pub(crate) mod record;
 pub(crate) mod reply;
 pub(crate) mod run_question;
@@ -21,6 +23,7 @@ pub(crate) mod words;
 
 pub use axis_level::{AxisLevel, KindReading};
 pub use condition::{Condition, EnhancerName};
+pub(crate) use decides::Decides;
 pub use degradation::{Degradation, ReadingName};
 pub use detail::{
     AnswerReading, ChoiceDetail, ImageFacts, OpenDetail, Step, TrialOutcome, WalkFacts,
@@ -36,7 +39,7 @@ pub use run_question::{RunQuestion, Thumbnail};
 pub use severity::{Axis, Severity};
 pub use trial_key::TrialKey;
 
-/// The record of a trial, of a question with choices if nothing else is said.
+/// The record of a trial; by default of a question with choices.
 pub type Record<D = ChoiceDetail> = record::Record<D>;
 
 #[cfg(test)]
@@ -96,7 +99,7 @@ mod tests {
         }
 
         #[test]
-        fn no_text_is_read_as_another(text in "(L[0-6]|E[0-9]{1,2}(\\.[0-9]{0,3})?)?-?(ev|noise|raw)?(@[a-z&]{0,3})?(\\+[a-z]{0,3})?|\\PC{0,12}") {
+        fn a_condition_is_written_as_it_was_read(text in "(L[0-6]|E[0-9]{1,2}(\\.[0-9]{0,3})?)?-?(ev|noise|raw)?(@[a-z&]{0,3})?(\\+[a-z]{0,3})?|\\PC{0,12}") {
             if let Ok(condition) = text.parse::<Condition>() {
                 prop_assert_eq!(condition.to_string().to_lowercase(), text.to_lowercase());
             }

@@ -1,4 +1,4 @@
-//! What is asked: [`Question`], its [`Choices`], and what was understood of a reply, [`Answer`].
+//! A [`Question`] with its [`Choices`], and the [`Answer`] that is read from a reply.
 
 use std::fmt;
 
@@ -17,7 +17,7 @@ impl fmt::Display for QuestionId {
     }
 }
 
-/// What kind of question it is: the paper's five families, or a category of a ready-made set.
+/// The kind of a question: one of the paper's five families, or a category of a ready-made set.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Family {
     /// "What type of room is this?"
@@ -30,12 +30,12 @@ pub enum Family {
     Color,
     /// "Which object is closest to the camera?"
     Closest,
-    /// A category of somebody else's set, in its own words.
+    /// A category of a ready-made set, by its name there.
     Other(String),
 }
 
 impl Family {
-    /// The name under which all families together stand in tables and files; no family may have it.
+    /// The name of all families together in tables and files; no family may have this name.
     pub const TOTAL: &str = "all";
 
     /// The paper's five families.
@@ -47,7 +47,7 @@ impl Family {
         Self::Closest,
     ];
 
-    /// The name in files and tables: `room_type`, `affordance`, `presence`, `color`, `closest`, or the set's own.
+    /// The name in files and tables: `room_type`, `affordance`, `presence`, `color`, `closest`, or a ready-made set's name.
     #[must_use]
     pub fn name(&self) -> &str {
         match self {
@@ -88,7 +88,7 @@ impl<'de> Deserialize<'de> for Family {
     }
 }
 
-/// The answers a question offers, in the order shown, and which of them is true.
+/// The answers that a question offers, in the order shown, and the index of the true one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Choices {
     texts: Vec<String>,
@@ -96,14 +96,14 @@ pub struct Choices {
 }
 
 impl Choices {
-    /// How many choices there can be: one letter each.
+    /// The maximum number of choices: one letter each.
     pub const MOST: usize = 26;
 
-    /// Checks a list of choices: 2 to 26, none empty, no two alike (letter case and outer space aside), the true one
-    /// among them.
+    /// Checks a list of choices: there are 2 to 26, none is empty, no two are equal (without regard to letter case and outer
+    /// spaces), and `truth` is the index of one of them.
     ///
     /// # Errors
-    /// [`Error::Data`] with what is wrong; its place is `choices`.
+    /// [`Error::Data`] at the place `choices`.
     pub fn new(texts: Vec<String>, truth: usize) -> Result<Self, Error> {
         let wrong = |problem: String| Err(Error::data("choices", problem));
         if !(2..=Self::MOST).contains(&texts.len()) {
@@ -152,7 +152,7 @@ impl Choices {
         self.truth
     }
 
-    /// How many there are, at least 2.
+    /// The number of choices, at least 2.
     #[must_use]
     #[expect(clippy::len_without_is_empty, reason = "there are always two")]
     pub fn len(&self) -> usize {
@@ -169,26 +169,26 @@ pub(crate) fn letter(index: usize) -> char {
 /// One multiple-choice question about one frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Question {
-    /// Its name.
+    /// The name of the question, unique in its data set.
     pub id: QuestionId,
-    /// The frame it is about.
+    /// The frame that the question is about.
     pub frame: FrameId,
-    /// Its kind.
+    /// The family of the question.
     pub family: Family,
-    /// The question in words, without the choices.
+    /// The text of the question, without the choices.
     pub text: String,
-    /// The answers offered.
+    /// The answers that the model may choose from.
     pub choices: Choices,
-    /// What the generator saw that makes the answer true; `Null` for questions that came without.
+    /// The facts from which the generator derived the answer; `Null` if the data set states none.
     pub evidence: serde_json::Value,
 }
 
-/// What was understood of a reply.
+/// The answer that is read from a reply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Answer {
-    /// One choice, by its index.
+    /// A choice, by its index.
     Chosen(usize),
-    /// No choice; never guessed.
+    /// No readable choice; a choice is never guessed.
     Unparsed(UnreadReason),
 }
 
@@ -196,28 +196,28 @@ pub enum Answer {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum UnreadReason {
-    /// Nothing was said.
+    /// The reply was empty.
     Empty,
-    /// The model declined.
+    /// The model refused to answer.
     Refused,
     /// The reply was cut at the token limit before an answer.
     Truncated,
-    /// A content filter withheld it.
+    /// A content filter withheld the reply.
     Filtered,
     /// More than one choice was named.
     Ambiguous,
-    /// A letter beyond the choices.
+    /// The reply named a letter that no choice has.
     OutOfRange,
-    /// The letter of one choice with the text of another.
+    /// The reply named the letter of one choice with the text of another.
     Contradiction,
-    /// The only choice named was denied.
+    /// The reply named one choice only to deny it.
     Negated,
     /// No choice was named in the form that this reading accepts.
     NoChoice,
 }
 
 impl UnreadReason {
-    /// All of them.
+    /// All reasons, in the order of tables.
     pub const ALL: [Self; 9] = [
         Self::Empty,
         Self::Refused,

@@ -1,4 +1,4 @@
-//! What was asked of a model in a trial and what came of it: [`Record`].
+//! The record of a trial: what a model was asked, and the result: [`Record`].
 
 use std::fmt;
 
@@ -11,62 +11,62 @@ use super::reply::{Finish, Reply, Usage};
 use super::trial_key::TrialKey;
 use crate::error::Result;
 
-/// One line of `records.jsonl`: what every trial has, and what its experiment adds.
+/// One line of `records.jsonl`: the fields of every trial, and those that its experiment adds.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Record<D> {
-    /// What decides the reply, as a digest.
+    /// The digest of everything that decides the reply.
     pub key: TrialKey,
-    /// The question.
+    /// The name of the question.
     pub question: QuestionId,
-    /// Who was asked: the model, the judge, or the people.
+    /// The name of the model, the judge or the group of people that was asked.
     pub model: String,
-    /// Whether it saw the images.
+    /// Whether the model was shown the images.
     pub view: View,
-    /// What it saw; `None` where it saw nothing. A line has what follows from it in columns too.
-    #[serde(flatten, serialize_with = "shown::serialize")]
+    /// The condition of the images; `None` if the model was shown none. Further columns of the line follow from it.
+    #[serde(flatten, serialize_with = "condition_columns::serialize")]
     pub condition: Option<Condition>,
-    /// The reply; `None` where it failed.
+    /// The text of the reply; `None` if no reply came.
     pub reply: Option<String>,
-    /// The words of a refusal that came apart from the reply.
+    /// The text of a refusal that the server sent separately from the reply.
     pub refusal: Option<String>,
-    /// Why the model stopped; `None` where it failed.
+    /// The reason why the model stopped; `None` if no reply came.
     pub finish: Option<Finish>,
-    /// How it was asked; left out of the file where it was asked directly.
+    /// The way in which the model was asked; not in the file if it was asked directly.
     #[serde(skip_serializing_if = "Via::is_direct")]
     pub via: Via,
-    /// What went wrong, where it failed.
+    /// The reason why no reply came; `None` if one came.
     pub failure: Option<Failure>,
-    /// Tokens charged.
+    /// The tokens that the server charged; `None` if it did not say.
     pub usage: Option<Usage>,
-    /// The model's name as the server gave it.
+    /// The model's name in the server's reply.
     pub served_model: Option<String>,
-    /// How long the last try took, in milliseconds.
+    /// The duration of the last try, in milliseconds.
     pub latency_ms: Option<u64>,
-    /// How many requests it took.
+    /// The number of requests that were sent.
     pub attempts: u32,
-    /// What the experiment adds.
+    /// The fields that the experiment adds.
     #[serde(flatten)]
     pub detail: D,
 }
 
-/// What an experiment adds to a record.
+/// The fields that an experiment adds to a record.
 pub trait Detail: Clone + Serialize + Send {
-    /// A whole line of records, from which it is read in one pass.
+    /// A complete line of a record file; records are read through this type in one pass.
     type Line: DeserializeOwned + Into<Record<Self>>;
 
     /// The schema of a run with these records.
     const SCHEMA: &'static str;
 
-    /// Enters what is read from a reply; also when a kept reply is read again.
+    /// Reads the answer from a reply into the detail; a stored reply can be read again.
     ///
     /// # Errors
-    /// If the detail does not say what the reply is an answer to.
+    /// If the choices of the detail are not valid.
     fn read(&mut self, reply: &Reply) -> Result<()>;
 
-    /// The choices in the order shown; none if the answer is open.
+    /// The choices in the order shown; empty if the question is open.
     fn choices(&self) -> &[String];
 
-    /// How many times the same was asked before.
+    /// How many times the same question was asked before.
     fn repeat(&self) -> u32;
 }
 
@@ -77,7 +77,7 @@ impl<'de, D: Detail> Deserialize<'de> for Record<D> {
 }
 
 impl<D> Record<D> {
-    /// The record of a trial before anything came of it; without a condition the model sees nothing.
+    /// The record of a trial without a result; without a condition the model is shown no image.
     #[must_use]
     pub fn blank(
         key: TrialKey,
@@ -111,7 +111,7 @@ impl<D> Record<D> {
         self.failure.is_some()
     }
 
-    /// The record with what went wrong after so many requests.
+    /// The record with a failure after this number of requests.
     #[must_use]
     pub fn failed_by(self, failure: Failure, attempts: u32) -> Self {
         Self {
@@ -121,7 +121,7 @@ impl<D> Record<D> {
         }
     }
 
-    /// The record as one that was asked in a batch.
+    /// The record, marked as asked in a batch.
     #[must_use]
     pub fn batched(self) -> Self {
         Self {
@@ -132,10 +132,10 @@ impl<D> Record<D> {
 }
 
 impl<D: Detail> Record<D> {
-    /// The record with a reply and what is read from it.
+    /// The record with a reply and the answer that is read from it.
     ///
     /// # Errors
-    /// If the record does not say what the reply is an answer to.
+    /// If the choices of the record are not valid.
     pub fn answered(mut self, reply: Reply) -> Result<Self> {
         self.read(&reply)?;
         self.reply = Some(reply.text);
@@ -148,10 +148,10 @@ impl<D: Detail> Record<D> {
         Ok(self)
     }
 
-    /// The record with its kept reply read as this version of the program reads.
+    /// The record with its stored reply read again, by the rules of this version of the program.
     ///
     /// # Errors
-    /// As of [`answered`](Self::answered).
+    /// As for [`answered`](Self::answered).
     pub fn reread(mut self) -> Result<Self> {
         if let Some(text) = self.reply.clone() {
             let reply = Reply {
@@ -172,19 +172,19 @@ impl<D: Detail> Record<D> {
 }
 
 /// The columns that follow from a condition.
-mod shown {
+mod condition_columns {
     use serde::{Serialize, Serializer};
 
     use crate::types::degradation::{Axis, Degradation, ReadingName, Severity};
     use crate::types::{AxisLevel, Condition, EnhancerName};
 
     #[derive(Serialize)]
-    struct Written<'a> {
+    struct Columns<'a> {
         condition: Option<&'a Condition>,
         level: Option<AxisLevel>,
         variant: &'static str,
         ev: Option<f64>,
-        /// In place of `ev` for kinds that are measured in another unit.
+        /// The severity of kinds that are not measured in EV; they have no `ev`.
         #[serde(skip_serializing_if = "Option::is_none")]
         severity: Option<Severity>,
         reading: Option<&'a ReadingName>,
@@ -201,7 +201,7 @@ mod shown {
         let level = condition.map(Condition::level);
         let light = level.filter(|level| level.axis().is_none_or(|axis| axis == Axis::LIGHT));
         let severity = degradation.map(Degradation::severity);
-        Written {
+        Columns {
             condition,
             level,
             variant: degradation.map_or("none", |how| how.kind().word()),
@@ -218,9 +218,9 @@ mod shown {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum View {
-    /// It was.
+    /// The model was shown the image.
     Image,
-    /// It had the words alone.
+    /// The model was asked without the image.
     Blind,
 }
 
@@ -230,30 +230,30 @@ impl fmt::Display for View {
     }
 }
 
-/// What went wrong where no reply came.
+/// The reason why no reply came.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FailureKind {
-    /// No connection, or it broke.
+    /// No connection could be made, or it broke.
     Connection,
-    /// Not finished in time.
+    /// The reply was not complete in time.
     Timeout,
-    /// Too many requests, after all retries.
+    /// The server refused the request because of its rate limit, also after all retries.
     RateLimit,
-    /// The server failed, after all retries.
+    /// The server failed, also after all retries.
     Server,
-    /// The request was refused.
+    /// The request was refused, by the server or by a model in this process.
     Request,
-    /// A moderator refused what the request showed or asked.
+    /// Moderation refused the image or the question.
     Filtered,
-    /// The answer was not a chat completion.
+    /// The response was not a chat completion.
     Response,
-    /// The image could not be made.
+    /// The image could not be made, so no request was sent.
     Image,
 }
 
 impl FailureKind {
-    /// All of them.
+    /// All kinds of failure, in the order of tables.
     pub const ALL: [Self; 8] = [
         Self::Connection,
         Self::Timeout,
@@ -269,24 +269,24 @@ impl FailureKind {
 /// A trial without a reply.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Failure {
-    /// What kind.
+    /// The kind of failure.
     pub kind: FailureKind,
-    /// The HTTP status, where there was one.
+    /// The HTTP status; `None` if the server sent none.
     pub status: Option<u16>,
-    /// What was said, shortened and without secrets.
+    /// The error text, shortened and without secrets.
     pub message: String,
 }
 
-/// How a question reached its model.
+/// The way in which a question reached its model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Via {
-    /// As a request of its own.
+    /// As a single request.
     #[default]
     Direct,
     /// In a file of a Batch API, which costs less.
     Batch,
-    /// Not at all: the answer was given in a file, by people or another program.
+    /// Not asked: the answer came from a file, made by people or another program.
     File,
 }
 

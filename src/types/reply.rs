@@ -1,16 +1,16 @@
-//! What a model said: [`Reply`].
+//! The reply of a model: [`Reply`].
 
 use serde::{Deserialize, Serialize};
 
-/// Why a model stopped speaking.
+/// The reason why a model stopped.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Finish {
-    /// It was done.
+    /// The reply is complete.
     Stop,
-    /// It ran into the token limit.
+    /// The token limit was reached.
     Length,
-    /// A content filter cut in.
+    /// A content filter stopped the reply.
     Filter,
     /// Another reason, in the server's words.
     Other(String),
@@ -18,17 +18,17 @@ pub enum Finish {
     Unknown,
 }
 
-/// Tokens a request was charged for, where the server said so.
+/// The tokens that the server charged for a request; `None` where it did not say.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Usage {
-    /// Tokens of the prompt, image included.
+    /// The number of tokens in the prompt, image included.
     pub prompt_tokens: Option<u64>,
-    /// Tokens of the reply, hidden reasoning included.
+    /// The number of tokens in the reply, hidden reasoning included.
     pub completion_tokens: Option<u64>,
 }
 
 impl Usage {
-    /// All tokens, where any were told.
+    /// The sum of both numbers; `None` if the server stated neither.
     #[must_use]
     pub fn total(&self) -> Option<u64> {
         let (prompt, completion) = (self.prompt_tokens, self.completion_tokens);
@@ -40,24 +40,24 @@ impl Usage {
 /// One reply of a model, as it arrived.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reply {
-    /// What it said, text parts joined; hidden reasoning left out.
+    /// The text, with its parts joined and without hidden reasoning.
     pub text: String,
-    /// The words of a refusal that came apart from the text; never read for an answer.
+    /// The text of a refusal that came separately; no answer is read from it.
     pub refusal: Option<String>,
-    /// Why it stopped.
+    /// The reason why the model stopped.
     pub finish: Finish,
-    /// Tokens charged.
+    /// The tokens that the server charged; `None` if it did not say.
     pub usage: Option<Usage>,
-    /// The model's name as the server gave it.
+    /// The model's name in the server's reply.
     pub served_model: Option<String>,
-    /// From the first byte sent in the last try to the last received, in milliseconds.
+    /// The time from the first byte sent to the last byte received in the last try, in milliseconds.
     pub latency_ms: u64,
-    /// How many requests it took.
+    /// The number of requests that were sent.
     pub attempts: u32,
 }
 
 impl Reply {
-    /// A reply that was made in process: complete, at no cost.
+    /// A complete reply from this process, without cost.
     #[must_use]
     pub fn local(text: String) -> Self {
         Self {

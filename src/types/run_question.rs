@@ -1,4 +1,4 @@
-//! What a run asked, as it keeps it beside its records: [`RunQuestion`] questions and [`Thumbnail`]s of their images.
+//! The questions of a run ([`RunQuestion`]) and small copies of their images ([`Thumbnail`]), stored next to its records.
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -8,41 +8,41 @@ use super::digest::Digest;
 use super::frame::FrameId;
 use super::question::{Family, Question, QuestionId};
 
-/// One line of a run's `questions.jsonl`: a question with the scene of its frame. It reads back as a file of questions, too.
+/// One line of a run's `questions.jsonl`: a question with the scene of its frame. The file can also be used as `--questions`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RunQuestion {
-    /// The question's name.
+    /// The name of the question, unique in its data set.
     pub id: QuestionId,
-    /// Its place among all questions of the data, those that were not asked included.
+    /// The index among all questions of the data, from 0; questions that were not asked count too.
     #[serde(default)]
     pub place: usize,
-    /// The scene of its frame; empty where the data set says nothing of scenes.
+    /// The scene of the frame; empty if the data set names no scenes.
     #[serde(default)]
     pub scene: String,
-    /// Its frame.
+    /// The frame that the question is about.
     pub frame: FrameId,
-    /// Its kind.
+    /// The family of the question.
     pub family: Family,
-    /// The question in words.
+    /// The text of the question, without the choices.
     #[serde(rename = "question")]
     pub text: String,
-    /// The choices in the order of the data set; a record has them as they were shown.
+    /// The choices in the order of the data set; a record has them in the order shown.
     pub choices: Vec<String>,
-    /// The text of the true one.
+    /// The text of the true choice.
     pub answer: String,
-    /// Other answers that are right, too; of open questions alone.
+    /// Further right answers; only for open questions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub extra_answers: Option<Vec<String>>,
-    /// What makes it true.
+    /// The facts from which the answer was derived.
     #[serde(default)]
     pub evidence: Value,
-    /// The digest of what it is about: the file of its frame, or those of its walk in the order shown. `None` if nobody was to see it.
+    /// The digest of the frame's file, or of the walk's files in the order shown. `None` if all models were blind.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub image: Option<Digest>,
 }
 
 impl RunQuestion {
-    /// Whether it asks the same as another of its name, about the same image if both say which.
+    /// Whether two questions are the same, evidence and place aside; images are compared if both are known.
     #[must_use]
     pub fn is_same(&self, other: &Self) -> bool {
         let words = |question: &Self| Self {
@@ -52,10 +52,10 @@ impl RunQuestion {
             ..question.clone()
         };
         let images = self.image.zip(other.image);
-        words(self) == words(other) && images.is_none_or(|(own, theirs)| own == theirs)
+        words(self) == words(other) && images.is_none_or(|(image, other)| image == other)
     }
 
-    /// A question about a frame of this scene.
+    /// The stored form of a question at an index, about a frame of this scene.
     #[must_use]
     pub fn new(question: &Question, place: usize, scene: &str) -> Self {
         let choices = question.choices.texts();
@@ -78,16 +78,16 @@ impl RunQuestion {
 /// One line of a run's `thumbnails.jsonl`: a small copy of an image as it was sent.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Thumbnail {
-    /// The frame.
+    /// The name of the frame.
     pub frame: FrameId,
-    /// What was done to it.
+    /// The condition in which the frame was sent.
     pub condition: Condition,
     /// The digest of the file that was sent.
     pub image: Digest,
-    /// The whole of it, small, as a `data:` URL.
+    /// The whole image in reduced size, as a `data:` URL.
     pub small: String,
-    /// The middle of it pixel for pixel, its light amplified, as a `data:` URL.
+    /// The middle of the image at full resolution and brightened, as a `data:` URL.
     pub crop: String,
-    /// By how many EV the crop's light is amplified.
+    /// The gain that brightens the crop, in EV.
     pub stops: f32,
 }

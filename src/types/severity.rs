@@ -1,4 +1,4 @@
-//! How strong a degradation is: [`Severity`], along an [`Axis`].
+//! The strength of a degradation, [`Severity`], and its quantity, [`Axis`].
 
 use std::fmt;
 use std::num::NonZeroU16;
@@ -11,39 +11,39 @@ use crate::error::Error;
 /// The quantity on the axis of a curve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Axis {
-    /// What is measured.
+    /// The name of the quantity, as `exposure drop`.
     pub title: &'static str,
-    /// Its unit.
+    /// The unit of the quantity, as `EV`.
     pub unit: &'static str,
 }
 
 impl Axis {
-    /// Light that is missing, in exposure values: one EV is a factor of two.
+    /// The exposure drop in exposure values; one EV is a factor of two in light.
     pub const LIGHT: Self = Self {
         title: "exposure drop",
         unit: "EV",
     };
 }
 
-/// How strong a degradation is: hundredths of its kind's unit, so that equality and order are exact.
+/// The strength of a degradation in hundredths of its kind's unit, so that equality and order are exact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Severity(NonZeroU16);
 
 impl Severity {
-    /// L1: 2 EV.
+    /// Level L1, an exposure drop of 2 EV.
     pub const L1: Self = Self::hundredths(200);
-    /// L2: 4 EV.
+    /// Level L2, an exposure drop of 4 EV.
     pub const L2: Self = Self::hundredths(400);
-    /// L3: 6 EV.
+    /// Level L3, an exposure drop of 6 EV.
     pub const L3: Self = Self::hundredths(600);
-    /// L4: 7.5 EV.
+    /// Level L4, an exposure drop of 7.5 EV.
     pub const L4: Self = Self::hundredths(750);
-    /// L5: 9 EV.
+    /// Level L5, an exposure drop of 9 EV.
     pub const L5: Self = Self::hundredths(900);
     /// The exposure drops of the paper (DarkQA, section III), smallest first.
     pub const LADDER: [Self; 5] = [Self::L1, Self::L2, Self::L3, Self::L4, Self::L5];
 
-    /// So many hundredths; 0 is taken as 1, for no severity is none.
+    /// A severity in hundredths of the kind's unit; 0 becomes 1, because a severity is never zero.
     #[must_use]
     pub const fn hundredths(count: u16) -> Self {
         match NonZeroU16::new(count) {
@@ -60,7 +60,7 @@ impl Severity {
 }
 
 impl fmt::Display for Severity {
-    /// The shortest decimal.
+    /// The shortest decimal, as `7.5`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.value())
     }
@@ -75,12 +75,12 @@ impl Serialize for Severity {
 impl FromStr for Severity {
     type Err = Error;
 
-    /// Reads a decimal number above 0 with two decimals at most.
+    /// Reads a decimal number above 0 with at most two decimals.
     fn from_str(text: &str) -> Result<Self, Error> {
         let (whole, part) = text.split_once('.').unwrap_or((text, "0"));
         let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
         if !digits(whole) || !digits(part) {
-            let problem = format_args!("{text:?} is no decimal number, as 3.3");
+            let problem = format_args!("{text:?} is not a decimal number like 3.3");
             return Err(Error::usage("level", problem));
         }
         if part.len() > 2 {

@@ -1,4 +1,4 @@
-//! The name of a trial: [`TrialKey`].
+//! The key that identifies a trial: [`TrialKey`].
 
 use std::fmt;
 use std::str::FromStr;
@@ -8,7 +8,7 @@ use super::words::as_text;
 use crate::error::Error;
 
 /// The digest of everything that decides a reply: question and choices as shown, the recipe of the image, prompt, model
-/// and parameters. Two trials with one key are one trial.
+/// and parameters. Trials with the same key are the same trial.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct TrialKey([u8; 16]);
 
@@ -34,8 +34,12 @@ impl FromStr for TrialKey {
         let key = digits
             .then(|| u128::from_str_radix(text, 16).ok())
             .flatten();
-        key.map(|key| Self(key.to_be_bytes()))
-            .ok_or_else(|| Error::data("key", format_args!("{text:?} is no key of 32 digits")))
+        key.map(|key| Self(key.to_be_bytes())).ok_or_else(|| {
+            Error::data(
+                "key",
+                format_args!("{text:?} is not a key of 32 hexadecimal digits"),
+            )
+        })
     }
 }
 

@@ -1,4 +1,4 @@
-//! Types that are written as words or as text, and read back: [`words`], [`as_text`].
+//! Macros for types that are written as a word or a text and read back: [`words`], [`as_text`].
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use serde::de::{Error, Visitor};
 
-/// Gives the values of an enum their words, which `Display` writes.
+/// Implements `Display` for an enum: one word for each value.
 macro_rules! words {
     ($type:ident { $($value:ident = $word:literal),+ $(,)? }) => {
         impl std::fmt::Display for $type {
@@ -18,7 +18,7 @@ macro_rules! words {
 }
 pub(crate) use words;
 
-/// Has types written in files as their `Display` writes them.
+/// Implements `Serialize` through `Display`.
 macro_rules! written_as_text {
     ($($type:ty),+) => {
         $(impl serde::Serialize for $type {
@@ -30,7 +30,7 @@ macro_rules! written_as_text {
 }
 pub(crate) use written_as_text;
 
-/// Has types written in files as their `Display` writes them, and read as their `FromStr` reads them.
+/// Implements `Serialize` through `Display` and `Deserialize` through `FromStr`.
 macro_rules! as_text {
     ($($type:ty),+) => {
         crate::types::words::written_as_text!($($type),+);
@@ -44,7 +44,7 @@ macro_rules! as_text {
 }
 pub(crate) use as_text;
 
-/// Reads a text as a type does.
+/// A serde visitor that reads a string through `FromStr`.
 pub(crate) struct Text<T>(PhantomData<T>);
 
 impl<T> Text<T> {

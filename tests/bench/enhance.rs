@@ -40,7 +40,7 @@ fn enhance(c: &mut Criterion) {
         &search.open().unwrap(),
         number("DARKQA_BENCH_THREADS"),
     );
-    let tiling = number("DARKQA_BENCH_TILE").map_or(Tiling::Auto, Tiling::Of);
+    let tiling = number("DARKQA_BENCH_TILE").map_or(Tiling::Auto, Tiling::Side);
     let mut enhancer = enhancer.unwrap().with_tiling(tiling);
     let mut group = c.benchmark_group(enhancer.name().to_string());
     group.sample_size(10);

@@ -1,11 +1,11 @@
-//! What a server says is left of its limits: [`Allowance`].
+//! The remaining limits that a server reports in its headers: [`Allowance`].
 
 use std::time::{Duration, SystemTime};
 
-use jiff::Timestamp;
+use jiff::{SignedDuration, Timestamp};
 use reqwest::header::HeaderMap;
 
-/// What is left of one limit, and how long it takes until all of it is there again.
+/// The rest of one limit, and the time until the limit is full again.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Remainder {
     limit: Option<f64>,
@@ -13,31 +13,30 @@ struct Remainder {
     reset: Duration,
 }
 
-/// What is left of the limits on requests and on tokens.
+/// The rest of the limits on requests and on tokens.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(in crate::ask) struct Allowance {
     requests: Option<Remainder>,
     tokens: Option<Remainder>,
 }
 
-/// What an allowance asks for.
+/// The advice that follows from an allowance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Asks {
-    /// Nothing.
     Nothing,
-    /// This distance between requests.
+    /// Keep this spacing between requests.
     Spacing(Duration),
-    /// No request for so long.
+    /// Send no request for this time.
     Pause(Duration),
 }
 
 impl Allowance {
-    /// Reads the headers of a reply: `x-ratelimit-{limit,remaining,reset}-{requests,tokens}` (OpenAI and those like it), the
+    /// Reads the headers of a reply: `x-ratelimit-{limit,remaining,reset}-{requests,tokens}` (OpenAI and similar servers), the
     /// same without an ending (OpenRouter), and `anthropic-ratelimit-{requests,tokens}-{limit,remaining,reset}`. A limit
-    /// without a rest and a time says nothing that could be kept to.
+    /// without `remaining` and `reset` is ignored.
     pub(in crate::ask) fn read(headers: &HeaderMap, now: SystemTime) -> Self {
         let text = |name: &str| headers.get(name)?.to_str().ok().map(str::trim);
-        let left = |name: &dyn Fn(&str) -> String| {
+        let remainder = |name: &dyn Fn(&str) -> String| {
             let number = |field| text(&name(field))?.parse::<f64>().ok();
             let remaining = number("remaining").filter(|n| n.is_finite())?;
             Some(Remainder {
@@ -47,19 +46,23 @@ impl Allowance {
             })
         };
         let of = |kind: &str| {
-            left(&|field| format!("x-ratelimit-{field}-{kind}"))
-                .or_else(|| left(&|field| format!("anthropic-ratelimit-{kind}-{field}")))
+            remainder(&|field| format!("x-ratelimit-{field}-{kind}"))
+                .or_else(|| remainder(&|field| format!("anthropic-ratelimit-{kind}-{field}")))
         };
         Self {
-            requests: of("requests").or_else(|| left(&|field| format!("x-ratelimit-{field}"))),
+            requests: of("requests").or_else(|| remainder(&|field| format!("x-ratelimit-{field}"))),
             tokens: of("tokens"),
         }
     }
 
-    /// What follows for requests of so many tokens each.
+    /// The advice for requests of `tokens` tokens each.
     pub(super) fn asks(&self, tokens: f64) -> Asks {
-        let requests = self.requests.map_or(Asks::Nothing, |left| left.asks(1.0));
-        let tokens = self.tokens.map_or(Asks::Nothing, |left| left.asks(tokens));
+        let requests = self
+            .requests
+            .map_or(Asks::Nothing, |remainder| remainder.asks(1.0));
+        let tokens = self
+            .tokens
+            .map_or(Asks::Nothing, |remainder| remainder.asks(tokens));
         match (requests, tokens) {
             (Asks::Pause(a), Asks::Pause(b)) => Asks::Pause(a.max(b)),
             (Asks::Spacing(a), Asks::Spacing(b)) => Asks::Spacing(a.max(b)),
@@ -71,9 +74,9 @@ impl Allowance {
 }
 
 impl Remainder {
-    /// Above half of the limit nothing; below, the rest is spread over the time until all is there again. Where the limit
-    /// fills up all the time (OpenAI), that is the rate of filling at half and less below it, so half is where it settles;
-    /// where it is filled at once when a minute is over, the rest lasts for the rest of the minute. Neither runs dry.
+    /// The advice for requests that use `each` of the limit. Above half of the limit there is none; below, the rest is spread
+    /// over the time until the limit is full again. If the limit refills continuously (OpenAI), this is the refill rate at
+    /// half and less below, so the rest settles at half. If it refills at the end of each minute, the rest lasts until then.
     fn asks(self, each: f64) -> Asks {
         if self.reset.is_zero() || self.limit.is_some_and(|limit| self.remaining > limit / 2.0) {
             return Asks::Nothing;
@@ -86,10 +89,10 @@ impl Remainder {
     }
 }
 
-/// Seconds from which a number is no length of time but a date.
+/// The number of seconds from which a number is a date and not a duration.
 const DATES: f64 = 1e9;
 
-/// A length of time: `6m0s`, `17ms`, seconds; or the time until a date: RFC 3339, or seconds or milliseconds since 1970.
+/// A duration (`6m0s`, `17ms`, or seconds), or the time until a date (RFC 3339, or seconds or milliseconds since 1970).
 fn duration(text: &str, now: SystemTime) -> Option<Duration> {
     let until = |date: SystemTime| date.duration_since(now).unwrap_or(Duration::ZERO);
     if let Ok(number) = text.parse::<f64>() {
@@ -109,29 +112,7 @@ fn duration(text: &str, now: SystemTime) -> Option<Duration> {
     if let Ok(date) = text.parse::<Timestamp>() {
         return Some(until(date.into()));
     }
-    let mut seconds = 0.0;
-    let mut rest = text;
-    while !rest.is_empty() {
-        let digits = rest.find(|c: char| !c.is_ascii_digit() && c != '.')?;
-        let (number, after) = rest.split_at(digits);
-        let unit = after
-            .find(|c: char| c.is_ascii_digit())
-            .unwrap_or(after.len());
-        let scale = match &after[..unit] {
-            "h" => 3600.0,
-            "m" => 60.0,
-            "s" => 1.0,
-            "ms" => 1e-3,
-            "us" | "µs" => 1e-6,
-            "ns" => 1e-9,
-            _ => return None,
-        };
-        seconds += number.parse::<f64>().ok()? * scale;
-        rest = &after[unit..];
-    }
-    (!text.is_empty())
-        .then(|| Duration::try_from_secs_f64(seconds).ok())
-        .flatten()
+    text.parse::<SignedDuration>().ok()?.try_into().ok()
 }
 
 #[cfg(test)]
@@ -149,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn lengths_of_every_form_are_read() {
+    fn durations_of_every_form_are_read() {
         let now = SystemTime::UNIX_EPOCH + Duration::from_secs(NOW);
         for (text, ms) in [
             ("6m0s", Some(360_000)),
@@ -184,7 +165,7 @@ mod tests {
             .asks(1000.0)
         };
         assert_eq!(openai("499", "120ms"), Asks::Nothing);
-        // Half of 500 a minute: the rate of filling, 120 ms.
+        // Half of 500 a minute: the spacing is the refill rate, 120 ms.
         assert_eq!(
             openai("250", "30s"),
             Asks::Spacing(Duration::from_millis(120))
@@ -201,7 +182,7 @@ mod tests {
         ]);
         assert_eq!(tokens.asks(1000.0), Asks::Spacing(Duration::from_secs(3)));
         assert_eq!(tokens.asks(20_000.0), Asks::Pause(Duration::from_secs(30)));
-        // A rest without a time, or a limit alone, cannot be kept to.
+        // A rest without a reset time is ignored.
         assert_eq!(
             read(&[
                 ("x-ratelimit-limit-requests", "500"),

@@ -1,34 +1,34 @@
-//! The rate that an endpoint takes, learned from what it turns away: [`LearnedRate`].
+//! The rate that an endpoint accepts, learned from its rejections: [`LearnedRate`].
 
 use std::collections::VecDeque;
 
 use tokio::time::{Duration, Instant};
 
-/// The distance to keep between requests, learned from pauses: guessed at the first, corrected while they come soon, and
-/// measured once requests flowed for a while before one.
+/// The spacing between requests, learned from pauses. It is guessed at the first pause, corrected at later ones, and measured
+/// if requests passed for at least a second before a pause.
 #[derive(Debug)]
 pub(super) struct LearnedRate {
-    /// The distance.
+    /// The current spacing; zero for none.
     spacing: Duration,
-    /// How it became known.
+    /// The way in which the spacing became known.
     source: RateSource,
-    /// The distance when the pause began that holds now.
-    tried: Duration,
-    /// When the last ones passed since the last pause.
-    passed: VecDeque<Instant>,
-    /// When the pause began that holds now; `None` while there is none.
-    paused: Option<Instant>,
-    /// How many were turned away in it.
-    turned_away: usize,
-    /// How many the endpoint took before its first pause: the size of its bucket.
+    /// The spacing at the beginning of the current pause.
+    spacing_before_pause: Duration,
+    /// The times of the last requests that passed since the last pause, at most [`REMEMBERED`].
+    pass_times: VecDeque<Instant>,
+    /// The beginning of the current pause; `None` if there is none.
+    pause_start: Option<Instant>,
+    /// The number of rejections in the current pause.
+    rejections: usize,
+    /// The number of requests that the endpoint accepted in a burst: the size of its token bucket.
     burst: Option<usize>,
-    /// How many passed before the last pause that a longer spacing had delayed.
+    /// The number of requests before the last pause that a longer spacing had delayed.
     sent_before_pause: usize,
-    /// How many pauses since then a longer spacing has not delayed.
+    /// The number of pauses since then that a longer spacing did not delay.
     unexplained_pauses: u32,
 }
 
-/// How the spacing that an endpoint wants became known.
+/// The way in which the spacing became known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum RateSource {
     Guessed,
@@ -36,44 +36,43 @@ enum RateSource {
     Measured,
 }
 
-/// What a success leaves of a distance that was guessed, that was too short once, and that was measured: it is halved in 7,
-/// in 69 and in 3,465 successes.
+/// The factors by which a success shortens a spacing that was guessed, corrected or measured: they halve it in 7, 69 and 3,465
+/// successes.
 const EASING: [f64; 3] = [0.9, 0.99, 0.9998];
 
-/// What a pause makes of a distance that was too short.
+/// The factor that lengthens a spacing that was too short.
 const SLOWER: f64 = 1.5;
 
-/// A measured rate is used to this share: a little below it nothing is turned away.
+/// The share of a measured rate that is used: slightly below the rate nothing is rejected.
 const MARGIN: f64 = 0.97;
 
-/// Below this distance there is none.
+/// The minimum spacing; a shorter one is set to zero.
 const NEGLIGIBLE: Duration = Duration::from_millis(1);
 
-/// The longest distance, so that one long pause does not leave a run crawling.
+/// The maximum spacing, so that one long pause does not slow down the whole run.
 pub(super) const WIDEST: Duration = Duration::from_secs(5);
 
-/// The shortest time over which a rate is measured.
+/// The minimum time over which a rate is measured.
 const MEASURED: Duration = Duration::from_secs(1);
 
-/// Where nothing is known of the rate, so many at least pass in the length of the pause.
+/// The minimum number of requests in the length of a pause if the rate is unknown.
 const PROBES: u32 = 32;
 
 /// After this many pauses that a longer spacing did not delay, the rate limit is not the cause: some servers reject requests at
 /// random.
 const UNEXPLAINED_PAUSES: u32 = 8;
 
-/// After this many of them the rate is learned again.
+/// After this many such pauses the rate is learned again.
 const RELEARN_AFTER: u32 = 48;
 
-/// The maximum number of passes that are remembered.
+/// The maximum number of requests whose times are remembered.
 const REMEMBERED: usize = 2048;
 
-/// What is known of an endpoint's rate before anything is learned.
+/// Whether the user stated a rate for the endpoint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum StatedRate {
-    /// Nothing.
     Unknown,
-    /// The user has stated it: one that is turned away shows that something else has used it up.
+    /// The user stated a quota: a rejection within it means that other programs use the same limit.
     Known,
 }
 
@@ -82,82 +81,84 @@ impl LearnedRate {
         Self {
             spacing: Duration::ZERO,
             source: RateSource::Guessed,
-            tried: Duration::ZERO,
-            passed: VecDeque::new(),
-            paused: None,
-            turned_away: 0,
+            spacing_before_pause: Duration::ZERO,
+            pass_times: VecDeque::new(),
+            pause_start: None,
+            rejections: 0,
             burst: None,
             sent_before_pause: 0,
             unexplained_pauses: 0,
         }
     }
 
-    /// The distance to keep.
+    /// The spacing between requests; zero for none.
     pub(super) fn spacing(&self) -> Duration {
         self.spacing
     }
 
-    /// Notes that a request passes, `paused_until` being when the last pause ends.
+    /// Notes that a request passes; `paused_until` is the end of the last pause.
     pub(super) fn pass(&mut self, now: Instant, paused_until: Instant) {
-        if let Some(paused) = self.paused.filter(|_| now >= paused_until) {
-            if self.counted(paused) < MEASURED {
-                self.burst = self.burst.max(Some(self.taken()));
+        if let Some(pause_start) = self.pause_start.filter(|_| now >= paused_until) {
+            if self.time_before(pause_start) < MEASURED {
+                self.burst = self.burst.max(Some(self.accepted()));
             }
-            self.paused = None;
-            self.passed.clear();
-            self.turned_away = 0;
+            self.pause_start = None;
+            self.pass_times.clear();
+            self.rejections = 0;
         }
-        self.passed.push_back(now);
-        if self.passed.len() > REMEMBERED {
-            self.passed.pop_front();
+        self.pass_times.push_back(now);
+        if self.pass_times.len() > REMEMBERED {
+            self.pass_times.pop_front();
         }
     }
 
-    /// Notes a success, after which the distance may be a little shorter.
-    pub(super) fn ease(&mut self) {
-        let eased = self.spacing.mul_f64(EASING[self.source as usize]);
-        self.spacing = if eased < NEGLIGIBLE {
+    /// Shortens the spacing slightly after a success.
+    pub(super) fn shorten(&mut self) {
+        let shorter = self.spacing.mul_f64(EASING[self.source as usize]);
+        self.spacing = if shorter < NEGLIGIBLE {
             Duration::ZERO
         } else {
-            eased
+            shorter
         };
     }
 
-    /// Notes that a request was turned away for so long.
-    pub(super) fn turn_away(&mut self, now: Instant, wait: Duration, stated: StatedRate) {
-        let paused = *self.paused.get_or_insert(now);
-        self.turned_away += 1;
-        if self.turned_away == 1 {
-            self.tried = self.spacing;
-            self.compare();
+    /// Notes that a request was rejected and the server asked for this wait.
+    pub(super) fn note_rejection(&mut self, now: Instant, wait: Duration, stated: StatedRate) {
+        let pause_start = *self.pause_start.get_or_insert(now);
+        self.rejections += 1;
+        if self.rejections == 1 {
+            self.spacing_before_pause = self.spacing;
+            self.check_cause();
         }
         if self.unexplained_pauses >= UNEXPLAINED_PAUSES {
-            (self.source, self.spacing) = (RateSource::Guessed, self.tried);
+            (self.source, self.spacing) = (RateSource::Guessed, self.spacing_before_pause);
             return;
         }
-        let (source, spacing) = match self.rate(paused) {
+        let (source, spacing) = match self.rate(pause_start) {
             Some(rate) => (
                 RateSource::Measured,
                 Duration::from_secs_f64(1.0 / (rate * MARGIN)),
             ),
-            // Too fast, if not by much: it was right a moment ago.
-            None if !self.tried.is_zero() => (RateSource::Corrected, self.tried.mul_f64(SLOWER)),
+            // The spacing worked until now, so it is only slightly too short.
+            None if !self.spacing_before_pause.is_zero() => (
+                RateSource::Corrected,
+                self.spacing_before_pause.mul_f64(SLOWER),
+            ),
             None if stated == StatedRate::Known => (RateSource::Guessed, Duration::ZERO),
             None => {
-                let time = self.counted(paused).saturating_add(wait);
-                let taken = u32::try_from(self.taken()).unwrap_or(u32::MAX);
-                (RateSource::Guessed, time / PROBES.max(taken))
+                let time = self.time_before(pause_start).saturating_add(wait);
+                let accepted = u32::try_from(self.accepted()).unwrap_or(u32::MAX);
+                (RateSource::Guessed, time / PROBES.max(accepted))
             }
         };
         (self.source, self.spacing) = (source, spacing.min(WIDEST));
     }
 
-    /// Whether the distance kept since the last pause has put this one off: a limit on the rate is met later the slower
-    /// requests come.
-    fn compare(&mut self) {
-        let passed = self.passed.len();
-        if self.tried.is_zero() {
-            // No distance was kept that could have put it off.
+    /// Notes whether the spacing delayed this pause: a rate limit is reached later if requests are slower.
+    fn check_cause(&mut self) {
+        let passed = self.pass_times.len();
+        if self.spacing_before_pause.is_zero() {
+            // Without a spacing nothing could delay the pause.
         } else if passed >= 2 * self.sent_before_pause {
             (self.sent_before_pause, self.unexplained_pauses) = (passed, 0);
         } else {
@@ -165,26 +166,26 @@ impl LearnedRate {
         }
     }
 
-    /// How many passed since the last pause and were not turned away.
-    fn taken(&self) -> usize {
-        self.passed.len().saturating_sub(self.turned_away)
+    /// The number of requests since the last pause that were not rejected.
+    fn accepted(&self) -> usize {
+        self.pass_times.len().saturating_sub(self.rejections)
     }
 
-    /// How long they passed before this pause began.
-    fn counted(&self, paused: Instant) -> Duration {
-        let first = self.passed.front();
-        first.map_or(Duration::ZERO, |first| paused - *first)
+    /// The time from the first remembered request to the beginning of a pause.
+    fn time_before(&self, pause_start: Instant) -> Duration {
+        let first = self.pass_times.front();
+        first.map_or(Duration::ZERO, |first| pause_start - *first)
     }
 
-    /// How many in a second the endpoint takes: it turned one away when, since some moment, more had passed than it held in
-    /// store and was filled up with since (a token bucket). That moment is the one that asks for the highest rate.
-    fn rate(&self, paused: Instant) -> Option<f64> {
-        let burst = self.burst? + self.turned_away;
-        let times = self.passed.iter().enumerate();
+    /// The number of requests per second that the endpoint accepts, if it is a token bucket. It rejects a request when more
+    /// passed since some moment than the bucket's size and its refill since then. The moment with the highest rate counts.
+    fn rate(&self, pause_start: Instant) -> Option<f64> {
+        let burst = self.burst? + self.rejections;
+        let times = self.pass_times.iter().enumerate();
         let rates = times.filter_map(|(before, since)| {
-            let flow = (self.passed.len() - before).checked_sub(burst)?;
-            let lasted = paused - *since;
-            (flow > 0 && lasted >= MEASURED).then(|| flow as f64 / lasted.as_secs_f64())
+            let refilled = (self.pass_times.len() - before).checked_sub(burst)?;
+            let time = pause_start - *since;
+            (refilled > 0 && time >= MEASURED).then(|| refilled as f64 / time.as_secs_f64())
         });
         rates.reduce(f64::max)
     }

@@ -1,8 +1,8 @@
-//! When to send, and how much at once.
+//! The times at which requests are sent, and the number of requests in flight.
 //!
-//! All requests to one endpoint pass one [`Gate`], which keeps to what the user allows (`--rpm`, `--tpm`), to what the server
-//! says is left ([`Allowance`]) and to the pauses it asks for ([`asked_wait`]). How many are on the wire at once is another
-//! matter, the [`Window`]'s: a long pause must not narrow it, nor a wide one shorten the pause.
+//! All requests to one endpoint pass one [`Gate`]. It follows the user's limits (`--rpm`, `--tpm`), the remaining limits that the
+//! server reports ([`Allowance`]) and the pauses that it asks for ([`asked_wait`]). The number in flight is set separately by the
+//! [`Window`]: a long pause must not narrow the window, and a wide window must not shorten a pause.
 
 mod allowance;
 mod gate;

@@ -1,11 +1,11 @@
-//! How long a server asks to wait: [`asked_wait`].
+//! The wait that a server asks for: [`asked_wait`].
 
 use std::time::{Duration, SystemTime};
 
 use reqwest::header::{DATE, HeaderMap, RETRY_AFTER};
 
-/// How long a server asks to wait: `retry-after-ms`, else `Retry-After` in seconds (fractions too) or as a date, which is read
-/// by the server's own clock where it tells the time. `None` where it asks for nothing, for no time, or in a form nobody knows.
+/// The wait that a server asks for: `retry-after-ms`, otherwise `Retry-After` in seconds (fractions too) or as a date. A date is
+/// compared with the server's clock if it sends `Date`. `None` without a header, for no wait, or in an unknown form.
 pub(in crate::ask) fn asked_wait(headers: &HeaderMap, now: SystemTime) -> Option<Duration> {
     let text = |name: &str| headers.get(name)?.to_str().ok();
     let after = || text(RETRY_AFTER.as_str());
@@ -23,7 +23,7 @@ pub(in crate::ask) fn asked_wait(headers: &HeaderMap, now: SystemTime) -> Option
         })
 }
 
-/// A positive number of units; longer than can be written down is as long as can be.
+/// A positive number of units as a duration, at most [`Duration::MAX`].
 fn seconds(text: &str, unit: f64) -> Option<Duration> {
     let seconds = text.trim().parse::<f64>().ok()? * unit;
     (seconds.is_finite() && seconds > 0.0)

@@ -1,4 +1,4 @@
-//! How many requests are on the wire at once: [`Window`] within [`Bounds`].
+//! The number of requests in flight: [`Window`] within [`Bounds`].
 
 use std::fmt;
 use std::num::NonZeroUsize;
@@ -7,7 +7,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tokio::time::{Duration, Instant};
 
-/// The least and the most requests at once.
+/// The minimum, first and maximum number of requests in flight.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Bounds {
     least: NonZeroUsize,
@@ -16,14 +16,14 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// Where nobody says otherwise: from 8 up to 32 as the server keeps pace, down to 1 where it is overloaded.
+    /// The default: it starts at 8, rises to 32 while replies do not get slower, and falls to 1 if the server is overloaded.
     pub const DEFAULT: Self = Self {
         least: NonZeroUsize::MIN,
         first: NonZeroUsize::new(8).unwrap(),
         most: NonZeroUsize::new(32).unwrap(),
     };
 
-    /// The most.
+    /// The maximum number of requests in flight.
     #[must_use]
     pub fn most(self) -> usize {
         self.most.get()
@@ -61,17 +61,17 @@ impl FromStr for Bounds {
     }
 }
 
-/// What an overload leaves of the window.
+/// The factor by which an overload narrows the window.
 const CUT: f64 = 0.7;
 
-/// A window in which replies take so much longer than in the quickest one is wide enough: the server only queues what comes
-/// on top.
+/// A round whose replies take this much longer than in the quickest round ends the widening: the server only queues further
+/// requests.
 const QUEUEING: f64 = 1.5;
 
 /// The window of an endpoint: additive increase, multiplicative decrease (Chiu and Jain 1989, Comput. Netw. ISDN Syst. 17:1).
 ///
-/// Each round of successes widens it by one request while replies come no slower; an overload (429, 503, 529, a time-out)
-/// narrows it by a third, once for all that were under way then.
+/// Each round of successes widens it by one request while replies do not get slower. An overload (429, 503, 529, a timeout)
+/// narrows it by a third, once for all requests in flight at that time.
 #[derive(Debug)]
 pub(in crate::ask) struct Window {
     bounds: Bounds,
@@ -81,14 +81,14 @@ pub(in crate::ask) struct Window {
 #[derive(Debug)]
 struct State {
     width: f64,
-    /// Overloads of requests that were sent before do not count again.
+    /// The time of the last narrowing; overloads of requests that were sent before it are ignored.
     cut_at: Option<Instant>,
-    /// Replies of the round under way and the time they took together.
+    /// The number of replies in the current round; `took` is their total time.
     replies: u32,
     took: Duration,
-    /// The mean time of a reply in the quickest round.
+    /// The mean time of a reply in the quickest round; `None` before the first round ends.
     quickest: Option<Duration>,
-    /// Whether the last round was slower than is worth a wider window.
+    /// Whether the last round was too slow to widen the window.
     queueing: bool,
 }
 
@@ -107,12 +107,12 @@ impl Window {
         }
     }
 
-    /// How many requests may be on the wire now.
+    /// The number of requests that may be in flight now.
     pub(in crate::ask) fn width(&self) -> usize {
         self.state().width as usize
     }
 
-    /// Notes a reply that took so long.
+    /// Notes a reply that came after this time.
     pub(in crate::ask) fn succeeded(&self, took: Duration) {
         let mut state = self.state();
         state.replies += 1;
@@ -130,7 +130,7 @@ impl Window {
         }
     }
 
-    /// Notes an overload that a request sent at this time met.
+    /// Notes the overload of a request that was sent at this time.
     pub(in crate::ask) fn overloaded(&self, sent: Instant) {
         let mut state = self.state();
         if state.cut_at.is_none_or(|cut| sent > cut) {
@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
-    async fn it_widens_one_by_one_and_narrows_by_a_third() {
+    async fn the_window_widens_by_one_and_narrows_by_a_third() {
         let window = Window::new("8-32".parse().unwrap());
         for _ in 0..9 {
             window.succeeded(Duration::from_millis(200));
@@ -175,7 +175,7 @@ mod tests {
         for _ in 0..32 {
             window.overloaded(sent);
         }
-        assert_eq!(window.width(), 22, "all of one moment count once");
+        assert_eq!(window.width(), 22, "simultaneous overloads count once");
         for _ in 0..20 {
             tokio::time::advance(Duration::from_millis(100)).await;
             window.overloaded(Instant::now());
@@ -184,9 +184,9 @@ mod tests {
     }
 
     #[test]
-    fn it_stays_where_the_server_only_queues() {
+    fn the_window_stays_if_the_server_only_queues() {
         let window = Window::new("4-64".parse().unwrap());
-        // One slot: a reply takes as long as all that are before it.
+        // The server answers one at a time: a reply waits for all that were sent before it.
         for _ in 0..2000 {
             window.succeeded(Duration::from_millis(100 * window.width() as u64));
         }

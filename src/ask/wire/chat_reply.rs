@@ -1,4 +1,4 @@
-//! Replies of OpenAI's chat completions, read as leniently as servers are written: [`read`].
+//! Replies of OpenAI's chat completions, read leniently, because servers differ: [`read`].
 
 use serde_json::Value;
 
@@ -7,17 +7,17 @@ use crate::ask::complaint::{Complaint, UnreadableReply, page_title};
 use crate::ask::escapes;
 use crate::types::{Finish, Reply, Usage};
 
-/// Reads a body; `latency_ms` and `attempts` are left at zero.
+/// Reads a body; `latency_ms` and `attempts` stay zero.
 ///
-/// An error is looked for first at the top level and then in the choice, since gateways send both with status 200. Fields that
-/// do not matter may be missing, null or of another type; hidden reasoning is never looked at. Bytes that are no UTF-8, and
-/// escapes that are no character, become replacement characters: a small model at temperature 0 would say them again however
-/// often it is asked. An event stream that nobody asked for is put together.
+/// Errors are searched first at the top level and then in the choice, because gateways send both with status 200. Unimportant
+/// fields may be missing, null or of another type; hidden reasoning is never read. Invalid UTF-8 and escapes of no character
+/// become replacement characters: a small model at temperature 0 would send them again at each retry. An event stream that was
+/// not requested is joined.
 pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableReply> {
     let text = String::from_utf8_lossy(body);
     let text = text.trim_start_matches('\u{FEFF}');
     let completion = parsed(text, content_type)?;
-    // A completion may have a field "message" of its own.
+    // A completion may have its own field "message", so only `error` counts there.
     let complaint = match completion.get("choices") {
         Some(_) => Complaint::in_error(&completion),
         None => Complaint::of(&completion),
@@ -39,14 +39,14 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableR
         .get("message")
         .filter(|message| message.is_object())
         .ok_or_else(|| other("a choice without a message"))?;
-    let (text, refused) = content(message.get("content"))?;
+    let (text, refusal_part) = content(message.get("content"))?;
     let refusal = message.get("refusal").and_then(Value::as_str);
     Ok(Reply {
         text,
         refusal: refusal
             .filter(|words| !words.is_empty())
             .map(str::to_owned)
-            .or(refused),
+            .or(refusal_part),
         finish: finish(reason),
         usage: usage(completion.get("usage")),
         served_model: completion
@@ -68,12 +68,12 @@ fn parsed(text: &str, content_type: &str) -> Result<Value, UnreadableReply> {
             .ok_or_else(|| other("an event stream that holds no whole chat completion"));
     }
     serde_json::from_str(text).or_else(|error| {
-        let mended = escapes::mended(text).and_then(|text| serde_json::from_str(&text).ok());
-        mended.ok_or_else(|| unreadable(text, content_type, &error))
+        let repaired = escapes::repaired(text).and_then(|text| serde_json::from_str(&text).ok());
+        repaired.ok_or_else(|| unreadable(text, content_type, &error))
     })
 }
 
-/// What a body is that is no JSON.
+/// The description of a body that is not JSON.
 fn unreadable(text: &str, content_type: &str, error: &serde_json::Error) -> UnreadableReply {
     if text.trim().is_empty() {
         return other("an empty body");
@@ -84,7 +84,7 @@ fn unreadable(text: &str, content_type: &str, error: &serde_json::Error) -> Unre
     )
 }
 
-/// The choice with index 0, else the first.
+/// The choice with index 0, or the first one if none has it.
 fn choice(completion: &Value) -> Result<&Value, UnreadableReply> {
     let choices = completion
         .get("choices")
@@ -97,7 +97,7 @@ fn choice(completion: &Value) -> Result<&Value, UnreadableReply> {
         .ok_or_else(|| other("a completion with no choices in it"))
 }
 
-/// The words of a message and those of a refusal among its parts.
+/// The text of a message, and the text of a refusal among its parts.
 fn content(content: Option<&Value>) -> Result<(String, Option<String>), UnreadableReply> {
     let parts = match content {
         None | Some(Value::Null) => return Ok((String::new(), None)),
@@ -111,7 +111,7 @@ fn content(content: Option<&Value>) -> Result<(String, Option<String>), Unreadab
         match part.get("type").and_then(Value::as_str) {
             Some("text" | "output_text") => text += words("text"),
             Some("refusal") => refusal += words("refusal"),
-            // A part without a type is a plain text, or holds one.
+            // A part without a type is a text, or has a field `text`.
             None => text += part.as_str().unwrap_or_else(|| words("text")),
             Some(_) => {}
         }
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn the_rest_is_read_where_it_is_there() {
+    fn optional_fields_are_read_if_present() {
         let whole = "\n\n \r\n{\"model\":\"m-1\",\"choices\":[{\"finish_reason\":\"length\",\"message\":{\"content\":\"\"}}],\"usage\":{\"prompt_tokens\":9,\"completion_tokens\":\"many\"},\"timings\":{}}";
         let reply = json(whole).unwrap();
         assert_eq!(reply.finish, Finish::Length);
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_inside_a_success_are_found() {
+    fn errors_with_a_status_of_success_are_found() {
         for body in [
             r#"{"error":{"message":"m","code":502},"choices":[{"message":{"content":"B"}}]}"#,
             r#"{"error":"m"}"#,
@@ -233,9 +233,9 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_completion_is_named() {
+    fn a_body_that_is_not_a_completion_is_described() {
         let deep = "[".repeat(1000);
-        for (body, content_type, said) in [
+        for (body, content_type, expected) in [
             ("", "application/json", "empty"),
             ("{\"choices\":[", "application/json", "no whole JSON"),
             ("{\"choices\":null}", "application/json", "without choices"),
@@ -264,12 +264,12 @@ mod tests {
             let Err(UnreadableReply::Other(what)) = read(body.as_bytes(), content_type) else {
                 panic!("{body}");
             };
-            assert!(what.contains(said), "{what}");
+            assert!(what.contains(expected), "{what}");
         }
     }
 
     #[test]
-    fn bytes_that_are_no_text_do_not_lose_the_reply() {
+    fn invalid_text_does_not_lose_the_reply() {
         let body = b"\xef\xbb\xbf{\"choices\":[{\"message\":{\"content\":\"B \xff\xfe\"}}]}";
         assert_eq!(read(body, "").unwrap().text, "B \u{FFFD}\u{FFFD}");
         assert_eq!(message(r#"{"content":"B \ud83d"}"#).text, "B \u{FFFD}");

@@ -1,4 +1,4 @@
-//! Requests of OpenAI's chat completions: the JSON of one, [`body`], and what servers refuse of it, [`fields`].
+//! Requests of OpenAI's chat completions: the JSON [`body`], and the [`fields`] that servers may refuse.
 
 use std::sync::Arc;
 
@@ -41,7 +41,7 @@ struct Turn<'a> {
     content: Content<'a>,
 }
 
-// Words alone go as a plain string, which text-only servers without a notion of parts take too.
+// Text without images is sent as a plain string: text-only servers may not support parts.
 #[derive(Serialize)]
 #[serde(untagged)]
 enum Content<'a> {
@@ -63,11 +63,11 @@ struct ImageUrl {
     url: &'static str,
 }
 
-/// Where an image goes: a field without a value. No question can contain it, whatever it says: within a text every quotation
-/// mark has a backslash before it.
+/// The place of an image: a field with an empty value. No question can contain it, because in a JSON text every quotation mark
+/// has a backslash before it.
 const PLACE: &str = r#""url":"""#;
 
-/// The body of one request: words, images, and the words behind them.
+/// The body of one request: text, images, and the text after them.
 pub(super) fn body(
     parameters: &Parameters,
     fields: RequestFields,
@@ -96,7 +96,7 @@ pub(super) fn body(
     Ok(with_images(json, message.images))
 }
 
-/// A body with the images in their places; their bytes are shared and not copied.
+/// A body with the images in their places; their bytes are shared, not copied.
 fn with_images(json: String, images: &[Arc<Payload>]) -> Parts {
     if images.is_empty() {
         return Parts::new([json.into()]);
@@ -119,7 +119,7 @@ fn with_images(json: String, images: &[Arc<Payload>]) -> Parts {
     Parts::new(pieces)
 }
 
-/// What a message holds, with a place for each image.
+/// The content of a message, with a place for each image.
 fn content(message: Message<'_>, detail: Option<ImageDetail>) -> Content<'_> {
     let Message {
         before,
@@ -139,13 +139,13 @@ fn content(message: Message<'_>, detail: Option<ImageDetail>) -> Content<'_> {
     Content::Parts(parts.collect())
 }
 
-/// An object with one of the letters, as OpenAI's `json_schema` format.
+/// OpenAI's `json_schema` format for an object with one of the letters.
 fn format(letters: &[char]) -> Value {
     let schema = constraint::schema(letters);
     json!({"type": "json_schema", "json_schema": {"name": constraint::ANSWER, "strict": true, "schema": schema}})
 }
 
-/// The fields that a server may complain about.
+/// The fields that a server may refuse.
 pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField> {
     let parameters = sent.parameters;
     let limit = |field| sent.fields.token_field == field;
@@ -153,49 +153,49 @@ pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField> {
         RequestField {
             name: "temperature",
             sent: sent.fields.temperature.is_some(),
-            refused: Some(AdaptableField::Temperature),
+            adaptable: Some(AdaptableField::Temperature),
             hint: "leave the temperature to the server: --temperature default",
         },
         RequestField {
             name: "top_p",
             sent: parameters.top_p.is_some(),
-            refused: None,
+            adaptable: None,
             hint: "leave --top-p out: the model takes no other than its own",
         },
         RequestField {
             name: "max_tokens",
             sent: limit(TokenField::MaxTokens),
-            refused: Some(AdaptableField::TokenField),
+            adaptable: Some(AdaptableField::TokenField),
             hint: "send the limit otherwise: --token-field max_completion_tokens (or none), or another --max-tokens",
         },
         RequestField {
             name: "max_completion_tokens",
             sent: limit(TokenField::MaxCompletionTokens),
-            refused: Some(AdaptableField::TokenField),
+            adaptable: Some(AdaptableField::TokenField),
             hint: "send the limit otherwise: --token-field max_tokens (or none), or another --max-tokens",
         },
         RequestField {
             name: "reasoning_effort",
             sent: parameters.reasoning_effort.is_some(),
-            refused: None,
+            adaptable: None,
             hint: "leave --reasoning-effort out, or give a value the model takes",
         },
         RequestField {
             name: "detail",
             sent: sent.has_image && parameters.detail.is_some(),
-            refused: None,
+            adaptable: None,
             hint: "leave --detail out, or give a value the server takes",
         },
         RequestField {
             name: "response_format",
             sent: parameters.constrain == Constrain::Json,
-            refused: None,
+            adaptable: None,
             hint: "leave --constrain out: the server does not take it",
         },
         RequestField {
             name: "structured_outputs",
             sent: parameters.constrain == Constrain::Choice,
-            refused: None,
+            adaptable: None,
             hint: "leave --constrain out, or try --constrain json",
         },
     ])

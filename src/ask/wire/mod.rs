@@ -1,7 +1,7 @@
-//! The APIs by which models are asked: [`Wire`].
+//! The APIs through which models are asked: [`Wire`].
 //!
-//! A wire says what the bytes of a request and of a reply look like. Who waits, retries, keeps to rates and takes keys out of
-//! messages ([`Endpoint`](super::Endpoint), [`Remote`](super::Remote)) does not depend on it.
+//! A wire defines the bytes of requests and replies. Waits, retries, rates and the removal of keys from messages
+//! ([`Endpoint`](super::Endpoint), [`Remote`](super::Remote)) do not depend on it.
 
 mod chat_reply;
 mod chat_request;
@@ -20,27 +20,26 @@ use super::secret::Secret;
 use crate::error::{Error, Result};
 use crate::types::Reply;
 
-/// An API by which a model is asked.
+/// An API through which a model is asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Wire {
-    /// OpenAI's chat completions, which most servers understand.
+    /// OpenAI's chat completions, which most servers support.
     #[default]
     Chat,
 }
 
 impl Wire {
-    /// All of them.
     pub(super) const ALL: [Self; 1] = [Self::Chat];
 
-    /// The path behind the base URL to which requests go.
+    /// The path of requests, below the base URL.
     pub(super) fn path(self) -> &'static str {
         match self {
             Self::Chat => "chat/completions",
         }
     }
 
-    /// The path that a line of a Batch API's file asks; `None` if the API has no batches of OpenAI's form.
+    /// The path in a line of a Batch API's file; `None` if the API has no batches of OpenAI's form.
     #[expect(clippy::unnecessary_wraps, reason = "other APIs have no such batches")]
     pub(super) fn batch_url(self) -> Option<&'static str> {
         match self {
@@ -55,7 +54,7 @@ impl Wire {
         }
     }
 
-    /// The body of one request that offers so many choices; 0 if the answer is open.
+    /// The body of one request with this number of choices; 0 if the question is open.
     pub(super) fn body(
         self,
         parameters: &Parameters,
@@ -68,14 +67,14 @@ impl Wire {
         }
     }
 
-    /// The fields of a request about which a server may complain.
+    /// The fields of a request that a server may refuse.
     pub(super) fn fields(self, sent: SentFields<'_>) -> Vec<RequestField> {
         match self {
             Self::Chat => chat_request::fields(sent),
         }
     }
 
-    /// Reads the body of a reply with a status of success; `latency_ms` and `attempts` are left at zero.
+    /// Reads the body of a reply with a status of success; `latency_ms` and `attempts` stay zero.
     pub(super) fn reply(self, body: &[u8], content_type: &str) -> Result<Reply, UnreadableReply> {
         match self {
             Self::Chat => chat_reply::read(body, content_type),
@@ -90,14 +89,14 @@ impl Wire {
     }
 }
 
-/// A key as OpenAI and Azure take it.
+/// The header with the key, as OpenAI and Azure expect it.
 fn key_header(key: &Secret, form: KeyHeader) -> Result<HeaderMap> {
     let (name, text) = match form {
         KeyHeader::ApiKey => (HeaderName::from_static("api-key"), key.expose().to_owned()),
         _ => (AUTHORIZATION, format!("Bearer {}", key.expose())),
     };
-    let unfit = |_| Error::usage("key", "no HTTP header can carry it");
-    let mut value = HeaderValue::try_from(text).map_err(unfit)?;
+    let invalid = |_| Error::usage("key", "it has characters that an HTTP header cannot carry");
+    let mut value = HeaderValue::try_from(text).map_err(invalid)?;
     value.set_sensitive(true);
     Ok(HeaderMap::from_iter([(name, value)]))
 }

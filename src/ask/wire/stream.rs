@@ -1,21 +1,20 @@
-//! A chat completion that came as an event stream though none was asked for: [`assemble`].
+//! A chat completion that came as an event stream, although none was requested: [`assemble`].
 
 use serde_json::{Map, Value, json};
 
-/// Whether a body is an event stream, by its type or by how it begins.
+/// Whether a body is an event stream, by its content type or its beginning.
 pub(super) fn is_stream(text: &str, content_type: &str) -> bool {
     content_type.starts_with("text/event-stream") || text.trim_start().starts_with("data:")
 }
 
-/// Puts the pieces of the choice with index 0 together into a completion as `chat_reply` knows it; an event
-/// with an error is returned as it is. `None` where the stream is none of a chat completion, or broke off: neither
-/// `[DONE]` nor a reason to finish came.
+/// The completion that the pieces of the choice with index 0 make, in the form of `chat_reply`. An event with an error is
+/// returned unchanged. `None` if the stream is not a chat completion, or ended without `[DONE]` and a finish reason.
 pub(super) fn assemble(stream: &str) -> Option<Value> {
-    let mut whole = Map::new();
+    let mut completion = Map::new();
     let mut finish = Value::Null;
     let mut message = Map::new();
     let (mut started, mut done) = (false, false);
-    // Lines may end in CR, LF or both; comments and the names of events say nothing.
+    // Lines may end in CR, LF or both; comments and event names are ignored.
     let lines = stream.split(['\n', '\r']);
     for data in lines.filter_map(|line| line.strip_prefix("data:")) {
         let data = data.trim();
@@ -29,7 +28,7 @@ pub(super) fn assemble(stream: &str) -> Option<Value> {
         }
         for field in ["model", "usage"] {
             if let Some(value) = event.get(field).filter(|value| !value.is_null()) {
-                whole.insert(field.to_owned(), value.clone());
+                completion.insert(field.to_owned(), value.clone());
             }
         }
         let choices = event.get("choices").and_then(Value::as_array);
@@ -45,8 +44,8 @@ pub(super) fn assemble(stream: &str) -> Option<Value> {
         let delta = choice.get("delta").or_else(|| choice.get("message"));
         for field in ["content", "refusal"] {
             if let Some(text) = delta.and_then(|delta| delta.get(field)?.as_str()) {
-                let sofar = message.entry(field).or_insert_with(|| json!(""));
-                *sofar = json!(format!("{}{text}", sofar.as_str().unwrap_or_default()));
+                let joined = message.entry(field).or_insert_with(|| json!(""));
+                *joined = json!(format!("{}{text}", joined.as_str().unwrap_or_default()));
             }
         }
     }
@@ -54,8 +53,8 @@ pub(super) fn assemble(stream: &str) -> Option<Value> {
         return None;
     }
     let choice = json!({"index": 0, "message": message, "finish_reason": finish});
-    whole.insert("choices".to_owned(), json!([choice]));
-    Some(Value::Object(whole))
+    completion.insert("choices".to_owned(), json!([choice]));
+    Some(Value::Object(completion))
 }
 
 #[cfg(test)]
@@ -76,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stream_that_broke_off_is_none() {
+    fn an_incomplete_stream_is_refused() {
         let piece = "data: {\"choices\":[{\"index\":0,\"delta\":{\"content\":\"B\"}}]}\n\n";
         assert_eq!(assemble(piece), None);
         assert_eq!(assemble(&format!("{piece}data: {{\"choi")), None);

@@ -5,7 +5,7 @@ use clap::CommandFactory as _;
 use super::*;
 use crate::cli::Cli;
 
-/// What the words, the variables and the file `c.toml` with this text say together.
+/// The matches of these words, these variables and a file `c.toml` with this text.
 fn parsed(words: &[&str], variables: &[(&str, &str)], file: &str) -> Result<ArgMatches, String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("c.toml");
@@ -28,7 +28,7 @@ fn parsed(words: &[&str], variables: &[(&str, &str)], file: &str) -> Result<ArgM
 
 /// The values of a flag of the command that is called.
 fn values(matches: &ArgMatches, id: &str) -> Vec<String> {
-    let values = own(matches).get_raw(id).into_iter().flatten();
+    let values = command_matches(matches).get_raw(id).into_iter().flatten();
     values.map(|value| value.to_string_lossy().into()).collect()
 }
 
@@ -44,7 +44,7 @@ fn commands(command: &Command, path: &[String]) -> Vec<(Vec<String>, Command)> {
     all
 }
 
-/// A value that a flag takes, and that is not its default.
+/// A valid value of a flag that is not its default.
 fn sample(arg: &Arg) -> String {
     let possible = arg.get_possible_values();
     if let Some(last) = possible.last() {
@@ -80,11 +80,11 @@ fn sample(arg: &Arg) -> String {
     text.to_owned()
 }
 
-/// The words that a command cannot do without, but for one flag.
-fn required(command: &Command, but: &Arg) -> Vec<String> {
+/// The words that a command requires, without one flag.
+fn required(command: &Command, without: &Arg) -> Vec<String> {
     let mut words = Vec::new();
     for arg in command.get_arguments() {
-        let conflicts = hides(command, but, arg);
+        let conflicts = hides(command, without, arg);
         let needed = arg.is_required_set() || arg.get_id() == "inputs" || arg.get_id() == "pairs";
         if conflicts || !needed && arg.get_id() != "out" {
             continue;
@@ -99,7 +99,7 @@ fn required(command: &Command, but: &Arg) -> Vec<String> {
 }
 
 #[test]
-fn every_flag_is_said_by_word_variable_and_file_alike() {
+fn every_flag_can_be_set_by_word_variable_and_file() {
     let mut all = Cli::command();
     all.build();
     let (mut wrong, mut count) = (Vec::new(), 0);
@@ -107,7 +107,7 @@ fn every_flag_is_said_by_word_variable_and_file_alike() {
         if command.has_subcommands() && !path.is_empty() {
             continue;
         }
-        for arg in of_flags(&command) {
+        for arg in settable_flags(&command) {
             count += 1;
             let id = arg.get_id().as_str();
             let flag = arg.get_long().unwrap();
@@ -117,7 +117,7 @@ fn every_flag_is_said_by_word_variable_and_file_alike() {
             } else {
                 sample(arg)
             };
-            // What the flag needs beside it.
+            // Other words that the flag requires.
             let mut words = [&path[..], &required(&command, arg)].concat();
             match id {
                 "normal" => words.push("--low=abc".to_owned()),
@@ -133,7 +133,7 @@ fn every_flag_is_said_by_word_variable_and_file_alike() {
             } else {
                 format!("--{flag}={value}")
             };
-            let (variable, key) = (name_of(&key(arg)), key(arg));
+            let (variable, key) = (variable_name(&key(arg)), key(arg));
             let table = match &path[..] {
                 [] => String::new(),
                 path => format!("[{}]\n", path.join(".")),
@@ -163,43 +163,43 @@ fn every_flag_is_said_by_word_variable_and_file_alike() {
 }
 
 #[test]
-fn every_flag_says_what_it_is_if_nobody_says_it() {
+fn every_flag_states_its_default() {
     let mut all = Cli::command();
     all.build();
     for (path, command) in commands(&all, &[]) {
         for arg in command.get_arguments() {
             let help = arg.get_long_help().or(arg.get_help());
             let help = help.map(ToString::to_string).unwrap_or_default();
-            let said = !arg.get_action().takes_values()
+            let stated = !arg.get_action().takes_values()
                 || arg.get_long().is_none()
                 || arg.is_required_set()
                 || !arg.get_default_values().is_empty()
                 || help.contains("default: ");
-            assert!(said, "{path:?} {}: no default is said", arg.get_id());
+            assert!(stated, "{path:?} {}: no default is stated", arg.get_id());
         }
     }
 }
 
 #[test]
-fn what_no_words_say_is_the_default_of_the_group() {
-    fn unsaid<A: clap::Args + std::fmt::Debug>() -> String {
+fn a_group_without_words_has_its_default_values() {
+    fn defaults<A: clap::Args + std::fmt::Debug>() -> String {
         let command = A::augment_args(Command::new("group"));
         let matches = command.try_get_matches_from(["group"]).unwrap();
         format!("{:?}", A::from_arg_matches(&matches).unwrap())
     }
     let sending = format!("{:?}", crate::ask::Sending::default());
-    assert_eq!(unsaid::<crate::ask::Sending>(), sending);
+    assert_eq!(defaults::<crate::ask::Sending>(), sending);
     let rooms = format!("{:?}", crate::rooms::Rooms::default());
-    assert_eq!(unsaid::<crate::rooms::Rooms>(), rooms);
+    assert_eq!(defaults::<crate::rooms::Rooms>(), rooms);
     let parameters = crate::ask::Parameters::new(String::new());
     assert_eq!(
-        unsaid::<crate::ask::Parameters>(),
+        defaults::<crate::ask::Parameters>(),
         format!("{parameters:?}")
     );
 }
 
 #[test]
-fn words_go_before_variables_before_the_file() {
+fn words_override_variables_and_variables_override_the_file() {
     let variables = [
         ("DARKQA_SEED", "2"),
         ("DARKQA_GAIN", "0.5"),
@@ -221,7 +221,7 @@ fn words_go_before_variables_before_the_file() {
 }
 
 #[test]
-fn a_table_of_a_command_goes_before_the_top_and_says_nothing_to_others() {
+fn a_table_of_a_command_overrides_the_top_and_affects_no_other_command() {
     let file = "seed = 3\n[synthesize]\nseed = 4\nsheet = \"noise\"\n[batch.export]\nseed = 5\n";
     let words = ["synthesize", "in", "--out", "out"];
     let matches = parsed(&words, &[], file).unwrap();
@@ -233,7 +233,7 @@ fn a_table_of_a_command_goes_before_the_top_and_says_nothing_to_others() {
 }
 
 #[test]
-fn the_first_to_speak_of_a_switch_decides() {
+fn the_first_layer_that_sets_a_switch_decides() {
     for (variable, file, expected) in [
         ("false", "allow-http = true", false),
         ("", "allow-http = false", false),
@@ -251,7 +251,7 @@ fn the_first_to_speak_of_a_switch_decides() {
 }
 
 #[test]
-fn a_flag_hides_what_it_conflicts_with_below() {
+fn a_flag_hides_conflicting_flags_of_lower_layers() {
     let file = "resume = \"old\"\napi-key-env = \"KEY\"";
     let words = ["--out", "new"];
     let matches = parsed(&words, &[("DARKQA_API_KEY_FILE", "key")], file).unwrap();
@@ -262,7 +262,7 @@ fn a_flag_hides_what_it_conflicts_with_below() {
 }
 
 #[test]
-fn what_cannot_be_used_names_where_it_is_said_and_what_may_be_meant() {
+fn errors_name_the_source_of_a_value_and_suggest_a_correction() {
     let wrong = |words: &[&str], variables: &[(&str, &str)], file: &str| {
         parsed(words, variables, file).unwrap_err()
     };

@@ -14,7 +14,7 @@ const FEEDING: Feeding = Feeding {
 };
 const READING: OutputReading = OutputReading {
     layout: None,
-    likely: TensorLayout::Nchw,
+    preferred: TensorLayout::Nchw,
     color: ChannelOrder::Rgb,
     range: ValueRange::Unit,
     certainty: Certainty::Known,
@@ -72,7 +72,7 @@ fn every_convention_gives_every_byte_back() {
                 };
                 let input = feeding.window(&image, whole(&image));
                 let reading = OutputReading {
-                    likely: layout,
+                    preferred: layout,
                     color,
                     range,
                     ..READING
@@ -100,7 +100,7 @@ fn every_convention_gives_every_byte_back() {
                 };
                 let bytes = reading.bytes(samples, layout, [11, 24], part).unwrap();
                 assert_eq!(bytes, image.samples()[(2 * 24 + 3) * 3..][..12]);
-                // The way by floats, for models of a fixed size, feeds and reads the same.
+                // Planes of floats, for models of a fixed size, are fed and read in the same way.
                 let planes = reading.planes(samples, layout, [11, 24]).unwrap();
                 assert_eq!(planes.to_rgb(Rounding::Round).unwrap(), image);
                 if element != ElementType::Float16 {
@@ -131,7 +131,7 @@ fn mean_and_deviation_are_the_models_channels() {
 }
 
 #[test]
-fn what_is_missing_is_padded() {
+fn pixels_beyond_the_image_are_padded() {
     let image = Rgb::new(1, 3, vec![1, 1, 1, 2, 2, 2, 3, 3, 3]).unwrap();
     let wide = TileWindow {
         right: 8,
@@ -158,7 +158,7 @@ fn what_is_missing_is_padded() {
 }
 
 #[test]
-fn samples_are_held_in_range_and_rounded() {
+fn samples_are_clamped_and_rounded() {
     let values = [-0.1, 1.1, 0.5, f32::INFINITY, 1.4 / 255.0, 1.6 / 255.0];
     let part = TileWindow {
         left: 0,
@@ -187,8 +187,8 @@ fn samples_are_held_in_range_and_rounded() {
 }
 
 #[test]
-fn values_of_another_range_are_told() {
-    let wild = |values: &[f32], range, certainty| {
+fn values_of_another_range_are_refused() {
+    let checked = |values: &[f32], range, certainty| {
         let reading = OutputReading {
             range,
             certainty,
@@ -196,7 +196,7 @@ fn values_of_another_range_are_told() {
         };
         reading.check(values).err()
     };
-    let likely = |values: &[f32], range| match wild(values, range, Certainty::Assumed) {
+    let likely = |values: &[f32], range| match checked(values, range, Certainty::Assumed) {
         Some(OutOfRange::Beyond { likely, .. }) => Some(likely),
         other => {
             assert_eq!(other, None);
@@ -215,16 +215,16 @@ fn values_of_another_range_are_told() {
         likely(&[0.0, 0.9], ValueRange::Bytes),
         Some(ValueRange::Unit)
     );
-    // A model that does not clamp overshoots by little, or seldom by much.
+    // A model that does not clamp overshoots by a little, or rarely by much.
     assert_eq!(likely(&[-0.1, 1.4], ValueRange::Unit), None);
-    let mut seldom = vec![0.5; 1000];
-    seldom[0] = -3.0;
-    seldom[1] = 40.0;
-    assert_eq!(likely(&seldom, ValueRange::Unit), None);
+    let mut rare = vec![0.5; 1000];
+    rare[0] = -3.0;
+    rare[1] = 40.0;
+    assert_eq!(likely(&rare, ValueRange::Unit), None);
     assert_eq!(
-        wild(&[0.0, 200.0], ValueRange::Unit, Certainty::Known),
+        checked(&[0.0, 200.0], ValueRange::Unit, Certainty::Known),
         None
     );
-    let broken = wild(&[0.0, f32::NAN], ValueRange::Unit, Certainty::Known);
+    let broken = checked(&[0.0, f32::NAN], ValueRange::Unit, Certainty::Known);
     assert_eq!(broken, Some(OutOfRange::NotNumbers));
 }

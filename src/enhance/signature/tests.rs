@@ -46,7 +46,7 @@ fn the_only_image_is_taken_whatever_its_name() {
 }
 
 #[test]
-fn among_several_a_telling_name_decides() {
+fn among_several_the_name_decides() {
     for (names, expected) in [
         (&["illumination", "output"][..], "output"),
         (&["enhanced", "params"], "enhanced"),
@@ -72,7 +72,7 @@ fn zero_dce_gives_its_second_output_under_any_name() {
 }
 
 #[test]
-fn what_could_ruin_pixels_is_left_to_the_user() {
+fn an_ambiguous_output_must_be_stated() {
     for names in [
         &["1", "2"][..],
         &["output", "322"],
@@ -108,12 +108,12 @@ fn a_stated_output_is_taken_where_it_can_be_an_image() {
         stated(&outputs, OutputChoice::Name("2".into())),
         Ok("2".into())
     );
-    // Of one output it is that one.
+    // With a single output, any index is that one.
     assert_eq!(stated(&outputs[1..2], index(3)), Ok("2".into()));
     for (choice, part) in [
         (index(3), "does not have"),
         (OutputChoice::Name("x".into()), "does not have"),
-        (index(2), "none of its image outputs"),
+        (index(2), "not one of its image outputs"),
     ] {
         let message = stated(&outputs, choice).unwrap_err();
         assert!(message.contains(part), "{message}");
@@ -121,7 +121,7 @@ fn a_stated_output_is_taken_where_it_can_be_an_image() {
 }
 
 #[test]
-fn fixed_sizes_are_read_and_have_to_agree() {
+fn fixed_sizes_are_read_and_must_agree() {
     let fixed = port("in", &[1, 3, 96, 128]);
     let found = of(
         std::slice::from_ref(&fixed),
@@ -162,7 +162,7 @@ fn layouts_and_elements_are_read() {
 }
 
 #[test]
-fn what_the_graph_leaves_open_is_stated() {
+fn a_layout_that_the_graph_leaves_open_must_be_stated() {
     let open = [port("x", &[0, 0, 0, 0])];
     let message = of(&open, &[image("y")]).unwrap_err();
     assert!(message.contains("layout_in = \"nchw\""), "{message}");
@@ -194,7 +194,10 @@ fn further_numbers_need_values() {
         ..port("n", &[])
     };
     let message = of(&[image("x"), whole], &[image("y")]).unwrap_err();
-    assert!(message.contains("one float is supported"), "{message}");
+    assert!(
+        message.contains("only single floats are supported"),
+        "{message}"
+    );
 }
 
 #[test]
@@ -211,10 +214,10 @@ fn other_conventions_are_refused_by_name() {
             "takes 2 images",
         ),
         (vec![double], "float64"),
-        (vec![port("a", &[1, 1, 0, 0])], "no image of three"),
+        (vec![port("a", &[1, 1, 0, 0])], "not an image of three"),
         (vec![port("a", &[2, 3, 0, 0])], "several images"),
         (vec![port("a", &[])], "no image among"),
-        (vec![port("a", &[1, 85])], "no image of three"),
+        (vec![port("a", &[1, 85])], "not an image of three"),
     ];
     for (inputs, part) in cases {
         let message = of(&inputs, &[image("out")]).unwrap_err();

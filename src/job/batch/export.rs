@@ -1,39 +1,39 @@
-//! What is left to ask, as input files: [`export`].
+//! Export of the remaining requests as input files of a Batch API: [`export`].
 
 use std::path::PathBuf;
 
 use super::BatchFileArgs;
-use super::requests::{Requests, remote, summary};
+use super::requests::{Requests, require_remote, summary};
 use crate::error::Result;
 use crate::job::experiment::Experiment;
-use crate::job::open_run::{OpenRun, Remaining, limit, pipeline, wanted};
+use crate::job::open_run::{OpenRun, Remaining, limit, missing_thumbnails, pipeline};
 use crate::job::outcome::Outcome;
 use crate::job::plan::Plan;
 use crate::job::timings::Timings;
 use crate::job::workers::pool;
 use crate::types::manifest::Status;
 
-/// Writes the input files of the first phase that has anything left, and notes its trials in the run as sent.
+/// Writes the input files of the first phase with remaining trials, and records in the run that these trials are sent.
 pub(crate) fn export<E: Experiment>(
     mut run: OpenRun<'_, E>,
     files: &BatchFileArgs,
 ) -> Result<Outcome> {
     for phase in 0..E::PHASES.len() {
         let models = run.experiment.models(phase);
-        let left = run.left(phase)?;
+        let remaining = run.remaining(phase)?;
         let last = phase + 1 == E::PHASES.len();
-        if left.plan.left() == 0 && !last {
+        if remaining.plan.remaining() == 0 && !last {
             continue;
         }
-        remote(models)?;
-        run.note_counts(&left.stored)?;
-        let Remaining { plan, out, .. } = left;
+        require_remote(models)?;
+        run.write_counts(&remaining.stored)?;
+        let Remaining { plan, in_batch, .. } = remaining;
         let trials = plan.keys.len();
-        let answered = trials - plan.left() - out;
+        let answered = trials - plan.remaining() - in_batch;
         let written = write(&mut run, phase, plan, files)?;
-        let mut output = summary(&written, answered, out, run.store.folder());
+        let mut output = summary(&written, answered, in_batch, run.store.folder());
         if !last {
-            output += "and after that the same command again, for what is left and the ";
+            output += "then run the same command again, for the remaining requests and the ";
             output += &(E::PHASES[phase + 1..].join(", ") + "\n");
         }
         return Ok(Outcome {
@@ -63,29 +63,29 @@ fn write<E: Experiment>(
     };
     let limit = limit(settings);
     let mut pipeline = pipeline(experiment, enhancers, limit, &timings);
-    let wanted = wanted(experiment, run.store.folder())?;
+    let missing = missing_thumbnails(experiment, run.store.folder())?;
     let sources = experiment.sources();
     workers.install(|| pipeline.largest(sources, &plan.sources))?;
-    let bar = run.progress.bar("writing requests", plan.left());
+    let bar = run.progress.bar("writing requests", plan.remaining());
     let mut requests = Requests::<E::Item>::new(experiment.models(phase), files, &mut run.store)?;
-    let mut unshown = Vec::new();
+    let mut problems = Vec::new();
     let plan = plan.sources.into_iter();
     workers.install(|| {
-        pipeline.one_by_one(sources, plan, &wanted, |group| {
+        pipeline.for_each_group(sources, plan, &missing, |group| {
             bar.advance(group.trials.len());
             if let Some(problem) = &group.problem {
                 tracing::debug!("{problem}");
-                unshown.push(problem.clone());
+                problems.push(problem.clone());
                 return Ok(());
             }
             requests.add(&group)
         })
     })?;
     drop(bar);
-    if let Some(first) = unshown.first() {
+    if let Some(first) = problems.first() {
         tracing::warn!(
-            "{} groups of requests have images that cannot be made and are not in the files; the first: {first}",
-            unshown.len()
+            "groups of requests that are not in the files, because their images cannot be made: {}; the first: {first}",
+            problems.len()
         );
     }
     requests.finish()

@@ -8,17 +8,17 @@ use crate::error::{Error, Result};
 use crate::store::Store;
 use crate::types::{Detail, Record};
 
-/// Where a file is written until it is whole.
+/// Extension of a file until it is complete.
 const PART: &str = "part";
 
 /// The input files of one model, split by bytes and by requests.
 pub(crate) struct ModelInputFiles<D> {
     folder: PathBuf,
     stem: String,
-    most_bytes: u64,
-    most_requests: usize,
+    max_bytes: u64,
+    max_requests: usize,
     open: Option<OpenFile<D>>,
-    /// The whole ones, with their requests.
+    /// Finished files, each with its number of requests.
     done: Vec<(PathBuf, usize)>,
 }
 
@@ -26,27 +26,27 @@ struct OpenFile<D> {
     path: PathBuf,
     file: BufWriter<File>,
     bytes: u64,
-    /// The trials in it, as the records that they will become.
+    /// The trials in the file, as records without an outcome.
     blanks: Vec<Record<D>>,
 }
 
 impl<D: Detail> ModelInputFiles<D> {
-    pub(crate) fn new(folder: &Path, model: &str, most_bytes: u64, most_requests: usize) -> Self {
+    pub(crate) fn new(folder: &Path, model: &str, max_bytes: u64, max_requests: usize) -> Self {
         let safe = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
         Self {
             folder: folder.to_owned(),
             stem: model.replace(|c| !safe(c), "_"),
-            most_bytes,
-            most_requests,
+            max_bytes,
+            max_requests,
             open: None,
             done: Vec::new(),
         }
     }
 
-    /// Adds one line, and what is known of its trial.
+    /// Adds one line, and the record of its trial without an outcome.
     ///
     /// # Errors
-    /// Where it alone is larger than a file may be, or cannot be written.
+    /// If the line alone is larger than a file may be, or cannot be written.
     pub(crate) fn add(
         &mut self,
         line: &[u8],
@@ -54,15 +54,15 @@ impl<D: Detail> ModelInputFiles<D> {
         store: &mut Store<D>,
     ) -> Result<()> {
         let size = line.len() as u64;
-        if size > self.most_bytes {
+        if size > self.max_bytes {
             let megabytes = size as f64 / 1e6;
             let problem = format!(
-                "one request is {megabytes:.1} MB, more than a whole file; make images smaller by --max-side or --image jpeg:95"
+                "one request has {megabytes:.1} MB, more than a file may have; make images smaller with --max-side or --image jpeg:95"
             );
             return Err(Error::usage("--file-size", problem));
         }
         let full = self.open.as_ref().is_some_and(|open| {
-            open.bytes + size > self.most_bytes || open.blanks.len() >= self.most_requests
+            open.bytes + size > self.max_bytes || open.blanks.len() >= self.max_requests
         });
         if full {
             self.close(store)?;
@@ -80,13 +80,13 @@ impl<D: Detail> ModelInputFiles<D> {
         Ok(())
     }
 
-    /// Ends the last file; all of them with their requests.
+    /// Closes the last file; all files, each with its number of requests.
     pub(crate) fn finish(mut self, store: &mut Store<D>) -> Result<Vec<(PathBuf, usize)>> {
         self.close(store)?;
         Ok(self.done)
     }
 
-    /// A new file, numbered on from those that lie there.
+    /// A new file, with the first number that no file in the folder has.
     fn next(&self) -> Result<OpenFile<D>> {
         let path = (1..=u32::MAX)
             .map(|n| self.folder.join(format!("{}-{n:03}.jsonl", self.stem)))
@@ -102,15 +102,15 @@ impl<D: Detail> ModelInputFiles<D> {
         })
     }
 
-    /// Makes the open file whole. Its trials are noted as out before it bears its name, so that none is handed in whose
-    /// replies nobody would know.
+    /// Completes the open file. The run records its trials before the file gets its final name. So the user never uploads a file
+    /// whose replies the run would not recognize.
     fn close(&mut self, store: &mut Store<D>) -> Result<()> {
         let Some(open) = self.open.take() else {
             return Ok(());
         };
         let unwritten = |e| Error::file(&open.path, "write", e);
-        let whole = open.file.into_inner();
-        whole
+        let flushed = open.file.into_inner();
+        flushed
             .map_err(std::io::IntoInnerError::into_error)
             .and_then(|file| file.sync_all())
             .map_err(unwritten)?;

@@ -1,4 +1,4 @@
-//! The output of a Batch API, taken over into a run: [`import`].
+//! Import of the output of a Batch API into a run: [`import`].
 
 use std::collections::{BTreeSet, HashMap};
 use std::fmt::Write;
@@ -6,7 +6,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
-use crate::ask::batch::{BatchLine, unconstrained};
+use crate::ask::batch::{BatchLine, with_letter};
 use crate::ask::{Constrain, Wire};
 use crate::error::{Error, Result};
 use crate::store::Store;
@@ -14,37 +14,37 @@ use crate::types::flag::read_word;
 use crate::types::manifest::RunManifest;
 use crate::types::{Detail, Record, Reply, TrialKey};
 
-/// What became of the lines.
+/// Numbers of lines, by what they led to.
 #[derive(Debug, Default)]
 struct ReplyCounts {
     answered: usize,
     failed: usize,
-    /// Trials whose line was taken over already, or that have been answered otherwise.
-    again: usize,
-    /// Ids that the run has sent in no batch.
-    strange: usize,
+    /// Lines of trials that were imported before, or answered in another way.
+    imported_before: usize,
+    /// Lines whose id is in no batch of this run.
+    unknown: usize,
 }
 
-/// Takes the replies of output and error files over, each of them once, however often a file is given; what became of them.
+/// Imports the replies of output and error files; a summary for the user. Each reply is imported once, even if a file is named again.
 ///
 /// # Errors
-/// Where nothing of the run is out in a batch, or a line is none of such a file: those before it are kept.
+/// If the run has written no batch, or a line is not one of a Batch API. The lines before it are kept.
 pub(crate) fn import<D: Detail>(
     store: &mut Store<D>,
     manifest: &RunManifest,
     files: &[PathBuf],
 ) -> Result<String> {
-    let blanks = store.batched()?;
+    let blanks = store.batch_trials()?;
     if blanks.is_empty() {
         let problem =
-            "nothing of this run is out in a batch: its requests are written first".to_owned();
+            "this run has written no requests for a batch; write them first, by batch export or openeqa --batch".to_owned();
         let path = store.folder().to_owned();
         return Err(Error::Run { path, problem });
     }
     let blanks: HashMap<TrialKey, Record<D>> =
         blanks.into_iter().map(|blank| (blank.key, blank)).collect();
-    let mut out = store.out_in_batches()?;
-    let mut tally = ReplyCounts::default();
+    let mut waiting = store.pending_in_batches()?;
+    let mut counts = ReplyCounts::default();
     for path in files {
         let file = File::open(path).map_err(|e| Error::file(path, "read", e))?;
         for (i, line) in BufReader::new(file).lines().enumerate() {
@@ -53,11 +53,11 @@ pub(crate) fn import<D: Detail>(
                 continue;
             }
             let line = BatchLine::read(&line, Wire::Chat).ok_or_else(|| not_a_line(path, i + 1))?;
-            take(line, &blanks, manifest, &mut out, store, &mut tally)?;
+            import_line(line, &blanks, manifest, &mut waiting, store, &mut counts)?;
         }
     }
     store.sync()?;
-    Ok(summary(&tally, out.len()))
+    Ok(summary(&counts, waiting.len()))
 }
 
 fn not_a_line(path: &Path, line: usize) -> Error {
@@ -66,70 +66,70 @@ fn not_a_line(path: &Path, line: usize) -> Error {
     Error::line(path, line, problem)
 }
 
-fn take<D: Detail>(
+fn import_line<D: Detail>(
     line: BatchLine,
     blanks: &HashMap<TrialKey, Record<D>>,
     manifest: &RunManifest,
-    out: &mut BTreeSet<TrialKey>,
+    waiting: &mut BTreeSet<TrialKey>,
     store: &mut Store<D>,
-    tally: &mut ReplyCounts,
+    counts: &mut ReplyCounts,
 ) -> Result<()> {
     let key = line.id.parse::<TrialKey>().ok();
     let Some(blank) = key.and_then(|key| blanks.get(&key)) else {
-        tally.strange += 1;
+        counts.unknown += 1;
         return Ok(());
     };
-    if !out.remove(&blank.key) {
-        tally.again += 1;
+    if !waiting.remove(&blank.key) {
+        counts.imported_before += 1;
         return Ok(());
     }
     let blank = blank.clone().batched();
     let record = match line.result {
         Ok(reply) => {
-            tally.answered += 1;
+            counts.answered += 1;
             let constrain = constrain(manifest, &blank.model)?;
             let choices = blank.detail.choices().len();
             let reply = Reply {
                 attempts: 1,
-                ..unconstrained(reply, constrain, choices)
+                ..with_letter(reply, constrain, choices)
             };
             blank.answered(reply)?
         }
         Err(failure) => {
-            tally.failed += 1;
+            counts.failed += 1;
             blank.failed_by(failure, 1)
         }
     };
     store.append(&record)
 }
 
-/// What the run lets a model say.
+/// The constraint on the replies of a model, from the manifest.
 fn constrain(manifest: &RunManifest, model: &str) -> Result<Constrain> {
     let models = manifest.columns.get("model");
-    let said = models.and_then(|models| models.get(model)?.get("--constrain")?.as_str());
-    said.map_or(Ok(Constrain::None), read_word)
+    let name = models.and_then(|models| models.get(model)?.get("--constrain")?.as_str());
+    name.map_or(Ok(Constrain::None), read_word)
 }
 
-fn summary(tally: &ReplyCounts, out: usize) -> String {
+fn summary(counts: &ReplyCounts, waiting: usize) -> String {
     let ReplyCounts {
         answered,
         failed,
-        again,
-        strange,
-    } = tally;
-    let mut text = format!("{answered} replies taken over, {failed} failed");
-    if *again > 0 {
-        let _ = write!(text, ", {again} were taken over before");
+        imported_before,
+        unknown,
+    } = counts;
+    let mut text = format!("replies: {answered} imported, {failed} failed");
+    if *imported_before > 0 {
+        let _ = write!(text, ", {imported_before} imported before");
     }
-    if *strange > 0 {
-        let _ = write!(text, ", {strange} are of another run");
+    if *unknown > 0 {
+        let _ = write!(text, ", {unknown} of another run");
     }
-    if out > 0 {
-        let _ = write!(text, ", {out} still out");
+    if waiting > 0 {
+        let _ = write!(text, ", {waiting} still waiting for a batch");
     }
     text.push('\n');
     if *failed > 0 {
-        text.push_str("what failed is asked again by the next batch, or directly\n");
+        text.push_str("failed requests are asked again by the next batch export, or by the evaluation itself\n");
     }
     text
 }

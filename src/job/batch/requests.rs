@@ -1,4 +1,4 @@
-//! What is left to ask, as lines of input files: [`Requests`].
+//! The remaining requests as lines of input files: [`Requests`].
 
 use std::fmt::Write;
 use std::fs;
@@ -11,36 +11,36 @@ use crate::job::models::ModelUnderTest;
 use crate::job::trial::{Item, PreparedGroup};
 use crate::store::{BATCH, Store};
 
-/// The files under way.
+/// The input files of all models, while they are written.
 pub(crate) struct Requests<'a, I: Item> {
     models: &'a [ModelUnderTest],
     url: Option<&'a str>,
-    /// Those of each model.
+    /// Files of each model, in the order of `models`.
     files: Vec<ModelInputFiles<I::Detail>>,
     store: &'a mut Store<I::Detail>,
 }
 
 impl<'a, I: Item> Requests<'a, I> {
-    /// Begins files in the folder of a run.
+    /// Input files in the batch folder of a run, which is created.
     ///
     /// # Errors
-    /// Where the folder cannot be made.
+    /// If the folder cannot be created.
     pub(crate) fn new(
         models: &'a [ModelUnderTest],
-        config: &'a BatchFileArgs,
+        args: &'a BatchFileArgs,
         store: &'a mut Store<I::Detail>,
     ) -> Result<Self> {
         let folder = store.folder().join(BATCH);
         fs::create_dir_all(&folder).map_err(|e| Error::file(&folder, "create", e))?;
-        let bytes = config.file_size.get().saturating_mul(1_000_000);
+        let bytes = args.file_size.get().saturating_mul(1_000_000);
         let files = models.iter().enumerate().map(|(i, model)| {
-            // Two models may have names that make one file name, and one model may be asked with images and without.
+            // The number is needed: two names may give the same file name, and a model may be asked with and without images.
             let stem = format!("{}-{}", i + 1, model.model.name());
-            ModelInputFiles::new(&folder, &stem, bytes, config.file_requests.get())
+            ModelInputFiles::new(&folder, &stem, bytes, args.file_requests.get())
         });
         Ok(Self {
             models,
-            url: config.url.as_deref(),
+            url: args.url.as_deref(),
             files: files.collect(),
             store,
         })
@@ -66,7 +66,7 @@ impl<'a, I: Item> Requests<'a, I> {
         Ok(())
     }
 
-    /// Ends all files; each with its number of requests.
+    /// Closes all files; each with its number of requests.
     pub(crate) fn finish(self) -> Result<Vec<(PathBuf, usize)>> {
         let mut written = Vec::new();
         for files in self.files {
@@ -76,16 +76,16 @@ impl<'a, I: Item> Requests<'a, I> {
     }
 }
 
-/// Makes sure that all models can be asked in a batch.
+/// Checks that all models can be asked in a batch.
 ///
 /// # Errors
-/// Where one is built in.
-pub(crate) fn remote(models: &[ModelUnderTest]) -> Result<()> {
+/// If one is built in.
+pub(crate) fn require_remote(models: &[ModelUnderTest]) -> Result<()> {
     match models.iter().find(|model| !model.model.is_remote()) {
         None => Ok(()),
         Some(local) => {
             let problem = format_args!(
-                "{} is built in; a batch asks models of an endpoint",
+                "{} is built in; a batch can only ask models of an endpoint",
                 local.model.name()
             );
             Err(Error::usage("--model", problem))
@@ -93,24 +93,28 @@ pub(crate) fn remote(models: &[ModelUnderTest]) -> Result<()> {
     }
 }
 
-/// What was written, and what is to be done with it.
+/// The files written, with the next step for the user.
 pub(crate) fn summary(
     written: &[(PathBuf, usize)],
     answered: usize,
-    out: usize,
+    in_batch: usize,
     run: &Path,
 ) -> String {
-    let left: usize = written.iter().map(|(_, requests)| requests).sum();
+    let ending = |count: usize| if count == 1 { "" } else { "s" };
+    let (files, requests) = (written.len(), written.iter().map(|(_, requests)| requests));
+    let requests: usize = requests.sum();
     let mut text = format!(
-        "{left} requests in {} files; {answered} are answered already, {out} out in an earlier batch\n",
-        written.len()
+        "{requests} request{} in {files} file{}; {answered} already answered, {in_batch} waiting for an earlier batch\n",
+        ending(requests),
+        ending(files)
     );
     for (path, requests) in written {
-        let _ = writeln!(text, "{} ({requests} requests)", path.display());
+        let ending = ending(*requests);
+        let _ = writeln!(text, "{} ({requests} request{ending})", path.display());
     }
     let _ = writeln!(
         text,
-        "hand each in to the Batch API, then: darkqa-eval batch import {} OUTPUT.jsonl ERRORS.jsonl …",
+        "upload each file to the Batch API, then run: darkqa-eval batch import {} OUTPUT.jsonl ERRORS.jsonl …",
         run.display()
     );
     text

@@ -26,11 +26,11 @@ fn frame() -> (tempfile::TempDir, Dataset, Source) {
     (folder, dataset, source)
 }
 
-/// What is sent and kept of the frame, and whether it was decoded.
-fn sent(
+/// The image and thumbnail of the frame, and whether its file was decoded.
+fn pipeline_output(
     condition: &str,
     (format, max_side): (&str, Option<u32>),
-    wanted: bool,
+    with_thumbnail: bool,
 ) -> (Arc<Payload>, Option<Thumbnail>, bool) {
     let (_folder, dataset, source) = frame();
     let max_side = max_side.and_then(NonZeroU32::new);
@@ -39,7 +39,7 @@ fn sent(
         readings: Readings::default(),
         format: format.parse().unwrap(),
         scaling: max_side.map_or(Scaling::Never, Scaling::MaxSide),
-        scaled: DegradedAt::Native,
+        degraded_at: DegradedAt::Native,
         camera_of: CameraOf::Frame,
         enhancers: Vec::new(),
     };
@@ -55,33 +55,34 @@ fn sent(
     };
     let mut work = FrameWork::planned(steps, &source, &source.frames[0]);
     let condition = condition.parse().unwrap();
-    let name = wanted.then_some(&source.name);
-    let (image, copy) = pipeline
-        .image_and_copy(&mut work, &condition, name)
+    let name = with_thumbnail.then_some(&source.name);
+    let (image, thumbnail) = pipeline
+        .image_and_thumbnail(&mut work, &condition, name)
         .unwrap();
-    (image, copy, work.is_decoded())
+    (image, thumbnail, work.is_decoded())
 }
 
 #[test]
-fn a_file_that_is_sent_as_it_is_is_decoded_for_a_copy_alone() {
-    let (image, copy, decoded) = sent("L0", ("png", None), false);
-    assert!(copy.is_none() && !decoded);
+fn a_file_that_is_sent_as_it_is_is_decoded_only_for_a_thumbnail() {
+    let (image, thumbnail, decoded) = pipeline_output("L0", ("png", None), false);
+    assert!(thumbnail.is_none() && !decoded);
     let (folder, ..) = frame();
     let file = std::fs::read(folder.path().join("a.png")).unwrap();
     assert_eq!(image.file().unwrap(), file);
-    let (image, copy, decoded) = sent("L0", ("png", None), true);
+    let (image, thumbnail, decoded) = pipeline_output("L0", ("png", None), true);
     assert!(decoded);
-    assert_eq!(copy.unwrap().image, image.facts().digest);
+    assert_eq!(thumbnail.unwrap().image, image.facts().digest);
 }
 
 #[test]
-fn copies_show_what_was_sent() {
+fn thumbnails_show_what_was_sent() {
     for condition in ["L0", "L2-ev", "L3-noise"] {
         for how in [("png", None), ("png", Some(50)), ("jpeg:60", Some(50))] {
-            let (image, copy, _) = sent(condition, how, true);
-            let copy = copy.unwrap();
-            let of_file = thumbnail(&copy.frame, &copy.condition, &image, None).unwrap();
-            assert_eq!(copy, of_file, "{condition} {how:?}");
+            let (image, thumbnail, _) = pipeline_output(condition, how, true);
+            let thumbnail = thumbnail.unwrap();
+            let of_file =
+                super::thumbnail(&thumbnail.frame, &thumbnail.condition, &image, None).unwrap();
+            assert_eq!(thumbnail, of_file, "{condition} {how:?}");
         }
     }
 }

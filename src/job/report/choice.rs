@@ -1,4 +1,4 @@
-//! What runs of questions with choices hold, from their records alone.
+//! The report of a run of questions with choices, from its records alone.
 
 use super::combine::{Combined, combine};
 use crate::error::Result;
@@ -13,7 +13,7 @@ use crate::store::Store;
 use crate::types::manifest::RunManifest;
 use crate::types::{ChoiceDetail, Record};
 
-/// Reads the replies of a run again and writes its whole report and its manifest into its folder.
+/// Reads the replies of a run again, and writes its report and manifest into its folder.
 pub(crate) fn write(
     store: &Store,
     mut run: StoredRun<ChoiceDetail>,

@@ -1,4 +1,4 @@
-//! Several runs of questions with choices as one: [`combine`].
+//! Joining several runs of questions with choices: [`combine`].
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -12,11 +12,11 @@ use crate::score::findings::Findings;
 use crate::types::manifest::RunManifest;
 use crate::types::{ChoiceDetail, QuestionId, Record, RunQuestion};
 
-/// Several runs as one.
+/// Several runs of questions with choices, joined.
 pub(super) type Combined = Joined<ChoiceDetail>;
 
 impl Combined {
-    /// What the records say.
+    /// The results that follow from the records.
     pub(super) fn findings(&self) -> Findings<'_> {
         let scenes = self.questions.iter();
         let scenes = scenes.map(|question| (question.frame.clone(), question.scene.clone()));
@@ -24,7 +24,7 @@ impl Combined {
         Findings::new(&self.records, &scenes.collect(), offers)
     }
 
-    /// What the page shows besides.
+    /// Further inputs of the HTML page.
     pub(super) fn shown(&self) -> PageInputs<'_> {
         let runs = self.runs.iter().map(|run| page::PageRun {
             name: run.name.clone(),
@@ -39,26 +39,26 @@ impl Combined {
         }
     }
 
-    /// The runs and where they lie.
-    pub(super) fn places(&self) -> Vec<(&RunManifest, &Path)> {
+    /// The manifest and the folder of each run.
+    pub(super) fn manifests(&self) -> Vec<(&RunManifest, &Path)> {
         let runs = self.runs.iter();
         runs.map(|run| (&run.manifest, &*run.folder)).collect()
     }
 }
 
-/// Puts runs together, as [`join`] does.
+/// Joins runs that can be compared.
 ///
 /// # Errors
-/// If a run shares no question with the others, or one of one name has other choices or another truth.
+/// If a run shares no question with the others, or a question has other choices or another truth in two runs.
 pub(super) fn combine(runs: Vec<StoredRun<ChoiceDetail>>) -> Result<Combined> {
     if runs.len() > 1 {
-        agree(&runs)?;
+        check_comparable(&runs)?;
     }
     join(runs, |_| true)
 }
 
-/// What is offered, for the chance line: each question as often as it has orders of its choices, since an answer to each order
-/// counts for itself; those not asked yet once. A run that kept no questions has those in its records.
+/// The choices of all questions, for the chance line. A question is repeated for each order of its choices, since the answer to each
+/// order counts separately. Questions that are not asked yet are included once. Without stored questions, those in the records count.
 fn offers(records: &[Record], questions: &[RunQuestion]) -> Vec<OfferedChoices> {
     let mut orders = BTreeMap::<&QuestionId, BTreeSet<&[String]>>::new();
     let mut all = BTreeMap::<&QuestionId, OfferedChoices>::new();
@@ -86,8 +86,8 @@ fn offers(records: &[Record], questions: &[RunQuestion]) -> Vec<OfferedChoices> 
     offers.collect()
 }
 
-/// Makes sure that runs can be compared.
-fn agree(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
+/// Checks that runs can be compared.
+fn check_comparable(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
     let mut questions = BTreeMap::<&QuestionId, (usize, BTreeSet<&String>, &String)>::new();
     let wrong = |run: &StoredRun<ChoiceDetail>, problem: String| {
         let path = run.folder.clone();
@@ -101,22 +101,22 @@ fn agree(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
                 let problem = format!("the record {} has no true choice", record.key);
                 return wrong(run, problem);
             };
-            let (place, there, true_there) = questions
+            let (first, known, known_truth) = questions
                 .entry(&record.question)
                 .or_insert_with(|| (index, choices.clone(), truth));
-            shared |= *place != index;
-            if (&*there, *true_there) != (&choices, truth) {
+            shared |= *first != index;
+            if (&*known, *known_truth) != (&choices, truth) {
                 let problem = format!(
-                    "the question {} has other choices or another truth in {}; report them each by itself",
+                    "the question {} has other choices or another truth in {}; report each run alone",
                     record.question,
-                    runs[*place].folder.display()
+                    runs[*first].folder.display()
                 );
                 return wrong(run, problem);
             }
         }
         if others && !shared {
             let problem = format!(
-                "the run shares no question with {}; report them each by itself",
+                "the run shares no question with {}; report each run alone",
                 runs[0].folder.display()
             );
             return wrong(run, problem);

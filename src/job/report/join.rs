@@ -1,4 +1,4 @@
-//! Several runs as one, whatever was asked: [`join`].
+//! Joining several runs of either kind: [`join`].
 
 use std::collections::{BTreeSet, HashMap, HashSet};
 use std::ops::Range;
@@ -10,7 +10,7 @@ use crate::job::stored::StoredRun;
 use crate::types::manifest::RunManifest;
 use crate::types::{Detail, QuestionId, Record, RunQuestion, Thumbnail, TrialKey, View};
 
-/// Several runs as one.
+/// The runs, with all records, questions and thumbnails.
 pub(super) struct Joined<D> {
     pub(super) runs: Vec<JoinedRun>,
     pub(super) records: Vec<Record<D>>,
@@ -18,19 +18,19 @@ pub(super) struct Joined<D> {
     pub(super) thumbnails: Vec<Thumbnail>,
 }
 
-/// One of them.
+/// One of the joined runs.
 pub(super) struct JoinedRun {
     pub(super) folder: PathBuf,
     pub(super) name: String,
     pub(super) manifest: RunManifest,
     pub(super) cost: Option<String>,
-    /// Where its records are among all.
+    /// Range of its records among those of all runs.
     pub(super) records: Range<usize>,
 }
 
-/// Puts runs together. A model that answered the same item in two of them in different ways (another seed, prompt or
-/// parameter) stands once for each, with the run's name; a trial that two of them share counts once. Models are told apart by the
-/// records that are `compared`.
+/// Joins runs. If a model answered the same item in two runs as different trials (another seed, prompt or parameter), it is listed
+/// once per run, with the run's name. A trial that two runs share counts once. Only records that are `compared` decide whether a
+/// model is listed per run.
 pub(super) fn join<D: Detail>(
     runs: Vec<StoredRun<D>>,
     compared: impl Fn(&Record<D>) -> bool,
@@ -79,7 +79,7 @@ pub(super) fn join<D: Detail>(
     Ok(joined)
 }
 
-/// What runs are called: their folders' names, or their paths where two have one name.
+/// Names of runs: those of their folders, or their paths if two folders have the same name.
 fn names<D: Detail>(runs: &[StoredRun<D>]) -> Vec<String> {
     let short: Vec<String> = runs.iter().map(StoredRun::name).collect();
     let distinct: BTreeSet<&String> = short.iter().collect();
@@ -107,8 +107,8 @@ fn answered_twice<D: Detail>(
                 (&record.condition, &record.question),
                 (record.detail.choices(), record.detail.repeat()),
             );
-            let (key, place) = *keys.entry(item).or_insert((record.key, index));
-            if key != record.key && place != index {
+            let (key, first) = *keys.entry(item).or_insert((record.key, index));
+            if key != record.key && first != index {
                 twice.insert((record.view, record.model.clone()));
             }
         }

@@ -1,4 +1,4 @@
-//! What runs hold, from their records alone, as files and in words.
+//! Reports of runs, from their records alone: files, and text for the terminal.
 
 pub(crate) mod choice;
 mod combine;

@@ -1,4 +1,4 @@
-//! What came of open questions: scored from the records, and left in the run folder.
+//! The report of a run of open questions: scored from its records, and written into its folder.
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -20,12 +20,12 @@ use crate::types::flag::read_word;
 use crate::types::manifest::Status;
 use crate::types::{OpenDetail, QuestionId, Record, RunQuestion, Step};
 
-/// The setting of a run that names who marked the answers.
+/// Setting in the manifest with the name of the judge.
 pub(crate) const JUDGE: &str = "--judge";
-/// The setting of a run that says how answers are judged.
+/// Setting in the manifest with the protocol of judging.
 pub(crate) const PROTOCOL: &str = "--protocol";
 
-/// The scores of a run.
+/// The answers of a run, with their scores.
 pub(crate) struct Scores {
     pub(crate) run: StoredRun<OpenDetail>,
     judge: Option<String>,
@@ -35,16 +35,16 @@ pub(crate) struct Scores {
 }
 
 impl Scores {
-    /// Scores what a run holds by the marks of the judge that it names.
+    /// The scores of a run, from the marks of the judge in its manifest.
     pub(crate) fn new(run: StoredRun<OpenDetail>) -> Result<Self> {
         let setting = |name| run.manifest.settings.get(name).and_then(Value::as_str);
         let judge = setting(JUDGE).map(str::to_owned);
         let protocol = setting(PROTOCOL).map_or(Ok(Protocol::Upstream), read_word)?;
         let ids: Vec<&QuestionId> = run.questions.iter().map(|question| &question.id).collect();
-        let predicted = predictions(&run.records, &ids, protocol);
+        let predictions = predictions(&run.records, &ids, protocol);
         let marks = marks(&run.records, judge.as_deref());
         let (mut scored, mut answers) = (Vec::new(), Vec::new());
-        for prediction in predicted {
+        for prediction in predictions {
             let outcome = outcome(&prediction, ids[prediction.question], &marks, protocol);
             scored.push(ScoredAnswer {
                 subject: prediction.subject.clone(),
@@ -69,8 +69,8 @@ impl Scores {
         })
     }
 
-    /// Whether a mark came that cannot be read.
-    fn unmarked(&self) -> bool {
+    /// Whether the mark of an answer cannot be read.
+    fn has_unmarked(&self) -> bool {
         let mut answers = self.answers.iter();
         answers.any(|answer| answer.outcome == AnswerOutcome::Unmarked)
     }
@@ -94,7 +94,7 @@ impl Scores {
         products(&report, &tables(&report))
     }
 
-    /// What belongs on standard output.
+    /// The text for standard output.
     pub(crate) fn shown(&self, show: StdoutFormat) -> Result<String> {
         let report = self.report();
         self.show(&report, &tables(&report), show)
@@ -113,7 +113,7 @@ impl Scores {
         }
     }
 
-    /// Writes the report and the manifest into the run's folder; what belongs on standard output.
+    /// Writes the report and the manifest into the run's folder; returns the text for standard output.
     pub(crate) fn write(&self, store: &Store<OpenDetail>, show: StdoutFormat) -> Result<String> {
         let report = self.report();
         let tables = tables(&report);
@@ -127,10 +127,10 @@ impl Scores {
     }
 }
 
-/// Several runs as one, as [`join`] puts them together.
+/// Several runs, joined to one by [`join`].
 ///
 /// # Errors
-/// If their answers were marked by different judges or read by different protocols, or one has another question of the same name.
+/// If the runs have different judges or protocols, or different questions under the same name.
 pub(crate) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<StoredRun<OpenDetail>> {
     let mut questions = HashMap::<QuestionId, RunQuestion>::new();
     let mut marked: Option<(PathBuf, [Option<Value>; 2])> = None;
@@ -141,9 +141,9 @@ pub(crate) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<StoredRun<Open
         };
         let by = [JUDGE, PROTOCOL].map(|name| run.manifest.settings.get(name).cloned());
         match &marked {
-            Some((other, their)) if *their != by => {
+            Some((other, other_by)) if *other_by != by => {
                 return wrong(format!(
-                    "its answers were marked by another judge or read by another protocol than those of {}; report them each alone",
+                    "its answers were marked by another judge or read by another protocol than those of {}; report each run alone",
                     other.display()
                 ));
             }
@@ -159,7 +159,7 @@ pub(crate) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<StoredRun<Open
                 ..question.clone()
             }) {
                 return wrong(format!(
-                    "the question {} is another in the other runs; report them each alone",
+                    "the question {} is different in the other runs; report each run alone",
                     question.id
                 ));
             }
@@ -177,15 +177,14 @@ pub(crate) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<StoredRun<Open
     })
 }
 
-/// Scores what a run holds and writes its whole report and its manifest into its folder. A run that is complete but for marks that
-/// cannot be read is incomplete.
+/// Scores a run, and writes its report and manifest into its folder. The run is incomplete if a mark cannot be read.
 pub(crate) fn write(
     store: &Store<OpenDetail>,
     run: StoredRun<OpenDetail>,
     show: StdoutFormat,
 ) -> Result<Outcome> {
     let mut scores = Scores::new(run)?;
-    if scores.run.manifest.status == Status::Complete && scores.unmarked() {
+    if scores.run.manifest.status == Status::Complete && scores.has_unmarked() {
         scores.run.manifest.status = Status::Incomplete;
     }
     Ok(Outcome {
@@ -199,15 +198,15 @@ type Marks<'a> = HashMap<(&'a QuestionId, &'a str), &'a Record<OpenDetail>>;
 
 fn marks<'a>(records: &'a [Record<OpenDetail>], judge: Option<&str>) -> Marks<'a> {
     let marks = records.iter().filter(|record| {
-        let own = record.detail.step == Step::Mark && Some(&*record.model) == judge;
-        own && record.failure.is_none()
+        let is_mark = record.detail.step == Step::Mark && Some(&*record.model) == judge;
+        is_mark && record.failure.is_none()
     });
     marks
         .filter_map(|record| Some(((&record.question, record.detail.judged.as_deref()?), record)))
         .collect()
 }
 
-/// What came of an answer.
+/// The outcome of an answer, from its mark.
 fn outcome(
     prediction: &Prediction,
     question: &QuestionId,
@@ -222,7 +221,7 @@ fn outcome(
     let Some(record) = marks.get(&(question, &**answer)) else {
         return AnswerOutcome::Unjudged;
     };
-    // Read again: alike in every table, also if an earlier version has kept it.
+    // Marks of earlier versions are read again, so that all tables use the same reading.
     let reply = record.reply.as_deref().unwrap_or_default();
     mark(reply, protocol).map_or(AnswerOutcome::Unmarked, AnswerOutcome::Marked)
 }

@@ -1,4 +1,4 @@
-//! One run or several, of whatever was asked: [`report`].
+//! The command `report`, for one run or several: [`report`].
 
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -18,23 +18,23 @@ use crate::report::tables::tables;
 use crate::report::terminal::evaluation;
 use crate::store::{AddressChange, Store};
 use crate::types::manifest::Status;
-use crate::types::{ChoiceDetail, OpenDetail};
+use crate::types::{ChoiceDetail, Decides, OpenDetail};
 
 /// The flags of `report`.
 #[derive(Debug, Args)]
 pub(crate) struct ReportArgs {
-    /// Folders of runs
-    #[arg(value_name = "RUN", required = true)]
+    /// The folders of the runs; several runs are compared
+    #[arg(value_name = "RUN", required = true, add = Decides::Nothing)]
     pub runs: Vec<PathBuf>,
-    /// Read all kept replies again by the rules of this version; asks nothing, and keeps the readings that changed
-    #[arg(long)]
+    /// Read all stored replies again by the rules of this version; asks nothing, and stores the readings that changed
+    #[arg(long, add = Decides::Nothing)]
     pub rescore: bool,
-    /// Where the report goes: report.html, tables as CSV and LaTeX, figures as SVG; default: the folder of the run where it
+    /// Where the report goes: report.html, tables as CSV and LaTeX, figures as SVG; default: the folder of the run if it
     /// is one, else nowhere
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub out: Option<PathBuf>,
     /// Print the summary as JSON instead of a table
-    #[arg(long)]
+    #[arg(long, add = Decides::Nothing)]
     pub json: bool,
 }
 
@@ -44,7 +44,7 @@ impl ReportArgs {
     }
 }
 
-/// Shows a run, or compares several of one kind; if readings are made again, those that changed are kept with their run.
+/// The report of a run, or a comparison of several of the same kind. With `--rescore`, changed readings are stored in their run.
 ///
 /// # Errors
 /// If a folder holds no run, a record is broken, or the runs asked different questions.
@@ -83,7 +83,7 @@ fn of_choices(args: &ReportArgs, mut runs: Vec<StoredRun<ChoiceDetail>>) -> Resu
             let records = run.records.len();
             let _ = writeln!(
                 output,
-                "{changed} of {records} records read otherwise than before"
+                "{changed} of {records} records now read differently"
             );
             run.manifest.counts = count(run.manifest.counts.trials, &run.records);
         }
@@ -95,9 +95,9 @@ fn of_choices(args: &ReportArgs, mut runs: Vec<StoredRun<ChoiceDetail>>) -> Resu
     output += &match (&*combined.runs, &args.out) {
         ([run], None) => match Store::open(&run.folder, &run.manifest, AddressChange::Allowed) {
             Ok(store) => in_its_folder(&store, &run.manifest, &combined, args.show())?,
-            // A run under way, or in a folder that cannot be written to, is shown all the same.
-            Err(held) => {
-                tracing::warn!("the report is not written: {held}");
+            // A run that another process writes, or in a read-only folder, is shown anyway.
+            Err(error) => {
+                tracing::warn!("the report is not written: {error}");
                 compare(&combined, args)?
             }
         },
@@ -106,32 +106,34 @@ fn of_choices(args: &ReportArgs, mut runs: Vec<StoredRun<ChoiceDetail>>) -> Resu
     Ok(output)
 }
 
-/// Shows several runs as one, and writes the report where it is wanted.
+/// The text of several runs, joined. Writes the report if `--out` is set.
 fn compare(combined: &Combined, args: &ReportArgs) -> Result<String> {
     let findings = combined.findings();
-    let (tables, places) = (tables(&findings), combined.places());
+    let (tables, runs) = (tables(&findings), combined.manifests());
     let shown = match args.show() {
-        StdoutFormat::Json => {
-            summary(&tables, &findings.summary.unread, RunList::Several(&places))?
-        }
-        StdoutFormat::Table => evaluation(&tables, &places),
+        StdoutFormat::Json => summary(&tables, &findings.summary.unread, RunList::Several(&runs))?,
+        StdoutFormat::Table => evaluation(&tables, &runs),
     };
-    let made = match args.out {
+    let files = match args.out {
         Some(_) => products(&findings, &tables, &combined.shown())?,
         None => Vec::new(),
     };
-    elsewhere(args, shown, made)
+    write_files(args, shown, files)
 }
 
-/// Writes a report into `--out`, or says that this would.
-fn elsewhere(args: &ReportArgs, mut text: String, made: Vec<(String, Vec<u8>)>) -> Result<String> {
+/// The text, with a line about the report. Writes the files of the report into `--out` if it is set.
+fn write_files(
+    args: &ReportArgs,
+    mut text: String,
+    contents: Vec<(String, Vec<u8>)>,
+) -> Result<String> {
     let Some(out) = &args.out else {
         if args.show() == StdoutFormat::Table {
             text += "report: --out DIR writes it\n";
         }
         return Ok(text);
     };
-    for (name, content) in made {
+    for (name, content) in contents {
         files::write(&out.join(name), &content)?;
     }
     if args.show() == StdoutFormat::Table {
@@ -144,23 +146,23 @@ fn of_open(args: &ReportArgs, runs: Vec<StoredRun<OpenDetail>>) -> Result<String
     if let Some(run) = runs.iter().find(|run| run.records.is_empty()) {
         return Err(no_records(run.folder.clone()));
     }
-    let alone = runs.len() == 1;
+    let is_single = runs.len() == 1;
     let scores = open::Scores::new(open::combine(runs)?)?;
     let run = &scores.run;
-    if alone && args.out.is_none() {
+    if is_single && args.out.is_none() {
         match Store::open(&run.folder, &run.manifest, AddressChange::Allowed) {
             Ok(store) => return scores.write(&store, args.show()),
-            Err(held) => tracing::warn!("the report is not written: {held}"),
+            Err(error) => tracing::warn!("the report is not written: {error}"),
         }
     }
-    let made = match args.out {
+    let files = match args.out {
         Some(_) => scores.products()?,
         None => Vec::new(),
     };
-    elsewhere(args, scores.shown(args.show())?, made)
+    write_files(args, scores.shown(args.show())?, files)
 }
 
-/// Reads all kept replies again and keeps the readings that changed; how many did.
+/// Reads all stored replies again, and stores the readings that changed; returns their number.
 fn reread(run: &mut StoredRun<ChoiceDetail>) -> Result<usize> {
     let mut store = Store::open(&run.folder, &run.manifest, AddressChange::Allowed)?;
     let mut changed = 0;

@@ -1,16 +1,16 @@
-//! What the words of data sets mean: [`meaning()`], from a word to a class of mpcat40.
+//! Classes of the words of data sets: [`meaning()`], from a word to a class of mpcat40.
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
-/// HM3D-Sem's words.
+/// Table of the words of HM3D-Sem.
 const HM3D: &str = include_str!("hm3d.tsv");
-/// What goes before them.
+/// Table of words that override HM3D-Sem's.
 const OVERRIDES: &str = include_str!("overrides.tsv");
-/// AI2-THOR's types.
+/// Table of the object types of AI2-THOR.
 const THOR: &str = include_str!("thor.tsv");
 
-/// The class of what no table has.
+/// Class of words that no table has.
 pub(crate) const UNKNOWN: &str = "misc";
 
 type NameTable = BTreeMap<&'static str, &'static str>;
@@ -22,26 +22,26 @@ fn table(text: &'static str) -> NameTable {
 
 static TABLES: LazyLock<[NameTable; 3]> = LazyLock::new(|| [OVERRIDES, HM3D, THOR].map(table));
 
-/// What a word means.
+/// Meaning of a word of a data set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Meaning {
     /// A class of mpcat40.
     Class(&'static str),
-    /// Nothing: the data set itself does not know.
+    /// No class: the word is empty or means unknown.
     Nothing,
-    /// It stands in no table.
+    /// No table has the word.
     Unlisted,
 }
 
-/// A word in the one spelling of the tables: lower case, single spaces, no underscores.
-fn spelled(word: &str) -> String {
+/// A word in the spelling of the tables: lower case, single spaces, no underscores.
+fn normalized(word: &str) -> String {
     let lower = word.to_lowercase().replace('_', " ");
     lower.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// What a word of a data set means; the suffixes `/otherroom` and `/outside` say where, not what.
+/// The meaning of a word of a data set. The suffixes `/otherroom` and `/outside` are ignored, because they give the place only.
 pub(crate) fn meaning(word: &str) -> Meaning {
-    let word = spelled(word);
+    let word = normalized(word);
     let bare = [
         "/otherroom",
         "/ otherroom",
@@ -66,10 +66,11 @@ pub(crate) fn meaning(word: &str) -> Meaning {
     }
 }
 
-/// The class of a word of a data set, which is counted as `shown` where it stands in no table; `None` where it means nothing.
+/// The class of a word of a data set; `None` if the word has no meaning. Words that no table has get [`UNKNOWN`] and are counted
+/// in `unlisted` under the name `original`.
 pub(crate) fn class_of(
     word: &str,
-    shown: &str,
+    original: &str,
     count: usize,
     unlisted: &mut BTreeMap<String, usize>,
 ) -> Option<&'static str> {
@@ -77,18 +78,18 @@ pub(crate) fn class_of(
         Meaning::Nothing => None,
         Meaning::Class(class) => Some(class),
         Meaning::Unlisted => {
-            *unlisted.entry(shown.to_owned()).or_insert(0) += count;
+            *unlisted.entry(original.to_owned()).or_insert(0) += count;
             Some(UNKNOWN)
         }
     }
 }
 
-/// The class that goes before what a data set's own table says of a word.
+/// The class that overrides the data set's class of a word; `None` if there is none.
 pub(crate) fn overridden(word: &str) -> Option<&'static str> {
-    TABLES[0].get(spelled(word).as_str()).copied()
+    TABLES[0].get(normalized(word).as_str()).copied()
 }
 
-/// A type of AI2-THOR (`CoffeeTable`) in words (`coffee table`), with its class.
+/// An object type of AI2-THOR (`CoffeeTable`) in words (`coffee table`), and its class.
 pub(crate) fn thor(kind: &str) -> (String, &'static str) {
     let mut words = String::new();
     let mut before = ' ';

@@ -1,19 +1,24 @@
-//! Which masks of an image stand out of its noise: [`MaskContrasts`].
+//! Visibility of the masks of an image in its noise: [`MaskContrasts`].
 //!
-//! The image is cut into square cells. Where two masks meet in one, the means of their pixels there are compared: close to
-//! the border between them, so that light which changes over the room plays no part. The squares of these differences, each
-//! over its own uncertainty, are added up over all cells of a border, for the sign of a contrast changes along it as patterns
-//! and light do. Noise alone makes one of each on average; what is more than that is contrast. Rose's criterion says that a
-//! signal is seen where it is at least five times its uncertainty (Rose, "The sensitivity performance of the human eye on an
-//! absolute scale", J. Opt. Soc. Am. 38:196, 1948; Burgess, "The Rose model, revisited", J. Opt. Soc. Am. A 16:633, 1999);
-//! here, that the excess is five times the deviation of the sum, or that the differences, added up with their signs, are five
-//! times theirs: contrast of one sign is seen through more noise. A mask is visible where half of its outline is seen, each
-//! border weighing as many cells as it has; the edge of the image is no outline.
+//! The image is cut into square cells. In a cell that contains two masks, the mean values of their pixels are compared. Both
+//! lie close to their common border, so light that changes over the room has no effect. Each difference is squared and
+//! divided by its variance, and the sum is taken over all cells of a border: squares, because the sign of a contrast can
+//! change along the border with patterns and light. Noise alone gives 1 per cell on average; the excess is contrast.
 //!
-//! The uncertainty is that of noise, not of patterns, and comes from the image itself: how unlike the halves of cells within one
-//! mask are, of cells about as bright, in the smoother half of them (towards the lower envelope; Liu, Freeman, Szeliski and Kang,
-//! "Noise estimation from a single image", CVPR 2006); the noise that rows share, from how unlike neighbouring rows of the
-//! whole image are; and the rounding to whole codes.
+//! By Rose's criterion, a signal is seen if it is at least five times its uncertainty (Rose, "The sensitivity performance of
+//! the human eye on an absolute scale", J. Opt. Soc. Am. 38:196, 1948; Burgess, "The Rose model, revisited", J. Opt. Soc.
+//! Am. A 16:633, 1999). Here a border is seen in two cases: the excess is five times the standard deviation of the sum, or
+//! the sum of the signed differences is five times its own, which finds contrast of one sign in more noise. A mask is
+//! visible if half of its outline is seen, where each border counts by its number of cells. The edge of the image is not
+//! part of the outline.
+//!
+//! The uncertainty is that of noise, not of patterns. It is estimated from the image in three parts:
+//!
+//! - Pixel noise: the differences between the halves of cells within one mask, over cells of similar brightness. Only the
+//!   smoother half of these cells is used (towards the lower envelope; Liu, Freeman, Szeliski and Kang, "Noise estimation
+//!   from a single image", CVPR 2006).
+//! - Row noise: the differences between neighbouring rows of the whole image.
+//! - Rounding to whole codes.
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -21,26 +26,26 @@ use std::sync::LazyLock;
 use crate::questions::colors::{Color, Palette};
 use crate::types::Rgb;
 
-/// Rose's criterion: a difference is seen where it is so many times its uncertainty.
+/// Rose's criterion: a difference is seen if it is at least this many times its uncertainty.
 pub(crate) const ROSE: f64 = 5.0;
 
-/// A cell has a side of this share of the image's shorter side.
+/// Number of cells along the shorter side of the image.
 const CELLS: usize = 60;
 
-/// The mean of the smaller half of variances of two normal draws each, over the mean of all: of chi-squared with two degrees of
-/// freedom, 1 − ln 2.
+/// Mean of the smaller half of chi-squared values with two degrees of freedom, relative to the mean of all: 1 − ln 2. Each
+/// variance of a cell is such a value, because it comes from two normal differences.
 const SMALLER_HALF: f64 = 1.0 - std::f64::consts::LN_2;
 
-/// So many smooth cells at least tell the noise of their brightness.
-const ENOUGH: usize = 12;
+/// Minimum number of cells within one mask to estimate the noise at their brightness (chosen).
+const MIN_CELLS: usize = 12;
 
-/// The variance of rounding to whole codes.
+/// Variance of rounding to whole codes, in codes squared.
 const ROUNDING: f64 = 1.0 / 12.0;
 
-/// A median absolute deviation times this is a standard deviation, for normal noise.
+/// Ratio of the standard deviation to the median absolute deviation of normal noise.
 const DEVIATION: f64 = 1.4826;
 
-/// Linear light of each code in 65,535ths (IEC 61966-2-1).
+/// Linear light of each sRGB code, from 0 to 65,535 (IEC 61966-2-1).
 static LINEAR: LazyLock<[u32; 256]> = LazyLock::new(|| {
     std::array::from_fn(|code| {
         let value = code as f64 / 255.0;
@@ -53,7 +58,7 @@ static LINEAR: LazyLock<[u32; 256]> = LazyLock::new(|| {
     })
 });
 
-/// The linear light of a code, in 65,535ths.
+/// The linear light of an sRGB code, from 0 to 65,535.
 #[must_use]
 pub(crate) fn linear(code: u8) -> u32 {
     LINEAR[usize::from(code)]
@@ -82,7 +87,7 @@ struct MaskPatch {
 }
 
 impl MaskPatch {
-    fn take(&mut self, pixel: [u8; 3]) {
+    fn add(&mut self, pixel: [u8; 3]) {
         self.count += 1;
         for (channel, code) in pixel.into_iter().enumerate() {
             let value = u64::from(code);
@@ -96,34 +101,37 @@ impl MaskPatch {
     }
 }
 
-/// Two masks in one cell.
+/// The difference between two masks in one cell.
 #[derive(Debug, Clone, Copy)]
 struct MaskBorder {
     row: usize,
-    /// The mean of both, which tells how much noise there is.
+    /// Mean of both masks, in codes per channel; the noise depends on it.
     light: [f64; 3],
+    /// Difference of the means, in codes per channel.
     difference: [f64; 3],
-    /// One over the pixels of each, added.
+    /// Sum of 1 / pixels over both masks; times the pixel variance it is the variance of the difference.
     share: f64,
 }
 
-/// How much noise pixels have by how bright they are, for one channel: a variance for each step of brightness.
+/// Noise of the pixels of one channel: a variance in codes squared for each step of brightness.
 #[derive(Debug, Clone, Default)]
 struct PixelNoise(BTreeMap<u32, f64>);
 
 impl PixelNoise {
-    /// The step of a code: half an octave, for noise goes with light.
+    /// The step of a code. A step is half an octave, because noise depends on light.
     fn step(light: f64) -> u32 {
         (2.0 * libm::log2(light + 1.0)) as u32
     }
 
-    /// The variances of the smoother half of the cells, by brightness.
+    /// Estimates the noise from brightness and variance of cells; only the smoother half of each step is used.
     fn of(cells: &[(f64, f64)]) -> Self {
         let mut steps: BTreeMap<u32, Vec<f64>> = BTreeMap::new();
         for (light, variance) in cells {
             steps.entry(Self::step(*light)).or_default().push(*variance);
         }
-        let enough = steps.into_iter().filter(|(_, list)| list.len() >= ENOUGH);
+        let enough = steps
+            .into_iter()
+            .filter(|(_, list)| list.len() >= MIN_CELLS);
         Self(
             enough
                 .map(|(step, mut list)| {
@@ -136,7 +144,7 @@ impl PixelNoise {
         )
     }
 
-    /// The variance at a brightness; where too little is as bright, that of what is nearest to it.
+    /// The variance at a brightness, or at the nearest brightness with an estimate; 0 if there is none.
     fn at(&self, light: f64) -> f64 {
         let step = Self::step(light);
         let nearest = self.0.iter().min_by_key(|(known, _)| known.abs_diff(step));
@@ -144,19 +152,23 @@ impl PixelNoise {
     }
 }
 
-/// What is seen of the masks of an image.
+/// Contrasts between the masks of an image, their colours and the noise.
 #[derive(Debug)]
 pub(crate) struct MaskContrasts {
+    /// Cells of the border between each pair of masks.
     borders: BTreeMap<(u32, u32), Vec<MaskBorder>>,
     shades: BTreeMap<u32, Shades>,
-    /// Brightness and variance of the cells within one mask, by channel; then what they tell.
+    /// Brightness and variance of the cells within one mask, by channel.
     smooth: [Vec<(f64, f64)>; 3],
+    /// Noise by channel, estimated from `smooth`.
     noise: [PixelNoise; 3],
+    /// Standard deviation of the noise that the pixels of a row share, in codes.
     row_noise: f64,
+    /// Side of a cell in pixels.
     side: usize,
 }
 
-/// The pixels of a cell: by mask, and by quarter.
+/// Sums over the pixels of a cell, by mask and by quarter.
 #[derive(Debug, Clone, Default)]
 struct GridCell {
     patches: Vec<MaskPatch>,
@@ -164,33 +176,35 @@ struct GridCell {
 }
 
 impl GridCell {
-    fn take(&mut self, mask: u32, quarter: usize, pixel: [u8; 3]) {
-        let place = self.patches.iter().position(|patch| patch.mask == mask);
-        let place = place.unwrap_or_else(|| {
+    fn add(&mut self, mask: u32, quarter: usize, pixel: [u8; 3]) {
+        let index = self.patches.iter().position(|patch| patch.mask == mask);
+        let index = index.unwrap_or_else(|| {
             self.patches.push(MaskPatch {
                 mask,
                 ..MaskPatch::default()
             });
             self.patches.len() - 1
         });
-        self.patches[place].take(pixel);
-        self.quarters[quarter].take(pixel);
+        self.patches[index].add(pixel);
+        self.quarters[quarter].add(pixel);
     }
 }
 
 impl MaskContrasts {
-    /// Looks at an image through masks of a width and height; colours are named after a gain of linear light.
-    pub(super) fn at(
+    /// Measures an image through masks of a given width and height. Colours are named after a gain of linear light.
+    pub(super) fn measure(
         image: &Rgb,
         masks: &[u32],
         [width, height]: [usize; 2],
         gain: f64,
         palette: &Palette,
     ) -> Self {
-        let [wide, high] = [image.width(), image.height()];
-        // Even, so that a cell has four quarters.
-        let side = (wide.min(high) / CELLS).max(4).next_multiple_of(2);
-        let mut look = Self {
+        let [image_width, image_height] = [image.width(), image.height()];
+        // Even, so that a cell has four equal quarters.
+        let side = (image_width.min(image_height) / CELLS)
+            .max(4)
+            .next_multiple_of(2);
+        let mut contrasts = Self {
             borders: BTreeMap::new(),
             shades: BTreeMap::new(),
             smooth: Default::default(),
@@ -198,49 +212,46 @@ impl MaskContrasts {
             row_noise: row_noise(image),
             side,
         };
-        let columns: Vec<usize> = (0..wide)
-            .map(|x| (2 * x + 1) * width / (2 * wide))
+        let columns: Vec<usize> = (0..image_width)
+            .map(|x| (2 * x + 1) * width / (2 * image_width))
             .collect();
-        let mut cells: Vec<GridCell> = vec![GridCell::default(); wide.div_ceil(side)];
+        let mut cells: Vec<GridCell> = vec![GridCell::default(); image_width.div_ceil(side)];
         let (pixels, _) = image.samples().as_chunks::<3>();
-        for (y, row) in pixels.chunks_exact(wide).enumerate() {
-            let from = (2 * y + 1) * height / (2 * high) * width;
+        for (y, row) in pixels.chunks_exact(image_width).enumerate() {
+            let from = (2 * y + 1) * height / (2 * image_height) * width;
             let lower = 2 * usize::from(y % side >= side / 2);
             for (x, pixel) in row.iter().enumerate() {
                 let quarter = lower + usize::from(x % side >= side / 2);
-                cells[x / side].take(masks[from + columns[x]], quarter, *pixel);
+                cells[x / side].add(masks[from + columns[x]], quarter, *pixel);
             }
-            if (y + 1) % side == 0 || y + 1 == high {
+            if (y + 1) % side == 0 || y + 1 == image_height {
                 for cell in &mut cells {
-                    look.take(y / side, cell, gain, palette);
+                    contrasts.add(y / side, cell, gain, palette);
                     *cell = GridCell::default();
                 }
             }
         }
-        look.noise = [0, 1, 2].map(|channel| PixelNoise::of(&look.smooth[channel]));
-        look
+        contrasts.noise = [0, 1, 2].map(|channel| PixelNoise::of(&contrasts.smooth[channel]));
+        contrasts
     }
 
-    /// Takes note of one cell.
-    fn take(&mut self, row: usize, cell: &GridCell, gain: f64, palette: &Palette) {
+    /// Adds one cell of a row of cells.
+    fn add(&mut self, row: usize, cell: &GridCell, gain: f64, palette: &Palette) {
         let whole = (self.side * self.side) as u32;
         if let [patch] = &cell.patches[..]
             && patch.count == whole
         {
-            self.smoothness(patch, &cell.quarters);
+            self.add_smooth(patch, &cell.quarters);
         }
-        let least = (whole / 16).max(3);
+        let min_pixels = (whole / 16).max(3);
         for (i, a) in cell.patches.iter().enumerate() {
-            if a.count >= 2 * least {
-                self.shades
-                    .entry(a.mask)
-                    .or_default()
-                    .take(a, gain, palette);
+            if a.count >= 2 * min_pixels {
+                self.shades.entry(a.mask).or_default().add(a, gain, palette);
             }
             let others = cell.patches[i + 1..].iter();
-            for b in others.filter(|b| a.count.min(b.count) >= least) {
+            for b in others.filter(|b| a.count.min(b.count) >= min_pixels) {
                 let (a, b) = if a.mask < b.mask { (a, b) } else { (b, a) };
-                let meeting = MaskBorder {
+                let border = MaskBorder {
                     row,
                     light: [0, 1, 2].map(|i| f64::midpoint(a.mean(i), b.mean(i))),
                     difference: [0, 1, 2].map(|i| a.mean(i) - b.mean(i)),
@@ -249,14 +260,14 @@ impl MaskContrasts {
                 self.borders
                     .entry((a.mask, b.mask))
                     .or_default()
-                    .push(meeting);
+                    .push(border);
             }
         }
     }
 
-    /// Takes note of how unlike the halves of a cell within one mask are, across and down: what is compared at borders, where
-    /// there is none; as a variance of pixels.
-    fn smoothness(&mut self, patch: &MaskPatch, quarters: &[MaskPatch; 4]) {
+    /// Adds the variance of a cell within one mask. It comes from the differences between the left and right halves and
+    /// between the upper and lower halves: the comparison made at borders, where there is no border.
+    fn add_smooth(&mut self, patch: &MaskPatch, quarters: &[MaskPatch; 4]) {
         let pixels = f64::from(patch.count) / 4.0;
         for channel in 0..3 {
             let [a, b, c, d] = [0, 1, 2, 3].map(|i| quarters[i].mean(channel));
@@ -266,33 +277,33 @@ impl MaskContrasts {
         }
     }
 
-    /// How far the contrast along a border is above what noise makes, over the deviation of that; in the channel where it is
-    /// largest.
+    /// The contrast along a border above the level of noise, in standard deviations of the noise. The channel with the largest
+    /// value counts.
     fn signal(&self, border: &[MaskBorder]) -> f64 {
-        let mut rows: Vec<usize> = border.iter().map(|meeting| meeting.row).collect();
+        let mut rows: Vec<usize> = border.iter().map(|cell| cell.row).collect();
         rows.dedup();
         let (cells, rows) = (border.len() as f64, rows.len() as f64);
-        // Each side averages half of the rows of a cell.
+        // Variance by row noise: each mask averages half of the rows of a cell.
         let shared = 4.0 * self.row_noise * self.row_noise / self.side as f64;
         let signals = (0..3).map(|channel| {
-            let (mut sum, mut signed, mut weights, mut alike) = (0.0, 0.0, 0.0, 0.0);
-            for meeting in border {
-                let own = self.noise[channel].at(meeting.light[channel]).max(ROUNDING);
-                let variance = own * meeting.share + shared;
-                sum += meeting.difference[channel] * meeting.difference[channel] / variance;
-                signed += meeting.difference[channel] / variance;
+            let (mut sum, mut signed, mut weights, mut correlation) = (0.0, 0.0, 0.0, 0.0);
+            for cell in border {
+                let own = self.noise[channel].at(cell.light[channel]).max(ROUNDING);
+                let variance = own * cell.share + shared;
+                sum += cell.difference[channel] * cell.difference[channel] / variance;
+                signed += cell.difference[channel] / variance;
                 weights += 1.0 / variance;
-                alike += shared / variance / cells;
+                correlation += shared / variance / cells;
             }
-            // Draws that are alike scatter together: by rows, as far as the noise is that of rows.
-            let together = (cells / rows - 1.0) * alike;
-            let squares = (sum - cells) / (2.0 * cells * (1.0 + together * alike)).sqrt();
-            squares.max(signed.abs() / (weights * (1.0 + together)).sqrt())
+            // Cells of one row share its noise, so their differences are correlated and the sums vary more.
+            let inflation = (cells / rows - 1.0) * correlation;
+            let squares = (sum - cells) / (2.0 * cells * (1.0 + inflation * correlation)).sqrt();
+            squares.max(signed.abs() / (weights * (1.0 + inflation)).sqrt())
         });
         signals.fold(f64::MIN, f64::max)
     }
 
-    /// The masks of whose outline half is seen.
+    /// The masks with at least half of their outline seen.
     pub(crate) fn visible(&self) -> impl Iterator<Item = usize> {
         let mut outlines: BTreeMap<u32, [f64; 2]> = BTreeMap::new();
         for ((a, b), border) in &self.borders {
@@ -311,7 +322,7 @@ impl MaskContrasts {
             .map(|(mask, _)| mask as usize)
     }
 
-    /// What colours a mask has, the first the most.
+    /// The colours of a mask, the best first; see [`Shades::colors`].
     pub(super) fn colors(&self, mask: usize, palette: &Palette) -> Vec<Color> {
         let shades = u32::try_from(mask)
             .ok()
@@ -320,16 +331,16 @@ impl MaskContrasts {
     }
 }
 
-/// The colours of a mask, cell by cell, after the gain.
+/// The colours of a mask, one per cell, after the gain.
 #[derive(Debug, Clone, Default)]
 struct Shades {
     cells: Vec<[u8; 3]>,
-    /// How many pixels have each colour.
+    /// Number of pixels of each colour.
     counts: [u64; Color::ALL.len()],
 }
 
 impl Shades {
-    fn take(&mut self, patch: &MaskPatch, gain: f64, palette: &Palette) {
+    fn add(&mut self, patch: &MaskPatch, gain: f64, palette: &Palette) {
         let code = |sum: u64| {
             let linear = sum as f64 / f64::from(patch.count) / 65_535.0 * gain;
             let value = if linear <= 0.0031308 {
@@ -341,14 +352,14 @@ impl Shades {
         };
         let codes = patch.linear.map(code);
         self.cells.push(codes);
-        let named = palette.color(codes);
-        if let Some(place) = Color::ALL.iter().position(|known| Some(*known) == named) {
-            self.counts[place] += u64::from(patch.count);
+        let name = palette.color(codes);
+        if let Some(index) = Color::ALL.iter().position(|color| Some(*color) == name) {
+            self.counts[index] += u64::from(patch.count);
         }
     }
 
-    /// The colour of the median of its cells, which noise moves least and which is the rulebook's own check; then those of its
-    /// cells, the commonest first.
+    /// First the colour of the median over the cells: noise changes it least, and the rulebook checks the same. Then the colours
+    /// of the cells, the most common first.
     fn colors(&self, palette: &Palette) -> Vec<Color> {
         let median = |channel: usize| {
             let mut codes: Vec<u8> = self.cells.iter().map(|cell| cell[channel]).collect();
@@ -369,8 +380,8 @@ impl Shades {
     }
 }
 
-/// The deviation of the noise that the pixels of a row share, in codes: from how far each row's mean is from those of its
-/// neighbours. The median is not moved by the few rows where things begin and end.
+/// The standard deviation of the noise that the pixels of a row share, in codes. It comes from the differences between the mean
+/// of each row and those of its neighbours. The median ignores the few rows where objects begin and end.
 fn row_noise(image: &Rgb) -> f64 {
     let width = image.width() * 3;
     let means: Vec<f64> = image
@@ -387,7 +398,7 @@ fn row_noise(image: &Rgb) -> f64 {
     }
     let middle = bends.len() / 2;
     let (_, median, _) = bends.select_nth_unstable_by(middle, f64::total_cmp);
-    // The variance of a row less the mean of two others is one and a half times that of a row.
+    // A row minus the mean of two others has 1.5 times the variance of a row.
     *median * DEVIATION / 1.5_f64.sqrt()
 }
 

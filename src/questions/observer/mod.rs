@@ -1,23 +1,22 @@
-//! An observer who knows where to look: what could still be answered from given pixels, [`ObservedFrame`] and [`Observation`].
+//! A model observer: what the rules could still answer from given pixels, [`ObservedFrame`] and [`Observation`].
 //!
-//! The observer has a frame's masks and depth, and of its image only the pixels that it is sent. It finds out anew which
-//! segments stand out of the noise ([`contrast`]) and what colour each has, and answers by the rulebook over what it sees.
-//! Where nothing that it sees bears on a question it has no answer, and whoever asks takes its prior: any choice is as
-//! likely as another.
+//! The observer has a frame's masks and depth, but sees only the pixels of the image that it is sent. It measures which
+//! segments are visible in the noise ([`contrast`]) and their colours, and answers by the rulebook from these segments.
+//! If no visible segment helps with a question, it has no answer. The caller then guesses: all choices are equally likely.
 //!
-//! What it is: a line that says how much of the evidence the pixels still hold for one who need not find it, name it or tell
-//! it from other things: a model observer in the sense of medical imaging (Barrett, Yao, Rolland and Myers, "Model observers
-//! for assessment of image quality", PNAS 90:9758, 1993), with the place of the signal known and the decision by Rose's rule.
-//! As the decision is about contrast against noise, no change of brightness or gain helps it. Where an enhancer does raise
-//! its line, it is by two things: colours, for a gain alone does not undo the tints that rounding and clipping leave near
-//! black, nor a tone curve that the dark image lacks, and an enhancer may have learned to; and averaging over more than a
-//! cell, which the observer does along borders and not across.
+//! The observer measures how much evidence the pixels still hold if nothing has to be found, named or told apart. It is a
+//! model observer as in medical imaging (Barrett, Yao, Rolland and Myers, "Model observers for assessment of image quality",
+//! PNAS 90:9758, 1993): the place of the signal is known, and the decision follows Rose's criterion. The decision compares
+//! contrast with noise, so a change of brightness or gain does not help. An enhancer can help in two ways:
 //!
-//! What it is not: a bound on every model. A model may do better where it knows what rooms look like and guesses what it
-//! cannot see, and where a part of a thing tells the whole: the observer asks for half of an outline. It will mostly do
-//! worse. It is told two things that a model is not: the masks with their depth, and how bright the frame was in good light
-//! (one number, the mean of its linear light), which stands in for an eye that is adapted to the dark: colours are named as
-//! they are after this one gain.
+//! - Colours. A gain alone removes neither the tints that rounding and clipping leave near black, nor a missing tone curve.
+//!   An enhancer may have learned to remove both.
+//! - Averaging over more than a cell. The observer averages along borders only.
+//!
+//! The observer is not an upper bound for all models. A model may do better if it guesses from its knowledge of rooms, or if
+//! a small part of an object is enough; the observer needs half of an outline. Most models will do worse. The observer has
+//! two inputs that a model does not have: the masks with their depth, and the mean linear light of the clean frame (one
+//! number). The second replaces an eye that is adapted to the dark: colours are named after this one gain.
 
 pub(crate) mod contrast;
 mod wording;
@@ -36,28 +35,28 @@ use contrast::{MaskContrasts, mean_light};
 use wording::QuestionTopic;
 pub(crate) use wording::understood;
 
-/// What the observer does, and how: a change of it is another observer.
+/// Version of the observer's method; it enters the digest of the model.
 pub(crate) const VERSION: u32 = 1;
 
-/// A frame as the observer knows it: where everything is, and nothing of how it looks but its mean light.
+/// What the observer knows of a frame: the place of every segment and the mean light, but no pixels.
 #[derive(Debug)]
 pub struct ObservedFrame {
     size: [usize; 2],
-    /// The mask of each pixel, from 1; 0 for none.
+    /// Mask of each pixel, from 1; 0 for no mask.
     masks: Vec<u32>,
-    /// The number of each mask in the map.
+    /// Number of each mask in the map of segments.
     numbers: Vec<u32>,
-    /// What was measured in good light. Colours are not read from it.
+    /// Statistics of the clean frame. Their colours are not used.
     statistics: FrameStatistics,
-    /// The mean linear light.
+    /// Mean linear light of the clean frame, from 0 to 1.
     light: f64,
 }
 
 impl ObservedFrame {
-    /// Takes note of a frame.
+    /// Prepares a clean frame for observation.
     ///
     /// # Errors
-    /// Where the frame has no classes.
+    /// If the frame has no classes.
     pub fn new(frame: &Frame, labels: &Labels, rules: &Rules, palette: &Palette) -> Result<Self> {
         let key = Digest::of(frame.id.0.as_bytes());
         let statistics = measure(frame, labels, rules, palette, key)?;
@@ -71,15 +70,15 @@ impl ObservedFrame {
         })
     }
 
-    /// Looks at an image of the frame, whatever was done to it. One of another size is looked at through the same masks.
+    /// Observes a degraded or enhanced image of the frame. For an image of another size, the masks are scaled.
     #[must_use]
     pub fn look(&self, image: &Rgb, palette: &Palette) -> Observation {
         let gain = self.light / mean_light(image).max(f64::MIN_POSITIVE);
-        let look = MaskContrasts::at(image, &self.masks, self.size, gain, palette);
+        let contrasts = MaskContrasts::measure(image, &self.masks, self.size, gain, palette);
         let number = |mask: usize| mask.checked_sub(1).and_then(|i| self.numbers.get(i));
-        let visible: BTreeMap<u32, Vec<Color>> = look
+        let visible: BTreeMap<u32, Vec<Color>> = contrasts
             .visible()
-            .filter_map(|mask| Some((*number(mask)?, look.colors(mask, palette))))
+            .filter_map(|mask| Some((*number(mask)?, contrasts.colors(mask, palette))))
             .collect();
         let mut seen = self.statistics.clone();
         seen.segments
@@ -101,25 +100,26 @@ impl ObservedFrame {
     }
 }
 
-/// What the observer sees of a frame in one image.
+/// The segments that the observer sees in one image of a frame.
 #[derive(Debug, Clone)]
 pub struct Observation {
-    /// How many segments it sees.
+    /// Number of visible segments.
     pub visible: usize,
+    /// Statistics of the frame, with the visible segments only.
     seen: FrameStatistics,
-    /// The colours of each segment that it sees, by number, the first the most.
+    /// Colours of each visible segment, by its number; the best comes first.
     colors: BTreeMap<u32, Vec<Color>>,
 }
 
 impl Observation {
-    /// The answer to a question, as an index of its choices; `None` where nothing that is seen bears on it, or where the
-    /// question is none of the rulebook's (see [`understood`]).
+    /// The answer to a question, as an index of its choices. `None` if no visible segment helps, or if the question is not
+    /// one of the rulebook (see [`understood`]).
     #[must_use]
     pub fn answer(&self, question: &Question, rules: &Rules) -> Option<usize> {
         let answer = match QuestionTopic::of(question, rules.book())? {
             QuestionTopic::Room => self.room(rules),
-            QuestionTopic::Activity(activity) => self.suits(activity, rules),
-            QuestionTopic::Presence(class) => self.there(&class),
+            QuestionTopic::Activity(activity) => self.affordance(activity, rules),
+            QuestionTopic::Presence(class) => self.presence(&class),
             QuestionTopic::Color(class) => self.color(&class, question),
             QuestionTopic::Closest => self.closest(question, rules),
         }?;
@@ -130,7 +130,7 @@ impl Observation {
             .position(|text| *text == answer)
     }
 
-    /// The room, by what is seen of it: where the rulebook is not sure, the one that most speaks for.
+    /// The room type by the visible segments. If the rulebook gives none, the type with the highest score.
     fn room(&self, rules: &Rules) -> Option<String> {
         let book = rules.book();
         let signs = classify(&self.seen, book);
@@ -143,8 +143,8 @@ impl Observation {
         })
     }
 
-    /// Whether the room is one where it is done, or what it takes is seen.
-    fn suits(&self, activity: usize, rules: &Rules) -> Option<String> {
+    /// Yes if the activity belongs to the type of room, or if the objects that it needs are visible.
+    fn affordance(&self, activity: usize, rules: &Rules) -> Option<String> {
         let book = rules.book();
         let activity = book.activity.get(activity)?;
         let seen = |token: &String| self.seen.shows(token, book);
@@ -156,12 +156,12 @@ impl Observation {
         Some(yes_no(yes))
     }
 
-    /// Whether a class is there: where none is seen it is more likely not, unless nothing at all is seen.
-    fn there(&self, class: &str) -> Option<String> {
+    /// Yes if the class is visible, else no, because absence is then more likely. `None` if no segment is visible.
+    fn presence(&self, class: &str) -> Option<String> {
         (self.visible > 0).then(|| yes_no(self.seen.of_class(class) > 0))
     }
 
-    /// The colour that most of the largest segment of a class has, of those offered.
+    /// The best colour of the largest visible segment of a class, among the colours offered.
     fn color(&self, class: &str, question: &Question) -> Option<String> {
         let segments = self
             .seen
@@ -177,7 +177,7 @@ impl Observation {
         colors.find(offered).map(|color| color.name().to_owned())
     }
 
-    /// The nearest of what is offered and seen. Whatever is not seen is less likely to be nearer than the nearest that is.
+    /// The nearest object that is offered and visible. An object that is not visible is less likely to be nearer.
     fn closest(&self, question: &Question, rules: &Rules) -> Option<String> {
         let book = rules.book();
         let offered = |segment: &&Segment| {

@@ -1,25 +1,25 @@
-//! What a question of the rulebook is about, by its words alone: [`QuestionTopic`].
+//! The subject of a question, read from its text: [`QuestionTopic`].
 
 use crate::questions::rules::{RuleBook, Rules};
 use crate::types::Question;
 
-/// What a question is about.
+/// Subject of a question of the rulebook.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum QuestionTopic {
     /// The type of the room.
     Room,
-    /// Whether the room suits an activity, by its place in the rulebook.
+    /// Whether the room suits an activity, given by its index in the rulebook.
     Activity(usize),
-    /// Whether a class is there.
+    /// Whether an object of a class is visible.
     Presence(String),
-    /// The colour of a class.
+    /// The colour of the object of a class.
     Color(String),
-    /// What is closest.
+    /// The object that is closest to the camera.
     Closest,
 }
 
 impl QuestionTopic {
-    /// Reads a question by the rulebook's own words; the evidence, which holds the answer, is not looked at.
+    /// Compares the text of a question with the templates of the rulebook. The evidence, which holds the answer, is not read.
     pub(super) fn of(question: &Question, book: &RuleBook) -> Option<Self> {
         let text = question.text.trim();
         if text == book.room_type.text {
@@ -37,14 +37,14 @@ impl QuestionTopic {
         if let Some(activity) = activity {
             return Some(Self::Activity(activity));
         }
-        let told = |template: &str, class: &str| {
+        let fill = |template: &str, class: &str| {
             template
                 .replace("{article}", book.article(class))
                 .replace("{object}", book.name(class))
         };
         let class = |template: &str| {
             let mut classes = book.class.keys();
-            classes.find(|class| text == told(template, class)).cloned()
+            classes.find(|class| text == fill(template, class)).cloned()
         };
         class(&book.presence.text)
             .map(Self::Presence)
@@ -52,7 +52,7 @@ impl QuestionTopic {
     }
 }
 
-/// Whether a question is one of the rulebook's, so that the observer can answer it.
+/// Whether a question is one of the rulebook, so that the observer can answer it.
 #[must_use]
 pub(crate) fn understood(question: &Question, rules: &Rules) -> bool {
     QuestionTopic::of(question, rules.book()).is_some()

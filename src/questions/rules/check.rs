@@ -1,4 +1,4 @@
-//! Whether a rulebook holds together: every class, room and token that it names is there.
+//! Consistency checks of a rulebook: every class, room and token that it names must be defined.
 
 use std::collections::BTreeSet;
 
@@ -6,7 +6,7 @@ use super::{RuleBook, SCHEMA};
 use crate::types::Choices;
 
 impl RuleBook {
-    /// Says what does not.
+    /// Returns the first inconsistency as an error message.
     pub(super) fn check(&self) -> Result<(), String> {
         if self.schema != SCHEMA {
             return Err(format!("schema {:?}; {SCHEMA:?} expected", self.schema));
@@ -37,7 +37,7 @@ impl RuleBook {
     fn check_classes(&self) -> Result<(), String> {
         let unknown = |place: &str, class: &str| {
             Err(format!(
-                "{place} names the class {class:?}, which [class] has not"
+                "{place} names the class {class:?}, which [class] does not define"
             ))
         };
         for group in &self.confusable {
@@ -59,7 +59,10 @@ impl RuleBook {
                 return unknown("token", class);
             }
             if token.class.is_none() && token.names.is_empty() && token.starts.is_empty() {
-                return Err(format!("the token {:?} stands for everything", token.token));
+                return Err(format!(
+                    "the token {:?} matches every segment; give it names, starts or a class",
+                    token.token
+                ));
             }
         }
         Ok(())
@@ -104,15 +107,15 @@ impl RuleBook {
                 return Err(format!("{token:?} is neither a token nor a class"));
             }
         }
-        let twice = self.activity.iter().enumerate().find(|(i, activity)| {
+        let repeated = self.activity.iter().enumerate().find(|(i, activity)| {
             self.activity[..*i]
                 .iter()
                 .any(|other| other.activity == activity.activity)
         });
-        if let Some((_, twice)) = twice {
+        if let Some((_, activity)) = repeated {
             return Err(format!(
-                "the activity {:?} stands there twice",
-                twice.activity
+                "the activity {:?} is defined twice",
+                activity.activity
             ));
         }
         match self
@@ -120,7 +123,10 @@ impl RuleBook {
             .iter()
             .find(|activity| activity.enablers.is_empty())
         {
-            Some(idle) => Err(format!("the activity {:?} has no enablers", idle.activity)),
+            Some(activity) => Err(format!(
+                "the activity {:?} has no enablers",
+                activity.activity
+            )),
             None => Ok(()),
         }
     }

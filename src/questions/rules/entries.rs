@@ -1,4 +1,4 @@
-//! The entries of a rulebook.
+//! The tables of a rulebook. Fields without a comment are explained in `rules.toml`.
 
 use std::collections::BTreeMap;
 use std::collections::BTreeSet;
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::questions::colors::Color;
 
-/// What is measured of a frame.
+/// Thresholds for measuring a frame.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MeasureRule {
@@ -26,7 +26,7 @@ pub struct MeasureRule {
     pub detail_ppm: u64,
 }
 
-/// What makes a segment evidence.
+/// Thresholds that a segment must pass to be evidence.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[expect(
@@ -40,58 +40,57 @@ pub struct EvidenceRule {
     pub border_area_ppm: u64,
 }
 
-/// What a class is like.
+/// A property of a class.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ClassFlag {
-    /// Part of the building.
+    /// Part of the building, such as a wall.
     Structural,
-    /// On a surface: never the closest object.
+    /// Lies flat on a surface, so it is never the closest object.
     Flat,
-    /// Never asked, may hide anything.
+    /// Contains objects of many kinds; never asked.
     Generic,
-    /// Questions name it.
+    /// Questions name the class.
     Asked,
-    /// Its colour is asked.
+    /// Questions ask for the colour of the class.
     Color,
 }
 
-/// One canonical class.
+/// One canonical class of mpcat40.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ClassRule {
-    /// What it is called in a question; the class itself where it is not said.
+    /// Name in a question; default: the class itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// Its article; "a" where it is not said.
+    /// Article in a question; default: "a".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub article: Option<String>,
-    /// What it is like.
+    /// Properties of the class; may be empty.
     pub flags: BTreeSet<ClassFlag>,
 }
 
-/// What words add to classes.
+/// Words that change how a segment of a class is treated.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WordRules {
-    /// Flat whatever their class.
+    /// Words whose segments are flat, whatever their class.
     pub flat: BTreeSet<String>,
-    /// Words that a class does not cover in plain speech.
+    /// By class, words that do not fit the class in plain English.
     pub unlike: BTreeMap<String, BTreeSet<String>>,
 }
 
-/// A group of which one hides the absence of another.
+/// Classes and words that may be mistaken for each other: if one is visible, none of the others can be called absent.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Confusable {
-    /// Its classes.
     pub classes: BTreeSet<String>,
-    /// Words of segments that belong to it, too.
+    /// Words of segments that also belong to the group.
     #[serde(default)]
     pub names: BTreeSet<String>,
 }
 
-/// When a room has a type.
+/// Scores that a room type needs, and the room types that questions ask about.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RoomRule {
@@ -100,51 +99,51 @@ pub struct RoomRule {
     pub order: Vec<String>,
 }
 
-/// What a segment says of its room, by its word.
+/// A token: a kind of object that matters for the type of room, found by the word and class of a segment.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TokenRule {
-    /// The token.
+    /// Name of the token.
     pub token: String,
-    /// The words it stands for.
+    /// Words of the data set that it stands for.
     #[serde(default)]
     pub names: BTreeSet<String>,
-    /// The beginnings of words it stands for.
+    /// Beginnings of words that it stands for.
     #[serde(default)]
     pub starts: Vec<String>,
-    /// The class that the segment must have.
+    /// Class that the segment must have; `None` for any class.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub class: Option<String>,
 }
 
-/// What speaks for a room.
+/// A combination of objects that is evidence for a type of room.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Clue {
-    /// The room.
+    /// Room type that the clue supports.
     pub room: String,
-    /// How strongly.
+    /// Points added to the score of the room type.
     pub weight: u32,
-    /// What must be seen.
+    /// Objects that must all be visible.
     pub seen: Vec<Sign>,
-    /// What may not be anywhere.
+    /// Tokens that must not have a pixel in the frame.
     #[serde(default)]
     pub unseen: Vec<String>,
 }
 
-/// A token that must be seen so often.
+/// A token and the number of its segments that a clue needs.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sign {
-    /// The token.
+    /// Token of the segments.
     pub token: String,
-    /// The least area of a segment that counts.
+    /// Minimum area of a segment that counts, in millionths of the frame.
     #[serde(default)]
     pub area_ppm: u64,
-    /// How many of them at least.
+    /// Minimum number of segments.
     #[serde(default = "one")]
     pub least: usize,
-    /// How many of them at most.
+    /// Maximum number of segments; `None` for no limit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub most: Option<usize>,
 }
@@ -153,29 +152,29 @@ fn one() -> usize {
     1
 }
 
-/// Which of two rooms wins.
+/// A rule by which one of two rival room types wins.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Contest {
-    /// The room that wins.
+    /// Room type that wins.
     pub winner: String,
-    /// The one it wins against.
+    /// Room type that it wins against.
     pub loser: String,
-    /// The score that the winner needs.
+    /// Minimum score of the winner.
     #[serde(default)]
     pub least_score: u32,
-    /// The tokens whose areas are compared, the winner's first.
+    /// Tokens whose areas are compared, the winner's first; `None` for no comparison.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tokens: Option<[String; 2]>,
-    /// How many times as large the winner's must be.
+    /// Minimum ratio of the winner's area to the other area.
     #[serde(default)]
     pub area_ratio: u64,
-    /// What may not be anywhere.
+    /// Tokens that must not have a pixel in the frame.
     #[serde(default)]
     pub unseen: Vec<String>,
 }
 
-/// A room seen through a door.
+/// Thresholds for a room seen through a door: how much smaller and farther its segments are.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Doorway {
@@ -183,7 +182,7 @@ pub struct Doorway {
     pub depth_ratio_ppm: u64,
 }
 
-/// What must hold before anything is said to be absent.
+/// Limits of a frame in which a class or token can be called absent.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ClosedWorld {
@@ -209,17 +208,17 @@ pub struct AffordanceRule {
     pub strict: bool,
 }
 
-/// What a room may be suitable for.
+/// An activity that a room may be suitable for.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ActivityRule {
-    /// In words that follow "I want to".
+    /// The activity, in words that follow "I want to".
     pub activity: String,
-    /// The rooms where it is done.
+    /// Room types where the activity is done.
     pub rooms: BTreeSet<String>,
-    /// Sets of tokens, any one of which makes it possible.
+    /// Sets of tokens; one complete set makes the activity possible.
     pub enablers: Vec<Vec<String>>,
-    /// What would do at a pinch.
+    /// Tokens that could substitute an enabler.
     pub pinch: Vec<String>,
 }
 
@@ -253,15 +252,15 @@ pub struct ColorRule {
     pub neighbours: Vec<[Color; 2]>,
 }
 
-/// Which colours are offered.
+/// The colours that are offered as choices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ColorChoices {
-    /// All eleven names.
+    /// All eleven colour names.
     All11,
-    /// The eight of `fixed8`.
+    /// The colours listed in `fixed8`.
     Fixed8,
-    /// The answer and four that are no neighbours of it.
+    /// The answer and four colours that are not its neighbours.
     K5,
 }
 
@@ -281,17 +280,17 @@ pub struct ClosestRule {
     pub choices: usize,
 }
 
-/// Between which objects the gap is measured.
+/// The objects between which the gap is measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum GapScope {
-    /// The two nearest.
+    /// The two nearest objects, even of the same class.
     Instances,
-    /// The nearest, and the nearest of another class.
+    /// The nearest object and the nearest one of another class.
     Classes,
 }
 
-/// How the answers are evened out.
+/// Limits for balancing the answers.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BalanceRule {

@@ -1,7 +1,7 @@
-//! The rulebook: every threshold, table and template by which questions are made, [`Rules`].
+//! The rulebook: every threshold, table and template that questions are generated with, [`Rules`].
 //!
-//! It is one TOML file, built in as `rules.toml`, whose comments say what each entry means and what it rests on. The names of
-//! the fields here are its own.
+//! A rulebook is one TOML file. The built-in one is `rules.toml`; its comments explain each entry and give its source. The
+//! fields here have the same names.
 
 mod check;
 mod entries;
@@ -15,12 +15,12 @@ use crate::types::Digest;
 
 pub use entries::*;
 
-/// The rulebook that is built in.
+/// Text of the built-in rulebook.
 const BUILT_IN: &str = include_str!("../rules.toml");
-/// The schema of the file.
+/// Schema of the file, with its version.
 const SCHEMA: &str = "darkqa.rules/1";
 
-/// A whole rulebook.
+/// A checked rulebook with its digests.
 #[derive(Debug, Clone)]
 pub struct Rules {
     book: RuleBook,
@@ -28,42 +28,32 @@ pub struct Rules {
     measure_digest: Digest,
 }
 
-/// The file.
+/// The content of a rulebook file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RuleBook {
     schema: String,
-    /// The version of the rules, in words.
+    /// Version of the rules; it stands in the evidence of each question.
     pub version: String,
-    /// Of every choice between candidates that are equally good.
+    /// Seed of every pick between candidates that are equally good.
     pub seed: u64,
-    /// What is measured of a frame.
     pub measure: MeasureRule,
-    /// What makes a segment evidence.
     pub qualified: EvidenceRule,
-    /// The canonical classes.
+    /// Canonical classes by name.
     pub class: BTreeMap<String, ClassRule>,
-    /// What words add to classes.
     pub names: WordRules,
-    /// Groups of which one hides the absence of another.
     pub confusable: Vec<Confusable>,
-    /// When a room has a type.
     pub room: RoomRule,
-    /// What a segment says of its room, by its word; the first that fits.
+    /// The first token that matches a segment counts.
     pub token: Vec<TokenRule>,
-    /// What speaks for a room.
     pub clue: Vec<Clue>,
-    /// Which of two rooms wins.
     pub contest: Vec<Contest>,
-    /// A room seen through a door.
     pub doorway: Doorway,
-    /// What must hold before anything is said to be absent.
     pub closed_world: ClosedWorld,
     /// "What type of room is this?"
     pub room_type: RoomTypeRule,
     /// "Is this room suitable for this?"
     pub affordance: AffordanceRule,
-    /// What a room may be suitable for.
     pub activity: Vec<ActivityRule>,
     /// "Is there a chair in the image?"
     pub presence: PresenceRule,
@@ -71,23 +61,22 @@ pub struct RuleBook {
     pub color: ColorRule,
     /// "Which object is closest to the camera?"
     pub closest: ClosestRule,
-    /// How the answers are evened out.
     pub balance: BalanceRule,
 }
 
 impl Rules {
-    /// The rulebook that is built in.
+    /// Returns the built-in rulebook.
     ///
     /// # Errors
-    /// None: a test reads the very same text.
+    /// Never: a test parses the same text.
     pub fn built_in() -> Result<Self> {
         Self::parse(BUILT_IN)
     }
 
-    /// Reads a rulebook.
+    /// Parses and checks a rulebook.
     ///
     /// # Errors
-    /// [`Error::Data`] where it is no TOML of this schema, or names a class, room or token that it has not.
+    /// [`Error::Data`] if the text is not TOML of this schema, or names a class, room or token that it does not define.
     pub fn parse(text: &str) -> Result<Self> {
         let wrong = |problem: String| Error::data("rules", problem);
         let book: RuleBook = toml::from_str(text).map_err(|e| {
@@ -96,7 +85,7 @@ impl Rules {
             wrong(format!("line {line}: {}", e.message().replace('\n', ", ")))
         })?;
         book.check().map_err(wrong)?;
-        // The content, not its spelling: a comment changes no question.
+        // The digest covers the values, not the text: a comment does not change it.
         let content = |part: String| Digest::of_parts([part.as_bytes()]);
         let whole = serde_json::to_string(&book).map_err(|e| wrong(e.to_string()))?;
         let measure = serde_json::to_string(&book.measure).map_err(|e| wrong(e.to_string()))?;
@@ -107,19 +96,19 @@ impl Rules {
         })
     }
 
-    /// What the rulebook says.
+    /// The content of the rulebook.
     #[must_use]
     pub fn book(&self) -> &RuleBook {
         &self.book
     }
 
-    /// The content of the whole rulebook.
+    /// The digest of the whole rulebook.
     #[must_use]
     pub fn digest(&self) -> Digest {
         self.digest
     }
 
-    /// The content of what decides the statistics of a frame.
+    /// The digest of `[measure]`, the part of the rulebook that decides the statistics of a frame.
     #[must_use]
     pub fn measure_digest(&self) -> Digest {
         self.measure_digest
@@ -127,14 +116,14 @@ impl Rules {
 }
 
 impl RuleBook {
-    /// Whether a class is of this kind.
+    /// Whether a class has a property; false for unknown classes.
     #[must_use]
     pub fn is(&self, class: &str, flag: ClassFlag) -> bool {
         let class = self.class.get(class);
         class.is_some_and(|class| class.flags.contains(&flag))
     }
 
-    /// What a class is called in a question.
+    /// The name of a class in a question.
     #[must_use]
     pub fn name<'a>(&'a self, class: &'a str) -> &'a str {
         let name = self
@@ -144,7 +133,7 @@ impl RuleBook {
         name.unwrap_or(class)
     }
 
-    /// The article of a class.
+    /// The article of a class in a question.
     #[must_use]
     pub fn article(&self, class: &str) -> &str {
         let class = self.class.get(class);
@@ -153,19 +142,19 @@ impl RuleBook {
             .unwrap_or("a")
     }
 
-    /// The token of a segment by its word and class.
+    /// The token of a segment by its word and class; the class itself if no token matches.
     #[must_use]
     pub fn token<'a>(&'a self, name: &str, class: &'a str) -> &'a str {
-        let fits = |token: &&TokenRule| {
-            let named = token.names.contains(name)
+        let matches = |token: &&TokenRule| {
+            let word_matches = token.names.contains(name)
                 || token
                     .starts
                     .iter()
                     .any(|start| name.starts_with(start.as_str()))
                 || token.names.is_empty() && token.starts.is_empty();
-            named && token.class.as_deref().is_none_or(|only| only == class)
+            word_matches && token.class.as_deref().is_none_or(|only| only == class)
         };
-        let token = self.token.iter().find(fits);
+        let token = self.token.iter().find(matches);
         token.map_or(class, |token| &token.token)
     }
 }
@@ -175,7 +164,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_built_in_rules_are_whole() {
+    fn the_built_in_rules_are_complete() {
         let rules = Rules::built_in().unwrap();
         let book = rules.book();
         let asked = book

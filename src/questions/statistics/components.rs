@@ -1,4 +1,4 @@
-//! Connected pieces of one label: [`components`].
+//! Connected components of equal label: [`components`].
 
 use super::rim::runs;
 
@@ -9,8 +9,8 @@ struct LabelRun {
     label: u32,
 }
 
-/// Numbers the pieces of equal label that hang together by edges or corners, row by row from 1; a label that `of` says is 0 is
-/// none and gets 0.
+/// The component of each pixel. Pixels of equal label that touch by edges or corners are one component, numbered row by row
+/// from 1. Pixels whose label `of` maps to 0 get 0.
 pub(super) fn components<T: Copy + PartialEq>(
     labels: &[T],
     [width, height]: [usize; 2],
@@ -22,7 +22,7 @@ pub(super) fn components<T: Copy + PartialEq>(
         let row = &labels[y * width..][..width];
         let mut found: Vec<(LabelRun, u32)> = Vec::new();
         let above: &[(LabelRun, u32)] = rows.last().map_or(&[], |above| above);
-        // Runs of both rows come from left to right: whatever ends before this one begins is passed for good.
+        // Runs of both rows come from left to right. A run above that ends before this one begins is not needed again.
         let mut first = 0;
         for (left, right) in runs(row) {
             let label = of(row[left]);
@@ -32,7 +32,7 @@ pub(super) fn components<T: Copy + PartialEq>(
             while above.get(first).is_some_and(|(run, _)| run.right < left) {
                 first += 1;
             }
-            let mut own = None;
+            let mut joined = None;
             for (run, node) in above[first..]
                 .iter()
                 .take_while(|(run, _)| run.left <= right)
@@ -40,12 +40,12 @@ pub(super) fn components<T: Copy + PartialEq>(
                 if run.label != label {
                     continue;
                 }
-                own = Some(match own {
+                joined = Some(match joined {
                     None => *node,
                     Some(other) => join(&mut parents, other, *node),
                 });
             }
-            let node = own.unwrap_or_else(|| {
+            let node = joined.unwrap_or_else(|| {
                 parents.push(parents.len() as u32);
                 parents.len() as u32 - 1
             });
@@ -56,10 +56,10 @@ pub(super) fn components<T: Copy + PartialEq>(
     number(&rows, &mut parents, [width, height])
 }
 
-/// Joins two trees; the older root stays.
-fn join(parents: &mut [u32], one: u32, other: u32) -> u32 {
-    let (one, other) = (root(parents, one), root(parents, other));
-    let (old, new) = (one.min(other), one.max(other));
+/// Joins the trees of two nodes and returns the common root, which is the older one.
+fn join(parents: &mut [u32], a: u32, b: u32) -> u32 {
+    let (a, b) = (root(parents, a), root(parents, b));
+    let (old, new) = (a.min(b), a.max(b));
     parents[new as usize] = old;
     old
 }
@@ -99,7 +99,7 @@ mod tests {
 
     use super::*;
 
-    fn plainly(labels: &[u32], [width, height]: [usize; 2]) -> Vec<u32> {
+    fn reference(labels: &[u32], [width, height]: [usize; 2]) -> Vec<u32> {
         let mut pieces = vec![0; labels.len()];
         let mut next = 0;
         for start in 0..labels.len() {
@@ -113,10 +113,10 @@ mod tests {
                 let (x, y) = (i % width, i / width);
                 for j in y.saturating_sub(1)..=(y + 1).min(height - 1) {
                     for k in x.saturating_sub(1)..=(x + 1).min(width - 1) {
-                        let there = j * width + k;
-                        if labels[there] == labels[start] && pieces[there] == 0 {
-                            pieces[there] = next;
-                            open.push(there);
+                        let neighbour = j * width + k;
+                        if labels[neighbour] == labels[start] && pieces[neighbour] == 0 {
+                            pieces[neighbour] = next;
+                            open.push(neighbour);
                         }
                     }
                 }
@@ -127,12 +127,12 @@ mod tests {
 
     proptest! {
         #[test]
-        fn pieces_hang_together(
+        fn piecesare_connected(
             (width, height, labels) in (1..12_usize, 1..12_usize).prop_flat_map(|(width, height)| {
                 (Just(width), Just(height), prop::collection::vec(0..3_u32, width * height))
             }),
         ) {
-            prop_assert_eq!(components(&labels, [width, height], |label| label), plainly(&labels, [width, height]));
+            prop_assert_eq!(components(&labels, [width, height], |label| label), reference(&labels, [width, height]));
         }
     }
 }

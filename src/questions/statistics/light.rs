@@ -1,4 +1,4 @@
-//! What a mask's pixels show: their colour and their depth, [`MaskCore`]; and what is measured of all pixels.
+//! Colour and depth of the pixels of a mask, [`MaskCore`], and measurements over all pixels.
 
 use ndarray::{CowArray, Ix2};
 
@@ -7,7 +7,7 @@ use crate::questions::colors::{BINS, Palette};
 use crate::questions::rules::MeasureRule;
 use crate::types::{DepthKind, Frame, Intrinsics};
 
-/// Depth and colour of the pixels of a mask.
+/// Colours and depths of the core pixels of a mask.
 pub(super) struct MaskCore {
     pub(super) count: u64,
     colors: [u64; BINS],
@@ -18,7 +18,7 @@ pub(super) struct MaskCore {
 }
 
 impl MaskCore {
-    /// Nothing yet, of a mask of so many pixels.
+    /// An empty core, with memory for the depths of `area` pixels.
     pub(super) fn of(area: u64, frame: &Frame) -> Self {
         Self {
             count: 0,
@@ -33,7 +33,8 @@ impl MaskCore {
         }
     }
 
-    pub(super) fn tell(self, segment: &mut Segment) {
+    /// Writes the results into a segment.
+    pub(super) fn write_to(self, segment: &mut Segment) {
         segment.core = self.count;
         segment.colors = self.colors;
         segment.median = self
@@ -51,7 +52,7 @@ fn depths(mut depths: Vec<u32>) -> Option<SegmentDepth> {
     }
     let count = depths.len() as u64;
     let [near, middle, far] = [10, 50, 90].map(|percent| rank(count, percent) as usize);
-    // What lies before the median is nearer, and what lies behind it farther.
+    // Values before the median are smaller, values after it larger, so each half is enough for its quantile.
     let (nearer, &mut median, farther) = depths.select_nth_unstable(middle);
     let ranked = |depths: &mut [u32], rank| *depths.select_nth_unstable(rank).1;
     Some(SegmentDepth {
@@ -69,12 +70,12 @@ fn depths(mut depths: Vec<u32>) -> Option<SegmentDepth> {
     })
 }
 
-/// The index of a quantile among so many in order: ⌈percent · count / 100⌉ − 1.
+/// The index of a quantile in a sorted list: ⌈percent · count / 100⌉ − 1.
 fn rank(count: u64, percent: u64) -> u64 {
     (percent * count).div_ceil(100).saturating_sub(1)
 }
 
-/// A quantile of 8-bit values by their counts.
+/// A quantile of 8-bit values, from their histogram.
 fn quantile(counts: &[u32; 256], count: u64, percent: u64) -> u8 {
     let rank = rank(count, percent);
     let mut seen = 0;
@@ -85,13 +86,13 @@ fn quantile(counts: &[u32; 256], count: u64, percent: u64) -> u8 {
     value.unwrap_or(0) as u8
 }
 
-/// The image and its depth, as a mask's pixels see them.
+/// The image and depth of a frame, prepared for reading runs of pixels.
 pub(super) struct PixelLight<'a> {
     frame: &'a Frame,
     rule: &'a MeasureRule,
     palette: &'a Palette,
     depth: Option<CowArray<'a, u32, Ix2>>,
-    /// The squares of the slopes of rays by column and by row.
+    /// Squares of the slopes of rays, by column and by row; `None` if the depth needs no conversion.
     slopes: Option<[Vec<f64>; 2]>,
 }
 
@@ -118,8 +119,8 @@ impl<'a> PixelLight<'a> {
         }
     }
 
-    /// Adds a run of a row to a mask.
-    pub(super) fn fall(&self, core: &mut MaskCore, y: usize, left: usize, right: usize) {
+    /// Adds a run of pixels of a row to a core.
+    pub(super) fn add_run(&self, core: &mut MaskCore, y: usize, left: usize, right: usize) {
         let start = y * self.frame.rgb.width();
         let samples = &self.frame.rgb.samples()[(start + left) * 3..(start + right) * 3];
         core.count += (right - left) as u64;
@@ -128,9 +129,9 @@ impl<'a> PixelLight<'a> {
             for (counts, value) in core.channels.iter_mut().zip(rgb) {
                 counts[usize::from(value)] += 1;
             }
-            let most = rgb[0].max(rgb[1]).max(rgb[2]);
-            core.bright += u64::from(most >= self.rule.bright);
-            core.crushed += u64::from(most <= self.rule.crushed);
+            let max = rgb[0].max(rgb[1]).max(rgb[2]);
+            core.bright += u64::from(max >= self.rule.bright);
+            core.crushed += u64::from(max <= self.rule.crushed);
         }
         let depth = self.depth.as_ref().and_then(|depth| depth.as_slice());
         let (Some(depth), Some(depths)) = (depth, &mut core.depths) else {
@@ -152,20 +153,20 @@ impl<'a> PixelLight<'a> {
     }
 }
 
-/// The camera, where depth is to be turned from the axis to the rays.
+/// The camera, if depth must be converted from the optical axis to the rays.
 fn rays(frame: &Frame) -> Option<Intrinsics> {
     frame
         .intrinsics
         .filter(|_| frame.depth_kind == DepthKind::Planar)
 }
 
-/// What is known of a frame's depth.
+/// The measurements of a frame's depth map; `None` without one.
 pub(super) fn frame_depth(frame: &Frame) -> Option<FrameDepth> {
-    const MOST: usize = 1 << 16;
+    const SIZE: usize = 1 << 16;
     let depth = frame.depth.as_ref()?;
-    let mut counts = vec![0_u32; MOST];
+    let mut counts = vec![0_u32; SIZE];
     for depth in depth {
-        counts[(*depth as usize).min(MOST - 1)] += 1;
+        counts[(*depth as usize).min(SIZE - 1)] += 1;
     }
     let holes = u64::from(counts[0]);
     let rank = rank(depth.len() as u64 - holes, 50);
@@ -184,7 +185,7 @@ pub(super) fn frame_depth(frame: &Frame) -> Option<FrameDepth> {
     })
 }
 
-/// The 10 %, 50 % and 90 % quantiles of luma, which has the weights of ITU-R BT.709 in 256ths.
+/// The 10 %, 50 % and 90 % quantiles of luma (weights of ITU-R BT.709 in 256ths).
 pub(super) fn luma(frame: &Frame) -> [u8; 3] {
     let mut counts = [0; 256];
     let (pixels, _) = frame.rgb.samples().as_chunks::<3>();

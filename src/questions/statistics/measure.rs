@@ -13,12 +13,12 @@ use crate::types::{Digest, Frame, Labels};
 
 /// Measures a frame.
 ///
-/// All counts are of whole pixels, and all lengths whole millimetres. The one use of floating-point numbers is the way from
-/// the depth along the axis to that along the ray, `z · √(1 + ((x − cx) / fx)² + ((y − cy) / fy)²)`, whose operations IEEE 754
-/// rounds alike on every machine.
+/// Counts are whole pixels and lengths whole millimetres. Only the conversion of depth from the optical axis to the ray,
+/// `z · √(1 + ((x − cx) / fx)² + ((y − cy) / fy)²)`, uses floating-point numbers. IEEE 754 rounds these operations the same
+/// way on every machine.
 ///
 /// # Errors
-/// [`crate::error::Error::Data`] with the frame where it has no classes at all.
+/// [`crate::error::Error::Data`] with the frame if it has no classes at all.
 pub fn measure(
     frame: &Frame,
     labels: &Labels,
@@ -51,7 +51,7 @@ pub fn measure(
             *words.entry(segment.word.clone()).or_insert(0) += segment.area;
         }
         if let Some(core) = cores[mask].take() {
-            core.tell(&mut segment);
+            core.write_to(&mut segment);
             segments.push(segment);
         }
     }

@@ -1,6 +1,6 @@
-//! What is measured of a frame, Φ_f of the paper: [`FrameStatistics`], and of each of its segments: [`Segment`].
+//! The measurements of a frame, Φ_f of the paper: [`FrameStatistics`], and of each of its segments: [`Segment`].
 //!
-//! The rules see nothing else of a frame, so that they can be changed without opening an image again.
+//! The rules see nothing else of a frame, so changed rules do not need the images again.
 
 mod components;
 mod light;
@@ -23,133 +23,134 @@ use crate::types::{Digest, FrameId};
 
 pub use measure::measure;
 
-/// What is measured, and how. A change of it makes every kept statistic anew.
+/// Version of the measurements. If it changes, all cached statistics are computed again.
 pub(crate) const VERSION: u64 = 1;
 
-/// What is measured of a frame.
+/// The measurements of a frame.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FrameStatistics {
-    /// The frame.
+    /// Id of the frame.
     pub frame: FrameId,
-    /// The content of all that was measured, with the thresholds of measuring.
+    /// Digest of the measured files and the thresholds for measuring.
     pub key: Digest,
-    /// The scene it is a view of.
+    /// Scene of the frame.
     pub scene: String,
     /// Width and height in pixels.
     pub size: [usize; 2],
-    /// The 10 %, 50 % and 90 % quantiles of luma.
+    /// 10 %, 50 % and 90 % quantiles of luma, from 0 to 255.
     pub luma: [u8; 3],
-    /// Pixels without a class.
+    /// Number of pixels without a class.
     pub void: u64,
-    /// Those of them that survive an opening: more than a margin between two labels.
+    /// Number of void pixels that remain after a morphological opening, which removes thin margins between labels.
     pub effective_void: u64,
-    /// Those of them in the lower half.
+    /// Number of effective void pixels in the lower half of the frame.
     pub lower_void: u64,
-    /// Pixels of each canonical class, the smallest segments' too.
+    /// Number of pixels of each canonical class, with tiny segments.
     pub classes: BTreeMap<String, u64>,
-    /// Those of them that belong to no segment.
+    /// Number of pixels of each class that belong to no segment.
     pub loose: BTreeMap<String, u64>,
-    /// Pixels of segments by their own word, the smallest too.
+    /// Number of pixels of segments by word, with tiny segments.
     pub words: BTreeMap<String, u64>,
-    /// Pixels of numbers that the label space has not, by number.
+    /// Number of pixels by map number, for numbers that the label space does not have.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub unknown: BTreeMap<u16, u64>,
-    /// What is known of depth.
+    /// Measurements of the depth map; `None` without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth: Option<FrameDepth>,
-    /// The segments that are not tiny, by number.
+    /// The segments that are not tiny, sorted by number.
     pub segments: Vec<Segment>,
-    /// The type of the room, where a person has said it.
+    /// Room type stated by the data set.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub room: Option<String>,
 }
 
-/// What is known of a frame's depth.
+/// The measurements of a depth map.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FrameDepth {
-    /// Pixels without depth.
+    /// Number of pixels without depth.
     pub holes: u64,
-    /// The median of the others in millimetres, as they lie in the map; 65,535 stands for that or more.
+    /// Median of the other pixels in millimetres, as stored in the map; 65,535 stands for that or more.
     pub median: u32,
-    /// Whether segments' depths are distances along rays; along the axis, where the camera is unknown.
+    /// Direction of the depths of segments; the optical axis if planar depth has no known camera.
     pub along: DepthAxis,
 }
 
-/// What the depths of segments are measured along.
+/// Direction along which the depths of segments are measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DepthAxis {
-    /// The ray through the pixel.
+    /// Along the ray through the pixel.
     Ray,
-    /// The optical axis.
+    /// Along the optical axis of the camera.
     Axis,
 }
 
-/// What is measured of a segment.
+/// The measurements of a segment.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Segment {
-    /// Its number in the map; where the frame has no map of segments, or one of parts, the number of the connected piece of
-    /// one class, row by row from 1.
+    /// Number in the map of segments. Without such a map, or with one of parts, the number of the connected component, counted
+    /// row by row from 1.
     pub id: u32,
-    /// The canonical class that most of it has; the first by name where two are as common.
+    /// Most common canonical class of the pixels; the first by name if two are equally common.
     pub class: String,
-    /// The data set's own word for it, in lower case.
+    /// Word of the data set for the segment, in lower case.
     pub word: String,
-    /// Whether the word says that it is in another room or outside.
+    /// Place of the segment as its word gives it.
     #[serde(default, skip_serializing_if = "SegmentPlace::is_here")]
     pub stands: SegmentPlace,
-    /// The region of the scene, where that is known.
+    /// Region of the scene, if it is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub region: Option<i64>,
-    /// How many parts of an over-segmentation it is made of; 0 where there were none.
+    /// Number of parts that were merged, for maps of parts; else 0.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub parts: usize,
-    /// Its pixels.
+    /// Number of pixels of the whole mask.
     pub area: u64,
-    /// Those of them that have its class.
+    /// Number of pixels that have the class of the segment.
     pub pure: u64,
-    /// Left, top, right and bottom, the latter two exclusive.
+    /// Left, top, right and bottom in pixels; right and bottom are exclusive.
     pub bbox: [usize; 4],
-    /// Pixels of its rim: those with a 4-neighbour outside of it or of the image.
+    /// Number of rim pixels: those with a 4-neighbour outside the segment or the image.
     pub rim: u64,
-    /// Those of them within the frame's border.
+    /// Number of rim pixels within the border of the frame.
     pub rim_on_border: u64,
-    /// Pixels of the eroded mask, or of the whole where that is empty: depth and colour are theirs.
+    /// Number of core pixels: the eroded mask, or the whole mask if erosion leaves nothing. Depth and colour are measured on
+    /// them.
     pub core: u64,
-    /// Their depth.
+    /// Depth of the core; `None` if no core pixel has depth.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth: Option<SegmentDepth>,
-    /// How many of them have each colour: the eleven names in their order, then none.
+    /// Number of core pixels of each colour: the eleven names in order, then those without a name.
     pub colors: [u64; BINS],
-    /// The median of each channel.
+    /// Median code of each channel over the core.
     pub median: [u8; 3],
-    /// Over-exposed pixels.
+    /// Number of over-exposed core pixels.
     pub bright: u64,
-    /// Crushed pixels.
+    /// Number of core pixels crushed to black.
     pub crushed: u64,
 }
 
 /// The depth of a segment in millimetres: nearest-rank quantiles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SegmentDepth {
-    /// Pixels that have one.
+    /// Number of core pixels with depth.
     pub valid: u64,
-    /// The nearest tenth.
+    /// 10 % quantile in millimetres.
     pub p10: u32,
-    /// The median.
+    /// 50 % quantile in millimetres.
     pub median: u32,
-    /// The farthest tenth.
+    /// 90 % quantile in millimetres.
     pub p90: u32,
 }
 
-/// Where a segment stands, by its word.
+/// Place of a segment, as its word gives it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SegmentPlace {
-    /// In the room.
+    /// In the same room as the camera.
     #[default]
     Here,
-    /// In another room, or outside: seen through an opening.
+    /// In another room or outside, seen through an opening.
     Elsewhere,
 }
 
@@ -165,44 +166,44 @@ fn is_zero(count: &usize) -> bool {
     *count == 0
 }
 
-/// A share in millionths.
+/// The share of a part in the whole, in millionths.
 #[must_use]
 pub(crate) fn ppm(part: u64, whole: u64) -> u64 {
     part * 1_000_000 / whole.max(1)
 }
 
 impl FrameStatistics {
-    /// All pixels.
+    /// The number of pixels of the frame.
     #[must_use]
     pub fn pixels(&self) -> u64 {
         (self.size[0] * self.size[1]) as u64
     }
 
-    /// A share of all pixels in millionths.
+    /// The share of a number of pixels in the frame, in millionths.
     #[must_use]
     pub fn ppm(&self, part: u64) -> u64 {
         ppm(part, self.pixels())
     }
 
-    /// The pixels of a class.
+    /// The number of pixels of a class.
     #[must_use]
     pub fn of_class(&self, class: &str) -> u64 {
         self.classes.get(class).copied().unwrap_or(0)
     }
 
-    /// The area of a segment in millionths.
+    /// The area of a segment, in millionths of the frame.
     #[must_use]
     pub fn area(&self, segment: &Segment) -> u64 {
         self.ppm(segment.area)
     }
 
-    /// Whether a segment is large, pure and whole enough to be evidence.
+    /// Whether a segment is evidence: large enough, of one class and not cut by the border.
     #[must_use]
     pub fn qualified(&self, segment: &Segment, book: &RuleBook) -> bool {
         self.disqualified(segment, book).is_none()
     }
 
-    /// Why a segment is no evidence; `None` where it is.
+    /// Why a segment is not evidence; `None` if it is.
     #[must_use]
     pub fn disqualified(&self, segment: &Segment, book: &RuleBook) -> Option<Reason> {
         let rule = &book.qualified;
@@ -233,13 +234,14 @@ impl FrameStatistics {
         segments.filter(|segment| self.qualified(segment, book))
     }
 
-    /// Whether any pixel of a token is in the picture, the smallest segments' too.
+    /// Whether the frame has any pixel of a token, tiny segments included.
     #[must_use]
     pub fn shows(&self, token: &str, book: &RuleBook) -> bool {
         if book.class.contains_key(token) && self.of_class(token) > 0 {
             return true;
         }
-        // A word of a tiny segment is looked up without its class: a token that needs one is named as it.
+        // Words are looked up without a class, because tiny segments are counted by word only. A token that needs a class
+        // has the name of this class.
         let words = self.words.keys();
         let mut tokens = words.map(|word| book.token(word, ""));
         tokens.any(|found| found == token)
@@ -247,32 +249,32 @@ impl FrameStatistics {
 }
 
 impl Segment {
-    /// Whether too much of it is of other classes.
+    /// Whether too many pixels have other classes.
     #[must_use]
     pub fn mixed(&self, book: &RuleBook) -> bool {
         ppm(self.pure, self.area) < book.measure.purity_ppm
     }
 
-    /// Whether its class does not cover it in plain words.
+    /// Whether the word of the segment does not fit its class in plain English.
     #[must_use]
     pub fn unlike(&self, book: &RuleBook) -> bool {
         let words = book.names.unlike.get(&self.class);
         words.is_some_and(|words| words.contains(&self.word))
     }
 
-    /// Its token.
+    /// The token of the segment by its word and class.
     #[must_use]
     pub fn token<'a>(&'a self, book: &'a RuleBook) -> &'a str {
         book.token(&self.word, &self.class)
     }
 
-    /// Whether it lies on a surface.
+    /// Whether the segment lies flat on a surface.
     #[must_use]
     pub fn flat(&self, book: &RuleBook) -> bool {
         book.is(&self.class, ClassFlag::Flat) || book.names.flat.contains(&self.word)
     }
 
-    /// Its depth, where enough of it has one.
+    /// The depth of the segment; `None` if too few core pixels have depth.
     #[must_use]
     pub fn measured(&self, book: &RuleBook) -> Option<SegmentDepth> {
         self.depth.filter(|depth| {
@@ -281,8 +283,8 @@ impl Segment {
         })
     }
 
-    /// The commonest name of its colours with its pixels, those of the next (a name or none), and those without a name; the
-    /// first name by order where two are as common.
+    /// The most common colour name, its number of pixels, the number of the second most common bin (a name or none), and the
+    /// number without a name. If two are equally common, the first in order counts.
     #[must_use]
     pub fn leading_color(&self) -> (Option<Color>, u64, u64, u64) {
         let mut bins: Vec<(usize, u64)> = self.colors.iter().copied().enumerate().collect();
@@ -299,12 +301,12 @@ impl Segment {
     }
 }
 
-/// A data set's word in its one spelling, and where it says that the thing stands: lower case, single spaces, without the
-/// suffixes `/otherroom` and `/outside` of HM3D-Sem.
+/// A word of a data set in a uniform spelling (lower case, single spaces), and the place it gives. The suffixes `/otherroom` and
+/// `/outside` of HM3D-Sem are removed.
 #[must_use]
 pub(crate) fn plain_word(word: &str) -> (String, SegmentPlace) {
     let lower = word.to_lowercase();
-    let mut stands = SegmentPlace::Here;
+    let mut place = SegmentPlace::Here;
     let mut rest = lower.trim();
     while let Some(before) = [
         "/otherroom",
@@ -316,14 +318,14 @@ pub(crate) fn plain_word(word: &str) -> (String, SegmentPlace) {
     .iter()
     .find_map(|suffix| rest.strip_suffix(suffix))
     {
-        (rest, stands) = (before.trim_end(), SegmentPlace::Elsewhere);
+        (rest, place) = (before.trim_end(), SegmentPlace::Elsewhere);
     }
     let words: Vec<&str> = rest.split_whitespace().collect();
-    (words.join(" "), stands)
+    (words.join(" "), place)
 }
 
-/// The label numbers of a frame that its label space has not.
+/// The map numbers of a frame that the label space does not have.
 #[must_use]
-pub(crate) fn strangers(statistics: &FrameStatistics) -> BTreeSet<u16> {
+pub(crate) fn unknown_labels(statistics: &FrameStatistics) -> BTreeSet<u16> {
     statistics.unknown.keys().copied().collect()
 }

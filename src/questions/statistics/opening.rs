@@ -1,19 +1,19 @@
-//! What of a set of pixels is more than a margin: [`opened`].
+//! Morphological opening of a set of pixels, which removes thin margins: [`open`].
 
 use super::rim::runs;
 
-/// The opening of a set by a square of radius `radius`, in place: what the squares cover that lie wholly within it. Outside of
-/// the image there is nothing of the set, so that an unlabelled frame around the picture is a margin, too.
-pub(super) fn opened(set: &mut [bool], [width, height]: [usize; 2], radius: usize) {
+/// Opens a set of pixels in place with a square of radius `radius`: the pixels remain that are covered by squares lying wholly
+/// within the set. Pixels outside the image are not in the set, so an unlabelled border around the image is also a margin.
+pub(super) fn open(set: &mut [bool], [width, height]: [usize; 2], radius: usize) {
     let whole = 2 * radius + 1;
     let mut streaks = vec![0_usize; width];
-    // The centres of squares, spread along their rows.
+    // The centres of such squares, widened by the radius along their rows.
     let mut spread = vec![false; set.len()];
     for y in 0..height {
         let row = &set[y * width..][..width];
         for (left, right) in runs(row) {
-            let held = row[left] && right - left >= whole;
-            let (from, to) = if held {
+            let long_enough = row[left] && right - left >= whole;
+            let (from, to) = if long_enough {
                 (left + radius, right - radius)
             } else {
                 (right, right)
@@ -34,12 +34,12 @@ pub(super) fn opened(set: &mut [bool], [width, height]: [usize; 2], radius: usiz
             }
         }
     }
-    // Then along the columns: how far it is to the last centre above, then to the next below.
+    // Then along the columns: `since` is the distance to the last centre above, then to the next one below.
     set.fill(false);
-    for rows in [RowRange::Down, RowRange::Up] {
+    for direction in [Direction::Down, Direction::Up] {
         let mut since = vec![radius + 1; width];
         for i in 0..height {
-            let y = if rows == RowRange::Down {
+            let y = if direction == Direction::Down {
                 i
             } else {
                 height - 1 - i
@@ -57,7 +57,7 @@ pub(super) fn opened(set: &mut [bool], [width, height]: [usize; 2], radius: usiz
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum RowRange {
+enum Direction {
     Down,
     Up,
 }
@@ -68,8 +68,8 @@ mod tests {
 
     use super::*;
 
-    fn plainly(set: &[bool], [width, height]: [usize; 2], radius: usize) -> Vec<bool> {
-        let mut out = vec![false; set.len()];
+    fn reference(set: &[bool], [width, height]: [usize; 2], radius: usize) -> Vec<bool> {
+        let mut expected = vec![false; set.len()];
         let side = 2 * radius + 1;
         for top in 0..(height + 1).saturating_sub(side) {
             for left in 0..(width + 1).saturating_sub(side) {
@@ -77,16 +77,16 @@ mod tests {
                     (top..top + side).flat_map(|y| (left..left + side).map(move |x| y * width + x))
                 };
                 if square().all(|i| set[i]) {
-                    square().for_each(|i| out[i] = true);
+                    square().for_each(|i| expected[i] = true);
                 }
             }
         }
-        out
+        expected
     }
 
     proptest! {
         #[test]
-        fn what_squares_cover_stays(
+        fn pixels_covered_by_squares_remain(
             width in 1..16_usize, height in 1..16_usize, radius in 1..4_usize, bits in any::<u128>(), coarse in 1..6_usize,
         ) {
             let mut set: Vec<bool> = (0..width * height)
@@ -95,8 +95,8 @@ mod tests {
                     bits >> (cell % 127) & 3 != 0
                 })
                 .collect();
-            let expected = plainly(&set, [width, height], radius);
-            opened(&mut set, [width, height], radius);
+            let expected = reference(&set, [width, height], radius);
+            open(&mut set, [width, height], radius);
             prop_assert_eq!(set, expected);
         }
     }

@@ -1,9 +1,10 @@
-//! The inner part of every mask at once: [`cores`].
+//! The eroded masks of an image, all in one pass: [`cores`].
 
-/// Calls `visit(y, left, right, mask)` for every run of pixels whose square of radius `radius` lies within their own mask,
-/// row by row; the image's edge is no rim, for nothing flies there. Mask 0 is none.
+/// Calls `visit(y, left, right, mask)`, row by row, for every run of pixels whose square of radius `radius` lies within their
+/// own mask. Masks continue beyond the edge of the image, because there are no flying pixels of depth there. Mask 0 is skipped.
 ///
-/// One pass: a run of a row keeps its middle, and a column counts for how many rows it has been in the middle of one mask.
+/// One pass: each run of a row is shortened by the radius. For each column, `streaks` counts the rows for which the column has
+/// been inside such a run of the same mask.
 pub(super) fn cores(
     masks: &[u32],
     [width, height]: [usize; 2],
@@ -12,7 +13,7 @@ pub(super) fn cores(
 ) {
     let whole = 2 * radius as u32 + 1;
     let mut streaks = vec![0_u32; width];
-    // Above the first row and below the last the mask goes on as it is there.
+    // Above the first row and below the last row, the masks of these rows continue.
     for y in 0..height + radius {
         if y < height {
             let row = &masks[y * width..][..width];
@@ -63,7 +64,7 @@ pub(super) fn cores(
     }
 }
 
-/// The runs of equal values of a row, as left and right, the latter exclusive.
+/// The runs of equal values of a row, as left and right (exclusive).
 pub(super) fn runs<T: PartialEq>(row: &[T]) -> impl Iterator<Item = (usize, usize)> {
     let mut left = 0;
     std::iter::from_fn(move || {
@@ -73,20 +74,20 @@ pub(super) fn runs<T: PartialEq>(row: &[T]) -> impl Iterator<Item = (usize, usiz
     })
 }
 
-/// How many values at the front are the same; `None` where there are none.
+/// The number of equal values at the front; `None` if the list is empty.
 fn streak<T: PartialEq>(values: &[T]) -> Option<usize> {
-    /// Compared at once, without a way out between.
+    /// Number of values compared without a branch, so that the compiler can use SIMD.
     const LANES: usize = 32;
     let first = values.first()?;
-    let strangers = |lanes: &[T; LANES]| -> u32 {
-        let strange = lanes.iter().map(|value| u32::from(value != first));
-        strange.sum()
+    let different = |lanes: &[T; LANES]| -> u32 {
+        let differs = lanes.iter().map(|value| u32::from(value != first));
+        differs.sum()
     };
     let (chunks, _) = values.as_chunks::<LANES>();
     let whole = LANES
         * chunks
             .iter()
-            .take_while(|lanes| strangers(lanes) == 0)
+            .take_while(|lanes| different(lanes) == 0)
             .count();
     let rest = values[whole..].iter();
     Some(whole + rest.take_while(|value| *value == first).count())
@@ -98,8 +99,8 @@ mod tests {
 
     use super::*;
 
-    /// The same, pixel by pixel.
-    fn plainly(masks: &[u32], [width, height]: [usize; 2], radius: usize) -> Vec<u32> {
+    /// The core mask of each pixel, computed pixel by pixel.
+    fn reference(masks: &[u32], [width, height]: [usize; 2], radius: usize) -> Vec<u32> {
         let at = |x: usize, y: usize| masks[y * width + x];
         let whole = |x: usize, y: usize| {
             let rows = y.saturating_sub(radius)..=(y + radius).min(height - 1);
@@ -121,7 +122,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn cores_are_what_they_are(
+        fn cores_are_those_computed_pixel_by_pixel(
             width in 1..14_usize, height in 1..14_usize, radius in 0..4_usize, bits in any::<u64>(), coarse in 1..5_usize,
         ) {
             let masks: Vec<u32> = (0..width * height)
@@ -134,7 +135,7 @@ mod tests {
             cores(&masks, [width, height], radius, |y, left, right, mask| {
                 found[y * width + left..y * width + right].fill(mask);
             });
-            prop_assert_eq!(found, plainly(&masks, [width, height], radius));
+            prop_assert_eq!(found, reference(&masks, [width, height], radius));
         }
     }
 }

@@ -1,43 +1,43 @@
-//! The maps of a frame, as numbers: [`SceneMaps`].
+//! The masks and labels of a frame's pixels: [`SceneMaps`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use ndarray::{CowArray, Ix2};
 
 use super::components::components;
-use super::opening::opened;
+use super::opening::open;
 use super::rim::runs;
 use crate::error::{Error, Result};
 use crate::questions::rules::MeasureRule;
 use crate::types::{Frame, Labels, Segmentation};
 
-/// A number of the semantic map that stands for nothing.
+/// Label of pixels without a class.
 const VOID: u32 = u32::MAX;
 
-/// What says the label of a pixel.
+/// Source of the label of a pixel.
 enum LabelSource<'a> {
-    /// A semantic map.
+    /// A semantic map, which gives each pixel a label.
     OfPixels(CowArray<'a, u16, Ix2>),
-    /// The names of segments: the label of each mask, [`VOID`] for none, that of no mask first.
+    /// The names of segments: the label of each mask, or [`VOID`]. Index 0 stands for pixels without a mask.
     OfMasks(Vec<u32>),
 }
 
-/// The maps of a frame, as numbers.
+/// The mask and the label of each pixel of a frame.
 pub(in crate::questions) struct SceneMaps<'a> {
     pub(in crate::questions) size: [usize; 2],
     labels: &'a Labels,
-    kinds: LabelSource<'a>,
-    /// The mask of each pixel, from 1; 0 for none.
+    source: LabelSource<'a>,
+    /// Mask of each pixel, from 1; 0 for no mask.
     pub(in crate::questions) masks: Vec<u32>,
-    /// The number of each mask in the map.
+    /// Number of each mask in the map of segments.
     pub(in crate::questions) numbers: Vec<u32>,
-    /// How many parts each mask is made of, where it is.
+    /// Number of parts of each mask; empty unless the map has parts.
     pub(super) parts: Vec<usize>,
-    /// The class of a number above those of a semantic map: that of a segment by its name alone.
+    /// Class of each label from [`NAMED`] on: labels of segments that have a class by their name only.
     named: BTreeMap<u32, String>,
 }
 
-/// Where the numbers of classes begin that a segment has by its name alone.
+/// First label of segments that have a class by their name only; labels of semantic maps have 16 bits.
 const NAMED: u32 = 1 << 16;
 
 impl<'a> SceneMaps<'a> {
@@ -46,20 +46,22 @@ impl<'a> SceneMaps<'a> {
         let mut scene = Self {
             size,
             labels,
-            kinds: LabelSource::OfMasks(Vec::new()),
+            source: LabelSource::OfMasks(Vec::new()),
             masks: Vec::new(),
             numbers: Vec::new(),
             parts: Vec::new(),
             named: BTreeMap::new(),
         };
         if let Some(segments) = &frame.segments {
-            scene.number(plain(&segments.as_standard_layout()));
+            scene.number_masks(plain(&segments.as_standard_layout()));
         }
         match &frame.semantic {
             Some(semantic) => {
-                scene.kinds = LabelSource::OfPixels(semantic.as_standard_layout());
+                scene.source = LabelSource::OfPixels(semantic.as_standard_layout());
             }
-            None if frame.segments.is_some() && !frame.names.is_empty() => scene.by_name(frame),
+            None if frame.segments.is_some() && !frame.names.is_empty() => {
+                scene.label_by_name(frame)
+            }
             None => {
                 let problem = "no classes: neither a semantic map (sem) nor segments (over) with names in segments.json";
                 return Err(Error::data(format_args!("frame {:?}", frame.id.0), problem));
@@ -67,14 +69,14 @@ impl<'a> SceneMaps<'a> {
         }
         match (&frame.segments, frame.segmentation) {
             (Some(_), Segmentation::Instances) => {}
-            (Some(_), Segmentation::Parts) => scene.merge(),
-            (None, _) => scene.cut(),
+            (Some(_), Segmentation::Parts) => scene.merge_parts(),
+            (None, _) => scene.split_labels(),
         }
         Ok(scene)
     }
 
-    /// Numbers the masks by their ids.
-    fn number(&mut self, segments: &[u32]) {
+    /// Numbers the masks from 1, in the order of their numbers in the map.
+    fn number_masks(&mut self, segments: &[u32]) {
         let mut ids = BTreeMap::new();
         for (left, _) in runs(segments) {
             if segments[left] != 0 {
@@ -92,8 +94,8 @@ impl<'a> SceneMaps<'a> {
         self.numbers = ids.into_keys().collect();
     }
 
-    /// Gives each mask the class of its segment's name.
-    fn by_name(&mut self, frame: &Frame) {
+    /// Gives each mask the class that belongs to the name of its segment.
+    fn label_by_name(&mut self, frame: &Frame) {
         let mut classes: BTreeMap<&str, u32> = BTreeMap::new();
         let named = self.numbers.iter().map(|number| {
             let name = frame.names.get(number);
@@ -102,16 +104,16 @@ impl<'a> SceneMaps<'a> {
                 *classes.entry(&name.canonical).or_insert(next)
             })
         });
-        self.kinds = LabelSource::OfMasks(std::iter::once(VOID).chain(named).collect());
+        self.source = LabelSource::OfMasks(std::iter::once(VOID).chain(named).collect());
         self.named = classes
             .into_iter()
             .map(|(name, id)| (id, name.to_owned()))
             .collect();
     }
 
-    /// Cuts the classes into connected pieces.
-    fn cut(&mut self) {
-        let LabelSource::OfPixels(ids) = &self.kinds else {
+    /// Makes each connected component of a label a mask.
+    fn split_labels(&mut self) {
+        let LabelSource::OfPixels(ids) = &self.source else {
             return;
         };
         let label = |id| self.label(id).wrapping_add(1);
@@ -119,8 +121,8 @@ impl<'a> SceneMaps<'a> {
         self.numbers = (1..=self.masks.iter().copied().max().unwrap_or(0)).collect();
     }
 
-    /// Merges the parts of objects: neighbours whose commonest label is the same.
-    fn merge(&mut self) {
+    /// Merges the parts of objects: neighbouring masks whose most common label is the same.
+    fn merge_parts(&mut self) {
         let mut joint = JointCounts::new();
         self.each_run(|left, right, mask, id| {
             *joint.entry((mask, id)).or_insert(0) += (right - left) as u64;
@@ -158,7 +160,7 @@ impl<'a> SceneMaps<'a> {
         self.numbers = (1..=count).collect();
     }
 
-    /// The label of a number of the semantic map.
+    /// The label of a number of the semantic map; [`VOID`] for void numbers.
     fn label(&self, id: u16) -> u32 {
         if self.labels.void.contains(&id) {
             VOID
@@ -174,14 +176,14 @@ impl<'a> SceneMaps<'a> {
         }
     }
 
-    /// Visits every run of a row.
+    /// Visits every run of one mask and one label in a row.
     pub(super) fn each_run_of(&self, y: usize, visit: &mut impl FnMut(usize, usize, u32, u32)) {
         let [width, _] = self.size;
         let start = y * width;
         let masks = &self.masks[start..start + width];
         for (left, right) in runs(masks) {
             let (from, to, mask) = (start + left, start + right, masks[left]);
-            match &self.kinds {
+            match &self.source {
                 LabelSource::OfMasks(labels) => visit(from, to, mask, labels[mask as usize]),
                 LabelSource::OfPixels(ids) => {
                     let ids = &plain(ids)[from..to];
@@ -193,7 +195,7 @@ impl<'a> SceneMaps<'a> {
         }
     }
 
-    /// The canonical class of a label; `None` for none.
+    /// The canonical class of a label; `None` if it has none.
     pub(super) fn class(&self, id: u32) -> Option<&str> {
         match u16::try_from(id) {
             Ok(id) => self
@@ -205,7 +207,7 @@ impl<'a> SceneMaps<'a> {
         }
     }
 
-    /// The data set's word for a label.
+    /// The word of the data set for a label; may be empty.
     pub(super) fn word(&self, id: u32) -> &str {
         let label = u16::try_from(id)
             .ok()
@@ -213,7 +215,7 @@ impl<'a> SceneMaps<'a> {
         label.map_or("", |label| &label.name)
     }
 
-    /// Pixels of numbers that the label space has not.
+    /// The number of pixels of each map number that the label space does not have.
     pub(super) fn unknown(&self, joint: &JointCounts) -> BTreeMap<u16, u64> {
         let mut unknown = BTreeMap::new();
         for (&(_, id), count) in joint {
@@ -226,7 +228,7 @@ impl<'a> SceneMaps<'a> {
         unknown
     }
 
-    /// Pixels without a class, those that survive an opening, and those of them in the lower half.
+    /// Numbers of pixels without a class: all, those that remain after an opening, and those of these in the lower half.
     pub(super) fn void(&self, joint: &JointCounts, rule: &MeasureRule) -> (u64, u64, u64) {
         let [width, height] = self.size;
         let all = joint
@@ -238,21 +240,21 @@ impl<'a> SceneMaps<'a> {
         }
         let mut void = vec![false; width * height];
         self.each_run(|left, right, _, id| void[left..right].fill(self.class(id).is_none()));
-        opened(&mut void, self.size, rounded(height, rule.void_per_height));
+        open(&mut void, self.size, rounded(height, rule.void_per_height));
         let count = |pixels: &[bool]| pixels.iter().filter(|void| **void).count() as u64;
         (all, count(&void), count(&void[height / 2 * width..]))
     }
 }
 
-/// Pixels by mask and label.
+/// Number of pixels by mask and label.
 pub(super) type JointCounts = BTreeMap<(u32, u32), u64>;
 
-/// The numbers of a map, row by row.
+/// The values of a map, row by row.
 fn plain<'a, T>(map: &'a CowArray<'_, T, Ix2>) -> &'a [T] {
     map.as_slice().unwrap_or_default()
 }
 
-/// A length in pixels that goes with the height: at least 1, to the nearest.
+/// A length in pixels proportional to the height: round(height / per_height), at least 1.
 pub(super) fn rounded(height: usize, per_height: usize) -> usize {
     ((2 * height + per_height) / (2 * per_height)).max(1)
 }

@@ -1,4 +1,4 @@
-//! What is measured of masks: [`MaskShapes`].
+//! Shapes of masks, and the segments made of them: [`MaskShapes`].
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use crate::questions::colors::{BINS, Palette};
 use crate::questions::rules::MeasureRule;
 use crate::types::{Frame, Segmentation};
 
-/// What is measured of the mask alone.
+/// Measurements of the shape of a mask.
 #[derive(Clone)]
 pub(super) struct MaskShape {
     area: u64,
@@ -27,20 +27,21 @@ impl MaskShape {
         rim_on_border: 0,
     };
 
-    /// Takes a run of a row.
-    fn take(&mut self, row: usize, left: usize, right: usize) {
+    /// Adds a run of pixels of a row.
+    fn add(&mut self, row: usize, left: usize, right: usize) {
         self.area += (right - left) as u64;
-        let [least, top, most, bottom] = self.bbox;
+        let [first, top, last, bottom] = self.bbox;
         self.bbox = [
-            least.min(left),
+            first.min(left),
             top.min(row),
-            most.max(right),
+            last.max(right),
             bottom.max(row + 1),
         ];
     }
 }
 
-/// How many pixels between two columns of a run are of its rim: they end it, or have something else above or below.
+/// The number of rim pixels of a run between columns `from` and `to`: the ends of the run, and pixels with another mask above or
+/// below.
 fn rim(
     mask: u32,
     [from, to]: [usize; 2],
@@ -64,15 +65,15 @@ fn rim(
     u64::from(count) + whole.count() as u64
 }
 
-/// All masks.
+/// The shapes of all masks of a frame.
 pub(super) struct MaskShapes {
     pub(super) list: Vec<MaskShape>,
-    /// Pixels by mask and label.
+    /// Number of pixels by mask and label.
     pub(super) joint: JointCounts,
 }
 
 impl MaskShapes {
-    /// Measures all masks.
+    /// Measures the shapes of all masks.
     pub(super) fn of(scene: &SceneMaps<'_>, rule: &MeasureRule) -> Self {
         let [width, height] = scene.size;
         let mut shapes = Self {
@@ -93,7 +94,7 @@ impl MaskShapes {
                     continue;
                 };
                 let shape = &mut shapes.list[index as usize];
-                shape.take(y, left, right);
+                shape.add(y, left, right);
                 let rim = |from: usize, to: usize| {
                     let (from, to) = (from.max(left), to.min(right));
                     rim(mask, [from, to], [left, right], [above, below])
@@ -110,7 +111,7 @@ impl MaskShapes {
         shapes
     }
 
-    /// What a mask is, before its depth and its colour; `None` where it has no class.
+    /// The segment of a mask, still without depth and colour; `None` if no pixel has a class.
     pub(super) fn segment(
         &self,
         frame: &Frame,
@@ -125,7 +126,7 @@ impl MaskShapes {
                 *classes.entry(class).or_insert(0) += count;
             }
         }
-        // Of classes as common as each other, the first.
+        // If several classes are equally common, the first by name counts.
         let (&class, &pure) = classes.iter().rev().max_by_key(|(_, count)| **count)?;
         let number = scene.numbers[mask as usize - 1];
         let own = match (&frame.segments, frame.segmentation) {
@@ -135,8 +136,8 @@ impl MaskShapes {
         let word = own.map_or_else(
             || {
                 let of_class = labels.filter(|((_, id), _)| scene.class(*id) == Some(class));
-                let commonest = of_class.rev().max_by_key(|(_, count)| **count);
-                commonest.map_or("", |((_, id), _)| scene.word(*id))
+                let most_common = of_class.rev().max_by_key(|(_, count)| **count);
+                most_common.map_or("", |((_, id), _)| scene.word(*id))
             },
             |name| &name.name,
         );
@@ -162,7 +163,7 @@ impl MaskShapes {
         })
     }
 
-    /// Depth and colour of the masks that are not tiny.
+    /// Depth and colour of each mask; `None` for tiny masks.
     pub(super) fn cores(
         &self,
         frame: &Frame,
@@ -181,7 +182,7 @@ impl MaskShapes {
         let radius = rounded(scene.size[1], rule.erosion_per_height);
         cores(&scene.masks, scene.size, radius, |y, left, right, mask| {
             if let Some(core) = &mut found[mask as usize - 1] {
-                light.fall(core, y, left, right);
+                light.add_run(core, y, left, right);
             }
         });
         let width = scene.size[0];
@@ -193,7 +194,7 @@ impl MaskShapes {
             for y in top..bottom {
                 let row = &scene.masks[y * width + left..y * width + right];
                 for (from, to) in runs(row).filter(|(from, _)| row[*from] == mask) {
-                    light.fall(core, y, left + from, left + to);
+                    light.add_run(core, y, left + from, left + to);
                 }
             }
         }

@@ -1,4 +1,4 @@
-//! Frames are measured as counting pixel by pixel would.
+//! Measurements agree with counting pixel by pixel.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -66,7 +66,7 @@ fn measured_by(frame: &Frame, rules: &Rules) -> FrameStatistics {
     measure(frame, &labels(), rules, &palette, Digest::of(b"")).unwrap()
 }
 
-/// The rulebook with another number.
+/// The built-in rulebook with one text replaced.
 fn rules(from: &str, to: &str) -> Rules {
     let text = include_str!("../rules.toml");
     assert!(text.contains(from), "{from}");
@@ -75,7 +75,7 @@ fn rules(from: &str, to: &str) -> Rules {
 
 #[test]
 fn pixels_are_counted_by_class_and_segment() {
-    // A chair of two pieces, a night stand with a corner of dresser in it, and void.
+    // A chair in two pieces, a night stand with a corner labelled dresser, and void.
     #[rustfmt::skip]
     let semantic = vec![
         1, 1, 1, 1, 1, 1,
@@ -126,7 +126,7 @@ fn pixels_are_counted_by_class_and_segment() {
         ]
         .into()
     );
-    // Without a map of segments, connected pieces of a label are segments.
+    // Without a map of segments, the connected components of a label are segments.
     frame.segments = None;
     let found = measured(&frame);
     let pieces: Vec<(&str, u64)> = found
@@ -154,7 +154,7 @@ fn unknown_numbers_are_void_and_counted() {
 }
 
 #[test]
-fn names_of_segments_go_before_the_words_of_labels() {
+fn names_of_segments_override_the_words_of_labels() {
     let mut frame = frame(4, 1, vec![4, 4, 1, 1]);
     frame.segments = Some(map(4, 1, &[5_u32, 5, 70_000, 70_000]));
     let name = |name: &str, canonical: &str| SegmentName {
@@ -170,7 +170,7 @@ fn names_of_segments_go_before_the_words_of_labels() {
         ("office chair", SegmentPlace::Elsewhere, Some(3))
     );
     assert_eq!(found.segments[1].word, "wall");
-    // Without a semantic map, the names' classes are all there are.
+    // Without a semantic map, only the names of segments give classes.
     frame.semantic = None;
     let found = measured(&frame);
     assert_eq!(found.classes, [("chair".into(), 2)].into());
@@ -197,7 +197,7 @@ fn parts_of_one_class_are_merged() {
     frame.segments = Some(map(7, 1, &[1_u32, 2, 2, 2, 3, 4, 5]));
     frame.segmentation = Segmentation::Parts;
     let found = measured(&frame);
-    // Part 2 is wall for the most part, and so no neighbour of the same class.
+    // Most of part 2 is wall, so it is not merged with the chair.
     let parts: Vec<(&str, u64, usize)> = found
         .segments
         .iter()
@@ -216,7 +216,7 @@ fn parts_of_one_class_are_merged() {
 }
 
 #[test]
-fn depth_is_along_the_ray_where_the_camera_is_known() {
+fn depth_is_along_the_ray_if_the_camera_is_known() {
     let mut frame = frame(3, 1, vec![4, 4, 4]);
     frame.depth = Some(map(3, 1, &[1000_u32, 1000, 0]));
     assert_eq!(measured(&frame).depth.unwrap().along, DepthAxis::Axis);
@@ -228,7 +228,7 @@ fn depth_is_along_the_ray_where_the_camera_is_known() {
     });
     let found = measured(&frame);
     let depth = found.segments[0].depth.unwrap();
-    // One pixel off the axis by its focal length: √2.
+    // One pixel is one focal length off the axis: factor √2.
     assert_eq!(
         (depth.valid, depth.p10, depth.median, depth.p90),
         (2, 1000, 1000, 1414)
@@ -252,7 +252,7 @@ fn depth_is_along_the_ray_where_the_camera_is_known() {
 }
 
 #[test]
-fn the_rim_of_a_mask_tells_neither_depth_nor_colour() {
+fn the_rim_of_a_mask_is_not_used_for_depth_and_colour() {
     let (width, height) = (12, 9);
     let inside = |i: usize| (3..10).contains(&(i % width)) && (2..8).contains(&(i / width));
     let ids = (0..width * height)
@@ -288,7 +288,7 @@ fn the_rim_of_a_mask_tells_neither_depth_nor_colour() {
 }
 
 #[test]
-fn tiny_segments_count_for_their_class_and_word_alone() {
+fn tiny_segments_count_only_for_their_class_and_word() {
     let semantic: Vec<u16> = (0..2000).map(|i| if i == 0 { 4 } else { 1 }).collect();
     let frame = frame(2000, 1, semantic);
     let listed = |ppm: &str| {
@@ -307,11 +307,11 @@ fn tiny_segments_count_for_their_class_and_word_alone() {
 }
 
 #[test]
-fn void_counts_where_it_is_more_than_a_margin() {
+fn void_counts_if_it_is_wider_than_a_margin() {
     let (width, height) = (40, 200);
     let void = |i: usize| {
         let (x, y) = (i % width, i / width);
-        // A frame of 4 pixels around the picture, and a hole of 5 × 6 in its lower half.
+        // A void border of 4 pixels left and right, and a hole of 5 × 6 pixels in the lower half.
         x < 4 || x >= width - 4 || (10..15).contains(&x) && (150..156).contains(&y)
     };
     let ids = (0..width * height).map(|i| u16::from(!void(i))).collect();
@@ -337,8 +337,8 @@ fn words_have_one_spelling() {
     }
 }
 
-/// Areas, rims and quantiles, pixel by pixel.
-fn plainly(frame: &Frame) -> BTreeMap<u32, (u64, u64, Option<[u32; 3]>)> {
+/// Area, number of rim pixels and depth quantiles of each segment, computed pixel by pixel.
+fn reference(frame: &Frame) -> BTreeMap<u32, (u64, u64, Option<[u32; 3]>)> {
     let (segments, depth) = (
         frame.segments.as_ref().unwrap(),
         frame.depth.as_ref().unwrap(),
@@ -370,7 +370,7 @@ fn plainly(frame: &Frame) -> BTreeMap<u32, (u64, u64, Option<[u32; 3]>)> {
             }
         }
         if core {
-            // Marks that there is a core, whether it has depth or not.
+            // Marks that the segment has a core, even if the core has no depth.
             entry.3.push(0);
         }
     }
@@ -391,7 +391,7 @@ fn plainly(frame: &Frame) -> BTreeMap<u32, (u64, u64, Option<[u32; 3]>)> {
 
 proptest! {
     #[test]
-    fn any_maps_are_measured_as_by_hand(
+    fn measurements_of_any_maps_agree_with_the_reference(
         width in 1..24_usize, height in 1..24_usize, coarse in 1..6_usize, bits in any::<u128>(), seed in any::<u32>(),
     ) {
         let cell = |i: usize| i % width / coarse * 5 + i / width / coarse * 11;
@@ -403,7 +403,7 @@ proptest! {
         let depths: Vec<u32> = pixels.map(|i| (i as u32).wrapping_mul(seed | 1) >> 18).collect();
         frame.depth = Some(map(width, height, &depths));
         let found = measured(&frame);
-        let expected = plainly(&frame);
+        let expected = reference(&frame);
         for segment in &found.segments {
             let (area, rim, depth) = expected[&segment.id];
             prop_assert_eq!((segment.area, segment.rim), (area, rim));

@@ -7,7 +7,7 @@ fn ask(frame: &FrameStatistics, activity: &str, answer: &str) -> Option<Reason> 
 }
 
 #[test]
-fn yes_needs_the_room_and_what_it_takes() {
+fn yes_needs_the_room_and_an_enabler() {
     let bedroom = frame(&BEDROOM);
     assert_eq!(ask(&bedroom, "sleep", "yes"), None);
     assert_eq!(ask(&bedroom, "cook a meal", "yes"), Some(Reason::OtherRoom));
@@ -55,7 +55,7 @@ fn yes_needs_the_room_and_what_it_takes() {
 }
 
 #[test]
-fn no_needs_that_nothing_of_it_is_seen() {
+fn no_needs_that_no_enabler_and_no_substitute_is_visible() {
     let bathroom = [("toilet", "toilet", 60_000), ("towel", "towel", 9_000)];
     let with = |class, word| frame(&[&bathroom[..], &[(class, word, 1)]].concat());
     assert_eq!(ask(&frame(&bathroom), "sleep", "no"), None);
@@ -85,7 +85,7 @@ fn no_needs_that_nothing_of_it_is_seen() {
 }
 
 #[test]
-fn no_needs_a_frame_that_says_what_is_not_there() {
+fn no_needs_a_frame_that_can_show_absence() {
     let bedroom = frame(&BEDROOM);
     let no = |frame: &FrameStatistics| ask(frame, "cook a meal", "no");
     assert_eq!(no(&bedroom), None);
@@ -105,7 +105,7 @@ fn no_needs_a_frame_that_says_what_is_not_there() {
 }
 
 #[test]
-fn what_would_do_at_a_pinch_counts_where_that_is_strict() {
+fn substitutes_count_only_if_the_rule_is_strict() {
     let frame = frame(&[("toilet", "toilet", 60_000), ("sofa", "sofa", 9_000)]);
     let rules = rules("strict = true", "strict = false");
     let lenient = candidate_by(&frame, &Family::Affordance, "sleep", "no", &rules);
@@ -117,19 +117,19 @@ fn what_would_do_at_a_pinch_counts_where_that_is_strict() {
 }
 
 #[test]
-fn what_cannot_be_labelled_is_not_denied() {
+fn classes_that_cannot_be_labelled_are_not_called_absent() {
     let mut labels = labels();
     labels.expressible.remove("sofa");
     let rules = Rules::built_in().unwrap();
-    let said = say(
+    let results = run_rules(
         &[frame(&BEDROOM)],
-        |order| order.families = [Family::Affordance].into(),
+        |request| request.families = [Family::Affordance].into(),
         &rules,
     );
-    assert!(said.candidates.len() > 10);
+    assert!(results.candidates.len() > 10);
     let bathroom = frame(&[("toilet", "toilet", 60_000)]);
     let palette = Palette::built_in().unwrap();
-    let order = QuestionRequest {
+    let request = QuestionRequest {
         dataset: "",
         labels: &labels,
         rules: &rules,
@@ -140,12 +140,12 @@ fn what_cannot_be_labelled_is_not_denied() {
         rejected: BTreeSet::new(),
     };
     let mut reasons = BTreeSet::new();
-    generate(&[bathroom], &order, |_, verdict| {
-        if let RuleResult::Falls(fallen) = verdict
-            && fallen.answer.as_deref() == Some("no")
-            && ["sleep", "relax on a sofa", "sofa"].contains(&fallen.about.as_str())
+    generate(&[bathroom], &request, |_, result| {
+        if let RuleResult::Rejected(rejection) = result
+            && rejection.answer.as_deref() == Some("no")
+            && ["sleep", "relax on a sofa", "sofa"].contains(&rejection.about.as_str())
         {
-            reasons.insert(fallen.reason);
+            reasons.insert(rejection.reason);
         }
     })
     .unwrap();

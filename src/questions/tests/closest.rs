@@ -2,15 +2,15 @@
 
 use super::*;
 
-/// A chair at 2 m and a table behind it, with whatever else.
+/// Why the question is rejected for a chair at 2 m and a table at 3 m, after a change.
 fn two(change: impl FnOnce(&mut FrameStatistics)) -> Option<Reason> {
     let mut frame = frame(&[
         ("chair", "chair", 50_000),
         ("table", "table", 50_000),
         ("wall", "wall", 500_000),
     ]);
-    frame.segments[0].depth = Some(deep(50_000, 2000));
-    frame.segments[1].depth = Some(deep(50_000, 3000));
+    frame.segments[0].depth = Some(depth_at(50_000, 2000));
+    frame.segments[1].depth = Some(depth_at(50_000, 3000));
     change(&mut frame);
     candidate(&frame, &Family::Closest, "", "").err()
 }
@@ -19,12 +19,12 @@ fn third(frame: &mut FrameStatistics, class: &str, area: u64, depth: Option<u32>
     let mut segment = frame.segments[0].clone();
     (segment.id, segment.class, segment.word) = (9, class.to_owned(), class.to_owned());
     (segment.area, segment.pure, segment.core) = (area, area, area);
-    segment.depth = depth.map(|depth| deep(area, depth));
+    segment.depth = depth.map(|depth| depth_at(area, depth));
     frame.segments.push(segment);
 }
 
 #[test]
-fn the_nearest_is_asked_for() {
+fn the_nearest_object_is_the_answer() {
     let mut frame = frame(&[
         ("chair", "chair", 50_000),
         ("table", "table", 50_000),
@@ -32,24 +32,24 @@ fn the_nearest_is_asked_for() {
         ("bed", "bed", 50_000),
         ("sink", "sink", 50_000),
     ]);
-    let claim = candidate(&frame, &Family::Closest, "", "").unwrap();
-    assert_eq!((claim.answer(), claim.choices.len()), ("chair", 4));
-    assert!(!claim.choices.contains(&"sink".to_owned()));
-    assert_eq!(claim.evidence["gap_mm"], 1000);
-    frame.segments[4].depth = Some(deep(50_000, 1000));
-    let claim = candidate(&frame, &Family::Closest, "", "").unwrap();
-    assert_eq!(claim.answer(), "sink");
+    let question = candidate(&frame, &Family::Closest, "", "").unwrap();
+    assert_eq!((question.answer(), question.choices.len()), ("chair", 4));
+    assert!(!question.choices.contains(&"sink".to_owned()));
+    assert_eq!(question.evidence["gap_mm"], 1000);
+    frame.segments[4].depth = Some(depth_at(50_000, 1000));
+    let question = candidate(&frame, &Family::Closest, "", "").unwrap();
+    assert_eq!(question.answer(), "sink");
     assert_eq!(two(|_| {}), None);
 }
 
 #[test]
 fn the_gap_must_be_wide() {
-    let gap = |depth| two(|frame| frame.segments[1].depth = Some(deep(50_000, depth)));
+    let gap = |depth| two(|frame| frame.segments[1].depth = Some(depth_at(50_000, depth)));
     assert_eq!((gap(2300), gap(2299)), (None, Some(Reason::Gap)));
     let far = |depth| {
         two(|frame| {
-            frame.segments[0].depth = Some(deep(50_000, 5000));
-            frame.segments[1].depth = Some(deep(50_000, depth));
+            frame.segments[0].depth = Some(depth_at(50_000, 5000));
+            frame.segments[1].depth = Some(depth_at(50_000, depth));
         })
     };
     assert_eq!((far(5500), far(5499)), (None, Some(Reason::Gap)));
@@ -68,7 +68,7 @@ fn the_gap_must_be_wide() {
 }
 
 #[test]
-fn two_of_one_class_are_a_matter_of_scope() {
+fn the_scope_decides_about_two_objects_of_one_class() {
     let same = |frame: &mut FrameStatistics| third(frame, "chair", 50_000, Some(2100));
     assert_eq!(two(same), Some(Reason::Gap));
     let classes = rules("gap_scope = \"instances\"", "gap_scope = \"classes\"");
@@ -87,7 +87,7 @@ fn two_of_one_class_are_a_matter_of_scope() {
 }
 
 #[test]
-fn there_must_be_two_that_can_be_offered() {
+fn two_objects_must_be_eligible() {
     assert_eq!(
         two(|frame| drop(frame.segments.remove(1))),
         Some(Reason::Few)
@@ -115,16 +115,16 @@ fn there_must_be_two_that_can_be_offered() {
         two(|frame| {
             let segment = &mut frame.segments[1];
             (segment.area, segment.pure, segment.core) = (area, area, area);
-            segment.depth = Some(deep(area, 3000));
+            segment.depth = Some(depth_at(area, 3000));
         })
     };
     assert_eq!((small(5_000), small(4_999)), (None, Some(Reason::Few)));
-    let valid = |valid| two(|frame| frame.segments[1].depth = Some(deep(valid, 3000)));
+    let valid = |valid| two(|frame| frame.segments[1].depth = Some(depth_at(valid, 3000)));
     assert_eq!((valid(25_000), valid(24_999)), (None, Some(Reason::Few)));
 }
 
 #[test]
-fn depth_must_be_there_and_plausible() {
+fn depth_must_exist_and_be_plausible() {
     assert_eq!(two(|frame| frame.depth = None), Some(Reason::NoDepth));
     let median = |median| two(|frame| frame.depth.as_mut().unwrap().median = median);
     assert_eq!((median(300), median(299)), (None, Some(Reason::Scale)));
@@ -137,7 +137,7 @@ fn depth_must_be_there_and_plausible() {
 }
 
 #[test]
-fn whatever_may_be_nearer_blocks() {
+fn objects_that_may_be_nearer_block_the_question() {
     let rival =
         |class: &'static str, area, depth| two(move |frame| third(frame, class, area, depth));
     for class in ["objects", "misc", "furniture", "clothes", "gym_equipment"] {
@@ -159,7 +159,7 @@ fn whatever_may_be_nearer_blocks() {
         assert_eq!(rival(class, 90_000, Some(1_000)), None, "{class}");
         assert_eq!(rival(class, 90_000, None), None, "{class}");
     }
-    // Small for an answer, large enough to be nearer; mixed, whatever most of it is; far, but reaching nearer.
+    // Rivals: too small for an answer but near; a mixed segment of any class; far by the median but near by the 10 % quantile.
     assert_eq!(rival("sofa", 4_000, Some(1_000)), Some(Reason::Rival));
     let mixed = two(|frame| {
         third(frame, "wall", 90_000, Some(1_000));

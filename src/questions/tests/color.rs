@@ -8,7 +8,7 @@ fn sofa(change: impl FnOnce(&mut FrameStatistics)) -> Option<Reason> {
     candidate(&frame, &Family::Color, "sofa", "").err()
 }
 
-/// A sofa with so many thousandths of brown, of red, and without a name.
+/// A sofa with shares of brown, of red and without a name, in thousandths; the rest is blue.
 fn shares(brown: u64, red: u64, none: u64) -> Option<Reason> {
     sofa(|frame| {
         let sofa = &mut frame.segments[1];
@@ -23,9 +23,9 @@ fn shares(brown: u64, red: u64, none: u64) -> Option<Reason> {
 #[test]
 fn one_colour_must_dominate() {
     let frame = frame(&[("sofa", "sofa", 100_000)]);
-    let claim = candidate(&frame, &Family::Color, "sofa", "").unwrap();
-    assert_eq!((claim.answer(), claim.choices.len()), ("brown", 11));
-    assert_eq!(claim.text, "What color is the sofa in the image?");
+    let question = candidate(&frame, &Family::Color, "sofa", "").unwrap();
+    assert_eq!((question.answer(), question.choices.len()), ("brown", 11));
+    assert_eq!(question.text, "What color is the sofa in the image?");
     assert_eq!(shares(600, 300, 0), None);
     assert_eq!(shares(599, 201, 0), Some(Reason::Motley));
     assert_eq!(shares(660, 330, 0), None);
@@ -38,13 +38,13 @@ fn one_colour_must_dominate() {
 }
 
 #[test]
-fn it_must_be_the_only_one_and_large_enough() {
-    let beside = |area| {
+fn the_object_must_be_unique_and_large_enough() {
+    let with_second = |area| {
         let frame = frame(&[("sofa", "sofa", 100_000), ("sofa", "sofa", area)]);
         candidate(&frame, &Family::Color, "sofa", "").err()
     };
     assert_eq!(
-        (beside(999), beside(1_000)),
+        (with_second(999), with_second(1_000)),
         (None, Some(Reason::NotUnique))
     );
     let loose = |pixels| {
@@ -76,13 +76,13 @@ fn it_must_be_the_only_one_and_large_enough() {
         "shower",
         "fireplace",
     ] {
-        let said = say(
+        let results = run_rules(
             &[frame(&[(class, "", 100_000)])],
             |_| {},
             &Rules::built_in().unwrap(),
         );
-        let colors = said
-            .made
+        let colors = results
+            .generated
             .asked
             .iter()
             .filter(|asked| asked.question.family == Family::Color);
@@ -91,7 +91,7 @@ fn it_must_be_the_only_one_and_large_enough() {
 }
 
 #[test]
-fn light_and_shadow_decide_no_colour() {
+fn over_exposed_and_crushed_pixels_block_the_question() {
     let bright = |bright| sofa(|frame| frame.segments[1].bright = bright);
     assert_eq!(
         (bright(40_000), bright(40_001)),
@@ -121,8 +121,8 @@ fn light_and_shadow_decide_no_colour() {
 fn other_choices_can_be_offered() {
     let frame = frame(&[("sofa", "sofa", 100_000)]);
     let eight = rules("candidates = \"all11\"", "candidates = \"fixed8\"");
-    let claim = candidate_by(&frame, &Family::Color, "sofa", "", &eight).unwrap();
-    assert_eq!((claim.choices.len(), claim.answer()), (8, "brown"));
+    let question = candidate_by(&frame, &Family::Color, "sofa", "", &eight).unwrap();
+    assert_eq!((question.choices.len(), question.answer()), (8, "brown"));
     let without = rules("\"blue\", \"brown\"]\nneighbours", "\"blue\"]\nneighbours");
     let text = include_str!("../rules.toml").replacen(
         "\"blue\", \"brown\"]\nneighbours",
@@ -131,12 +131,15 @@ fn other_choices_can_be_offered() {
     );
     let seven = Rules::parse(&text.replacen("\"all11\"", "\"fixed8\"", 1)).unwrap();
     assert_ne!(without.digest(), seven.digest());
-    let fallen = candidate_by(&frame, &Family::Color, "sofa", "", &seven);
-    assert_eq!(fallen.err(), Some(Reason::NotOffered));
+    let rejection = candidate_by(&frame, &Family::Color, "sofa", "", &seven);
+    assert_eq!(rejection.err(), Some(Reason::NotOffered));
     let five = rules("candidates = \"all11\"", "candidates = \"k5\"");
-    let claim = candidate_by(&frame, &Family::Color, "sofa", "", &five).unwrap();
-    assert_eq!((claim.choices.len(), claim.answer()), (5, "brown"));
+    let question = candidate_by(&frame, &Family::Color, "sofa", "", &five).unwrap();
+    assert_eq!((question.choices.len(), question.answer()), (5, "brown"));
     for near in ["black", "red", "orange"] {
-        assert!(!claim.choices.iter().any(|choice| choice == near), "{near}");
+        assert!(
+            !question.choices.iter().any(|choice| choice == near),
+            "{near}"
+        );
     }
 }

@@ -1,6 +1,6 @@
-//! Every rule on frames made for it: it fires, it abstains on either side of each threshold, and each blocker blocks.
+//! Every rule on synthetic frames, on both sides of each threshold and with each reason for rejection.
 //!
-//! The frames have a million pixels, so that an area in pixels is one in millionths.
+//! The frames have a million pixels, so that an area in pixels is also one in millionths.
 
 #![allow(clippy::unwrap_used)]
 
@@ -27,7 +27,7 @@ use crate::questions::statistics::{
 };
 use crate::types::{Digest, Family, FrameId, Labels, QuestionId};
 
-/// A frame of the given segments: class, the data set's word, area.
+/// A frame with the given segments: class, word of the data set, area in pixels.
 pub(crate) fn frame(segments: &[(&str, &str, u64)]) -> FrameStatistics {
     let mut frame = FrameStatistics {
         frame: FrameId("scene/0".into()),
@@ -69,7 +69,7 @@ pub(crate) fn frame(segments: &[(&str, &str, u64)]) -> FrameStatistics {
             rim: 1000,
             rim_on_border: 0,
             core: area,
-            depth: Some(deep(area, 2000 + 1000 * id)),
+            depth: Some(depth_at(area, 2000 + 1000 * id)),
             colors,
             median: [110, 70, 40],
             bright: 0,
@@ -79,7 +79,8 @@ pub(crate) fn frame(segments: &[(&str, &str, u64)]) -> FrameStatistics {
     frame
 }
 
-fn deep(valid: u64, median: u32) -> SegmentDepth {
+/// Depth quantiles within 100 mm of the median.
+fn depth_at(valid: u64, median: u32) -> SegmentDepth {
     SegmentDepth {
         valid,
         p10: median - 100,
@@ -88,7 +89,7 @@ fn deep(valid: u64, median: u32) -> SegmentDepth {
     }
 }
 
-/// A label space that can say everything.
+/// A label space in which every class is expressible.
 pub(crate) fn labels() -> Labels {
     let rules = Rules::built_in().unwrap();
     Labels {
@@ -97,19 +98,19 @@ pub(crate) fn labels() -> Labels {
     }
 }
 
-/// What the rules say of frames, and every candidate of the first.
+/// The questions about frames, and every candidate of the first frame.
 struct RuleResults {
-    made: Generated,
+    generated: Generated,
     candidates: Vec<RuleResult>,
 }
 
-fn say(
+fn run_rules(
     frames: &[FrameStatistics],
     change: impl FnOnce(&mut QuestionRequest<'_>),
     rules: &Rules,
 ) -> RuleResults {
     let (labels, palette) = (labels(), Palette::built_in().unwrap());
-    let mut order = QuestionRequest {
+    let mut request = QuestionRequest {
         dataset: "test",
         labels: &labels,
         rules,
@@ -119,20 +120,20 @@ fn say(
         balance: BalanceMode::None,
         rejected: BTreeSet::new(),
     };
-    change(&mut order);
+    change(&mut request);
     let mut candidates = Vec::new();
-    let made = generate(frames, &order, |name, verdict| {
+    let generated = generate(frames, &request, |name, result| {
         if *name == frames[0].frame {
-            candidates.push(verdict.clone());
+            candidates.push(result.clone());
         }
     });
     RuleResults {
-        made: made.unwrap(),
+        generated: generated.unwrap(),
         candidates,
     }
 }
 
-/// What becomes of a candidate of a family about something, with the answer of yes or no where it has one.
+/// The candidate of a family, subject and answer, or why it is rejected. An empty subject or answer stands for any.
 fn candidate(
     frame: &FrameStatistics,
     family: &Family,
@@ -149,22 +150,22 @@ fn candidate_by(
     answer: &str,
     rules: &Rules,
 ) -> Result<Candidate, Reason> {
-    let said = say(std::slice::from_ref(frame), |_| {}, rules);
+    let results = run_rules(std::slice::from_ref(frame), |_| {}, rules);
     let mut found: Vec<Result<Candidate, Reason>> = Vec::new();
-    for verdict in said.candidates {
-        match verdict {
-            RuleResult::Holds(claim) => {
-                let same = claim.about == about || about.is_empty();
-                let answered = answer.is_empty() || claim.answer() == answer;
-                if claim.family == *family && same && answered {
-                    found.push(Ok(claim));
+    for result in results.candidates {
+        match result {
+            RuleResult::Viable(candidate) => {
+                let same = candidate.about == about || about.is_empty();
+                let answered = answer.is_empty() || candidate.answer() == answer;
+                if candidate.family == *family && same && answered {
+                    found.push(Ok(candidate));
                 }
             }
-            RuleResult::Falls(fallen) => {
-                let other = fallen.answer.as_deref().unwrap_or(answer);
+            RuleResult::Rejected(rejection) => {
+                let other = rejection.answer.as_deref().unwrap_or(answer);
                 let answered = answer.is_empty() || other == answer;
-                if fallen.family == *family && fallen.about == about && answered {
-                    found.push(Err(fallen.reason));
+                if rejection.family == *family && rejection.about == about && answered {
+                    found.push(Err(rejection.reason));
                 }
             }
         }
@@ -175,6 +176,7 @@ fn candidate_by(
         .unwrap_or_else(|| panic!("no candidate {family} {about} {answer}"))
 }
 
+/// The built-in rulebook with one text replaced.
 fn rules(from: &str, to: &str) -> Rules {
     let text = include_str!("../rules.toml");
     assert!(text.contains(from), "{from}");

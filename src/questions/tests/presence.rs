@@ -14,9 +14,9 @@ fn chair(change: impl FnOnce(&mut Segment)) -> FrameStatistics {
 
 #[test]
 fn yes_needs_one_good_segment() {
-    let claim = candidate(&chair(|_| {}), &Family::Presence, "chair", "yes").unwrap();
-    assert_eq!(claim.text, "Is there a chair in the image?");
-    assert_eq!(claim.evidence["segments"][0]["id"], 2);
+    let question = candidate(&chair(|_| {}), &Family::Presence, "chair", "yes").unwrap();
+    assert_eq!(question.text, "Is there a chair in the image?");
+    assert_eq!(question.evidence["segments"][0]["id"], 2);
     let check = |change: fn(&mut Segment)| ask(&chair(change), "chair", "yes");
     for (change, expected) in [
         (
@@ -47,7 +47,7 @@ fn yes_needs_one_good_segment() {
     }
     let pet = frame(&[("bed", "dog bed", 90_000)]);
     assert_eq!(ask(&pet, "bed", "yes"), Some(Reason::Unlike));
-    // A tiny one beside a good one does no harm.
+    // A tiny chair beside a good one does not matter.
     let two = frame(&[("chair", "chair", 600), ("chair", "chair", 20_000)]);
     assert_eq!(ask(&two, "chair", "yes"), None);
 }
@@ -74,7 +74,7 @@ fn words_fit_their_classes() {
 }
 
 #[test]
-fn no_needs_that_nothing_like_it_is_seen() {
+fn no_needs_that_no_confusable_class_is_visible() {
     let wall = frame(&[("wall", "wall", 500_000)]);
     assert_eq!(ask(&wall, "bathtub", "no"), None);
     let with = |class: &'static str, word: &'static str| {
@@ -112,7 +112,7 @@ fn no_needs_that_nothing_like_it_is_seen() {
 }
 
 #[test]
-fn no_needs_a_frame_that_says_what_is_not_there() {
+fn no_needs_a_frame_that_can_show_absence() {
     let wall = frame(&[("wall", "wall", 500_000)]);
     let no = |frame: &FrameStatistics| ask(frame, "bathtub", "no");
     let void = |effective_void| FrameStatistics {
@@ -131,8 +131,8 @@ fn no_needs_a_frame_that_says_what_is_not_there() {
 }
 
 #[test]
-fn no_is_asked_of_what_is_common_in_such_rooms_elsewhere() {
-    // Twelve classes stand in the bedrooms of another scene; bathtubs do not.
+fn no_is_asked_about_classes_common_in_such_rooms_elsewhere() {
+    // The bedroom of another scene has twelve classes; bathtub is not one of them.
     let common = [
         "bed",
         "cabinet",
@@ -150,16 +150,16 @@ fn no_is_asked_of_what_is_common_in_such_rooms_elsewhere() {
     let mut other = frame(&common.map(|class| (class, "", 20_000)));
     (other.frame, other.scene) = (FrameId("other/0".into()), "other".into());
     let rules = Rules::built_in().unwrap();
-    let said = say(&[frame(&BEDROOM), other], |_| {}, &rules);
+    let results = run_rules(&[frame(&BEDROOM), other], |_| {}, &rules);
     let reason = |class: &str| {
-        said.candidates.iter().find_map(|verdict| match verdict {
-            RuleResult::Falls(fallen)
-                if fallen.family == Family::Presence && fallen.about == class =>
+        results.candidates.iter().find_map(|result| match result {
+            RuleResult::Rejected(rejection)
+                if rejection.family == Family::Presence && rejection.about == class =>
             {
-                Some(Some(fallen.reason))
+                Some(Some(rejection.reason))
             }
-            RuleResult::Holds(claim)
-                if claim.family == Family::Presence && claim.about == class =>
+            RuleResult::Viable(candidate)
+                if candidate.family == Family::Presence && candidate.about == class =>
             {
                 Some(None)
             }

@@ -3,9 +3,9 @@
 use super::*;
 
 #[test]
-fn it_is_asked_where_enough_is_seen() {
+fn it_is_asked_if_enough_is_visible() {
     let ask = |frame: &FrameStatistics| {
-        candidate(frame, &Family::RoomType, "", "").map(|claim| claim.answer().to_owned())
+        candidate(frame, &Family::RoomType, "", "").map(|question| question.answer().to_owned())
     };
     let bedroom = frame(&BEDROOM);
     assert_eq!(ask(&bedroom), Ok("bedroom".into()));
@@ -19,7 +19,7 @@ fn it_is_asked_where_enough_is_seen() {
         ask(&frame(&[("wall", "wall", 900_000)])),
         Err(Reason::NoRoom)
     );
-    // One asked segment must be large.
+    // A single asked segment must be large.
     assert_eq!(
         ask(&frame(&[("toilet", "toilet", 50_000)])),
         Ok("bathroom".into())
@@ -33,18 +33,18 @@ fn it_is_asked_where_enough_is_seen() {
 }
 
 #[test]
-fn a_stated_room_is_used_where_that_is_asked_for() {
+fn a_stated_room_is_used_on_request() {
     let mut frame = frame(&[("toilet", "toilet", 50_000)]);
     frame.room = Some("living_room".into());
     let rules = Rules::built_in().unwrap();
     let answer = |source| {
-        let said = say(
+        let results = run_rules(
             std::slice::from_ref(&frame),
-            |order| order.room_source = source,
+            |request| request.room_source = source,
             &rules,
         );
-        let asked = said
-            .made
+        let asked = results
+            .generated
             .asked
             .iter()
             .find(|asked| asked.question.family == Family::RoomType);

@@ -1,9 +1,9 @@
-//! What room it is.
+//! The classification of rooms.
 
 use super::*;
 
 #[test]
-fn each_room_is_known_by_its_signs() {
+fn each_room_is_classified_by_its_signs() {
     for (segments, expected) in [
         (vec![("bed", "bed", 15_000)], "bedroom"),
         (vec![("toilet", "toilet", 3_000)], "bathroom"),
@@ -66,8 +66,8 @@ fn each_room_is_known_by_its_signs() {
 }
 
 #[test]
-fn weak_or_small_signs_say_nothing() {
-    for (segments, why) in [
+fn weak_or_small_signs_give_no_room() {
+    for (segments, reason) in [
         (vec![("wall", "wall", 900_000)], NoRoom::NoSigns),
         (vec![("bed", "bed", 14_999)], NoRoom::NoSigns),
         (vec![("bed", "dog bed", 90_000)], NoRoom::NoSigns),
@@ -93,7 +93,7 @@ fn weak_or_small_signs_say_nothing() {
             NoRoom::NotAsked,
         ),
     ] {
-        assert_eq!(room(&segments), Err(why), "{segments:?}");
+        assert_eq!(room(&segments), Err(reason), "{segments:?}");
     }
 }
 
@@ -105,7 +105,7 @@ fn a_clue_counts_once() {
 }
 
 #[test]
-fn a_classroom_is_no_dining_room() {
+fn a_classroom_is_not_a_dining_room() {
     let mut segments = vec![("table", "table", 9_000)];
     segments.extend([("chair", "chair", 9_000); 4]);
     for blocker in [
@@ -118,13 +118,13 @@ fn a_classroom_is_no_dining_room() {
         let with = [segments.clone(), vec![blocker]].concat();
         assert!(room(&with).is_err(), "{blocker:?}");
     }
-    // Two tables, or three chairs.
+    // Two tables or only three chairs are not enough.
     assert!(room(&[segments.clone(), vec![("table", "table", 9_000)]].concat()).is_err());
     assert_eq!(room(&segments[..4]), Err(NoRoom::Weak));
 }
 
 #[test]
-fn contests_are_won_by_their_rules_alone() {
+fn only_the_rules_of_contests_decide_them() {
     let (bed, sofa) = (("bed", "bed", 200_000), ("sofa", "sofa", 100_000));
     assert_eq!(room(&[bed, sofa]), Ok("bedroom".into()));
     assert_eq!(
@@ -148,7 +148,7 @@ fn contests_are_won_by_their_rules_alone() {
         room(&[washer, ("appliances", "stove", 9_000)]),
         Ok("kitchen".into())
     );
-    // Open plans.
+    // Open-plan rooms have no type.
     let kitchen = ("cabinet", "kitchen cabinet", 9_000);
     assert_eq!(room(&[kitchen, sofa]), Err(NoRoom::Contested));
     assert_eq!(
@@ -159,7 +159,7 @@ fn contests_are_won_by_their_rules_alone() {
         room(&[kitchen, ("table", "dining table", 9_000)]),
         Err(NoRoom::Contested)
     );
-    // A second room that is weak, but too near.
+    // The second room type is weak, but its score is too close.
     let near = [
         ("table", "dining table", 9_000),
         ("chair", "dining chair", 9_000),
@@ -170,7 +170,7 @@ fn contests_are_won_by_their_rules_alone() {
         room(&[("table", "dining table", 9_000), ("table", "desk", 9_000)]),
         Err(NoRoom::Contested)
     );
-    // Three contend.
+    // Three rivals have no winner.
     assert_eq!(
         room(&[bed, kitchen, ("toilet", "toilet", 9_000)]),
         Err(NoRoom::Contested)
@@ -206,8 +206,8 @@ fn a_room_behind_a_door_does_not_count() {
             ("cabinet", "kitchen cabinet", 400_000),
             ("toilet", "toilet", area),
         ]);
-        frame.segments[0].depth = Some(deep(400_000, 2000));
-        frame.segments[1].depth = measured.then(|| deep(area, depth));
+        frame.segments[0].depth = Some(depth_at(400_000, 2000));
+        frame.segments[1].depth = measured.then(|| depth_at(area, depth));
         classify(&frame, Rules::built_in().unwrap().book()).room
     };
     assert_eq!(at(100_000, 3000, true), Ok("kitchen".into()));

@@ -1,4 +1,4 @@
-//! All families together.
+//! Tests of all families together.
 
 use proptest::prelude::*;
 
@@ -7,7 +7,7 @@ use super::*;
 fn many() -> Vec<FrameStatistics> {
     let mut frames = Vec::new();
     for i in 0..60 {
-        let mut made = match i % 4 {
+        let mut statistics = match i % 4 {
             0 => frame(&BEDROOM),
             1 => frame(&[("toilet", "toilet", 60_000), ("sink", "sink", 9_000)]),
             2 => frame(&[
@@ -20,34 +20,45 @@ fn many() -> Vec<FrameStatistics> {
                 ("appliances", "stove", 9_000),
             ]),
         };
-        (made.scene, made.frame) = (
+        (statistics.scene, statistics.frame) = (
             format!("s{}", i / 12),
             FrameId(format!("s{}/{i:02}", i / 12)),
         );
-        frames.push(made);
+        frames.push(statistics);
     }
     frames
 }
 
 #[test]
-fn order_changes_nothing_and_names_are_of_content() {
+fn the_order_of_frames_does_not_matter_and_ids_depend_on_content() {
     let rules = Rules::built_in().unwrap();
     let frames = many();
     let mut shuffled = frames.clone();
     shuffled.reverse();
     shuffled.swap(3, 40);
-    let made = |frames: &[FrameStatistics]| {
-        say(frames, |order| order.balance = BalanceMode::Full, &rules).made
+    let questions = |frames: &[FrameStatistics]| {
+        run_rules(
+            frames,
+            |request| request.balance = BalanceMode::Full,
+            &rules,
+        )
+        .generated
     };
-    let (one, other) = (made(&frames), made(&shuffled));
+    let (one, other) = (questions(&frames), questions(&shuffled));
     assert_eq!(one.asked, other.asked);
-    assert_eq!(one.tallies, other.tallies);
+    assert_eq!(one.counts, other.counts);
     let names: BTreeSet<&QuestionId> = one.asked.iter().map(|asked| &asked.question.id).collect();
     assert_eq!(names.len(), one.asked.len());
     let wider = crate::questions::tests::rules("gap_mm = 300", "gap_mm = 301");
-    let same = say(&frames, |order| order.balance = BalanceMode::Full, &wider).made;
-    let ids = |made: &Generated| {
-        made.asked
+    let same = run_rules(
+        &frames,
+        |request| request.balance = BalanceMode::Full,
+        &wider,
+    )
+    .generated;
+    let ids = |generated: &Generated| {
+        generated
+            .asked
             .iter()
             .map(|asked| asked.question.id.clone())
             .collect::<Vec<_>>()
@@ -58,12 +69,17 @@ fn order_changes_nothing_and_names_are_of_content() {
 #[test]
 fn yes_and_no_are_nearly_even_before_anything_is_dropped() {
     let rules = Rules::built_in().unwrap();
-    let made = say(&many(), |order| order.balance = BalanceMode::Binary, &rules).made;
+    let generated = run_rules(
+        &many(),
+        |request| request.balance = BalanceMode::Binary,
+        &rules,
+    )
+    .generated;
     let mut counts: BTreeMap<(&Family, &str), [i64; 2]> = BTreeMap::new();
     let binary = |asked: &&GeneratedQuestion| {
         matches!(asked.question.family, Family::Affordance | Family::Presence)
     };
-    for asked in made.asked.iter().filter(binary) {
+    for asked in generated.asked.iter().filter(binary) {
         counts
             .entry((&asked.question.family, &asked.about))
             .or_default()[asked.question.choices.truth()] += 1;
@@ -75,44 +91,44 @@ fn yes_and_no_are_nearly_even_before_anything_is_dropped() {
 }
 
 #[test]
-fn what_a_person_rejects_is_not_asked_and_nothing_else_changes() {
+fn questions_that_a_person_rejects_are_not_asked_and_nothing_else_changes() {
     let rules = Rules::built_in().unwrap();
-    let before = say(&many(), |_| {}, &rules).made;
+    let before = run_rules(&many(), |_| {}, &rules).generated;
     let rejected = before.asked[7].question.id.clone();
-    let after = say(
+    let after = run_rules(
         &many(),
-        |order| order.rejected = [rejected.clone()].into(),
+        |request| request.rejected = [rejected.clone()].into(),
         &rules,
     )
-    .made;
+    .generated;
     let mut expected = before.asked.clone();
     expected.retain(|asked| asked.question.id != rejected);
     assert_eq!(after.asked, expected);
 }
 
 #[test]
-fn black_frames_are_asked_nothing() {
+fn no_question_is_asked_about_black_frames() {
     let dark = |median| {
         let frame = FrameStatistics {
             luma: [0, median, 90],
             ..frame(&BEDROOM)
         };
-        let made = say(&[frame], |_| {}, &Rules::built_in().unwrap()).made;
-        (made.asked.is_empty(), made.dark.len())
+        let generated = run_rules(&[frame], |_| {}, &Rules::built_in().unwrap()).generated;
+        (generated.asked.is_empty(), generated.dark.len())
     };
     assert_eq!((dark(15), dark(16)), ((true, 1), (false, 0)));
 }
 
 #[test]
-fn frames_without_depth_yield_nothing_about_the_closest() {
+fn frames_without_depth_get_no_closest_question() {
     let mut frames = many();
     for frame in &mut frames {
         frame.depth = None;
     }
-    let made = say(&frames, |_| {}, &Rules::built_in().unwrap()).made;
-    assert_eq!(made.tallies[&Family::Closest].viable, 0);
+    let generated = run_rules(&frames, |_| {}, &Rules::built_in().unwrap()).generated;
+    assert_eq!(generated.counts[&Family::Closest].viable, 0);
     assert_eq!(
-        made.tallies[&Family::Closest].fallen,
+        generated.counts[&Family::Closest].rejections,
         [(Reason::NoDepth, 60)].into()
     );
 }
@@ -130,7 +146,7 @@ fn any_segment() -> impl Strategy<Value = (usize, usize, u64, u64, u32, u64)> {
 
 proptest! {
     #[test]
-    fn any_frames_give_sound_questions(
+    fn any_frames_give_valid_questions(
         frames in prop::collection::vec(
             (prop::collection::vec(any_segment(), 0..12), 0..300_000_u64, any::<bool>(), 0..3_usize), 1..8,
         ),
@@ -141,31 +157,52 @@ proptest! {
         let frames: Vec<FrameStatistics> = frames
             .into_iter()
             .enumerate()
-            .map(|(i, (segments, void, deep_frame, scene))| {
+            .map(|(i, (segments, void, has_depth, scene))| {
                 let list: Vec<(&str, &str, u64)> = segments.iter().map(|s| (classes[s.0].as_str(), words[s.1], s.2)).collect();
-                let mut made = frame(&list);
-                for (segment, (_, _, area, pure, depth, color)) in made.segments.iter_mut().zip(&segments) {
+                let mut statistics = frame(&list);
+                for (segment, (_, _, area, pure, depth, color)) in statistics.segments.iter_mut().zip(&segments) {
                     segment.pure = area * pure / 100;
-                    segment.depth = (*depth > 100).then(|| deep(area * color / 100, *depth + 100));
+                    segment.depth = (*depth > 100).then(|| depth_at(area * color / 100, *depth + 100));
                     segment.colors.rotate_right(*color as usize % 12);
                 }
-                made.depth = made.depth.filter(|_| deep_frame);
-                (made.effective_void, made.lower_void) = (void, void / 2);
-                (made.scene, made.frame) = (format!("s{scene}"), FrameId(format!("s{scene}/{i}")));
-                made
+                statistics.depth = statistics.depth.filter(|_| has_depth);
+                (statistics.effective_void, statistics.lower_void) = (void, void / 2);
+                (statistics.scene, statistics.frame) = (format!("s{scene}"), FrameId(format!("s{scene}/{i}")));
+                statistics
             })
             .collect();
         for balance in [BalanceMode::None, BalanceMode::Binary, BalanceMode::Full] {
-            let made = say(&frames, |order| order.balance = balance, &rules).made;
+            let generated = run_rules(&frames, |request| request.balance = balance, &rules).generated;
             let mut seen = BTreeSet::new();
-            for asked in &made.asked {
+            for asked in &generated.asked {
                 let question = &asked.question;
                 prop_assert!(question.choices.texts().contains(&asked.answer().to_owned()));
                 prop_assert!(seen.insert((question.frame.clone(), question.family.clone())));
             }
-            for tally in made.tallies.values() {
-                prop_assert_eq!(tally.viable, tally.asked + tally.left.values().sum::<u64>());
+            for counts in generated.counts.values() {
+                prop_assert_eq!(counts.viable, counts.asked + counts.omitted.values().sum::<u64>());
             }
         }
     }
+}
+
+#[test]
+fn every_family_has_its_rule_its_tests_and_its_description() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let readme = std::fs::read_to_string(root.join("README.md")).unwrap();
+    let mut missing = Vec::new();
+    for family in Family::PAPER {
+        for file in [
+            format!("src/questions/{family}.rs"),
+            format!("src/questions/tests/{family}.rs"),
+        ] {
+            if !root.join(&file).is_file() {
+                missing.push(file);
+            }
+        }
+        if !readme.contains(&family.to_string()) {
+            missing.push(format!("{family} in README.md"));
+        }
+    }
+    assert!(missing.is_empty(), "{missing:?}");
 }

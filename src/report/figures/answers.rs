@@ -1,15 +1,15 @@
-//! What models say when they no longer see: hallucination and collapse.
+//! Figures of the answers of models that no longer see: hallucination and collapse.
 
 use super::super::chart::{Chart, Panel, PanelContent, PlotLine};
 use super::super::words::{family as family_name, light};
-use super::{GROUND, Overview};
+use super::{Overview, REFERENCE};
 use crate::score::confusion::{Confusion, Hallucination};
 use crate::score::estimate::Estimate;
 use crate::types::Family;
 
 impl Overview<'_> {
     pub(super) fn hallucination(&self) -> Option<(String, Chart)> {
-        let variant = self.noisiest()?;
+        let variant = self.main_variant()?;
         if self.findings.hallucinations.is_empty() {
             return None;
         }
@@ -18,7 +18,7 @@ impl Overview<'_> {
                 let mut rates = self.findings.hallucinations.iter();
                 rate(rates.find(|rates| rates.subject == *subject)?)
             });
-            let n = lines.iter().find_map(|line| match &line.shape {
+            let n = lines.iter().find_map(|line| match &line.content {
                 PanelContent::Curve(points) => points.first().map(|(_, rate)| rate.n),
                 PanelContent::Flat(_) => None,
             });
@@ -36,10 +36,10 @@ impl Overview<'_> {
         self.chart("share of replies in %", panels, 2, &caption)
     }
 
-    /// How often the commonest answer is given, by level, against how often the commonest is true.
+    /// Share of the most frequent answer by level, against the share of the most frequent true answer.
     pub(super) fn collapse(&self) -> Option<(String, Chart)> {
-        let variant = self.noisiest()?;
-        let of_family = |family: Family| {
+        let variant = self.main_variant()?;
+        let panel = |family: Family| {
             let mut truth = None;
             let mut lines = self.lines(&variant, |subject| {
                 let mut confusions = self.findings.confusions.iter();
@@ -53,14 +53,14 @@ impl Overview<'_> {
             let (share, n) = truth?;
             lines.push(PlotLine {
                 name: "commonest true answer".to_owned(),
-                look: GROUND,
-                shape: PanelContent::Flat(share),
+                style: REFERENCE,
+                content: PanelContent::Flat(share),
             });
             let title = format!("{}, n {n}", family_name(Some(&family)));
             Some(Panel { title, lines })
         };
         let panels = [Family::RoomType, Family::Color].into_iter();
-        let panels: Vec<Panel> = panels.filter_map(of_family).collect();
+        let panels: Vec<Panel> = panels.filter_map(panel).collect();
         let caption = format!(
             "Answer collapse, {}: how often the answer given most often is given, by level.",
             light(&variant, None)
@@ -72,8 +72,9 @@ impl Overview<'_> {
     }
 }
 
+/// Share of the most frequent true answer, and the number of replies.
 fn commonest_truth(confusion: &Confusion) -> Option<(f64, usize)> {
     let truths = confusion.shares().into_iter().map(|(_, truth)| truth);
-    let (all, most) = truths.fold((0, 0), |(all, most), n| (all + n, most.max(n)));
-    (all > 0).then(|| (most as f64 / all as f64, all))
+    let (all, highest) = truths.fold((0, 0), |(all, highest), n| (all + n, highest.max(n)));
+    (all > 0).then(|| (highest as f64 / all as f64, all))
 }

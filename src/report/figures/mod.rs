@@ -1,4 +1,4 @@
-//! The paper's figures, and more: each a function from [`Findings`] to a [`Chart`].
+//! The paper's figures and others: each is a function from [`Findings`] to a [`Chart`].
 
 mod answers;
 mod thresholds;
@@ -14,19 +14,19 @@ use crate::score::findings::Findings;
 use crate::score::subject::{CHANCE, Subject};
 use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
 
-/// All figures that the records have something for.
+/// All figures for which there are records.
 ///
 /// # Errors
-/// Where one cannot be drawn.
+/// If a figure cannot be drawn.
 pub(crate) fn figures(findings: &Findings<'_>) -> Result<Vec<Figure>> {
-    let view = Overview::new(findings);
+    let overview = Overview::new(findings);
     let charts = [
-        ("accuracy", view.accuracy()),
-        ("variants", view.variants()),
-        ("enhancers", view.enhancers()),
-        ("families", view.families()),
-        ("hallucination", view.hallucination()),
-        ("collapse", view.collapse()),
+        ("accuracy", overview.accuracy()),
+        ("variants", overview.variants()),
+        ("enhancers", overview.enhancers()),
+        ("families", overview.families()),
+        ("hallucination", overview.hallucination()),
+        ("collapse", overview.collapse()),
     ];
     let mut figures = Vec::new();
     for (name, chart) in charts {
@@ -40,18 +40,18 @@ pub(crate) fn figures(findings: &Findings<'_>) -> Result<Vec<Figure>> {
     Ok(figures)
 }
 
-/// The built-in models: a floor and a ceiling, not models under test.
+/// The built-in models. They are a lower and an upper bound, not models under test.
 const BUILT_IN: [&str; 2] = ["random", "observer"];
 
-/// The look of what no model says: chance, and the truth.
-const GROUND: LineStyle = LineStyle(27);
+/// Style of lines that belong to no model: chance, and the most frequent true answer.
+const REFERENCE: LineStyle = LineStyle(27);
 
 const ACCURACY: &str = "accuracy in %";
 
-/// What the figures are drawn from.
+/// The findings, with the models, enhancers and levels that occur in them.
 struct Overview<'a> {
     findings: &'a Findings<'a>,
-    /// Models that see, in order; each has the look of its place.
+    /// Models with images, sorted. The index of a model is its line style.
     models: Vec<&'a str>,
     enhancers: Vec<&'a EnhancerName>,
     levels: BTreeSet<AxisLevel>,
@@ -74,7 +74,7 @@ impl<'a> Overview<'a> {
         }
     }
 
-    /// Some number of a model over the levels, in one variant, raw or enhanced; L0 is the untouched frame.
+    /// A quantity of a model by level, in one variant, raw or enhanced. L0 is the clean frame.
     fn points(
         &self,
         model: &str,
@@ -90,8 +90,8 @@ impl<'a> Overview<'a> {
         points.collect()
     }
 
-    /// The accuracy of a subject on a family.
-    fn share(&self, subject: &Subject, family: Option<&Family>) -> Option<Estimate> {
+    /// Accuracy of a subject on a family, in the strict reading.
+    fn accuracy_of(&self, subject: &Subject, family: Option<&Family>) -> Option<Estimate> {
         let cell = self
             .findings
             .summary
@@ -99,25 +99,29 @@ impl<'a> Overview<'a> {
         cell.accuracy
     }
 
-    /// The blind lines, each in the look of its model, and chance.
-    fn floors(&self, family: Option<&Family>) -> Vec<PlotLine> {
+    /// Flat lines: models without images, each in the style of its model, and chance.
+    fn flat_lines(&self, family: Option<&Family>) -> Vec<PlotLine> {
         let cells = self.findings.summary.of(family, ReadingMode::Strict);
-        let here = cells.filter(|cell| cell.subject.view != Some(View::Image));
-        let lines = here.filter_map(|cell| {
+        let flat = cells.filter(|cell| cell.subject.view != Some(View::Image));
+        let lines = flat.filter_map(|cell| {
             let model = &*cell.subject.model;
-            let (name, look) = if cell.subject.view.is_none() {
-                (CHANCE.to_owned(), GROUND)
+            let (name, style) = if cell.subject.view.is_none() {
+                (CHANCE.to_owned(), REFERENCE)
             } else {
-                (format!("{model} without images"), self.look(model))
+                (format!("{model} without images"), self.style(model))
             };
-            let shape = PanelContent::Flat(cell.accuracy?.value);
-            Some(PlotLine { name, look, shape })
+            let content = PanelContent::Flat(cell.accuracy?.value);
+            Some(PlotLine {
+                name,
+                style,
+                content,
+            })
         });
         lines.collect()
     }
 
-    /// The models that a mean is taken over: not the built-in ones, where there are others.
-    fn judged(&self) -> Vec<&'a str> {
+    /// The models over which a mean is taken: without the built-in ones, if there are others.
+    fn averaged_models(&self) -> Vec<&'a str> {
         let others = self.models.iter().filter(|model| !BUILT_IN.contains(model));
         let others: Vec<&str> = others.copied().collect();
         if others.is_empty() {
@@ -127,20 +131,20 @@ impl<'a> Overview<'a> {
         }
     }
 
-    fn look(&self, model: &str) -> LineStyle {
-        let place = self.models.iter().position(|known| *known == model);
-        LineStyle(place.unwrap_or(self.models.len()))
+    fn style(&self, model: &str) -> LineStyle {
+        let index = self.models.iter().position(|known| *known == model);
+        LineStyle(index.unwrap_or(self.models.len()))
     }
 
-    /// What is drawn where one variant has to do: the last kind that was asked, the noisy one, in its first reading.
-    fn noisiest(&self) -> Option<KindReading> {
-        let variants = self.variants_there();
+    /// The variant for figures that show only one: the last kind that was asked, in its first light reading.
+    fn main_variant(&self) -> Option<KindReading> {
+        let variants = self.tested_variants();
         let kind = variants.last()?.kind;
         variants.into_iter().find(|variant| variant.kind == kind)
     }
 
-    /// The kinds that were asked, in each light reading.
-    fn variants_there(&self) -> Vec<KindReading> {
+    /// All variants that were asked: kinds in each light reading.
+    fn tested_variants(&self) -> Vec<KindReading> {
         let subjects = self.findings.grid.subjects.iter();
         let variants = subjects.map(|subject| &subject.variant);
         let degraded = variants.filter(|variant| variant.kind.is_some());
@@ -148,7 +152,7 @@ impl<'a> Overview<'a> {
         degraded.into_iter().cloned().collect()
     }
 
-    /// The lines of all models in one variant, raw, of some number of each subject.
+    /// Lines of a quantity for all models, in one variant, raw.
     fn lines(
         &self,
         variant: &KindReading,
@@ -157,20 +161,20 @@ impl<'a> Overview<'a> {
         let models = self.models.iter();
         let lines = models.map(|model| PlotLine {
             name: (*model).to_owned(),
-            look: self.look(model),
-            shape: PanelContent::Curve(self.points(model, variant, None, &mut number)),
+            style: self.style(model),
+            content: PanelContent::Curve(self.points(model, variant, None, &mut number)),
         });
         lines.collect()
     }
 
-    /// The lines of the accuracy of all models, with what they are held against.
+    /// Lines of the accuracy of all models, with the flat lines.
     fn accuracies(&self, variant: &KindReading, family: Option<&Family>) -> Vec<PlotLine> {
-        let mut lines = self.lines(variant, |subject| self.share(subject, family));
-        lines.extend(self.floors(family));
+        let mut lines = self.lines(variant, |subject| self.accuracy_of(subject, family));
+        lines.extend(self.flat_lines(family));
         lines
     }
 
-    /// How the intervals were made, and on how many questions.
+    /// Note on the number of items and on the intervals.
     fn note(&self) -> String {
         let (grid, unit) = (&self.findings.grid, self.findings.unit);
         format!(
@@ -186,7 +190,7 @@ impl<'a> Overview<'a> {
     }
 
     fn accuracy(&self) -> Option<(String, Chart)> {
-        let variants = self.variants_there();
+        let variants = self.tested_variants();
         let panels = variants.iter().map(|variant| Panel {
             title: format!("{}, n {}", light(variant, None), self.n(None)),
             lines: self.accuracies(variant, None),
@@ -196,28 +200,32 @@ impl<'a> Overview<'a> {
         self.chart(ACCURACY, panels, 2, caption)
     }
 
-    /// The mean over models of each variant, with the range of the models.
+    /// Mean over the models for each variant, with the range of the models.
     fn variants(&self) -> Option<(String, Chart)> {
-        let (variants, models) = (self.variants_there(), self.judged());
+        let (variants, models) = (self.tested_variants(), self.averaged_models());
         if variants.len() < 2 {
             return None;
         }
         let line = |(index, variant): (usize, &KindReading)| {
             let curves = models.iter();
             let curves: Vec<Vec<(AxisLevel, Estimate)>> = curves
-                .map(|model| self.points(model, variant, None, |subject| self.share(subject, None)))
+                .map(|model| {
+                    self.points(model, variant, None, |subject| {
+                        self.accuracy_of(subject, None)
+                    })
+                })
                 .collect();
             PlotLine {
                 name: light(variant, None),
-                look: LineStyle(index),
-                shape: PanelContent::Curve(mean(&curves)),
+                style: LineStyle(index),
+                content: PanelContent::Curve(mean(&curves)),
             }
         };
         let mut lines: Vec<PlotLine> = variants.iter().enumerate().map(line).collect();
-        let floors = self.floors(None).into_iter();
-        lines.extend(floors.filter(|line| line.name == CHANCE));
+        let flat_lines = self.flat_lines(None).into_iter();
+        lines.extend(flat_lines.filter(|line| line.name == CHANCE));
         let title = match &*models {
-            [one] => format!("{one}, n {}", self.n(None)),
+            [single] => format!("{single}, n {}", self.n(None)),
             several => format!("mean of {} models, n {} each", several.len(), self.n(None)),
         };
         let (caption, mut chart) = self.chart(
@@ -237,17 +245,17 @@ impl<'a> Overview<'a> {
 
     fn enhancers(&self) -> Option<(String, Chart)> {
         let mut panels = Vec::new();
-        for variant in self.variants_there() {
+        for variant in self.tested_variants() {
             for model in &self.models {
                 let line = |(index, enhancer): (usize, Option<&EnhancerName>)| {
                     let points = self.points(model, &variant, enhancer, |subject| {
-                        self.share(subject, None)
+                        self.accuracy_of(subject, None)
                     });
-                    // L0 alone is no line of an enhancer's.
+                    // L0 alone is not a line of an enhancer.
                     (points.len() > 1).then(|| PlotLine {
                         name: enhancer.map_or("raw".to_owned(), ToString::to_string),
-                        look: LineStyle(index),
-                        shape: PanelContent::Curve(points),
+                        style: LineStyle(index),
+                        content: PanelContent::Curve(points),
                     })
                 };
                 let all = std::iter::once(None).chain(self.enhancers.iter().copied().map(Some));
@@ -267,7 +275,7 @@ impl<'a> Overview<'a> {
     }
 
     fn families(&self) -> Option<(String, Chart)> {
-        let variant = &self.noisiest()?;
+        let variant = &self.main_variant()?;
         let families = self.findings.grid.families();
         let panels = families.into_iter().map(|family| {
             let n = self.n(Some(family));
@@ -284,7 +292,7 @@ impl<'a> Overview<'a> {
         self.chart(ACCURACY, panels, 3, &caption)
     }
 
-    /// A chart of panels of which some have lines.
+    /// A caption and a chart; `None` without panels or without models that see.
     fn chart(
         &self,
         measure: &'static str,
@@ -305,16 +313,16 @@ impl<'a> Overview<'a> {
     }
 }
 
-/// The mean of curves at the levels that all of them have, with their range; of one alone itself.
+/// Mean of curves at the levels that all of them have, with their range. A single curve is returned as it is.
 fn mean(curves: &[Vec<(AxisLevel, Estimate)>]) -> Vec<(AxisLevel, Estimate)> {
-    if let [one] = curves {
-        return one.clone();
+    if let [single] = curves {
+        return single.clone();
     }
     let at = |level: AxisLevel| {
         let values: Option<Vec<f64>> = curves
             .iter()
             .map(|curve| {
-                let point = curve.iter().find(|(there, _)| *there == level);
+                let point = curve.iter().find(|(at, _)| *at == level);
                 point.map(|(_, estimate)| estimate.value)
             })
             .collect();

@@ -1,24 +1,24 @@
-//! The darkness thresholds side by side.
+//! The figure of the darkness thresholds.
 
 use plotters::prelude::*;
 
 use super::super::chart::{
-    BELOW, Figure, FigureArea, GRID, LEFT, LineStyle, PAPER, RIGHT, path, words,
+    BACKGROUND, BELOW, Figure, FigureArea, GRID, LEFT, LineStyle, RIGHT, draw_path, draw_text,
 };
 use super::super::words::{light, stops};
 use crate::error::{Error, Result};
 use crate::score::curve::{Curve, Threshold};
 use crate::score::findings::Findings;
 
-/// The width of the names, of the axis, and of the numbers, in pixels.
+/// Widths of the names, of the axis and of the numbers, in pixels.
 const NAMES: i32 = 330;
 const AXIS: i32 = 400;
 const NUMBERS: i32 = 150;
 const ROW: i32 = 24;
-/// The darkest level of all, in EV.
-const MOST: f64 = 9.0;
+/// End of the axis in EV: the exposure drop of L5, the darkest named level.
+const MAX_EV: f64 = 9.0;
 
-/// A row a curve: its threshold and interval over exposure drops; `None` where no curve has one.
+/// A row for each curve, with its threshold and interval on an axis of exposure drops. `None` if no curve has a threshold.
 pub(super) fn figure(findings: &Findings<'_>) -> Result<Option<Figure>> {
     let rows = findings
         .curves
@@ -53,29 +53,29 @@ pub(super) fn figure(findings: &Findings<'_>) -> Result<Option<Figure>> {
 
 fn draw(root: &FigureArea<'_>, rows: &[(&Curve, Threshold)], unit: &str) -> Result<(), String> {
     let failed = |e: DrawingAreaErrorKind<_>| e.to_string();
-    let x = |ev: f64| NAMES + (ev.clamp(0.0, MOST) / MOST * f64::from(AXIS)).round() as i32;
-    let dot = LineStyle(0).colour();
-    root.fill(&PAPER).map_err(failed)?;
+    let x = |ev: f64| NAMES + (ev.clamp(0.0, MAX_EV) / MAX_EV * f64::from(AXIS)).round() as i32;
+    let colour = LineStyle(0).colour();
+    root.fill(&BACKGROUND).map_err(failed)?;
     let bottom = 12 + rows.len() as i32 * ROW;
     for tick in 0..=9 {
         let at = x(f64::from(tick));
-        path(root, &[(at, 8), (at, bottom)], GRID.stroke_width(1))?;
-        words(root, &tick.to_string(), (at, bottom + 6), 13, BELOW)?;
+        draw_path(root, &[(at, 8), (at, bottom)], GRID.stroke_width(1))?;
+        draw_text(root, &tick.to_string(), (at, bottom + 6), 13, BELOW)?;
     }
     for (row, (curve, threshold)) in (0..).zip(rows) {
         let y = 12 + row * ROW + ROW / 2;
         let light = light(&curve.variant, curve.enhancer.as_ref());
         let name = format!("{}, {light}", curve.model);
-        words(root, &name, (NAMES - 14, y), 13, RIGHT)?;
+        draw_text(root, &name, (NAMES - 14, y), 13, RIGHT)?;
         let ends = [(x(threshold.low), y), (x(threshold.high), y)];
-        path(root, &ends, dot.stroke_width(2))?;
+        draw_path(root, &ends, colour.stroke_width(2))?;
         if threshold.high.is_infinite() {
-            let tip = vec![(x(MOST) + 8, y), (x(MOST), y - 5), (x(MOST), y + 5)];
-            root.draw(&Polygon::new(tip, dot)).map_err(failed)?;
+            let tip = vec![(x(MAX_EV) + 8, y), (x(MAX_EV), y - 5), (x(MAX_EV), y + 5)];
+            root.draw(&Polygon::new(tip, colour)).map_err(failed)?;
         }
         if threshold.value.is_finite() {
             let place = (x(threshold.value), y);
-            let point = Circle::new(place, 5, dot.filled());
+            let point = Circle::new(place, 5, colour.filled());
             root.draw(&point).map_err(failed)?;
         }
         let darkest = curve.darkest.value();
@@ -86,10 +86,10 @@ fn draw(root: &FigureArea<'_>, rows: &[(&Curve, Threshold)], unit: &str) -> Resu
             stops(threshold.high, darkest)
         );
         let place = (NAMES + AXIS + 16, y);
-        words(root, &number, place, 13, LEFT)?;
+        draw_text(root, &number, place, 13, LEFT)?;
     }
-    let below = format!("darkness threshold in EV, with 95 % interval by {unit}");
+    let axis_title = format!("darkness threshold in EV, with 95 % interval by {unit}");
     let place = (NAMES + AXIS / 2, bottom + 30);
-    words(root, &below, place, 13, BELOW)?;
+    draw_text(root, &axis_title, place, 13, BELOW)?;
     root.present().map_err(failed)
 }

@@ -1,4 +1,4 @@
-//! Scores over darkness: [`figures`].
+//! Figures of the scores by level: [`figures`].
 
 use super::open_report::OpenReport;
 use super::tables::ladder;
@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::report::chart::{Chart, Figure, LineStyle, Panel, PanelContent, PlotLine};
 use crate::score::open::Group;
 
-/// The scores by level, all questions together, and by category where there are several.
+/// Scores by level: all questions together, and by category if there are several.
 pub(super) fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {
     let whole = ladder(report.summary, &Group::All);
     if whole.levels.len() < 2 {
@@ -48,36 +48,37 @@ pub(super) fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {
     Ok(figures)
 }
 
+/// The panel of a group: a curve for each series, and a flat line for each model without images.
 fn panel(report: &OpenReport<'_>, group: &Group) -> Panel {
     let ladder = ladder(report.summary, group);
     let seeing = ladder.series.len();
     let lines = ladder.series.iter().enumerate();
-    let lines = lines.map(|(place, (series, steps))| {
-        let steps = steps.iter();
-        let points = steps.filter_map(|(level, cell)| Some((*level, cell.score?)));
+    let lines = lines.map(|(index, (series, cells))| {
+        let cells = cells.iter();
+        let points = cells.filter_map(|(level, cell)| Some((*level, cell.score?)));
         PlotLine {
             name: format!("{}, {}", series.model, series.light()),
-            look: LineStyle(place),
-            shape: PanelContent::Curve(points.collect()),
+            style: LineStyle(index),
+            content: PanelContent::Curve(points.collect()),
         }
     });
-    let blind = ladder.floors.iter().enumerate();
-    let blind = blind.filter_map(|(place, (subject, cell))| {
+    let blind = ladder.without_level.iter().enumerate();
+    let blind = blind.filter_map(|(index, (subject, cell))| {
         Some(PlotLine {
             name: format!("{} without images", subject.model),
-            look: LineStyle(seeing + place),
-            shape: PanelContent::Flat(cell.score?.value),
+            style: LineStyle(seeing + index),
+            content: PanelContent::Flat(cell.score?.value),
         })
     });
     let n = report.questions.len();
     let title = match group {
         Group::All => format!("all, n {n}"),
         part => {
-            let own = report.questions.iter();
-            let own = own
+            let questions = report.questions.iter();
+            let questions = questions
                 .filter(|question| question.family.name() == part.name())
                 .count();
-            format!("{}, n {own}", part.name())
+            format!("{}, n {questions}", part.name())
         }
     };
     Panel {

@@ -1,4 +1,4 @@
-//! What a run of open questions leaves: [`products`], [`summary_json`], and what stands at its end: [`render`].
+//! The report of a run of open questions: its files ([`products`], [`summary_json`]) and its text in the terminal ([`render`]).
 
 mod coverage;
 mod figure;
@@ -17,30 +17,30 @@ pub(crate) use tables::tables;
 
 use self::coverage::coverage;
 use crate::error::Result;
-use crate::report::products::{PAGE, numbers};
+use crate::report::products::{PAGE, table_files};
 use crate::report::table::Table;
 use crate::report::{chart, json, terminal};
 use crate::types::manifest::RunManifest;
 
-/// The files of a run by name: the numbers as CSV, the table as LaTeX, the figures as SVG, answers and marks as upstream's own
-/// files, and the page.
+/// Files of a run by name: numbers as CSV, the table as LaTeX, figures as SVG, answers and marks in upstream's format, and the
+/// HTML page.
 ///
 /// # Errors
-/// If one cannot be made.
+/// If a file cannot be made.
 pub(crate) fn products(
     report: &OpenReport<'_>,
     tables: &[Table],
 ) -> Result<Vec<(String, Vec<u8>)>> {
     let figures = figure::figures(report)?;
     let page = page::page(report, tables, &figures)?;
-    let mut made = numbers(tables, "Table")?;
-    made.extend(chart::files(figures));
-    made.extend(upstream::files(report)?);
-    made.push((PAGE.to_owned(), page.into_bytes()));
-    Ok(made)
+    let mut files = table_files(tables, "Table")?;
+    files.extend(chart::files(figures));
+    files.extend(upstream::files(report)?);
+    files.push((PAGE.to_owned(), page.into_bytes()));
+    Ok(files)
 }
 
-/// What stands above the rows of `summary.json`.
+/// The head of `summary.json`.
 #[derive(Serialize)]
 struct Head<'a> {
     schema: &'static str,
@@ -53,11 +53,11 @@ struct Head<'a> {
     clusters: usize,
 }
 
-/// The summary as JSON: the run's manifest, who marked and how, and the rows of the CSV; with the folder if it is not itself in
-/// there.
+/// The summary as JSON: the run's manifest, the judge and the protocol, and the rows of the CSV. `folder` is given if the
+/// summary is not stored in the run's folder.
 ///
 /// # Errors
-/// If it cannot be written.
+/// If the summary cannot be written.
 pub(crate) fn summary_json(
     report: &OpenReport<'_>,
     tables: &[Table],
@@ -75,14 +75,14 @@ pub(crate) fn summary_json(
     json::document(head, &tables[0])
 }
 
-/// What stands at the end of a run: how far it has come if it is not complete, scores by level, by split and by category, what they
-/// rest on, and where it lies.
+/// The text at the end of a run: its progress if it is not complete, the scores by level, split and category, the number of
+/// scored answers, and the folder.
 #[must_use]
 pub(crate) fn render(report: &OpenReport<'_>, tables: &[Table], folder: &Path) -> String {
-    let mut text = terminal::progress(report.manifest, "answers and marks there");
+    let mut text = terminal::progress(report.manifest, "answers and marks stored");
     match report.judge {
         Some(_) => text += &terminal::render(tables),
-        None => text += "Nothing is marked: --judge NAME has the answers marked\n",
+        None => text += "No answer is marked: name a judge with --judge NAME\n",
     }
     for line in coverage(report) {
         let _ = writeln!(text, "{line}");

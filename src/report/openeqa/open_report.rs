@@ -1,4 +1,4 @@
-//! What a run of open questions says: [`OpenReport`].
+//! The data of a report on open questions: [`OpenReport`].
 
 use crate::score::llm_match::Protocol;
 use crate::score::open::{AnswerOutcome, OpenSummary};
@@ -6,36 +6,32 @@ use crate::score::subject::Subject;
 use crate::types::manifest::RunManifest;
 use crate::types::{RunQuestion, Thumbnail};
 
-/// Everything that a run of open questions says.
+/// Everything that a report on open questions shows.
 #[derive(Debug, Clone)]
 pub(crate) struct OpenReport<'a> {
-    /// The scores.
     pub summary: &'a OpenSummary,
-    /// The run.
     pub manifest: &'a RunManifest,
-    /// Who marked the answers; `None` for nobody.
+    /// Name of the judge; `None` if no judge was named.
     pub judge: Option<&'a str>,
-    /// How they were judged.
+    /// Protocol by which the answers are judged.
     pub protocol: Protocol,
-    /// What the run is called: its folder.
+    /// Name of the run: its folder.
     pub name: String,
     /// The questions in the order of their file.
     pub questions: &'a [RunQuestion],
     /// The answers, each to one of the questions.
     pub answers: &'a [ReportedAnswer],
-    /// The small copies of images, by walk and condition.
+    /// Thumbnails of images, by walk and condition.
     pub thumbnails: &'a [Thumbnail],
 }
 
-/// One answer.
+/// One answer of one subject to one question.
 #[derive(Debug, Clone)]
 pub(crate) struct ReportedAnswer {
-    /// Whose.
     pub subject: Subject,
-    /// The question's place.
+    /// Index of the question in the report.
     pub question: usize,
-    /// In its own words; `None` where there is none.
+    /// The full text of the answer; `None` if there is none.
     pub answer: Option<String>,
-    /// What came of it.
     pub outcome: AnswerOutcome,
 }

@@ -1,4 +1,4 @@
-//! The one HTML file of a run of open questions: [`page`]. All of it is text, SVG and small images; its script only filters.
+//! The HTML page of a run of open questions: [`page`]. It has only text, SVG and thumbnails; its script only filters.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -17,13 +17,13 @@ use crate::score::open::AnswerOutcome;
 use crate::score::subject::Subject;
 use crate::types::{AxisLevel, View};
 
-/// The template.
+/// The template of the page.
 const PAGE: &str = include_str!("page.html");
 
-/// The page.
+/// The page as HTML.
 ///
 /// # Errors
-/// Where the template cannot be filled.
+/// If the template cannot be filled.
 pub(super) fn page(
     report: &OpenReport<'_>,
     tables: &[Table],
@@ -40,7 +40,7 @@ pub(super) fn page(
             "alerts": alerts(report),
             "intro": intro(report),
             "figures": figures,
-            "tables": tables::shown(tables, SECTION),
+            "tables": tables::page_tables(tables, SECTION),
             "categories": categories.collect::<BTreeSet<_>>(),
             "walks": walks(report),
             "facts": manifest_facts(report.manifest),
@@ -49,12 +49,12 @@ pub(super) fn page(
     )
 }
 
-/// What must be read before any number.
+/// Warnings at the top of the page: missing marks, missing answers, no judge.
 fn alerts(report: &OpenReport<'_>) -> Vec<String> {
     let (status, counts) = (report.manifest.status, report.manifest.counts);
     let mut alerts = Vec::new();
     let unmarked = report.answers.iter();
-    let unmarked = unmarked.filter(|told| told.outcome == AnswerOutcome::Unmarked);
+    let unmarked = unmarked.filter(|answer| answer.outcome == AnswerOutcome::Unmarked);
     match unmarked.count() {
         0 => {}
         n => alerts.push(format!(
@@ -94,34 +94,32 @@ fn intro(report: &OpenReport<'_>) -> Vec<String> {
     ]
 }
 
-/// The walks in the order of their questions, each with its images and questions.
+/// The walks in the order of their questions, each with its thumbnails and questions.
 fn walks(report: &OpenReport<'_>) -> Vec<Value> {
-    let mut told = BTreeMap::<usize, Vec<&ReportedAnswer>>::new();
-    for one in report.answers {
-        told.entry(one.question).or_default().push(one);
+    let mut by_question = BTreeMap::<usize, Vec<&ReportedAnswer>>::new();
+    for answer in report.answers {
+        by_question.entry(answer.question).or_default().push(answer);
     }
     let mut walks: Vec<(&str, Vec<Value>)> = Vec::new();
-    let mut places = BTreeMap::new();
+    let mut indices = BTreeMap::new();
     for (index, question) in report.questions.iter().enumerate() {
         let episode = &*question.frame.0;
-        let place = *places.entry(episode).or_insert_with(|| {
+        let walk = *indices.entry(episode).or_insert_with(|| {
             walks.push((episode, Vec::new()));
             walks.len() - 1
         });
-        let own = told.remove(&index).unwrap_or_default();
+        let answers = by_question.remove(&index).unwrap_or_default();
         let extra = question.extra_answers.as_ref();
         let extra = extra.map(|extra| readable(&extra.join("; ")));
-        walks[place].1.push(json!({
+        walks[walk].1.push(json!({
             "id": question.id,
             "text": readable(&question.text),
             "answer": readable(&question.answer),
             "extra": extra,
             "category": question.family.name(),
-            // The marks of models that see, in words.
-            "marks": marks(&own),
-            // Whether some model's mark at its darkest is below that on the lit frames.
-            "lost": lost(&own),
-            "rows": own.into_iter().map(row).collect::<Vec<_>>(),
+            "marks": marks(&answers),
+            "lost": lost(&answers),
+            "rows": answers.into_iter().map(row).collect::<Vec<_>>(),
         }));
     }
     let walks = walks
@@ -131,11 +129,11 @@ fn walks(report: &OpenReport<'_>) -> Vec<Value> {
 }
 
 fn images(report: &OpenReport<'_>, episode: &str) -> Vec<Value> {
-    let own = report.thumbnails.iter();
-    let mut own: Vec<_> = own
+    let all = report.thumbnails.iter();
+    let mut thumbnails: Vec<_> = all
         .filter(|thumbnail| thumbnail.frame.0 == episode)
         .collect();
-    own.sort_by_key(|thumbnail| &thumbnail.condition);
+    thumbnails.sort_by_key(|thumbnail| &thumbnail.condition);
     let image = |thumbnail: &&crate::types::Thumbnail| {
         let caption = format!(
             "{}, the frame in the middle of the walk",
@@ -143,38 +141,38 @@ fn images(report: &OpenReport<'_>, episode: &str) -> Vec<Value> {
         );
         json!({"url": thumbnail.small, "caption": caption})
     };
-    own.iter().map(image).collect()
+    thumbnails.iter().map(image).collect()
 }
 
-fn row(told: &ReportedAnswer) -> Value {
-    let mark = match told.outcome {
+fn row(reported: &ReportedAnswer) -> Value {
+    let mark = match reported.outcome {
         AnswerOutcome::Marked(mark) => mark.to_string(),
         AnswerOutcome::Null => "0 (no answer)".to_owned(),
         AnswerOutcome::Unmarked => "none in the judge's reply".to_owned(),
         AnswerOutcome::Unjudged => "not judged".to_owned(),
         AnswerOutcome::Missing => "–".to_owned(),
     };
-    let answer = match (&told.answer, told.outcome) {
+    let answer = match (&reported.answer, reported.outcome) {
         (Some(answer), _) => readable(answer),
         (None, AnswerOutcome::Missing) => "not answered".to_owned(),
         (None, _) => "none".to_owned(),
     };
-    let subject = &told.subject;
+    let subject = &reported.subject;
     json!({"model": subject.model, "shown": subject.condition(), "mark": mark, "answer": answer})
 }
 
-/// `gpt-4o L0 5 · L2-noise 4`, a text for each model that sees.
-fn marks(told: &[&ReportedAnswer]) -> Vec<String> {
+/// A text for each model with images, for example `gpt-4o: L0 5 · L2-noise 4`.
+fn marks(answers: &[&ReportedAnswer]) -> Vec<String> {
     let mut by_model = BTreeMap::<&str, Vec<String>>::new();
-    for one in told {
-        if one.subject.view == Some(View::Image) {
-            let mark = match one.outcome {
+    for answer in answers {
+        if answer.subject.view == Some(View::Image) {
+            let mark = match answer.outcome {
                 AnswerOutcome::Marked(mark) => mark.to_string(),
                 AnswerOutcome::Null => "0".to_owned(),
                 _ => "–".to_owned(),
             };
-            let model = by_model.entry(&one.subject.model).or_default();
-            model.push(format!("{} {mark}", one.subject.condition()));
+            let model = by_model.entry(&answer.subject.model).or_default();
+            model.push(format!("{} {mark}", answer.subject.condition()));
         }
     }
     let models = by_model.into_iter();
@@ -183,15 +181,16 @@ fn marks(told: &[&ReportedAnswer]) -> Vec<String> {
         .collect()
 }
 
-fn lost(told: &[&ReportedAnswer]) -> bool {
+/// Whether some subject with a level has fewer points than the same model on the clean frames.
+fn lost(answers: &[&ReportedAnswer]) -> bool {
     let points = |subject: &Subject| {
-        let mut own = told.iter().filter(|one| one.subject == *subject);
-        own.find_map(|one| one.outcome.points())
+        let mut of_subject = answers.iter().filter(|answer| answer.subject == *subject);
+        of_subject.find_map(|answer| answer.outcome.points())
     };
-    told.iter().any(|one| {
-        let subject = &one.subject;
-        let lit = Subject::seeing(&subject.model, AxisLevel::L0, &subject.variant, None);
-        let pair = points(&lit).zip(one.outcome.points());
-        subject.level.is_some() && pair.is_some_and(|(lit, here)| here < lit)
+    answers.iter().any(|answer| {
+        let subject = &answer.subject;
+        let clean = Subject::seeing(&subject.model, AxisLevel::L0, &subject.variant, None);
+        let pair = points(&clean).zip(answer.outcome.points());
+        subject.level.is_some() && pair.is_some_and(|(clean, here)| here < clean)
     })
 }

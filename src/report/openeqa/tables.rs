@@ -1,4 +1,4 @@
-//! The tables of a run of open questions: [`tables`].
+//! Tables of a run of open questions: [`tables`].
 
 use super::open_report::OpenReport;
 use crate::report::ladder::{Ladder, Series, SeriesByLevel};
@@ -11,10 +11,10 @@ use crate::score::estimate::Estimate;
 use crate::score::open::{Baseline, Group, OpenCell, OpenSummary};
 use crate::score::subject::Subject;
 
-/// The section of the page with all tables.
+/// Name of the page section that has all tables.
 pub(super) const SECTION: &str = "scores";
 
-/// Every table of a run; the first is the summary.
+/// All tables of a run; the first is the summary.
 #[must_use]
 pub(crate) fn tables(report: &OpenReport<'_>) -> Vec<Table> {
     let mut tables = vec![summary(report.summary), levels(report)];
@@ -34,25 +34,25 @@ pub(crate) fn tables(report: &OpenReport<'_>) -> Vec<Table> {
     tables
 }
 
-/// The scores of a group over the levels.
+/// The scores of a group by series and level.
 pub(super) fn ladder<'a>(summary: &'a OpenSummary, group: &Group) -> Ladder<'a, OpenCell> {
     let cells = summary.cells.iter().filter(|cell| cell.group == *group);
-    Ladder::new(cells.map(|cell| (&cell.subject, cell))).with_lit()
+    Ladder::new(cells.map(|cell| (&cell.subject, cell))).with_clean()
 }
 
-/// A score, and what it differs by from the lit frames; of the unrounded means.
+/// The cell of a score with its difference from the clean frames, which is that of the unrounded means.
 fn score(summary: &OpenSummary, cell: Option<&OpenCell>) -> TableCell {
     let Some(cell) = cell else {
         return TableCell::Absent;
     };
-    let change = summary.change(&cell.subject, Baseline::Lit, &cell.group);
+    let change = summary.change(&cell.subject, Baseline::Clean, &cell.group);
     let change = change.map(|change| change.difference.value);
     TableCell::from(cell.score.map(|score| TableCell::Changed(score, change)))
 }
 
 fn summary(summary: &OpenSummary) -> Table {
-    let change = |cell: &OpenCell, against| -> Option<Estimate> {
-        let change = summary.change(&cell.subject, against, &cell.group)?;
+    let change = |cell: &OpenCell, baseline| -> Option<Estimate> {
+        let change = summary.change(&cell.subject, baseline, &cell.group)?;
         Some(change.difference)
     };
     let drop = "csv drop drop_low drop_high drop_n";
@@ -60,7 +60,7 @@ fn summary(summary: &OpenSummary) -> Table {
         .subject(|cell| &cell.subject, |variant| variant.word().to_owned())
         .column(Text, "csv by", |cell| cell.group.kind())
         .column(Text, "csv group", |cell| cell.group.name().to_owned())
-        .column(Count, "csv due", |cell| cell.due)
+        .column(Count, "csv due", |cell| cell.planned)
         .column(Count, "csv n", |cell| cell.scored())
         .column(Count, "csv missing", |cell| cell.missing)
         .column(Count, "csv unjudged", |cell| cell.unjudged)
@@ -68,19 +68,19 @@ fn summary(summary: &OpenSummary) -> Table {
         .column(Count, "csv null", |cell| cell.null)
         .column(Count, "csv cut", |cell| cell.cut)
         .column(Share, "csv value low high", |cell| cell.score)
-        .column(Points, drop, |cell| change(cell, Baseline::Lit))
+        .column(Points, drop, |cell| change(cell, Baseline::Clean))
         .column(Points, "csv gain gain_low gain_high", |cell| {
             change(cell, Baseline::Raw)
         })
         .column(Text, "csv reading", |cell| reading(&cell.subject))
-        .made()
+        .build()
 }
 
 fn levels(report: &OpenReport<'_>) -> Table {
     let summary = report.summary;
     let ladder = ladder(summary, &Group::All);
     let mut table = ladder
-        .layout("levels", |cell| score(summary, cell))
+        .table("levels", |cell| score(summary, cell))
         .page(
             SECTION,
             "Score in % ± half of the 95 % interval (difference from L0)",
@@ -89,10 +89,10 @@ fn levels(report: &OpenReport<'_>) -> Table {
             format!(
                 "{} of {}",
                 line.sum(OpenCell::scored),
-                line.sum(|cell| cell.due)
+                line.sum(|cell| cell.planned)
             )
         })
-        .made();
+        .build();
     let judge = report.judge.unwrap_or("nobody");
     let protocol = report.protocol;
     table.heading = Some(format!(
@@ -104,22 +104,23 @@ fn levels(report: &OpenReport<'_>) -> Table {
         escaped(judge),
         report.questions.len()
     ));
-    let floors = ladder.floors.iter();
-    let notes = floors.map(|(subject, cell)| {
-        let shown = texts(ColumnKind::Accuracy, &score(summary, Some(cell))).concat();
-        let (scored, due) = (cell.scored(), cell.due);
-        let of = if scored == due {
+    let without_level = ladder.without_level.iter();
+    let notes = without_level.map(|(subject, cell)| {
+        let text = texts(ColumnKind::Accuracy, &score(summary, Some(cell))).concat();
+        let (scored, planned) = (cell.scored(), cell.planned);
+        let of = if scored == planned {
             String::new()
         } else {
-            format!(" of {due}")
+            format!(" of {planned}")
         };
-        format!("{} without images: {shown}, n {scored}{of}", subject.model)
+        format!("{} without images: {text}, n {scored}{of}", subject.model)
     });
     table.notes = notes.collect();
     table
 }
 
-/// The scores of one series: a row a split or category. All of them are one table in the terminal, where blind models stand beside.
+/// The scores of one series, with a row for each split and category. In the terminal, the tables of all series are one table,
+/// with a column for models without images.
 fn by_group(
     summary: &OpenSummary,
     series: &Series<'_>,
@@ -127,45 +128,45 @@ fn by_group(
     groups: &[(&Group, Ladder<'_, OpenCell>)],
 ) -> Table {
     let rows = groups.iter().enumerate();
-    let once = |place: usize, text: &str| {
-        if place == 0 {
+    let once = |index: usize, text: &str| {
+        if index == 0 {
             text.to_owned()
         } else {
             String::new()
         }
     };
     let light = series.light();
-    let mut layout = TableBuilder::new("groups", rows)
+    let mut builder = TableBuilder::new("groups", rows)
         .page(SECTION, &format!("{}, {light}", series.model))
-        .column(Text, "terminal model", |(place, _)| {
-            once(*place, series.model)
+        .column(Text, "terminal model", |(index, _)| {
+            once(*index, series.model)
         })
-        .column(Text, "terminal light", |(place, _)| once(*place, &light))
+        .column(Text, "terminal light", |(index, _)| once(*index, &light))
         .column(
             Text,
             "terminal of | page split or category",
             |(_, (group, _))| group.name().to_owned(),
         );
     for level in &whole.levels {
-        layout = layout.column(
+        builder = builder.column(
             Accuracy,
             &*format!("terminal {level} | page {level}"),
             |(_, (_, ladder))| {
-                let steps: Option<&SeriesByLevel<'_, OpenCell>> = ladder.series.get(series);
-                let cell = steps.and_then(|steps| steps.get(level));
+                let cells: Option<&SeriesByLevel<'_, OpenCell>> = ladder.series.get(series);
+                let cell = cells.and_then(|cells| cells.get(level));
                 score(summary, cell.copied())
             },
         );
     }
-    if !whole.floors.is_empty() {
-        layout = layout.column(Accuracy, "terminal blind", |(_, (_, ladder))| {
+    if !whole.without_level.is_empty() {
+        builder = builder.column(Accuracy, "terminal blind", |(_, (_, ladder))| {
             let is_same = |(subject, _): &&(&Subject, &OpenCell)| subject.model == series.model;
-            let mut floors = ladder.floors.iter();
-            let own = floors.find(is_same).or(ladder.floors.first());
-            score(summary, own.map(|(_, cell)| *cell))
+            let mut without_level = ladder.without_level.iter();
+            let cell_of_model = without_level.find(is_same).or(ladder.without_level.first());
+            score(summary, cell_of_model.map(|(_, cell)| *cell))
         });
     }
-    let mut table = layout.made();
+    let mut table = builder.build();
     table.heading = Some(String::new());
     table
 }

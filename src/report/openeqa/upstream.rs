@@ -1,4 +1,4 @@
-//! Answers and marks as the files of `facebookresearch/open-eqa`, which its scripts read: [`files`].
+//! Answers and marks in the file format of `facebookresearch/open-eqa`, for its scripts: [`files`].
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::score::open::AnswerOutcome;
 use crate::score::subject::Subject;
 
-/// The folder of these files.
+/// Folder of these files in a run.
 const FOLDER: &str = "upstream";
 
 #[derive(Serialize)]
@@ -18,65 +18,73 @@ struct Answer<'a> {
     answer: Option<&'a str>,
 }
 
-/// For each model in each condition `NAME.json`, its answers, and where a judge has marked them `NAME-JUDGE-metrics.json`. What
-/// was not answered or not marked is left out. Where several people answered one question there is no such file, which has one
-/// answer a question.
+/// For each subject, `NAME.json` with its answers and, if there is a judge, `NAME-JUDGE-metrics.json` with its marks.
+///
+/// Missing answers and marks are left out. A subject with several answers to one question has no such files, because the format
+/// has one answer per question.
 pub(super) fn files(report: &OpenReport<'_>) -> Result<Vec<(String, Vec<u8>)>> {
     let mut by_subject = BTreeMap::<&Subject, BTreeMap<usize, Vec<&ReportedAnswer>>>::new();
-    for told in report.answers {
-        if told.outcome != AnswerOutcome::Missing {
-            let questions = by_subject.entry(&told.subject).or_default();
-            questions.entry(told.question).or_default().push(told);
+    for reported in report.answers {
+        if reported.outcome != AnswerOutcome::Missing {
+            let questions = by_subject.entry(&reported.subject).or_default();
+            questions
+                .entry(reported.question)
+                .or_default()
+                .push(reported);
         }
     }
-    let mut made = Vec::new();
+    let mut files = Vec::new();
     for (subject, questions) in by_subject {
-        let single: Option<Vec<(usize, &ReportedAnswer)>> = questions
+        let answers_by_question: Option<Vec<(usize, &ReportedAnswer)>> = questions
             .into_iter()
-            .map(|(question, told)| match &told[..] {
-                [one] => Some((question, *one)),
+            .map(|(question, reported)| match &reported[..] {
+                [single] => Some((question, *single)),
                 _ => None,
             })
             .collect();
-        let Some(single) = single else {
+        let Some(answers_by_question) = answers_by_question else {
             continue;
         };
-        let stem = safe(&format!("{}-{}", subject.model, subject.condition()));
-        let answers = single.iter().map(|(question, told)| Answer {
-            question_id: &report.questions[*question].id.0,
-            answer: told.answer.as_deref(),
-        });
+        let stem = file_name(&format!("{}-{}", subject.model, subject.condition()));
+        let answers = answers_by_question
+            .iter()
+            .map(|(question, reported)| Answer {
+                question_id: &report.questions[*question].id.0,
+                answer: reported.answer.as_deref(),
+            });
         let answers: Vec<Answer<'_>> = answers.collect();
-        made.push((format!("{FOLDER}/{stem}.json"), written(&answers)?));
+        files.push((format!("{FOLDER}/{stem}.json"), json_file(&answers)?));
         let Some(judge) = report.judge else {
             continue;
         };
-        let marks = single.iter().filter_map(|(question, told)| {
-            let mark = match told.outcome {
-                AnswerOutcome::Marked(mark) => mark,
-                // Upstream's own score of an answer that is none.
-                AnswerOutcome::Null => 0,
-                AnswerOutcome::Missing | AnswerOutcome::Unjudged | AnswerOutcome::Unmarked => {
-                    return None;
-                }
-            };
-            Some((&*report.questions[*question].id.0, mark))
-        });
+        let marks = answers_by_question
+            .iter()
+            .filter_map(|(question, reported)| {
+                let mark = match reported.outcome {
+                    AnswerOutcome::Marked(mark) => mark,
+                    // Upstream's score of a null answer.
+                    AnswerOutcome::Null => 0,
+                    AnswerOutcome::Missing | AnswerOutcome::Unjudged | AnswerOutcome::Unmarked => {
+                        return None;
+                    }
+                };
+                Some((&*report.questions[*question].id.0, mark))
+            });
         let marks: serde_json::Map<String, serde_json::Value> = marks
             .map(|(id, mark)| (id.to_owned(), mark.into()))
             .collect();
-        let name = format!("{FOLDER}/{stem}-{}-metrics.json", safe(judge));
-        made.push((name, written(&marks)?));
+        let name = format!("{FOLDER}/{stem}-{}-metrics.json", file_name(judge));
+        files.push((name, json_file(&marks)?));
     }
-    Ok(made)
+    Ok(files)
 }
 
-/// A name for a file.
-fn safe(name: &str) -> String {
+/// A name without characters that are unsafe in file names.
+fn file_name(name: &str) -> String {
     name.replace(|c: char| !(c.is_alphanumeric() || "-_.+".contains(c)), "_")
 }
 
-fn written(value: &impl Serialize) -> Result<Vec<u8>> {
+fn json_file(value: &impl Serialize) -> Result<Vec<u8>> {
     let mut text = serde_json::to_vec_pretty(value).map_err(|e| Error::data(FOLDER, e))?;
     text.push(b'\n');
     Ok(text)

@@ -1,4 +1,4 @@
-//! The items as the page's script reads them: [`packed`], compressed JSON in base64.
+//! The items as the page's script reads them, as compressed JSON in base64: [`packed`].
 
 use std::collections::{BTreeMap, HashMap};
 use std::io::Write;
@@ -10,22 +10,22 @@ use flate2::write::GzEncoder;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::shown::PageInputs;
+use super::inputs::PageInputs;
 use crate::error::{Error, Result};
 use crate::score::choice::ReadingMode;
 use crate::score::findings::Findings;
 use crate::score::grid::{Grid, TrialResult};
 use crate::types::{AxisLevel, FrameId, QuestionId, RunQuestion, Thumbnail, UnreadReason, View};
 
-/// The codes of marks beside the indices of choices.
+/// Codes of results that are not the index of a choice.
 const UNREAD: u8 = 26;
 const FAILED: u8 = 27;
 const ABSENT: u8 = 28;
 
-/// The longest reply on the page, in characters; shorter where all of them together are too long.
-const LONGEST: [usize; 5] = [20_000, 2_000, 400, 100, 30];
-/// How many bytes of different replies, and how many of small copies, are packed: the first that fit are taken.
-const ROOM: [SizeLimit; 3] = [
+/// Maximum length of a reply on the page, in characters. The first value with which all replies fit is used.
+const MAX_REPLY_CHARS: [usize; 5] = [20_000, 2_000, 400, 100, 30];
+/// Size limits, tried in order until the packed items fit into [`MAX_PACKED_BYTES`].
+const SIZE_LIMITS: [SizeLimit; 3] = [
     SizeLimit {
         text: 12_000_000,
         pictures: 8_500_000,
@@ -39,13 +39,15 @@ const ROOM: [SizeLimit; 3] = [
         pictures: 1_000_000,
     },
 ];
-/// The most bytes that the items may take of the page, which is to stay under 15 MB.
-const MOST_PACKED: usize = 13_500_000;
+/// Maximum size of the packed items in bytes, so that the page stays under 15 MB.
+const MAX_PACKED_BYTES: usize = 13_500_000;
 
-/// Room for what can be left out of a page.
+/// Maximum sizes of the parts that can be shortened.
 #[derive(Debug, Clone, Copy)]
 struct SizeLimit {
+    /// Bytes of all different replies.
     text: usize,
+    /// Bytes of all thumbnails.
     pictures: usize,
 }
 
@@ -74,7 +76,7 @@ struct Subject<'a> {
     name: String,
     model: &'a str,
     condition: String,
-    /// What the levels of one line have in common.
+    /// Variant and enhancer in words, or `blind`.
     light: String,
     level: Option<AxisLevel>,
     variant: String,
@@ -92,7 +94,7 @@ struct Question<'a> {
 
 #[derive(Serialize)]
 struct Item {
-    /// The question's name; with the order and turn where it was asked more than once.
+    /// Id of the question; from its second item on with a number: `id#2`.
     name: String,
     question: usize,
     choices: usize,
@@ -114,37 +116,37 @@ struct Picture<'a> {
     stops: f32,
 }
 
-/// A list without repetition, and the place of each of its entries.
+/// A list without repetition, and the index of each entry.
 struct Distinct<T> {
     list: Vec<T>,
-    places: HashMap<T, usize>,
+    indices: HashMap<T, usize>,
 }
 
 impl<T: Copy + Eq + std::hash::Hash> Distinct<T> {
     fn new() -> Self {
         Self {
             list: Vec::new(),
-            places: HashMap::new(),
+            indices: HashMap::new(),
         }
     }
 
-    fn place(&mut self, entry: T) -> usize {
-        *self.places.entry(entry).or_insert_with(|| {
+    fn index_of(&mut self, entry: T) -> usize {
+        *self.indices.entry(entry).or_insert_with(|| {
             self.list.push(entry);
             self.list.len() - 1
         })
     }
 }
 
-/// Everything that the script shows, packed.
+/// Everything that the script shows, as compressed JSON in base64.
 ///
 /// # Errors
-/// Where it cannot be written.
-pub(super) fn packed<'a>(findings: &'a Findings<'a>, shown: &PageInputs<'a>) -> Result<String> {
+/// If the data cannot be written.
+pub(super) fn packed<'a>(findings: &'a Findings<'a>, inputs: &PageInputs<'a>) -> Result<String> {
     let mut packed = String::new();
-    for room in ROOM {
-        packed = pack(&data(findings, shown, room))?;
-        if packed.len() <= MOST_PACKED {
+    for limit in SIZE_LIMITS {
+        packed = pack(&data(findings, inputs, limit))?;
+        if packed.len() <= MAX_PACKED_BYTES {
             break;
         }
     }
@@ -160,58 +162,58 @@ fn pack(data: &PageData<'_>) -> Result<String> {
     Ok(STANDARD.encode(bytes))
 }
 
-fn data<'a>(findings: &'a Findings<'a>, shown: &PageInputs<'a>, room: SizeLimit) -> PageData<'a> {
+fn data<'a>(findings: &'a Findings<'a>, inputs: &PageInputs<'a>, limit: SizeLimit) -> PageData<'a> {
     let grid = &findings.grid;
-    let listed: HashMap<&QuestionId, &RunQuestion> = shown
+    let run_questions: HashMap<&QuestionId, &RunQuestion> = inputs
         .questions
         .iter()
         .map(|question| (&question.id, question))
         .collect();
     let (mut frames, mut families) = (Distinct::new(), Distinct::new());
-    let (mut asked, mut choices) = (Distinct::new(), Distinct::new());
+    let (mut question_ids, mut choices) = (Distinct::new(), Distinct::new());
     let mut questions = Vec::new();
     let mut items = Vec::new();
     let mut times = HashMap::<&QuestionId, usize>::new();
     for item in &grid.items {
         let record = item.record;
-        let number = asked.place(&record.question);
+        let number = question_ids.index_of(&record.question);
         if number == questions.len() {
-            let listed = listed.get(&record.question);
+            let run_question = run_questions.get(&record.question);
             questions.push(Question {
                 id: &record.question.0,
-                frame: frames.place(&*record.detail.frame.0),
-                family: families.place(record.detail.family.name()),
-                text: listed.map_or("", |listed| &listed.text),
-                evidence: listed
-                    .map(|listed| &listed.evidence)
+                frame: frames.index_of(&*record.detail.frame.0),
+                family: families.index_of(record.detail.family.name()),
+                text: run_question.map_or("", |run_question| &run_question.text),
+                evidence: run_question
+                    .map(|run_question| &run_question.evidence)
                     .filter(|e| !e.is_null()),
             });
         }
-        let turn = times.entry(&record.question).or_default();
-        *turn += 1;
+        let time = times.entry(&record.question).or_default();
+        *time += 1;
         items.push(Item {
-            name: match turn {
+            name: match time {
                 1 => record.question.to_string(),
-                turn => format!("{}#{turn}", record.question),
+                time => format!("{}#{time}", record.question),
             },
             question: number,
-            choices: choices.place(record.detail.choices.as_slice()),
+            choices: choices.index_of(record.detail.choices.as_slice()),
             truth: record.detail.truth,
         });
     }
-    let (texts, replies) = replies(grid, room.text);
+    let (texts, replies) = replies(grid, limit.text);
     let marks = |mode| {
         let of =
-            |subject| (0..grid.items.len()).map(move |item| code(grid.mark(subject, item), mode));
+            |subject| (0..grid.items.len()).map(move |item| code(grid.result(subject, item), mode));
         (0..grid.subjects.len())
             .map(|subject| of(subject).collect())
             .collect()
     };
     let (reasons, why) = reasons(grid);
     PageData {
-        runs: shown.runs.iter().map(|run| run.name.clone()).collect(),
+        runs: inputs.runs.iter().map(|run| run.name.clone()).collect(),
         drops: drops(grid),
-        thumbnails: thumbnails(shown.thumbnails, &frames.places, room.pictures),
+        thumbnails: thumbnails(inputs.thumbnails, &frames.indices, limit.pictures),
         families: families.list,
         frames: frames.list,
         subjects: subjects(grid),
@@ -228,7 +230,7 @@ fn data<'a>(findings: &'a Findings<'a>, shown: &PageInputs<'a>, room: SizeLimit)
     }
 }
 
-/// The severity of each level that stands in the grid, by its name.
+/// Severity of each level of the grid, by the level's name.
 fn drops(grid: &Grid<'_>) -> BTreeMap<String, f64> {
     let levels = grid.subjects.iter().filter_map(|subject| subject.level);
     levels
@@ -236,11 +238,11 @@ fn drops(grid: &Grid<'_>) -> BTreeMap<String, f64> {
         .collect()
 }
 
-fn code(mark: TrialResult, mode: ReadingMode) -> u8 {
-    match mark {
+fn code(result: TrialResult, mode: ReadingMode) -> u8 {
+    match result {
         TrialResult::Absent => ABSENT,
         TrialResult::Failed => FAILED,
-        TrialResult::Read { .. } => mark.reading(mode).flatten().unwrap_or(UNREAD),
+        TrialResult::Read { .. } => result.reading(mode).flatten().unwrap_or(UNREAD),
     }
 }
 
@@ -263,47 +265,49 @@ fn subjects<'a>(grid: &'a Grid<'_>) -> Vec<Subject<'a>> {
     grid.subjects.iter().map(subject).collect()
 }
 
-/// The reasons for which replies are unread, with none first, and the place of each mark's.
+/// The different reasons for unreadable replies, with `None` first, and for each subject and item the index of its reason.
 fn reasons(grid: &Grid<'_>) -> (Vec<Value>, Vec<Vec<usize>>) {
     let mut reasons: Distinct<Option<UnreadReason>> = Distinct::new();
-    reasons.place(None);
-    let mut places = Vec::new();
+    reasons.index_of(None);
+    let mut indices = Vec::new();
     for subject in 0..grid.subjects.len() {
         let why = (0..grid.items.len()).map(|item| {
             let record = grid.record(subject, item);
-            reasons.place(record.and_then(|record| record.detail.strict?.why))
+            reasons.index_of(record.and_then(|record| record.detail.strict?.why))
         });
-        places.push(why.collect());
+        indices.push(why.collect());
     }
     let named = reasons.list.iter().map(|why| serde_json::json!(why));
-    (named.collect(), places)
+    (named.collect(), indices)
 }
 
-/// The different replies, cut where they are too long for a page, and the place of each mark's.
-fn replies(grid: &Grid<'_>, room: usize) -> (Vec<String>, Vec<Vec<usize>>) {
+/// The different replies, cut if they are too long, and for each subject and item the index of its reply.
+///
+/// Refusals and failure messages take the place of a reply.
+fn replies(grid: &Grid<'_>, limit: usize) -> (Vec<String>, Vec<Vec<usize>>) {
     let mut texts: Distinct<&str> = Distinct::new();
-    texts.place("");
-    let mut places = Vec::new();
+    texts.index_of("");
+    let mut indices = Vec::new();
     for subject in 0..grid.subjects.len() {
-        let said = (0..grid.items.len()).map(|item| {
+        let of_subject = (0..grid.items.len()).map(|item| {
             let Some(record) = grid.record(subject, item) else {
                 return 0;
             };
             let failure = || record.failure.as_ref().map(|failure| &*failure.message);
             let text = record.reply.as_deref().filter(|text| !text.is_empty());
             let text = text.or(record.refusal.as_deref()).or_else(failure);
-            texts.place(text.unwrap_or_default())
+            texts.index_of(text.unwrap_or_default())
         });
-        places.push(said.collect());
+        indices.push(of_subject.collect());
     }
     let fits = |longest: &&usize| {
         let lengths = texts.list.iter().map(|text| text.len().min(**longest));
-        lengths.sum::<usize>() <= room
+        lengths.sum::<usize>() <= limit
     };
-    let longest = LONGEST
+    let longest = MAX_REPLY_CHARS
         .iter()
         .find(fits)
-        .unwrap_or(&LONGEST[LONGEST.len() - 1]);
+        .unwrap_or(&MAX_REPLY_CHARS[MAX_REPLY_CHARS.len() - 1]);
     let cut = |text: &&str| match text.char_indices().nth(*longest) {
         None => (*text).to_owned(),
         Some((end, _)) => {
@@ -314,7 +318,7 @@ fn replies(grid: &Grid<'_>, room: usize) -> (Vec<String>, Vec<Vec<usize>>) {
             )
         }
     };
-    (texts.list.iter().map(cut).collect(), places)
+    (texts.list.iter().map(cut).collect(), indices)
 }
 
 fn confusions<'a>(findings: &'a Findings<'_>) -> Vec<Confusion<'a>> {
@@ -330,11 +334,11 @@ fn confusions<'a>(findings: &'a Findings<'_>) -> Vec<Confusion<'a>> {
     named.collect()
 }
 
-/// The small copies of as many frames as there is room for, by the number of each.
+/// Thumbnails of as many frames as the size limit allows, by the index of the frame.
 fn thumbnails<'a>(
     all: &'a [Thumbnail],
     numbers: &HashMap<&str, usize>,
-    mut room: usize,
+    mut bytes_left: usize,
 ) -> BTreeMap<usize, BTreeMap<String, Picture<'a>>> {
     let mut by_frame = BTreeMap::<&FrameId, Vec<&Thumbnail>>::new();
     for thumbnail in all {
@@ -343,7 +347,7 @@ fn thumbnails<'a>(
             .or_default()
             .push(thumbnail);
     }
-    let mut kept = BTreeMap::new();
+    let mut by_number = BTreeMap::new();
     for (frame, thumbnails) in by_frame {
         let size: usize = thumbnails
             .iter()
@@ -352,10 +356,10 @@ fn thumbnails<'a>(
         let Some(number) = numbers.get(&*frame.0) else {
             continue;
         };
-        if size > room {
+        if size > bytes_left {
             break;
         }
-        room -= size;
+        bytes_left -= size;
         let pictures = thumbnails.into_iter().map(|t| {
             let picture = Picture {
                 small: &t.small,
@@ -364,7 +368,7 @@ fn thumbnails<'a>(
             };
             (t.condition.to_string(), picture)
         });
-        kept.insert(*number, pictures.collect());
+        by_number.insert(*number, pictures.collect());
     }
-    kept
+    by_number
 }

@@ -1,15 +1,15 @@
-//! The one HTML file that people open first: [`page`].
+//! The HTML page of an evaluation: [`page`].
 //!
-//! All numbers and figures are in it as text and SVG, so that it reads and prints without a script; the items, with their
-//! small images, are packed data that its script unfolds. It opens without a network, and its policy allows none.
+//! All numbers and figures are text and SVG, so that the page can be read and printed without scripts. The items, with their
+//! thumbnails, are packed data that its script reads. The page needs no network, and its content security policy allows none.
 
+mod inputs;
 mod items;
 mod sections;
-mod shown;
 pub(super) mod tables;
 
-pub use shown::PageInputs;
-pub(crate) use shown::PageRun;
+pub use inputs::PageInputs;
+pub(crate) use inputs::PageRun;
 
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -22,72 +22,72 @@ use crate::score::findings::Findings;
 use crate::types::Record;
 use crate::types::manifest::{RunManifest, Status};
 
-/// The parts of the page.
+/// The template of the page, its style and its script.
 const PAGE: &str = include_str!("page.html");
 pub(super) const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
 
-/// What the template is filled with. It is no JSON on the way: the cells of a large run are a hundred thousand.
+/// The values of the template. They are not converted to JSON first, because a large run has 100,000 cells.
 #[derive(Serialize)]
 struct Page<'a> {
     title: String,
-    /// What must be read before any number.
+    /// Warnings at the top of the page.
     alerts: Vec<String>,
     intro: Vec<String>,
     sections: Vec<sections::PageSection<'a>>,
     runs: Vec<Value>,
-    /// The items, packed.
+    /// The items, as compressed JSON in base64.
     data: String,
     css: &'static str,
     script: &'static str,
 }
 
-/// The page.
+/// The page as HTML.
 ///
 /// # Errors
-/// Where a figure cannot be drawn.
+/// If the items cannot be written or the template cannot be filled.
 pub(crate) fn page<'a>(
     findings: &'a Findings<'a>,
     tables: &[Table],
     figures: &[Figure],
-    shown: &PageInputs<'a>,
+    inputs: &PageInputs<'a>,
 ) -> Result<String> {
     filled(
         PAGE,
         Page {
-            title: title(shown),
-            alerts: alerts(shown),
+            title: title(inputs),
+            alerts: alerts(inputs),
             intro: intro(findings),
-            sections: sections::sections(tables, figures, shown.thumbnails),
-            runs: shown.runs.iter().map(facts).collect(),
-            data: items::packed(findings, shown)?,
+            sections: sections::sections(tables, figures, inputs.thumbnails),
+            runs: inputs.runs.iter().map(facts).collect(),
+            data: items::packed(findings, inputs)?,
             css: STYLE,
             script: SCRIPT,
         },
     )
 }
 
-fn title(shown: &PageInputs<'_>) -> String {
-    match &*shown.runs {
+fn title(inputs: &PageInputs<'_>) -> String {
+    match &*inputs.runs {
         [one] => format!("Seeing in the dark: {}", one.name),
         several => format!("Seeing in the dark: {} runs compared", several.len()),
     }
 }
 
-/// What must be read before any number: which run is not whole.
-fn alerts(shown: &PageInputs<'_>) -> Vec<String> {
-    let broken = shown
+/// Warnings at the top of the page: runs that are incomplete or have failed trials.
+fn alerts(inputs: &PageInputs<'_>) -> Vec<String> {
+    let incomplete = inputs
         .runs
         .iter()
         .filter(|run| run.manifest.status != Status::Complete || run.manifest.counts.failed > 0);
-    let told = broken.map(|run| {
+    let alerts = incomplete.map(|run| {
         let (status, counts) = (run.manifest.status, run.manifest.counts);
         format!(
             "{}: {status}; {} of {} trials answered, {} failed. Failed trials are not scored; the same command asks them again.",
             run.name, counts.answered, counts.trials, counts.failed
         )
     });
-    told.collect()
+    alerts.collect()
 }
 
 fn intro(findings: &Findings<'_>) -> Vec<String> {
@@ -111,13 +111,13 @@ fn intro(findings: &Findings<'_>) -> Vec<String> {
 fn facts(run: &PageRun<'_>) -> Value {
     let manifest = run.manifest;
     let mut rows = about(manifest);
-    rows.extend(spent(run.records));
+    rows.extend(usage(run.records));
     rows.extend(run.cost.iter().map(|cost| fact("cost", cost.clone())));
     rows.extend(settings(manifest));
     json!({"name": run.name, "rows": rows})
 }
 
-/// What a manifest says, as rows of names and values.
+/// The facts of a manifest, as rows of names and values.
 pub(super) fn manifest_facts(manifest: &RunManifest) -> Vec<(String, String)> {
     [about(manifest), settings(manifest)].concat()
 }
@@ -151,8 +151,8 @@ fn about(manifest: &RunManifest) -> Vec<(String, String)> {
     ]
 }
 
-/// What the replies took: requests, tokens, bytes, time, and who answered.
-fn spent(records: &[Record]) -> Vec<(String, String)> {
+/// Totals over the records: requests, tokens, bytes, latency, and the models that the servers named.
+fn usage(records: &[Record]) -> Vec<(String, String)> {
     let requests: u64 = records
         .iter()
         .map(|record| u64::from(record.attempts))

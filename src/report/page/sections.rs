@@ -1,4 +1,4 @@
-//! The sections of the page before the items: [`sections`].
+//! Sections of the page before the items: [`sections`].
 
 use serde::Serialize;
 
@@ -20,26 +20,30 @@ pub(super) struct PageSection<'a> {
     tables: Vec<tables::PageTable<'a>>,
 }
 
-/// All sections that the records have something for.
+/// All sections that have a table, a figure or samples.
 pub(super) fn sections<'a>(
     tables: &'a [Table],
     figures: &'a [Figure],
     thumbnails: &[Thumbnail],
 ) -> Vec<PageSection<'a>> {
-    let sections = SECTIONS.iter().filter_map(|&(id, title, note, drawn)| {
-        let figures = figures.iter().filter(|figure| drawn.contains(&figure.name));
-        let figures: Vec<&Figure> = figures.collect();
-        let samples = samples(thumbnails).filter(|_| id == ENHANCERS);
-        let tables = tables::shown(tables, id);
-        let is_there = !tables.is_empty() || !figures.is_empty() || samples.is_some();
-        is_there.then_some(PageSection {
-            id,
-            title,
-            note,
-            figures,
-            samples,
-            tables,
-        })
-    });
+    let sections = SECTIONS
+        .iter()
+        .filter_map(|&(id, title, note, figure_names)| {
+            let figures = figures
+                .iter()
+                .filter(|figure| figure_names.contains(&figure.name));
+            let figures: Vec<&Figure> = figures.collect();
+            let samples = samples(thumbnails).filter(|_| id == ENHANCERS);
+            let tables = tables::page_tables(tables, id);
+            let has_content = !tables.is_empty() || !figures.is_empty() || samples.is_some();
+            has_content.then_some(PageSection {
+                id,
+                title,
+                note,
+                figures,
+                samples,
+                tables,
+            })
+        });
     sections.collect()
 }

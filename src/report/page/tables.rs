@@ -1,18 +1,18 @@
-//! Tables on a page: [`shown`].
+//! Tables as a page shows them: [`page_tables`].
 
 use serde::Serialize;
 
 use crate::report::table::{ColumnKind, Table, TableCell, TableFormat};
 use crate::report::words::words;
 
-/// The most rows that are shown without being asked for.
-const MOST: usize = 60;
+/// Maximum number of rows of a table that is not folded.
+const MAX_OPEN_ROWS: usize = 60;
 
 /// A table as the template reads it.
 #[derive(Serialize)]
 pub(in crate::report) struct PageTable<'a> {
     caption: &'a str,
-    /// Whether it is shown when it is asked for.
+    /// Whether the table is closed until the reader opens it.
     folded: bool,
     head: Vec<&'a str>,
     rows: Vec<Vec<PageCell>>,
@@ -25,9 +25,9 @@ struct PageCell {
 }
 
 /// The tables of a section that have a row.
-pub(in crate::report) fn shown<'a>(tables: &'a [Table], section: &str) -> Vec<PageTable<'a>> {
-    let here = tables.iter().filter(|table| table.section == section);
-    let shown = here.map(|table| {
+pub(in crate::report) fn page_tables<'a>(tables: &'a [Table], section: &str) -> Vec<PageTable<'a>> {
+    let in_section = tables.iter().filter(|table| table.section == section);
+    let tables = in_section.map(|table| {
         let head = table.columns.iter();
         let rows = table.rows_in(TableFormat::Page).map(|row| {
             let cells = table.cells(row);
@@ -39,20 +39,20 @@ pub(in crate::report) fn shown<'a>(tables: &'a [Table], section: &str) -> Vec<Pa
         let rows: Vec<Vec<PageCell>> = rows.collect();
         PageTable {
             caption: &table.caption,
-            folded: table.is_folded || rows.len() > MOST,
+            folded: table.is_folded || rows.len() > MAX_OPEN_ROWS,
             head: head
                 .filter_map(|column| column.heads.page.as_deref())
                 .collect(),
             rows,
         }
     });
-    shown.filter(|table| !table.rows.is_empty()).collect()
+    tables.filter(|table| !table.rows.is_empty()).collect()
 }
 
 fn text(kind: ColumnKind, cell: &TableCell) -> PageCell {
     let class = match (kind, cell) {
         (_, TableCell::Below(_)) => "below",
-        (_, TableCell::Significance(verdict)) => verdict.word(),
+        (_, TableCell::Significance(significance)) => significance.word(),
         (ColumnKind::Failures, TableCell::Count(1..)) => "worse",
         (ColumnKind::Text, _) => "text",
         _ => "",

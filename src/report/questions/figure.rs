@@ -1,4 +1,4 @@
-//! The figure of a set of questions, as SVG: [`figure`].
+//! Bar charts of a set of questions, as SVG: [`figure`].
 
 use std::collections::BTreeMap;
 
@@ -9,26 +9,26 @@ use crate::error::{Error, Result};
 use crate::questions::summary::QuestionSummary;
 use crate::types::Family;
 
-/// The most bars of a panel.
-const MOST: usize = 24;
-/// The height of a bar with the space around it, in pixels.
-const BAR: i32 = 20;
-/// The width of the figure, in pixels.
+/// Maximum number of bars in a panel.
+const MAX_BARS: usize = 24;
+/// Height of a bar with the space around it, in pixels.
+const BAR_HEIGHT: i32 = 20;
+/// Width of the figure in pixels.
 const WIDTH: i32 = 1100;
 
-/// One panel: bars by name.
+/// A panel of named bars.
 struct BarPanel {
     title: String,
     bars: Vec<(String, u64)>,
 }
 
 impl BarPanel {
-    /// The largest first, those beyond [`MOST`] together.
+    /// A panel with the largest bars first. If there are more than [`MAX_BARS`], the smallest share one bar.
     fn ranked(title: &str, counts: impl Iterator<Item = (String, u64)>) -> Self {
         let mut bars: Vec<(String, u64)> = counts.filter(|(_, count)| *count > 0).collect();
         bars.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
-        if bars.len() > MOST {
-            let rest = bars.split_off(MOST - 1);
+        if bars.len() > MAX_BARS {
+            let rest = bars.split_off(MAX_BARS - 1);
             bars.push((
                 format!("{} others", rest.len()),
                 rest.iter().map(|(_, count)| count).sum(),
@@ -40,20 +40,21 @@ impl BarPanel {
         }
     }
 
-    /// At least one, which says that there are none; at most [`MOST`].
+    /// Number of rows: the bars, or one row that says "none".
     fn rows(&self) -> i32 {
         i32::try_from(self.bars.len()).unwrap_or(i32::MAX).max(1)
     }
 
     fn height(&self) -> i32 {
-        60 + BAR * self.rows()
+        60 + BAR_HEIGHT * self.rows()
     }
 }
 
-/// Questions by family, answers, rooms and classes (by pixels, segments and questions), as bars with their counts and shares.
+/// Bars with counts and shares: questions by family, frames by room, answers by family, and classes by questions, segments
+/// and pixels.
 ///
 /// # Errors
-/// Where the figure cannot be drawn.
+/// If the figure cannot be drawn.
 pub(crate) fn figure(summary: &QuestionSummary) -> Result<String> {
     let panels = panels(summary);
     // Two columns, each panel in the shorter one.
@@ -69,7 +70,7 @@ pub(crate) fn figure(summary: &QuestionSummary) -> Result<String> {
         .map(|(height, _)| *height)
         .max()
         .unwrap_or(0)
-        .max(BAR);
+        .max(BAR_HEIGHT);
     let mut svg = String::new();
     {
         let root =
@@ -145,7 +146,7 @@ fn bars<'a>(
     const NAMES: i32 = 190;
     const LONGEST: f64 = 220.0;
     let total: u64 = panel.bars.iter().map(|(_, count)| count).sum();
-    let most = panel
+    let highest = panel
         .bars
         .iter()
         .map(|(_, count)| *count)
@@ -160,8 +161,8 @@ fn bars<'a>(
     ))?;
     let small = ("sans-serif", 13).into_font();
     for (i, (name, count)) in (0..).zip(&panel.bars) {
-        let y = top + 40 + i * BAR;
-        let length = (*count as f64 / most as f64 * LONGEST).round() as i32;
+        let y = top + 40 + i * BAR_HEIGHT;
+        let length = (*count as f64 / highest as f64 * LONGEST).round() as i32;
         let bar = [(left + NAMES, y), (left + NAMES + length.max(1), y + 14)];
         root.draw(&Rectangle::new(bar, RGBColor(70, 110, 160).filled()))?;
         root.draw(&Text::new(name.clone(), (left + 12, y + 1), small.clone()))?;

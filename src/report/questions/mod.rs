@@ -1,4 +1,4 @@
-//! What a set of questions is like: a table, a file of all counts, and a figure.
+//! Statistics of a set of questions: a table, files of all counts, and a figure.
 
 pub(crate) mod figure;
 pub(crate) mod review;
@@ -7,15 +7,16 @@ use std::fmt::{Display, Write as _};
 
 use super::table::ColumnKind::{Count, Text};
 use super::table::TableBuilder;
+use super::words::counted;
 use super::{csv as files, terminal};
 use crate::error::{Error, Result};
 use crate::questions::summary::{Baselines, CandidateCounts, QuestionSummary};
 use crate::types::Family;
 
-/// How many reasons a line of the table names.
+/// Maximum number of reasons in a line of the table.
 const REASONS: usize = 3;
 
-/// The table at the end: questions by family with what came of their candidates and what not looking would score.
+/// The table for the terminal: questions by family, with their candidates and with the scores of answering without images.
 #[must_use]
 pub(crate) fn table(summary: &QuestionSummary) -> String {
     let families = Family::PAPER.iter().filter_map(|family| {
@@ -36,7 +37,7 @@ pub(crate) fn table(summary: &QuestionSummary) -> String {
     let table = TableBuilder::new("questions", rows)
         .column(Text, "terminal family", |(family, _)| *family)
         .column(Count, "terminal questions", |(_, candidates)| {
-            candidates.map_or(summary.questions, |own| own.asked as usize)
+            candidates.map_or(summary.questions, |counts| counts.asked as usize)
         })
         .column(Count, "terminal chance %", |(family, _)| {
             share(family, |base| base.chance)
@@ -48,40 +49,42 @@ pub(crate) fn table(summary: &QuestionSummary) -> String {
             share(family, |base| base.prior)
         })
         .column(Count, "terminal candidates that hold", |(_, candidates)| {
-            candidates.map_or(String::new(), |own| own.viable.to_string())
+            candidates.map_or(String::new(), |counts| counts.viable.to_string())
         })
         .column(Text, "terminal why others do not", |(_, candidates)| {
             candidates.map_or(String::new(), reasons)
         })
-        .made();
+        .build();
     let mut text = terminal::table(&[table]);
     notes(summary, &mut text);
     text
 }
 
-/// Why most of the other candidates do not hold.
+/// The most frequent reasons for rejected candidates, with counts.
 fn reasons(candidates: &CandidateCounts) -> String {
-    let fallen = candidates.fallen.iter();
-    let mut fallen: Vec<(String, u64)> = fallen
-        .map(|(reason, count)| (word(reason), *count))
+    let rejected = candidates.fallen.iter();
+    let mut rejected: Vec<(String, u64)> = rejected
+        .map(|(reason, count)| (variant_words(reason), *count))
         .collect();
-    fallen.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
-    let reasons = fallen.iter().take(REASONS);
+    rejected.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
+    let reasons = rejected.iter().take(REASONS);
     let reasons: Vec<String> = reasons
         .map(|(reason, count)| format!("{reason} {count}"))
         .collect();
     reasons.join(", ")
 }
 
-/// The lines below the table.
+/// Appends the notes below the table.
 fn notes(summary: &QuestionSummary, text: &mut String) {
     let mut note = |line: String| {
-        // Writing to a text cannot fail.
+        // Writing to a string cannot fail.
         let _ = writeln!(text, "{line}");
     };
     note(format!(
-        "{} questions about {} frames of {} scenes; prior: the commonest answer to the same words in other scenes",
-        summary.questions, summary.frames, summary.scenes
+        "{} about {} of {}; prior: the commonest answer to the same words in other scenes",
+        counted(summary.questions, "question"),
+        counted(summary.frames, "frame"),
+        counted(summary.scenes, "scene")
     ));
     let sum = |count: fn(&CandidateCounts) -> u64| -> u64 {
         summary.candidates.values().map(count).sum()
@@ -99,30 +102,33 @@ fn notes(summary: &QuestionSummary, text: &mut String) {
     let [both, same] = summary.room_agreement;
     if both > 0 {
         note(format!(
-            "rooms: {same} of {both} that are seen and stated agree"
+            "rooms: {same} of {both} that are both seen and stated agree"
         ));
     }
     if summary.dark > 0 {
-        note(format!("{} frames are too dark to ask about", summary.dark));
+        note(format!(
+            "too dark to ask about: {}",
+            counted(summary.dark, "frame")
+        ));
     }
     if summary.failed > 0 {
         note(format!(
-            "{} frames could not be measured, and have no questions",
-            summary.failed
+            "no questions, because measuring failed: {}",
+            counted(summary.failed, "frame")
         ));
     }
     if !summary.unknown.is_empty() {
         let ids: Vec<String> = summary.unknown.keys().take(8).map(u16::to_string).collect();
         note(format!(
-            "numbers that classes.json does not have were taken as unlabelled: {} of them, as {} (--strict refuses them)",
-            summary.unknown.len(),
+            "{} not in classes.json and read as unlabelled, for example {} (--strict makes this an error)",
+            counted(summary.unknown.len(), "number"),
             ids.join(", ")
         ));
     }
 }
 
-/// A unit variant in the words of its file.
-fn word<T: serde::Serialize>(value: &T) -> String {
+/// The serialised name of a unit variant, with spaces.
+fn variant_words<T: serde::Serialize>(value: &T) -> String {
     let json = serde_json::to_value(value).unwrap_or_default();
     json.as_str().unwrap_or_default().replace('_', " ")
 }
@@ -130,7 +136,7 @@ fn word<T: serde::Serialize>(value: &T) -> String {
 /// The summary as JSON.
 ///
 /// # Errors
-/// Where it cannot be written as such.
+/// If the statistics cannot be written.
 pub(crate) fn json(summary: &QuestionSummary) -> Result<String> {
     let text = serde_json::to_string_pretty(summary).map_err(|e| Error::data("statistics", e))?;
     Ok(text + "\n")
@@ -139,7 +145,7 @@ pub(crate) fn json(summary: &QuestionSummary) -> Result<String> {
 /// All counts as CSV: `table, row, column, count`.
 ///
 /// # Errors
-/// Where it cannot be written as such.
+/// If the statistics cannot be written.
 pub(crate) fn csv(summary: &QuestionSummary) -> Result<Vec<u8>> {
     let mut rows: Vec<[String; 4]> = Vec::new();
     let mut row = |table: &str, row: &dyn Display, column: &str, count: &dyn Display| {
@@ -163,7 +169,7 @@ pub(crate) fn csv(summary: &QuestionSummary) -> Result<Vec<u8>> {
         row("candidates", &name, "rejected", &candidates.rejected);
         row("candidates", &name, "unbalanced", &candidates.unbalanced);
         for (reason, count) in &candidates.fallen {
-            row("fallen", &name, &word(reason), count);
+            row("fallen", &name, &variant_words(reason), count);
         }
     }
     for (questions, frames) in &summary.per_frame {
@@ -210,6 +216,6 @@ pub(crate) fn csv(summary: &QuestionSummary) -> Result<Vec<u8>> {
         .column(Text, "csv row", |[_, row, ..]| row.clone())
         .column(Text, "csv column", |[.., column, _]| column.clone())
         .column(Count, "csv count", |[.., count]| count.clone())
-        .made();
+        .build();
     files::csv(&[table])
 }

@@ -7,10 +7,10 @@ use crate::questions::GeneratedQuestion;
 use crate::report::script::embedded;
 use crate::types::Digest;
 
-/// The page, with a place for the questions.
+/// The template of the page.
 const PAGE: &str = include_str!("review.html");
-/// The place.
-const PLACE: &str = "/*QUESTIONS*/null";
+/// The text in the template that the questions replace.
+const PLACEHOLDER: &str = "/*QUESTIONS*/null";
 
 /// A question as the page shows it.
 #[derive(Debug, Serialize)]
@@ -22,24 +22,24 @@ pub(crate) struct ReviewItem<'a> {
     choices: &'a [String],
     answer: &'a str,
     evidence: &'a serde_json::Value,
-    /// Where the image is, from the page.
+    /// Path of the image relative to the page.
     image: String,
-    /// Width and height of the image.
+    /// Size of the image in pixels: width, height.
     size: [usize; 2],
 }
 
 impl<'a> ReviewItem<'a> {
-    /// A question about an image at this place, of this size.
+    /// A question about the image at path `image`; `size` is its width and height in pixels.
     #[must_use]
-    pub(crate) fn new(asked: &'a GeneratedQuestion, image: String, size: [usize; 2]) -> Self {
-        let question = &asked.question;
+    pub(crate) fn new(generated: &'a GeneratedQuestion, image: String, size: [usize; 2]) -> Self {
+        let question = &generated.question;
         Self {
             id: &question.id.0,
             frame: &question.frame.0,
             family: question.family.name(),
             question: &question.text,
             choices: question.choices.texts(),
-            answer: asked.answer(),
+            answer: generated.answer(),
             evidence: &question.evidence,
             image,
             size,
@@ -47,22 +47,22 @@ impl<'a> ReviewItem<'a> {
     }
 }
 
-/// All that the page is told.
+/// The data of the page.
 #[derive(Serialize)]
 struct ReviewPage<'a> {
-    /// Under which the browser keeps the verdicts until they are saved.
+    /// Digest of the question ids. The browser stores verdicts under it until they are saved.
     set: Digest,
     items: &'a [ReviewItem<'a>],
 }
 
-/// One file that shows question by question with its image, its answer and the boxes of its evidence, takes verdicts from the
-/// keyboard, and saves them as lines of JSON.
+/// The page as one HTML file. It shows each question with its image, its answer and the boxes of its evidence, takes verdicts
+/// from the keyboard, and saves them as lines of JSON.
 ///
 /// # Errors
-/// Where the questions cannot be written.
+/// If the questions cannot be written.
 pub(crate) fn page(items: &[ReviewItem<'_>]) -> Result<String> {
     let set = Digest::of_parts(items.iter().map(|item| item.id.as_bytes()));
-    Ok(PAGE.replacen(PLACE, &embedded(&ReviewPage { set, items })?, 1))
+    Ok(PAGE.replacen(PLACEHOLDER, &embedded(&ReviewPage { set, items })?, 1))
 }
 
 #[cfg(test)]
@@ -73,7 +73,7 @@ mod tests {
     use crate::types::{Choices, Family, FrameId, Question, QuestionId};
 
     #[test]
-    fn no_word_of_a_question_leaves_its_place() {
+    fn no_text_of_a_question_ends_the_script() {
         let choices = ["</script><b>", "no"].map(str::to_owned).to_vec();
         let question = Question {
             id: QuestionId("a".into()),
@@ -83,13 +83,13 @@ mod tests {
             choices: Choices::new(choices, 0).unwrap(),
             evidence: json!({ "segments": [] }),
         };
-        let asked = GeneratedQuestion {
+        let generated = GeneratedQuestion {
             question,
             about: String::new(),
             scene: String::new(),
         };
-        let page = page(&[ReviewItem::new(&asked, "a.png".into(), [4, 3])]).unwrap();
-        assert!(!page.contains(PLACE));
+        let page = page(&[ReviewItem::new(&generated, "a.png".into(), [4, 3])]).unwrap();
+        assert!(!page.contains(PLACEHOLDER));
         assert_eq!(page.to_lowercase().matches("</script").count(), 1);
         assert!(!page.contains("<!--"));
     }

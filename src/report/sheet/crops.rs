@@ -1,20 +1,20 @@
-//! Crops of images side by side.
+//! Crops of images side by side: [`crops`].
 
 use super::{CELL, GAP, LINE, SheetCanvas};
 use crate::types::Rgb;
 
-/// One row: what it shows, and its images, which are of one size.
+/// One row of crops. Its images have the same size.
 #[derive(Debug, Clone)]
 pub(crate) struct CropRow<'a> {
-    /// What the images have in common.
+    /// Label of the row.
     pub name: String,
-    /// The images.
+    /// One image for each column.
     pub images: Vec<&'a Rgb>,
-    /// By how much their light is amplified.
+    /// Factor by which the light of the images is amplified.
     pub amplified: f64,
 }
 
-/// The middle of each image, pixel for pixel, lightened as its row says, below the columns' names.
+/// A sheet with the middle of each image at full resolution, brightened by the factor of its row, below the column names.
 #[must_use]
 pub(crate) fn crops(columns: &[&str], rows: &[CropRow<'_>]) -> Rgb {
     let height = CELL * 2 / 3;
@@ -38,7 +38,7 @@ pub(crate) fn crops(columns: &[&str], rows: &[CropRow<'_>]) -> Rgb {
                 (image.width() - size[1]) / 2,
             ];
             let place = [top + LINE, GAP + column * step[1]];
-            sheet.put(place, size, |y, x| {
+            sheet.fill(place, size, |y, x| {
                 let at = ((first[0] + y) * image.width() + first[1] + x) * 3;
                 [0, 1, 2].map(|channel| {
                     let code = f64::from(image.samples()[at + channel]);
@@ -55,7 +55,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_middle_is_shown_in_its_light() {
+    fn the_middle_is_shown_brightened() {
         let image = Rgb::new(3, 500, vec![10; 4500]).unwrap();
         let rows = [CropRow {
             name: "a".to_owned(),
@@ -63,12 +63,12 @@ mod tests {
             amplified: 4.0,
         }];
         let sheet = crops(&["real", "made"], &rows);
-        let lit = sheet
+        let brightened = sheet
             .samples()
             .chunks(3)
             .filter(|pixel| **pixel == [19; 3])
             .count();
-        assert!(lit >= 2 * 3 * CELL);
+        assert!(brightened >= 2 * 3 * CELL);
         assert!(crops(&[], &[]).width() > 0);
     }
 }

@@ -1,32 +1,31 @@
-//! The paper's example figure: both variants by level.
+//! The paper's figure of examples, both variants by level: [`levels()`].
 
 use super::{CELL, GAP, LINE, SheetCanvas, fitted, letter_width, mean};
 use crate::types::degradation::Axis;
 use crate::types::{AxisLevel, Rgb};
 
-/// One level of a frame.
+/// The images of a frame at one level.
 #[derive(Debug, Clone)]
 pub(crate) struct LevelColumn {
-    /// Which.
     pub level: AxisLevel,
-    /// By exposure drop alone.
+    /// Image with exposure drop alone.
     pub exposure: Rgb,
-    /// With the sensor's noise.
+    /// Image with sensor noise.
     pub noise: Rgb,
 }
 
-/// The frame and its levels, exposure drop above noise, as the paper's figure of examples (DarkQA, Fig. 3).
+/// A sheet with the frame and its levels, exposure drop above noise, as the paper's figure of examples (DarkQA, Fig. 3).
 ///
-/// Cells are means of the pixels they stand for. In the lower right corner of L3, L4 and L5 the middle of the image (half
-/// its sides, so a quarter of it) is shown in 10, 20 and 50 times its light, as the paper's insets; its pixels are
-/// picked, not averaged, so that the noise keeps its strength. The paper says "pixel intensities amplified": codes taken
-/// so many times would leave nothing of a bright room but white, so its light is meant.
+/// Images are scaled down by means of pixels. As in the paper's insets, the lower right corner of L3, L4 and L5 shows the
+/// middle of the image (half of each side, a quarter of the area) with 10, 20 and 50 times its light. Pixels of insets are
+/// picked, not averaged, so that the noise keeps its strength. The paper says "pixel intensities amplified". Multiplied codes
+/// would make a bright room white, so we take this to mean the light.
 #[must_use]
 pub(crate) fn levels(clean: &Rgb, columns: &[LevelColumn]) -> Rgb {
     let size = fitted(clean.height(), clean.width());
     let [height, width] = size;
     let margin = 6 * letter_width() + GAP;
-    // A label needs its room, however small the image is.
+    // A label needs its width even if the image is small.
     let cell = width.max(CELL / 2);
     let mut sheet = SheetCanvas::new(
         GAP + LINE + 2 * (GAP + height.max(LINE)) + GAP,
@@ -44,7 +43,7 @@ pub(crate) fn levels(clean: &Rgb, columns: &[LevelColumn]) -> Rgb {
     let left = |column: usize| margin + column * (cell + GAP);
     sheet.write([GAP, left(0)], cell, "L0", [0; 3]);
     for top in tops {
-        sheet.put([top, left(0)], size, |row, column| {
+        sheet.fill([top, left(0)], size, |row, column| {
             mean(clean, size, row, column)
         });
     }
@@ -54,7 +53,7 @@ pub(crate) fn levels(clean: &Rgb, columns: &[LevelColumn]) -> Rgb {
         let label = format!("{} -{} {unit}", column.level, column.level.value());
         sheet.write([GAP, left], cell, &label, [0; 3]);
         for (top, image) in tops.into_iter().zip([&column.exposure, &column.noise]) {
-            sheet.put([top, left], size, |row, column| {
+            sheet.fill([top, left], size, |row, column| {
                 mean(image, size, row, column)
             });
             if let Some(factor) = amplification(column.level) {
@@ -65,7 +64,7 @@ pub(crate) fn levels(clean: &Rgb, columns: &[LevelColumn]) -> Rgb {
     sheet.finish()
 }
 
-/// By how much an inset is amplified; up to 5 EV, images can be seen as they are.
+/// Factor by which the light of an inset is amplified; `None` below 5 EV, where the image itself is visible.
 fn amplification(level: AxisLevel) -> Option<u16> {
     match level.value() {
         ..5.0 => None,
@@ -75,7 +74,7 @@ fn amplification(level: AxisLevel) -> Option<u16> {
     }
 }
 
-/// The amplified middle of the image in a cell's lower right corner, with a white edge and its factor.
+/// Draws the amplified middle of the image in the lower right corner of a cell, with a white edge and its factor.
 fn inset(
     sheet: &mut SheetCanvas,
     [top, left]: [usize; 2],
@@ -88,29 +87,29 @@ fn inset(
         return;
     }
     let (top, left) = (top + size[0] - height, left + size[1] - width);
-    sheet.put([top - 1, left - 1], [height + 1, width + 1], |_, _| {
+    sheet.fill([top - 1, left - 1], [height + 1, width + 1], |_, _| {
         [255; 3]
     });
-    let lighter = lighter(factor);
-    let from = |at: usize, of: usize, side: usize| side / 4 + at * (side / 2) / of;
-    sheet.put([top, left], [height, width], |row, column| {
+    let brightened = brightened(factor);
+    let source = |at: usize, of: usize, side: usize| side / 4 + at * (side / 2) / of;
+    sheet.fill([top, left], [height, width], |row, column| {
         let (y, x) = (
-            from(row, height, image.height()),
-            from(column, width, image.width()),
+            source(row, height, image.height()),
+            source(column, width, image.width()),
         );
         let at = (y * image.width() + x) * 3;
-        [0, 1, 2].map(|channel| lighter[usize::from(image.samples()[at + channel])])
+        [0, 1, 2].map(|channel| brightened[usize::from(image.samples()[at + channel])])
     });
     let label = format!("×{factor}");
-    let room = label.chars().count() * letter_width();
-    if height > LINE && width > room {
-        sheet.put([top, left], [LINE, room + 2], |_, _| [0; 3]);
-        sheet.write([top, left + 1], room, &label, [255; 3]);
+    let label_width = label.chars().count() * letter_width();
+    if height > LINE && width > label_width {
+        sheet.fill([top, left], [LINE, label_width + 2], |_, _| [0; 3]);
+        sheet.write([top, left + 1], label_width, &label, [255; 3]);
     }
 }
 
-/// The code of so many times a code's light: times factor^(1/2.2).
-fn lighter(factor: u16) -> [u8; 256] {
+/// For each code, the code of `factor` times its light: the code times factor^(1/2.2).
+fn brightened(factor: u16) -> [u8; 256] {
     let scale = libm::pow(f64::from(factor), 1.0 / 2.2);
     std::array::from_fn(|code| (code as f64 * scale).round().min(255.0) as u8)
 }

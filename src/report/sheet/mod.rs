@@ -1,4 +1,4 @@
-//! Figures made of pictures: [`levels()`], [`noise()`] and [`crops()`], with words on them.
+//! Figures made of images with labels: [`levels()`], [`noise()`] and [`crops()`].
 
 mod crops;
 mod levels;
@@ -12,14 +12,14 @@ pub(crate) use noise::{Signal, noise};
 
 use crate::types::Rgb;
 
-/// The height of a line of text in pixels.
+/// Height of a line of text in pixels.
 const LINE: usize = RasterHeight::Size20.val();
-/// The space about everything.
+/// Space around images and labels in pixels.
 const GAP: usize = 8;
-/// The widest cell.
+/// Maximum width of an image on a sheet in pixels.
 const CELL: usize = 360;
 
-/// A white sheet that pictures and words are put on.
+/// A white image on which images and text are drawn.
 struct SheetCanvas {
     height: usize,
     width: usize,
@@ -35,7 +35,7 @@ impl SheetCanvas {
         }
     }
 
-    /// Sets a pixel; what lies beyond the sheet is left out.
+    /// Sets a pixel; pixels outside the sheet are ignored.
     fn set(&mut self, row: usize, column: usize, colour: [u8; 3]) {
         if row < self.height && column < self.width {
             let at = (row * self.width + column) * 3;
@@ -48,8 +48,8 @@ impl SheetCanvas {
         [self.samples[at], self.samples[at + 1], self.samples[at + 2]]
     }
 
-    /// Puts pixels of the given size at a place.
-    fn put(
+    /// Fills a rectangle at `[top, left]` with the colours of `colour`, by row and column.
+    fn fill(
         &mut self,
         [top, left]: [usize; 2],
         [height, width]: [usize; 2],
@@ -66,7 +66,7 @@ impl SheetCanvas {
     fn write(&mut self, [top, left]: [usize; 2], width: usize, text: &str, ink: [u8; 3]) {
         let step = letter_width();
         for (index, letter) in text.chars().take(width / step).enumerate() {
-            // What the font lacks is left blank.
+            // A character that the font lacks stays blank.
             let Some(glyph) = get_raster(letter, FontWeight::Regular, RasterHeight::Size20) else {
                 continue;
             };
@@ -97,7 +97,7 @@ fn letter_width() -> usize {
     get_raster_width(FontWeight::Regular, RasterHeight::Size20)
 }
 
-/// The size of a picture in a cell: its own, or smaller by a whole factor's worth so that it is at most [`CELL`] wide.
+/// Size of an image in a cell: height, width. Wider images are scaled down to a width of [`CELL`].
 fn fitted(height: usize, width: usize) -> [usize; 2] {
     if width <= CELL {
         return [height, width];
@@ -105,7 +105,7 @@ fn fitted(height: usize, width: usize) -> [usize; 2] {
     [(height * CELL / width).max(1), CELL]
 }
 
-/// The mean colour of the pixels that fall into a pixel of a smaller picture.
+/// Mean colour of the pixels that one pixel of a smaller image covers.
 fn mean(image: &Rgb, [height, width]: [usize; 2], row: usize, column: usize) -> [u8; 3] {
     let span = |at: usize, of: usize, from: usize| {
         let begin = at * from / of;
@@ -130,7 +130,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn text_is_cut_where_its_place_ends() {
+    fn text_is_cut_at_its_width() {
         let mut canvas = SheetCanvas::new(LINE, 100);
         canvas.write([0, 0], 50, "MMMMMMMMMMMM", [0, 0, 0]);
         let inked = |from: usize| {
@@ -140,14 +140,14 @@ mod tests {
     }
 
     #[test]
-    fn a_smaller_picture_holds_the_means() {
+    fn a_smaller_image_holds_the_means() {
         let image = Rgb::new(2, 4, (0..24).collect()).unwrap();
         assert_eq!(mean(&image, [1, 2], 0, 0), [8, 9, 10]);
         assert_eq!(mean(&image, [2, 4], 1, 3), [21, 22, 23]);
     }
 
     #[test]
-    fn pictures_are_never_wider_than_their_cell() {
+    fn images_are_never_wider_than_their_cell() {
         assert_eq!(fitted(720, 1280), [202, CELL]);
         assert_eq!(fitted(3, 5), [3, 5]);
         assert_eq!(fitted(1, 5000), [1, CELL]);

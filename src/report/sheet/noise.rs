@@ -1,32 +1,33 @@
-//! The terms of the noise alone, as signals.
+//! The terms of the noise model as separate images: [`noise()`].
 
 use ndarray::Array2;
 
 use super::{CELL, GAP, LINE, SheetCanvas};
 use crate::types::Rgb;
 
-/// One signal on the sensor.
+/// One noise term on the sensor.
 #[derive(Debug, Clone)]
 pub(crate) struct Signal {
-    /// What it is called.
+    /// Label of the image.
     pub name: String,
-    /// Height × width, in ADU.
+    /// Values in ADU, height × width.
     pub adu: Array2<f32>,
 }
 
-/// Each signal's middle, pixel for pixel, about mid grey, with its mean and standard deviation (over the whole of it).
+/// A sheet with the middle of each signal at full resolution around mid grey, with its mean and standard deviation, which are
+/// those of the whole signal.
 ///
-/// Grey goes from three standard deviations below the mean, black, to three above it, white.
+/// Black is three standard deviations below the mean, and white three above it.
 #[must_use]
 pub(crate) fn noise(signals: &[Signal]) -> Rgb {
     const COLUMNS: usize = 3;
-    let side = |length: fn(&Array2<f32>) -> usize, most: usize| {
+    let side = |length: fn(&Array2<f32>) -> usize, max: usize| {
         signals
             .iter()
             .map(|signal| length(&signal.adu))
             .min()
             .unwrap_or(1)
-            .min(most)
+            .min(max)
     };
     let (height, width) = (side(Array2::nrows, CELL * 3 / 4), side(Array2::ncols, CELL));
     let step = [GAP + 2 * LINE + height, GAP + CELL];
@@ -50,7 +51,7 @@ pub(crate) fn noise(signals: &[Signal]) -> Rgb {
         } else {
             0.0
         };
-        sheet.put([top + 2 * LINE, left], [height, width], |row, column| {
+        sheet.fill([top + 2 * LINE, left], [height, width], |row, column| {
             let value = f64::from(signal.adu[[first[0] + row, first[1] + column]]);
             [(127.5 + (value - mean) * scale).round().clamp(0.0, 255.0) as u8; 3]
         });
@@ -58,6 +59,7 @@ pub(crate) fn noise(signals: &[Signal]) -> Rgb {
     sheet.finish()
 }
 
+/// Mean and standard deviation of a signal, in ADU.
 fn moments(adu: &Array2<f32>) -> [f64; 2] {
     let n = adu.len().max(1) as f64;
     let mean = adu.iter().map(|x| f64::from(*x)).sum::<f64>() / n;

@@ -1,4 +1,4 @@
-//! How far models agree in each condition.
+//! The table of the agreement of models in each condition.
 
 use crate::report::table::ColumnKind::{Count, Ratio, Share, Text};
 use crate::report::table::{Table, TableBuilder};
@@ -7,26 +7,26 @@ use crate::score::agreement::Agreement;
 pub(super) fn agreement(agreements: &[Agreement]) -> Table {
     TableBuilder::new("agreement", agreements)
         .page("agreement", "Agreement in each condition")
-        .column(Text, "csv condition | page condition", |one| {
-            one.first.condition()
+        .column(Text, "csv condition | page condition", |agreement| {
+            agreement.first.condition()
         })
-        .column(Text, "csv model | page model", |one| {
-            one.first.model.clone()
+        .column(Text, "csv model | page model", |agreement| {
+            agreement.first.model.clone()
         })
-        .column(Text, "csv against | page and", |one| {
-            one.second.model.clone()
+        .column(Text, "csv against | page and", |agreement| {
+            agreement.second.model.clone()
         })
-        .column(Count, "csv n", |one| one.same.n)
+        .column(Count, "csv n", |agreement| agreement.same.n)
         .column(
             Share,
             "csv same_answer same_low same_high | page same answer in % [95 %]",
-            |one| one.same,
+            |agreement| agreement.same,
         )
         .column(
             Ratio,
             "csv kappa kappa_low kappa_high | page κ [95 %]",
-            |one| one.kappa,
+            |agreement| agreement.kappa,
         )
-        .column(Count, "page n", |one| one.same.n)
-        .made()
+        .column(Count, "page n", |agreement| agreement.same.n)
+        .build()
 }

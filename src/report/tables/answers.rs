@@ -1,4 +1,4 @@
-//! What models answer: false positives and negatives, collapse, and answers given against true ones.
+//! Tables of the answers: false positives and negatives, collapse, and answers given against true answers.
 
 use crate::report::table::ColumnKind::{Count, Number, Percent, Share, Text};
 use crate::report::table::{Table, TableBuilder};
@@ -28,19 +28,19 @@ fn hallucination(rates: &[Hallucination]) -> Table {
         .column(Count, "csv fn_n", |rates| {
             rates.false_negative.map_or(0, |rate| rate.n)
         })
-        .made()
+        .build()
 }
 
 fn collapse(confusions: &[Confusion]) -> Table {
-    let collapsed = confusions.iter();
-    let collapsed = collapsed.filter_map(|one| Some((one, one.collapse()?)));
-    TableBuilder::new("collapse", collapsed)
+    let collapses = confusions.iter();
+    let collapses = collapses.filter_map(|confusion| Some((confusion, confusion.collapse()?)));
+    TableBuilder::new("collapse", collapses)
         .page(
             "answers",
             "The answer given most often, and how often it is true",
         )
-        .subject(|(one, _)| &one.subject, ToString::to_string)
-        .family(|(one, _)| Some(&one.family))
+        .subject(|(confusion, _)| &confusion.subject, ToString::to_string)
+        .family(|(confusion, _)| Some(&confusion.family))
         .column(Text, "csv top_answer | page given most often", |(_, c)| {
             c.top.clone()
         })
@@ -57,29 +57,29 @@ fn collapse(confusions: &[Confusion]) -> Table {
             |(_, c)| c.true_entropy,
         )
         .column(Count, "csv n | page n", |(_, c)| c.n)
-        .made()
+        .build()
 }
 
-/// A row for each true answer and each answer given to it; the given one is empty if none could be read.
+/// A row for each true answer and each answer given to it. The answer given is empty if none could be read.
 fn confusion(confusions: &[Confusion]) -> Table {
-    let cells = confusions.iter().flat_map(|one| {
-        let rows = one.counts.iter().enumerate();
+    let cells = confusions.iter().flat_map(|confusion| {
+        let rows = confusion.counts.iter().enumerate();
         let cells = rows.flat_map(|(truth, row)| {
-            let given = row.iter().enumerate();
-            given.map(move |(given, count)| (truth, given, *count))
+            let answer = row.iter().enumerate();
+            answer.map(move |(answer, count)| (truth, answer, *count))
         });
-        cells.map(move |cell| (one, cell))
+        cells.map(move |cell| (confusion, cell))
     });
-    let there = cells.filter(|(_, (_, _, count))| *count > 0);
-    TableBuilder::new("confusion", there)
-        .subject(|(one, _)| &one.subject, ToString::to_string)
-        .family(|(one, _)| Some(&one.family))
-        .column(Text, "csv truth", |(one, (truth, _, _))| {
-            one.labels[*truth].clone()
+    let non_empty = cells.filter(|(_, (_, _, count))| *count > 0);
+    TableBuilder::new("confusion", non_empty)
+        .subject(|(confusion, _)| &confusion.subject, ToString::to_string)
+        .family(|(confusion, _)| Some(&confusion.family))
+        .column(Text, "csv truth", |(confusion, (truth, _, _))| {
+            confusion.labels[*truth].clone()
         })
-        .column(Text, "csv given", |(one, (_, given, _))| {
-            one.labels.get(*given).cloned()
+        .column(Text, "csv given", |(confusion, (_, answer, _))| {
+            confusion.labels.get(*answer).cloned()
         })
         .column(Count, "csv count", |(_, (_, _, count))| *count)
-        .made()
+        .build()
 }

@@ -1,4 +1,4 @@
-//! Every difference with its test, a table a kind of comparison: all families together, and by family.
+//! Tables of all differences with their tests, for each kind of comparison: all families together, and by family.
 
 use super::sections::ENHANCERS;
 use crate::report::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
@@ -7,15 +7,18 @@ use crate::report::words::name;
 use crate::score::comparison::{Comparison, ComparisonKind, Significance};
 use crate::score::findings::Findings;
 
-/// The most rows of a kind in the terminal; all of them are in the file.
-const MOST: usize = 40;
+/// Maximum number of rows of a kind in the terminal. The CSV file has all rows.
+const MAX_ROWS: usize = 40;
 
 pub(super) fn comparisons(findings: &Findings<'_>) -> Vec<Table> {
     let mut tables = Vec::new();
     for kind in ComparisonKind::ALL {
-        let all = findings.comparisons.iter().filter(|one| one.kind == kind);
-        let (whole, parts): (Vec<&Comparison>, Vec<&Comparison>) =
-            all.partition(|one| one.family.is_none());
+        let all = findings
+            .comparisons
+            .iter()
+            .filter(|comparison| comparison.kind == kind);
+        let (whole, by_family): (Vec<&Comparison>, Vec<&Comparison>) =
+            all.partition(|comparison| comparison.family.is_none());
         let (caption, heading) = titles(kind);
         let mut total = table(kind, caption, &whole);
         total.is_folded = kind != ComparisonKind::Enhancer;
@@ -27,14 +30,15 @@ pub(super) fn comparisons(findings: &Findings<'_>) -> Vec<Table> {
             }
             shorten(&mut total, kind, &whole);
         }
-        let mut parts = table(kind, &format!("{caption}, by family"), &parts);
-        parts.is_folded = true;
-        tables.extend([total, parts]);
+        let mut by_family = table(kind, &format!("{caption}, by family"), &by_family);
+        by_family.is_folded = true;
+        tables.extend([total, by_family]);
     }
     tables
 }
 
-/// The caption on the page, and the line above the table in the terminal, where what darkness costs is read from the levels.
+/// The caption on the page, and the heading in the terminal. The kind `Level` has no heading, because the terminal shows
+/// accuracy by level anyway.
 fn titles(kind: ComparisonKind) -> (&'static str, Option<&'static str>) {
     match kind {
         ComparisonKind::Level => ("Each dark level less L0, raw", None),
@@ -57,24 +61,24 @@ fn titles(kind: ComparisonKind) -> (&'static str, Option<&'static str>) {
     }
 }
 
-/// Leaves out of the terminal what is there too much.
+/// Hides rows in the terminal: those beyond [`MAX_ROWS`] and, for blind models, those that say little.
 fn shorten(table: &mut Table, kind: ComparisonKind, comparisons: &[&Comparison]) {
     let mut printed: Vec<usize> = (0..comparisons.len()).collect();
     if kind == ComparisonKind::Blind {
-        // Blind models are held against raw images here; against enhanced ones in the file.
+        // The terminal compares blind models with raw images only; the file also has the enhanced ones.
         printed.retain(|index| comparisons[*index].first.enhancer.is_none());
-        let is_better = |index: &usize| comparisons[*index].verdict == Significance::Better;
+        let is_better = |index: &usize| comparisons[*index].significance == Significance::Better;
         if !printed.is_empty() && printed.iter().all(is_better) {
             let line = format!("better in all {} conditions", printed.len());
             table.notes.push(line);
             printed.clear();
         }
     }
-    if printed.len() > MOST {
-        let more = printed.len() - MOST;
+    if printed.len() > MAX_ROWS {
+        let more = printed.len() - MAX_ROWS;
         let line = format!("{more} more rows are in comparisons.csv");
         table.notes.push(line);
-        printed.truncate(MOST);
+        printed.truncate(MAX_ROWS);
     }
     for (index, row) in table.rows.iter_mut().enumerate() {
         if !printed.contains(&index) {
@@ -88,74 +92,83 @@ fn table(kind: ComparisonKind, caption: &str, comparisons: &[&Comparison]) -> Ta
         ComparisonKind::Enhancer => ENHANCERS,
         _ => "comparisons",
     };
-    let layout =
+    let builder =
         TableBuilder::new("comparisons", comparisons.iter().copied()).page(section, caption);
-    let layout = numbers(whom(layout));
-    layout
+    let builder = numbers(subjects(builder));
+    builder
         .column(
             ColumnKind::Significance,
             "csv verdict | terminal | page | latex",
-            |one| one.verdict,
+            |comparison| comparison.significance,
         )
-        .made()
+        .build()
 }
 
-/// What is compared with what.
-fn whom(layout: TableBuilder<&Comparison>) -> TableBuilder<&Comparison> {
-    layout
-        .column(Text, "csv kind", |one| one.kind.name())
-        .column(Text, "csv model | latex Model", |one| {
-            one.first.model.clone()
+fn subjects(builder: TableBuilder<&Comparison>) -> TableBuilder<&Comparison> {
+    builder
+        .column(Text, "csv kind", |comparison| comparison.kind.name())
+        .column(Text, "csv model | latex Model", |comparison| {
+            comparison.first.model.clone()
         })
-        .column(Text, "csv condition | latex Condition", |one| {
-            one.first.condition()
+        .column(Text, "csv condition | latex Condition", |comparison| {
+            comparison.first.condition()
         })
-        .column(Text, "csv against_model", |one| one.second.model.clone())
-        .column(Text, "csv against_condition", |one| one.second.condition())
-        .column(Text, "terminal", |one| named(one))
-        .column(Text, "page first", |one| name(&one.first))
-        .column(Text, "page second", |one| name(&one.second))
-        .family(|one| one.family.as_ref())
+        .column(Text, "csv against_model", |comparison| {
+            comparison.second.model.clone()
+        })
+        .column(Text, "csv against_condition", |comparison| {
+            comparison.second.condition()
+        })
+        .column(Text, "terminal", |comparison| title(comparison))
+        .column(Text, "page first", |comparison| name(&comparison.first))
+        .column(Text, "page second", |comparison| name(&comparison.second))
+        .family(|comparison| comparison.family.as_ref())
 }
 
-fn numbers(layout: TableBuilder<&Comparison>) -> TableBuilder<&Comparison> {
+fn numbers(builder: TableBuilder<&Comparison>) -> TableBuilder<&Comparison> {
     let difference = "csv difference low high | terminal difference, 95 % interval | page difference [95 %] \
                       | latex Difference [95\\,\\%]";
-    layout
-        .column(Count, "csv n", |one| one.paired.difference.n)
-        .column(Number, "csv first", |one| one.paired.first)
-        .column(Percent, "csv second | latex Raw", |one| one.paired.second)
-        .column(Percent, "latex Enhanced", |one| one.paired.first)
-        .column(Points, difference, |one| one.paired.difference)
-        .column(Count, "latex Rescued / harmed", |one| {
-            format!("{} / {}", one.paired.gained, one.paired.lost)
+    builder
+        .column(Count, "csv n", |comparison| comparison.paired.difference.n)
+        .column(Number, "csv first", |comparison| comparison.paired.first)
+        .column(Percent, "csv second | latex Raw", |comparison| {
+            comparison.paired.second
+        })
+        .column(Percent, "latex Enhanced", |comparison| {
+            comparison.paired.first
+        })
+        .column(Points, difference, |comparison| {
+            comparison.paired.difference
+        })
+        .column(Count, "latex Rescued / harmed", |comparison| {
+            format!("{} / {}", comparison.paired.gained, comparison.paired.lost)
         })
         .column(
             Count,
             "csv only_first | terminal only first | page only first",
-            |one| one.paired.gained,
+            |comparison| comparison.paired.gained,
         )
         .column(
             Count,
             "csv only_second | terminal only second | page only second",
-            |one| one.paired.lost,
+            |comparison| comparison.paired.lost,
         )
-        .column(Count, "page n", |one| one.paired.difference.n)
-        .column(P, "csv p_mcnemar | page p (McNemar)", |one| {
-            one.paired.mcnemar
+        .column(Count, "page n", |comparison| comparison.paired.difference.n)
+        .column(P, "csv p_mcnemar | page p (McNemar)", |comparison| {
+            comparison.paired.mcnemar
         })
-        .column(P, "csv p | page p", |one| one.paired.p)
+        .column(P, "csv p | page p", |comparison| comparison.paired.p)
         .column(
             P,
             "csv p_holm | terminal p (Holm) | page p (Holm) | latex $p$ (Holm)",
-            |one| one.holm,
+            |comparison| comparison.holm,
         )
 }
 
-/// What is compared, in one cell.
-fn named(one: &Comparison) -> String {
-    let (first, second) = (&one.first, &one.second);
-    match one.kind {
+/// The two subjects of a comparison as one text.
+fn title(comparison: &Comparison) -> String {
+    let (first, second) = (&comparison.first, &comparison.second);
+    match comparison.kind {
         ComparisonKind::Model => {
             format!("{} – {}, {}", first.model, second.model, first.condition())
         }

@@ -1,4 +1,4 @@
-//! Accuracy by family: a row a subject, with images and without, and what is below a model without images marked.
+//! The table of accuracy by family, with a row for each subject. Numbers below those of a model without images are marked.
 
 use crate::report::latex::escaped;
 use crate::report::table::ColumnKind::{Percent, Text};
@@ -12,7 +12,7 @@ use crate::types::Family;
 pub(super) fn families(findings: &Findings<'_>) -> Table {
     let subjects = findings.grid.subjects.iter().map(Some);
     // The last row is chance.
-    let mut layout = TableBuilder::new("families", subjects.chain([None]))
+    let mut builder = TableBuilder::new("families", subjects.chain([None]))
         .page("families", "Accuracy in % by family")
         .column(Text, "page model | latex Model", |subject| {
             subject
@@ -29,9 +29,9 @@ pub(super) fn families(findings: &Findings<'_>) -> Table {
             latex: family.map(|_| escaped(name)),
             ..ColumnHeads::default()
         };
-        layout = layout.column(Percent, names, |subject| share(findings, *subject, family));
+        builder = builder.column(Percent, names, |subject| share(findings, *subject, family));
     }
-    let mut table = layout.made();
+    let mut table = builder.build();
     table.latex = Some(
         "Accuracy in \\% by family. Underlined: below a model without images (its own, where it was asked so)."
             .to_owned(),
@@ -39,6 +39,7 @@ pub(super) fn families(findings: &Findings<'_>) -> Table {
     table
 }
 
+/// The cell of a subject and a family; `None` is chance.
 fn share(findings: &Findings<'_>, subject: Option<&Subject>, family: Option<&Family>) -> TableCell {
     let mut cells = findings.summary.of(family, ReadingMode::Strict);
     let cell = cells.find(|cell| match subject {

@@ -1,4 +1,5 @@
-//! A row an item and curve: the level at which it is first not answered rightly; empty if it never fails.
+//! The table of first failing levels, with a row for each item and curve. The level is empty if the item never fails
+//! or if an earlier level has no reply.
 
 use crate::report::table::ColumnKind::{Count, Text};
 use crate::report::table::{Table, TableBuilder};
@@ -6,9 +7,9 @@ use crate::score::findings::Findings;
 
 pub(super) fn flips(findings: &Findings<'_>) -> Table {
     let items = &findings.grid.items;
-    let rows = findings.falls.iter().flat_map(|fall| {
-        let items = items.iter().zip(&fall.first);
-        items.map(move |(item, first)| (fall, item.record, *first))
+    let rows = findings.first_failures.iter().flat_map(|failure| {
+        let items = items.iter().zip(&failure.first);
+        items.map(move |(item, first)| (failure, item.record, *first))
     });
     TableBuilder::new("flips", rows)
         .column(Text, "csv question", |(_, record, _)| {
@@ -21,9 +22,9 @@ pub(super) fn flips(findings: &Findings<'_>) -> Table {
         .column(Count, "csv repeat", |(_, record, _)| {
             record.detail.repeat as usize
         })
-        .line(|(fall, _, _)| (&fall.model, &fall.variant, fall.enhancer.as_ref()))
+        .line(|(failure, _, _)| (&failure.model, &failure.variant, failure.enhancer.as_ref()))
         .column(Text, "csv first_failing", |(_, _, first)| {
             first.map(|level| level.to_string())
         })
-        .made()
+        .build()
 }

@@ -1,4 +1,4 @@
-//! What became of the trials of each subject, besides right and wrong.
+//! The table of replies, unreadable replies and failures of each subject.
 
 use crate::report::table::ColumnKind::{Count, Failures};
 use crate::report::table::{Table, TableBuilder};
@@ -6,7 +6,7 @@ use crate::report::words::percent;
 use crate::score::health::Health;
 use crate::types::{FailureKind, UnreadReason};
 
-/// The columns of reasons for which replies could not be read.
+/// CSV columns of the reasons for unreadable replies, in the order of [`UnreadReason::ALL`].
 const UNREAD: [&str; UnreadReason::ALL.len()] = [
     "empty",
     "refused",
@@ -19,7 +19,7 @@ const UNREAD: [&str; UnreadReason::ALL.len()] = [
     "no_choice",
 ];
 
-/// The columns of reasons for which no reply came.
+/// CSV columns of the kinds of failure, in the order of [`FailureKind::ALL`].
 const FAILED: [&str; FailureKind::ALL.len()] = [
     "failed_connection",
     "failed_timeout",
@@ -31,7 +31,7 @@ const FAILED: [&str; FailureKind::ALL.len()] = [
     "failed_image",
 ];
 
-/// Reasons that are not the form of an answer.
+/// Reasons that do not concern the form of the answer.
 const OTHER: [UnreadReason; 4] = [
     UnreadReason::Refused,
     UnreadReason::Filtered,
@@ -40,7 +40,7 @@ const OTHER: [UnreadReason; 4] = [
 ];
 
 pub(super) fn health(health: &[Health]) -> Table {
-    let mut layout = TableBuilder::new("health", health)
+    let mut builder = TableBuilder::new("health", health)
         .page("health", "Replies and failures by subject")
         .subject(|health| &health.subject, ToString::to_string)
         .column(Count, "csv replies | page replies", |health| health.replies)
@@ -51,7 +51,7 @@ pub(super) fn health(health: &[Health]) -> Table {
             share(health, health.lenient_only)
         })
         .column(Count, "page other form", |health| {
-            // A foreign record may give a reason beside a choice.
+            // An imported record may have both a choice and a reason.
             (health.replies - health.read).saturating_sub(health.unread_for(&OTHER))
         })
         .column(Count, "page refused or filtered", |health| {
@@ -64,17 +64,17 @@ pub(super) fn health(health: &[Health]) -> Table {
             health.unread_for(&[UnreadReason::Empty])
         })
         .column(Failures, "page failed", |health| health.failures());
-    for (why, name) in UnreadReason::ALL.into_iter().zip(UNREAD) {
-        layout = layout.column(Count, &*format!("csv {name}"), |health| {
-            health.unread_for(&[why])
+    for (reason, name) in UnreadReason::ALL.into_iter().zip(UNREAD) {
+        builder = builder.column(Count, &*format!("csv {name}"), |health| {
+            health.unread_for(&[reason])
         });
     }
     for (kind, name) in FailureKind::ALL.into_iter().zip(FAILED) {
-        layout = layout.column(Count, &*format!("csv {name}"), |health| {
+        builder = builder.column(Count, &*format!("csv {name}"), |health| {
             health.failed.get(&kind).copied().unwrap_or(0)
         });
     }
-    layout.made()
+    builder.build()
 }
 
 fn share(health: &Health, count: usize) -> String {

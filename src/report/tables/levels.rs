@@ -1,4 +1,4 @@
-//! Accuracy by level: a row a model, variant and enhancer.
+//! The table of accuracy by level, with a row for each model, variant and enhancer.
 
 use crate::report::ladder::{Ladder, LadderRow};
 use crate::report::table::ColumnKind::Count;
@@ -15,7 +15,7 @@ pub(super) fn levels(findings: &Findings<'_>) -> Table {
     let strict = summary.of(None, ReadingMode::Strict);
     let ladder = Ladder::new(strict.map(|cell| (&cell.subject, cell)));
     let mut table = ladder
-        .layout("levels", |cell| {
+        .table("levels", |cell| {
             cell.map_or(TableCell::Blank, |cell| accuracy(summary, cell))
         })
         .page(
@@ -33,7 +33,7 @@ pub(super) fn levels(findings: &Findings<'_>) -> Table {
         .column(Count, "terminal failed", |line| {
             line.sum(|cell| cell.failed)
         })
-        .made();
+        .build();
     add_always(&mut table, &ladder);
     table.heading = Some(
         "Accuracy in %: strict ± half of the 95 % interval (lenient where it differs); n replies at each level"
@@ -69,29 +69,30 @@ fn accuracy(summary: &AccuracySummary, cell: &AccuracyCell) -> TableCell {
     }
 }
 
-/// How many replies stand behind the numbers of a series, from the least to the most.
+/// Smallest and largest number of replies at a level of a series, as text.
 fn replies(line: &LadderRow<'_, AccuracyCell>) -> String {
-    let replies = line.steps().map(AccuracyCell::replies);
+    let replies = line.cells().map(AccuracyCell::replies);
     match (replies.clone().min(), replies.max()) {
-        (Some(least), Some(most)) if least != most => format!("{least}–{most}"),
-        (least, _) => least.unwrap_or(0).to_string(),
+        (Some(min), Some(max)) if min != max => format!("{min}–{max}"),
+        (min, _) => min.unwrap_or(0).to_string(),
     }
 }
 
-/// The share of questions that were answered rightly every time.
+/// Share in percent of questions that were answered correctly every time.
 fn always(cell: &AccuracyCell) -> Option<String> {
     Some(percent(cell.always?.value))
 }
 
-/// Adds to the terminal, below each series that was asked more than once, how often it was right every time.
+/// Adds a row below each series whose questions were asked more than once, for the terminal only: the share that was right
+/// every time.
 fn add_always(table: &mut Table, ladder: &Ladder<'_, AccuracyCell>) {
-    for (place, steps) in ladder.series.values().enumerate().rev() {
-        if steps.values().all(|cell| cell.always.is_none()) {
+    for (index, cells) in ladder.series.values().enumerate().rev() {
+        if cells.values().all(|cell| cell.always.is_none()) {
             continue;
         }
         let levels = ladder.levels.iter();
-        let at = levels.map(
-            |level| match steps.get(level).and_then(|cell| always(cell)) {
+        let shares = levels.map(
+            |level| match cells.get(level).and_then(|cell| always(cell)) {
                 Some(share) => TableCell::Text(share),
                 None => TableCell::Blank,
             },
@@ -103,21 +104,24 @@ fn add_always(table: &mut Table, ladder: &Ladder<'_, AccuracyCell>) {
             TableCell::Blank,
         ];
         let row = TableRow {
-            cells: names.into_iter().chain(at).collect(),
+            cells: names.into_iter().chain(shares).collect(),
             hidden_in: vec![TableFormat::Page, TableFormat::Latex],
         };
-        table.rows.insert(place + 1, row);
+        table.rows.insert(index + 1, row);
     }
 }
 
-/// The lines below the table: models without images, chance, and why replies could not be read.
+/// The notes below the table: models without images, chance, and reasons for unreadable replies.
 fn notes(summary: &AccuracySummary, ladder: &Ladder<'_, AccuracyCell>) -> Vec<String> {
-    let floors = ladder.floors.iter().map(|(_, cell)| *cell);
+    let without_level = ladder.without_level.iter().map(|(_, cell)| *cell);
     let (chance, blind): (Vec<&AccuracyCell>, Vec<&AccuracyCell>) =
-        floors.partition(|cell| cell.subject.view.is_none());
-    let mut notes: Vec<String> = blind.into_iter().map(|cell| floor(summary, cell)).collect();
+        without_level.partition(|cell| cell.subject.view.is_none());
+    let mut notes: Vec<String> = blind
+        .into_iter()
+        .map(|cell| note_without_images(summary, cell))
+        .collect();
     let mut all = summary.of(None, ReadingMode::Strict);
-    let asked = if all.any(|cell| cell.always.is_some()) {
+    let unit = if all.any(|cell| cell.always.is_some()) {
         "orders of choices"
     } else {
         "questions"
@@ -125,13 +129,13 @@ fn notes(summary: &AccuracySummary, ladder: &Ladder<'_, AccuracyCell>) -> Vec<St
     let chance = chance.into_iter().filter_map(|cell| cell.accuracy);
     notes.extend(chance.map(|chance| {
         let share = 100.0 * chance.value;
-        format!("chance: {share:.2} over {} {asked}", chance.n)
+        format!("chance: {share:.2} over {} {unit}", chance.n)
     }));
     notes.extend(unread(summary));
     notes
 }
 
-fn floor(summary: &AccuracySummary, cell: &AccuracyCell) -> String {
+fn note_without_images(summary: &AccuracySummary, cell: &AccuracyCell) -> String {
     let accuracy = texts(ColumnKind::Accuracy, &accuracy(summary, cell)).concat();
     let always = always(cell).map(|share| format!(", right every time {share}"));
     let unparsed = cell.unparsed.to_string();
@@ -147,7 +151,7 @@ fn floor(summary: &AccuracySummary, cell: &AccuracyCell) -> String {
     )
 }
 
-/// Why replies could not be read, if that is not the model's own way of answering.
+/// Counts of unreadable replies by reason, for reasons that do not concern the form of the answer.
 fn unread(summary: &AccuracySummary) -> Option<String> {
     let reasons = [
         (
@@ -158,8 +162,8 @@ fn unread(summary: &AccuracySummary) -> Option<String> {
         (UnreadReason::Filtered, "withheld by a filter"),
         (UnreadReason::Empty, "empty"),
     ];
-    let counts = reasons.iter().filter_map(|(why, what)| {
-        let count = summary.unread.get(why).filter(|count| **count > 0)?;
+    let counts = reasons.iter().filter_map(|(reason, what)| {
+        let count = summary.unread.get(reason).filter(|count| **count > 0)?;
         Some(format!("{count} {what}"))
     });
     let counts: Vec<String> = counts.collect();

@@ -1,4 +1,4 @@
-//! The tables of an evaluation, one file a subject matter: [`tables`].
+//! Tables of an evaluation, with one file for each topic: [`tables`].
 
 mod agreement;
 mod answers;
@@ -22,7 +22,7 @@ use crate::types::{EnhancerName, Family, KindReading};
 pub(super) use sections::{ENHANCERS, SECTIONS};
 pub(super) use summary::{SUMMARY, reading};
 
-/// Every table of an evaluation; the first is the summary.
+/// All tables of an evaluation; the first is the summary.
 #[must_use]
 pub fn tables(findings: &Findings<'_>) -> Vec<Table> {
     [
@@ -43,28 +43,28 @@ pub fn tables(findings: &Findings<'_>) -> Vec<Table> {
 }
 
 impl<T> TableBuilder<T> {
-    /// The columns that say whom a row is about.
+    /// Adds the columns of the subject of a row.
     pub(in crate::report) fn subject(
         self,
         of: impl Fn(&T) -> &Subject,
         variant: impl Fn(&KindReading) -> String,
     ) -> Self {
-        let said = |text: Option<String>| TableCell::from(text);
+        let cell = |text: Option<String>| TableCell::from(text);
         self.column(Text, "csv model", |row| of(row).model.clone())
             .column(Text, "csv view", |row| {
-                said(of(row).view.map(|view| view.to_string()))
+                cell(of(row).view.map(|view| view.to_string()))
             })
             .column(Text, "csv level", |row| {
-                said(of(row).level.map(|level| level.to_string()))
+                cell(of(row).level.map(|level| level.to_string()))
             })
             .column(Text, "csv variant", |row| variant(&of(row).variant))
             .column(Text, "csv enhancer", |row| {
-                said(of(row).enhancer.as_ref().map(ToString::to_string))
+                cell(of(row).enhancer.as_ref().map(ToString::to_string))
             })
             .column(Text, "page subject", |row| name(of(row)))
     }
 
-    /// The columns that say which line over the levels a row is about: its model, variant and enhancer.
+    /// Adds the columns of the curve of a row: model, variant and enhancer.
     fn line(self, of: impl Fn(&T) -> (&str, &KindReading, Option<&EnhancerName>)) -> Self {
         self.column(Text, "csv model | terminal model | page model", |row| {
             of(row).0.to_owned()
@@ -75,7 +75,7 @@ impl<T> TableBuilder<T> {
         })
     }
 
-    /// The columns of the family; `None` is all of them together.
+    /// Adds the columns of the family; `None` is all families together.
     fn family(self, of: impl Fn(&T) -> Option<&Family>) -> Self {
         self.column(Text, "csv family", |row| {
             of(row).map_or(Family::TOTAL, Family::name).to_owned()

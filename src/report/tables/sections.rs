@@ -1,6 +1,6 @@
-//! The sections of the page of an evaluation: [`SECTIONS`].
+//! Sections of the page of an evaluation: [`SECTIONS`].
 
-/// A section of the page: its name in links, its title, what is said above it, and its figures.
+/// A section of the page: its id, its title, the text below the title, and the names of its figures.
 pub(in crate::report) type Section = (
     &'static str,
     &'static str,
@@ -62,5 +62,5 @@ pub(in crate::report) const SECTIONS: [Section; 8] = [
     ),
 ];
 
-/// The section with pictures of the frames.
+/// Id of the section that has thumbnails of the frames.
 pub(in crate::report) const ENHANCERS: &str = "enhancers";

@@ -1,4 +1,4 @@
-//! The accuracy of every subject with its interval and counts.
+//! The table of the accuracy of every subject, with intervals and counts.
 
 use crate::report::table::ColumnKind::{Count, Percent, Share, Text};
 use crate::report::table::{Table, TableBuilder, TableCell};
@@ -30,7 +30,7 @@ pub(super) fn subjects(summary: &AccuracySummary) -> Table {
         .column(Count, "page n", |cell| cell.replies())
         .column(Count, "page not readable", |cell| cell.unparsed)
         .column(Count, "page failed", |cell| cell.failed)
-        .made();
+        .build();
     table.is_folded = true;
     table
 }

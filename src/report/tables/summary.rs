@@ -1,4 +1,4 @@
-//! Every accuracy: `summary.csv` and the rows of `summary.json`.
+//! The table of all accuracies: `summary.csv` and the rows of `summary.json`.
 
 use crate::report::table::ColumnKind::{Count, Share, Text};
 use crate::report::table::{Table, TableBuilder, TableCell};
@@ -6,11 +6,11 @@ use crate::score::accuracy::AccuracySummary;
 use crate::score::choice::ReadingMode;
 use crate::score::subject::Subject;
 
-/// The name of the table.
+/// Name of the summary table.
 pub(in crate::report) const SUMMARY: &str = "summary";
 
 pub(super) fn summary(summary: &AccuracySummary) -> Table {
-    let layout = TableBuilder::new(SUMMARY, &summary.cells)
+    let builder = TableBuilder::new(SUMMARY, &summary.cells)
         .subject(|cell| &cell.subject, |variant| variant.word().to_owned())
         .family(|cell| cell.family.as_ref())
         .column(Text, "csv mode", |cell| match cell.mode {
@@ -24,17 +24,17 @@ pub(super) fn summary(summary: &AccuracySummary) -> Table {
         .column(Count, "csv unparsed", |cell| cell.unparsed)
         .column(Count, "csv failed", |cell| cell.failed)
         .column(Share, "csv value low high", |cell| cell.accuracy);
-    let layout = if summary.cells.iter().any(|cell| cell.always.is_some()) {
-        layout.column(Share, "csv always", |cell| cell.always)
+    let builder = if summary.cells.iter().any(|cell| cell.always.is_some()) {
+        builder.column(Share, "csv always", |cell| cell.always)
     } else {
-        layout
+        builder
     };
-    layout
+    builder
         .column(Text, "csv reading", |cell| reading(&cell.subject))
-        .made()
+        .build()
 }
 
-/// The light reading of a subject.
+/// The light reading of a subject, if it has one.
 pub(in crate::report) fn reading(subject: &Subject) -> TableCell {
     TableCell::from(subject.variant.reading.as_ref().map(ToString::to_string))
 }

@@ -1,4 +1,4 @@
-//! Darkness thresholds and areas below the curves: all families together, and each.
+//! Tables of darkness thresholds and areas: all families together, and by family.
 
 use crate::report::table::ColumnKind::{Number, Share, Text, Threshold};
 use crate::report::table::{Table, TableBuilder, TableCell};
@@ -8,7 +8,7 @@ use crate::score::findings::Findings;
 
 pub(super) fn thresholds(findings: &Findings<'_>) -> Vec<Table> {
     let curves = findings.curves.iter();
-    let (whole, parts): (Vec<&Curve>, Vec<&Curve>) =
+    let (whole, by_family): (Vec<&Curve>, Vec<&Curve>) =
         curves.partition(|curve| curve.family.is_none());
     let heading = format!(
         "Darkness threshold in EV (half-way from L0 to chance) and mean accuracy in %, with 95 % intervals by {}",
@@ -16,12 +16,12 @@ pub(super) fn thresholds(findings: &Findings<'_>) -> Vec<Table> {
     );
     let mut whole = table("Thresholds and areas", &whole);
     whole.heading = (!whole.rows.is_empty()).then_some(heading);
-    let mut parts = table("Thresholds and areas by family", &parts);
-    parts.is_folded = true;
-    vec![whole, parts]
+    let mut by_family = table("Thresholds and areas by family", &by_family);
+    by_family.is_folded = true;
+    vec![whole, by_family]
 }
 
-/// Thresholds are `inf` beyond the darkest level, and empty if the light is not above chance.
+/// A threshold is `inf` beyond the darkest level, and empty if accuracy at L0 is not above chance.
 fn table(caption: &str, curves: &[&Curve]) -> Table {
     TableBuilder::new("thresholds", curves)
         .page("thresholds", caption)
@@ -51,5 +51,5 @@ fn table(caption: &str, curves: &[&Curve]) -> Table {
         .column(Text, "page EV", |curve| {
             format!("0–{}", curve.darkest.value())
         })
-        .made()
+        .build()
 }

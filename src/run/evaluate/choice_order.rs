@@ -5,20 +5,20 @@ use std::num::NonZeroU32;
 use clap::Args;
 
 use crate::error::Result;
-use crate::types::{Choices, Digest, Question};
+use crate::types::{Choices, Decides, Digest, Question};
 
 /// The flags for the order of choices and for repeats.
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Data")]
 pub(crate) struct ChoiceOrder {
     /// Show the choices of each question in an order drawn from --seed, the same in every condition
-    #[arg(long)]
+    #[arg(long, add = Decides::Reply)]
     pub shuffle_options: bool,
     /// Ask each question once for every rotation of its choices: what a model answers by position averages out
-    #[arg(long)]
+    #[arg(long, add = Decides::Reply)]
     pub circular: bool,
     /// Ask everything N times
-    #[arg(long, value_name = "N", default_value_t = NonZeroU32::MIN)]
+    #[arg(long, value_name = "N", default_value_t = NonZeroU32::MIN, add = Decides::Trials)]
     pub repeats: NonZeroU32,
 }
 

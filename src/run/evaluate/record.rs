@@ -17,7 +17,7 @@ impl Item for ChoiceItem {
         Query::Choice(&self.question)
     }
 
-    fn place(&self) -> &str {
+    fn source(&self) -> &str {
         &self.question.frame.0
     }
 

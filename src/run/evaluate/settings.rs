@@ -10,6 +10,7 @@ use crate::ask::{Constrain, Prompts};
 use crate::dataset::{DataArgs, PixelLimit, SelectionArgs};
 use crate::error::Result;
 use crate::job::settings::{ExperimentSettings, JobArgs, JobSettings};
+use crate::types::Decides;
 
 /// The flags of an evaluation, by help heading.
 #[derive(Debug, Args)]
@@ -42,10 +43,10 @@ pub(crate) struct EvaluateArgs {
 #[command(next_help_heading = "Model")]
 pub(crate) struct ChoiceArgs {
     /// What the server lets the model say; other numbers than unconstrained ones
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, add = Decides::Reply)]
     pub constrain: Constrain,
     /// A folder with custom prompts (choice.txt, blind.txt); default: built in
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", add = Decides::Reply)]
     pub prompts: Option<PathBuf>,
 }
 
@@ -54,7 +55,7 @@ pub(crate) struct ChoiceArgs {
 #[command(next_help_heading = "Sending")]
 pub(crate) struct ShrinkArgs {
     /// Shrink images whose longer side is longer than this, in pixels; default: never
-    #[arg(long, value_name = "PIXELS")]
+    #[arg(long, value_name = "PIXELS", add = Decides::Pixels)]
     pub max_side: Option<NonZeroU32>,
 }
 
@@ -76,7 +77,7 @@ impl EvaluateArgs {
     /// [`Error::Usage`](crate::error::Error::Usage), which names the flag with the invalid value.
     pub(super) fn resolve(self) -> Result<Evaluation> {
         if self.job.models.is_empty() {
-            return Err(self.job.nameless());
+            return Err(self.job.no_model_error());
         }
         let prompts = self.choice.prompts.as_deref();
         Ok(Evaluation {

@@ -24,7 +24,7 @@ use crate::job::timings::Timings;
 use crate::job::workers::pool;
 use crate::synthesis::{LightArgs, LightSettings};
 use crate::types::manifest::Status;
-use crate::types::{Condition, FrameId, Question};
+use crate::types::{Condition, Decides, FrameId, Question};
 
 use set::{ReadySet, SetForm};
 
@@ -32,13 +32,13 @@ use set::{ReadySet, SetForm};
 #[derive(Debug, Args)]
 pub(crate) struct ExportArgs {
     /// The form of the sets
-    #[arg(value_name = "KIND", value_enum)]
+    #[arg(value_name = "KIND", value_enum, add = Decides::Nothing)]
     pub kind: SetForm,
     /// A folder of frames, or a ready-made set (.tsv, .jsonl)
-    #[arg(value_name = "DATA", value_parser = dataset::place)]
+    #[arg(value_name = "DATA", value_parser = dataset::place, add = Decides::Reply)]
     pub data: DataPlace,
     /// Where the sets go, one for each condition
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub out: PathBuf,
     /// The flags that select questions.
     #[command(flatten)]
@@ -56,7 +56,7 @@ pub(crate) struct ExportArgs {
     #[command(flatten)]
     pub loading: EnhancerRunArgs,
     /// Replace sets that exist already
-    #[arg(long, help_heading = "Output")]
+    #[arg(long, help_heading = "Output", add = Decides::Nothing)]
     pub force: bool,
 }
 

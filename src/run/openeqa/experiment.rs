@@ -12,7 +12,7 @@ use super::record::OpenItem;
 use super::setup::OpenSetup;
 use crate::ask::Server;
 use crate::error::Result;
-use crate::job::budget::words;
+use crate::job::budget::text_tokens;
 use crate::job::experiment::{ExpectedRequest, Experiment};
 use crate::job::identity::{self, Columns, Identity};
 use crate::job::models::ModelUnderTest;
@@ -101,7 +101,7 @@ impl Experiment for OpenSetup<'_> {
         let walk = &self.config.walk;
         let fields = [
             ("--num-frames", json!(walk.frames)),
-            ("--degrade", json!(walk.darkened)),
+            ("--degrade", json!(walk.degraded_at)),
             ("--sensor", json!(walk.camera)),
         ];
         let fields = fields.map(|(field, value)| (field.to_owned(), value));
@@ -127,7 +127,7 @@ impl Experiment for OpenSetup<'_> {
         ]
     }
 
-    fn given(&self) -> &[Record<OpenDetail>] {
+    fn imported_records(&self) -> &[Record<OpenDetail>] {
         &self.file_answers
     }
 
@@ -142,7 +142,7 @@ impl Experiment for OpenSetup<'_> {
         })
     }
 
-    fn to_come(&self, remaining: &[SourcePlan<OpenItem>]) -> Vec<ExpectedRequest> {
+    fn expected_requests(&self, remaining: &[SourcePlan<OpenItem>]) -> Vec<ExpectedRequest> {
         if self.judge.is_none() {
             return Vec::new();
         }
@@ -157,8 +157,8 @@ impl Experiment for OpenSetup<'_> {
                 };
                 Some(ExpectedRequest {
                     model: 0,
-                    words: words(&prompt(question, ANSWER)),
-                    reply: mark.reply_tokens(),
+                    text_tokens: text_tokens(&prompt(question, ANSWER)),
+                    reply_tokens: mark.reply_tokens(),
                 })
             }
             OpenItem::Mark { .. } => None,

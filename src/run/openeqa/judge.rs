@@ -10,32 +10,33 @@ use crate::error::Result;
 use crate::job::models::ModelName;
 use crate::job::settings::JobArgs;
 use crate::score::llm_match::Protocol;
+use crate::types::Decides;
 
 /// The flags of the judge, the model that marks the answers.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Judge")]
 pub(crate) struct JudgeArgs {
     /// The model that marks the answers; default: none, answers are gathered and not marked
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", add = Decides::Trials)]
     pub judge: Option<ModelName>,
     /// How answers are judged and marks read
-    #[arg(long, value_enum, default_value_t = Protocol::Upstream)]
+    #[arg(long, value_enum, default_value_t = Protocol::Upstream, add = Decides::Reply)]
     pub protocol: Protocol,
     /// The judge's endpoint; default: that of the models
-    #[arg(long, value_name = "URL")]
+    #[arg(long, value_name = "URL", add = Decides::Reply)]
     pub judge_base_url: Option<String>,
     /// The variable that holds the key of the judge's endpoint, or none; default: OPENAI_API_KEY, or without
     /// --judge-base-url that of the models
-    #[arg(long, value_name = "NAME|none", conflicts_with = "judge_api_key_file")]
+    #[arg(long, value_name = "NAME|none", conflicts_with = "judge_api_key_file", add = Decides::Nothing)]
     pub judge_api_key_env: Option<String>,
     /// A file that holds the key of the judge's endpoint; default: none, a variable holds it
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", add = Decides::Nothing)]
     pub judge_api_key_file: Option<PathBuf>,
     /// The judge's sampling temperature
-    #[arg(long, value_name = "T|auto|default", default_value = "0.2")]
+    #[arg(long, value_name = "T|auto|default", default_value = "0.2", add = Decides::Reply)]
     pub judge_temperature: Temperature,
     /// The most tokens of a judge's reply
-    #[arg(long, value_name = "N", default_value = "32")]
+    #[arg(long, value_name = "N", default_value = "32", add = Decides::Reply)]
     pub judge_max_tokens: NonZeroU32,
 }
 
@@ -56,7 +57,7 @@ impl JudgeArgs {
             return Ok(None);
         };
         let of_judge = |e: crate::error::Error| e.at("the judge");
-        model.answers_in_words().map_err(of_judge)?;
+        model.require_open_answers().map_err(of_judge)?;
         let mut access = job.access.clone();
         let own_access = self.judge_base_url.is_some()
             || self.judge_api_key_env.is_some()

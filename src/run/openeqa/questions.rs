@@ -9,22 +9,23 @@ use clap::Args;
 
 use crate::dataset::openeqa::OpenQuestion;
 use crate::error::{Error, Result};
+use crate::types::Decides;
 
 /// The flags that select questions.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "OpenEQA")]
 pub(crate) struct OpenSelectionArgs {
     /// Only questions of these splits, as hm3d-v0,scannet-v0; default: all
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = trimmed)]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = trimmed, add = Decides::Trials)]
     pub splits: Vec<String>,
     /// Only questions of these categories, as "object localization,world knowledge"; default: all
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = trimmed)]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = trimmed, add = Decides::Trials)]
     pub categories: Vec<String>,
     /// Only the questions whose ids stand in this file, a JSON array, as open-eqa-v0-184-questions.json; default: all
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", add = Decides::Trials)]
     pub subset: Option<PathBuf>,
     /// Only the first N questions; default: all
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", add = Decides::Trials)]
     pub limit: Option<NonZeroUsize>,
 }
 

@@ -44,7 +44,7 @@ impl Item for OpenItem {
         Query::Open(&self.question().id)
     }
 
-    fn place(&self) -> &str {
+    fn source(&self) -> &str {
         match self {
             Self::Answer(question) => &question.episode,
             // A judge sees no frames, so its failures are counted by question.

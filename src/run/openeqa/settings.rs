@@ -14,12 +14,13 @@ use crate::job::models::ModelName;
 use crate::job::settings::{ExperimentSettings, JobArgs, JobSettings};
 use crate::job::walk::Walk;
 use crate::score::llm_match::Protocol;
+use crate::types::Decides;
 
 /// The flags of `openeqa`.
 #[derive(Debug, Args)]
 pub(crate) struct OpenEqaArgs {
     /// The questions, as open-eqa-v0.json
-    #[arg(long, value_name = "FILE", help_heading = "OpenEQA")]
+    #[arg(long, value_name = "FILE", help_heading = "OpenEQA", add = Decides::Reply)]
     pub questions: PathBuf,
     /// The flags that select questions.
     #[command(flatten)]
@@ -35,12 +36,11 @@ pub(crate) struct OpenEqaArgs {
         long,
         value_name = "N|none",
         help_heading = "OpenEQA",
-        default_value = "1234"
-    )]
+        default_value = "1234", add = Decides::Reply)]
     pub sampling_seed: SamplingSeed,
     /// Answers of people or another program, as upstream's files ([{"question_id", "answer"}], with "level" or "condition"
     /// beside them where it is not L0), to be marked like a model's; repeatable; default: none
-    #[arg(long, value_name = "NAME=FILE", help_heading = "OpenEQA")]
+    #[arg(long, value_name = "NAME=FILE", help_heading = "OpenEQA", add = Decides::Trials)]
     pub answers: Vec<AnswersFile>,
     /// The flags of the judge.
     #[command(flatten)]
@@ -50,11 +50,10 @@ pub(crate) struct OpenEqaArgs {
         long,
         value_name = "DIR",
         help_heading = "OpenEQA",
-        conflicts_with_all = ["batch", "dry_run"]
-    )]
+        conflicts_with_all = ["batch", "dry_run"], add = Decides::Nothing)]
     pub study: Option<PathBuf>,
     /// Write what is left to ask as files of a Batch API, answers first and then marks, and ask nothing
-    #[arg(long, help_heading = "Batch", conflicts_with = "dry_run")]
+    #[arg(long, help_heading = "Batch", conflicts_with = "dry_run", add = Decides::Nothing)]
     pub batch: bool,
     /// The flags for the batch files.
     #[command(flatten)]
@@ -138,11 +137,11 @@ impl OpenEqaArgs {
         };
         let nothing_to_ask = self.job.models.is_empty() && self.answers.is_empty();
         if nothing_to_ask && !matches!(task, OpenTask::Study(_)) {
-            return Err(self.job.nameless());
+            return Err(self.job.no_model_error());
         }
         let models = &self.job.models;
         let mut names = models.model.iter().chain(&models.blind_model);
-        names.try_for_each(ModelName::answers_in_words)?;
+        names.try_for_each(ModelName::require_open_answers)?;
         let SamplingSeed(seed) = self.sampling_seed;
         let protocol = self.judge.protocol;
         let judge = self.judge.resolve(&self.job, seed)?;

@@ -23,12 +23,12 @@ use crate::questions::reason::Reason;
 use crate::questions::room::RoomSource;
 use crate::questions::rule_context::RuleResult;
 use crate::questions::rules::Rules;
-use crate::questions::statistics::{self, FrameStatistics, measure, strangers};
+use crate::questions::statistics::{self, FrameStatistics, measure, unknown_labels};
 use crate::questions::summary::QuestionSummary;
 use crate::questions::{Generated, GeneratedQuestion, QuestionRequest, generate};
 use crate::report;
 use crate::types::manifest::Status;
-use crate::types::{Digest, Family, FrameId, Labels, QuestionId};
+use crate::types::{Decides, Digest, Family, FrameId, Labels, QuestionId};
 
 use statistics_cache::StatisticsCache;
 
@@ -36,43 +36,43 @@ use statistics_cache::StatisticsCache;
 #[derive(Debug, Args)]
 pub(crate) struct QuestionsArgs {
     /// A folder of frames with their maps (frames.jsonl, classes.json), as import makes it
-    #[arg(value_name = "DATA")]
+    #[arg(value_name = "DATA", add = Decides::Reply)]
     pub data: PathBuf,
     /// Where the questions go (.jsonl); the statistics of the frames go into a file next to it
-    #[arg(long, value_name = "FILE", value_parser = file)]
+    #[arg(long, value_name = "FILE", value_parser = file, add = Decides::Nothing)]
     pub out: PathBuf,
     /// The rulebook; default: the one built in (src/questions/rules.toml)
-    #[arg(long, value_name = "FILE", help_heading = "Rules")]
+    #[arg(long, value_name = "FILE", help_heading = "Rules", add = Decides::Trials)]
     pub rules: Option<PathBuf>,
     /// The names of colours, a table like src/questions/colors.txt; default: the one built in
-    #[arg(long, value_name = "FILE", help_heading = "Rules")]
+    #[arg(long, value_name = "FILE", help_heading = "Rules", add = Decides::Trials)]
     pub colors: Option<PathBuf>,
     /// Only these families: room_type, affordance, presence, color, closest; default: all
-    #[arg(long, value_name = "LIST", help_heading = "Rules", value_delimiter = ',', value_parser = family)]
+    #[arg(long, value_name = "LIST", help_heading = "Rules", value_delimiter = ',', value_parser = family, add = Decides::Trials)]
     pub families: Vec<Family>,
     /// How the answers are evened out
-    #[arg(long, value_enum, default_value_t, help_heading = "Rules")]
+    #[arg(long, value_enum, default_value_t, help_heading = "Rules", add = Decides::Trials)]
     pub balance: BalanceMode,
     /// Where the kind of room is read from
-    #[arg(long, value_enum, default_value_t, help_heading = "Rules")]
+    #[arg(long, value_enum, default_value_t, help_heading = "Rules", add = Decides::Trials)]
     pub room: RoomSource,
     /// Refuse numbers of a semantic map that classes.json does not have, instead of counting them as unlabelled
-    #[arg(long, help_heading = "Rules")]
+    #[arg(long, help_heading = "Rules", add = Decides::Trials)]
     pub strict: bool,
     /// Write every candidate and why it was taken or rejected, one per line; default: not written
-    #[arg(long, value_name = "FILE", help_heading = "Checking")]
+    #[arg(long, value_name = "FILE", help_heading = "Checking", add = Decides::Nothing)]
     pub candidates: Option<PathBuf>,
     /// Write the statistics of frames, questions and answers: JSON, CSV and a figure; default: not written
-    #[arg(long, value_name = "DIR", help_heading = "Checking")]
+    #[arg(long, value_name = "DIR", help_heading = "Checking", add = Decides::Nothing)]
     pub stats: Option<PathBuf>,
     /// Write a page on which a person accepts or rejects each question; default: not written
-    #[arg(long, value_name = "FILE.html", help_heading = "Checking")]
+    #[arg(long, value_name = "FILE.html", help_heading = "Checking", add = Decides::Nothing)]
     pub review: Option<PathBuf>,
     /// Leave out what a person has rejected on such a page; repeatable; default: nothing
-    #[arg(long, value_name = "FILE", help_heading = "Checking")]
+    #[arg(long, value_name = "FILE", help_heading = "Checking", add = Decides::Trials)]
     pub verdicts: Vec<PathBuf>,
     /// Print the statistics as JSON instead of a table
-    #[arg(long, help_heading = "Output")]
+    #[arg(long, help_heading = "Output", add = Decides::Nothing)]
     pub json: bool,
     /// The maximum size of an image.
     #[command(flatten)]
@@ -209,8 +209,8 @@ fn warn(generated: &Generated, making: &QuestionMaking<'_>) {
     for uneven in &generated.uneven {
         tracing::warn!("{uneven}");
     }
-    let closest = generated.tallies.get(&Family::Closest);
-    let scale = closest.and_then(|tally| tally.fallen.get(&Reason::Scale));
+    let closest = generated.counts.get(&Family::Closest);
+    let scale = closest.and_then(|tally| tally.rejections.get(&Reason::Scale));
     if let Some(frames) = scale {
         let measure = &making.rules.book().measure;
         tracing::warn!(
@@ -299,7 +299,7 @@ fn measure_frame(
         cache.add(&found)?;
         found
     };
-    let unknown = strangers(&found);
+    let unknown = unknown_labels(&found);
     if making.args.strict && !unknown.is_empty() {
         let problem = format_args!(
             "its semantic map has the numbers {unknown:?}, which are not in classes.json"
@@ -339,7 +339,7 @@ impl<'a> WrittenQuestion<'a> {
 /// A candidate as a line of the `--candidates` file.
 fn candidate_line(frame: &FrameId, result: &RuleResult) -> Value {
     match result {
-        RuleResult::Holds(candidate) => json!({
+        RuleResult::Viable(candidate) => json!({
             "frame": frame,
             "family": candidate.family,
             "about": candidate.about,
@@ -348,7 +348,7 @@ fn candidate_line(frame: &FrameId, result: &RuleResult) -> Value {
             "question": candidate.text,
             "evidence": candidate.evidence,
         }),
-        RuleResult::Falls(rejection) => json!({
+        RuleResult::Rejected(rejection) => json!({
             "frame": frame,
             "family": rejection.family,
             "about": rejection.about,

@@ -30,7 +30,7 @@ use crate::job::interrupt::Interrupt;
 use crate::job::observer;
 use crate::job::progress::Progress;
 use crate::types::manifest::Status;
-use crate::types::{Choices, Digest, Family, FrameId, Question, QuestionId};
+use crate::types::{Choices, Decides, Digest, Family, FrameId, Question, QuestionId};
 
 use completion::{Completion, RequestFault};
 use puzzle::Puzzle;
@@ -44,13 +44,13 @@ const LARGEST: usize = 64 << 20;
 #[derive(Debug, Args)]
 pub(crate) struct ServeArgs {
     /// The frames that the observer knows: rooms:frames=N,seed=N,size=WIDTHxHEIGHT, or a folder of frames with maps
-    #[arg(long, value_name = "DIR|rooms:…", value_parser = dataset::place, default_value_t)]
+    #[arg(long, value_name = "DIR|rooms:…", value_parser = dataset::place, default_value_t, add = Decides::Reply)]
     pub data: DataPlace,
     /// The port on 127.0.0.1, 0 for any that is free
-    #[arg(long, value_name = "N", default_value_t = 8089)]
+    #[arg(long, value_name = "N", default_value_t = 8089, add = Decides::Nothing)]
     pub port: u16,
     /// The seed of the guesses
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, add = Decides::Pixels)]
     pub seed: u64,
 }
 

@@ -14,22 +14,22 @@ use crate::job::rebuild::{ImageRebuilder, RebuildArgs};
 use crate::job::stored::StoredRun;
 use crate::report::study::{StudyImage, StudyQuestion, page};
 use crate::types::manifest::Status;
-use crate::types::{Condition, Digest, FrameId, QuestionId, Record, RunQuestion};
+use crate::types::{Condition, Decides, Digest, FrameId, QuestionId, Record, RunQuestion};
 
 /// The flags of `study pack`.
 #[derive(Debug, Args)]
 pub(crate) struct PackArgs {
     /// The folder of a run
-    #[arg(value_name = "RUN")]
+    #[arg(value_name = "RUN", add = Decides::Nothing)]
     pub run: PathBuf,
     /// Where the page and its images go
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub out: PathBuf,
     /// Ask only N questions, chosen by a hash of their ids; default: all
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", add = Decides::Trials)]
     pub items: Option<NonZeroUsize>,
     /// Only these conditions, as L3-noise+zerodce; repeatable; default: all of the run
-    #[arg(long, value_name = "CONDITION")]
+    #[arg(long, value_name = "CONDITION", add = Decides::Nothing)]
     pub condition: Vec<Condition>,
     /// Where the data and enhancers are now.
     #[command(flatten)]

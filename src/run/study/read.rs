@@ -17,25 +17,27 @@ use crate::job::stored::StoredRun;
 use crate::job::{Outcome, StdoutFormat, count, now};
 use crate::store::{AddressChange, Store};
 use crate::types::manifest::{Counts, RunManifest, Status};
-use crate::types::{ChoiceDetail, Condition, Detail, Digest, QuestionId, Record, Reply, TrialKey};
+use crate::types::{
+    ChoiceDetail, Condition, Decides, Detail, Digest, QuestionId, Record, Reply, TrialKey,
+};
 
 /// The flags of `study read`.
 #[derive(Debug, Args)]
 pub(crate) struct ReadArgs {
     /// The folder of the run whose questions were answered
-    #[arg(value_name = "RUN")]
+    #[arg(value_name = "RUN", add = Decides::Nothing)]
     pub run: PathBuf,
     /// Files of answers, as the page saves them: lines of {"question", "condition", "person", "answer"}
-    #[arg(value_name = "FILE", required = true)]
+    #[arg(value_name = "FILE", required = true, add = Decides::Nothing)]
     pub files: Vec<PathBuf>,
     /// The folder of the people's run
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub out: PathBuf,
     /// The name of the people in tables, next to the names of models
-    #[arg(long, value_name = "NAME", default_value = "human", value_parser = NonEmptyStringValueParser::new())]
+    #[arg(long, value_name = "NAME", default_value = "human", value_parser = NonEmptyStringValueParser::new(), add = Decides::Reply)]
     pub name: String,
     /// Print the summary as JSON instead of a table
-    #[arg(long)]
+    #[arg(long, add = Decides::Nothing)]
     pub json: bool,
 }
 

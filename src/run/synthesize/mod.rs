@@ -23,29 +23,29 @@ use crate::job::timings::Timings;
 use crate::job::workers::{ThreadArgs, pool};
 use crate::synthesis::{LightArgs, LightSettings, NoiseKey};
 use crate::types::manifest::Status;
-use crate::types::{Condition, Degradation, FrameId, Rgb};
+use crate::types::{Condition, Decides, Degradation, FrameId, Rgb};
 use sidecar::ImageSidecar;
 
 /// The flags of `synthesize`.
 #[derive(Debug, Args)]
 pub(crate) struct SynthesizeArgs {
     /// Images, folders of images, or folders of frames (frames.jsonl)
-    #[arg(required = true, value_name = "INPUT")]
+    #[arg(required = true, value_name = "INPUT", add = Decides::Pixels)]
     pub inputs: Vec<PathBuf>,
     /// Where the images go, each with a JSON file of all settings that made it
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub out: PathBuf,
     /// The flags for the degradations.
     #[command(flatten)]
     pub light: LightArgs,
     /// Make again the image of this JSON file, from the one INPUT that it was made from; default: make images of all levels
-    #[arg(long, value_name = "FILE", help_heading = "Synthesis")]
+    #[arg(long, value_name = "FILE", help_heading = "Synthesis", add = Decides::Pixels)]
     pub from: Option<PathBuf>,
     /// One figure per input instead; default: images
-    #[arg(long, value_enum, help_heading = "Synthesis", conflicts_with = "from")]
+    #[arg(long, value_enum, help_heading = "Synthesis", conflicts_with = "from", add = Decides::Nothing)]
     pub sheet: Option<Sheet>,
     /// Replace images that exist already
-    #[arg(long, help_heading = "Synthesis")]
+    #[arg(long, help_heading = "Synthesis", add = Decides::Nothing)]
     pub force: bool,
     /// The maximum size of an image.
     #[command(flatten)]

@@ -160,7 +160,7 @@ impl ImageSidecar {
         };
         let SensorRecord { amplify, tone, .. } = *sensor;
         let state = sensor.state.clone();
-        let negative = Negative::taken(&clean, &key, &state, amplify, tone, &Term::ALL);
+        let negative = Negative::with_state(&clean, &key, &state, amplify, tone, &Term::ALL);
         Ok(negative.develop(severity))
     }
 }

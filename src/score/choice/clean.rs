@@ -1,4 +1,4 @@
-//! What a model said aloud: hidden reasoning, invisible characters and leaked tokens taken away.
+//! Removal of hidden reasoning, invisible characters and leaked template tokens from a reply.
 
 use std::sync::LazyLock;
 
@@ -7,8 +7,8 @@ use unicode_normalization::UnicodeNormalization;
 
 use crate::types::question::UnreadReason;
 
-/// Marks that end a stretch of reasoning: those of DeepSeek, Qwen and many others, Magistral, Kimi, Cohere, Seed,
-/// and the final channel of the harmony format (also as it reads where a server drops its special tokens).
+/// Markers that end a reasoning block: those of DeepSeek, Qwen and many others, Magistral, Kimi, Cohere, Seed, and the
+/// final channel of the harmony format (also as it reads if a server drops its special tokens).
 static END: LazyLock<Regex> = LazyLock::new(|| {
     compiled(concat!(
         r"(?i)</(?:seed:)?(?:think|thinking|thought|thoughts|reasoning|reflection|analysis|scratchpad)>",
@@ -18,7 +18,7 @@ static END: LazyLock<Regex> = LazyLock::new(|| {
     ))
 });
 
-/// Marks that begin a stretch of reasoning.
+/// Markers that begin a reasoning block.
 static BEGIN: LazyLock<Regex> = LazyLock::new(|| {
     compiled(concat!(
         r"(?i)<(?:seed:)?(?:think|thinking|thought|thoughts|reasoning|reflection|analysis|scratchpad)>",
@@ -32,7 +32,7 @@ static BEGIN: LazyLock<Regex> = LazyLock::new(|| {
 static HARMONY_CLOSE: LazyLock<Regex> =
     LazyLock::new(|| compiled(r"(?i)<\|(?:return|end)\|>\s*\z"));
 
-/// Tokens after which a model's turn is over.
+/// Tokens that end a model's turn.
 static TURN_END: LazyLock<Regex> = LazyLock::new(|| {
     compiled(concat!(
         r"(?i)<\|\s*(?:im_end|eot_id|eot|eom_id|end|endoftext|end[_▁]of[_▁](?:text|turn|sentence|message)|return|eos",
@@ -41,7 +41,7 @@ static TURN_END: LazyLock<Regex> = LazyLock::new(|| {
     ))
 });
 
-/// Other tokens of chat templates, with the speaker's name that belongs to them.
+/// Other tokens of chat templates, with the name of the role that follows them.
 static TOKEN: LazyLock<Regex> = LazyLock::new(|| {
     compiled(concat!(
         r"(?i)<\|(?:im_start|start_header_id|start|role)\|>\s*(?:assistant|model|system)?(?:\s*<\|end_header_id\|>)?",
@@ -50,7 +50,7 @@ static TOKEN: LazyLock<Regex> = LazyLock::new(|| {
     ))
 });
 
-/// Where a model that does not stop begins to ask itself the next question.
+/// The beginning of the next question, which a model that does not stop asks itself.
 static NEXT_TURN: LazyLock<Regex> = LazyLock::new(|| {
     compiled(concat!(
         r"(?i)\n[#*>\s]*(?:(?:next |new )?question|q|user|human|instruction|frage|pregunta|pergunta|domanda|vraag",
@@ -58,19 +58,19 @@ static NEXT_TURN: LazyLock<Regex> = LazyLock::new(|| {
     ))
 });
 
-/// What follows the last mark that ends reasoning, trimmed.
+/// The text after the last marker that ends reasoning, trimmed.
 ///
 /// # Errors
-/// Why nothing is left to read.
-pub(super) fn spoken(reply: &str) -> Result<&str, UnreadReason> {
-    let (mut text, mark) = match END.find_iter(reply).last() {
-        Some(mark) => (&reply[mark.end()..], mark.as_str()),
+/// If nothing is left to read, the reason.
+pub(super) fn without_reasoning(reply: &str) -> Result<&str, UnreadReason> {
+    let (mut text, marker) = match END.find_iter(reply).last() {
+        Some(marker) => (&reply[marker.end()..], marker.as_str()),
         None => (reply, ""),
     };
     if BEGIN.is_match(text) {
         return Err(UnreadReason::Truncated);
     }
-    if mark.ends_with("<|message|>")
+    if marker.ends_with("<|message|>")
         && let Some(close) = HARMONY_CLOSE.find(text)
     {
         text = &text[..close.start()];
@@ -81,8 +81,8 @@ pub(super) fn spoken(reply: &str) -> Result<&str, UnreadReason> {
     }
 }
 
-/// The text in compatibility form (NFKC) without invisible characters and template tokens; what a token ends is the
-/// end.
+/// The text in compatibility form (NFKC) without invisible characters and template tokens. It ends at the first token that
+/// ends a turn with text.
 pub(super) fn tidy(text: &str) -> String {
     let text: String = text
         .nfkc()
@@ -94,20 +94,20 @@ pub(super) fn tidy(text: &str) -> String {
         .replace("<|end_of_box|>", "</answer>");
     let end = TURN_END
         .find_iter(&text)
-        .map(|mark| mark.start())
+        .map(|marker| marker.start())
         .find(|&start| !text[..start].trim().is_empty());
     let turn = &text[..end.unwrap_or(text.len())];
     let turn = TURN_END.replace_all(turn, " ");
     TOKEN.replace_all(&turn, " ").trim().to_owned()
 }
 
-/// What stands before the question that a model asks itself next, where anything does.
+/// The text before the next question that a model asks itself, if there is any.
 pub(super) fn before_next_turn(text: &str) -> Option<&str> {
     let next = NEXT_TURN.find(text)?;
     Some(text[..next.start()].trim()).filter(|text| !text.is_empty())
 }
 
-/// Whether a character takes no space: joiners, direction and byte order marks, variation selectors.
+/// Whether a character has no width: joiners, direction and byte order marks, variation selectors.
 fn is_invisible(c: char) -> bool {
     matches!(c, '\u{ad}' | '\u{34f}' | '\u{61c}' | '\u{180e}' | '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}'
         | '\u{2060}'..='\u{206f}' | '\u{fe00}'..='\u{fe0f}' | '\u{feff}' | '\u{e0000}'..='\u{e01ef}')
@@ -117,7 +117,7 @@ fn is_blank(c: char) -> bool {
     c.is_whitespace() || is_invisible(c)
 }
 
-/// Compiles a literal pattern; the tests compile every one.
+/// A compiled literal pattern; the tests compile every one.
 #[expect(clippy::expect_used, reason = "a literal that the tests compile")]
 pub(super) fn compiled(pattern: &str) -> Regex {
     Regex::new(pattern).expect("a literal pattern")

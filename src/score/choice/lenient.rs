@@ -1,4 +1,4 @@
-//! The lenient reading: level after level, and the first that finds something decides.
+//! The lenient reading: a sequence of steps, of which the first that finds something decides.
 
 use super::clean;
 use super::names::{Delimiting, Name};
@@ -6,37 +6,37 @@ use super::plain::{fold, plain};
 use super::refusal::declines;
 use super::stated::{alternative, stated};
 use super::strict;
+use super::structured::{boxed, json};
 use super::view::{ChoiceViews, ReplyView};
-use super::written::{boxed, json};
 use crate::types::question::{Answer, Choices, UnreadReason};
 
-/// Reads a reply, reasoning left out already.
+/// The lenient reading of a reply without its reasoning.
 pub(super) fn read(text: &str, choices: &Choices) -> Answer {
-    let offered = ChoiceViews::new(choices);
+    let choices = ChoiceViews::new(choices);
     let tidy = clean::tidy(text);
-    // A model that runs on and asks itself the next question has answered ours before.
-    let first = clean::before_next_turn(&tidy).map(|before| levels(before, &offered));
+    // A model that goes on and asks itself the next question has answered ours before.
+    let first = clean::before_next_turn(&tidy).map(|before| steps(before, &choices));
     match first {
         None | Some(Answer::Unparsed(UnreadReason::NoChoice | UnreadReason::Refused)) => {
-            levels(&tidy, &offered)
+            steps(&tidy, &choices)
         }
         Some(answer) => answer,
     }
 }
 
-/// All levels, on a tidied text.
-fn levels(tidy: &str, offered: &ChoiceViews) -> Answer {
+/// All steps, on a text from [`clean::tidy`].
+fn steps(tidy: &str, choices: &ChoiceViews) -> Answer {
     let text = plain(tidy);
     let folded = fold(&text);
-    let view = ReplyView::new(&text, &folded, offered);
+    let view = ReplyView::new(&text, &folded, choices);
     None.or_else(|| contradiction(&view))
-        .or_else(|| json(tidy, offered))
-        .or_else(|| boxed(tidy, offered))
-        .unwrap_or_else(|| spoken(&view))
+        .or_else(|| json(tidy, choices))
+        .or_else(|| boxed(tidy, choices))
+        .unwrap_or_else(|| read_plain(&view))
 }
 
-/// The levels that need no form: of a reply without markup, or of a value in a form.
-pub(super) fn spoken(view: &ReplyView<'_>) -> Answer {
+/// The steps for plain text: a reply without markup, or a value in JSON, LaTeX or a tag.
+pub(super) fn read_plain(view: &ReplyView<'_>) -> Answer {
     None.or_else(|| contradiction(view))
         .or_else(|| strict::read(view.text, &view.offered.texts))
         .or_else(|| yes_or_no(view))
@@ -44,7 +44,7 @@ pub(super) fn spoken(view: &ReplyView<'_>) -> Answer {
         .or_else(|| stated(view))
         .or_else(|| letters(view))
         .or_else(|| texts(view))
-        .unwrap_or_else(|| nothing(view))
+        .unwrap_or_else(|| unread(view))
 }
 
 /// A letter with the text of another choice: "B. bathroom".
@@ -52,21 +52,21 @@ fn contradiction(view: &ReplyView<'_>) -> Option<Answer> {
     let labels = view
         .letters
         .iter()
-        .filter(|letter| letter.grip == Delimiting::Firm);
+        .filter(|letter| letter.delimiting == Delimiting::Firm);
     let mut wrong = labels.filter_map(|letter| {
         let text = view.labelled_text(letter)?;
         (text.choice != letter.choice).then_some(letter.choice)
     });
-    let why = match wrong.next()? {
+    let reason = match wrong.next()? {
         Some(_) => UnreadReason::Contradiction,
         None => UnreadReason::OutOfRange,
     };
-    Some(Answer::Unparsed(why))
+    Some(Answer::Unparsed(reason))
 }
 
-/// The leading word, where yes and no are offered: "Yes, there is no lamp".
+/// The leading word, if yes and no are among the choices: "Yes, there is no lamp".
 fn yes_or_no(view: &ReplyView<'_>) -> Option<Answer> {
-    /// What "no" is part of at the beginning of a reply that does not answer.
+    /// Words after a leading "no" of a reply that does not answer.
     const NOT_AN_ANSWER: [&str; 8] = [
         "idea",
         "clue",
@@ -79,7 +79,7 @@ fn yes_or_no(view: &ReplyView<'_>) -> Option<Answer> {
     ];
     let (yes, no) = view.offered.yes_no?;
     let word = view.folded.split(|c: char| !c.is_alphanumeric()).next()?;
-    let (said, other) = match word {
+    let (chosen, other) = match word {
         "yes" => (yes, no),
         "no" => (no, yes),
         _ => return None,
@@ -97,16 +97,16 @@ fn yes_or_no(view: &ReplyView<'_>) -> Option<Answer> {
     let named = |names: &[Name]| {
         names
             .iter()
-            .any(|name| name.choice == Some(other) && name.grip > Delimiting::Loose)
+            .any(|name| name.choice == Some(other) && name.delimiting > Delimiting::Loose)
     };
     Some(if named(&view.texts) || named(&view.letters) {
         Answer::Unparsed(UnreadReason::Ambiguous)
     } else {
-        Answer::Chosen(said)
+        Answer::Chosen(chosen)
     })
 }
 
-/// The only choice named, and never but to deny it: "This is not a kitchen".
+/// The only choice named, and always denied: "This is not a kitchen".
 fn denial(view: &ReplyView<'_>) -> Option<Answer> {
     let names = || view.letters.iter().chain(&view.texts);
     let first = names().next()?.choice?;
@@ -116,11 +116,11 @@ fn denial(view: &ReplyView<'_>) -> Option<Answer> {
 
 /// Letters in brackets or before punctuation: "(B)", "B, because there is a stove".
 fn letters(view: &ReplyView<'_>) -> Option<Answer> {
-    let held = view
+    let delimited = view
         .letters
         .iter()
-        .filter(|letter| letter.grip > Delimiting::Loose);
-    let first = held.clone().max_by_key(|letter| letter.grip)?;
+        .filter(|letter| letter.delimiting > Delimiting::Loose);
+    let first = delimited.clone().max_by_key(|letter| letter.delimiting)?;
     let Some(index) = first.choice else {
         return Some(Answer::Unparsed(UnreadReason::OutOfRange));
     };
@@ -134,23 +134,23 @@ fn letters(view: &ReplyView<'_>) -> Option<Answer> {
             .texts
             .iter()
             .all(|text| text.choice == view.texts[0].choice);
-    let why = if view.letters.iter().any(another)
-        || held
+    let reason = if view.letters.iter().any(another)
+        || delimited
             .clone()
             .chain(&view.texts)
             .any(|name| alternative(view, name))
     {
         UnreadReason::Ambiguous
-    } else if held.clone().any(|letter| view.denies(letter)) {
+    } else if delimited.clone().any(|letter| view.denies(letter)) {
         return Some(negated(view));
-    } else if held.clone().any(contradicts)
-        || (first.grip < Delimiting::Firm && only_text && another(&view.texts[0]))
+    } else if delimited.clone().any(contradicts)
+        || (first.delimiting < Delimiting::Firm && only_text && another(&view.texts[0]))
     {
         UnreadReason::Contradiction
     } else {
         return Some(Answer::Chosen(index));
     };
-    Some(Answer::Unparsed(why))
+    Some(Answer::Unparsed(reason))
 }
 
 /// The texts of choices, as whole words: "It is a kitchen."
@@ -166,7 +166,7 @@ fn texts(view: &ReplyView<'_>) -> Option<Answer> {
     Some(Answer::Chosen(first))
 }
 
-/// Why a choice that is named only beside a "not" was not read.
+/// The reason for a choice that is named only with a denial.
 fn negated(view: &ReplyView<'_>) -> Answer {
     Answer::Unparsed(if declines(view.folded) {
         UnreadReason::Refused
@@ -175,8 +175,8 @@ fn negated(view: &ReplyView<'_>) -> Answer {
     })
 }
 
-/// Why nothing at all was read.
-fn nothing(view: &ReplyView<'_>) -> Answer {
+/// The reason for a reply that names no choice.
+fn unread(view: &ReplyView<'_>) -> Answer {
     Answer::Unparsed(if declines(view.folded) {
         UnreadReason::Refused
     } else {

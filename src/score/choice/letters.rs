@@ -1,48 +1,53 @@
-//! Where a reply names a choice by its letter.
+//! Letters in a reply that name a choice.
 
 use std::sync::LazyLock;
 
 use regex::Regex;
 
 use super::clean::compiled;
-use super::names::{Delimiting, Name, index_of, joins};
+use super::names::{Delimiting, Name, continues_word, index_of};
 
-/// Words that follow the letter A, never the article.
+/// Words that can follow the letter A but not the article.
 pub(super) static AFTER_A: LazyLock<Regex> = LazyLock::new(|| {
     compiled(
         r"(?i)\A(?:and|or|but|because|since|as|is|isn't|was|are|would|could|can|cannot|must|should|may|might|seems|appears|has|shows|does|doesn't|fits|for|due|not|nor|if|then|&|/|=|[a-z])(?:[^\w-]|\z)",
     )
 });
 
-/// Words that follow the letter I, never the pronoun.
+/// Words that can follow the letter I but not the pronoun.
 pub(super) static AFTER_I: LazyLock<Regex> =
     LazyLock::new(|| compiled(r"(?i)\A(?:is|isn't|because|or|&|/|=)(?:\W|\z)"));
 
-/// Every letter that is named as one, from left to right; one beyond the choices only where it is held firmly.
+/// Every letter that names a choice, from left to right. A letter beyond the choices is included only if it is firmly
+/// delimited.
 pub(super) fn letters(text: &str, choices: usize) -> Vec<Name> {
     let candidates = text
         .bytes()
         .enumerate()
         .filter(|(_, byte)| byte.is_ascii_alphabetic());
-    let named = candidates.filter_map(|(at, byte)| {
+    let names = candidates.filter_map(|(start, byte)| {
         let letter = char::from(byte);
-        let grip = grip(text, at, letter)?;
+        let delimiting = delimiting(text, start, letter)?;
         let choice = index_of(letter).filter(|index| *index < choices);
-        (choice.is_some() || grip == Delimiting::Firm).then_some(Name {
-            start: at,
-            end: at + 1,
+        (choice.is_some() || delimiting == Delimiting::Firm).then_some(Name {
+            start,
+            end: start + 1,
             choice,
-            grip,
+            delimiting,
         })
     });
-    named.collect()
+    names.collect()
 }
 
-/// How surely the letter at a byte is meant as a choice; `None` for a part of a word, an article, a pronoun.
-fn grip(text: &str, at: usize, letter: char) -> Option<Delimiting> {
-    let (left, right) = (&text[..at], &text[at + 1..]);
+/// How clearly the letter at byte `start` is delimited as a choice; `None` for a part of a word, an article or a pronoun.
+fn delimiting(text: &str, start: usize, letter: char) -> Option<Delimiting> {
+    let (left, right) = (&text[..start], &text[start + 1..]);
     let (before, after) = (left.chars().next_back(), right.chars().next());
-    if joins(before) || joins(after) || before == Some('\'') || after == Some('\'') {
+    if continues_word(before)
+        || continues_word(after)
+        || before == Some('\'')
+        || after == Some('\'')
+    {
         return None;
     }
     if hyphenated(left, right) || abbreviated(left, right) {
@@ -51,7 +56,7 @@ fn grip(text: &str, at: usize, letter: char) -> Option<Delimiting> {
     if matches!(before, Some('(' | '[')) && matches!(after, Some(')' | ']')) {
         return Some(Delimiting::Firm);
     }
-    let leading = at == 0 || left == "(" || left == "[";
+    let leading = start == 0 || left == "(" || left == "[";
     let label = matches!(after, Some('.' | ')' | ':' | ']'));
     if letter.is_ascii_lowercase() {
         return (leading && label).then_some(Delimiting::Firm);
@@ -77,11 +82,12 @@ fn grip(text: &str, at: usize, letter: char) -> Option<Delimiting> {
     }
 }
 
-/// "T-shirt", "Plan-B".
+/// Whether a letter is part of a hyphenated word: "T-shirt", "Plan-B".
 pub(super) fn hyphenated(left: &str, right: &str) -> bool {
     let dash = |c: Option<char>| matches!(c, Some('-' | '‐' | '‑'));
     let (mut before, mut after) = (left.chars().rev(), right.chars());
-    (dash(before.next()) && joins(before.next())) || (dash(after.next()) && joins(after.next()))
+    (dash(before.next()) && continues_word(before.next()))
+        || (dash(after.next()) && continues_word(after.next()))
 }
 
 /// Whether the words before a letter say that it is one: "option A".
@@ -104,11 +110,14 @@ pub(super) fn called_letter(left: &str) -> bool {
     word.len() <= WORDS[7].len() && WORDS.contains(&word.to_lowercase().as_str())
 }
 
-/// "U.S.", "e.g.": single letters, each with its period; "N/A".
+/// Whether a letter is part of an abbreviation: "U.S.", "e.g.", "N/A".
 fn abbreviated(left: &str, right: &str) -> bool {
     let mut before = left.chars().rev();
     let mut after = right.chars();
-    let preceded = before.next() == Some('.') && joins(before.next()) && !joins(before.next());
-    let followed = after.next() == Some('.') && joins(after.next()) && after.next() == Some('.');
+    let preceded = before.next() == Some('.')
+        && continues_word(before.next())
+        && !continues_word(before.next());
+    let followed =
+        after.next() == Some('.') && continues_word(after.next()) && after.next() == Some('.');
     preceded || followed || left.ends_with("N/") || right.starts_with("/A")
 }

@@ -8,25 +8,24 @@ use regex::Regex;
 
 use super::clean::compiled;
 
-/// How firmly a marker announces.
+/// How strongly a marker announces an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum MarkerKind {
-    /// "answer", "correct option": what it is said to be is the answer.
+    /// "answer", "correct option": the choice that follows is the answer.
     Answer,
     /// "choose", "go with": a decision.
     Decision,
-    /// "option", "letter": a choice is named, perhaps in passing.
+    /// "option", "letter": a choice is mentioned, perhaps not as the answer.
     Mention,
 }
 
 /// One marker in a text.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Marker {
-    /// Its first byte.
+    /// First byte of the marker.
     pub(super) start: usize,
-    /// The byte after its last.
+    /// The byte after its last byte.
     pub(super) end: usize,
-    /// How firmly it announces.
     pub(super) kind: MarkerKind,
 }
 
@@ -66,7 +65,7 @@ pub(super) fn markers(folded: &str) -> impl Iterator<Item = Marker> {
     })
 }
 
-/// What leads from a marker to the name: its words, one at a time.
+/// One of the words between a marker and the name of a choice.
 static LEAD: LazyLock<Regex> = LazyLock::new(|| {
     compiled(concat!(
         r"\A[\s]*(?:(?P<colon>[:=]|=>|->|[→⇒⟶])",
@@ -90,28 +89,28 @@ static ARTICLE: LazyLock<Regex> = LazyLock::new(|| {
     ))
 });
 
-/// How many bytes of articles and opening words stand at a text's beginning.
+/// Number of bytes of articles and opening words at the beginning of a text.
 pub(super) fn article(folded: &str) -> usize {
     ARTICLE.find(folded).map_or(0, |found| found.end())
 }
 
-/// The way from a marker to what it announces.
+/// The words between a marker and the name that it announces.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Lead {
-    /// The bytes where the announced name may begin, the farthest last.
+    /// Bytes at which the announced name may begin, in increasing order.
     pub(super) steps: Vec<usize>,
-    /// Whether it comes after a verb or colon, so that it is said to be the answer.
+    /// Whether there is a verb or a colon, so that the name is stated to be the answer.
     pub(super) linked: bool,
-    /// Whether a colon follows the marker, so that all the rest is the answer.
+    /// Whether there is a colon, so that all the rest is the answer.
     pub(super) colon: bool,
-    /// Whether it is said not to be the answer.
+    /// Whether the name is stated not to be the answer.
     pub(super) denied: bool,
 }
 
-/// More words than this announce nothing.
-const LEAD_WORDS: usize = 12;
+/// Maximum number of words between a marker and a name.
+const MAX_LEAD_WORDS: usize = 12;
 
-/// Follows the words after a marker that ends at byte `end`.
+/// The lead after a marker that ends at byte `end`.
 pub(super) fn lead(folded: &str, end: usize) -> Lead {
     let mut lead = Lead {
         steps: vec![past_space(folded, end)],
@@ -120,7 +119,7 @@ pub(super) fn lead(folded: &str, end: usize) -> Lead {
         denied: false,
     };
     let mut at = end;
-    for _ in 0..LEAD_WORDS {
+    for _ in 0..MAX_LEAD_WORDS {
         let Some(found) = LEAD.captures(&folded[at..]) else {
             break;
         };
@@ -134,12 +133,12 @@ pub(super) fn lead(folded: &str, end: usize) -> Lead {
     lead
 }
 
-/// The first byte from `at` on that is no white space.
+/// The first byte from `at` on that is not white space.
 fn past_space(text: &str, at: usize) -> usize {
     text.len() - text[at..].trim_start().len()
 }
 
-static PRAISE: LazyLock<Regex> = LazyLock::new(|| {
+static CONFIRMATION: LazyLock<Regex> = LazyLock::new(|| {
     compiled(concat!(
         r"\A[)\].]*\s*(?:is|seems|would be|must be|should be|appears to be|looks like)\s+",
         r"(?:(?:clearly|definitely|probably|likely|most|therefore|thus|also|indeed)\s+)*(?:the\s+|my\s+)?(?:most\s+|only\s+)?",
@@ -149,19 +148,19 @@ static PRAISE: LazyLock<Regex> = LazyLock::new(|| {
         r"|\A[)\].]*\s*(?:가|이)\s*(?:정답|답)"
     ))
 });
-static PRAISE_OF_LETTER: LazyLock<Regex> = LazyLock::new(|| {
+static LETTER_CONFIRMATION: LazyLock<Regex> = LazyLock::new(|| {
     compiled(concat!(
         r"\A[)\].]*\s*(?:is|seems|would be|must be)\s+(?:clearly |definitely |probably |most likely |likely )?(?:correct|right|best|true)\b",
         r"|\A[)\].]*\s*(?:是)?(?:正确|正確|对的|對的)"
     ))
 });
 
-/// Whether a letter is followed by words that call it the answer: "B is correct".
-pub(super) fn praises_letter(after: &str) -> bool {
-    PRAISE.is_match(after) || PRAISE_OF_LETTER.is_match(after)
+/// Whether the text after a letter calls it the answer: "B is correct".
+pub(super) fn confirms_letter(after: &str) -> bool {
+    CONFIRMATION.is_match(after) || LETTER_CONFIRMATION.is_match(after)
 }
 
-/// Whether a choice's text is followed by words that call it the answer: "kitchen is the best answer".
-pub(super) fn praises_text(after: &str) -> bool {
-    PRAISE.is_match(after)
+/// Whether the text after a choice's text calls it the answer: "kitchen is the best answer".
+pub(super) fn confirms_text(after: &str) -> bool {
+    CONFIRMATION.is_match(after)
 }

@@ -1,11 +1,11 @@
-//! Reading the choice out of a reply, by exact match: [`read`] and [`readings`].
+//! Reading of the choice in a reply, by exact match: [`read`] and [`readings`].
 //!
-//! Two readings are always reported beside each other. [`ReadingMode::Strict`] takes a reply that is an answer and nothing
-//! else; [`ReadingMode::Lenient`] also finds an answer inside a reply, and where two readings are possible it takes neither.
-//! No choice is ever guessed, and where the strict reading finds one the lenient reading finds the same.
+//! Two readings are always reported together. [`ReadingMode::Strict`] accepts a reply that is an answer and nothing else.
+//! [`ReadingMode::Lenient`] also finds an answer inside a reply; if two choices are possible, it accepts neither. No choice
+//! is ever guessed. If the strict reading finds a choice, the lenient reading finds the same.
 //!
-//! A reply passes through `clean` (hidden reasoning, invisible characters, leaked tokens), `strict`, and then the
-//! levels of `lenient`, in the order that its table shows.
+//! A reply passes through `clean` (which removes hidden reasoning, invisible characters and leaked tokens), then `strict`,
+//! then the steps of `lenient`, in the order of its functions `steps` and `read_plain`.
 
 mod clean;
 mod lenient;
@@ -16,35 +16,35 @@ mod plain;
 mod refusal;
 mod stated;
 mod strict;
+mod structured;
 #[cfg(test)]
 mod tests;
 mod view;
-mod written;
 
 use serde::Serialize;
 
 use crate::types::question::{Answer, Choices, UnreadReason};
 use crate::types::reply::{Finish, Reply};
 
-/// How much of a reply may stand around the answer.
+/// How much text a reply may have around the answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ReadingMode {
-    /// Nothing: the whole reply is a choice's text, its letter, or its letter with its text. The headline number.
+    /// None: the whole reply is a choice's text, its letter, or its letter with its text. Headline numbers use this reading.
     Strict,
-    /// Sentences, markup, JSON, LaTeX; as long as one choice alone is meant.
+    /// Sentences, markup, JSON or LaTeX, if exactly one choice is meant.
     Lenient,
 }
 
 impl ReadingMode {
-    /// Both, the headline first.
+    /// Both readings, the headline reading first.
     pub const ALL: [Self; 2] = [Self::Strict, Self::Lenient];
 }
 
-/// The choice that a reply makes; its index is that of the order shown.
+/// The choice in a reply, as an index in the order shown, or the reason why none could be read.
 ///
-/// Whatever stands in a closed reasoning block is left out; a block that is opened and never closed leaves nothing to
-/// read and is [`UnreadReason::Truncated`].
+/// Text in a closed reasoning block is ignored. A block that is opened and never closed leaves nothing to read: the reason
+/// is then [`UnreadReason::Truncated`].
 ///
 /// ```
 /// use darkqa_eval::score::choice::{ReadingMode, read};
@@ -58,9 +58,9 @@ impl ReadingMode {
 /// ```
 #[must_use]
 pub fn read(reply: &str, choices: &Choices, mode: ReadingMode) -> Answer {
-    let text = match clean::spoken(reply) {
+    let text = match clean::without_reasoning(reply) {
         Ok(text) => text,
-        Err(why) => return Answer::Unparsed(why),
+        Err(reason) => return Answer::Unparsed(reason),
     };
     if let Some(answer) = strict::read(text, choices.texts()) {
         return answer;
@@ -71,18 +71,18 @@ pub fn read(reply: &str, choices: &Choices, mode: ReadingMode) -> Answer {
     }
 }
 
-/// The strict and the lenient reading of a reply, in this order, with regard to how it ended.
+/// The strict and the lenient reading of a reply, in this order, considering how the reply ended.
 ///
-/// The exact words of a choice count however the reply ended. Otherwise a refusal beside the text, a content filter
-/// and the token limit decide, in this order: an explanation that was cut may still have changed its mind, so it is
-/// not read leniently.
+/// The exact words of a choice count in any case. Otherwise a separate refusal, a content filter and the token limit
+/// decide, in this order. A truncated explanation is not read leniently, because it could still have ended in another
+/// choice.
 #[must_use]
 pub fn readings(reply: &Reply, choices: &Choices) -> (Answer, Answer) {
     let strict = read(&reply.text, choices, ReadingMode::Strict);
     if let Answer::Chosen(_) = strict {
         return (strict, strict);
     }
-    let why = match &reply.finish {
+    let reason = match &reply.finish {
         _ if reply.refusal.is_some() => UnreadReason::Refused,
         Finish::Filter => UnreadReason::Filtered,
         Finish::Length => UnreadReason::Truncated,
@@ -90,5 +90,5 @@ pub fn readings(reply: &Reply, choices: &Choices) -> (Answer, Answer) {
             return (strict, read(&reply.text, choices, ReadingMode::Lenient));
         }
     };
-    (Answer::Unparsed(why), Answer::Unparsed(why))
+    (Answer::Unparsed(reason), Answer::Unparsed(reason))
 }

@@ -1,4 +1,4 @@
-//! The names of choices in a text: where a letter or a text stands, and whether it is denied.
+//! Names of choices in a text: the position of a letter or a choice's text, and whether it is denied.
 
 use std::sync::LazyLock;
 
@@ -6,57 +6,57 @@ use regex::Regex;
 
 use super::clean::compiled;
 
-/// How surely a name is meant as one.
+/// How clearly a name is delimited from the text around it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Delimiting {
-    /// A letter among words: enough to doubt another, too little to be an answer.
+    /// A letter among words: enough to make another choice ambiguous, but not enough for an answer.
     Loose,
     /// A letter before punctuation or a line's end, or a choice's text.
     Plain,
-    /// A letter in brackets, or first in the reply.
+    /// A letter in brackets, or at the beginning of the reply.
     Firm,
 }
 
-/// One place where a choice is named.
+/// One name of a choice in a text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Name {
-    /// Its first byte; for a letter, that of the letter itself.
+    /// First byte of the name; for a letter in brackets, that of the letter.
     pub(super) start: usize,
-    /// The byte after its last.
+    /// The byte after its last byte.
     pub(super) end: usize,
-    /// Which choice; `None` for a letter beyond them.
+    /// Index of the choice; `None` for a letter beyond the choices.
     pub(super) choice: Option<usize>,
-    /// How surely.
-    pub(super) grip: Delimiting,
+    pub(super) delimiting: Delimiting,
 }
 
-/// The index that a Latin letter stands for.
+/// Index of the choice with a Latin letter: 0 for A.
 pub(super) fn index_of(letter: char) -> Option<usize> {
     letter
         .is_ascii_alphabetic()
         .then(|| usize::from(letter.to_ascii_uppercase() as u8 - b'A'))
 }
 
-/// Whether a character beside a letter makes it part of a longer word. Scripts without letter case never do: their
-/// texts stand beside a Latin letter without a space.
-pub(super) fn joins(c: Option<char>) -> bool {
+/// Whether a character next to a letter makes it part of a longer word. Characters of scripts without letter case do not,
+/// because these scripts write no space next to a Latin letter.
+pub(super) fn continues_word(c: Option<char>) -> bool {
     c.is_some_and(|c| c.is_numeric() || c == '_' || c.is_lowercase() || c.is_uppercase())
 }
 
-/// Whether two neighbours are of one word. Scripts that write no spaces have no words to speak of.
-pub(super) fn one_word(left: Option<char>, right: Option<char>) -> bool {
+/// Whether two neighbouring characters belong to the same word; false for scripts that write no spaces.
+pub(super) fn same_word(left: Option<char>, right: Option<char>) -> bool {
     let spaced = |c: char| (c.is_alphanumeric() || c == '_') && !unspaced(c);
     left.is_some_and(spaced) && right.is_some_and(spaced)
 }
 
-/// Thai to Khmer, kana, Han, Hangul (whose particles are joined to the word).
+/// Whether a character belongs to a script without spaces: Thai to Khmer, kana, Han, and Hangul, whose particles are joined
+/// to the word.
 fn unspaced(c: char) -> bool {
     matches!(c, '\u{e00}'..='\u{eff}' | '\u{1000}'..='\u{109f}' | '\u{1100}'..='\u{11ff}' | '\u{1780}'..='\u{17ff}'
         | '\u{2e80}'..='\u{9fff}' | '\u{ac00}'..='\u{d7ff}' | '\u{f900}'..='\u{faff}' | '\u{20000}'..='\u{3ffff}')
 }
 
-/// Whether the span is a number that goes on outside it: 2 in 12, 2.5, 1,200, 1/2 or -2.
-pub(super) fn cut_number(text: &str, start: usize, end: usize) -> bool {
+/// Whether the span is part of a longer number: 2 in 12, 2.5, 1,200, 1/2 or -2.
+pub(super) fn part_of_number(text: &str, start: usize, end: usize) -> bool {
     let digit = |c: Option<char>| c.is_some_and(char::is_numeric);
     let mut before = text[..start].chars().rev();
     let mut after = text[end..].chars();
@@ -71,7 +71,7 @@ pub(super) fn cut_number(text: &str, start: usize, end: usize) -> bool {
         || (last && (worded(a1) || a1 == Some('%') || (mark(a1) && digit(a2))))
 }
 
-/// Where a clause begins anew, so that a "not" before it no longer reaches.
+/// The beginning of a clause. A "not" before it does not deny names after it.
 static CLAUSE: LazyLock<Regex> = LazyLock::new(|| {
     compiled(concat!(
         r"[.;:!?\n,()。,、;—–]|\b(?:but|so|because|since|therefore|thus|hence|although|though|however|sondern",
@@ -89,7 +89,7 @@ static DENIAL: LazyLock<Regex> = LazyLock::new(|| {
     ))
 });
 
-/// Words that look like a denial and are none.
+/// Words that look like a denial but are not one.
 static NO_DENIAL: LazyLock<Regex> = LazyLock::new(|| {
     compiled(
         r"\b(?:no doubt|without (?:a |any )?doubt|no question|not only|nothing but|none other than|not just)\b|非常",
@@ -108,13 +108,13 @@ static DENIAL_AFTER: LazyLock<Regex> = LazyLock::new(|| {
     ))
 });
 
-/// How far around a name a denial is looked for, in bytes.
-const REACH: usize = 96;
+/// Maximum distance of a denial from a name, in bytes.
+const MAX_DISTANCE: usize = 96;
 
 /// Whether the words around a span deny it.
 pub(super) fn denied(folded: &str, start: usize, end: usize) -> bool {
-    let from = folded.ceil_char_boundary(start.saturating_sub(REACH));
-    let to = folded.floor_char_boundary(end.saturating_add(REACH));
+    let from = folded.ceil_char_boundary(start.saturating_sub(MAX_DISTANCE));
+    let to = folded.floor_char_boundary(end.saturating_add(MAX_DISTANCE));
     let before = folded[from..start].trim_end_matches(['(', '[', ' ']);
     let clause = CLAUSE.find_iter(before).last().map_or(0, |m| m.end());
     let clause = NO_DENIAL.replace_all(&before[clause..], " ");

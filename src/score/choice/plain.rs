@@ -1,4 +1,4 @@
-//! A reply without its markup: Markdown, HTML, LaTeX, quotes, pictographs.
+//! Removal of markup from a reply: Markdown, HTML, LaTeX, quotes, pictographs.
 
 use std::sync::LazyLock;
 
@@ -29,7 +29,7 @@ static LINE_START: LazyLock<Regex> =
 static SPACES: LazyLock<Regex> = LazyLock::new(|| compiled(r"[^\S\n]+"));
 static LINES: LazyLock<Regex> = LazyLock::new(|| compiled(r" ?\n[\s]*"));
 
-/// How deep LaTeX groups are unwrapped.
+/// Maximum depth of LaTeX groups that are unwrapped.
 const LATEX_DEPTH: usize = 4;
 
 /// The text without markup, one space between words, no empty lines, trimmed.
@@ -51,38 +51,38 @@ pub(super) fn plain(text: &str) -> String {
     LINES.replace_all(text.trim(), "\n").into_owned()
 }
 
-/// Drops emphasis, quotes and pictographs; a crossed-out mark becomes the word it stands for.
+/// The text without emphasis, quotes and pictographs; a cross mark becomes "not".
 fn without_signs(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    let mut before = None;
+    let mut plain = String::with_capacity(text.len());
+    let mut previous = None;
     let mut rest = text.chars().peekable();
     while let Some(c) = rest.next() {
-        let after = rest.peek().copied();
+        let next = rest.peek().copied();
         let inside =
-            before.is_some_and(char::is_alphanumeric) && after.is_some_and(char::is_alphanumeric);
+            previous.is_some_and(char::is_alphanumeric) && next.is_some_and(char::is_alphanumeric);
         match c {
-            '\'' | '’' | '‘' | 'ʼ' if inside => out.push('\''),
-            '_' if inside => out.push('_'),
+            '\'' | '’' | '‘' | 'ʼ' if inside => plain.push('\''),
+            '_' if inside => plain.push('_'),
             '*' | '`' | '$' | '_' | '\'' | '’' | '‘' | '‚' | '"' | '“' | '”' | '„' | '‟' | '«'
             | '»' | '‹' | '›' | '「' | '」' | '『' | '』' | '《' | '》' | '〈' | '〉' | '″' =>
                 {}
-            '【' | '〔' | '〖' => out.push('['),
-            '】' | '〕' | '〗' => out.push(']'),
-            '|' => out.push('\n'),
-            '❌' | '✗' | '✘' | '❎' | '✖' => out.push_str(" not "),
+            '【' | '〔' | '〖' => plain.push('['),
+            '】' | '〕' | '〗' => plain.push(']'),
+            '|' => plain.push('\n'),
+            '❌' | '✗' | '✘' | '❎' | '✖' => plain.push_str(" not "),
             '~'
             | '\u{20e3}'
             | '\u{2600}'..='\u{27bf}'
             | '\u{2b00}'..='\u{2bff}'
-            | '\u{1f000}'..='\u{1faff}' => out.push(' '),
-            c => out.push(c),
+            | '\u{1f000}'..='\u{1faff}' => plain.push(' '),
+            c => plain.push(c),
         }
-        before = Some(c);
+        previous = Some(c);
     }
-    out
+    plain
 }
 
-/// The text in lower case, each character where it was: one whose other case is longer or shorter stays as it is.
+/// The text in lower case with the same byte positions: a character whose lower case has another length stays as it is.
 pub(super) fn fold(text: &str) -> String {
     let lower = |c: char| {
         let mut lower = c.to_lowercase();

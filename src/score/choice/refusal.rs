@@ -1,4 +1,4 @@
-//! Replies that decline: recognised only to say why nothing was read, never to read something.
+//! Recognition of replies that decline to answer. It only decides the reason why nothing was read.
 
 use std::sync::LazyLock;
 
@@ -22,7 +22,7 @@ static REFUSAL: LazyLock<Regex> = LazyLock::new(|| {
     ))
 });
 
-/// Whether a text (in lower case) declines to answer, or says that nothing can be seen.
+/// Whether a text in lower case declines to answer or says that nothing can be seen.
 pub(super) fn declines(folded: &str) -> bool {
     REFUSAL.is_match(folded)
 }

@@ -8,43 +8,45 @@ use super::clean::compiled;
 use super::lenient;
 use super::letters::{AFTER_A, AFTER_I, called_letter, hyphenated};
 use super::markers::{self, Lead, Marker, MarkerKind};
-use super::names::{Delimiting, Name, index_of, joins};
+use super::names::{Delimiting, Name, continues_word, index_of};
 use super::plain::fold;
 use super::view::ReplyView;
 use crate::types::question::{Answer, UnreadReason};
 
-/// One announcement.
+/// A statement about a choice at one place in a reply.
 #[derive(Debug, Clone, Copy)]
 struct Announcement {
-    /// Its first byte.
+    /// First byte of the announcement.
     at: usize,
     kind: MarkerKind,
-    what: What,
+    statement: Statement,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum What {
-    /// This is the answer, or what stands in the answer's place cannot be read.
+enum Statement {
+    /// This is the answer, or the text in its place cannot be read.
     Is(Answer),
     /// This choice is not the answer.
     IsNot(usize),
 }
 
-/// The answer that a text announces: of those said to be the answer the last one; else the one that is decided for or
-/// spoken of, where there is only one.
+/// The answer that a text announces: the last one that is stated to be the answer, else the only one that is chosen, else
+/// the only one that is mentioned.
 pub(super) fn stated(view: &ReplyView<'_>) -> Option<Answer> {
-    let marks: Vec<Marker> = markers::markers(view.folded).collect();
-    let mut sayings: Vec<Announcement> = praised(view).collect();
+    let found: Vec<Marker> = markers::markers(view.folded).collect();
+    let mut announcements: Vec<Announcement> = confirmed(view).collect();
     let mut end = view.text.len();
-    for mark in marks.into_iter().rev() {
-        sayings.extend(saying(view, mark, end));
-        if mark.kind == MarkerKind::Answer {
-            end = mark.start;
+    for marker in found.into_iter().rev() {
+        announcements.extend(announcement(view, marker, end));
+        if marker.kind == MarkerKind::Answer {
+            end = marker.start;
         }
     }
-    sayings.sort_by_key(|saying| saying.at);
+    announcements.sort_by_key(|announcement| announcement.at);
     let of = |kind: MarkerKind| -> Vec<Announcement> {
-        let same = sayings.iter().filter(|saying| saying.kind == kind);
+        let same = announcements
+            .iter()
+            .filter(|announcement| announcement.kind == kind);
         same.copied().collect()
     };
     last(&of(MarkerKind::Answer))
@@ -52,111 +54,113 @@ pub(super) fn stated(view: &ReplyView<'_>) -> Option<Answer> {
         .or_else(|| only(&of(MarkerKind::Mention), &view.letters))
 }
 
-/// The last that was said to be the answer, unless it was taken back.
-fn last(sayings: &[Announcement]) -> Option<Answer> {
+/// The last answer that is stated, unless it is denied later.
+fn last(announcements: &[Announcement]) -> Option<Answer> {
     let readable = |answer: Answer| {
         !matches!(
             answer,
             Answer::Unparsed(UnreadReason::NoChoice | UnreadReason::Refused)
         )
     };
-    let said = |saying: &Announcement| match saying.what {
-        What::Is(answer) => Some((saying.at, answer)),
-        What::IsNot(_) => None,
+    let answer_of = |announcement: &Announcement| match announcement.statement {
+        Statement::Is(answer) => Some((announcement.at, answer)),
+        Statement::IsNot(_) => None,
     };
-    let (at, answer) = sayings
+    let (at, answer) = announcements
         .iter()
         .rev()
-        .filter_map(said)
+        .filter_map(answer_of)
         .find(|(_, answer)| readable(*answer))
-        .or_else(|| sayings.iter().rev().find_map(said))?;
-    let back = |saying: &Announcement| {
-        saying.at > at
-            && matches!((saying.what, answer), (What::IsNot(a), Answer::Chosen(b)) if a == b)
+        .or_else(|| announcements.iter().rev().find_map(answer_of))?;
+    let retracts = |announcement: &Announcement| {
+        announcement.at > at
+            && matches!((announcement.statement, answer), (Statement::IsNot(a), Answer::Chosen(b)) if a == b)
     };
-    Some(if sayings.iter().any(back) {
+    Some(if announcements.iter().any(retracts) {
         Answer::Unparsed(UnreadReason::Negated)
     } else {
         answer
     })
 }
 
-/// The one choice that is spoken of; `beside` are letters that must not name another.
-fn only(sayings: &[Announcement], beside: &[Name]) -> Option<Answer> {
+/// The only choice that is announced; `other_letters` must not name another one.
+fn only(announcements: &[Announcement], other_letters: &[Name]) -> Option<Answer> {
     let mut chosen = None;
-    for saying in sayings {
-        match saying.what {
-            What::Is(Answer::Chosen(index)) if chosen.is_none_or(|other| other == index) => {
+    for announcement in announcements {
+        match announcement.statement {
+            Statement::Is(Answer::Chosen(index)) if chosen.is_none_or(|other| other == index) => {
                 chosen = Some(index);
             }
-            What::Is(Answer::Chosen(_)) => return Some(Answer::Unparsed(UnreadReason::Ambiguous)),
-            What::Is(unparsed) => return Some(unparsed),
-            What::IsNot(_) => {}
+            Statement::Is(Answer::Chosen(_)) => {
+                return Some(Answer::Unparsed(UnreadReason::Ambiguous));
+            }
+            Statement::Is(unparsed) => return Some(unparsed),
+            Statement::IsNot(_) => {}
         }
     }
     let chosen = chosen?;
-    for saying in sayings {
-        match saying.what {
-            What::IsNot(index) if index == chosen => {
+    for announcement in announcements {
+        match announcement.statement {
+            Statement::IsNot(index) if index == chosen => {
                 return Some(Answer::Unparsed(UnreadReason::Negated));
             }
-            What::IsNot(_) => return Some(Answer::Unparsed(UnreadReason::Ambiguous)),
-            What::Is(_) => {}
+            Statement::IsNot(_) => return Some(Answer::Unparsed(UnreadReason::Ambiguous)),
+            Statement::Is(_) => {}
         }
     }
     let other = |name: &Name| name.choice != Some(chosen);
-    Some(if beside.iter().any(other) {
+    Some(if other_letters.iter().any(other) {
         Answer::Unparsed(UnreadReason::Ambiguous)
     } else {
         Answer::Chosen(chosen)
     })
 }
 
-/// What a marker announces; `end` is where the next answer is announced.
-fn saying(view: &ReplyView<'_>, mark: Marker, end: usize) -> Option<Announcement> {
-    let lead = markers::lead(view.folded, mark.end);
-    let kind = match mark.kind {
+/// The announcement of a marker; `end` is the byte at which the next answer is announced.
+fn announcement(view: &ReplyView<'_>, marker: Marker, end: usize) -> Option<Announcement> {
+    let lead = markers::lead(view.folded, marker.end);
+    let kind = match marker.kind {
         MarkerKind::Answer if !lead.linked => MarkerKind::Mention,
         kind => kind,
     };
-    let what = match announced(view, &lead) {
-        Some((name, _)) if lead.denied || view.denies(&name) => What::IsNot(name.choice?),
-        Some((_, answer)) => What::Is(answer),
+    let statement = match announced(view, &lead) {
+        Some((name, _)) if lead.denied || view.denies(&name) => Statement::IsNot(name.choice?),
+        Some((_, answer)) => Statement::Is(answer),
         None if lead.colon && kind == MarkerKind::Answer => {
             let rest = view.text.get(*lead.steps.last()?..end)?.trim();
-            What::Is(rest_of(view, rest)?)
+            Statement::Is(read_rest(view, rest)?)
         }
         None => return None,
     };
     Some(Announcement {
-        at: mark.start,
+        at: marker.start,
         kind,
-        what,
+        statement,
     })
 }
 
-/// What is said after "Answer:" in more words than a name: in the rest of the line, else in all that follows.
-fn rest_of(view: &ReplyView<'_>, rest: &str) -> Option<Answer> {
+/// The answer after "Answer:" if more than a name follows: from the rest of the line, else from all the rest.
+fn read_rest(view: &ReplyView<'_>, rest: &str) -> Option<Answer> {
     if rest.is_empty() {
         return None;
     }
     let line = rest.lines().next().unwrap_or_default();
-    let [line, rest] =
-        [line, rest].map(|text| lenient::spoken(&ReplyView::new(text, &fold(text), view.offered)));
+    let [line, rest] = [line, rest]
+        .map(|text| lenient::read_plain(&ReplyView::new(text, &fold(text), view.offered)));
     Some(match line {
         Answer::Unparsed(UnreadReason::NoChoice) => rest,
         line => line,
     })
 }
 
-/// The name that a marker leads to, with what it says once its surroundings are regarded.
+/// The name that a marker leads to, and the answer that it gives in its context.
 fn announced(view: &ReplyView<'_>, lead: &Lead) -> Option<(Name, Answer)> {
-    let far = *lead.steps.last()?;
+    let last_step = *lead.steps.last()?;
     let longer = |name: &Name| name.end - name.start > 1;
     let name = view
-        .text_from(far)
+        .text_from(last_step)
         .filter(longer)
-        .or_else(|| letter_at(view, far))
+        .or_else(|| letter_at(view, last_step))
         .or_else(|| lead.steps.iter().rev().find_map(|&at| view.text_at(at)))?;
     let after = &view.text[name.end..];
     if after.trim_start_matches([')', ']']).starts_with('?') {
@@ -166,14 +170,15 @@ fn announced(view: &ReplyView<'_>, lead: &Lead) -> Option<(Name, Answer)> {
         return Some((name, Answer::Unparsed(UnreadReason::OutOfRange)));
     };
     let contradicts = |text: Name| text.choice != Some(index);
-    let answer =
-        if name.grip == Delimiting::Firm && view.labelled_text(&name).is_some_and(contradicts) {
-            Answer::Unparsed(UnreadReason::Contradiction)
-        } else if alternative(view, &name) {
-            Answer::Unparsed(UnreadReason::Ambiguous)
-        } else {
-            Answer::Chosen(index)
-        };
+    let answer = if name.delimiting == Delimiting::Firm
+        && view.labelled_text(&name).is_some_and(contradicts)
+    {
+        Answer::Unparsed(UnreadReason::Contradiction)
+    } else if alternative(view, &name) {
+        Answer::Unparsed(UnreadReason::Ambiguous)
+    } else {
+        Answer::Chosen(index)
+    };
     Some((name, answer))
 }
 
@@ -184,7 +189,7 @@ static ALTERNATIVE: LazyLock<Regex> = LazyLock::new(|| {
     ))
 });
 
-/// Whether another choice is offered in the same breath: "B or C", "B/C", "kitchen or bathroom".
+/// Whether another choice follows as an alternative: "B or C", "B/C", "kitchen or bathroom".
 pub(super) fn alternative(view: &ReplyView<'_>, name: &Name) -> bool {
     let Some(link) = ALTERNATIVE.find(&view.folded[name.end..]) else {
         return false;
@@ -194,7 +199,7 @@ pub(super) fn alternative(view: &ReplyView<'_>, name: &Name) -> bool {
     other.is_some_and(|other| other.choice != name.choice && !view.denies(&other))
 }
 
-/// The letter that is named where one is expected, in either case, in brackets or bare.
+/// The letter at a byte where one is expected: upper or lower case, with or without brackets.
 fn letter_at(view: &ReplyView<'_>, at: usize) -> Option<Name> {
     let open = view.text[at..].starts_with(['(', '[']);
     let start = at + usize::from(open);
@@ -207,10 +212,13 @@ fn letter_at(view: &ReplyView<'_>, at: usize) -> Option<Name> {
         start,
         end: start + 1,
         choice: index_of(letter).filter(|index| *index < view.offered.texts.len()),
-        grip: Delimiting::Firm,
+        delimiting: Delimiting::Firm,
     };
     let after = right.chars().next();
-    if joins(after) || hyphenated(left, right) || (after == Some('\'') && !turkish_copula(right)) {
+    if continues_word(after)
+        || hyphenated(left, right)
+        || (after == Some('\'') && !turkish_copula(right))
+    {
         return None;
     }
     let words = right.trim_start_matches(' ');
@@ -234,23 +242,23 @@ fn turkish_copula(right: &str) -> bool {
         .any(|end| right.starts_with(end))
 }
 
-/// Names that are called the answer after they stand: "B is the correct answer".
-fn praised<'a>(view: &'a ReplyView<'_>) -> impl Iterator<Item = Announcement> + 'a {
+/// Names that the text after them calls the answer: "B is the correct answer".
+fn confirmed<'a>(view: &'a ReplyView<'_>) -> impl Iterator<Item = Announcement> + 'a {
     let letters = view
         .letters
         .iter()
-        .filter(|name| markers::praises_letter(&view.folded[name.end..]));
+        .filter(|name| markers::confirms_letter(&view.folded[name.end..]));
     let texts = view
         .texts
         .iter()
-        .filter(|name| markers::praises_text(&view.folded[name.end..]));
+        .filter(|name| markers::confirms_text(&view.folded[name.end..]));
     letters
         .chain(texts)
         .filter(|name| !view.denies(name))
         .map(|name| Announcement {
             at: name.start,
             kind: MarkerKind::Answer,
-            what: What::Is(match name.choice {
+            statement: Statement::Is(match name.choice {
                 Some(index) => Answer::Chosen(index),
                 None => Answer::Unparsed(UnreadReason::OutOfRange),
             }),

@@ -1,12 +1,12 @@
-//! The exact forms: a choice's text, its letter, or its letter with its text.
+//! The strict reading: a choice's text, its letter, or its letter with its text.
 
 use super::names::index_of;
 use crate::types::question::{Answer, UnreadReason};
 
-/// Reads a reply that is one of the exact forms, whole; `None` where it is none.
+/// The answer of a reply that is exactly one of the strict forms; otherwise `None`.
 ///
-/// The forms are, in either case of letters: a choice's text with or without a final period; `B`, `(B)`, `[B]`, `B.`,
-/// `B)`, `B:`; and such a letter, or `B -`, before the text of the same choice.
+/// The forms, in upper or lower case, are: a choice's text with or without a final period; `B`, `(B)`, `[B]`, `B.`, `B)`,
+/// `B:`; and such a letter, or `B -`, before the text of the same choice.
 pub(super) fn read(text: &str, choices: &[String]) -> Option<Answer> {
     let by_text = position(text, choices);
     let by_letter = label(text).and_then(|(letter, rest)| {
@@ -22,7 +22,7 @@ pub(super) fn read(text: &str, choices: &[String]) -> Option<Answer> {
         }
     });
     match (by_text, by_letter) {
-        // Only where choices are themselves letters can a reply be one choice's text and another's letter.
+        // A reply can be one choice's text and another's letter only if the choices are themselves letters.
         (Some(text), Some(Answer::Chosen(letter))) if text != letter => {
             Some(Answer::Unparsed(UnreadReason::Ambiguous))
         }
@@ -31,7 +31,7 @@ pub(super) fn read(text: &str, choices: &[String]) -> Option<Answer> {
     }
 }
 
-/// The choice whose text this is, letter case and a final period aside.
+/// Index of the choice with this text, ignoring letter case and a final period.
 fn position(text: &str, choices: &[String]) -> Option<usize> {
     fn bare(text: &str) -> &str {
         text.strip_suffix('.').unwrap_or(text)
@@ -47,7 +47,7 @@ fn position(text: &str, choices: &[String]) -> Option<usize> {
     exact.or_else(|| choices.iter().position(nearly))
 }
 
-/// The letter that a reply begins with as a label, and what follows it, which may be nothing.
+/// The letter with which a reply begins as a label, and the text after it, which may be empty.
 fn label(text: &str) -> Option<(char, &str)> {
     let text = text.trim();
     let mut chars = text.chars();

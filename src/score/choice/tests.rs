@@ -1,4 +1,4 @@
-//! Every rule of reading, on a table of replies, and what holds for any reply.
+//! Every rule of reading, on a table of replies, and properties that hold for any reply.
 
 #![allow(clippy::unwrap_used)]
 
@@ -9,7 +9,7 @@ use super::{ReadingMode, read, readings};
 use crate::types::question::{Answer, Choices, UnreadReason};
 use crate::types::reply::{Finish, Reply};
 
-/// One line of the table: the set of choices, the reply, and what each mode reads.
+/// One line of the table: the set of choices, the reply, and the expected answer in each mode.
 #[derive(Deserialize)]
 struct Case {
     of: String,
@@ -52,7 +52,7 @@ const SETS: [(&str, &[&str]); 9] = [
     ("left_right", &["left", "right", "in front", "behind"]),
 ];
 
-/// The first sets: those whose texts are words, so that no letter or sign in them can be read as something else.
+/// Number of leading sets whose texts are words, so that no letter or sign in them can be read as something else.
 const PLAIN_SETS: usize = 6;
 
 fn choices(set: &str) -> Choices {
@@ -87,7 +87,7 @@ fn the_table_of_replies_is_read() {
 }
 
 #[test]
-fn how_a_reply_ended_is_regarded() {
+fn the_end_of_a_reply_is_considered() {
     let rooms = choices("rooms");
     let reply = |text: &str, finish: Finish, refusal: Option<&str>| Reply {
         finish,
@@ -142,7 +142,7 @@ fn long_replies_are_read() {
     );
     let found = read(&answered, &rooms, ReadingMode::Lenient);
     assert_eq!(found, Answer::Chosen(1));
-    // What any level looks for, over and over: were one of them quadratic, this test would not end in good time.
+    // Repetitions of what the steps search for. If one step were quadratic, this test would take very long.
     for piece in [
         "answer: ",
         "answer is ",
@@ -172,7 +172,7 @@ fn long_replies_are_read() {
     }
 }
 
-/// Fragments that the levels look for, so that random strings of them reach every level.
+/// Fragments that the steps search for, so that random strings of them reach every step.
 const FRAGMENTS: [&str; 64] = [
     "A",
     "B",

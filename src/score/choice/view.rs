@@ -1,18 +1,18 @@
-//! A plain text with every place where it names one of the offered choices.
+//! A plain text with every name of a choice in it: [`ReplyView`].
 
 use super::letters::letters;
-use super::names::{Delimiting, Name, cut_number, denied, one_word};
+use super::names::{Delimiting, Name, denied, part_of_number, same_word};
 use super::plain::{fold, plain};
 use super::{clean, markers};
 use crate::types::question::Choices;
 
-/// The choices as they can stand in a plain text.
+/// The choices as they occur in plain text.
 pub(super) struct ChoiceViews {
-    /// Their texts without markup.
+    /// Texts of the choices without markup.
     pub(super) texts: Vec<String>,
-    /// The same in lower case without a final period, longest first, with the choices they belong to.
+    /// The same texts in lower case without a final period, longest first, each with the index of its choice.
     folded: Vec<(String, usize)>,
-    /// Which choices are "yes" and "no", where both are offered.
+    /// Indices of "yes" and "no", if both are choices.
     pub(super) yes_no: Option<(usize, usize)>,
 }
 
@@ -46,22 +46,21 @@ impl ChoiceViews {
     }
 }
 
-/// A plain text and what it names.
+/// A plain text and the names of choices in it.
 pub(super) struct ReplyView<'a> {
-    /// The text.
     pub(super) text: &'a str,
-    /// The text in lower case, byte for byte.
+    /// The text in lower case, with the same byte positions.
     pub(super) folded: &'a str,
-    /// What it is read against.
+    /// The choices of the question.
     pub(super) offered: &'a ChoiceViews,
-    /// Letters, from left to right.
+    /// Letters that name a choice, from left to right.
     pub(super) letters: Vec<Name>,
-    /// Texts of choices, from left to right, none inside a longer one.
+    /// Texts of choices, from left to right. None lies inside a longer one.
     pub(super) texts: Vec<Name>,
 }
 
 impl<'a> ReplyView<'a> {
-    /// Looks through a text; `folded` is [`fold`] of it.
+    /// The view of a text; `folded` is [`fold`] of it.
     pub(super) fn new(text: &'a str, folded: &'a str, offered: &'a ChoiceViews) -> Self {
         let texts = texts(folded, offered);
         let within = |letter: &Name| {
@@ -81,13 +80,13 @@ impl<'a> ReplyView<'a> {
         }
     }
 
-    /// The choice's text that begins at a byte, articles and words such as "it is" passed over.
+    /// The choice's text that begins at a byte, after optional articles and words such as "it is".
     pub(super) fn text_at(&self, at: usize) -> Option<Name> {
         self.text_from(at)
             .or_else(|| self.text_from(at + markers::article(&self.folded[at..])))
     }
 
-    /// The choice's text that begins at just this byte.
+    /// The choice's text that begins exactly at a byte.
     pub(super) fn text_from(&self, at: usize) -> Option<Name> {
         let first = self.texts.partition_point(|name| name.start < at);
         let name = self.texts.get(first).copied();
@@ -99,44 +98,44 @@ impl<'a> ReplyView<'a> {
         denied(self.folded, name.start, name.end)
     }
 
-    /// The text that follows a letter as its label does: "B. kitchen", "(B) a kitchen", "B: kitchen".
+    /// The choice's text after a letter that labels it: "B. kitchen", "(B) a kitchen", "B: kitchen".
     pub(super) fn labelled_text(&self, letter: &Name) -> Option<Name> {
         let rest = &self.text[letter.end..];
         let after =
             rest.trim_start_matches([')', ']', '.', ':', ',', '、', ' ', '\n', '-', '–', '—']);
         let gap = &rest[..rest.len() - after.len()];
         let name = self.text_at(letter.end + gap.len())?;
-        // On another line it is the letter's text only where it fills the line.
+        // On another line it is the letter's text only if it fills the line.
         let line = self.text[name.end..].trim_start_matches(['.', ' ']);
         let alone = !gap.contains('\n') || line.is_empty() || line.starts_with('\n');
         (!gap.is_empty() && alone && !self.denies(&name)).then_some(name)
     }
 }
 
-/// Every whole-word place of a choice's text, longest texts first, from left to right.
+/// Every choice's text that occurs as whole words, from left to right. Longer texts take precedence.
 fn texts(folded: &str, offered: &ChoiceViews) -> Vec<Name> {
-    let mut taken = vec![false; folded.len()];
+    let mut covered = vec![false; folded.len()];
     let mut names = Vec::new();
     for (i, (text, choice)) in offered.folded.iter().enumerate() {
-        // Two choices may differ in markup alone; then every place names both.
-        let twins = offered.folded[i + 1..]
+        // Two choices may differ only in markup; then every occurrence names both.
+        let duplicates = offered.folded[i + 1..]
             .iter()
-            .take_while(|(twin, _)| twin.len() == text.len());
-        let twins: Vec<usize> = twins
-            .filter(|(twin, _)| twin == text)
+            .take_while(|(duplicate, _)| duplicate.len() == text.len());
+        let duplicates: Vec<usize> = duplicates
+            .filter(|(duplicate, _)| duplicate == text)
             .map(|(_, index)| *index)
             .collect();
         for (start, _) in folded.match_indices(text.as_str()) {
             let end = start + text.len();
-            if taken[start..end].contains(&true) || !whole(folded, start, end) {
+            if covered[start..end].contains(&true) || !stands_alone(folded, start, end) {
                 continue;
             }
-            taken[start..end].fill(true);
-            names.extend([*choice].iter().chain(&twins).map(|&choice| Name {
+            covered[start..end].fill(true);
+            names.extend([*choice].iter().chain(&duplicates).map(|&choice| Name {
                 start,
                 end,
                 choice: Some(choice),
-                grip: Delimiting::Plain,
+                delimiting: Delimiting::Plain,
             }));
         }
     }
@@ -144,15 +143,16 @@ fn texts(folded: &str, offered: &ChoiceViews) -> Vec<Name> {
     names
 }
 
-/// Whether a span stands for itself: no part of a word or number, and no "no" that belongs to a noun.
-fn whole(folded: &str, start: usize, end: usize) -> bool {
+/// Whether a span is not part of a word or a number, not an article, and not a "no" before a noun.
+fn stands_alone(folded: &str, start: usize, end: usize) -> bool {
     let span = &folded[start..end];
     let (before, after) = (
         folded[..start].chars().next_back(),
         folded[end..].chars().next(),
     );
-    let inside = one_word(before, span.chars().next()) || one_word(span.chars().next_back(), after);
+    let inside =
+        same_word(before, span.chars().next()) || same_word(span.chars().next_back(), after);
     let article = span.len() == 1 && matches!(span, "a" | "i") && after == Some(' ');
     let noun = span == "no" && !after.is_none_or(|c| ".,;:!?)\n".contains(c));
-    !inside && !article && !noun && !cut_number(folded, start, end)
+    !inside && !article && !noun && !part_of_number(folded, start, end)
 }

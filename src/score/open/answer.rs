@@ -1,25 +1,25 @@
-//! One answer and what came of it: [`ScoredAnswer`], [`AnswerOutcome`].
+//! One open answer and its outcome: [`ScoredAnswer`], [`AnswerOutcome`].
 
 use crate::score::llm_match::points;
 use crate::score::subject::Subject;
 
-/// What came of an answer.
+/// Outcome of an open answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AnswerOutcome {
-    /// It was not given yet, or it failed: not scored.
+    /// There is no answer yet, or the trial failed. Not scored.
     Missing,
-    /// It was given and not judged yet: not scored.
+    /// The answer is not judged yet. Not scored.
     Unjudged,
-    /// The judge's reply has no mark in it: not scored.
+    /// The judge's reply has no mark. Not scored.
     Unmarked,
-    /// There is none: worth nothing, unjudged.
+    /// A null answer. It has 0 points without a judge.
     Null,
-    /// The judge's mark.
+    /// The mark from the judge's reply, before it is clipped to 1 to 5.
     Marked(i64),
 }
 
 impl AnswerOutcome {
-    /// What it is worth, between 0 and 1; `None` where it is not scored.
+    /// Points between 0 and 1; `None` if the answer is not scored.
     #[must_use]
     pub fn points(self) -> Option<f64> {
         match self {
@@ -30,15 +30,15 @@ impl AnswerOutcome {
     }
 }
 
-/// One answer to one question.
+/// One answer of one subject to one question.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScoredAnswer {
-    /// Whose it is.
+    /// Model and condition that gave the answer.
     pub subject: Subject,
-    /// The question's place among those asked.
+    /// Index of the question among those asked.
     pub question: usize,
-    /// What came of it.
+    /// Outcome of the answer.
     pub outcome: AnswerOutcome,
-    /// Whether the protocol has cut it before it was judged.
+    /// Whether the protocol shortened the answer before it was judged.
     pub cut: bool,
 }

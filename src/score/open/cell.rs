@@ -1,4 +1,4 @@
-//! One score: [`OpenCell`].
+//! The score of a subject on a group of questions: [`OpenCell`].
 
 use std::collections::BTreeMap;
 
@@ -7,42 +7,40 @@ use super::group::Group;
 use crate::score::estimate::Estimate;
 use crate::score::subject::Subject;
 
-/// How many independent right-or-wrong replies a mark may count for: one on a scale of five steps varies less than such a reply
-/// of the same mean, at least where it is not all or nothing.
-const MOST: f64 = 4.0;
+/// Maximum number of independent right-or-wrong replies that one mark may count for. A mark on a scale of five steps varies
+/// less than such a reply with the same mean, unless all marks are 1 or 5.
+const MAX_WEIGHT: f64 = 4.0;
 
-/// The score of a subject on a group of questions, and what it rests on.
+/// Score of a subject on a group of questions, with the counts behind it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OpenCell {
-    /// Whose.
     pub subject: Subject,
-    /// On what.
     pub group: Group,
-    /// How many answers are due.
-    pub due: usize,
-    /// Those not given, or failed.
+    /// Number of answers that the run asks for.
+    pub planned: usize,
+    /// Number of answers that are not there yet or failed.
     pub missing: usize,
-    /// Those not judged yet.
+    /// Number of answers that are not judged yet.
     pub unjudged: usize,
-    /// Those whose judge gave no mark.
+    /// Number of answers without a mark in the judge's reply.
     pub unmarked: usize,
-    /// Those that are none.
+    /// Number of null answers, which score 0.
     pub null: usize,
-    /// Those that the protocol has cut.
+    /// Number of answers that the protocol shortened before they were judged.
     pub cut: usize,
-    /// The mean, between 0 and 1; `None` where nothing is scored. Its `n` counts answers.
+    /// Mean score, between 0 and 1; `None` if no answer is scored. Its `n` is the number of answers.
     pub score: Option<Estimate>,
 }
 
 impl OpenCell {
-    /// How many answers are scored.
+    /// Number of scored answers.
     #[must_use]
     pub fn scored(&self) -> usize {
         self.score.map_or(0, |score| score.n)
     }
 }
 
-/// Scores the answers of a subject on a group.
+/// The cell of a subject and a group; `cluster` returns the cluster of a question.
 pub(super) fn cell(
     subject: &Subject,
     group: &Group,
@@ -50,8 +48,8 @@ pub(super) fn cell(
     cluster: impl Fn(usize) -> usize,
 ) -> OpenCell {
     let count = |outcome| {
-        let alike = answers.iter().filter(|answer| answer.outcome == outcome);
-        alike.count()
+        let same = answers.iter().filter(|answer| answer.outcome == outcome);
+        same.count()
     };
     let mut sums = BTreeMap::<usize, (f64, f64)>::new();
     for answer in answers {
@@ -65,12 +63,12 @@ pub(super) fn cell(
     OpenCell {
         subject: subject.clone(),
         group: group.clone(),
-        due: answers.len(),
+        planned: answers.len(),
         missing: count(AnswerOutcome::Missing),
         unjudged: count(AnswerOutcome::Unjudged),
         unmarked: count(AnswerOutcome::Unmarked),
         null: count(AnswerOutcome::Null),
         cut: answers.iter().filter(|answer| answer.cut).count(),
-        score: Estimate::scored(&sums, MOST, n),
+        score: Estimate::scored(&sums, MAX_WEIGHT, n),
     }
 }

@@ -1,4 +1,4 @@
-//! One score less another: [`ScoreChange`].
+//! The difference of two scores: [`ScoreChange`].
 
 use std::collections::BTreeMap;
 
@@ -9,54 +9,51 @@ use crate::score::paired::difference;
 use crate::score::subject::Subject;
 use crate::types::{AxisLevel, View};
 
-/// What a score is held against.
+/// The subject to which a score is compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Baseline {
-    /// The same model on the lit frames.
-    Lit,
+    /// The same model on the clean frames.
+    Clean,
     /// The same model at the same level without an enhancer.
     Raw,
 }
 
-/// A subject's score less that of another, on the questions that both were scored on.
+/// Score of a subject minus that of a baseline, on the questions for which both have a score.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScoreChange {
-    /// Whose.
     pub subject: Subject,
-    /// Against what.
-    pub against: Baseline,
-    /// On what.
+    pub baseline: Baseline,
     pub group: Group,
-    /// The difference of the unrounded means; its `n` counts questions.
+    /// Difference of the unrounded means. Its `n` is the number of questions.
     pub difference: Estimate,
 }
 
-/// Whom a subject is held against.
-pub(super) fn others(subject: &Subject) -> Vec<(Baseline, Subject)> {
+/// The baselines of a subject; none for a subject without images.
+pub(super) fn baselines(subject: &Subject) -> Vec<(Baseline, Subject)> {
     let Some(level) = subject.level.filter(|_| subject.view == Some(View::Image)) else {
         return Vec::new();
     };
     let seeing =
         |level, enhancer| Subject::seeing(&subject.model, level, &subject.variant, enhancer);
-    let lit = (level != AxisLevel::L0).then(|| (Baseline::Lit, seeing(AxisLevel::L0, None)));
+    let clean = (level != AxisLevel::L0).then(|| (Baseline::Clean, seeing(AxisLevel::L0, None)));
     let raw = subject
         .enhancer
         .is_some()
         .then(|| (Baseline::Raw, seeing(level, None)));
-    lit.into_iter().chain(raw).collect()
+    clean.into_iter().chain(raw).collect()
 }
 
-/// The first's mean less the second's on the questions that both were scored on; several people's answers to one question count as
-/// their mean.
+/// Mean of the first answers minus mean of the second, on the questions for which both have a score. Several people's answers
+/// to one question count as their mean.
 pub(super) fn change(
     first: &[&ScoredAnswer],
     second: &[&ScoredAnswer],
-    is_of: impl Fn(usize) -> bool,
+    in_group: impl Fn(usize) -> bool,
     cluster: impl Fn(usize) -> usize,
 ) -> Option<Estimate> {
     let means = |answers: &[&ScoredAnswer]| {
         let mut means = BTreeMap::<usize, (f64, f64)>::new();
-        for answer in answers.iter().filter(|answer| is_of(answer.question)) {
+        for answer in answers.iter().filter(|answer| in_group(answer.question)) {
             if let Some(points) = answer.outcome.points() {
                 let (sum, n) = means.entry(answer.question).or_default();
                 (*sum, *n) = (*sum + points, *n + 1.0);

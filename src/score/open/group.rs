@@ -1,40 +1,40 @@
-//! Questions that are scored together: [`Group`], by the [`QuestionGroups`] of each.
+//! Groups of questions that are scored together: [`Group`]. [`QuestionGroups`] holds the groups of one question.
 
 use std::collections::BTreeSet;
 
-/// What a question belongs to.
+/// The walk, category and split of a question.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct QuestionGroups {
-    /// Its walk.
+    /// Name of its walk.
     pub episode: String,
-    /// Its category.
+    /// Name of its category.
     pub category: String,
-    /// Its split.
+    /// Name of its split.
     pub split: String,
 }
 
-/// Questions that are scored together.
+/// A group of questions that are scored together.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Group {
-    /// All.
+    /// All questions of the run.
     All,
-    /// Those of a split.
+    /// The questions of a split.
     Split(String),
-    /// Those of a category.
+    /// The questions of a category.
     Category(String),
 }
 
 impl Group {
-    /// Whether a question belongs to it.
-    pub(super) fn has(&self, topic: &QuestionGroups) -> bool {
+    /// Whether a question belongs to the group.
+    pub(super) fn has(&self, question: &QuestionGroups) -> bool {
         match self {
             Self::All => true,
-            Self::Split(split) => *split == topic.split,
-            Self::Category(category) => *category == topic.category,
+            Self::Split(split) => *split == question.split,
+            Self::Category(category) => *category == question.category,
         }
     }
 
-    /// The name in files and tables.
+    /// Name of the group in files and tables.
     #[must_use]
     pub fn name(&self) -> &str {
         match self {
@@ -43,7 +43,7 @@ impl Group {
         }
     }
 
-    /// What it groups by.
+    /// Kind of group in files: `all`, `split` or `category`.
     #[must_use]
     pub fn kind(&self) -> &'static str {
         match self {
@@ -54,10 +54,13 @@ impl Group {
     }
 }
 
-/// All questions; the splits and the categories where there are several.
-pub(super) fn groups(topics: &[QuestionGroups]) -> Vec<Group> {
-    let splits: BTreeSet<&String> = topics.iter().map(|topic| &topic.split).collect();
-    let categories: BTreeSet<&String> = topics.iter().map(|topic| &topic.category).collect();
+/// The groups to score: all questions, then splits and categories if there are several.
+pub(super) fn groups(questions: &[QuestionGroups]) -> Vec<Group> {
+    let splits: BTreeSet<&String> = questions.iter().map(|question| &question.split).collect();
+    let categories: BTreeSet<&String> = questions
+        .iter()
+        .map(|question| &question.category)
+        .collect();
     let several = |names: BTreeSet<&String>, make: fn(String) -> Group| {
         let several = names.len() > 1;
         let names = names.into_iter().filter(move |_| several);

@@ -1,7 +1,7 @@
-//! The scores of open answers: [`OpenSummary`], from the marks of a judge.
+//! Scores of open answers from the marks of a judge: [`OpenSummary`].
 //!
 //! A score is 100 · mean((clip(mark, 1, 5) − 1) / 4) (Majumdar et al. 2024, CVPR, section 4.2). Questions about one walk share
-//! its frames, so that walks are the clusters; of one walk alone the questions are.
+//! its frames, so the walks are the clusters. If there is only one walk, the questions are.
 
 mod answer;
 mod cell;
@@ -13,7 +13,7 @@ mod tests;
 use std::collections::{BTreeMap, BTreeSet};
 
 use self::cell::cell;
-use self::change::{change, others};
+use self::change::{baselines, change};
 use self::group::groups;
 use super::subject::Subject;
 
@@ -23,61 +23,61 @@ pub use change::Baseline;
 pub(crate) use change::ScoreChange;
 pub use group::{Group, QuestionGroups};
 
-/// Every score of a run.
+/// All scores of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OpenSummary {
-    /// What the clusters are: `episode`, or `question` of one episode alone.
+    /// Unit of the clusters: `episode`, or `question` if there is only one episode.
     pub unit: &'static str,
-    /// How many there are.
+    /// Number of clusters of all questions.
     pub clusters: usize,
-    /// Scores by subject, and by group within.
+    /// Scores, ordered by subject, then by group.
     pub cells: Vec<OpenCell>,
-    /// Differences, likewise.
+    /// Differences of scores, ordered by subject, baseline and group.
     pub changes: Vec<ScoreChange>,
 }
 
 impl OpenSummary {
-    /// The cell of a subject on a group.
+    /// Score of a subject on a group.
     #[must_use]
     pub fn cell(&self, subject: &Subject, group: &Group) -> Option<&OpenCell> {
         let mut cells = self.cells.iter();
         cells.find(|cell| cell.subject == *subject && cell.group == *group)
     }
 
-    /// How a subject does against another on a group.
+    /// Difference of a subject from a baseline on a group.
     #[must_use]
     pub fn change(
         &self,
         subject: &Subject,
-        against: Baseline,
+        baseline: Baseline,
         group: &Group,
     ) -> Option<&ScoreChange> {
         self.changes.iter().find(|change| {
-            change.subject == *subject && change.against == against && change.group == *group
+            change.subject == *subject && change.baseline == baseline && change.group == *group
         })
     }
 
-    /// All groups in their order.
+    /// All groups that have a score, sorted.
     #[must_use]
     pub fn groups(&self) -> BTreeSet<&Group> {
         self.cells.iter().map(|cell| &cell.group).collect()
     }
 }
 
-/// Scores answers; `topics` holds what each question belongs to.
+/// Scores of the answers; `questions` holds the groups of each question.
 #[must_use]
-pub fn open_summary(answers: &[ScoredAnswer], topics: &[QuestionGroups]) -> OpenSummary {
-    let episodes: BTreeMap<&str, usize> = topics
+pub fn open_summary(answers: &[ScoredAnswer], questions: &[QuestionGroups]) -> OpenSummary {
+    let episodes: BTreeMap<&str, usize> = questions
         .iter()
-        .map(|topic| &*topic.episode)
+        .map(|question| &*question.episode)
         .collect::<BTreeSet<_>>()
         .into_iter()
         .zip(0..)
         .collect();
-    let walks = episodes.len() > 1;
+    let by_walk = episodes.len() > 1;
     let cluster = |question: usize| {
-        if walks {
-            episodes[&*topics[question].episode]
+        if by_walk {
+            episodes[&*questions[question].episode]
         } else {
             question
         }
@@ -86,24 +86,25 @@ pub fn open_summary(answers: &[ScoredAnswer], topics: &[QuestionGroups]) -> Open
     for answer in answers {
         by_subject.entry(&answer.subject).or_default().push(answer);
     }
-    let groups = groups(topics);
+    let groups = groups(questions);
     let (mut cells, mut changes) = (Vec::new(), Vec::new());
     for (subject, answers) in &by_subject {
         for group in &groups {
-            let of = |answer: &&&ScoredAnswer| group.has(&topics[answer.question]);
-            let here: Vec<&ScoredAnswer> = answers.iter().filter(of).copied().collect();
-            cells.push(cell(subject, group, &here, cluster));
+            let is_scored_here = |answer: &&&ScoredAnswer| group.has(&questions[answer.question]);
+            let in_group: Vec<&ScoredAnswer> =
+                answers.iter().filter(is_scored_here).copied().collect();
+            cells.push(cell(subject, group, &in_group, cluster));
         }
-        for (against, other) in others(subject) {
-            let Some(theirs) = by_subject.get(&other) else {
+        for (baseline, other) in baselines(subject) {
+            let Some(baseline_answers) = by_subject.get(&other) else {
                 continue;
             };
             for group in &groups {
-                let is_of = |question: usize| group.has(&topics[question]);
-                let difference = change(answers, theirs, is_of, cluster);
+                let in_group = |question: usize| group.has(&questions[question]);
+                let difference = change(answers, baseline_answers, in_group, cluster);
                 changes.extend(difference.map(|difference| ScoreChange {
                     subject: (*subject).clone(),
-                    against,
+                    baseline,
                     group: group.clone(),
                     difference,
                 }));
@@ -111,8 +112,12 @@ pub fn open_summary(answers: &[ScoredAnswer], topics: &[QuestionGroups]) -> Open
         }
     }
     OpenSummary {
-        unit: if walks { "episode" } else { "question" },
-        clusters: if walks { episodes.len() } else { topics.len() },
+        unit: if by_walk { "episode" } else { "question" },
+        clusters: if by_walk {
+            episodes.len()
+        } else {
+            questions.len()
+        },
         cells,
         changes,
     }

@@ -2,7 +2,7 @@
 
 use super::*;
 
-fn topic(episode: usize, category: &str) -> QuestionGroups {
+fn groups(episode: usize, category: &str) -> QuestionGroups {
     QuestionGroups {
         episode: format!("hm3d-v0/{episode:03}"),
         category: category.into(),
@@ -12,7 +12,7 @@ fn topic(episode: usize, category: &str) -> QuestionGroups {
 
 fn scored(level: &str, question: usize, outcome: AnswerOutcome) -> ScoredAnswer {
     ScoredAnswer {
-        subject: Subject::shown("m", Some(&level.parse().unwrap())),
+        subject: Subject::new("m", Some(&level.parse().unwrap())),
         question,
         outcome,
         cut: false,
@@ -22,7 +22,7 @@ fn scored(level: &str, question: usize, outcome: AnswerOutcome) -> ScoredAnswer 
 #[test]
 fn marks_become_upstreams_score() {
     use AnswerOutcome::{Marked, Missing, Null, Unmarked};
-    let topics: Vec<QuestionGroups> = (0..7).map(|i| topic(0, ["a", "b"][i % 2])).collect();
+    let questions: Vec<QuestionGroups> = (0..7).map(|i| groups(0, ["a", "b"][i % 2])).collect();
     let outcomes = [
         Marked(5),
         Marked(5),
@@ -36,12 +36,15 @@ fn marks_become_upstreams_score() {
     let answers: Vec<ScoredAnswer> = answers
         .map(|(i, outcome)| scored("L0", i, outcome))
         .collect();
-    let summary = open_summary(&answers, &topics);
+    let summary = open_summary(&answers, &questions);
     let all = summary.cell(&answers[0].subject, &Group::All).unwrap();
     let score = all.score.unwrap();
     assert!((score.value - 0.5).abs() < 1e-12 && score.n == 5);
     assert!(score.low < 0.5 && score.high > 0.5);
-    assert_eq!((all.due, all.null, all.missing, all.unmarked), (7, 1, 1, 1));
+    assert_eq!(
+        (all.planned, all.null, all.missing, all.unmarked),
+        (7, 1, 1, 1)
+    );
     assert_eq!((summary.unit, summary.clusters), ("question", 7));
     let names: Vec<&str> = summary.groups().iter().map(|group| group.name()).collect();
     assert_eq!(names, ["all", "a", "b"]);
@@ -50,7 +53,7 @@ fn marks_become_upstreams_score() {
 #[test]
 fn drops_are_of_unrounded_means_on_shared_questions() {
     use AnswerOutcome::{Marked, Missing};
-    let topics: Vec<QuestionGroups> = (0..6).map(|i| topic(i / 2, "a")).collect();
+    let questions: Vec<QuestionGroups> = (0..6).map(|i| groups(i / 2, "a")).collect();
     let marks = |level: &str, marks: [i64; 6]| -> Vec<ScoredAnswer> {
         let outcome = |mark| if mark == 0 { Missing } else { Marked(mark) };
         let marks = marks.into_iter().enumerate();
@@ -64,18 +67,22 @@ fn drops_are_of_unrounded_means_on_shared_questions() {
         marks("L2-noise+ruas", [5, 4, 5, 1, 1, 5]),
     ]
     .concat();
-    let summary = open_summary(&answers, &topics);
-    let dark = Subject::shown("m", Some(&"L2-noise".parse().unwrap()));
-    let drop = summary.change(&dark, Baseline::Lit, &Group::All).unwrap();
+    let summary = open_summary(&answers, &questions);
+    let degraded = Subject::new("m", Some(&"L2-noise".parse().unwrap()));
+    let drop = summary
+        .change(&degraded, Baseline::Clean, &Group::All)
+        .unwrap();
     // (0.25 + 0 + 0.5 + 0.75 + 0) / 5, the fifth question being unanswered at L0.
     assert!((drop.difference.value + 0.3).abs() < 1e-12 && drop.difference.n == 5);
     assert!(drop.difference.low < -0.3 && drop.difference.high > -0.3);
-    let mended = Subject::shown("m", Some(&"L2-noise+ruas".parse().unwrap()));
-    let gain = summary.change(&mended, Baseline::Raw, &Group::All).unwrap();
+    let enhanced = Subject::new("m", Some(&"L2-noise+ruas".parse().unwrap()));
+    let gain = summary
+        .change(&enhanced, Baseline::Raw, &Group::All)
+        .unwrap();
     assert!((gain.difference.value - 0.125).abs() < 1e-12);
     assert!(
         summary
-            .change(&mended, Baseline::Lit, &Group::All)
+            .change(&enhanced, Baseline::Clean, &Group::All)
             .is_some()
     );
     assert_eq!(summary.changes.len(), 3);

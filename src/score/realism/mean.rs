@@ -1,22 +1,22 @@
-//! The mean of a few numbers with its interval: [`Mean`].
+//! Mean of a few numbers with its interval: [`Mean`].
 
 use serde::Serialize;
 
 use crate::score::student::student;
 
-/// A mean with its 95 % interval by Student's t distribution; one number alone has none.
+/// A mean with its 95 % interval by Student's t distribution.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(crate) struct Mean {
-    /// The mean; `None` in JSON where it is infinite.
+    /// The mean; null in JSON if it is infinite.
     pub value: f64,
-    /// The interval.
+    /// Ends of the interval; `None` for a single number or an infinite mean.
     pub interval: Option<[f64; 2]>,
-    /// Of how many.
+    /// Number of values that the mean is taken over.
     pub n: usize,
 }
 
 impl Mean {
-    /// The mean of numbers, of which some may be infinite; `None` of none.
+    /// Mean of numbers, some of which may be infinite; `None` without numbers.
     #[must_use]
     pub(crate) fn of(numbers: &[f64]) -> Option<Self> {
         let n = numbers.len();

@@ -1,4 +1,4 @@
-//! How near a made image is to a real one: [`psnr`], [`ssim`](ssim::ssim), and the divergence of their noise
+//! Similarity of a synthetic image to a real one: [`psnr`], [`ssim`](ssim::ssim), and the divergence of their noise
 //! ([`residual`]).
 
 pub(crate) mod mean;
@@ -12,38 +12,38 @@ pub(crate) use ssim::same_size;
 use crate::error::{Error, Result};
 use crate::types::Rgb;
 
-/// How one made image compares with the real one.
+/// Similarity of one synthetic image to the real one.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(crate) struct ImageComparison {
-    /// In dB; null in JSON where it is infinite.
+    /// Peak signal-to-noise ratio in dB; null in JSON if it is infinite.
     pub psnr: f64,
-    /// Structural similarity.
+    /// Structural similarity, at most 1.
     pub ssim: f64,
-    /// By the rule that is asked for.
+    /// Divergence of the residuals by the requested rule about empty bins.
     pub kl: Divergence,
-    /// By the other rule about empty bins.
+    /// The same by the other rule.
     pub kl_other: Divergence,
 }
 
-/// What one pair shows.
+/// Comparison of the synthetic images of one pair with its real image.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct PairComparison {
-    /// The pair's name.
+    /// Name of the pair.
     pub pair: String,
-    /// The exposure drop in EV.
+    /// Exposure drop of the pair in EV.
     pub drop: f32,
-    /// By exposure drop alone.
+    /// The image made by exposure drop alone.
     pub exposure: ImageComparison,
-    /// With the sensor's noise.
+    /// The image made with sensor noise.
     pub noise: ImageComparison,
-    /// PSNR of the sensor branch without noise: its tone, apart from its noise.
+    /// PSNR in dB of the sensor branch without noise, which shows the error of its tones alone.
     pub clean_psnr: f64,
 }
 
-/// Peak signal-to-noise ratio in dB, peak 255, over all samples; infinite where the images are the same.
+/// Peak signal-to-noise ratio in dB, peak 255, over all samples; infinite for equal images.
 ///
 /// # Errors
-/// Where the sizes differ.
+/// If the sizes differ.
 pub(crate) fn psnr(a: &Rgb, b: &Rgb) -> Result<f64> {
     same_size(a, b)?;
     let squares = a.samples().iter().zip(b.samples()).map(|(a, b)| {
@@ -54,10 +54,10 @@ pub(crate) fn psnr(a: &Rgb, b: &Rgb) -> Result<f64> {
     Ok(10.0 * libm::log10(255.0 * 255.0 / mean))
 }
 
-/// The exposure drop between two images: log2 of their ratio of mean linear light (gamma 2.2), in EV.
+/// Exposure drop between two images in EV: log2 of the ratio of their mean linear light (gamma 2.2).
 ///
 /// # Errors
-/// Where either is black.
+/// If one of the images is black.
 pub(crate) fn exposure_drop(normal: &Rgb, low: &Rgb) -> Result<f32> {
     let linear: [f64; 256] =
         std::array::from_fn(|code| libm::pow((code as f64 / 255.0).max(1e-8), 2.2));
@@ -75,7 +75,8 @@ pub(crate) fn exposure_drop(normal: &Rgb, low: &Rgb) -> Result<f32> {
     };
     let black = |image: &Rgb| image.samples().iter().all(|code| *code == 0);
     if black(normal) || black(low) {
-        let problem = "an image is black, so there is no drop to estimate; give one with --ev";
+        let problem =
+            "an image is black, so its exposure drop cannot be estimated; set it with --ev";
         return Err(Error::data("pair", problem));
     }
     Ok(libm::log2(mean(normal) / mean(low)) as f32)
@@ -86,7 +87,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn equal_images_are_infinitely_near() {
+    fn equal_images_have_infinite_psnr() {
         let image = Rgb::new(12, 12, vec![9; 432]).unwrap();
         assert!(psnr(&image, &image).unwrap().is_infinite());
         assert!((ssim::ssim(&image, &image).unwrap() - 1.0).abs() < 1e-12);
@@ -103,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fall_of_light_is_found() {
+    fn an_exposure_drop_is_estimated() {
         let [light, dark] = [200, 100].map(|code| Rgb::new(2, 2, vec![code; 12]).unwrap());
         assert!((exposure_drop(&light, &dark).unwrap() - 2.2).abs() < 1e-6);
         assert!(exposure_drop(&light, &Rgb::black(2, 2)).is_err());

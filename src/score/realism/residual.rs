@@ -1,4 +1,4 @@
-//! What noise leaves when the clean image is taken away: [`Residuals`], and how far those of a synthesis are from real
+//! Residuals of noisy images over their clean image: [`Residuals`], and the divergence of synthetic residuals from real
 //! ones ([`divergence`]).
 
 use std::fmt;
@@ -10,15 +10,15 @@ use super::ssim::same_size;
 use crate::error::Result;
 use crate::types::Rgb;
 
-/// Differences of two 8-bit codes: −255 to 255.
+/// Number of possible differences of two 8-bit codes: −255 to 255.
 const STEPS: usize = 511;
 
-/// How often each difference of codes occurs, all channels pooled, and how it spreads by clean code.
+/// Counts of the differences of codes, all channels pooled, and their moments by clean code.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Residuals {
-    /// Of −255 to 255.
+    /// Number of samples with each difference, from −255 to 255.
     counts: Vec<u64>,
-    /// By clean code: number, sum, and sum of squares.
+    /// For each clean code: number of samples, sum and sum of squares of the differences.
     codes: Vec<[i64; 3]>,
 }
 
@@ -32,10 +32,10 @@ impl Default for Residuals {
 }
 
 impl Residuals {
-    /// Those of `image` over `clean`.
+    /// Residuals of `image` over `clean`.
     ///
     /// # Errors
-    /// Where the sizes differ.
+    /// If the sizes differ.
     pub(crate) fn of(image: &Rgb, clean: &Rgb) -> Result<Self> {
         same_size(image, clean)?;
         let mut residuals = Self::default();
@@ -50,7 +50,7 @@ impl Residuals {
         Ok(residuals)
     }
 
-    /// Adds those of another image.
+    /// Adds the residuals of another image.
     pub(crate) fn add(&mut self, other: &Self) {
         for (a, b) in self.counts.iter_mut().zip(&other.counts) {
             *a += b;
@@ -62,13 +62,13 @@ impl Residuals {
         }
     }
 
-    /// Each difference of codes, −255 to 255, with its share of all.
+    /// Each difference of codes, −255 to 255, with its share of all samples.
     pub(crate) fn shares(&self) -> impl Iterator<Item = (i32, f64)> {
         let n = self.counts.iter().sum::<u64>().max(1) as f64;
         (-255..).zip(self.counts.iter().map(move |count| *count as f64 / n))
     }
 
-    /// Of each clean code that occurs: the code, how often, and the residual's mean and standard deviation.
+    /// For each clean code that occurs: the code, its number of samples, and the mean and standard deviation of its residuals.
     pub(crate) fn by_code(&self) -> impl Iterator<Item = (usize, i64, [f64; 2])> {
         let codes = self.codes.iter().enumerate();
         codes
@@ -97,27 +97,26 @@ impl Residuals {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Bins {
-    /// Residuals in [0, 1] units, 64 bins from −0.1 to 0.1 and one beyond either end, as the code of Fu et al. 2023 has it.
+    /// Residuals in [0, 1] units, 64 bins from −0.1 to 0.1 and one beyond either end, as in the code of Fu et al. 2023.
     #[default]
     Fu,
     /// Residuals in codes, edges −260, −256 … 260, and one count added to each bin (Kousha et al. 2022).
     Kousha,
 }
 
-/// What is done about empty bins.
+/// Rule for empty bins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum EmptyBins {
-    /// 10⁻⁸ is added to the share of each bin, and the shares are made to sum to 1 again.
+    /// 10⁻⁸ is added to the share of each bin, and the shares are normalized to sum to 1 again.
     #[default]
     Eps,
-    /// Only bins filled on both sides are kept, and nothing is made to sum to 1: a synthesis without noise then scores 0
-    /// or less.
+    /// Only bins that are filled on both sides are used, and the shares are not normalized: a synthesis without noise then
+    /// has a divergence of 0 or less.
     Drop,
 }
 
 impl EmptyBins {
-    /// The other rule.
     #[must_use]
     pub(crate) fn other(self) -> Self {
         match self {
@@ -151,23 +150,23 @@ impl Bins {
 }
 
 /// The inner edges of [`Bins::Fu`] are numpy's `arange(-0.1, 0.1 + 1e-9, 0.2 / 64)`: s + i · d with d = (s + 0.2/64) − s.
-/// The middle one is 8·10⁻¹⁷, not 0, so that a residual of 0 falls into the bin below it.
+/// The middle edge is 8·10⁻¹⁷, not 0, so that a residual of 0 is counted in the bin below it.
 fn inner_edge(index: usize) -> f64 {
     const FIRST: f64 = -0.1;
     let step = (FIRST + 0.2 / 64.0) - FIRST;
     FIRST + index as f64 * step
 }
 
-/// How far the synthetic residuals are from the real ones.
+/// Divergence of synthetic residuals from real ones.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(crate) struct Divergence {
     /// D_KL(real ‖ synthetic) in nats.
     pub nats: f64,
-    /// The bins that are empty on the synthetic side alone.
+    /// Number of bins that are empty on the synthetic side only.
     pub empty: usize,
 }
 
-/// D_KL(real ‖ synthetic) of two sets of residuals. [`EmptyBins`] does not concern [`Bins::Kousha`], which leaves no bin empty.
+/// D_KL(real ‖ synthetic) of two sets of residuals. The rule is ignored for [`Bins::Kousha`], which leaves no bin empty.
 #[must_use]
 pub(crate) fn divergence(
     real: &Residuals,
@@ -197,11 +196,13 @@ pub(crate) fn divergence(
     }
 }
 
-/// What is added to each bin.
+/// Amount added to each bin.
 #[derive(Clone, Copy)]
 enum AddedCount {
     Nothing,
+    /// 1 to the count.
     Count,
+    /// 10⁻⁸ to the share.
     Share,
 }
 
@@ -253,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_residuals_are_no_distance_apart() {
+    fn equal_residuals_have_no_divergence() {
         let same = residuals(&[(-3, 10), (0, 80), (7, 10)]);
         for (bins, rule) in [
             (Bins::Fu, EmptyBins::Eps),
@@ -265,24 +266,24 @@ mod tests {
         }
     }
 
-    /// By hand: real (½, ½) against synthetic (1, 0) and against (¼, ¾).
+    /// Computed by hand: real (½, ½) against synthetic (1, 0) and against (¼, ¾).
     #[test]
-    fn hand_made_histograms_have_their_divergence() {
+    fn divergence_matches_values_computed_by_hand() {
         let real = residuals(&[(0, 50), (20, 50)]);
-        let bare = residuals(&[(0, 100)]);
-        let dropped = divergence(&real, &bare, Bins::Fu, EmptyBins::Drop);
+        let noiseless = residuals(&[(0, 100)]);
+        let dropped = divergence(&real, &noiseless, Bins::Fu, EmptyBins::Drop);
         assert!((dropped.nats - 0.5 * f64::ln(0.5)).abs() < 1e-12);
         assert_eq!(dropped.empty, 1);
-        let eps = divergence(&real, &bare, Bins::Fu, EmptyBins::Eps);
-        let due = 0.5 * f64::ln(0.5) + 0.5 * f64::ln(0.5 / 1e-8);
-        assert!((eps.nats - due).abs() < 1e-4, "{}", eps.nats);
+        let eps = divergence(&real, &noiseless, Bins::Fu, EmptyBins::Eps);
+        let expected = 0.5 * f64::ln(0.5) + 0.5 * f64::ln(0.5 / 1e-8);
+        assert!((eps.nats - expected).abs() < 1e-4, "{}", eps.nats);
         let other = residuals(&[(0, 25), (20, 75)]);
         let found = divergence(&real, &other, Bins::Fu, EmptyBins::Drop).nats;
         assert!((found - 0.5 * f64::ln(2.0) - 0.5 * f64::ln(2.0 / 3.0)).abs() < 1e-12);
-        let kousha = divergence(&real, &bare, Bins::Kousha, EmptyBins::Eps).nats;
+        let kousha = divergence(&real, &noiseless, Bins::Kousha, EmptyBins::Eps).nats;
         let p = 51.0 / 230.0;
-        let due = p * f64::ln(51.0 / 101.0) + p * f64::ln(51.0);
-        assert!((kousha - due).abs() < 1e-12);
+        let expected = p * f64::ln(51.0 / 101.0) + p * f64::ln(51.0);
+        assert!((kousha - expected).abs() < 1e-12);
     }
 
     const NUMPY: [usize; 53] = [
@@ -291,9 +292,9 @@ mod tests {
         60, 61, 63, 64, 65,
     ];
 
-    /// numpy's own bins of the residuals k/255 for k from −26 to 26: `np.histogram` with the edges above.
+    /// The bins of numpy for the residuals k/255, k from −26 to 26: `np.histogram` with the edges above.
     #[test]
-    fn bins_are_numpys() {
+    fn bins_are_those_of_numpy() {
         let found: Vec<usize> = (-26..=26).map(|k| Bins::Fu.of(k)).collect();
         assert_eq!(found, NUMPY);
         assert_eq!((Bins::Fu.of(-255), Bins::Fu.of(255)), (0, 65));
@@ -304,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn spread_is_told_by_clean_code() {
+    fn spread_is_reported_by_clean_code() {
         let clean = Rgb::new(1, 2, vec![10, 10, 10, 10, 20, 20]).unwrap();
         let noisy = Rgb::new(1, 2, vec![8, 12, 8, 12, 21, 21]).unwrap();
         let found: Vec<_> = Residuals::of(&noisy, &clean).unwrap().by_code().collect();

@@ -1,25 +1,25 @@
-//! The structural similarity of two images: [`ssim`].
+//! Structural similarity of two images: [`ssim`].
 
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
 use crate::types::Rgb;
 
-/// The window's half-width: 3.5 deviations of 1.5 pixels.
+/// Half-width of the window in pixels: 3.5 deviations of 1.5 pixels, rounded down.
 const RADIUS: usize = 5;
 const TAPS: usize = 2 * RADIUS + 1;
 
-/// Local means of x, y, x², y² and xy.
+/// Number of local means: of x, y, x², y² and xy.
 const MOMENTS: usize = 5;
 
-/// Refuses images of different sizes, with both of them.
+/// Checks that two images have the same size; the error names both sizes.
 pub(crate) fn same_size(a: &Rgb, b: &Rgb) -> Result<()> {
     let [a, b] = [a, b].map(|image| (image.width(), image.height()));
     if a == b {
         return Ok(());
     }
     let problem = format_args!(
-        "{} × {} pixels against {} × {}; a pair is of one size",
+        "{} × {} pixels against {} × {}; both images of a pair must have the same size",
         a.0, a.1, b.0, b.1
     );
     Err(Error::data("pair", problem))
@@ -28,11 +28,11 @@ pub(crate) fn same_size(a: &Rgb, b: &Rgb) -> Result<()> {
 /// Structural similarity (Wang et al. 2004): gaussian window of deviation 1.5 (11 × 11), K1 0.01, K2 0.03, population
 /// covariance, data range 255; the mean over the three channels and the interior, where the window lies within the image.
 ///
-/// As scikit-image's `structural_similarity` with `gaussian_weights=True, sigma=1.5, use_sample_covariance=False,
+/// It equals scikit-image's `structural_similarity` with `gaussian_weights=True, sigma=1.5, use_sample_covariance=False,
 /// data_range=255, channel_axis=-1`.
 ///
 /// # Errors
-/// Where the sizes differ, or a side is shorter than the window.
+/// If the sizes differ, or if a side is shorter than the window.
 pub(crate) fn ssim(a: &Rgb, b: &Rgb) -> Result<f64> {
     same_size(a, b)?;
     let (height, width) = (a.height(), a.width());
@@ -43,7 +43,7 @@ pub(crate) fn ssim(a: &Rgb, b: &Rgb) -> Result<f64> {
     }
     let window = window();
     let rows = (0..height - TAPS + 1).into_par_iter();
-    // Collected before they are summed, so that threads do not enter.
+    // The rows are collected before they are summed, so that the result does not depend on the threads.
     let sums: Vec<f64> = rows.map(|row| row_sum(a, b, row, &window)).collect();
     let n = 3 * (height - TAPS + 1) * (width - TAPS + 1);
     Ok(sums.iter().sum::<f64>() / n as f64)
@@ -99,7 +99,7 @@ fn similarity([x, y, xx, yy, xy]: [f64; MOMENTS]) -> f64 {
 mod tests {
     use super::*;
 
-    /// Images by an integer rule; the figures are scikit-image 0.26's of the same.
+    /// An image by an integer rule. The expected values are those of scikit-image 0.26 for the same images.
     fn image(height: usize, width: usize, salt: usize) -> Rgb {
         let sample = |i: usize| ((i * i * 31 + i * salt * 17 + salt) % 251) as u8;
         Rgb::new(height, width, (0..height * width * 3).map(sample).collect()).unwrap()
@@ -112,10 +112,13 @@ mod tests {
     ];
 
     #[test]
-    fn figures_are_those_of_another_program() {
-        for (height, width, salt, due) in SKIMAGE {
+    fn values_are_those_of_scikit_image() {
+        for (height, width, salt, expected) in SKIMAGE {
             let found = ssim(&image(height, width, 1), &image(height, width, salt)).unwrap();
-            assert!((found - due).abs() < 1e-9, "{height} × {width}: {found}");
+            assert!(
+                (found - expected).abs() < 1e-9,
+                "{height} × {width}: {found}"
+            );
         }
     }
 

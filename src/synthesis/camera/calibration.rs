@@ -1,4 +1,4 @@
-//! How a camera's noise goes with its gain: [`Calibration`], from a preset or a TOML file.
+//! Noise of a camera as a function of its gain: [`Calibration`], built in or from a TOML file.
 
 use std::fmt::Display;
 
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 
-/// The five calibrated cameras, the paper's first.
+/// Names and files of the five built-in calibrations, the paper's camera first.
 const PRESETS: [(&str, &str); 5] = [
     ("sony-a7s2", include_str!("sony-a7s2.toml")),
     ("nikon-d850", include_str!("nikon-d850.toml")),
@@ -15,53 +15,53 @@ const PRESETS: [(&str, &str); 5] = [
     ("canon-eos-700d", include_str!("canon-eos-700d.toml")),
 ];
 
-/// The calibrated noise of a sensor (Wei et al., "Physics-based noise modeling for extreme low-light photography", ELD),
+/// Calibrated noise of a sensor (Wei et al., "Physics-based noise modeling for extreme low-light photography", ELD),
 /// with the ranges that its gain and its ratio are drawn from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct Calibration {
-    /// What it is called.
+    /// Name of the camera, as `sony-a7s2`.
     pub name: String,
-    /// The range of a sample above its black level, in ADU.
+    /// Range of a sample above its black level, in ADU.
     pub adu_range: f64,
-    /// The range that the system gain K is drawn from, log-uniform, in ADU an electron.
+    /// Range that the system gain K is drawn from, log-uniform, in ADU per electron.
     pub gain: [f64; 2],
-    /// The range that the ratio r is drawn from, uniform.
+    /// Range that the ratio r is drawn from, uniform.
     pub ratio: [f64; 2],
-    /// K at the first step; each further step doubles it.
+    /// K at the first step, in ADU per electron; each further step doubles it.
     pub first_gain: f64,
     /// Scale σ_TL of the read noise, in ADU.
     pub read_scale: LogFit,
     /// Standard deviation σ_r of the row noise, in ADU.
     pub row_deviation: LogFit,
-    /// What was measured at each gain.
+    /// Measurements at each gain, in ascending order of gain.
     #[serde(rename = "step")]
     pub steps: Vec<GainStep>,
 }
 
-/// ln σ = slope · ln K + intercept + deviation · z, with z standard normal.
+/// Fit of a noise parameter σ to the gain: ln σ = slope · ln K + intercept + deviation · z, with z standard normal.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LogFit {
-    /// The slope.
+    /// Slope of ln σ over ln K.
     pub slope: f64,
     /// ln σ at K = 1.
     pub intercept: f64,
-    /// The scatter about the line.
+    /// Standard deviation of ln σ about the line.
     pub deviation: f64,
 }
 
-/// The measurements at one gain: one of each is drawn.
+/// Measurements at one gain, of which one shape and one set of offsets are drawn.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GainStep {
     /// Shapes λ of the read noise's Tukey-λ distribution.
     pub shape: Vec<f64>,
-    /// Offsets of the planes in ADU, in the calibration's order R, G1, B, G2.
+    /// Offsets of the planes, in ADU, in the calibration's order R, G1, B, G2.
     pub bias: Vec<[f64; 4]>,
 }
 
-/// A sensor's noise at one gain.
+/// Noise parameters of a sensor at one gain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SensorNoise {
     /// Scale σ_TL of the read noise, in ADU.
@@ -75,35 +75,36 @@ pub struct SensorNoise {
 }
 
 impl Calibration {
-    /// The names of the calibrated cameras.
+    /// Names of the built-in calibrations, the paper's camera first.
     pub fn names() -> impl Iterator<Item = &'static str> {
         PRESETS.iter().map(|(name, _)| *name)
     }
 
-    /// A calibrated camera.
+    /// The built-in calibration of this name; `None` if there is none.
     #[must_use]
     pub fn preset(name: &str) -> Option<Self> {
         let (name, text) = PRESETS.iter().find(|(known, _)| *known == name)?;
-        // A test reads every one of them.
+        // A test parses every preset.
         Self::parse(text, name).ok()
     }
 
-    /// Reads a calibration; `place` is where the text came from, for messages.
+    /// Parses a calibration; `place` names the file in messages.
     ///
     /// # Errors
-    /// [`Error::Data`] with the key that is missing, unknown or impossible.
+    /// [`Error::Data`] with the key that is missing, unknown or out of range.
     pub fn parse(text: &str, place: impl Display) -> Result<Self> {
-        let read: Self = toml::from_str(text).map_err(|e| {
+        let calibration: Self = toml::from_str(text).map_err(|e| {
             let before = e.span().and_then(|span| text.get(..span.start));
             let line = before.unwrap_or_default().matches('\n').count() + 1;
             Error::data(
                 format_args!("{place}, line {line}"),
-                format_args!("no calibration: {}", e.message()),
+                format_args!("not a calibration: {}", e.message()),
             )
         })?;
-        read.check()
+        calibration
+            .check()
             .map_err(|problem| Error::data(place, problem))?;
-        Ok(read)
+        Ok(calibration)
     }
 
     fn check(&self) -> std::result::Result<(), String> {
@@ -116,7 +117,7 @@ impl Calibration {
                 ))
             }
         };
-        let rising = |key: &str, [low, high]: [f64; 2], limits| {
+        let range = |key: &str, [low, high]: [f64; 2], limits| {
             within(key, low, limits)?;
             within(key, high, limits)?;
             if low > high {
@@ -125,8 +126,8 @@ impl Calibration {
             Ok(())
         };
         within("adu-range", self.adu_range, [1.0, 1e6])?;
-        rising("gain", self.gain, GAINS)?;
-        rising("ratio", self.ratio, RATIOS)?;
+        range("gain", self.gain, GAINS)?;
+        range("ratio", self.ratio, RATIOS)?;
         within("first-gain", self.first_gain, GAINS)?;
         for (key, fit) in [
             ("read-scale", self.read_scale),
@@ -156,9 +157,9 @@ impl Calibration {
 
     /// The noise at system gain `gain`.
     ///
-    /// `scatter` holds the standard normal numbers by which σ_TL and σ_r stand off their fits. `choices`, uniform in (0, 1),
-    /// choose among a step's measurements with even odds, for λ and for the offsets. The calibration's own author advises
-    /// to take both near the gain: the offsets of ISO 25600 do not belong to K = 0.1.
+    /// `scatter` holds the standard normal numbers z of the fits of σ_TL and σ_r. `choices`, uniform in (0, 1), choose among
+    /// a step's measurements of λ and of the offsets, all with the same probability. The calibration's author advises to
+    /// take both near the gain: the offsets of ISO 25600 do not belong to K = 0.1.
     #[must_use]
     pub fn noise_at(&self, gain: f64, scatter: [f64; 2], choices: [f64; 2]) -> SensorNoise {
         let step = &self.steps[self.step(gain)];
@@ -172,7 +173,7 @@ impl Calibration {
         }
     }
 
-    /// The step whose gain is nearest, up to that of the range's upper end: what was measured beyond it is not used.
+    /// Index of the step with the nearest gain. Steps above the upper end of the gain range are not used.
     fn step(&self, gain: f64) -> usize {
         let nearest = |gain: f64| {
             let step = (libm::log2(gain / self.first_gain) + 0.5).floor();
@@ -182,9 +183,9 @@ impl Calibration {
     }
 }
 
-/// The system gains K that may be; those of the calibrated cameras lie between 0.094 and 29.
+/// Allowed range of the system gain K, in ADU per electron; the built-in calibrations lie between 0.094 and 29.
 pub(super) const GAINS: [f64; 2] = [0.01, 100.0];
-/// The amplification ratios r that may be.
+/// Allowed range of the amplification ratio r.
 pub(super) const RATIOS: [f64; 2] = [1.0, 10000.0];
 
 impl LogFit {
@@ -202,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn presets_are_read_and_bear_their_names() {
+    fn presets_are_parsed_and_have_their_names() {
         for (name, text) in PRESETS {
             assert_eq!(Calibration::parse(text, name).unwrap().name, name);
         }
@@ -257,14 +258,18 @@ mod tests {
     #[test]
     fn offsets_reach_their_planes() {
         let bias = sony().noise_at(6.0, [0.0; 2], [0.0; 2]).bias;
-        let due = [-1.5595009, -1.5976678, -1.3571521, -1.3204409];
-        assert!(bias.iter().zip(due).all(|(a, b)| (a - b).abs() < 1e-15));
+        let expected = [-1.5595009, -1.5976678, -1.3571521, -1.3204409];
+        assert!(
+            bias.iter()
+                .zip(expected)
+                .all(|(a, b)| (a - b).abs() < 1e-15)
+        );
     }
 
     #[test]
-    fn what_cannot_be_a_camera_names_its_key() {
+    fn an_impossible_calibration_is_refused_with_its_key() {
         let good = PRESETS[0].1;
-        for (from, to, says) in [
+        for (from, to, part) in [
             ("adu-range = 15871.0", "adu-range = nan", "adu-range: NaN"),
             ("gain = [0.1, 6.0]", "gain = [6.0, 0.1]", "gain: the range"),
             ("gain = [0.1, 6.0]", "gain = [0.1, inf]", "gain: inf"),
@@ -285,7 +290,7 @@ mod tests {
                 .unwrap_err()
                 .to_string();
             assert!(
-                error.starts_with("my.toml") && error.contains(says),
+                error.starts_with("my.toml") && error.contains(part),
                 "{error}"
             );
         }

@@ -1,4 +1,4 @@
-//! The camera that a frame is taken with: [`CameraModel`] and one [`CameraState`] of it.
+//! The camera of a frame: the distribution of cameras ([`CameraModel`]) and one drawn from it ([`CameraState`]).
 
 mod calibration;
 
@@ -16,11 +16,11 @@ use super::random::{Component, NoiseKey, Site, SiteWords, Stream};
 use crate::error::{Error, Result};
 use crate::types::Digest;
 
-/// The distribution that each frame's camera is drawn from.
+/// Distribution that each frame's camera is drawn from.
 ///
 /// The default is the paper's: a Sony A7S2 with its gain K log-uniform in [0.1, 6.0] and its amplification ratio r
-/// uniform in [100, 300]. Either may be pinned; pinning one leaves every other number of the state as it was drawn,
-/// save what is a function of K.
+/// uniform in [100, 300]. Either may be pinned. The other numbers of the state then stay as they were drawn, except those
+/// that are functions of K.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CameraModel {
     calibration: Arc<Calibration>,
@@ -29,25 +29,25 @@ pub struct CameraModel {
     ratio: Option<f64>,
 }
 
-/// Where a state comes from.
+/// How the state of a frame's camera is chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sampling {
     /// Drawn for each frame.
     #[default]
     Drawn,
-    /// The middle of every distribution, the same for all frames.
+    /// Middle of every distribution, the same for all frames.
     Fixed,
 }
 
 impl Default for CameraModel {
     fn default() -> Self {
-        // The paper's own camera, which is among the presets.
-        Self::preset("sony-a7s2").unwrap_or_else(|_| unreachable!("a test reads it"))
+        // The paper's camera.
+        Self::preset("sony-a7s2").unwrap_or_else(|_| unreachable!("a test reads this preset"))
     }
 }
 
-/// Written by the calibration's name and digest: its numbers would fill a page.
+/// Writes the calibration's name and digest instead of its numbers, which would fill a page.
 impl Serialize for CameraModel {
     fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
         let calibration =
@@ -63,7 +63,7 @@ impl Serialize for CameraModel {
 }
 
 impl CameraModel {
-    /// The cameras of a calibration.
+    /// Cameras of a calibration, drawn for each frame, with nothing pinned.
     #[must_use]
     pub fn new(calibration: Calibration) -> Self {
         Self {
@@ -74,46 +74,46 @@ impl CameraModel {
         }
     }
 
-    /// A calibrated camera by its name.
+    /// Cameras of a built-in calibration by its name.
     ///
     /// # Errors
-    /// Where none is called so.
+    /// If no calibration has this name.
     pub fn preset(name: &str) -> Result<Self> {
         Calibration::preset(name).map(Self::new).ok_or_else(|| {
             let names: Vec<_> = Calibration::names().collect();
             let problem = format!(
-                "{name:?} is none of {}, and no TOML file of a calibration",
+                "{name:?} is not one of {}, and not a TOML file of a calibration",
                 names.join(", ")
             );
             Error::usage("--camera", problem)
         })
     }
 
-    /// Whether a state is drawn or fixed (`--fixed`).
+    /// Sets whether states are drawn or fixed (`--fixed`).
     pub fn set_sampling(&mut self, sampling: Sampling) {
         self.sampling = sampling;
     }
 
-    /// Pins the system gain K, in ADU an electron (`--gain`).
+    /// Pins the system gain K, in ADU per electron (`--gain`).
     ///
     /// # Errors
-    /// Where K is not within 0.01 to 100.
+    /// If K is not within 0.01 to 100.
     pub fn pin_gain(&mut self, gain: f64) -> Result<()> {
-        self.gain = Some(within("--gain", gain, GAINS)?);
+        self.gain = Some(check_range("--gain", gain, GAINS)?);
         Ok(())
     }
 
-    /// Pins the ratio r by which the light is cut before the shot noise and amplified after it (`--ratio`).
+    /// Pins the ratio r: the light is divided by it before the shot noise and multiplied by it after (`--ratio`).
     ///
     /// # Errors
-    /// Where r is not within 1 to 10000.
+    /// If r is not within 1 to 10000.
     pub fn pin_ratio(&mut self, ratio: f64) -> Result<()> {
-        self.ratio = Some(within("--ratio", ratio, RATIOS)?);
+        self.ratio = Some(check_range("--ratio", ratio, RATIOS)?);
         Ok(())
     }
 }
 
-fn within(flag: &str, value: f64, [low, high]: [f64; 2]) -> Result<f64> {
+fn check_range(flag: &str, value: f64, [low, high]: [f64; 2]) -> Result<f64> {
     if value >= low && value <= high {
         Ok(value)
     } else {
@@ -124,23 +124,23 @@ fn within(flag: &str, value: f64, [low, high]: [f64; 2]) -> Result<f64> {
     }
 }
 
-/// Everything about the camera that takes one frame.
+/// Parameters of the camera that takes one frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CameraState {
-    /// Linear sRGB → camera, rows summing to 1.
+    /// Matrix from linear sRGB to camera colours; its rows sum to 1.
     pub rgb_to_camera: Matrix,
-    /// Camera → linear sRGB: the inverse of `rgb_to_camera`.
+    /// Matrix from camera colours to linear sRGB: the inverse of `rgb_to_camera`.
     pub camera_to_rgb: Matrix,
-    /// Brightness gain of all channels.
+    /// Brightness gain, common to all channels.
     pub rgb_gain: f64,
     /// White-balance gain of red.
     pub red_gain: f64,
     /// White-balance gain of blue.
     pub blue_gain: f64,
-    /// System gain K, in ADU an electron.
+    /// System gain K, in ADU per electron.
     pub system_gain: f64,
-    /// Amplification ratio r.
+    /// Ratio r by which light is divided before the shot noise and multiplied after it.
     pub ratio: f64,
     /// Scale σ_TL of the read noise's Tukey-λ distribution, in ADU; not its standard deviation.
     pub read_scale: f64,
@@ -150,14 +150,14 @@ pub struct CameraState {
     pub row_deviation: f64,
     /// Offset of each Bayer plane, in ADU, in the order R, Gr, Gb, B.
     pub bias: [f64; 4],
-    /// The range of a sample above its black level, in ADU.
+    /// Range of a sample above its black level, in ADU.
     pub adu_range: f64,
 }
 
 impl CameraState {
     /// Draws the camera of the frame that `key` belongs to.
     ///
-    /// Matrix and gains follow Brooks et al. 2019, the sensor's noise Wei et al. 2021, K and r DarkQA.
+    /// Matrix and colour gains follow Brooks et al. 2019, the sensor's noise Wei et al. 2021, K and r DarkQA.
     #[must_use]
     pub fn draw(key: &NoiseKey, model: &CameraModel) -> Self {
         if model.sampling == Sampling::Fixed {
@@ -166,18 +166,18 @@ impl CameraState {
         let draws = CameraStream(key.stream(Component::Camera));
         let weights = StateNumber::WEIGHTS.map(|number| draws.uniform(number));
         let calibration = &model.calibration;
-        let [least, most] = calibration.gain;
-        let octaves = draws.uniform(StateNumber::Gain) * libm::log(most / least);
-        let system_gain = model.gain.unwrap_or(least * libm::exp(octaves));
+        let [min_gain, max_gain] = calibration.gain;
+        let log_gain = draws.uniform(StateNumber::Gain) * libm::log(max_gain / min_gain);
+        let system_gain = model.gain.unwrap_or(min_gain * libm::exp(log_gain));
         let noise = calibration.noise_at(
             system_gain,
             [StateNumber::ReadScale, StateNumber::RowDeviation]
-                .map(|number| draws.of(number).normal()),
+                .map(|number| draws.words(number).normal()),
             [StateNumber::ReadShape, StateNumber::Bias].map(|number| draws.uniform(number)),
         );
         let [low, high] = calibration.ratio;
         Self {
-            rgb_gain: 1.0 / draws.cut_normal(StateNumber::RgbGain),
+            rgb_gain: 1.0 / draws.truncated_normal(StateNumber::RgbGain),
             red_gain: draws.between(StateNumber::RedGain, 1.9, 2.4),
             blue_gain: draws.between(StateNumber::BlueGain, 1.5, 1.9),
             system_gain,
@@ -188,11 +188,11 @@ impl CameraState {
         }
     }
 
-    /// The camera at the middle of each distribution, and the first of a step's measurements.
+    /// The camera at the middle of each distribution, with the first measurement of the gain step.
     fn median(model: &CameraModel) -> Self {
         let calibration = &model.calibration;
-        let [least, most] = calibration.gain;
-        let system_gain = model.gain.unwrap_or((least * most).sqrt());
+        let [min_gain, max_gain] = calibration.gain;
+        let system_gain = model.gain.unwrap_or((min_gain * max_gain).sqrt());
         let noise = calibration.noise_at(system_gain, [0.0; 2], [0.0; 2]);
         let [low, high] = calibration.ratio;
         Self {
@@ -205,7 +205,7 @@ impl CameraState {
         }
     }
 
-    /// A state of colour and noise, its gains and ratio 1.
+    /// A state with this colour and noise; all gains and the ratio are 1.
     fn of(weights: [f64; 4], noise: &SensorNoise, calibration: &Calibration) -> Self {
         let rgb_to_camera = colour::rgb_to_camera(weights);
         Self {
@@ -225,7 +225,7 @@ impl CameraState {
     }
 }
 
-/// The numbers of a state, each with its own place in the camera's stream: none depends on how many others are drawn.
+/// Random numbers of a state. Each has a fixed address in the camera's stream, so that none depends on the other draws.
 #[derive(Debug, Clone, Copy)]
 enum StateNumber {
     FirstWeight,
@@ -252,26 +252,26 @@ impl StateNumber {
     ];
 }
 
-/// The camera's stream, addressed by what is drawn.
+/// The camera's random stream, addressed by [`StateNumber`].
 #[derive(Debug, Clone, Copy)]
 struct CameraStream(Stream);
 
 impl CameraStream {
-    fn of(self, number: StateNumber) -> SiteWords {
+    fn words(self, number: StateNumber) -> SiteWords {
         self.0.at(Site::new(number as usize, 0))
     }
 
     fn uniform(self, number: StateNumber) -> f64 {
-        Open01.sample(&mut self.of(number))
+        Open01.sample(&mut self.words(number))
     }
 
     fn between(self, number: StateNumber, low: f64, high: f64) -> f64 {
         low + self.uniform(number) * (high - low)
     }
 
-    /// N(0.8, 0.1), drawn again beyond three deviations: uncut, its inverse, the brightness gain, has no bound.
-    fn cut_normal(self, number: StateNumber) -> f64 {
-        let mut words = self.of(number);
+    /// A draw of N(0.8, 0.1), truncated at three deviations, because its inverse, the brightness gain, would have no bound.
+    fn truncated_normal(self, number: StateNumber) -> f64 {
+        let mut words = self.words(number);
         loop {
             let z = words.normal();
             if z.abs() <= 3.0 {

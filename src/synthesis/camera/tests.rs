@@ -1,7 +1,7 @@
 use super::*;
 use crate::types::FrameId;
 
-/// The fixed camera: the one that published figures of flat greys are for.
+/// The fixed camera, for which the published figures of flat greys hold.
 pub(in crate::synthesis) fn median() -> CameraState {
     let mut model = CameraModel::default();
     model.set_sampling(Sampling::Fixed);
@@ -31,7 +31,7 @@ fn a_state_is_read_as_it_was_written() {
 }
 
 #[test]
-fn every_calibrated_camera_keeps_its_ranges() {
+fn every_calibrated_camera_stays_in_its_ranges() {
     for name in Calibration::names() {
         let model = CameraModel::preset(name).unwrap();
         let [low, high] = model.calibration.gain;
@@ -70,7 +70,7 @@ fn numbers_have_their_distributions() {
     let of = |f: fn(&CameraState) -> f64| all.iter().map(f).collect::<Vec<_>>();
     let uniform = |low: f64, high: f64| move |x: f64| (x - low) / (high - low);
     let normal = |z: f64| 0.5 * libm::erfc(-z / f64::sqrt(2.0));
-    let cut =
+    let truncated =
         |inverse: f64| (normal((inverse - 0.8) / 0.1) - normal(-3.0)) / (1.0 - 2.0 * normal(-3.0));
     let cases = [
         (
@@ -83,7 +83,7 @@ fn numbers_have_their_distributions() {
         ("r", kolmogorov(of(|s| s.ratio), uniform(100.0, 300.0))),
         ("red", kolmogorov(of(|s| s.red_gain), uniform(1.9, 2.4))),
         ("blue", kolmogorov(of(|s| s.blue_gain), uniform(1.5, 1.9))),
-        ("1/rgb", kolmogorov(of(|s| 1.0 / s.rgb_gain), cut)),
+        ("1/rgb", kolmogorov(of(|s| 1.0 / s.rgb_gain), truncated)),
     ];
     for (name, distance) in cases {
         assert!(distance < 1.95, "{name}: {distance}");
@@ -96,7 +96,7 @@ fn numbers_have_their_distributions() {
 }
 
 #[test]
-fn a_pinned_number_moves_no_other() {
+fn a_pinned_number_changes_no_other() {
     let mut pinned = CameraModel::default();
     pinned.pin_ratio(42.0).unwrap();
     let (free, fixed) = (states(&CameraModel::default(), 20), states(&pinned, 20));
@@ -117,7 +117,7 @@ fn a_pinned_number_moves_no_other() {
 }
 
 #[test]
-fn frames_and_seeds_have_their_own_camera() {
+fn frames_and_seeds_have_different_cameras() {
     let draw = |seed, id: &str| {
         CameraState::draw(
             &NoiseKey::new(seed, &FrameId(id.to_owned())),

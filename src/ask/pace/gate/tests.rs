@@ -4,8 +4,8 @@ fn free() -> Gate {
     Gate::new(Quota::default())
 }
 
-fn ease(gate: &Gate) {
-    gate.ease(None, Allowance::default(), Duration::MAX);
+fn succeed(gate: &Gate) {
+    gate.succeeded(None, Allowance::default(), Duration::MAX);
 }
 
 #[tokio::test(start_paused = true)]
@@ -14,22 +14,22 @@ async fn an_open_gate_delays_nobody() {
     let start = Instant::now();
     for _ in 0..1000 {
         gate.pass().await;
-        ease(&gate);
+        succeed(&gate);
     }
     assert_eq!(start.elapsed(), Duration::ZERO);
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_shut_gate_holds_all_and_lets_them_go_at_the_rate_shown() {
+async fn after_a_pause_requests_pass_at_the_rate_that_was_accepted() {
     let gate = free();
     let start = Instant::now();
     for _ in 0..45 {
         gate.pass().await;
     }
     for _ in 0..5 {
-        gate.shut(Duration::from_secs(2));
+        gate.rate_limited(Duration::from_secs(2));
     }
-    // Forty were taken, then a pause of 2 s: one in 50 ms.
+    // 40 were accepted before a pause of 2 s: one in 50 ms.
     let mut passed = Vec::new();
     for _ in 0..3 {
         gate.pass().await;
@@ -37,7 +37,7 @@ async fn a_shut_gate_holds_all_and_lets_them_go_at_the_rate_shown() {
     }
     assert_eq!(passed, [2000, 2050, 2100]);
     for _ in 0..300 {
-        ease(&gate);
+        succeed(&gate);
     }
     gate.pass().await;
     let eased = start.elapsed();
@@ -46,27 +46,27 @@ async fn a_shut_gate_holds_all_and_lets_them_go_at_the_rate_shown() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn those_waiting_wait_on_when_it_shuts_again() {
+async fn waiting_requests_wait_for_a_second_pause_too() {
     let gate = std::sync::Arc::new(free());
     let start = Instant::now();
-    gate.shut(Duration::from_secs(1));
+    gate.rate_limited(Duration::from_secs(1));
     let waiting = tokio::spawn({
         let gate = gate.clone();
         async move { gate.pass().await }
     });
     tokio::time::sleep(Duration::from_millis(900)).await;
-    gate.shut(Duration::from_secs(4));
+    gate.rate_limited(Duration::from_secs(4));
     waiting.await.unwrap();
     assert!(start.elapsed() >= Duration::from_millis(4900));
-    // One that is dropped while waiting leaves the gate as it was.
-    gate.shut(Duration::from_secs(1));
+    // A request that is dropped while it waits changes nothing.
+    gate.rate_limited(Duration::from_secs(1));
     let dropped = tokio::time::timeout(Duration::from_millis(10), gate.pass()).await;
     assert!(dropped.is_err());
     gate.pass().await;
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_quota_is_kept_from_the_first_request_on() {
+async fn a_quota_applies_from_the_first_request_on() {
     let quota = Quota {
         requests: NonZeroU32::new(1200),
         tokens: None,
@@ -76,7 +76,7 @@ async fn a_quota_is_kept_from_the_first_request_on() {
     for _ in 0..300 {
         gate.pass().await;
     }
-    // 20 in a second, a quarter of a second's worth of them in advance.
+    // 20 a second, of which those of a quarter of a second may pass in advance.
     let took = start.elapsed();
     assert!(took >= Duration::from_millis(14_650), "{took:?}");
     assert!(took <= Duration::from_millis(14_750), "{took:?}");
@@ -87,12 +87,12 @@ async fn a_quota_is_kept_from_the_first_request_on() {
     }
     assert!(
         idle.elapsed() >= Duration::from_secs(1),
-        "no minute is saved up"
+        "an idle minute does not allow a burst"
     );
 }
 
 #[tokio::test(start_paused = true)]
-async fn tokens_are_counted_by_what_replies_were_charged() {
+async fn the_token_quota_uses_the_tokens_of_the_replies() {
     let quota = Quota {
         requests: None,
         tokens: NonZeroU32::new(60_000),
@@ -100,7 +100,7 @@ async fn tokens_are_counted_by_what_replies_were_charged() {
     let gate = Gate::new(quota);
     for _ in 0..200 {
         gate.pass().await;
-        gate.ease(Some(2000), Allowance::default(), Duration::MAX);
+        gate.succeeded(Some(2000), Allowance::default(), Duration::MAX);
     }
     let start = Instant::now();
     for _ in 0..10 {
@@ -111,7 +111,7 @@ async fn tokens_are_counted_by_what_replies_were_charged() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn absurd_figures_of_a_server_stop_nothing() {
+async fn absurd_numbers_from_a_server_do_not_stop_the_run() {
     let quota = Quota {
         requests: None,
         tokens: NonZeroU32::new(u32::MAX),
@@ -124,52 +124,53 @@ async fn absurd_figures_of_a_server_stop_nothing() {
     ] {
         headers.insert(name, value.parse().unwrap());
     }
-    let left = Allowance::read(&headers, std::time::SystemTime::now());
+    let allowance = Allowance::read(&headers, std::time::SystemTime::now());
     for _ in 0..10 {
-        gate.ease(Some(u64::MAX), left, Duration::from_mins(2));
-        gate.shut(Duration::MAX);
+        gate.succeeded(Some(u64::MAX), allowance, Duration::from_mins(2));
+        gate.rate_limited(Duration::MAX);
     }
     let passed = tokio::time::timeout(Duration::from_mins(1), gate.pass()).await;
-    assert!(passed.is_ok(), "a wait that no clock can show is none");
+    assert!(passed.is_ok(), "a wait beyond the clock's range is ignored");
 }
 
-/// A server that holds `store` requests, has `first` of them at first and lets `rate` of them in each second; how long
-/// 300 requests of 32 at once take, and how often they are turned away.
-async fn against(first: f64, store: f64, rate: f64, wait: Duration) -> (f64, u32) {
+/// The seconds that 300 requests take, 32 at once, and the number of rejections. The server has a token bucket of `burst`
+/// requests with `first` in it at the start, and refills `rate` of them per second.
+async fn run_against_bucket(first: f64, burst: f64, rate: f64, wait: Duration) -> (f64, u32) {
     let gate = std::sync::Arc::new(free());
     let level = std::sync::Arc::new(Mutex::new((first, Instant::now())));
     let start = Instant::now();
     let mut asking = tokio::task::JoinSet::new();
-    let left = std::sync::Arc::new(std::sync::atomic::AtomicU32::new(300));
-    let away = std::sync::Arc::new(std::sync::atomic::AtomicU32::new(0));
+    let remaining = std::sync::Arc::new(std::sync::atomic::AtomicU32::new(300));
+    let rejections = std::sync::Arc::new(std::sync::atomic::AtomicU32::new(0));
     for _ in 0..32 {
-        let (gate, level, left, away) = (gate.clone(), level.clone(), left.clone(), away.clone());
+        let (gate, level) = (gate.clone(), level.clone());
+        let (remaining, rejections) = (remaining.clone(), rejections.clone());
         asking.spawn(async move {
             use std::sync::atomic::Ordering::Relaxed;
-            while left
+            while remaining
                 .fetch_update(Relaxed, Relaxed, |n| n.checked_sub(1))
                 .is_ok()
             {
                 loop {
                     gate.pass().await;
-                    let taken = {
+                    let accepted = {
                         let mut level = level.lock().unwrap();
                         let now = Instant::now();
                         let filled = level.0 + (now - level.1).as_secs_f64() * rate;
-                        *level = (filled.min(store), now);
+                        *level = (filled.min(burst), now);
                         level.0 >= 1.0 && {
                             level.0 -= 1.0;
                             true
                         }
                     };
-                    if taken {
+                    if accepted {
                         tokio::time::sleep(Duration::from_millis(100)).await;
-                        ease(&gate);
+                        succeed(&gate);
                         break;
                     }
-                    away.fetch_add(1, Relaxed);
+                    rejections.fetch_add(1, Relaxed);
                     tokio::time::sleep(Duration::from_millis(5)).await;
-                    gate.shut(wait);
+                    gate.rate_limited(wait);
                 }
             }
         });
@@ -177,12 +178,12 @@ async fn against(first: f64, store: f64, rate: f64, wait: Duration) -> (f64, u32
     while asking.join_next().await.is_some() {}
     (
         start.elapsed().as_secs_f64(),
-        away.load(std::sync::atomic::Ordering::Relaxed),
+        rejections.load(std::sync::atomic::Ordering::Relaxed),
     )
 }
 
 #[tokio::test(start_paused = true)]
-async fn requests_turned_away_at_random_leave_no_run_crawling() {
+async fn random_rejections_do_not_slow_a_run_down() {
     for (every, wait) in [(20, 1.0), (3, 0.5)] {
         let (gate, wait) = (free(), Duration::from_secs_f64(wait));
         let start = Instant::now();
@@ -190,36 +191,36 @@ async fn requests_turned_away_at_random_leave_no_run_crawling() {
             gate.pass().await;
             tokio::time::sleep(Duration::from_millis(20)).await;
             if i % every == every - 1 {
-                gate.shut(wait);
+                gate.rate_limited(wait);
             } else {
-                ease(&gate);
+                succeed(&gate);
             }
         }
         let least = wait * (600 / every) + Duration::from_secs(12);
         let took = start.elapsed();
-        assert!(took < least * 2, "{took:?} where {least:?} were needed");
+        assert!(took < least * 2, "{took:?}, {least:?} were needed");
     }
 }
 
 #[tokio::test(start_paused = true)]
-async fn an_unknown_rate_is_found_out() {
-    for (first, store, rate, wait, longest) in [
-        // Without a pause it were 14 s; each of two costs a second and more.
+async fn an_unknown_rate_is_learned() {
+    for (first, burst, rate, wait, longest) in [
+        // Without a pause it would be 14 s; each of two pauses costs more than a second.
         (20.0, 20.0, 20.0, 2.0, 23.0),
         (8.0, 20.0, 20.0, 2.0, 26.0),
         (8.0, 20.0, 20.0, 0.5, 18.0),
-        // 59 s.
+        // Without a pause, 59 s.
         (5.0, 5.0, 5.0, 1.0, 110.0),
-        // 240 s.
+        // Without a pause, 240 s.
         (60.0, 60.0, 1.0, 6.0, 300.0),
-        // 6 s.
+        // Without a pause, 6 s.
         (50.0, 50.0, 50.0, 1.0, 8.0),
     ] {
         let wait = Duration::from_secs_f64(wait);
-        let (took, away) = against(first, store, rate, wait).await;
+        let (took, rejections) = run_against_bucket(first, burst, rate, wait).await;
         assert!(
-            took < longest && away < 80,
-            "{store} {rate}: {took} s, {away} turned away"
+            took < longest && rejections < 80,
+            "{burst} {rate}: {took} s, {rejections} rejections"
         );
     }
 }

@@ -4,7 +4,7 @@ use crate::types::FrameId;
 
 const SIZE: [usize; 2] = [240, 180];
 
-/// Normal draws, near enough: sums of twelve even ones.
+/// Approximately normal draws: sums of twelve uniform ones.
 fn normal(seed: u64, count: usize) -> Vec<f64> {
     let frame = FrameId("noise".to_owned());
     let picker = Picker {
@@ -13,7 +13,7 @@ fn normal(seed: u64, count: usize) -> Vec<f64> {
         frame: &frame,
     };
     let mut state = picker.bits("", "") | 1;
-    let mut even = || {
+    let mut uniform = || {
         // Marsaglia's xorshift64 (2003).
         state ^= state << 13;
         state ^= state >> 7;
@@ -21,11 +21,11 @@ fn normal(seed: u64, count: usize) -> Vec<f64> {
         (state >> 11) as f64 / (1_u64 << 53) as f64
     };
     (0..count)
-        .map(|_| (0..12).map(|_| even()).sum::<f64>() - 6.0)
+        .map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0)
         .collect()
 }
 
-/// A disc on a ground: its mask is 2, the ground's 1.
+/// The masks of a disc (2) on a background (1).
 fn masks() -> Vec<u32> {
     let [width, height] = SIZE;
     let inside = |i: usize| {
@@ -37,7 +37,7 @@ fn masks() -> Vec<u32> {
         .collect()
 }
 
-/// The disc, so much brighter than a ground of 60, under noise of pixels and of rows.
+/// The disc on a background of code 60, brighter by `step` codes, with noise of pixels and of rows.
 fn image(step: f64, pixel: f64, row: f64, seed: u64) -> Rgb {
     let [width, height] = SIZE;
     let (draws, rows) = (
@@ -57,12 +57,12 @@ fn image(step: f64, pixel: f64, row: f64, seed: u64) -> Rgb {
 
 fn sees(image: &Rgb) -> bool {
     let palette = Palette::built_in().unwrap();
-    let look = MaskContrasts::at(image, &masks(), SIZE, 1.0, &palette);
-    look.visible().any(|mask| mask == 2)
+    let contrasts = MaskContrasts::measure(image, &masks(), SIZE, 1.0, &palette);
+    contrasts.visible().any(|mask| mask == 2)
 }
 
 #[test]
-fn contrast_is_held_against_noise() {
+fn contrast_is_compared_with_noise() {
     for (step, pixel, row, seen) in [
         (40.0, 0.0, 0.0, true),
         (1.0, 0.0, 0.0, true),
@@ -88,22 +88,23 @@ fn noise_alone_shows_nothing() {
 }
 
 #[test]
-fn a_gain_shows_no_more() {
+fn a_gain_makes_nothing_more_visible() {
     let dim = image(6.0, 12.0, 1.0, 9);
     let mut bright = dim.clone();
     for code in bright.samples_mut() {
         *code = (u32::from(*code) * 2).min(255) as u8;
     }
     let signals = |image: &Rgb| {
-        let look = MaskContrasts::at(image, &masks(), SIZE, 1.0, &Palette::built_in().unwrap());
-        look.signal(&look.borders[&(1, 2)])
+        let contrasts =
+            MaskContrasts::measure(image, &masks(), SIZE, 1.0, &Palette::built_in().unwrap());
+        contrasts.signal(&contrasts.borders[&(1, 2)])
     };
     let (a, b) = (signals(&dim), signals(&bright));
     assert!((a - b).abs() < 0.02 * a, "{a} {b}");
 }
 
 #[test]
-fn rows_tell_their_noise() {
+fn the_noise_of_rows_is_estimated() {
     for row in [0.0, 3.0, 8.0] {
         let found = row_noise(&image(30.0, 4.0, row, 2));
         assert!((found - row).abs() < 0.15 * row + 0.6, "{row}: {found}");
@@ -117,8 +118,8 @@ fn colours_are_named_after_the_gain() {
     let dark = Rgb::new(height, width, samples).unwrap();
     let palette = Palette::built_in().unwrap();
     let name = |gain: f64| {
-        let look = MaskContrasts::at(&dark, &masks(), SIZE, gain, &palette);
-        look.colors(2, &palette)[0].name()
+        let contrasts = MaskContrasts::measure(&dark, &masks(), SIZE, gain, &palette);
+        contrasts.colors(2, &palette)[0].name()
     };
     assert_eq!((name(1.0), name(40.0)), ("black", "red"));
     assert!(

@@ -1,4 +1,4 @@
-//! Answers in a form: JSON with an answer's key, `\boxed{}`, `<answer>`.
+//! Answers in structured form: JSON with an answer key, `\boxed{}`, `<answer>`.
 
 use std::sync::LazyLock;
 
@@ -11,7 +11,7 @@ use super::plain::{fold, plain};
 use super::view::{ChoiceViews, ReplyView};
 use crate::types::question::{Answer, UnreadReason};
 
-/// Keys whose value is the answer, without case, spaces and punctuation.
+/// JSON keys whose value is the answer, in lower case without spaces and punctuation.
 const KEYS: [&str; 24] = [
     "answer",
     "ans",
@@ -39,7 +39,7 @@ const KEYS: [&str; 24] = [
     "回答",
 ];
 
-/// Keys that hold the answer inside an answer's object.
+/// JSON keys that hold the answer inside the object of an answer key.
 const INNER_KEYS: [&str; 5] = ["text", "label", "value", "name", "id"];
 
 static TAGGED: LazyLock<Regex> = LazyLock::new(|| {
@@ -49,23 +49,23 @@ static TAGGED: LazyLock<Regex> = LazyLock::new(|| {
     ))
 });
 
-/// The longest box that is looked into, in bytes; an answer is shorter.
+/// Maximum length of a LaTeX box that is read, in bytes. An answer is shorter.
 const BOX_BYTES: usize = 2000;
 
-/// The answer under an answer's key in the JSON objects of a text. An object with such a key is the last word, also
-/// where its value cannot be read.
-pub(super) fn json(tidy: &str, offered: &ChoiceViews) -> Option<Answer> {
+/// The answer under an answer key in the JSON objects of a text. An object with such a key decides, even if its value cannot
+/// be read.
+pub(super) fn json(tidy: &str, choices: &ChoiceViews) -> Option<Answer> {
     let mut answers = Vec::new();
     let mut from = 0;
     while let Some(at) = tidy[from..].find('{') {
         let start = from + at;
         let mut values = serde_json::Deserializer::from_str(&tidy[start..]).into_iter::<Value>();
-        // A failed attempt costs no more than its depth, which `serde_json` bounds: the scan stays linear.
+        // The cost of a failed attempt is limited by the depth, which `serde_json` bounds, so the scan stays linear.
         from = match values.next() {
             Some(Ok(value)) => {
                 for (key, value) in value.as_object().into_iter().flatten() {
                     if KEYS.contains(&key_form(key).as_str()) {
-                        answers.push(value_answer(value, offered));
+                        answers.push(value_answer(value, choices));
                     }
                 }
                 start + values.byte_offset()
@@ -83,18 +83,18 @@ fn key_form(key: &str) -> String {
         .collect()
 }
 
-/// The answer that a JSON value gives. A number is a choice's text, never its position.
-fn value_answer(value: &Value, offered: &ChoiceViews) -> Answer {
-    let nothing = Answer::Unparsed(UnreadReason::NoChoice);
+/// The answer in a JSON value. A number is read as a choice's text, never as its position.
+fn value_answer(value: &Value, choices: &ChoiceViews) -> Answer {
+    let unread = Answer::Unparsed(UnreadReason::NoChoice);
     match value {
-        Value::String(text) => text_answer(text, offered),
-        Value::Number(number) => text_answer(&number.to_string(), offered),
+        Value::String(text) => text_answer(text, choices),
+        Value::Number(number) => text_answer(&number.to_string(), choices),
         Value::Array(values) => {
             let answers: Vec<Answer> = values
                 .iter()
-                .map(|value| value_answer(value, offered))
+                .map(|value| value_answer(value, choices))
                 .collect();
-            agreed(&answers).unwrap_or(nothing)
+            agreed(&answers).unwrap_or(unread)
         }
         Value::Object(fields) => {
             let named = fields.iter().filter(|(key, _)| {
@@ -102,16 +102,16 @@ fn value_answer(value: &Value, offered: &ChoiceViews) -> Answer {
                 KEYS.contains(&key.as_str()) || INNER_KEYS.contains(&key.as_str())
             });
             let answers: Vec<Answer> = named
-                .map(|(_, value)| value_answer(value, offered))
+                .map(|(_, value)| value_answer(value, choices))
                 .collect();
-            agreed(&answers).unwrap_or(nothing)
+            agreed(&answers).unwrap_or(unread)
         }
-        Value::Null | Value::Bool(_) => nothing,
+        Value::Null | Value::Bool(_) => unread,
     }
 }
 
 /// The answer in `\boxed{…}` and `<answer>…</answer>`.
-pub(super) fn boxed(tidy: &str, offered: &ChoiceViews) -> Option<Answer> {
+pub(super) fn boxed(tidy: &str, choices: &ChoiceViews) -> Option<Answer> {
     let tagged = TAGGED
         .captures_iter(tidy)
         .filter_map(|found| found.get(1))
@@ -119,11 +119,11 @@ pub(super) fn boxed(tidy: &str, offered: &ChoiceViews) -> Option<Answer> {
     let inner = boxes(tidy)
         .chain(tagged)
         .filter(|inner| !inner.trim().is_empty());
-    let answers: Vec<Answer> = inner.map(|inner| text_answer(inner, offered)).collect();
+    let answers: Vec<Answer> = inner.map(|inner| text_answer(inner, choices)).collect();
     agreed(&answers)
 }
 
-/// What stands in LaTeX boxes, up to the brace that closes each.
+/// Contents of LaTeX boxes, up to the closing brace of each.
 fn boxes(text: &str) -> impl Iterator<Item = &str> {
     const OPENINGS: [&str; 3] = ["\\boxed", "\\fbox", "\\framebox"];
     OPENINGS.into_iter().flat_map(move |opening| {
@@ -144,22 +144,22 @@ fn boxes(text: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-fn text_answer(text: &str, offered: &ChoiceViews) -> Answer {
+fn text_answer(text: &str, choices: &ChoiceViews) -> Answer {
     let text = plain(text);
-    lenient::spoken(&ReplyView::new(&text, &fold(&text), offered))
+    lenient::read_plain(&ReplyView::new(&text, &fold(&text), choices))
 }
 
-/// The one choice that the answers agree on; what could not be read at all has no voice beside others.
+/// The choice on which all answers agree. Answers that could not be read are ignored if there are others.
 fn agreed(answers: &[Answer]) -> Option<Answer> {
-    let mute = |answer: &&Answer| {
+    let is_readable = |answer: &&Answer| {
         !matches!(
             answer,
             Answer::Unparsed(UnreadReason::NoChoice | UnreadReason::Empty | UnreadReason::Refused)
         )
     };
-    let mut voices = answers.iter().filter(mute);
-    let first = *voices.next().or(answers.first())?;
-    let same = voices.all(|answer| *answer == first);
+    let mut readable = answers.iter().filter(is_readable);
+    let first = *readable.next().or(answers.first())?;
+    let same = readable.all(|answer| *answer == first);
     Some(if same {
         first
     } else {
