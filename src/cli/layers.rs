@@ -207,20 +207,21 @@ fn file_values(
     let text = reading::text(path)?;
     let table: Table = text.parse().map_err(|e| invalid_toml(path, &text, &e))?;
     let mut values = BTreeMap::new();
-    read_table(&mut values, path, &table, all, (command, called), &[])?;
+    let flags: Vec<String> = settable_flags(command).map(key).collect();
+    read_table(&mut values, path, &table, all, (&flags, called), &[])?;
     Ok(values)
 }
 
-/// Adds the entries of a table, and of those nested tables that lead to the command that is called.
+/// Adds the entries of a table, and of those nested tables that lead to the command that is called. The tables of other commands
+/// are checked: each of their keys is a flag of the command that it is for.
 fn read_table(
     flag_values: &mut BTreeMap<String, LayeredValue>,
     path: &Path,
     table: &Table,
     at: &Command,
-    (command, called): (&Command, &[String]),
+    (flags, called): (&[String], &[String]),
     within: &[&str],
 ) -> Result<()> {
-    let flags: Vec<String> = settable_flags(command).map(key).collect();
     for (key, value) in table.iter().filter(|(_, value)| !value.is_table()) {
         let flag = key.replace('_', "-");
         let place = [within, &[key]].concat().join(".");
@@ -232,7 +233,7 @@ fn read_table(
         if !flags.contains(&flag) {
             let problem = format_args!(
                 "there is no flag --{flag} here{}",
-                suggestion(&flag, &flags, "--")
+                suggestion(&flag, flags, "--")
             );
             return Err(Error::usage(origin, problem));
         }
@@ -260,16 +261,15 @@ fn read_table(
                 format_args!("there is no command {name}{}", suggestion(name, &names, ""));
             return Err(Error::usage(origin, problem));
         };
-        if called.first().is_some_and(|called| called == name) {
-            let within = [within, &[name]].concat();
-            read_table(
-                flag_values,
-                path,
-                inner,
-                next,
-                (command, &called[1..]),
-                &within,
-            )?;
+        let within = [within, &[name]].concat();
+        match called.split_first() {
+            Some((first, rest)) if first == name => {
+                read_table(flag_values, path, inner, next, (flags, rest), &within)?;
+            }
+            _ => {
+                let unused = &mut BTreeMap::new();
+                read_table(unused, path, inner, next, (&every_flag(next), &[]), &within)?;
+            }
         }
     }
     Ok(())

@@ -121,14 +121,20 @@ impl CircuitBreaker {
     }
 
     pub(crate) fn interrupted(&mut self) {
-        self.stopped = true;
-        self.end.get_or_insert(EndReason::Interrupted);
+        self.stop(EndReason::Interrupted);
     }
 
     /// Stops the run because one more question could exceed `--max-cost`.
     pub(crate) fn over_budget(&mut self) {
-        self.stopped = true;
-        self.end.get_or_insert(EndReason::OverBudget);
+        self.stop(EndReason::OverBudget);
+    }
+
+    /// Ends the run. The first reason counts; that one of several models was stopped before is not the end of the run.
+    fn stop(&mut self, reason: EndReason) {
+        if !self.stopped {
+            self.stopped = true;
+            self.end = Some(reason);
+        }
     }
 
     pub(crate) fn succeeded(&mut self, model: usize) {
@@ -242,6 +248,20 @@ mod tests {
         }
         assert!(!breaker.stopped(), "the other model continues");
         breaker.is_stopped(0)
+    }
+
+    #[test]
+    fn an_interrupt_after_one_model_was_stopped_is_the_end() {
+        let mut breaker = breaker(2, None);
+        for i in 0..5 {
+            breaker.succeeded(1);
+            let failure = error(FailureKind::Server, Reach::Trial);
+            breaker.failed(0, &failure, &i.to_string());
+        }
+        assert!(breaker.is_stopped(0) && !breaker.stopped());
+        breaker.interrupted();
+        breaker.over_budget();
+        assert!(matches!(breaker.into_end(), EndReason::Interrupted));
     }
 
     #[test]

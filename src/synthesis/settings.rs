@@ -341,13 +341,13 @@ mod tests {
             ["L0", "E3.3", "L3", "L4", "L5", "E11"]
         );
         for (wrong, part) in [
-            ("L6", "\"L6\" is none of"),
-            ("", "\"\" is none of"),
+            ("L6", "\"L6\" is not one of"),
+            ("", "\"\" is not one of"),
             ("L3-L1", "runs backwards"),
             ("0-5", "is not a range"),
             ("3.333", "two decimals"),
             ("16.5", "above 16"),
-            ("-2", "none of"),
+            ("-2", "not one of"),
         ] {
             let error = wrong.parse::<Levels>().unwrap_err();
             assert!(error.contains(part), "{error}");

@@ -233,6 +233,19 @@ fn a_table_of_a_command_overrides_the_top_and_affects_no_other_command() {
 }
 
 #[test]
+fn a_mistyped_key_in_the_table_of_another_command_is_refused() {
+    for (file, part) in [
+        ("[synthesize]\nsheeet = \"noise\"", "did you mean --sheet?"),
+        ("[batch.export]\nsede = 5", "did you mean --seed?"),
+        ("[batch]\nsede = 5", "did you mean --seed?"),
+    ] {
+        let error = parsed(&[], &[], file).unwrap_err();
+        assert!(error.contains(part), "{file}: {error}");
+    }
+    parsed(&[], &[], "[batch]\nseed = 5").unwrap();
+}
+
+#[test]
 fn the_first_layer_that_sets_a_switch_decides() {
     for (variable, file, expected) in [
         ("false", "allow-http = true", false),

@@ -200,7 +200,7 @@ fn every_family_has_its_rule_its_tests_and_its_description() {
                 missing.push(file);
             }
         }
-        if !readme.contains(&family.to_string()) {
+        if !readme.contains(&format!("`{family}`")) {
             missing.push(format!("{family} in README.md"));
         }
     }
