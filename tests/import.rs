@@ -2,6 +2,9 @@
 
 #![allow(clippy::unwrap_used, missing_docs)]
 
+#[path = "support/table.rs"]
+mod table;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -10,6 +13,7 @@ use darkqa_eval::internals::dataset::Dataset;
 use darkqa_eval::types::{DepthKind, Frame, FrameId};
 use image::{GrayImage, ImageBuffer, Luma, Rgb, RgbImage, Rgba, RgbaImage};
 use serde_json::Value;
+use table::check_rows;
 use tempfile::TempDir;
 
 const WIDTH: u32 = 8;
@@ -186,10 +190,11 @@ fn habitat_renders_of_hm3d() {
 fn habitat_renders_of_matterport_and_replica() {
     let house = "R 0 0 0 0 b 0 0 0\nC 0 1 painting 39 objects 0\nC 1 1 bed 11 bed 0\nO 0 0 0 0 0 0\nO 1 0 1 0 0 0\n";
     let replica = r#"{"objects":[{"id":0,"class_name":"picture"},{"id":1,"class_name":"bed"}]}"#;
-    for (name, text, room) in [
+    let rows = [
         ("m.house", house, Some("bedroom")),
         ("info_semantic.json", replica, None),
-    ] {
+    ];
+    check_rows(rows, |(name, text, room)| {
         let scene = Scene::new();
         scene.rgb("s/rgb/0.png");
         scene.deep("s/depth/0.png", 2000, 3000);
@@ -206,7 +211,7 @@ fn habitat_renders_of_matterport_and_replica() {
             (camera.fx - 4.0).abs() < 1e-9 && (camera.cx - 3.5).abs() < 1e-9,
             "{camera:?}"
         );
-    }
+    });
 }
 
 #[test]

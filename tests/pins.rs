@@ -19,6 +19,7 @@ use support::endpoint::{Answer, MockEndpoint};
 use support::house::House;
 use support::onnx;
 use support::run::{Bench, called, records, words};
+use support::table::check_rows;
 
 /// The lines of a file of JSON objects.
 fn lines(path: &std::path::Path) -> Vec<Value> {
@@ -87,7 +88,7 @@ fn exam() -> Bench {
         .flat_map(|pair| [question(0, &pair[0]), question(1, &pair[1])]);
     let all: Vec<String> = all.map(|question| question.to_string()).collect();
     bench.file("set.jsonl", all.join("\n"));
-    for (model, skill) in SKILLS {
+    check_rows(SKILLS, |(model, skill)| {
         let mut script = vec![json!({"default": "A"}).to_string()];
         for (condition, right) in CONDITIONS.into_iter().zip(skill) {
             for (family, right) in right.into_iter().enumerate() {
@@ -98,7 +99,7 @@ fn exam() -> Bench {
             }
         }
         bench.file(&format!("{model}.jsonl"), script.join("\n"));
-    }
+    });
     bench
 }
 
@@ -319,10 +320,11 @@ fn a_limit_that_cuts_most_replies_is_warned_of() {
             && said.contains("--max-tokens"),
         "{said}"
     );
-    for (cut, words) in [(5, Value::Null), (10, json!("The answer is C"))] {
+    let rows = [(5, Value::Null), (10, json!("The answer is C"))];
+    check_rows(rows, |(cut, words)| {
         let said = told_of_cut(cut, &words);
         assert!(!said.contains("replies were cut"), "{said}");
-    }
+    });
 }
 
 // ---- Open questions about enhanced walks ----

@@ -3,6 +3,9 @@
 
 #![allow(clippy::unwrap_used, missing_docs)]
 
+#[path = "support/table.rs"]
+mod table;
+
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,6 +14,7 @@ use assert_cmd::Command;
 use darkqa_eval::internals::labels::space;
 use image::{GrayImage, ImageBuffer, Luma, Rgb, RgbImage};
 use serde_json::{Value, json};
+use table::check_rows;
 use tempfile::TempDir;
 
 const SIZE: (u32, u32) = (320, 240);
@@ -290,9 +294,9 @@ fn nothing_is_denied_that_the_labels_cannot_say() {
     let of_nyu40 = denied(&[]);
     assert!(of_nyu40.contains(&"toilet".to_owned()), "{of_nyu40:?}");
     // NYU40 puts plants and stools under catch-alls.
-    for hidden in ["plant", "stool"] {
+    check_rows(["plant", "stool"], |hidden| {
         assert!(!of_nyu40.contains(&hidden.to_owned()), "{of_nyu40:?}");
-    }
+    });
     let own = [
         (1, "wall"),
         (2, "floor"),
@@ -474,13 +478,13 @@ fn segments_of_8_bits_are_refused() {
 
 #[test]
 fn maps_of_another_size_are_refused() {
-    for map in ["sem", "over", "depth"] {
+    check_rows(["sem", "over", "depth"], |map| {
         let (data, out) = (Data::of(&[bedroom("s")]), folder());
         let small = ImageBuffer::<Luma<u16>, Vec<u16>>::new(SIZE.0 / 2, SIZE.1);
         small.save(data.path(&format!("{map}0.png"))).unwrap();
         let words = [&format!("{map}0.png")[..], "240 × 160", "240 × 320"];
         data.ask(out.path(), &[]).refused(&words);
-    }
+    });
 }
 
 #[test]
@@ -496,14 +500,15 @@ fn a_broken_frame_does_not_stop_the_others() {
 
 #[test]
 fn a_scale_of_depth_off_by_a_thousand_is_refused() {
-    for (scale, says) in [(1.0, "deeper than any room"), (1e-6, "depth_scale")] {
+    let rows = [(1.0, "deeper than any room"), (1e-6, "depth_scale")];
+    check_rows(rows, |(scale, says)| {
         let (data, out) = (Data::of(&[bedroom("s")]), folder());
         data.change(|line| line["depth_scale"] = scale.into());
         let said = data.ask(out.path(), &[]);
         let told = format!("{}{}", said.out, said.err);
         assert!(told.contains(says), "{scale}: {told}");
         assert!(!said.questions.contains("closest"));
-    }
+    });
 }
 
 #[test]

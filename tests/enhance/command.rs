@@ -1,6 +1,7 @@
 //! The command `enhance`.
 
 use crate::support::onnx;
+use crate::support::table::check_rows;
 use crate::{image, map};
 
 #[test]
@@ -43,10 +44,10 @@ fn the_command_enhances_files_and_folders() {
         "{err}"
     );
     assert!(err.contains("b.png"), "{err}");
-    for name in ["mended/a.png", "mended/c.png"] {
+    check_rows(["mended/a.png", "mended/c.png"], |name| {
         let made = image::open(at(name)).unwrap().into_rgb8().into_raw();
         assert_eq!(made, map(&dark, |x| 2.0 * x).samples(), "{name}");
-    }
+    });
     let (_, out, _) = call(&["c.png", "--out", "mended"]);
     assert!(out.contains("1 kept as they were"), "{out}");
     let (code, out, _) = call(&["--describe"]);
@@ -54,13 +55,14 @@ fn the_command_enhances_files_and_folders() {
         code == 0 && out.contains("NCHW") && out.contains("usual"),
         "{out}"
     );
-    for words in [
+    let rows = [
         &["--out", "x"][..],
         &["c.png"],
         &["c.png", "--describe"],
         &["c.png", "--out", "x", "--tile", "0"],
-    ] {
+    ];
+    check_rows(rows, |words| {
         let (code, _, err) = call(words);
         assert_eq!((code, err.lines().count()), (2, 1), "{err}");
-    }
+    });
 }

@@ -5,15 +5,16 @@ use darkqa_eval::types::Rgb;
 
 use crate::support::onnx::Size::{Known, Named};
 use crate::support::onnx::{self, Graph, Type};
+use crate::support::table::check_rows;
 use crate::{fault, image, loaded, map, open};
 
 #[test]
 fn an_identity_gives_every_byte_back_at_any_size() {
     let (_folder, mut enhancer) = loaded(&onnx::identity());
-    for (height, width) in [(16, 16), (7, 31), (1, 1), (16, 16)] {
+    check_rows([(16, 16), (7, 31), (1, 1), (16, 16)], |(height, width)| {
         let image = image(height, width);
         assert_eq!(enhancer.enhance(&image).unwrap(), image);
-    }
+    });
 }
 
 #[test]
@@ -31,13 +32,14 @@ fn gain_and_gamma_are_computed_and_held_in_range() {
 #[test]
 fn of_zero_dces_three_outputs_the_second_is_the_image() {
     let image = image(8, 8);
-    for names in [
+    let rows = [
         ["enhance_image_1", "enhance_image", "r"],
         ["101", "102", "103"],
-    ] {
+    ];
+    check_rows(rows, |names| {
         let (_folder, mut enhancer) = loaded(&onnx::three_outputs(names));
         assert_eq!(enhancer.enhance(&image).unwrap(), map(&image, |x| 2.0 * x));
-    }
+    });
 }
 
 #[test]
@@ -65,14 +67,15 @@ fn every_layout_and_type_gives_every_byte_back() {
     let image = image(12, 20);
     let any = [Named("height"), Named("width")];
     let three = Known(3);
-    for shape in [
+    let rows = [
         vec![Known(1), three, any[0], any[1]],
         vec![Named("batch"), three, any[0], any[1]],
         vec![Known(1), any[0], any[1], three],
         vec![three, any[0], any[1]],
         vec![any[0], any[1], three],
         vec![Known(1), three, Known(12), any[1]],
-    ] {
+    ];
+    check_rows(rows, |shape| {
         for element in [Type::Float, Type::Half, Type::Byte] {
             let (_folder, mut enhancer) = loaded(&onnx::shaped(element, &shape));
             assert_eq!(
@@ -82,13 +85,13 @@ fn every_layout_and_type_gives_every_byte_back() {
                 enhancer.describe()
             );
         }
-    }
+    });
 }
 
 #[test]
 fn other_conventions_are_refused_by_name() {
     let any = [Named("height"), Named("width")];
-    for (graph, part) in [
+    let rows = [
         (
             onnx::shaped(Type::Float, &[Known(1), Known(1), any[0], any[1]]),
             "not an image of three",
@@ -103,10 +106,11 @@ fn other_conventions_are_refused_by_name() {
         ),
         (onnx::no_image(), "no output that is an image"),
         (onnx::two_inputs(), "exposure = 0.5"),
-    ] {
+    ];
+    check_rows(rows, |(graph, part)| {
         let message = fault(&graph).to_lowercase();
         assert!(message.contains(part), "{message}");
-    }
+    });
 }
 
 #[test]

@@ -10,6 +10,7 @@ use darkqa_eval::types::{Rgb, Severity};
 
 use crate::open;
 use crate::support::onnx;
+use crate::support::table::check_rows;
 
 fn shipped() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("models/gray-gain.onnx")
@@ -47,10 +48,10 @@ fn the_shipped_enhancer_exposes_for_gray() {
     let dark = Rgb::new(6, 8, (0..144).map(|i| 5 + (i % 9) as u8).collect()).unwrap();
     assert!((mean(&enhancer.enhance(&dark).unwrap()) - 0.18).abs() < 0.004);
     // A bright image is not darkened, and a black one is not lifted.
-    for byte in [0, 200] {
+    check_rows([0, 200], |byte| {
         let flat = Rgb::new(6, 8, vec![byte; 144]).unwrap();
         assert_eq!(enhancer.enhance(&flat).unwrap(), flat);
-    }
+    });
 }
 
 fn lift() -> Enhancer {
@@ -103,13 +104,14 @@ fn the_trained_enhancer_brings_a_room_back() {
 #[test]
 fn the_trained_enhancer_invents_nothing() {
     let mut enhancer = lift();
-    for color in [
+    let rows = [
         [0, 0, 0],
         [3, 3, 3],
         [20, 16, 12],
         [90, 110, 130],
         [255, 255, 255],
-    ] {
+    ];
+    check_rows(rows, |color| {
         let flat = Rgb::new(64, 96, color.repeat(64 * 96)).unwrap();
         let made = enhancer.enhance(&flat).unwrap();
         let (pixels, _) = made.samples().as_chunks::<3>();
@@ -120,7 +122,7 @@ fn the_trained_enhancer_invents_nothing() {
             let spread = codes.iter().max().unwrap() - codes.iter().min().unwrap();
             assert!(spread <= 8, "{color:?}: {spread} codes apart");
         }
-    }
+    });
     // One edge in, one edge out.
     let halves: Vec<u8> = (0..64 * 96)
         .flat_map(|i| if i % 96 < 48 { [8, 8, 8] } else { [24, 20, 16] })

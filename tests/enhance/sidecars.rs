@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use darkqa_eval::enhance::ModelFile;
 
 use crate::support::onnx;
+use crate::support::table::check_rows;
 use crate::{fault, image, loaded, map, open, stated};
 
 #[test]
@@ -15,11 +16,11 @@ fn a_sidecar_says_which_output_it_is() {
     let path = graph.write(folder.path(), "model.onnx");
     let sidecar = folder.path().join("model.onnx.toml");
     let image = image(8, 8);
-    for text in ["output = 1", "output = \"18\""] {
+    check_rows(["output = 1", "output = \"18\""], |text| {
         std::fs::write(&sidecar, text).unwrap();
         let mended = open(&path).unwrap().enhance(&image).unwrap();
         assert_eq!(mended, map(&image, |x| 2.0 * x));
-    }
+    });
     std::fs::write(&sidecar, "output = 1\nlayout_in = \"nhwc\"").unwrap();
     let message = open(&path).err().unwrap().to_string();
     assert!(message.contains("layout_in"), "{message}");
@@ -28,7 +29,7 @@ fn a_sidecar_says_which_output_it_is() {
 #[test]
 fn a_sidecar_says_what_a_graph_cannot() {
     let image = image(12, 20);
-    for (graph, sidecar) in [
+    let rows = [
         (
             onnx::identity(),
             "range_in = \"0..255\"\nrange_out = \"0..255\"",
@@ -44,7 +45,8 @@ fn a_sidecar_says_what_a_graph_cannot() {
             "mean = [0.5, 0.5, 0.5]\nstd = [0.5, 0.5, 0.5]",
         ),
         (onnx::two_inputs(), "[extra]\nexposure = 1"),
-    ] {
+    ];
+    check_rows(rows, |(graph, sidecar)| {
         let (_folder, mut enhancer) = stated(&graph, sidecar);
         assert_eq!(enhancer.enhance(&image).unwrap(), image, "{sidecar}");
         assert!(
@@ -52,7 +54,7 @@ fn a_sidecar_says_what_a_graph_cannot() {
             "{}",
             enhancer.describe()
         );
-    }
+    });
     let (_folder, mut truncated) = stated(&onnx::gain(0.5), "rounding = \"truncate\"");
     let half: Vec<u8> = image.samples().iter().map(|byte| byte / 2).collect();
     assert_eq!(truncated.enhance(&image).unwrap().samples(), half);
@@ -60,14 +62,15 @@ fn a_sidecar_says_what_a_graph_cannot() {
 
 #[test]
 fn a_range_that_nobody_stated_is_checked() {
-    for (graph, likely) in [
+    let rows = [
         (onnx::ranged(0.0, 255.0), "range_out = \"0..255\""),
         (onnx::ranged(-1.0, 1.0), "range_out = \"-1..1\""),
-    ] {
+    ];
+    check_rows(rows, |(graph, likely)| {
         let (_folder, mut enhancer) = loaded(&graph);
         let message = enhancer.enhance(&image(12, 20)).unwrap_err().to_string();
         assert!(message.contains(likely), "{message}");
-    }
+    });
 }
 
 #[test]

@@ -7,6 +7,7 @@ use darkqa_eval::types::Rgb;
 
 use crate::support::onnx::Size::Known;
 use crate::support::onnx::{self, Type};
+use crate::support::table::check_rows;
 use crate::{image, loaded, stated};
 
 #[test]
@@ -28,11 +29,11 @@ fn sides_are_filled_up_to_multiples() {
     // Found by trying, and stated in every way.
     let (_folder, mut found) = loaded(&onnx::of_eights());
     assert_eq!(found.enhance(&image).unwrap(), image);
-    for pad in ["reflect", "zero", "replicate", "crop"] {
+    check_rows(["reflect", "zero", "replicate", "crop"], |pad| {
         let sidecar = format!("multiple = 8\npad = \"{pad}\"");
         let (_folder, mut enhancer) = stated(&onnx::of_eights(), &sidecar);
         assert_eq!(enhancer.enhance(&image).unwrap(), image, "{pad}");
-    }
+    });
     let (_folder, mut wrong) = stated(&onnx::of_eights(), "multiple = 2");
     let message = wrong.enhance(&image).unwrap_err().to_string();
     assert!(message.contains("multiple = 8"), "{message}");
@@ -44,7 +45,8 @@ fn tiles_are_exact_or_refused() {
     let tiles = |side| Tiling::Side(NonZeroUsize::new(side).unwrap());
     let (_folder, mut blurred) = loaded(&onnx::blurred());
     let whole = blurred.enhance(&image).unwrap();
-    for sidecar in ["", "tile = \"exact:2\"", "tile = \"exact:2\"\nmultiple = 4"] {
+    let rows = ["", "tile = \"exact:2\"", "tile = \"exact:2\"\nmultiple = 4"];
+    check_rows(rows, |sidecar| {
         let (_folder, enhancer) = stated(&onnx::blurred(), sidecar);
         for side in [80, 100, 1000] {
             let (_folder, enhancer) = stated(&onnx::blurred(), sidecar);
@@ -69,8 +71,8 @@ fn tiles_are_exact_or_refused() {
             .unwrap_err()
             .to_string();
         assert!(message.contains("--tile"), "{message}");
-    }
-    for graph in [onnx::mean_added(), onnx::blurred()] {
+    });
+    check_rows([onnx::mean_added(), onnx::blurred()], |graph| {
         // Of the mean every pixel is part; of the blur more than is stated here.
         let (_folder, enhancer) = stated(&graph, "tile = \"exact:0\"");
         let message = enhancer
@@ -79,7 +81,7 @@ fn tiles_are_exact_or_refused() {
             .unwrap_err()
             .to_string();
         assert!(message.contains("at their seams"), "{message}");
-    }
+    });
     let (_folder, enhancer) = stated(&onnx::mean_added(), "tile = \"none\"");
     let message = enhancer
         .with_tiling(tiles(40))

@@ -6,22 +6,17 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
+use crate::support::frames::png;
 use crate::support::onnx;
-use crate::support::run::{Bench, records};
-use crate::{frames, png, text};
+use crate::support::run::{Bench, records, words};
+use crate::support::table::check_rows;
+use crate::text;
 
 #[test]
 fn the_built_in_rooms_run_without_anything() {
     let bench = Bench::new();
-    let words = [
-        "--model",
-        "observer",
-        "--blind-model",
-        "observer",
-        "--out",
-        "run",
-    ];
-    let table = bench.complete(&words);
+    let args = words("--model observer --blind-model observer --out run");
+    let table = bench.complete(&args);
     assert!(
         table.contains("untouched")
             && table.contains("with noise")
@@ -56,23 +51,11 @@ fn the_built_in_rooms_run_without_anything() {
 
 #[test]
 fn every_condition_runs_raw_and_enhanced() {
-    let bench = Bench::new();
-    frames(&bench);
+    let bench = Bench::with_frames();
     onnx::gain(3.0).write(&bench.path(""), "bright.onnx");
     onnx::gamma(0.5).write(&bench.path(""), "curve.onnx");
-    let words = [
-        "--data",
-        "frames",
-        "--model",
-        "random",
-        "--llie",
-        "bright.onnx",
-        "--llie",
-        "curve.onnx",
-        "--out",
-        "run",
-    ];
-    let table = bench.complete(&words);
+    let args = words("--data frames --model random --llie bright.onnx --llie curve.onnx --out run");
+    let table = bench.complete(&args);
     assert!(
         table.contains("with noise + bright") && table.contains("with noise + curve"),
         "{table}"
@@ -96,7 +79,7 @@ fn every_condition_runs_raw_and_enhanced() {
         );
         digests.into_iter().next().unwrap()
     };
-    let shown: BTreeSet<String> = [
+    let digests: BTreeSet<String> = [
         "L0",
         "L1-ev",
         "L1-noise",
@@ -106,26 +89,17 @@ fn every_condition_runs_raw_and_enhanced() {
     .iter()
     .map(|c| digest(c, "b.png"))
     .collect();
-    assert_eq!(shown.len(), 5, "five different images");
+    assert_eq!(digests.len(), 5, "five different images");
 }
 
 #[test]
 fn threads_and_order_change_no_byte() {
-    let bench = Bench::new();
-    frames(&bench);
+    let bench = Bench::with_frames();
     let images = |run: &str, threads: &str, concurrency: &str| {
-        bench.complete(&[
-            "--data",
-            "frames",
-            "--model",
-            "random",
-            "--threads",
-            threads,
-            "--concurrency",
-            concurrency,
-            "--out",
-            run,
-        ]);
+        bench.complete(&words(&format!(
+            "--data frames --model random --threads {threads} --concurrency {concurrency} \
+             --out {run}"
+        )));
         let digests: BTreeMap<String, String> = records(&bench.path(run))
             .iter()
             .map(|r| (r["key"].to_string(), r["image"]["digest"].to_string()))
@@ -141,33 +115,28 @@ fn threads_and_order_change_no_byte() {
 #[test]
 fn the_reference_run_is_made_again() {
     let bench = Bench::new();
-    bench.complete(&[
-        "--model",
-        "observer",
-        "--data",
-        "rooms:frames=12,size=320x240",
-        "--levels",
-        "L0,L3",
-        "--out",
-        "run",
-    ]);
+    bench.complete(&words(
+        "--model observer --data rooms:frames=12,size=320x240 --levels L0,L3 --out run",
+    ));
     let reference = Path::new(env!("CARGO_MANIFEST_DIR")).join("results/reference");
-    let made = |run: &Path| -> BTreeMap<String, Value> {
-        let kept = records(run).into_iter();
-        kept.map(|record| (record["key"].to_string(), record))
+    let by_key = |run: &Path| -> BTreeMap<String, Value> {
+        let records = records(run).into_iter();
+        records
+            .map(|record| (record["key"].to_string(), record))
             .collect()
     };
     // Trials, choices, replies and the very files that were sent, whatever machine made them.
-    assert_eq!(made(&bench.path("run")), made(&reference));
-    for name in [
+    assert_eq!(by_key(&bench.path("run")), by_key(&reference));
+    let names = [
         "summary.csv",
         "comparisons.csv",
         "thresholds.csv",
         "figures/accuracy.svg",
-    ] {
+    ];
+    check_rows(names, |name| {
         let file = |run: &Path| fs::read_to_string(run.join(name)).unwrap();
         assert_eq!(file(&bench.path("run")), file(&reference), "{name}");
-    }
+    });
 }
 
 #[test]
@@ -180,22 +149,15 @@ fn ready_made_sets_are_read() {
     bench.file("set/base64.tsv", format!("index\timage\tquestion\tA\tB\tanswer\n7\t{file}\tWhat?\tred\tblue\tB\n8\t7\tAnd?\tyes\tno\tA\n"));
     bench.file("set/lines.jsonl", "{\"id\":1,\"image\":\"one.png\",\"question\":\"What?\",\"choices\":[\"red\",\"blue\"],\"answer\":\"blue\",\"family\":\"color\"}\n");
     bench.file("script.jsonl", "{\"default\":\"B\"}\n");
-    for (set, n, right) in [
+    let rows = [
         ("paths.tsv", 2, 1),
         ("base64.tsv", 2, 1),
         ("lines.jsonl", 1, 1),
-    ] {
-        let data = format!("set/{set}");
-        bench.complete(&[
-            "--data",
-            &data,
-            "--model",
-            "script:script.jsonl",
-            "--levels",
-            "L0,L3",
-            "--out",
-            set,
-        ]);
+    ];
+    check_rows(rows, |(set, n, right)| {
+        bench.complete(&words(&format!(
+            "--data set/{set} --model script:script.jsonl --levels L0,L3 --out {set}"
+        )));
         let records = records(&bench.path(set));
         assert_eq!(records.len(), n * 3, "{set}");
         let seen = records
@@ -207,7 +169,7 @@ fn ready_made_sets_are_read() {
             records.iter().all(|record| record["image"]["width"] == 24),
             "{set}"
         );
-    }
+    });
     let of_paths = records(&bench.path("paths.tsv"));
     let first = of_paths
         .iter()
@@ -222,22 +184,12 @@ fn ready_made_sets_are_read() {
 
 #[test]
 fn two_scripts_that_say_the_same_are_two_models() {
-    let bench = Bench::new();
-    frames(&bench);
+    let bench = Bench::with_frames();
     for script in ["one.jsonl", "two.jsonl"] {
         bench.file(script, "{\"default\":\"A\"}\n");
     }
-    bench.complete(&[
-        "--data",
-        "frames",
-        "--model",
-        "script:one.jsonl",
-        "--model",
-        "script:two.jsonl",
-        "--levels",
-        "L0",
-        "--out",
-        "run",
-    ]);
+    bench.complete(&words(
+        "--data frames --model script:one.jsonl --model script:two.jsonl --levels L0 --out run",
+    ));
     assert_eq!(records(&bench.path("run")).len(), 6);
 }

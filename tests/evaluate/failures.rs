@@ -5,66 +5,46 @@ use std::fs;
 use serde_json::Value;
 
 use crate::support::endpoint::{Answer, MockEndpoint};
+use crate::support::frames::png;
 use crate::support::onnx;
-use crate::support::run::{Bench, records};
-use crate::{frames, png, text};
+use crate::support::process::wait_until;
+use crate::support::run::{Bench, model_args, records, words};
+use crate::support::table::check_rows;
+use crate::text;
 
 #[test]
 fn a_broken_image_is_found_before_anything_is_asked() {
-    let bench = Bench::new();
-    frames(&bench);
+    let bench = Bench::with_frames();
     let whole = png(20);
     let endpoint = MockEndpoint::start([Answer::text("A")]);
     let url = endpoint.base_url();
     let mut corrupt = whole.clone();
     let middle = corrupt.len() / 2;
     corrupt[middle] ^= 0x40;
-    for (broken, says) in [
+    let rows = [
         (&whole[..whole.len() - 40], "ends before"),
         (&corrupt, "checksum"),
-    ] {
+    ];
+    check_rows(rows, |(broken, message)| {
         bench.file("frames/a.png", broken);
-        let run = bench.call(&[
-            "--data",
-            "frames",
-            "--model",
-            "m",
-            "--base-url",
-            &url,
-            "--levels",
-            "L0",
-            "--out",
-            "run",
-        ]);
+        let run = bench.call(&model_args(&url, "--data frames --levels L0 --out run"));
         assert_eq!(run.code, Some(2), "{run:?}");
         assert!(
-            run.stderr.contains("a.png: not a whole image") && run.stderr.contains(says),
+            run.stderr.contains("a.png: not a whole image") && run.stderr.contains(message),
             "{run:?}"
         );
-    }
+    });
     assert_eq!(endpoint.requests().len(), 0);
 }
 
 #[test]
 fn a_model_that_does_not_exist_stops_itself_alone() {
-    let bench = Bench::new();
-    frames(&bench);
+    let bench = Bench::with_frames();
     let endpoint = MockEndpoint::start([Answer::error(404, "model_not_found", "no such model")]);
     let url = endpoint.base_url();
-    let run = bench.call(&[
-        "--data",
-        "frames",
-        "--model",
-        "random",
-        "--model",
-        "gone",
-        "--base-url",
-        &url,
-        "--levels",
-        "L0-L2",
-        "--out",
-        "run",
-    ]);
+    let run = bench.call(&words(&format!(
+        "--data frames --model random --model gone --base-url {url} --levels L0-L2 --out run"
+    )));
     assert_eq!(run.code, Some(2), "{run:?}");
     assert!(
         run.stderr.contains("gone") && run.stderr.contains("no such model"),
@@ -79,27 +59,16 @@ fn a_model_that_does_not_exist_stops_itself_alone() {
 
 #[test]
 fn an_endpoint_that_is_not_there_is_noticed_by_its_first_failures() {
-    let bench = Bench::new();
-    frames(&bench);
+    let bench = Bench::with_frames();
     let free = std::net::TcpListener::bind("127.0.0.1:0")
         .unwrap()
         .local_addr()
         .unwrap();
     let url = format!("http://{free}/v1");
-    let run = bench.call(&[
-        "--data",
-        "frames",
-        "--model",
-        "m",
-        "--base-url",
+    let run = bench.call(&model_args(
         &url,
-        "--retries",
-        "0",
-        "--concurrency",
-        "1",
-        "--out",
-        "run",
-    ]);
+        "--data frames --retries 0 --concurrency 1 --out run",
+    ));
     assert_eq!(run.code, Some(2), "{run:?}");
     assert!(
         run.stderr.contains("m: 5 trials in a row failed"),
@@ -110,31 +79,17 @@ fn an_endpoint_that_is_not_there_is_noticed_by_its_first_failures() {
 
 #[test]
 fn an_image_that_changes_under_way_is_not_taken_for_the_old_one() {
-    let bench = Bench::new();
-    frames(&bench);
+    let bench = Bench::with_frames();
     let later = Answer::error(429, "slow_down", "later").header("retry-after", "1");
     let endpoint = MockEndpoint::start([later, Answer::text("A")]);
     let url = endpoint.base_url();
     let changed = bench.path("frames/b.png");
     let run = std::thread::scope(|scope| {
         scope.spawn(|| {
-            while endpoint.requests().is_empty() {
-                std::thread::sleep(std::time::Duration::from_millis(5));
-            }
+            wait_until(|| !endpoint.requests().is_empty());
             fs::write(&changed, png(200)).unwrap();
         });
-        bench.call(&[
-            "--data",
-            "frames",
-            "--model",
-            "m",
-            "--base-url",
-            &url,
-            "--concurrency",
-            "1",
-            "--out",
-            "run",
-        ])
+        bench.call(&model_args(&url, "--data frames --concurrency 1 --out run"))
     });
     assert_eq!(run.code, Some(1), "{run:?}");
     let of_b: Vec<Value> = records(&bench.path("run"))
@@ -151,23 +106,11 @@ fn an_image_that_changes_under_way_is_not_taken_for_the_old_one() {
 
 #[test]
 fn an_enhancer_that_fails_is_found_before_anything_is_asked() {
-    let bench = Bench::new();
-    frames(&bench);
+    let bench = Bench::with_frames();
     onnx::not_a_number().write(&bench.path(""), "nan.onnx");
     let endpoint = MockEndpoint::start([Answer::text("A")]);
     let url = endpoint.base_url();
-    let run = bench.call(&[
-        "--data",
-        "frames",
-        "--model",
-        "m",
-        "--base-url",
-        &url,
-        "--llie",
-        "nan.onnx",
-        "--out",
-        "run",
-    ]);
+    let run = bench.call(&model_args(&url, "--data frames --llie nan.onnx --out run"));
     assert_eq!(run.code, Some(2), "{run:?}");
     assert!(
         run.stderr.contains("nan.onnx") && run.stderr.contains("NaN"),

@@ -4,26 +4,17 @@ use std::fs;
 
 use serde_json::{Value, json};
 
-use crate::support::run::{Bench, records};
-use crate::{frames, text};
+use crate::support::run::{Bench, records, words};
+use crate::support::table::check_rows;
+use crate::text;
 
 #[test]
 fn a_record_and_a_row_keep_the_contract() {
-    let bench = Bench::new();
-    frames(&bench);
+    let bench = Bench::with_frames();
     bench.file("script.jsonl", "{\"question\":\"a1\",\"reply\":\"No.\"}\n{\"question\":\"b1\",\"condition\":\"L1-ev\",\"reply\":\"too dark to see\"}\n{\"default\":\"**A**\"}\n");
-    let table = bench.complete(&[
-        "--data",
-        "frames",
-        "--model",
-        "script:script.jsonl",
-        "--levels",
-        "L0,L1",
-        "--variant",
-        "ev",
-        "--out",
-        "run",
-    ]);
+    let table = bench.complete(&words(
+        "--data frames --model script:script.jsonl --levels L0,L1 --variant ev --out run",
+    ));
     assert!(
         table.contains("(66.7)"),
         "the lenient reading differs: {table}"
@@ -39,7 +30,7 @@ fn a_record_and_a_row_keep_the_contract() {
         .keys()
         .map(String::as_str)
         .collect();
-    for key in [
+    let rows = [
         "key",
         "question",
         "frame",
@@ -63,9 +54,10 @@ fn a_record_and_a_row_keep_the_contract() {
         "latency_ms",
         "attempts",
         "image",
-    ] {
+    ];
+    check_rows(rows, |key| {
         assert!(keys.contains(&key), "{key} of {keys:?}");
-    }
+    });
     assert_eq!(
         (
             text(record, "level"),
@@ -112,13 +104,11 @@ fn a_record_and_a_row_keep_the_contract() {
 #[test]
 fn json_is_the_summary() {
     let bench = Bench::new();
-    let output = bench.complete(&[
-        "--model", "random", "--levels", "L0", "--json", "--out", "run",
-    ]);
+    let output = bench.complete(&words("--model random --levels L0 --json --out run"));
     let summary: Value = serde_json::from_str(&output).unwrap();
     assert_eq!(summary["run"]["status"], "complete");
     assert_eq!(summary["folder"], "run");
-    let kept = fs::read(bench.path("run/summary.json")).unwrap();
-    let kept: Value = serde_json::from_slice(&kept).unwrap();
-    assert_eq!(summary["rows"], kept["rows"]);
+    let stored = fs::read(bench.path("run/summary.json")).unwrap();
+    let stored: Value = serde_json::from_slice(&stored).unwrap();
+    assert_eq!(summary["rows"], stored["rows"]);
 }

@@ -6,28 +6,16 @@ use std::fs;
 use serde_json::{Value, json};
 
 use crate::support::endpoint::{Answer, MockEndpoint};
-use crate::support::run::{Bench, called, files, records};
-use crate::{frames, text};
+use crate::support::run::{Bench, called, files, model_args, records, words};
+use crate::text;
 
 #[test]
 fn words_are_the_same_bytes_in_every_condition() {
-    let bench = Bench::new();
-    frames(&bench);
+    let bench = Bench::with_frames();
     let endpoint = MockEndpoint::start([Answer::text("A")]);
     let url = endpoint.base_url();
-    bench.complete(&[
-        "--data",
-        "frames",
-        "--model",
-        "m",
-        "--base-url",
-        &url,
-        "--levels",
-        "L0,L5",
-        "--out",
-        "run",
-    ]);
-    let mut by_words = BTreeMap::<String, Vec<String>>::new();
+    bench.complete(&model_args(&url, "--data frames --levels L0,L5 --out run"));
+    let mut by_text = BTreeMap::<String, Vec<String>>::new();
     for request in endpoint.requests() {
         let content = request.json()["messages"][0]["content"].clone();
         assert_eq!(
@@ -35,20 +23,20 @@ fn words_are_the_same_bytes_in_every_condition() {
             (&json!("text"), &json!("image_url"))
         );
         let image = text(&content[1]["image_url"], "url").to_owned();
-        by_words
+        by_text
             .entry(text(&content[0], "text").to_owned())
             .or_default()
             .push(image);
     }
-    assert_eq!(by_words.len(), 3);
+    assert_eq!(by_text.len(), 3);
     assert!(
-        by_words
+        by_text
             .keys()
-            .any(|words| words.contains("Is there a \"lamp\" {{here}}?\nA. yes\nB. no\n")),
+            .any(|text| text.contains("Is there a \"lamp\" {{here}}?\nA. yes\nB. no\n")),
         "{:?}",
-        by_words.keys()
+        by_text.keys()
     );
-    for images in by_words.values() {
+    for images in by_text.values() {
         let different: BTreeSet<&String> = images.iter().collect();
         assert_eq!(
             (images.len(), different.len()),
@@ -61,24 +49,13 @@ fn words_are_the_same_bytes_in_every_condition() {
 #[test]
 fn the_untouched_file_itself_is_sent() {
     use base64::Engine as _;
-    let bench = Bench::new();
-    frames(&bench);
+    let bench = Bench::with_frames();
     let endpoint = MockEndpoint::start([Answer::text("A")]);
     let url = endpoint.base_url();
-    bench.complete(&[
-        "--data",
-        "frames",
-        "--model",
-        "m",
-        "--base-url",
+    bench.complete(&model_args(
         &url,
-        "--levels",
-        "L0",
-        "--limit",
-        "1",
-        "--out",
-        "run",
-    ]);
+        "--data frames --levels L0 --limit 1 --out run",
+    ));
     let request = endpoint.requests()[0].json();
     let url = text(&request["messages"][0]["content"][1]["image_url"], "url").to_owned();
     let sent = base64::engine::general_purpose::STANDARD
@@ -89,25 +66,13 @@ fn the_untouched_file_itself_is_sent() {
 
 #[test]
 fn a_blind_model_sees_words_alone() {
-    let bench = Bench::new();
-    frames(&bench);
+    let bench = Bench::with_frames();
     let endpoint = MockEndpoint::start([Answer::text("A")]);
     let url = endpoint.base_url();
-    let words = [
-        "--data",
-        "frames",
-        "--model",
-        "random",
-        "--blind-model",
-        "gpt",
-        "--base-url",
-        &url,
-        "--levels",
-        "L0",
-        "--out",
-        "run",
-    ];
-    let table = bench.complete(&words);
+    let line = format!(
+        "--data frames --model random --blind-model gpt --base-url {url} --levels L0 --out run"
+    );
+    let table = bench.complete(&words(&line));
     assert!(
         table.contains("gpt without images: 33.3 ±")
             && table.contains(", n 3, unparsed 0, failed 0"),
@@ -133,26 +98,15 @@ fn a_blind_model_sees_words_alone() {
 #[test]
 fn the_key_is_nowhere() {
     const KEY: &str = "sk-very-secret-0123456789";
-    let bench = Bench::new();
-    frames(&bench);
+    let bench = Bench::with_frames();
     let echo = Answer::error(400, "bad", &format!("your key {KEY} may not do that"));
     let endpoint =
         MockEndpoint::start([Answer::text(&format!("A {KEY}")), echo, Answer::text("B")]);
     let url = endpoint.base_url();
-    let mut command = bench.command(&[
-        "--data",
-        "frames",
-        "--model",
-        "m",
-        "--base-url",
+    let mut command = bench.command(&model_args(
         &url,
-        "--levels",
-        "L0",
-        "--concurrency",
-        "1",
-        "--out",
-        "run",
-    ]);
+        "--data frames --levels L0 --concurrency 1 --out run",
+    ));
     let run = called(command.env("OPENAI_API_KEY", KEY).env("RUST_LOG", "trace"));
     assert_eq!(
         endpoint.requests()[0].header("authorization"),

@@ -4,37 +4,20 @@ use std::fs;
 
 use serde_json::{Value, json};
 
-use crate::frames;
 use crate::support::endpoint::{Answer, MockEndpoint};
-use crate::support::run::{Bench, records};
+use crate::support::run::{Bench, model_args, records, words};
+use crate::support::table::check_rows;
 
 #[test]
 fn a_stopped_run_goes_on_where_it_stopped() {
-    let bench = Bench::new();
-    frames(&bench);
-    let words = |url: &str| -> Vec<String> {
-        let words = [
-            "--data",
-            "frames",
-            "--model",
-            "m",
-            "--base-url",
-            url,
-            "--levels",
-            "L0-L2",
-            "--concurrency",
-            "1",
-        ];
-        words.iter().map(|&word| word.to_owned()).collect()
-    };
+    let bench = Bench::with_frames();
     let answers = std::iter::repeat_n(Answer::text("A"), 4)
         .chain([Answer::error(401, "invalid_api_key", "no such key")])
         .chain([Answer::text("B")]);
     let endpoint = MockEndpoint::start(answers);
     let url = endpoint.base_url();
-    let words: Vec<String> = words(&url);
-    let words: Vec<&str> = words.iter().map(String::as_str).collect();
-    let stopped = bench.call(&words);
+    let args = model_args(&url, "--data frames --levels L0-L2 --concurrency 1");
+    let stopped = bench.call(&args);
     assert_eq!(stopped.code, Some(2), "{stopped:?}");
     assert!(stopped.stderr.contains("no such key"), "{stopped:?}");
     let runs: Vec<_> = fs::read_dir(bench.path("results"))
@@ -43,7 +26,7 @@ fn a_stopped_run_goes_on_where_it_stopped() {
         .collect();
     assert_eq!((runs.len(), records(&runs[0]).len()), (1, 4));
 
-    bench.complete(&words);
+    bench.complete(&args);
     assert_eq!(
         endpoint.requests().len(),
         15 + 1,
@@ -51,7 +34,7 @@ fn a_stopped_run_goes_on_where_it_stopped() {
     );
     assert_eq!(records(&runs[0]).len(), 15);
 
-    let table = bench.complete(&words);
+    let table = bench.complete(&args);
     assert!(table.contains("exposure drop"), "{table}");
     assert_eq!(
         endpoint.requests().len(),
@@ -62,32 +45,20 @@ fn a_stopped_run_goes_on_where_it_stopped() {
 
 #[test]
 fn a_torn_record_is_asked_again_and_nothing_else() {
-    let bench = Bench::new();
-    frames(&bench);
+    let bench = Bench::with_frames();
     let endpoint = MockEndpoint::start([Answer::text("A")]);
     let url = endpoint.base_url();
-    let words = [
-        "--data",
-        "frames",
-        "--model",
-        "m",
-        "--base-url",
-        &url,
-        "--levels",
-        "L0",
-        "--out",
-        "run",
-    ];
-    bench.complete(&words);
+    let args = model_args(&url, "--data frames --levels L0 --out run");
+    bench.complete(&args);
     let path = bench.path("run/records.jsonl");
-    let kept = fs::read(&path).unwrap();
-    fs::write(&path, &kept[..kept.len() - 20]).unwrap();
+    let stored = fs::read(&path).unwrap();
+    fs::write(&path, &stored[..stored.len() - 20]).unwrap();
     let manifest = fs::read_to_string(bench.path("run/manifest.json")).unwrap();
     bench.file(
         "run/manifest.json",
         manifest.replace("\"complete\"", "\"started\""),
     );
-    bench.complete(&words);
+    bench.complete(&args);
     assert_eq!(
         (records(&bench.path("run")).len(), endpoint.requests().len()),
         (3, 4)
@@ -96,26 +67,12 @@ fn a_torn_record_is_asked_again_and_nothing_else() {
 
 #[test]
 fn failed_trials_are_counted_apart_and_asked_again() {
-    let bench = Bench::new();
-    frames(&bench);
+    let bench = Bench::with_frames();
     let broken = Answer::error(400, "bad_image", "cannot look at this");
     let endpoint = MockEndpoint::start([Answer::text("B"), broken, Answer::text("A")]);
     let url = endpoint.base_url();
-    let words = [
-        "--data",
-        "frames",
-        "--model",
-        "m",
-        "--base-url",
-        &url,
-        "--levels",
-        "L0",
-        "--concurrency",
-        "1",
-        "--out",
-        "run",
-    ];
-    let first = bench.call(&words);
+    let args = model_args(&url, "--data frames --levels L0 --concurrency 1 --out run");
+    let first = bench.call(&args);
     assert_eq!(first.code, Some(1), "{first:?}");
     let csv = fs::read_to_string(bench.path("run/summary.csv")).unwrap();
     assert!(
@@ -130,7 +87,7 @@ fn failed_trials_are_counted_apart_and_asked_again() {
         (&failed["failure"]["status"], &failed["strict"]),
         (&json!(400), &Value::Null)
     );
-    bench.complete(&words);
+    bench.complete(&args);
     assert_eq!(
         endpoint.requests().len(),
         4,
@@ -141,56 +98,42 @@ fn failed_trials_are_counted_apart_and_asked_again() {
 #[test]
 fn another_configuration_on_the_same_folder_is_refused() {
     let bench = Bench::new();
-    bench.complete(&["--model", "random", "--levels", "L0", "--out", "run"]);
-    for (more, field) in [
-        (["--seed", "7"], "--seed"),
-        (["--image", "jpeg:90"], "--image"),
-    ] {
-        let mut words = vec!["--model", "random", "--levels", "L0", "--out", "run"];
-        words.extend(more);
-        let refused = bench.call(&words);
+    let args = words("--model random --levels L0 --out run");
+    bench.complete(&args);
+    let rows = [("--seed", "7"), ("--image", "jpeg:90")];
+    check_rows(rows, |(field, value)| {
+        let refused = bench.call(&[&args[..], &[field, value]].concat());
         assert_eq!(refused.code, Some(2), "{refused:?}");
         assert!(
             refused.stderr.contains(&format!("another {field}")),
             "{refused:?}"
         );
-    }
+    });
 }
 
 #[test]
 fn kept_replies_are_read_as_new_ones() {
-    let bench = Bench::new();
-    frames(&bench);
+    let bench = Bench::with_frames();
     bench.file("script.jsonl", "{\"default\":\"A\"}\n");
-    let words = [
-        "--data",
-        "frames",
-        "--model",
-        "script:script.jsonl",
-        "--levels",
-        "L0",
-        "--out",
-        "run",
-    ];
-    let table = bench.complete(&words);
+    let args = words("--data frames --model script:script.jsonl --levels L0 --out run");
+    let table = bench.complete(&args);
     let path = bench.path("run/records.jsonl");
     let records = fs::read_to_string(&path).unwrap();
     fs::write(&path, records.replace("\"chosen\":0", "\"chosen\":1")).unwrap();
-    assert_eq!(bench.complete(&words), table);
+    assert_eq!(bench.complete(&args), table);
 }
 
 #[test]
 fn showing_a_complete_run_changes_nothing() {
     let bench = Bench::new();
-    let words = ["--model", "random", "--levels", "L0", "--out", "run"];
-    let table = bench.complete(&words);
-    let kept = |name: &str| fs::read(bench.path("run").join(name)).unwrap();
-    let before = ["manifest.json", "summary.json", "records.jsonl"].map(kept);
-    let mut again = words.to_vec();
-    again.extend(["--concurrency", "3"]);
-    assert_eq!(bench.complete(&again), table);
+    let args = words("--model random --levels L0 --out run");
+    let table = bench.complete(&args);
+    let file = |name: &str| fs::read(bench.path("run").join(name)).unwrap();
+    let before = ["manifest.json", "summary.json", "records.jsonl"].map(file);
+    let more = [&args[..], &["--concurrency", "3"]].concat();
+    assert_eq!(bench.complete(&more), table);
     assert_eq!(
-        ["manifest.json", "summary.json", "records.jsonl"].map(kept),
+        ["manifest.json", "summary.json", "records.jsonl"].map(file),
         before
     );
 }

@@ -5,11 +5,12 @@ use darkqa_eval::types::FailureKind;
 use serde_json::json;
 
 use crate::support::endpoint::Answer;
-use crate::{asked, gzipped};
+use crate::support::table::check_rows;
+use crate::{ask, gzipped};
 
 /// Failures of this one request: it is not sent again, and others go on.
-#[tokio::test]
-async fn what_is_wrong_with_one_request_fails_it_at_once() {
+#[test]
+fn what_is_wrong_with_one_request_fails_it_at_once() {
     use FailureKind::{Filtered, Request, Response, Server};
     let bomb = vec![b' '; 300 << 20];
     let cases = [
@@ -90,22 +91,22 @@ async fn what_is_wrong_with_one_request_fails_it_at_once() {
             "16 MiB",
         ),
     ];
-    for (name, answer, kind, said) in cases {
-        let asked = asked(vec![answer]).await;
-        let error = asked.result.unwrap_err();
+    check_rows(cases, |(name, answer, kind, message)| {
+        let outcome = ask(vec![answer]);
+        let error = outcome.result.unwrap_err();
         assert_eq!(
             (error.failure.kind, error.reach),
             (kind, Reach::Trial),
             "{name}: {error}"
         );
-        assert_eq!((error.attempts, asked.requests.len()), (1, 1), "{name}");
-        assert!(error.failure.message.contains(said), "{name}: {error}");
-    }
+        assert_eq!((error.attempts, outcome.requests.len()), (1, 1), "{name}");
+        assert!(error.failure.message.contains(message), "{name}: {error}");
+    });
 }
 
 /// Failures that every other request would meet: the run is to stop, and is told how to mend it.
-#[tokio::test]
-async fn what_reaches_every_request_is_told_apart() {
+#[test]
+fn what_reaches_every_request_is_told_apart() {
     let moved = |status| Answer::new(status, "").header("location", "https://elsewhere.example/v1");
     let cases = [
         ("401", Answer::error(401, "x", "no"), "--api-key-env"),
@@ -191,15 +192,15 @@ async fn what_reaches_every_request_is_told_apart() {
             "--blind",
         ),
     ];
-    for (name, answer, said) in cases {
-        let asked = asked(vec![answer]).await;
-        let error = asked.result.unwrap_err();
+    check_rows(cases, |(name, answer, message)| {
+        let outcome = ask(vec![answer]);
+        let error = outcome.result.unwrap_err();
         assert_eq!(
             (error.reach, error.attempts),
             (Reach::Endpoint, 1),
             "{name}: {error}"
         );
-        assert_eq!(asked.requests.len(), 1, "{name}");
-        assert!(error.failure.message.contains(said), "{name}: {error}");
-    }
+        assert_eq!(outcome.requests.len(), 1, "{name}");
+        assert!(error.failure.message.contains(message), "{name}: {error}");
+    });
 }

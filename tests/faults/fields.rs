@@ -4,11 +4,11 @@ use darkqa_eval::internals::ask::{Parameters, Reach, Temperature};
 use serde_json::{Value, json};
 
 use crate::support::endpoint::Answer;
-use crate::{asked, asked_with, sending};
+use crate::{ask, ask_with, sending};
 
 /// Fields that a server does not take are sent otherwise from then on, where that was left to the program.
-#[tokio::test]
-async fn fields_are_adapted_once_for_all() {
+#[test]
+fn fields_are_adapted_once_for_all() {
     let refused = |param: &str, code: &str| {
         let message = format!("Unsupported: '{param}' is not supported with this model.");
         Answer::json(
@@ -18,10 +18,10 @@ async fn fields_are_adapted_once_for_all() {
     };
     let limit = || refused("max_tokens", "unsupported_parameter");
     let heat = || refused("temperature", "unsupported_value");
-    let asked = asked(vec![limit(), heat(), Answer::text("B")]).await;
-    assert_eq!(asked.result.unwrap().attempts, 3);
-    let [first, second, third] = &asked.requests[..] else {
-        panic!("{:?}", asked.requests);
+    let outcome = ask(vec![limit(), heat(), Answer::text("B")]);
+    assert_eq!(outcome.result.unwrap().attempts, 3);
+    let [first, second, third] = &outcome.requests[..] else {
+        panic!("{:?}", outcome.requests);
     };
     assert_eq!(
         (&first["max_tokens"], &first["temperature"]),
@@ -39,24 +39,23 @@ async fn fields_are_adapted_once_for_all() {
         temperature: Temperature::Of(0.5),
         ..Parameters::new("m".into())
     };
-    let asked = asked_with(vec![heat()], sending(), stated).await;
-    let error = asked.result.unwrap_err();
+    let outcome = ask_with(vec![heat()], sending(), stated);
+    let error = outcome.result.unwrap_err();
     assert_eq!((error.reach, error.attempts), (Reach::Endpoint, 1));
     assert!(
         error.failure.message.contains("--temperature default"),
         "{error}"
     );
     // A server that takes neither name is left after both.
-    let asked = asked_with(
+    let outcome = ask_with(
         vec![
             limit(),
             refused("max_completion_tokens", "unsupported_parameter"),
         ],
         sending(),
         Parameters::new("m".into()),
-    )
-    .await;
-    let error = asked.result.unwrap_err();
+    );
+    let error = outcome.result.unwrap_err();
     assert_eq!(
         (error.reach, error.attempts),
         (Reach::Endpoint, 2),

@@ -35,37 +35,46 @@ fn image() -> Payload {
     Payload::encode(&Rgb::new(4, 6, samples).unwrap(), PayloadFormat::Png, None).unwrap()
 }
 
-struct Asked {
+/// The outcome of one question.
+struct Outcome {
     result: Result<Reply, AskError>,
-    waited: Duration,
+    /// The time until the result, pauses included.
+    time: Duration,
     requests: Vec<Value>,
 }
 
 /// Asks once, with an image, of a server that plays these answers.
-async fn asked_with(answers: Vec<Answer>, sending: Sending, parameters: Parameters) -> Asked {
+fn ask_with(answers: Vec<Answer>, sending: Sending, parameters: Parameters) -> Outcome {
     let mock = MockEndpoint::start(answers);
     let access = Access {
         key: Some(Secret::new("sk-0123456789abcdef", "KEY").unwrap()),
         ..Access::new(mock.base_url().parse().unwrap())
     };
-    let endpoint = Arc::new(Endpoint::open(access, sending).unwrap());
-    let model = Remote::open(endpoint, Wire::Chat, parameters).unwrap();
-    let started = Instant::now();
-    let images = [Arc::new(image())];
-    let message = Message {
-        images: &images,
-        ..Message::words("Red?")
-    };
-    let result = model.ask(message, 2).await;
-    Asked {
-        result,
-        waited: started.elapsed(),
-        requests: mock.requests().iter().map(Request::json).collect(),
-    }
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .unwrap();
+    runtime.block_on(async {
+        let endpoint = Arc::new(Endpoint::open(access, sending).unwrap());
+        let model = Remote::open(endpoint, Wire::Chat, parameters).unwrap();
+        let started = Instant::now();
+        let images = [Arc::new(image())];
+        let message = Message {
+            images: &images,
+            ..Message::words("Red?")
+        };
+        let result = model.ask(message, 2).await;
+        Outcome {
+            result,
+            time: started.elapsed(),
+            requests: mock.requests().iter().map(Request::json).collect(),
+        }
+    })
 }
 
-async fn asked(answers: Vec<Answer>) -> Asked {
-    asked_with(answers, sending(), Parameters::new("m".into())).await
+/// The same with the usual settings.
+fn ask(answers: Vec<Answer>) -> Outcome {
+    ask_with(answers, sending(), Parameters::new("m".into()))
 }
 
 fn gzip(text: &[u8]) -> Vec<u8> {

@@ -4,12 +4,13 @@ use darkqa_eval::types::Finish;
 use serde_json::json;
 
 use crate::support::endpoint::Answer;
-use crate::{PIECE, asked, completion, gzipped, stream};
+use crate::support::table::check_rows;
+use crate::{PIECE, ask, completion, gzipped, stream};
 
 /// Replies that are answers at the first request, with the text that is read and why the model stopped.
-#[tokio::test]
+#[test]
 #[expect(clippy::too_many_lines, reason = "a table")]
-async fn a_message_is_found_in_every_shape() {
+fn a_message_is_found_in_every_shape() {
     let b = r#"{"role":"assistant","content":"B"}"#;
     let plain = completion(b);
     let http = |head: &str, body: &str| Answer::raw(format!("{head}\r\n\r\n{body}"));
@@ -175,9 +176,9 @@ async fn a_message_is_found_in_every_shape() {
         ),
         ("a slow body", Answer::text("B").drip(1), "B", Finish::Stop),
     ];
-    for (name, answer, text, finish) in cases {
-        let asked = asked(vec![answer]).await;
-        let reply = asked
+    check_rows(cases, |(name, answer, text, finish)| {
+        let outcome = ask(vec![answer]);
+        let reply = outcome
             .result
             .unwrap_or_else(|error| panic!("{name}: {error}"));
         assert_eq!(
@@ -185,13 +186,10 @@ async fn a_message_is_found_in_every_shape() {
             (text, &finish),
             "{name}"
         );
-        assert_eq!((reply.attempts, asked.requests.len()), (1, 1), "{name}");
-    }
+        assert_eq!((reply.attempts, outcome.requests.len()), (1, 1), "{name}");
+    });
     let refused = json!({"content": null, "refusal": "The answer is A, but I cannot say so."});
-    let reply = asked(vec![Answer::message(&refused, "stop")])
-        .await
-        .result
-        .unwrap();
+    let reply = ask(vec![Answer::message(&refused, "stop")]).result.unwrap();
     assert_eq!(reply.text, "");
     assert!(reply.refusal.unwrap().starts_with("The answer"));
 }

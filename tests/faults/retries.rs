@@ -7,12 +7,13 @@ use darkqa_eval::types::FailureKind;
 use serde_json::json;
 
 use crate::support::endpoint::Answer;
-use crate::{PIECE, asked, asked_with, completion, gzip, sending, stream};
+use crate::support::table::check_rows;
+use crate::{PIECE, ask, ask_with, completion, gzip, sending, stream};
 
 /// Failures that pass: the same request is sent again, and answered then.
-#[tokio::test]
+#[test]
 #[expect(clippy::too_many_lines, reason = "a table")]
-async fn what_may_pass_is_tried_again() {
+fn what_may_pass_is_tried_again() {
     let html = Answer::new(200, "<html><title>Sign in</title>").header("content-type", "text/html");
     let mut cut_gzip = gzip(completion(r#"{"content":"B"}"#).as_bytes());
     cut_gzip.truncate(cut_gzip.len() / 2);
@@ -106,20 +107,20 @@ async fn what_may_pass_is_tried_again() {
         ),
         ("nesting without end", Answer::new(200, "[".repeat(5000))),
     ];
-    for (name, answer) in cases {
-        let asked = asked(vec![answer, Answer::text("B")]).await;
-        let reply = asked
+    check_rows(cases, |(name, answer)| {
+        let outcome = ask(vec![answer, Answer::text("B")]);
+        let reply = outcome
             .result
             .unwrap_or_else(|error| panic!("{name}: {error}"));
         assert_eq!((reply.text.as_str(), reply.attempts), ("B", 2), "{name}");
-        assert_eq!(asked.requests.len(), 2, "{name}");
-        assert_eq!(asked.requests[0], asked.requests[1], "{name}");
-    }
+        assert_eq!(outcome.requests.len(), 2, "{name}");
+        assert_eq!(outcome.requests[0], outcome.requests[1], "{name}");
+    });
 }
 
 /// Retries come to an end, with the last failure.
-#[tokio::test]
-async fn retries_come_to_an_end() {
+#[test]
+fn retries_come_to_an_end() {
     use FailureKind::{Connection, RateLimit, Response, Server, Timeout};
     let cases = [
         ("500", Answer::error(500, "x", "oops"), Server, Some(500)),
@@ -142,31 +143,31 @@ async fn retries_come_to_an_end() {
         ("half a body and silence", Answer::stuck(), Timeout, None),
         ("a drip", Answer::text("B").drip(20), Timeout, None),
     ];
-    for (name, answer, kind, status) in cases {
+    check_rows(cases, |(name, answer, kind, status)| {
         let sending = Sending {
             retries: 2,
             timeout: Duration::from_millis(150),
             ..sending()
         };
-        let asked = asked_with(vec![answer], sending, Parameters::new("m".into())).await;
-        let error = asked.result.unwrap_err();
+        let outcome = ask_with(vec![answer], sending, Parameters::new("m".into()));
+        let error = outcome.result.unwrap_err();
         assert_eq!(
             (error.failure.kind, error.failure.status),
             (kind, status),
             "{name}"
         );
         assert_eq!((error.attempts, error.reach), (3, Reach::Trial), "{name}");
-        assert_eq!(asked.requests.len(), 3, "{name}");
+        assert_eq!(outcome.requests.len(), 3, "{name}");
         if kind == Timeout {
-            assert!(asked.waited >= Duration::from_millis(450), "{name}");
+            assert!(outcome.time >= Duration::from_millis(450), "{name}");
             assert!(error.failure.message.contains("--timeout"), "{error}");
         }
-    }
+    });
 }
 
 /// Waits that a server asks for are kept, in every form, and those beyond `--max-wait` are not begun.
-#[tokio::test]
-async fn waits_are_kept_and_capped() {
+#[test]
+fn waits_are_kept_and_capped() {
     let limited = |name: &str, value: &str| Answer::error(429, "x", "slow").header(name, value);
     let date = |seconds| httpdate::fmt_http_date(SystemTime::now() + Duration::from_secs(seconds));
     let skewed = limited("retry-after", "Sun, 06 Nov 1994 08:49:38 GMT")
@@ -197,20 +198,20 @@ async fn waits_are_kept_and_capped() {
         ("none", limited("retry-after", "0"), 0),
         ("less than none", limited("retry-after", "-5"), 0),
     ];
-    for (name, answer, least) in cases {
-        let asked = asked(vec![answer, Answer::text("B")]).await;
-        assert_eq!(asked.result.unwrap().attempts, 2, "{name}");
-        let waited = asked.waited.as_millis();
+    check_rows(cases, |(name, answer, least)| {
+        let outcome = ask(vec![answer, Answer::text("B")]);
+        assert_eq!(outcome.result.unwrap().attempts, 2, "{name}");
+        let waited = outcome.time.as_millis();
         assert!(
             (least..least + 1900).contains(&waited),
             "{name}: {waited} ms"
         );
-    }
-    for wait in ["600", "1e300", &date(86_400)] {
-        let asked = asked(vec![limited("retry-after", wait)]).await;
-        let error = asked.result.unwrap_err();
+    });
+    check_rows(["600", "1e300", &date(86_400)], |wait| {
+        let outcome = ask(vec![limited("retry-after", wait)]);
+        let error = outcome.result.unwrap_err();
         assert!(error.failure.message.contains("--max-wait"), "{error}");
         assert_eq!((error.attempts, error.reach), (1, Reach::Endpoint));
-        assert!(asked.waited < Duration::from_secs(2));
-    }
+        assert!(outcome.time < Duration::from_secs(2));
+    });
 }

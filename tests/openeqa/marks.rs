@@ -7,7 +7,8 @@ use serde_json::{Value, json};
 
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::house::House;
-use crate::support::run::records;
+use crate::support::run::{records, words};
+use crate::support::table::check_rows;
 
 #[test]
 fn marks_come_to_upstreams_score() {
@@ -26,23 +27,15 @@ fn marks_come_to_upstreams_score() {
     // Question by question, and of each question in the order of the file.
     let marks = ["5", "1", "5", "3"].map(Answer::text);
     let judge = MockEndpoint::start(marks);
-    let called = house.call(&[
-        "--answers",
-        "human=people.json",
-        "--judge",
-        "j",
-        "--judge-base-url",
-        &judge.base_url(),
-        "--concurrency",
-        "1",
-        "--out",
-        "run",
-    ]);
+    let called = house.call(&words(&format!(
+        "--answers human=people.json --judge j --judge-base-url {} --concurrency 1 --out run",
+        judge.base_url()
+    )));
     assert_eq!(called.code, Some(0), "{called:?}");
-    let dark = records(&house.0.path("run")).into_iter();
-    let dark: Vec<Value> = dark.filter(|record| record["level"] == "L2").collect();
+    let records = records(&house.0.path("run")).into_iter();
+    let degraded: Vec<Value> = records.filter(|record| record["level"] == "L2").collect();
     assert_eq!(
-        (&dark[0]["ev"], &dark[0]["reading"]),
+        (&degraded[0]["ev"], &degraded[0]["reading"]),
         (&json!(4.0), &json!("paper"))
     );
     // What was answered alike at L2 is not judged again.
@@ -53,14 +46,17 @@ fn marks_come_to_upstreams_score() {
         let mut rows = rows.filter(|row| row["by"] == "all" && row["level"] == level);
         rows.next().unwrap().clone()
     };
-    let lit = row("L0");
+    let clean = row("L0");
     assert_eq!(
-        (&lit["value"], &lit["n"], &lit["null"]),
+        (&clean["value"], &clean["n"], &clean["null"]),
         (&json!(0.5), &json!(5), &json!(1))
     );
-    let dark = row("L2");
+    let degraded = row("L2");
     // The first question alone is there in both: 1 against (1 + 0) / 2.
-    assert_eq!((&dark["drop"], &dark["drop_n"]), (&json!(0.5), &json!(1)));
+    assert_eq!(
+        (&degraded["drop"], &degraded["drop_n"]),
+        (&json!(0.5), &json!(1))
+    );
     assert!(
         called
             .stderr
@@ -81,36 +77,29 @@ fn what_is_missing_is_named_and_counted_and_nothing_is_lost() {
         "{\"question\": \"q1\", \"reply\": \"**4**\"}\n{\"default\": \"Quite good.\"}",
     );
     house.0.file("ids.json", "[\"q1\", \"q2\", \"q3\", \"q9\"]");
-    let flags = [
-        "--model",
-        "script:a.jsonl",
-        "--judge",
-        "script:j.jsonl",
-        "--levels",
-        "L0,L2",
-        "--subset",
-        "ids.json",
-        "--out",
-        "run",
-    ];
-    let called = house.call(&flags);
+    let args = words(
+        "--model script:a.jsonl --judge script:j.jsonl --levels L0,L2 --subset ids.json --out run",
+    );
+    let called = house.call(&args);
     assert_eq!(called.code, Some(1), "{called:?}");
-    for said in [
+    let notes = [
         "1 of 4 ids are not in the file of questions: q9",
         "1 of 2 walks cannot be shown (scannet-v0/001-b); unanswered questions: 1",
-    ] {
-        assert!(called.stderr.contains(said), "{said}: {}", called.stderr);
-    }
-    for said in [
+    ];
+    check_rows(notes, |note| {
+        assert!(called.stderr.contains(note), "{note}: {}", called.stderr);
+    });
+    let counts = [
         "0 of 6 answers scored",
         "2 not answered",
         "4 without a mark in the judge's reply",
-    ] {
-        assert!(called.stdout.contains(said), "{said}: {}", called.stdout);
-    }
+    ];
+    check_rows(counts, |count| {
+        assert!(called.stdout.contains(count), "{count}: {}", called.stdout);
+    });
     // The judge's prose is read by the tolerant protocol, where there is a mark in it; nobody is asked again for it.
     let before = records(&house.0.path("run")).len();
-    let called = house.call(&[&flags[..], &["--protocol", "tolerant"]].concat());
+    let called = house.call(&[&args[..], &["--protocol", "tolerant"]].concat());
     assert!(
         called.stdout.contains("2 of 6 answers scored"),
         "{}",
@@ -125,7 +114,7 @@ fn what_is_missing_is_named_and_counted_and_nothing_is_lost() {
     RgbImage::from_pixel(96, 64, Rgb([9; 3]))
         .save(&path)
         .unwrap();
-    let called = house.call(&flags);
+    let called = house.call(&args);
     assert!(
         called.stdout.contains("without a mark"),
         "{}",
@@ -141,7 +130,7 @@ fn what_is_missing_is_named_and_counted_and_nothing_is_lost() {
     assert_eq!(new.len(), 3);
 
     fs::remove_dir_all(house.0.path("walks")).unwrap();
-    let called = house.call(&flags);
+    let called = house.call(&args);
     assert_eq!(called.code, Some(2));
     assert!(
         called.stderr.contains("--frames: no walk can be shown"),
@@ -161,20 +150,9 @@ fn a_model_that_is_gone_keeps_nobody_elses_answers_from_their_marks() {
         }
     });
     let base = mock.base_url();
-    let called = house.call(&[
-        "--model",
-        "gone",
-        "--model",
-        "m",
-        "--judge",
-        "j",
-        "--base-url",
-        &base,
-        "--levels",
-        "L0",
-        "--out",
-        "run",
-    ]);
+    let called = house.call(&words(&format!(
+        "--model gone --model m --judge j --base-url {base} --levels L0 --out run"
+    )));
     assert_eq!(called.code, Some(2), "{called:?}");
     assert!(called.stderr.contains("no such model"), "{}", called.stderr);
     let summary = house.read("run/summary.json");

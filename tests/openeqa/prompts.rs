@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::house::House;
+use crate::support::run::words;
 use crate::{images, sent};
 
 /// Upstream's prompt for an answer with images, up to them.
@@ -13,8 +14,8 @@ const VISION: &str = "You are an intelligent question answering agent. I will as
 You will be shown a set of images that have been collected from a single location.\n\
 Given a user query, you must output `text` to answer to the question asked by the user.\n";
 
-/// The words of a request, with a mark for each image.
-fn words(request: &Value) -> String {
+/// The text of a request, with a mark for each image.
+fn prompt_text(request: &Value) -> String {
     let content = &request["messages"][0]["content"];
     if let Some(text) = content.as_str() {
         return text.to_owned();
@@ -25,11 +26,11 @@ fn words(request: &Value) -> String {
         .collect()
 }
 
-fn check_asked(asked: &[Value]) {
+fn check_prompts(requests: &[Value]) {
     let queries = ["What colour is it?", "Where's the {sofa}?", "Is it “safe”?"];
-    for (request, query) in asked.iter().zip(queries) {
+    for (request, query) in requests.iter().zip(queries) {
         assert_eq!(
-            words(request),
+            prompt_text(request),
             format!("{VISION}[image][image][image]User Query: {query}")
         );
         let fields: Vec<&str> = request
@@ -61,19 +62,19 @@ fn check_asked(asked: &[Value]) {
             .map(|image| image.get_pixel(9, 9)[0])
             .collect()
     };
-    assert_eq!(greys(&asked[0]), [100, 140, 180]);
-    assert_eq!(greys(&asked[2]), [100, 100, 120]);
+    assert_eq!(greys(&requests[0]), [100, 140, 180]);
+    assert_eq!(greys(&requests[2]), [100, 100, 120]);
 }
 
-fn check_judged(judged: &[Value]) {
+fn check_judge_prompts(requests: &[Value]) {
     let ends = [
         "Your Turn:\nQuestion: What colour is it?\nAnswer: brown\nResponse: It's brown.",
         "Your Turn:\nQuestion: Where's the {sofa}?\nAnswer: Near the café's door\nExtra Answers: ['By the stairs', \"it's here\", \
          '\"both\" it\\'s', '日本']\nResponse: Near it",
         "Your Turn:\nQuestion: Is it “safe”?\nAnswer: No\nResponse: No",
     ];
-    for (request, end) in judged.iter().zip(ends) {
-        let prompt = words(request);
+    for (request, end) in requests.iter().zip(ends) {
+        let prompt = prompt_text(request);
         assert!(prompt.ends_with(end), "{prompt}");
         assert!(
             prompt.starts_with("You are an AI assistant who will help me to evaluate the response")
@@ -103,27 +104,16 @@ fn every_prompt_is_upstreams_byte_for_byte() {
         Answer::text("Your mark: 3"),
         Answer::text("1"),
     ]);
-    let called = house.call(&[
-        "--model",
-        "m",
-        "--base-url",
-        &model.base_url(),
-        "--judge",
-        "j",
-        "--judge-base-url",
-        &judge.base_url(),
-        "--levels",
-        "L0",
-        "--concurrency",
-        "1",
-        "--out",
-        "run",
-    ]);
+    let called = house.call(&words(&format!(
+        "--model m --base-url {} --judge j --judge-base-url {} --levels L0 --concurrency 1 --out run",
+        model.base_url(),
+        judge.base_url()
+    )));
     assert_eq!(called.code, Some(0), "{called:?}");
-    let (asked, judged) = (sent(&model), sent(&judge));
-    assert_eq!((asked.len(), judged.len()), (3, 3));
-    check_asked(&asked);
-    check_judged(&judged);
+    let (answers, marks) = (sent(&model), sent(&judge));
+    assert_eq!((answers.len(), marks.len()), (3, 3));
+    check_prompts(&answers);
+    check_judge_prompts(&marks);
     assert_eq!(
         house.read("run/upstream/m-L0.json"),
         json!([
@@ -151,19 +141,14 @@ fn blind_models_are_asked_and_read_as_upstream_does() {
         Answer::text("I cannot see."),
         Answer::text("A: yes"),
     ]);
-    let base = model.base_url();
-    let asked = [
-        "--blind-model",
-        "m",
-        "--base-url",
-        &base,
-        "--concurrency",
-        "1",
-    ];
-    let called = house.call(&[&asked[..], &["--judge", "script:j.jsonl", "--out", "run"]].concat());
+    let line = format!(
+        "--blind-model m --base-url {} --concurrency 1 --judge script:j.jsonl --out run",
+        model.base_url()
+    );
+    let called = house.call(&words(&line));
     assert_eq!(called.code, Some(2), "{called:?}");
     house.0.file("j.jsonl", "{\"default\": \"5\"}");
-    let called = house.call(&[&asked[..], &["--judge", "script:j.jsonl", "--out", "run"]].concat());
+    let called = house.call(&words(&line));
     assert_eq!(called.code, Some(0), "{called:?}");
     let request = model.requests()[0].json();
     let prompt = request["messages"][0]["content"].as_str().unwrap();

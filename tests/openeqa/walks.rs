@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::house::{House, flags};
-use crate::support::run::{called, records};
+use crate::support::run::{called, model_args, records, words};
 use crate::{images, sent};
 
 #[test]
@@ -17,14 +17,7 @@ fn a_broken_frame_takes_its_walk_out_alone() {
         .0
         .file("walks/hm3d-v0/000-a/00002-rgb.png", "no image");
     house.0.file("a.jsonl", "{\"default\": \"an answer\"}");
-    let called = house.call(&[
-        "--model",
-        "script:a.jsonl",
-        "--levels",
-        "L0",
-        "--out",
-        "run",
-    ]);
+    let called = house.call(&words("--model script:a.jsonl --levels L0 --out run"));
     assert_eq!(called.code, Some(1), "{called:?}");
     assert!(called.stderr.contains("00002-rgb.png"), "{}", called.stderr);
     let failed = records(&house.0.path("run"));
@@ -46,25 +39,14 @@ fn one_camera_takes_a_walk_and_the_frames_are_the_same_at_every_level() {
     let house = House::new();
     let model = MockEndpoint::start([Answer::text("x")]);
     let base = model.base_url();
-    let made = |out: &str, flags: &[&str]| -> Vec<Value> {
+    let requests = |out: &str, flags: &str| -> Vec<Value> {
         let before = model.requests().len();
-        let own = [
-            "--model",
-            "m",
-            "--base-url",
-            &base,
-            "--limit",
-            "1",
-            "--concurrency",
-            "1",
-            "--out",
-            out,
-        ];
-        let called = house.call(&[&own[..], flags].concat());
+        let line = format!("--limit 1 --concurrency 1 --out {out} {flags}");
+        let called = house.call(&model_args(&base, &line));
         assert_eq!(called.code, Some(0), "{called:?}");
         sent(&model).split_off(before)
     };
-    let all = made("a", &["--levels", "L0,L2,L4"]);
+    let all = requests("a", "--levels L0,L2,L4");
     assert_eq!(all.len(), 3);
     let means: Vec<Vec<f64>> = all
         .iter()
@@ -85,17 +67,11 @@ fn one_camera_takes_a_walk_and_the_frames_are_the_same_at_every_level() {
         );
     }
     // The same in any order and by another run; other noise by another state of the camera or after the scaling.
-    assert_eq!(made("b", &["--levels", "L2"])[0], all[1]);
-    assert_ne!(
-        made("c", &["--levels", "L2", "--sensor", "frame"])[0],
-        all[1]
-    );
-    assert_ne!(
-        made("d", &["--levels", "L2", "--degrade", "resized"])[0],
-        all[1]
-    );
+    assert_eq!(requests("b", "--levels L2")[0], all[1]);
+    assert_ne!(requests("c", "--levels L2 --sensor frame")[0], all[1]);
+    assert_ne!(requests("d", "--levels L2 --degrade resized")[0], all[1]);
     // A level more in the same run asks for that level alone.
-    assert_eq!(made("b", &["--levels", "L2,L4"]), [all[2].clone()]);
+    assert_eq!(requests("b", "--levels L2,L4"), [all[2].clone()]);
 }
 
 #[test]
@@ -103,18 +79,10 @@ fn the_only_frame_of_a_walk_is_shown_as_often_as_frames_are_asked_for() {
     let house = House::new();
     fs::remove_file(house.0.path("walks/scannet-v0/001-b/00001-rgb.png")).unwrap();
     let mock = MockEndpoint::start([Answer::text("an answer")]);
-    let called = house.call(&[
-        "--model",
-        "m",
-        "--base-url",
+    let called = house.call(&model_args(
         &mock.base_url(),
-        "--levels",
-        "L0,L2",
-        "--splits",
-        "scannet-v0",
-        "--out",
-        "run",
-    ]);
+        "--levels L0,L2 --splits scannet-v0 --out run",
+    ));
     assert_eq!(called.code, Some(0), "{called:?}");
     for request in sent(&mock) {
         let parts = request["messages"][0]["content"].as_array().unwrap();
@@ -131,15 +99,8 @@ fn the_only_frame_of_a_walk_is_shown_as_often_as_frames_are_asked_for() {
 fn a_task_of_an_array_asks_about_walks_of_its_own() {
     let house = House::new();
     house.0.file("a.jsonl", "{\"default\": \"an answer\"}");
-    let words = flags(&[
-        "--model",
-        "script:a.jsonl",
-        "--levels",
-        "L0",
-        "--out",
-        "run",
-    ]);
-    let mut command = house.0.command(&words);
+    let args = flags(&words("--model script:a.jsonl --levels L0 --out run"));
+    let mut command = house.0.command(&args);
     command.envs([
         ("SLURM_ARRAY_TASK_ID", "1"),
         ("SLURM_ARRAY_TASK_MIN", "0"),
@@ -152,7 +113,7 @@ fn a_task_of_an_array_asks_about_walks_of_its_own() {
         "{}",
         called.stderr
     );
-    let asked = records(&house.0.path("run/shard-2-of-2"));
-    let asked: Vec<&Value> = asked.iter().map(|record| &record["question"]).collect();
-    assert_eq!(asked, ["q3"]);
+    let records = records(&house.0.path("run/shard-2-of-2"));
+    let questions: Vec<&Value> = records.iter().map(|record| &record["question"]).collect();
+    assert_eq!(questions, ["q3"]);
 }
