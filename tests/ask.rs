@@ -271,8 +271,8 @@ async fn keys_are_in_no_error_and_no_debug_output() {
             },
         );
         let error = model.ask(Message::words("Red?"), 2).await.unwrap_err();
-        let shown = format!("{error:?} {error} {model:?}");
-        assert!(!shown.contains("sk-very"), "{shown}");
+        let text = format!("{error:?} {error} {model:?}");
+        assert!(!text.contains("sk-very"), "{text}");
         assert!(error.failure.message.contains("[secret]"), "{error}");
         assert!(!error.failure.message.contains(char::is_control));
         assert!(error.failure.message.len() < 500);
@@ -290,10 +290,10 @@ async fn keys_are_in_no_error_and_no_debug_output() {
     )
     .unwrap();
     let error = model.ask(Message::words("Red?"), 2).await.unwrap_err();
-    let shown = format!("{error:?} {model:?}");
+    let text = format!("{error:?} {model:?}");
     check_rows(["us3r", "passw0rd", "t0ken"], |secret| {
-        assert!(!error.failure.message.contains(secret), "{shown}");
-        assert!(!format!("{error:?}").contains(secret), "{shown}");
+        assert!(!error.failure.message.contains(secret), "{text}");
+        assert!(!format!("{error:?}").contains(secret), "{text}");
     });
     let basic = mock.requests()[0]
         .header("authorization")

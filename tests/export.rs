@@ -175,10 +175,10 @@ fn nothing_is_written_over_unasked() {
     let flags = ["--levels", "L0"];
     run(data.path(), "llava", out.path(), &flags).success();
     let assert = run(data.path(), "llava", out.path(), &flags).code(2);
-    let said = String::from_utf8(assert.get_output().stderr.clone()).unwrap();
+    let message = String::from_utf8(assert.get_output().stderr.clone()).unwrap();
     assert!(
-        said.contains("questions.jsonl: the set exists already; --force"),
-        "{said}"
+        message.contains("questions.jsonl: the set exists already; --force"),
+        "{message}"
     );
     run(
         data.path(),
@@ -188,11 +188,11 @@ fn nothing_is_written_over_unasked() {
     )
     .success();
     let assert = run(data.path(), "parquet", out.path(), &flags).code(2);
-    let said = String::from_utf8(assert.get_output().stderr.clone()).unwrap();
+    let message = String::from_utf8(assert.get_output().stderr.clone()).unwrap();
     assert!(
-        said.contains(
+        message.contains(
             "invalid value 'parquet' for '<KIND>' [possible values: vlmevalkit, imagefolder, llava"
         ),
-        "{said}"
+        "{message}"
     );
 }

@@ -151,9 +151,9 @@ fn a_broken_pair_does_not_stop_the_others() {
         ),
         (&["realism"], "PAIRS"),
     ];
-    check_rows(rows, |(words, says)| {
-        let refused = bench.call(words);
-        assert_eq!(refused.code, Some(2), "{words:?}: {refused:?}");
+    check_rows(rows, |(args, message)| {
+        let refused = bench.call(args);
+        assert_eq!(refused.code, Some(2), "{args:?}: {refused:?}");
         assert_eq!(
             refused.stderr.trim_end().lines().count(),
             1,
@@ -161,8 +161,8 @@ fn a_broken_pair_does_not_stop_the_others() {
             refused.stderr
         );
         assert!(
-            refused.stderr.contains(says),
-            "{words:?}: {}",
+            refused.stderr.contains(message),
+            "{args:?}: {}",
             refused.stderr
         );
     });

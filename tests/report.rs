@@ -75,10 +75,10 @@ fn several_runs_become_one_comparison() {
         assert_eq!(row[place("second")], "1");
     }
     // Nothing is written where nothing is wanted.
-    let told = bench.call(&["report", "one", "three"]);
+    let called = bench.call(&["report", "one", "three"]);
     assert!(
-        told.stdout.contains("report: --out DIR writes it"),
-        "{told:?}"
+        called.stdout.contains("report: --out DIR writes it"),
+        "{called:?}"
     );
     let json = bench.call(&["report", "one", "three", "--json"]);
     let json: Value = serde_json::from_str(&json.stdout).unwrap();
@@ -185,12 +185,12 @@ fn runs_of_earlier_versions_are_read() {
     assert_eq!(called.code, Some(0), "{called:?}");
     assert!(called.stdout.contains("chance: 33.33 over 3 questions"));
     assert!(bench.path("run/report.html").is_file());
-    let shown = bench.call(&["show", "run", "q0"]);
+    let called = bench.call(&["show", "run", "q0"]);
     assert!(
-        shown
+        called
             .stderr
             .contains("the run does not say how its images were made"),
-        "{shown:?}"
+        "{called:?}"
     );
 }
 
@@ -202,15 +202,15 @@ fn what_was_sent_is_made_again() {
     ));
     let first = records(&bench.path("run")).remove(0);
     let id = first["question"].as_str().unwrap();
-    let shown = bench.call(&["show", "run", id]);
-    assert_eq!(shown.code, Some(0), "{shown:?}");
+    let called = bench.call(&["show", "run", id]);
+    assert_eq!(called.code, Some(0), "{called:?}");
     assert_eq!(
-        shown
+        called
             .stdout
             .matches("the very bytes that were sent")
             .count(),
         3,
-        "{shown:?}"
+        "{called:?}"
     );
     for record in records(&bench.path("run"))
         .iter()

@@ -98,8 +98,8 @@ fn wrong(asked: &GeneratedQuestion, seen: &Seen) -> Option<String> {
             if suits { "yes" } else { "no" }.to_owned()
         }
         Family::Presence => {
-            let there = !seen.of_class(about).is_empty();
-            if there { "yes" } else { "no" }.to_owned()
+            let is_visible = !seen.of_class(about).is_empty();
+            if is_visible { "yes" } else { "no" }.to_owned()
         }
         Family::Color => {
             // One of them is asked about; the others are slivers.
@@ -312,11 +312,11 @@ fn settings_that_make_no_sense_are_named() {
         ("rooms:seed=x", "seed=x"),
         ("rooms:doors=4", "doors=4"),
     ];
-    check_rows(rows, |(data, says)| {
+    check_rows(rows, |(data, message)| {
         let refused = bench.call(&["--model", "random", "--data", data]);
         assert_eq!(refused.code, Some(2), "{refused:?}");
         assert!(
-            refused.stderr.contains("--data") && refused.stderr.contains(says),
+            refused.stderr.contains("--data") && refused.stderr.contains(message),
             "{refused:?}"
         );
     });

@@ -104,12 +104,12 @@ fn what_a_client_sends_is_answered_in_its_own_words() {
     let (status, reply) =
         server.ask(&json!({"model": "darkqa-random", "messages": user(json!(WORDS))}));
     assert_eq!((status, &reply["object"]), (200, &json!("chat.completion")));
-    let said = reply["choices"][0]["message"]["content"].as_str().unwrap();
-    assert!(["A", "B"].contains(&said), "{reply}");
+    let answer = reply["choices"][0]["message"]["content"].as_str().unwrap();
+    assert!(["A", "B"].contains(&answer), "{reply}");
     let parts = json!([{"type": "text", "text": WORDS}]);
     let (_, again) =
         server.ask(&json!({"model": "darkqa-random", "messages": user(parts), "temperature": 1}));
-    assert_eq!(again["choices"][0]["message"]["content"], said);
+    assert_eq!(again["choices"][0]["message"]["content"], answer);
     let stream =
         json!({"model": "darkqa-observer", "messages": user(json!(WORDS)), "stream": true});
     let (status, events) = server.ask(&stream);
@@ -147,11 +147,11 @@ fn what_a_client_sends_is_answered_in_its_own_words() {
             "only data URLs",
         ),
     ];
-    check_rows(rows, |(body, status, says)| {
+    check_rows(rows, |(body, status, part)| {
         let (found, reply) = server.ask(&body);
         let message = reply["error"]["message"].as_str().unwrap();
         assert!(
-            found == status && message.contains(says),
+            found == status && message.contains(part),
             "{body}: {found} {reply}"
         );
     });

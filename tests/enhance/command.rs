@@ -22,13 +22,13 @@ fn the_command_enhances_files_and_folders() {
         .unwrap();
     }
     std::fs::write(at("dark/b.png"), "no image").unwrap();
-    let call = |words: &[&str]| {
+    let call = |args: &[&str]| {
         let mut command = assert_cmd::Command::cargo_bin("darkqa-eval").unwrap();
         let output = command
             .current_dir(folder.path())
             .arg("enhance")
             .arg(&model)
-            .args(words);
+            .args(args);
         let output = output.output().unwrap();
         let text = |bytes| String::from_utf8(bytes).unwrap();
         (
@@ -45,8 +45,8 @@ fn the_command_enhances_files_and_folders() {
     );
     assert!(err.contains("b.png"), "{err}");
     check_rows(["mended/a.png", "mended/c.png"], |name| {
-        let made = image::open(at(name)).unwrap().into_rgb8().into_raw();
-        assert_eq!(made, map(&dark, |x| 2.0 * x).samples(), "{name}");
+        let enhanced = image::open(at(name)).unwrap().into_rgb8().into_raw();
+        assert_eq!(enhanced, map(&dark, |x| 2.0 * x).samples(), "{name}");
     });
     let (_, out, _) = call(&["c.png", "--out", "mended"]);
     assert!(out.contains("1 kept as they were"), "{out}");
@@ -61,8 +61,8 @@ fn the_command_enhances_files_and_folders() {
         &["c.png", "--describe"],
         &["c.png", "--out", "x", "--tile", "0"],
     ];
-    check_rows(rows, |words| {
-        let (code, _, err) = call(words);
+    check_rows(rows, |args| {
+        let (code, _, err) = call(args);
         assert_eq!((code, err.lines().count()), (2, 1), "{err}");
     });
 }

@@ -58,8 +58,8 @@ fn external_data_is_loaded_from_beside_the_model() {
     std::fs::write(folder.path().join("gain.bin"), 2.0_f32.to_le_bytes()).unwrap();
     let path = onnx::external_gain("gain.bin").write(folder.path(), "model.onnx");
     let image = image(8, 8);
-    let mended = open(&path).unwrap().enhance(&image).unwrap();
-    assert_eq!(mended, map(&image, |x| 2.0 * x));
+    let enhanced = open(&path).unwrap().enhance(&image).unwrap();
+    assert_eq!(enhanced, map(&image, |x| 2.0 * x));
 }
 
 #[test]

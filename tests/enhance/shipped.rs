@@ -19,12 +19,12 @@ fn shipped() -> PathBuf {
 /// `DARKQA_BLESS=1 cargo test --test enhance` writes the file anew.
 #[test]
 fn the_shipped_enhancer_is_what_the_writer_makes() {
-    let made = onnx::gray_gain().model();
+    let model = onnx::gray_gain().model();
     if std::env::var_os("DARKQA_BLESS").is_some_and(|value| value == "1") {
-        std::fs::write(shipped(), &made).unwrap();
+        std::fs::write(shipped(), &model).unwrap();
     }
     assert!(
-        std::fs::read(shipped()).unwrap() == made,
+        std::fs::read(shipped()).unwrap() == model,
         "models/gray-gain.onnx differs; write it anew with DARKQA_BLESS=1"
     );
 }
@@ -113,8 +113,8 @@ fn the_trained_enhancer_invents_nothing() {
     ];
     check_rows(rows, |color| {
         let flat = Rgb::new(64, 96, color.repeat(64 * 96)).unwrap();
-        let made = enhancer.enhance(&flat).unwrap();
-        let (pixels, _) = made.samples().as_chunks::<3>();
+        let enhanced = enhancer.enhance(&flat).unwrap();
+        let (pixels, _) = enhanced.samples().as_chunks::<3>();
         // Away from the rim, where convolutions see the end of the image.
         let inner = (24..40).flat_map(|y| &pixels[y * 96 + 24..y * 96 + 72]);
         for channel in 0..3 {
@@ -127,10 +127,10 @@ fn the_trained_enhancer_invents_nothing() {
     let halves: Vec<u8> = (0..64 * 96)
         .flat_map(|i| if i % 96 < 48 { [8, 8, 8] } else { [24, 20, 16] })
         .collect();
-    let made = enhancer
+    let enhanced = enhancer
         .enhance(&Rgb::new(64, 96, halves).unwrap())
         .unwrap();
-    let row = &made.samples()[32 * 96 * 3..33 * 96 * 3];
+    let row = &enhanced.samples()[32 * 96 * 3..33 * 96 * 3];
     let steps: Vec<u8> = (24..71)
         .map(|x| row[x * 3].abs_diff(row[x * 3 + 3]))
         .collect();

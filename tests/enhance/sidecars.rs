@@ -18,8 +18,8 @@ fn a_sidecar_says_which_output_it_is() {
     let image = image(8, 8);
     check_rows(["output = 1", "output = \"18\""], |text| {
         std::fs::write(&sidecar, text).unwrap();
-        let mended = open(&path).unwrap().enhance(&image).unwrap();
-        assert_eq!(mended, map(&image, |x| 2.0 * x));
+        let enhanced = open(&path).unwrap().enhance(&image).unwrap();
+        assert_eq!(enhanced, map(&image, |x| 2.0 * x));
     });
     std::fs::write(&sidecar, "output = 1\nlayout_in = \"nhwc\"").unwrap();
     let message = open(&path).err().unwrap().to_string();
@@ -78,17 +78,17 @@ fn a_preset_says_what_its_authors_do() {
     let folder = tempfile::tempdir().unwrap();
     let path = onnx::two_outputs().write(folder.path(), "model.onnx");
     let image = image(8, 8);
-    let said = |preset: &str| PathBuf::from(format!("{preset}:{}", path.display()));
-    let mended = open(&said("zero-dce")).unwrap().enhance(&image).unwrap();
-    assert_eq!(mended, map(&image, |x| 2.0 * x));
-    let described = open(&said("sci")).unwrap().describe();
+    let file = |preset: &str| PathBuf::from(format!("{preset}:{}", path.display()));
+    let enhanced = open(&file("zero-dce")).unwrap().enhance(&image).unwrap();
+    assert_eq!(enhanced, map(&image, |x| 2.0 * x));
+    let described = open(&file("sci")).unwrap().describe();
     assert!(
         described.contains("preset sci") && described.contains("truncate"),
         "{described}"
     );
     let digests =
-        ["sci", "zero-dce"].map(|preset| ModelFile::read(&said(preset)).unwrap().digest());
+        ["sci", "zero-dce"].map(|preset| ModelFile::read(&file(preset)).unwrap().digest());
     assert_ne!(digests[0], digests[1]);
-    let message = open(&said("nonesuch")).err().unwrap().to_string();
+    let message = open(&file("nonesuch")).err().unwrap().to_string();
     assert!(message.contains("is not a preset"), "{message}");
 }
