@@ -19,6 +19,7 @@ use darkqa_eval::types::{
 };
 use serde_json::{Value, json};
 use support::endpoint::{Answer, MockEndpoint};
+use support::table::check_rows;
 
 const KEY: &str = "sk-very-secret-0123";
 
@@ -270,8 +271,8 @@ async fn keys_are_in_no_error_and_no_debug_output() {
             },
         );
         let error = model.ask(Message::words("Red?"), 2).await.unwrap_err();
-        let shown = format!("{error:?} {error} {model:?}");
-        assert!(!shown.contains("sk-very"), "{shown}");
+        let text = format!("{error:?} {error} {model:?}");
+        assert!(!text.contains("sk-very"), "{text}");
         assert!(error.failure.message.contains("[secret]"), "{error}");
         assert!(!error.failure.message.contains(char::is_control));
         assert!(error.failure.message.len() < 500);
@@ -289,11 +290,11 @@ async fn keys_are_in_no_error_and_no_debug_output() {
     )
     .unwrap();
     let error = model.ask(Message::words("Red?"), 2).await.unwrap_err();
-    let shown = format!("{error:?} {model:?}");
-    for secret in ["us3r", "passw0rd", "t0ken"] {
-        assert!(!error.failure.message.contains(secret), "{shown}");
-        assert!(!format!("{error:?}").contains(secret), "{shown}");
-    }
+    let text = format!("{error:?} {model:?}");
+    check_rows(["us3r", "passw0rd", "t0ken"], |secret| {
+        assert!(!error.failure.message.contains(secret), "{text}");
+        assert!(!format!("{error:?}").contains(secret), "{text}");
+    });
     let basic = mock.requests()[0]
         .header("authorization")
         .unwrap()
@@ -390,7 +391,7 @@ fn broken_scripts_are_named_with_their_line() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("replies.jsonl");
     let good = r#"{"question":"q","reply":"B"}"#;
-    for wrong in [
+    let rows = [
         good,
         "nonsense",
         r#"{"question":"q"}"#,
@@ -399,10 +400,11 @@ fn broken_scripts_are_named_with_their_line() {
         r#"{"condition":"L3-noise","default":"B"}"#,
         r#"{"question":"q","condition":"L9","reply":"B"}"#,
         r#"{"question":"q","answer":"B"}"#,
-    ] {
+    ];
+    check_rows(rows, |wrong| {
         std::fs::write(&path, format!("{good}\n\n{wrong}\n")).unwrap();
         let error = Script::load(&path).unwrap_err().to_string();
         assert!(error.contains("replies.jsonl, line 3: "), "{error}");
-    }
+    });
     assert!(Script::load(dir.path()).is_err());
 }

@@ -9,33 +9,22 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 use support::endpoint::{Answer, MockEndpoint};
-use support::run::{Bench, files, records};
+use support::run::{Bench, files, records, words};
+use support::table::check_rows;
 
 const QUESTIONS: usize = 4;
 
-const RUN: [&str; 12] = [
-    "--data",
-    "set.jsonl",
-    "--model",
-    "m",
-    "--blind-model",
-    "m",
-    "--levels",
-    "L0,L3",
-    "--out",
-    "run",
-    "--base-url",
-    "http://127.0.0.1:9/v1",
-];
+/// The run without its folder and its endpoint.
+const RUN: &str = "--data set.jsonl --model m --blind-model m --levels L0,L3";
 
-fn exported(bench: &Bench, more: &[&str]) -> String {
-    let words: Vec<&str> = ["batch", "export"]
-        .iter()
-        .chain(&RUN)
-        .chain(more)
-        .copied()
-        .collect();
-    bench.complete(&words)
+/// The run in its folder, at an endpoint that nobody serves, and more arguments.
+fn args(more: &str) -> Vec<&str> {
+    let place = words("--out run --base-url http://127.0.0.1:9/v1");
+    [words(RUN), place, words(more)].concat()
+}
+
+fn export(bench: &Bench, more: &str) -> String {
+    bench.complete(&[words("batch export"), args(more)].concat())
 }
 
 /// The lines of all input files.
@@ -71,9 +60,9 @@ fn expired(request: &Value) -> String {
 #[test]
 fn what_is_left_goes_out_in_files_and_comes_back_in_any_order() {
     let bench = Bench::with_questions(QUESTIONS);
-    let told = exported(&bench, &["--file-requests", "5"]);
+    let message = export(&bench, "--file-requests 5");
     // L0, L3 in both variants, and blind: 4 conditions of 4 questions.
-    assert!(told.starts_with("16 requests in 4 files"), "{told}");
+    assert!(message.starts_with("16 requests in 4 files"), "{message}");
     let requests = requests(&bench);
     let ids: BTreeSet<&str> = requests
         .iter()
@@ -93,13 +82,13 @@ fn what_is_left_goes_out_in_files_and_comes_back_in_any_order() {
     assert_eq!(seeing.count(), 12);
 
     // An evaluation leaves alone what is out; so does a second export.
-    let idle = bench.call(&RUN);
+    let idle = bench.call(&args(""));
     assert_eq!(idle.code, Some(1), "{idle:?}");
     assert!(
         idle.stderr.contains("16 trials are waiting for a batch"),
         "{idle:?}"
     );
-    assert!(exported(&bench, &[]).starts_with("0 requests in 0 files"));
+    assert!(export(&bench, "").starts_with("0 requests in 0 files"));
 
     // Two expired, the rest in any order, a stranger among them.
     let mut output: Vec<String> = requests[2..].iter().map(|r| answer(r, "C")).collect();
@@ -142,23 +131,22 @@ fn what_is_left_goes_out_in_files_and_comes_back_in_any_order() {
     }
 
     // What expired goes out again, and once more if it fails once more; in the end it is asked directly.
-    assert!(exported(&bench, &[]).starts_with("2 requests in 1 file; 14 already answered"));
+    assert!(export(&bench, "").starts_with("2 requests in 1 file; 14 already answered"));
     assert!(
-        exported(&bench, &[]).starts_with("0 requests in 0 files; 14 already answered, 2 waiting")
+        export(&bench, "").starts_with("0 requests in 0 files; 14 already answered, 2 waiting")
     );
     bench.call(&["batch", "import", "run", "errors.jsonl"]);
     let mock = MockEndpoint::start([Answer::text("C")]);
     let base = mock.base_url();
-    let mut words = RUN.to_vec();
-    (words[8], words[11]) = ("--resume", &base);
-    let done = bench.call(&words);
+    let place = ["--resume", "run", "--base-url", &base];
+    let done = bench.call(&[&words(RUN)[..], &place].concat());
     assert_eq!((done.code, mock.requests().len()), (Some(0), 2), "{done:?}");
 }
 
 #[test]
 fn broken_files_are_named() {
     let bench = Bench::with_questions(QUESTIONS);
-    exported(&bench, &[]);
+    export(&bench, "");
     let good = answer(&requests(&bench)[0], "C");
     bench.file("out.jsonl", format!("{good}\n{{\"custom\""));
     let broken = bench.call(&["batch", "import", "run", "out.jsonl"]);
@@ -172,33 +160,20 @@ fn broken_files_are_named() {
         1,
         "what came before it is kept"
     );
-    for (words, said) in [
-        (
-            vec!["batch", "import", "nowhere", "out.jsonl"],
-            "no run in this folder",
-        ),
-        (
-            vec!["batch", "import", "run", "none.jsonl"],
-            "none.jsonl: cannot read",
-        ),
-        (
-            vec!["batch", "export", "--model", "random", "--out", "x"],
-            "built in",
-        ),
-    ] {
-        let called = bench.call(&words);
-        assert_eq!(called.code, Some(2), "{words:?}");
-        assert!(called.stderr.contains(said), "{called:?}");
-    }
-    let small: Vec<&str> = ["batch", "export"]
-        .iter()
-        .chain(&RUN)
-        .chain(&["--file-size", "1", "--url", "v1"])
-        .copied()
-        .collect();
+    let rows = [
+        ("batch import nowhere out.jsonl", "no run in this folder"),
+        ("batch import run none.jsonl", "none.jsonl: cannot read"),
+        ("batch export --model random --out x", "built in"),
+    ];
+    check_rows(rows, |(args, message)| {
+        let called = bench.call(&words(args));
+        assert_eq!(called.code, Some(2), "{args}");
+        assert!(called.stderr.contains(message), "{called:?}");
+    });
+    let wrong = [words("batch export"), args("--file-size 1 --url v1")].concat();
     assert!(
         bench
-            .call(&small)
+            .call(&wrong)
             .stderr
             .contains("for '--url <PATH>': a path expected")
     );

@@ -2,6 +2,9 @@
 
 #![allow(clippy::unwrap_used, missing_docs)]
 
+#[path = "support/table.rs"]
+mod table;
+
 use std::fs;
 use std::path::Path;
 
@@ -10,6 +13,7 @@ use darkqa_eval::internals::dataset::{DataPlace, Dataset};
 use darkqa_eval::internals::synthesis::expose;
 use darkqa_eval::types::{Question, Rgb, Severity};
 use image::{Rgb as Pixel, RgbImage};
+use table::check_rows;
 use tempfile::TempDir;
 
 /// Two frames with three questions, one of them with three choices and with what a table must quote.
@@ -70,12 +74,13 @@ fn every_form_is_read_back() {
     let data = data();
     let original = Dataset::open(&DataPlace::Path(data.path().to_owned()), None).unwrap();
     let name = original.name().to_owned();
-    for (kind, file) in [
+    let rows = [
         ("vlmevalkit", format!("{name}_CONDITION.tsv")),
         ("imagefolder", "CONDITION".to_owned()),
         ("imagefolder", "CONDITION/metadata.jsonl".to_owned()),
         ("llava", "CONDITION/questions.jsonl".to_owned()),
-    ] {
+    ];
+    check_rows(rows, |(kind, file)| {
         let out = tempfile::tempdir().unwrap();
         run(
             data.path(),
@@ -98,7 +103,7 @@ fn every_form_is_read_back() {
                 assert_eq!(pixels(&set, &question.text), expected, "{kind} {condition}");
             }
         }
-    }
+    });
 }
 
 #[test]
@@ -170,10 +175,10 @@ fn nothing_is_written_over_unasked() {
     let flags = ["--levels", "L0"];
     run(data.path(), "llava", out.path(), &flags).success();
     let assert = run(data.path(), "llava", out.path(), &flags).code(2);
-    let said = String::from_utf8(assert.get_output().stderr.clone()).unwrap();
+    let message = String::from_utf8(assert.get_output().stderr.clone()).unwrap();
     assert!(
-        said.contains("questions.jsonl: the set exists already; --force"),
-        "{said}"
+        message.contains("questions.jsonl: the set exists already; --force"),
+        "{message}"
     );
     run(
         data.path(),
@@ -183,11 +188,11 @@ fn nothing_is_written_over_unasked() {
     )
     .success();
     let assert = run(data.path(), "parquet", out.path(), &flags).code(2);
-    let said = String::from_utf8(assert.get_output().stderr.clone()).unwrap();
+    let message = String::from_utf8(assert.get_output().stderr.clone()).unwrap();
     assert!(
-        said.contains(
+        message.contains(
             "invalid value 'parquet' for '<KIND>' [possible values: vlmevalkit, imagefolder, llava"
         ),
-        "{said}"
+        "{message}"
     );
 }

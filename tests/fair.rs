@@ -8,25 +8,23 @@ use std::fs;
 
 use serde_json::{Value, json};
 use support::endpoint::{Answer, MockEndpoint};
-use support::run::{Bench, records};
+use support::run::{Bench, model_args, records, words};
 
-const SET: [&str; 4] = ["--data", "set.jsonl", "--levels", "L0"];
+/// The arguments of every run, and more of them.
+fn args(more: &str) -> Vec<&str> {
+    [words("--data set.jsonl --levels L0"), words(more)].concat()
+}
 
-fn run(bench: &Bench, more: &[&str]) -> String {
-    let words: Vec<&str> = SET
-        .iter()
-        .chain(&["--out", "run"])
-        .chain(more)
-        .copied()
-        .collect();
-    bench.complete(&words)
+/// The output of a complete run in the folder `run`.
+fn run(bench: &Bench, more: &str) -> String {
+    bench.complete(&[args("--out run"), words(more)].concat())
 }
 
 #[test]
 fn every_rotation_is_asked_and_an_answer_by_position_averages_out() {
     let bench = Bench::with_questions(6);
     bench.file("script.jsonl", "{\"default\":\"A\"}");
-    let told = run(&bench, &["--model", "script:script.jsonl", "--circular"]);
+    let table = run(&bench, "--model script:script.jsonl --circular");
     let records = records(&bench.path("run"));
     assert_eq!(records.len(), 18);
     let truths: Vec<u64> = records
@@ -41,10 +39,10 @@ fn every_rotation_is_asked_and_an_answer_by_position_averages_out() {
         assert_eq!(record["choices"][truth], "brown");
     }
     // Always A: right in one rotation of three, never in all.
-    assert!(told.contains("33.3 ±"), "{told}");
+    assert!(table.contains("33.3 ±"), "{table}");
     assert!(
-        told.contains("right every time") && told.contains("0.0"),
-        "{told}"
+        table.contains("right every time") && table.contains("0.0"),
+        "{table}"
     );
     let csv = fs::read_to_string(bench.path("run/summary.csv")).unwrap();
     assert!(
@@ -56,18 +54,8 @@ fn every_rotation_is_asked_and_an_answer_by_position_averages_out() {
     );
     let text = "{\"default\":\"brown\"}";
     bench.file("script.jsonl", text);
-    let words: Vec<&str> = SET
-        .iter()
-        .chain(&[
-            "--out",
-            "by-text",
-            "--model",
-            "script:script.jsonl",
-            "--circular",
-        ])
-        .copied()
-        .collect();
-    assert!(bench.complete(&words).contains("100.0"));
+    let by_text = args("--out by-text --model script:script.jsonl --circular");
+    assert!(bench.complete(&by_text).contains("100.0"));
 }
 
 #[test]
@@ -85,11 +73,11 @@ fn chance_is_that_of_what_is_asked() {
     bench.file("set.jsonl", two + &four);
     bench.file("script.jsonl", "{\"default\":\"A\"}");
     // Two replies with a half and four with a quarter each: two of six, as for the one who always says A.
-    let told = run(&bench, &["--model", "script:script.jsonl", "--circular"]);
-    assert!(told.contains("33.3 ±"), "{told}");
+    let table = run(&bench, "--model script:script.jsonl --circular");
+    assert!(table.contains("33.3 ±"), "{table}");
     assert!(
-        told.contains("chance: 33.33 over 6 orders of choices"),
-        "{told}"
+        table.contains("chance: 33.33 over 6 orders of choices"),
+        "{table}"
     );
 }
 
@@ -97,21 +85,9 @@ fn chance_is_that_of_what_is_asked() {
 fn shuffled_orders_are_the_same_in_every_condition_and_run() {
     let orders = |seed: &str| {
         let bench = Bench::with_questions(6);
-        let words: Vec<&str> = [
-            "--data",
-            "set.jsonl",
-            "--levels",
-            "L0,L2",
-            "--out",
-            "run",
-            "--model",
-            "random",
-            "--shuffle-options",
-            "--seed",
-            seed,
-        ]
-        .to_vec();
-        bench.complete(&words);
+        bench.complete(&words(&format!(
+            "--data set.jsonl --levels L0,L2 --out run --model random --shuffle-options --seed {seed}"
+        )));
         let orders: BTreeSet<(String, String)> = records(&bench.path("run"))
             .iter()
             .map(|record| {
@@ -135,8 +111,8 @@ fn repeats_are_trials_of_their_own() {
     let bench = Bench::with_questions(6);
     let mock = MockEndpoint::start([Answer::text("C")]);
     let base = mock.base_url();
-    let words = ["--model", "m", "--base-url", &base, "--repeats", "3"];
-    run(&bench, &words);
+    let repeated = format!("--model m --base-url {base} --repeats 3");
+    run(&bench, &repeated);
     assert_eq!(mock.requests().len(), 18);
     let records = records(&bench.path("run"));
     let repeats: Vec<u64> = records
@@ -146,7 +122,7 @@ fn repeats_are_trials_of_their_own() {
     for repeat in 0..3 {
         assert_eq!(repeats.iter().filter(|r| **r == repeat).count(), 6);
     }
-    run(&bench, &words);
+    run(&bench, &repeated);
     assert_eq!(mock.requests().len(), 18, "none is asked again");
 }
 
@@ -155,10 +131,8 @@ fn a_constraint_is_sent_and_its_object_is_read() {
     let bench = Bench::with_questions(6);
     let mock = MockEndpoint::start([Answer::text("{\"answer\": \"C\"}")]);
     let base = mock.base_url();
-    run(
-        &bench,
-        &["--model", "m", "--base-url", &base, "--constrain", "json"],
-    );
+    let model = format!("--model m --base-url {base}");
+    run(&bench, &format!("{model} --constrain json"));
     let sent = &mock.requests()[0].json();
     let schema = &sent["response_format"]["json_schema"]["schema"];
     assert_eq!(
@@ -172,30 +146,13 @@ fn a_constraint_is_sent_and_its_object_is_read() {
         );
     }
     // It measures something else, so it is another run.
-    let words: Vec<&str> = SET
-        .iter()
-        .chain(&["--out", "run", "--model", "m", "--base-url", &base])
-        .copied()
-        .collect();
-    assert!(bench.call(&words).stderr.contains("--constrain"));
+    let other = [args("--out run"), words(&model)].concat();
+    assert!(bench.call(&other).stderr.contains("--constrain"));
 
     let mock = MockEndpoint::start([Answer::text("I think C")]);
     let base = mock.base_url();
-    let words: Vec<&str> = SET
-        .iter()
-        .chain(&[
-            "--out",
-            "free",
-            "--model",
-            "m",
-            "--base-url",
-            &base,
-            "--constrain",
-            "choice",
-        ])
-        .copied()
-        .collect();
-    let called = bench.call(&words);
+    let free = args("--out free --constrain choice");
+    let called = bench.call(&[free, model_args(&base, "")].concat());
     assert_eq!(
         mock.requests()[0].json()["structured_outputs"]["choice"],
         json!(["A", "B", "C"])
@@ -211,9 +168,9 @@ fn a_constraint_is_sent_and_its_object_is_read() {
 fn kept_replies_are_read_again_without_a_call() {
     let bench = Bench::with_questions(6);
     bench.file("script.jsonl", "{\"default\":\"C\"}");
-    let table = run(&bench, &["--model", "script:script.jsonl"]);
-    let shown = bench.complete(&["report", "run"]);
-    assert_eq!(shown, table, "the same from the records alone");
+    let table = run(&bench, "--model script:script.jsonl");
+    let report = bench.complete(&["report", "run"]);
+    assert_eq!(report, table, "the same from the records alone");
     // As an earlier version might have read them.
     let path = bench.path("run/records.jsonl");
     let old: String = fs::read_to_string(&path)
@@ -228,16 +185,16 @@ fn kept_replies_are_read_again_without_a_call() {
         .collect();
     fs::write(&path, &old).unwrap();
     assert!(bench.complete(&["report", "run"]).contains("0.0 ±"));
-    let anew = bench.complete(&["report", "run", "--rescore"]);
+    let rescored = bench.complete(&["report", "run", "--rescore"]);
     assert!(
-        anew.starts_with("6 of 6 records now read differently\n"),
-        "{anew}"
+        rescored.starts_with("6 of 6 records now read differently\n"),
+        "{rescored}"
     );
-    assert!(anew.ends_with(&table), "{anew}");
+    assert!(rescored.ends_with(&table), "{rescored}");
     let again = bench.complete(&["report", "run", "--rescore"]);
     assert!(again.starts_with("0 of 6"), "{again}");
-    let kept = fs::read_to_string(&path).unwrap();
-    assert!(kept.starts_with(&old), "what was kept is never changed");
+    let stored = fs::read_to_string(&path).unwrap();
+    assert!(stored.starts_with(&old), "what was kept is never changed");
     let none = bench.call(&["report", "nowhere"]);
     assert_eq!(none.code, Some(2));
 }
@@ -254,23 +211,8 @@ fn replies_without_an_answer_are_told_by_reason() {
     ));
     let mock = MockEndpoint::start(answers);
     let base = mock.base_url();
-    let words = [
-        "--model",
-        "m",
-        "--base-url",
-        &base,
-        "--repeats",
-        "2",
-        "--concurrency",
-        "1",
-    ];
-    let words: Vec<&str> = SET
-        .iter()
-        .chain(&["--out", "run"])
-        .chain(&words)
-        .copied()
-        .collect();
-    let called = bench.call(&words);
+    let repeated = args("--out run --repeats 2 --concurrency 1");
+    let called = bench.call(&[repeated, model_args(&base, "")].concat());
     assert!(
         called.stdout.contains(
             "10 cut at the token limit (--max-tokens), 1 refused, 1 withheld by a filter"

@@ -11,7 +11,7 @@ use std::fs;
 use serde_json::Value;
 use support::house::House;
 use support::onnx;
-use support::run::{Bench, records};
+use support::run::{Bench, records, words};
 
 /// The digest of all that a run holds but times, addresses and versions of libraries.
 fn digest(bench: &Bench, run: &str) -> String {
@@ -37,45 +37,20 @@ fn digest(bench: &Bench, run: &str) -> String {
 fn an_evaluation_with_an_enhancer() {
     let bench = Bench::new();
     onnx::gain(2.0).write(&bench.path(""), "bright.onnx");
-    bench.complete(&[
-        "--model",
-        "random",
-        "--blind-model",
-        "random",
-        "--data",
-        "rooms:frames=4,size=96x72",
-        "--levels",
-        "L0,L2,L4",
-        "--llie",
-        "bright.onnx",
-        "--llie-on",
-        "both",
-        "--shuffle-options",
-        "--repeats",
-        "2",
-        "--out",
-        "run",
-    ]);
+    bench.complete(&words(
+        "--model random --blind-model random --data rooms:frames=4,size=96x72 --levels L0,L2,L4 \
+         --llie bright.onnx --llie-on both --shuffle-options --repeats 2 --out run",
+    ));
     assert_eq!(digest(&bench, "run"), EVALUATION);
 }
 
 #[test]
 fn an_evaluation_at_a_drop_of_its_own_in_two_readings() {
     let bench = Bench::new();
-    bench.complete(&[
-        "--model",
-        "observer",
-        "--data",
-        "rooms:frames=4,size=160x120",
-        "--levels",
-        "L0,3.3",
-        "--profile",
-        "paper,physical",
-        "--max-side",
-        "120",
-        "--out",
-        "run",
-    ]);
+    bench.complete(&words(
+        "--model observer --data rooms:frames=4,size=160x120 --levels L0,3.3 \
+         --profile paper,physical --max-side 120 --out run",
+    ));
     assert_eq!(digest(&bench, "run"), READINGS);
 }
 
@@ -91,20 +66,10 @@ fn open_questions_with_marks_and_an_enhancer() {
         "j.jsonl",
         "{\"question\": \"q1\", \"reply\": \"4\"}\n{\"default\": \"2\"}",
     );
-    let called = house.call(&[
-        "--model",
-        "script:a.jsonl",
-        "--blind-model",
-        "script:a.jsonl",
-        "--judge",
-        "script:j.jsonl",
-        "--llie",
-        "bright.onnx",
-        "--protocol",
-        "tolerant",
-        "--out",
-        "run",
-    ]);
+    let called = house.call(&words(
+        "--model script:a.jsonl --blind-model script:a.jsonl --judge script:j.jsonl \
+         --llie bright.onnx --protocol tolerant --out run",
+    ));
     assert_eq!(called.code, Some(0), "{called:?}");
     assert_eq!(digest(&house.0, "run"), OPENEQA);
 }

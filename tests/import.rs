@@ -2,6 +2,9 @@
 
 #![allow(clippy::unwrap_used, missing_docs)]
 
+#[path = "support/table.rs"]
+mod table;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -10,6 +13,7 @@ use darkqa_eval::internals::dataset::Dataset;
 use darkqa_eval::types::{DepthKind, Frame, FrameId};
 use image::{GrayImage, ImageBuffer, Luma, Rgb, RgbImage, Rgba, RgbaImage};
 use serde_json::Value;
+use table::check_rows;
 use tempfile::TempDir;
 
 const WIDTH: u32 = 8;
@@ -157,10 +161,10 @@ fn habitat() -> Scene {
 fn habitat_renders_of_hm3d() {
     let scene = habitat();
     let out = scene.run("habitat", &["--every", "2"]).success();
-    let said = String::from_utf8(out.get_output().stdout.clone()).unwrap();
+    let message = String::from_utf8(out.get_output().stdout.clone()).unwrap();
     assert!(
-        said.contains("2 frames of 1 scenes") && said.contains("\"bed, made\" 1"),
-        "{said}"
+        message.contains("2 frames of 1 scenes") && message.contains("\"bed, made\" 1"),
+        "{message}"
     );
     let set = Dataset::of_frames(&scene.out()).unwrap();
     let names: Vec<&str> = set.frames().map(|id| id.0.as_str()).collect();
@@ -186,10 +190,11 @@ fn habitat_renders_of_hm3d() {
 fn habitat_renders_of_matterport_and_replica() {
     let house = "R 0 0 0 0 b 0 0 0\nC 0 1 painting 39 objects 0\nC 1 1 bed 11 bed 0\nO 0 0 0 0 0 0\nO 1 0 1 0 0 0\n";
     let replica = r#"{"objects":[{"id":0,"class_name":"picture"},{"id":1,"class_name":"bed"}]}"#;
-    for (name, text, room) in [
+    let rows = [
         ("m.house", house, Some("bedroom")),
         ("info_semantic.json", replica, None),
-    ] {
+    ];
+    check_rows(rows, |(name, text, room)| {
         let scene = Scene::new();
         scene.rgb("s/rgb/0.png");
         scene.deep("s/depth/0.png", 2000, 3000);
@@ -206,7 +211,7 @@ fn habitat_renders_of_matterport_and_replica() {
             (camera.fx - 4.0).abs() < 1e-9 && (camera.cx - 3.5).abs() < 1e-9,
             "{camera:?}"
         );
-    }
+    });
 }
 
 #[test]
@@ -222,10 +227,11 @@ fn what_is_wrong_with_renders_is_said() {
         "00800-x/x.semantic.txt",
         "HM3D Semantic Annotations\n9,FF,\"bed\",0\n",
     );
-    let said = scene.refused("habitat", &[]);
+    let message = scene.refused("habitat", &[]);
     assert!(
-        said.contains("scene_dataset_config.json") && said.contains("no frame of it could be read"),
-        "{said}"
+        message.contains("scene_dataset_config.json")
+            && message.contains("no frame of it could be read"),
+        "{message}"
     );
     scene.text(
         "00800-x/x.semantic.txt",
@@ -241,10 +247,10 @@ fn what_is_wrong_with_renders_is_said() {
     fs::remove_file(scene.at("00800-x/semantic/001.npy")).unwrap();
     // 8 bits hold no numbers of instances; the other frames are taken.
     let assert = scene.run("habitat", &[]).code(1);
-    let said = String::from_utf8(assert.get_output().stderr.clone()).unwrap();
+    let message = String::from_utf8(assert.get_output().stderr.clone()).unwrap();
     assert!(
-        said.contains("001.png: a grey PNG of 8 bits; 16-bit grey expected"),
-        "{said}"
+        message.contains("001.png: a grey PNG of 8 bits; 16-bit grey expected"),
+        "{message}"
     );
     assert_eq!(
         Dataset::of_frames(&scene.out()).unwrap().frames().count(),
@@ -313,8 +319,8 @@ fn frames_of_scannet() {
         "scene0000_00/scene0000_00.aggregation.json",
         &format!("{{\"segGroups\":[{groups}]}}"),
     );
-    let said = scene.refused("scannet", &["--force"]);
-    assert!(said.contains("256 objects, but the 8 bits"), "{said}");
+    let message = scene.refused("scannet", &["--force"]);
+    assert!(message.contains("256 objects, but the 8 bits"), "{message}");
 }
 
 #[test]
@@ -340,10 +346,10 @@ fn images_and_maps_of_nyu() {
     scene.rgb("rgb/00001.png");
     scene.deep("depth/00001.png", 10_000, 15_000);
     scene.shallow("labels/00001.png", 3, 255);
-    let said = scene.refused("nyu", &["--labels", "nyu40-1"]);
+    let message = scene.refused("nyu", &["--labels", "nyu40-1"]);
     assert!(
-        said.contains("depth_scale is missing") && said.contains("--depth-scale"),
-        "{said}"
+        message.contains("depth_scale is missing") && message.contains("--depth-scale"),
+        "{message}"
     );
     let set = scene.import("nyu", &["--labels", "nyu40-1", "--depth-scale", "0.0002"]);
     let frame = frame(&set, "src/00001");
@@ -353,13 +359,13 @@ fn images_and_maps_of_nyu() {
         frame.intrinsics.is_none(),
         "the camera is that of 640 × 480"
     );
-    let said = scene.refused("nyu", &["--force", "--depth-scale", "0.00001"]);
+    let message = scene.refused("nyu", &["--force", "--depth-scale", "0.00001"]);
     assert!(
-        said.contains("typical depth is 0.1 m") && said.contains("--depth-scale"),
-        "{said}"
+        message.contains("typical depth is 0.1 m") && message.contains("--depth-scale"),
+        "{message}"
     );
-    let said = scene.refused("nyu", &["--force", "--depth-scale", "1"]);
-    assert!(said.contains("deeper than any room"), "{said}");
+    let message = scene.refused("nyu", &["--force", "--depth-scale", "1"]);
+    assert!(message.contains("deeper than any room"), "{message}");
 }
 
 #[test]
@@ -486,10 +492,10 @@ fn broken_folders_are_named() {
     fs::remove_file(scene.at("sem/b.png")).unwrap();
     let small = GrayImage::new(3, 3);
     small.save(scene.at("sem/a.png")).unwrap();
-    let said = scene.refused("folder", &flags);
+    let message = scene.refused("folder", &flags);
     assert!(
-        said.contains("a.png: 3 × 3 pixels") && said.contains("never scaled"),
-        "{said}"
+        message.contains("a.png: 3 × 3 pixels") && message.contains("never scaled"),
+        "{message}"
     );
     assert!(Scene::new().refused("habitat", &[]).contains("--src: "));
     assert!(

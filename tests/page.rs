@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use support::browser::{Browser, chromium};
 use support::endpoint::{Answer, MockEndpoint};
 use support::house::House;
-use support::run::Bench;
+use support::run::{Bench, words};
 
 /// The model that says what it is told.
 const SAID: &str = "script:said.jsonl";
@@ -47,19 +47,9 @@ fn the_page_works_in_a_browser() {
     };
     let bench = Bench::with_questions(40);
     bench.file("said.jsonl", hostile());
-    let words = [
-        "--data",
-        "set.jsonl",
-        "--model",
-        SAID,
-        "--model",
-        "random",
-        "--blind-model",
-        "random",
-        "--out",
-        "run",
-    ];
-    let called = bench.call(&words);
+    let line =
+        format!("--data set.jsonl --model {SAID} --model random --blind-model random --out run");
+    let called = bench.call(&words(&line));
     assert_eq!(called.code, Some(0), "{called:?}");
     let url = format!("file://{}", bench.path("run/report.html").display());
 
@@ -258,16 +248,9 @@ fn people_can_answer() {
         return;
     };
     let bench = Bench::with_questions(6);
-    bench.complete(&[
-        "--model",
-        "random",
-        "--data",
-        "set.jsonl",
-        "--levels",
-        "L0,L3",
-        "--out",
-        "run",
-    ]);
+    bench.complete(&words(
+        "--model random --data set.jsonl --levels L0,L3 --out run",
+    ));
     bench.complete(&["study", "pack", "run", "--out", "pack"]);
     let url = format!("file://{}", bench.path("pack/study.html").display());
     browser.window(1200, 800, "light");
@@ -411,14 +394,9 @@ fn people_can_answer_in_their_own_words() {
     // What the page saves is what the program takes.
     house.0.file("answers.json", saved.as_str().unwrap());
     house.0.file("j.jsonl", "{\"default\": \"5\"}");
-    let called = house.call(&[
-        "--answers",
-        "human=answers.json",
-        "--judge",
-        "script:j.jsonl",
-        "--out",
-        "run",
-    ]);
+    let called = house.call(&words(
+        "--answers human=answers.json --judge script:j.jsonl --out run",
+    ));
     assert_eq!(called.code, Some(0), "{called:?}");
     assert!(
         called.stdout.contains("2 of 2 answers scored")

@@ -19,6 +19,7 @@ use support::endpoint::{Answer, MockEndpoint};
 use support::house::House;
 use support::onnx;
 use support::run::{Bench, called, records, words};
+use support::table::check_rows;
 
 /// The lines of a file of JSON objects.
 fn lines(path: &std::path::Path) -> Vec<Value> {
@@ -87,7 +88,7 @@ fn exam() -> Bench {
         .flat_map(|pair| [question(0, &pair[0]), question(1, &pair[1])]);
     let all: Vec<String> = all.map(|question| question.to_string()).collect();
     bench.file("set.jsonl", all.join("\n"));
-    for (model, skill) in SKILLS {
+    check_rows(SKILLS, |(model, skill)| {
         let mut script = vec![json!({"default": "A"}).to_string()];
         for (condition, right) in CONDITIONS.into_iter().zip(skill) {
             for (family, right) in right.into_iter().enumerate() {
@@ -98,7 +99,7 @@ fn exam() -> Bench {
             }
         }
         bench.file(&format!("{model}.jsonl"), script.join("\n"));
-    }
+    });
     bench
 }
 
@@ -184,17 +185,17 @@ fn a_long_torn_line_is_cut_off_whole() {
     let path = bench.path("run/records.jsonl");
     let whole = fs::read_to_string(&path).unwrap();
     let last = whole.lines().next_back().unwrap();
-    let kept = &whole[..whole.len() - last.len() - 1];
-    assert_eq!((whole.lines().count(), kept.lines().count()), (3, 2));
+    let intact = &whole[..whole.len() - last.len() - 1];
+    assert_eq!((whole.lines().count(), intact.lines().count()), (3, 2));
     let sizes = [STEP - 1, STEP, STEP + 1, 2 * STEP, 5 * STEP + 7];
     for (before, size) in sizes.into_iter().enumerate() {
         // The reply went on and on, and the process was killed in the midst of it.
         let begun = last.split_once("\"reply\":\"").unwrap().0;
         let torn = format!("{begun}\"reply\":\"{}", "on and on ".repeat(size / 10 + 1));
-        fs::write(&path, format!("{kept}{}", &torn[..size])).unwrap();
+        fs::write(&path, format!("{intact}{}", &torn[..size])).unwrap();
         bench.complete(&words(&line));
         let mended = fs::read_to_string(&path).unwrap();
-        assert!(mended.starts_with(kept), "{size}: {} bytes", mended.len());
+        assert!(mended.starts_with(intact), "{size}: {} bytes", mended.len());
         assert_eq!(records(&bench.path("run")).len(), 3, "{size}");
         assert_eq!(endpoint.requests().len(), 3 + before + 1, "{size}");
     }
@@ -207,9 +208,9 @@ fn a_long_torn_line_is_cut_off_whole() {
 fn outage(length: usize) -> (Option<i32>, String, usize) {
     const TOGETHER: usize = 20;
     let bench = Bench::with_questions(200);
-    let asked = AtomicUsize::new(0);
+    let count = AtomicUsize::new(0);
     let endpoint = MockEndpoint::answering(move |_| {
-        let place = asked.fetch_add(1, Ordering::SeqCst);
+        let place = count.fetch_add(1, Ordering::SeqCst);
         let milliseconds = if place < TOGETHER { 0 } else { 60 };
         // Later outcomes come later, so that none of the good replies falls among the failures.
         thread::sleep(Duration::from_millis(milliseconds));
@@ -232,19 +233,19 @@ fn outage(length: usize) -> (Option<i32>, String, usize) {
 
 #[test]
 fn an_outage_of_fewer_than_three_windows_is_survived() {
-    let (code, said, failed) = outage(30);
-    assert_eq!((code, failed), (Some(1), 30), "{said}");
-    let (code, said, failed) = outage(59);
-    assert_eq!((code, failed), (Some(1), 59), "{said}");
+    let (code, output, failed) = outage(30);
+    assert_eq!((code, failed), (Some(1), 30), "{output}");
+    let (code, output, failed) = outage(59);
+    assert_eq!((code, failed), (Some(1), 59), "{output}");
 }
 
 #[test]
 fn an_outage_of_three_windows_stops_the_run() {
-    let (code, said, failed) = outage(1000);
-    assert_eq!(code, Some(2), "{said}");
-    assert!(said.contains("m: 60 trials in a row failed"), "{said}");
+    let (code, output, failed) = outage(1000);
+    assert_eq!(code, Some(2), "{output}");
+    assert!(output.contains("m: 60 trials in a row failed"), "{output}");
     // Those that were under way then, and no more.
-    assert!((60..100).contains(&failed), "{failed}: {said}");
+    assert!((60..100).contains(&failed), "{failed}: {output}");
 }
 
 // ---- The frames that a report shows ----
@@ -276,7 +277,7 @@ fn small_copies_are_kept_of_the_frames_of_lowest_digest() {
         .iter()
         .flat_map(|frame| ["L0", "L5-noise"].map(|at| (frame.clone(), at.to_owned())))
         .collect();
-    let kept = |run: &str| {
+    let stored = |run: &str| {
         let lines = lines(&bench.path(&format!("{run}/thumbnails.jsonl")));
         let text = |line: &Value, field: &str| line[field].as_str().unwrap().to_owned();
         let places = lines
@@ -289,7 +290,7 @@ fn small_copies_are_kept_of_the_frames_of_lowest_digest() {
             .map(|line| (text(line, "image"), text(line, "crop")));
         (places, images.collect::<BTreeSet<(String, String)>>())
     };
-    let (whole, merged) = (kept("whole"), kept("merged"));
+    let (whole, merged) = (stored("whole"), stored("merged"));
     assert_eq!(whole.0, due);
     assert_eq!(whole, merged);
 }
@@ -297,9 +298,9 @@ fn small_copies_are_kept_of_the_frames_of_lowest_digest() {
 // ---- Replies that were cut ----
 
 /// What is said where so many of ten replies were cut at the token limit, with these words.
-fn told_of_cut(cut: usize, said: &Value) -> String {
+fn cut_report(cut: usize, output: &Value) -> String {
     let bench = Bench::with_questions(10);
-    let cut = std::iter::repeat_n(Answer::message(&json!({"content": said}), "length"), cut);
+    let cut = std::iter::repeat_n(Answer::message(&json!({"content": output}), "length"), cut);
     let endpoint = MockEndpoint::start(cut.chain([Answer::text("C")]));
     let base = endpoint.base_url();
     let line = format!(
@@ -313,16 +314,17 @@ fn told_of_cut(cut: usize, said: &Value) -> String {
 
 #[test]
 fn a_limit_that_cuts_most_replies_is_warned_of() {
-    let said = told_of_cut(6, &Value::Null);
+    let output = cut_report(6, &Value::Null);
     assert!(
-        said.contains("6 of the first 10 replies were cut at the token limit")
-            && said.contains("--max-tokens"),
-        "{said}"
+        output.contains("6 of the first 10 replies were cut at the token limit")
+            && output.contains("--max-tokens"),
+        "{output}"
     );
-    for (cut, words) in [(5, Value::Null), (10, json!("The answer is C"))] {
-        let said = told_of_cut(cut, &words);
-        assert!(!said.contains("replies were cut"), "{said}");
-    }
+    let rows = [(5, Value::Null), (10, json!("The answer is C"))];
+    check_rows(rows, |(cut, words)| {
+        let output = cut_report(cut, &words);
+        assert!(!output.contains("replies were cut"), "{output}");
+    });
 }
 
 // ---- Open questions about enhanced walks ----
@@ -370,13 +372,13 @@ fn answer_batch(house: &House, file: &str, reply: &str) -> Vec<Value> {
 }
 
 /// The conditions of what a run holds, answers and marks apart, each as often as it is there.
-fn held(house: &House) -> BTreeMap<String, usize> {
-    let mut held = BTreeMap::new();
+fn counts(house: &House) -> BTreeMap<String, usize> {
+    let mut counts = BTreeMap::new();
     for record in lines(&house.0.path("run/records.jsonl")) {
         let name = record["condition"].as_str().unwrap_or("marks").to_owned();
-        *held.entry(name).or_default() += usize::from(record["failure"].is_null());
+        *counts.entry(name).or_default() += usize::from(record["failure"].is_null());
     }
-    held
+    counts
 }
 
 #[test]
@@ -385,8 +387,11 @@ fn enhanced_walks_go_through_batch_and_page() {
     let silent = MockEndpoint::start([Answer::error(400, "bad", "must not be asked")]);
     let line = format!("{OPEN} {}", silent.base_url());
     let batch = format!("{line} --batch");
-    let told = house.call(&words(&batch));
-    assert!(told.stdout.contains("9 requests in 1 files"), "{told:?}");
+    let called = house.call(&words(&batch));
+    assert!(
+        called.stdout.contains("9 requests in 1 files"),
+        "{called:?}"
+    );
     let requests = answer_batch(&house, "run/batch/1-m-001.jsonl", "It is brown");
     let mut light = BTreeMap::<String, Vec<f64>>::new();
     for trial in lines(&house.0.path("run/batch/trials.jsonl")) {
@@ -407,16 +412,19 @@ fn enhanced_walks_go_through_batch_and_page() {
     for (raw, enhanced) in light["L3-noise"].iter().zip(&light["L3-noise+bright"]) {
         assert!((2.5 * raw..3.5 * raw).contains(enhanced), "{light:?}");
     }
-    let told = house.call(&words(&batch));
+    let called = house.call(&words(&batch));
     // One mark for each question: all conditions were answered alike.
-    assert!(told.stdout.contains("3 requests in 1 files"), "{told:?}");
+    assert!(
+        called.stdout.contains("3 requests in 1 files"),
+        "{called:?}"
+    );
     answer_batch(&house, "run/batch/1-j-001.jsonl", "Your mark: 4");
     let called = house.call(&words(&line));
     assert_eq!(called.code, Some(0), "{called:?}");
     assert!(called.stdout.contains("bright"), "{}", called.stdout);
     assert!(silent.requests().is_empty());
     let each = ["L0", "L3-noise", "L3-noise+bright", "marks"];
-    assert_eq!(held(&house), each.map(|name| (name.to_owned(), 3)).into());
+    assert_eq!(counts(&house), each.map(|name| (name.to_owned(), 3)).into());
     let summary = house.read("run/summary.json");
     let mut rows = summary["rows"].as_array().unwrap().iter();
     let row = rows.find(|row| row["by"] == "all" && row["enhancer"] == "bright");
@@ -452,11 +460,13 @@ fn enhanced_walks_go_on_where_they_were_stopped() {
     let after = fs::read_to_string(house.0.path("run/records.jsonl")).unwrap();
     assert!(after.starts_with(&before));
     let each = ["L0", "L3-noise", "L3-noise+bright", "marks"];
-    assert_eq!(held(&house), each.map(|name| (name.to_owned(), 3)).into());
-    let shown = lines(&house.0.path("run/thumbnails.jsonl"));
-    let shown = shown.iter().map(|line| line["condition"].as_str().unwrap());
+    assert_eq!(counts(&house), each.map(|name| (name.to_owned(), 3)).into());
+    let thumbnails = lines(&house.0.path("run/thumbnails.jsonl"));
+    let thumbnails = thumbnails
+        .iter()
+        .map(|line| line["condition"].as_str().unwrap());
     assert_eq!(
-        shown.collect::<BTreeSet<&str>>(),
+        thumbnails.collect::<BTreeSet<&str>>(),
         each[..3].iter().copied().collect()
     );
 }
@@ -482,9 +492,9 @@ fn a_null_or_refused_reply_is_no_answer() {
     );
     let called = house.call(&words(&line));
     assert_eq!(called.code, Some(0), "{called:?}");
-    let asked = judge.requests();
-    assert_eq!(asked.len(), 1, "the judge is sent what is an answer");
-    let prompt = asked[0].json()["messages"][0]["content"].to_string();
+    let requests = judge.requests();
+    assert_eq!(requests.len(), 1, "the judge is sent what is an answer");
+    let prompt = requests[0].json()["messages"][0]["content"].to_string();
     assert!(prompt.contains("Response: No"), "{prompt}");
     assert_eq!(
         house.read("run/upstream/m-L0.json"),

@@ -3,6 +3,9 @@
 
 #![allow(clippy::unwrap_used, missing_docs)]
 
+#[path = "support/table.rs"]
+mod table;
+
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,6 +14,7 @@ use assert_cmd::Command;
 use darkqa_eval::internals::labels::space;
 use image::{GrayImage, ImageBuffer, Luma, Rgb, RgbImage};
 use serde_json::{Value, json};
+use table::check_rows;
 use tempfile::TempDir;
 
 const SIZE: (u32, u32) = (320, 240);
@@ -113,12 +117,12 @@ impl Data {
         self.write("frames.jsonl", &format!("{first}\n{rest}"));
     }
 
-    fn ask(&self, out: &Path, flags: &[&str]) -> Said {
+    fn ask(&self, out: &Path, flags: &[&str]) -> Outcome {
         let mut command = Command::cargo_bin("darkqa-eval").unwrap();
         let out = out.join("q.jsonl");
         let command = command.arg("questions").arg(self.0.path()).arg("--out");
         let output = command.arg(&out).args(flags).output().unwrap();
-        Said {
+        Outcome {
             code: output.status.code().unwrap(),
             out: String::from_utf8(output.stdout).unwrap(),
             err: String::from_utf8(output.stderr).unwrap(),
@@ -136,14 +140,14 @@ fn line(scene: &str, frame: usize) -> Value {
     })
 }
 
-struct Said {
+struct Outcome {
     code: i32,
     out: String,
     err: String,
     questions: String,
 }
 
-impl Said {
+impl Outcome {
     fn lines(&self) -> Vec<Value> {
         assert_eq!(self.code, 0, "{}", self.err);
         let lines = self.questions.lines();
@@ -174,13 +178,13 @@ fn folder() -> TempDir {
 #[test]
 fn a_bedroom_is_asked_about_in_every_family() {
     let (data, out) = (Data::of(&[bedroom("s")]), folder());
-    let said = data.ask(out.path(), &["--balance", "none"]);
+    let outcome = data.ask(out.path(), &["--balance", "none"]);
     let answers: Vec<(String, String)> =
         ["room_type", "affordance", "presence", "color", "closest"]
             .into_iter()
             .map(|family| {
-                let asked = said.of(family);
-                assert_eq!(asked.len(), 1, "{family}: {}", said.questions);
+                let asked = outcome.of(family);
+                assert_eq!(asked.len(), 1, "{family}: {}", outcome.questions);
                 (
                     asked[0]["question"].to_string(),
                     asked[0]["answer"].to_string(),
@@ -189,13 +193,13 @@ fn a_bedroom_is_asked_about_in_every_family() {
             .collect();
     assert_eq!(answers[0].1, "\"bedroom\"");
     assert_eq!(answers[4].1, "\"chair\"", "{answers:?}");
-    for line in said.lines() {
+    for line in outcome.lines() {
         let choices = line["choices"].as_array().unwrap();
         assert!(choices.contains(&line["answer"]), "{line}");
         let rules = &line["evidence"]["rules"];
         assert_eq!(rules["digest"].as_str().unwrap().len(), 64, "{line}");
     }
-    let depths = &said.of("closest")[0]["evidence"]["segments"];
+    let depths = &outcome.of("closest")[0]["evidence"]["segments"];
     assert!(depths.as_array().unwrap().len() >= 2, "{depths}");
 }
 
@@ -246,7 +250,7 @@ fn what_was_measured_is_kept_by_content() {
         }
     }
     fs::write(&kept, format!("{frame}\n")).unwrap();
-    let closest = |said: &Said| said.of("closest")[0]["answer"].clone();
+    let closest = |outcome: &Outcome| outcome.of("closest")[0]["answer"].clone();
     assert_eq!(closest(&data.ask(out.path(), &[])), "chest of drawers");
     // Another image under the same name is measured anew.
     let mut things = BEDROOM;
@@ -263,9 +267,9 @@ fn nothing_is_asked_of_depth_where_there_is_none() {
             .unwrap()
             .retain(|key, _| !key.starts_with("depth"));
     });
-    let said = data.ask(out.path(), &["--balance", "none"]);
-    assert_eq!(said.of("closest").len(), 0);
-    assert_eq!(said.of("room_type").len(), 1);
+    let outcome = data.ask(out.path(), &["--balance", "none"]);
+    assert_eq!(outcome.of("closest").len(), 0);
+    assert_eq!(outcome.of("room_type").len(), 1);
 }
 
 #[test]
@@ -290,9 +294,9 @@ fn nothing_is_denied_that_the_labels_cannot_say() {
     let of_nyu40 = denied(&[]);
     assert!(of_nyu40.contains(&"toilet".to_owned()), "{of_nyu40:?}");
     // NYU40 puts plants and stools under catch-alls.
-    for hidden in ["plant", "stool"] {
+    check_rows(["plant", "stool"], |hidden| {
         assert!(!of_nyu40.contains(&hidden.to_owned()), "{of_nyu40:?}");
-    }
+    });
     let own = [
         (1, "wall"),
         (2, "floor"),
@@ -331,8 +335,8 @@ fn verdicts_leave_out_what_was_rejected() {
         verdicts.to_str().unwrap(),
     ];
     let after = data.ask(out.path(), &flags);
-    let ids = |said: &Said| -> Vec<String> {
-        let mut ids: Vec<String> = said
+    let ids = |outcome: &Outcome| -> Vec<String> {
+        let mut ids: Vec<String> = outcome
             .lines()
             .iter()
             .map(|line| line["id"].to_string())
@@ -353,7 +357,7 @@ fn verdicts_leave_out_what_was_rejected() {
 #[test]
 fn rules_and_colours_are_a_file_that_stands_in_each_question() {
     let (data, out) = (Data::of(&[bedroom("s")]), folder());
-    let digest = |said: &Said, of: &str| said.lines()[0]["evidence"]["rules"][of].clone();
+    let digest = |outcome: &Outcome, of: &str| outcome.lines()[0]["evidence"]["rules"][of].clone();
     let first = data.ask(out.path(), &[]);
     let rules = out.path().join("rules.toml");
     let built_in = fs::read_to_string(concat!(
@@ -362,9 +366,9 @@ fn rules_and_colours_are_a_file_that_stands_in_each_question() {
     ))
     .unwrap();
     fs::write(&rules, built_in.replace("crushed = 3 ", "crushed = 4 ")).unwrap();
-    let said = data.ask(out.path(), &["--rules", rules.to_str().unwrap()]);
-    assert_ne!(digest(&said, "digest"), digest(&first, "digest"));
-    assert_eq!(digest(&said, "colors"), digest(&first, "colors"));
+    let outcome = data.ask(out.path(), &["--rules", rules.to_str().unwrap()]);
+    assert_ne!(digest(&outcome, "digest"), digest(&first, "digest"));
+    assert_eq!(digest(&outcome, "colors"), digest(&first, "colors"));
     fs::write(&rules, "[measure\n").unwrap();
     data.ask(out.path(), &["--rules", rules.to_str().unwrap()])
         .refused(&["rules.toml", "line 1"]);
@@ -378,8 +382,8 @@ fn rules_and_colours_are_a_file_that_stands_in_each_question() {
 fn statistics_are_written_in_every_form() {
     let (data, out) = (Data::of(&[bedroom("a"), bedroom("b")]), folder());
     let stats = out.path().join("stats");
-    let said = data.ask(out.path(), &["--stats", stats.to_str().unwrap(), "--json"]);
-    let json: Value = serde_json::from_str(&said.out).unwrap();
+    let outcome = data.ask(out.path(), &["--stats", stats.to_str().unwrap(), "--json"]);
+    let json: Value = serde_json::from_str(&outcome.out).unwrap();
     assert_eq!(
         json,
         serde_json::from_slice::<Value>(&fs::read(stats.join("statistics.json")).unwrap()).unwrap()
@@ -393,8 +397,8 @@ fn statistics_are_written_in_every_form() {
 #[test]
 fn questions_are_evaluated_as_they_are() {
     let (data, out) = (Data::of(&[bedroom("s")]), folder());
-    let said = data.ask(out.path(), &["--balance", "none"]);
-    data.write("questions.jsonl", &said.questions);
+    let outcome = data.ask(out.path(), &["--balance", "none"]);
+    data.write("questions.jsonl", &outcome.questions);
     let mut command = Command::cargo_bin("darkqa-eval").unwrap();
     let run = out.path().join("run");
     command
@@ -405,7 +409,7 @@ fn questions_are_evaluated_as_they_are() {
         .assert()
         .success();
     let records = walk(&run, "records.jsonl");
-    let asked = said.lines().len();
+    let asked = outcome.lines().len();
     // At L0, and at L5 in both variants.
     assert_eq!(records.lines().count(), 3 * asked, "{records}");
 }
@@ -433,9 +437,9 @@ fn unknown_numbers_are_counted_or_refused() {
         things: things.to_vec(),
     };
     let (data, out) = (Data::of(&[view]), folder());
-    let said = data.ask(out.path(), &["--json"]);
-    assert_eq!(said.code, 0, "{}", said.err);
-    assert!(said.out.contains("77"), "{}", said.out);
+    let outcome = data.ask(out.path(), &["--json"]);
+    assert_eq!(outcome.code, 0, "{}", outcome.err);
+    assert!(outcome.out.contains("77"), "{}", outcome.out);
     data.ask(out.path(), &["--strict"])
         .refused(&["frame \"s/0\"", "77", "classes.json"]);
 }
@@ -474,13 +478,13 @@ fn segments_of_8_bits_are_refused() {
 
 #[test]
 fn maps_of_another_size_are_refused() {
-    for map in ["sem", "over", "depth"] {
+    check_rows(["sem", "over", "depth"], |map| {
         let (data, out) = (Data::of(&[bedroom("s")]), folder());
         let small = ImageBuffer::<Luma<u16>, Vec<u16>>::new(SIZE.0 / 2, SIZE.1);
         small.save(data.path(&format!("{map}0.png"))).unwrap();
         let words = [&format!("{map}0.png")[..], "240 × 160", "240 × 320"];
         data.ask(out.path(), &[]).refused(&words);
-    }
+    });
 }
 
 #[test]
@@ -488,22 +492,23 @@ fn a_broken_frame_does_not_stop_the_others() {
     let (data, out) = (Data::of(&[bedroom("a"), bedroom("b")]), folder());
     let bytes = fs::read(data.path("rgb1.png")).unwrap();
     fs::write(data.path("rgb1.png"), &bytes[..bytes.len() / 2]).unwrap();
-    let said = data.ask(out.path(), &[]);
-    assert_eq!(said.code, 1, "{}", said.err);
-    assert!(said.err.contains("rgb1.png"), "{}", said.err);
-    assert!(said.questions.contains("a/0") && !said.questions.contains("b/1"));
+    let outcome = data.ask(out.path(), &[]);
+    assert_eq!(outcome.code, 1, "{}", outcome.err);
+    assert!(outcome.err.contains("rgb1.png"), "{}", outcome.err);
+    assert!(outcome.questions.contains("a/0") && !outcome.questions.contains("b/1"));
 }
 
 #[test]
 fn a_scale_of_depth_off_by_a_thousand_is_refused() {
-    for (scale, says) in [(1.0, "deeper than any room"), (1e-6, "depth_scale")] {
+    let rows = [(1.0, "deeper than any room"), (1e-6, "depth_scale")];
+    check_rows(rows, |(scale, part)| {
         let (data, out) = (Data::of(&[bedroom("s")]), folder());
         data.change(|line| line["depth_scale"] = scale.into());
-        let said = data.ask(out.path(), &[]);
-        let told = format!("{}{}", said.out, said.err);
-        assert!(told.contains(says), "{scale}: {told}");
-        assert!(!said.questions.contains("closest"));
-    }
+        let outcome = data.ask(out.path(), &[]);
+        let message = format!("{}{}", outcome.out, outcome.err);
+        assert!(message.contains(part), "{scale}: {message}");
+        assert!(!outcome.questions.contains("closest"));
+    });
 }
 
 #[test]
@@ -516,11 +521,11 @@ fn broken_lines_are_named() {
     );
     data.ask(out.path(), &[]).refused(&["frames.jsonl, line 2"]);
     data.write("frames.jsonl", &text.replace("rgb1.png", "missing.png"));
-    let said = data.ask(out.path(), &[]);
+    let outcome = data.ask(out.path(), &[]);
     assert!(
-        said.code != 0 && said.err.contains("missing.png"),
+        outcome.code != 0 && outcome.err.contains("missing.png"),
         "{}",
-        said.err
+        outcome.err
     );
     data.write(
         "frames.jsonl",

@@ -9,6 +9,7 @@ use std::fs;
 use image::{Rgb, RgbImage};
 use serde_json::Value;
 use support::run::Bench;
+use support::table::check_rows;
 
 /// A normal image, and the same 2.2 EV darker (so that codes are halved) under noise of a few codes.
 fn pair(bench: &Bench, name: &str, salt: u32) {
@@ -83,15 +84,16 @@ fn files_hold_every_pair() {
         "{}",
         table.stderr
     );
-    for word in [
+    let rows = [
         "exposure drop alone",
         "with sensor noise",
         "±",
         "Fu et al. 2023",
         "other rule: ",
-    ] {
+    ];
+    check_rows(rows, |word| {
         assert!(table.stdout.contains(word), "{word:?}: {}", table.stdout);
-    }
+    });
     let pairs = fs::read_to_string(bench.path("out/pairs.csv")).unwrap();
     assert_eq!(pairs.lines().count(), 5);
     assert!(
@@ -139,7 +141,7 @@ fn a_broken_pair_does_not_stop_the_others() {
         called.stderr
     );
     assert!(called.stdout.contains("1 pair failed"));
-    for (words, says) in [
+    let rows = [
         (&["realism", "nowhere"][..], "nowhere"),
         (&["realism", "pairs/low"], "--normal DIR"),
         (&["realism", "pairs", "--ev", "99"], "--ev"),
@@ -148,9 +150,10 @@ fn a_broken_pair_does_not_stop_the_others() {
             "'--kl-bins <KL_BINS>' [possible values: fu, kousha]",
         ),
         (&["realism"], "PAIRS"),
-    ] {
-        let refused = bench.call(words);
-        assert_eq!(refused.code, Some(2), "{words:?}: {refused:?}");
+    ];
+    check_rows(rows, |(args, message)| {
+        let refused = bench.call(args);
+        assert_eq!(refused.code, Some(2), "{args:?}: {refused:?}");
         assert_eq!(
             refused.stderr.trim_end().lines().count(),
             1,
@@ -158,9 +161,9 @@ fn a_broken_pair_does_not_stop_the_others() {
             refused.stderr
         );
         assert!(
-            refused.stderr.contains(says),
-            "{words:?}: {}",
+            refused.stderr.contains(message),
+            "{args:?}: {}",
             refused.stderr
         );
-    }
+    });
 }

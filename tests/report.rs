@@ -8,21 +8,13 @@ use std::fs;
 use std::path::Path;
 
 use serde_json::{Value, json};
-use support::run::{Bench, records};
+use support::run::{Bench, records, words};
+use support::table::check_rows;
 
 /// A run of the random model over both variants of two levels, in this folder.
-fn run(bench: &Bench, out: &str, further: &[&str]) {
-    let words = [
-        "--model",
-        "random",
-        "--data",
-        "set.jsonl",
-        "--levels",
-        "L0,L5",
-        "--out",
-        out,
-    ];
-    bench.complete(&[&words, further].concat());
+fn run(bench: &Bench, out: &str, more: &str) {
+    let line = format!("--model random --data set.jsonl --levels L0,L5 --out {out} {more}");
+    bench.complete(&words(&line));
 }
 
 fn csv(path: &Path) -> Vec<Vec<String>> {
@@ -36,39 +28,34 @@ fn csv(path: &Path) -> Vec<Vec<String>> {
 #[test]
 fn several_runs_become_one_comparison() {
     let bench = Bench::with_questions(12);
-    run(&bench, "one", &[]);
-    run(&bench, "two", &["--seed", "1"]);
+    run(&bench, "one", "");
+    run(&bench, "two", "--seed 1");
     bench.file("said.jsonl", "{\"default\": \"C\"}\n");
-    bench.complete(&[
-        "--model",
-        "script:said.jsonl",
-        "--data",
-        "set.jsonl",
-        "--levels",
-        "L0,L5",
-        "--out",
-        "three",
-    ]);
+    bench.complete(&words(
+        "--model script:said.jsonl --data set.jsonl --levels L0,L5 --out three",
+    ));
     let called = bench.call(&["report", "one", "two", "three", "--out", "all"]);
     assert_eq!(called.code, Some(0), "{called:?}");
     // Random draws by the condition and the question: the seed of the light does not change what it was asked at L0 and by
     // exposure, so those trials are one; with noise the two runs answered differently, and the model stands twice.
-    for label in ["random (one)", "random (two)", "script:said.jsonl"] {
+    let rows = ["random (one)", "random (two)", "script:said.jsonl"];
+    check_rows(rows, |label| {
         assert!(called.stdout.contains(label), "{label}: {called:?}");
-    }
+    });
     assert!(called.stdout.contains("report: all/report.html"));
     let page = fs::read_to_string(bench.path("all/report.html")).unwrap();
     assert!(page.contains("Seeing in the dark: 3 runs compared"));
-    for name in [
+    let rows = [
         "summary.csv",
         "comparisons.csv",
         "thresholds.csv",
         "agreement.csv",
         "tables.tex",
         "figures/accuracy.svg",
-    ] {
+    ];
+    check_rows(rows, |name| {
         assert!(bench.path("all").join(name).is_file(), "{name}");
-    }
+    });
     let described = include_str!("../results/README.md");
     let files = fs::read_dir(bench.path("all")).unwrap();
     let files = files.map(|file| file.unwrap().file_name().into_string().unwrap());
@@ -88,10 +75,10 @@ fn several_runs_become_one_comparison() {
         assert_eq!(row[place("second")], "1");
     }
     // Nothing is written where nothing is wanted.
-    let told = bench.call(&["report", "one", "three"]);
+    let called = bench.call(&["report", "one", "three"]);
     assert!(
-        told.stdout.contains("report: --out DIR writes it"),
-        "{told:?}"
+        called.stdout.contains("report: --out DIR writes it"),
+        "{called:?}"
     );
     let json = bench.call(&["report", "one", "three", "--json"]);
     let json: Value = serde_json::from_str(&json.stdout).unwrap();
@@ -101,12 +88,12 @@ fn several_runs_become_one_comparison() {
 #[test]
 fn runs_that_cannot_be_compared_are_named() {
     let bench = Bench::with_questions(3);
-    run(&bench, "one", &[]);
+    run(&bench, "one", "");
     let text = fs::read_to_string(bench.path("set.jsonl")).unwrap();
     bench.file("set.jsonl", text.replace("\"id\":\"q", "\"id\":\"other"));
-    run(&bench, "strange", &[]);
+    run(&bench, "strange", "");
     bench.file("set.jsonl", text.replace("\"red\"", "\"pink\""));
-    run(&bench, "foreign", &[]);
+    run(&bench, "foreign", "");
     let refused = |runs: [&str; 2]| bench.call(&["report", runs[0], runs[1]]);
     let strange = refused(["one", "strange"]);
     assert_eq!(strange.code, Some(2));
@@ -133,7 +120,7 @@ fn runs_that_cannot_be_compared_are_named() {
 #[test]
 fn broken_records_are_named_or_passed_over() {
     let bench = Bench::with_questions(3);
-    run(&bench, "run", &[]);
+    run(&bench, "run", "");
     let path = bench.path("run/records.jsonl");
     let whole = fs::read_to_string(&path).unwrap();
     let report = || bench.call(&["report", "run"]);
@@ -177,7 +164,7 @@ fn broken_records_are_named_or_passed_over() {
 #[test]
 fn runs_of_earlier_versions_are_read() {
     let bench = Bench::with_questions(3);
-    run(&bench, "run", &[]);
+    run(&bench, "run", "");
     // What the first version wrote: no questions, no small copies, no recipe, records of the first fields alone.
     for later in ["questions.jsonl", "thumbnails.jsonl", "report.html"] {
         fs::remove_file(bench.path("run").join(later)).unwrap();
@@ -198,32 +185,32 @@ fn runs_of_earlier_versions_are_read() {
     assert_eq!(called.code, Some(0), "{called:?}");
     assert!(called.stdout.contains("chance: 33.33 over 3 questions"));
     assert!(bench.path("run/report.html").is_file());
-    let shown = bench.call(&["show", "run", "q0"]);
+    let called = bench.call(&["show", "run", "q0"]);
     assert!(
-        shown
+        called
             .stderr
             .contains("the run does not say how its images were made"),
-        "{shown:?}"
+        "{called:?}"
     );
 }
 
 #[test]
 fn what_was_sent_is_made_again() {
     let bench = Bench::new();
-    bench.complete(&[
-        "--model", "random", "--levels", "L0,L4", "--limit", "4", "--seed", "3", "--out", "run",
-    ]);
+    bench.complete(&words(
+        "--model random --levels L0,L4 --limit 4 --seed 3 --out run",
+    ));
     let first = records(&bench.path("run")).remove(0);
     let id = first["question"].as_str().unwrap();
-    let shown = bench.call(&["show", "run", id]);
-    assert_eq!(shown.code, Some(0), "{shown:?}");
+    let called = bench.call(&["show", "run", id]);
+    assert_eq!(called.code, Some(0), "{called:?}");
     assert_eq!(
-        shown
+        called
             .stdout
             .matches("the very bytes that were sent")
             .count(),
         3,
-        "{shown:?}"
+        "{called:?}"
     );
     for record in records(&bench.path("run"))
         .iter()
@@ -271,7 +258,7 @@ fn what_was_sent_is_made_again() {
 #[test]
 fn people_enter_as_a_model() {
     let bench = Bench::with_questions(6);
-    run(&bench, "run", &[]);
+    run(&bench, "run", "");
     let packed = bench.call(&["study", "pack", "run", "--out", "pack"]);
     assert_eq!(packed.code, Some(0), "{packed:?}");
     assert!(
@@ -296,17 +283,8 @@ fn people_enter_as_a_model() {
         text += &line(&question, "L5-noise", 2, Value::Null);
     }
     bench.file("answers.jsonl", &text);
-    let words = [
-        "study",
-        "read",
-        "run",
-        "answers.jsonl",
-        "--out",
-        "people",
-        "--name",
-        "people",
-    ];
-    let read = bench.call(&words);
+    let args = words("study read run answers.jsonl --out people --name people");
+    let read = bench.call(&args);
     assert_eq!(read.code, Some(0), "{read:?}");
     assert!(
         read.stdout.contains(
@@ -314,23 +292,25 @@ fn people_enter_as_a_model() {
         ),
         "{read:?}"
     );
-    let made = records(&bench.path("people"));
-    assert_eq!(made.len(), 18);
+    let imported = records(&bench.path("people"));
+    assert_eq!(imported.len(), 18);
     assert_eq!(
-        made.iter()
+        imported
+            .iter()
             .filter(|record| record["outcome"] == "right")
             .count(),
         12
     );
     assert_eq!(
-        made.iter()
+        imported
+            .iter()
             .filter(|record| record["strict"]["why"] == "empty")
             .count(),
         6
     );
     // The same again changes nothing.
-    bench.call(&words);
-    assert!(records(&bench.path("people")) == made);
+    bench.call(&args);
+    assert!(records(&bench.path("people")) == imported);
     let both = bench.call(&["report", "run", "people", "--out", "both"]);
     assert_eq!(both.code, Some(0), "{both:?}");
     let rows = csv(&bench.path("both/comparisons.csv"));
@@ -340,7 +320,7 @@ fn people_enter_as_a_model() {
         .unwrap();
     assert_eq!((&*held[1], &*held[3], &*held[6]), ("people", "random", "6"));
     bench.file("answers.jsonl", "{\"question\": 1}\n");
-    let broken = bench.call(&words);
+    let broken = bench.call(&args);
     assert!(
         broken
             .stderr

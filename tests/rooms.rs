@@ -14,7 +14,8 @@ use darkqa_eval::internals::rooms::{Room, RoomTruth, Rooms, ThingTruth, VERSION,
 use darkqa_eval::questions::{Generated, GeneratedQuestion, QuestionRequest, generate};
 use darkqa_eval::types::{Digest, Family, Frame, FrameId};
 use rayon::prelude::*;
-use support::run::{Bench, records};
+use support::run::{Bench, records, words};
+use support::table::check_rows;
 
 /// What is seen of a frame by number, and what its generator knows of it.
 struct Seen {
@@ -97,8 +98,8 @@ fn wrong(asked: &GeneratedQuestion, seen: &Seen) -> Option<String> {
             if suits { "yes" } else { "no" }.to_owned()
         }
         Family::Presence => {
-            let there = !seen.of_class(about).is_empty();
-            if there { "yes" } else { "no" }.to_owned()
+            let is_visible = !seen.of_class(about).is_empty();
+            if is_visible { "yes" } else { "no" }.to_owned()
         }
         Family::Color => {
             // One of them is asked about; the others are slivers.
@@ -285,9 +286,9 @@ fn rooms_on_disk_are_those_in_the_program() {
     assert!(again.stderr.contains("--force"), "{again:?}");
     // The frames on disk and those in the program are asked the same, and answered alike.
     let run = |data: &str, out: &str| {
-        bench.complete(&[
-            "--model", "observer", "--data", data, "--levels", "L0,L4", "--out", out,
-        ]);
+        bench.complete(&words(&format!(
+            "--model observer --data {data} --levels L0,L4 --out {out}"
+        )));
         let kept = records(&bench.path(out)).into_iter();
         kept.map(|record| {
             (
@@ -304,31 +305,26 @@ fn rooms_on_disk_are_those_in_the_program() {
 #[test]
 fn settings_that_make_no_sense_are_named() {
     let bench = Bench::new();
-    for (data, says) in [
+    let rows = [
         ("rooms:frames=0", "frames=0"),
         ("rooms:size=640", "size=640"),
         ("rooms:size=9x9", "size=9x9"),
         ("rooms:seed=x", "seed=x"),
         ("rooms:doors=4", "doors=4"),
-    ] {
+    ];
+    check_rows(rows, |(data, message)| {
         let refused = bench.call(&["--model", "random", "--data", data]);
         assert_eq!(refused.code, Some(2), "{refused:?}");
         assert!(
-            refused.stderr.contains("--data") && refused.stderr.contains(says),
+            refused.stderr.contains("--data") && refused.stderr.contains(message),
             "{refused:?}"
         );
-    }
+    });
     // A file without questions is no wish for those of the rules.
     bench.file("empty.jsonl", "\n");
-    let words = [
-        "--model",
-        "random",
-        "--data",
-        "rooms:frames=1",
-        "--questions",
-        "empty.jsonl",
-    ];
-    let refused = bench.call(&words);
+    let refused = bench.call(&words(
+        "--model random --data rooms:frames=1 --questions empty.jsonl",
+    ));
     assert!(
         refused.stderr.contains("empty.jsonl: no questions in it"),
         "{refused:?}"

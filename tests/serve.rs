@@ -9,7 +9,8 @@ use std::io::{BufRead, BufReader};
 use std::process::{Child, Stdio};
 
 use serde_json::{Value, json};
-use support::run::{Bench, records};
+use support::run::{Bench, records, words};
+use support::table::check_rows;
 
 /// A server of four small rooms; it ends with the test.
 struct Server {
@@ -19,21 +20,8 @@ struct Server {
 
 impl Server {
     fn start(bench: &Bench) -> Self {
-        let words = [
-            "serve",
-            "--data",
-            "rooms:frames=4,size=200x150",
-            "--port",
-            "0",
-            "--quiet",
-        ];
-        let program = bench.command(&words);
-        let mut command = std::process::Command::new(program.get_program());
-        command
-            .args(program.get_args())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null());
-        let mut process = command.spawn().unwrap();
+        let args = words("serve --data rooms:frames=4,size=200x150 --port 0 --quiet");
+        let mut process = bench.spawn(&args, Stdio::piped());
         let mut url = String::new();
         BufReader::new(process.stdout.take().unwrap())
             .read_line(&mut url)
@@ -116,12 +104,12 @@ fn what_a_client_sends_is_answered_in_its_own_words() {
     let (status, reply) =
         server.ask(&json!({"model": "darkqa-random", "messages": user(json!(WORDS))}));
     assert_eq!((status, &reply["object"]), (200, &json!("chat.completion")));
-    let said = reply["choices"][0]["message"]["content"].as_str().unwrap();
-    assert!(["A", "B"].contains(&said), "{reply}");
+    let answer = reply["choices"][0]["message"]["content"].as_str().unwrap();
+    assert!(["A", "B"].contains(&answer), "{reply}");
     let parts = json!([{"type": "text", "text": WORDS}]);
     let (_, again) =
         server.ask(&json!({"model": "darkqa-random", "messages": user(parts), "temperature": 1}));
-    assert_eq!(again["choices"][0]["message"]["content"], said);
+    assert_eq!(again["choices"][0]["message"]["content"], answer);
     let stream =
         json!({"model": "darkqa-observer", "messages": user(json!(WORDS)), "stream": true});
     let (status, events) = server.ask(&stream);
@@ -130,7 +118,7 @@ fn what_a_client_sends_is_answered_in_its_own_words() {
         status == 200 && events.starts_with("data: {") && events.ends_with("data: [DONE]\n\n"),
         "{events}"
     );
-    for (body, status, says) in [
+    let rows = [
         (
             json!({"model": "gpt-4o", "messages": user(json!(WORDS))}),
             404,
@@ -158,14 +146,15 @@ fn what_a_client_sends_is_answered_in_its_own_words() {
             400,
             "only data URLs",
         ),
-    ] {
+    ];
+    check_rows(rows, |(body, status, part)| {
         let (found, reply) = server.ask(&body);
         let message = reply["error"]["message"].as_str().unwrap();
         assert!(
-            found == status && message.contains(says),
+            found == status && message.contains(part),
             "{body}: {found} {reply}"
         );
-    }
+    });
 }
 
 #[test]
@@ -173,14 +162,8 @@ fn a_port_that_is_taken_is_named() {
     let bench = Bench::new();
     let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     let port = taken.local_addr().unwrap().port().to_string();
-    let words = [
-        "serve",
-        "--data",
-        "rooms:frames=1,size=64x48",
-        "--port",
-        &port,
-    ];
-    let refused = bench.call(&words);
+    let line = format!("serve --data rooms:frames=1,size=64x48 --port {port}");
+    let refused = bench.call(&words(&line));
     assert_eq!(refused.code, Some(2), "{refused:?}");
     assert!(refused.stderr.contains("--port: 127.0.0.1:"), "{refused:?}");
 }

@@ -29,6 +29,7 @@ use rand::rngs::StdRng;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::{Beta, Distribution as _};
 use support::made::record;
+use support::table::check_rows;
 
 /// The only model.
 const MODEL: &str = "m";
@@ -73,7 +74,8 @@ fn sizes(random: &mut StdRng, frames: usize, least: usize, most: usize) -> Vec<u
 fn intervals_of_shares_hold_the_truth() {
     let mut random = StdRng::seed_from_u64(8);
     let (mut table, mut within) = (String::new(), true);
-    for (frames, least, most) in [(24, 4, 12), (48, 2, 6), (200, 2, 6)] {
+    let rows = [(24, 4, 12), (48, 2, 6), (200, 2, 6)];
+    check_rows(rows, |(frames, least, most)| {
         for mean in [0.33, 0.6, 0.9] {
             for correlation in [0.0, 0.2] {
                 let held = percent(4000, || {
@@ -99,7 +101,7 @@ fn intervals_of_shares_hold_the_truth() {
                 within &= (93.0..=97.0).contains(&held);
             }
         }
-    }
+    });
     println!("{table}");
     assert!(within, "{table}");
 }
@@ -167,7 +169,7 @@ fn intervals_of_open_scores_hold_the_truth() {
     let (mut table, mut within) = (String::new(), true);
     let polar = ([5; 4], [1; 4]);
     let graded = ([5, 5, 4, 3], [1, 1, 2, 3]);
-    for (name, marks) in [("1 or 5", polar), ("1 to 5", graded)] {
+    check_rows([("1 or 5", polar), ("1 to 5", graded)], |(name, marks)| {
         for count in [16, 32, 63] {
             for (mean, rho) in [(0.5, 0.0), (0.75, 0.1), (0.9, 0.1)] {
                 let (good, bad) = (points(marks.0), points(marks.1));
@@ -194,7 +196,7 @@ fn intervals_of_open_scores_hold_the_truth() {
                     .all(|held| (93.0..=97.0).contains(held));
             }
         }
-    }
+    });
     println!("{table}");
     assert!(within, "{table}");
 }
@@ -246,7 +248,7 @@ fn paired(records: &[Record]) -> PairedComparison {
 fn intervals_of_differences_hold_the_truth() {
     let mut random = StdRng::seed_from_u64(9);
     let mut table = String::new();
-    for (frames, least, most) in [(24, 4, 12), (48, 2, 6)] {
+    check_rows([(24, 4, 12), (48, 2, 6)], |(frames, least, most)| {
         for (first, second) in [(0.05, 0.05), (0.1, 0.02), (0.3, 0.1)] {
             for correlation in [0.0, 0.1] {
                 let held = percent(1000, || {
@@ -263,7 +265,7 @@ fn intervals_of_differences_hold_the_truth() {
                 assert!((92.5..=98.0).contains(&held), "{table}");
             }
         }
-    }
+    });
     println!("{table}");
 }
 

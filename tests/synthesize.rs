@@ -8,7 +8,8 @@ use std::fs;
 use std::path::Path;
 
 use serde_json::{Value, json};
-use support::run::Bench;
+use support::run::{Bench, words};
+use support::table::check_rows;
 
 /// A folder with one image, and one question about it.
 fn frames(bench: &Bench) {
@@ -86,15 +87,8 @@ fn what_is_there_is_kept_unless_it_is_another() {
     let bench = Bench::new();
     frames(&bench);
     let call = |more: &[&str]| {
-        let words = [
-            "synthesize",
-            "frames/a.png",
-            "--out",
-            "out",
-            "--levels",
-            "L2",
-        ];
-        bench.call(&[&words[..], more].concat())
+        let args = words("synthesize frames/a.png --out out --levels L2");
+        bench.call(&[&args[..], more].concat())
     };
     assert_eq!(call(&[]).stdout, "out: 2 made of 1 frames\n");
     assert_eq!(
@@ -118,53 +112,31 @@ fn what_is_there_is_kept_unless_it_is_another() {
 fn a_file_makes_its_image_again() {
     let bench = Bench::new();
     frames(&bench);
-    let made = bench.call(&[
-        "synthesize",
-        "frames/a.png",
-        "--out",
-        "out",
-        "--levels",
-        "L3",
-        "--draws",
-        "fresh",
-        "--amplify",
-        "all",
-        "--camera",
-        "nikon-d850",
-        "--seed",
-        "3",
-    ]);
+    let made = bench.call(&words(
+        "synthesize frames/a.png --out out --levels L3 \
+         --draws fresh --amplify all --camera nikon-d850 --seed 3",
+    ));
     assert_eq!(made.code, Some(0), "{made:?}");
     let sidecar = json_of(&bench.path("out/a_L3-noise@custom.json"));
     assert_eq!(sidecar["sensor"]["reading"], "custom");
     assert_eq!(sidecar["sensor"]["model"]["name"], "nikon-d850");
     assert_eq!(sidecar["drop"], 6.0);
-    for condition in ["L3-noise@custom", "L3-ev"] {
+    check_rows(["L3-noise@custom", "L3-ev"], |condition| {
         let from = format!("out/a_{condition}.json");
-        let again = bench.call(&[
-            "synthesize",
-            "frames/a.png",
-            "--out",
-            "again",
-            "--from",
-            &from,
-        ]);
+        let again = bench.call(&words(&format!(
+            "synthesize frames/a.png --out again --from {from}"
+        )));
         assert_eq!(again.code, Some(0), "{again:?}");
         let [old, new] = ["out", "again"]
             .map(|folder| fs::read(bench.path(&format!("{folder}/a_{condition}.png"))).unwrap());
         assert_eq!(old, new);
-    }
+    });
     image::RgbImage::new(2, 2)
         .save(bench.path("b.png"))
         .unwrap();
-    let wrong = bench.call(&[
-        "synthesize",
-        "b.png",
-        "--out",
-        "again",
-        "--from",
-        "out/a_L3-noise@custom.json",
-    ]);
+    let wrong = bench.call(&words(
+        "synthesize b.png --out again --from out/a_L3-noise@custom.json",
+    ));
     assert_eq!(wrong.code, Some(2));
     assert!(wrong.stderr.contains("another image"), "{}", wrong.stderr);
 }
@@ -174,16 +146,9 @@ fn one_broken_frame_does_not_stop_the_others() {
     let bench = Bench::new();
     frames(&bench);
     bench.file("frames/b.png", "no image");
-    let made = bench.call(&[
-        "synthesize",
-        "frames",
-        "--out",
-        "out",
-        "--levels",
-        "L0-L1",
-        "--variant",
-        "noise",
-    ]);
+    let made = bench.call(&words(
+        "synthesize frames --out out --levels L0-L1 --variant noise",
+    ));
     assert_eq!(made.code, Some(1));
     assert_eq!(made.stdout, "out: 2 made of 2 frames, 2 failed\n");
     assert!(made.stderr.contains("b.png"), "{}", made.stderr);
@@ -211,9 +176,8 @@ fn what_makes_no_sense_is_one_line() {
             "--ratio",
         ),
     ];
-    for (words, says) in cases {
-        let words = [&["synthesize", "--out", "out"], words].concat();
-        let refused = bench.call(&words);
+    check_rows(cases, |(args, message)| {
+        let refused = bench.call(&[&["synthesize", "--out", "out"], args].concat());
         assert_eq!(refused.code, Some(2), "{refused:?}");
         assert_eq!(
             refused.stderr.trim_end().lines().count(),
@@ -221,16 +185,9 @@ fn what_makes_no_sense_is_one_line() {
             "{}",
             refused.stderr
         );
-        assert!(refused.stderr.contains(says), "{}", refused.stderr);
-    }
-    let small = bench.call(&[
-        "synthesize",
-        "frames/a.png",
-        "--out",
-        "out",
-        "--max-pixels",
-        "100",
-    ]);
+        assert!(refused.stderr.contains(message), "{}", refused.stderr);
+    });
+    let small = bench.call(&words("synthesize frames/a.png --out out --max-pixels 100"));
     assert_eq!(small.code, Some(1));
     assert!(small.stderr.contains("--max-pixels"), "{}", small.stderr);
 }

@@ -7,13 +7,14 @@ mod support;
 
 use std::collections::BTreeSet;
 use std::fs;
-use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
+use std::process::Stdio;
+use std::time::Duration;
 
 use serde_json::{Value, json};
 use support::endpoint::{Answer, MockEndpoint};
 use support::house::{House, flags};
-use support::run::{Called, called, files, records};
+use support::process::{signal, wait_until};
+use support::run::{Called, assert_same_products, files, records, words};
 
 /// A script that answers each question in its own words, and one that marks the answers.
 fn scripts(house: &House) {
@@ -28,14 +29,16 @@ fn scripts(house: &House) {
     );
 }
 
-fn run(house: &House, more: &[&str]) -> Called {
-    let own = ["--model", "script:a.jsonl", "--judge", "script:j.jsonl"];
-    house.call(&[&own[..], &["--levels", "L0,L3"], more].concat())
+/// A run with the scripts, and more arguments.
+fn run(house: &House, more: &str) -> Called {
+    let line = format!("--model script:a.jsonl --judge script:j.jsonl --levels L0,L3 {more}");
+    house.call(&words(&line))
 }
 
-fn complete(house: &House, more: &[&str]) -> String {
+/// The output of a run with the scripts that must be complete.
+fn complete(house: &House, more: &str) -> String {
     let called = run(house, more);
-    assert_eq!(called.code, Some(0), "{more:?}: {called:?}");
+    assert_eq!(called.code, Some(0), "{more}: {called:?}");
     called.stdout
 }
 
@@ -43,44 +46,28 @@ fn complete(house: &House, more: &[&str]) -> String {
 fn parts_are_together_what_one_run_is() {
     let house = House::new();
     scripts(&house);
-    complete(&house, &["--out", "whole"]);
+    complete(&house, "--out whole");
     for part in ["1/2", "2/2"] {
-        complete(&house, &["--out", "parts", "--shard", part]);
+        complete(&house, &format!("--out parts --shard {part}"));
     }
-    let told = house.0.complete(&["merge", "parts", "--out", "merged"]);
+    let table = house.0.complete(&["merge", "parts", "--out", "merged"]);
     let (whole, merged) = (house.0.path("whole"), house.0.path("merged"));
     let keys = |run: &std::path::Path| -> BTreeSet<String> {
         let records = records(run).into_iter();
         records.map(|record| record["key"].to_string()).collect()
     };
     assert_eq!(keys(&whole), keys(&merged));
-    // Every product but those that hold times or the run's name, byte for byte.
-    let timed = [
-        "manifest.json",
-        "records.jsonl",
-        "summary.json",
-        "report.html",
-        "thumbnails.jsonl",
-    ];
-    let mut compared = 0;
-    for path in files(&whole) {
-        let name = path.strip_prefix(&whole).unwrap();
-        if !timed.iter().any(|timed| name.ends_with(timed)) {
-            let there = fs::read(merged.join(name)).unwrap();
-            assert_eq!(fs::read(&path).unwrap(), there, "{}", name.display());
-            compared += 1;
-        }
-    }
+    let compared = assert_same_products(&whole, &merged);
     assert!(compared > 5, "{compared}");
     // It is the run that the whole command goes on with: nothing is left to ask, of answers or of marks.
     let before = fs::read(merged.join("records.jsonl")).unwrap();
-    assert_eq!(complete(&house, &["--out", "merged"]), told);
+    assert_eq!(complete(&house, "--out merged"), table);
     assert_eq!(fs::read(merged.join("records.jsonl")).unwrap(), before);
     // Runs of the other kind are no part of it.
-    let other = ["--data", "rooms:frames=2,size=64x48", "--model", "random"];
-    let shard = ["--levels", "L0", "--shard", "1/2", "--out", "parts"];
     fs::remove_dir_all(house.0.path("parts/shard-1-of-2")).unwrap();
-    house.0.complete(&[&other[..], &shard].concat());
+    house.0.complete(&words(
+        "--data rooms:frames=2,size=64x48 --model random --levels L0 --shard 1/2 --out parts",
+    ));
     let refused = house.0.call(&["merge", "parts", "--out", "mixed"]);
     assert_eq!(refused.code, Some(2), "{refused:?}");
     assert!(
@@ -94,13 +81,13 @@ fn parts_are_together_what_one_run_is() {
 fn a_report_is_made_from_the_folder_alone() {
     let house = House::new();
     scripts(&house);
-    let told = complete(&house, &["--out", "run"]);
+    let table = complete(&house, "--out run");
     let page = fs::read(house.0.path("run/report.html")).unwrap();
     for gone in ["report.html", "summary.csv", "summary.json", "tables.tex"] {
         fs::remove_file(house.0.path(&format!("run/{gone}"))).unwrap();
     }
     fs::remove_dir_all(house.0.path("walks")).unwrap();
-    assert_eq!(house.0.complete(&["report", "run"]), told);
+    assert_eq!(house.0.complete(&["report", "run"]), table);
     assert_eq!(fs::read(house.0.path("run/report.html")).unwrap(), page);
 }
 
@@ -108,30 +95,30 @@ fn a_report_is_made_from_the_folder_alone() {
 fn several_runs_are_compared_if_one_judge_marked_them() {
     let house = House::new();
     scripts(&house);
-    complete(&house, &["--out", "one"]);
+    complete(&house, "--out one");
     house.0.file("b.jsonl", "{\"default\": \"grey\"}");
-    let other = ["--model", "script:b.jsonl", "--levels", "L0,L3"];
-    let judged = |judge: &str, out: &str| {
-        let called = house.call(&[&other[..], &["--judge", judge, "--out", out]].concat());
+    let run_other = |judge: &str, out: &str| {
+        let line = format!("--model script:b.jsonl --levels L0,L3 --judge {judge} --out {out}");
+        let called = house.call(&words(&line));
         assert_eq!(called.code, Some(0), "{called:?}");
     };
-    judged("script:j.jsonl", "two");
-    let told = house
+    run_other("script:j.jsonl", "two");
+    let table = house
         .0
         .complete(&["report", "one", "two", "--out", "compared"]);
     for model in ["script:a.jsonl", "script:b.jsonl"] {
-        assert!(told.contains(model), "{told}");
+        assert!(table.contains(model), "{table}");
     }
     let summary = fs::read_to_string(house.0.path("compared/summary.csv")).unwrap();
     let of_all = summary.lines().filter(|line| line.contains(",all,all,"));
     assert_eq!(of_all.count(), 4, "{summary}");
     // The same model with other replies stands once for each run.
     house.0.file("a.jsonl", "{\"default\": \"nothing\"}");
-    complete(&house, &["--out", "three"]);
-    let told = house.0.complete(&["report", "one", "three"]);
-    assert!(told.contains("script:a.jsonl (three)"), "{told}");
+    complete(&house, "--out three");
+    let table = house.0.complete(&["report", "one", "three"]);
+    assert!(table.contains("script:a.jsonl (three)"), "{table}");
     fs::copy(house.0.path("j.jsonl"), house.0.path("k.jsonl")).unwrap();
-    judged("script:k.jsonl", "four");
+    run_other("script:k.jsonl", "four");
     let refused = house.0.call(&["report", "one", "four"]);
     assert_eq!(refused.code, Some(2), "{refused:?}");
     assert!(
@@ -145,12 +132,19 @@ fn several_runs_are_compared_if_one_judge_marked_them() {
 fn the_images_of_a_walk_are_made_again_and_proved() {
     let house = House::new();
     scripts(&house);
-    complete(&house, &["--out", "run"]);
-    let told = house.0.complete(&["show", "run", "q1"]);
-    assert_eq!(told.matches("the very bytes that were sent").count(), 2);
-    assert!(told.contains("brown") && told.contains("grey"), "{told}");
-    let shown = files(&house.0.path("run/shown"));
-    assert_eq!(shown.len(), 6, "three frames in two conditions: {shown:?}");
+    complete(&house, "--out run");
+    let report = house.0.complete(&["show", "run", "q1"]);
+    assert_eq!(report.matches("the very bytes that were sent").count(), 2);
+    assert!(
+        report.contains("brown") && report.contains("grey"),
+        "{report}"
+    );
+    let images = files(&house.0.path("run/shown"));
+    assert_eq!(
+        images.len(),
+        6,
+        "three frames in two conditions: {images:?}"
+    );
     // Another frame in the place of one that was shown is noticed.
     let [one, other] = ["00002", "00003"].map(|frame| {
         house
@@ -162,7 +156,7 @@ fn the_images_of_a_walk_are_made_again_and_proved() {
     assert_eq!(called.code, Some(1), "{called:?}");
     assert!(called.stdout.contains("NOT the bytes that were sent"));
     // And the run goes on with it no more.
-    let refused = run(&house, &["--out", "run"]);
+    let refused = run(&house, "--out run");
     assert_eq!(refused.code, Some(2), "{refused:?}");
     assert!(
         refused.stderr.contains("is not the one stored in this run"),
@@ -175,7 +169,7 @@ fn the_images_of_a_walk_are_made_again_and_proved() {
 fn time_is_said_of_walks_too() {
     let house = House::new();
     scripts(&house);
-    let called = run(&house, &["--out", "run", "--timings"]);
+    let called = run(&house, "--out run --timings");
     assert!(
         called.stderr.contains("timings:") && called.stderr.contains("degrade"),
         "{}",
@@ -191,52 +185,22 @@ fn a_killed_run_goes_on_and_asks_nothing_twice() {
         let judge = request["model"] == "j";
         Answer::text(if judge { "5" } else { "an answer" })
     });
-    let base = mock.base_url();
-    let words = flags(&[
-        "--model",
-        "m",
-        "--judge",
-        "j",
-        "--base-url",
-        &base,
-        "--levels",
-        "L0-L5",
-        "--variant",
-        "both",
-        "--concurrency",
-        "2",
-        "--out",
-        "run",
-    ]);
-    let mut child = Command::new(assert_cmd::cargo::cargo_bin("darkqa-eval"))
-        .args(&words)
-        .current_dir(house.0.path(""))
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
-    let started = Instant::now();
+    let line = format!(
+        "--model m --judge j --base-url {} --levels L0-L5 --variant both --concurrency 2 --out run",
+        mock.base_url()
+    );
+    let args = flags(&words(&line));
+    let mut child = house.0.spawn(&args, Stdio::null());
     let path = house.0.path("run/records.jsonl");
-    let there = || {
-        fs::read_to_string(&path)
-            .unwrap_or_default()
-            .lines()
-            .count()
-    };
-    while there() < 8 {
-        assert!(started.elapsed() < Duration::from_mins(1), "nothing came");
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    let killed = Command::new("kill")
-        .args(["-9", &child.id().to_string()])
-        .status();
-    assert!(killed.unwrap().success());
+    let stored = || fs::read_to_string(&path).unwrap_or_default();
+    wait_until(|| stored().lines().count() >= 8);
+    signal(&child, "-9");
     child.wait().unwrap();
-    let kept: Vec<Value> = records(&house.0.path("run"));
-    let called = called(&mut house.0.command(&words));
+    let before: Vec<Value> = records(&house.0.path("run"));
+    let called = house.0.call(&args);
     assert_eq!(called.code, Some(0), "{called:?}");
     let all = records(&house.0.path("run"));
-    assert_eq!(all[..kept.len()], kept[..]);
+    assert_eq!(all[..before.len()], before[..]);
     let keys: BTreeSet<String> = all.iter().map(|record| record["key"].to_string()).collect();
     assert_eq!(keys.len(), all.len(), "no trial twice");
     // 3 questions in 11 conditions, and a mark for each question, for all answers are alike.

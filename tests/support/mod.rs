@@ -11,10 +11,13 @@
 
 pub mod browser;
 pub mod endpoint;
+pub mod frames;
 pub mod house;
 pub mod made;
 pub mod onnx;
+pub mod process;
 pub mod run;
+pub mod table;
 
 /// Keeps the ONNX Runtime of this test program from reporting anything; to be called before it is opened.
 #[expect(unsafe_code, reason = "the environment is how ONNX Runtime is told")]

@@ -91,6 +91,12 @@ pub fn words(line: &str) -> Vec<&str> {
     line.split_whitespace().collect()
 }
 
+/// The arguments for the model `m` of an endpoint, and more of them in one line.
+pub fn model_args<'a>(base_url: &'a str, line: &'a str) -> Vec<&'a str> {
+    let model = ["--model", "m", "--base-url", base_url];
+    [&model[..], &words(line)].concat()
+}
+
 pub fn called(command: &mut Command) -> Called {
     let output = command.output().unwrap();
     Called {
@@ -140,4 +146,31 @@ pub fn files(folder: &Path) -> Vec<PathBuf> {
             }
         })
         .collect()
+}
+
+/// Asserts that all files of two runs are the same bytes, but for those that hold times or the name of the run. Returns how many
+/// files were compared.
+pub fn assert_same_products(run: &Path, other: &Path) -> usize {
+    let timed = [
+        "manifest.json",
+        "records.jsonl",
+        "summary.json",
+        "report.html",
+        "thumbnails.jsonl",
+    ];
+    let mut compared = 0;
+    for path in files(run) {
+        let name = path.strip_prefix(run).unwrap();
+        if timed.iter().any(|timed| name.ends_with(timed)) {
+            continue;
+        }
+        assert_eq!(
+            fs::read(&path).unwrap(),
+            fs::read(other.join(name)).unwrap(),
+            "{}",
+            name.display()
+        );
+        compared += 1;
+    }
+    compared
 }

@@ -1,0 +1,20 @@
+//! The main job from the outside: the program is called as a user calls it.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+#[path = "../support/mod.rs"]
+mod support;
+
+mod conditions;
+mod failures;
+mod interruption;
+mod outputs;
+mod requests;
+mod resume;
+
+use serde_json::Value;
+
+/// A field of a record; empty if it is not a text.
+fn text<'a>(record: &'a Value, key: &str) -> &'a str {
+    record[key].as_str().unwrap_or("")
+}

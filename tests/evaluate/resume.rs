@@ -1,0 +1,139 @@
+//! The same command on a folder that holds a run: what is asked again, and what is not.
+
+use std::fs;
+
+use serde_json::{Value, json};
+
+use crate::support::endpoint::{Answer, MockEndpoint};
+use crate::support::run::{Bench, model_args, records, words};
+use crate::support::table::check_rows;
+
+#[test]
+fn a_stopped_run_goes_on_where_it_stopped() {
+    let bench = Bench::with_frames();
+    let answers = std::iter::repeat_n(Answer::text("A"), 4)
+        .chain([Answer::error(401, "invalid_api_key", "no such key")])
+        .chain([Answer::text("B")]);
+    let endpoint = MockEndpoint::start(answers);
+    let url = endpoint.base_url();
+    let args = model_args(&url, "--data frames --levels L0-L2 --concurrency 1");
+    let stopped = bench.call(&args);
+    assert_eq!(stopped.code, Some(2), "{stopped:?}");
+    assert!(stopped.stderr.contains("no such key"), "{stopped:?}");
+    let runs: Vec<_> = fs::read_dir(bench.path("results"))
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .collect();
+    assert_eq!((runs.len(), records(&runs[0]).len()), (1, 4));
+
+    bench.complete(&args);
+    assert_eq!(
+        endpoint.requests().len(),
+        15 + 1,
+        "3 questions in 5 conditions, and the one that was refused"
+    );
+    assert_eq!(records(&runs[0]).len(), 15);
+
+    let table = bench.complete(&args);
+    assert!(table.contains("exposure drop"), "{table}");
+    assert_eq!(
+        endpoint.requests().len(),
+        15 + 1,
+        "a complete run asks nothing"
+    );
+}
+
+#[test]
+fn a_torn_record_is_asked_again_and_nothing_else() {
+    let bench = Bench::with_frames();
+    let endpoint = MockEndpoint::start([Answer::text("A")]);
+    let url = endpoint.base_url();
+    let args = model_args(&url, "--data frames --levels L0 --out run");
+    bench.complete(&args);
+    let path = bench.path("run/records.jsonl");
+    let stored = fs::read(&path).unwrap();
+    fs::write(&path, &stored[..stored.len() - 20]).unwrap();
+    let manifest = fs::read_to_string(bench.path("run/manifest.json")).unwrap();
+    bench.file(
+        "run/manifest.json",
+        manifest.replace("\"complete\"", "\"started\""),
+    );
+    bench.complete(&args);
+    assert_eq!(
+        (records(&bench.path("run")).len(), endpoint.requests().len()),
+        (3, 4)
+    );
+}
+
+#[test]
+fn failed_trials_are_counted_apart_and_asked_again() {
+    let bench = Bench::with_frames();
+    let broken = Answer::error(400, "bad_image", "cannot look at this");
+    let endpoint = MockEndpoint::start([Answer::text("B"), broken, Answer::text("A")]);
+    let url = endpoint.base_url();
+    let args = model_args(&url, "--data frames --levels L0 --concurrency 1 --out run");
+    let first = bench.call(&args);
+    assert_eq!(first.code, Some(1), "{first:?}");
+    let csv = fs::read_to_string(bench.path("run/summary.csv")).unwrap();
+    assert!(
+        csv.contains("m,image,L0,none,,all,strict,2,2,0,1,1"),
+        "{csv}"
+    );
+    let failed = records(&bench.path("run"))
+        .into_iter()
+        .find(|record| record["outcome"] == "failed")
+        .unwrap();
+    assert_eq!(
+        (&failed["failure"]["status"], &failed["strict"]),
+        (&json!(400), &Value::Null)
+    );
+    bench.complete(&args);
+    assert_eq!(
+        endpoint.requests().len(),
+        4,
+        "only the failed one is asked again"
+    );
+}
+
+#[test]
+fn another_configuration_on_the_same_folder_is_refused() {
+    let bench = Bench::new();
+    let args = words("--model random --levels L0 --out run");
+    bench.complete(&args);
+    let rows = [("--seed", "7"), ("--image", "jpeg:90")];
+    check_rows(rows, |(field, value)| {
+        let refused = bench.call(&[&args[..], &[field, value]].concat());
+        assert_eq!(refused.code, Some(2), "{refused:?}");
+        assert!(
+            refused.stderr.contains(&format!("another {field}")),
+            "{refused:?}"
+        );
+    });
+}
+
+#[test]
+fn kept_replies_are_read_as_new_ones() {
+    let bench = Bench::with_frames();
+    bench.file("script.jsonl", "{\"default\":\"A\"}\n");
+    let args = words("--data frames --model script:script.jsonl --levels L0 --out run");
+    let table = bench.complete(&args);
+    let path = bench.path("run/records.jsonl");
+    let records = fs::read_to_string(&path).unwrap();
+    fs::write(&path, records.replace("\"chosen\":0", "\"chosen\":1")).unwrap();
+    assert_eq!(bench.complete(&args), table);
+}
+
+#[test]
+fn showing_a_complete_run_changes_nothing() {
+    let bench = Bench::new();
+    let args = words("--model random --levels L0 --out run");
+    let table = bench.complete(&args);
+    let file = |name: &str| fs::read(bench.path("run").join(name)).unwrap();
+    let before = ["manifest.json", "summary.json", "records.jsonl"].map(file);
+    let more = [&args[..], &["--concurrency", "3"]].concat();
+    assert_eq!(bench.complete(&more), table);
+    assert_eq!(
+        ["manifest.json", "summary.json", "records.jsonl"].map(file),
+        before
+    );
+}

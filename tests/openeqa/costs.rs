@@ -1,0 +1,57 @@
+//! Costs of answers and marks: the estimate, and the budget.
+
+use serde_json::{Value, json};
+
+use crate::support::endpoint::{Answer, MockEndpoint};
+use crate::support::house::House;
+use crate::support::run::words;
+
+#[test]
+fn a_dry_run_says_what_it_would_take_and_sends_nothing() {
+    let house = House::new();
+    let silent = MockEndpoint::start([Answer::error(400, "bad", "must not be asked")]);
+    let base = silent.base_url();
+    let called = house.call(&words(&format!(
+        "--model gpt-4o --base-url {base} --judge gpt-4o-mini --out run --dry-run --json"
+    )));
+    assert_eq!(called.code, Some(0), "{called:?}");
+    let estimate: Value = serde_json::from_str(&called.stdout).unwrap();
+    // Three questions at three levels, and as many marks.
+    assert_eq!(
+        (
+            &estimate["lines"][0]["requests"],
+            &estimate["lines"][1]["requests"]
+        ),
+        (&json!(9), &json!(9))
+    );
+    assert_eq!(estimate["lines"][1]["model"], "gpt-4o-mini (judge)");
+    assert_eq!(
+        (&estimate["trials"], &estimate["images"]),
+        (&json!(18), &json!(18))
+    );
+    assert!(estimate["lines"][0]["dollars"].as_f64().unwrap() > 0.0);
+    assert!(estimate["bytes"].as_f64().unwrap() > 9.0 * 3.0 * 100.0);
+    assert!(silent.requests().is_empty() && !house.0.path("run").exists());
+}
+
+#[test]
+fn a_budget_holds_for_answers_and_marks_together() {
+    let house = House::new();
+    let usage = json!({"prompt_tokens": 100_000, "completion_tokens": 10});
+    let body = json!({"choices": [{"message": {"content": "5"}, "finish_reason": "stop"}], "usage": usage});
+    let mock = MockEndpoint::start([Answer::json(200, &body)]);
+    let base = mock.base_url();
+    // 0.25 dollars a reply of gpt-4o.
+    let call = |dollars: &str| {
+        house.call(&words(&format!(
+            "--model gpt-4o --judge gpt-4o --base-url {base} --levels L0 --out run --max-cost {dollars}"
+        )))
+    };
+    let called = call("1.1");
+    assert_eq!(called.code, Some(130), "{called:?}");
+    assert_eq!(mock.requests().len(), 4);
+    let called = call("9");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    // Three answers and, as they are alike but about three questions, three marks.
+    assert_eq!(mock.requests().len(), 6);
+}

@@ -1,0 +1,186 @@
+//! Marks and scores: upstream's arithmetic, what is missing, answers of people.
+
+use std::fs;
+
+use image::{Rgb, RgbImage};
+use serde_json::{Value, json};
+
+use crate::support::endpoint::{Answer, MockEndpoint};
+use crate::support::house::House;
+use crate::support::run::{records, words};
+use crate::support::table::check_rows;
+
+#[test]
+fn marks_come_to_upstreams_score() {
+    let house = House::new();
+    // [5, 5, 3, 1, null] of upstream's own arithmetic, by people's answers at L0 and L2.
+    let people = json!([
+        {"question_id": "q1", "answer": "brown", "annotator": 1},
+        {"question_id": "q2", "answer": "at the door", "annotator": 1},
+        {"question_id": "q3", "answer": "perhaps", "annotator": 1},
+        {"question_id": "q1", "answer": "red", "annotator": "two"},
+        {"question_id": "q2", "answer": null, "annotator": "two"},
+        {"question_id": "q1", "answer": "brown", "level": "L2", "annotator": 1},
+        {"question_id": "strange", "answer": "x"},
+    ]);
+    house.0.file("people.json", people.to_string());
+    // Question by question, and of each question in the order of the file.
+    let marks = ["5", "1", "5", "3"].map(Answer::text);
+    let judge = MockEndpoint::start(marks);
+    let called = house.call(&words(&format!(
+        "--answers human=people.json --judge j --judge-base-url {} --concurrency 1 --out run",
+        judge.base_url()
+    )));
+    assert_eq!(called.code, Some(0), "{called:?}");
+    let records = records(&house.0.path("run")).into_iter();
+    let degraded: Vec<Value> = records.filter(|record| record["level"] == "L2").collect();
+    assert_eq!(
+        (&degraded[0]["ev"], &degraded[0]["reading"]),
+        (&json!(4.0), &json!("paper"))
+    );
+    // What was answered alike at L2 is not judged again.
+    assert_eq!(judge.requests().len(), 4);
+    let summary = house.read("run/summary.json");
+    let row = |level: &str| {
+        let rows = summary["rows"].as_array().unwrap().iter();
+        let mut rows = rows.filter(|row| row["by"] == "all" && row["level"] == level);
+        rows.next().unwrap().clone()
+    };
+    let clean = row("L0");
+    assert_eq!(
+        (&clean["value"], &clean["n"], &clean["null"]),
+        (&json!(0.5), &json!(5), &json!(1))
+    );
+    let degraded = row("L2");
+    // The first question alone is there in both: 1 against (1 + 0) / 2.
+    assert_eq!(
+        (&degraded["drop"], &degraded["drop_n"]),
+        (&json!(0.5), &json!(1))
+    );
+    assert!(
+        called
+            .stderr
+            .contains("1 of 7 answers are to questions that are not asked: strange")
+    );
+    // Several people's answers are no file of upstream's, which has one a question.
+    assert!(!house.0.path("run/upstream/human-L0.json").exists());
+    assert!(house.0.path("run/upstream/human-L2-noise.json").exists());
+}
+
+#[test]
+fn what_is_missing_is_named_and_counted_and_nothing_is_lost() {
+    let house = House::new();
+    fs::remove_dir_all(house.0.path("walks/scannet-v0")).unwrap();
+    house.0.file("a.jsonl", "{\"default\": \"an answer\"}");
+    house.0.file(
+        "j.jsonl",
+        "{\"question\": \"q1\", \"reply\": \"**4**\"}\n{\"default\": \"Quite good.\"}",
+    );
+    house.0.file("ids.json", "[\"q1\", \"q2\", \"q3\", \"q9\"]");
+    let args = words(
+        "--model script:a.jsonl --judge script:j.jsonl --levels L0,L2 --subset ids.json --out run",
+    );
+    let called = house.call(&args);
+    assert_eq!(called.code, Some(1), "{called:?}");
+    let notes = [
+        "1 of 4 ids are not in the file of questions: q9",
+        "1 of 2 walks cannot be shown (scannet-v0/001-b); unanswered questions: 1",
+    ];
+    check_rows(notes, |note| {
+        assert!(called.stderr.contains(note), "{note}: {}", called.stderr);
+    });
+    let counts = [
+        "0 of 6 answers scored",
+        "2 not answered",
+        "4 without a mark in the judge's reply",
+    ];
+    check_rows(counts, |count| {
+        assert!(called.stdout.contains(count), "{count}: {}", called.stdout);
+    });
+    // The judge's prose is read by the tolerant protocol, where there is a mark in it; nobody is asked again for it.
+    let before = records(&house.0.path("run")).len();
+    let called = house.call(&[&args[..], &["--protocol", "tolerant"]].concat());
+    assert!(
+        called.stdout.contains("2 of 6 answers scored"),
+        "{}",
+        called.stdout
+    );
+    let after = records(&house.0.path("run"));
+    // The two that failed are tried again, nothing else.
+    assert_eq!(after.len(), before + 2);
+    // The walk is found again: its question is asked, the others are not.
+    let path = house.0.path("walks/scannet-v0/001-b/00000-rgb.png");
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    RgbImage::from_pixel(96, 64, Rgb([9; 3]))
+        .save(&path)
+        .unwrap();
+    let called = house.call(&args);
+    assert!(
+        called.stdout.contains("without a mark"),
+        "{}",
+        called.stdout
+    );
+    assert!(!called.stdout.contains("not answered"), "{}", called.stdout);
+    let more = records(&house.0.path("run"));
+    let new: Vec<&Value> = more[after.len()..].iter().collect();
+    assert!(
+        new.iter().all(|record| record["question"] == "q3"),
+        "{new:?}"
+    );
+    assert_eq!(new.len(), 3);
+
+    fs::remove_dir_all(house.0.path("walks")).unwrap();
+    let called = house.call(&args);
+    assert_eq!(called.code, Some(2));
+    assert!(
+        called.stderr.contains("--frames: no walk can be shown"),
+        "{}",
+        called.stderr
+    );
+}
+
+#[test]
+fn a_model_that_is_gone_keeps_nobody_elses_answers_from_their_marks() {
+    let house = House::new();
+    let mock = MockEndpoint::answering(|request| {
+        if request["model"] == "gone" {
+            Answer::error(404, "model_not_found", "no such model")
+        } else {
+            Answer::text("5")
+        }
+    });
+    let base = mock.base_url();
+    let called = house.call(&words(&format!(
+        "--model gone --model m --judge j --base-url {base} --levels L0 --out run"
+    )));
+    assert_eq!(called.code, Some(2), "{called:?}");
+    assert!(called.stderr.contains("no such model"), "{}", called.stderr);
+    let summary = house.read("run/summary.json");
+    let mut rows = summary["rows"].as_array().unwrap().iter();
+    let row = rows
+        .find(|row| row["model"] == "m" && row["by"] == "all")
+        .unwrap();
+    assert_eq!((&row["value"], &row["n"]), (&json!(1.0), &json!(3)));
+}
+
+#[test]
+fn people_get_a_page_without_the_answers_and_their_file_is_marked() {
+    let house = House::new();
+    let called = house.call(&["--study", "study", "--levels", "L0,L4"]);
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert!(
+        called
+            .stdout
+            .contains("3 questions about 2 walks, 10 images, 2 conditions"),
+        "{}",
+        called.stdout
+    );
+    let page = fs::read_to_string(house.0.path("study/study.html")).unwrap();
+    assert!(!page.contains("café") && page.contains("What colour is it?"));
+    let images = fs::read_dir(house.0.path("study/images")).unwrap();
+    assert!(
+        images
+            .map(|entry| entry.unwrap().file_name())
+            .all(|name| !name.to_string_lossy().contains('L'))
+    );
+}

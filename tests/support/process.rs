@@ -1,0 +1,36 @@
+//! The program as a process that a test waits for, interrupts or kills.
+
+use std::process::{Child, Command, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use super::run::Bench;
+
+impl Bench {
+    /// Starts the program in this folder; standard error is not shown.
+    pub fn spawn(&self, args: &[&str], stdout: Stdio) -> Child {
+        Command::new(assert_cmd::cargo::cargo_bin("darkqa-eval"))
+            .args(args)
+            .current_dir(self.path(""))
+            .stdout(stdout)
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap()
+    }
+}
+
+/// Sends a signal to a process: `-INT`, `-TERM` or `-9`.
+pub fn signal(process: &Child, signal: &str) {
+    let id = process.id().to_string();
+    let status = Command::new("kill").args([signal, &id]).status();
+    assert!(status.unwrap().success());
+}
+
+/// Waits until a condition holds, one minute at most.
+pub fn wait_until(condition: impl Fn() -> bool) {
+    let start = Instant::now();
+    while !condition() {
+        assert!(start.elapsed() < Duration::from_mins(1), "nothing came");
+        thread::sleep(Duration::from_millis(5));
+    }
+}

@@ -1,0 +1,27 @@
+//! Tables of cases: every row is checked, and all rows that fail are reported.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// Checks every row of a table. Fails at the end with the number and the message of each row that failed.
+pub(crate) fn check_rows<T>(rows: impl IntoIterator<Item = T>, mut check: impl FnMut(T)) {
+    let mut failures = Vec::new();
+    for (number, row) in rows.into_iter().enumerate() {
+        if let Err(panic) = catch_unwind(AssertUnwindSafe(|| check(row))) {
+            failures.push(format!("row {number}: {}", message(&*panic)));
+        }
+    }
+    assert!(
+        failures.is_empty(),
+        "{} rows failed:\n{}",
+        failures.len(),
+        failures.join("\n")
+    );
+}
+
+/// The message of a panic.
+fn message(panic: &(dyn Any + Send)) -> &str {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    text.or_else(|| panic.downcast_ref::<&str>().copied())
+        .unwrap_or("no message")
+}
