@@ -74,6 +74,6 @@ fn open_questions_with_marks_and_an_enhancer() {
     assert_eq!(digest(&house.0, "run"), OPENEQA);
 }
 
-const EVALUATION: &str = "cb4b86d082e98687";
-const READINGS: &str = "16ea692bffea97bb";
+const EVALUATION: &str = "05c47f25360236fa";
+const READINGS: &str = "2d1c691b0b2686af";
 const OPENEQA: &str = "8afee46475f53581";

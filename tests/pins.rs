@@ -389,7 +389,7 @@ fn enhanced_walks_go_through_batch_and_page() {
     let batch = format!("{line} --batch");
     let called = house.call(&words(&batch));
     assert!(
-        called.stdout.contains("9 requests in 1 files"),
+        called.stdout.contains("9 requests in 1 file;"),
         "{called:?}"
     );
     let requests = answer_batch(&house, "run/batch/1-m-001.jsonl", "It is brown");
@@ -415,7 +415,7 @@ fn enhanced_walks_go_through_batch_and_page() {
     let called = house.call(&words(&batch));
     // One mark for each question: all conditions were answered alike.
     assert!(
-        called.stdout.contains("3 requests in 1 files"),
+        called.stdout.contains("3 requests in 1 file;"),
         "{called:?}"
     );
     answer_batch(&house, "run/batch/1-j-001.jsonl", "Your mark: 4");

@@ -189,7 +189,7 @@ fn runs_of_earlier_versions_are_read() {
     assert!(
         called
             .stderr
-            .contains("the run does not say how its images were made"),
+            .contains("the manifest of the run has no image flags"),
         "{called:?}"
     );
 }

@@ -122,7 +122,7 @@ fn what_a_client_sends_is_answered_in_its_own_words() {
         (
             json!({"model": "gpt-4o", "messages": user(json!(WORDS))}),
             404,
-            "none of darkqa-observer",
+            "is not one of darkqa-observer, darkqa-random",
         ),
         (json!({"messages": []}), 400, "missing field `model`"),
         (json!([1]), 400, "none that is understood"),

@@ -71,7 +71,7 @@ fn parts_are_together_what_one_run_is() {
     let refused = house.0.call(&["merge", "parts", "--out", "mixed"]);
     assert_eq!(refused.code, Some(2), "{refused:?}");
     assert!(
-        refused.stderr.contains("cannot be one run"),
+        refused.stderr.contains("cannot be merged"),
         "{}",
         refused.stderr
     );

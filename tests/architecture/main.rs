@@ -67,7 +67,7 @@ const CIRCLES: [(&[&str], &str); 3] = [
 /// The functions that make a digest, and use debug output in what they tell the user alone.
 const DEBUG_IN_MESSAGES: [(&str, &str); 4] = [
     ("job/observer.rs", "open"),
-    ("run/questions/mod.rs", "one"),
+    ("run/questions/mod.rs", "measure_frame"),
     ("run/serve/mod.rs", "answer"),
     ("types/digest.rs", "from_str"),
 ];
