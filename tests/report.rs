@@ -60,7 +60,12 @@ fn several_runs_become_one_comparison() {
     let files = fs::read_dir(bench.path("all")).unwrap();
     let files = files.map(|file| file.unwrap().file_name().into_string().unwrap());
     let missing: Vec<String> = files
-        .filter(|file| file.ends_with(".csv") && !described.contains(&format!("`{file}`")))
+        .filter(|file| {
+            Path::new(file)
+                .extension()
+                .is_some_and(|ending| ending == "csv")
+                && !described.contains(&format!("`{file}`"))
+        })
         .collect();
     assert!(missing.is_empty(), "not in results/README.md: {missing:?}");
     let rows = csv(&bench.path("all/comparisons.csv"));

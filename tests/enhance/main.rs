@@ -96,8 +96,8 @@ fn threads_and_enhancers_do_not_disturb_each_other() {
             scope.spawn(move || {
                 let (_folder, mut enhancer) = loaded(&onnx::gain(factor));
                 for _ in 0..5 {
-                    let enhanced = enhancer.enhance(image).unwrap();
-                    assert_eq!(enhanced, map(image, |x| f64::from(factor) * x));
+                    let result = enhancer.enhance(image).unwrap();
+                    assert_eq!(result, map(image, |x| f64::from(factor) * x));
                 }
             });
         }

@@ -113,8 +113,8 @@ fn the_trained_enhancer_invents_nothing() {
     ];
     check_rows(rows, |color| {
         let flat = Rgb::new(64, 96, color.repeat(64 * 96)).unwrap();
-        let enhanced = enhancer.enhance(&flat).unwrap();
-        let (pixels, _) = enhanced.samples().as_chunks::<3>();
+        let lifted = enhancer.enhance(&flat).unwrap();
+        let (pixels, _) = lifted.samples().as_chunks::<3>();
         // Away from the rim, where convolutions see the end of the image.
         let inner = (24..40).flat_map(|y| &pixels[y * 96 + 24..y * 96 + 72]);
         for channel in 0..3 {
@@ -127,10 +127,10 @@ fn the_trained_enhancer_invents_nothing() {
     let halves: Vec<u8> = (0..64 * 96)
         .flat_map(|i| if i % 96 < 48 { [8, 8, 8] } else { [24, 20, 16] })
         .collect();
-    let enhanced = enhancer
+    let lifted = enhancer
         .enhance(&Rgb::new(64, 96, halves).unwrap())
         .unwrap();
-    let row = &enhanced.samples()[32 * 96 * 3..33 * 96 * 3];
+    let row = &lifted.samples()[32 * 96 * 3..33 * 96 * 3];
     let steps: Vec<u8> = (24..71)
         .map(|x| row[x * 3].abs_diff(row[x * 3 + 3]))
         .collect();
