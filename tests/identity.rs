@@ -364,22 +364,22 @@ fn what_decides_nothing_asks_nothing() {
 
 /// Flags that the tables here leave out, and where they are held.
 const ELSEWHERE: [(&str, &str); 17] = [
-    ("--splits", "tests/openeqa.rs"),
-    ("--categories", "tests/openeqa.rs"),
+    ("--splits", "tests/openeqa/"),
+    ("--categories", "tests/openeqa/"),
     ("--file-size", "tests/batch.rs"),
     ("--file-requests", "tests/batch.rs"),
     ("--url", "tests/batch.rs"),
     ("--out", "names the folder"),
     ("--resume", "names the folder"),
     ("--shard", "tests/shards.rs"),
-    ("--ort-lib", "a library of one machine: tests/enhance.rs"),
+    ("--ort-lib", "a library of one machine: tests/enhance/"),
     ("--ca-file", "takes a server with TLS: tests/ask.rs"),
-    ("--frames", "tests/openeqa.rs"),
-    ("--answers", "tests/openeqa.rs"),
-    ("--judge", "marks are trials of their own: tests/openeqa.rs"),
-    ("--protocol", "tests/openeqa.rs"),
-    ("--subset", "tests/openeqa.rs"),
-    ("--study", "tests/openeqa.rs"),
+    ("--frames", "tests/openeqa/"),
+    ("--answers", "tests/openeqa/"),
+    ("--judge", "marks are trials of their own: tests/openeqa/"),
+    ("--protocol", "tests/openeqa/"),
+    ("--subset", "tests/openeqa/"),
+    ("--study", "tests/openeqa/"),
     ("--batch", "tests/batch.rs"),
 ];
 

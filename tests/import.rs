@@ -361,7 +361,8 @@ fn images_and_maps_of_nyu() {
     );
     let message = scene.refused("nyu", &["--force", "--depth-scale", "0.00001"]);
     assert!(
-        message.contains("typical depth of the frames is 0.1 m") && message.contains("--depth-scale"),
+        message.contains("typical depth of the frames is 0.1 m")
+            && message.contains("--depth-scale"),
         "{message}"
     );
     let message = scene.refused("nyu", &["--force", "--depth-scale", "1"]);

@@ -125,7 +125,7 @@ fn what_a_client_sends_is_answered_in_its_own_words() {
             "is not one of darkqa-observer, darkqa-random",
         ),
         (json!({"messages": []}), 400, "missing field `model`"),
-        (json!([1]), 400, "none that is understood"),
+        (json!([1]), 400, "not a valid chat completion"),
         (
             json!({"model": "darkqa-random", "messages": user(json!("hi"))}),
             400,

@@ -61,7 +61,7 @@ impl Camera {
         self.to_room(Vec3::NEG_Z)
     }
 
-    fn to_room(&self, v: Vec3) -> Vec3 {
+    fn to_room(self, v: Vec3) -> Vec3 {
         let (tilt, angle) = (cos_sin(-self.tilt), cos_sin(self.angle));
         let v = vec3(
             v.x,

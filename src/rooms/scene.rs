@@ -49,7 +49,7 @@ pub(super) struct Pose {
 
 impl Pose {
     /// A point of the room in the coordinates of the piece.
-    pub(super) fn to_piece(&self, place: Vec3) -> Vec3 {
+    pub(super) fn to_piece(self, place: Vec3) -> Vec3 {
         self.direction_to_piece(place - self.at)
     }
 
@@ -64,7 +64,7 @@ impl Pose {
     }
 
     /// A point of the piece in the coordinates of the room.
-    pub(super) fn to_room(&self, v: Vec3) -> Vec3 {
+    pub(super) fn to_room(self, v: Vec3) -> Vec3 {
         let rotation = cos_sin(self.angle);
         self.at
             + vec3(

@@ -67,7 +67,7 @@ pub fn expose_into(clean: &Rgb, drop_ev: f64, degraded: &mut Rgb) {
                 clean,
                 factor,
                 codes,
-            })
+            });
         });
 }
 

@@ -84,7 +84,10 @@ fn the_runtime_is_opened_once() {
         install: Install::Offline,
     };
     let message = other.open().err().unwrap().to_string();
-    assert!(message.contains("this process has already loaded"), "{message}");
+    assert!(
+        message.contains("this process has already loaded"),
+        "{message}"
+    );
 }
 
 #[test]

@@ -60,7 +60,7 @@ impl<'a> SceneMaps<'a> {
                 scene.source = LabelSource::OfPixels(semantic.as_standard_layout());
             }
             None if frame.segments.is_some() && !frame.names.is_empty() => {
-                scene.label_by_name(frame)
+                scene.label_by_name(frame);
             }
             None => {
                 let problem = "no classes: neither a semantic map (sem) nor segments (over) with names in segments.json";
