@@ -380,6 +380,12 @@ fn frames_of_sun_rgb_d() {
         2000_u16.rotate_left(3),
         9000_u16.rotate_left(3),
     );
+    // The depth before holes were filled, under the same name: it is not the one that is read.
+    scene.deep(
+        &at("depth/img_0063.png"),
+        1000_u16.rotate_left(3),
+        1000_u16.rotate_left(3),
+    );
     scene.text(&at("intrinsics.txt"), "500 0 3 0 510 2 0 0 1\n");
     scene.text(&at("scene.txt"), "living_room\n");
     scene.text(

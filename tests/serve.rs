@@ -165,5 +165,10 @@ fn a_port_that_is_taken_is_named() {
     let line = format!("serve --data rooms:frames=1,size=64x48 --port {port}");
     let refused = bench.call(&words(&line));
     assert_eq!(refused.code, Some(2), "{refused:?}");
-    assert!(refused.stderr.contains("--port: 127.0.0.1:"), "{refused:?}");
+    assert!(
+        refused
+            .stderr
+            .contains("--port: cannot listen at 127.0.0.1:"),
+        "{refused:?}"
+    );
 }

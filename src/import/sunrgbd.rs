@@ -102,8 +102,11 @@ impl SunRgbd {
                 "no image in this folder",
             ));
         };
+        // `depth_bfx` is `depth` with its holes filled, under the same file name.
         let mut depths = files(&folder.join("depth_bfx"), &[".png"])?;
-        depths.extend(files(&folder.join("depth"), &[".png"])?);
+        if depths.is_empty() {
+            depths = files(&folder.join("depth"), &[".png"])?;
+        }
         let camera = folder.join("intrinsics.txt");
         let intrinsics = match camera
             .exists()
