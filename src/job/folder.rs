@@ -15,7 +15,7 @@ use crate::store::{self, AddressChange};
 use crate::types::{Detail as _, Digest};
 
 /// Parent of the run folders that the user does not name.
-const RESULTS: &str = "results";
+pub(super) const RESULTS: &str = "results";
 
 /// The folder of a run: the one named, else the newest of the same identity and plan, else a new one.
 pub(crate) fn find<E: Experiment>(experiment: &E) -> Result<PathBuf> {

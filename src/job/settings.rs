@@ -1,11 +1,13 @@
 //! The settings that every experiment has: their flags ([`JobArgs`]) and the validated settings ([`JobSettings`]).
 
+use std::fmt::Display;
 use std::num::NonZeroU32;
-use std::path::PathBuf;
+use std::path::{self, Path, PathBuf};
 
 use clap::Args;
 
 use super::enhancers::{self, EnhancerRunArgs};
+use super::folder::RESULTS;
 use super::image_words::ImageWords;
 use super::models::{AskSettings, ModelArgs};
 use super::money::{MoneyArgs, MoneySettings};
@@ -198,7 +200,7 @@ impl JobArgs {
             shard,
             show_timings: self.scale.timings,
             show: StdoutFormat::of(self.output.json),
-            place: RunPlace::from(self.output),
+            place: RunPlace::from(self.output).checked()?,
             image_flags: self.image_flags,
         })
     }
@@ -226,6 +228,34 @@ impl From<OutputArgs> for RunPlace {
 }
 
 impl RunPlace {
+    /// The choice itself, if the folder can be written to: an error here costs nothing, one after the images are made does.
+    fn checked(self) -> Result<Self> {
+        let (flag, path) = match &self {
+            Self::Automatic => ("--out", Path::new(RESULTS)),
+            Self::Named(path) => ("--out", path.as_path()),
+            Self::Resume(path) => ("--resume", path.as_path()),
+        };
+        let problem = |folder: &Path, e: &dyn Display| {
+            let folder = folder.display();
+            Error::usage(
+                flag,
+                format_args!("cannot write to {folder}: {e}; --out DIR names another folder"),
+            )
+        };
+        if flag == "--resume" && !path.is_dir() {
+            return Err(Error::usage(
+                flag,
+                format_args!("{}: no such folder; it must hold a run", path.display()),
+            ));
+        }
+        let absolute = path::absolute(path).map_err(|e| problem(path, &e))?;
+        let existing = absolute.ancestors().find(|folder| folder.exists());
+        let existing = existing.unwrap_or(&absolute);
+        // A file without a name: it is gone when it is closed.
+        tempfile::tempfile_in(existing).map_err(|e| problem(existing, &e))?;
+        Ok(self)
+    }
+
     /// The choice for a shard: a subfolder of the whole run's folder.
     #[must_use]
     pub(crate) fn for_shard(&self, shard: Shard) -> Self {

@@ -38,6 +38,26 @@ fn a_broken_image_is_found_before_anything_is_asked() {
 }
 
 #[test]
+fn a_folder_that_cannot_be_written_is_found_before_the_data_are_read() {
+    let bench = Bench::new();
+    bench.file("file", "");
+    let rows = [
+        ("--out file", "--out: cannot write to"),
+        ("--out file/run", "--out: cannot write to"),
+        ("--out file/run --dry-run", "--out: cannot write to"),
+        ("--resume gone", "--resume: gone: no such folder"),
+    ];
+    check_rows(rows, |(place, message)| {
+        let line = format!("--model random --data nowhere --levels L0 {place}");
+        let run = bench.call(&words(&line));
+        assert_eq!(run.code, Some(2), "{run:?}");
+        assert!(run.stderr.contains(message), "{run:?}");
+    });
+    let files = fs::read_dir(bench.path("")).unwrap().count();
+    assert_eq!(files, 1, "nothing is left behind");
+}
+
+#[test]
 fn a_model_that_does_not_exist_stops_itself_alone() {
     let bench = Bench::with_frames();
     let endpoint = MockEndpoint::start([Answer::error(404, "model_not_found", "no such model")]);
