@@ -9,13 +9,11 @@ use super::experiment::{DetailOf, Experiment};
 use super::models::{AskSettings, ModelName};
 use super::observer;
 use super::plan::Plan;
+use super::settings::RESULTS;
 use super::settings::RunPlace;
 use crate::error::{Error, Result};
 use crate::store::{self, AddressChange};
 use crate::types::{Detail as _, Digest};
-
-/// Parent of the run folders that the user does not name.
-pub(super) const RESULTS: &str = "results";
 
 /// The folder of a run: the one named, else the newest of the same identity and plan, else a new one.
 pub(crate) fn find<E: Experiment>(experiment: &E) -> Result<PathBuf> {

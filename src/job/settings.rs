@@ -7,7 +7,6 @@ use std::path::{self, Path, PathBuf};
 use clap::Args;
 
 use super::enhancers::{self, EnhancerRunArgs};
-use super::folder::RESULTS;
 use super::image_words::ImageWords;
 use super::models::{AskSettings, ModelArgs};
 use super::money::{MoneyArgs, MoneySettings};
@@ -205,6 +204,9 @@ impl JobArgs {
         })
     }
 }
+
+/// Parent of the run folders that the user does not name.
+pub(super) const RESULTS: &str = "results";
 
 /// The choice of the run folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
