@@ -247,7 +247,10 @@ impl RunPlace {
         if flag == "--resume" && !path.is_dir() {
             return Err(Error::usage(
                 flag,
-                format_args!("{}: no such folder; it must hold a run", path.display()),
+                format_args!(
+                    "{}: no such folder; it must hold a run, and --out DIR begins a new one",
+                    path.display()
+                ),
             ));
         }
         let absolute = path::absolute(path).map_err(|e| problem(path, &e))?;
