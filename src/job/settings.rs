@@ -235,24 +235,22 @@ impl RunPlace {
         let (flag, path) = match &self {
             Self::Automatic => ("--out", Path::new(RESULTS)),
             Self::Named(path) => ("--out", path.as_path()),
-            Self::Resume(path) => ("--resume", path.as_path()),
+            Self::Resume(path) if path.is_dir() => ("--resume", path.as_path()),
+            Self::Resume(path) => {
+                let path = path.display();
+                let remedy = "it must hold a run, and --out DIR begins a new one";
+                let problem = format_args!("{path}: no such folder; {remedy}");
+                return Err(Error::usage("--resume", problem));
+            }
         };
         let problem = |folder: &Path, e: &dyn Display| {
             let folder = folder.display();
+            let remedy = "--out DIR names another folder";
             Error::usage(
                 flag,
-                format_args!("cannot write to {folder}: {e}; --out DIR names another folder"),
+                format_args!("cannot write to {folder}: {e}; {remedy}"),
             )
         };
-        if flag == "--resume" && !path.is_dir() {
-            return Err(Error::usage(
-                flag,
-                format_args!(
-                    "{}: no such folder; it must hold a run, and --out DIR begins a new one",
-                    path.display()
-                ),
-            ));
-        }
         let absolute = path::absolute(path).map_err(|e| problem(path, &e))?;
         let existing = absolute.ancestors().find(|folder| folder.exists());
         let existing = existing.unwrap_or(&absolute);

@@ -6,6 +6,15 @@ use serde::{Deserialize, Serialize};
 
 use super::digest::Digest;
 
+/// Suffixes of HM3D-Sem's words for things seen through a door or a window: they give the place, not the thing.
+pub(crate) const OTHER_PLACES: [&str; 5] = [
+    "/otherroom",
+    "/ otherroom",
+    "/other room",
+    "/outside",
+    "/ outside",
+];
+
 /// The class that one number of a semantic map stands for.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Label {

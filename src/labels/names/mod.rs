@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
+use crate::types::labels::OTHER_PLACES;
+
 /// Table of the words of HM3D-Sem.
 const HM3D: &str = include_str!("hm3d.tsv");
 /// Table of words that override HM3D-Sem's.
@@ -42,16 +44,10 @@ fn normalized(word: &str) -> String {
 /// The meaning of a word of a data set. The suffixes `/otherroom` and `/outside` are ignored, because they give the place only.
 pub(crate) fn meaning(word: &str) -> Meaning {
     let word = normalized(word);
-    let bare = [
-        "/otherroom",
-        "/ otherroom",
-        "/other room",
-        "/outside",
-        "/ outside",
-    ]
-    .iter()
-    .find_map(|suffix| word.strip_suffix(suffix))
-    .map_or(word.as_str(), str::trim_end);
+    let bare = OTHER_PLACES
+        .iter()
+        .find_map(|suffix| word.strip_suffix(suffix))
+        .map_or(word.as_str(), str::trim_end);
     if bare.is_empty() {
         return Meaning::Nothing;
     }

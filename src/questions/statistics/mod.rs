@@ -19,6 +19,7 @@ use serde::{Deserialize, Serialize};
 use super::colors::{BINS, Color, NONE};
 use super::reason::Reason;
 use super::rules::{ClassFlag, RuleBook};
+use crate::types::labels::OTHER_PLACES;
 use crate::types::{Digest, FrameId};
 
 pub use measure::measure;
@@ -308,15 +309,9 @@ pub(crate) fn plain_word(word: &str) -> (String, SegmentPlace) {
     let lower = word.to_lowercase();
     let mut place = SegmentPlace::Here;
     let mut rest = lower.trim();
-    while let Some(before) = [
-        "/otherroom",
-        "/ otherroom",
-        "/other room",
-        "/outside",
-        "/ outside",
-    ]
-    .iter()
-    .find_map(|suffix| rest.strip_suffix(suffix))
+    while let Some(before) = OTHER_PLACES
+        .iter()
+        .find_map(|suffix| rest.strip_suffix(suffix))
     {
         (rest, place) = (before.trim_end(), SegmentPlace::Elsewhere);
     }
