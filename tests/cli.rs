@@ -68,7 +68,7 @@ fn wrong_words_name_their_flag() {
     let bench = Bench::new();
     let rows = [
         ("--modle x", &["--modle"][..]),
-        ("", &["--model", "random"]),
+        ("--limit 3", &["--model", "random"]),
         (
             "--model random --levels L7",
             &["--levels", "\"L7\"", "L0, L1"],
@@ -110,6 +110,21 @@ fn wrong_words_name_their_flag() {
     check_rows(rows, |(line, parts)| {
         refused(&bench, line, parts);
     });
+}
+
+#[test]
+fn a_call_without_words_shows_the_first_steps() {
+    let called = Bench::new().call(&[]);
+    assert_eq!(called.code, Some(2));
+    for part in [
+        "error: --model",
+        "--llie lift",
+        "--dry-run",
+        "--help",
+        "https://",
+    ] {
+        assert!(called.stderr.contains(part), "{called:?}");
+    }
 }
 
 #[test]

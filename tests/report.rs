@@ -261,6 +261,49 @@ fn what_was_sent_is_made_again() {
 }
 
 #[test]
+fn an_item_is_drawn_as_one_picture() {
+    let bench = Bench::new();
+    let rooms = "rooms:frames=3,size=96x64";
+    bench.complete(&words(&format!(
+        "--model random --levels L0,L4 --limit 3 --llie gray-gain --data {rooms} --out run"
+    )));
+    let item = records(&bench.path("run")).remove(0);
+    let id = item["question"].as_str().unwrap();
+    let draw = |more: &[&str]| {
+        let mut words = vec!["show", "run", id, "--sheet", "item.png"];
+        words.extend(more);
+        let _ = fs::remove_file(bench.path("item.png"));
+        bench.call(&words)
+    };
+    let drawn = draw(&[]);
+    assert_eq!(drawn.code, Some(0), "{drawn:?}");
+    assert!(drawn.stdout.contains("not drawn: L4-ev\n"), "{drawn:?}");
+    let picture = image::open(bench.path("item.png")).unwrap();
+    assert!(picture.width() > 500 && picture.height() > 400);
+    // Other rooms are other images.
+    let other = draw(&["--data", "rooms:frames=3,size=96x64,seed=8"]);
+    assert_eq!(other.code, Some(1), "{other:?}");
+    let changed = "NOT the bytes that were sent: L0, L4-noise, L4-noise+gray-gain;";
+    assert!(other.stdout.contains(changed), "{other:?}");
+    bench.complete(&words(&format!(
+        "--model random --levels L0 --limit 3 --data {rooms} --out light"
+    )));
+    check_rows(
+        [
+            ("run", "nothing", "did not ask \"nothing\" with images"),
+            ("light", id, "no model was shown a dark image"),
+        ],
+        |(run, id, problem)| {
+            let refused = bench.call(&["show", run, id, "--sheet", "item.png"]);
+            assert_eq!(refused.code, Some(2), "{refused:?}");
+            assert!(refused.stderr.contains(problem), "{refused:?}");
+        },
+    );
+    let refused = bench.call(&["show", "run", id, "--sheet", "item.gif"]);
+    assert!(refused.stderr.contains(".png or .jpg"), "{refused:?}");
+}
+
+#[test]
 fn people_enter_as_a_model() {
     let bench = Bench::with_questions(6);
     run(&bench, "run", "");

@@ -146,6 +146,16 @@ impl Payload {
         &self.facts
     }
 
+    /// Extension of a name for the file, without the dot.
+    #[must_use]
+    pub fn extension(&self) -> &'static str {
+        if self.facts.format == PayloadFormat::Png.name() {
+            "png"
+        } else {
+            "jpg"
+        }
+    }
+
     /// The bytes of the encoded file.
     ///
     /// # Errors

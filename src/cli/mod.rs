@@ -39,12 +39,19 @@ const FATAL: u8 = 2;
 /// Exit code: interrupted, or stopped by `--max-cost`; the same command continues.
 const INTERRUPTED: u8 = 130;
 
+/// Printed after the error of a call without any word.
+const FIRST_STEPS: &str = "
+  darkqa-eval --model observer --llie lift                    try it, without key or data
+  darkqa-eval --model gpt-4o --data my-frames/ --dry-run      your own images: the requests, tokens and dollars it would take
+  darkqa-eval --help                                          every flag and command
+  https://github.com/darkqa-eval/darkqa-eval                  the documentation";
+
 /// The exit code of the program, after it has carried out the command that these words name.
 #[must_use]
 pub fn main(words: impl Iterator<Item = OsString>) -> ExitCode {
-    let matches = match layers::parse(command::command(), words.collect(), |name| {
-        std::env::var_os(name)
-    }) {
+    let words: Vec<OsString> = words.collect();
+    let first_steps = if words.len() == 1 { FIRST_STEPS } else { "" };
+    let matches = match layers::parse(command::command(), words, |name| std::env::var_os(name)) {
         Ok(matches) => matches,
         Err(layers::Problem::Error(e)) => return fail(&e.to_string()),
         Err(layers::Problem::Help(help)) => {
@@ -79,7 +86,7 @@ pub fn main(words: impl Iterator<Item = OsString>) -> ExitCode {
     match carry_out(cli, &progress) {
         Ok(outcome) => finish(outcome),
         // The text of an error of this crate includes its cause.
-        Err(e) => fail(&e.to_string()),
+        Err(e) => fail(&format!("{e}{first_steps}")),
     }
 }
 

@@ -49,6 +49,9 @@ impl Description {
             self.flushed,
             "set to zero, which changes no byte",
         );
+        let runtime = graph.runtime();
+        let source = format!("{}: {}", runtime.place(), runtime.path().display());
+        lines.add("ONNX Runtime", runtime.version(), source);
         aligned(path, &lines.0)
     }
 

@@ -8,6 +8,7 @@ use serde::Serialize;
 use crate::error::{Error, Result};
 use crate::types::{Digest, EnhancerName};
 
+use super::built_in::BuiltIn;
 use super::preset::Preset;
 use super::sidecar::{self, ModelSidecar};
 use super::weights::Weights;
@@ -15,6 +16,7 @@ use super::weights::Weights;
 /// An ONNX file with its sidecar, read and checked as far as possible without ONNX Runtime.
 #[derive(Debug)]
 pub struct ModelFile {
+    /// Path of the file; for an enhancer of the program, what messages call it.
     pub(super) path: PathBuf,
     pub(super) name: EnhancerName,
     pub(super) digest: Digest,
@@ -27,25 +29,40 @@ pub struct ModelFile {
 }
 
 impl ModelFile {
-    /// Reads a model, `FILE.onnx` or `PRESET:FILE.onnx`, its sidecar `FILE.onnx.toml` if there is one, and the files of its
-    /// external data.
+    /// Reads a model: an enhancer of the program (`lift`, `gray-gain`), or `FILE.onnx` or `PRESET:FILE.onnx` with its sidecar
+    /// `FILE.onnx.toml` if there is one, and the files of its external data.
     ///
     /// # Errors
     /// If a file cannot be read or is not an ONNX model, its name is not an [`EnhancerName`], the sidecar has an unknown key,
-    /// or the preset does not exist.
+    /// or the enhancer of the program or the preset does not exist.
     pub fn read(model: &Path) -> Result<Self> {
+        if let Some(built_in) = BuiltIn::named(model)? {
+            let path = PathBuf::from(format!("{} (built in)", built_in.name));
+            let name = EnhancerName::new(built_in.name)?;
+            return Self::of(path, name, None, built_in.model.to_vec(), built_in.sidecar);
+        }
         let (preset, path) = Preset::split(model)?;
-        let path = path.as_path();
-        let bytes = std::fs::read(path).map_err(|e| Error::file(path, "read", e))?;
-        let weights = Weights::find(&bytes).map_err(|_| not_onnx(path, &bytes))?;
+        let bytes = std::fs::read(&path).map_err(|e| Error::file(&path, "read", e))?;
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         let name = EnhancerName::new(&stem)?;
-        let text = sidecar::text_for(path)?;
-        let sidecar = ModelSidecar::parse(path, &text)?;
+        let text = sidecar::text_for(&path)?;
+        Self::of(path, name, preset, bytes, &text)
+    }
+
+    /// The model of these bytes, with the text of its sidecar.
+    fn of(
+        path: PathBuf,
+        name: EnhancerName,
+        preset: Option<Preset>,
+        bytes: Vec<u8>,
+        sidecar: &str,
+    ) -> Result<Self> {
+        let weights = Weights::find(&bytes).map_err(|_| not_onnx(&path, &bytes))?;
+        let sidecar = ModelSidecar::parse(&path, sidecar)?;
         Ok(Self {
-            path: path.to_owned(),
+            digest: digest(&path, &bytes, &sidecar, &weights, preset.as_ref())?,
+            path,
             name,
-            digest: digest(path, &bytes, &sidecar, &weights, preset.as_ref())?,
             sidecar,
             preset,
             bytes,
@@ -53,7 +70,7 @@ impl ModelFile {
         })
     }
 
-    /// Name in tables and records: the file's name without its extension.
+    /// Name in tables and records: the file's name without its extension, or that of an enhancer of the program.
     #[must_use]
     pub fn name(&self) -> &EnhancerName {
         &self.name

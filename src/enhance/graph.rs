@@ -75,6 +75,11 @@ impl Graph {
         })
     }
 
+    /// The ONNX Runtime that runs it.
+    pub(super) fn runtime(&self) -> &Runtime {
+        &self.runtime
+    }
+
     /// A handle that ends a run from another thread.
     pub(super) fn stopper(&self) -> Stopper {
         Stopper(Arc::clone(&self.options))

@@ -11,6 +11,7 @@
 //! still lacks something is refused, with its name. [`ModelFile::read`] needs no runtime: a file that is not an ONNX model
 //! is refused before anything is searched or installed, and a resumed run knows its digest.
 
+mod built_in;
 mod convention;
 mod describe;
 mod enhancer;

@@ -17,7 +17,7 @@ use crate::error::{Error, Result};
 
 use super::install::{Pin, install};
 use super::library::{OLDEST, PINNED, probe};
-use super::search::Surroundings;
+use super::search::{LibraryPlace, Surroundings};
 
 /// Whether the library may be installed if it is not found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,6 +44,8 @@ pub struct Runtime(Arc<OpenRuntime>);
 struct OpenRuntime {
     path: PathBuf,
     version: String,
+    /// Where it was found, as `beside the program`.
+    place: String,
     environment: Environment,
     jobs: Sender<Job>,
 }
@@ -70,8 +72,8 @@ pub unsafe fn forbid_telemetry() {
 static OPEN: Mutex<Option<Runtime>> = Mutex::new(None);
 
 impl RuntimeSearch {
-    /// Opens the named library. Without one, it opens the first usable one beside the program, in the user's cache, in the
-    /// Python environments on `PATH` or in the system's folders. Else it installs version 1.31.1 with pip, if allowed.
+    /// Opens the named library. Without one, it opens the first usable one in the places of [`LibraryPlace`]. Else it installs
+    /// version 1.31.1 with pip, if allowed.
     ///
     /// # Errors
     /// If the named library is not usable, or none was found and none could be installed. The message says what was tried
@@ -82,14 +84,21 @@ impl RuntimeSearch {
         if let Some(runtime) = open.as_ref() {
             return self.check_same(runtime);
         }
-        let (path, version) = match &self.library {
-            Some(path) => {
-                let version = probe(path).map_err(|e| unusable_library(path, &e))?;
-                (path.clone(), version)
+        let found = match &self.library {
+            Some(named) => {
+                // The system's loader would search a bare name in its own folders.
+                let path = std::path::absolute(named).unwrap_or_else(|_| named.clone());
+                let version = probe(&path).map_err(|e| unusable_library(&path, &e))?;
+                let place = "named by --ort-lib or ORT_DYLIB_PATH".to_owned();
+                FoundLibrary {
+                    path,
+                    version,
+                    place,
+                }
             }
             None => find(&Surroundings::of_this_process(), self.install)?,
         };
-        let runtime = Runtime::start(path, version)?;
+        let runtime = Runtime::start(found)?;
         Ok(open.insert(runtime).clone())
     }
 
@@ -109,12 +118,28 @@ impl RuntimeSearch {
     }
 }
 
-/// Path and version of the first usable library, or of one that is installed now.
-fn find(surroundings: &Surroundings, allowed: Install) -> Result<(PathBuf, String)> {
+/// A usable library.
+#[derive(Debug)]
+struct FoundLibrary {
+    path: PathBuf,
+    version: String,
+    /// Where it was found, as `beside the program`.
+    place: String,
+}
+
+/// The first usable library, or one that is installed now.
+fn find(surroundings: &Surroundings, allowed: Install) -> Result<FoundLibrary> {
     let mut rejected = Vec::new();
-    for path in surroundings.candidates() {
+    for (place, path) in surroundings.candidates() {
         match probe(&path) {
-            Ok(version) => return Ok((path, version)),
+            Ok(version) => {
+                let place = place.to_string();
+                return Ok(FoundLibrary {
+                    path,
+                    version,
+                    place,
+                });
+            }
             Err(problem) => {
                 tracing::debug!("{} {problem}", path.display());
                 rejected.push(format!("{} {problem}", path.display()));
@@ -128,8 +153,8 @@ fn find(surroundings: &Surroundings, allowed: Install) -> Result<(PathBuf, Strin
     installed.map_err(|problem| Error::Runtime(not_found_message(&problem, &rejected)))
 }
 
-/// Installs the pinned library into the cache; returns its path and version.
-fn install_here(surroundings: &Surroundings) -> Result<(PathBuf, String), String> {
+/// Installs the pinned library into the cache.
+fn install_here(surroundings: &Surroundings) -> Result<FoundLibrary, String> {
     let pin = Pin::of_this_platform().ok_or_else(|| {
         format!(
             "no library is known for {} {}",
@@ -151,7 +176,12 @@ fn install_here(surroundings: &Surroundings) -> Result<(PathBuf, String), String
     );
     let path = install(pin, &folder)?;
     let version = probe(&path).map_err(|e| format!("{} {e}", path.display()))?;
-    Ok((path, version))
+    let place = LibraryPlace::Cache.to_string();
+    Ok(FoundLibrary {
+        path,
+        version,
+        place,
+    })
 }
 
 /// Message for a missing library: what was tried, and how to provide one.
@@ -160,8 +190,9 @@ fn not_found_message(problem: &str, rejected: &[String]) -> String {
         [] => String::new(),
         rejected => format!(" (skipped: {})", rejected.join("; ")),
     };
+    let places = LibraryPlace::ALL.map(|place| place.to_string()).join(", ");
     format!(
-        "no library was found{rejected}, and {problem}. Three ways out: install the Python package into the environment on PATH (`pip install onnxruntime=={PINNED}`); or name the library of any release from 1.{OLDEST} on with --ort-lib FILE or ORT_DYLIB_PATH; or let it be installed: without --offline, with pip on PATH and a reachable package index"
+        "no library was found ({places}){rejected}, and {problem}. Three ways out: install the Python package into the environment of this program or one on PATH (`pip install onnxruntime=={PINNED}`); or name the library of any release from 1.{OLDEST} on with --ort-lib FILE or ORT_DYLIB_PATH; or let it be installed: without --offline, with pip on PATH and a reachable package index"
     )
 }
 
@@ -174,7 +205,12 @@ fn unusable_library(path: &Path, problem: &str) -> Error {
 
 impl Runtime {
     /// Loads a library that [`probe`] accepted, and starts its thread.
-    fn start(path: PathBuf, version: String) -> Result<Self> {
+    fn start(found: FoundLibrary) -> Result<Self> {
+        let FoundLibrary {
+            path,
+            version,
+            place,
+        } = found;
         let fault = |e: &dyn std::error::Error| Error::Runtime(format!("{}: {e}", path.display()));
         if std::env::var_os(TELEMETRY_SWITCH).is_none_or(|value| value != "1") {
             tracing::warn!(
@@ -199,6 +235,7 @@ impl Runtime {
         Ok(Self(Arc::new(OpenRuntime {
             path,
             version,
+            place,
             environment,
             jobs,
         })))
@@ -214,6 +251,11 @@ impl Runtime {
     #[must_use]
     pub fn version(&self) -> &str {
         &self.0.version
+    }
+
+    /// Where the library was found, as `beside the program`.
+    pub(super) fn place(&self) -> &str {
+        &self.0.place
     }
 
     pub(super) fn environment(&self) -> &Environment {

@@ -3,6 +3,7 @@
 use std::cmp::Reverse;
 use std::collections::HashSet;
 use std::env::{self, consts};
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 use super::library::{PINNED, is_library_name};
@@ -10,7 +11,8 @@ use super::library::{PINNED, is_library_name};
 /// Folders and variables of the process that decide where a library is searched.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Surroundings {
-    /// Folder of the running program.
+    /// Folder of the running program, without links: a link to the program may stand anywhere, its environment is where the
+    /// program itself is.
     pub(super) program: Option<PathBuf>,
     /// Cache folder of the user.
     pub(super) cache: Option<PathBuf>,
@@ -22,6 +24,45 @@ pub(super) struct Surroundings {
     pub(super) home: Option<PathBuf>,
     /// Library folders of the system.
     pub(super) system: Vec<PathBuf>,
+}
+
+/// Where a library was found, in the order of the search.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum LibraryPlace {
+    /// The folder of the program.
+    Program,
+    /// The packages of the Python environment that the program is installed in.
+    Environment,
+    /// The user's cache, into which this program installs it.
+    Cache,
+    /// The packages of the active Python environment and of those on `PATH`.
+    Python,
+    /// The folders of the system.
+    System,
+}
+
+impl LibraryPlace {
+    /// All, in the order of the search. What was installed with the program goes first, so that a job on a cluster needs no
+    /// setting.
+    pub(super) const ALL: [Self; 5] = [
+        Self::Program,
+        Self::Environment,
+        Self::Cache,
+        Self::Python,
+        Self::System,
+    ];
+}
+
+impl fmt::Display for LibraryPlace {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Program => "beside the program",
+            Self::Environment => "in the Python environment of the program",
+            Self::Cache => "in the user's cache folder",
+            Self::Python => "in the Python environments on PATH",
+            Self::System => "in the folders of the system",
+        })
+    }
 }
 
 impl Surroundings {
@@ -49,7 +90,9 @@ impl Surroundings {
         });
         system.extend(system_folders());
         Self {
+            // macOS gives the link that was called, Linux the program itself.
             program: env::current_exe()
+                .and_then(|program| program.canonicalize())
                 .ok()
                 .and_then(|program| program.parent().map(Path::to_owned)),
             cache,
@@ -66,27 +109,41 @@ impl Surroundings {
         Some(cache.join("darkqa-eval").join("onnxruntime").join(PINNED))
     }
 
-    /// Files with the library's name, in the order in which they are tried: beside the program, in the cache, in Python
-    /// environments, in the system's folders.
-    pub(super) fn candidates(&self) -> Vec<PathBuf> {
-        let folders = self
-            .program
-            .iter()
-            .cloned()
-            .chain(self.installed())
-            .chain(self.python_packages())
-            .chain(self.system.iter().cloned());
+    /// Files with the library's name, each with where it was found, in the order in which they are tried: that of
+    /// [`LibraryPlace`].
+    pub(super) fn candidates(&self) -> Vec<(LibraryPlace, PathBuf)> {
         let mut seen = HashSet::new();
-        folders
-            .flat_map(|folder| libraries_in(&folder))
-            .filter(|path| {
+        LibraryPlace::ALL
+            .into_iter()
+            .flat_map(|place| {
+                let folders = self.folders(place).into_iter();
+                folders.flat_map(move |folder| {
+                    libraries_in(&folder)
+                        .into_iter()
+                        .map(move |path| (place, path))
+                })
+            })
+            .filter(|(_, path)| {
                 // Several names often link to one library.
                 seen.insert(path.canonicalize().unwrap_or_else(|_| path.clone()))
             })
             .collect()
     }
 
-    /// The `onnxruntime/capi` folders of the Python environments on `PATH`; no Python is run.
+    /// The folders of a place.
+    fn folders(&self, place: LibraryPlace) -> Vec<PathBuf> {
+        match place {
+            LibraryPlace::Program => self.program.iter().cloned().collect(),
+            LibraryPlace::Environment => {
+                self.program.as_deref().map_or_else(Vec::new, own_packages)
+            }
+            LibraryPlace::Cache => self.installed().into_iter().collect(),
+            LibraryPlace::Python => self.python_packages(),
+            LibraryPlace::System => self.system.clone(),
+        }
+    }
+
+    /// The `onnxruntime/capi` folders of the active Python environment and of those on `PATH`; no Python is run.
     fn python_packages(&self) -> Vec<PathBuf> {
         let mut prefixes: Vec<PathBuf> = self.virtual_env.iter().cloned().collect();
         for folder in &self.path {
@@ -111,15 +168,33 @@ impl Surroundings {
     }
 }
 
-/// The `onnxruntime/capi` folders under one installation prefix of Python.
+/// The `onnxruntime/capi` folders of the environment that the program is installed in: `P/bin/darkqa-eval` has its packages in
+/// `P/lib/python3.12/site-packages` (on Windows `P\Scripts` and `P\Lib\site-packages`), and beside `bin` after
+/// `pip install --target`. So an environment need not be active.
+fn own_packages(program: &Path) -> Vec<PathBuf> {
+    let Some(prefix) = program.parent() else {
+        return Vec::new();
+    };
+    let target = prefix.join("onnxruntime").join("capi");
+    let target = target.is_dir().then_some(target);
+    packages_in(prefix).into_iter().chain(target).collect()
+}
+
+/// The `onnxruntime/capi` folders under one installation prefix, those of the newest version of Python first.
 fn packages_in(prefix: &Path) -> Vec<PathBuf> {
     let mut roots = vec![prefix.join("Lib")];
     for lib in ["lib", "lib64", "local/lib"] {
-        let versions = sorted_entries(&prefix.join(lib));
-        roots.extend(versions.into_iter().filter(|path| {
-            path.file_name()
-                .is_some_and(|name| name.to_string_lossy().starts_with("python3"))
-        }));
+        let mut versions: Vec<(Reverse<u32>, PathBuf)> = sorted_entries(&prefix.join(lib))
+            .into_iter()
+            .filter_map(|path| {
+                let version = path.file_name()?.to_str()?.strip_prefix("python3")?;
+                // Debian's folder for all versions, `python3`, counts as the oldest.
+                let minor = version.trim_start_matches('.').parse().unwrap_or(0);
+                Some((Reverse(minor), path))
+            })
+            .collect();
+        versions.sort();
+        roots.extend(versions.into_iter().map(|(_, path)| path));
     }
     let packages = ["site-packages", "dist-packages"];
     roots
@@ -185,14 +260,23 @@ mod tests {
         std::fs::write(path, "").unwrap();
     }
 
+    fn paths(surroundings: &Surroundings) -> Vec<PathBuf> {
+        let candidates = surroundings.candidates().into_iter();
+        candidates.map(|(_, path)| path).collect()
+    }
+
     #[test]
     fn candidates_come_in_order() {
         let root = tempfile::tempdir().unwrap();
         let root = root.path().canonicalize().unwrap();
         let at = |name: &str| root.join(name);
         let expected: Vec<PathBuf> = [
-            "program/libonnxruntime.so.1.20.0",
-            "program/libonnxruntime.so",
+            "env/bin/libonnxruntime.so.1.20.0",
+            "env/bin/libonnxruntime.so",
+            "env/lib/python3.12/site-packages/onnxruntime/capi/libonnxruntime.so.1.22.1",
+            "env/lib/python3.9/site-packages/onnxruntime/capi/libonnxruntime.so.1.31.1",
+            "env/lib/python3/dist-packages/onnxruntime/capi/libonnxruntime.so.1.17.3",
+            "env/onnxruntime/capi/libonnxruntime.so.1.21.0",
             "cache/darkqa-eval/onnxruntime/1.31.1/libonnxruntime.so.1.31.1",
             "venv/lib/python3.12/site-packages/onnxruntime/capi/libonnxruntime.so.1.22.0",
             "usr/lib/python3/dist-packages/onnxruntime/capi/libonnxruntime.so.1.18.0",
@@ -207,14 +291,14 @@ mod tests {
         touch(&at("system/libonnxruntime_providers_shared.so"));
         touch(&at("usr/bin/python3"));
         let surroundings = Surroundings {
-            program: Some(at("program")),
+            program: Some(at("env/bin")),
             cache: Some(at("cache")),
             virtual_env: Some(at("venv")),
             path: vec![at("missing"), at("usr/bin")],
             home: Some(at("home")),
             system: vec![at("system")],
         };
-        assert_eq!(surroundings.candidates(), expected);
+        assert_eq!(paths(&surroundings), expected);
     }
 
     #[test]
@@ -237,7 +321,7 @@ mod tests {
             path: vec![root.join("venv/bin")],
             ..Surroundings::default()
         };
-        assert_eq!(surroundings.candidates(), expected);
+        assert_eq!(paths(&surroundings), expected);
     }
 
     #[test]
@@ -250,6 +334,6 @@ mod tests {
             system: vec![root.path().to_owned()],
             ..Surroundings::default()
         };
-        assert_eq!(surroundings.candidates(), [library]);
+        assert_eq!(paths(&surroundings), [library]);
     }
 }

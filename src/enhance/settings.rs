@@ -14,9 +14,9 @@ use crate::types::{Decides, KindSet};
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Enhancement")]
 pub(crate) struct EnhancerArgs {
-    /// An enhancement model as ONNX, or PRESET:FILE (zero-dce, zero-dce++, ruas-lol, ruas-upe, retinexformer, darkir, sci,
-    /// iat, pairlie, enlightengan); repeatable: each is shown beside raw; default: none
-    #[arg(long, value_name = "FILE", add = Decides::Trials)]
+    /// An enhancer: lift or gray-gain, which are built in; FILE.onnx; or PRESET:FILE.onnx (zero-dce, zero-dce++, ruas-lol,
+    /// ruas-upe, retinexformer, darkir, sci, iat, pairlie, enlightengan); repeatable: each is shown beside raw; default: none
+    #[arg(long, value_name = "NAME|FILE", add = Decides::Trials)]
     pub llie: Vec<PathBuf>,
     /// Which degraded variants are enhanced
     #[arg(long, value_name = "noise|ev|both", default_value_t = KindSet::NOISE, add = Decides::Trials)]
@@ -41,7 +41,8 @@ pub(crate) struct SizeArgs {
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Enhancement")]
 pub(crate) struct RuntimeArgs {
-    /// The ONNX Runtime library to load; default: ORT_DYLIB_PATH, else found, else installed once by pip
+    /// The ONNX Runtime library to load; default: ORT_DYLIB_PATH, else the first found beside the program, in its Python
+    /// environment, in the cache folder, in the Python environments on PATH, in the system; else installed once by pip
     #[arg(long, value_name = "FILE", add = Decides::Nothing)]
     pub ort_lib: Option<PathBuf>,
     /// Never install ONNX Runtime

@@ -1,6 +1,7 @@
 //! Rebuilding the images of a run: `ImageRebuilder`.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use clap::Args;
 
@@ -13,12 +14,13 @@ use super::source::{Frames, Source, SourceFrame};
 use super::timings::Timings;
 use super::walk::{Walk, WalkFolder};
 use super::workers::ThreadArgs;
+use crate::ask::Payload;
 use crate::dataset::{DataPlace, Dataset, place};
 use crate::enhance::{Enhancer, RuntimeArgs};
 use crate::error::{Error, Result};
 use crate::synthesis::SensorSettings;
 use crate::types::manifest::RunManifest;
-use crate::types::{Condition, Decides, Digest, FrameId};
+use crate::types::{Condition, Decides, FrameId};
 
 /// Flags for the current paths of a run's data and enhancers, and for running them.
 ///
@@ -50,14 +52,6 @@ pub(crate) struct ImageRebuilder {
 enum FrameFolder {
     Frames(Dataset),
     Walks(WalkFolder, Walk),
-}
-
-/// The file of one image, as it would be sent.
-pub(crate) struct RebuiltImage {
-    pub(crate) file: Vec<u8>,
-    pub(crate) digest: Digest,
-    /// Extension of the file name, without the dot.
-    pub(crate) ending: &'static str,
 }
 
 impl ImageRebuilder {
@@ -107,12 +101,12 @@ impl ImageRebuilder {
         })
     }
 
-    /// The images of a frame or walk in each of these conditions, in the order shown.
+    /// The images of a frame or walk in each of these conditions, in the order shown, as they would be sent.
     pub(crate) fn images(
         &mut self,
         name: &FrameId,
         conditions: &[Condition],
-    ) -> Result<Vec<Vec<RebuiltImage>>> {
+    ) -> Result<Vec<Vec<Arc<Payload>>>> {
         let source = self.source(name).map_err(|e| {
             let problem =
                 format_args!("{e}; if the data were moved, name their folder with --data");
@@ -134,10 +128,7 @@ impl ImageRebuilder {
         let conditions: Vec<&Condition> = conditions.iter().collect();
         let images = pipeline.images(&source, &conditions);
         self.enhancers = pipeline.enhancers;
-        let images = images?.into_iter();
         images
-            .map(|images| images.iter().map(|image| rebuilt(image)).collect())
-            .collect()
     }
 
     fn source(&self, name: &FrameId) -> Result<Source> {
@@ -162,15 +153,6 @@ fn with_new_paths(mut flags: ImageFlags, args: &RebuildArgs) -> Result<ImageFlag
         flags.llie.clone_from(&args.llie);
     }
     Ok(flags)
-}
-
-fn rebuilt(image: &crate::ask::Payload) -> Result<RebuiltImage> {
-    let facts = image.facts();
-    Ok(RebuiltImage {
-        file: image.file()?,
-        digest: facts.digest,
-        ending: if facts.format == "png" { "png" } else { "jpg" },
-    })
 }
 
 /// The frames of a data set. Its questions are ignored.

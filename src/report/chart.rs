@@ -71,6 +71,20 @@ impl LineStyle {
         COLOURS[self.0 % COLOURS.len()]
     }
 
+    /// Red, green and blue of the colour.
+    pub(super) fn rgb(self) -> [u8; 3] {
+        let colour = self.colour();
+        [colour.0, colour.1, colour.2]
+    }
+
+    /// Lengths of dash and gap in pixels; `None` for a solid line.
+    pub(super) fn dashes(self) -> Option<[f64; 2]> {
+        match self.dash() {
+            (0, _) => None,
+            (drawn, gap) => Some([drawn.into(), gap.into()]),
+        }
+    }
+
     fn dash(self) -> (i32, i32) {
         DASHES[(self.0 + self.0 / COLOURS.len()) % DASHES.len()]
     }

@@ -19,8 +19,8 @@ use crate::types::manifest::Status;
 /// The flags of `enhance`.
 #[derive(Debug, Args)]
 pub(crate) struct EnhanceArgs {
-    /// The model as ONNX, or PRESET:FILE (zero-dce, zero-dce++, ruas-lol, ruas-upe, retinexformer, darkir, sci, iat,
-    /// pairlie, enlightengan)
+    /// The enhancer: lift or gray-gain, which are built in; FILE.onnx; or PRESET:FILE.onnx (zero-dce, zero-dce++, ruas-lol,
+    /// ruas-upe, retinexformer, darkir, sci, iat, pairlie, enlightengan)
     #[arg(value_name = "MODEL", add = Decides::Trials)]
     pub model: PathBuf,
     /// Images (PNG, JPEG) and folders of frames

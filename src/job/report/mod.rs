@@ -6,5 +6,7 @@ mod cost;
 mod join;
 pub(crate) mod open;
 mod runs;
+mod story;
 
 pub(crate) use runs::{ReportArgs, report};
+pub(crate) use story::story_curves;

@@ -1,6 +1,7 @@
 //! The paper's figures and others: each is a function from [`Findings`] to a [`Chart`].
 
 mod answers;
+mod story;
 mod thresholds;
 
 use std::collections::BTreeSet;
@@ -13,6 +14,8 @@ use crate::score::estimate::Estimate;
 use crate::score::findings::Findings;
 use crate::score::subject::{CHANCE, Subject};
 use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
+
+pub(crate) use story::{StoryCurves, story_curves};
 
 /// All figures for which there are records.
 ///

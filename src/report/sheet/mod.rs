@@ -1,14 +1,17 @@
-//! Figures made of images with labels: [`levels()`], [`noise()`] and [`crops()`].
+//! Figures made of images with labels: [`levels()`], [`noise()`], [`crops()`] and [`story()`].
 
 mod crops;
 mod levels;
 mod noise;
+mod story;
+mod strokes;
 
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 
 pub(crate) use crops::{CropRow, crops};
 pub(crate) use levels::{LevelColumn, levels};
 pub(crate) use noise::{Signal, noise};
+pub(crate) use story::{Story, StoryCell, StoryMark, StoryRow, story};
 
 use crate::types::Rgb;
 

@@ -73,7 +73,7 @@ pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
         let rebuilt = rebuilder.images(&frame, &conditions)?;
         for (condition, image) in conditions.iter().zip(rebuilt.iter().flatten()) {
             if let Some(sent) = sent.get(&(frame.clone(), condition.clone()))
-                && *sent != image.digest
+                && *sent != image.facts().digest
             {
                 let problem = format!(
                     "{frame} at {condition} is not the image that was sent: the data, an enhancement model or this program has changed"
@@ -82,8 +82,8 @@ pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
             }
             // The name does not reveal the level.
             let name = Digest::of_parts([frame.0.as_bytes(), condition.to_string().as_bytes()]);
-            let name = format!("images/{}.{}", &name.to_string()[..16], image.ending);
-            write(&args.out.join(&name), &image.file)?;
+            let name = format!("images/{}.{}", &name.to_string()[..16], image.extension());
+            write(&args.out.join(&name), &image.file()?)?;
             shots.push(StudyImage {
                 condition: condition.to_string(),
                 images: vec![name],

@@ -1,0 +1,62 @@
+//! The curves of the picture that tells a run's story: [`story_curves`].
+
+use super::{Overview, light};
+use crate::report::chart::{LineStyle, PanelContent, PlotLine};
+use crate::score::findings::Findings;
+use crate::score::subject::CHANCE;
+use crate::types::{EnhancerName, KindReading};
+
+/// Accuracy over the levels in one variant: each model raw, and each with one enhancer.
+#[derive(Debug, Clone)]
+pub(crate) struct StoryCurves {
+    /// The last kind that was asked, in its first light reading.
+    pub variant: KindReading,
+    /// The variant in words.
+    pub light: String,
+    /// The first enhancer of the run; `None` if there is none.
+    pub enhancer: Option<EnhancerName>,
+    /// Curves, models without images, and chance.
+    pub lines: Vec<PlotLine>,
+    /// Number of items and kind of intervals.
+    pub note: String,
+}
+
+/// The curves of a run; `None` if no model was shown a dark image.
+pub(crate) fn story_curves(findings: &Findings<'_>) -> Option<StoryCurves> {
+    let overview = Overview::new(findings);
+    let variant = overview.main_variant()?;
+    let enhancer = overview.enhancers.first().copied();
+    let mut lines = Vec::new();
+    for model in &overview.models {
+        for enhancer in [None, enhancer] {
+            let points = overview.points(model, &variant, enhancer, |subject| {
+                overview.accuracy_of(subject, None)
+            });
+            let name =
+                enhancer.map_or_else(|| (*model).to_owned(), |name| format!("{model} + {name}"));
+            // The untouched frame alone is not a line, and without an enhancer the second line is the first.
+            if points.len() > 1 && lines.iter().all(|line: &PlotLine| line.name != name) {
+                lines.push(PlotLine {
+                    name,
+                    style: LineStyle(lines.len()),
+                    content: PanelContent::Curve(points),
+                });
+            }
+        }
+    }
+    for line in overview.flat_lines(None) {
+        // A model without images has a curve in its own style above.
+        let style = match line.name.as_str() {
+            CHANCE => line.style,
+            _ => LineStyle(lines.len()),
+        };
+        lines.push(PlotLine { style, ..line });
+    }
+    Some(StoryCurves {
+        light: light(&variant, None),
+        variant,
+        enhancer: enhancer.cloned(),
+        lines,
+        note: overview.note(),
+    })
+}

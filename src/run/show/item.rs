@@ -1,0 +1,124 @@
+//! An item of a run with the replies to it, as text: [`ShownItem`].
+
+use std::fmt::Write;
+
+use crate::job::stored::AnyRun;
+use crate::types::manifest::RunManifest;
+use crate::types::question::letter;
+use crate::types::{self, Condition, Digest, FrameId, OpenDetail, Record, RunQuestion};
+
+/// The reply of one model to the item, in one condition.
+pub(super) struct ShownAnswer {
+    pub(super) model: String,
+    pub(super) condition: Option<Condition>,
+    pub(super) outcome: &'static str,
+    pub(super) reply: String,
+    /// The digest of the image that was sent, or of all images of a walk.
+    pub(super) sent: Option<Digest>,
+}
+
+/// The item and the replies to it.
+pub(super) struct ShownItem {
+    pub(super) source: FrameId,
+    pub(super) text: String,
+    pub(super) answers: Vec<ShownAnswer>,
+}
+
+/// The manifest of a run, and one item of it; `None` if the run did not ask the item.
+pub(super) fn read(run: AnyRun, name: &str) -> (RunManifest, Option<ShownItem>) {
+    match run {
+        AnyRun::Choice(run) => {
+            let matching = run
+                .records
+                .iter()
+                .filter(|record| record.question.0 == name);
+            let records: Vec<&Record> = matching.collect();
+            let item = records.first().map(|first| ShownItem {
+                source: first.detail.frame.clone(),
+                text: choice_text(first, stored_question(&run.questions, name)),
+                answers: records.iter().map(|record| choice_answer(record)).collect(),
+            });
+            (run.manifest, item)
+        }
+        AnyRun::Open(run) => {
+            let matching = run
+                .records
+                .iter()
+                .filter(|record| record.question.0 == name);
+            let records: Vec<&Record<OpenDetail>> = matching.collect();
+            let item = records.first().map(|first| ShownItem {
+                source: FrameId(first.detail.episode.clone()),
+                text: open_text(first, stored_question(&run.questions, name)),
+                answers: records.iter().map(|record| open_answer(record)).collect(),
+            });
+            (run.manifest, item)
+        }
+    }
+}
+
+fn stored_question<'a>(questions: &'a [RunQuestion], name: &str) -> Option<&'a RunQuestion> {
+    questions.iter().find(|question| question.id.0 == name)
+}
+
+pub(super) fn choice_text(record: &Record, stored_question: Option<&RunQuestion>) -> String {
+    let mut text = format!("{}, about {}\n", record.question, record.detail.frame);
+    if let Some(stored_question) = stored_question {
+        let _ = writeln!(text, "{}", stored_question.text);
+    }
+    for (index, choice) in record.detail.choices.iter().enumerate() {
+        let truth = if index == record.detail.truth {
+            "  (true)"
+        } else {
+            ""
+        };
+        let _ = writeln!(text, "  {}. {choice}{truth}", letter(index));
+    }
+    text
+}
+
+fn choice_answer(record: &Record) -> ShownAnswer {
+    ShownAnswer {
+        model: record.model.clone(),
+        condition: record.condition.clone(),
+        outcome: match record.detail.outcome {
+            types::TrialOutcome::Right => "right",
+            types::TrialOutcome::Wrong => "wrong",
+            types::TrialOutcome::Unparsed => "not readable",
+            types::TrialOutcome::Failed => "failed",
+        },
+        reply: reply(record.reply.as_deref(), record.failure.as_ref()),
+        sent: record.detail.image.as_ref().map(|image| image.digest),
+    }
+}
+
+fn open_text(record: &Record<OpenDetail>, stored_question: Option<&RunQuestion>) -> String {
+    let mut text = format!("{}, about {}\n", record.question, record.detail.episode);
+    if let Some(stored_question) = stored_question {
+        let _ = writeln!(
+            text,
+            "{}\n  {}  (true)",
+            stored_question.text, stored_question.answer
+        );
+    }
+    text
+}
+
+fn open_answer(record: &Record<OpenDetail>) -> ShownAnswer {
+    ShownAnswer {
+        model: record.model.clone(),
+        condition: record.condition.clone(),
+        outcome: match (&record.failure, &record.detail.judged) {
+            (Some(_), _) => "failed",
+            (None, Some(_)) => "marked",
+            (None, None) => "answered",
+        },
+        reply: reply(record.reply.as_deref(), record.failure.as_ref()),
+        sent: record.detail.images.as_ref().map(|images| images.digest),
+    }
+}
+
+fn reply(reply: Option<&str>, failure: Option<&types::Failure>) -> String {
+    let message = failure.map(|failure| failure.message.as_str());
+    let text = reply.or(message).unwrap_or_default();
+    text.chars().take(200).collect()
+}

@@ -1,0 +1,161 @@
+//! `show`: making the images of one item again, and checking by their digests that they are those that were sent.
+
+mod item;
+mod settings;
+mod sheet;
+
+use std::collections::BTreeSet;
+use std::fmt::Write;
+use std::sync::Arc;
+
+use crate::ask::Payload;
+use crate::dataset::inputs::stem;
+use crate::error::{Error, Result};
+use crate::files::write;
+use crate::job::Outcome;
+use crate::job::rebuild::ImageRebuilder;
+use crate::job::stored::AnyRun;
+use crate::types::manifest::Status;
+use crate::types::{Condition, Digest};
+
+use item::{ShownAnswer, read};
+pub(crate) use settings::ShowArgs;
+
+/// Makes the images again, writes them, and prints for each whether it is the one that was sent; or draws one picture of them.
+///
+/// # Errors
+/// If the run or the item is missing, or its data or enhancers are not found.
+pub(crate) fn show(args: ShowArgs) -> Result<Outcome> {
+    if let Some(path) = &args.sheet {
+        return sheet::sheet(&args, path);
+    }
+    let folder = args.run.clone();
+    let name = args.question_id();
+    let (manifest, item) = read(AnyRun::open(&folder)?, name);
+    let Some(item) = item else {
+        let problem = format!(
+            "no question {name:?} in this run; report.html and questions.jsonl have their ids"
+        );
+        return Err(Error::Run {
+            path: folder,
+            problem,
+        });
+    };
+    let conditions = conditions(&item.answers, &args)?;
+    let out = args.out.clone().unwrap_or_else(|| folder.join("shown"));
+    let mut rebuilder = ImageRebuilder::open(args.rebuild, &manifest, &folder, &conditions)?;
+    let images = rebuilder.images(&item.source, &conditions)?;
+    let mut text = item.text;
+    let mut all_same = true;
+    for (condition, images) in conditions.iter().zip(images) {
+        let multiple = images.len() > 1;
+        for (place, image) in images.iter().enumerate() {
+            let place = if multiple {
+                format!("_{place:03}")
+            } else {
+                String::new()
+            };
+            let name = format!(
+                "{}_{condition}{place}.{}",
+                stem(&item.source)?,
+                image.extension()
+            );
+            let path = out.join(name);
+            write(&path, &image.file()?)?;
+            let _ = writeln!(text, "{condition}: {}", path.display());
+        }
+        let digest = joint_digest(&images);
+        let sent = sent(&item.answers, condition);
+        let comparison = if sent.is_empty() {
+            format!("the digest of what was sent is not stored; {digest} now")
+        } else if sent.iter().all(|sent| *sent == digest) {
+            format!("the very bytes that were sent ({digest})")
+        } else {
+            all_same = false;
+            format!("NOT the bytes that were sent: {digest} now")
+        };
+        let _ = writeln!(text, "{condition}: {comparison}");
+        text += &replies(&item.answers, Some(condition));
+    }
+    text += &replies(&item.answers, None);
+    if !all_same {
+        text += "the data, an enhancement model or this program has changed since the run\n";
+    }
+    Ok(Outcome {
+        status: if all_same {
+            Status::Complete
+        } else {
+            Status::Incomplete
+        },
+        output: text,
+    })
+}
+
+/// The conditions of the item, limited to those of `--condition`.
+fn conditions(answers: &[ShownAnswer], args: &ShowArgs) -> Result<Vec<Condition>> {
+    let wanted = &args.condition;
+    let asked = answers.iter().filter_map(|answer| answer.condition.clone());
+    let asked: BTreeSet<Condition> = asked.collect();
+    if asked.is_empty() {
+        let problem =
+            "the item was only asked without images, so there is nothing to show".to_owned();
+        let path = args.run.clone();
+        return Err(Error::Run { path, problem });
+    }
+    if wanted.is_empty() {
+        return Ok(asked.into_iter().collect());
+    }
+    if let Some(missing) = wanted.iter().find(|condition| !asked.contains(condition)) {
+        let asked: Vec<String> = asked.iter().map(ToString::to_string).collect();
+        let problem = format!(
+            "the item was not asked at {missing}; it was at {}",
+            asked.join(", ")
+        );
+        return Err(Error::usage("--condition", problem));
+    }
+    Ok(wanted.clone())
+}
+
+/// The digest of images that are sent together, as in a record.
+fn joint_digest(images: &[Arc<Payload>]) -> Digest {
+    match images {
+        [only] => only.facts().digest,
+        multiple => Digest::of_parts(
+            multiple
+                .iter()
+                .map(|image| &image.facts().digest.as_bytes()[..]),
+        ),
+    }
+}
+
+/// The digests of the images that were sent in a condition.
+fn sent(answers: &[ShownAnswer], condition: &Condition) -> BTreeSet<Digest> {
+    let matching = answers
+        .iter()
+        .filter(|answer| answer.condition.as_ref() == Some(condition));
+    matching.filter_map(|answer| answer.sent).collect()
+}
+
+/// The reply of each model in a condition, or without an image. Replies are escaped, so that they cannot send control
+/// characters to the terminal.
+fn replies(answers: &[ShownAnswer], condition: Option<&Condition>) -> String {
+    let mut text = String::new();
+    let without = if condition.is_none() {
+        " without an image"
+    } else {
+        ""
+    };
+    for answer in answers
+        .iter()
+        .filter(|answer| answer.condition.as_ref() == condition)
+    {
+        let ShownAnswer {
+            model,
+            outcome,
+            reply,
+            ..
+        } = answer;
+        let _ = writeln!(text, "  {model}{without}: {outcome}: {reply:?}");
+    }
+    text
+}

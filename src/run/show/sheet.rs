@@ -1,0 +1,220 @@
+//! `show --sheet`: one item over the levels and the curves of its run, as one picture: [`sheet`].
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use std::sync::Arc;
+
+use super::item::choice_text;
+use super::settings::ShowArgs;
+use crate::ask::{Payload, PayloadFormat};
+use crate::error::{Error, Result};
+use crate::files::write;
+use crate::job::Outcome;
+use crate::job::rebuild::ImageRebuilder;
+use crate::job::report::story_curves;
+use crate::job::stored::StoredRun;
+use crate::report::figures::StoryCurves;
+use crate::report::sheet::{Story, StoryCell, StoryMark, StoryRow, story};
+use crate::types::manifest::{RunManifest, Status};
+use crate::types::{AxisLevel, Condition, KindReading, Record, TrialOutcome};
+
+/// Draws the picture and writes it. The outcome says which conditions are left out, and which images are not those that were sent.
+///
+/// # Errors
+/// If the folder holds no run of questions with choices, the run has no dark images, it did not ask the item with images, or an
+/// image cannot be made again.
+pub(super) fn sheet(args: &ShowArgs, path: &Path) -> Result<Outcome> {
+    let format = format(path)?;
+    let item = SheetItem::read(args)?;
+    let rows = item.rows();
+    let images = item.images(args, &rows)?;
+    let cell = |condition: &Condition| -> Option<Result<StoryCell>> {
+        let image = images.get(condition)?;
+        let marks = item.marks(condition);
+        Some(image.decode().map(|image| StoryCell { image, marks }))
+    };
+    let drawn = rows.iter().map(|(name, conditions)| {
+        let cells = conditions.iter();
+        let cells = cells.map(|condition| condition.as_ref().and_then(cell).transpose());
+        let name = name.clone();
+        cells
+            .collect::<Result<_>>()
+            .map(|cells| StoryRow { name, cells })
+    });
+    let picture = story(&Story {
+        rows: drawn.collect::<Result<_>>()?,
+        question: item.question.clone(),
+        levels: item.levels.iter().copied().collect(),
+        lines: item.curves.lines.clone(),
+        note: item.curves.note.clone(),
+    });
+    write(path, &Payload::encode(&picture, format, None)?.file()?)?;
+    let left_out = item
+        .asked()
+        .filter(|condition| !images.contains_key(condition));
+    let changed = images
+        .iter()
+        .filter(|(condition, image)| item.is_changed(condition, image));
+    let changed = names(changed.map(|(condition, _)| condition));
+    let drawn = format!("{}: the item over the levels\n", path.display());
+    let left_out = names(left_out).map(|names| format!("not drawn: {names}\n"));
+    let note = changed.as_ref().map(|names| {
+        format!(
+            "NOT the bytes that were sent: {names}; the data, an enhancer or this program has changed since the run\n"
+        )
+    });
+    Ok(Outcome {
+        status: changed.map_or(Status::Complete, |_| Status::Incomplete),
+        output: [Some(drawn), left_out, note]
+            .into_iter()
+            .flatten()
+            .collect(),
+    })
+}
+
+/// Conditions as a list of names; `None` if there are none.
+fn names<'a>(conditions: impl Iterator<Item = &'a Condition>) -> Option<String> {
+    let names: BTreeSet<String> = conditions.map(ToString::to_string).collect();
+    let names: Vec<String> = names.into_iter().collect();
+    (!names.is_empty()).then(|| names.join(", "))
+}
+
+/// The name of each row of images, and the condition of each of its columns; `None` where the item was not asked.
+type SheetRows = Vec<(String, Vec<Option<Condition>>)>;
+
+/// An item of a run, with what the picture needs of the run.
+struct SheetItem {
+    manifest: RunManifest,
+    /// The records of the item with images, at least one.
+    records: Vec<Record>,
+    /// The question, and its choices in one line.
+    question: Vec<String>,
+    levels: BTreeSet<AxisLevel>,
+    curves: StoryCurves,
+}
+
+impl SheetItem {
+    fn read(args: &ShowArgs) -> Result<Self> {
+        let run = StoredRun::of_choices(&args.run, "--sheet draws questions with choices")?;
+        let problem = |problem: String| Error::Run {
+            path: args.run.clone(),
+            problem,
+        };
+        let name = args.question_id();
+        let records = run.records.iter();
+        let shown =
+            records.filter(|record| record.question.0 == name && record.condition.is_some());
+        let records: Vec<Record> = shown.cloned().collect();
+        let Some(first) = records.first() else {
+            return Err(problem(format!("the run did not ask {name:?} with images")));
+        };
+        let stored = run.questions.iter().find(|question| question.id.0 == name);
+        let text = choice_text(first, stored);
+        let mut lines = text.lines().skip(1);
+        let question = lines.next().unwrap_or_default().to_owned();
+        let choices: Vec<&str> = lines.map(str::trim).collect();
+        let manifest = run.manifest.clone();
+        let curves = story_curves(run)?
+            .ok_or_else(|| problem("no model was shown a dark image".to_owned()))?;
+        let conditions = records
+            .iter()
+            .filter_map(|record| record.condition.as_ref());
+        Ok(Self {
+            levels: conditions.map(Condition::level).collect(),
+            question: vec![question, choices.join("   ").replace("  (true)", " (true)")],
+            manifest,
+            curves,
+            records,
+        })
+    }
+
+    /// The conditions that the item was asked in.
+    fn asked(&self) -> impl Iterator<Item = &Condition> {
+        self.records
+            .iter()
+            .filter_map(|record| record.condition.as_ref())
+    }
+
+    /// The rows of the picture: raw, and enhanced if the run has an enhancer.
+    fn rows(&self) -> SheetRows {
+        let enhancer = self.curves.enhancer.as_ref();
+        let row = |name: String, enhancer: Option<_>| {
+            let levels = self.levels.iter();
+            let conditions = levels.map(|level| {
+                let fits = |condition: &&Condition| {
+                    let variant = condition.kind_reading();
+                    condition.level() == *level
+                        && condition.enhancer.as_ref() == enhancer
+                        && (variant == self.curves.variant || variant == KindReading::NONE)
+                };
+                self.asked().find(fits).cloned()
+            });
+            (name, conditions.collect())
+        };
+        let raw = row(self.curves.light.clone(), None);
+        let enhanced = enhancer.map(|name| row(format!("+ {name}"), Some(name)));
+        std::iter::once(raw).chain(enhanced).collect()
+    }
+
+    /// The image of each condition of the rows, made again.
+    fn images(
+        &self,
+        args: &ShowArgs,
+        rows: &SheetRows,
+    ) -> Result<BTreeMap<Condition, Arc<Payload>>> {
+        let conditions = rows
+            .iter()
+            .flat_map(|(_, conditions)| conditions.iter().flatten());
+        let conditions: Vec<Condition> = conditions.cloned().collect();
+        let rebuild = args.rebuild.clone();
+        let mut rebuilder = ImageRebuilder::open(rebuild, &self.manifest, &args.run, &conditions)?;
+        let images = rebuilder.images(&self.records[0].detail.frame, &conditions)?;
+        let images = images.into_iter().flatten();
+        Ok(conditions.into_iter().zip(images).collect())
+    }
+
+    /// Whether an image is another one than was sent.
+    fn is_changed(&self, condition: &Condition, image: &Payload) -> bool {
+        let records = self.records.iter();
+        let mut records = records.filter(|record| record.condition.as_ref() == Some(condition));
+        records.any(|record| {
+            let sent = record.detail.image.as_ref();
+            sent.is_some_and(|sent| sent.digest != image.facts().digest)
+        })
+    }
+
+    /// The mark of each model in a condition; of several replies of one model the first counts.
+    fn marks(&self, condition: &Condition) -> Vec<(String, StoryMark)> {
+        let mut marks: Vec<(String, StoryMark)> = Vec::new();
+        for record in &self.records {
+            let known = marks.iter().any(|(model, _)| *model == record.model);
+            if known || record.condition.as_ref() != Some(condition) {
+                continue;
+            }
+            let mark = match record.detail.outcome {
+                TrialOutcome::Right => StoryMark::Right,
+                TrialOutcome::Wrong => StoryMark::Wrong,
+                TrialOutcome::Unparsed | TrialOutcome::Failed => StoryMark::None,
+            };
+            marks.push((record.model.clone(), mark));
+        }
+        marks
+    }
+}
+
+/// The format of a picture by the extension of its name: PNG, or JPEG of a quality at which letters stay clean (chosen).
+fn format(path: &Path) -> Result<PayloadFormat> {
+    let extension = path.extension().unwrap_or_default().to_string_lossy();
+    let format = match &*extension.to_ascii_lowercase() {
+        "png" => "png".parse(),
+        "jpg" | "jpeg" => "jpeg:90".parse(),
+        _ => {
+            let problem = format_args!(
+                "{}: a name that ends in .png or .jpg expected",
+                path.display()
+            );
+            return Err(Error::usage("--sheet", problem));
+        }
+    };
+    format.map_err(|e| Error::usage("--sheet", e))
+}
