@@ -94,7 +94,7 @@
 //!
 //! # Where to add what
 //!
-//! The files that are edited by hand; snapshots of the help, README and CHANGELOG come on top.
+//! The files that are edited by hand; snapshots of the help, the pages in `src/docs` and CHANGELOG come on top.
 //!
 //! | to add | files |
 //! |---|---|

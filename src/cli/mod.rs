@@ -135,6 +135,12 @@ fn carry_out(cli: Cli, progress: &Progress) -> Result<Outcome> {
     }
 }
 
+/// All commands and flags of the program, so that a test can hold the documentation to them.
+#[must_use]
+pub fn command() -> clap::Command {
+    command::command()
+}
+
 fn completions(shell: Shell) -> Outcome {
     let mut script = Vec::new();
     clap_complete::generate(shell, &mut command::command(), NAME, &mut script);
