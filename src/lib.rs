@@ -98,10 +98,10 @@
 //!
 //! | to add | files |
 //! |---|---|
-//! | a flag | the structure of its group, where it acts, the test of what it does, its row in `tests/identity.rs`; where it may be idle, `cli/no_effect.rs` |
-//! | a format to import | `import/<kind>.rs`, `import/mod.rs`, `import/README.md`, `tests/import.rs` |
-//! | a kind of degradation | `types/degradation.rs`, `synthesis/<kind>.rs`, `synthesis/mod.rs`, `synthesis/exposures.rs`, `tests/synthesize.rs`, `results/README.md` |
-//! | an API of endpoints | `ask/wire/<api>.rs`, `ask/wire/mod.rs`, `job/models.rs`, `tests/support/endpoint.rs`, `tests/ask.rs` |
+//! | a flag | the structure of its group, where it acts, the test of what it does, its row in `tests/program/identity.rs`; where it may be idle, `cli/no_effect.rs` |
+//! | a format to import | `import/<kind>.rs`, `import/mod.rs`, `import/README.md`, `tests/program/import.rs` |
+//! | a kind of degradation | `types/degradation.rs`, `synthesis/<kind>.rs`, `synthesis/mod.rs`, `synthesis/exposures.rs`, `tests/program/synthesize.rs`, `results/README.md` |
+//! | an API of endpoints | `ask/wire/<api>.rs`, `ask/wire/mod.rs`, `job/models.rs`, `tests/support/endpoint.rs`, `tests/program/ask.rs` |
 //! | an experiment | `run/<experiment>/`, its detail in `types/detail.rs` and `score/record.rs`, `job/stored.rs` |
 //!
 //! # What must hold

@@ -88,7 +88,7 @@ mod tests {
     #[test]
     fn every_kind_is_described_and_tested() {
         let readme = include_str!("README.md");
-        let tests = include_str!("../../tests/import.rs");
+        let tests = include_str!("../../tests/program/import.rs");
         let missing: Vec<String> = DataSetKind::value_variants()
             .iter()
             .map(ToString::to_string)
@@ -99,7 +99,7 @@ mod tests {
             .collect();
         assert!(
             missing.is_empty(),
-            "import/README.md or tests/import.rs lacks {missing:?}"
+            "import/README.md or tests/program/import.rs lacks {missing:?}"
         );
     }
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use clap::Args;
 use rayon::prelude::*;
@@ -15,7 +16,7 @@ use crate::job::progress::Progress;
 use crate::job::workers::{ThreadArgs, pool};
 use crate::rooms::{self, Room, Rooms};
 use crate::types::manifest::Status;
-use crate::types::{Decides, FrameId, Labels};
+use crate::types::{Decides, FrameId, Labels, SegmentName};
 
 /// The flags of `rooms`.
 #[derive(Debug, Args)]
@@ -48,19 +49,21 @@ pub(crate) fn rooms(args: &RoomsArgs, progress: &Progress) -> Result<Outcome> {
     let workers = pool(args.threads.threads)?;
     let rooms: BTreeMap<FrameId, Room> = args.rooms.all().collect();
     let bar = progress.bar("rooms", rooms.len());
-    let lines: Vec<Map<String, Value>> = workers.install(|| {
-        let lines = rooms
-            .values()
-            .collect::<Vec<_>>()
-            .into_par_iter()
-            .map(|room| {
-                let line = write_frame(args, room);
-                bar.inc();
-                line
-            });
-        lines.collect::<Result<_>>()
+    let frames: Vec<WrittenFrame> = workers.install(|| {
+        let frames = rooms.values().collect::<Vec<_>>().into_par_iter();
+        let frames = frames.map(|room| {
+            let frame = write_frame(args, room);
+            bar.inc();
+            frame
+        });
+        frames.collect::<Result<_>>()
     })?;
     drop(bar);
+    // The frames of a scene share a file of names, which two threads must not write at once.
+    let scenes = frames.iter().map(|frame| (&*frame.scene, &frame.names));
+    for (scene, names) in scenes.collect::<BTreeMap<_, _>>() {
+        frame_folder::names(&args.out, scene, names)?;
+    }
     let info = json!({
         "schema": "darkqa.dataset/1",
         "name": args.rooms.title(),
@@ -68,14 +71,24 @@ pub(crate) fn rooms(args: &RoomsArgs, progress: &Progress) -> Result<Outcome> {
         "source": format!("darkqa-eval rooms {} {}", rooms::VERSION, args.rooms),
     });
     let labels: Labels = rooms::labels();
-    frame_folder::finish(&args.out, &labels, &info, lines.iter())?;
+    let lines = frames.iter().map(|frame| &frame.line);
+    frame_folder::finish(&args.out, &labels, &info, lines)?;
     Ok(Outcome {
         status: Status::Complete,
-        output: format!("{}: {} frames\n", args.out.display(), lines.len()),
+        output: format!("{}: {} frames\n", args.out.display(), frames.len()),
     })
 }
 
-fn write_frame(args: &RoomsArgs, room: &Room) -> Result<Map<String, Value>> {
+/// A frame whose files are written.
+struct WrittenFrame {
+    /// Its line in `frames.jsonl`.
+    line: Map<String, Value>,
+    scene: String,
+    /// The names of the segments of the scene.
+    names: Arc<BTreeMap<u32, SegmentName>>,
+}
+
+fn write_frame(args: &RoomsArgs, room: &Room) -> Result<WrittenFrame> {
     let frame = room.frame()?;
     let paths = FramePaths {
         out: &args.out,
@@ -97,6 +110,9 @@ fn write_frame(args: &RoomsArgs, room: &Room) -> Result<Map<String, Value>> {
     line.insert("intrinsics".to_owned(), json!(frame.intrinsics));
     line.insert("pose".to_owned(), json!(room.pose()));
     line.insert("room_gt".to_owned(), json!(frame.room));
-    frame_folder::names(&args.out, &frame.scene, &frame.names)?;
-    Ok(line)
+    Ok(WrittenFrame {
+        line,
+        scene: frame.scene.clone(),
+        names: Arc::clone(&frame.names),
+    })
 }

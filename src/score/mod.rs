@@ -5,7 +5,7 @@
 //! against the true ones ([`confusion`]) and the agreement of models ([`agreement`]).
 //!
 //! Intervals come from the clusters ([`cluster`]) in one of three ways. Each was chosen because its 95 % intervals hold the
-//! truth 93 to 97 times in a hundred in simulation (`tests/statistics.rs`). The plain percentile bootstrap does not do so
+//! truth 93 to 97 times in a hundred in simulation (`tests/program/statistics.rs`). The plain percentile bootstrap does not do so
 //! with fewer than about 50 clusters, or near 0 and 1.
 //!
 //! - shares: Wilson's score interval at the clusters' effective number of replies ([`estimate::Estimate::clustered`]);

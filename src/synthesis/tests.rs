@@ -372,7 +372,7 @@ fn every_kind_of_degradation_is_made_described_and_tested() {
     let clean = Rgb::new(4, 4, vec![200; 48]).unwrap();
     let key = super::NoiseKey::new(0, &FrameId("a".to_owned()));
     let described = include_str!("../../results/README.md");
-    let tested = include_str!("../../tests/synthesize.rs");
+    let tested = include_str!("../../tests/program/synthesize.rs");
     let mut missing = Vec::new();
     for kind in Kind::ALL {
         let how = Degradation::new(kind, kind.ladder()[2], None).unwrap();
@@ -384,7 +384,7 @@ fn every_kind_of_degradation_is_made_described_and_tested() {
             missing.push(format!("{word} in results/README.md"));
         }
         if !tested.contains(&format!("-{word}")) {
-            missing.push(format!("L…-{word} in tests/synthesize.rs"));
+            missing.push(format!("L…-{word} in tests/program/synthesize.rs"));
         }
     }
     assert!(missing.is_empty(), "{missing:?}");

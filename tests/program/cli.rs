@@ -1,0 +1,342 @@
+//! The command line as a contract: its help, and one clear line for each wrong word.
+
+use std::collections::BTreeSet;
+
+use crate::support::onnx;
+use crate::support::run::{Bench, called, words};
+use crate::support::table::check_rows;
+use serde_json::json;
+
+#[test]
+fn the_help_is_as_it_was() {
+    let bench = Bench::new();
+    let help = called(bench.command(&["--help"]).env("COLUMNS", "110"));
+    assert_eq!(help.code, Some(0));
+    let help = help.stdout.replace("darkqa-eval.exe", "darkqa-eval");
+    let long = help
+        .lines()
+        .map(str::trim_end)
+        .collect::<Vec<_>>()
+        .join("\n");
+    insta::assert_snapshot!(long);
+}
+
+/// A frame with one question; `wrong` changes the question.
+fn data(bench: &Bench, wrong: impl FnOnce(&mut serde_json::Value)) {
+    let image = image::RgbImage::from_fn(8, 8, |x, y| {
+        image::Rgb([(x * 30) as u8, (y * 30) as u8, 90])
+    });
+    std::fs::create_dir_all(bench.path("frames")).unwrap();
+    image.save(bench.path("frames/a.png")).unwrap();
+    let mut question = json!({"id": "q", "frame": "a.png", "question": "Is it?", "choices": ["yes", "no"], "answer": "no"});
+    wrong(&mut question);
+    bench.file("frames/questions.jsonl", question.to_string());
+}
+
+/// A call that must end with exit code 2 and one line that contains all of `parts`.
+fn refused(bench: &Bench, line: &str, parts: &[&str]) {
+    let refused = bench.call(&words(line));
+    assert_eq!(refused.code, Some(2), "{line:?}: {refused:?}");
+    assert_eq!(
+        refused.stderr.trim_end().lines().count(),
+        1,
+        "{line:?}: {}",
+        refused.stderr
+    );
+    assert!(
+        refused.stderr.starts_with("error: "),
+        "{line:?}: {}",
+        refused.stderr
+    );
+    for part in parts {
+        assert!(
+            refused.stderr.contains(part),
+            "{line:?}: {part:?} is not in: {}",
+            refused.stderr
+        );
+    }
+    assert!(refused.stdout.is_empty());
+    assert!(!bench.path("run").exists(), "{line:?} left a run behind");
+}
+
+#[test]
+fn wrong_words_name_their_flag() {
+    let bench = Bench::new();
+    let rows = [
+        ("--modle x", &["--modle"][..]),
+        ("--limit 3", &["--model", "random"]),
+        (
+            "--model random --levels L7",
+            &["--levels", "\"L7\"", "L0, L1"],
+        ),
+        ("--model random --limit 0", &["--limit"]),
+        (
+            "--model random --data nowhere",
+            &["--data", "nowhere", "no such file"],
+        ),
+        (
+            "--model random --families smell",
+            &["--families", "smell", "room_type"],
+        ),
+        ("--model random --config nowhere.toml", &["nowhere.toml"]),
+        (
+            "--model random --resume nowhere",
+            &["--resume", "nowhere", "--out"],
+        ),
+        ("--model random --out a --resume b", &["--out", "--resume"]),
+        (
+            "--resume nowhere",
+            &["--model", "--resume takes the same flags"],
+        ),
+        (
+            "--model random --threads 1025",
+            &["--threads", "1025", "1024"],
+        ),
+        ("--model random --max-failures 0", &["--max-failures"]),
+        ("--model random --model random", &["--model", "twice"]),
+        ("--model random --image webp", &["--image", "webp"]),
+        ("--model random --prompts nowhere", &["nowhere"]),
+        ("--model script:nowhere.jsonl", &["nowhere.jsonl"]),
+        // Found before the rooms are drawn, which would take hours.
+        (
+            "--model random --data rooms:frames=100000 --llie nowhere.onnx",
+            &["nowhere.onnx"],
+        ),
+    ];
+    check_rows(rows, |(line, parts)| {
+        refused(&bench, line, parts);
+    });
+}
+
+#[test]
+fn a_call_without_words_shows_the_first_steps() {
+    let called = Bench::new().call(&[]);
+    assert_eq!(called.code, Some(2));
+    for part in [
+        "error: --model",
+        "--llie lift",
+        "--dry-run",
+        "--help",
+        "https://",
+    ] {
+        assert!(called.stderr.contains(part), "{called:?}");
+    }
+}
+
+#[test]
+fn completions_and_manual_come_from_the_flags() {
+    let bench = Bench::new();
+    check_rows(["bash", "zsh", "fish", "powershell", "elvish"], |shell| {
+        let script = bench.complete(&["completions", shell]);
+        assert!(script.contains("llie-max-side"), "{shell}");
+    });
+    bench.complete(&["man", "pages"]);
+    let page =
+        |name: &str| std::fs::read_to_string(bench.path(&format!("pages/{name}.1"))).unwrap();
+    assert!(page("darkqa-eval").contains("llie\\-max\\-side"));
+    assert!(page("darkqa-eval-openeqa").contains("judge\\-base\\-url"));
+    assert!(page("darkqa-eval-batch-export").contains("file\\-size"));
+}
+
+#[test]
+fn a_dry_run_needs_no_key() {
+    let bench = Bench::with_questions(3);
+    let args = words("--data set.jsonl --model gpt-4o --dry-run");
+    let run = bench.complete(&args);
+    assert!(run.starts_with("Nothing was sent. 33 of 33"), "{run}");
+    // A file that is not there is not looked for, either.
+    bench.complete(&[&args[..], &["--api-key-file", "nowhere"]].concat());
+}
+
+#[test]
+fn what_changes_nothing_is_said() {
+    let bench = Bench::with_questions(3);
+    let args = words("--data set.jsonl --model random --blind");
+    let quiet = bench.call(&args);
+    assert_eq!((quiet.code, &*quiet.stderr), (Some(0), ""));
+    let run = bench.call(&[&args[..], &["--levels", "L3", "--llie", "no.onnx"]].concat());
+    assert_eq!(
+        run.stderr.trim(),
+        "WARN --levels, --llie: no effect: no model is shown an image"
+    );
+}
+
+#[test]
+fn a_remote_endpoint_needs_a_key() {
+    let bench = Bench::new();
+    refused(
+        &bench,
+        "--model gpt-4o",
+        &[
+            "OPENAI_API_KEY",
+            "https://api.openai.com/v1",
+            "--api-key-env",
+            "--api-key-file",
+        ],
+    );
+    refused(&bench, "--model m --api-key-file nowhere", &["nowhere"]);
+    bench.file("key", "sk-secret-42\n");
+    let line = "--model m --base-url http://example.org/v1 --api-key-file key";
+    refused(&bench, line, &["http://example.org", "--allow-http"]);
+    assert!(!bench.call(&words(line)).stderr.contains("sk-secret-42"));
+}
+
+#[test]
+fn wrong_data_name_their_file() {
+    let bench = Bench::new();
+    let line = "--data frames --model random --out run";
+    data(&bench, |question| question["answer"] = "maybe".into());
+    refused(
+        &bench,
+        line,
+        &["questions.jsonl, line 1", "\"maybe\"", "choices"],
+    );
+    data(&bench, |question| question["choices"] = json!(["yes"]));
+    refused(&bench, line, &["questions.jsonl, line 1"]);
+    data(&bench, |question| question["frame"] = "z.png".into());
+    refused(&bench, line, &["questions.jsonl", "\"z.png\"", "\"a.png\""]);
+    data(&bench, |_| ());
+    bench.file("frames/a.png", "not an image");
+    refused(&bench, line, &["a.png", "not an image"]);
+    std::fs::remove_file(bench.path("frames/questions.jsonl")).unwrap();
+    refused(&bench, line, &["frames", "questions.jsonl", "--questions"]);
+    bench.file("empty/readme.txt", "");
+    refused(
+        &bench,
+        "--data empty --model random",
+        &["empty", "frames.jsonl"],
+    );
+    bench.file("table.tsv", "a\tb\n1\t2\n");
+    refused(
+        &bench,
+        "--data table.tsv --model random",
+        &["table.tsv", "column"],
+    );
+}
+
+#[test]
+fn wrong_enhancers_name_their_file() {
+    let bench = Bench::new();
+    // Where ONNX Runtime is not there yet, its first use installs it and says so.
+    onnx::identity().write(&bench.path(""), "fine.onnx");
+    bench.complete(&words(
+        "--model random --limit 1 --levels L1 --out first --llie fine.onnx",
+    ));
+    let line = |file: &str| format!("--model random --out run --llie {file}");
+    refused(&bench, &line("nowhere.onnx"), &["nowhere.onnx"]);
+    bench.file("text.onnx", "this is no model, whatever its name says");
+    refused(&bench, &line("text.onnx"), &["text.onnx", "ONNX"]);
+    onnx::no_image().write(&bench.path(""), "blind.onnx");
+    refused(&bench, &line("blind.onnx"), &["blind.onnx", "output"]);
+    onnx::no_image().write(&bench.path(""), "rank.onnx");
+    refused(&bench, &line("rank.onnx"), &["rank.onnx"]);
+    let missing = "--model random --out run --llie fine.onnx --ort-lib no-such.so";
+    refused(&bench, missing, &["no-such.so"]);
+    let twice = "--model random --out run --llie fine.onnx --llie fine.onnx";
+    refused(&bench, twice, &["--llie", "fine"]);
+}
+
+/// A short run that needs no network.
+const SHORT: &str = "--model random --limit 2 --out run --json";
+
+/// The different values that the rows of a summary have under a name, as JSON.
+fn values(summary: &str, name: &str) -> BTreeSet<String> {
+    let summary: serde_json::Value = serde_json::from_str(summary).unwrap();
+    let rows = summary["rows"].as_array().unwrap().iter();
+    rows.filter(|row| row["model"] == "random")
+        .map(|row| row[name].to_string())
+        .collect()
+}
+
+#[test]
+fn a_switch_turned_off_above_beats_one_turned_on_below() {
+    let rows = [
+        ("--config c.toml", "false", "\"image\""),
+        ("--config c.toml", "", "\"blind\""),
+        ("--blind", "false", "\"blind\""),
+        ("", "yes", "\"blind\""),
+        ("", "0", "\"image\""),
+    ];
+    check_rows(rows, |(line, variable, view)| {
+        let bench = Bench::new();
+        bench.file("c.toml", "blind = true\nlevels = \"L0\"\n");
+        let mut command = bench.command(&words(SHORT));
+        command.args(words(line)).args(["--levels", "L0"]);
+        let run = called(command.env("DARKQA_BLIND", variable));
+        assert_eq!(run.code, Some(0), "{run:?}");
+        let views = values(&run.stdout, "view");
+        assert_eq!(views, [view.into()].into(), "{line:?} {variable:?}");
+    });
+}
+
+#[test]
+fn the_variables_of_others_are_defaults_below_the_file() {
+    let bench = Bench::new();
+    bench.file("c.toml", "base-url = \"http://of-the-file.test/v1\"\n");
+    let error = |line: &str, ours: &str| {
+        let mut command = bench.command(&["--model", "m"]);
+        command.env("OPENAI_BASE_URL", "http://of-openai.test/v1");
+        called(command.env("DARKQA_BASE_URL", ours).args(words(line))).stderr
+    };
+    let rows = [
+        ("", "", "of-openai.test"),
+        ("--config c.toml", "", "of-the-file.test"),
+        ("--config c.toml", "http://ours.test", "ours.test"),
+    ];
+    check_rows(rows, |(line, ours, host)| {
+        let error = error(line, ours);
+        assert!(error.contains(host), "{line:?} {ours:?}: {error}");
+    });
+}
+
+#[test]
+fn a_file_of_flags_has_lists_and_names_its_mistakes() {
+    let bench = Bench::new();
+    bench.file(
+        "lists.toml",
+        "levels = [\"L0\", \"L3\"]\nvariant = \"ev\"\nfamilies = [\"color\", \"presence\"]\n",
+    );
+    let listed = bench.complete(&words(&format!("{SHORT} --config lists.toml")));
+    assert_eq!(
+        values(&listed, "level"),
+        ["\"L0\"".into(), "\"L3\"".into()].into()
+    );
+    let bench = Bench::new();
+    let rows = [
+        ("seed = 1\nblind = = 2\n", &["c.toml, line 2: "][..]),
+        ("seed = 1\n\nmodel = [\"a\",\n", &["c.toml, line "]),
+        (
+            "config = \"other.toml\"",
+            &["c.toml, config: ", "--config", "one file"],
+        ),
+        ("seed = [1, 2]", &["c.toml, seed: "]),
+        ("blind = 3", &["c.toml, blind: ", "true or false"]),
+    ];
+    check_rows(rows, |(text, parts)| {
+        bench.file("c.toml", text);
+        refused(&bench, "--model random --config c.toml", parts);
+    });
+}
+
+#[test]
+fn a_variable_that_sets_nothing_is_refused() {
+    let bench = Bench::new();
+    let run = called(bench.command(&words(SHORT)).env("DARKQA_LEVEL", "L0"));
+    assert_eq!(run.code, Some(2), "{run:?}");
+    assert_eq!(
+        run.stderr,
+        "error: DARKQA_LEVEL: no flag of this name; did you mean DARKQA_LEVELS?\n"
+    );
+    // A variable that another command knows is none of this one's business.
+    let run = called(bench.command(&words(SHORT)).env("DARKQA_BALANCE", "none"));
+    assert_eq!(run.code, Some(0), "{run:?}");
+}
+
+#[test]
+fn a_cause_is_said_once() {
+    let bench = Bench::new();
+    let error = bench
+        .call(&["--model", "random", "--config", "nowhere.toml"])
+        .stderr;
+    assert_eq!(error.matches("os error").count(), 1, "{error}");
+}

@@ -1,0 +1,246 @@
+//! The README and the pages in `src/docs`: their commands parse and run, their links lead somewhere, their flags exist.
+//!
+//! A block with the fence `sh` is run, one with `sh no-run` is only parsed: it needs large data, another machine or an installer.
+//! All blocks of a page are run by one shell in an empty folder, with a mock endpoint at `OPENAI_BASE_URL`, few and small rooms
+//! where no data are named, and the folder `models` at `$MODELS`. A comment `<!-- test: … -->` is a command that readers do not
+//! see. A block with the fence `text` shows what commands of its page print; `text no-run` shows what others print.
+
+mod page;
+mod shell;
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+use crate::support::endpoint::{Answer, MockEndpoint};
+use crate::support::run::Bench;
+use crate::support::table::check_rows;
+use clap::error::ErrorKind;
+use darkqa_eval::cli;
+use page::{Block, BlockKind, Page, files, pages, root};
+use regex::Regex;
+
+/// Flags of other programs that pages name: `sbatch`, `pip`, `cargo`, and `inspect eval`.
+const OF_OTHERS: [&str; 4] = ["--array", "--no-deps", "--path", "--no-log-images"];
+
+/// The words that follow the name of the program in a command; `None` for other commands.
+fn arguments(words: &[String]) -> Option<&[String]> {
+    let is_prefix =
+        |word: &&String| *word == "uvx" || word.split('=').next().is_some_and(is_variable);
+    let start = words.iter().take_while(is_prefix).count();
+    let (program, arguments) = words[start..].split_first()?;
+    (program == "darkqa-eval").then_some(arguments)
+}
+
+/// Whether a word is the name of a variable in front of a command, as in `DARKQA_LEVELS=L0 darkqa-eval`.
+fn is_variable(name: &str) -> bool {
+    name.contains('_') && name.chars().all(|c| c.is_ascii_uppercase() || c == '_')
+}
+
+#[test]
+fn every_command_parses() {
+    let (mut wrong, mut count) = (Vec::new(), 0);
+    for page in pages() {
+        let shown = page.blocks.iter().filter(|block| {
+            matches!(
+                block.kind,
+                BlockKind::SetUp | BlockKind::Run | BlockKind::ParseOnly
+            )
+        });
+        for block in shown {
+            for (line, words) in shell::commands(&block.lines) {
+                let Some(arguments) = arguments(&words) else {
+                    continue;
+                };
+                count += 1;
+                let program = "darkqa-eval".to_owned();
+                let words = std::iter::once(&program).chain(arguments);
+                if let Err(error) = cli::command().try_get_matches_from(words)
+                    && !matches!(
+                        error.kind(),
+                        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion
+                    )
+                {
+                    let place = page.at(block.line + 1 + line);
+                    wrong.push(format!("{place}: {error}"));
+                }
+            }
+        }
+    }
+    assert!(count > 60, "{count} commands found");
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn the_commands_of_every_page_run_and_print_what_it_shows() {
+    check_rows(pages(), |page| {
+        let bench = Bench::new();
+        let ran = run(&page, bench.path("").as_path());
+        let said = String::from_utf8_lossy(&ran.stderr);
+        assert!(
+            ran.status.success(),
+            "{}: {}\n{said}",
+            page.name,
+            ran.status
+        );
+        let printed = std::fs::read_to_string(bench.path(PRINTED)).unwrap_or_default();
+        let missing = missing_lines(&page, &printed);
+        assert!(missing.is_empty(), "not printed: {missing:#?}");
+    });
+}
+
+/// The file with all that the commands of a page print.
+const PRINTED: &str = "printed.txt";
+
+/// Runs the commands of a page in a folder.
+fn run(page: &Page, folder: &Path) -> Output {
+    let mock = MockEndpoint::answering(|body| {
+        let is_judge = body.to_string().contains("Your mark");
+        Answer::text(if is_judge { "4" } else { "A" })
+    });
+    let program = assert_cmd::cargo::cargo_bin("darkqa-eval");
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let folders = program.parent().map(Path::to_owned).into_iter();
+    let path = std::env::join_paths(folders.chain(std::env::split_paths(&path))).unwrap();
+    let mut shell = Command::new("bash");
+    for (name, _) in std::env::vars() {
+        let begins = ["OPENAI_", "DARKQA_", "RUST_LOG"];
+        if begins.iter().any(|begin| name.starts_with(begin)) {
+            shell.env_remove(name);
+        }
+    }
+    shell
+        .args(["-c", &script(page)])
+        .current_dir(folder)
+        .env("PATH", path)
+        .env("OPENAI_BASE_URL", mock.base_url())
+        .env("DARKQA_DATA", "rooms:frames=2,size=96x64")
+        .env("MODELS", root().join("models"))
+        .stdin(Stdio::null())
+        .output()
+        .unwrap()
+}
+
+/// The commands of a page that are run, as one script that stops at the first failure.
+fn script(page: &Page) -> String {
+    let run = |block: &&Block| matches!(block.kind, BlockKind::SetUp | BlockKind::Run);
+    let blocks = page.blocks.iter().filter(run).map(|block| {
+        let place = page.at(block.line + 1);
+        let lines = block.lines.join("\n");
+        // Braces run the lines in this shell, so that variables stay set.
+        format!("echo '{place}' >&2\n{{\n{lines}\n}} >> {PRINTED}\n")
+    });
+    format!("set -eu\n{}", blocks.collect::<String>())
+}
+
+/// The lines of the page's `text` blocks of which no printed line has the beginning. The numbers of a page are from a larger run,
+/// so each line counts up to its first digit; lines that frame a table do not count.
+fn missing_lines(page: &Page, printed: &str) -> Vec<String> {
+    let one_space = |line: &str| line.split_whitespace().collect::<Vec<_>>().join(" ");
+    let printed: Vec<String> = printed.lines().map(one_space).collect();
+    let shown = page
+        .blocks
+        .iter()
+        .filter(|block| block.kind == BlockKind::Output);
+    let numbered = shown.flat_map(|block| (block.line + 1..).zip(&block.lines));
+    let missing = numbered.filter(|(_, line)| {
+        let begin = line.split(|c: char| c.is_ascii_digit()).next();
+        let begin = one_space(begin.unwrap_or_default());
+        begin.chars().any(char::is_alphabetic)
+            && !printed.iter().any(|line| line.starts_with(&begin))
+    });
+    missing
+        .map(|(number, line)| format!("{}: {line}", page.at(number)))
+        .collect()
+}
+
+#[test]
+fn every_link_leads_to_a_file_and_a_heading() {
+    let mut wrong = Vec::new();
+    for page in pages()
+        .into_iter()
+        .chain([Page::read("src/docs/SUMMARY.md")])
+    {
+        for (line, link) in page.links() {
+            let Some((path, anchor)) = page.target(link) else {
+                continue;
+            };
+            let place = page.at(line);
+            if !path.exists() {
+                wrong.push(format!("{place}: {link}: no such file"));
+            } else if !anchor.is_empty() {
+                let name = path.strip_prefix(root()).unwrap_or(&path);
+                if !Page::read(&name.to_string_lossy()).has_anchor(anchor) {
+                    wrong.push(format!("{place}: {link}: no such heading"));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn every_page_is_in_the_summary_and_says_what_its_reader_will_have() {
+    let pages = pages();
+    let pages = &pages[1..];
+    let listed: BTreeSet<&str> = pages.iter().map(|page| &*page.name).collect();
+    assert_eq!(listed.len(), pages.len(), "a page is listed twice");
+    let files = files();
+    let files: BTreeSet<&str> = files.iter().map(String::as_str).collect();
+    assert_eq!(listed, files);
+    check_rows(pages, |page| {
+        let first = page.first_sentence();
+        assert!(
+            first.starts_with("At the end of this page"),
+            "{}: {first}",
+            page.name
+        );
+    });
+}
+
+/// The long flags of a command and of the commands in it.
+fn flags(command: &clap::Command) -> BTreeSet<String> {
+    let own = command.get_arguments().filter_map(clap::Arg::get_long);
+    let own = own.map(|flag| format!("--{flag}"));
+    own.chain(command.get_subcommands().flat_map(flags))
+        .collect()
+}
+
+#[test]
+fn pages_name_every_flag_and_no_other() {
+    let mut command = cli::command();
+    command.build();
+    let all = flags(&command);
+    let flag = Regex::new("(?:^|[^-[:alnum:]])(--[a-z][a-z0-9-]*)").unwrap();
+    let (mut named, mut unknown) = (BTreeSet::new(), Vec::new());
+    for page in pages() {
+        for (number, line) in (1..).zip(page.text.lines()) {
+            for found in flag.captures_iter(line) {
+                let name = &found[1];
+                if !all.contains(name) && !OF_OTHERS.contains(&name) {
+                    unknown.push(format!("{}: {name}", page.at(number)));
+                }
+                named.insert(name.to_owned());
+            }
+        }
+    }
+    assert!(unknown.is_empty(), "no such flag: {unknown:#?}");
+    let builtin = ["--help", "--version"];
+    let silent = all
+        .iter()
+        .filter(|flag| !named.contains(*flag) && !builtin.contains(&&***flag));
+    let silent: Vec<&String> = silent.collect();
+    assert!(silent.is_empty(), "on no page: {silent:?}");
+}
+
+#[test]
+fn the_readme_is_one_page_and_reads_well_elsewhere() {
+    let readme = Page::read("README.md");
+    let words = readme.text.split_whitespace().count();
+    let lines = readme.text.lines().count();
+    assert!(words < 1200 && lines <= 120, "{words} words, {lines} lines");
+    // The page of the crate and that of the wheel show the README without the repository.
+    let links = readme.links().into_iter();
+    let relative: Vec<(usize, &str)> = links.filter(|(_, link)| !link.contains("://")).collect();
+    assert!(relative.is_empty(), "{relative:?}");
+}

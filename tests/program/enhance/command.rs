@@ -1,0 +1,68 @@
+//! The command `enhance`.
+
+use super::{image, map};
+use crate::support::onnx;
+use crate::support::table::check_rows;
+
+#[test]
+fn the_command_enhances_files_and_folders() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let model = onnx::gain(2.0).write(folder.path(), "gain.onnx");
+    std::fs::create_dir(at("dark")).unwrap();
+    let dark = image(20, 30);
+    for name in ["dark/a.png", "dark/b.png", "c.png"] {
+        image::save_buffer(
+            at(name),
+            dark.samples(),
+            30,
+            20,
+            image::ExtendedColorType::Rgb8,
+        )
+        .unwrap();
+    }
+    std::fs::write(at("dark/b.png"), "no image").unwrap();
+    let call = |args: &[&str]| {
+        let mut command = assert_cmd::Command::cargo_bin("darkqa-eval").unwrap();
+        let output = command
+            .current_dir(folder.path())
+            .arg("enhance")
+            .arg(&model)
+            .args(args);
+        let output = output.output().unwrap();
+        let text = |bytes| String::from_utf8(bytes).unwrap();
+        (
+            output.status.code().unwrap(),
+            text(output.stdout),
+            text(output.stderr),
+        )
+    };
+    let (code, out, err) = call(&["dark", "c.png", "--out", "mended"]);
+    assert_eq!(
+        (code, out.as_str()),
+        (1, "mended: 2 made by gain, 1 failed\n"),
+        "{err}"
+    );
+    assert!(err.contains("b.png"), "{err}");
+    check_rows(["mended/a.png", "mended/c.png"], |name| {
+        let enhanced = image::open(at(name)).unwrap().into_rgb8().into_raw();
+        assert_eq!(enhanced, map(&dark, |x| 2.0 * x).samples(), "{name}");
+    });
+    let (_, out, _) = call(&["c.png", "--out", "mended"]);
+    assert!(out.contains("1 kept as they were"), "{out}");
+    let (code, out, _) = call(&["--describe"]);
+    assert!(
+        code == 0 && out.contains("NCHW") && out.contains("usual"),
+        "{out}"
+    );
+    let rows = [
+        &["--out", "x"][..],
+        &["c.png"],
+        &["c.png", "--describe"],
+        &["c.png", "--out", "x", "--tile", "0"],
+    ];
+    check_rows(rows, |args| {
+        let (code, _, err) = call(args);
+        assert_eq!((code, err.lines().count()), (2, 1), "{err}");
+    });
+}

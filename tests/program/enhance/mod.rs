@@ -1,0 +1,111 @@
+//! Stage 3 through its own door: models made by hand, on the ONNX Runtime that is found or installed.
+mod command;
+mod models;
+mod shipped;
+mod sidecars;
+mod sizes;
+
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+
+use crate::support::onnx::{self, Graph};
+use darkqa_eval::enhance::{Enhancer, Install, ModelFile, Runtime, RuntimeSearch};
+use darkqa_eval::types::Rgb;
+use tempfile::TempDir;
+
+fn runtime() -> Runtime {
+    crate::support::forbid_telemetry();
+    let search = RuntimeSearch {
+        library: std::env::var_os("ORT_DYLIB_PATH").map(PathBuf::from),
+        install: Install::Allowed,
+    };
+    search.open().unwrap()
+}
+
+fn open(path: &Path) -> darkqa_eval::Result<Enhancer> {
+    Enhancer::open(ModelFile::read(path)?, &runtime(), NonZeroUsize::new(1))
+}
+
+/// A model in a folder of its own, loaded.
+fn loaded(graph: &Graph) -> (TempDir, Enhancer) {
+    let folder = tempfile::tempdir().unwrap();
+    let enhancer = open(&graph.write(folder.path(), "model.onnx")).unwrap();
+    (folder, enhancer)
+}
+
+/// A model with a sidecar.
+fn stated(graph: &Graph, sidecar: &str) -> (TempDir, Enhancer) {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("model.onnx.toml"), sidecar).unwrap();
+    let enhancer = open(&graph.write(folder.path(), "model.onnx")).unwrap();
+    (folder, enhancer)
+}
+
+/// What is wrong with a model.
+fn fault(graph: &Graph) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let path = graph.write(folder.path(), "model.onnx");
+    let message = open(&path).err().unwrap().to_string();
+    assert!(
+        message.starts_with(&path.display().to_string()),
+        "{message}"
+    );
+    message
+}
+
+/// An image with all 256 bytes in it, where it is large enough.
+fn image(height: usize, width: usize) -> Rgb {
+    let samples = (0..height * width * 3).map(|i| (i * 37 % 256) as u8);
+    Rgb::new(height, width, samples.collect()).unwrap()
+}
+
+/// An image with a function on each byte.
+fn map(image: &Rgb, with: impl Fn(f64) -> f64) -> Rgb {
+    let samples = image
+        .samples()
+        .iter()
+        .map(|byte| (with(f64::from(*byte) / 255.0).clamp(0.0, 1.0) * 255.0).round() as u8);
+    Rgb::new(image.height(), image.width(), samples.collect()).unwrap()
+}
+
+#[test]
+fn the_runtime_is_opened_once() {
+    let first = runtime();
+    assert_eq!(first.path(), runtime().path());
+    assert!(first.version().starts_with("1."));
+    let folder = tempfile::tempdir().unwrap();
+    let other = RuntimeSearch {
+        library: Some(folder.path().join("other.so")),
+        install: Install::Offline,
+    };
+    let message = other.open().err().unwrap().to_string();
+    assert!(
+        message.contains("this process has already loaded"),
+        "{message}"
+    );
+}
+
+#[test]
+fn threads_and_enhancers_do_not_disturb_each_other() {
+    let image = image(9, 14);
+    std::thread::scope(|scope| {
+        for factor in [1.0_f32, 2.0, 3.0, 4.0] {
+            let image = &image;
+            scope.spawn(move || {
+                let (_folder, mut enhancer) = loaded(&onnx::gain(factor));
+                for _ in 0..5 {
+                    let result = enhancer.enhance(image).unwrap();
+                    assert_eq!(result, map(image, |x| f64::from(factor) * x));
+                }
+            });
+        }
+    });
+}
+
+#[test]
+fn the_callers_arithmetic_keeps_its_subnormal_numbers() {
+    let (_folder, mut enhancer) = loaded(&onnx::identity());
+    enhancer.enhance(&image(4, 4)).unwrap();
+    let half = std::hint::black_box(f32::MIN_POSITIVE) / std::hint::black_box(2.0);
+    assert!(half.is_subnormal());
+}

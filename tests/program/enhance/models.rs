@@ -1,0 +1,147 @@
+//! Graphs: what each computes, and those that are refused.
+
+use darkqa_eval::enhance::ModelFile;
+use darkqa_eval::types::Rgb;
+
+use super::{fault, image, loaded, map, open};
+use crate::support::onnx::Size::{Known, Named};
+use crate::support::onnx::{self, Graph, Type};
+use crate::support::table::check_rows;
+
+#[test]
+fn an_identity_gives_every_byte_back_at_any_size() {
+    let (_folder, mut enhancer) = loaded(&onnx::identity());
+    check_rows([(16, 16), (7, 31), (1, 1), (16, 16)], |(height, width)| {
+        let image = image(height, width);
+        assert_eq!(enhancer.enhance(&image).unwrap(), image);
+    });
+}
+
+#[test]
+fn gain_and_gamma_are_computed_and_held_in_range() {
+    let image = image(12, 20);
+    let (_folder, mut gain) = loaded(&onnx::gain(2.2));
+    assert_eq!(gain.enhance(&image).unwrap(), map(&image, |x| 2.2 * x));
+    let (_folder, mut gamma) = loaded(&onnx::gamma(0.45));
+    assert_eq!(
+        gamma.enhance(&image).unwrap(),
+        map(&image, |x| x.powf(0.45))
+    );
+}
+
+#[test]
+fn of_zero_dces_three_outputs_the_second_is_the_image() {
+    let image = image(8, 8);
+    let rows = [
+        ["enhance_image_1", "enhance_image", "r"],
+        ["101", "102", "103"],
+    ];
+    check_rows(rows, |names| {
+        let (_folder, mut enhancer) = loaded(&onnx::three_outputs(names));
+        assert_eq!(enhancer.enhance(&image).unwrap(), map(&image, |x| 2.0 * x));
+    });
+}
+
+#[test]
+fn subnormal_weights_count_as_zero() {
+    let image = image(4, 4);
+    // 1e-39 · 1e38 = 0.1, if the weight is not flushed.
+    let (_folder, mut subnormal) = loaded(&onnx::weight(1e-39));
+    assert_eq!(subnormal.enhance(&image).unwrap(), image);
+    let (_folder, mut normal) = loaded(&onnx::weight(2e-38));
+    assert_eq!(normal.enhance(&image).unwrap(), map(&image, |x| x + 2.0));
+}
+
+#[test]
+fn external_data_is_loaded_from_beside_the_model() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("gain.bin"), 2.0_f32.to_le_bytes()).unwrap();
+    let path = onnx::external_gain("gain.bin").write(folder.path(), "model.onnx");
+    let image = image(8, 8);
+    let enhanced = open(&path).unwrap().enhance(&image).unwrap();
+    assert_eq!(enhanced, map(&image, |x| 2.0 * x));
+}
+
+#[test]
+fn every_layout_and_type_gives_every_byte_back() {
+    let image = image(12, 20);
+    let any = [Named("height"), Named("width")];
+    let three = Known(3);
+    let rows = [
+        vec![Known(1), three, any[0], any[1]],
+        vec![Named("batch"), three, any[0], any[1]],
+        vec![Known(1), any[0], any[1], three],
+        vec![three, any[0], any[1]],
+        vec![any[0], any[1], three],
+        vec![Known(1), three, Known(12), any[1]],
+    ];
+    check_rows(rows, |shape| {
+        for element in [Type::Float, Type::Half, Type::Byte] {
+            let (_folder, mut enhancer) = loaded(&onnx::shaped(element, &shape));
+            assert_eq!(
+                enhancer.enhance(&image).unwrap(),
+                image,
+                "{}",
+                enhancer.describe()
+            );
+        }
+    });
+}
+
+#[test]
+fn other_conventions_are_refused_by_name() {
+    let any = [Named("height"), Named("width")];
+    let rows = [
+        (
+            onnx::shaped(Type::Float, &[Known(1), Known(1), any[0], any[1]]),
+            "not an image of three",
+        ),
+        (
+            onnx::shaped(Type::Long, &[Known(1), Known(3), any[0], any[1]]),
+            "i64",
+        ),
+        (
+            onnx::shaped(Type::Float, &[Named("n"), Named("c"), any[0], any[1]]),
+            "layout_in",
+        ),
+        (onnx::no_image(), "no output that is an image"),
+        (onnx::two_inputs(), "exposure = 0.5"),
+    ];
+    check_rows(rows, |(graph, part)| {
+        let message = fault(&graph).to_lowercase();
+        assert!(message.contains(part), "{message}");
+    });
+}
+
+#[test]
+fn what_goes_wrong_while_running_is_an_error() {
+    let (_folder, mut halved) = loaded(&onnx::halved());
+    let message = halved.enhance(&image(8, 8)).unwrap_err().to_string();
+    assert!(message.contains("[1, 3, 4, 4]"), "{message}");
+    let (_folder, mut broken) = loaded(&onnx::not_a_number());
+    let message = broken.enhance(&image(8, 8)).unwrap_err().to_string();
+    assert!(message.contains("not numbers"), "{message}");
+    // An image without a black pixel divides well, on the same session.
+    let gray = Rgb::new(2, 2, vec![100; 12]).unwrap();
+    assert_eq!(broken.enhance(&gray).unwrap().samples(), [255; 12]);
+}
+
+#[test]
+fn a_graph_that_the_runtime_refuses_is_an_error() {
+    let graph = Graph::new().node("NoSuchOperator", &["input"], "output");
+    assert!(fault(&graph).contains("NoSuchOperator"));
+    let mut bytes = onnx::gain(2.0).model();
+    bytes.truncate(bytes.len() / 2);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cut.onnx");
+    std::fs::write(&path, bytes).unwrap();
+    assert!(open(&path).is_err());
+}
+
+#[test]
+fn the_name_is_that_of_the_file() {
+    let (folder, enhancer) = loaded(&onnx::identity());
+    let file = ModelFile::read(&folder.path().join("model.onnx")).unwrap();
+    assert_eq!(enhancer.name().as_str(), "model");
+    assert_eq!(enhancer.name(), file.name());
+}

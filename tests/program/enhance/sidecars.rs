@@ -1,0 +1,94 @@
+//! Sidecars and presets: what a graph does not say about its inputs and outputs.
+
+use std::path::PathBuf;
+
+use darkqa_eval::enhance::ModelFile;
+
+use super::{fault, image, loaded, map, open, stated};
+use crate::support::onnx;
+use crate::support::table::check_rows;
+
+#[test]
+fn a_sidecar_says_which_output_it_is() {
+    let graph = onnx::two_outputs();
+    assert!(fault(&graph).contains("several outputs"));
+    let folder = tempfile::tempdir().unwrap();
+    let path = graph.write(folder.path(), "model.onnx");
+    let sidecar = folder.path().join("model.onnx.toml");
+    let image = image(8, 8);
+    check_rows(["output = 1", "output = \"18\""], |text| {
+        std::fs::write(&sidecar, text).unwrap();
+        let enhanced = open(&path).unwrap().enhance(&image).unwrap();
+        assert_eq!(enhanced, map(&image, |x| 2.0 * x));
+    });
+    std::fs::write(&sidecar, "output = 1\nlayout_in = \"nhwc\"").unwrap();
+    let message = open(&path).err().unwrap().to_string();
+    assert!(message.contains("layout_in"), "{message}");
+}
+
+#[test]
+fn a_sidecar_says_what_a_graph_cannot() {
+    let image = image(12, 20);
+    let rows = [
+        (
+            onnx::identity(),
+            "range_in = \"0..255\"\nrange_out = \"0..255\"",
+        ),
+        (
+            onnx::identity(),
+            "range_in = \"-1..1\"\nrange_out = \"-1..1\"\ncolor = \"bgr\"",
+        ),
+        (onnx::ranged(0.0, 255.0), "range_out = \"0..255\""),
+        (onnx::ranged(-1.0, 1.0), "range_out = \"-1..1\""),
+        (
+            onnx::ranged(0.5, 1.0),
+            "mean = [0.5, 0.5, 0.5]\nstd = [0.5, 0.5, 0.5]",
+        ),
+        (onnx::two_inputs(), "[extra]\nexposure = 1"),
+    ];
+    check_rows(rows, |(graph, sidecar)| {
+        let (_folder, mut enhancer) = stated(&graph, sidecar);
+        assert_eq!(enhancer.enhance(&image).unwrap(), image, "{sidecar}");
+        assert!(
+            enhancer.describe().contains("sidecar"),
+            "{}",
+            enhancer.describe()
+        );
+    });
+    let (_folder, mut truncated) = stated(&onnx::gain(0.5), "rounding = \"truncate\"");
+    let half: Vec<u8> = image.samples().iter().map(|byte| byte / 2).collect();
+    assert_eq!(truncated.enhance(&image).unwrap().samples(), half);
+}
+
+#[test]
+fn a_range_that_nobody_stated_is_checked() {
+    let rows = [
+        (onnx::ranged(0.0, 255.0), "range_out = \"0..255\""),
+        (onnx::ranged(-1.0, 1.0), "range_out = \"-1..1\""),
+    ];
+    check_rows(rows, |(graph, likely)| {
+        let (_folder, mut enhancer) = loaded(&graph);
+        let message = enhancer.enhance(&image(12, 20)).unwrap_err().to_string();
+        assert!(message.contains(likely), "{message}");
+    });
+}
+
+#[test]
+fn a_preset_says_what_its_authors_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = onnx::two_outputs().write(folder.path(), "model.onnx");
+    let image = image(8, 8);
+    let file = |preset: &str| PathBuf::from(format!("{preset}:{}", path.display()));
+    let enhanced = open(&file("zero-dce")).unwrap().enhance(&image).unwrap();
+    assert_eq!(enhanced, map(&image, |x| 2.0 * x));
+    let described = open(&file("sci")).unwrap().describe();
+    assert!(
+        described.contains("preset sci") && described.contains("truncate"),
+        "{described}"
+    );
+    let digests =
+        ["sci", "zero-dce"].map(|preset| ModelFile::read(&file(preset)).unwrap().digest());
+    assert_ne!(digests[0], digests[1]);
+    let message = open(&file("nonesuch")).err().unwrap().to_string();
+    assert!(message.contains("is not a preset"), "{message}");
+}

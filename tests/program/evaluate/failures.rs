@@ -1,0 +1,140 @@
+//! Broken images, models, endpoints and enhancers: found early, and never taken for answers.
+
+use std::fs;
+
+use serde_json::Value;
+
+use super::text;
+use crate::support::endpoint::{Answer, MockEndpoint};
+use crate::support::frames::png;
+use crate::support::onnx;
+use crate::support::process::wait_until;
+use crate::support::run::{Bench, model_args, records, words};
+use crate::support::table::check_rows;
+
+#[test]
+fn a_broken_image_is_found_before_anything_is_asked() {
+    let bench = Bench::with_frames();
+    let whole = png(20);
+    let endpoint = MockEndpoint::start([Answer::text("A")]);
+    let url = endpoint.base_url();
+    let mut corrupt = whole.clone();
+    let middle = corrupt.len() / 2;
+    corrupt[middle] ^= 0x40;
+    let rows = [
+        (&whole[..whole.len() - 40], "ends before"),
+        (&corrupt, "checksum"),
+    ];
+    check_rows(rows, |(broken, message)| {
+        bench.file("frames/a.png", broken);
+        let run = bench.call(&model_args(&url, "--data frames --levels L0 --out run"));
+        assert_eq!(run.code, Some(2), "{run:?}");
+        assert!(
+            run.stderr.contains("a.png: not a whole image") && run.stderr.contains(message),
+            "{run:?}"
+        );
+    });
+    assert_eq!(endpoint.requests().len(), 0);
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_is_found_before_the_data_are_read() {
+    let bench = Bench::new();
+    bench.file("file", "");
+    let rows = [
+        ("--out file", "--out: cannot write to"),
+        ("--out file/run", "--out: cannot write to"),
+        ("--out file/run --dry-run", "--out: cannot write to"),
+        ("--resume gone", "--resume: gone: no such folder"),
+    ];
+    check_rows(rows, |(place, message)| {
+        let line = format!("--model random --data nowhere --levels L0 {place}");
+        let run = bench.call(&words(&line));
+        assert_eq!(run.code, Some(2), "{run:?}");
+        assert!(run.stderr.contains(message), "{run:?}");
+    });
+    let files = fs::read_dir(bench.path("")).unwrap().count();
+    assert_eq!(files, 1, "nothing is left behind");
+}
+
+#[test]
+fn a_model_that_does_not_exist_stops_itself_alone() {
+    let bench = Bench::with_frames();
+    let endpoint = MockEndpoint::start([Answer::error(404, "model_not_found", "no such model")]);
+    let url = endpoint.base_url();
+    let run = bench.call(&words(&format!(
+        "--data frames --model random --model gone --base-url {url} --levels L0-L2 --out run"
+    )));
+    assert_eq!(run.code, Some(2), "{run:?}");
+    assert!(
+        run.stderr.contains("gone") && run.stderr.contains("no such model"),
+        "{run:?}"
+    );
+    let csv = fs::read_to_string(bench.path("run/summary.csv")).unwrap();
+    assert!(
+        csv.contains("random,image,L2,noise,,all,strict,3,") && !csv.contains("gone"),
+        "{csv}"
+    );
+}
+
+#[test]
+fn an_endpoint_that_is_not_there_is_noticed_by_its_first_failures() {
+    let bench = Bench::with_frames();
+    let free = std::net::TcpListener::bind("127.0.0.1:0")
+        .unwrap()
+        .local_addr()
+        .unwrap();
+    let url = format!("http://{free}/v1");
+    let run = bench.call(&model_args(
+        &url,
+        "--data frames --retries 0 --concurrency 1 --out run",
+    ));
+    assert_eq!(run.code, Some(2), "{run:?}");
+    assert!(
+        run.stderr.contains("m: 5 trials in a row failed"),
+        "{run:?}"
+    );
+    assert_eq!(records(&bench.path("run")).len(), 5);
+}
+
+#[test]
+fn an_image_that_changes_under_way_is_not_taken_for_the_old_one() {
+    let bench = Bench::with_frames();
+    let later = Answer::error(429, "slow_down", "later").header("retry-after", "1");
+    let endpoint = MockEndpoint::start([later, Answer::text("A")]);
+    let url = endpoint.base_url();
+    let changed = bench.path("frames/b.png");
+    let run = std::thread::scope(|scope| {
+        scope.spawn(|| {
+            wait_until(|| !endpoint.requests().is_empty());
+            fs::write(&changed, png(200)).unwrap();
+        });
+        bench.call(&model_args(&url, "--data frames --concurrency 1 --out run"))
+    });
+    assert_eq!(run.code, Some(1), "{run:?}");
+    let of_b: Vec<Value> = records(&bench.path("run"))
+        .into_iter()
+        .filter(|record| record["frame"] == "b.png")
+        .collect();
+    assert_eq!(of_b.len(), 11);
+    assert!(
+        of_b.iter()
+            .all(|record| text(&record["failure"], "message").contains("changed while the run")),
+        "{of_b:?}"
+    );
+}
+
+#[test]
+fn an_enhancer_that_fails_is_found_before_anything_is_asked() {
+    let bench = Bench::with_frames();
+    onnx::not_a_number().write(&bench.path(""), "nan.onnx");
+    let endpoint = MockEndpoint::start([Answer::text("A")]);
+    let url = endpoint.base_url();
+    let run = bench.call(&model_args(&url, "--data frames --llie nan.onnx --out run"));
+    assert_eq!(run.code, Some(2), "{run:?}");
+    assert!(
+        run.stderr.contains("nan.onnx") && run.stderr.contains("NaN"),
+        "{run:?}"
+    );
+    assert_eq!(endpoint.requests().len(), 0);
+}

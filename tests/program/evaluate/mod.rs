@@ -1,0 +1,15 @@
+//! The main job from the outside: the program is called as a user calls it.
+
+mod conditions;
+mod failures;
+mod interruption;
+mod outputs;
+mod requests;
+mod resume;
+
+use serde_json::Value;
+
+/// A field of a record; empty if it is not a text.
+fn text<'a>(record: &'a Value, key: &str) -> &'a str {
+    record[key].as_str().unwrap_or("")
+}

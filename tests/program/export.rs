@@ -1,0 +1,193 @@
+//! `export`: what is written for other tools is read back as the same questions with the same pixels.
+
+use std::fs;
+use std::path::Path;
+
+use crate::support::table::check_rows;
+use assert_cmd::Command;
+use darkqa_eval::internals::dataset::{DataPlace, Dataset};
+use darkqa_eval::internals::synthesis::expose;
+use darkqa_eval::types::{Question, Rgb, Severity};
+use image::{Rgb as Pixel, RgbImage};
+use tempfile::TempDir;
+
+/// Two frames with three questions, one of them with three choices and with what a table must quote.
+fn data() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, shade) in [("a.png", 200), ("b.png", 120)] {
+        let image = RgbImage::from_fn(16, 12, |x, y| Pixel([shade, x as u8 * 9, y as u8 * 9]));
+        image.save(folder.path().join(name)).unwrap();
+    }
+    let questions = [
+        r#"{"id":"q1","frame":"b.png","family":"presence","question":"Is there a sink?","choices":["yes","no"],"answer":"no"}"#,
+        r#"{"id":"q2","frame":"a.png","family":"color","question":"What\tcolor, \"said\"?","choices":["red","dark, blue","grey"],"answer":"grey"}"#,
+        r#"{"id":"q3","frame":"b.png","family":"closest","question":"Nearest?","choices":["chair","table"],"answer":"chair"}"#,
+    ];
+    fs::write(folder.path().join("questions.jsonl"), questions.join("\n")).unwrap();
+    folder
+}
+
+fn run(data: &Path, kind: &str, out: &Path, flags: &[&str]) -> assert_cmd::assert::Assert {
+    let mut command = Command::cargo_bin("darkqa-eval").unwrap();
+    command
+        .args(["export", kind])
+        .arg(data)
+        .arg("--out")
+        .arg(out)
+        .args(flags)
+        .assert()
+}
+
+/// The content of questions, in the order of their words.
+fn words(set: &Dataset) -> Vec<(String, Vec<String>, usize, String)> {
+    let word = |question: &Question| {
+        let choices = &question.choices;
+        (
+            question.text.clone(),
+            choices.texts().to_vec(),
+            choices.truth(),
+            question.family.to_string(),
+        )
+    };
+    let mut words: Vec<_> = set.questions().iter().map(word).collect();
+    words.sort();
+    words
+}
+
+/// The pixels that a question is about, by its words.
+fn pixels(set: &Dataset, text: &str) -> Rgb {
+    let question = set
+        .questions()
+        .iter()
+        .find(|question| question.text == text)
+        .unwrap();
+    set.picture(&question.frame).unwrap().decode().unwrap()
+}
+
+#[test]
+fn every_form_is_read_back() {
+    let data = data();
+    let original = Dataset::open(&DataPlace::Path(data.path().to_owned()), None).unwrap();
+    let name = original.name().to_owned();
+    let rows = [
+        ("vlmevalkit", format!("{name}_CONDITION.tsv")),
+        ("imagefolder", "CONDITION".to_owned()),
+        ("imagefolder", "CONDITION/metadata.jsonl".to_owned()),
+        ("llava", "CONDITION/questions.jsonl".to_owned()),
+    ];
+    check_rows(rows, |(kind, file)| {
+        let out = tempfile::tempdir().unwrap();
+        run(
+            data.path(),
+            kind,
+            out.path(),
+            &["--levels", "L0,L2", "--variant", "ev"],
+        )
+        .success();
+        for (condition, degraded) in [("L0", false), ("L2-ev", true)] {
+            let path = out.path().join(file.replace("CONDITION", condition));
+            let set = Dataset::open(&DataPlace::Path(path.clone()), None).unwrap();
+            assert_eq!(words(&set), words(&original), "{}", path.display());
+            for question in original.questions() {
+                let clean = original.picture(&question.frame).unwrap().decode().unwrap();
+                let expected = if degraded {
+                    expose(&clean, Severity::L2)
+                } else {
+                    clean
+                };
+                assert_eq!(pixels(&set, &question.text), expected, "{kind} {condition}");
+            }
+        }
+    });
+}
+
+#[test]
+fn a_table_holds_each_image_once() {
+    let (data, out) = (data(), tempfile::tempdir().unwrap());
+    run(data.path(), "vlmevalkit", out.path(), &["--levels", "L0"]).success();
+    let table = fs::read_dir(out.path())
+        .unwrap()
+        .next()
+        .unwrap()
+        .unwrap()
+        .path();
+    let mut reader = csv::ReaderBuilder::new()
+        .delimiter(b'\t')
+        .from_path(table)
+        .unwrap();
+    assert_eq!(
+        reader.headers().unwrap(),
+        [
+            "index", "image", "question", "answer", "category", "id", "A", "B", "C"
+        ]
+        .as_slice()
+    );
+    let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
+    let images: Vec<bool> = rows.iter().map(|row| row[1].len() > 64).collect();
+    assert_eq!(images, [true, true, false]);
+    // The second question about a frame names the row of the first.
+    assert_eq!((&rows[2][1], &rows[1][0], &rows[2][5]), ("0", "0", "q3"));
+}
+
+#[test]
+fn the_noise_is_that_of_an_evaluation() {
+    let (data, out, dark) = (
+        data(),
+        tempfile::tempdir().unwrap(),
+        tempfile::tempdir().unwrap(),
+    );
+    run(
+        data.path(),
+        "imagefolder",
+        out.path(),
+        &["--levels", "L3", "--variant", "noise", "--seed", "5"],
+    )
+    .success();
+    let mut command = Command::cargo_bin("darkqa-eval").unwrap();
+    command
+        .arg("synthesize")
+        .arg(data.path())
+        .arg("--out")
+        .arg(dark.path());
+    command
+        .args(["--levels", "L3", "--variant", "noise", "--seed", "5"])
+        .assert()
+        .success();
+    let open = |path: std::path::PathBuf| image::open(path).unwrap().into_rgb8();
+    for name in ["a", "b"] {
+        let exported = open(out.path().join(format!("L3-noise/images/{name}.png")));
+        assert_eq!(
+            exported,
+            open(dark.path().join(format!("{name}_L3-noise.png"))),
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn nothing_is_written_over_unasked() {
+    let (data, out) = (data(), tempfile::tempdir().unwrap());
+    let flags = ["--levels", "L0"];
+    run(data.path(), "llava", out.path(), &flags).success();
+    let assert = run(data.path(), "llava", out.path(), &flags).code(2);
+    let message = String::from_utf8(assert.get_output().stderr.clone()).unwrap();
+    assert!(
+        message.contains("questions.jsonl: the set exists already; --force"),
+        "{message}"
+    );
+    run(
+        data.path(),
+        "llava",
+        out.path(),
+        &["--levels", "L0", "--force"],
+    )
+    .success();
+    let assert = run(data.path(), "parquet", out.path(), &flags).code(2);
+    let message = String::from_utf8(assert.get_output().stderr.clone()).unwrap();
+    assert!(
+        message.contains(
+            "invalid value 'parquet' for '<KIND>' [possible values: vlmevalkit, imagefolder, llava"
+        ),
+        "{message}"
+    );
+}

@@ -1,0 +1,222 @@
+//! Orders of choices, repeats, constraints, and reading again.
+use std::collections::BTreeSet;
+use std::fs;
+
+use crate::support::endpoint::{Answer, MockEndpoint};
+use crate::support::run::{Bench, model_args, records, words};
+use serde_json::{Value, json};
+
+/// The arguments of every run, and more of them.
+fn args(more: &str) -> Vec<&str> {
+    [words("--data set.jsonl --levels L0"), words(more)].concat()
+}
+
+/// The output of a complete run in the folder `run`.
+fn run(bench: &Bench, more: &str) -> String {
+    bench.complete(&[args("--out run"), words(more)].concat())
+}
+
+#[test]
+fn every_rotation_is_asked_and_an_answer_by_position_averages_out() {
+    let bench = Bench::with_questions(6);
+    bench.file("script.jsonl", "{\"default\":\"A\"}");
+    let table = run(&bench, "--model script:script.jsonl --circular");
+    let records = records(&bench.path("run"));
+    assert_eq!(records.len(), 18);
+    let truths: Vec<u64> = records
+        .iter()
+        .map(|r| r["truth"].as_u64().unwrap())
+        .collect();
+    for truth in 0..3 {
+        assert_eq!(truths.iter().filter(|t| **t == truth).count(), 6);
+    }
+    for record in &records {
+        let truth = record["truth"].as_u64().unwrap() as usize;
+        assert_eq!(record["choices"][truth], "brown");
+    }
+    // Always A: right in one rotation of three, never in all.
+    assert!(table.contains("33.3 ±"), "{table}");
+    assert!(
+        table.contains("right every time") && table.contains("0.0"),
+        "{table}"
+    );
+    let csv = fs::read_to_string(bench.path("run/summary.csv")).unwrap();
+    assert!(
+        csv.lines()
+            .next()
+            .unwrap()
+            .ends_with("value,low,high,always,reading"),
+        "{csv}"
+    );
+    let text = "{\"default\":\"brown\"}";
+    bench.file("script.jsonl", text);
+    let by_text = args("--out by-text --model script:script.jsonl --circular");
+    assert!(bench.complete(&by_text).contains("100.0"));
+}
+
+#[test]
+fn chance_is_that_of_what_is_asked() {
+    let bench = Bench::with_questions(1);
+    let question = |id: &str, choices: &[&str]| {
+        let question = json!({
+            "id": id, "image": "a.png", "family": "color", "question": "What color is it?", "choices": choices,
+            "answer": "brown",
+        });
+        format!("{question}\n")
+    };
+    let two = question("two", &["red", "brown"]);
+    let four = question("four", &["red", "brown", "blue", "green"]);
+    bench.file("set.jsonl", two + &four);
+    bench.file("script.jsonl", "{\"default\":\"A\"}");
+    // Two replies with a half and four with a quarter each: two of six, as for the one who always says A.
+    let table = run(&bench, "--model script:script.jsonl --circular");
+    assert!(table.contains("33.3 ±"), "{table}");
+    assert!(
+        table.contains("chance: 33.33 over 6 orders of choices"),
+        "{table}"
+    );
+}
+
+#[test]
+fn shuffled_orders_are_the_same_in_every_condition_and_run() {
+    let orders = |seed: &str| {
+        let bench = Bench::with_questions(6);
+        bench.complete(&words(&format!(
+            "--data set.jsonl --levels L0,L2 --out run --model random --shuffle-options --seed {seed}"
+        )));
+        let orders: BTreeSet<(String, String)> = records(&bench.path("run"))
+            .iter()
+            .map(|record| {
+                (
+                    record["question"].to_string(),
+                    record["choices"].to_string(),
+                )
+            })
+            .collect();
+        assert_eq!(orders.len(), 6, "one order a question");
+        orders
+    };
+    assert_eq!(orders("1"), orders("1"));
+    assert_ne!(orders("1"), orders("2"));
+    let kinds: BTreeSet<String> = orders("1").into_iter().map(|(_, order)| order).collect();
+    assert!(kinds.len() > 1);
+}
+
+#[test]
+fn repeats_are_trials_of_their_own() {
+    let bench = Bench::with_questions(6);
+    let mock = MockEndpoint::start([Answer::text("C")]);
+    let base = mock.base_url();
+    let repeated = format!("--model m --base-url {base} --repeats 3");
+    run(&bench, &repeated);
+    assert_eq!(mock.requests().len(), 18);
+    let records = records(&bench.path("run"));
+    let repeats: Vec<u64> = records
+        .iter()
+        .map(|r| r["repeat"].as_u64().unwrap_or(0))
+        .collect();
+    for repeat in 0..3 {
+        assert_eq!(repeats.iter().filter(|r| **r == repeat).count(), 6);
+    }
+    run(&bench, &repeated);
+    assert_eq!(mock.requests().len(), 18, "none is asked again");
+}
+
+#[test]
+fn a_constraint_is_sent_and_its_object_is_read() {
+    let bench = Bench::with_questions(6);
+    let mock = MockEndpoint::start([Answer::text("{\"answer\": \"C\"}")]);
+    let base = mock.base_url();
+    let model = format!("--model m --base-url {base}");
+    run(&bench, &format!("{model} --constrain json"));
+    let sent = &mock.requests()[0].json();
+    let schema = &sent["response_format"]["json_schema"]["schema"];
+    assert_eq!(
+        schema["properties"]["answer"]["enum"],
+        json!(["A", "B", "C"])
+    );
+    for record in records(&bench.path("run")) {
+        assert_eq!(
+            (&record["reply"], &record["outcome"]),
+            (&"C".into(), &"right".into())
+        );
+    }
+    // It measures something else, so it is another run.
+    let other = [args("--out run"), words(&model)].concat();
+    assert!(bench.call(&other).stderr.contains("--constrain"));
+
+    let mock = MockEndpoint::start([Answer::text("I think C")]);
+    let base = mock.base_url();
+    let free = args("--out free --constrain choice");
+    let called = bench.call(&[free, model_args(&base, "")].concat());
+    assert_eq!(
+        mock.requests()[0].json()["structured_outputs"]["choice"],
+        json!(["A", "B", "C"])
+    );
+    assert!(
+        called.stderr.contains("--constrain choice"),
+        "said once: {called:?}"
+    );
+    assert_eq!(called.stderr.matches("--constrain choice").count(), 1);
+}
+
+#[test]
+fn kept_replies_are_read_again_without_a_call() {
+    let bench = Bench::with_questions(6);
+    bench.file("script.jsonl", "{\"default\":\"C\"}");
+    let table = run(&bench, "--model script:script.jsonl");
+    let report = bench.complete(&["report", "run"]);
+    assert_eq!(report, table, "the same from the records alone");
+    // As an earlier version might have read them.
+    let path = bench.path("run/records.jsonl");
+    let old: String = fs::read_to_string(&path)
+        .unwrap()
+        .lines()
+        .map(|line| {
+            let mut record: Value = serde_json::from_str(line).unwrap();
+            record["strict"] = json!({"chosen": null, "why": "no_choice"});
+            record["outcome"] = "unparsed".into();
+            record.to_string() + "\n"
+        })
+        .collect();
+    fs::write(&path, &old).unwrap();
+    assert!(bench.complete(&["report", "run"]).contains("0.0 ±"));
+    let rescored = bench.complete(&["report", "run", "--rescore"]);
+    assert!(
+        rescored.starts_with("6 of 6 records now read differently\n"),
+        "{rescored}"
+    );
+    assert!(rescored.ends_with(&table), "{rescored}");
+    let again = bench.complete(&["report", "run", "--rescore"]);
+    assert!(again.starts_with("0 of 6"), "{again}");
+    let stored = fs::read_to_string(&path).unwrap();
+    assert!(stored.starts_with(&old), "what was kept is never changed");
+    let none = bench.call(&["report", "nowhere"]);
+    assert_eq!(none.code, Some(2));
+}
+
+#[test]
+fn replies_without_an_answer_are_told_by_reason() {
+    let bench = Bench::with_questions(6);
+    let thinking = json!({"content": null, "reasoning_content": "hmm"});
+    let mut answers = vec![Answer::message(&thinking, "length"); 10];
+    answers.push(Answer::message(&json!({"content": null}), "content_filter"));
+    answers.push(Answer::message(
+        &json!({"content": null, "refusal": "no"}),
+        "stop",
+    ));
+    let mock = MockEndpoint::start(answers);
+    let base = mock.base_url();
+    let repeated = args("--out run --repeats 2 --concurrency 1");
+    let called = bench.call(&[repeated, model_args(&base, "")].concat());
+    assert!(
+        called.stdout.contains(
+            "10 cut at the token limit (--max-tokens), 1 refused, 1 withheld by a filter"
+        ),
+        "{called:?}"
+    );
+    assert!(
+        called.stderr.contains("10 of the first 10 replies"),
+        "{called:?}"
+    );
+}

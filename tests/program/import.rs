@@ -1,0 +1,519 @@
+//! `import`: every layout, written by the tests, becomes frames of the common interface.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::support::table::check_rows;
+use assert_cmd::Command;
+use darkqa_eval::internals::dataset::Dataset;
+use darkqa_eval::types::{DepthKind, Frame, FrameId};
+use image::{GrayImage, ImageBuffer, Luma, Rgb, RgbImage, Rgba, RgbaImage};
+use serde_json::Value;
+use tempfile::TempDir;
+
+const WIDTH: u32 = 8;
+const HEIGHT: u32 = 6;
+
+/// A folder to be imported, and the one it is imported to.
+struct Scene(TempDir);
+
+impl Scene {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    fn at(&self, name: &str) -> PathBuf {
+        let path = self.0.path().join("src").join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        path
+    }
+
+    fn text(&self, name: &str, text: &str) {
+        fs::write(self.at(name), text).unwrap();
+    }
+
+    fn rgb(&self, name: &str) {
+        RgbImage::from_fn(WIDTH, HEIGHT, |x, y| Rgb([x as u8 * 20, y as u8 * 20, 90]))
+            .save(self.at(name))
+            .unwrap();
+    }
+
+    /// A 16-bit map: `left` in the left half, `right` in the right.
+    fn deep(&self, name: &str, left: u16, right: u16) {
+        let map = ImageBuffer::from_fn(WIDTH, HEIGHT, |x, _| {
+            Luma([if x < WIDTH / 2 { left } else { right }])
+        });
+        map.save(self.at(name)).unwrap();
+    }
+
+    fn shallow(&self, name: &str, left: u8, right: u8) {
+        let map = GrayImage::from_fn(WIDTH, HEIGHT, |x, _| {
+            Luma([if x < WIDTH / 2 { left } else { right }])
+        });
+        map.save(self.at(name)).unwrap();
+    }
+
+    /// An array as NumPy writes it.
+    fn npy<T: Copy>(&self, name: &str, descr: &str, left: T, right: T, bytes: fn(T) -> Vec<u8>) {
+        let header = format!(
+            "{{'descr': '{descr}', 'fortran_order': False, 'shape': ({HEIGHT}, {WIDTH}), }}\n"
+        );
+        let mut file = b"\x93NUMPY\x01\x00".to_vec();
+        file.extend((header.len() as u16).to_le_bytes());
+        file.extend(header.bytes());
+        for i in 0..WIDTH * HEIGHT {
+            file.extend(bytes(if i % WIDTH < WIDTH / 2 { left } else { right }));
+        }
+        fs::write(self.at(name), file).unwrap();
+    }
+
+    fn metres(&self, name: &str, left: f32, right: f32) {
+        self.npy(name, "<f4", left, right, |value| {
+            value.to_le_bytes().to_vec()
+        });
+    }
+
+    fn out(&self) -> PathBuf {
+        self.0.path().join("out")
+    }
+
+    fn run(&self, kind: &str, flags: &[&str]) -> assert_cmd::assert::Assert {
+        let mut command = Command::cargo_bin("darkqa-eval").unwrap();
+        command
+            .env_clear()
+            .args(["import", kind, "--src"])
+            .arg(self.0.path().join("src"));
+        command.arg("--out").arg(self.out()).args(flags).assert()
+    }
+
+    /// Imports, and reads what came of it.
+    fn import(&self, kind: &str, flags: &[&str]) -> Dataset {
+        self.run(kind, flags).success();
+        Dataset::of_frames(&self.out()).unwrap()
+    }
+
+    /// Imports in vain, and returns what is said.
+    fn refused(&self, kind: &str, flags: &[&str]) -> String {
+        let assert = self.run(kind, flags).failure();
+        String::from_utf8(assert.get_output().stderr.clone()).unwrap()
+    }
+
+    fn line(&self, i: usize) -> Value {
+        let text = fs::read_to_string(self.out().join("frames.jsonl")).unwrap();
+        serde_json::from_str(text.lines().nth(i).unwrap()).unwrap()
+    }
+}
+
+fn frame(set: &Dataset, name: &str) -> Frame {
+    set.frame(&FrameId(name.into())).unwrap()
+}
+
+/// The values of a map on its left and right.
+fn sides<T: Copy>(map: Option<&ndarray::Array2<T>>) -> (T, T) {
+    let map = map.unwrap();
+    (map[(0, 0)], map[(0, WIDTH as usize - 1)])
+}
+
+/// The canonical classes on the left and right.
+fn classes(set: &Dataset, frame: &Frame) -> (String, String) {
+    let (left, right) = sides(frame.semantic.as_ref());
+    let labels = &set.labels().unwrap().labels;
+    (
+        labels[&left].canonical.clone(),
+        labels[&right].canonical.clone(),
+    )
+}
+
+fn pair(left: &str, right: &str) -> (String, String) {
+    (left.into(), right.into())
+}
+
+/// One scene of habitat-sim.
+fn habitat() -> Scene {
+    let scene = Scene::new();
+    for i in 0..5 {
+        let name = |kind: &str, end: &str| format!("00800-x/{kind}/{i:03}.{end}");
+        RgbaImage::from_pixel(WIDTH, HEIGHT, Rgba([9, 9, 9, 255]))
+            .save(scene.at(&name("rgb", "png")))
+            .unwrap();
+        scene.metres(&name("depth", "npy"), 2.0, f32::NAN);
+        scene.npy(&name("semantic", "npy"), "<i4", 3_i32, 70_000, |value| {
+            value.to_le_bytes().to_vec()
+        });
+    }
+    scene.text(
+        "00800-x/x.semantic.txt",
+        "HM3D Semantic Annotations\n3,FF,\"bed, made\",0\n70000,AA,\"Kitchen cabinet\",1\n",
+    );
+    let steps = (0..5).map(|i| {
+        format!("{{\"frame\":\"{i:03}\",\"t\":{},\"pose\":[1,0],\"intrinsics\":{{\"fx\":4,\"fy\":4,\"cx\":3.5,\"cy\":2.5}}}}\n", f64::from(i) * 0.9)
+    });
+    scene.text("00800-x/trajectory.jsonl", &steps.collect::<String>());
+    scene
+}
+
+#[test]
+fn habitat_renders_of_hm3d() {
+    let scene = habitat();
+    let out = scene.run("habitat", &["--every", "2"]).success();
+    let message = String::from_utf8(out.get_output().stdout.clone()).unwrap();
+    assert!(
+        message.contains("2 frames of 1 scenes") && message.contains("\"bed, made\" 1"),
+        "{message}"
+    );
+    let set = Dataset::of_frames(&scene.out()).unwrap();
+    let names: Vec<&str> = set.frames().map(|id| id.0.as_str()).collect();
+    assert_eq!(names, ["00800-x/000", "00800-x/003"]);
+    let frame = frame(&set, "00800-x/003");
+    assert_eq!(sides(frame.depth.as_ref()), (2000, 0));
+    assert_eq!(sides(frame.segments.as_ref()), (3, 70_000));
+    assert_eq!(classes(&set, &frame), pair("misc", "cabinet"));
+    assert_eq!(frame.names[&70_000].name, "Kitchen cabinet");
+    assert_eq!(frame.names[&3].region, Some(0));
+    assert!((frame.intrinsics.unwrap().fx - 4.0).abs() < 1e-9);
+    assert_eq!(
+        (
+            scene.line(1)["t"].as_f64(),
+            scene.line(1)["depth_scale"].as_f64()
+        ),
+        (Some(2.7), Some(0.001))
+    );
+    assert_eq!(set.title(), "habitat");
+}
+
+#[test]
+fn habitat_renders_of_matterport_and_replica() {
+    let house = "R 0 0 0 0 b 0 0 0\nC 0 1 painting 39 objects 0\nC 1 1 bed 11 bed 0\nO 0 0 0 0 0 0\nO 1 0 1 0 0 0\n";
+    let replica = r#"{"objects":[{"id":0,"class_name":"picture"},{"id":1,"class_name":"bed"}]}"#;
+    let rows = [
+        ("m.house", house, Some("bedroom")),
+        ("info_semantic.json", replica, None),
+    ];
+    check_rows(rows, |(name, text, room)| {
+        let scene = Scene::new();
+        scene.rgb("s/rgb/0.png");
+        scene.deep("s/depth/0.png", 2000, 3000);
+        scene.deep("s/semantic/0.png", 0, 1);
+        scene.text(&format!("s/{name}"), text);
+        let set = scene.import("habitat", &["--depth-scale", "0.001", "--hfov", "90"]);
+        let frame = frame(&set, "s/0");
+        // An instance may have the number 0, which stands for none here.
+        assert_eq!(sides(frame.segments.as_ref()), (1, 2), "{name}");
+        assert_eq!(classes(&set, &frame), pair("picture", "bed"));
+        assert_eq!(frame.room.as_deref(), room);
+        let camera = frame.intrinsics.unwrap();
+        assert!(
+            (camera.fx - 4.0).abs() < 1e-9 && (camera.cx - 3.5).abs() < 1e-9,
+            "{camera:?}"
+        );
+    });
+}
+
+#[test]
+fn what_is_wrong_with_renders_is_said() {
+    let scene = habitat();
+    fs::remove_file(scene.at("00800-x/x.semantic.txt")).unwrap();
+    assert!(
+        scene
+            .refused("habitat", &[])
+            .contains("none of *.semantic.txt")
+    );
+    scene.text(
+        "00800-x/x.semantic.txt",
+        "HM3D Semantic Annotations\n9,FF,\"bed\",0\n",
+    );
+    let message = scene.refused("habitat", &[]);
+    assert!(
+        message.contains("scene_dataset_config.json")
+            && message.contains("no frame of it could be read"),
+        "{message}"
+    );
+    scene.text(
+        "00800-x/x.semantic.txt",
+        "HM3D Semantic Annotations\n9,FF,bed,0\n",
+    );
+    assert!(
+        scene
+            .refused("habitat", &[])
+            .contains("x.semantic.txt, line 2: a name between quotes")
+    );
+    let scene = habitat();
+    scene.shallow("00800-x/semantic/001.png", 3, 3);
+    fs::remove_file(scene.at("00800-x/semantic/001.npy")).unwrap();
+    // 8 bits hold no numbers of instances; the other frames are taken.
+    let assert = scene.run("habitat", &[]).code(1);
+    let message = String::from_utf8(assert.get_output().stderr.clone()).unwrap();
+    assert!(
+        message.contains("001.png: a grey PNG of 8 bits; 16-bit grey expected"),
+        "{message}"
+    );
+    assert_eq!(
+        Dataset::of_frames(&scene.out()).unwrap().frames().count(),
+        4
+    );
+    assert!(
+        scene
+            .refused("habitat", &[])
+            .contains("the folder has frames already; --force")
+    );
+    scene.run("habitat", &["--force", "--count", "2"]).success();
+    assert_eq!(
+        Dataset::of_frames(&scene.out()).unwrap().frames().count(),
+        2
+    );
+}
+
+#[test]
+fn frames_of_scannet() {
+    let scene = Scene::new();
+    scene.text(
+        "scannetv2-labels.combined.tsv",
+        "id\traw_category\tcategory\tcount\tnyu40id\tmpcat40index\tmpcat40\n1\twall\twall\t9\t1\t1\twall\n1191\tcoffee table\ttable\t9\t7\t5\ttable\n76\tpainting\tpicture\t1\t11\t39\tobjects\n31\tx\tx\t1\t1\t41\tunlabeled\n",
+    );
+    for i in [0, 30] {
+        let name = |kind: &str, end: &str| format!("scene0000_00/{kind}/{i}.{end}");
+        scene.rgb(&name("color", "jpg"));
+        // Half the size of colour.
+        let deep = ImageBuffer::from_fn(WIDTH / 2, HEIGHT / 2, |x, _| {
+            Luma([if x < WIDTH / 4 { 1500_u16 } else { 2500 }])
+        });
+        deep.save(scene.at(&name("depth", "png"))).unwrap();
+        scene.deep(&name("label-filt", "png"), 1191, 76);
+        scene.shallow(&name("instance-filt", "png"), 4, 0);
+        scene.text(
+            &name("pose", "txt"),
+            if i == 0 {
+                "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"
+            } else {
+                "-inf -inf -inf -inf"
+            },
+        );
+    }
+    scene.text(
+        "scene0000_00/scene0000_00.txt",
+        "axisAlignment = 1\nsceneType = Bedroom / Hotel\n",
+    );
+    scene.text(
+        "scene0000_00/intrinsic/intrinsic_color.txt",
+        "4 0 3.5 0\n0 4 2.5 0\n0 0 1 0\n0 0 0 1\n",
+    );
+    let set = scene.import("scannet", &[]);
+    let frame = frame(&set, "scene0000_00/0");
+    assert_eq!(set.frames().count(), 1);
+    assert_eq!(sides(frame.depth.as_ref()), (1500, 2500));
+    assert_eq!(classes(&set, &frame), pair("table", "picture"));
+    assert_eq!(set.labels().unwrap().labels[&1191].name, "coffee table");
+    assert!(set.labels().unwrap().void.contains(&31));
+    let (left, right) = sides(frame.segments.as_ref());
+    assert!(left > 0 && right == 0);
+    assert_eq!(frame.room.as_deref(), Some("bedroom"));
+    assert!((frame.intrinsics.unwrap().cy - 2.5).abs() < 1e-9);
+
+    let groups = vec!["{}"; 256].join(",");
+    scene.text(
+        "scene0000_00/scene0000_00.aggregation.json",
+        &format!("{{\"segGroups\":[{groups}]}}"),
+    );
+    let message = scene.refused("scannet", &["--force"]);
+    assert!(message.contains("256 objects, but the 8 bits"), "{message}");
+}
+
+#[test]
+fn frames_of_scannet_25k() {
+    let scene = Scene::new();
+    scene.rgb("scene0001_00/color/000100.jpg");
+    scene.deep("scene0001_00/depth/000100.png", 1500, 0);
+    scene.shallow("scene0001_00/label/000100.png", 5, 0);
+    scene.deep("scene0001_00/instance/000100.png", 5002, 0);
+    let set = scene.import("scannet", &[]);
+    let frame = frame(&set, "scene0001_00/000100");
+    assert_eq!(sides(frame.semantic.as_ref()), (5, 0));
+    assert_eq!(set.labels().unwrap().space, "nyu40");
+    assert_eq!(
+        (frame.segments.unwrap()[(0, 0)], scene.line(0)["t"].as_f64()),
+        (1, Some(100.0 / 30.0))
+    );
+}
+
+#[test]
+fn images_and_maps_of_nyu() {
+    let scene = Scene::new();
+    scene.rgb("rgb/00001.png");
+    scene.deep("depth/00001.png", 10_000, 15_000);
+    scene.shallow("labels/00001.png", 3, 255);
+    let message = scene.refused("nyu", &["--labels", "nyu40-1"]);
+    assert!(
+        message.contains("depth_scale is missing") && message.contains("--depth-scale"),
+        "{message}"
+    );
+    let set = scene.import("nyu", &["--labels", "nyu40-1", "--depth-scale", "0.0002"]);
+    let frame = frame(&set, "src/00001");
+    assert_eq!(sides(frame.depth.as_ref()), (2000, 3000));
+    assert_eq!(sides(frame.semantic.as_ref()), (4, 0));
+    assert!(
+        frame.intrinsics.is_none(),
+        "the camera is that of 640 × 480"
+    );
+    let message = scene.refused("nyu", &["--force", "--depth-scale", "0.00001"]);
+    assert!(
+        message.contains("typical depth of the frames is 0.1 m")
+            && message.contains("--depth-scale"),
+        "{message}"
+    );
+    let message = scene.refused("nyu", &["--force", "--depth-scale", "1"]);
+    assert!(message.contains("deeper than any room"), "{message}");
+}
+
+#[test]
+fn frames_of_sun_rgb_d() {
+    let scene = Scene::new();
+    let at = |name: &str| format!("kv1/b3dodata/img_0063/{name}");
+    scene.rgb(&at("image/img_0063.jpg"));
+    // 2000 mm and 9000 mm, rotated left by three bits.
+    scene.deep(
+        &at("depth_bfx/img_0063.png"),
+        2000_u16.rotate_left(3),
+        9000_u16.rotate_left(3),
+    );
+    // The depth before holes were filled, under the same name: it is not the one that is read.
+    scene.deep(
+        &at("depth/img_0063.png"),
+        1000_u16.rotate_left(3),
+        1000_u16.rotate_left(3),
+    );
+    scene.text(&at("intrinsics.txt"), "500 0 3 0 510 2 0 0 1\n");
+    scene.text(&at("scene.txt"), "living_room\n");
+    scene.text(
+        &at("annotation2Dfinal/index.json"),
+        r#"{"frames":[{"polygon":[{"x":[0,8,8,0],"y":[0,0,6,6],"object":0},{"x":[-1,3.6,3.6,-1],"y":[-1,-1,9,9],"object":2},{"x":3,"y":2,"object":9}]}],"objects":[{"name":"wall"},null,{"name":"night_stand:2"}]}"#,
+    );
+    let set = scene.import("sunrgbd", &[]);
+    let frame = frame(&set, "kv1-b3dodata/img_0063");
+    assert_eq!(sides(frame.depth.as_ref()), (2000, 8000));
+    assert_eq!(sides(frame.segments.as_ref()), (3, 1));
+    assert_eq!(classes(&set, &frame), pair("chest_of_drawers", "wall"));
+    assert_eq!(frame.room.as_deref(), Some("living room"));
+    assert!((frame.intrinsics.unwrap().fy - 510.0).abs() < 1e-9);
+}
+
+#[test]
+fn dumps_of_ai2_thor() {
+    let scene = Scene::new();
+    scene.rgb("FloorPlan201/rgb/0.png");
+    scene.metres("FloorPlan201/depth/0.npy", 1.25, 3.0);
+    let colors = RgbImage::from_fn(WIDTH, HEIGHT, |x, _| {
+        if x < 4 {
+            Rgb([1, 2, 3])
+        } else {
+            Rgb([4, 5, 6])
+        }
+    });
+    colors
+        .save(scene.at("FloorPlan201/instance/0.png"))
+        .unwrap();
+    scene.text(
+        "FloorPlan201/colors.json",
+        r#"{"(1, 2, 3)": "TVStand|-1.0|0.0|2.0", "(4, 5, 6)": "CoffeeTable|1|2|3"}"#,
+    );
+    let set = scene.import("thor", &["--hfov", "90"]);
+    let frame = frame(&set, "FloorPlan201/0");
+    assert_eq!(sides(frame.depth.as_ref()), (1250, 3000));
+    assert_eq!(classes(&set, &frame), pair("furniture", "table"));
+    let (_, right) = sides(frame.segments.as_ref());
+    assert_eq!(
+        (frame.names[&right].name.as_str(), frame.room.as_deref()),
+        ("coffee table", Some("living room"))
+    );
+    scene.text("FloorPlan201/colors.json", r#"{"red": "Bed|1"}"#);
+    assert!(
+        scene
+            .refused("thor", &["--force"])
+            .contains("\"red\" is not a colour")
+    );
+}
+
+#[test]
+fn folders_of_images_and_maps() {
+    let scene = Scene::new();
+    scene.rgb("home/images/a.png");
+    scene.metres("home/depth/a.npy", 2.0, 4.0);
+    scene.shallow("home/masks/a.png", 4, 9);
+    scene.deep("home/instances/a.png", 300, 0);
+    assert!(
+        scene
+            .refused("folder", &[])
+            .contains("--labels: the label space")
+    );
+    assert!(
+        scene
+            .refused("folder", &["--labels", "klingon"])
+            .contains("ade150, mpcat40, nyu13, nyu40")
+    );
+    let set = scene.import(
+        "folder",
+        &[
+            "--labels",
+            "nyu40",
+            "--depth-kind",
+            "euclid",
+            "--name",
+            "mine",
+        ],
+    );
+    let found = frame(&set, "home/a");
+    assert_eq!((set.title(), found.depth_kind), ("mine", DepthKind::Euclid));
+    assert_eq!(sides(found.segments.as_ref()), (300, 0));
+    // What was imported can be imported again, as for its key frames.
+    let again = scene.0.path().join("again");
+    let mut command = Command::cargo_bin("darkqa-eval").unwrap();
+    command
+        .args(["import", "folder", "--count", "1", "--src"])
+        .arg(scene.out())
+        .arg("--out")
+        .arg(&again);
+    command.assert().success();
+    let twice = frame(&Dataset::of_frames(&again).unwrap(), "home/a");
+    assert_eq!(
+        (twice.depth, twice.semantic, twice.segments),
+        (found.depth, found.semantic, found.segments)
+    );
+    assert_eq!(twice.rgb, found.rgb);
+}
+
+#[test]
+fn broken_folders_are_named() {
+    let scene = Scene::new();
+    scene.rgb("rgb/a.png");
+    scene.shallow("sem/b.png", 1, 2);
+    let flags = ["--labels", "nyu40"];
+    assert!(
+        scene
+            .refused("folder", &flags)
+            .contains("b.png: no image has the name of this map")
+    );
+    fs::remove_file(scene.at("sem/b.png")).unwrap();
+    let small = GrayImage::new(3, 3);
+    small.save(scene.at("sem/a.png")).unwrap();
+    let message = scene.refused("folder", &flags);
+    assert!(
+        message.contains("a.png: 3 × 3 pixels") && message.contains("never scaled"),
+        "{message}"
+    );
+    assert!(Scene::new().refused("habitat", &[]).contains("--src: "));
+    assert!(
+        scene
+            .refused("habitat", &[])
+            .contains("no frames of habitat in this folder")
+    );
+    assert!(
+        scene
+            .refused("lego", &[])
+            .contains("invalid value 'lego' for '<KIND>' [possible values: habitat, scannet")
+    );
+    assert!(
+        scene
+            .refused("folder", &["--labels", "nyu40", "--every", "2", "--force"])
+            .contains("--every: the frame")
+    );
+    assert!(!Path::new(&scene.out().join("frames.jsonl")).exists());
+}

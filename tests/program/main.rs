@@ -1,0 +1,32 @@
+//! The tests of the program and the library as a whole, a module a subject. They are one program, because each test program links the
+//! library anew: `cargo test --test program report::` runs one module.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+#[path = "../support/mod.rs"]
+mod support;
+
+mod ask;
+mod batch;
+mod cli;
+mod documentation;
+mod enhance;
+mod evaluate;
+mod export;
+mod fair;
+mod faults;
+mod golden;
+mod identity;
+mod import;
+mod money;
+mod openeqa;
+mod pins;
+mod questions;
+mod realism;
+mod report;
+mod rooms;
+mod serve;
+mod shards;
+mod statistics;
+mod synthesize;
+mod walks;

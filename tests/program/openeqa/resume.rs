@@ -1,0 +1,99 @@
+//! Runs that go on: after a stop, and with replies of a batch.
+
+use std::fs;
+
+use serde_json::{Value, json};
+
+use super::images;
+use crate::support::endpoint::{Answer, MockEndpoint};
+use crate::support::house::House;
+use crate::support::run::{model_args, records, words};
+
+#[test]
+fn nothing_is_asked_twice_and_what_was_out_in_a_batch_is_taken_over() {
+    let house = House::new();
+    let silent = MockEndpoint::start([Answer::error(400, "bad", "must not be asked")]);
+    let base = silent.base_url();
+    let args = model_args(&base, "--judge j --levels L0,L4 --out run");
+    let batch = [&args[..], &["--batch"]].concat();
+    let called = house.call(&batch);
+    assert!(
+        called.stdout.contains("6 requests in 1 file;"),
+        "{called:?}"
+    );
+    let answer = |file: &str, text: &dyn Fn(usize) -> String| {
+        let input = fs::read_to_string(house.0.path(file)).unwrap();
+        let lines = input.lines().enumerate().map(|(i, line)| {
+            let line: Value = serde_json::from_str(line).unwrap();
+            let body = json!({"choices": [{"message": {"content": text(i)}, "finish_reason": "stop"}], "usage": {"prompt_tokens": 9}});
+            let line = json!({"custom_id": line["custom_id"], "response": {"status_code": 200, "body": body}, "error": null});
+            format!("{line}\n")
+        });
+        house.0.file("out.jsonl", lines.collect::<String>());
+        let called = house.0.call(&words("batch import run out.jsonl"));
+        assert_eq!(called.code, Some(0), "{called:?}");
+        assert!(called.stdout.contains("imported, 0 failed"), "{called:?}");
+    };
+    let line: Value = serde_json::from_str(
+        fs::read_to_string(house.0.path("run/batch/1-m-001.jsonl"))
+            .unwrap()
+            .lines()
+            .next()
+            .unwrap(),
+    )
+    .unwrap();
+    assert_eq!(images(&line["body"]).len(), 3);
+    answer("run/batch/1-m-001.jsonl", &|i| format!("answer {i}"));
+    // Now the marks, one for each different answer.
+    let called = house.call(&batch);
+    assert!(
+        called.stdout.contains("6 requests in 1 file;"),
+        "{called:?}"
+    );
+    answer("run/batch/1-j-001.jsonl", &|_| "Your mark: 4".to_owned());
+    let called = house.call(&args);
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert!(called.stdout.contains("75.0 ±"), "{}", called.stdout);
+    assert!(silent.requests().is_empty());
+    // As a whole it is there already.
+    assert_eq!(house.call(&args).stdout, called.stdout);
+    // Another judge marks the same answers.
+    house.0.file("j.jsonl", "{\"default\": \"1\"}");
+    let other = [
+        &args[..4],
+        &words("--judge script:j.jsonl --levels L0,L4 --out run"),
+    ]
+    .concat();
+    let called = house.call(&other);
+    assert!(
+        called.stdout.contains("0.0 ±") && silent.requests().is_empty(),
+        "{called:?}"
+    );
+}
+
+#[test]
+fn a_run_goes_on_where_it_was_stopped() {
+    let house = House::new();
+    let refused = Answer::error(401, "invalid_api_key", "no");
+    let model = MockEndpoint::start([Answer::text("one"), refused]);
+    let base = model.base_url();
+    let args = model_args(&base, "--levels L0 --concurrency 1 --out run");
+    let called = house.call(&args);
+    assert_eq!(called.code, Some(2), "{called:?}");
+    assert_eq!(records(&house.0.path("run")).len(), 1);
+    let well = MockEndpoint::start([Answer::text("more")]);
+    let base = well.base_url();
+    let again = model_args(&base, "--levels L0 --concurrency 1 --resume run");
+    let called = house.call(&again);
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_eq!(well.requests().len(), 2);
+    // An evaluation is not mixed up with it.
+    let other = words("--data rooms:frames=1 --model random --out run");
+    let called = house.0.call(&other);
+    assert_eq!(called.code, Some(2), "{called:?}");
+    assert!(
+        called.stderr.contains("darkqa.openeqa/2"),
+        "{}",
+        called.stderr
+    );
+}

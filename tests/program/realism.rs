@@ -1,0 +1,165 @@
+//! `realism` from the outside, on pairs that the test makes: the dark one by an independent, simple noise.
+
+use std::fs;
+
+use crate::support::run::Bench;
+use crate::support::table::check_rows;
+use image::{Rgb, RgbImage};
+use serde_json::Value;
+
+/// A normal image, and the same 2.2 EV darker (so that codes are halved) under noise of a few codes.
+fn pair(bench: &Bench, name: &str, salt: u32) {
+    let normal = RgbImage::from_fn(96, 64, |x, y| {
+        Rgb([
+            (60 + x) as u8,
+            (50 + 2 * y) as u8,
+            (40 + (x + y) % 120) as u8,
+        ])
+    });
+    let mut state = salt;
+    let low = RgbImage::from_fn(96, 64, |x, y| {
+        Rgb(normal.get_pixel(x, y).0.map(|code| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            // The sum of two uniform numbers, from −12 to 12.
+            let noise = (state >> 8) % 13 + (state >> 20) % 13;
+            (u32::from(code) / 2 + noise).saturating_sub(12) as u8
+        }))
+    });
+    for (folder, image) in [("normal", &normal), ("low", &low)] {
+        fs::create_dir_all(bench.path(&format!("pairs/{folder}"))).unwrap();
+        image
+            .save(bench.path(&format!("pairs/{folder}/{name}.png")))
+            .unwrap();
+    }
+}
+
+fn json(bench: &Bench, words: &[&str]) -> Value {
+    let words = [&["realism", "pairs", "--json"], words].concat();
+    let called = bench.call(&words);
+    assert_eq!(called.code, Some(0), "{called:?}");
+    serde_json::from_str(&called.stdout).unwrap()
+}
+
+#[test]
+fn noise_is_nearer_to_noise_than_its_absence() {
+    let bench = Bench::new();
+    for (salt, name) in ["a", "b", "c"].into_iter().enumerate() {
+        pair(&bench, name, salt as u32);
+    }
+    let kl = |summary: &Value, row: &str| summary[row]["kl"]["value"].as_f64().unwrap();
+    for rules in [&[][..], &["--kl-bins", "kousha"]] {
+        let summary = json(&bench, rules);
+        assert!(
+            kl(&summary, "noise") < 0.5 * kl(&summary, "exposure"),
+            "{summary:#}"
+        );
+        let drop = summary["drop"]["value"].as_f64().unwrap();
+        assert!((drop - 2.2).abs() < 0.1, "{drop}");
+        assert_eq!(summary["pairs"], 3);
+    }
+    let dropped = json(&bench, &["--kl-empty", "drop"]);
+    assert!(kl(&dropped, "exposure") <= 0.0);
+    assert_eq!(json(&bench, &[]), json(&bench, &["--threads", "1"]));
+    assert_ne!(json(&bench, &[]), json(&bench, &["--seed", "1"]));
+}
+
+#[test]
+fn files_hold_every_pair() {
+    let bench = Bench::new();
+    pair(&bench, "a", 1);
+    pair(&bench, "b", 2);
+    fs::copy(
+        bench.path("pairs/low/b.png"),
+        bench.path("pairs/low/stray.png"),
+    )
+    .unwrap();
+    let table = bench.call(&["realism", "pairs", "--out", "out"]);
+    assert_eq!(table.code, Some(0), "{table:?}");
+    assert!(
+        table.stderr.contains("stray.png: no partner"),
+        "{}",
+        table.stderr
+    );
+    let rows = [
+        "exposure drop alone",
+        "with sensor noise",
+        "±",
+        "Fu et al. 2023",
+        "other rule: ",
+    ];
+    check_rows(rows, |word| {
+        assert!(table.stdout.contains(word), "{word:?}: {}", table.stdout);
+    });
+    let pairs = fs::read_to_string(bench.path("out/pairs.csv")).unwrap();
+    assert_eq!(pairs.lines().count(), 5);
+    assert!(
+        fs::read_to_string(bench.path("out/residuals.svg"))
+            .unwrap()
+            .starts_with("<svg")
+    );
+    assert!(image::open(bench.path("out/crops.png")).unwrap().width() > 700);
+    let summary = fs::read_to_string(bench.path("out/summary.json")).unwrap();
+    assert_eq!(
+        serde_json::from_str::<Value>(&summary).unwrap()["unmatched"],
+        1
+    );
+}
+
+#[test]
+fn equal_images_are_told_as_such() {
+    let bench = Bench::new();
+    pair(&bench, "a", 1);
+    fs::copy(
+        bench.path("pairs/low/a.png"),
+        bench.path("pairs/normal/a.png"),
+    )
+    .unwrap();
+    let table = bench.call(&["realism", "pairs"]);
+    assert!(table.stdout.contains('∞'), "{}", table.stdout);
+    let summary = json(&bench, &[]);
+    assert_eq!(summary["exposure"]["psnr"]["value"], Value::Null);
+    assert!(summary["exposure"]["kl"]["value"].as_f64().unwrap().abs() < 1e-9);
+}
+
+#[test]
+fn a_broken_pair_does_not_stop_the_others() {
+    let bench = Bench::new();
+    pair(&bench, "a", 1);
+    pair(&bench, "b", 2);
+    RgbImage::new(20, 20)
+        .save(bench.path("pairs/low/b.png"))
+        .unwrap();
+    let called = bench.call(&["realism", "pairs"]);
+    assert_eq!(called.code, Some(1), "{called:?}");
+    assert!(
+        called.stderr.contains("b: ") && called.stderr.contains("20 × 20"),
+        "{}",
+        called.stderr
+    );
+    assert!(called.stdout.contains("1 pair failed"));
+    let rows = [
+        (&["realism", "nowhere"][..], "nowhere"),
+        (&["realism", "pairs/low"], "--normal DIR"),
+        (&["realism", "pairs", "--ev", "99"], "--ev"),
+        (
+            &["realism", "pairs", "--kl-bins", "two"],
+            "'--kl-bins <KL_BINS>' [possible values: fu, kousha]",
+        ),
+        (&["realism"], "PAIRS"),
+    ];
+    check_rows(rows, |(args, message)| {
+        let refused = bench.call(args);
+        assert_eq!(refused.code, Some(2), "{args:?}: {refused:?}");
+        assert_eq!(
+            refused.stderr.trim_end().lines().count(),
+            1,
+            "{}",
+            refused.stderr
+        );
+        assert!(
+            refused.stderr.contains(message),
+            "{args:?}: {}",
+            refused.stderr
+        );
+    });
+}

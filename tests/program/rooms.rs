@@ -1,0 +1,333 @@
+//! The built-in rooms, held to what their generator knows.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::support::run::{Bench, records, words};
+use crate::support::table::check_rows;
+use darkqa_eval::internals::dataset::{DataPlace, Dataset};
+use darkqa_eval::internals::questions::{
+    BalanceMode, ClassFlag, Palette, RoomSource, Rules, measure,
+};
+use darkqa_eval::internals::rooms::{Room, RoomTruth, Rooms, ThingTruth, VERSION, labels};
+use darkqa_eval::questions::{Generated, GeneratedQuestion, QuestionRequest, generate};
+use darkqa_eval::types::{Digest, Family, Frame, FrameId};
+use rayon::prelude::*;
+
+/// What is seen of a frame by number, and what its generator knows of it.
+struct Seen {
+    truth: RoomTruth,
+    pixels: BTreeMap<u32, usize>,
+}
+
+impl Seen {
+    fn of(room: &Room, frame: &Frame) -> Self {
+        let mut pixels = BTreeMap::new();
+        for number in frame.segments.as_ref().unwrap() {
+            *pixels.entry(*number).or_insert(0) += 1;
+        }
+        Self {
+            truth: room.truth(),
+            pixels,
+        }
+    }
+
+    /// The things of a class that are in view.
+    fn of_class(&self, class: &str) -> Vec<&ThingTruth> {
+        let things = self.pixels.keys().filter_map(|number| {
+            let place = (*number as usize).checked_sub(1)?;
+            self.truth.things.get(place)
+        });
+        things.filter(|thing| thing.class == class).collect()
+    }
+}
+
+/// Questions about the rooms of a seed, by Algorithm 1, with what the generator knows of their frames.
+fn asked(rooms: Rooms) -> (Generated, BTreeMap<FrameId, Seen>) {
+    let (rules, palette, labels) = (
+        Rules::built_in().unwrap(),
+        Palette::built_in().unwrap(),
+        labels(),
+    );
+    let rooms: Vec<(FrameId, Room)> = rooms.all().collect();
+    let measured = rooms.par_iter().map(|(id, room)| {
+        let frame = room.frame().unwrap();
+        let key = Digest::of(id.0.as_bytes());
+        let statistics = measure(&frame, &labels, &rules, &palette, key).unwrap();
+        (statistics, (id.clone(), Seen::of(room, &frame)))
+    });
+    let (statistics, seen): (Vec<_>, BTreeMap<FrameId, Seen>) = measured.unzip();
+    let order = QuestionRequest {
+        dataset: "rooms",
+        labels: &labels,
+        rules: &rules,
+        palette: &palette,
+        families: Family::PAPER.into_iter().collect(),
+        room_source: RoomSource::Signature,
+        balance: BalanceMode::default(),
+        rejected: BTreeSet::new(),
+    };
+    (generate(&statistics, &order, |_, _| {}).unwrap(), seen)
+}
+
+/// Where each activity of the rulebook is done.
+const DONE_IN: [(&str, &[&str]); 10] = [
+    ("sleep", &["bedroom"]),
+    ("take a shower", &["bathroom"]),
+    ("use the toilet", &["bathroom"]),
+    ("wash my hands", &["bathroom", "kitchen"]),
+    ("cook a meal", &["kitchen"]),
+    ("watch TV on the sofa", &["living room"]),
+    ("relax on a sofa", &["living room"]),
+    ("have dinner with my family", &["dining room"]),
+    ("work at a desk", &["office"]),
+    ("do the laundry", &[]),
+];
+
+/// What is wrong with an answer, by what the generator knows.
+fn wrong(asked: &GeneratedQuestion, seen: &Seen) -> Option<String> {
+    let (answer, about) = (asked.answer(), asked.about.as_str());
+    let truth = match &asked.question.family {
+        Family::RoomType => seen.truth.room.to_owned(),
+        Family::Affordance => {
+            let (_, rooms) = DONE_IN.iter().find(|(known, _)| *known == about)?;
+            let suits = rooms.contains(&seen.truth.room);
+            if suits { "yes" } else { "no" }.to_owned()
+        }
+        Family::Presence => {
+            let is_visible = !seen.of_class(about).is_empty();
+            if is_visible { "yes" } else { "no" }.to_owned()
+        }
+        Family::Color => {
+            // One of them is asked about; the others are slivers.
+            let things = seen.of_class(about);
+            let largest = things.iter().max_by_key(|thing| {
+                let place = seen
+                    .truth
+                    .things
+                    .iter()
+                    .position(|other| std::ptr::eq(other, **thing));
+                seen.pixels.get(&(place.unwrap() as u32 + 1))
+            });
+            largest.map_or("", |thing| thing.color).to_owned()
+        }
+        Family::Closest => {
+            let offered = asked.question.choices.texts();
+            let book = Rules::built_in().unwrap();
+            let nearest = |class: &str| {
+                let things = seen.of_class(class);
+                let near = things.iter().map(|thing| thing.near);
+                near.fold(f32::MAX, f32::min)
+            };
+            let classes = book.book().class.keys();
+            let offered =
+                classes.filter(|class| offered.contains(&book.book().name(class).to_owned()));
+            let winner = offered.min_by(|a, b| nearest(a).total_cmp(&nearest(b)));
+            book.book().name(winner?).to_owned()
+        }
+        Family::Other(_) => return None,
+    };
+    (truth != answer).then(|| {
+        format!(
+            "{} {}: {answer:?}, but {truth:?} ({})",
+            asked.question.frame, asked.question.text, asked.question.evidence
+        )
+    })
+}
+
+/// Two hundred frames, as many of each kind of room as of any other.
+fn many(seed: u64) -> Rooms {
+    Rooms {
+        frames: 204,
+        seed,
+        size: [240, 180],
+    }
+}
+
+#[test]
+fn the_questions_are_right_and_even() {
+    let (made, seen) = asked(many(7));
+    let faults: Vec<String> = made
+        .asked
+        .iter()
+        .filter_map(|asked| wrong(asked, &seen[&asked.question.frame]))
+        .collect();
+    let counts = format!("{} of {}", faults.len(), made.asked.len());
+    assert!(faults.is_empty(), "{counts}:\n{}", faults.join("\n"));
+
+    // Every family, and no answer much more often than another.
+    let mut answers: BTreeMap<&Family, BTreeMap<&str, usize>> = BTreeMap::new();
+    for asked in &made.asked {
+        let of_family = answers.entry(&asked.question.family).or_default();
+        *of_family.entry(asked.answer()).or_insert(0) += 1;
+    }
+    for family in Family::PAPER {
+        let counts = &answers[&family];
+        let total: usize = counts.values().sum();
+        let most = counts.values().max().unwrap();
+        let binary = counts.len() == 2;
+        assert!(total >= 40, "{family}: {total}");
+        let share = 100 * most / total;
+        assert!(
+            share <= if binary { 55 } else { 45 },
+            "{family}: {counts:?}"
+        );
+    }
+    let chances = made
+        .asked
+        .iter()
+        .map(|asked| 1.0 / asked.question.choices.len() as f64);
+    let chance = chances.sum::<f64>() / made.asked.len() as f64;
+    assert!((0.30..0.37).contains(&chance), "{chance}");
+
+    // Every class that is asked about is there in at least ten frames.
+    let rules = Rules::built_in().unwrap();
+    let classes = rules.book().class.iter();
+    for (class, _) in classes.filter(|(_, class)| class.flags.contains(&ClassFlag::Asked)) {
+        let frames = seen
+            .values()
+            .filter(|seen| !seen.of_class(class).is_empty());
+        let count = frames.count();
+        assert!(count >= 10, "{class}: in {count} frames");
+    }
+}
+
+/// The pixels of one small frame.
+fn pixels(rooms: Rooms, place: usize) -> Digest {
+    let (_, room) = rooms.all().nth(place).unwrap();
+    let frame = room.frame().unwrap();
+    let depth = frame
+        .depth
+        .as_ref()
+        .unwrap()
+        .iter()
+        .flat_map(|depth| depth.to_le_bytes());
+    let segments = frame
+        .segments
+        .as_ref()
+        .unwrap()
+        .iter()
+        .flat_map(|id| id.to_le_bytes());
+    let maps: Vec<u8> = depth.chain(segments).collect();
+    Digest::of_parts([frame.rgb.samples(), &maps])
+}
+
+#[test]
+fn a_seed_gives_the_same_bytes_everywhere() {
+    let rooms = Rooms {
+        frames: 12,
+        seed: 7,
+        size: [160, 120],
+    };
+    let all = |threads: usize| -> Vec<Digest> {
+        let cores = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        cores.install(|| {
+            (0..12)
+                .into_par_iter()
+                .map(|place| pixels(rooms, place))
+                .collect()
+        })
+    };
+    let made = all(1);
+    assert_eq!(made, all(3));
+    // Another number of frames leaves them as they are; another seed or version does not. Where this digest changes,
+    // `rooms::VERSION` must, and with it `results/reference` and the digest of every picture of a room.
+    assert_eq!(pixels(Rooms { frames: 4, ..rooms }, 3), made[3]);
+    assert_ne!(pixels(Rooms { seed: 8, ..rooms }, 3), made[3]);
+    let digests: Vec<[u8; 32]> = made.iter().map(|digest| *digest.as_bytes()).collect();
+    let whole = Digest::of_parts(digests.iter().map(|digest| &digest[..]));
+    assert_eq!((VERSION, &*whole.to_string()), (1, PINNED));
+}
+
+/// The pixels and maps of twelve small frames of version 1.
+const PINNED: &str = "7a51bca2f0bb166d7f79c25df389ee1c69006179ef5ee5231c7011014d17f512";
+
+#[test]
+fn rooms_on_disk_are_those_in_the_program() {
+    let bench = Bench::new();
+    let size = ["--frames", "4", "--size", "160x120"];
+    bench.complete(&[&["rooms", "--out", "frames"][..], &size].concat());
+    let folder = Dataset::of_frames(&bench.path("frames")).unwrap();
+    let rooms = Rooms {
+        frames: 4,
+        size: [160, 120],
+        ..Rooms::default()
+    };
+    let built_in = Dataset::open_without_questions(&DataPlace::Rooms(rooms)).unwrap();
+    assert_eq!(folder.labels(), built_in.labels());
+    assert_eq!(folder.title(), built_in.title());
+    let mut count = 0;
+    for name in built_in.frames() {
+        let [kept, drawn] = [&folder, &built_in].map(|set| set.frame(name).unwrap());
+        assert!(kept.rgb == drawn.rgb, "{name}");
+        assert_eq!(
+            (&kept.depth, &kept.semantic),
+            (&drawn.depth, &drawn.semantic)
+        );
+        assert_eq!(
+            (&kept.segments, &kept.names),
+            (&drawn.segments, &drawn.names)
+        );
+        assert_eq!(
+            (&kept.room, kept.intrinsics),
+            (&drawn.room, drawn.intrinsics)
+        );
+        count += 1;
+    }
+    assert_eq!(count, 4);
+    let again = bench.call(&[&["rooms", "--out", "frames"][..], &size].concat());
+    assert_eq!(again.code, Some(2));
+    assert!(again.stderr.contains("--force"), "{again:?}");
+    // The frames on disk and those in the program are asked the same, and answered alike.
+    let run = |data: &str, out: &str| {
+        bench.complete(&words(&format!(
+            "--model observer --data {data} --levels L0,L4 --out {out}"
+        )));
+        let kept = records(&bench.path(out)).into_iter();
+        kept.map(|record| {
+            (
+                record["question"].to_string(),
+                record["condition"].to_string(),
+                record["reply"].to_string(),
+            )
+        })
+        .collect::<BTreeSet<_>>()
+    };
+    assert_eq!(run("frames", "a"), run("rooms:frames=4,size=160x120", "b"));
+}
+
+#[test]
+fn settings_that_make_no_sense_are_named() {
+    let bench = Bench::new();
+    let rows = [
+        ("rooms:frames=0", "frames=0"),
+        ("rooms:size=640", "size=640"),
+        ("rooms:size=9x9", "size=9x9"),
+        ("rooms:seed=x", "seed=x"),
+        ("rooms:doors=4", "doors=4"),
+    ];
+    check_rows(rows, |(data, message)| {
+        let refused = bench.call(&["--model", "random", "--data", data]);
+        assert_eq!(refused.code, Some(2), "{refused:?}");
+        assert!(
+            refused.stderr.contains("--data") && refused.stderr.contains(message),
+            "{refused:?}"
+        );
+    });
+    // A file without questions is no wish for those of the rules.
+    bench.file("empty.jsonl", "\n");
+    let refused = bench.call(&words(
+        "--model random --data rooms:frames=1 --questions empty.jsonl",
+    ));
+    assert!(
+        refused.stderr.contains("empty.jsonl: no questions in it"),
+        "{refused:?}"
+    );
+    let refused = bench.call(&["rooms", "--out", "x", "--size", "big"]);
+    assert!(
+        refused.stderr.contains("--size") && refused.stderr.contains("WIDTHxHEIGHT of 32"),
+        "{refused:?}"
+    );
+}

@@ -1,0 +1,170 @@
+//! The built-in models behind an endpoint, asked as a client asks them.
+
+use std::collections::BTreeMap;
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Stdio};
+
+use crate::support::run::{Bench, records, words};
+use crate::support::table::check_rows;
+use serde_json::{Value, json};
+
+/// A server of four small rooms; it ends with the test.
+struct Server {
+    process: Child,
+    url: String,
+}
+
+impl Server {
+    fn start(bench: &Bench) -> Self {
+        let args = words("serve --data rooms:frames=4,size=200x150 --port 0 --quiet");
+        let mut process = bench.spawn(&args, Stdio::piped());
+        let mut url = String::new();
+        BufReader::new(process.stdout.take().unwrap())
+            .read_line(&mut url)
+            .unwrap();
+        let url = url.trim().to_owned();
+        assert!(
+            url.starts_with("http://127.0.0.1:") && url.ends_with("/v1"),
+            "{url}"
+        );
+        Self { process, url }
+    }
+
+    fn ask(&self, body: &Value) -> (u16, Value) {
+        let runtime = tokio::runtime::Runtime::new().unwrap();
+        runtime.block_on(async {
+            let client = reqwest::Client::builder().no_proxy().build().unwrap();
+            let request = client.post(format!("{}/chat/completions", self.url));
+            let reply = request.body(body.to_string()).send().await.unwrap();
+            let status = reply.status().as_u16();
+            let text = reply.text().await.unwrap();
+            (
+                status,
+                serde_json::from_str(&text).unwrap_or(Value::String(text)),
+            )
+        })
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        self.process.kill().unwrap();
+        self.process.wait().unwrap();
+    }
+}
+
+const WORDS: &str = "Is it dark?\nA. yes\nB. no";
+
+#[test]
+fn over_the_wire_the_observer_sees_what_it_sees_in_the_program() {
+    let bench = Bench::new();
+    let server = Server::start(&bench);
+    let replies = |model: &str, out: &str| -> BTreeMap<String, String> {
+        bench.complete(&[
+            "--model",
+            model,
+            "--base-url",
+            &server.url,
+            "--data",
+            "rooms:frames=4,size=200x150",
+            "--levels",
+            "L0,L2",
+            "--out",
+            out,
+        ]);
+        let kept = records(&bench.path(out)).into_iter();
+        kept.map(|record| {
+            let item = format!("{} {}", record["question"], record["condition"]);
+            (item, record["reply"].to_string())
+        })
+        .collect()
+    };
+    let (here, there) = (
+        replies("observer", "here"),
+        replies("darkqa-observer", "there"),
+    );
+    assert!(here.len() >= 30, "{}", here.len());
+    // Where it sees nothing that bears on the question it guesses, there as it likes.
+    let apart = here
+        .iter()
+        .filter(|(item, reply)| there[*item] != **reply)
+        .count();
+    assert!(apart * 10 <= here.len(), "{apart} of {}", here.len());
+}
+
+#[test]
+fn what_a_client_sends_is_answered_in_its_own_words() {
+    let bench = Bench::new();
+    let server = Server::start(&bench);
+    let user = |content: Value| json!([{"role": "user", "content": content}]);
+    let (status, reply) =
+        server.ask(&json!({"model": "darkqa-random", "messages": user(json!(WORDS))}));
+    assert_eq!((status, &reply["object"]), (200, &json!("chat.completion")));
+    let answer = reply["choices"][0]["message"]["content"].as_str().unwrap();
+    assert!(["A", "B"].contains(&answer), "{reply}");
+    let parts = json!([{"type": "text", "text": WORDS}]);
+    let (_, again) =
+        server.ask(&json!({"model": "darkqa-random", "messages": user(parts), "temperature": 1}));
+    assert_eq!(again["choices"][0]["message"]["content"], answer);
+    let stream =
+        json!({"model": "darkqa-observer", "messages": user(json!(WORDS)), "stream": true});
+    let (status, events) = server.ask(&stream);
+    let events = events.as_str().unwrap();
+    assert!(
+        status == 200 && events.starts_with("data: {") && events.ends_with("data: [DONE]\n\n"),
+        "{events}"
+    );
+    let rows = [
+        (
+            json!({"model": "gpt-4o", "messages": user(json!(WORDS))}),
+            404,
+            "is not one of darkqa-observer, darkqa-random",
+        ),
+        (json!({"messages": []}), 400, "missing field `model`"),
+        (json!([1]), 400, "not a valid chat completion"),
+        (
+            json!({"model": "darkqa-random", "messages": user(json!("hi"))}),
+            400,
+            "no choices in the text",
+        ),
+        (
+            json!({"model": "darkqa-observer", "messages": user(json!([
+                {"type": "text", "text": WORDS},
+                {"type": "image_url", "image_url": {"url": "data:image/png;base64,AAAA"}},
+            ]))}),
+            400,
+            "image_url: ",
+        ),
+        (
+            json!({"model": "darkqa-observer", "messages": user(json!([
+                {"type": "image_url", "image_url": {"url": "file:///etc/passwd"}},
+            ]))}),
+            400,
+            "only data URLs",
+        ),
+    ];
+    check_rows(rows, |(body, status, part)| {
+        let (found, reply) = server.ask(&body);
+        let message = reply["error"]["message"].as_str().unwrap();
+        assert!(
+            found == status && message.contains(part),
+            "{body}: {found} {reply}"
+        );
+    });
+}
+
+#[test]
+fn a_port_that_is_taken_is_named() {
+    let bench = Bench::new();
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = taken.local_addr().unwrap().port().to_string();
+    let line = format!("serve --data rooms:frames=1,size=64x48 --port {port}");
+    let refused = bench.call(&words(&line));
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    assert!(
+        refused
+            .stderr
+            .contains("--port: cannot listen at 127.0.0.1:"),
+        "{refused:?}"
+    );
+}

@@ -1,0 +1,209 @@
+//! One evaluation in parts: the same records and the same summary as in one piece, whoever names the parts.
+
+use std::collections::BTreeMap;
+use std::fs;
+
+use crate::support::endpoint::{Answer, MockEndpoint};
+use crate::support::process::{signal, wait_until};
+use crate::support::run::{Bench, assert_same_products, called, model_args, records, words};
+use serde_json::Value;
+
+/// The arguments of every evaluation here, and more of them.
+fn args(more: &str) -> Vec<&str> {
+    let models = words("--model random --blind-model random");
+    let trials = words("--levels L0,L2 --data rooms:frames=6,size=120x90");
+    [models, trials, words(more)].concat()
+}
+
+/// The records by key, without the time they took.
+fn timeless(run: &std::path::Path) -> BTreeMap<String, Value> {
+    let mut all = BTreeMap::new();
+    for mut record in records(run) {
+        record["latency_ms"] = Value::Null;
+        let key = record["key"].as_str().unwrap().to_owned();
+        assert!(all.insert(key, record).is_none(), "no trial twice");
+    }
+    all
+}
+
+#[test]
+fn parts_are_together_what_one_run_is() {
+    let bench = Bench::new();
+    bench.complete(&args("--out whole"));
+    for part in ["1/4", "2/4", "3/4", "4/4"] {
+        bench.complete(&args(&format!("--out parts --shard {part}")));
+    }
+    let folders: Vec<String> = fs::read_dir(bench.path("parts"))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    assert_eq!(folders.len(), 4);
+    assert!(folders.contains(&"shard-2-of-4".to_owned()), "{folders:?}");
+    let table = bench.complete(&["merge", "parts", "--out", "merged"]);
+    let (whole, merged) = (bench.path("whole"), bench.path("merged"));
+    assert_eq!(timeless(&whole), timeless(&merged));
+    let compared = assert_same_products(&whole, &merged);
+    assert!(compared > 8, "{compared}");
+    let rows = |run: &std::path::Path| -> Value {
+        let text = fs::read(run.join("summary.json")).unwrap();
+        serde_json::from_slice::<Value>(&text).unwrap()["rows"].take()
+    };
+    assert_eq!(rows(&whole), rows(&merged));
+    // It is the run that the whole command goes on with, and there is nothing left to ask.
+    let before = fs::read(merged.join("records.jsonl")).unwrap();
+    assert_eq!(bench.complete(&args("--out merged")), table);
+    assert_eq!(fs::read(merged.join("records.jsonl")).unwrap(), before);
+    // Merging again changes nothing.
+    assert_eq!(
+        bench.complete(&["merge", "parts", "--out", "merged"]),
+        table
+    );
+    assert_eq!(fs::read(merged.join("records.jsonl")).unwrap(), before);
+}
+
+#[test]
+fn a_batch_system_says_which_part_it_is() {
+    let bench = Bench::new();
+    let task = |variables: &[(&str, &str)], more: &str| {
+        let mut command = bench.command(&args(more));
+        command.envs(variables.iter().copied());
+        called(&mut command)
+    };
+    let slurm = [
+        ("SLURM_ARRAY_TASK_ID", "3"),
+        ("SLURM_ARRAY_TASK_MIN", "2"),
+        ("SLURM_ARRAY_TASK_COUNT", "2"),
+    ];
+    let array = task(&slurm, "--out array");
+    assert_eq!(array.code, Some(0), "{array:?}");
+    assert!(
+        array
+            .stderr
+            .contains("task 2 of a Slurm array of 2: this process does shard 2/2"),
+        "{}",
+        array.stderr
+    );
+    assert!(bench.path("array/shard-2-of-2/manifest.json").exists());
+    let whole = task(&slurm, "--out all --shard none");
+    assert_eq!(whole.code, Some(0), "{whole:?}");
+    assert!(bench.path("all/manifest.json").exists());
+    let pod = [("JOB_COMPLETION_INDEX", "1")];
+    let lost = task(&pod, "--out pod");
+    assert_eq!(lost.code, Some(2));
+    assert!(lost.stderr.contains("--shard auto/N"), "{}", lost.stderr);
+    let found = task(&pod, "--out pod --shard auto/3");
+    assert_eq!(found.code, Some(0), "{found:?}");
+    assert!(bench.path("pod/shard-2-of-3/manifest.json").exists());
+}
+
+#[test]
+fn missing_double_and_foreign_parts_are_named() {
+    let bench = Bench::new();
+    bench.complete(&args("--out parts --shard 1/3"));
+    bench.complete(&args("--out parts --shard 3/3"));
+    let refused = |line: &str, message: &str| {
+        let called = bench.call(&words(&format!("merge {line}")));
+        assert_eq!(called.code, Some(2), "{called:?}");
+        assert!(
+            called.stderr.contains(message),
+            "{message}: {}",
+            called.stderr
+        );
+    };
+    refused("parts --out m", "1 shard is missing: 2/3; --partial");
+    assert!(!bench.path("m").exists());
+    let partial = bench.call(&["merge", "parts", "--out", "m", "--partial"]);
+    assert_eq!(partial.code, Some(1), "{partial:?}");
+    assert!(
+        partial.stdout.starts_with("incomplete:"),
+        "{}",
+        partial.stdout
+    );
+    bench.complete(&args("--out again --shard 3/3"));
+    refused("parts again --out n", "shard 3/3 is present twice, also in");
+    bench.complete(&args("--out other --shard 2/3 --seed 9"));
+    refused("parts other --out n", "is of another run than");
+    bench.complete(&args("--out four --shard 2/4"));
+    refused("parts four --out n", "cannot be of the same run");
+    bench.complete(&args("--out whole"));
+    refused("whole --out n", "the run is not a shard");
+    refused("nowhere --out n", "nowhere");
+    let empty = bench.call(&args("--out x --shard 7/7"));
+    assert!(
+        empty.stderr.contains("7/7 is empty: there are 6 frames"),
+        "{}",
+        empty.stderr
+    );
+}
+
+#[test]
+fn limits_and_means_are_shared_by_the_parts() {
+    let bench = Bench::with_questions(6);
+    let mock = MockEndpoint::start([Answer::text("B")]);
+    let base = mock.base_url();
+    let requests_per_minute = |run: &str| {
+        let text = fs::read(bench.path(run).join("manifest.json")).unwrap();
+        let manifest: Value = serde_json::from_slice(&text).unwrap();
+        manifest["settings"]["--rpm"].clone()
+    };
+    let whole = "--data set.jsonl --levels L0 --rpm 7000 --out run --shard 1/1";
+    bench.complete(&model_args(&base, whole));
+    assert_eq!(requests_per_minute("run"), 7000);
+    let half = "--levels L0 --rpm 7001 --out part --shard 2/2";
+    bench.complete(&model_args(&base, half));
+    assert_eq!(requests_per_minute("part/shard-2-of-2"), 3500);
+    // Half of what may be spent is less than a reply costs.
+    let dear = format!(
+        "--model gpt-4o --base-url {base} --levels L0 --max-cost 0.0001 --out dear --shard 1/2"
+    );
+    assert_eq!(bench.call(&words(&dear)).code, Some(130));
+}
+
+/// The script as a node runs it, with a `scontrol` that writes down what it is told.
+#[cfg(unix)]
+#[test]
+fn the_script_of_slurm_has_a_stopped_task_started_again() {
+    use std::os::unix::fs::PermissionsExt as _;
+    use std::time::Duration;
+
+    let bench = Bench::with_questions(400);
+    let mock = MockEndpoint::answering(|_| {
+        std::thread::sleep(Duration::from_millis(20));
+        Answer::text("B")
+    });
+    let control = bench.file("bin/scontrol", "#!/bin/sh\necho \"$@\" >> told\n");
+    fs::set_permissions(&control, fs::Permissions::from_mode(0o755)).unwrap();
+    let program = std::path::Path::new(env!("CARGO_BIN_EXE_darkqa-eval"));
+    let folders = [bench.path("bin"), program.parent().unwrap().to_owned()];
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let path = folders.into_iter().chain(std::env::split_paths(&path));
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/src/run/cluster/slurm.sh");
+    let base = mock.base_url();
+    let args = model_args(
+        &base,
+        "--data set.jsonl --levels L0 --concurrency 1 --out run",
+    );
+    let variables = [
+        ("SLURM_ARRAY_JOB_ID", "7"),
+        ("SLURM_ARRAY_TASK_ID", "0"),
+        ("SLURM_ARRAY_TASK_COUNT", "1"),
+    ];
+    let mut task = std::process::Command::new("bash")
+        .arg(script)
+        .args(args)
+        .current_dir(bench.path(""))
+        .envs(variables)
+        .env("PATH", std::env::join_paths(path).unwrap())
+        .env_remove("OPENAI_API_KEY")
+        .spawn()
+        .unwrap();
+    wait_until(|| mock.requests().len() >= 5);
+    signal(&task, "-TERM");
+    assert_eq!(task.wait().unwrap().code(), Some(130));
+    assert_eq!(
+        fs::read_to_string(bench.path("told")).unwrap(),
+        "requeue 7_0\n"
+    );
+    let answered = records(&bench.path("run")).len();
+    assert!((5..400).contains(&answered), "{answered}");
+}

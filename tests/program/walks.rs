@@ -1,0 +1,212 @@
+//! Runs of open questions and what every run can do: parts and their merging, reports from the folder alone, images made again, and
+//! a kill in the midst of it.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::process::Stdio;
+use std::time::Duration;
+
+use crate::support::endpoint::{Answer, MockEndpoint};
+use crate::support::house::{House, flags};
+use crate::support::process::{signal, wait_until};
+use crate::support::run::{Called, assert_same_products, files, records, words};
+use serde_json::{Value, json};
+
+/// A script that answers each question in its own words, and one that marks the answers.
+fn scripts(house: &House) {
+    house.0.file(
+        "a.jsonl",
+        "{\"question\": \"q1\", \"condition\": \"L0\", \"reply\": \"brown\"}\n{\"question\": \"q1\", \"reply\": \"grey\"}\n\
+         {\"default\": \"an answer\"}",
+    );
+    house.0.file(
+        "j.jsonl",
+        "{\"question\": \"q1\", \"reply\": \"4\"}\n{\"default\": \"2\"}",
+    );
+}
+
+/// A run with the scripts, and more arguments.
+fn run(house: &House, more: &str) -> Called {
+    let line = format!("--model script:a.jsonl --judge script:j.jsonl --levels L0,L3 {more}");
+    house.call(&words(&line))
+}
+
+/// The output of a run with the scripts that must be complete.
+fn complete(house: &House, more: &str) -> String {
+    let called = run(house, more);
+    assert_eq!(called.code, Some(0), "{more}: {called:?}");
+    called.stdout
+}
+
+#[test]
+fn parts_are_together_what_one_run_is() {
+    let house = House::new();
+    scripts(&house);
+    complete(&house, "--out whole");
+    for part in ["1/2", "2/2"] {
+        complete(&house, &format!("--out parts --shard {part}"));
+    }
+    let table = house.0.complete(&["merge", "parts", "--out", "merged"]);
+    let (whole, merged) = (house.0.path("whole"), house.0.path("merged"));
+    let keys = |run: &std::path::Path| -> BTreeSet<String> {
+        let records = records(run).into_iter();
+        records.map(|record| record["key"].to_string()).collect()
+    };
+    assert_eq!(keys(&whole), keys(&merged));
+    let compared = assert_same_products(&whole, &merged);
+    assert!(compared > 5, "{compared}");
+    // It is the run that the whole command goes on with: nothing is left to ask, of answers or of marks.
+    let before = fs::read(merged.join("records.jsonl")).unwrap();
+    assert_eq!(complete(&house, "--out merged"), table);
+    assert_eq!(fs::read(merged.join("records.jsonl")).unwrap(), before);
+    // Runs of the other kind are no part of it.
+    fs::remove_dir_all(house.0.path("parts/shard-1-of-2")).unwrap();
+    house.0.complete(&words(
+        "--data rooms:frames=2,size=64x48 --model random --levels L0 --shard 1/2 --out parts",
+    ));
+    let refused = house.0.call(&["merge", "parts", "--out", "mixed"]);
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    assert!(
+        refused.stderr.contains("cannot be merged"),
+        "{}",
+        refused.stderr
+    );
+}
+
+#[test]
+fn a_report_is_made_from_the_folder_alone() {
+    let house = House::new();
+    scripts(&house);
+    let table = complete(&house, "--out run");
+    let page = fs::read(house.0.path("run/report.html")).unwrap();
+    for gone in ["report.html", "summary.csv", "summary.json", "tables.tex"] {
+        fs::remove_file(house.0.path(&format!("run/{gone}"))).unwrap();
+    }
+    fs::remove_dir_all(house.0.path("walks")).unwrap();
+    assert_eq!(house.0.complete(&["report", "run"]), table);
+    assert_eq!(fs::read(house.0.path("run/report.html")).unwrap(), page);
+}
+
+#[test]
+fn several_runs_are_compared_if_one_judge_marked_them() {
+    let house = House::new();
+    scripts(&house);
+    complete(&house, "--out one");
+    house.0.file("b.jsonl", "{\"default\": \"grey\"}");
+    let run_other = |judge: &str, out: &str| {
+        let line = format!("--model script:b.jsonl --levels L0,L3 --judge {judge} --out {out}");
+        let called = house.call(&words(&line));
+        assert_eq!(called.code, Some(0), "{called:?}");
+    };
+    run_other("script:j.jsonl", "two");
+    let table = house
+        .0
+        .complete(&["report", "one", "two", "--out", "compared"]);
+    for model in ["script:a.jsonl", "script:b.jsonl"] {
+        assert!(table.contains(model), "{table}");
+    }
+    let summary = fs::read_to_string(house.0.path("compared/summary.csv")).unwrap();
+    let of_all = summary.lines().filter(|line| line.contains(",all,all,"));
+    assert_eq!(of_all.count(), 4, "{summary}");
+    // The same model with other replies stands once for each run.
+    house.0.file("a.jsonl", "{\"default\": \"nothing\"}");
+    complete(&house, "--out three");
+    let table = house.0.complete(&["report", "one", "three"]);
+    assert!(table.contains("script:a.jsonl (three)"), "{table}");
+    fs::copy(house.0.path("j.jsonl"), house.0.path("k.jsonl")).unwrap();
+    run_other("script:k.jsonl", "four");
+    let refused = house.0.call(&["report", "one", "four"]);
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    assert!(
+        refused.stderr.contains("another judge"),
+        "{}",
+        refused.stderr
+    );
+}
+
+#[test]
+fn the_images_of_a_walk_are_made_again_and_proved() {
+    let house = House::new();
+    scripts(&house);
+    complete(&house, "--out run");
+    let report = house.0.complete(&["show", "run", "q1"]);
+    assert_eq!(report.matches("the very bytes that were sent").count(), 2);
+    assert!(
+        report.contains("brown") && report.contains("grey"),
+        "{report}"
+    );
+    let images = files(&house.0.path("run/shown"));
+    assert_eq!(
+        images.len(),
+        6,
+        "three frames in two conditions: {images:?}"
+    );
+    // Another frame in the place of one that was shown is noticed.
+    let [one, other] = ["00002", "00003"].map(|frame| {
+        house
+            .0
+            .path(&format!("walks/hm3d-v0/000-a/{frame}-rgb.png"))
+    });
+    fs::copy(other, one).unwrap();
+    let called = house.0.call(&["show", "run", "q1"]);
+    assert_eq!(called.code, Some(1), "{called:?}");
+    assert!(called.stdout.contains("NOT the bytes that were sent"));
+    // And the run goes on with it no more.
+    let refused = run(&house, "--out run");
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    assert!(
+        refused.stderr.contains("is not the one stored in this run"),
+        "{}",
+        refused.stderr
+    );
+}
+
+#[test]
+fn time_is_said_of_walks_too() {
+    let house = House::new();
+    scripts(&house);
+    let called = run(&house, "--out run --timings");
+    assert!(
+        called.stderr.contains("timings:") && called.stderr.contains("degrade"),
+        "{}",
+        called.stderr
+    );
+}
+
+#[test]
+fn a_killed_run_goes_on_and_asks_nothing_twice() {
+    let house = House::new();
+    let mock = MockEndpoint::answering(|request| {
+        std::thread::sleep(Duration::from_millis(60));
+        let judge = request["model"] == "j";
+        Answer::text(if judge { "5" } else { "an answer" })
+    });
+    let line = format!(
+        "--model m --judge j --base-url {} --levels L0-L5 --variant both --concurrency 2 --out run",
+        mock.base_url()
+    );
+    let args = flags(&words(&line));
+    let mut child = house.0.spawn(&args, Stdio::null());
+    let path = house.0.path("run/records.jsonl");
+    let stored = || fs::read_to_string(&path).unwrap_or_default();
+    wait_until(|| stored().lines().count() >= 8);
+    signal(&child, "-9");
+    child.wait().unwrap();
+    let before: Vec<Value> = records(&house.0.path("run"));
+    let called = house.0.call(&args);
+    assert_eq!(called.code, Some(0), "{called:?}");
+    let all = records(&house.0.path("run"));
+    assert_eq!(all[..before.len()], before[..]);
+    let keys: BTreeSet<String> = all.iter().map(|record| record["key"].to_string()).collect();
+    assert_eq!(keys.len(), all.len(), "no trial twice");
+    // 3 questions in 11 conditions, and a mark for each question, for all answers are alike.
+    let steps = |step: &str| all.iter().filter(|record| record["step"] == step).count();
+    assert_eq!((steps("answer"), steps("mark")), (33, 3));
+    assert!(
+        mock.requests().len() <= all.len() + 2,
+        "only what was in flight is asked again: {}",
+        mock.requests().len()
+    );
+    let summary: Value = house.read("run/summary.json");
+    assert_eq!(summary["run"]["status"], json!("complete"));
+}
