@@ -241,15 +241,28 @@ fn frames_of_list(folder: &Path, list: &Path) -> Result<BTreeMap<FrameId, ImageS
 
 fn images(folder: &Path) -> Result<BTreeMap<FrameId, ImageSource>> {
     let mut sources = BTreeMap::new();
-    for path in entries(folder)?.into_iter().filter(|path| is_image(path)) {
+    let (images, others): (Vec<PathBuf>, Vec<PathBuf>) = entries(folder)?
+        .into_iter()
+        .partition(|path| is_image(path));
+    for path in images {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         sources.insert(FrameId(name.into_owned()), ImageSource::image(path));
     }
     if sources.is_empty() {
-        return Err(Error::data(
-            folder.display(),
-            format_args!("neither a {FRAMES} nor any PNG or JPEG image in this folder"),
-        ));
+        let has_images =
+            |inner: &&PathBuf| entries(inner).is_ok_and(|of| of.iter().any(|path| is_image(path)));
+        let remedy = others
+            .iter()
+            .find(has_images)
+            .map_or_else(String::new, |inner| {
+                format!(
+                    "; a folder in it has some: name that one, as {}",
+                    inner.display()
+                )
+            });
+        let problem =
+            format_args!("neither a {FRAMES} nor any PNG or JPEG image in this folder{remedy}");
+        return Err(Error::data(folder.display(), problem));
     }
     Ok(sources)
 }
@@ -291,6 +304,18 @@ mod tests {
         assert_eq!(frame.depth.unwrap(), array![[0, 3000]]);
         assert_eq!(frame.semantic.unwrap(), array![[3, 4]]);
         assert_eq!(frame.segments.unwrap(), array![[0, 1500]]);
+    }
+
+    #[test]
+    fn a_folder_of_folders_of_images_names_one_of_them() {
+        let folder = tempfile::tempdir().unwrap();
+        let problem = || images(folder.path()).err().unwrap().to_string();
+        assert!(problem().ends_with("in this folder"), "{}", problem());
+        fs::create_dir(folder.path().join("inner")).unwrap();
+        RgbImage::new(2, 1)
+            .save(folder.path().join("inner/a.png"))
+            .unwrap();
+        assert!(problem().ends_with("inner"), "{}", problem());
     }
 
     #[test]
