@@ -50,7 +50,7 @@ class Run(NamedTuple):
                 else:
                     add_readings(record)
                 add_reply(record)
-            except (KeyError, IndexError, TypeError) as error:
+            except (AttributeError, KeyError, IndexError, TypeError) as error:
                 raise ValueError(f"{path}:{number}: not a record of {self.schema}: {error!r}") from error
             if questions is not None:
                 if record["question"] not in questions:
@@ -66,7 +66,7 @@ class Run(NamedTuple):
         return {
             (record["question"], record["judged"]): record[protocol]
             for _, record in _lines(self.folder / "records.jsonl")
-            if record["step"] == "mark" and record["model"] == judge and record["failure"] is None
+            if record.get("step") == "mark" and record["model"] == judge and record["failure"] is None
         }
 
 
