@@ -247,6 +247,18 @@ class OpenQuestions(RunTest):
         self.assertEqual(set(tolerant["scene"]), set(walks))
         left_out = set(tolerant) - set(load_run(self.folder / "run", questions=False))
         self.assertEqual(left_out, {"text", "answer"})
+        # Another judge, who gives other marks, and fails on one answer.
+        self.write_lines("strict.jsonl", [{"question": "q0", "reply": "1"}, {"question": "q2", "reply": "2"}])
+        self.call(f"{asked} --judge script:strict.jsonl", code=1)
+        strict = self.check("another judge")
+        self.assertEqual(set(strict["mark"].dropna()), {1, 2})
+        self.assertEqual(strict["outcome"].value_counts()["unjudged"], 1)
+        # A reply that the server refused is no answer.
+        records = read_lines(self.folder / "run" / "records.jsonl")
+        refused = next(record for record in records if record["question"] == "q0" and record["level"] == "L2")
+        self.write_lines("run/records.jsonl", [*records, {**refused, "refusal": "I cannot help with this."}])
+        self.call("report run")
+        self.assertEqual(self.check("refused")["outcome"].value_counts()["null"], outcomes["null"] + 1)
 
     def check(self, name):
         """Compare the table of the run with its `summary.csv`."""
