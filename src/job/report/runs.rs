@@ -129,7 +129,7 @@ fn write_files(
 ) -> Result<String> {
     let Some(out) = &args.out else {
         if args.show() == StdoutFormat::Table {
-            text += "report: --out DIR writes it\n";
+            text += "report: not written; --out DIR writes one\n";
         }
         return Ok(text);
     };
