@@ -87,10 +87,12 @@ impl FailureClass {
             300..400 => {
                 Self::permanent("redirects are not followed: give the final address as --base-url")
             }
-            401 if !sent.has_key => {
-                Self::permanent("no key was sent: set OPENAI_API_KEY, or name another variable or a file with --api-key-env or --api-key-file")
-            }
-            401 => Self::permanent("check the key; it is taken from OPENAI_API_KEY (for Azure AZURE_OPENAI_API_KEY) unless --api-key-env or --api-key-file names another"),
+            401 if !sent.has_key => Self::permanent(
+                "no key was sent: set OPENAI_API_KEY, or name another variable or a file with --api-key-env or --api-key-file",
+            ),
+            401 => Self::permanent(
+                "check the key; it is taken from OPENAI_API_KEY (for Azure AZURE_OPENAI_API_KEY) unless --api-key-env or --api-key-file names another",
+            ),
             400.. if complaint.has_code(&PERMANENT) || complaint.mentions_any(&PERMANENT_WORDS) => {
                 Self::permanent("check the key, --model and --base-url")
             }

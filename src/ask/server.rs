@@ -117,7 +117,7 @@ impl AccessArgs {
                 name,
                 format_args!(
                     "no key for {base}: set this variable, or name another with --api-key-env NAME or a file with --api-key-file FILE; \
-                     an endpoint without keys takes --api-key-env none"
+                     a server of your own is named by --base-url URL, and --api-key-env none sends no key"
                 ),
             )),
         }

@@ -39,7 +39,7 @@ impl Inputs {
                 let described = format!("{:?} of {}", id.0, input.display());
                 if let Some(other) = used_names.insert(stem.clone(), described.clone()) {
                     let problem = format!(
-                        "{described} and {other} would both be written as {stem}; give each its own --out"
+                        "{described} and {other} would both be written as {stem}; rename one of them, or give each folder its own --out"
                     );
                     return Err(Error::usage("INPUT", problem));
                 }

@@ -220,7 +220,7 @@ impl Kind {
         }
         let Some(number) = upper.strip_prefix('E') else {
             return Err(wrong(format!(
-                "{label:?} is not one of L0, L1, L2, L3, L4, L5 and not of the form E3.3"
+                "{label:?} is not one of L0, L1, L2, L3, L4, L5 and not a number of stops such as 3.3 or E3.3"
             )));
         };
         let severity = number.parse::<Severity>()?;

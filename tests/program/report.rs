@@ -78,7 +78,9 @@ fn several_runs_become_one_comparison() {
     // Nothing is written where nothing is wanted.
     let called = bench.call(&["report", "one", "three"]);
     assert!(
-        called.stdout.contains("report: not written; --out DIR writes one"),
+        called
+            .stdout
+            .contains("report: not written; --out DIR writes one"),
         "{called:?}"
     );
     let json = bench.call(&["report", "one", "three", "--json"]);
