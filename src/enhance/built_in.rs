@@ -43,9 +43,14 @@ impl BuiltIn {
         }
         let found = ALL.iter().find(|enhancer| enhancer.name == text);
         found.map(Some).ok_or_else(|| {
-            let names = ALL.map(|enhancer| enhancer.name).join(", ");
+            let names = ALL.map(|enhancer| enhancer.name);
+            let near = names.into_iter().find(|name| {
+                strsim::damerau_levenshtein(name, &text.to_lowercase()) <= 2
+            });
+            let near = near.map_or_else(String::new, |name| format!("did you mean {name}? "));
+            let names = names.join(", ");
             let problem = format_args!(
-                "{text:?} is not an enhancer in the program ({names}); name a file with its extension or its folder: {text}.onnx, ./{text}; a preset stands before its file: zero-dce:FILE.onnx"
+                "{near}{text:?} is not an enhancer in the program ({names}); name a file with its extension or its folder: {text}.onnx, ./{text}; a preset stands before its file: zero-dce:FILE.onnx"
             );
             Error::usage("--llie", problem)
         })
@@ -75,6 +80,8 @@ mod tests {
         for file in ["lift.onnx", "./lift", "models/lift", "C:lift", "lift.ort"] {
             assert!(BuiltIn::named(Path::new(file)).unwrap().is_none(), "{file}");
         }
+        let typo = BuiltIn::named(Path::new("lfit")).err().unwrap().to_string();
+        assert!(typo.contains("did you mean lift?"), "{typo}");
         for wrong in ["lfit", "zerodce", "Lift", ""] {
             let message = BuiltIn::named(Path::new(wrong)).err().unwrap().to_string();
             assert!(

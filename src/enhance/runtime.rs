@@ -146,15 +146,24 @@ fn find(surroundings: &Surroundings, allowed: Install) -> Result<FoundLibrary> {
             }
         }
     }
+    rejected.extend(
+        surroundings
+            .packages_without_library()
+            .iter()
+            .map(|folder| {
+                let folder = folder.display();
+                format!("{folder} holds no library; the packages from version 1.19 on do")
+            }),
+    );
     let installed = match allowed {
         Install::Offline => Err("--offline forbids its installation".to_owned()),
-        Install::Allowed => install_here(surroundings),
+        Install::Allowed => install_here(surroundings, &rejected),
     };
     installed.map_err(|problem| Error::Runtime(not_found_message(&problem, &rejected)))
 }
 
 /// Installs the pinned library into the cache.
-fn install_here(surroundings: &Surroundings) -> Result<FoundLibrary, String> {
+fn install_here(surroundings: &Surroundings, rejected: &[String]) -> Result<FoundLibrary, String> {
     let pin = Pin::of_this_platform().ok_or_else(|| {
         format!(
             "no library is known for {} {}",
@@ -171,7 +180,8 @@ fn install_here(surroundings: &Surroundings) -> Result<FoundLibrary, String> {
         format!("{variables}, so there is no cache folder to install it into")
     })?;
     tracing::warn!(
-        "ONNX Runtime was not found; installing version {PINNED} with pip, once, into {}",
+        "ONNX Runtime was not found{}; installing version {PINNED} with pip, once, into {}",
+        skipped(rejected),
         folder.display()
     );
     let path = install(pin, &folder)?;
@@ -184,12 +194,17 @@ fn install_here(surroundings: &Surroundings) -> Result<FoundLibrary, String> {
     })
 }
 
-/// Message for a missing library: what was tried, and how to provide one.
-fn not_found_message(problem: &str, rejected: &[String]) -> String {
-    let rejected = match rejected {
+/// The libraries and packages that cannot be used, each with its problem.
+fn skipped(rejected: &[String]) -> String {
+    match rejected {
         [] => String::new(),
         rejected => format!(" (skipped: {})", rejected.join("; ")),
-    };
+    }
+}
+
+/// Message for a missing library: what was tried, and how to provide one.
+fn not_found_message(problem: &str, rejected: &[String]) -> String {
+    let rejected = skipped(rejected);
     let places = LibraryPlace::ALL.map(|place| place.to_string()).join(", ");
     format!(
         "no library was found ({places}){rejected}, and {problem}. Three ways out: install the Python package into the environment of this program or one on PATH (`pip install onnxruntime=={PINNED}`); or name the library of any release from 1.{OLDEST} on with --ort-lib FILE or ORT_DYLIB_PATH; or let it be installed: without --offline, with pip on PATH and a reachable package index"

@@ -130,6 +130,17 @@ impl Surroundings {
             .collect()
     }
 
+    /// The Python packages of ONNX Runtime that hold no library: those before 1.19, where it is a part of the Python module.
+    pub(super) fn packages_without_library(&self) -> Vec<PathBuf> {
+        let places = [LibraryPlace::Environment, LibraryPlace::Python];
+        let folders = places.into_iter().flat_map(|place| self.folders(place));
+        let mut empty: Vec<PathBuf> = folders
+            .filter(|folder| libraries_in(folder).is_empty())
+            .collect();
+        empty.dedup();
+        empty
+    }
+
     /// The folders of a place.
     fn folders(&self, place: LibraryPlace) -> Vec<PathBuf> {
         match place {
@@ -322,6 +333,22 @@ mod tests {
             ..Surroundings::default()
         };
         assert_eq!(paths(&surroundings), expected);
+    }
+
+    #[test]
+    fn a_package_without_a_library_is_named() {
+        let root = tempfile::tempdir().unwrap();
+        let capi = root
+            .path()
+            .join("lib/python3.12/site-packages/onnxruntime/capi");
+        touch(&capi.join("onnxruntime_pybind11_state.so"));
+        let surroundings = Surroundings {
+            program: Some(root.path().join("bin")),
+            ..Surroundings::default()
+        };
+        assert_eq!(surroundings.packages_without_library(), [capi.clone()]);
+        touch(&capi.join("libonnxruntime.so.1.19.0"));
+        assert!(surroundings.packages_without_library().is_empty());
     }
 
     #[test]

@@ -43,7 +43,7 @@ pub(crate) fn figures(findings: &Findings<'_>) -> Result<Vec<Figure>> {
     Ok(figures)
 }
 
-/// The built-in models. They are a lower and an upper bound, not models under test.
+/// The built-in models. They stand for comparison, and are not models under test.
 const BUILT_IN: [&str; 2] = ["random", "observer"];
 
 /// Style of lines that belong to no model: chance, and the most frequent true answer.
