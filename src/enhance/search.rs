@@ -346,7 +346,10 @@ mod tests {
             program: Some(root.path().join("bin")),
             ..Surroundings::default()
         };
-        assert_eq!(surroundings.packages_without_library(), [capi.clone()]);
+        assert_eq!(
+            surroundings.packages_without_library(),
+            std::slice::from_ref(&capi)
+        );
         touch(&capi.join("libonnxruntime.so.1.19.0"));
         assert!(surroundings.packages_without_library().is_empty());
     }
