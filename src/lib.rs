@@ -98,7 +98,7 @@
 //!
 //! | to add | files |
 //! |---|---|
-//! | a flag | the structure of its group, where it acts, the test of what it does, its row in `tests/program/identity.rs`; where it may be idle, `cli/no_effect.rs` |
+//! | a flag | the structure of its group, where it acts, the test of what it does, for an evaluation or `openeqa` its row in `tests/program/identity.rs`; where it may be idle, `cli/no_effect.rs` |
 //! | a format to import | `import/<kind>.rs`, `import/mod.rs`, `import/README.md`, `tests/program/import.rs` |
 //! | a kind of degradation | `types/degradation.rs`, `synthesis/<kind>.rs`, `synthesis/mod.rs`, `synthesis/exposures.rs`, `tests/program/synthesize.rs`, `results/README.md` |
 //! | an API of endpoints | `ask/wire/<api>.rs`, `ask/wire/mod.rs`, `job/models.rs`, `tests/support/endpoint.rs`, `tests/program/ask.rs` |

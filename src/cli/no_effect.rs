@@ -225,90 +225,93 @@ mod tests {
         without_effect(&Cli::from_arg_matches(&matches).unwrap(), &matches)
     }
 
+    /// Calls, each with the beginning of the one line that names its idle flags.
+    const IDLE: &[(&str, &str)] = &[
+        (
+            "--model m --blind --llie f.onnx --levels L3",
+            "--levels, --llie: no effect: no model is shown an image",
+        ),
+        (
+            "--blind-model m --max-side 9 --image jpeg:9 --detail low",
+            "--image, --max-side, --detail: no effect: no model is shown",
+        ),
+        (
+            "--model m --llie f.onnx --levels L0",
+            "--llie: no effect: the only level is L0",
+        ),
+        (
+            "--model m --levels L0 --variant ev --ratio 9 --fixed",
+            "--ratio, --fixed, --variant: no effect: the only level is L0",
+        ),
+        (
+            "--model m --variant ev --profile eld",
+            "--profile: no effect: no variant has noise",
+        ),
+        (
+            "--model m --tile whole --offline",
+            "--tile, --offline: no effect: no --llie is named",
+        ),
+        (
+            "--model m --llie f.onnx --variant ev",
+            "--llie: no effect: --llie-on names no variant of --variant",
+        ),
+        (
+            "--model random --temperature 0 --rpm 9 --max-cost 1",
+            "--temperature, --rpm, --max-cost: no effect: all models are built in",
+        ),
+        (
+            "--model random --constrain json",
+            "--constrain: no effect: all models are built in",
+        ),
+        (
+            "--model m --dry-run --timings",
+            "--timings: no effect: --dry-run sends nothing",
+        ),
+        (
+            "openeqa --questions q --frames f --model m --judge-temperature 1",
+            "--judge-temperature: no effect: no judge is named",
+        ),
+        (
+            "openeqa --questions q --frames f --model m --url /v1",
+            "--url: no effect: only --batch",
+        ),
+        (
+            "openeqa --questions q --frames f --study s --rpm 9",
+            "--rpm: no effect: --study asks no model",
+        ),
+        (
+            "openeqa --questions q --frames f --model m --levels L0 --gain 1",
+            "--gain: no effect: the only level is L0",
+        ),
+        (
+            "synthesize a --out b --from c --levels L3 --camera x",
+            "--levels, --camera: no effect: --from",
+        ),
+        (
+            "synthesize a --out b --sheet noise --variant ev",
+            "--variant: no effect: a sheet",
+        ),
+        (
+            "synthesize a --out b --levels L0 --tone none",
+            "--tone: no effect: the only level is L0",
+        ),
+        (
+            "export llava a --out b --llie-on ev",
+            "--llie-on: no effect: no --llie",
+        ),
+        (
+            "realism a --kl-bins kousha --kl-empty drop",
+            "--kl-empty: no effect: the bins of kousha",
+        ),
+        (
+            "enhance m --describe --force",
+            "--force: no effect: --describe",
+        ),
+    ];
+
     #[test]
     fn flags_without_effect_are_named() {
-        for (words, idle) in [
-            (
-                "--model m --blind --llie f.onnx --levels L3",
-                "--levels, --llie: no effect: no model is shown an image",
-            ),
-            (
-                "--blind-model m --max-side 9 --image jpeg:9 --detail low",
-                "--image, --max-side, --detail: no effect: no model is shown",
-            ),
-            (
-                "--model m --llie f.onnx --levels L0",
-                "--llie: no effect: the only level is L0",
-            ),
-            (
-                "--model m --levels L0 --variant ev --ratio 9 --fixed",
-                "--ratio, --fixed, --variant: no effect: the only level is L0",
-            ),
-            (
-                "--model m --variant ev --profile eld",
-                "--profile: no effect: no variant has noise",
-            ),
-            (
-                "--model m --tile whole --offline",
-                "--tile, --offline: no effect: no --llie is named",
-            ),
-            (
-                "--model m --llie f.onnx --variant ev",
-                "--llie: no effect: --llie-on names no variant of --variant",
-            ),
-            (
-                "--model random --temperature 0 --rpm 9 --max-cost 1",
-                "--temperature, --rpm, --max-cost: no effect: all models are built in",
-            ),
-            (
-                "--model random --constrain json",
-                "--constrain: no effect: all models are built in",
-            ),
-            (
-                "--model m --dry-run --timings",
-                "--timings: no effect: --dry-run sends nothing",
-            ),
-            (
-                "openeqa --questions q --frames f --model m --judge-temperature 1",
-                "--judge-temperature: no effect: no judge is named",
-            ),
-            (
-                "openeqa --questions q --frames f --model m --url /v1",
-                "--url: no effect: only --batch",
-            ),
-            (
-                "openeqa --questions q --frames f --study s --rpm 9",
-                "--rpm: no effect: --study asks no model",
-            ),
-            (
-                "openeqa --questions q --frames f --model m --levels L0 --gain 1",
-                "--gain: no effect: the only level is L0",
-            ),
-            (
-                "synthesize a --out b --from c --levels L3 --camera x",
-                "--levels, --camera: no effect: --from",
-            ),
-            (
-                "synthesize a --out b --sheet noise --variant ev",
-                "--variant: no effect: a sheet",
-            ),
-            (
-                "synthesize a --out b --levels L0 --tone none",
-                "--tone: no effect: the only level is L0",
-            ),
-            (
-                "export llava a --out b --llie-on ev",
-                "--llie-on: no effect: no --llie",
-            ),
-            (
-                "realism a --kl-bins kousha --kl-empty drop",
-                "--kl-empty: no effect: the bins of kousha",
-            ),
-            (
-                "enhance m --describe --force",
-                "--force: no effect: --describe",
-            ),
-        ] {
+        for (words, idle) in IDLE {
             let lines = lines(words);
             assert_eq!(lines.len(), 1, "{words}: {lines:?}");
             assert!(lines[0].starts_with(idle), "{words}: {lines:?}");
