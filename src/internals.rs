@@ -46,6 +46,7 @@ pub mod score {
     pub use crate::score::cluster::Clusters;
     pub use crate::score::curve::curves;
     pub use crate::score::estimate::Estimate;
+    pub use crate::score::fidelity::FidelityFindings;
     pub use crate::score::findings::Findings;
     pub use crate::score::grid::{ClusterCount, Grid};
     pub use crate::score::open::{

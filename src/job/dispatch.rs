@@ -251,11 +251,9 @@ impl<I: Item> ReplySink<'_, I> {
             stimulus,
             trials,
             problem,
-            thumbnail,
+            notes,
         } = group;
-        if let Some(thumbnail) = thumbnail {
-            self.store.append_thumbnail(&thumbnail)?;
-        }
+        notes.store(self.store)?;
         let stimulus = Arc::new(stimulus);
         let ready = trials.into_iter().map(|trial| PreparedTrial {
             trial,

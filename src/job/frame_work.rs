@@ -29,17 +29,22 @@ impl ImageSteps<'_> {
     /// The image as it is sent, and the pixels that were encoded.
     pub(crate) fn payload<'p>(&self, image: &'p Rgb) -> Result<(Arc<Payload>, Cow<'p, Rgb>)> {
         let (payload, encoded) = self.timings.time(TimedStep::Encode, || {
-            let encoded = match self.recipe.scaling {
-                Scaling::MaxSide(side) => Payload::scaled(image, Some(side))?,
-                Scaling::LongerSide(side) if longer_side(image) != side => {
-                    Cow::Owned(bilinear(image, side)?)
-                }
-                Scaling::Never | Scaling::LongerSide(_) => Cow::Borrowed(image),
-            };
+            let encoded = self.scaled(image)?;
             let payload = Payload::encode(&encoded, self.recipe.format, None)?;
             Ok((payload, encoded))
         })?;
         Ok((self.checked(payload)?, encoded))
+    }
+
+    /// The image in the size sent.
+    fn scaled<'p>(&self, image: &'p Rgb) -> Result<Cow<'p, Rgb>> {
+        Ok(match self.recipe.scaling {
+            Scaling::MaxSide(side) => Payload::scaled(image, Some(side))?,
+            Scaling::LongerSide(side) if longer_side(image) != side => {
+                Cow::Owned(bilinear(image, side)?)
+            }
+            Scaling::Never | Scaling::LongerSide(_) => Cow::Borrowed(image),
+        })
     }
 
     fn checked(&self, payload: Payload) -> Result<Arc<Payload>> {
@@ -70,7 +75,9 @@ pub(crate) struct FrameWork<'a> {
     /// Digest of the file when the plan was made; `None` if any file is accepted.
     planned: Option<Digest>,
     picture: Option<Picture>,
-    clean: Option<Rgb>,
+    clean: Option<Arc<Rgb>>,
+    /// The clean frame in the size sent.
+    clean_as_sent: Option<Arc<Rgb>>,
     exposures: Exposures,
     degraded: Option<(Option<Degradation>, Rgb)>,
 }
@@ -96,6 +103,7 @@ impl<'a> FrameWork<'a> {
             planned,
             picture: None,
             clean: None,
+            clean_as_sent: None,
             exposures: Exposures::default(),
             degraded: None,
         }
@@ -151,23 +159,38 @@ impl<'a> FrameWork<'a> {
     }
 
     /// The clean frame: in its own size, or scaled if its light is reduced after scaling.
-    pub(crate) fn clean(&mut self) -> Result<&Rgb> {
+    pub(crate) fn clean(&mut self) -> Result<&Arc<Rgb>> {
         if self.clean.is_none() {
             let ImageSteps {
                 recipe, timings, ..
             } = self.steps;
             let picture = self.picture()?;
             let clean = timings.time(TimedStep::Decode, || picture.decode())?;
-            self.clean = Some(match (recipe.degraded_at, recipe.scaling) {
+            let clean = match (recipe.degraded_at, recipe.scaling) {
                 (DegradedAt::Resized, Scaling::LongerSide(side)) if longer_side(&clean) != side => {
                     bilinear(&clean, side)?
                 }
                 _ => clean,
-            });
+            };
+            self.clean = Some(Arc::new(clean));
         }
         once(&mut self.clean, || {
             Err(Error::data(&self.frame, "the frame was not read"))
         })
+    }
+
+    /// The clean frame in the size sent.
+    pub(crate) fn clean_as_sent(&mut self) -> Result<Arc<Rgb>> {
+        if let Some(clean) = &self.clean_as_sent {
+            return Ok(Arc::clone(clean));
+        }
+        let steps = self.steps;
+        let clean = self.clean()?;
+        let scaled = match steps.scaled(clean)? {
+            Cow::Borrowed(_) => Arc::clone(clean),
+            Cow::Owned(scaled) => Arc::new(scaled),
+        };
+        Ok(Arc::clone(self.clean_as_sent.insert(scaled)))
     }
 
     /// Whether the file was decoded.

@@ -11,9 +11,10 @@ use rayon::prelude::*;
 use tokio::sync::mpsc::Sender;
 
 use super::frame_work::{FrameWork, ImageSteps, StagedFrame};
+use super::image_notes::{ImageNotes, MissingNotes, WantedNotes, fidelity};
 use super::plan::{SourcePlan, TrialGroup};
 use super::source::{Source, SourceFrame};
-use super::thumbnail::{MissingThumbnails, thumbnail};
+use super::thumbnail::thumbnail;
 use super::timings::TimedStep;
 use super::trial::{Item, PreparedGroup, Stimulus};
 use super::workers::Workers;
@@ -116,7 +117,7 @@ impl<'a> ImagePipeline<'a> {
         mut self,
         sources: &[Source],
         plan: Vec<SourcePlan<I>>,
-        missing: &MissingThumbnails,
+        missing: &MissingNotes,
         workers: &Workers,
         groups: &Sender<PreparedGroup<I>>,
     ) {
@@ -152,7 +153,7 @@ impl<'a> ImagePipeline<'a> {
         &mut self,
         sources: &[Source],
         plan: impl Iterator<Item = SourcePlan<I>>,
-        missing: &MissingThumbnails,
+        missing: &MissingNotes,
         groups: &Sender<PreparedGroup<I>>,
     ) {
         let timings = self.steps.timings;
@@ -174,7 +175,7 @@ impl<'a> ImagePipeline<'a> {
         &mut self,
         sources: &[Source],
         plan: impl Iterator<Item = SourcePlan<I>>,
-        missing: &MissingThumbnails,
+        missing: &MissingNotes,
         mut take: impl FnMut(PreparedGroup<I>) -> Result<(), X>,
     ) -> Result<(), X> {
         for part in plan {
@@ -183,15 +184,18 @@ impl<'a> ImagePipeline<'a> {
             let mut work = self.begin(source, &conditions);
             for TrialGroup { condition, trials } in part.groups {
                 let result = self.group(&mut work, condition.as_ref(), source, missing);
-                let (images, thumbnail, problem) = match result {
-                    Ok((images, thumbnail)) => (images, thumbnail, None),
-                    Err(problem) => (Vec::new(), None, Some(problem.to_string())),
+                let (images, notes, problem) = match result {
+                    Ok((images, notes)) => (images, notes, None),
+                    Err(problem) => {
+                        let problem = Some(problem.to_string());
+                        (Vec::new(), ImageNotes::default(), problem)
+                    }
                 };
                 take(PreparedGroup {
                     stimulus: Stimulus { condition, images },
                     trials,
                     problem,
-                    thumbnail,
+                    notes,
                 })?;
             }
         }
@@ -215,60 +219,71 @@ impl<'a> ImagePipeline<'a> {
         }
     }
 
-    /// The images of a group in the order shown, with a thumbnail of the middle one if it is missing; none if nothing is shown.
+    /// The images of a group in the order shown, with the missing notes; none if nothing is shown. Of a walk, the middle image
+    /// has a thumbnail, and no fidelity is measured.
     fn group(
         &mut self,
         work: &mut SourceWork<'_>,
         condition: Option<&Condition>,
         source: &Source,
-        missing: &MissingThumbnails,
-    ) -> Result<(Vec<Arc<Payload>>, Option<Thumbnail>)> {
+        missing: &MissingNotes,
+    ) -> Result<(Vec<Arc<Payload>>, ImageNotes)> {
         let Some(condition) = condition else {
-            return Ok((Vec::new(), None));
+            return Ok((Vec::new(), ImageNotes::default()));
         };
         let name = &source.name;
-        let is_missing = missing.lacks(name, condition);
+        let wanted = missing.of(name, condition);
         match work {
             SourceWork::Frame(work) => {
-                let name = is_missing.then_some(name);
-                let (image, thumbnail) = self.image_and_thumbnail(work, condition, name)?;
-                Ok((vec![image], thumbnail))
+                let (image, notes) = self.image_and_notes(work, condition, name, wanted)?;
+                Ok((vec![image], notes))
             }
             SourceWork::Walk(images) => {
                 let images = images.remove(condition).unwrap_or_default();
-                let middle = images.get(images.len() / 2).filter(|_| is_missing);
-                let thumbnail =
-                    middle.and_then(|middle| try_thumbnail(name, condition, middle, None));
-                Ok((images, thumbnail))
+                let middle = images.get(images.len() / 2).filter(|_| wanted.thumbnail);
+                let notes = ImageNotes {
+                    thumbnail: middle
+                        .and_then(|middle| try_thumbnail(name, condition, middle, None)),
+                    fidelity: None,
+                };
+                Ok((images, notes))
             }
             SourceWork::Failed(problem) => Err(Error::data(condition, problem)),
         }
     }
 
-    /// A frame in a condition as it is sent, and its thumbnail if a name for it is given.
-    fn image_and_thumbnail(
+    /// A frame in a condition as it is sent, with the notes that are wanted.
+    fn image_and_notes(
         &mut self,
         work: &mut FrameWork<'_>,
         condition: &Condition,
-        name: Option<&FrameId>,
-    ) -> Result<(Arc<Payload>, Option<Thumbnail>)> {
+        name: &FrameId,
+        wanted: WantedNotes,
+    ) -> Result<(Arc<Payload>, ImageNotes)> {
         let steps = work.steps;
         let thumbnail = |image: &Payload, encoded: &Rgb| {
-            let make = || try_thumbnail(name?, condition, image, Some(encoded));
+            let make = || try_thumbnail(name, condition, image, Some(encoded));
             steps.timings.time(TimedStep::Encode, make)
         };
+        let mut notes = ImageNotes::default();
         if let Some(image) = work.unchanged_file(condition)? {
             // The file is decoded only for its thumbnail.
-            let thumbnail = match name {
-                Some(_) => thumbnail(&image, work.clean()?),
-                None => None,
-            };
-            return Ok((image, thumbnail));
+            if wanted.thumbnail {
+                notes.thumbnail = thumbnail(&image, work.clean()?);
+            }
+            return Ok((image, notes));
         }
+        let clean = wanted.fidelity.then(|| work.clean_as_sent()).transpose()?;
         let pixels = self.pixels(work, condition)?;
         let (image, encoded) = steps.payload(&pixels)?;
-        let thumbnail = thumbnail(&image, &encoded);
-        Ok((image, thumbnail))
+        if wanted.thumbnail {
+            notes.thumbnail = thumbnail(&image, &encoded);
+        }
+        if let Some(clean) = clean {
+            let measure = || fidelity(name, condition, &image, [&*encoded, &*clean]);
+            notes.fidelity = Some(steps.timings.time(TimedStep::Measure, measure)?);
+        }
+        Ok((image, notes))
     }
 
     /// The images of a source in each of these conditions, in the order shown.
@@ -311,8 +326,12 @@ impl<'a> ImagePipeline<'a> {
         work: &mut FrameWork<'_>,
         condition: &Condition,
     ) -> Result<Arc<Payload>> {
-        let (image, _) = self.image_and_thumbnail(work, condition, None)?;
-        Ok(image)
+        if let Some(image) = work.unchanged_file(condition)? {
+            return Ok(image);
+        }
+        let steps = work.steps;
+        let pixels = self.pixels(work, condition)?;
+        Ok(steps.payload(&pixels)?.0)
     }
 
     /// The pixels of a frame in a condition, in the size of the frame.

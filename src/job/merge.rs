@@ -15,7 +15,8 @@ use crate::error::{Error, Result};
 use crate::store::{self, AddressChange, Store};
 use crate::types::manifest::{RunManifest, Status, differences};
 use crate::types::{
-    ChoiceDetail, Decides, Detail, OpenDetail, Record, RunQuestion, Thumbnail, TrialKey,
+    ChoiceDetail, Decides, Detail, ImageFidelity, OpenDetail, Record, RunQuestion, Thumbnail,
+    TrialKey,
 };
 
 /// The flags of `merge`.
@@ -101,8 +102,8 @@ fn merge_all<D: Detail + PartialEq>(
         .flat_map(|part| part.run.questions.clone())
         .collect();
     questions.sort_by_key(|question| question.place);
-    let (records, thumbnails) = merged_records(parts, &questions)?;
-    manifest.count(count(manifest.counts.trials, &records));
+    let merged = MergedParts::of(parts, &questions)?;
+    manifest.count(count(manifest.counts.trials, &merged.records));
     if missing > 0 {
         manifest.status = Status::Incomplete;
     }
@@ -113,7 +114,7 @@ fn merge_all<D: Detail + PartialEq>(
         .into_iter()
         .map(|record| (record.key, record))
         .collect();
-    for record in &records {
+    for record in &merged.records {
         if present.get(&record.key) != Some(record) {
             store.append(record)?;
         }
@@ -123,9 +124,18 @@ fn merge_all<D: Detail + PartialEq>(
         .into_iter()
         .map(|thumbnail| (thumbnail.frame, thumbnail.condition))
         .collect();
-    for thumbnail in thumbnails {
+    for thumbnail in merged.thumbnails {
         if !present.contains(&(thumbnail.frame.clone(), thumbnail.condition.clone())) {
             store.append_thumbnail(&thumbnail)?;
+        }
+    }
+    let present: BTreeSet<_> = store::read_fidelity(&args.out)?
+        .into_iter()
+        .map(|image| (image.frame, image.condition))
+        .collect();
+    for image in merged.fidelity {
+        if !present.contains(&(image.frame.clone(), image.condition.clone())) {
+            store.append_fidelity(&image)?;
         }
     }
     let run = StoredRun::of(&args.out, manifest)?;
@@ -283,32 +293,43 @@ fn merged_manifest<D>(parts: &[MergePart<D>]) -> Result<RunManifest> {
     Ok(manifest)
 }
 
-/// The records of all shards in the order of the questions, and the thumbnails that one run would have stored.
-fn merged_records<D: Detail>(
-    parts: Vec<MergePart<D>>,
-    questions: &[RunQuestion],
-) -> Result<(Vec<Record<D>>, Vec<Thumbnail>)> {
-    let wanted =
-        MissingThumbnails::new(questions.iter().map(|question| &question.frame), Vec::new());
-    let (mut records, mut thumbnails) = (Vec::new(), Vec::new());
-    let mut keys = HashMap::<TrialKey, PathBuf>::new();
-    for MergePart { run, .. } in parts {
-        for record in run.records {
-            if let Some(other) = keys.insert(record.key, run.folder.clone()) {
-                let problem = format!(
-                    "the trial {} is also in {}: these are not shards of the same run",
-                    record.key,
-                    other.display()
-                );
-                return Err(Error::Run {
-                    path: run.folder,
-                    problem,
-                });
+/// What the shards of a run stored, as one run would have stored it.
+struct MergedParts<D> {
+    /// Records in the order of the questions.
+    records: Vec<Record<D>>,
+    thumbnails: Vec<Thumbnail>,
+    fidelity: Vec<ImageFidelity>,
+}
+
+impl<D: Detail> MergedParts<D> {
+    fn of(parts: Vec<MergePart<D>>, questions: &[RunQuestion]) -> Result<Self> {
+        let frames = questions.iter().map(|question| &question.frame);
+        let wanted = MissingThumbnails::new(frames, Vec::new());
+        let mut merged = Self {
+            records: Vec::new(),
+            thumbnails: Vec::new(),
+            fidelity: Vec::new(),
+        };
+        let mut keys = HashMap::<TrialKey, PathBuf>::new();
+        for MergePart { run, .. } in parts {
+            for record in run.records {
+                if let Some(other) = keys.insert(record.key, run.folder.clone()) {
+                    let problem = format!(
+                        "the trial {} is also in {}: these are not shards of the same run",
+                        record.key,
+                        other.display()
+                    );
+                    let path = run.folder;
+                    return Err(Error::Run { path, problem });
+                }
+                merged.records.push(record);
             }
-            records.push(record);
+            let copies = run.thumbnails.into_iter();
+            let wanted = copies.filter(|thumbnail| wanted.wants(&thumbnail.frame));
+            merged.thumbnails.extend(wanted);
+            merged.fidelity.extend(run.fidelity);
         }
-        let copies = run.thumbnails.into_iter();
-        thumbnails.extend(copies.filter(|thumbnail| wanted.wants(&thumbnail.frame)));
+        merged.records = in_order(merged.records, questions);
+        Ok(merged)
     }
-    Ok((in_order(records, questions), thumbnails))
 }

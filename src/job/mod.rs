@@ -17,6 +17,7 @@ pub(crate) mod experiment;
 mod folder;
 pub(crate) mod frame_work;
 pub(crate) mod identity;
+pub(crate) mod image_notes;
 pub(crate) mod image_pipeline;
 pub(crate) mod image_words;
 pub(crate) mod interrupt;

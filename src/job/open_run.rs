@@ -11,6 +11,7 @@ use super::enhancers::OpenEnhancers;
 use super::experiment::{DetailOf, Experiment, RecordOf};
 use super::folder::now;
 use super::frame_work::ImageSteps;
+use super::image_notes::MissingNotes;
 use super::image_pipeline::ImagePipeline;
 use super::manifest;
 use super::models;
@@ -28,7 +29,7 @@ use crate::error::Result;
 use crate::report::forecast::money;
 use crate::store::{self, Store};
 use crate::types::manifest::{Counts, RunManifest};
-use crate::types::{Record, Thumbnail, TrialKey};
+use crate::types::{Record, TrialKey};
 
 /// A run folder that no other process writes to, with all that asking needs.
 pub(crate) struct OpenRun<'a, E: Experiment> {
@@ -143,7 +144,7 @@ impl<E: Experiment> OpenRun<'_, E> {
             settings,
             timings: &timings,
         };
-        let missing = missing_thumbnails(experiment, self.store.folder())?;
+        let missing = missing_notes(experiment, self.store.folder())?;
         let started = Instant::now();
         let sources = experiment.sources();
         let end = dispatcher.run(counts, budget, &mut self.store, stoppers, |groups| {
@@ -247,14 +248,11 @@ pub(crate) fn limit(settings: &JobSettings) -> Option<ImageLimit> {
     Some(settings.max_image.map_or_else(known, ImageLimit::stated))
 }
 
-/// The thumbnails that a run folder does not have yet.
-pub(super) fn missing_thumbnails<E: Experiment>(
-    experiment: &E,
-    folder: &Path,
-) -> Result<MissingThumbnails> {
-    let present: Vec<Thumbnail> = store::read_thumbnails(folder)?;
+/// The notes about images that a run folder does not have yet.
+pub(super) fn missing_notes<E: Experiment>(experiment: &E, folder: &Path) -> Result<MissingNotes> {
     let names = experiment.sources().iter().map(|source| &source.name);
-    Ok(MissingThumbnails::new(names, present))
+    let thumbnails = MissingThumbnails::new(names, store::read_thumbnails(folder)?);
+    Ok(MissingNotes::new(thumbnails, store::read_fidelity(folder)?))
 }
 
 /// Keys of the trials that have a reply.

@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 use crate::error::{Error, Result};
 use crate::store;
 use crate::types::manifest::RunManifest;
-use crate::types::{ChoiceDetail, Detail, OpenDetail, QuestionId, Record, RunQuestion, Thumbnail};
+use crate::types::{
+    ChoiceDetail, Detail, ImageFidelity, OpenDetail, QuestionId, Record, RunQuestion, Thumbnail,
+};
 
 /// A run as read from its folder.
 pub(crate) struct StoredRun<D> {
@@ -15,6 +17,7 @@ pub(crate) struct StoredRun<D> {
     pub(crate) records: Vec<Record<D>>,
     pub(crate) questions: Vec<RunQuestion>,
     pub(crate) thumbnails: Vec<Thumbnail>,
+    pub(crate) fidelity: Vec<ImageFidelity>,
 }
 
 impl<D: Detail> StoredRun<D> {
@@ -34,6 +37,7 @@ impl<D: Detail> StoredRun<D> {
             records: in_order(store::read_records(folder)?, &questions),
             questions,
             thumbnails: store::read_thumbnails(folder)?,
+            fidelity: store::read_fidelity(folder)?,
             folder: folder.to_owned(),
             manifest,
         })

@@ -15,6 +15,8 @@ pub(crate) enum TimedStep {
     Enhance,
     /// Scaling and encoding of an image.
     Encode,
+    /// Comparison of an image with its clean frame.
+    Measure,
     /// Images wait until they are asked about.
     Waiting,
     /// No request is in flight, because no image is ready.
@@ -24,11 +26,12 @@ pub(crate) enum TimedStep {
 }
 
 impl TimedStep {
-    const ALL: [(Self, &str); 7] = [
+    const ALL: [(Self, &str); 8] = [
         (Self::Decode, "decode"),
         (Self::Degrade, "degrade"),
         (Self::Enhance, "enhance"),
         (Self::Encode, "encode"),
+        (Self::Measure, "measure"),
         (Self::Waiting, "waiting"),
         (Self::Idle, "idle"),
         (Self::Full, "full"),
@@ -87,6 +90,7 @@ impl fmt::Display for TimingsText<'_> {
             TimedStep::Degrade,
             TimedStep::Enhance,
             TimedStep::Encode,
+            TimedStep::Measure,
         ];
         let busy: f64 = image_steps.iter().map(|step| timings.seconds(*step)).sum();
         write!(f, "timings: {took:.1} s; images:")?;

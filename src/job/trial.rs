@@ -4,10 +4,11 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
+use super::image_notes::ImageNotes;
 use super::models::ModelUnderTest;
 use crate::ask::{Message, Payload, Query};
 use crate::error::Result;
-use crate::types::{Condition, Detail, Digest, QuestionId, Record, Thumbnail, TrialKey};
+use crate::types::{Condition, Detail, Digest, QuestionId, Record, TrialKey};
 
 /// The subject of a trial: a question with choices, an open question, or an answer to judge.
 pub(crate) trait Item: Clone + Send + Sync + 'static {
@@ -146,6 +147,6 @@ pub(crate) struct PreparedGroup<I> {
     pub(crate) trials: Vec<Trial<I>>,
     /// Reason why the images could not be made; else `None`.
     pub(crate) problem: Option<String>,
-    /// Thumbnail for the report; `None` if it is not wanted or exists already.
-    pub(crate) thumbnail: Option<Thumbnail>,
+    /// What the report needs to know of the images.
+    pub(crate) notes: ImageNotes,
 }

@@ -137,7 +137,8 @@ fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
     all
 }
 
-fn significance(difference: f64, p: f64) -> Significance {
+/// The result of a difference with this p-value.
+pub(super) fn significance(difference: f64, p: f64) -> Significance {
     if p >= 0.05 {
         Significance::Tied
     } else if difference > 0.0 {

@@ -10,11 +10,12 @@ use super::cluster::{ClusterUnit, Clusters};
 use super::comparison::{Comparison, ComparisonKind, comparisons};
 use super::confusion::{Confusion, Hallucination, confusions, hallucinations};
 use super::curve::{Curve, curves};
+use super::fidelity::FidelityFindings;
 use super::flips::{FirstFailure, first_failures};
 use super::grid::Grid;
 use super::health::{Health, healths};
 use super::subject::Subject;
-use crate::types::{Family, FrameId, Record};
+use crate::types::{Family, FrameId, ImageFidelity, Record};
 
 /// All results that are computed from the records of a run.
 #[derive(Debug)]
@@ -39,16 +40,19 @@ pub struct Findings<'a> {
     pub first_failures: Vec<FirstFailure>,
     /// Agreement of models in each condition.
     pub agreements: Vec<Agreement>,
+    /// What the similarity of images to their clean frames says about the answers; `None` if it was not measured.
+    pub fidelity: Option<FidelityFindings>,
 }
 
 impl<'a> Findings<'a> {
     /// Results of the records. `scenes` holds the scene of each frame for which it is known; `questions` are all questions
-    /// of the run, for the chance line.
+    /// of the run, for the chance line; `measured` holds the images that were compared with their clean frames.
     #[must_use]
     pub fn new(
         records: &'a [Record],
         scenes: &BTreeMap<FrameId, String>,
         questions: impl IntoIterator<Item = OfferedChoices>,
+        measured: &[ImageFidelity],
     ) -> Self {
         let pairs = records
             .iter()
@@ -71,6 +75,7 @@ impl<'a> Findings<'a> {
             hallucinations: hallucinations(&grid),
             first_failures: first_failures(&grid),
             agreements: agreements(&grid, &draws),
+            fidelity: FidelityFindings::new(&grid, measured),
             grid,
         }
     }

@@ -14,6 +14,7 @@
 
 pub(crate) mod accuracy;
 pub(crate) mod agreement;
+pub(crate) mod auc;
 pub(crate) mod bootstrap;
 pub(crate) mod chance;
 pub mod choice;
@@ -22,6 +23,7 @@ pub(crate) mod comparison;
 pub(crate) mod confusion;
 pub(crate) mod curve;
 pub(crate) mod estimate;
+pub(crate) mod fidelity;
 pub(crate) mod findings;
 pub(crate) mod flips;
 pub(crate) mod grid;

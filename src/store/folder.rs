@@ -9,7 +9,7 @@ use super::lines::lines;
 use crate::error::{Error, Result};
 use crate::files::{self, is_unfinished};
 use crate::types::manifest::{ColumnDifference, RunManifest, differences};
-use crate::types::{Detail, Record, RunQuestion, Thumbnail, TrialKey};
+use crate::types::{Detail, ImageFidelity, Record, RunQuestion, Thumbnail, TrialKey};
 
 const MANIFEST: &str = "manifest.json";
 pub(super) const RECORDS: &str = "records.jsonl";
@@ -17,6 +17,8 @@ pub(super) const RECORDS: &str = "records.jsonl";
 pub(super) const QUESTIONS: &str = "questions.jsonl";
 /// Small copies of images that were sent.
 pub(super) const THUMBNAILS: &str = "thumbnails.jsonl";
+/// The similarity of images to their clean frames.
+pub(super) const FIDELITY: &str = "fidelity.jsonl";
 
 /// Whether a stored run may continue at another address of its endpoint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,6 +71,11 @@ pub(crate) fn read_questions(folder: &Path) -> Result<Vec<RunQuestion>> {
 /// The small copies of images of a run; none if the run has no such file.
 pub(crate) fn read_thumbnails(folder: &Path) -> Result<Vec<Thumbnail>> {
     lines(&folder.join(THUMBNAILS))
+}
+
+/// The similarity of the images of a run to their clean frames; none if the run has no such file.
+pub(crate) fn read_fidelity(folder: &Path) -> Result<Vec<ImageFidelity>> {
+    lines(&folder.join(FIDELITY))
 }
 
 /// The newest run folder in `base` whose name ends in `-<hash>`.

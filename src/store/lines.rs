@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::error::{Error, Result};
-use crate::types::{Detail, Record, RunQuestion, Thumbnail};
+use crate::types::{Detail, ImageFidelity, Record, RunQuestion, Thumbnail};
 
 /// Appends lines to a file, which is created if it does not exist.
 pub(super) fn append<T: Serialize>(path: &Path, values: &[T]) -> Result<File> {
@@ -80,6 +80,10 @@ impl StoredLine for RunQuestion {
 
 impl StoredLine for Thumbnail {
     const WHAT: &str = "a thumbnail";
+}
+
+impl StoredLine for ImageFidelity {
+    const WHAT: &str = "the fidelity of an image";
 }
 
 /// Cuts off an incomplete last line: everything after the last line end.

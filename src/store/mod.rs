@@ -1,8 +1,8 @@
 //! Stage 6, store: the run folder `results/<run>/`.
 //!
 //! `records.jsonl` is the source of truth: one line a trial, appended and handed to the operating system as soon as a reply
-//! arrives, so that a killed run loses nothing. `manifest.json` describes the run, `questions.jsonl` has its questions, and
-//! `thumbnails.jsonl` small copies of its images. All other files are made again from these.
+//! arrives, so that a killed run loses nothing. `manifest.json` describes the run, `questions.jsonl` has its questions,
+//! `thumbnails.jsonl` small copies of its images, and `fidelity.jsonl` their similarity to the clean frames. All other files are made again from these.
 
 mod folder;
 mod lines;
@@ -17,14 +17,17 @@ use std::time::{Duration, Instant};
 use crate::error::{Error, Result};
 use crate::types::manifest::RunManifest;
 use crate::types::{
-    ChoiceDetail, Detail, QuestionId, Record, RunQuestion, Thumbnail, TrialKey, Via,
+    ChoiceDetail, Detail, ImageFidelity, QuestionId, Record, RunQuestion, Thumbnail, TrialKey, Via,
 };
 
-use folder::{QUESTIONS, RECORDS, THUMBNAILS, check_same_run, create_run, write, write_manifest};
+use folder::{
+    FIDELITY, QUESTIONS, RECORDS, THUMBNAILS, check_same_run, create_run, write, write_manifest,
+};
 use lines::{append, json_lines, lines, repair};
 
 pub(crate) use folder::{
-    AddressChange, find, read_manifest, read_questions, read_records, read_thumbnails, schema,
+    AddressChange, find, read_fidelity, read_manifest, read_questions, read_records,
+    read_thumbnails, schema,
 };
 
 /// The subfolder of a run for Batch API files.
@@ -107,6 +110,11 @@ impl<D: Detail> Store<D> {
             std::slice::from_ref(thumbnail),
         )
         .map(drop)
+    }
+
+    /// Appends the similarity of an image to its clean frame.
+    pub(crate) fn append_fidelity(&mut self, fidelity: &ImageFidelity) -> Result<()> {
+        append(&self.folder.join(FIDELITY), std::slice::from_ref(fidelity)).map(drop)
     }
 
     /// Writes the questions of the run, new and stored ones, in the order of the data.

@@ -9,6 +9,7 @@ pub(crate) mod detail;
 pub(crate) mod digest;
 pub(crate) mod flag;
 pub(crate) mod frame;
+pub(crate) mod image_notes;
 pub(crate) mod kind_set;
 pub(crate) mod labels;
 pub(crate) mod manifest;
@@ -30,12 +31,13 @@ pub use detail::{
 };
 pub use digest::Digest;
 pub use frame::{DepthKind, Frame, FrameId, Intrinsics, Rgb, Segmentation};
+pub use image_notes::{ImageFidelity, Thumbnail};
 pub use kind_set::KindSet;
 pub use labels::{Label, Labels, SegmentName};
 pub use question::{Answer, Choices, Family, Question, QuestionId, UnreadReason};
 pub use record::{Detail, Failure, FailureKind, Via, View};
 pub use reply::{Finish, Reply, Usage};
-pub use run_question::{RunQuestion, Thumbnail};
+pub use run_question::RunQuestion;
 pub use severity::{Axis, Severity};
 pub use trial_key::TrialKey;
 

@@ -1,9 +1,8 @@
-//! The questions of a run ([`RunQuestion`]) and small copies of their images ([`Thumbnail`]), stored next to its records.
+//! The questions of a run ([`RunQuestion`]), stored next to its records.
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::condition::Condition;
 use super::digest::Digest;
 use super::frame::FrameId;
 use super::question::{Family, Question, QuestionId};
@@ -73,21 +72,4 @@ impl RunQuestion {
             image: None,
         }
     }
-}
-
-/// One line of a run's `thumbnails.jsonl`: a small copy of an image as it was sent.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Thumbnail {
-    /// The name of the frame.
-    pub frame: FrameId,
-    /// The condition in which the frame was sent.
-    pub condition: Condition,
-    /// The digest of the file that was sent.
-    pub image: Digest,
-    /// The whole image in reduced size, as a `data:` URL.
-    pub small: String,
-    /// The middle of the image at full resolution and brightened, as a `data:` URL.
-    pub crop: String,
-    /// The gain that brightens the crop, in EV.
-    pub stops: f32,
 }

@@ -51,7 +51,7 @@ fn records() -> Vec<Record> {
 
 fn bench(c: &mut Criterion) {
     let records = records();
-    let find = || Findings::new(&records, &BTreeMap::new(), []);
+    let find = || Findings::new(&records, &BTreeMap::new(), [], &[]);
     let mut group = c.benchmark_group("100,320 records");
     group.sample_size(10);
     group.bench_function("find what they say", |b| b.iter(|| black_box(find())));

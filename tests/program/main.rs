@@ -15,6 +15,7 @@ mod evaluate;
 mod export;
 mod fair;
 mod faults;
+mod fidelity;
 mod golden;
 mod identity;
 mod import;

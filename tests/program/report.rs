@@ -169,7 +169,12 @@ fn runs_of_earlier_versions_are_read() {
     let bench = Bench::with_questions(3);
     run(&bench, "run", "");
     // What the first version wrote: no questions, no small copies, no recipe, records of the first fields alone.
-    for later in ["questions.jsonl", "thumbnails.jsonl", "report.html"] {
+    for later in [
+        "questions.jsonl",
+        "thumbnails.jsonl",
+        "fidelity.jsonl",
+        "report.html",
+    ] {
         fs::remove_file(bench.path("run").join(later)).unwrap();
     }
     let path = bench.path("run/manifest.json");

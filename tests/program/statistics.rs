@@ -406,7 +406,7 @@ fn a_made_set_gives_the_papers_arithmetic() {
             family: record.detail.family.clone(),
             choices: record.detail.choices.len(),
         });
-    let findings = Findings::new(&records, &BTreeMap::new(), offers.collect::<Vec<_>>());
+    let findings = Findings::new(&records, &BTreeMap::new(), offers.collect::<Vec<_>>(), &[]);
     let rates = &findings.hallucinations[0];
     assert_eq!(rates.false_positive.unwrap().value, 0.25);
     assert_eq!(rates.false_negative.unwrap().value, 0.6);

@@ -157,6 +157,7 @@ pub fn assert_same_products(run: &Path, other: &Path) -> usize {
         "summary.json",
         "report.html",
         "thumbnails.jsonl",
+        "fidelity.jsonl",
     ];
     let mut compared = 0;
     for path in files(run) {

@@ -6,7 +6,7 @@ use super::BatchFileArgs;
 use super::requests::{Requests, require_remote, summary};
 use crate::error::Result;
 use crate::job::experiment::Experiment;
-use crate::job::open_run::{OpenRun, Remaining, limit, missing_thumbnails, pipeline};
+use crate::job::open_run::{OpenRun, Remaining, limit, missing_notes, pipeline};
 use crate::job::outcome::Outcome;
 use crate::job::plan::Plan;
 use crate::job::timings::Timings;
@@ -63,7 +63,7 @@ fn write<E: Experiment>(
     };
     let limit = limit(settings);
     let mut pipeline = pipeline(experiment, enhancers, limit, &timings);
-    let missing = missing_thumbnails(experiment, run.store.folder())?;
+    let missing = missing_notes(experiment, run.store.folder())?;
     let sources = experiment.sources();
     workers.install(|| pipeline.largest(sources, &plan.sources))?;
     let bar = run.progress.bar("writing requests", plan.remaining());

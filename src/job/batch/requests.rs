@@ -49,9 +49,7 @@ impl<'a, I: Item> Requests<'a, I> {
     /// Adds all requests of a group.
     pub(crate) fn add(&mut self, group: &PreparedGroup<I>) -> Result<()> {
         let stimulus = &group.stimulus;
-        if let Some(thumbnail) = &group.thumbnail {
-            self.store.append_thumbnail(thumbnail)?;
-        }
+        group.notes.store(self.store)?;
         for trial in &group.trials {
             let model = &self.models[trial.model].model;
             let (id, query) = (trial.key.to_string(), trial.item.query());

@@ -21,7 +21,7 @@ impl Combined {
         let scenes = self.questions.iter();
         let scenes = scenes.map(|question| (question.frame.clone(), question.scene.clone()));
         let offers = offers(&self.records, &self.questions);
-        Findings::new(&self.records, &scenes.collect(), offers)
+        Findings::new(&self.records, &scenes.collect(), offers, &self.fidelity)
     }
 
     /// Further inputs of the HTML page.

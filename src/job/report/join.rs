@@ -8,7 +8,9 @@ use super::cost::cost;
 use crate::error::Result;
 use crate::job::stored::StoredRun;
 use crate::types::manifest::RunManifest;
-use crate::types::{Detail, QuestionId, Record, RunQuestion, Thumbnail, TrialKey, View};
+use crate::types::{
+    Detail, ImageFidelity, QuestionId, Record, RunQuestion, Thumbnail, TrialKey, View,
+};
 
 /// The runs, with all records, questions and thumbnails.
 pub(super) struct Joined<D> {
@@ -16,6 +18,7 @@ pub(super) struct Joined<D> {
     pub(super) records: Vec<Record<D>>,
     pub(super) questions: Vec<RunQuestion>,
     pub(super) thumbnails: Vec<Thumbnail>,
+    pub(super) fidelity: Vec<ImageFidelity>,
 }
 
 /// One of the joined runs.
@@ -42,6 +45,7 @@ pub(super) fn join<D: Detail>(
         records: Vec::new(),
         questions: Vec::new(),
         thumbnails: Vec::new(),
+        fidelity: Vec::new(),
     };
     let mut known = HashSet::<TrialKey>::new();
     let mut listed = BTreeSet::<QuestionId>::new();
@@ -75,6 +79,7 @@ pub(super) fn join<D: Detail>(
         joined.thumbnails.extend(thumbnails.filter(|thumbnail| {
             pictured.insert((thumbnail.frame.clone(), thumbnail.condition.clone()))
         }));
+        joined.fidelity.extend(run.fidelity);
     }
     Ok(joined)
 }

@@ -174,6 +174,7 @@ pub(crate) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<StoredRun<Open
         manifest: first.manifest,
         questions: joined.questions,
         thumbnails: joined.thumbnails,
+        fidelity: joined.fidelity,
     })
 }
 

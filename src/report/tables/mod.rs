@@ -4,6 +4,7 @@ mod agreement;
 mod answers;
 mod comparisons;
 mod families;
+mod fidelity;
 mod flips;
 mod health;
 mod levels;
@@ -34,6 +35,7 @@ pub fn tables(findings: &Findings<'_>) -> Vec<Table> {
         comparisons::comparisons(findings),
         answers::answers(findings),
         vec![flips::flips(findings)],
+        Vec::from_iter(fidelity::fidelity(findings.fidelity.as_ref())),
         vec![agreement::agreement(&findings.agreements)],
         vec![health::health(&findings.health)],
     ]

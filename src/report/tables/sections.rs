@@ -9,7 +9,7 @@ pub(in crate::report) type Section = (
 );
 
 /// The sections of the page in order.
-pub(in crate::report) const SECTIONS: [Section; 8] = [
+pub(in crate::report) const SECTIONS: [Section; 9] = [
     (
         "accuracy",
         "Accuracy in the dark",
@@ -45,6 +45,14 @@ pub(in crate::report) const SECTIONS: [Section; 8] = [
         "comparisons",
         "Comparisons",
         "Each paired by item, in percentage points.",
+        &[],
+    ),
+    (
+        "fidelity",
+        "Fidelity",
+        "Does a better picture mean better answers? PSNR and SSIM of each image against its clean frame, in the size sent. The AUC \
+         is the share of pairs of a right and a wrong answer, of the same model, family and condition, in which the image of the \
+         right one has the higher value; 0.5 is chance.",
         &[],
     ),
     (

@@ -9,8 +9,14 @@ use crate::types::Rgb;
 const RADIUS: usize = 5;
 const TAPS: usize = 2 * RADIUS + 1;
 
-/// Number of local means: of x, y, x², y² and xy.
-const MOMENTS: usize = 5;
+/// Number of local means: of x, y, x² + y² and xy.
+const MOMENTS: usize = 4;
+
+/// Number of samples that are computed together; a multiple of the width of common vector registers.
+const LANES: usize = 8;
+
+/// Code that is subtracted from every sample, so that its square keeps more digits in `f32`.
+const MIDDLE: f32 = 128.0;
 
 /// Checks that two images have the same size; the error names both sizes.
 pub(crate) fn same_size(a: &Rgb, b: &Rgb) -> Result<()> {
@@ -29,7 +35,8 @@ pub(crate) fn same_size(a: &Rgb, b: &Rgb) -> Result<()> {
 /// covariance, data range 255; the mean over the three channels and the interior, where the window lies within the image.
 ///
 /// It equals scikit-image's `structural_similarity` with `gaussian_weights=True, sigma=1.5, use_sample_covariance=False,
-/// data_range=255, channel_axis=-1`.
+/// data_range=255, channel_axis=-1` to 10⁻⁶: the local means are `f32` about the middle code, which takes a third of the time of
+/// `f64`.
 ///
 /// # Errors
 /// If the sizes differ, or if a side is shorter than the window.
@@ -49,49 +56,85 @@ pub(crate) fn ssim(a: &Rgb, b: &Rgb) -> Result<f64> {
     Ok(sums.iter().sum::<f64>() / n as f64)
 }
 
-fn window() -> [f64; TAPS] {
+fn window() -> [f32; TAPS] {
     let weights: [f64; TAPS] = std::array::from_fn(|tap| {
         let distance = tap as f64 - RADIUS as f64;
         libm::exp(-0.5 * distance * distance / (1.5 * 1.5))
     });
     let sum: f64 = weights.iter().sum();
-    weights.map(|weight| weight / sum)
+    weights.map(|weight| (weight / sum) as f32)
 }
 
 /// The sum over the windows whose first row is `row`.
-fn row_sum(a: &Rgb, b: &Rgb, row: usize, window: &[f64; TAPS]) -> f64 {
+fn row_sum(a: &Rgb, b: &Rgb, row: usize, window: &[f32; TAPS]) -> f64 {
     let stride = 3 * a.width();
-    let mut columns = vec![[0.0; MOMENTS]; stride];
-    for (tap, weight) in window.iter().enumerate() {
-        let line = |image: &Rgb| {
-            let begin = (row + tap) * stride;
-            begin..begin + stride.min(image.samples().len())
-        };
-        let (a, b) = (&a.samples()[line(a)], &b.samples()[line(b)]);
-        for ((sums, x), y) in columns.iter_mut().zip(a).zip(b) {
-            let (x, y) = (f64::from(*x), f64::from(*y));
-            for (sum, moment) in sums.iter_mut().zip([x, y, x * x, y * y, x * y]) {
-                *sum += weight * moment;
-            }
-        }
-    }
+    let columns = column_means(a, b, row, window);
+    let windows = stride - 3 * (TAPS - 1);
     let mut total = 0.0;
-    for first in 0..stride - 3 * (TAPS - 1) {
-        let mut means = [0.0; MOMENTS];
-        for (tap, weight) in window.iter().enumerate() {
-            for (mean, moment) in means.iter_mut().zip(columns[first + 3 * tap]) {
-                *mean += weight * moment;
+    for begin in (0..windows).step_by(LANES) {
+        let [x, y, squares, product] = std::array::from_fn(|moment| {
+            let mut means = [0.0; LANES];
+            for (tap, weight) in window.iter().enumerate() {
+                let columns = &columns[moment][begin + 3 * tap..][..LANES];
+                for (mean, column) in means.iter_mut().zip(columns) {
+                    *mean += weight * column;
+                }
             }
-        }
-        total += similarity(means);
+            means
+        });
+        let lanes = (windows - begin).min(LANES);
+        let similarities: [f32; LANES] =
+            std::array::from_fn(|lane| similarity(x[lane], y[lane], squares[lane], product[lane]));
+        total += similarities[..lanes]
+            .iter()
+            .copied()
+            .map(f64::from)
+            .sum::<f64>();
     }
     total
 }
 
-fn similarity([x, y, xx, yy, xy]: [f64; MOMENTS]) -> f64 {
-    const C1: f64 = (0.01 * 255.0) * (0.01 * 255.0);
-    const C2: f64 = (0.03 * 255.0) * (0.03 * 255.0);
-    let (variances, covariance) = (xx - x * x + (yy - y * y), xy - x * y);
+/// Weighted means over the columns of the windows whose first row is `row`, by moment; padded, so that all lanes can be read.
+fn column_means(a: &Rgb, b: &Rgb, row: usize, window: &[f32; TAPS]) -> [Vec<f32>; MOMENTS] {
+    let stride = 3 * a.width();
+    let mut columns = [(); MOMENTS].map(|()| vec![0.0; stride + 2 * LANES]);
+    for begin in (0..stride).step_by(LANES) {
+        let mut means = [[0.0; LANES]; MOMENTS];
+        for (tap, weight) in window.iter().enumerate() {
+            let line = (row + tap) * stride;
+            let samples = |image: &Rgb| centered(&image.samples()[line + begin..line + stride]);
+            let (x, y) = (samples(a), samples(b));
+            for lane in 0..LANES {
+                let (x, y) = (x[lane], y[lane]);
+                means[0][lane] += weight * x;
+                means[1][lane] += weight * y;
+                means[2][lane] += weight * (x * x + y * y);
+                means[3][lane] += weight * (x * y);
+            }
+        }
+        for (columns, means) in columns.iter_mut().zip(&means) {
+            columns[begin..begin + LANES].copy_from_slice(means);
+        }
+    }
+    columns
+}
+
+/// The first samples less the middle code; 0 beyond the end of the line.
+fn centered(line: &[u8]) -> [f32; LANES] {
+    let codes = line.first_chunk::<LANES>().copied().unwrap_or_else(|| {
+        let mut codes = [MIDDLE as u8; LANES];
+        codes[..line.len()].copy_from_slice(line);
+        codes
+    });
+    codes.map(|code| f32::from(code) - MIDDLE)
+}
+
+/// Similarity of a window, from the means of x, y, x² + y² and xy of centered samples.
+fn similarity(x: f32, y: f32, squares: f32, product: f32) -> f32 {
+    const C1: f32 = (0.01 * 255.0) * (0.01 * 255.0);
+    const C2: f32 = (0.03 * 255.0) * (0.03 * 255.0);
+    let (variances, covariance) = (squares - x * x - y * y, product - x * y);
+    let (x, y) = (x + MIDDLE, y + MIDDLE);
     (2.0 * x * y + C1) * (2.0 * covariance + C2) / ((x * x + y * y + C1) * (variances + C2))
 }
 
@@ -116,7 +159,7 @@ mod tests {
         for (height, width, salt, expected) in SKIMAGE {
             let found = ssim(&image(height, width, 1), &image(height, width, salt)).unwrap();
             assert!(
-                (found - expected).abs() < 1e-9,
+                (found - expected).abs() < 1e-6,
                 "{height} × {width}: {found}"
             );
         }

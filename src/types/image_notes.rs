@@ -1,0 +1,40 @@
+//! Facts about images that were sent, stored next to the records of a run for its report: small copies ([`Thumbnail`]) and the
+//! similarity to the clean frame ([`ImageFidelity`]).
+
+use serde::{Deserialize, Serialize};
+
+use super::condition::Condition;
+use super::digest::Digest;
+use super::frame::FrameId;
+
+/// One line of a run's `thumbnails.jsonl`: a small copy of an image as it was sent.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Thumbnail {
+    /// The name of the frame.
+    pub frame: FrameId,
+    /// The condition in which the frame was sent.
+    pub condition: Condition,
+    /// The digest of the file that was sent.
+    pub image: Digest,
+    /// The whole image in reduced size, as a `data:` URL.
+    pub small: String,
+    /// The middle of the image at full resolution and brightened, as a `data:` URL.
+    pub crop: String,
+    /// The gain that brightens the crop, in EV.
+    pub stops: f32,
+}
+
+/// One line of a run's `fidelity.jsonl`: how similar an image is to its clean frame, both in the size sent, before any JPEG.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ImageFidelity {
+    /// The name of the frame.
+    pub frame: FrameId,
+    /// The condition in which the frame was sent.
+    pub condition: Condition,
+    /// The digest of the file that was sent.
+    pub image: Digest,
+    /// Peak signal-to-noise ratio in dB, peak 255, over all samples; `None` if the image equals the clean frame.
+    pub psnr: Option<f64>,
+    /// Structural similarity, at most 1; `None` if the image is smaller than the window of 11 × 11 pixels.
+    pub ssim: Option<f64>,
+}

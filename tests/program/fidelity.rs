@@ -1,0 +1,116 @@
+//! Does a better picture mean better answers: the numbers of a simulation whose truth is known, and those of a run.
+
+use std::collections::BTreeMap;
+use std::fs;
+
+use crate::support::made::record;
+use crate::support::run::{Bench, records, words};
+use darkqa_eval::internals::score::{FidelityFindings, Findings};
+use darkqa_eval::types::{Condition, Digest, ImageFacts, ImageFidelity, Record};
+use rand::rngs::StdRng;
+use rand::{RngExt as _, SeedableRng as _};
+use rand_distr::{Beta, Distribution as _, Normal};
+use serde_json::Value;
+
+/// Fidelity findings of made replies: `clusters` frames with `questions` each. The right-rate of a frame is drawn with an
+/// intraclass correlation of 0.2, and the PSNR of its image follows the rate with a slope.
+fn findings(
+    random: &mut StdRng,
+    [clusters, questions]: [usize; 2],
+    slope: f64,
+) -> FidelityFindings {
+    let condition: Condition = "L3-ev".parse().unwrap();
+    let (rates, noise) = (Beta::new(2.4, 1.6).unwrap(), Normal::new(0.0, 1.0).unwrap());
+    let (mut records, mut measured) = (Vec::new(), Vec::new());
+    for frame in 0..clusters {
+        let rate: f64 = rates.sample(random);
+        let image = Digest::of(format!("image {frame}").as_bytes());
+        for question in 0..questions {
+            let name = (frame * questions + question, frame);
+            let mut reply: Record = record("m", &condition, name, random.random_bool(rate));
+            reply.detail.image = Some(ImageFacts {
+                digest: image,
+                bytes: 1,
+                width: 1,
+                height: 1,
+                format: "png".to_owned(),
+            });
+            records.push(reply);
+        }
+        measured.push(ImageFidelity {
+            frame: records[records.len() - 1].detail.frame.clone(),
+            condition: condition.clone(),
+            image,
+            psnr: Some(20.0 + slope * (rate - 0.6) + noise.sample(random)),
+            ssim: None,
+        });
+    }
+    let found = Findings::new(&records, &BTreeMap::new(), [], &measured);
+    found.fidelity.unwrap()
+}
+
+/// How often the interval of the AUC leaves out ½, in percent.
+fn rejected(seed: u64, times: usize, sizes: [usize; 2], slope: f64) -> f64 {
+    let mut random = StdRng::seed_from_u64(seed);
+    let found = (0..times).filter(|_| {
+        let auc = findings(&mut random, sizes, slope).within[0];
+        auc.is_some_and(|auc| auc.estimate.low > 0.5 || auc.estimate.high < 0.5)
+    });
+    100.0 * found.count() as f64 / times as f64
+}
+
+#[test]
+fn fidelity_that_says_nothing_is_rarely_called_a_predictor() {
+    for sizes in [[12, 8], [25, 8], [52, 20]] {
+        let rate = rejected(1, 400, sizes, 0.0);
+        assert!((1.5..=8.0).contains(&rate), "{sizes:?}: {rate} %");
+    }
+    // Fidelity that follows the rate of the frame is found.
+    assert!(rejected(2, 60, [52, 20], 8.0) > 90.0);
+}
+
+#[test]
+fn a_run_keeps_the_fidelity_of_its_images_and_reports_it() {
+    let bench = Bench::new();
+    let run = |variant: &str| {
+        let line = format!(
+            "--model random --data rooms:frames=8,size=160x120 --out run --levels L0,L1,L5 --variant {variant}"
+        );
+        bench.complete(&words(&line))
+    };
+    run("ev");
+    let lines = |name: &str| -> Vec<Value> {
+        let text = fs::read_to_string(bench.path("run").join(name)).unwrap();
+        text.lines()
+            .map(|line| serde_json::from_str(line).unwrap())
+            .collect()
+    };
+    let stored = lines("fidelity.jsonl");
+    let records = records(&bench.path("run"));
+    let dark = records.iter().filter(|record| record["condition"] != "L0");
+    for record in dark {
+        let image = stored
+            .iter()
+            .find(|line| line["image"] == record["image"]["digest"]);
+        let image = image.unwrap_or_else(|| panic!("{record}"));
+        assert_eq!(image["condition"], record["condition"]);
+        assert_eq!(image["frame"], record["frame"]);
+        let lighter = stored
+            .iter()
+            .find(|other| other["frame"] == image["frame"] && other["condition"] == "L1-ev");
+        let psnr = |line: &Value| line["psnr"].as_f64().unwrap();
+        let is_darker = record["level"] == "L5";
+        assert_eq!(psnr(image) < psnr(lighter.unwrap()), is_darker, "{image}");
+    }
+    assert!(stored.iter().all(|line| line["condition"] != "L0"));
+    let table = fs::read_to_string(bench.path("run/fidelity.csv")).unwrap();
+    assert!(
+        table.starts_with("condition,level,variant,enhancer,images,psnr,ssim,n,accuracy,psnr_auc")
+    );
+    assert_eq!(table.lines().count(), 3, "{table}");
+    // Images that were measured are not measured again; a new condition is added.
+    run("both");
+    let after = lines("fidelity.jsonl");
+    assert_eq!(after.len(), 2 * stored.len());
+    assert_eq!(after[..stored.len()], stored);
+}
