@@ -41,6 +41,14 @@ impl Subject {
         }
     }
 
+    /// Whether the model only stands for comparison and is not under test: `random`, `observer` and its kinds (`observer:…`),
+    /// also with the name of a run in brackets.
+    #[must_use]
+    pub fn is_reference(&self) -> bool {
+        let name = self.model.split(" (").next().unwrap_or_default();
+        matches!(name, "random" | "observer") || name.starts_with("observer:")
+    }
+
     /// The condition as text, for example `L3-noise+zerodce`; `blind` without images.
     #[must_use]
     pub fn condition(&self) -> String {

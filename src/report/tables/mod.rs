@@ -7,6 +7,7 @@ mod families;
 mod flips;
 mod health;
 mod levels;
+mod pooled;
 mod sections;
 mod subjects;
 mod summary;
@@ -31,6 +32,7 @@ pub fn tables(findings: &Findings<'_>) -> Vec<Table> {
         vec![subjects::subjects(&findings.summary)],
         thresholds::thresholds(findings),
         vec![families::families(findings)],
+        pooled::pooled(findings),
         comparisons::comparisons(findings),
         answers::answers(findings),
         vec![flips::flips(findings)],
