@@ -36,7 +36,16 @@ pub(super) fn fields(cell: &TableCell, names: usize) -> impl Iterator<Item = Csv
         TableCell::Text(text) => fields[0] = CsvField::Text(text),
         TableCell::Count(count) => fields[0] = CsvField::Count(*count),
         TableCell::Number(number) => fields[0] = CsvField::Number(*number),
-        TableCell::Significance(verdict) => fields[0] = CsvField::Text(verdict.word()),
+        TableCell::Significance(verdict) => {
+            // `tied` stays for one release; the column `shown` says what it means.
+            let word = if verdict.is_shown() {
+                verdict.word()
+            } else {
+                "tied"
+            };
+            fields[0] = CsvField::Text(word);
+            fields[1] = CsvField::Text(if verdict.is_shown() { "true" } else { "false" });
+        }
         TableCell::Threshold(t, _) => {
             fields = [t.value, t.low, t.high, 0.0].map(CsvField::Number);
             fields[3] = CsvField::None;

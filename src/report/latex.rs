@@ -4,8 +4,8 @@ use std::fmt::Write;
 
 use super::table::{Column, ColumnKind, Table, TableCell, TableFormat};
 use super::words::{percent, points, words};
-use crate::score::comparison::Significance;
 use crate::score::estimate::Estimate;
+use crate::score::significance::Significance;
 
 /// All tables that have a LaTeX caption; `head` names them in the first comment line.
 #[must_use]

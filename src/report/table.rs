@@ -1,9 +1,9 @@
 //! One table of a report: [`Table`], its [`Column`]s and [`TableCell`]s. It holds numbers. The modules that write it format
 //! them: `csv`, `json`, `latex`, `page` and `terminal`.
 
-use crate::score::comparison::Significance;
 use crate::score::curve::Threshold;
 use crate::score::estimate::Estimate;
+use crate::score::significance::Significance;
 
 /// A table of numbers. A format for which it has no title leaves it out.
 #[derive(Debug, Clone, PartialEq)]

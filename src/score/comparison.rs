@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::choice::ReadingMode;
 use super::grid::Grid;
 use super::paired::PairedComparison;
-use super::significance::holm;
+use super::significance::{Significance, holm, least_p};
 use super::subject::Subject;
 use crate::types::{AxisLevel, Family, KindReading, View};
 use rayon::prelude::*;
@@ -48,29 +48,6 @@ impl ComparisonKind {
     }
 }
 
-/// Result of a comparison at the 5 % level, after Holm's correction.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Significance {
-    /// The first subject is better.
-    Better,
-    /// The first subject is worse.
-    Worse,
-    /// No significant difference. This does not show that the two are equal.
-    Tied,
-}
-
-impl Significance {
-    /// The word for the result in tables.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Better => "better",
-            Self::Worse => "worse",
-            Self::Tied => "tied",
-        }
-    }
-}
-
 /// One subject against another on the items to which both replied, in the strict reading.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
@@ -85,6 +62,8 @@ pub struct Comparison {
     /// p-value after Holm's correction over all comparisons of this kind and these models. Another model in the report
     /// therefore changes no result. Comparisons by family are corrected separately.
     pub holm: f64,
+    /// The smallest p-value after correction that the clusters of this comparison allow, however large the difference is.
+    pub least_holm: f64,
     pub significance: Significance,
 }
 
@@ -109,7 +88,8 @@ pub(crate) fn comparisons(grid: &Grid<'_>) -> Vec<Comparison> {
                 family: family.cloned(),
                 paired: PairedComparison::new(grid, first, second, family, ReadingMode::Strict)?,
                 holm: 1.0,
-                significance: Significance::Tied,
+                least_holm: 1.0,
+                significance: Significance::NotShown,
             })
         });
     corrected(paired.collect())
@@ -127,25 +107,21 @@ fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
         sets.entry(set).or_default().push(index);
     }
     for set in sets.into_values() {
-        let values: Vec<f64> = set.iter().map(|index| all[*index].paired.p).collect();
-        for (index, holm) in set.into_iter().zip(holm(&values)) {
+        let values = |of: fn(&PairedComparison) -> f64| -> Vec<f64> {
+            let values = set.iter().map(|index| of(&all[*index].paired));
+            holm(&values.collect::<Vec<_>>())
+        };
+        let corrected = values(|paired| paired.p);
+        let least = values(|paired| least_p(paired.clusters));
+        for ((index, holm), least_holm) in set.into_iter().zip(corrected).zip(least) {
             let comparison = &mut all[index];
+            let difference = comparison.paired.difference.value;
             comparison.holm = holm;
-            comparison.significance = significance(comparison.paired.difference.value, holm);
+            comparison.least_holm = least_holm;
+            comparison.significance = Significance::of(difference, holm, least_holm);
         }
     }
     all
-}
-
-/// The result of a difference with this p-value.
-pub(super) fn significance(difference: f64, p: f64) -> Significance {
-    if p >= 0.05 {
-        Significance::Tied
-    } else if difference > 0.0 {
-        Significance::Better
-    } else {
-        Significance::Worse
-    }
 }
 
 /// The indices of the subjects that a kind compares.

@@ -4,9 +4,8 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::auc::{Auc, PairCounts, RankedReply};
 use super::choice::ReadingMode;
-use super::comparison::{Significance, significance};
 use super::grid::Grid;
-use super::significance::holm;
+use super::significance::{Significance, holm};
 use super::subject::Subject;
 use crate::types::{AxisLevel, Digest, EnhancerName, Family, ImageFidelity, KindReading, View};
 
@@ -194,7 +193,7 @@ impl ConditionSums {
                 Some(Prediction {
                     auc,
                     holm: auc.p,
-                    significance: significance(0.0, auc.p),
+                    significance: Significance::NotShown,
                 })
             }),
         })
@@ -221,7 +220,8 @@ fn correct(rows: &mut [ConditionFidelity]) {
             .collect();
         for (prediction, holm) in predictions.iter_mut().zip(holm(&values)) {
             prediction.holm = holm;
-            prediction.significance = significance(prediction.auc.estimate.value - 0.5, holm);
+            prediction.significance =
+                Significance::of(prediction.auc.estimate.value - 0.5, holm, 0.0);
         }
     }
 }

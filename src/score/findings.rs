@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::accuracy::{AccuracySummary, summarize};
 use super::agreement::{Agreement, agreements};
+use super::best::{BestInTheDark, best_in_the_dark};
 use super::bootstrap::Resamples;
 use super::chance::OfferedChoices;
 use super::cluster::{ClusterUnit, Clusters};
@@ -14,6 +15,8 @@ use super::fidelity::FidelityFindings;
 use super::flips::{FirstFailure, first_failures};
 use super::grid::Grid;
 use super::health::{Health, healths};
+use super::pooled::{PooledFinding, pooled};
+use super::significance::Significance;
 use super::subject::Subject;
 use crate::types::{Family, FrameId, ImageFidelity, Record};
 
@@ -28,6 +31,10 @@ pub struct Findings<'a> {
     pub summary: AccuracySummary,
     /// Counts of replies, unreadable replies and failures of each subject.
     pub health: Vec<Health>,
+    /// Differences of all models together, ordered by kind, variant, enhancer, family and level.
+    pub pooled: Vec<PooledFinding>,
+    /// The models by their mean accuracy in the dark, if there are two or more.
+    pub best: Option<BestInTheDark>,
     /// Paired differences between subjects.
     pub comparisons: Vec<Comparison>,
     /// Thresholds and areas, for all families together and for each family.
@@ -65,6 +72,8 @@ impl<'a> Findings<'a> {
             unit: clusters.unit(),
             summary: summarize(&grid, &health, questions),
             health,
+            pooled: pooled(&grid),
+            best: best_in_the_dark(&grid),
             comparisons: comparisons(&grid),
             curves: grid
                 .groups()
@@ -80,14 +89,15 @@ impl<'a> Findings<'a> {
         }
     }
 
-    /// Whether a subject is less accurate than the same model without images, or than any such model if its own was not asked.
+    /// Whether a subject is shown to be less accurate than the same model without images, or than such a model if its own was not
+    /// asked: the paired test says so after Holm's correction.
     #[must_use]
     pub fn below_blind(&self, subject: &Subject, family: Option<&Family>) -> bool {
         self.comparisons.iter().any(|comparison| {
             comparison.kind == ComparisonKind::Blind
                 && comparison.family.as_ref() == family
                 && comparison.first == *subject
-                && comparison.paired.difference.value < 0.0
+                && comparison.significance == Significance::Worse
         })
     }
 }

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use super::choice::ReadingMode;
 use super::cluster::Clusters;
 use super::subject::Subject;
-use crate::types::{AnswerReading, Family, QuestionId, Record, TrialOutcome};
+use crate::types::{AnswerReading, Family, KindReading, QuestionId, Record, TrialOutcome};
 
 /// Result of one item for one subject.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,6 +24,12 @@ pub enum TrialResult {
 }
 
 impl TrialResult {
+    /// Whether the item was asked, with or without a reply.
+    #[must_use]
+    pub fn is_asked(self) -> bool {
+        self != Self::Absent
+    }
+
     /// The reading in one mode; `None` if there is no reply, `Some(None)` if no choice could be read.
     #[must_use]
     #[expect(clippy::option_option, reason = "no reply, or no readable choice")]
@@ -150,6 +156,24 @@ impl<'a> Grid<'a> {
     #[must_use]
     pub fn find(&self, subject: &Subject) -> Option<usize> {
         self.subjects.binary_search(subject).ok()
+    }
+
+    /// The variants that were asked, sorted: kinds of degradation in each light reading.
+    #[must_use]
+    pub fn variants(&self) -> BTreeSet<&KindReading> {
+        let variants = self.subjects.iter().map(|subject| &subject.variant);
+        variants.filter(|variant| variant.kind.is_some()).collect()
+    }
+
+    /// The variant where only one is shown: the last kind that was asked, in its first light reading.
+    #[must_use]
+    pub fn main_variant(&self) -> Option<KindReading> {
+        let variants = self.variants();
+        let kind = variants.last()?.kind;
+        variants
+            .into_iter()
+            .find(|variant| variant.kind == kind)
+            .cloned()
     }
 
     /// Items of a family, each with its result for a subject.

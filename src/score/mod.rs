@@ -15,6 +15,7 @@
 pub(crate) mod accuracy;
 pub(crate) mod agreement;
 pub(crate) mod auc;
+pub(crate) mod best;
 pub(crate) mod bootstrap;
 pub(crate) mod chance;
 pub mod choice;
@@ -31,8 +32,10 @@ pub(crate) mod health;
 pub(crate) mod llm_match;
 pub(crate) mod open;
 pub(crate) mod paired;
+pub(crate) mod pooled;
 pub(crate) mod realism;
 mod record;
 pub(crate) mod significance;
+mod split_mix;
 mod student;
 pub(crate) mod subject;

@@ -20,6 +20,8 @@ pub struct PairedComparison {
     pub gained: usize,
     /// Number of items that only the second subject got right.
     pub lost: usize,
+    /// Number of clusters that have a pair.
+    pub clusters: usize,
     /// McNemar's exact p-value, which treats items as independent.
     pub mcnemar: f64,
     /// Exact p-value of swapping the two subjects in whole clusters.
@@ -85,6 +87,7 @@ impl PairedComparison {
             difference: difference(&nets, n),
             gained,
             lost,
+            clusters: clusters.len(),
             mcnemar: mcnemar(gained, lost),
             p: sign_flip(&differences),
         })

@@ -138,18 +138,13 @@ impl<'a> Overview<'a> {
 
     /// The variant for figures that show only one: the last kind that was asked, in its first light reading.
     fn main_variant(&self) -> Option<KindReading> {
-        let variants = self.tested_variants();
-        let kind = variants.last()?.kind;
-        variants.into_iter().find(|variant| variant.kind == kind)
+        self.findings.grid.main_variant()
     }
 
     /// All variants that were asked: kinds in each light reading.
     fn tested_variants(&self) -> Vec<KindReading> {
-        let subjects = self.findings.grid.subjects.iter();
-        let variants = subjects.map(|subject| &subject.variant);
-        let degraded = variants.filter(|variant| variant.kind.is_some());
-        let degraded: BTreeSet<&KindReading> = degraded.collect();
-        degraded.into_iter().cloned().collect()
+        let variants = self.findings.grid.variants().into_iter();
+        variants.cloned().collect()
     }
 
     /// Lines of a quantity for all models, in one variant, raw.

@@ -100,7 +100,7 @@ fn intro(findings: &Findings<'_>) -> Vec<String> {
     vec![format!(
         "{} items about {} frames, {} subjects (model × condition). Strict reading. Intervals are 95 %, by {unit} \
          ({} clusters); differences are paired by item, tested by swapping whole {unit}s, and corrected by Holm over the comparisons of one kind and model; \
-         “tied” says that nothing is shown, not that there is nothing.",
+         “not shown” does not say that there is no difference.",
         grid.items.len(),
         frames.len(),
         grid.subjects.len(),

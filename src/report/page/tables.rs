@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use crate::report::table::{ColumnKind, Table, TableCell, TableFormat};
 use crate::report::words::words;
+use crate::score::significance::Significance;
 
 /// Maximum number of rows of a table that is not folded.
 const MAX_OPEN_ROWS: usize = 60;
@@ -52,8 +53,10 @@ pub(in crate::report) fn page_tables<'a>(tables: &'a [Table], section: &str) -> 
 fn text(kind: ColumnKind, cell: &TableCell) -> PageCell {
     let class = match (kind, cell) {
         (_, TableCell::Below(_)) => "below",
-        (_, TableCell::Significance(significance)) => significance.word(),
-        (ColumnKind::Failures, TableCell::Count(1..)) => "worse",
+        (_, TableCell::Significance(Significance::Better)) => "better",
+        (_, TableCell::Significance(Significance::Worse))
+        | (ColumnKind::Failures, TableCell::Count(1..)) => "worse",
+        (_, TableCell::Significance(_)) => "unshown",
         (ColumnKind::Text, _) => "text",
         _ => "",
     };

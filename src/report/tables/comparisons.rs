@@ -1,11 +1,13 @@
 //! Tables of all differences with their tests, for each kind of comparison: all families together, and by family.
 
+use super::pooled::too_few_clusters;
 use super::sections::ENHANCERS;
 use crate::report::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
 use crate::report::table::{Table, TableBuilder, TableFormat};
 use crate::report::words::name;
-use crate::score::comparison::{Comparison, ComparisonKind, Significance};
+use crate::score::comparison::{Comparison, ComparisonKind};
 use crate::score::findings::Findings;
+use crate::score::significance::Significance;
 
 /// Maximum number of rows of a kind in the terminal. The CSV file has all rows.
 const MAX_ROWS: usize = 40;
@@ -20,6 +22,9 @@ pub(super) fn comparisons(findings: &Findings<'_>) -> Vec<Table> {
         let (whole, by_family): (Vec<&Comparison>, Vec<&Comparison>) =
             all.partition(|comparison| comparison.family.is_none());
         let (caption, heading) = titles(kind);
+        let least = whole.iter();
+        let least = least.map(|comparison| (comparison.least_holm, comparison.paired.clusters));
+        let note = too_few_clusters(least, &findings.unit.to_string());
         let mut total = table(kind, caption, &whole);
         total.is_folded = kind != ComparisonKind::Enhancer;
         if !whole.is_empty() {
@@ -29,6 +34,7 @@ pub(super) fn comparisons(findings: &Findings<'_>) -> Vec<Table> {
                 total.latex = Some(caption.to_owned());
             }
             shorten(&mut total, kind, &whole);
+            total.notes.extend(note);
         }
         let mut by_family = table(kind, &format!("{caption}, by family"), &by_family);
         by_family.is_folded = true;
@@ -98,7 +104,7 @@ fn table(kind: ComparisonKind, caption: &str, comparisons: &[&Comparison]) -> Ta
     builder
         .column(
             ColumnKind::Significance,
-            "csv verdict | terminal | page | latex",
+            "csv verdict shown | terminal | page | latex",
             |comparison| comparison.significance,
         )
         .build()

@@ -8,6 +8,7 @@ mod fidelity;
 mod flips;
 mod health;
 mod levels;
+mod pooled;
 mod sections;
 mod subjects;
 mod summary;
@@ -32,6 +33,7 @@ pub fn tables(findings: &Findings<'_>) -> Vec<Table> {
         vec![subjects::subjects(&findings.summary)],
         thresholds::thresholds(findings),
         vec![families::families(findings)],
+        pooled::pooled(findings),
         comparisons::comparisons(findings),
         answers::answers(findings),
         vec![flips::flips(findings)],

@@ -1,0 +1,132 @@
+//! Tables of the differences of all models together, and of the models by area.
+
+use crate::report::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
+use crate::report::table::{Table, TableBuilder};
+use crate::report::words::{counted, light, p};
+use crate::score::findings::Findings;
+use crate::score::pooled::{PooledFinding, PooledKind};
+
+/// All families together, then by family.
+pub(super) fn pooled(findings: &Findings<'_>) -> Vec<Table> {
+    let (whole, by_family): (Vec<&PooledFinding>, Vec<&PooledFinding>) = findings
+        .pooled
+        .iter()
+        .partition(|finding| finding.family.is_none());
+    let models = whole.iter().map(|finding| finding.models.len()).max();
+    let of_models = counted(models.unwrap_or(0), "model");
+    let mut total = table(&format!("Pooled over {of_models}"), &whole);
+    if models.is_some_and(|models| models > 1) {
+        total.heading = Some(format!(
+            "Pooled over {of_models}, paired by question, in percentage points"
+        ));
+    }
+    total.notes = notes(&whole, &findings.unit.to_string());
+    let mut by_family = table(&format!("Pooled over {of_models}, by family"), &by_family);
+    by_family.is_folded = true;
+    vec![total, by_family]
+}
+
+fn table(caption: &str, findings: &[&PooledFinding]) -> Table {
+    let builder = TableBuilder::new("pooled", findings.iter().copied())
+        .page("comparisons", caption)
+        .column(Text, "csv kind", |finding| finding.kind.name())
+        .column(Text, "csv level", |finding| finding.level.to_string())
+        .column(Text, "csv variant", |finding| finding.variant.to_string())
+        .column(Text, "csv enhancer", |finding| {
+            finding.enhancer.as_ref().map(ToString::to_string)
+        })
+        .column(Text, "terminal | page difference", |finding| title(finding))
+        .family(|finding| finding.family.as_ref());
+    numbers(builder)
+        .column(
+            ColumnKind::Significance,
+            "csv verdict shown | terminal | page",
+            |finding| finding.verdict,
+        )
+        .column(Text, "csv names", |finding| finding.models.join(";"))
+        .build()
+}
+
+fn numbers(builder: TableBuilder<&PooledFinding>) -> TableBuilder<&PooledFinding> {
+    builder
+        .column(Count, "csv models", |finding| finding.models.len())
+        .column(Count, "csv n | page n", |finding| finding.items)
+        .column(Count, "csv dropped | page dropped", |finding| {
+            finding.dropped
+        })
+        .column(Count, "csv clusters", |finding| finding.clusters)
+        .column(Number, "csv first", |finding| finding.first)
+        .column(Number, "csv second", |finding| finding.second)
+        .column(Percent, "terminal first | page first", |finding| {
+            finding.first
+        })
+        .column(Percent, "terminal second | page second", |finding| {
+            finding.second
+        })
+        .column(
+            Points,
+            "csv difference low high | terminal difference, 95 % interval | page difference [95 %]",
+            |finding| finding.difference,
+        )
+        .column(P, "csv p | page p", |finding| finding.p)
+        .column(Count, "csv draws", |finding| finding.draws)
+        .column(
+            P,
+            "csv p_holm | terminal p (Holm) | page p (Holm)",
+            |finding| finding.holm,
+        )
+        .column(Number, "csv p_least", |finding| finding.least_p)
+}
+
+/// The two sides in words, as `L3, with noise less L0`.
+fn title(finding: &PooledFinding) -> String {
+    let first = light(&finding.variant, finding.enhancer.as_ref());
+    let second = match finding.kind {
+        PooledKind::Darkness => "L0",
+        PooledKind::Noise => "exposure drop",
+        PooledKind::Enhancer => "raw",
+        PooledKind::Blind => "without images",
+    };
+    format!("{} {first} − {second}", finding.level)
+}
+
+/// Lines below the table: what is left out, and what so few clusters can show.
+fn notes(findings: &[&PooledFinding], unit: &str) -> Vec<String> {
+    let mut notes = Vec::new();
+    let most = findings.iter().max_by_key(|finding| finding.dropped);
+    if let Some(most) = most.filter(|finding| finding.dropped > 0) {
+        notes.push(format!(
+            "left out where a model has no reply: up to {} of {}",
+            most.dropped,
+            counted(most.items + most.dropped, "item")
+        ));
+    }
+    notes.extend(draws(findings));
+    let least = findings
+        .iter()
+        .map(|finding| (finding.least_holm, finding.clusters));
+    notes.extend(too_few_clusters(least, unit));
+    notes
+}
+
+fn draws(findings: &[&PooledFinding]) -> Option<String> {
+    let draws = findings.iter().find_map(|finding| finding.draws)?;
+    Some(format!(
+        "p by {draws} draws where the exact table would be too large"
+    ))
+}
+
+/// The line below a table of tests in which no verdict is possible. `least` holds, for each test, the smallest corrected p-value
+/// that its clusters allow, and their number.
+pub(super) fn too_few_clusters(
+    least: impl Iterator<Item = (f64, usize)>,
+    unit: &str,
+) -> Option<String> {
+    let impossible = least.filter(|(least, _)| *least >= 0.05);
+    let (least, clusters) = impossible.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(format!(
+        "no verdict where p cannot be below 0.05: with {}, p (Holm) is {} at least",
+        counted(clusters, unit),
+        p(least)
+    ))
+}
