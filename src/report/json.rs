@@ -5,6 +5,7 @@ use std::path::Path;
 
 use serde::{Serialize, Serializer};
 
+use super::alert::Alert;
 use super::csv::fields;
 use super::table::{Table, TableRow};
 use crate::error::{Error, Result};
@@ -60,6 +61,7 @@ struct Head<'a> {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     runs: Vec<ComparedRun<'a>>,
     unread: &'a BTreeMap<UnreadReason, usize>,
+    alerts: &'a [Alert],
 }
 
 /// One of several runs.
@@ -86,6 +88,7 @@ pub(crate) fn summary(
     tables: &[Table],
     unread: &BTreeMap<UnreadReason, usize>,
     runs: RunList<'_>,
+    alerts: &[Alert],
 ) -> Result<String> {
     let (run, folder, runs) = match runs {
         RunList::One(run, folder) => (Some(run), folder, [].as_slice()),
@@ -100,6 +103,7 @@ pub(crate) fn summary(
         run,
         runs: runs.collect(),
         unread,
+        alerts,
     };
     document(head, &tables[0])
 }

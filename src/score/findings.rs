@@ -7,6 +7,7 @@ use super::agreement::{Agreement, agreements};
 use super::bootstrap::Resamples;
 use super::chance::OfferedChoices;
 use super::cluster::{ClusterUnit, Clusters};
+use super::common::CommonItems;
 use super::comparison::{Comparison, ComparisonKind, comparisons};
 use super::confusion::{Confusion, Hallucination, confusions, hallucinations};
 use super::curve::{Curve, curves};
@@ -39,6 +40,8 @@ pub struct Findings<'a> {
     pub first_failures: Vec<FirstFailure>,
     /// Agreement of models in each condition.
     pub agreements: Vec<Agreement>,
+    /// What the models share; `None` if all were asked the same questions.
+    pub common: Option<CommonItems>,
 }
 
 impl<'a> Findings<'a> {
@@ -71,6 +74,7 @@ impl<'a> Findings<'a> {
             hallucinations: hallucinations(&grid),
             first_failures: first_failures(&grid),
             agreements: agreements(&grid, &draws),
+            common: CommonItems::of(&grid),
             grid,
         }
     }

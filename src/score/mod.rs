@@ -18,6 +18,7 @@ pub(crate) mod bootstrap;
 pub(crate) mod chance;
 pub mod choice;
 pub(crate) mod cluster;
+pub(crate) mod common;
 pub(crate) mod comparison;
 pub(crate) mod confusion;
 pub(crate) mod curve;

@@ -6,6 +6,7 @@ use std::path::Path;
 use super::join::{Joined, join};
 use crate::error::{Error, Result};
 use crate::job::stored::StoredRun;
+use crate::report::alert::Alert;
 use crate::report::page::{self, PageInputs};
 use crate::score::chance::OfferedChoices;
 use crate::score::findings::Findings;
@@ -25,17 +26,18 @@ impl Combined {
     }
 
     /// Further inputs of the HTML page.
-    pub(super) fn shown(&self) -> PageInputs<'_> {
+    pub(super) fn shown<'a>(&'a self, alerts: &'a [Alert]) -> PageInputs<'a> {
         let runs = self.runs.iter().map(|run| page::PageRun {
             name: run.name.clone(),
             manifest: &run.manifest,
-            records: &self.records[run.records.clone()],
+            records: run.records.iter().map(|place| &self.records[*place]).collect(),
             cost: run.cost.clone(),
         });
         PageInputs {
             runs: runs.collect(),
             questions: &self.questions,
             thumbnails: &self.thumbnails,
+            alerts,
         }
     }
 

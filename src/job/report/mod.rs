@@ -1,11 +1,15 @@
 //! Reports of runs, from their records alone: files, and text for the terminal.
 
+mod alerts;
 pub(crate) mod choice;
 mod combine;
 mod cost;
 mod join;
+mod lights;
+mod models;
 pub(crate) mod open;
 mod runs;
+mod settings;
 mod story;
 
 pub(crate) use runs::{ReportArgs, report};

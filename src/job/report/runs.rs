@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::alerts::alerts;
 use super::choice::in_its_folder;
 use super::combine::{Combined, combine};
 use super::open;
@@ -110,14 +111,18 @@ fn of_choices(args: &ReportArgs, mut runs: Vec<StoredRun<ChoiceDetail>>) -> Resu
 fn compare(combined: &Combined, args: &ReportArgs) -> Result<String> {
     let findings = combined.findings();
     let (tables, runs) = (tables(&findings), combined.manifests());
+    let alerts = alerts(combined, &findings);
+    let unread = &findings.summary.unread;
+    let json = || summary(&tables, unread, RunList::Several(&runs), &alerts);
     let shown = match args.show() {
-        StdoutFormat::Json => summary(&tables, &findings.summary.unread, RunList::Several(&runs))?,
-        StdoutFormat::Table => evaluation(&tables, &runs),
+        StdoutFormat::Json => json()?,
+        StdoutFormat::Table => evaluation(&tables, &runs, &alerts),
     };
-    let files = match args.out {
-        Some(_) => products(&findings, &tables, &combined.shown())?,
-        None => Vec::new(),
-    };
+    let mut files = Vec::new();
+    if args.out.is_some() {
+        files = products(&findings, &tables, &combined.shown(&alerts))?;
+        files.push(("summary.json".to_owned(), json()?.into_bytes()));
+    }
     write_files(args, shown, files)
 }
 

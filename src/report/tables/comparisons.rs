@@ -58,6 +58,10 @@ fn titles(kind: ComparisonKind) -> (&'static str, Option<&'static str>) {
             "With images less without",
             Some("With images against without, paired by question"),
         ),
+        ComparisonKind::Light => (
+            "Light less light",
+            Some("One light against another, same model, paired by question"),
+        ),
     }
 }
 
