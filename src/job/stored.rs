@@ -9,6 +9,7 @@ use crate::types::manifest::RunManifest;
 use crate::types::{ChoiceDetail, Detail, OpenDetail, QuestionId, Record, RunQuestion, Thumbnail};
 
 /// A run as read from its folder.
+#[derive(Clone)]
 pub(crate) struct StoredRun<D> {
     pub(crate) folder: PathBuf,
     pub(crate) manifest: RunManifest,

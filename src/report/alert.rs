@@ -60,5 +60,8 @@ pub enum AlertKind {
 /// The alerts as lines of the terminal, each marked with `!`; empty without an alert.
 #[must_use]
 pub(in crate::report) fn lines(alerts: &[Alert]) -> String {
-    alerts.iter().map(|alert| format!("! {}\n", alert.text)).collect()
+    let lines = alerts
+        .iter()
+        .map(|alert| ["! ", &*alert.text, "\n"].concat());
+    lines.collect()
 }

@@ -35,7 +35,11 @@ impl CommonItems {
     /// The common items of a grid; `None` if all models were asked the same questions.
     #[must_use]
     pub(crate) fn of(grid: &Grid<'_>) -> Option<Self> {
-        let all: BTreeSet<&QuestionId> = grid.items.iter().map(|item| &item.record.question).collect();
+        let all: BTreeSet<&QuestionId> = grid
+            .items
+            .iter()
+            .map(|item| &item.record.question)
+            .collect();
         let mut asked = BTreeMap::<(bool, &str), BTreeSet<&QuestionId>>::new();
         for (index, subject) in grid.subjects.iter().enumerate() {
             let model = (subject.view == Some(View::Blind), &*subject.model);
@@ -53,13 +57,18 @@ impl CommonItems {
         let shared = shared_items(grid);
         let restricted = grid.restricted(&shared);
         let items = restricted.items.iter();
-        let offers: Vec<OfferedChoices> = items.clone().map(|item| OfferedChoices::of(item.record)).collect();
+        let offers: Vec<OfferedChoices> = items
+            .clone()
+            .map(|item| OfferedChoices::of(item.record))
+            .collect();
         let shared: BTreeSet<&QuestionId> = items.map(|item| &item.record.question).collect();
-        let asked = asked.into_iter().map(|((is_blind, model), questions)| AskedQuestions {
-            model: model.to_owned(),
-            is_blind,
-            questions: questions.len(),
-        });
+        let asked = asked
+            .into_iter()
+            .map(|((is_blind, model), questions)| AskedQuestions {
+                model: model.to_owned(),
+                is_blind,
+                questions: questions.len(),
+            });
         Some(Self {
             asked: asked.collect(),
             questions: all.len(),
@@ -77,12 +86,16 @@ pub(crate) fn shared_items(grid: &Grid<'_>) -> Vec<bool> {
         if subject.view != Some(View::Image) {
             continue;
         }
-        let replied = models.entry(&subject.model).or_insert_with(|| vec![false; grid.items.len()]);
+        let replied = models
+            .entry(&subject.model)
+            .or_insert_with(|| vec![false; grid.items.len()]);
         for (item, replied) in replied.iter_mut().enumerate() {
             *replied |= grid.result(index, item).is_reply();
         }
     }
     models.retain(|_, replied| replied.contains(&true));
     let items = 0..grid.items.len();
-    items.map(|item| models.values().all(|replied| replied[item])).collect()
+    items
+        .map(|item| models.values().all(|replied| replied[item]))
+        .collect()
 }

@@ -162,7 +162,7 @@ fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
     all
 }
 
-fn significance(difference: f64, p: f64) -> Significance {
+pub(super) fn significance(difference: f64, p: f64) -> Significance {
     if p >= 0.05 {
         Significance::Tied
     } else if difference > 0.0 {

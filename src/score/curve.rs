@@ -47,9 +47,10 @@ pub(super) struct CurvePoints {
 impl CurvePoints {
     /// All curves of a grid that have L0 and at least one degraded level.
     pub(super) fn all(grid: &Grid<'_>) -> Vec<Self> {
-        let degraded = grid.subjects.iter().filter(|subject| {
-            subject.view == Some(View::Image) && subject.variant.kind.is_some()
-        });
+        let degraded = grid
+            .subjects
+            .iter()
+            .filter(|subject| subject.view == Some(View::Image) && subject.variant.kind.is_some());
         let mut keys: Vec<(&str, &KindReading, Option<&EnhancerName>)> = degraded
             .map(|subject| (&*subject.model, &subject.variant, subject.enhancer.as_ref()))
             .collect();

@@ -207,11 +207,17 @@ impl<'a> Grid<'a> {
         let items = self.items.iter().zip(kept);
         Self {
             subjects: self.subjects.clone(),
-            items: items.filter(|(_, kept)| **kept).map(|(item, _)| *item).collect(),
+            items: items
+                .filter(|(_, kept)| **kept)
+                .map(|(item, _)| *item)
+                .collect(),
             clusters: self.clusters,
             results: cells.iter().map(|cell| self.results[*cell]).collect(),
             records: self.records,
-            record_indices: cells.iter().map(|cell| self.record_indices[*cell]).collect(),
+            record_indices: cells
+                .iter()
+                .map(|cell| self.record_indices[*cell])
+                .collect(),
         }
     }
 

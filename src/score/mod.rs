@@ -14,6 +14,7 @@
 
 pub(crate) mod accuracy;
 pub(crate) mod agreement;
+pub(crate) mod baseline;
 pub(crate) mod bootstrap;
 pub(crate) mod chance;
 pub mod choice;

@@ -102,7 +102,9 @@ impl KindReading {
     /// The group of runs as names end with it, ` @RUN`; empty without a group.
     #[must_use]
     pub fn group_suffix(&self) -> String {
-        self.group.as_ref().map_or_else(String::new, ToString::to_string)
+        self.group
+            .as_ref()
+            .map_or_else(String::new, ToString::to_string)
     }
 
     fn named_reading(&self) -> Option<&ReadingName> {

@@ -52,7 +52,9 @@ pub(super) fn of_runs<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
 }
 
 fn of_progress(runs: &[JoinedRun]) -> Vec<Alert> {
-    let unfinished = runs.iter().filter(|run| run.manifest.status != Status::Complete);
+    let unfinished = runs
+        .iter()
+        .filter(|run| run.manifest.status != Status::Complete);
     let alerts = unfinished.map(|run| {
         let (status, counts) = (run.manifest.status, run.manifest.counts);
         let text = format!(
@@ -76,19 +78,44 @@ fn of_settings<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let (constraints, parameters): (Vec<Setting>, Vec<Setting>) = {
         let settings = manifests.iter().map(|run| parameter_flags(run));
         let all = differing(&settings.collect::<Vec<_>>());
-        all.into_iter().partition(|setting| setting.flag == "--constrain")
+        all.into_iter()
+            .partition(|setting| setting.flag == "--constrain")
     };
     let version = of(&|run| Settings::from([("the version".to_owned(), run.version.clone())]));
     let judged = of(&|run| super::settings::noted(run, &["--judge", "--protocol"]));
     let rows = [
         (AlertKind::Data, "The data differ", flags(&["--data"])),
-        (AlertKind::Questions, "The orders of choices differ", flags(&ORDERS)),
-        (AlertKind::Images, "The size or encoding of images differs", flags(&ENCODING)),
-        (AlertKind::Prompts, "The prompts differ", flags(&["--prompts"])),
-        (AlertKind::Parameters, "The parameters of models differ", parameters),
-        (AlertKind::Constrain, "Replies are constrained differently", constraints),
+        (
+            AlertKind::Questions,
+            "The orders of choices differ",
+            flags(&ORDERS),
+        ),
+        (
+            AlertKind::Images,
+            "The size or encoding of images differs",
+            flags(&ENCODING),
+        ),
+        (
+            AlertKind::Prompts,
+            "The prompts differ",
+            flags(&["--prompts"]),
+        ),
+        (
+            AlertKind::Parameters,
+            "The parameters of models differ",
+            parameters,
+        ),
+        (
+            AlertKind::Constrain,
+            "Replies are constrained differently",
+            constraints,
+        ),
         (AlertKind::Scoring, "The scoring differs", judged),
-        (AlertKind::Version, "The versions of this program differ", version),
+        (
+            AlertKind::Version,
+            "The versions of this program differ",
+            version,
+        ),
     ];
     let mut alerts: Vec<Alert> = rows
         .into_iter()
@@ -121,13 +148,21 @@ fn of_light<D: Detail>(joined: &Joined<D>, light: &[Setting], names: &[String]) 
             _ => format!("{differing} of {shared} shared images differ"),
         };
         let curves = listed(&curves);
-        sentences.push(format!("{curves} stands apart as {}: {why}.", listed(&groups)));
+        sentences.push(format!(
+            "{curves} stands apart as {}: {why}.",
+            listed(&groups)
+        ));
     }
     if !sentences.is_empty() {
         alerts.push(Alert::new(AlertKind::Light, sentences.join(" ")));
     }
     if !joined.lights.undigested.is_empty() {
-        let runs: Vec<&String> = joined.lights.undigested.iter().map(|run| &names[*run]).collect();
+        let runs: Vec<&String> = joined
+            .lights
+            .undigested
+            .iter()
+            .map(|run| &names[*run])
+            .collect();
         let text = format!(
             "The records of {} hold no digests of images: the settings in the manifests decide what was shown.",
             listed(&runs)
@@ -152,7 +187,9 @@ fn of_questions<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
         asked.push(ids);
     }
     let mut alerts = Vec::new();
-    let shared = asked[0].keys().filter(|id| asked.iter().all(|ids| ids.contains_key(*id)));
+    let shared = asked[0]
+        .keys()
+        .filter(|id| asked.iter().all(|ids| ids.contains_key(*id)));
     let shared: Vec<&&QuestionId> = shared.collect();
     if asked.iter().any(|ids| ids.len() != shared.len()) {
         let counts = joined.runs.iter().zip(&asked);
@@ -193,11 +230,18 @@ fn of_questions<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
 fn of_servers<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let names = names(&joined.runs);
     let mut served = BTreeMap::<&str, BTreeMap<usize, BTreeSet<&str>>>::new();
-    for (index, run) in joined.runs.iter().enumerate().filter(|(_, run)| !is_of_people(&run.manifest)) {
+    for (index, run) in joined
+        .runs
+        .iter()
+        .enumerate()
+        .filter(|(_, run)| !is_of_people(&run.manifest))
+    {
         for place in &run.records {
             let record = &joined.records[*place];
             if let Some(name) = &record.served_model {
-                let runs = served.entry(joined.models.asked(&record.model)).or_default();
+                let runs = served
+                    .entry(joined.models.asked(&record.model))
+                    .or_default();
                 runs.entry(index).or_default().insert(name);
             }
         }
@@ -217,7 +261,10 @@ fn of_servers<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
             alerts.push(Alert::new(AlertKind::Served, text));
         }
     }
-    let models = joined.runs.iter().filter_map(|run| run.manifest.columns.get("model"));
+    let models = joined
+        .runs
+        .iter()
+        .filter_map(|run| run.manifest.columns.get("model"));
     let models: BTreeSet<&String> = models.flat_map(BTreeMap::keys).collect();
     for model in models {
         let addresses = joined.runs.iter().map(|run| {
@@ -227,7 +274,10 @@ fn of_servers<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
         let differing = differing(&addresses.collect::<Vec<_>>());
         if !differing.is_empty() {
             let what = format!("{model} was asked at several addresses");
-            alerts.push(Alert::new(AlertKind::Served, sentence(&what, &differing, &names)));
+            alerts.push(Alert::new(
+                AlertKind::Served,
+                sentence(&what, &differing, &names),
+            ));
         }
     }
     alerts
@@ -252,7 +302,10 @@ fn of_replies(findings: &Findings<'_>) -> Vec<Alert> {
             alerts.push(Alert::new(AlertKind::Unread, text));
         }
         if failed > 0 {
-            let (trials, are) = (counted(failed, "trial"), if failed == 1 { "is" } else { "are" });
+            let (trials, are) = (
+                counted(failed, "trial"),
+                if failed == 1 { "is" } else { "are" },
+            );
             let text = format!("{trials} of {model} failed and {are} not scored.");
             alerts.push(Alert::new(AlertKind::Failed, text));
         }
@@ -262,7 +315,10 @@ fn of_replies(findings: &Findings<'_>) -> Vec<Alert> {
 
 /// Answers of people that are no choice of their question.
 fn of_people(combined: &Combined) -> Vec<Alert> {
-    let people = combined.runs.iter().filter(|run| is_of_people(&run.manifest));
+    let people = combined
+        .runs
+        .iter()
+        .filter(|run| is_of_people(&run.manifest));
     let alerts = people.filter_map(|run| {
         let records = run.records.iter().map(|place| &combined.records[*place]);
         let unread = records.filter_map(|record| record.detail.strict?.why);
@@ -282,13 +338,27 @@ fn of_repeats(combined: &Combined) -> Option<Alert> {
     let people = |run: &&JoinedRun| !is_of_people(&run.manifest);
     let times = combined.runs.iter().filter(people).map(|run| {
         let records = run.records.iter().map(|place| &combined.records[*place]);
-        (&run.name, records.map(|record| record.detail.repeat + 1).max().unwrap_or(1))
+        (
+            &run.name,
+            records
+                .map(|record| record.detail.repeat + 1)
+                .max()
+                .unwrap_or(1),
+        )
     });
     let times: Vec<(&String, u32)> = times.collect();
-    let differs = times.iter().any(|(_, times_here)| *times_here != times[0].1);
+    let differs = times
+        .iter()
+        .any(|(_, times_here)| *times_here != times[0].1);
     differs.then(|| {
-        let times: Vec<String> = times.iter().map(|(run, times)| format!("{times} in {run}")).collect();
-        let text = format!("Questions were asked a different number of times: --repeats is {}.", listed(&times));
+        let times: Vec<String> = times
+            .iter()
+            .map(|(run, times)| format!("{times} in {run}"))
+            .collect();
+        let text = format!(
+            "Questions were asked a different number of times: --repeats is {}.",
+            listed(&times)
+        );
         Alert::new(AlertKind::Questions, text)
     })
 }
@@ -298,10 +368,17 @@ fn of_items(findings: &Findings<'_>) -> Vec<Alert> {
     let Some(common) = &findings.common else {
         return Vec::new();
     };
-    let short = common.asked.iter().filter(|asked| asked.questions < common.questions);
+    let short = common
+        .asked
+        .iter()
+        .filter(|asked| asked.questions < common.questions);
     let short: Vec<String> = short
         .map(|asked| {
-            let blind = if asked.is_blind { " without images" } else { "" };
+            let blind = if asked.is_blind {
+                " without images"
+            } else {
+                ""
+            };
             format!("{}{blind} {}", asked.model, asked.questions)
         })
         .collect();
@@ -322,7 +399,10 @@ fn names(runs: &[JoinedRun]) -> Vec<String> {
 }
 
 fn sentence(what: &str, settings: &[Setting], names: &[String]) -> String {
-    let settings: Vec<String> = settings.iter().map(|setting| setting.words(names)).collect();
+    let settings: Vec<String> = settings
+        .iter()
+        .map(|setting| setting.words(names))
+        .collect();
     format!("{what}: {}.", settings.join("; "))
 }
 

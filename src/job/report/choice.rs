@@ -48,7 +48,8 @@ pub(super) fn in_its_folder(
         StdoutFormat::Json => json(Some(folder))?,
         StdoutFormat::Table => {
             let report = folder.join(PAGE);
-            evaluation(&tables, &[(manifest, folder)], &alerts) + &format!("report: {}\n", report.display())
+            evaluation(&tables, &[(manifest, folder)], &alerts)
+                + &format!("report: {}\n", report.display())
         }
     })
 }

@@ -48,7 +48,9 @@ pub(super) fn join<D: Detail>(
 ) -> Result<Joined<D>> {
     let names = names(&runs);
     let mut order: Vec<usize> = (0..runs.len()).collect();
-    order.sort_by(|one, other| (&names[*one], &runs[*one].folder).cmp(&(&names[*other], &runs[*other].folder)));
+    order.sort_by(|one, other| {
+        (&names[*one], &runs[*one].folder).cmp(&(&names[*other], &runs[*other].folder))
+    });
     let lights = Lights::of(&runs, &names, &order);
     for (index, run) in runs.iter_mut().enumerate().filter(|_| !lights.is_one()) {
         let records = run.records.iter_mut();
@@ -104,7 +106,10 @@ impl<D: Detail> Joined<D> {
         let mut records = Vec::with_capacity(run.records.len());
         for mut record in run.records {
             let group = self.models.group(&record.model, index);
-            let trial = (self.models.key(record.key), group.map_or(0, |(group, _)| group + 1));
+            let trial = (
+                self.models.key(record.key),
+                group.map_or(0, |(group, _)| group + 1),
+            );
             if let Some(place) = known.trials.get(&trial) {
                 records.push(*place);
                 continue;

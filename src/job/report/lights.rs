@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::settings::{self, some};
 use crate::job::stored::StoredRun;
-use crate::types::manifest::RunManifest;
 use crate::types::degradation::Kind;
+use crate::types::manifest::RunManifest;
 use crate::types::{Condition, Detail, Digest, EnhancerName, KindReading, LightGroup, Record};
 
 /// The conditions of one curve: a kind of degradation in a light reading, raw or with an enhancer, at all levels.
@@ -104,7 +104,10 @@ impl Lights {
             };
             let mut groups: Vec<Vec<usize>> = Vec::new();
             for run in order.iter().copied().filter(|run| having.contains(run)) {
-                match groups.iter_mut().find(|group| group.iter().all(|other| agree(run, *other))) {
+                match groups
+                    .iter_mut()
+                    .find(|group| group.iter().all(|other| agree(run, *other)))
+                {
                     Some(group) => group.push(run),
                     None => groups.push(vec![run]),
                 }
@@ -128,7 +131,9 @@ impl Lights {
                     let name = &names[part[0]];
                     parted.insert(name.clone());
                     let group = LightGroup::new(name, &part);
-                    let own = part.iter().map(|run| (((*curve).clone(), *run), group.clone()));
+                    let own = part
+                        .iter()
+                        .map(|run| (((*curve).clone(), *run), group.clone()));
                     lights.groups.extend(own);
                 }
             }
@@ -225,10 +230,16 @@ impl Seen {
             undigested,
         };
         for (condition, runs) in curves {
-            seen.curves.entry(Curve::of(condition)).or_default().extend(runs);
+            seen.curves
+                .entry(Curve::of(condition))
+                .or_default()
+                .extend(runs);
         }
         for ((condition, one, other), found) in pairs {
-            let pair = seen.pairs.entry((Curve::of(condition), one, other)).or_default();
+            let pair = seen
+                .pairs
+                .entry((Curve::of(condition), one, other))
+                .or_default();
             pair.shared += found.shared;
             pair.differing += found.differing;
         }

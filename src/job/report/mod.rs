@@ -1,8 +1,10 @@
 //! Reports of runs, from their records alone: files, and text for the terminal.
 
 mod alerts;
+mod baseline;
 pub(crate) mod choice;
 mod combine;
+mod common;
 mod cost;
 mod join;
 mod lights;

@@ -4,9 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::settings::{Setting, Settings, differing, is_digest, parameters};
 use crate::job::stored::StoredRun;
-use crate::types::{
-    Condition, Detail, Digest, QuestionId, Record, RunQuestion, TrialKey, View,
-};
+use crate::types::{Condition, Detail, Digest, QuestionId, Record, RunQuestion, TrialKey, View};
 
 /// The most settings in the name of a model; with more, the run's name stands there.
 const MOST_SETTINGS: usize = 2;
@@ -34,7 +32,7 @@ pub(super) fn item<D: Detail>(record: &Record<D>) -> Item<'_> {
 #[derive(Debug, Default)]
 pub(super) struct Names {
     /// The number of the group and the name, by model and run.
-    names: HashMap<String, HashMap<usize, (usize, String)>>,
+    by_run: HashMap<String, HashMap<usize, (usize, String)>>,
     /// The keys of trials that repeat another one by image, words, model and parameters, with the key of that one.
     repeated: HashMap<TrialKey, TrialKey>,
     /// The settings that differ, by model.
@@ -57,7 +55,10 @@ impl Names {
         let mut having = BTreeMap::<&str, BTreeSet<usize>>::new();
         for (index, run) in runs.iter().enumerate() {
             for record in run.records.iter().filter(|record| compared(record)) {
-                if !having.get(&*record.model).is_some_and(|runs| runs.contains(&index)) {
+                if !having
+                    .get(&*record.model)
+                    .is_some_and(|runs| runs.contains(&index))
+                {
                     having.entry(&record.model).or_default().insert(index);
                 }
             }
@@ -93,7 +94,7 @@ impl Names {
                     let name = format!("{model} ({suffix})");
                     group.iter().map(move |run| (*run, (number, name.clone())))
                 });
-                found.names.insert(model.to_owned(), named.collect());
+                found.by_run.insert(model.to_owned(), named.collect());
             }
             if !differences.is_empty() {
                 found.differences.insert(model.to_owned(), differences);
@@ -105,13 +106,16 @@ impl Names {
     /// The group of a run among those that asked a model in different ways, and the name of the model there; `None` if all
     /// asked it in the same way.
     pub(super) fn group(&self, model: &str, run: usize) -> Option<(usize, &String)> {
-        let (group, name) = self.names.get(model)?.get(&run)?;
+        let (group, name) = self.by_run.get(model)?.get(&run)?;
         Some((*group, name))
     }
 
     /// The name under which a model was asked.
     pub(super) fn asked<'a>(&'a self, name: &'a str) -> &'a str {
-        let renamed = self.names.iter().find(|(_, runs)| runs.values().any(|(_, new)| new == name));
+        let renamed = self
+            .by_run
+            .iter()
+            .find(|(_, runs)| runs.values().any(|(_, new)| new == name));
         renamed.map_or(name, |(model, _)| model)
     }
 
@@ -167,7 +171,12 @@ fn conflicts<'a, D: Detail>(
 ) -> (Pairs<'a>, HashMap<TrialKey, TrialKey>) {
     let texts: Vec<HashMap<&QuestionId, &RunQuestion>> = runs
         .iter()
-        .map(|run| run.questions.iter().map(|question| (&question.id, question)).collect())
+        .map(|run| {
+            run.questions
+                .iter()
+                .map(|question| (&question.id, question))
+                .collect()
+        })
         .collect();
     let mut firsts = HashMap::<Item<'_>, First>::new();
     let (mut conflicts, mut repeated) = (BTreeSet::new(), HashMap::new());
@@ -185,11 +194,14 @@ fn conflicts<'a, D: Detail>(
             }
             let words = [first.run, index].map(|run| texts[run].get(&record.question));
             let same_words = match words {
-                [Some(one), Some(other)] => (&one.text, &one.choices) == (&other.text, &other.choices),
+                [Some(one), Some(other)] => {
+                    (&one.text, &one.choices) == (&other.text, &other.choices)
+                }
                 _ => false,
             };
             let has = |run: usize| parameters_are_known(&runs[run], &record.model);
-            let same_image = record.view == View::Image && own.image.is_some() && own.image == first.image;
+            let same_image =
+                record.view == View::Image && own.image.is_some() && own.image == first.image;
             if same_words && same_image && has(first.run) && has(index) {
                 repeated.insert(own.key, first.key);
             } else {

@@ -89,7 +89,12 @@ pub(super) fn differing(runs: &[Option<Settings>]) -> Vec<Setting> {
             .collect(),
     });
     settings
-        .filter(|setting| setting.values.iter().any(|(_, v)| *v != setting.values[0].1))
+        .filter(|setting| {
+            setting
+                .values
+                .iter()
+                .any(|(_, v)| *v != setting.values[0].1)
+        })
         .collect()
 }
 
@@ -140,7 +145,9 @@ pub(super) fn noise(run: &RunManifest, runs: &[&RunManifest]) -> Settings {
     let mut settings: Settings = written.collect();
     // A default that is written out is another word for the same noise.
     for (name, content) in shared(run, runs, "reading") {
-        settings.extend(leaves(content).map(|(flag, value)| (format!("{flag} of noise@{name}"), value)));
+        settings.extend(
+            leaves(content).map(|(flag, value)| (format!("{flag} of noise@{name}"), value)),
+        );
     }
     settings
 }
@@ -170,7 +177,8 @@ fn shared<'a>(
 
 /// The settings of the noise that the words of the user already explain are left out.
 pub(super) fn without_repeated(mut settings: Vec<Setting>) -> Vec<Setting> {
-    let is_written = |setting: &Setting| NOISE.iter().any(|flag| setting.flag == format!("--{flag}"));
+    let is_written =
+        |setting: &Setting| NOISE.iter().any(|flag| setting.flag == format!("--{flag}"));
     if settings.iter().any(is_written) {
         settings.retain(|setting| !setting.flag.contains(" of noise@"));
     }
@@ -181,7 +189,8 @@ pub(super) fn without_repeated(mut settings: Vec<Setting>) -> Vec<Setting> {
 pub(super) fn parameters(run: &RunManifest, model: &str) -> Option<Settings> {
     let content = run.columns.get("model")?.get(model)?;
     let prompts = some(run, &["--prompts"]);
-    let own = leaves(content).filter(|(flag, _)| !["--base-url", "--model"].contains(&flag.as_str()));
+    let own =
+        leaves(content).filter(|(flag, _)| !["--base-url", "--model"].contains(&flag.as_str()));
     Some(own.chain(prompts).collect())
 }
 
@@ -190,20 +199,30 @@ pub(super) fn parameter_flags(run: &RunManifest) -> Option<Settings> {
     let models = run.columns.get("model")?;
     let mut values = BTreeMap::<String, BTreeSet<String>>::new();
     let mut remote = 0;
-    for content in models.values().filter(|content| content.get("--base-url").is_some()) {
+    for content in models
+        .values()
+        .filter(|content| content.get("--base-url").is_some())
+    {
         remote += 1;
-        for (flag, value) in leaves(content).filter(|(flag, _)| !["--base-url", "--model"].contains(&flag.as_str())) {
+        for (flag, value) in
+            leaves(content).filter(|(flag, _)| !["--base-url", "--model"].contains(&flag.as_str()))
+        {
             values.entry(flag).or_default().insert(value);
         }
     }
     let joined = |values: BTreeSet<String>| values.into_iter().collect::<Vec<_>>().join(" or ");
-    let values = values.into_iter().map(|(flag, values)| (flag, joined(values)));
+    let values = values
+        .into_iter()
+        .map(|(flag, values)| (flag, joined(values)));
     (remote > 0).then(|| values.collect())
 }
 
 /// Some of the settings that decide no reply.
 pub(super) fn noted(run: &RunManifest, fields: &[&str]) -> Settings {
-    let settings = run.settings.iter().filter(|(flag, value)| fields.contains(&flag.as_str()) && !value.is_null());
+    let settings = run
+        .settings
+        .iter()
+        .filter(|(flag, value)| fields.contains(&flag.as_str()) && !value.is_null());
     settings.map(field).collect()
 }
 
@@ -230,7 +249,11 @@ fn add_leaves(flag: &str, value: &Value, found: &mut Vec<(String, String)>) {
         Value::Object(fields) => {
             for (name, value) in fields {
                 let is_flag = flag.is_empty() || name.starts_with("--");
-                let name = if is_flag { name.clone() } else { format!("{flag} ({name})") };
+                let name = if is_flag {
+                    name.clone()
+                } else {
+                    format!("{flag} ({name})")
+                };
                 add_leaves(&name, value, found);
             }
         }
@@ -273,12 +296,21 @@ mod tests {
             let pair = value.map(|value| ("--seed".to_owned(), value.to_owned()));
             Some(pair.into_iter().collect::<Settings>())
         };
-        let runs = [settings(Some("0")), settings(Some("1")), settings(Some("0")), None, settings(None)];
+        let runs = [
+            settings(Some("0")),
+            settings(Some("1")),
+            settings(Some("0")),
+            None,
+            settings(None),
+        ];
         let names = ["a", "b", "c", "d", "e"].map(str::to_owned);
         let [setting] = &*differing(&runs) else {
             panic!("one setting differs");
         };
-        assert_eq!(setting.words(&names), "--seed is 0 in a and c, 1 in b and unset in e");
+        assert_eq!(
+            setting.words(&names),
+            "--seed is 0 in a and c, 1 in b and unset in e"
+        );
         assert!(differing(&[runs[0].clone(), runs[2].clone(), None]).is_empty());
     }
 
@@ -288,6 +320,9 @@ mod tests {
         let found = leaves(&content).map(|(flag, value)| (flag, short(&value)));
         let found: Vec<_> = found.collect();
         let expected = [("--camera (name)", "a7"), ("--llie", "abababab…")];
-        assert_eq!(found, expected.map(|(flag, value)| (flag.to_owned(), value.to_owned())));
+        assert_eq!(
+            found,
+            expected.map(|(flag, value)| (flag.to_owned(), value.to_owned()))
+        );
     }
 }

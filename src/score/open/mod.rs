@@ -97,7 +97,8 @@ pub fn open_summary(answers: &[ScoredAnswer], questions: &[QuestionGroups]) -> O
         }
         for (baseline, other) in baselines(subject) {
             let mut subjects = by_subject.iter();
-            let Some((_, baseline_answers)) = subjects.find(|(subject, _)| subject.is_for(&other)) else {
+            let Some((_, baseline_answers)) = subjects.find(|(subject, _)| subject.is_for(&other))
+            else {
                 continue;
             };
             for group in &groups {
