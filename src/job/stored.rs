@@ -11,6 +11,7 @@ use crate::types::{
 };
 
 /// A run as read from its folder.
+#[derive(Clone)]
 pub(crate) struct StoredRun<D> {
     pub(crate) folder: PathBuf,
     pub(crate) manifest: RunManifest,

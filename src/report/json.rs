@@ -5,8 +5,10 @@ use std::path::Path;
 
 use serde::{Serialize, Serializer};
 
+use super::alert::Alert;
 use super::csv::fields;
 use super::table::{Table, TableRow};
+use super::tables::BASELINE;
 use crate::error::{Error, Result};
 use crate::types::UnreadReason;
 use crate::types::manifest::RunManifest;
@@ -22,6 +24,15 @@ struct Document<'a, H> {
 
 fn rows<S: Serializer>(table: &Table, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_seq(table.rows.iter().map(|row| Named { table, row }))
+}
+
+/// The rows of a table as objects.
+struct Rows<'a>(&'a Table);
+
+impl Serialize for Rows<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        rows(self.0, serializer)
+    }
 }
 
 struct Named<'a> {
@@ -60,6 +71,10 @@ struct Head<'a> {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     runs: Vec<ComparedRun<'a>>,
     unread: &'a BTreeMap<UnreadReason, usize>,
+    alerts: &'a [Alert],
+    /// The rows of `baseline.csv`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    baseline: Option<Rows<'a>>,
 }
 
 /// One of several runs.
@@ -86,6 +101,7 @@ pub(crate) fn summary(
     tables: &[Table],
     unread: &BTreeMap<UnreadReason, usize>,
     runs: RunList<'_>,
+    alerts: &[Alert],
 ) -> Result<String> {
     let (run, folder, runs) = match runs {
         RunList::One(run, folder) => (Some(run), folder, [].as_slice()),
@@ -100,6 +116,8 @@ pub(crate) fn summary(
         run,
         runs: runs.collect(),
         unread,
+        alerts,
+        baseline: tables.iter().find(|table| table.name == BASELINE).map(Rows),
     };
     document(head, &tables[0])
 }

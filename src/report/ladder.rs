@@ -6,7 +6,7 @@ use super::table::ColumnKind::Text;
 use super::table::{ColumnKind, TableBuilder, TableCell, TableFormat};
 use super::words::light;
 use crate::score::subject::Subject;
-use crate::types::{AxisLevel, EnhancerName, KindReading, View};
+use crate::types::{AxisLevel, EnhancerName, KindReading, LightGroup, View};
 
 /// A model in one variant, raw or with one enhancer.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -75,7 +75,10 @@ impl<'a, C> Ladder<'a, C> {
         for (series, cells) in clean {
             let same_model = degraded.iter_mut();
             let mut same_model = same_model
-                .filter(|(other, _)| other.model == series.model)
+                .filter(|(other, _)| {
+                    let groups = [other, &series].map(|series| series.variant.group.as_ref());
+                    other.model == series.model && LightGroup::meet(groups[0], groups[1])
+                })
                 .peekable();
             if same_model.peek().is_some() {
                 same_model.for_each(|(_, other)| other.extend(&cells));

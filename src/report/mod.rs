@@ -1,5 +1,6 @@
 //! Stage 7, SHOW: reports from the records alone, and [`sheet`], figures of images that the caller passes in.
 
+pub(crate) mod alert;
 pub(crate) mod chart;
 mod csv;
 pub(crate) mod figures;

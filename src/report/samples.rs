@@ -7,7 +7,9 @@ use serde::Serialize;
 
 use super::words::light;
 use crate::types::degradation::Axis;
-use crate::types::{AxisLevel, Condition, EnhancerName, FrameId, KindReading, Thumbnail};
+use crate::types::{
+    AxisLevel, Condition, EnhancerName, FrameId, KindReading, LightGroup, Thumbnail,
+};
 
 #[derive(Serialize)]
 pub(super) struct SamplePage {
@@ -43,7 +45,7 @@ pub(super) fn samples(thumbnails: &[Thumbnail]) -> Option<SamplePage> {
     let lines: BTreeSet<(KindReading, Option<&EnhancerName>)> = thumbnails
         .iter()
         .map(|t| (t.condition.kind_reading(), t.condition.enhancer.as_ref()))
-        .filter(|(variant, _)| *variant != KindReading::NONE)
+        .filter(|(variant, _)| variant.kind.is_some())
         .collect();
     let lines = if lines.is_empty() {
         BTreeSet::from([(KindReading::NONE, None)])
@@ -57,7 +59,9 @@ pub(super) fn samples(thumbnails: &[Thumbnail]) -> Option<SamplePage> {
                 condition.level() == at
                     && (condition.kind_reading() == *variant
                         && condition.enhancer.as_ref() == *enhancer
-                        || at == AxisLevel::L0 && enhancer.is_none())
+                        || at == AxisLevel::L0
+                            && enhancer.is_none()
+                            && LightGroup::meet(condition.group.as_ref(), variant.group.as_ref()))
             };
             let images = levels.iter().map(|at| {
                 let mut of_frame = thumbnails

@@ -6,6 +6,7 @@ use std::path::Path;
 use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
 use comfy_table::{CellAlignment, LineStyle};
 
+use super::alert::{Alert, lines};
 use super::table::{Column, ColumnKind, Table, TableCell, TableFormat};
 use super::words::{half, percent, points, reach, stops, words};
 use crate::types::manifest::{Counts, RunManifest, Status};
@@ -93,16 +94,14 @@ pub(super) fn table(parts: &[Table]) -> String {
     format!("{grid}\n")
 }
 
-/// The text at the end of an evaluation: the progress of incomplete runs, the tables, and the folders of the runs.
+/// The text at the end of an evaluation: the alerts, the tables, and the folders of the runs.
 #[must_use]
-pub(crate) fn evaluation(tables: &[Table], runs: &[(&RunManifest, &Path)]) -> String {
-    let mut text = String::new();
-    for (run, folder) in runs {
-        if runs.len() > 1 && run.status != Status::Complete {
-            let _ = write!(text, "{}: ", folder.display());
-        }
-        text += &progress(run, "trials answered");
-    }
+pub(crate) fn evaluation(
+    tables: &[Table],
+    runs: &[(&RunManifest, &Path)],
+    alerts: &[Alert],
+) -> String {
+    let mut text = lines(alerts);
     let first = tables.iter().position(|table| table.heading.is_some());
     let (levels, rest) = tables.split_at(first.map_or(0, |first| first + 1));
     text += &render(levels);

@@ -7,10 +7,10 @@ use crate::types::{EnhancerName, Family, KindReading};
 
 /// A variant in words, with its enhancer.
 pub(super) fn light(variant: &KindReading, enhancer: Option<&EnhancerName>) -> String {
-    let variant = variant.title();
+    let (title, group) = (variant.title(), variant.group_suffix());
     match enhancer {
-        None => variant,
-        Some(name) => format!("{variant} + {name}"),
+        None => title + &group,
+        Some(name) => format!("{title} + {name}{group}"),
     }
 }
 

@@ -153,7 +153,8 @@ impl ClusterScores {
         variant: &KindReading,
         levels: &[AxisLevel],
     ) -> (Vec<Self>, usize) {
-        let subject = |model: &str, level| grid.find(&Subject::seeing(model, level, variant, None));
+        let subject =
+            |model: &str, level| grid.stand_in(&Subject::seeing(model, level, variant, None));
         let subjects = models.iter().map(|model| {
             let subjects = levels.iter().filter_map(|level| subject(model, *level));
             subjects.collect()

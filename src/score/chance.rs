@@ -1,7 +1,7 @@
 //! The accuracy of guessing: [`chance`].
 
 use super::estimate::Estimate;
-use crate::types::{Family, Question};
+use crate::types::{Family, Question, Record};
 
 /// Family of a question and the number of its choices.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -10,6 +10,16 @@ pub struct OfferedChoices {
     pub family: Family,
     /// Number of its choices.
     pub choices: usize,
+}
+
+impl OfferedChoices {
+    /// The choices that a record offers.
+    pub(crate) fn of(record: &Record) -> Self {
+        Self {
+            family: record.detail.family.clone(),
+            choices: record.detail.choices.len(),
+        }
+    }
 }
 
 impl From<&Question> for OfferedChoices {

@@ -23,16 +23,19 @@ pub enum ComparisonKind {
     Model,
     /// A model with images against a model without.
     Blind,
+    /// A model in one light against the same model in another: other images of the same frames at the same level.
+    Light,
 }
 
 impl ComparisonKind {
     /// All kinds in the order of the tables.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::Level,
         Self::Variant,
         Self::Enhancer,
         Self::Model,
         Self::Blind,
+        Self::Light,
     ];
 
     /// The name of the kind in CSV files.
@@ -44,9 +47,14 @@ impl ComparisonKind {
             Self::Enhancer => "enhancer",
             Self::Model => "model",
             Self::Blind => "blind",
+            Self::Light => "light",
         }
     }
 }
+
+/// Minimum number of items that two models, or a model in two lights, must share for a verdict; chosen. The two sides of the other
+/// kinds were asked the same items by one run.
+pub(crate) const MIN_PAIRS: usize = 30;
 
 /// One subject against another on the items to which both replied, in the strict reading.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,10 +69,20 @@ pub struct Comparison {
     pub paired: PairedComparison,
     /// p-value after Holm's correction over all comparisons of this kind and these models. Another model in the report
     /// therefore changes no result. Comparisons by family are corrected separately.
+    /// `1` if the sides share too few items.
     pub holm: f64,
     /// The smallest p-value after correction that the clusters of this comparison allow, however large the difference is.
     pub least_holm: f64,
     pub significance: Significance,
+}
+
+impl Comparison {
+    /// Whether the sides share too few items for a verdict.
+    #[must_use]
+    pub fn is_too_small(&self) -> bool {
+        let is_across = matches!(self.kind, ComparisonKind::Model | ComparisonKind::Light);
+        is_across && self.paired.difference.n < MIN_PAIRS
+    }
 }
 
 /// All comparisons of a grid, ordered by kind, family and subjects.
@@ -98,7 +116,11 @@ pub(crate) fn comparisons(grid: &Grid<'_>) -> Vec<Comparison> {
 /// The comparisons with their significance, after Holm's correction within each set.
 fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
     let mut sets = BTreeMap::<_, Vec<usize>>::new();
-    for (index, comparison) in all.iter().enumerate() {
+    for (index, comparison) in all.iter_mut().enumerate() {
+        if comparison.is_too_small() {
+            comparison.significance = Significance::TooFew;
+            continue;
+        }
         let models = (
             comparison.first.model.clone(),
             comparison.second.model.clone(),
@@ -133,9 +155,8 @@ pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)
             ComparisonKind::Level
                 if subject.variant.kind.is_some() && subject.enhancer.is_none() =>
             {
-                let clean =
-                    Subject::seeing(&subject.model, AxisLevel::L0, &KindReading::NONE, None);
-                grid.find(&clean).into_iter().collect()
+                let clean = Subject::seeing(&subject.model, AxisLevel::L0, &subject.variant, None);
+                grid.stand_in(&clean).into_iter().collect()
             }
             ComparisonKind::Variant => match subject
                 .variant
@@ -148,6 +169,7 @@ pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)
                     other.variant = KindReading {
                         kind: base,
                         reading: None,
+                        group: subject.variant.group.clone(),
                     };
                 }),
             },
@@ -155,6 +177,7 @@ pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)
                 changed(grid, subject, |other| other.enhancer = None)
             }
             ComparisonKind::Model => later_models(grid, index),
+            ComparisonKind::Light => later_lights(grid, index),
             ComparisonKind::Blind if subject.view == Some(View::Image) => blind(grid, subject),
             _ => Vec::new(),
         };
@@ -167,7 +190,7 @@ pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)
 fn changed(grid: &Grid<'_>, subject: &Subject, change: impl FnOnce(&mut Subject)) -> Vec<usize> {
     let mut other = subject.clone();
     change(&mut other);
-    grid.find(&other).into_iter().collect()
+    grid.stand_in(&other).into_iter().collect()
 }
 
 /// Later models of the grid in the same condition, so that each pair occurs once. Built-in reference models are compared
@@ -184,6 +207,21 @@ fn later_models(grid: &Grid<'_>, index: usize) -> Vec<usize> {
     later
         .filter(|(_, other)| other.model != subject.model && condition(other) == condition(subject))
         .filter(|(_, other)| !is_left_out(other))
+        .map(|(other, _)| other)
+        .collect()
+}
+
+/// Later subjects of the grid with the same model at the same level, raw or with the same enhancer, in another light reading or
+/// with the images of other runs.
+fn later_lights(grid: &Grid<'_>, index: usize) -> Vec<usize> {
+    let subject = &grid.subjects[index];
+    let later = grid.subjects.iter().enumerate().skip(index + 1);
+    let same = |other: &Subject| {
+        (&other.model, other.view, other.level) == (&subject.model, subject.view, subject.level)
+            && (other.variant.kind, &other.enhancer) == (subject.variant.kind, &subject.enhancer)
+    };
+    later
+        .filter(|(_, other)| same(other) && other.variant != subject.variant)
         .map(|(other, _)| other)
         .collect()
 }

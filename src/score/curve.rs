@@ -5,7 +5,7 @@ use super::choice::ReadingMode;
 use super::estimate::Estimate;
 use super::grid::{ClusterCount, Grid, TrialResult};
 use super::subject::Subject;
-use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
+use crate::types::{AxisLevel, EnhancerName, Family, KindReading, LightGroup, View};
 
 /// Exposure drop, in EV, at which a model's accuracy is half-way between that at L0 and chance, with a 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,9 +47,10 @@ pub(super) struct CurvePoints {
 impl CurvePoints {
     /// All curves of a grid that have L0 and at least one degraded level.
     pub(super) fn all(grid: &Grid<'_>) -> Vec<Self> {
-        let degraded = grid.subjects.iter().filter(|subject| {
-            subject.view == Some(View::Image) && subject.variant != KindReading::NONE
-        });
+        let degraded = grid
+            .subjects
+            .iter()
+            .filter(|subject| subject.view == Some(View::Image) && subject.variant.kind.is_some());
         let mut keys: Vec<(&str, &KindReading, Option<&EnhancerName>)> = degraded
             .map(|subject| (&*subject.model, &subject.variant, subject.enhancer.as_ref()))
             .collect();
@@ -59,7 +60,9 @@ impl CurvePoints {
             let on_curve = |subject: &Subject| {
                 subject.view == Some(View::Image)
                     && subject.model == model
-                    && (subject.level == Some(AxisLevel::L0) && subject.enhancer.is_none()
+                    && (subject.level == Some(AxisLevel::L0)
+                        && subject.enhancer.is_none()
+                        && LightGroup::meet(subject.variant.group.as_ref(), variant.group.as_ref())
                         || subject.variant == *variant && subject.enhancer.as_ref() == enhancer)
             };
             let subjects = grid.subjects.iter().enumerate();

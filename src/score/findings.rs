@@ -8,6 +8,7 @@ use super::best::{BestInTheDark, best_in_the_dark};
 use super::bootstrap::Resamples;
 use super::chance::OfferedChoices;
 use super::cluster::{ClusterUnit, Clusters};
+use super::common::CommonItems;
 use super::comparison::{Comparison, ComparisonKind, comparisons};
 use super::confusion::{Confusion, Hallucination, confusions, hallucinations};
 use super::curve::{Curve, curves};
@@ -49,6 +50,8 @@ pub struct Findings<'a> {
     pub agreements: Vec<Agreement>,
     /// What the similarity of images to their clean frames says about the answers; `None` if it was not measured.
     pub fidelity: Option<FidelityFindings>,
+    /// What the models share; `None` if all were asked the same questions.
+    pub common: Option<CommonItems>,
 }
 
 impl<'a> Findings<'a> {
@@ -85,6 +88,7 @@ impl<'a> Findings<'a> {
             first_failures: first_failures(&grid),
             agreements: agreements(&grid, &draws),
             fidelity: FidelityFindings::new(&grid, measured),
+            common: CommonItems::of(&grid),
             grid,
         }
     }

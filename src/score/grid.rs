@@ -30,6 +30,12 @@ impl TrialResult {
         self != Self::Absent
     }
 
+    /// Whether there is a reply, readable or not.
+    #[must_use]
+    pub fn is_reply(self) -> bool {
+        matches!(self, Self::Read { .. })
+    }
+
     /// The reading in one mode; `None` if there is no reply, `Some(None)` if no choice could be read.
     #[must_use]
     #[expect(clippy::option_option, reason = "no reply, or no readable choice")]
@@ -176,6 +182,14 @@ impl<'a> Grid<'a> {
             .cloned()
     }
 
+    /// Index of the first subject that stands for another, if the grid has one: that subject itself, or one whose group of
+    /// runs meets its own.
+    #[must_use]
+    pub fn stand_in(&self, subject: &Subject) -> Option<usize> {
+        let any = || self.subjects.iter().position(|other| other.is_for(subject));
+        self.find(subject).or_else(any)
+    }
+
     /// Items of a family, each with its result for a subject.
     pub fn of_family<'s>(
         &'s self,
@@ -204,6 +218,31 @@ impl<'a> Grid<'a> {
             }
         }
         counts
+    }
+
+    /// The grid with some of its items; `kept` has a value for each item. Clusters keep their numbers.
+    #[must_use]
+    pub fn restricted(&self, kept: &[bool]) -> Self {
+        let cells = |subject: usize| {
+            let items = kept.iter().enumerate().filter(|(_, kept)| **kept);
+            items.map(move |(item, _)| subject * self.items.len() + item)
+        };
+        let cells: Vec<usize> = (0..self.subjects.len()).flat_map(cells).collect();
+        let items = self.items.iter().zip(kept);
+        Self {
+            subjects: self.subjects.clone(),
+            items: items
+                .filter(|(_, kept)| **kept)
+                .map(|(item, _)| *item)
+                .collect(),
+            clusters: self.clusters,
+            results: cells.iter().map(|cell| self.results[*cell]).collect(),
+            records: self.records,
+            record_indices: cells
+                .iter()
+                .map(|cell| self.record_indices[*cell])
+                .collect(),
+        }
     }
 
     /// The families of the items, sorted.

@@ -15,11 +15,13 @@
 pub(crate) mod accuracy;
 pub(crate) mod agreement;
 pub(crate) mod auc;
+pub(crate) mod baseline;
 pub(crate) mod best;
 pub(crate) mod bootstrap;
 pub(crate) mod chance;
 pub mod choice;
 pub(crate) mod cluster;
+pub(crate) mod common;
 pub(crate) mod comparison;
 pub(crate) mod confusion;
 pub(crate) mod curve;

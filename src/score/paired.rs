@@ -2,7 +2,7 @@
 
 use super::choice::ReadingMode;
 use super::estimate::Estimate;
-use super::grid::Grid;
+use super::grid::{Grid, GridItem};
 use super::significance::{mcnemar, sign_flip};
 use super::student::student;
 use crate::types::Family;
@@ -53,10 +53,21 @@ impl PairedComparison {
         family: Option<&Family>,
         mode: ReadingMode,
     ) -> Option<Self> {
+        Self::on_items(grid, first, second, mode, |_, item| item.is_of(family))
+    }
+
+    /// The same on the items for which `has` is true; it takes the index of an item and the item.
+    pub(crate) fn on_items(
+        grid: &Grid<'_>,
+        first: usize,
+        second: usize,
+        mode: ReadingMode,
+        has: impl Fn(usize, &GridItem<'_>) -> bool,
+    ) -> Option<Self> {
         let mut clusters = vec![ClusterPairs::default(); grid.clusters];
         let mut right = [0_usize; 2];
         for (index, item) in grid.items.iter().enumerate() {
-            if !item.is_of(family) {
+            if !has(index, item) {
                 continue;
             }
             let reading = |subject| grid.result(subject, index).reading(mode);

@@ -157,18 +157,19 @@ impl PooledSet {
         let seeing = |level, variant, enhancer| Subject::seeing(model, level, variant, enhancer);
         let first = seeing(level, &self.variant, self.enhancer.as_ref());
         let second = match self.kind {
-            PooledKind::Darkness => seeing(AxisLevel::L0, &KindReading::NONE, None),
+            PooledKind::Darkness => seeing(AxisLevel::L0, &self.variant, None),
             PooledKind::Noise => {
                 let base = KindReading {
                     kind: self.variant.kind.and_then(Kind::base),
                     reading: None,
+                    group: self.variant.group.clone(),
                 };
                 seeing(level, &base, None)
             }
             PooledKind::Enhancer => seeing(level, &self.variant, None),
             PooledKind::Blind => Subject::new(other, None),
         };
-        Some((grid.find(&first)?, grid.find(&second)?))
+        Some((grid.find(&first)?, grid.stand_in(&second)?))
     }
 
     /// The levels of the first side, sorted.

@@ -4,7 +4,9 @@ use super::choice::readings;
 use super::llm_match::{Protocol, mark};
 use crate::error::Result;
 use crate::types::detail::{ChoiceLine, OpenLine};
-use crate::types::{Answer, ChoiceDetail, Choices, Detail, OpenDetail, Reply, Step, TrialOutcome};
+use crate::types::{
+    Answer, ChoiceDetail, Choices, Detail, Digest, OpenDetail, Reply, Step, TrialOutcome,
+};
 
 impl Detail for ChoiceDetail {
     type Line = ChoiceLine;
@@ -32,6 +34,14 @@ impl Detail for ChoiceDetail {
     fn repeat(&self) -> u32 {
         self.repeat
     }
+
+    fn source(&self) -> &str {
+        &self.frame.0
+    }
+
+    fn shown(&self) -> Option<Digest> {
+        self.image.as_ref().map(|image| image.digest)
+    }
 }
 
 impl Detail for OpenDetail {
@@ -54,5 +64,13 @@ impl Detail for OpenDetail {
 
     fn repeat(&self) -> u32 {
         0
+    }
+
+    fn source(&self) -> &str {
+        &self.episode
+    }
+
+    fn shown(&self) -> Option<Digest> {
+        self.images.as_ref().map(|images| images.digest)
     }
 }

@@ -20,6 +20,8 @@ pub enum Significance {
     /// No verdict is possible: with so few clusters and so many tests the corrected p cannot be below 0.05, however large the
     /// difference is.
     TooFewClusters,
+    /// Fewer items are shared than a verdict needs ([`MIN_PAIRS`](super::comparison::MIN_PAIRS)).
+    TooFew,
 }
 
 impl Significance {
@@ -51,6 +53,7 @@ impl Significance {
             Self::Worse => "worse",
             Self::NotShown => "not shown",
             Self::TooFewClusters => "",
+            Self::TooFew => "too few",
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::types::{AxisLevel, Condition, EnhancerName, KindReading, Record, View};
+use crate::types::{AxisLevel, Condition, EnhancerName, KindReading, LightGroup, Record, View};
 
 /// The model name of the chance line.
 pub(crate) const CHANCE: &str = "chance";
@@ -66,13 +66,34 @@ impl Subject {
         };
         let variant = match self.variant.kind {
             None => String::new(),
-            Some(_) => format!("-{}", self.variant),
+            Some(_) => format!("-{}", self.variant.kind_and_reading()),
         };
         let enhancer = self.enhancer.as_ref().map(|name| format!("+{name}"));
-        format!("{level}{variant}{}", enhancer.unwrap_or_default())
+        let group = self.variant.group_suffix();
+        format!("{level}{variant}{}{group}", enhancer.unwrap_or_default())
     }
 
-    /// A model with images, at a level of a variant, raw or enhanced. L0 is the clean frame of every variant and enhancer.
+    /// Whether a subject of a report stands for this one: they are equal, but that their groups of runs need only meet.
+    #[must_use]
+    pub fn is_for(&self, other: &Self) -> bool {
+        let (one, two) = (&self.variant, &other.variant);
+        self.model == other.model
+            && (self.view, self.level) == (other.view, other.level)
+            && (one.kind, &one.reading) == (two.kind, &two.reading)
+            && self.enhancer == other.enhancer
+            && LightGroup::meet(one.group.as_ref(), two.group.as_ref())
+    }
+
+    /// The same model in the same condition, whichever runs show its images.
+    #[must_use]
+    pub fn in_any_light(&self) -> Self {
+        let mut subject = self.clone();
+        subject.variant.group = None;
+        subject
+    }
+
+    /// A model with images, at a level of a variant, raw or enhanced. L0 is the clean frame of every variant and enhancer; it
+    /// keeps the group of runs, so that [`is_for`](Self::is_for) finds the clean frames of these runs.
     #[must_use]
     pub fn seeing(
         model: &str,
@@ -86,7 +107,10 @@ impl Subject {
             view: Some(View::Image),
             level: Some(level),
             variant: if is_clean {
-                KindReading::NONE
+                KindReading {
+                    group: variant.group.clone(),
+                    ..KindReading::NONE
+                }
             } else {
                 variant.clone()
             },

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::degradation::{Axis, Degradation, Kind, ReadingName, Severity};
+use super::light_group::LightGroup;
 use super::words::written_as_text;
 
 /// A point on the axis of a curve: L0 (the untouched frame) or a severity. All kinds of one axis share their points.
@@ -63,6 +64,8 @@ pub struct KindReading {
     pub kind: Option<Kind>,
     /// The light reading; `None` if the kind has none.
     pub reading: Option<ReadingName>,
+    /// The runs that show these images, in a report on runs that show different ones; else `None`.
+    pub group: Option<LightGroup>,
 }
 
 impl KindReading {
@@ -70,6 +73,7 @@ impl KindReading {
     pub const NONE: Self = Self {
         kind: None,
         reading: None,
+        group: None,
     };
 
     /// The kind's word in files and flags, or `none`.
@@ -78,12 +82,29 @@ impl KindReading {
         self.kind.map_or("none", Kind::word)
     }
 
-    /// The name in captions, as `with noise`; with the light reading if it is not the paper's.
+    /// The name in captions, as `with noise`; with the light reading if it is not the paper's, without the group of runs.
     #[must_use]
     pub fn title(&self) -> String {
         let kind = self.kind.map_or("untouched", Kind::title);
         self.named_reading()
             .map_or(kind.to_owned(), |reading| format!("{kind} @{reading}"))
+    }
+
+    /// The kind's word with the light reading if it is not the paper's, as `noise@eld`; without the group of runs.
+    #[must_use]
+    pub fn kind_and_reading(&self) -> String {
+        match self.named_reading() {
+            None => self.word().to_owned(),
+            Some(reading) => format!("{}@{reading}", self.word()),
+        }
+    }
+
+    /// The group of runs as names end with it, ` @RUN`; empty without a group.
+    #[must_use]
+    pub fn group_suffix(&self) -> String {
+        self.group
+            .as_ref()
+            .map_or_else(String::new, ToString::to_string)
     }
 
     fn named_reading(&self) -> Option<&ReadingName> {
@@ -98,17 +119,15 @@ impl From<Option<&Degradation>> for KindReading {
         Self {
             kind: degradation.map(Degradation::kind),
             reading: degradation.and_then(|how| how.reading().cloned()),
+            group: None,
         }
     }
 }
 
 impl fmt::Display for KindReading {
-    /// `none`, `ev`, `noise` or `noise@eld`.
+    /// `none`, `ev`, `noise`, `noise@eld` or `noise @RUN`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.named_reading() {
-            None => f.pad(self.word()),
-            Some(reading) => f.pad(&format!("{}@{reading}", self.word())),
-        }
+        f.pad(&(self.kind_and_reading() + &self.group_suffix()))
     }
 }
 

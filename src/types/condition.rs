@@ -7,6 +7,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use super::axis_level::{AxisLevel, KindReading};
 use super::degradation::Degradation;
+use super::light_group::LightGroup;
 use super::words::as_text;
 use crate::error::Error;
 
@@ -51,6 +52,8 @@ pub struct Condition {
     pub degradation: Option<Degradation>,
     /// The enhancer; `None` if the image is not enhanced.
     pub enhancer: Option<EnhancerName>,
+    /// The runs that show these images, in a report on runs that show different ones; else `None`.
+    pub group: Option<LightGroup>,
 }
 
 impl Condition {
@@ -58,6 +61,7 @@ impl Condition {
     pub const L0: Self = Self {
         degradation: None,
         enhancer: None,
+        group: None,
     };
 
     /// The condition without an enhancer.
@@ -66,6 +70,7 @@ impl Condition {
         Self {
             degradation,
             enhancer: None,
+            group: None,
         }
     }
 
@@ -75,10 +80,13 @@ impl Condition {
         self.degradation.as_ref().into()
     }
 
-    /// The value of the column `variant`: the kind with its light reading.
+    /// The value of the column `variant`: the kind with its light reading and its group of runs.
     #[must_use]
     pub fn kind_reading(&self) -> KindReading {
-        self.degradation.as_ref().into()
+        KindReading {
+            group: self.group.clone(),
+            ..self.degradation.as_ref().into()
+        }
     }
 }
 
@@ -88,9 +96,12 @@ impl fmt::Display for Condition {
             None => f.write_str("L0")?,
             Some(degradation) => write!(f, "{degradation}")?,
         }
-        match &self.enhancer {
+        if let Some(name) = &self.enhancer {
+            write!(f, "+{name}")?;
+        }
+        match &self.group {
             None => Ok(()),
-            Some(name) => write!(f, "+{name}"),
+            Some(group) => group.fmt(f),
         }
     }
 }
@@ -110,6 +121,7 @@ impl FromStr for Condition {
         Ok(Self {
             degradation,
             enhancer,
+            group: None,
         })
     }
 }

@@ -12,6 +12,7 @@ pub(crate) mod frame;
 pub(crate) mod image_notes;
 pub(crate) mod kind_set;
 pub(crate) mod labels;
+pub(crate) mod light_group;
 pub(crate) mod manifest;
 pub(crate) mod question;
 pub(crate) mod recent;
@@ -34,6 +35,7 @@ pub use frame::{DepthKind, Frame, FrameId, Intrinsics, Rgb, Segmentation};
 pub use image_notes::{ImageFidelity, Thumbnail};
 pub use kind_set::KindSet;
 pub use labels::{Label, Labels, SegmentName};
+pub use light_group::LightGroup;
 pub use question::{Answer, Choices, Family, Question, QuestionId, UnreadReason};
 pub use record::{Detail, Failure, FailureKind, Via, View};
 pub use reply::{Finish, Reply, Usage};
@@ -69,7 +71,7 @@ mod tests {
         #[test]
         fn conditions_read_back(degradation in degradation(), enhancer in prop::option::of("[A-Za-z0-9_.-]{1,12}")) {
             let enhancer = enhancer.map(|name| EnhancerName::new(&name).unwrap());
-            let condition = Condition { degradation, enhancer };
+            let condition = Condition { degradation, enhancer, group: None };
             prop_assert_eq!(&condition.to_string().parse::<Condition>().unwrap(), &condition);
             let json = serde_json::to_string(&condition).unwrap();
             prop_assert_eq!(serde_json::from_str::<Condition>(&json).unwrap(), condition);

@@ -6,6 +6,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use super::condition::Condition;
+use super::digest::Digest;
 use super::question::QuestionId;
 use super::reply::{Finish, Reply, Usage};
 use super::trial_key::TrialKey;
@@ -68,6 +69,12 @@ pub trait Detail: Clone + Serialize + Send {
 
     /// How many times the same question was asked before.
     fn repeat(&self) -> u32;
+
+    /// The name of what was shown: the frame or the walk.
+    fn source(&self) -> &str;
+
+    /// The digest of what was sent of it; `None` if nothing was sent, or if that is not known.
+    fn shown(&self) -> Option<Digest>;
 }
 
 impl<'de, D: Detail> Deserialize<'de> for Record<D> {

@@ -60,6 +60,7 @@ fn bench(c: &mut Criterion) {
         runs: Vec::new(),
         questions: &[],
         thumbnails: &[],
+        alerts: &[],
     };
     group.bench_function("make the report", |b| {
         b.iter(|| black_box(products(&findings, &tables(&findings), &shown).unwrap()));

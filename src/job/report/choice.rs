@@ -1,5 +1,6 @@
 //! The report of a run of questions with choices, from its records alone.
 
+use super::alerts::alerts;
 use super::combine::{Combined, combine};
 use crate::error::Result;
 use crate::job::outcome::Outcome;
@@ -35,19 +36,20 @@ pub(super) fn in_its_folder(
     show: StdoutFormat,
 ) -> Result<String> {
     let (folder, findings) = (store.folder(), combined.findings());
-    let tables = tables(&findings);
-    for (name, content) in products(&findings, &tables, &combined.shown())? {
+    let (tables, alerts) = (tables(&findings), alerts(combined, &findings));
+    for (name, content) in products(&findings, &tables, &combined.shown(&alerts))? {
         store.write(&name, &content)?;
     }
     let unread = &findings.summary.unread;
-    let json = |folder| summary(&tables, unread, RunList::One(manifest, folder));
+    let json = |folder| summary(&tables, unread, RunList::One(manifest, folder), &alerts);
     store.write("summary.json", json(None)?.as_bytes())?;
     store.write_manifest(manifest)?;
     Ok(match show {
         StdoutFormat::Json => json(Some(folder))?,
         StdoutFormat::Table => {
             let report = folder.join(PAGE);
-            evaluation(&tables, &[(manifest, folder)]) + &format!("report: {}\n", report.display())
+            evaluation(&tables, &[(manifest, folder)], &alerts)
+                + &format!("report: {}\n", report.display())
         }
     })
 }

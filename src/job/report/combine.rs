@@ -6,11 +6,14 @@ use std::path::Path;
 use super::join::{Joined, join};
 use crate::error::{Error, Result};
 use crate::job::stored::StoredRun;
+use crate::report::alert::Alert;
 use crate::report::page::{self, PageInputs};
 use crate::score::chance::OfferedChoices;
+use crate::score::cluster::Clusters;
 use crate::score::findings::Findings;
+use crate::score::grid::Grid;
 use crate::types::manifest::RunManifest;
-use crate::types::{ChoiceDetail, QuestionId, Record, RunQuestion};
+use crate::types::{ChoiceDetail, FrameId, QuestionId, Record, RunQuestion};
 
 /// Several runs of questions with choices, joined.
 pub(super) type Combined = Joined<ChoiceDetail>;
@@ -18,24 +21,37 @@ pub(super) type Combined = Joined<ChoiceDetail>;
 impl Combined {
     /// The results that follow from the records.
     pub(super) fn findings(&self) -> Findings<'_> {
-        let scenes = self.questions.iter();
-        let scenes = scenes.map(|question| (question.frame.clone(), question.scene.clone()));
         let offers = offers(&self.records, &self.questions);
-        Findings::new(&self.records, &scenes.collect(), offers, &self.fidelity)
+        Findings::new(
+            &self.records,
+            &scenes(&self.questions),
+            offers,
+            &self.fidelity,
+        )
+    }
+
+    /// The records by subject and item.
+    pub(super) fn grid(&self) -> Grid<'_> {
+        Grid::new(&self.records, &clusters(&self.records, &self.questions))
     }
 
     /// Further inputs of the HTML page.
-    pub(super) fn shown(&self) -> PageInputs<'_> {
+    pub(super) fn shown<'a>(&'a self, alerts: &'a [Alert]) -> PageInputs<'a> {
         let runs = self.runs.iter().map(|run| page::PageRun {
             name: run.name.clone(),
             manifest: &run.manifest,
-            records: &self.records[run.records.clone()],
+            records: run
+                .records
+                .iter()
+                .map(|place| &self.records[*place])
+                .collect(),
             cost: run.cost.clone(),
         });
         PageInputs {
             runs: runs.collect(),
             questions: &self.questions,
             thumbnails: &self.thumbnails,
+            alerts,
         }
     }
 
@@ -44,6 +60,25 @@ impl Combined {
         let runs = self.runs.iter();
         runs.map(|run| (&run.manifest, &*run.folder)).collect()
     }
+}
+
+/// The scene of each frame.
+fn scenes<'a>(questions: impl IntoIterator<Item = &'a RunQuestion>) -> BTreeMap<FrameId, String> {
+    let questions = questions.into_iter();
+    questions
+        .map(|question| (question.frame.clone(), question.scene.clone()))
+        .collect()
+}
+
+/// The clusters of records, with the scenes that these questions name.
+pub(super) fn clusters<'a>(
+    records: &[Record],
+    questions: impl IntoIterator<Item = &'a RunQuestion>,
+) -> Clusters {
+    let pairs = records
+        .iter()
+        .map(|record| (&record.question, &record.detail.frame));
+    Clusters::new(pairs, &scenes(questions))
 }
 
 /// Joins runs that can be compared.
@@ -87,7 +122,7 @@ fn offers(records: &[Record], questions: &[RunQuestion]) -> Vec<OfferedChoices> 
 }
 
 /// Checks that runs can be compared.
-fn check_comparable(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
+pub(super) fn check_comparable(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
     let mut questions = BTreeMap::<&QuestionId, (usize, BTreeSet<&String>, &String)>::new();
     let wrong = |run: &StoredRun<ChoiceDetail>, problem: String| {
         let path = run.folder.clone();

@@ -1,24 +1,30 @@
 //! Joining several runs of either kind: [`join`].
 
 use std::collections::{BTreeSet, HashMap, HashSet};
-use std::ops::Range;
 use std::path::PathBuf;
 
 use super::cost::cost;
+use super::lights::Lights;
+use super::models::Names;
 use crate::error::Result;
 use crate::job::stored::StoredRun;
 use crate::types::manifest::RunManifest;
 use crate::types::{
-    Detail, ImageFidelity, QuestionId, Record, RunQuestion, Thumbnail, TrialKey, View,
+    Condition, Detail, FrameId, ImageFidelity, QuestionId, Record, RunQuestion, Thumbnail, TrialKey,
 };
 
 /// The runs, with all records, questions and thumbnails.
 pub(super) struct Joined<D> {
+    /// The runs in the order in which they were named.
     pub(super) runs: Vec<JoinedRun>,
     pub(super) records: Vec<Record<D>>,
     pub(super) questions: Vec<RunQuestion>,
     pub(super) thumbnails: Vec<Thumbnail>,
     pub(super) fidelity: Vec<ImageFidelity>,
+    /// The images that differ between runs.
+    pub(super) lights: Lights,
+    /// The models that were asked in different ways.
+    pub(super) models: Names,
 }
 
 /// One of the joined runs.
@@ -27,61 +33,118 @@ pub(super) struct JoinedRun {
     pub(super) name: String,
     pub(super) manifest: RunManifest,
     pub(super) cost: Option<String>,
-    /// Range of its records among those of all runs.
-    pub(super) records: Range<usize>,
+    /// The questions of the run, of which [`Joined::questions`] holds each once.
+    pub(super) questions: Vec<RunQuestion>,
+    /// Places of its records among those of all runs. A record that several runs have is stored once, and listed by each.
+    pub(super) records: Vec<usize>,
 }
 
-/// Joins runs. If a model answered the same item in two runs as different trials (another seed, prompt or parameter), it is listed
-/// once per run, with the run's name. A trial that two runs share counts once. Only records that are `compared` decide whether a
-/// model is listed per run.
+/// Joins runs. Conditions whose images differ between runs are kept apart ([`Lights`]), and so are models that were asked in
+/// different ways ([`Names`]). A trial that two runs share counts once. Only records that are `compared` decide about models.
+///
+/// The result does not depend on the order of the runs, but for the order of [`Joined::runs`].
 pub(super) fn join<D: Detail>(
-    runs: Vec<StoredRun<D>>,
+    mut runs: Vec<StoredRun<D>>,
     compared: impl Fn(&Record<D>) -> bool,
 ) -> Result<Joined<D>> {
-    let twice = answered_twice(&runs, compared);
     let names = names(&runs);
+    let mut order: Vec<usize> = (0..runs.len()).collect();
+    order.sort_by(|one, other| {
+        (&names[*one], &runs[*one].folder).cmp(&(&names[*other], &runs[*other].folder))
+    });
+    let lights = Lights::of(&runs, &names, &order);
+    for (index, run) in runs.iter_mut().enumerate().filter(|_| !lights.is_one()) {
+        let records = run.records.iter_mut();
+        for condition in records.filter_map(|record| record.condition.as_mut()) {
+            lights.mark(condition, index);
+        }
+        for thumbnail in &mut run.thumbnails {
+            lights.mark(&mut thumbnail.condition, index);
+        }
+    }
+    let models = Names::of(&runs, &names, &order, &compared);
     let mut joined = Joined {
         runs: Vec::new(),
         records: Vec::new(),
         questions: Vec::new(),
         thumbnails: Vec::new(),
         fidelity: Vec::new(),
+        lights,
+        models,
     };
-    let mut known = HashSet::<TrialKey>::new();
-    let mut listed = BTreeSet::<QuestionId>::new();
-    let mut pictured = BTreeSet::new();
-    for (run, name) in runs.into_iter().zip(names) {
-        let first = joined.records.len();
+    let mut known = Known::default();
+    let mut runs: Vec<Option<StoredRun<D>>> = runs.into_iter().map(Some).collect();
+    let mut by_name = Vec::new();
+    for index in order {
+        if let Some(run) = runs[index].take() {
+            let run = joined.add(run, index, names[index].clone(), &mut known)?;
+            by_name.push((index, run));
+        }
+    }
+    by_name.sort_by_key(|(index, _)| *index);
+    joined.runs = by_name.into_iter().map(|(_, run)| run).collect();
+    Ok(joined)
+}
+
+/// What the runs before have.
+#[derive(Default)]
+struct Known {
+    /// Places of the records with a reply, by key and by the group of the model's name.
+    trials: HashMap<(TrialKey, usize), usize>,
+    questions: HashSet<QuestionId>,
+    thumbnails: BTreeSet<(FrameId, Condition)>,
+}
+
+impl<D: Detail> Joined<D> {
+    /// Adds what a run has and no run before it.
+    fn add(
+        &mut self,
+        run: StoredRun<D>,
+        index: usize,
+        name: String,
+        known: &mut Known,
+    ) -> Result<JoinedRun> {
         let cost = cost(&run.records)?;
+        let mut records = Vec::with_capacity(run.records.len());
         for mut record in run.records {
-            if known.contains(&record.key) {
+            let group = self.models.group(&record.model, index);
+            let trial = (
+                self.models.key(record.key),
+                group.map_or(0, |(group, _)| group + 1),
+            );
+            if let Some(place) = known.trials.get(&trial) {
+                records.push(*place);
                 continue;
             }
             if !record.failed() {
-                known.insert(record.key);
+                known.trials.insert(trial, self.records.len());
             }
-            if twice.contains(&(record.view, record.model.clone())) {
-                record.model = format!("{} ({name})", record.model);
+            if let Some((_, name)) = group {
+                record.model.clone_from(name);
             }
-            joined.records.push(record);
+            records.push(self.records.len());
+            self.records.push(record);
         }
-        joined.runs.push(JoinedRun {
+        for question in &run.questions {
+            if known.questions.insert(question.id.clone()) {
+                self.questions.push(question.clone());
+            }
+        }
+        let thumbnails = run.thumbnails.into_iter();
+        self.thumbnails.extend(thumbnails.filter(|thumbnail| {
+            let place = (thumbnail.frame.clone(), thumbnail.condition.clone());
+            known.thumbnails.insert(place)
+        }));
+        self.fidelity.extend(run.fidelity);
+        Ok(JoinedRun {
             folder: run.folder,
             name,
             manifest: run.manifest,
             cost,
-            records: first..joined.records.len(),
-        });
-        let questions = run.questions.into_iter();
-        let new = questions.filter(|question| listed.insert(question.id.clone()));
-        joined.questions.extend(new);
-        let thumbnails = run.thumbnails.into_iter();
-        joined.thumbnails.extend(thumbnails.filter(|thumbnail| {
-            pictured.insert((thumbnail.frame.clone(), thumbnail.condition.clone()))
-        }));
-        joined.fidelity.extend(run.fidelity);
+            questions: run.questions,
+            records,
+        })
     }
-    Ok(joined)
 }
 
 /// Names of runs: those of their folders, or their paths if two folders have the same name.
@@ -93,30 +156,4 @@ fn names<D: Detail>(runs: &[StoredRun<D>]) -> Vec<String> {
     }
     let paths = runs.iter().map(|run| run.folder.display().to_string());
     paths.collect()
-}
-
-/// The models that answered the same item in two runs as different trials.
-fn answered_twice<D: Detail>(
-    runs: &[StoredRun<D>],
-    compared: impl Fn(&Record<D>) -> bool,
-) -> BTreeSet<(View, String)> {
-    let mut keys = HashMap::new();
-    let mut twice = BTreeSet::new();
-    if runs.len() < 2 {
-        return twice;
-    }
-    for (index, run) in runs.iter().enumerate() {
-        for record in run.records.iter().filter(|record| compared(record)) {
-            let item = (
-                (record.view, &record.model),
-                (&record.condition, &record.question),
-                (record.detail.choices(), record.detail.repeat()),
-            );
-            let (key, first) = *keys.entry(item).or_insert((record.key, index));
-            if key != record.key && first != index {
-                twice.insert((record.view, record.model.clone()));
-            }
-        }
-    }
-    twice
 }

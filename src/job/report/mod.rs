@@ -1,11 +1,17 @@
 //! Reports of runs, from their records alone: files, and text for the terminal.
 
+mod alerts;
+mod baseline;
 pub(crate) mod choice;
 mod combine;
+mod common;
 mod cost;
 mod join;
+mod lights;
+mod models;
 pub(crate) mod open;
 mod runs;
+mod settings;
 mod story;
 
 pub(crate) use runs::{ReportArgs, report};

@@ -5,12 +5,14 @@ use std::path::PathBuf;
 
 use serde_json::Value;
 
+use super::alerts::of_runs;
 use super::join::join;
 use crate::error::{Error, Result};
 use crate::job::outcome::Outcome;
 use crate::job::outcome::StdoutFormat;
 use crate::job::predictions::{AnswerState, Prediction, predictions};
 use crate::job::stored::{StoredRun, in_order};
+use crate::report::alert::{Alert, AlertKind};
 use crate::report::openeqa::{OpenReport, ReportedAnswer, products, render, summary_json, tables};
 use crate::report::table::Table;
 use crate::score::llm_match::{Protocol, mark};
@@ -32,11 +34,12 @@ pub(crate) struct Scores {
     protocol: Protocol,
     summary: OpenSummary,
     answers: Vec<ReportedAnswer>,
+    alerts: Vec<Alert>,
 }
 
 impl Scores {
     /// The scores of a run, from the marks of the judge in its manifest.
-    pub(crate) fn new(run: StoredRun<OpenDetail>) -> Result<Self> {
+    pub(crate) fn new((run, alerts): (StoredRun<OpenDetail>, Vec<Alert>)) -> Result<Self> {
         let setting = |name| run.manifest.settings.get(name).and_then(Value::as_str);
         let judge = setting(JUDGE).map(str::to_owned);
         let protocol = setting(PROTOCOL).map_or(Ok(Protocol::Upstream), read_word)?;
@@ -66,6 +69,7 @@ impl Scores {
             judge,
             protocol,
             answers,
+            alerts,
         })
     }
 
@@ -79,6 +83,7 @@ impl Scores {
         OpenReport {
             summary: &self.summary,
             manifest: &self.run.manifest,
+            alerts: &self.alerts,
             judge: self.judge.as_deref(),
             protocol: self.protocol,
             name: self.run.name(),
@@ -127,11 +132,13 @@ impl Scores {
     }
 }
 
-/// Several runs, joined to one by [`join`].
+/// Several runs, joined to one by [`join`], with what differs between them.
 ///
 /// # Errors
 /// If the runs have different judges or protocols, or different questions under the same name.
-pub(crate) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<StoredRun<OpenDetail>> {
+pub(crate) fn combine(
+    runs: Vec<StoredRun<OpenDetail>>,
+) -> Result<(StoredRun<OpenDetail>, Vec<Alert>)> {
     let mut questions = HashMap::<QuestionId, RunQuestion>::new();
     let mut marked: Option<(PathBuf, [Option<Value>; 2])> = None;
     for run in &runs {
@@ -143,8 +150,10 @@ pub(crate) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<StoredRun<Open
         match &marked {
             Some((other, other_by)) if *other_by != by => {
                 return wrong(format!(
-                    "its answers were marked by another judge or read by another protocol than those of {}; report each run alone",
-                    other.display()
+                    "its answers were marked by {} and those of {} by {}: marks of two judges or protocols do not compare; report each run alone, or run openeqa on its folder again with the other's --judge and --protocol: only marks are asked",
+                    judged(&by),
+                    other.display(),
+                    judged(other_by)
                 ));
             }
             Some(_) => {}
@@ -166,16 +175,22 @@ pub(crate) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<StoredRun<Open
         }
     }
     let joined = join(runs, |record| record.detail.step == Step::Answer)?;
+    let mut alerts = of_runs(&joined);
+    if joined.runs.len() == 1 {
+        // The text and the page of one run say more about what is missing.
+        alerts.retain(|alert| alert.kind != AlertKind::NotComplete);
+    }
     let first = joined.runs.into_iter().next();
     let first = first.ok_or_else(|| Error::usage("RUN", "no run is named"))?;
-    Ok(StoredRun {
+    let run = StoredRun {
         records: in_order(joined.records, &joined.questions),
         folder: first.folder,
         manifest: first.manifest,
         questions: joined.questions,
         thumbnails: joined.thumbnails,
         fidelity: joined.fidelity,
-    })
+    };
+    Ok((run, alerts))
 }
 
 /// Scores a run, and writes its report and manifest into its folder. The run is incomplete if a mark cannot be read.
@@ -184,7 +199,7 @@ pub(crate) fn write(
     run: StoredRun<OpenDetail>,
     show: StdoutFormat,
 ) -> Result<Outcome> {
-    let mut scores = Scores::new(run)?;
+    let mut scores = Scores::new(combine(vec![run])?)?;
     if scores.run.manifest.status == Status::Complete && scores.has_unmarked() {
         scores.run.manifest.status = Status::Incomplete;
     }
@@ -234,4 +249,13 @@ fn topic(question: &RunQuestion) -> QuestionGroups {
         category: question.family.name().to_owned(),
         episode,
     }
+}
+
+/// A judge and a protocol in words.
+fn judged([judge, protocol]: &[Option<Value>; 2]) -> String {
+    let word = |value: &Option<Value>, other: &str| {
+        let word = value.as_ref().and_then(Value::as_str);
+        word.unwrap_or(other).to_owned()
+    };
+    format!("{} ({})", word(judge, "nobody"), word(protocol, "upstream"))
 }

@@ -5,13 +5,17 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::alerts::alerts;
+use super::baseline::Baseline;
 use super::choice::in_its_folder;
 use super::combine::{Combined, combine};
+use super::common::restrict;
 use super::open;
 use crate::error::{Error, Result};
 use crate::files;
 use crate::job::stored::{AnyRun, StoredRun};
 use crate::job::{Outcome, StdoutFormat, count};
+use crate::report::alert::Alert;
 use crate::report::json::{RunList, summary};
 use crate::report::products::{PAGE, products};
 use crate::report::tables::tables;
@@ -33,9 +37,27 @@ pub(crate) struct ReportArgs {
     /// is one, else nowhere
     #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub out: Option<PathBuf>,
+    /// Report only on the items that all models with images answered
+    #[arg(long, add = Decides::Nothing)]
+    pub common: bool,
+    /// An old run to compare with.
+    #[command(flatten)]
+    pub baseline: BaselineArgs,
     /// Print the summary as JSON instead of a table
     #[arg(long, add = Decides::Nothing)]
     pub json: bool,
+}
+
+/// The flags of a comparison with an old run.
+#[derive(Debug, Args)]
+pub(crate) struct BaselineArgs {
+    /// Compare each model and condition with the same ones of an old run: new less old, on the items and images that both have;
+    /// default: no comparison
+    #[arg(long, value_name = "OLD", add = Decides::Nothing)]
+    pub baseline: Option<PathBuf>,
+    /// Exit with 1 if any model is shown to be worse than the baseline in any condition
+    #[arg(long, requires = "baseline", add = Decides::Nothing)]
+    pub fail_if_worse: bool,
 }
 
 impl ReportArgs {
@@ -56,9 +78,9 @@ pub(crate) fn report(args: &ReportArgs) -> Result<Outcome> {
             AnyRun::Open(run) => open.push(run),
         }
     }
-    let output = match (choice.is_empty(), open.is_empty()) {
+    let (status, output) = match (choice.is_empty(), open.is_empty()) {
         (_, true) => of_choices(args, choice)?,
-        (true, false) => of_open(args, open)?,
+        (true, false) => (Status::Complete, of_open(args, open)?),
         (false, false) => {
             return Err(Error::usage(
                 "RUN",
@@ -66,13 +88,13 @@ pub(crate) fn report(args: &ReportArgs) -> Result<Outcome> {
             ));
         }
     };
-    Ok(Outcome {
-        status: Status::Complete,
-        output,
-    })
+    Ok(Outcome { status, output })
 }
 
-fn of_choices(args: &ReportArgs, mut runs: Vec<StoredRun<ChoiceDetail>>) -> Result<String> {
+fn of_choices(
+    args: &ReportArgs,
+    mut runs: Vec<StoredRun<ChoiceDetail>>,
+) -> Result<(Status, String)> {
     let mut output = String::new();
     for run in &mut runs {
         if run.records.is_empty() {
@@ -91,33 +113,68 @@ fn of_choices(args: &ReportArgs, mut runs: Vec<StoredRun<ChoiceDetail>>) -> Resu
     if args.show() == StdoutFormat::Json {
         output.clear();
     }
-    let combined = combine(runs)?;
-    output += &match (&*combined.runs, &args.out) {
-        ([run], None) => match Store::open(&run.folder, &run.manifest, AddressChange::Allowed) {
+    let old = args.baseline.baseline.as_ref().map(|folder| {
+        let old =
+            StoredRun::of_choices(folder, "--baseline compares runs of questions with choices")?;
+        Ok::<_, Error>((runs.clone(), old))
+    });
+    let old = old.transpose()?;
+    let mut combined = combine(runs)?;
+    if args.common {
+        combined = restrict(combined)?;
+    }
+    let baseline = old.map(|(new, old)| Baseline::new(&combined, new, old));
+    let baseline = baseline.transpose()?;
+    let in_folder = args.out.is_none() && !args.common && baseline.is_none();
+    output += &match &*combined.runs {
+        [run] if in_folder => match Store::open(&run.folder, &run.manifest, AddressChange::Allowed)
+        {
             Ok(store) => in_its_folder(&store, &run.manifest, &combined, args.show())?,
             // A run that another process writes, or in a read-only folder, is shown anyway.
             Err(error) => {
                 tracing::warn!("the report is not written: {error}");
-                compare(&combined, args)?
+                compare(&combined, baseline.as_ref(), args)?
             }
         },
-        _ => compare(&combined, args)?,
+        _ => compare(&combined, baseline.as_ref(), args)?,
     };
-    Ok(output)
+    let is_worse = baseline.is_some_and(|baseline| baseline.is_worse());
+    // A command whose outcome is not what was asked for ends with 1.
+    let status = if args.baseline.fail_if_worse && is_worse {
+        Status::Incomplete
+    } else {
+        Status::Complete
+    };
+    Ok((status, output))
 }
 
 /// The text of several runs, joined. Writes the report if `--out` is set.
-fn compare(combined: &Combined, args: &ReportArgs) -> Result<String> {
+fn compare(combined: &Combined, baseline: Option<&Baseline>, args: &ReportArgs) -> Result<String> {
     let findings = combined.findings();
-    let (tables, runs) = (tables(&findings), combined.manifests());
+    let (mut tables, runs) = (tables(&findings), combined.manifests());
+    let mut alerts = alerts(combined, &findings);
+    if let Some(baseline) = baseline {
+        // Below the table of levels.
+        tables.insert(tables.len().min(2), baseline.table());
+        let new = baseline
+            .alerts
+            .iter()
+            .filter(|alert| !alerts.contains(alert));
+        let new: Vec<Alert> = new.cloned().collect();
+        alerts.extend(new);
+        alerts.sort_by_key(|alert| alert.kind);
+    }
+    let unread = &findings.summary.unread;
+    let json = || summary(&tables, unread, RunList::Several(&runs), &alerts);
     let shown = match args.show() {
-        StdoutFormat::Json => summary(&tables, &findings.summary.unread, RunList::Several(&runs))?,
-        StdoutFormat::Table => evaluation(&tables, &runs),
+        StdoutFormat::Json => json()?,
+        StdoutFormat::Table => evaluation(&tables, &runs, &alerts),
     };
-    let files = match args.out {
-        Some(_) => products(&findings, &tables, &combined.shown())?,
-        None => Vec::new(),
-    };
+    let mut files = Vec::new();
+    if args.out.is_some() {
+        files = products(&findings, &tables, &combined.shown(&alerts))?;
+        files.push(("summary.json".to_owned(), json()?.into_bytes()));
+    }
     write_files(args, shown, files)
 }
 
@@ -143,6 +200,14 @@ fn write_files(
 }
 
 fn of_open(args: &ReportArgs, runs: Vec<StoredRun<OpenDetail>>) -> Result<String> {
+    let flags = [
+        ("--common", args.common),
+        ("--baseline", args.baseline.baseline.is_some()),
+    ];
+    if let Some((flag, _)) = flags.iter().find(|(_, is_set)| *is_set) {
+        let problem = "compares runs of questions with choices; marks of open questions have no such test: leave it out";
+        return Err(Error::usage(*flag, problem));
+    }
     if let Some(run) = runs.iter().find(|run| run.records.is_empty()) {
         return Err(no_records(run.folder.clone()));
     }

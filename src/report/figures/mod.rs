@@ -85,7 +85,8 @@ impl<'a> Overview<'a> {
         let levels = self.levels.iter();
         let points = levels.filter_map(|&level| {
             let subject = Subject::seeing(model, level, variant, enhancer);
-            Some((level, number(&subject)?))
+            let subject = self.findings.grid.stand_in(&subject)?;
+            Some((level, number(&self.findings.grid.subjects[subject])?))
         });
         points.collect()
     }

@@ -17,6 +17,7 @@ pub(crate) use tables::tables;
 
 use self::coverage::coverage;
 use crate::error::Result;
+use crate::report::alert::{Alert, lines};
 use crate::report::products::{PAGE, table_files};
 use crate::report::table::Table;
 use crate::report::{chart, json, terminal};
@@ -51,6 +52,7 @@ struct Head<'a> {
     protocol: String,
     clustered_by: &'static str,
     clusters: usize,
+    alerts: &'a [Alert],
 }
 
 /// The summary as JSON: the run's manifest, the judge and the protocol, and the rows of the CSV. `folder` is given if the
@@ -71,6 +73,7 @@ pub(crate) fn summary_json(
         protocol: report.protocol.to_string(),
         clustered_by: report.summary.unit,
         clusters: report.summary.clusters,
+        alerts: report.alerts,
     };
     json::document(head, &tables[0])
 }
@@ -79,7 +82,8 @@ pub(crate) fn summary_json(
 /// scored answers, and the folder.
 #[must_use]
 pub(crate) fn render(report: &OpenReport<'_>, tables: &[Table], folder: &Path) -> String {
-    let mut text = terminal::progress(report.manifest, "answers and marks stored");
+    let mut text = lines(report.alerts);
+    text += &terminal::progress(report.manifest, "answers and marks stored");
     match report.judge {
         Some(_) => text += &terminal::render(tables),
         None => text += "No answer is marked: name a judge with --judge NAME\n",

@@ -1,5 +1,6 @@
 //! The data of a report on open questions: [`OpenReport`].
 
+use crate::report::alert::Alert;
 use crate::score::llm_match::Protocol;
 use crate::score::open::{AnswerOutcome, OpenSummary};
 use crate::score::subject::Subject;
@@ -11,6 +12,8 @@ use crate::types::{RunQuestion, Thumbnail};
 pub(crate) struct OpenReport<'a> {
     pub summary: &'a OpenSummary,
     pub manifest: &'a RunManifest,
+    /// What stands above everything, if there are several runs.
+    pub alerts: &'a [Alert],
     /// Name of the judge; `None` if no judge was named.
     pub judge: Option<&'a str>,
     /// Protocol by which the answers are judged.

@@ -52,7 +52,11 @@ pub(super) fn page(
 /// Warnings at the top of the page: missing marks, missing answers, no judge.
 fn alerts(report: &OpenReport<'_>) -> Vec<String> {
     let (status, counts) = (report.manifest.status, report.manifest.counts);
-    let mut alerts = Vec::new();
+    let mut alerts: Vec<String> = report
+        .alerts
+        .iter()
+        .map(|alert| alert.text.clone())
+        .collect();
     let unmarked = report.answers.iter();
     let unmarked = unmarked.filter(|answer| answer.outcome == AnswerOutcome::Unmarked);
     match unmarked.count() {
@@ -184,7 +188,9 @@ fn marks(answers: &[&ReportedAnswer]) -> Vec<String> {
 /// Whether some subject with a level has fewer points than the same model on the clean frames.
 fn lost(answers: &[&ReportedAnswer]) -> bool {
     let points = |subject: &Subject| {
-        let mut of_subject = answers.iter().filter(|answer| answer.subject == *subject);
+        let mut of_subject = answers
+            .iter()
+            .filter(|answer| answer.subject.is_for(subject));
         of_subject.find_map(|answer| answer.outcome.points())
     };
     answers.iter().any(|answer| {

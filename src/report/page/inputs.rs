@@ -1,5 +1,6 @@
 //! Data of the page besides the findings: [`PageInputs`].
 
+use crate::report::alert::Alert;
 use crate::types::manifest::RunManifest;
 use crate::types::{Record, RunQuestion, Thumbnail};
 
@@ -10,7 +11,7 @@ pub struct PageRun<'a> {
     pub name: String,
     pub manifest: &'a RunManifest,
     /// Records of the run, for totals of requests, tokens and latency.
-    pub records: &'a [Record],
+    pub records: Vec<&'a Record>,
     /// Cost of the records in words; `None` if it is not known.
     pub cost: Option<String>,
 }
@@ -24,4 +25,6 @@ pub struct PageInputs<'a> {
     pub questions: &'a [RunQuestion],
     /// Thumbnails of the images; empty if the runs do not store them.
     pub thumbnails: &'a [Thumbnail],
+    /// What stands above everything.
+    pub alerts: &'a [Alert],
 }

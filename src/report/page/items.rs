@@ -81,6 +81,8 @@ struct Subject<'a> {
     level: Option<AxisLevel>,
     variant: String,
     enhancer: Option<&'a str>,
+    /// Index of the subject of the clean frames of the same images, if it was asked.
+    clean: Option<usize>,
 }
 
 #[derive(Serialize)]
@@ -261,8 +263,16 @@ fn subjects<'a>(grid: &'a Grid<'_>) -> Vec<Subject<'a>> {
             .enhancer
             .as_ref()
             .map(crate::types::EnhancerName::as_str),
+        clean: clean(grid, subject),
     };
     grid.subjects.iter().map(subject).collect()
+}
+
+/// Index of the subject of the clean frames of a subject with images.
+fn clean(grid: &Grid<'_>, of: &crate::score::subject::Subject) -> Option<usize> {
+    of.level?;
+    let clean = crate::score::subject::Subject::seeing(&of.model, AxisLevel::L0, &of.variant, None);
+    grid.stand_in(&clean)
 }
 
 /// The different reasons for unreadable replies, with `None` first, and for each subject and item the index of its reason.

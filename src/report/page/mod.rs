@@ -20,7 +20,7 @@ use super::template::filled;
 use crate::error::Result;
 use crate::score::findings::Findings;
 use crate::types::Record;
-use crate::types::manifest::{RunManifest, Status};
+use crate::types::manifest::RunManifest;
 
 /// The template of the page, its style and its script.
 const PAGE: &str = include_str!("page.html");
@@ -32,7 +32,7 @@ const SCRIPT: &str = include_str!("page.js");
 struct Page<'a> {
     title: String,
     /// Warnings at the top of the page.
-    alerts: Vec<String>,
+    alerts: Vec<&'a str>,
     intro: Vec<String>,
     sections: Vec<sections::PageSection<'a>>,
     runs: Vec<Value>,
@@ -56,7 +56,7 @@ pub(crate) fn page<'a>(
         PAGE,
         Page {
             title: title(inputs),
-            alerts: alerts(inputs),
+            alerts: inputs.alerts.iter().map(|alert| &*alert.text).collect(),
             intro: intro(findings),
             sections: sections::sections(tables, figures, inputs.thumbnails),
             runs: inputs.runs.iter().map(facts).collect(),
@@ -72,22 +72,6 @@ fn title(inputs: &PageInputs<'_>) -> String {
         [one] => format!("Seeing in the dark: {}", one.name),
         several => format!("Seeing in the dark: {} runs compared", several.len()),
     }
-}
-
-/// Warnings at the top of the page: runs that are incomplete or have failed trials.
-fn alerts(inputs: &PageInputs<'_>) -> Vec<String> {
-    let incomplete = inputs
-        .runs
-        .iter()
-        .filter(|run| run.manifest.status != Status::Complete || run.manifest.counts.failed > 0);
-    let alerts = incomplete.map(|run| {
-        let (status, counts) = (run.manifest.status, run.manifest.counts);
-        format!(
-            "{}: {status}; {} of {} trials answered, {} failed. Failed trials are not scored; the same command asks them again.",
-            run.name, counts.answered, counts.trials, counts.failed
-        )
-    });
-    alerts.collect()
 }
 
 fn intro(findings: &Findings<'_>) -> Vec<String> {
@@ -111,7 +95,7 @@ fn intro(findings: &Findings<'_>) -> Vec<String> {
 fn facts(run: &PageRun<'_>) -> Value {
     let manifest = run.manifest;
     let mut rows = about(manifest);
-    rows.extend(usage(run.records));
+    rows.extend(usage(&run.records));
     rows.extend(run.cost.iter().map(|cost| fact("cost", cost.clone())));
     rows.extend(settings(manifest));
     json!({"name": run.name, "rows": rows})
@@ -152,7 +136,7 @@ fn about(manifest: &RunManifest) -> Vec<(String, String)> {
 }
 
 /// Totals over the records: requests, tokens, bytes, latency, and the models that the servers named.
-fn usage(records: &[Record]) -> Vec<(String, String)> {
+fn usage(records: &[&Record]) -> Vec<(String, String)> {
     let requests: u64 = records
         .iter()
         .map(|record| u64::from(record.attempts))

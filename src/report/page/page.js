@@ -61,8 +61,9 @@ const find = (model, light, level) =>
 // L0 is the untouched frame of every light; a blind model has one condition alone.
 const at = (model, light, level) => {
   const there = find(model, light, level);
-  return there >= 0 || level !== "L0" ? there : find(model, "untouched", "L0");
+  return there >= 0 || level !== "L0" ? there : clean(model, light);
 };
+const clean = (model, light) => data.subjects.find((s) => s.model === model && s.light === light)?.clean ?? -1;
 const raw = (subject) => {
   const s = data.subjects[subject];
   return data.subjects.findIndex((o) => o.model === s.model && o.level === s.level && o.variant === s.variant && o.enhancer === null && o.light !== "blind");
@@ -78,8 +79,8 @@ const STATES = {
   "wrong": (s, i) => chosen(s, i) < UNREAD && !isRight(s, i),
   "not readable": (s, i) => chosen(s, i) === UNREAD,
   "no reply": (s, i) => chosen(s, i) === FAILED,
-  "lost since L0": (s, i) => { const l = at(data.subjects[s].model, "untouched", "L0"); return l >= 0 && isRight(l, i) && chosen(s, i) < FAILED && !isRight(s, i); },
-  "found since L0": (s, i) => { const l = at(data.subjects[s].model, "untouched", "L0"); return l >= 0 && chosen(l, i) < FAILED && !isRight(l, i) && isRight(s, i); },
+  "lost since L0": (s, i) => { const l = data.subjects[s].clean ?? -1; return l >= 0 && isRight(l, i) && chosen(s, i) < FAILED && !isRight(s, i); },
+  "found since L0": (s, i) => { const l = data.subjects[s].clean ?? -1; return l >= 0 && chosen(l, i) < FAILED && !isRight(l, i) && isRight(s, i); },
   "rescued by the enhancer": (s, i) => { const r = raw(s); return r >= 0 && r !== s && chosen(r, i) < FAILED && !isRight(r, i) && isRight(s, i); },
   "harmed by the enhancer": (s, i) => { const r = raw(s); return r >= 0 && r !== s && isRight(r, i) && chosen(s, i) < FAILED && !isRight(s, i); },
   "right here, wrong there": (s, i) => isRight(s, i) && both(s, i) && !isRight(there(), i),
@@ -103,7 +104,7 @@ const everyLevel = () => unique(data.subjects.filter((s) => s.level).map((s) => 
 const lights = (model) => unique(data.subjects.filter((s) => s.model === model).map((s) => s.light));
 const levels = (model, light) => {
   const there = data.subjects.filter((s) => s.model === model && s.light === light && s.level).map((s) => s.level);
-  return unique([...(there.length && find(model, "untouched", "L0") >= 0 ? ["L0"] : []), ...there]);
+  return unique([...(there.length && clean(model, light) >= 0 ? ["L0"] : []), ...there]);
 };
 
 const subjectNow = () => state.light === "blind" ? find(state.model, "blind", null) : at(state.model, state.light, state.level);

@@ -4,8 +4,8 @@ use super::pooled::too_few_clusters;
 use super::sections::ENHANCERS;
 use crate::report::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
 use crate::report::table::{Table, TableBuilder, TableFormat};
-use crate::report::words::name;
-use crate::score::comparison::{Comparison, ComparisonKind};
+use crate::report::words::counted;
+use crate::score::comparison::{Comparison, ComparisonKind, MIN_PAIRS};
 use crate::score::findings::Findings;
 use crate::score::significance::Significance;
 
@@ -35,6 +35,7 @@ pub(super) fn comparisons(findings: &Findings<'_>) -> Vec<Table> {
             }
             shorten(&mut total, kind, &whole);
             total.notes.extend(note);
+            total.notes.extend(too_few(&whole));
         }
         let mut by_family = table(kind, &format!("{caption}, by family"), &by_family);
         by_family.is_folded = true;
@@ -64,7 +65,25 @@ fn titles(kind: ComparisonKind) -> (&'static str, Option<&'static str>) {
             "With images less without",
             Some("With images against without, paired by question"),
         ),
+        ComparisonKind::Light => (
+            "Light less light",
+            Some("One light against another, same model, paired by question"),
+        ),
     }
+}
+
+/// A line about the rows whose sides share too few items for a verdict.
+fn too_few(comparisons: &[&Comparison]) -> Option<String> {
+    let small = comparisons
+        .iter()
+        .filter(|comparison| comparison.is_too_small());
+    let count = small.count();
+    (count > 0).then(|| {
+        let rows = counted(count, "row");
+        format!(
+            "too few: fewer than {MIN_PAIRS} items are shared in {rows}, so no verdict is given"
+        )
+    })
 }
 
 /// Hides rows in the terminal: those beyond [`MAX_ROWS`] and, for blind models, those that say little.
@@ -100,7 +119,7 @@ fn table(kind: ComparisonKind, caption: &str, comparisons: &[&Comparison]) -> Ta
     };
     let builder =
         TableBuilder::new("comparisons", comparisons.iter().copied()).page(section, caption);
-    let builder = numbers(subjects(builder));
+    let builder = numbers(subjects(builder, kind));
     builder
         .column(
             ColumnKind::Significance,
@@ -110,8 +129,8 @@ fn table(kind: ComparisonKind, caption: &str, comparisons: &[&Comparison]) -> Ta
         .build()
 }
 
-fn subjects(builder: TableBuilder<&Comparison>) -> TableBuilder<&Comparison> {
-    builder
+fn subjects(builder: TableBuilder<&Comparison>, kind: ComparisonKind) -> TableBuilder<&Comparison> {
+    let builder = builder
         .column(Text, "csv kind", |comparison| comparison.kind.name())
         .column(Text, "csv model | latex Model", |comparison| {
             comparison.first.model.clone()
@@ -125,17 +144,31 @@ fn subjects(builder: TableBuilder<&Comparison>) -> TableBuilder<&Comparison> {
         .column(Text, "csv against_condition", |comparison| {
             comparison.second.condition()
         })
-        .column(Text, "terminal", |comparison| title(comparison))
-        .column(Text, "page first", |comparison| name(&comparison.first))
-        .column(Text, "page second", |comparison| name(&comparison.second))
-        .family(|comparison| comparison.family.as_ref())
+        .column(Text, "terminal model | page model", |comparison| {
+            comparison.first.model.clone()
+        })
+        .column(Text, "terminal condition | page condition", |comparison| {
+            comparison.first.condition()
+        });
+    let builder = match kind {
+        ComparisonKind::Model | ComparisonKind::Blind | ComparisonKind::Light => {
+            builder.column(Text, "terminal less | page less", |comparison| {
+                against(comparison)
+            })
+        }
+        // The kind says what the first side is compared with.
+        ComparisonKind::Level | ComparisonKind::Variant | ComparisonKind::Enhancer => builder,
+    };
+    builder.family(|comparison| comparison.family.as_ref())
 }
 
 fn numbers(builder: TableBuilder<&Comparison>) -> TableBuilder<&Comparison> {
     let difference = "csv difference low high | terminal difference, 95 % interval | page difference [95 %] \
                       | latex Difference [95\\,\\%]";
     builder
-        .column(Count, "csv n", |comparison| comparison.paired.difference.n)
+        .column(Count, "csv n | terminal n", |comparison| {
+            comparison.paired.difference.n
+        })
         .column(Number, "csv first", |comparison| comparison.paired.first)
         .column(Percent, "csv second | latex Raw", |comparison| {
             comparison.paired.second
@@ -171,14 +204,14 @@ fn numbers(builder: TableBuilder<&Comparison>) -> TableBuilder<&Comparison> {
         )
 }
 
-/// The two subjects of a comparison as one text.
-fn title(comparison: &Comparison) -> String {
+/// What of the second side the first side does not imply: another model, or another condition.
+fn against(comparison: &Comparison) -> String {
     let (first, second) = (&comparison.first, &comparison.second);
-    match comparison.kind {
-        ComparisonKind::Model => {
-            format!("{} – {}, {}", first.model, second.model, first.condition())
-        }
-        _ if first.model == second.model => name(first),
-        _ => format!("{} – {}", name(first), second.model),
+    if first.model != second.model {
+        second.model.clone()
+    } else if comparison.kind == ComparisonKind::Light {
+        second.condition()
+    } else {
+        String::new()
     }
 }

@@ -10,8 +10,24 @@ use crate::score::choice::ReadingMode;
 use crate::score::findings::Findings;
 use crate::types::UnreadReason;
 
-pub(super) fn levels(findings: &Findings<'_>) -> Table {
-    let summary = &findings.summary;
+/// The table of all items and, if the models were not asked the same ones, the table of the items that they share.
+pub(super) fn levels(findings: &Findings<'_>) -> Vec<Table> {
+    let mut tables = vec![of_summary(findings, &findings.summary)];
+    if let Some(common) = &findings.common {
+        let what = format!(
+            "on the {} questions that all models with images answered",
+            common.shared_questions
+        );
+        let mut table = of_summary(findings, &common.summary);
+        table.heading = Some(format!("Accuracy in % {what}"));
+        table.caption = format!("Accuracy in % by level {what}");
+        table.latex = Some(format!("Accuracy in \\% {what}."));
+        tables.push(table);
+    }
+    tables
+}
+
+fn of_summary(findings: &Findings<'_>, summary: &AccuracySummary) -> Table {
     let strict = summary.of(None, ReadingMode::Strict);
     let ladder = Ladder::new(strict.map(|cell| (&cell.subject, cell)));
     let mut table = ladder

@@ -2,6 +2,7 @@
 
 mod agreement;
 mod answers;
+mod baseline;
 mod comparisons;
 mod families;
 mod fidelity;
@@ -21,6 +22,8 @@ use crate::score::findings::Findings;
 use crate::score::subject::Subject;
 use crate::types::{EnhancerName, Family, KindReading};
 
+pub(super) use baseline::BASELINE;
+pub(crate) use baseline::baseline;
 pub(super) use sections::{ENHANCERS, SECTIONS};
 pub(super) use summary::{SUMMARY, reading};
 
@@ -29,7 +32,7 @@ pub(super) use summary::{SUMMARY, reading};
 pub fn tables(findings: &Findings<'_>) -> Vec<Table> {
     [
         vec![summary::summary(&findings.summary)],
-        vec![levels::levels(findings)],
+        levels::levels(findings),
         vec![subjects::subjects(&findings.summary)],
         thresholds::thresholds(findings),
         vec![families::families(findings)],

@@ -1,5 +1,7 @@
 //! Sections of the page of an evaluation: [`SECTIONS`].
 
+use super::baseline::BASELINE;
+
 /// A section of the page: its id, its title, the text below the title, and the names of its figures.
 pub(in crate::report) type Section = (
     &'static str,
@@ -9,7 +11,14 @@ pub(in crate::report) type Section = (
 );
 
 /// The sections of the page in order.
-pub(in crate::report) const SECTIONS: [Section; 9] = [
+pub(in crate::report) const SECTIONS: [Section; 10] = [
+    (
+        BASELINE,
+        "Against the baseline",
+        "New less old for each model and condition, paired by item, on the items and images that both have. Replies, failures and \
+         costs are of all trials.",
+        &[],
+    ),
     (
         "accuracy",
         "Accuracy in the dark",

@@ -2,9 +2,10 @@
 
 use crate::report::table::ColumnKind::{Count, Share, Text};
 use crate::report::table::{Table, TableBuilder, TableCell};
-use crate::score::accuracy::AccuracySummary;
+use crate::score::accuracy::{AccuracyCell, AccuracySummary};
 use crate::score::choice::ReadingMode;
 use crate::score::subject::Subject;
+use crate::types::LightGroup;
 
 /// Name of the summary table.
 pub(in crate::report) const SUMMARY: &str = "summary";
@@ -29,9 +30,19 @@ pub(super) fn summary(summary: &AccuracySummary) -> Table {
     } else {
         builder
     };
-    builder
-        .column(Text, "csv reading", |cell| reading(&cell.subject))
-        .build()
+    let builder = builder.column(Text, "csv reading", |cell| reading(&cell.subject));
+    if summary.cells.iter().any(|cell| group(cell).is_some()) {
+        // The run whose images these are, where runs show different ones under one name.
+        return builder
+            .column(Text, "csv light", |cell| group(cell))
+            .build();
+    }
+    builder.build()
+}
+
+/// The name of the group of runs of a cell, if it has one.
+fn group(cell: &AccuracyCell) -> Option<&str> {
+    cell.subject.variant.group.as_ref().map(LightGroup::name)
 }
 
 /// The light reading of a subject, if it has one.

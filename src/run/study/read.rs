@@ -19,6 +19,7 @@ use crate::store::{AddressChange, Store};
 use crate::types::manifest::{Counts, RunManifest, Status};
 use crate::types::{
     ChoiceDetail, Condition, Decides, Detail, Digest, QuestionId, Record, Reply, TrialKey,
+    UnreadReason,
 };
 
 /// The flags of `study read`.
@@ -58,6 +59,19 @@ struct AnswerCounts {
     answers: usize,
     /// Questions or conditions that the run did not ask.
     unknown: BTreeSet<String>,
+    /// Answers that are no choice of their question, each in words.
+    no_choice: Vec<String>,
+}
+
+/// Maximum number of answers that a warning lists one by one.
+const MAX_LISTED: usize = 10;
+
+/// An answer with its place in the files.
+struct PlacedAnswer<'a> {
+    file: &'a Path,
+    /// Number of the line, from 1.
+    line: usize,
+    answer: AnswerLine,
 }
 
 /// Imports answers. Reading a file again changes nothing, and further files add to the run. A later answer of a person to
@@ -82,10 +96,11 @@ pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
         lines.extend(answers(path)?);
     }
     // Checked before the folder is created, so that files of another study leave no empty run.
-    let known: Vec<(&Record, AnswerLine)> = lines
+    let known: Vec<(&Record, PlacedAnswer<'_>)> = lines
         .into_iter()
         .filter_map(|line| {
-            let (question, condition) = (name(&line.question), line.condition.clone());
+            let answer = &line.answer;
+            let (question, condition) = (name(&answer.question), answer.condition.clone());
             let place = (QuestionId(question), condition.parse::<Condition>().ok()?);
             let record = asked.get(&place);
             if record.is_none() {
@@ -106,11 +121,15 @@ pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
     let mut people = People::new(store.records()?);
     for (asked, line) in known {
         counts.answers += 1;
-        if let Some(record) = people.record(asked, &line, &args.name)? {
+        let record = people.record(asked, &line.answer, &args.name)?;
+        counts.no_choice.extend(no_choice(&line, &record));
+        if people.is_new(&record) {
             store.append(&record)?;
+            people.add(record);
         }
     }
     store.sync()?;
+    warn_about(&counts.no_choice);
     let mut run = StoredRun::of(&args.out, people_manifest)?;
     run.manifest.count(count(run.records.len(), &run.records));
     let mut outcome = choice::write(&store, run, StdoutFormat::of(args.json))?;
@@ -120,13 +139,49 @@ pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
     Ok(outcome)
 }
 
-fn answers(path: &Path) -> Result<Vec<AnswerLine>> {
+fn answers(path: &Path) -> Result<Vec<PlacedAnswer<'_>>> {
     let text = reading::text(path)?;
     let lines = text.trim_start_matches('\u{feff}').lines().enumerate();
     lines
         .filter(|(_, line)| !line.trim().is_empty())
-        .map(|(i, line)| serde_json::from_str(line).map_err(|e| Error::json_line(path, i + 1, &e)))
+        .map(|(i, line)| {
+            let answer = serde_json::from_str(line);
+            Ok(PlacedAnswer {
+                file: path,
+                line: i + 1,
+                answer: answer.map_err(|e| Error::json_line(path, i + 1, &e))?,
+            })
+        })
         .collect()
+}
+
+/// An answer that is no choice of its question, in words; `None` if it is one, or if the person could not answer.
+fn no_choice(line: &PlacedAnswer<'_>, record: &Record) -> Option<String> {
+    let why = record.detail.strict?.why?;
+    let found = line.answer.answer.as_deref().unwrap_or_default();
+    let choices = record.detail.choices.join(", ");
+    let (file, number, question) = (line.file.display(), line.line, &record.question);
+    (why != UnreadReason::Empty)
+        .then(|| format!("{file}, line {number}: {found:?} is no choice of {question}: {choices}"))
+}
+
+/// Warns about answers that are no choice. They count as wrong, as those of a model do.
+fn warn_about(answers: &[String]) {
+    let count = answers.len();
+    if count == 0 {
+        return;
+    }
+    let mut text = match count {
+        1 => "1 answer is no choice of its question and counts as wrong".to_owned(),
+        _ => format!("{count} answers are no choices of their questions and count as wrong"),
+    };
+    for answer in answers.iter().take(MAX_LISTED) {
+        let _ = write!(text, "\n  {answer}");
+    }
+    if count > MAX_LISTED {
+        let _ = write!(text, "\n  and {} more", count - MAX_LISTED);
+    }
+    tracing::warn!("{text}");
 }
 
 /// A name, which may be written as a number.
@@ -194,8 +249,8 @@ impl People {
         people
     }
 
-    /// The record of an answer; `None` if the same answer is stored already.
-    fn record(&mut self, asked: &Record, line: &AnswerLine, name: &str) -> Result<Option<Record>> {
+    /// The record of an answer.
+    fn record(&mut self, asked: &Record, line: &AnswerLine, name: &str) -> Result<Record> {
         let person = self::name(&line.person);
         let place = asked
             .condition
@@ -223,11 +278,16 @@ impl People {
         };
         let mut answered = blank.answered(reply)?;
         answered.latency_ms = None;
-        if stored == Some(&answered) {
-            return Ok(None);
-        }
-        self.answers.insert(key, answered.clone());
-        Ok(Some(answered))
+        Ok(answered)
+    }
+
+    /// Whether a record is not stored yet as it is.
+    fn is_new(&self, record: &Record) -> bool {
+        self.answers.get(&record.key) != Some(record)
+    }
+
+    fn add(&mut self, record: Record) {
+        self.answers.insert(record.key, record);
     }
 }
 

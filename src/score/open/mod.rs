@@ -96,7 +96,9 @@ pub fn open_summary(answers: &[ScoredAnswer], questions: &[QuestionGroups]) -> O
             cells.push(cell(subject, group, &in_group, cluster));
         }
         for (baseline, other) in baselines(subject) {
-            let Some(baseline_answers) = by_subject.get(&other) else {
+            let mut subjects = by_subject.iter();
+            let Some((_, baseline_answers)) = subjects.find(|(subject, _)| subject.is_for(&other))
+            else {
                 continue;
             };
             for group in &groups {

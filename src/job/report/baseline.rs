@@ -1,0 +1,103 @@
+//! `--baseline`: new runs against an old one ([`Baseline`]).
+
+use std::collections::BTreeMap;
+
+use super::alerts::of_runs;
+use super::combine::{Combined, check_comparable, clusters};
+use super::cost::dollars;
+use super::join::join;
+use crate::error::Result;
+use crate::job::stored::StoredRun;
+use crate::report::alert::Alert;
+use crate::report::table::Table;
+use crate::report::tables::baseline;
+use crate::score::baseline::{BaselineRow, baseline_rows};
+use crate::score::grid::Grid;
+use crate::score::health::healths;
+use crate::score::significance::Significance;
+use crate::score::subject::Subject;
+use crate::types::{ChoiceDetail, Record};
+
+/// New runs against an old one.
+pub(super) struct Baseline {
+    rows: Vec<BaselineRow>,
+    /// The name of the old run.
+    old: String,
+    /// What differs between the new runs and the old one.
+    pub(super) alerts: Vec<Alert>,
+}
+
+impl Baseline {
+    /// The new runs, which `combined` joins, against the old one.
+    ///
+    /// # Errors
+    /// If they share no question, or one has other choices or another truth.
+    pub(super) fn new(
+        combined: &Combined,
+        new: Vec<StoredRun<ChoiceDetail>>,
+        old: StoredRun<ChoiceDetail>,
+    ) -> Result<Self> {
+        let name = old.name();
+        let mut runs = new;
+        runs.push(old.clone());
+        check_comparable(&runs)?;
+        // The names of models and conditions tell nothing apart here: a new model is held against the old one of its name.
+        let alerts = of_runs(&join(runs, |_| true)?);
+        let mark = |model: &str| format!("{model} (baseline {name})");
+        let mut records = combined.records.clone();
+        records.extend(old.records.into_iter().map(|record| Record {
+            model: mark(&record.model),
+            ..record
+        }));
+        let questions = combined.questions.iter().chain(&old.questions);
+        let clusters = clusters(&records, questions);
+        let grid = Grid::new(&records, &clusters);
+        let pairs = grid
+            .subjects
+            .iter()
+            .enumerate()
+            .filter_map(|(index, subject)| {
+                let old = Subject {
+                    model: mark(combined.models.asked(&subject.model)),
+                    ..subject.in_any_light()
+                };
+                Some((index, grid.find(&old)?))
+            });
+        let pairs: Vec<(usize, usize)> = pairs.collect();
+        let mut by_subject = BTreeMap::<Subject, Vec<&Record>>::new();
+        for record in &records {
+            by_subject
+                .entry(Subject::of(record))
+                .or_default()
+                .push(record);
+        }
+        let cost = |index: usize| {
+            let subject = &grid.subjects[index];
+            let unmarked = subject
+                .model
+                .strip_suffix(&mark(""))
+                .unwrap_or(&subject.model);
+            let records = by_subject.get(subject).map_or(&[][..], Vec::as_slice);
+            dollars(combined.models.asked(unmarked), records)
+                .ok()
+                .flatten()
+        };
+        Ok(Self {
+            rows: baseline_rows(&grid, &healths(&grid), &pairs, cost),
+            old: name,
+            alerts,
+        })
+    }
+
+    /// The table of all rows.
+    pub(super) fn table(&self) -> Table {
+        baseline(&self.rows, &self.old)
+    }
+
+    /// Whether any row is shown to be worse.
+    pub(super) fn is_worse(&self) -> bool {
+        self.rows
+            .iter()
+            .any(|row| row.significance == Significance::Worse)
+    }
+}

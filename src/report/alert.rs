@@ -1,0 +1,67 @@
+//! What a reader must know before any number of a report: [`Alert`].
+
+use serde::Serialize;
+
+/// One line above a report.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Alert {
+    pub kind: AlertKind,
+    /// One or two plain sentences, with the names of the runs and the values that differ.
+    pub text: String,
+}
+
+impl Alert {
+    /// An alert of a kind.
+    #[must_use]
+    pub fn new(kind: AlertKind, text: impl Into<String>) -> Self {
+        let text = text.into();
+        Self { kind, text }
+    }
+}
+
+/// The subject of an alert; alerts are shown in this order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AlertKind {
+    /// A run in which trials have no reply yet.
+    NotComplete,
+    /// Trials without a reply, which are not scored.
+    Failed,
+    /// Replies in which no answer can be read, above 2 %.
+    Unread,
+    /// Answers of people that are no choice of their question.
+    NoChoice,
+    /// Fewer clusters than an interval needs.
+    Clusters,
+    /// Models that did not answer the same questions.
+    Items,
+    /// Other questions, other words of one question, or other orders of its choices.
+    Questions,
+    /// Other data, or other files under the same names.
+    Data,
+    /// Other images by the seed, the noise model, an enhancer or the program.
+    Light,
+    /// Images of another size or encoding.
+    Images,
+    /// Other words around the questions.
+    Prompts,
+    /// Other parameters of the models.
+    Parameters,
+    /// A constraint on the replies of one side.
+    Constrain,
+    /// Other models behind one name, or another address.
+    Served,
+    /// Another way of scoring.
+    Scoring,
+    /// Another version of this program.
+    Version,
+}
+
+/// The alerts as lines of the terminal, each marked with `!`; empty without an alert.
+#[must_use]
+pub(in crate::report) fn lines(alerts: &[Alert]) -> String {
+    let lines = alerts
+        .iter()
+        .map(|alert| ["! ", &*alert.text, "\n"].concat());
+    lines.collect()
+}
