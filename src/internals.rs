@@ -31,9 +31,9 @@ pub mod questions {
 }
 
 pub mod report {
+    pub use crate::report::choice_report::ChoiceReport;
     pub use crate::report::page::PageInputs;
     pub use crate::report::products::products;
-    pub use crate::report::tables::tables;
 }
 
 pub mod rooms {

@@ -86,7 +86,7 @@ impl<'a, E: Experiment> Job<'a, E> {
             status: Status::Complete,
             output: match settings.show {
                 StdoutFormat::Json => json(&forecast)?,
-                StdoutFormat::Table => render(&forecast),
+                _ => render(&forecast),
             },
         })
     }

@@ -10,7 +10,7 @@ use super::report::{choice, open};
 use super::shard::Shard;
 use super::stored::{ExperimentKind, StoredRun, in_order};
 use super::thumbnail::MissingThumbnails;
-use super::{Outcome, StdoutFormat, count};
+use super::{Outcome, ShowArgs, StdoutFormat, count};
 use crate::error::{Error, Result};
 use crate::store::{self, AddressChange, Store};
 use crate::types::manifest::{RunManifest, Status, differences};
@@ -31,9 +31,9 @@ pub(crate) struct MergeArgs {
     /// Merge the shards that there are, even if others are missing
     #[arg(long, add = Decides::Nothing)]
     pub partial: bool,
-    /// Print the summary as JSON instead of a table
-    #[arg(long, add = Decides::Nothing)]
-    pub json: bool,
+    /// How the report is printed.
+    #[command(flatten)]
+    pub show: ShowArgs,
 }
 
 /// One shard, as read from its folder.
@@ -139,7 +139,7 @@ fn merge_all<D: Detail + PartialEq>(
         }
     }
     let run = StoredRun::of(&args.out, manifest)?;
-    write(&store, run, StdoutFormat::of(args.json))
+    write(&store, run, args.show.format())
 }
 
 /// The run folders among those named, and directly in them.

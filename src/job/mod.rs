@@ -51,4 +51,4 @@ pub(crate) use engine::Job;
 pub(crate) use folder::now;
 pub(crate) use manifest::count;
 pub(crate) use open_run::{limit, pipeline};
-pub(crate) use outcome::{Outcome, StdoutFormat};
+pub(crate) use outcome::{Outcome, ShowArgs, StdoutFormat};

@@ -1,5 +1,8 @@
-//! The result of a command: [`Outcome`].
+//! The result of a command ([`Outcome`]), and the format of its results ([`ShowArgs`], [`StdoutFormat`]).
 
+use clap::Args;
+
+use crate::types::Decides;
 use crate::types::manifest::Status;
 
 /// The status and output of a command that has ended.
@@ -11,17 +14,42 @@ pub(crate) struct Outcome {
     pub output: String,
 }
 
-/// Format of the results on standard output.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum StdoutFormat {
-    Table,
-    Json,
+/// Flags that say how a report is printed.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Output")]
+pub(crate) struct ShowArgs {
+    /// Print every table, not only the findings and the accuracies
+    #[arg(long, conflicts_with_all = ["json", "findings"], add = Decides::Nothing)]
+    pub full: bool,
+    /// Print the findings alone, without a table
+    #[arg(long, conflicts_with = "json", add = Decides::Nothing)]
+    pub findings: bool,
+    /// Print the summary as JSON instead of text
+    #[arg(long, add = Decides::Nothing)]
+    pub json: bool,
 }
 
-impl StdoutFormat {
-    /// The format for the switch `--json`.
+impl ShowArgs {
+    /// The format that the flags ask for.
     #[must_use]
-    pub(crate) fn of(json: bool) -> Self {
-        if json { Self::Json } else { Self::Table }
+    pub(crate) fn format(&self) -> StdoutFormat {
+        match (self.json, self.full, self.findings) {
+            (true, ..) => StdoutFormat::Json,
+            (_, true, _) => StdoutFormat::Full,
+            (.., true) => StdoutFormat::Findings,
+            _ => StdoutFormat::Short,
+        }
     }
+}
+
+/// Format of a report on standard output. Open questions have one text for all but JSON.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum StdoutFormat {
+    /// The findings and one table.
+    Short,
+    /// The findings alone.
+    Findings,
+    /// The findings and every table.
+    Full,
+    Json,
 }

@@ -10,7 +10,7 @@ use super::enhancers::{self, EnhancerRunArgs};
 use super::image_words::ImageWords;
 use super::models::{AskSettings, ModelArgs};
 use super::money::{MoneyArgs, MoneySettings};
-use super::outcome::StdoutFormat;
+use super::outcome::{ShowArgs, StdoutFormat};
 use super::shard::Shard;
 use crate::ask::{AccessArgs, Bounds, Constrain, ImageArgs, Parameters, PayloadFormat, Sending};
 use crate::enhance::{EnhancerArgs, ModelFile};
@@ -82,9 +82,9 @@ pub(crate) struct OutputArgs {
     /// Continue the run in this folder; takes the same flags as the run had; default: none
     #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub resume: Option<PathBuf>,
-    /// Print the summary as JSON instead of a table
-    #[arg(long, add = Decides::Nothing)]
-    pub json: bool,
+    /// How the report is printed.
+    #[command(flatten)]
+    pub show: ShowArgs,
 }
 
 /// The settings that every experiment has, validated. Files, environment and keys are read for them and nowhere later.
@@ -198,7 +198,7 @@ impl JobArgs {
             money: MoneySettings::resolve(&self.money, shard)?,
             shard,
             show_timings: self.scale.timings,
-            show: StdoutFormat::of(self.output.json),
+            show: self.output.show.format(),
             place: RunPlace::from(self.output).checked()?,
             image_flags: self.image_flags,
         })

@@ -6,7 +6,9 @@ use std::path::Path;
 use serde::{Serialize, Serializer};
 
 use super::alert::Alert;
+use super::choice_report::ChoiceReport;
 use super::csv::fields;
+use super::sentences::Sentence;
 use super::table::{Table, TableRow};
 use super::tables::BASELINE;
 use crate::error::{Error, Result};
@@ -72,6 +74,7 @@ struct Head<'a> {
     runs: Vec<ComparedRun<'a>>,
     unread: &'a BTreeMap<UnreadReason, usize>,
     alerts: &'a [Alert],
+    findings: &'a [Sentence],
     /// The rows of `baseline.csv`.
     #[serde(skip_serializing_if = "Option::is_none")]
     baseline: Option<Rows<'a>>,
@@ -93,16 +96,12 @@ pub(crate) enum RunList<'a> {
     Several(&'a [(&'a RunManifest, &'a Path)]),
 }
 
-/// The summary of runs as JSON; `unread` holds counts of unreadable replies by reason.
+/// The summary of runs as JSON.
 ///
 /// # Errors
 /// If the document cannot be written.
-pub(crate) fn summary(
-    tables: &[Table],
-    unread: &BTreeMap<UnreadReason, usize>,
-    runs: RunList<'_>,
-    alerts: &[Alert],
-) -> Result<String> {
+pub(crate) fn summary(report: &ChoiceReport<'_>, runs: RunList<'_>) -> Result<String> {
+    let tables = &report.tables;
     let (run, folder, runs) = match runs {
         RunList::One(run, folder) => (Some(run), folder, [].as_slice()),
         RunList::Several(runs) => (None, None, runs),
@@ -115,8 +114,9 @@ pub(crate) fn summary(
         folder,
         run,
         runs: runs.collect(),
-        unread,
-        alerts,
+        unread: &report.findings.summary.unread,
+        alerts: &report.alerts,
+        findings: &report.sentences,
         baseline: tables.iter().find(|table| table.name == BASELINE).map(Rows),
     };
     document(head, &tables[0])

@@ -2,15 +2,31 @@
 
 use std::fmt::Write;
 
+use super::sentences::Sentence;
 use super::table::{Column, ColumnKind, Table, TableCell, TableFormat};
-use super::words::{percent, points, words};
+use super::words::{interval, percent, points, words};
 use crate::score::estimate::Estimate;
 use crate::score::significance::Significance;
 
-/// All tables that have a LaTeX caption; `head` names them in the first comment line.
+/// The findings as a list, then all tables that have a LaTeX caption; `head` names them in the first comment line.
 #[must_use]
-pub(super) fn tables(head: &str, tables: &[Table]) -> String {
+pub(super) fn tables(head: &str, sentences: &[Sentence], tables: &[Table]) -> String {
     let mut text = format!("% {head} of darkqa-eval; \\usepackage{{booktabs}} in the preamble.\n");
+    if !sentences.is_empty() {
+        text += "\n\\begin{itemize}\n";
+        for Sentence {
+            text: line, detail, ..
+        } in sentences
+        {
+            let _ = writeln!(
+                text,
+                "  \\item {} {}",
+                escaped(line),
+                escaped(&format!("({detail})"))
+            );
+        }
+        text += "\\end{itemize}\n";
+    }
     for entry in tables {
         if let Some(caption) = &entry.latex {
             text += &table(caption, entry);
@@ -67,26 +83,30 @@ fn table(caption: &str, table: &Table) -> String {
     text + "    \\bottomrule\n  \\end{tabular}\n\\end{table}\n"
 }
 
-/// A share in percent with half of its interval.
-fn half(share: Estimate) -> String {
-    let half = percent((share.high - share.low) / 2.0);
-    format!("{} {{\\scriptsize$\\pm${half}}}", percent(share.value))
+/// A number above its interval.
+fn stacked(number: &str, share: Estimate) -> String {
+    let [low, high] = [share.low, share.high].map(percent);
+    format!("\\shortstack{{{number}\\\\{{\\tiny {low}--{high}}}}}")
 }
 
 fn cell_text(kind: ColumnKind, cell: &TableCell) -> String {
     match (kind, cell) {
         (_, TableCell::Absent | TableCell::Missing) => "--".to_owned(),
-        (_, TableCell::Below(share)) => format!("\\underline{{{}}}", half(*share)),
-        (ColumnKind::Accuracy | ColumnKind::Percent, TableCell::Estimate(share))
-        | (_, TableCell::Guess(share) | TableCell::Strict(share, _)) => half(*share),
-        (_, TableCell::Changed(share, None)) => percent(share.value),
+        (_, TableCell::Below(share)) => {
+            let number = format!("{}\\rlap{{$\\downarrow$}}", percent(share.value));
+            stacked(&number, *share)
+        }
         (_, TableCell::Changed(share, Some(change))) => {
             let change = escaped(&points(*change));
-            format!("{} {{\\scriptsize({change})}}", percent(share.value))
+            let number = format!("{} {{\\scriptsize({change})}}", percent(share.value));
+            stacked(&number, *share)
         }
         (_, TableCell::Significance(Significance::Better)) => "helps".to_owned(),
         (_, TableCell::Significance(Significance::Worse)) => "harms".to_owned(),
-        _ => escaped(&words(kind, cell)),
+        _ => {
+            let text = escaped(&words(kind, cell));
+            interval(kind, cell).map_or(text.clone(), |share| stacked(&text, share))
+        }
     }
 }
 

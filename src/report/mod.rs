@@ -2,6 +2,7 @@
 
 pub(crate) mod alert;
 pub(crate) mod chart;
+pub(crate) mod choice_report;
 mod csv;
 pub(crate) mod figures;
 pub(crate) mod forecast;
@@ -17,7 +18,9 @@ mod readable;
 pub(crate) mod realism;
 mod samples;
 mod script;
+pub(crate) mod sentences;
 pub(crate) mod sheet;
+pub(crate) mod short;
 pub(crate) mod study;
 pub(crate) mod table;
 pub(crate) mod tables;

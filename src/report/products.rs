@@ -1,25 +1,25 @@
 //! All files of a report: [`products`].
 
+use super::choice_report::ChoiceReport;
 use super::figures::figures;
 use super::page::{PageInputs, page};
 use super::samples::{figure, samples};
+use super::sentences::Sentence;
 use super::table::Table;
 use super::{chart, csv, latex};
 use crate::error::Result;
-use crate::score::findings::Findings;
 
 /// Files of a report by name: numbers as CSV, the main tables as LaTeX, figures as SVG, and the HTML page.
 ///
 /// # Errors
 /// If a file cannot be made.
 pub fn products<'a>(
-    findings: &'a Findings<'a>,
-    tables: &[Table],
+    report: &'a ChoiceReport<'a>,
     inputs: &PageInputs<'a>,
 ) -> Result<Vec<(String, Vec<u8>)>> {
-    let figures = figures(findings)?;
-    let page = page(findings, tables, &figures, inputs)?;
-    let mut files = table_files(tables, "Tables")?;
+    let figures = figures(report.findings)?;
+    let page = page(report, &figures, inputs)?;
+    let mut files = table_files(&report.tables, &report.sentences, "Findings and tables")?;
     files.extend(chart::files(figures));
     if let Some(samples) = samples(inputs.thumbnails) {
         files.push((
@@ -31,10 +31,14 @@ pub fn products<'a>(
     Ok(files)
 }
 
-/// The tables as CSV files and one LaTeX file; `head` names them in the latter.
-pub(super) fn table_files(tables: &[Table], head: &str) -> Result<Vec<(String, Vec<u8>)>> {
+/// The tables as CSV files, and one LaTeX file that begins with the findings; `head` names both there.
+pub(super) fn table_files(
+    tables: &[Table],
+    sentences: &[Sentence],
+    head: &str,
+) -> Result<Vec<(String, Vec<u8>)>> {
     let mut files = csv::files(tables)?;
-    let tables = latex::tables(head, tables);
+    let tables = latex::tables(head, sentences, tables);
     files.push(("tables.tex".to_owned(), tables.into_bytes()));
     Ok(files)
 }

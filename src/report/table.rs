@@ -251,7 +251,7 @@ impl Table {
     pub(super) fn cells<'t>(
         &'t self,
         row: &'t TableRow,
-    ) -> impl Iterator<Item = (&'t Column, &'t TableCell)> {
+    ) -> impl Iterator<Item = (&'t Column, &'t TableCell)> + Clone {
         self.columns.iter().zip(&row.cells)
     }
 }

@@ -6,9 +6,12 @@ use std::path::Path;
 use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
 use comfy_table::{CellAlignment, LineStyle};
 
-use super::alert::{Alert, lines};
+use super::alert::lines;
+use super::choice_report::ChoiceReport;
+use super::sentences::HOW_TO_READ;
+use super::short::sentence_lines;
 use super::table::{Column, ColumnKind, Table, TableCell, TableFormat};
-use super::words::{half, percent, points, reach, stops, words};
+use super::words::{interval, percent, points, reach, reach_of, stops, with_interval, words};
 use crate::types::manifest::{Counts, RunManifest, Status};
 
 /// The lenient number in brackets if it differs from the strict one; otherwise empty.
@@ -31,10 +34,10 @@ pub(super) fn texts(kind: ColumnKind, cell: &TableCell) -> Vec<String> {
             vec![stops(t.value, *darkest), reach(t.low, t.high, *darkest)]
         }
         (ColumnKind::Threshold, TableCell::Missing) => vec!["–".to_owned(), words(kind, cell)],
-        (ColumnKind::Share, TableCell::Estimate(share)) => vec![half(*share)],
+        (ColumnKind::Share, TableCell::Estimate(share)) => vec![with_interval(*share)],
         (_, TableCell::Strict(strict, lenient)) => {
             let lenient = differing(&percent(strict.value), &percent(*lenient));
-            vec![half(*strict) + &lenient]
+            vec![percent(strict.value) + &lenient]
         }
         _ => vec![words(kind, cell)],
     }
@@ -60,19 +63,29 @@ pub(super) fn render(tables: &[Table]) -> String {
     text
 }
 
-/// Tables with the same columns as one table; empty without a row.
+/// Name of the column with the widest reach of the intervals of a row.
+const REACH: &str = "95 %";
+
+/// Tables with the same columns as one table; empty without a row. A table of accuracies has a last column with the reach of its
+/// intervals.
 #[must_use]
 pub(super) fn table(parts: &[Table]) -> String {
     let mut grid = comfy_table::Table::new();
     grid.load_style(UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none()));
     let columns = parts.iter().take(1).flat_map(|table| &table.columns);
+    let has_reach = columns
+        .clone()
+        .any(|column| column.kind == ColumnKind::Accuracy);
     let names = columns.clone().flat_map(|column| &column.heads.terminal);
-    grid.set_header(names);
+    let reach = has_reach.then(|| REACH.to_owned());
+    grid.set_header(names.cloned().chain(reach));
     for table in parts {
         for row in table.rows_in(TableFormat::Terminal) {
             let cells = table.cells(row);
             let cells = cells.filter(|(column, _)| !column.heads.terminal.is_empty());
-            grid.add_row(cells.flat_map(|(column, cell)| texts(column.kind, cell)));
+            let reach = has_reach.then(|| widest_reach(cells.clone()));
+            let texts = cells.flat_map(|(column, cell)| texts(column.kind, cell));
+            grid.add_row(texts.chain(reach));
         }
     }
     if grid.row_count() == 0 {
@@ -94,21 +107,27 @@ pub(super) fn table(parts: &[Table]) -> String {
     format!("{grid}\n")
 }
 
-/// The text at the end of an evaluation: the alerts, the tables, and the folders of the runs.
+/// All that a report of questions with choices says: the alerts, the findings, every table, and the folders of the runs.
 #[must_use]
-pub(crate) fn evaluation(
-    tables: &[Table],
-    runs: &[(&RunManifest, &Path)],
-    alerts: &[Alert],
-) -> String {
-    let mut text = lines(alerts);
-    let first = tables.iter().position(|table| table.heading.is_some());
-    let (levels, rest) = tables.split_at(first.map_or(0, |first| first + 1));
-    text += &render(levels);
+pub(crate) fn full(report: &ChoiceReport<'_>, runs: &[(&RunManifest, &Path)]) -> String {
+    let mut text = lines(&report.alerts);
+    for sentence in &report.sentences {
+        text += &sentence_lines(sentence);
+    }
+    if !report.sentences.is_empty() {
+        let _ = writeln!(text, " {HOW_TO_READ}\n");
+    }
+    text += &render(&report.tables);
     for (_, folder) in runs {
         let _ = writeln!(text, "run: {}", folder.display());
     }
-    text + &render(rest)
+    text
+}
+
+/// How far the widest interval of these cells reaches down and up, as `−7.7 +7.1`; empty if no cell has one.
+fn widest_reach<'t>(cells: impl Iterator<Item = (&'t Column, &'t TableCell)>) -> String {
+    let accuracies = cells.filter(|(column, _)| column.kind == ColumnKind::Accuracy);
+    reach_of(accuracies.filter_map(|(column, cell)| interval(column.kind, cell)))
 }
 
 /// A line with the progress of a run; empty if the run is complete.

@@ -79,10 +79,42 @@ pub(super) fn stops(value: f64, darkest: f64) -> String {
     }
 }
 
-/// A share in percent with half of its interval.
-pub(super) fn half(share: Estimate) -> String {
-    let half = percent((share.high - share.low) / 2.0);
-    format!("{} ±{half}", percent(share.value))
+/// A share in percent with its interval, as `96.4 [93.0, 98.2]`.
+pub(super) fn with_interval(share: Estimate) -> String {
+    let [value, low, high] = [share.value, share.low, share.high].map(percent);
+    format!("{value} [{low}, {high}]")
+}
+
+/// The estimate of a cell whose interval does not stand in the same text: accuracies and scores.
+pub(super) fn interval(kind: ColumnKind, cell: &TableCell) -> Option<Estimate> {
+    match (kind, cell) {
+        (
+            _,
+            TableCell::Below(share) | TableCell::Strict(share, _) | TableCell::Changed(share, _),
+        )
+        | (ColumnKind::Accuracy | ColumnKind::Percent, TableCell::Estimate(share)) => Some(*share),
+        _ => None,
+    }
+}
+
+/// How far the widest of some intervals reaches down and up, in points, as `−7.7 +7.1`; empty without any.
+pub(super) fn reach_of(shares: impl Iterator<Item = Estimate>) -> String {
+    let widest = shares.fold(None, |widest: Option<[f64; 2]>, share| {
+        let [down, up] = widest.unwrap_or_default();
+        Some([
+            down.max(share.value - share.low),
+            up.max(share.high - share.value),
+        ])
+    });
+    widest.map_or(String::new(), |reach| {
+        let [down, up] = reach.map(percent);
+        format!("−{down} +{up}")
+    })
+}
+
+/// Both ends of an interval in percent, as `93.0–98.2`.
+pub(super) fn ends(share: Estimate) -> String {
+    format!("{}–{}", percent(share.low), percent(share.high))
 }
 
 /// A cell as text for people.
@@ -98,9 +130,9 @@ pub(super) fn words(kind: ColumnKind, cell: &TableCell) -> String {
         TableCell::Number(value) => number(kind, *value),
         TableCell::Guess(share) => number(ColumnKind::Number, 100.0 * share.value),
         TableCell::Estimate(number) | TableCell::Below(number) => estimate(kind, *number),
-        TableCell::Strict(share, _) | TableCell::Changed(share, None) => half(*share),
+        TableCell::Strict(share, _) | TableCell::Changed(share, None) => percent(share.value),
         TableCell::Changed(share, Some(change)) => {
-            format!("{} ({})", half(*share), points(*change))
+            format!("{} ({})", percent(share.value), points(*change))
         }
         TableCell::Threshold(threshold, darkest) => {
             let reach = reach(threshold.low, threshold.high, *darkest);
@@ -122,8 +154,7 @@ fn number(kind: ColumnKind, number: f64) -> String {
 fn estimate(kind: ColumnKind, estimate: Estimate) -> String {
     let [value, low, high] = [estimate.value, estimate.low, estimate.high].map(|x| number(kind, x));
     match kind {
-        ColumnKind::Percent => value,
-        ColumnKind::Accuracy => half(estimate),
+        ColumnKind::Percent | ColumnKind::Accuracy => value,
         _ => format!("{value} [{low}, {high}]"),
     }
 }

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::job::batch::replies;
 use crate::job::report::{choice, open};
 use crate::job::stored::{ExperimentKind, StoredRun, manifest};
-use crate::job::{Outcome, StdoutFormat, count};
+use crate::job::{Outcome, ShowArgs, StdoutFormat, count};
 use crate::store::{AddressChange, Store};
 use crate::types::{ChoiceDetail, Decides, Detail, OpenDetail};
 
@@ -21,9 +21,9 @@ pub(crate) struct BatchImportArgs {
     /// The output files and error files of the Batch API, in any order
     #[arg(value_name = "FILE", required = true, add = Decides::Nothing)]
     pub files: Vec<PathBuf>,
-    /// Print the summary as JSON instead of a table
-    #[arg(long, add = Decides::Nothing)]
-    pub json: bool,
+    /// How the report is printed.
+    #[command(flatten)]
+    pub show: ShowArgs,
 }
 
 /// Imports the replies of output and error files. Each reply is imported once, even if a file is imported again.
@@ -47,9 +47,9 @@ fn import_into<D: Detail>(
     let mut run = StoredRun::of(&args.run, manifest)?;
     let trials = run.manifest.counts.trials.max(run.records.len());
     run.manifest.count(count(trials, &run.records));
-    let show = StdoutFormat::of(args.json);
+    let show = args.show.format();
     let mut outcome = write(&store, run, show)?;
-    if show == StdoutFormat::Table {
+    if show != StdoutFormat::Json {
         outcome.output.insert_str(0, &imported);
     }
     Ok(outcome)

@@ -16,9 +16,9 @@ use crate::dataset::pairs::{Pair, Pairs};
 use crate::dataset::{Picture, PixelLimit};
 use crate::error::{Error, Result};
 use crate::files::write;
+use crate::job::Outcome;
 use crate::job::progress::Progress;
 use crate::job::workers::{ThreadArgs, pool};
-use crate::job::{Outcome, StdoutFormat};
 use crate::report;
 use crate::report::realism::{ComparedData, RealismSummary, ResidualRules};
 use crate::score::realism::residual::{Bins, EmptyBins, Residuals, divergence};
@@ -147,9 +147,10 @@ pub(crate) fn realism(args: &RealismArgs, progress: &Progress) -> Result<Outcome
         } else {
             Status::Incomplete
         },
-        output: match StdoutFormat::of(args.json) {
-            StdoutFormat::Table => summary.table(),
-            StdoutFormat::Json => summary.json(),
+        output: if args.json {
+            summary.json()
+        } else {
+            summary.table()
         },
     })
 }

@@ -16,7 +16,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use darkqa_eval::Kind;
-use darkqa_eval::internals::report::{PageInputs, products, tables};
+use darkqa_eval::internals::report::{ChoiceReport, PageInputs, products};
 use darkqa_eval::internals::score::Findings;
 use darkqa_eval::types::{Condition, Degradation, Digest, Family, Record, Severity};
 use made::record;
@@ -60,10 +60,12 @@ fn bench(c: &mut Criterion) {
         runs: Vec::new(),
         questions: &[],
         thumbnails: &[],
-        alerts: &[],
     };
     group.bench_function("make the report", |b| {
-        b.iter(|| black_box(products(&findings, &tables(&findings), &shown).unwrap()));
+        b.iter(|| {
+            let report = ChoiceReport::new(&findings, Vec::new());
+            black_box(products(&report, &shown).unwrap())
+        });
     });
     group.finish();
 }

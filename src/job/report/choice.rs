@@ -1,15 +1,18 @@
 //! The report of a run of questions with choices, from its records alone.
 
+use std::path::Path;
+
 use super::alerts::alerts;
 use super::combine::{Combined, combine};
 use crate::error::Result;
 use crate::job::outcome::Outcome;
 use crate::job::outcome::StdoutFormat;
 use crate::job::stored::StoredRun;
+use crate::report::choice_report::ChoiceReport;
 use crate::report::json::{RunList, summary};
 use crate::report::products::{PAGE, products};
-use crate::report::tables::tables;
-use crate::report::terminal::evaluation;
+use crate::report::short::{findings, short};
+use crate::report::terminal::full;
 use crate::store::Store;
 use crate::types::manifest::RunManifest;
 use crate::types::{ChoiceDetail, Record};
@@ -36,20 +39,29 @@ pub(super) fn in_its_folder(
     show: StdoutFormat,
 ) -> Result<String> {
     let (folder, findings) = (store.folder(), combined.findings());
-    let (tables, alerts) = (tables(&findings), alerts(combined, &findings));
-    for (name, content) in products(&findings, &tables, &combined.shown(&alerts))? {
+    let report = ChoiceReport::new(&findings, alerts(combined, &findings));
+    for (name, content) in products(&report, &combined.shown())? {
         store.write(&name, &content)?;
     }
-    let unread = &findings.summary.unread;
-    let json = |folder| summary(&tables, unread, RunList::One(manifest, folder), &alerts);
+    let json = |folder| summary(&report, RunList::One(manifest, folder));
     store.write("summary.json", json(None)?.as_bytes())?;
     store.write_manifest(manifest)?;
-    Ok(match show {
-        StdoutFormat::Json => json(Some(folder))?,
-        StdoutFormat::Table => {
-            let report = folder.join(PAGE);
-            evaluation(&tables, &[(manifest, folder)], &alerts)
-                + &format!("report: {}\n", report.display())
-        }
-    })
+    if show == StdoutFormat::Json {
+        return json(Some(folder));
+    }
+    let page = folder.join(PAGE);
+    Ok(text(&report, &[(manifest, folder)], show) + &format!("report: {}\n", page.display()))
+}
+
+/// The text of a report in a format other than JSON.
+pub(super) fn text(
+    report: &ChoiceReport<'_>,
+    runs: &[(&RunManifest, &Path)],
+    show: StdoutFormat,
+) -> String {
+    match show {
+        StdoutFormat::Findings => findings(report),
+        StdoutFormat::Full => full(report, runs),
+        StdoutFormat::Short | StdoutFormat::Json => short(report, runs),
+    }
 }

@@ -6,7 +6,6 @@ use std::path::Path;
 use super::join::{Joined, join};
 use crate::error::{Error, Result};
 use crate::job::stored::StoredRun;
-use crate::report::alert::Alert;
 use crate::report::page::{self, PageInputs};
 use crate::score::chance::OfferedChoices;
 use crate::score::cluster::Clusters;
@@ -36,7 +35,7 @@ impl Combined {
     }
 
     /// Further inputs of the HTML page.
-    pub(super) fn shown<'a>(&'a self, alerts: &'a [Alert]) -> PageInputs<'a> {
+    pub(super) fn shown(&self) -> PageInputs<'_> {
         let runs = self.runs.iter().map(|run| page::PageRun {
             name: run.name.clone(),
             manifest: &run.manifest,
@@ -51,7 +50,6 @@ impl Combined {
             runs: runs.collect(),
             questions: &self.questions,
             thumbnails: &self.thumbnails,
-            alerts,
         }
     }
 

@@ -113,8 +113,8 @@ impl Scores {
     ) -> Result<String> {
         let folder = &self.run.folder;
         match show {
-            StdoutFormat::Table => Ok(render(report, tables, folder)),
             StdoutFormat::Json => summary_json(report, tables, Some(folder)),
+            _ => Ok(render(report, tables, folder)),
         }
     }
 

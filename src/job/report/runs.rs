@@ -7,19 +7,17 @@ use clap::Args;
 
 use super::alerts::alerts;
 use super::baseline::Baseline;
-use super::choice::in_its_folder;
+use super::choice::{in_its_folder, text};
 use super::combine::{Combined, combine};
 use super::common::restrict;
 use super::open;
 use crate::error::{Error, Result};
 use crate::files;
 use crate::job::stored::{AnyRun, StoredRun};
-use crate::job::{Outcome, StdoutFormat, count};
-use crate::report::alert::Alert;
+use crate::job::{Outcome, ShowArgs, StdoutFormat, count};
+use crate::report::choice_report::ChoiceReport;
 use crate::report::json::{RunList, summary};
 use crate::report::products::{PAGE, products};
-use crate::report::tables::tables;
-use crate::report::terminal::evaluation;
 use crate::store::{AddressChange, Store};
 use crate::types::manifest::Status;
 use crate::types::{ChoiceDetail, Decides, OpenDetail};
@@ -43,9 +41,9 @@ pub(crate) struct ReportArgs {
     /// An old run to compare with.
     #[command(flatten)]
     pub baseline: BaselineArgs,
-    /// Print the summary as JSON instead of a table
-    #[arg(long, add = Decides::Nothing)]
-    pub json: bool,
+    /// How the report is printed.
+    #[command(flatten)]
+    pub show: ShowArgs,
 }
 
 /// The flags of a comparison with an old run.
@@ -58,12 +56,6 @@ pub(crate) struct BaselineArgs {
     /// Exit with 1 if any model is shown to be worse than the baseline in any condition
     #[arg(long, requires = "baseline", add = Decides::Nothing)]
     pub fail_if_worse: bool,
-}
-
-impl ReportArgs {
-    fn show(&self) -> StdoutFormat {
-        StdoutFormat::of(self.json)
-    }
 }
 
 /// The report of a run, or a comparison of several of the same kind. With `--rescore`, changed readings are stored in their run.
@@ -110,7 +102,7 @@ fn of_choices(
             run.manifest.counts = count(run.manifest.counts.trials, &run.records);
         }
     }
-    if args.show() == StdoutFormat::Json {
+    if args.show.format() == StdoutFormat::Json {
         output.clear();
     }
     let old = args.baseline.baseline.as_ref().map(|folder| {
@@ -129,7 +121,7 @@ fn of_choices(
     output += &match &*combined.runs {
         [run] if in_folder => match Store::open(&run.folder, &run.manifest, AddressChange::Allowed)
         {
-            Ok(store) => in_its_folder(&store, &run.manifest, &combined, args.show())?,
+            Ok(store) => in_its_folder(&store, &run.manifest, &combined, args.show.format())?,
             // A run that another process writes, or in a read-only folder, is shown anyway.
             Err(error) => {
                 tracing::warn!("the report is not written: {error}");
@@ -151,28 +143,26 @@ fn of_choices(
 /// The text of several runs, joined. Writes the report if `--out` is set.
 fn compare(combined: &Combined, baseline: Option<&Baseline>, args: &ReportArgs) -> Result<String> {
     let findings = combined.findings();
-    let (mut tables, runs) = (tables(&findings), combined.manifests());
-    let mut alerts = alerts(combined, &findings);
+    let runs = combined.manifests();
+    let mut report = ChoiceReport::new(&findings, alerts(combined, &findings));
     if let Some(baseline) = baseline {
         // Below the table of levels.
-        tables.insert(tables.len().min(2), baseline.table());
-        let new = baseline
-            .alerts
-            .iter()
-            .filter(|alert| !alerts.contains(alert));
-        let new: Vec<Alert> = new.cloned().collect();
-        alerts.extend(new);
-        alerts.sort_by_key(|alert| alert.kind);
+        let place = report.tables.len().min(2);
+        report.tables.insert(place, baseline.table());
+        let known = report.alerts.clone();
+        let new = baseline.alerts.iter();
+        let new = new.filter(|alert| !known.contains(alert));
+        report.alerts.extend(new.cloned());
+        report.alerts.sort_by_key(|alert| alert.kind);
     }
-    let unread = &findings.summary.unread;
-    let json = || summary(&tables, unread, RunList::Several(&runs), &alerts);
-    let shown = match args.show() {
+    let json = || summary(&report, RunList::Several(&runs));
+    let shown = match args.show.format() {
         StdoutFormat::Json => json()?,
-        StdoutFormat::Table => evaluation(&tables, &runs, &alerts),
+        show => text(&report, &runs, show),
     };
     let mut files = Vec::new();
     if args.out.is_some() {
-        files = products(&findings, &tables, &combined.shown(&alerts))?;
+        files = products(&report, &combined.shown())?;
         files.push(("summary.json".to_owned(), json()?.into_bytes()));
     }
     write_files(args, shown, files)
@@ -185,7 +175,7 @@ fn write_files(
     contents: Vec<(String, Vec<u8>)>,
 ) -> Result<String> {
     let Some(out) = &args.out else {
-        if args.show() == StdoutFormat::Table {
+        if args.show.format() != StdoutFormat::Json {
             text += "report: not written; --out DIR writes one\n";
         }
         return Ok(text);
@@ -193,7 +183,7 @@ fn write_files(
     for (name, content) in contents {
         files::write(&out.join(name), &content)?;
     }
-    if args.show() == StdoutFormat::Table {
+    if args.show.format() != StdoutFormat::Json {
         let _ = writeln!(text, "report: {}", out.join(PAGE).display());
     }
     Ok(text)
@@ -216,7 +206,7 @@ fn of_open(args: &ReportArgs, runs: Vec<StoredRun<OpenDetail>>) -> Result<String
     let run = &scores.run;
     if is_single && args.out.is_none() {
         match Store::open(&run.folder, &run.manifest, AddressChange::Allowed) {
-            Ok(store) => return scores.write(&store, args.show()),
+            Ok(store) => return scores.write(&store, args.show.format()),
             Err(error) => tracing::warn!("the report is not written: {error}"),
         }
     }
@@ -224,7 +214,7 @@ fn of_open(args: &ReportArgs, runs: Vec<StoredRun<OpenDetail>>) -> Result<String
         Some(_) => scores.products()?,
         None => Vec::new(),
     };
-    write_files(args, scores.shown(args.show())?, files)
+    write_files(args, scores.shown(args.show.format())?, files)
 }
 
 /// Reads all stored replies again, and stores the readings that changed; returns their number.

@@ -7,6 +7,7 @@ use crate::report::table::ColumnKind::{Accuracy, Count, Points, Share, Text};
 use crate::report::table::{ColumnKind, Table, TableBuilder, TableCell};
 use crate::report::tables::{SUMMARY, reading};
 use crate::report::terminal::texts;
+use crate::report::words::ends;
 use crate::score::estimate::Estimate;
 use crate::score::open::{Baseline, Group, OpenCell, OpenSummary};
 use crate::score::subject::Subject;
@@ -83,7 +84,7 @@ fn levels(report: &OpenReport<'_>) -> Table {
         .table("levels", |cell| score(summary, cell))
         .page(
             SECTION,
-            "Score in % ± half of the 95 % interval (difference from L0)",
+            "Score in % with 95 % intervals (difference from L0)",
         )
         .column(Count, "terminal scored", |line| {
             format!(
@@ -96,7 +97,7 @@ fn levels(report: &OpenReport<'_>) -> Table {
     let judge = report.judge.unwrap_or("nobody");
     let protocol = report.protocol;
     table.heading = Some(format!(
-        "Score in % (LLM-Match, marked by {judge}, protocol {protocol}): mean ± half of the 95 % interval over {} {}s (drop from L0)",
+        "Score in % (LLM-Match, marked by {judge}, protocol {protocol}): mean (drop from L0), and how far the widest 95 % interval over {} {}s reaches down and up",
         summary.clusters, summary.unit
     ));
     table.latex = Some(format!(
@@ -107,6 +108,8 @@ fn levels(report: &OpenReport<'_>) -> Table {
     let without_level = ladder.without_level.iter();
     let notes = without_level.map(|(subject, cell)| {
         let text = texts(ColumnKind::Accuracy, &score(summary, Some(cell))).concat();
+        let interval = cell.score.map(|share| format!(" [{}]", ends(share)));
+        let text = text + &interval.unwrap_or_default();
         let (scored, planned) = (cell.scored(), cell.planned);
         let of = if scored == planned {
             String::new()

@@ -1,6 +1,5 @@
 //! Data of the page besides the findings: [`PageInputs`].
 
-use crate::report::alert::Alert;
 use crate::types::manifest::RunManifest;
 use crate::types::{Record, RunQuestion, Thumbnail};
 
@@ -25,6 +24,4 @@ pub struct PageInputs<'a> {
     pub questions: &'a [RunQuestion],
     /// Thumbnails of the images; empty if the runs do not store them.
     pub thumbnails: &'a [Thumbnail],
-    /// What stands above everything.
-    pub alerts: &'a [Alert],
 }

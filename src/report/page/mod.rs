@@ -15,7 +15,8 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::chart::Figure;
-use super::table::Table;
+use super::choice_report::ChoiceReport;
+use super::sentences::{HOW_TO_READ, Sentence};
 use super::template::filled;
 use crate::error::Result;
 use crate::score::findings::Findings;
@@ -34,6 +35,9 @@ struct Page<'a> {
     /// Warnings at the top of the page.
     alerts: Vec<&'a str>,
     intro: Vec<String>,
+    /// The findings in words.
+    sentences: Vec<PageSentence<'a>>,
+    how_to_read: &'static str,
     sections: Vec<sections::PageSection<'a>>,
     runs: Vec<Value>,
     /// The items, as compressed JSON in base64.
@@ -42,23 +46,46 @@ struct Page<'a> {
     script: &'static str,
 }
 
+/// A finding in words, as the template reads it.
+#[derive(Serialize)]
+struct PageSentence<'a> {
+    class: &'static str,
+    sign: char,
+    text: &'a str,
+    detail: &'a str,
+}
+
+impl<'a> PageSentence<'a> {
+    fn new(sentence: &'a Sentence) -> Self {
+        Self {
+            class: sentence.tone.class(),
+            sign: sentence.tone.sign(),
+            text: &sentence.text,
+            detail: &sentence.detail,
+        }
+    }
+}
+
 /// The page as HTML.
 ///
 /// # Errors
 /// If the items cannot be written or the template cannot be filled.
 pub(crate) fn page<'a>(
-    findings: &'a Findings<'a>,
-    tables: &[Table],
+    report: &'a ChoiceReport<'a>,
     figures: &[Figure],
     inputs: &PageInputs<'a>,
 ) -> Result<String> {
+    let findings = report.findings;
+    let sentences = report.sentences.iter().map(PageSentence::new).collect();
     filled(
         PAGE,
         Page {
             title: title(inputs),
-            alerts: inputs.alerts.iter().map(|alert| &*alert.text).collect(),
+            alerts: report.alerts.iter().map(|alert| &*alert.text).collect(),
+            sentences,
+            how_to_read: HOW_TO_READ,
             intro: intro(findings),
-            sections: sections::sections(tables, figures, inputs.thumbnails),
+            sections: sections::sections(&report.tables, figures, inputs.thumbnails),
             runs: inputs.runs.iter().map(facts).collect(),
             data: items::packed(findings, inputs)?,
             css: STYLE,

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::report::table::{ColumnKind, Table, TableCell, TableFormat};
-use crate::report::words::words;
+use crate::report::words::{ends, interval, words};
 use crate::score::significance::Significance;
 
 /// Maximum number of rows of a table that is not folded.
@@ -22,6 +22,8 @@ pub(in crate::report) struct PageTable<'a> {
 #[derive(Serialize)]
 struct PageCell {
     text: String,
+    /// Both ends of the interval, which stand beneath the text; empty if there are none.
+    ends: String,
     class: &'static str,
 }
 
@@ -60,6 +62,9 @@ fn text(kind: ColumnKind, cell: &TableCell) -> PageCell {
         (ColumnKind::Text, _) => "text",
         _ => "",
     };
-    let text = words(kind, cell);
-    PageCell { text, class }
+    PageCell {
+        text: words(kind, cell),
+        ends: interval(kind, cell).map(ends).unwrap_or_default(),
+        class,
+    }
 }

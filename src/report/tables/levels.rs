@@ -4,7 +4,7 @@ use crate::report::ladder::{Ladder, LadderRow};
 use crate::report::table::ColumnKind::Count;
 use crate::report::table::{ColumnKind, Table, TableCell, TableFormat, TableRow};
 use crate::report::terminal::{differing, texts};
-use crate::report::words::percent;
+use crate::report::words::{ends, percent};
 use crate::score::accuracy::{AccuracyCell, AccuracySummary};
 use crate::score::choice::ReadingMode;
 use crate::score::findings::Findings;
@@ -34,10 +34,7 @@ fn of_summary(findings: &Findings<'_>, summary: &AccuracySummary) -> Table {
         .table("levels", |cell| {
             cell.map_or(TableCell::Blank, |cell| accuracy(summary, cell))
         })
-        .page(
-            "accuracy",
-            "Accuracy in % by level, with half of the 95 % interval",
-        )
+        .page("accuracy", "Accuracy in % by level, with 95 % intervals")
         .column(Count, "terminal n", |line| replies(line))
         .column(Count, "terminal unparsed", |line| {
             let strict = line.sum(|cell| cell.unparsed).to_string();
@@ -52,11 +49,11 @@ fn of_summary(findings: &Findings<'_>, summary: &AccuracySummary) -> Table {
         .build();
     add_always(&mut table, &ladder);
     table.heading = Some(
-        "Accuracy in %: strict ± half of the 95 % interval (lenient where it differs); n replies at each level"
+        "Accuracy in %: strict (lenient where it differs); n replies at each level; 95 %: how far the widest interval reaches down and up"
             .to_owned(),
     );
     table.latex = Some(format!(
-        "Accuracy in \\% (strict reading) with half of the 95\\,\\% interval by {}; {} items.",
+        "Accuracy in \\% (strict reading) with 95\\,\\% intervals by {}; {} items.",
         findings.unit,
         findings.grid.items.len()
     ));
@@ -152,7 +149,9 @@ fn notes(summary: &AccuracySummary, ladder: &Ladder<'_, AccuracyCell>) -> Vec<St
 }
 
 fn note_without_images(summary: &AccuracySummary, cell: &AccuracyCell) -> String {
-    let accuracy = texts(ColumnKind::Accuracy, &accuracy(summary, cell)).concat();
+    let text = texts(ColumnKind::Accuracy, &accuracy(summary, cell)).concat();
+    let interval = cell.accuracy.map(|share| format!(" [{}]", ends(share)));
+    let accuracy = text + &interval.unwrap_or_default();
     let always = always(cell).map(|share| format!(", right every time {share}"));
     let unparsed = cell.unparsed.to_string();
     let lenient = lenient(summary, cell).map(|cell| cell.unparsed.to_string());

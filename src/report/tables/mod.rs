@@ -29,7 +29,7 @@ pub(super) use summary::{SUMMARY, reading};
 
 /// All tables of an evaluation; the first is the summary.
 #[must_use]
-pub fn tables(findings: &Findings<'_>) -> Vec<Table> {
+pub(crate) fn tables(findings: &Findings<'_>) -> Vec<Table> {
     [
         vec![summary::summary(&findings.summary)],
         levels::levels(findings),

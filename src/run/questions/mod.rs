@@ -14,9 +14,9 @@ use serde_json::{Value, json};
 use crate::dataset::{Dataset, PixelLimit};
 use crate::error::{Error, Result};
 use crate::files::{reading, write};
+use crate::job::Outcome;
 use crate::job::progress::Progress;
 use crate::job::workers::{ThreadArgs, pool};
-use crate::job::{Outcome, StdoutFormat};
 use crate::questions::balance::BalanceMode;
 use crate::questions::colors::Palette;
 use crate::questions::reason::Reason;
@@ -193,13 +193,14 @@ pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Out
         } else {
             Status::Incomplete
         },
-        output: match StdoutFormat::of(args.json) {
-            StdoutFormat::Json => json,
-            StdoutFormat::Table => format!(
+        output: if args.json {
+            json
+        } else {
+            format!(
                 "{}{}\n",
                 report::questions::table(&summary),
                 args.out.display()
-            ),
+            )
         },
     })
 }

@@ -14,7 +14,7 @@ use crate::files::reading;
 use crate::job::report::choice;
 use crate::job::stored::StoredRun;
 
-use crate::job::{Outcome, StdoutFormat, count, now};
+use crate::job::{Outcome, ShowArgs, StdoutFormat, count, now};
 use crate::store::{AddressChange, Store};
 use crate::types::manifest::{Counts, RunManifest, Status};
 use crate::types::{
@@ -37,9 +37,9 @@ pub(crate) struct ReadArgs {
     /// The name of the people in tables, next to the names of models
     #[arg(long, value_name = "NAME", default_value = "human", value_parser = NonEmptyStringValueParser::new(), add = Decides::Reply)]
     pub name: String,
-    /// Print the summary as JSON instead of a table
-    #[arg(long, add = Decides::Nothing)]
-    pub json: bool,
+    /// How the report is printed.
+    #[command(flatten)]
+    pub show: ShowArgs,
 }
 
 /// A line of a file of answers.
@@ -132,8 +132,8 @@ pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
     warn_about(&counts.no_choice);
     let mut run = StoredRun::of(&args.out, people_manifest)?;
     run.manifest.count(count(run.records.len(), &run.records));
-    let mut outcome = choice::write(&store, run, StdoutFormat::of(args.json))?;
-    if StdoutFormat::of(args.json) == StdoutFormat::Table {
+    let mut outcome = choice::write(&store, run, args.show.format())?;
+    if args.show.format() != StdoutFormat::Json {
         outcome.output.insert_str(0, &summary(&counts));
     }
     Ok(outcome)

@@ -1,0 +1,33 @@
+//! All that a report of questions with choices shows: [`ChoiceReport`].
+
+use super::alert::Alert;
+use super::sentences::{Sentence, sentences};
+use super::table::Table;
+use super::tables::tables;
+use crate::score::findings::Findings;
+
+/// The findings of one run or several, in words and as tables. The terminal, the page and all files are made from it.
+#[derive(Debug)]
+pub struct ChoiceReport<'a> {
+    /// All numbers.
+    pub findings: &'a Findings<'a>,
+    /// What a reader must know before any number.
+    pub alerts: Vec<Alert>,
+    /// The findings in words.
+    pub(crate) sentences: Vec<Sentence>,
+    /// The tables; the first is the summary.
+    pub tables: Vec<Table>,
+}
+
+impl<'a> ChoiceReport<'a> {
+    /// The report of these findings.
+    #[must_use]
+    pub fn new(findings: &'a Findings<'a>, alerts: Vec<Alert>) -> Self {
+        Self {
+            findings,
+            alerts,
+            sentences: sentences(findings),
+            tables: tables(findings),
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! Sentences about the replies: how many could not be read, and whether fidelity predicts right ones.
+
+use super::sentence::{Numbers, Sentence, Tone};
+use crate::score::fidelity::{ConditionFidelity, FidelityFindings};
+use crate::score::findings::Findings;
+use crate::score::pooled::{PooledFinding, PooledKind};
+
+/// Unread replies and failed trials, with the share of the former; `None` if there are none. Built-in models are not counted.
+pub(super) fn health(findings: &Findings<'_>) -> Option<(f64, Sentence)> {
+    let health = findings.health.iter();
+    let health = health.filter(|health| !health.subject.is_reference());
+    let (mut replies, mut unread, mut failed) = (0, 0, 0);
+    for health in health {
+        replies += health.replies;
+        unread += health.unread.values().sum::<usize>();
+        failed += health.failures();
+    }
+    if unread == 0 && failed == 0 {
+        return None;
+    }
+    let mut numbers = Numbers::of(findings.unit);
+    let share = unread as f64 / replies.max(1) as f64;
+    let mut parts = Vec::new();
+    if unread > 0 {
+        let (count, percent) = (
+            numbers.count("unread", unread),
+            numbers.percent("share", share),
+        );
+        let noun = if unread == 1 { "reply" } else { "replies" };
+        parts.push(format!("{count} {noun} ({percent} %) could not be read"));
+    }
+    if failed > 0 {
+        let count = numbers.count("failed", failed);
+        let rest = if failed == 1 {
+            "trial failed and is"
+        } else {
+            "trials failed and are"
+        };
+        parts.push(format!("{count} {rest} not scored"));
+    }
+    let text = parts.join("; ") + ".";
+    let detail = format!(
+        "of {} replies; those that cannot be read count as wrong",
+        numbers.count("replies", replies)
+    );
+    Some((share, numbers.sentence("health", Tone::Note, text, detail)))
+}
+
+/// Whether PSNR tells right from wrong answers within a condition, and what the best enhancer does to both.
+pub(super) fn fidelity(findings: &Findings<'_>) -> Option<Sentence> {
+    let fidelity = findings.fidelity.as_ref()?;
+    let auc = fidelity.within[0]?;
+    let mut numbers = Numbers::of(findings.unit);
+    let estimate = auc.estimate;
+    let (tone, text) = if estimate.low > 0.5 {
+        let text = "Within a condition, images with a higher PSNR get more right answers.";
+        (Tone::Better, text)
+    } else if estimate.high < 0.5 {
+        let text = "Within a condition, images with a higher PSNR get fewer right answers.";
+        (Tone::Worse, text)
+    } else {
+        let text = "Within a condition, it is not shown that PSNR tells right from wrong answers.";
+        (Tone::NotShown, text)
+    };
+    let ends = [
+        ("auc", estimate.value),
+        ("low", estimate.low),
+        ("high", estimate.high),
+    ];
+    let [value, low, high] = ends.map(|(name, value)| numbers.number(name, value, 2));
+    let p = numbers.p("p", auc.p);
+    let replies = numbers.count("n", estimate.n);
+    let chance = numbers.number("chance", 0.5, 1);
+    let mut detail =
+        format!("AUC {value} [{low}, {high}], {chance} is chance, {p}; n = {replies} replies");
+    if let Some(example) = largest_gain(findings, fidelity) {
+        detail += &example_text(example, &mut numbers);
+    }
+    Some(numbers.sentence("fidelity", tone, text.to_owned(), detail))
+}
+
+/// An enhancer's images, the raw ones of the same level, and the difference of the answers.
+type Gain<'f> = (
+    &'f ConditionFidelity,
+    &'f ConditionFidelity,
+    &'f PooledFinding,
+);
+
+/// The enhancer and level with the largest gain of mean PSNR.
+fn largest_gain<'f>(
+    findings: &'f Findings<'_>,
+    fidelity: &'f FidelityFindings,
+) -> Option<Gain<'f>> {
+    let enhanced = fidelity
+        .conditions
+        .iter()
+        .filter(|row| row.enhancer.is_some());
+    let gains = enhanced.filter_map(|row| {
+        let raw = fidelity.conditions.iter().find(|raw| {
+            raw.enhancer.is_none() && raw.level == row.level && raw.variant == row.variant
+        })?;
+        let answers = findings.pooled.iter().find(|finding| {
+            finding.kind == PooledKind::Enhancer
+                && finding.family.is_none()
+                && finding.level == row.level
+                && finding.variant == row.variant
+                && finding.enhancer == row.enhancer
+        })?;
+        Some((row.means[0]? - raw.means[0]?, (row, raw, answers)))
+    });
+    gains
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, gain)| gain)
+}
+
+fn example_text((row, raw, answers): Gain<'_>, numbers: &mut Numbers) -> String {
+    let (Some(enhancer), [Some(before), Some(after)]) =
+        (&row.enhancer, [raw.means[0], row.means[0]])
+    else {
+        return String::new();
+    };
+    let (before, after) = (
+        numbers.number("psnr_raw", before, 1),
+        numbers.number("psnr_enhanced", after, 1),
+    );
+    let difference = numbers.difference("_answers", answers.difference);
+    let shown = if answers.verdict.is_shown() {
+        ""
+    } else {
+        ", not shown"
+    };
+    format!(
+        ". Largest gain: {enhancer} takes the mean PSNR at {} from {before} to {after} dB and the answers by {difference} points{shown}",
+        row.level
+    )
+}

@@ -1,0 +1,96 @@
+//! Findings in words: [`Sentence`]s that say what was shown, and no more than its test.
+//!
+//! Each sentence comes from typed results and from fixed wording. The terminal, the page, `summary.json` and `tables.tex` show the
+//! same strings. Rules:
+//!
+//! - “costs”, “harms”, “helps” and “falls below” are used only if p after Holm's correction is below 0.05.
+//! - If nothing is shown, the sentence says “is not shown”, with the interval. It never says that there is no difference.
+//! - A sentence is about the models of the run and names their number; it does not speak of models in general.
+
+mod answers;
+mod models;
+mod pooled;
+mod sentence;
+
+pub(crate) use sentence::Sentence;
+
+use crate::report::words::light;
+use crate::score::findings::Findings;
+use crate::score::pooled::{PooledFinding, PooledKind};
+use crate::types::KindReading;
+
+/// Largest number of sentences that are shown first; the others follow on request.
+pub(in crate::report) const FIRST: usize = 6;
+
+/// What is said about the sentences as a whole, in the line below them.
+pub(in crate::report) const HOW_TO_READ: &str = "p is Holm's, over the levels of a finding. An interval is of one level, uncorrected: effects outside it are ruled out at 95 %.";
+
+/// Share of unread replies above which this is said first.
+const MANY_UNREAD: f64 = 0.02;
+
+/// All sentences, in the order of their importance.
+#[must_use]
+pub(crate) fn sentences(findings: &Findings<'_>) -> Vec<Sentence> {
+    let mut sentences = Vec::new();
+    let health = answers::health(findings);
+    let (first, last) = match health {
+        Some((share, sentence)) if share > MANY_UNREAD => (Some(sentence), None),
+        health => (None, health.map(|(_, sentence)| sentence)),
+    };
+    sentences.extend(first);
+    if let Some(impossible) = pooled::impossible(findings) {
+        sentences.push(impossible);
+    } else {
+        sentences.extend(about_light(findings));
+        sentences.extend(models::best(findings));
+    }
+    sentences.extend(answers::fidelity(findings));
+    sentences.extend(last);
+    sentences.extend(pooled::power(findings));
+    sentences
+}
+
+/// Sentences about darkness, noise, enhancers and words alone, in the last kind of degradation that was asked. If it was asked in
+/// several lights, each sentence names its own.
+fn about_light(findings: &Findings<'_>) -> Vec<Sentence> {
+    let variants = findings.grid.variants();
+    let last = variants.last().map(|variant| variant.kind);
+    let variants: Vec<&KindReading> = variants
+        .into_iter()
+        .filter(|variant| Some(variant.kind) == last)
+        .collect();
+    let unit = findings.unit;
+    let mut all = Vec::new();
+    for variant in &variants {
+        let of = |kind| of_set(findings, kind, variant);
+        let mut sentences = Vec::new();
+        sentences.extend(pooled::darkness(&of(PooledKind::Darkness), unit));
+        sentences.extend(pooled::noise(&of(PooledKind::Noise), unit));
+        sentences.extend(pooled::enhancers(&of(PooledKind::Enhancer), unit));
+        sentences.extend(pooled::below_blind(&of(PooledKind::Blind), unit));
+        sentences.extend(models::families(findings, variant));
+        if variants.len() > 1 {
+            for sentence in &mut sentences {
+                sentence.text = format!("{}: {}", light(variant, None), sentence.text);
+            }
+        }
+        all.extend(sentences);
+    }
+    all
+}
+
+/// The findings over all families of one kind and variant, in the order of enhancers and levels.
+fn of_set<'f>(
+    findings: &'f Findings<'_>,
+    kind: PooledKind,
+    variant: &KindReading,
+) -> Vec<&'f PooledFinding> {
+    let pooled = findings.pooled.iter();
+    let of_set = pooled.filter(|finding| {
+        finding.kind == kind && finding.family.is_none() && finding.variant == *variant
+    });
+    of_set.collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,197 @@
+//! Golden sentences of each kind and verdict, and the check that each number in a sentence is one of its values.
+
+use super::pooled;
+use super::sentence::{Sentence, level_runs};
+use crate::score::cluster::ClusterUnit;
+use crate::score::estimate::Estimate;
+use crate::score::pooled::{PooledFinding, PooledKind};
+use crate::score::significance::Significance::{self, Better, NotShown, Worse};
+use crate::types::degradation::Kind;
+use crate::types::{AxisLevel, EnhancerName, KindReading, Severity};
+
+/// A finding at one of the named levels, with an interval of ± 4 points.
+fn finding(
+    kind: PooledKind,
+    level: usize,
+    difference: f64,
+    verdict: Significance,
+) -> PooledFinding {
+    let enhancer = (kind == PooledKind::Enhancer).then(|| EnhancerName::new("lift").unwrap());
+    PooledFinding {
+        kind,
+        family: None,
+        variant: KindReading {
+            kind: Some(Kind::Sensor),
+            ..KindReading::NONE
+        },
+        enhancer,
+        level: AxisLevel::new(Kind::Sensor, Severity::LADDER[level - 1]),
+        models: ["a", "b"].map(str::to_owned).to_vec(),
+        blind_models: Vec::new(),
+        first: 0.5,
+        second: 0.8637,
+        difference: Estimate {
+            value: difference,
+            low: difference - 0.04,
+            high: difference + 0.04,
+            n: 1237,
+        },
+        p: 0.0124,
+        draws: None,
+        holm: if verdict == NotShown { 0.062 } else { 0.0004 },
+        levels: 5,
+        verdict,
+        items: 1237,
+        dropped: 0,
+        clusters: 30,
+        least_p: 1e-9,
+        least_holm: 1e-8,
+    }
+}
+
+fn findings(kind: PooledKind, all: &[(f64, Significance)]) -> Vec<PooledFinding> {
+    let all = all.iter().enumerate();
+    all.map(|(i, (difference, verdict))| finding(kind, i + 1, *difference, *verdict))
+        .collect()
+}
+
+/// The numbers in a text, without those of level names.
+fn numbers(text: &str) -> Vec<f64> {
+    let text = text.replace('−', "-");
+    let words = text.split([' ', '[', ']', '(', ')', ';', '–', ':', '%']);
+    let words = words.map(|word| word.trim_end_matches(['.', ',']).replace(',', ""));
+    words.filter_map(|word| word.parse().ok()).collect()
+}
+
+/// The sentence as one line; each number in it must be one of its values.
+fn checked(sentence: &Sentence) -> String {
+    let line = format!(
+        "{} {} ({})",
+        sentence.tone.sign(),
+        sentence.text,
+        sentence.detail
+    );
+    for number in numbers(&line) {
+        let mut values = sentence.values.values();
+        assert!(
+            values.any(|value| (value.abs() - number.abs()).abs() < 1e-9),
+            "{number} of {line} is not in {:?}",
+            sentence.values
+        );
+    }
+    line
+}
+
+#[test]
+fn each_kind_and_verdict_has_its_words() {
+    use PooledKind::{Blind, Darkness, Enhancer, Noise};
+    type Levels<'a> = &'a [(f64, Significance)];
+    let say = |kind: PooledKind, levels: Levels<'_>| -> Vec<String> {
+        let all = findings(kind, levels);
+        let all: Vec<&PooledFinding> = all.iter().collect();
+        let unit = ClusterUnit::Scene;
+        let sentences: Vec<Sentence> = match kind {
+            Darkness => pooled::darkness(&all, unit).into_iter().collect(),
+            Noise => pooled::noise(&all, unit).into_iter().collect(),
+            Enhancer => pooled::enhancers(&all, unit),
+            Blind => pooled::below_blind(&all, unit).into_iter().collect(),
+        };
+        sentences.iter().map(checked).collect()
+    };
+    let said = say(
+        Darkness,
+        &[(-0.02, NotShown), (-0.1, Worse), (-0.449, Worse)],
+    );
+    assert_eq!(
+        said,
+        [
+            "− Darkness costs 44.9 points at L3, from 86.4 % at L0. (mean of these 2 models: −44.9 [−48.9, −40.9], p < 0.001; a loss is \
+          shown at L2–L3; n = 1,237 in 30 scenes)"
+        ]
+    );
+    let said = say(Darkness, &[(-0.02, NotShown), (-0.01, NotShown)]);
+    assert_eq!(
+        said,
+        [
+            "· It is not shown that darkness costs anything at any level. (mean of these 2 models: −1.0 [−5.0, +3.0], p = 0.062; at L2; \
+          n = 1,237 in 30 scenes)"
+        ]
+    );
+    let said = say(Darkness, &[(0.1, Better)]);
+    assert!(said[0].starts_with("+ At L1 accuracy is 10.0 points higher than at L0. ("));
+    let said = say(Noise, &[(-0.05, Worse), (-0.091, Worse), (0.01, NotShown)]);
+    assert!(
+        said[0]
+            .starts_with("− Sensor noise costs up to 9.1 points beyond the exposure drop (L2). (")
+    );
+    assert!(said[0].contains("; shown at L1–L2;"), "{said:?}");
+    let said = say(Noise, &[(0.03, NotShown)]);
+    assert!(said[0].starts_with("· It is not shown that sensor noise costs anything beyond"));
+    let said = say(
+        Enhancer,
+        &[
+            (-0.081, Worse),
+            (-0.06, Worse),
+            (-0.05, NotShown),
+            (0.056, Better),
+            (0.05, Better),
+        ],
+    );
+    let starts = [
+        "− lift harms at L1–L2: −8.1 points at most. (",
+        "+ lift helps at L4–L5: +5.6 points at most. (",
+        "· lift at L3: neither help nor harm is shown. (mean of these 2 models: −5.0 [−9.0, −1.0], p = 0.062; largest at L3, not shown \
+         after correction for 5 levels (uncorrected p = 0.012); n = 1,237 in 30 scenes)",
+    ];
+    assert_eq!(said.len(), starts.len());
+    for (said, start) in said.iter().zip(starts) {
+        assert!(said.starts_with(start), "{said}");
+    }
+    assert!(say(Blind, &[(0.2, Better), (0.0, NotShown)]).is_empty());
+    let said = say(Blind, &[(0.2, Better), (-0.1, Worse)]);
+    assert!(said[0].starts_with("− In the dark the models fall below the words alone at L2: pictures do more harm than none. ("));
+}
+
+#[test]
+fn one_model_and_lost_items_are_named() {
+    let mut one = finding(PooledKind::Darkness, 5, -0.3, Worse);
+    one.models = vec!["gpt-4o".to_owned()];
+    (one.dropped, one.draws, one.clusters) = (100, Some(100_000), 1);
+    let said = checked(&pooled::darkness(&[&one], ClusterUnit::Frame).unwrap());
+    assert!(
+        said.ends_with(
+            "(gpt-4o: −30.0 [−34.0, −26.0], p < 0.001; a loss is shown at L5; n = 1,237 in 1 frame, 100 left out because a model has no \
+             reply, p by 100,000 draws)"
+        ),
+        "{said}"
+    );
+}
+
+#[test]
+fn levels_are_joined_by_runs() {
+    let all = ["L1", "L2", "L3", "L4", "L5"];
+    assert_eq!(level_runs(&["L1", "L2", "L4"], &all), "L1–L2, L4");
+    assert_eq!(level_runs(&all, &all), "L1–L5");
+    assert_eq!(level_runs(&["L5"], &all), "L5");
+}
+
+#[test]
+fn no_sentence_says_more_than_its_test() {
+    let source = [
+        include_str!("pooled.rs"),
+        include_str!("models.rs"),
+        include_str!("answers.rs"),
+    ];
+    for text in source {
+        for word in [
+            "no effect",
+            "no difference is",
+            "equal to",
+            "tied",
+            "the same as",
+            "significant",
+        ] {
+            assert!(!text.contains(&format!("{word} ")), "{word}");
+        }
+    }
+}

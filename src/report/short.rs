@@ -1,0 +1,251 @@
+//! The text at the end of an evaluation, for 80 columns: [`short`].
+
+use std::fmt::Write;
+use std::path::Path;
+
+use super::choice_report::ChoiceReport;
+use super::ladder::{Ladder, Series, SeriesByLevel};
+use super::sentences::{FIRST, HOW_TO_READ, Sentence};
+use super::words::{counted, percent, reach_of, with_interval};
+use crate::score::accuracy::AccuracyCell;
+use crate::score::choice::ReadingMode;
+use crate::score::health::Health;
+use crate::types::AxisLevel;
+use crate::types::manifest::RunManifest;
+
+/// Width of the text in characters.
+const WIDTH: usize = 80;
+
+/// Width of the column of a level, and of the column of intervals, in characters.
+const LEVEL: usize = 7;
+const REACH: usize = 15;
+
+/// Width of a name in the table, in characters: no name is longer.
+const MAX_NAME: usize = 40;
+
+/// Maximum number of rows of the table.
+const MAX_ROWS: usize = 24;
+
+/// Mark of an accuracy that is shown to be below that without images.
+const BELOW: char = '▼';
+
+/// The alerts, the findings and one table. `runs` are the runs with their folders.
+#[must_use]
+pub(crate) fn short(report: &ChoiceReport<'_>, runs: &[(&RunManifest, &Path)]) -> String {
+    let mut text = findings(report);
+    text.push('\n');
+    text += &table(report);
+    for (_, folder) in runs {
+        let _ = writeln!(text, "run: {}", folder.display());
+    }
+    text
+}
+
+/// The head, the alerts and all that is found, without a table.
+#[must_use]
+pub(crate) fn findings(report: &ChoiceReport<'_>) -> String {
+    let mut text = head(report) + "\n";
+    for alert in &report.alerts {
+        text += &wrapped("! ", &alert.text, "  ");
+    }
+    for sentence in report.sentences.iter().take(FIRST) {
+        text += &sentence_lines(sentence);
+    }
+    if report.sentences.len() > FIRST {
+        let more = counted(report.sentences.len() - FIRST, "more finding");
+        let _ = writeln!(text, " {more}: --full");
+    }
+    let is_tested = |sentence: &Sentence| sentence.values.contains_key("p");
+    if report.sentences.iter().any(is_tested) {
+        text += &wrapped(" ", HOW_TO_READ, " ");
+    }
+    text
+}
+
+/// A sentence with its sign, and its detail beneath.
+pub(super) fn sentence_lines(sentence: &Sentence) -> String {
+    let sign = format!(" {}  ", sentence.tone.sign());
+    wrapped(&sign, &sentence.text, "    ") + &wrapped("    ", &sentence.detail, "    ")
+}
+
+/// Numbers of models, questions, frames, clusters and replies.
+fn head(report: &ChoiceReport<'_>) -> String {
+    let findings = report.findings;
+    let grid = &findings.grid;
+    let mut models: Vec<&str> = grid
+        .subjects
+        .iter()
+        .map(|subject| &*subject.model)
+        .collect();
+    models.dedup();
+    let who = match &models[..] {
+        [one] => (*one).to_owned(),
+        several => counted(several.len(), "model"),
+    };
+    let frames: std::collections::BTreeSet<_> = grid
+        .items
+        .iter()
+        .map(|item| &item.record.detail.frame)
+        .collect();
+    let questions: std::collections::BTreeSet<_> = grid
+        .items
+        .iter()
+        .map(|item| &item.record.question)
+        .collect();
+    let replies: usize = findings.health.iter().map(|health| health.replies).sum();
+    let failed: usize = findings.health.iter().map(Health::failures).sum();
+    let replies = match replies {
+        1 => "1 reply".to_owned(),
+        n => format!("{n} replies"),
+    };
+    format!(
+        "{who} · {} · {} · {replies}, {failed} failed · intervals by {}",
+        counted(questions.len(), "question"),
+        counted(frames.len(), "frame"),
+        findings.unit
+    )
+}
+
+/// Text in lines of [`WIDTH`] characters; the first begins with `first`, the others with `rest`.
+fn wrapped(first: &str, text: &str, rest: &str) -> String {
+    let mut lines = String::new();
+    let mut line = first.to_owned();
+    let mut is_empty = true;
+    for word in text.split(' ') {
+        if !is_empty && line.chars().count() + 1 + word.chars().count() > WIDTH {
+            lines += line.trim_end();
+            lines.push('\n');
+            rest.clone_into(&mut line);
+            is_empty = true;
+        }
+        if !is_empty {
+            line.push(' ');
+        }
+        line += word;
+        is_empty = false;
+    }
+    lines + line.trim_end() + "\n"
+}
+
+/// Accuracies by level: a block for each light with a row for each model, or one block if there is one model.
+fn table(report: &ChoiceReport<'_>) -> String {
+    let summary = &report.findings.summary;
+    let cells = summary.of(None, ReadingMode::Strict);
+    let ladder = Ladder::new(cells.map(|cell| (&cell.subject, cell))).with_clean();
+    let mut models: Vec<&str> = ladder.series.keys().map(|series| series.model).collect();
+    models.dedup();
+    let mut rows: Vec<(String, String, &SeriesByLevel<'_, AccuracyCell>)> = Vec::new();
+    let one = models.len() == 1;
+    for (series, cells) in &ladder.series {
+        let (block, name) = block_and_name(series, one);
+        rows.push((block, name, cells));
+    }
+    // The models of one light stand together.
+    rows.sort_by(|a, b| a.0.cmp(&b.0));
+    let hidden = rows.len().saturating_sub(MAX_ROWS);
+    rows.truncate(MAX_ROWS);
+    let levels: Vec<AxisLevel> = ladder.levels.iter().copied().collect();
+    let longest = rows.iter().map(|(_, name, _)| name.chars().count()).max();
+    let titles = rows.iter().map(|(block, ..)| block.chars().count()).max();
+    let room = WIDTH
+        .saturating_sub(1 + levels.len() * LEVEL + REACH)
+        .max(12);
+    let name_width = longest.max(titles).unwrap_or(0).min(room.min(MAX_NAME));
+    let mut text = String::from(" accuracy in %\n");
+    for block in rows.chunk_by(|a, b| a.0 == b.0) {
+        text += &line(
+            &block[0].0,
+            name_width,
+            levels.iter().map(|level| format!("{level} ")),
+            "95 %",
+        );
+        for (_, name, cells) in block {
+            let values = levels
+                .iter()
+                .map(|level| value(report, cells.get(level).copied()));
+            text += &line(
+                name,
+                name_width,
+                values,
+                &reach_of(cells.values().filter_map(|cell| cell.accuracy)),
+            );
+        }
+    }
+    if hidden > 0 {
+        let _ = writeln!(text, " {} --full", counted(hidden, "more row"));
+    }
+    text + &baselines(report, &ladder)
+}
+
+/// The title of the block and the name of the row of a series.
+fn block_and_name(series: &Series<'_>, is_single: bool) -> (String, String) {
+    if is_single {
+        (series.model.to_owned(), series.light())
+    } else {
+        (series.light(), series.model.to_owned())
+    }
+}
+
+fn line(name: &str, width: usize, values: impl Iterator<Item = String>, reach: &str) -> String {
+    let name = shortened(name, width);
+    let values = values.map(|value| format!("{value:>LEVEL$}"));
+    let values = values.collect::<Vec<_>>().concat();
+    let line = format!(" {name:<width$}{values}  {reach}");
+    line.trim_end().to_owned() + "\n"
+}
+
+/// A name with its middle left out, if it is longer than `width`.
+fn shortened(name: &str, width: usize) -> String {
+    let letters: Vec<char> = name.chars().collect();
+    if letters.len() <= width {
+        return name.to_owned();
+    }
+    let (head, tail) = (width.div_ceil(2) - 1, width / 2);
+    let middle = letters.len() - tail;
+    letters[..head]
+        .iter()
+        .chain(&['…'])
+        .chain(&letters[middle..])
+        .collect()
+}
+
+/// An accuracy in percent, with a mark if it is below that without images.
+fn value(report: &ChoiceReport<'_>, cell: Option<&AccuracyCell>) -> String {
+    let Some(cell) = cell else {
+        return String::new();
+    };
+    let Some(accuracy) = cell.accuracy else {
+        return "– ".to_owned();
+    };
+    let is_below = report.findings.below_blind(&cell.subject, None);
+    let mark = if is_below { BELOW } else { ' ' };
+    format!("{}{mark}", percent(accuracy.value))
+}
+
+/// Lines below the table: what the last column means, models without images, chance, and the mark.
+fn baselines(report: &ChoiceReport<'_>, ladder: &Ladder<'_, AccuracyCell>) -> String {
+    let mut parts = Vec::new();
+    for (subject, cell) in &ladder.without_level {
+        let Some(share) = cell.accuracy else {
+            continue;
+        };
+        parts.push(match subject.view {
+            None => format!("chance {}", percent(share.value)),
+            Some(_) if parts.is_empty() => {
+                format!("without images: {} {}", subject.model, with_interval(share))
+            }
+            Some(_) => format!("{} {}", subject.model, with_interval(share)),
+        });
+    }
+    let cells = report.findings.summary.of(None, ReadingMode::Strict);
+    let mut cells = cells.filter(|cell| cell.subject.level.is_some());
+    if cells.any(|cell| report.findings.below_blind(&cell.subject, None)) {
+        parts.push(format!("{BELOW} shown to be below the words alone"));
+    }
+    let text = "95 %: how far the widest interval of the row reaches down and up";
+    let mut text = wrapped(" ", text, " ");
+    if !parts.is_empty() {
+        text += &wrapped(" ", &parts.join(" · "), " ");
+    }
+    text
+}
