@@ -19,14 +19,17 @@ pub struct Agreement {
     pub kappa: Option<Estimate>,
 }
 
-/// Counts over the items of a cluster to which both models replied: all, and those that both, the first or the second got
-/// right.
+/// Counts over the items of a cluster.
 #[derive(Debug, Clone, Copy, Default)]
-struct AgreementCounts {
-    all: f32,
-    both: f32,
-    first: f32,
-    second: f32,
+pub struct AgreementCounts {
+    /// Number of items to which both models replied.
+    pub all: f32,
+    /// Number of them that both got right.
+    pub both: f32,
+    /// Number of them that the first model got right.
+    pub first: f32,
+    /// Number of them that the second model got right.
+    pub second: f32,
 }
 
 /// Agreement of every pair of models in every condition.
@@ -57,37 +60,37 @@ fn agreement(grid: &Grid<'_>, draws: &Resamples, first: usize, second: usize) ->
         cluster.first += one_if(a);
         cluster.second += one_if(b);
     }
-    let same = Estimate::clustered(&same)?;
-    let total =
-        |of: fn(&AgreementCounts) -> f32| counts.iter().map(|counts| f64::from(of(counts))).sum();
-    let value = kappa(
-        total(|r| r.all),
-        total(|r| r.both),
-        total(|r| r.first),
-        total(|r| r.second),
-    );
-    let interval = || {
-        let sums = |of: fn(&AgreementCounts) -> f32| {
-            draws.sums(&counts.iter().map(of).collect::<Vec<_>>())
-        };
-        let (all, both) = (sums(|r| r.all), sums(|r| r.both));
-        let (first, second) = (sums(|r| r.first), sums(|r| r.second));
-        let kappas = (0..all.len()).filter_map(|i| kappa(all[i], both[i], first[i], second[i]));
-        draws.interval(kappas.collect())
-    };
     Some(Agreement {
         first: grid.subjects[first].clone(),
         second: grid.subjects[second].clone(),
-        kappa: value.map(|value| {
-            let [low, high] = interval();
-            Estimate {
-                value,
-                low: low.min(value),
-                high: high.max(value),
-                n: same.n,
-            }
-        }),
-        same,
+        kappa: clustered_kappa(&counts, draws),
+        same: Estimate::clustered(&same)?,
+    })
+}
+
+/// κ of two models with its interval, from the counts of each cluster; `None` if one of them is always right or always wrong.
+#[must_use]
+pub fn clustered_kappa(counts: &[AgreementCounts], draws: &Resamples) -> Option<Estimate> {
+    let total =
+        |of: fn(&AgreementCounts) -> f32| counts.iter().map(|counts| f64::from(of(counts))).sum();
+    let all: f64 = total(|r| r.all);
+    let value = kappa(
+        all,
+        total(|r| r.both),
+        total(|r| r.first),
+        total(|r| r.second),
+    )?;
+    let sums =
+        |of: fn(&AgreementCounts) -> f32| draws.sums(&counts.iter().map(of).collect::<Vec<_>>());
+    let (drawn, both) = (sums(|r| r.all), sums(|r| r.both));
+    let (first, second) = (sums(|r| r.first), sums(|r| r.second));
+    let kappas = (0..drawn.len()).filter_map(|i| kappa(drawn[i], both[i], first[i], second[i]));
+    let [low, high] = draws.interval(kappas.collect());
+    Some(Estimate {
+        value,
+        low: low.min(value),
+        high: high.max(value),
+        n: all as usize,
     })
 }
 

@@ -350,9 +350,10 @@ fn thresholds_are_recovered() {
         let clusters = clusters_of(&records);
         let grid = Grid::new(&records, &clusters);
         let made = curves(&grid, &Resamples::new(clusters.count()), None);
-        let threshold = made[0].threshold.unwrap();
+        let threshold = made[0].summary.threshold.unwrap();
         sum += threshold.value;
-        areas += usize::from((made[0].area.low..=made[0].area.high).contains(&true_area));
+        let area = made[0].summary.area.unwrap();
+        areas += usize::from((area.low..=area.high).contains(&true_area));
         (threshold.low..=threshold.high).contains(&truth)
     });
     let mean = sum / times as f64;
