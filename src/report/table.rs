@@ -122,7 +122,7 @@ pub enum TableCell {
     Number(f64),
     /// A number with its interval.
     Estimate(Estimate),
-    /// An accuracy below that of a model without images.
+    /// An accuracy that is shown to be below that of a model without images.
     Below(Estimate),
     /// Expected accuracy of guessing.
     Guess(Estimate),
