@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::grid::ClusterCount;
-use super::quantiles::{least_share, student};
+use super::quantiles::{degrees_of_freedom, least_share, student};
 
 /// The 97.5 % quantile of the standard normal distribution, for 95 % intervals.
 const Z: f64 = 1.959_963_984_540_054;
@@ -84,7 +84,8 @@ impl Estimate {
         // At the minimum design effect no variance was estimated, so Student's quantile is not needed.
         let min_effect = if has_spread { 1.0 / max_weight } else { 1.0 };
         let quantile = if sums.len() > 1 && design_effect > min_effect {
-            student(degrees_of_freedom(sums, value))
+            let residuals = sums.iter().map(|(sum, n)| sum - value * n);
+            student(degrees_of_freedom(&residuals.collect::<Vec<_>>()))
         } else {
             Z
         };
@@ -144,28 +145,6 @@ impl Estimate {
             high: value,
             n,
         }
-    }
-}
-
-/// Degrees of freedom of the variance between clusters: C / (κ − 1), kept within 2 and C − 1, with the kurtosis
-/// κ = C Σr⁴ / (Σr²)² of the clusters' residuals r.
-///
-/// The variance of a variance grows with the kurtosis (Satterthwaite 1946, Biometrics Bull. 2:110, gives 2C / (κ − 1)). κ comes from the
-/// same clusters and is too small where a few of them make the variance; in simulation half of that number holds the truth where
-/// the share is near 0 or 1 and the clusters are strongly correlated.
-fn degrees_of_freedom(sums: &[(f64, f64)], value: f64) -> f64 {
-    let c = sums.len() as f64;
-    let squares = sums.iter().map(|(sum, n)| {
-        let residual = sum - value * n;
-        residual * residual
-    });
-    let second: f64 = squares.clone().sum();
-    let fourth: f64 = squares.map(|square| square * square).sum();
-    let kurtosis = c * fourth / (second * second);
-    if kurtosis > 1.0 {
-        (c / (kurtosis - 1.0)).clamp(f64::min(2.0, c - 1.0), c - 1.0)
-    } else {
-        c - 1.0
     }
 }
 

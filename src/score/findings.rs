@@ -79,7 +79,7 @@ impl<'a> Findings<'a> {
             confusions: confusions(&grid),
             hallucinations: hallucinations(&grid),
             first_failures: first_failures(&grid),
-            agreements: agreements(&grid, &draws),
+            agreements: agreements(&grid),
             grid,
         }
     }

@@ -1,4 +1,4 @@
-//! Quantiles of distributions for 95 % intervals: [`student`] and [`least_share`].
+//! Quantiles of distributions for 95 % intervals: [`student`] with its [`degrees_of_freedom`], and [`least_share`].
 
 use statrs::distribution::{Beta, ContinuousCDF as _, StudentsT};
 
@@ -7,6 +7,26 @@ use statrs::distribution::{Beta, ContinuousCDF as _, StudentsT};
 pub(super) fn student(degrees: f64) -> f64 {
     let distribution = StudentsT::new(0.0, 1.0, degrees);
     distribution.map_or(f64::INFINITY, |student| student.inverse_cdf(0.975))
+}
+
+/// Degrees of freedom of a variance between clusters, from the clusters' residuals r: C / (κ − 1), kept within 2 and C − 1, with
+/// their kurtosis κ = C Σr⁴ / (Σr²)².
+///
+/// The variance of a variance grows with the kurtosis (Satterthwaite 1946, Biometrics Bull. 2:110, gives 2C / (κ − 1)). κ comes from the
+/// same clusters and is too small where a few of them make the variance; in simulation half of that number holds the truth where
+/// shares are near 0 or 1 and clusters are strongly correlated (`tests/program/coverage.rs`).
+#[must_use]
+pub(super) fn degrees_of_freedom(residuals: &[f64]) -> f64 {
+    let c = residuals.len() as f64;
+    let squares = residuals.iter().map(|residual| residual * residual);
+    let second: f64 = squares.clone().sum();
+    let fourth: f64 = squares.map(|square| square * square).sum();
+    let kurtosis = c * fourth / (second * second);
+    if kurtosis > 1.0 {
+        (c / (kurtosis - 1.0)).clamp(f64::min(2.0, c - 1.0), c - 1.0)
+    } else {
+        c - 1.0
+    }
 }
 
 /// The lower end of the exact 95 % interval of a share, from `hits` of `n` independent trials (Clopper and Pearson 1934, Biometrika
