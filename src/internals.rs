@@ -41,6 +41,7 @@ pub mod rooms {
 }
 
 pub mod score {
+    pub use crate::score::agreement::{AgreementCounts, clustered_kappa};
     pub use crate::score::bootstrap::Resamples;
     pub use crate::score::chance::OfferedChoices;
     pub use crate::score::cluster::Clusters;
@@ -52,8 +53,11 @@ pub mod score {
     pub use crate::score::open::{
         AnswerOutcome, Baseline, Group, OpenSummary, QuestionGroups, ScoredAnswer, open_summary,
     };
-    pub use crate::score::paired::PairedComparison;
+    pub use crate::score::paired::{PairedComparison, difference};
+    pub use crate::score::pooled::{PooledFinding, PooledKind, pooled};
+    pub use crate::score::significance::Significance;
     pub use crate::score::subject::Subject;
+    pub use crate::score::threshold::{LevelCounts, NoThreshold};
 }
 
 pub mod synthesis {

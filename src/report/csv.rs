@@ -32,7 +32,7 @@ fn plain<S: Serializer>(number: &f64, serializer: S) -> Result<S::Ok, S::Error> 
 pub(super) fn fields(cell: &TableCell, names: usize) -> impl Iterator<Item = CsvField<'_>> {
     let mut fields = [CsvField::None; 4];
     match cell {
-        TableCell::Blank | TableCell::Absent | TableCell::Missing => {}
+        TableCell::Blank | TableCell::Absent | TableCell::Missing | TableCell::Unknown(_) => {}
         TableCell::Text(text) => fields[0] = CsvField::Text(text),
         TableCell::Count(count) => fields[0] = CsvField::Count(*count),
         TableCell::Number(number) => fields[0] = CsvField::Number(*number),

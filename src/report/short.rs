@@ -217,7 +217,7 @@ fn value(report: &ChoiceReport<'_>, cell: Option<&AccuracyCell>) -> String {
     let Some(accuracy) = cell.accuracy else {
         return "– ".to_owned();
     };
-    let is_below = report.findings.below_blind(&cell.subject, None);
+    let is_below = !report.findings.below_blind(&cell.subject, None).is_empty();
     let mark = if is_below { BELOW } else { ' ' };
     format!("{}{mark}", percent(accuracy.value))
 }
@@ -239,7 +239,7 @@ fn baselines(report: &ChoiceReport<'_>, ladder: &Ladder<'_, AccuracyCell>) -> St
     }
     let cells = report.findings.summary.of(None, ReadingMode::Strict);
     let mut cells = cells.filter(|cell| cell.subject.level.is_some());
-    if cells.any(|cell| report.findings.below_blind(&cell.subject, None)) {
+    if cells.any(|cell| !report.findings.below_blind(&cell.subject, None).is_empty()) {
         parts.push(format!("{BELOW} shown to be below the words alone"));
     }
     let text = "95 %: how far the widest interval of the row reaches down and up";

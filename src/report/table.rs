@@ -1,9 +1,9 @@
 //! One table of a report: [`Table`], its [`Column`]s and [`TableCell`]s. It holds numbers. The modules that write it format
 //! them: `csv`, `json`, `latex`, `page` and `terminal`.
 
-use crate::score::curve::Threshold;
 use crate::score::estimate::Estimate;
 use crate::score::significance::Significance;
+use crate::score::threshold::Threshold;
 
 /// A table of numbers. A format for which it has no title leaves it out.
 #[derive(Debug, Clone, PartialEq)]
@@ -112,6 +112,8 @@ pub enum TableCell {
     Absent,
     /// There is no number, because no reply can be counted.
     Missing,
+    /// The number is not known; the text says why.
+    Unknown(String),
     /// Text of any length.
     Text(String),
     /// A number of things.
@@ -120,7 +122,7 @@ pub enum TableCell {
     Number(f64),
     /// A number with its interval.
     Estimate(Estimate),
-    /// An accuracy below that of a model without images.
+    /// An accuracy that is shown to be below that of a model without images.
     Below(Estimate),
     /// Expected accuracy of guessing.
     Guess(Estimate),

@@ -33,7 +33,7 @@ pub(super) fn texts(kind: ColumnKind, cell: &TableCell) -> Vec<String> {
         (ColumnKind::Threshold, TableCell::Threshold(t, darkest)) => {
             vec![stops(t.value, *darkest), reach(t.low, t.high, *darkest)]
         }
-        (ColumnKind::Threshold, TableCell::Missing) => vec!["–".to_owned(), words(kind, cell)],
+        (ColumnKind::Threshold, TableCell::Unknown(_)) => vec!["–".to_owned(), words(kind, cell)],
         (ColumnKind::Share, TableCell::Estimate(share)) => vec![with_interval(*share)],
         (_, TableCell::Strict(strict, lenient)) => {
             let lenient = differing(&percent(strict.value), &percent(*lenient));

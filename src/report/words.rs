@@ -121,11 +121,8 @@ pub(super) fn ends(share: Estimate) -> String {
 pub(super) fn words(kind: ColumnKind, cell: &TableCell) -> String {
     match cell {
         TableCell::Blank | TableCell::Absent => String::new(),
-        TableCell::Missing if kind == ColumnKind::Threshold => {
-            "not clearly above chance at L0".to_owned()
-        }
         TableCell::Missing => "–".to_owned(),
-        TableCell::Text(text) => text.clone(),
+        TableCell::Text(text) | TableCell::Unknown(text) => text.clone(),
         TableCell::Count(count) => count.to_string(),
         TableCell::Number(value) => number(kind, *value),
         TableCell::Guess(share) => number(ColumnKind::Number, 100.0 * share.value),

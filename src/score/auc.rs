@@ -2,7 +2,7 @@
 //! with clustered replies.
 
 use super::estimate::Estimate;
-use super::student::student;
+use super::quantiles::{degrees_of_freedom, student};
 use statrs::distribution::{ContinuousCDF as _, StudentsT};
 
 /// Minimum number of clusters for an interval (chosen): with fewer, their spread is estimated too poorly.
@@ -109,9 +109,11 @@ impl PairCounts {
             return None;
         }
         let (c, value) = (count as f64, self.concordant / self.pairs);
-        let influence = |cluster: &[f64; 2]| (cluster[0] - value * cluster[1]) / self.pairs;
-        let squares: f64 = used
-            .map(|cluster| influence(cluster) * influence(cluster))
+        let influences = used.map(|[concordant, pairs]| (concordant - value * pairs) / self.pairs);
+        let influences: Vec<f64> = influences.collect();
+        let squares: f64 = influences
+            .iter()
+            .map(|influence| influence * influence)
             .sum();
         let error = (c / (c - 1.0) * squares).sqrt();
         let slope = value * (1.0 - value);
@@ -119,9 +121,10 @@ impl PairCounts {
             return None;
         }
         let logit = libm::log(value / (1.0 - value));
-        let half = student(count - 1) * error / slope;
+        let degrees = degrees_of_freedom(&influences);
+        let half = student(degrees) * error / slope;
         let at = |logit: f64| 1.0 / (1.0 + libm::exp(-logit));
-        let distribution = StudentsT::new(0.0, 1.0, c - 1.0).ok()?;
+        let distribution = StudentsT::new(0.0, 1.0, degrees).ok()?;
         // The same scale as the interval, so that it leaves out ½ exactly if p is below 0.05.
         let p = 2.0 * distribution.sf(logit.abs() * slope / error);
         Some(Auc {

@@ -5,8 +5,9 @@ use super::estimate::Estimate;
 use super::grid::{ClusterCount, Grid};
 use super::paired::difference;
 use super::pooled::pool;
-use super::significance::{Significance, gcd, holm, least_p, swap_test};
+use super::significance::{Significance, holm, least_p, swap_test};
 use super::subject::Subject;
+use super::trapezoid::weights;
 use crate::types::{AxisLevel, KindReading};
 
 /// Comparison of the models by their mean accuracy over the exposure drops, raw, in the strict reading.
@@ -251,37 +252,4 @@ fn pairs(clusters: &[ClusterScores], models: &[(ModelArea, usize)], weight: u64)
         pair.significance = Significance::of(pair.difference.value, holm, least_holm);
     }
     pairs
-}
-
-/// Weights of the levels in the trapezoid rule: whole numbers without a common divisor, so that sums of them are exact.
-fn weights(levels: &[AxisLevel]) -> Vec<u64> {
-    let drop = |level: &AxisLevel| (100.0 * level.value()).round() as u64;
-    let last = levels.len() - 1;
-    let width = |index: usize| {
-        drop(&levels[(index + 1).min(last)]) - drop(&levels[index.saturating_sub(1)])
-    };
-    let widths: Vec<u64> = (0..=last).map(width).collect();
-    let divisor = widths.iter().copied().fold(0, gcd).max(1);
-    widths.into_iter().map(|width| width / divisor).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::types::Severity;
-    use crate::types::degradation::Kind;
-
-    #[test]
-    fn weights_are_those_of_the_trapezoid_rule() {
-        let level = |severity| AxisLevel::new(Kind::Sensor, severity);
-        let paper = Severity::LADDER.map(level);
-        let paper = [&[AxisLevel::L0][..], &paper].concat();
-        assert_eq!(weights(&paper), [4, 8, 8, 7, 6, 3]);
-        let odd = [
-            AxisLevel::L0,
-            level(Severity::hundredths(330)),
-            level(Severity::L5),
-        ];
-        assert_eq!(weights(&odd), [11, 30, 19]);
-    }
 }

@@ -2,8 +2,8 @@
 
 use rand_distr::{Distribution as _, Uniform};
 
+use super::quantiles::student;
 use super::split_mix::SplitMix;
-use super::student::student;
 
 /// Number of bootstrap draws (chosen).
 const DRAWS: usize = 2000;
@@ -76,7 +76,7 @@ impl Resamples {
         let tail = if self.clusters < 2 {
             0.0
         } else {
-            let z = student(self.clusters - 1) * (c / (c - 1.0)).sqrt();
+            let z = student(c - 1.0) * (c / (c - 1.0)).sqrt();
             0.5 * libm::erfc(z / std::f64::consts::SQRT_2)
         };
         let last = values.len() - 1;
@@ -105,7 +105,7 @@ mod tests {
         let draws = Resamples::new(30);
         let means: Vec<f64> = draws.sums(&numbers).iter().map(|sum| sum / 30.0).collect();
         let [low, high] = draws.interval(means);
-        let half = student(29) * (77.5_f64 / 30.0).sqrt();
+        let half = student(29.0) * (77.5_f64 / 30.0).sqrt();
         assert!((low - (14.5 - half)).abs() < 0.25, "{low}");
         assert!((high - (14.5 + half)).abs() < 0.25, "{high}");
         let ends = Resamples::new(1).interval(vec![3.0, f64::INFINITY, 1.0]);

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::grid::ClusterCount;
-use super::student::student;
+use super::quantiles::{degrees_of_freedom, least_share, student};
 
 /// The 97.5 % quantile of the standard normal distribution, for 95 % intervals.
 const Z: f64 = 1.959_963_984_540_054;
@@ -41,9 +41,12 @@ impl Estimate {
     ///
     /// The interval is Wilson's at the effective number of replies n / d. The design effect d ≥ 1 is the variance of the
     /// share between clusters (linearised, times C / (C − 1) for C clusters) over that of independent replies. Student's
-    /// quantile of C − 1 degrees of freedom replaces the normal one. Dean and Pagano 2015 (J. Surv. Stat. Methodol. 3:484)
-    /// find this interval the best of seven for clustered shares. With one reply per cluster it is Wilson's own. If all
-    /// replies are right, or none, d is 1 + 0.2 (m − 1) for clusters of m replies (Kish 1965, section 5.4).
+    /// quantile replaces the normal one. Dean and Pagano 2015 (J. Surv. Stat. Methodol. 3:484) find this interval the best of seven
+    /// for clustered shares. With one reply per cluster it is Wilson's own. If all replies are right, or none, d is
+    /// 1 + 0.2 (m − 1) for clusters of m replies (Kish 1965, section 5.4).
+    ///
+    /// The degrees of freedom are those that the clusters' residuals allow ([`degrees_of_freedom`]), and no end is further away than
+    /// the share of wholly right and of wholly wrong clusters allows ([`Self::kept_by_whole_clusters`]).
     #[must_use]
     pub fn clustered(counts: &[ClusterCount]) -> Option<Self> {
         let answered = counts.iter().filter(|count| count.replies > 0);
@@ -60,7 +63,7 @@ impl Estimate {
     /// `sums` holds, for each cluster, the sum of its scores and their number. A score may count for up to `max_weight`
     /// independent replies, as the mean of several replies does. `n` is stored as the estimate's number of trials.
     #[must_use]
-    pub(super) fn scored(sums: &[(f64, f64)], max_weight: f64, n: usize) -> Option<Self> {
+    pub fn scored(sums: &[(f64, f64)], max_weight: f64, n: usize) -> Option<Self> {
         let all: f64 = sums.iter().map(|(_, n)| n).sum();
         if all <= 0.0 {
             return None;
@@ -81,11 +84,41 @@ impl Estimate {
         // At the minimum design effect no variance was estimated, so Student's quantile is not needed.
         let min_effect = if has_spread { 1.0 / max_weight } else { 1.0 };
         let quantile = if sums.len() > 1 && design_effect > min_effect {
-            student(sums.len() - 1)
+            let residuals = sums.iter().map(|(sum, n)| sum - value * n);
+            student(degrees_of_freedom(&residuals.collect::<Vec<_>>()))
         } else {
             Z
         };
-        Some(Self::wilson(value, effective, quantile, n))
+        let estimate = Self::wilson(value, effective, quantile, n);
+        Some(if has_spread {
+            estimate.kept_by_whole_clusters(sums)
+        } else {
+            estimate
+        })
+    }
+
+    /// The interval, cut by the exact intervals of the shares of clusters that are wholly right and wholly wrong: the share right is
+    /// at least that of wholly right clusters, and at most one minus that of wholly wrong ones.
+    ///
+    /// This says nothing of clusters that differ much in size, so that it is left out if the largest has three times the mean or more.
+    fn kept_by_whole_clusters(self, sums: &[(f64, f64)]) -> Self {
+        const ROUNDING: f64 = 1e-9;
+        let all: f64 = sums.iter().map(|(_, n)| n).sum();
+        let largest = sums.iter().map(|(_, n)| *n).fold(0.0, f64::max);
+        if largest >= 3.0 * all / sums.len() as f64 {
+            return self;
+        }
+        let share = |is_whole: fn(&(f64, f64)) -> bool| {
+            let whole = sums.iter().filter(|cluster| is_whole(cluster));
+            least_share(whole.count(), sums.len())
+        };
+        let right = share(|(sum, n)| *sum >= n * (1.0 - ROUNDING));
+        let wrong = share(|(sum, n)| *sum <= n * ROUNDING);
+        Self {
+            low: self.low.max(right.min(self.value)),
+            high: self.high.min((1.0 - wrong).max(self.value)),
+            ..self
+        }
     }
 
     /// Wilson's score interval about `value` for `count` effective replies.
@@ -145,6 +178,52 @@ mod tests {
     fn counts(pairs: &[(u32, u32)]) -> Vec<ClusterCount> {
         let count = |&(right, replies)| ClusterCount { right, replies };
         pairs.iter().map(count).collect()
+    }
+
+    #[test]
+    fn intervals_by_cluster_are_those_of_another_program() {
+        // numpy 2 and scipy 1.17.1, written apart from this program.
+        let one_bad = [vec![(180, 180); 51], vec![(20, 180)]].concat();
+        let few = [4, 4, 3, 4, 0, 2, 4, 4, 1, 4].map(|right| (right, 4));
+        let unequal = [
+            (9, 10),
+            (3, 4),
+            (0, 6),
+            (7, 7),
+            (8, 9),
+            (8, 9),
+            (1, 3),
+            (0, 2),
+            (2, 4),
+            (5, 6),
+            (5, 9),
+            (6, 8),
+        ];
+        let even = [5, 6, 4, 5, 5, 6, 4, 5].map(|right| (right, 10));
+        for (pairs, low, high) in [
+            // Not the 73.1 % that 2 degrees of freedom alone would give.
+            (&one_bad[..], 0.897_446_455_347_9, 0.999_177_030_322_5),
+            (&few, 0.424_046_756_632_2, 0.924_380_341_940_7),
+            (&unequal, 0.475_340_472_659_7, 0.858_841_117_722_1),
+            (&even, 0.392_974_150_861_2, 0.607_025_849_138_8),
+        ] {
+            let share = Estimate::clustered(&counts(pairs)).unwrap();
+            assert!((share.low - low).abs() < 1e-9, "{pairs:?}: {share:?}");
+            assert!((share.high - high).abs() < 1e-9, "{pairs:?}: {share:?}");
+        }
+        // One cluster holds most replies: wholly wrong clusters say little of the share.
+        let large = [
+            (1, 1),
+            (2, 2),
+            (2, 2),
+            (5, 5),
+            (9, 90),
+            (0, 3),
+            (0, 3),
+            (3, 3),
+        ];
+        let share = Estimate::clustered(&counts(&large)).unwrap();
+        assert!(share.low < least_share(5, 8), "{share:?}");
     }
 
     #[test]

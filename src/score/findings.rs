@@ -86,22 +86,23 @@ impl<'a> Findings<'a> {
             confusions: confusions(&grid),
             hallucinations: hallucinations(&grid),
             first_failures: first_failures(&grid),
-            agreements: agreements(&grid, &draws),
+            agreements: agreements(&grid),
             fidelity: FidelityFindings::new(&grid, measured),
             common: CommonItems::of(&grid),
             grid,
         }
     }
 
-    /// Whether a subject is shown to be less accurate than the same model without images, or than such a model if its own was not
-    /// asked: the paired test says so after Holm's correction.
+    /// The models without images than which a subject is shown to be less accurate: itself, or any if it was not asked without
+    /// images. The paired test says so after Holm's correction over the conditions of the two models.
     #[must_use]
-    pub fn below_blind(&self, subject: &Subject, family: Option<&Family>) -> bool {
-        self.comparisons.iter().any(|comparison| {
+    pub fn below_blind(&self, subject: &Subject, family: Option<&Family>) -> Vec<&str> {
+        let below = self.comparisons.iter().filter(|comparison| {
             comparison.kind == ComparisonKind::Blind
                 && comparison.family.as_ref() == family
                 && comparison.first == *subject
                 && comparison.significance == Significance::Worse
-        })
+        });
+        below.map(|comparison| &*comparison.second.model).collect()
     }
 }

@@ -4,13 +4,14 @@
 //! ([`accuracy`]), the paired differences ([`comparison`]), the curves over the levels ([`curve`]), the answers given
 //! against the true ones ([`confusion`]) and the agreement of models ([`agreement`]).
 //!
-//! Intervals come from the clusters ([`cluster`]) in one of three ways. Each was chosen because its 95 % intervals hold the
-//! truth 93 to 97 times in a hundred in simulation (`tests/program/statistics.rs`). The plain percentile bootstrap does not do so
-//! with fewer than about 50 clusters, or near 0 and 1.
+//! Intervals come from the clusters ([`cluster`]). Each was chosen because its 95 % intervals hold the truth in simulation
+//! (`tests/program/statistics.rs` and `coverage.rs`; `src/docs/numbers.md` says where they do so less than 93 times in a hundred).
+//! The plain percentile bootstrap does not do so with fewer than about 50 clusters, or near 0 and 1.
 //!
 //! - shares: Wilson's score interval at the clusters' effective number of replies ([`estimate::Estimate::clustered`]);
 //! - differences: Bonett and Price's adjusted interval with the clusters' variance ([`paired`]), and an exact test;
-//! - numbers that are computed from many shares (thresholds, areas, κ): the cluster bootstrap ([`bootstrap`]).
+//! - κ: its linear form in the clusters' counts, with the clusters' variance ([`agreement`]);
+//! - thresholds: the cluster bootstrap ([`bootstrap`]).
 
 pub(crate) mod accuracy;
 pub(crate) mod agreement;
@@ -35,9 +36,11 @@ pub(crate) mod llm_match;
 pub(crate) mod open;
 pub(crate) mod paired;
 pub(crate) mod pooled;
+mod quantiles;
 pub(crate) mod realism;
 mod record;
 pub(crate) mod significance;
 mod split_mix;
-mod student;
 pub(crate) mod subject;
+pub(crate) mod threshold;
+mod trapezoid;

@@ -3,8 +3,8 @@
 use super::choice::ReadingMode;
 use super::estimate::Estimate;
 use super::grid::{Grid, GridItem};
+use super::quantiles::{degrees_of_freedom, student};
 use super::significance::{mcnemar, sign_flip};
-use super::student::student;
 use crate::types::Family;
 
 /// Accuracy of one subject against another on the items to which both replied.
@@ -108,25 +108,25 @@ impl PairedComparison {
 /// The difference with the interval of Bonett and Price (2012, J. Educ. Behav. Stat. 37:479).
 ///
 /// It adds one pair in each direction, so that few or no discordant pairs do not look like certainty. Here the variance
-/// between clusters replaces that of independent pairs, and Student's quantile the normal one. `clusters` holds, for each
+/// between clusters replaces that of independent pairs, and Student's quantile the normal one, with the degrees of freedom that the
+/// clusters' residuals allow ([`degrees_of_freedom`]). `clusters` holds, for each
 /// cluster, the sum of the differences of its pairs (of scores between 0 and 1) and their number; `n` is the number of all
 /// pairs.
-pub(super) fn difference(clusters: &[(f64, f64)], n: usize) -> Estimate {
+#[must_use]
+pub fn difference(clusters: &[(f64, f64)], n: usize) -> Estimate {
     let (all, c) = (n as f64, clusters.len() as f64);
     let sum: f64 = clusters.iter().map(|(net, _)| net).sum();
     let value = sum / all;
-    let deviation = |(net, pairs): &(f64, f64)| net - value * pairs;
-    let between: f64 = clusters
-        .iter()
-        .map(|pairs| deviation(pairs) * deviation(pairs))
-        .sum();
+    let residuals = clusters.iter().map(|(net, pairs)| net - value * pairs);
+    let residuals: Vec<f64> = residuals.collect();
+    let between: f64 = residuals.iter().map(|residual| residual * residual).sum();
     let variance = if clusters.len() > 1 {
         c / (c - 1.0) * between
     } else {
         // One cluster shows no spread between clusters: the interval is the whole range.
         f64::INFINITY
     };
-    let half = student(clusters.len() - 1) * (variance + 2.0).sqrt() / (all + 2.0);
+    let half = student(degrees_of_freedom(&residuals)) * (variance + 2.0).sqrt() / (all + 2.0);
     let center = sum / (all + 2.0);
     Estimate {
         value,
@@ -156,7 +156,12 @@ mod tests {
         let pairs = [vec![(1, 1, 0); 12], vec![(1, 0, 1); 4], vec![(1, 0, 0); 84]].concat();
         let interval = estimate(&pairs);
         let variance = 100.0 / 99.0 * (16.0 - 100.0 * 0.08 * 0.08) + 2.0;
-        let half = student(99) * f64::sqrt(variance) / 102.0;
+        let residuals = pairs
+            .iter()
+            .map(|(_, gained, lost)| (gained - lost) as f64 - 0.08);
+        let degrees = degrees_of_freedom(&residuals.collect::<Vec<_>>());
+        assert!(degrees > 15.0 && degrees < 25.0, "{degrees}");
+        let half = student(degrees) * f64::sqrt(variance) / 102.0;
         assert!((interval.value - 0.08).abs() < 1e-12);
         assert!((interval.low - (8.0 / 102.0 - half)).abs() < 1e-12);
         assert!((interval.high - (8.0 / 102.0 + half)).abs() < 1e-12);

@@ -44,6 +44,7 @@ impl PooledKind {
 /// Difference of two conditions at one level, for all models of the pool together, in the strict reading.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PooledFinding {
+    /// The two sides.
     pub kind: PooledKind,
     /// Question family; `None` for all families together.
     pub family: Option<Family>,
@@ -216,7 +217,7 @@ struct PooledItem {
 
 /// All pooled findings, ordered by kind, variant, enhancer, family and level.
 #[must_use]
-pub(crate) fn pooled(grid: &Grid<'_>) -> Vec<PooledFinding> {
+pub fn pooled(grid: &Grid<'_>) -> Vec<PooledFinding> {
     let sets: Vec<PooledSet> = PooledSet::all(grid).into_iter().collect();
     let findings = sets.into_par_iter().flat_map_iter(|set| of_set(grid, &set));
     findings.collect()

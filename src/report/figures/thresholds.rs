@@ -7,8 +7,9 @@ use super::super::chart::{
 };
 use super::super::words::{light, stops};
 use crate::error::{Error, Result};
-use crate::score::curve::{Curve, Threshold};
+use crate::score::curve::Curve;
 use crate::score::findings::Findings;
+use crate::score::threshold::Threshold;
 
 /// Widths of the names, of the axis and of the numbers, in pixels.
 const NAMES: i32 = 330;
@@ -25,7 +26,7 @@ pub(super) fn figure(findings: &Findings<'_>) -> Result<Option<Figure>> {
         .iter()
         .filter(|curve| curve.family.is_none());
     let rows: Vec<(&Curve, Threshold)> = rows
-        .filter_map(|curve| Some((curve, curve.threshold?)))
+        .filter_map(|curve| Some((curve, *curve.summary.threshold.as_ref().ok()?)))
         .collect();
     if rows.is_empty() {
         return Ok(None);
@@ -78,7 +79,7 @@ fn draw(root: &FigureArea<'_>, rows: &[(&Curve, Threshold)], unit: &str) -> Resu
             let point = Circle::new(place, 5, colour.filled());
             root.draw(&point).map_err(failed)?;
         }
-        let darkest = curve.darkest.value();
+        let darkest = curve.summary.darkest.value();
         let number = format!(
             "{} [{}, {}]",
             stops(threshold.value, darkest),

@@ -20,19 +20,16 @@ pub(super) fn darkness(levels: &[&PooledFinding], unit: ClusterUnit) -> Option<S
     let mut numbers = Numbers::of(unit);
     let Some(worst) = shown.last() else {
         let better = of_verdict(levels, Significance::Better);
-        let (at, text) = match better.last() {
-            Some(better) => {
-                let gain = numbers.size("gain", better.difference.value);
-                let text = format!(
-                    "At {} accuracy is {gain} points higher than at L0.",
-                    better.level
-                );
-                (better, text)
-            }
-            None => {
-                let text = "It is not shown that darkness costs anything at any level.";
-                (darkest, text.to_owned())
-            }
+        let (at, text) = if let Some(better) = better.last() {
+            let gain = numbers.size("gain", better.difference.value);
+            let text = format!(
+                "At {} accuracy is {gain} points higher than at L0.",
+                better.level
+            );
+            (better, text)
+        } else {
+            let text = "It is not shown that darkness costs anything at any level.";
+            (darkest, text.to_owned())
         };
         let detail = detail(at, &mut numbers, &format!("; at {}", at.level));
         return Some(numbers.sentence("darkness", at.verdict.into(), text, detail));

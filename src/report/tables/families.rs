@@ -1,4 +1,5 @@
-//! The table of accuracy by family, with a row for each subject. Numbers below those of a model without images are marked.
+//! The table of accuracy by family, with a row for each subject. Numbers that are shown to be below those of a model without images
+//! are marked.
 
 use crate::report::latex::escaped;
 use crate::report::table::ColumnKind::{Percent, Text};
@@ -46,7 +47,7 @@ fn share(findings: &Findings<'_>, subject: Option<&Subject>, family: Option<&Fam
         Some(subject) => cell.subject == *subject,
         None => cell.subject.view.is_none(),
     });
-    let below = subject.is_some_and(|subject| findings.below_blind(subject, family));
+    let below = subject.is_some_and(|subject| !findings.below_blind(subject, family).is_empty());
     match cell.and_then(|cell| cell.accuracy) {
         None => TableCell::Missing,
         Some(chance) if subject.is_none() => TableCell::Number(chance.value),

@@ -38,11 +38,13 @@ fn table(caption: &str, findings: &[&PooledFinding]) -> Table {
         .column(Text, "terminal | page difference", |finding| title(finding))
         .family(|finding| finding.family.as_ref());
     numbers(builder)
-        .column(
-            ColumnKind::Significance,
-            "csv verdict shown | terminal | page",
-            |finding| finding.verdict,
-        )
+        .column(ColumnKind::Significance, "terminal | page", |finding| {
+            finding.verdict
+        })
+        .column(Text, "csv verdict", |finding| finding.verdict.word())
+        .column(Text, "csv shown", |finding| {
+            finding.verdict.is_shown().to_string()
+        })
         .column(Text, "csv names", |finding| finding.models.join(";"))
         .build()
 }

@@ -35,7 +35,7 @@ pub(in crate::report) const SECTIONS: [Section; 10] = [
     (
         "families",
         "Families of questions",
-        "Underlined: below a model without images (its own, where it was asked so), where pictures in the dark do more harm than none.",
+        "Underlined: shown to be below a model without images (its own, if it was asked so). There images in the dark do more harm than none.",
         &["families"],
     ),
     (

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::score::student::student;
+use crate::score::quantiles::student;
 
 /// A mean with its 95 % interval by Student's t distribution.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -27,7 +27,7 @@ impl Mean {
         let squares: f64 = numbers.iter().map(|x| (x - value) * (x - value)).sum();
         let interval = (n > 1 && value.is_finite()).then(|| {
             let error = (squares / (n - 1) as f64 / n as f64).sqrt();
-            let half = student(n - 1) * error;
+            let half = student((n - 1) as f64) * error;
             [value - half, value + half]
         });
         Some(Self { value, interval, n })
