@@ -9,6 +9,7 @@ mod support;
 mod ask;
 mod batch;
 mod cli;
+mod compared;
 mod coverage;
 mod documentation;
 mod enhance;

@@ -32,9 +32,15 @@ fn several_runs_become_one_comparison() {
     ));
     let called = bench.call(&["report", "one", "two", "three", "--out", "all"]);
     assert_eq!(called.code, Some(0), "{called:?}");
-    // Random draws by the condition and the question: the seed of the light does not change what it was asked at L0 and by
-    // exposure, so those trials are one; with noise the two runs answered differently, and the model stands twice.
-    let rows = ["random (one)", "random (two)", "script:said.jsonl"];
+    // The seed of the light is that of the guesses, too: the model stands twice. Its noise is that of another light.
+    let rows = [
+        "random (one)",
+        "random (two)",
+        "script:said.jsonl",
+        "with noise @one",
+        "with noise @two",
+        "! The light differs: --seed is 0 in one and three and 1 in two. noise stands apart as @one and @two: 2 of 2 shared images differ.",
+    ];
     check_rows(rows, |label| {
         assert!(called.stdout.contains(label), "{label}: {called:?}");
     });
@@ -337,6 +343,7 @@ fn people_enter_as_a_model() {
     let args = words("study read run answers.jsonl --out people --name people");
     let read = bench.call(&args);
     assert_eq!(read.code, Some(0), "{read:?}");
+    assert_eq!(read.stderr, "");
     assert!(
         read.stdout.contains(
             "answers imported: 18\nitems in the files that the run did not ask: 1, as nobody at L0"
@@ -370,6 +377,23 @@ fn people_enter_as_a_model() {
         .find(|row| row[0] == "model" && row[2] == "L0")
         .unwrap();
     assert_eq!((&*held[1], &*held[3], &*held[6]), ("people", "random", "6"));
+    // What is no choice is named with its place, and counted in the report.
+    let odd = line("q0", "L0", 3, json!("castle"))
+        + &line("q1", "L0", 3, json!("F"))
+        + &line("q2", "L0", 3, json!(null));
+    bench.file("odd.jsonl", &odd);
+    let read = bench.call(&words("study read run odd.jsonl --out odd"));
+    assert_eq!(read.code, Some(0), "{read:?}");
+    let rows = [
+        "2 answers are no choices of their questions and count as wrong",
+        "odd.jsonl, line 1: \"castle\" is no choice of q0: red, blue, brown",
+        "odd.jsonl, line 2: \"F\" is no choice of q1: red, blue, brown",
+    ];
+    check_rows(rows, |text| {
+        assert!(read.stderr.contains(text), "{text}: {read:?}");
+    });
+    let counted = "! 2 of 3 answers of people are no choice of their question, and count as wrong.";
+    assert!(read.stdout.contains(counted), "{read:?}");
     bench.file("answers.jsonl", "{\"question\": 1}\n");
     let broken = bench.call(&args);
     assert!(

@@ -147,9 +147,10 @@ fn of_light<D: Detail>(joined: &Joined<D>, light: &[Setting], names: &[String]) 
             0 => "no image is shared, and the settings differ".to_owned(),
             _ => format!("{differing} of {shared} shared images differ"),
         };
+        let stand = if curves.len() == 1 { "stands" } else { "stand" };
         let curves = listed(&curves);
         sentences.push(format!(
-            "{curves} stands apart as {}: {why}.",
+            "{curves} {stand} apart as {}: {why}.",
             listed(&groups)
         ));
     }
@@ -324,9 +325,9 @@ fn of_people(combined: &Combined) -> Vec<Alert> {
         let unread = records.filter_map(|record| record.detail.strict?.why);
         let count = unread.filter(|why| *why != UnreadReason::Empty).count();
         let text = format!(
-            "{} of {} people are no choice of their question, and count as wrong.",
-            counted(count, "answer"),
-            run.records.len()
+            "{} of {} of people are no choice of their question, and count as wrong.",
+            count,
+            counted(run.records.len(), "answer")
         );
         (count > 0).then(|| Alert::new(AlertKind::NoChoice, text))
     });
@@ -373,21 +374,25 @@ fn of_items(findings: &Findings<'_>) -> Vec<Alert> {
         .iter()
         .filter(|asked| asked.questions < common.questions);
     let short: Vec<String> = short
-        .map(|asked| {
+        .enumerate()
+        .map(|(place, asked)| {
             let blind = if asked.is_blind {
                 " without images"
             } else {
                 ""
             };
-            format!("{}{blind} {}", asked.model, asked.questions)
+            let of = match place {
+                0 => format!(" of {} questions", common.questions),
+                _ => String::new(),
+            };
+            format!("{}{blind} was asked {}{of}", asked.model, asked.questions)
         })
         .collect();
     if short.is_empty() {
         return Vec::new();
     }
     let text = format!(
-        "Models were asked different questions: of {} {}. Compare by the {} shared: a table of its own, or --common.",
-        common.questions,
+        "Models were asked different questions: {}. Compare by the {} shared: the second table has them, --common leaves out all others.",
         listed(&short),
         common.shared_questions
     );

@@ -268,9 +268,9 @@ fn same_by_manifest(curve: &Curve, one: &RunManifest, other: &RunManifest) -> bo
             all.extend(settings::noise(run, &runs));
         }
         if curve.enhancer.is_some() {
-            all.extend(settings::enhancers(run, &runs));
+            all.extend(settings::enhancers(run));
         }
-        all
+        Some(all)
     };
-    own(one) == own(other)
+    settings::differing(&runs.map(own)).is_empty()
 }

@@ -30,6 +30,9 @@ const NOISE: [&str; 9] = [
     "profile", "amplify", "tone", "draws", "coupling", "camera", "gain", "ratio", "fixed",
 ];
 
+/// Stands between the flag of a setting and the value of a column for which it is set, as in `--llie of ruas`.
+const OF: &str = " of ";
+
 /// The value of a setting that a run does not have.
 const UNSET: &str = "unset";
 
@@ -74,7 +77,8 @@ pub(super) fn listed<T: AsRef<str>>(texts: &[T]) -> String {
     }
 }
 
-/// The settings that differ; a run without settings does not take part.
+/// The settings that differ. A run without settings does not take part, nor does a run in the settings of a value that none of its
+/// columns has.
 pub(super) fn differing(runs: &[Option<Settings>]) -> Vec<Setting> {
     let flags: BTreeSet<&String> = runs.iter().flatten().flat_map(BTreeMap::keys).collect();
     let settings = flags.into_iter().map(|flag| Setting {
@@ -83,8 +87,10 @@ pub(super) fn differing(runs: &[Option<Settings>]) -> Vec<Setting> {
             .iter()
             .enumerate()
             .filter_map(|(run, settings)| {
-                let value = settings.as_ref()?.get(flag);
-                Some((run, value.map_or(UNSET, String::as_str).to_owned()))
+                let settings = settings.as_ref()?;
+                let value = settings.get(flag).map(String::as_str);
+                let unset = takes_part(settings, flag).then_some(UNSET);
+                Some((run, value.or(unset)?.to_owned()))
             })
             .collect(),
     });
@@ -96,6 +102,14 @@ pub(super) fn differing(runs: &[Option<Settings>]) -> Vec<Setting> {
                 .any(|(_, v)| *v != setting.values[0].1)
         })
         .collect()
+}
+
+/// Whether a run that does not have a setting could have it: if the setting is of a value of a column, the run has the value.
+fn takes_part(settings: &Settings, flag: &str) -> bool {
+    flag.split_once(OF).is_none_or(|(_, value)| {
+        let mut own = settings.keys().filter_map(|flag| flag.split_once(OF));
+        own.any(|(_, own)| own == value)
+    })
 }
 
 /// The identity of a run; that of people is the identity of the run whose images they saw.
@@ -120,7 +134,7 @@ pub(super) fn some(run: &RunManifest, fields: &[&str]) -> Settings {
 
 /// Everything in a manifest that decides images besides their size and encoding, for a comparison of these runs.
 pub(super) fn light(run: &RunManifest, runs: &[&RunManifest]) -> Settings {
-    let parts = [pixels(run), noise(run, runs), enhancers(run, runs)];
+    let parts = [pixels(run), noise(run, runs), enhancers(run)];
     parts.into_iter().flatten().collect()
 }
 
@@ -144,35 +158,22 @@ pub(super) fn noise(run: &RunManifest, runs: &[&RunManifest]) -> Settings {
     });
     let mut settings: Settings = written.collect();
     // A default that is written out is another word for the same noise.
-    for (name, content) in shared(run, runs, "reading") {
-        settings.extend(
-            leaves(content).map(|(flag, value)| (format!("{flag} of noise@{name}"), value)),
-        );
-    }
+    settings.extend(of_column(run, "reading"));
     settings
 }
 
-/// The content of the enhancers that all runs have.
-pub(super) fn enhancers(run: &RunManifest, runs: &[&RunManifest]) -> Settings {
+/// The content of the enhancers.
+pub(super) fn enhancers(run: &RunManifest) -> Settings {
+    of_column(run, "enhancer")
+}
+
+/// The settings behind the values of a column of a run.
+fn of_column(run: &RunManifest, column: &str) -> Settings {
     let mut settings = Settings::new();
-    for (name, content) in shared(run, runs, "enhancer") {
-        settings.extend(leaves(content).map(|(flag, value)| (format!("{flag} of {name}"), value)));
+    for (name, content) in run.columns.get(column).into_iter().flatten() {
+        settings.extend(leaves(content).map(|(flag, value)| (format!("{flag}{OF}{name}"), value)));
     }
     settings
-}
-
-/// The values of a column of a run that all runs with the column have.
-fn shared<'a>(
-    run: &'a RunManifest,
-    runs: &[&RunManifest],
-    column: &'a str,
-) -> Vec<(&'a String, &'a Value)> {
-    let values = run.columns.get(column).into_iter().flatten();
-    let is_shared = |name: &String| {
-        let mut others = runs.iter().filter_map(|other| other.columns.get(column));
-        others.all(|values| values.contains_key(name))
-    };
-    values.filter(|(name, _)| is_shared(name)).collect()
 }
 
 /// The settings of the noise that the words of the user already explain are left out.
@@ -180,7 +181,13 @@ pub(super) fn without_repeated(mut settings: Vec<Setting>) -> Vec<Setting> {
     let is_written =
         |setting: &Setting| NOISE.iter().any(|flag| setting.flag == format!("--{flag}"));
     if settings.iter().any(is_written) {
-        settings.retain(|setting| !setting.flag.contains(" of noise@"));
+        let is_noise = |setting: &Setting| {
+            let flag = setting.flag.split(OF).next().unwrap_or_default();
+            NOISE
+                .iter()
+                .any(|written| flag.contains(&format!("--{written}")))
+        };
+        settings.retain(|setting| !setting.flag.contains(OF) || !is_noise(setting));
     }
     settings
 }
