@@ -1,11 +1,14 @@
-//! The text at the end of an evaluation, for 80 columns: [`short`].
+//! The text of a report of questions with choices: [`short`] for 80 columns, [`findings`] alone, and [`full`] with all tables.
 
 use std::fmt::Write;
 use std::path::Path;
 
+use super::alert::lines;
 use super::choice_report::ChoiceReport;
 use super::ladder::{Ladder, Series, SeriesByLevel};
 use super::sentences::{FIRST, HOW_TO_READ, Sentence};
+use super::tables::unread;
+use super::terminal::render;
 use super::words::{counted, percent, reach_of, with_interval};
 use crate::score::accuracy::AccuracyCell;
 use crate::score::choice::ReadingMode;
@@ -41,6 +44,23 @@ pub(crate) fn short(report: &ChoiceReport<'_>, runs: &[(&RunManifest, &Path)]) -
     text
 }
 
+/// All that a report of questions with choices says: the alerts, the findings, every table, and the folders of the runs.
+#[must_use]
+pub(crate) fn full(report: &ChoiceReport<'_>, runs: &[(&RunManifest, &Path)]) -> String {
+    let mut text = lines(&report.alerts);
+    for sentence in &report.sentences {
+        text += &sentence_lines(sentence);
+    }
+    if !report.sentences.is_empty() {
+        let _ = writeln!(text, " {HOW_TO_READ}\n");
+    }
+    text += &render(&report.tables);
+    for (_, folder) in runs {
+        let _ = writeln!(text, "run: {}", folder.display());
+    }
+    text
+}
+
 /// The head, the alerts and all that is found, without a table.
 #[must_use]
 pub(crate) fn findings(report: &ChoiceReport<'_>) -> String {
@@ -63,7 +83,7 @@ pub(crate) fn findings(report: &ChoiceReport<'_>) -> String {
 }
 
 /// A sentence with its sign, and its detail beneath.
-pub(super) fn sentence_lines(sentence: &Sentence) -> String {
+fn sentence_lines(sentence: &Sentence) -> String {
     let sign = format!(" {}  ", sentence.tone.sign());
     wrapped(&sign, &sentence.text, "    ") + &wrapped("    ", &sentence.detail, "    ")
 }
@@ -129,7 +149,8 @@ fn wrapped(first: &str, text: &str, rest: &str) -> String {
 
 /// Accuracies by level: a block for each light with a row for each model, or one block if there is one model.
 fn table(report: &ChoiceReport<'_>) -> String {
-    let summary = &report.findings.summary;
+    let common = report.findings.common.as_ref();
+    let summary = common.map_or(&report.findings.summary, |common| &common.summary);
     let cells = summary.of(None, ReadingMode::Strict);
     let ladder = Ladder::new(cells.map(|cell| (&cell.subject, cell))).with_clean();
     let mut models: Vec<&str> = ladder.series.keys().map(|series| series.model).collect();
@@ -151,7 +172,11 @@ fn table(report: &ChoiceReport<'_>) -> String {
         .saturating_sub(1 + levels.len() * LEVEL + REACH)
         .max(12);
     let name_width = longest.max(titles).unwrap_or(0).min(room.min(MAX_NAME));
-    let mut text = String::from(" accuracy in %\n");
+    let shared = common.map(|common| {
+        let questions = counted(common.shared_questions, "question");
+        format!(" on the {questions} that all models with images answered")
+    });
+    let mut text = format!(" accuracy in %{}\n", shared.unwrap_or_default());
     for block in rows.chunk_by(|a, b| a.0 == b.0) {
         text += &line(
             &block[0].0,
@@ -242,10 +267,31 @@ fn baselines(report: &ChoiceReport<'_>, ladder: &Ladder<'_, AccuracyCell>) -> St
     if cells.any(|cell| !report.findings.below_blind(&cell.subject, None).is_empty()) {
         parts.push(format!("{BELOW} shown to be below the words alone"));
     }
-    let text = "95 %: how far the widest interval of the row reaches down and up";
-    let mut text = wrapped(" ", text, " ");
+    let mut text = String::new();
+    if !ladder.series.is_empty() {
+        let line = "95 %: how far the widest interval of the row reaches down and up";
+        text += &wrapped(" ", line, " ");
+    }
+    let lenient: usize = report
+        .findings
+        .health
+        .iter()
+        .map(|health| health.lenient_only)
+        .sum();
+    if lenient > 0 {
+        let replies = if lenient == 1 {
+            "reply is"
+        } else {
+            "replies are"
+        };
+        let line = format!("{lenient} more {replies} read by the lenient reading alone: --full");
+        text += &wrapped(" ", &line, " ");
+    }
     if !parts.is_empty() {
         text += &wrapped(" ", &parts.join(" · "), " ");
+    }
+    if let Some(reasons) = unread(&report.findings.summary) {
+        text += &wrapped(" ", &reasons, " ");
     }
     text
 }

@@ -1,15 +1,10 @@
 //! Tables as text for the terminal: [`render`].
 
 use std::fmt::Write;
-use std::path::Path;
 
 use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
 use comfy_table::{CellAlignment, LineStyle};
 
-use super::alert::lines;
-use super::choice_report::ChoiceReport;
-use super::sentences::HOW_TO_READ;
-use super::short::sentence_lines;
 use super::table::{Column, ColumnKind, Table, TableCell, TableFormat};
 use super::words::{interval, percent, points, reach, reach_of, stops, with_interval, words};
 use crate::types::manifest::{Counts, RunManifest, Status};
@@ -105,23 +100,6 @@ pub(super) fn table(parts: &[Table]) -> String {
         }
     }
     format!("{grid}\n")
-}
-
-/// All that a report of questions with choices says: the alerts, the findings, every table, and the folders of the runs.
-#[must_use]
-pub(crate) fn full(report: &ChoiceReport<'_>, runs: &[(&RunManifest, &Path)]) -> String {
-    let mut text = lines(&report.alerts);
-    for sentence in &report.sentences {
-        text += &sentence_lines(sentence);
-    }
-    if !report.sentences.is_empty() {
-        let _ = writeln!(text, " {HOW_TO_READ}\n");
-    }
-    text += &render(&report.tables);
-    for (_, folder) in runs {
-        let _ = writeln!(text, "run: {}", folder.display());
-    }
-    text
 }
 
 /// How far the widest interval of these cells reaches down and up, as `−7.7 +7.1`; empty if no cell has one.

@@ -54,7 +54,7 @@ pub(crate) struct BaselineArgs {
     #[arg(long, value_name = "OLD", add = Decides::Nothing)]
     pub baseline: Option<PathBuf>,
     /// Exit with 1 if any model is shown to be worse than the baseline in any condition
-    #[arg(long, requires = "baseline", add = Decides::Nothing)]
+    #[arg(long, add = Decides::Nothing)]
     pub fail_if_worse: bool,
 }
 
@@ -63,6 +63,10 @@ pub(crate) struct BaselineArgs {
 /// # Errors
 /// If a folder holds no run, a record is broken, or the runs asked different questions.
 pub(crate) fn report(args: &ReportArgs) -> Result<Outcome> {
+    if args.baseline.fail_if_worse && args.baseline.baseline.is_none() {
+        let problem = "compares with an old run: name it with --baseline OLD";
+        return Err(Error::usage("--fail-if-worse", problem));
+    }
     let (mut choice, mut open) = (Vec::new(), Vec::new());
     for folder in &args.runs {
         match AnyRun::open(folder)? {

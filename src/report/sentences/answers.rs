@@ -5,45 +5,27 @@ use crate::score::fidelity::{ConditionFidelity, FidelityFindings};
 use crate::score::findings::Findings;
 use crate::score::pooled::{PooledFinding, PooledKind};
 
-/// Unread replies and failed trials, with the share of the former; `None` if there are none. Built-in models are not counted.
-pub(super) fn health(findings: &Findings<'_>) -> Option<(f64, Sentence)> {
+/// Replies that could not be read, if they are few: an alert speaks of many, and of failed trials. Built-in models are not counted.
+pub(super) fn unread(findings: &Findings<'_>) -> Option<Sentence> {
     let health = findings.health.iter();
     let health = health.filter(|health| !health.subject.is_reference());
-    let (mut replies, mut unread, mut failed) = (0, 0, 0);
+    let (mut replies, mut unread) = (0, 0);
     for health in health {
         replies += health.replies;
         unread += health.unread.values().sum::<usize>();
-        failed += health.failures();
     }
-    if unread == 0 && failed == 0 {
+    let share = unread as f64 / replies.max(1) as f64;
+    if unread == 0 || share > MANY_UNREAD {
         return None;
     }
     let mut numbers = Numbers::of(findings.unit);
-    let share = unread as f64 / replies.max(1) as f64;
-    let mut parts = Vec::new();
-    if unread > 0 {
-        let (count, percent) = (
-            numbers.count("unread", unread),
-            numbers.percent("share", share),
-        );
-        let noun = if unread == 1 { "reply" } else { "replies" };
-        parts.push(format!("{count} {noun} ({percent} %) could not be read"));
-    }
-    if failed > 0 {
-        let count = numbers.count("failed", failed);
-        let rest = if failed == 1 {
-            "trial failed and is"
-        } else {
-            "trials failed and are"
-        };
-        parts.push(format!("{count} {rest} not scored"));
-    }
-    let text = parts.join("; ") + ".";
-    let detail = format!(
-        "of {} replies; those that cannot be read count as wrong",
-        numbers.count("replies", replies)
-    );
-    Some((share, numbers.sentence("health", Tone::Note, text, detail)))
+    let count = numbers.count("unread", unread);
+    let noun = if unread == 1 { "reply" } else { "replies" };
+    let percent = numbers.percent("share", share);
+    let text = format!("{count} {noun} ({percent} %) could not be read.");
+    let all = numbers.count("replies", replies);
+    let detail = format!("of {all} replies; those that cannot be read count as wrong");
+    Some(numbers.sentence("unread", Tone::Note, text, detail))
 }
 
 /// Whether PSNR tells right from wrong answers within a condition, and what the best enhancer does to both.

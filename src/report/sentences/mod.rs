@@ -25,19 +25,10 @@ pub(in crate::report) const FIRST: usize = 6;
 /// What is said about the sentences as a whole, in the line below them.
 pub(in crate::report) const HOW_TO_READ: &str = "p is Holm's, over the levels of a finding. An interval is of one level, uncorrected: effects outside it are ruled out at 95 %.";
 
-/// Share of unread replies above which this is said first.
-const MANY_UNREAD: f64 = 0.02;
-
 /// All sentences, in the order of their importance.
 #[must_use]
 pub(crate) fn sentences(findings: &Findings<'_>) -> Vec<Sentence> {
     let mut sentences = Vec::new();
-    let health = answers::health(findings);
-    let (first, last) = match health {
-        Some((share, sentence)) if share > MANY_UNREAD => (Some(sentence), None),
-        health => (None, health.map(|(_, sentence)| sentence)),
-    };
-    sentences.extend(first);
     if let Some(impossible) = pooled::impossible(findings) {
         sentences.push(impossible);
     } else {
@@ -45,7 +36,7 @@ pub(crate) fn sentences(findings: &Findings<'_>) -> Vec<Sentence> {
         sentences.extend(models::best(findings));
     }
     sentences.extend(answers::fidelity(findings));
-    sentences.extend(last);
+    sentences.extend(answers::unread(findings));
     sentences.extend(pooled::power(findings));
     sentences
 }

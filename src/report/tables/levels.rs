@@ -167,7 +167,7 @@ fn note_without_images(summary: &AccuracySummary, cell: &AccuracyCell) -> String
 }
 
 /// Counts of unreadable replies by reason, for reasons that do not concern the form of the answer.
-fn unread(summary: &AccuracySummary) -> Option<String> {
+pub(in crate::report) fn unread(summary: &AccuracySummary) -> Option<String> {
     let reasons = [
         (
             UnreadReason::Truncated,

@@ -24,6 +24,7 @@ use crate::types::{EnhancerName, Family, KindReading};
 
 pub(super) use baseline::BASELINE;
 pub(crate) use baseline::baseline;
+pub(super) use levels::unread;
 pub(super) use sections::{ENHANCERS, SECTIONS};
 pub(super) use summary::{SUMMARY, reading};
 
