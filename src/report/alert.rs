@@ -2,6 +2,9 @@
 
 use serde::Serialize;
 
+/// Share of unreadable replies of a model above which an alert names it; chosen.
+pub(crate) const MAX_UNREAD: f64 = 0.02;
+
 /// One line above a report.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Alert {

@@ -5,7 +5,7 @@ use super::estimate::Estimate;
 use super::grid::{ClusterCount, Grid};
 use super::paired::difference;
 use super::pooled::pool;
-use super::significance::{Significance, holm, least_p, swap_test};
+use super::significance::{Significance, SwapTest, holm, least_p, swap_test};
 use super::subject::Subject;
 use super::trapezoid::weights;
 use crate::types::{AxisLevel, KindReading};
@@ -93,28 +93,28 @@ pub(crate) fn best_in_the_dark(grid: &Grid<'_>) -> Option<BestInTheDark> {
         return None;
     }
     let names: Vec<&str> = curves.iter().map(|(model, _)| *model).collect();
-    let (scores, dropped) = ClusterScores::all(grid, &names, &variant, &levels);
-    if scores.is_empty() {
+    let scores = Scores::new(grid, &names, &variant, &levels);
+    if scores.items.is_empty() {
         return None;
     }
-    let weight: u64 = weights(&levels).iter().sum();
-    let mut models: Vec<(ModelArea, usize)> = (0..names.len())
-        .filter_map(|model| Some((area(&scores, model, names[model], weight)?, model)))
-        .collect();
+    let models =
+        (0..names.len()).filter_map(|model| Some((scores.area(model, names[model])?, model)));
+    let mut models: Vec<(ModelArea, usize)> = models.collect();
     models.sort_by(|(a, _), (b, _)| b.area.value.total_cmp(&a.area.value));
-    let pairs = pairs(&scores, &models, weight);
-    let leader = &models[0].0.model;
+    let pairs = scores.pairs(&models);
+    let leader = &models.first()?.0.model;
     let unshown = pairs
         .iter()
         .filter(|pair| pair.first == *leader && pair.significance != Significance::Better);
+    let clusters = scores.clusters();
     Some(BestInTheDark {
         not_shown_better_than: unshown.map(|pair| pair.second.clone()).collect(),
         variant,
         levels,
-        items: scores.iter().map(|cluster| cluster.items).sum(),
-        dropped,
-        clusters: scores.len(),
-        least_p: least_p(scores.len()),
+        items: scores.items.len(),
+        dropped: scores.dropped,
+        clusters,
+        least_p: least_p(clusters),
         models: models.into_iter().map(|(area, _)| area).collect(),
         pairs,
     })
@@ -133,27 +133,33 @@ fn levels(grid: &Grid<'_>, model: &str, variant: &KindReading) -> Vec<AxisLevel>
     levels
 }
 
-/// Sums over the items of a cluster that every model answered at every level.
-#[derive(Debug, Clone, Default)]
-struct ClusterScores {
-    /// Number of items.
-    items: usize,
+/// Right replies of all models to an item that every model answered at every level.
+struct ItemScores {
+    /// Index of the cluster.
+    cluster: usize,
     /// Weighted number of right replies of each model, over all levels.
     weighted: Vec<u64>,
-    /// Number of right replies of each model at L0.
-    clean: Vec<u32>,
-    /// Expected number of right guesses at one level.
-    guesses: f64,
+    /// Whether each model is right at L0.
+    clean: Vec<bool>,
+    /// Chance of a right guess.
+    guess: f64,
 }
 
-impl ClusterScores {
-    /// The clusters that have an item, and the number of items that are left out because a model has no reply.
-    fn all(
-        grid: &Grid<'_>,
-        models: &[&str],
-        variant: &KindReading,
-        levels: &[AxisLevel],
-    ) -> (Vec<Self>, usize) {
+/// Right replies of all models to their shared items.
+struct Scores {
+    items: Vec<ItemScores>,
+    /// Sum of the weights of the levels.
+    weight: u64,
+    /// Number of levels.
+    levels: usize,
+    /// Number of items that are left out because a model has no reply.
+    dropped: usize,
+    /// Number of clusters of all items of the grid.
+    all_clusters: usize,
+}
+
+impl Scores {
+    fn new(grid: &Grid<'_>, models: &[&str], variant: &KindReading, levels: &[AxisLevel]) -> Self {
         let subject =
             |model: &str, level| grid.stand_in(&Subject::seeing(model, level, variant, None));
         let subjects = models.iter().map(|model| {
@@ -162,94 +168,120 @@ impl ClusterScores {
         });
         let subjects: Vec<Vec<usize>> = subjects.collect();
         let weights = weights(levels);
-        let blank = Self {
-            weighted: vec![0; models.len()],
-            clean: vec![0; models.len()],
-            ..Self::default()
+        let mut scores = Self {
+            items: Vec::new(),
+            weight: weights.iter().sum(),
+            levels: levels.len(),
+            dropped: 0,
+            all_clusters: grid.clusters,
         };
-        let mut clusters = vec![blank; grid.clusters];
-        let mut dropped = 0;
         for (index, item) in grid.items.iter().enumerate() {
             let answered = |subject: &usize| {
                 let reading = grid.result(*subject, index).reading(ReadingMode::Strict);
                 reading.map(|chosen| item.is_right(chosen))
             };
-            let right = subjects
-                .iter()
-                .map(|levels| levels.iter().map(answered).collect());
+            let right = subjects.iter();
+            let right = right.map(|levels| levels.iter().map(answered).collect());
             let Some(right) = right.collect::<Option<Vec<Vec<bool>>>>() else {
                 let asked = |subject: &usize| grid.result(*subject, index).is_asked();
-                dropped += usize::from(subjects.iter().any(|levels| levels.iter().all(asked)));
+                let is_asked = subjects.iter().any(|levels| levels.iter().all(asked));
+                scores.dropped += usize::from(is_asked);
                 continue;
             };
-            let cluster = &mut clusters[item.cluster as usize];
-            cluster.items += 1;
-            cluster.guesses += 1.0 / item.record.detail.choices.len() as f64;
-            for (model, levels) in right.iter().enumerate() {
+            let weighted = right.iter().map(|levels| {
                 let right = levels.iter().zip(&weights).filter(|(right, _)| **right);
-                cluster.weighted[model] += right.map(|(_, weight)| weight).sum::<u64>();
-                cluster.clean[model] += u32::from(levels[0]);
-            }
-        }
-        clusters.retain(|cluster| cluster.items > 0);
-        (clusters, dropped)
-    }
-}
-
-/// The area of a model, given by its index.
-fn area(clusters: &[ClusterScores], model: usize, name: &str, weight: u64) -> Option<ModelArea> {
-    let n: usize = clusters.iter().map(|cluster| cluster.items).sum();
-    let mean = |cluster: &ClusterScores| cluster.weighted[model] as f64 / weight as f64;
-    let sums = |of: &dyn Fn(&ClusterScores) -> f64| -> Vec<(f64, f64)> {
-        let clusters = clusters.iter();
-        clusters
-            .map(|cluster| (of(cluster), cluster.items as f64))
-            .collect()
-    };
-    let clean_counts = clusters.iter().map(|cluster| ClusterCount {
-        right: cluster.clean[model],
-        replies: cluster.items as u32,
-    });
-    let clean = Estimate::clustered(&clean_counts.collect::<Vec<_>>())?;
-    let chance = clusters.iter().map(|cluster| cluster.guesses).sum::<f64>() / n as f64;
-    let lost = |cluster: &ClusterScores| mean(cluster) - f64::from(cluster.clean[model]);
-    Some(ModelArea {
-        model: name.to_owned(),
-        area: Estimate::scored(&sums(&mean), weight as f64, n)?,
-        clean,
-        loss: (clean.low > chance).then(|| difference(&sums(&lost), n)),
-    })
-}
-
-/// All pairs of models, given with their indices, with their verdicts.
-fn pairs(clusters: &[ClusterScores], models: &[(ModelArea, usize)], weight: u64) -> Vec<AreaPair> {
-    let n: usize = clusters.iter().map(|cluster| cluster.items).sum();
-    let mut pairs = Vec::new();
-    for (index, (first, a)) in models.iter().enumerate() {
-        for (second, b) in &models[index + 1..] {
-            let net =
-                |cluster: &ClusterScores| cluster.weighted[*a] as i64 - cluster.weighted[*b] as i64;
-            let nets: Vec<i64> = clusters.iter().map(net).collect();
-            let sums = clusters.iter().zip(&nets);
-            let sums =
-                sums.map(|(cluster, net)| (*net as f64 / weight as f64, cluster.items as f64));
-            let tested = swap_test(&nets);
-            pairs.push(AreaPair {
-                first: first.model.clone(),
-                second: second.model.clone(),
-                difference: difference(&sums.collect::<Vec<_>>(), n),
-                p: tested.p,
-                draws: tested.draws,
-                holm: 1.0,
-                significance: Significance::NotShown,
+                right.map(|(_, weight)| weight).sum()
+            });
+            scores.items.push(ItemScores {
+                cluster: item.cluster as usize,
+                weighted: weighted.collect(),
+                clean: right.iter().map(|levels| levels[0]).collect(),
+                guess: 1.0 / item.record.detail.choices.len() as f64,
             });
         }
+        scores
     }
-    let corrected = holm(&pairs.iter().map(|pair| pair.p).collect::<Vec<_>>());
-    let least_holm = pairs.len() as f64 * least_p(clusters.len());
-    for (pair, holm) in pairs.iter_mut().zip(corrected) {
-        pair.holm = holm;
-        pair.significance = Significance::of(pair.difference.value, holm, least_holm);
+
+    /// Number of clusters that have an item.
+    fn clusters(&self) -> usize {
+        self.sums(|_| 0).len()
     }
-    pairs
+
+    /// Sum of a number over the items of each cluster that has an item, and the number of these items.
+    fn sums(&self, of: impl Fn(&ItemScores) -> i64) -> Vec<(i64, u32)> {
+        let mut sums = vec![(0, 0); self.all_clusters];
+        for item in &self.items {
+            let (sum, count) = &mut sums[item.cluster];
+            *sum += of(item);
+            *count += 1;
+        }
+        sums.retain(|(_, count)| *count > 0);
+        sums
+    }
+
+    /// The mean of a weighted difference, as a share of all weights, and the test of swaps.
+    fn difference(&self, of: impl Fn(&ItemScores) -> i64) -> (Estimate, SwapTest) {
+        let weight = self.weight as f64;
+        let sums = self.sums(&of);
+        let nets: Vec<i64> = sums.iter().map(|(net, _)| *net).collect();
+        let shares = sums.iter();
+        let shares = shares.map(|(net, count)| (*net as f64 / weight, f64::from(*count)));
+        let squares = self.items.iter().map(|item| {
+            let share = of(item) as f64 / weight;
+            share * share
+        });
+        let estimate = difference(&shares.collect::<Vec<_>>(), squares.sum(), self.items.len());
+        (estimate, swap_test(&nets))
+    }
+
+    /// The area of a model, given by its index.
+    fn area(&self, model: usize, name: &str) -> Option<ModelArea> {
+        let (n, weight) = (self.items.len(), self.weight as f64);
+        let sums = self.sums(|item| item.weighted[model] as i64).into_iter();
+        let sums = sums.map(|(sum, count)| (sum as f64 / weight, f64::from(count)));
+        let clean = self.sums(|item| i64::from(item.clean[model])).into_iter();
+        let clean = clean.map(|(right, replies)| ClusterCount {
+            right: right as u32,
+            replies,
+        });
+        let clean = Estimate::clustered(&clean.collect::<Vec<_>>())?;
+        let chance = self.items.iter().map(|item| item.guess).sum::<f64>() / n as f64;
+        let lost = |item: &ItemScores| {
+            let clean = if item.clean[model] { self.weight } else { 0 };
+            item.weighted[model] as i64 - clean as i64
+        };
+        Some(ModelArea {
+            model: name.to_owned(),
+            area: Estimate::scored(&sums.collect::<Vec<_>>(), self.levels as f64, n)?,
+            clean,
+            loss: (clean.low > chance).then(|| self.difference(lost).0),
+        })
+    }
+
+    /// All pairs of models, given with their indices, with their verdicts.
+    fn pairs(&self, models: &[(ModelArea, usize)]) -> Vec<AreaPair> {
+        let mut pairs = Vec::new();
+        for (index, (first, a)) in models.iter().enumerate() {
+            for (second, b) in &models[index + 1..] {
+                let net = |item: &ItemScores| item.weighted[*a] as i64 - item.weighted[*b] as i64;
+                let (difference, tested) = self.difference(net);
+                pairs.push(AreaPair {
+                    first: first.model.clone(),
+                    second: second.model.clone(),
+                    difference,
+                    p: tested.p,
+                    draws: tested.draws,
+                    holm: 1.0,
+                    significance: Significance::NotShown,
+                });
+            }
+        }
+        let corrected = holm(&pairs.iter().map(|pair| pair.p).collect::<Vec<_>>());
+        let least_holm = pairs.len() as f64 * least_p(self.clusters());
+        for (pair, holm) in pairs.iter_mut().zip(corrected) {
+            pair.holm = holm;
+            pair.significance = Significance::of(pair.difference.value, holm, least_holm);
+        }
+        pairs
+    }
 }

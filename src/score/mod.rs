@@ -42,5 +42,7 @@ mod record;
 pub(crate) mod significance;
 mod split_mix;
 pub(crate) mod subject;
+#[cfg(test)]
+mod tests;
 pub(crate) mod threshold;
 mod trapezoid;

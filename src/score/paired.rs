@@ -95,7 +95,7 @@ impl PairedComparison {
         Some(Self {
             first: right[0] as f64 / n as f64,
             second: right[1] as f64 / n as f64,
-            difference: difference(&nets, n),
+            difference: difference(&nets, (gained + lost) as f64, n),
             gained,
             lost,
             clusters: clusters.len(),
@@ -108,12 +108,13 @@ impl PairedComparison {
 /// The difference with the interval of Bonett and Price (2012, J. Educ. Behav. Stat. 37:479).
 ///
 /// It adds one pair in each direction, so that few or no discordant pairs do not look like certainty. Here the variance
-/// between clusters replaces that of independent pairs, and Student's quantile the normal one, with the degrees of freedom that the
-/// clusters' residuals allow ([`degrees_of_freedom`]). `clusters` holds, for each
-/// cluster, the sum of the differences of its pairs (of scores between 0 and 1) and their number; `n` is the number of all
-/// pairs.
+/// between clusters replaces that of independent pairs, and Student's quantile the normal one. Where clusters vary more than independent
+/// pairs would, it has the degrees of freedom that their residuals allow ([`degrees_of_freedom`]), else one less than clusters.
+///
+/// `clusters` holds, for each cluster, the sum of the differences of its pairs (of scores between 0 and 1) and their number;
+/// `squares` is the sum of the squared differences of all pairs, and `n` the number of all pairs.
 #[must_use]
-pub fn difference(clusters: &[(f64, f64)], n: usize) -> Estimate {
+pub fn difference(clusters: &[(f64, f64)], squares: f64, n: usize) -> Estimate {
     let (all, c) = (n as f64, clusters.len() as f64);
     let sum: f64 = clusters.iter().map(|(net, _)| net).sum();
     let value = sum / all;
@@ -126,7 +127,13 @@ pub fn difference(clusters: &[(f64, f64)], n: usize) -> Estimate {
         // One cluster shows no spread between clusters: the interval is the whole range.
         f64::INFINITY
     };
-    let half = student(degrees_of_freedom(&residuals)) * (variance + 2.0).sqrt() / (all + 2.0);
+    let independent = squares - all * value * value;
+    let degrees = if between > independent * (1.0 + ROUNDING) {
+        degrees_of_freedom(&residuals)
+    } else {
+        c - 1.0
+    };
+    let half = student(degrees) * (variance + 2.0).sqrt() / (all + 2.0);
     let center = sum / (all + 2.0);
     Estimate {
         value,
@@ -136,18 +143,22 @@ pub fn difference(clusters: &[(f64, f64)], n: usize) -> Estimate {
     }
 }
 
+/// Relative error of sums that are equal but for rounding (chosen).
+const ROUNDING: f64 = 1e-9;
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn estimate(clusters: &[(i64, i64, i64)]) -> Estimate {
+        let squares: i64 = clusters.iter().map(|(_, gained, lost)| gained + lost).sum();
         let clusters =
             clusters
                 .iter()
                 .map(|&(all, gained, lost)| ClusterPairs { all, gained, lost });
         let clusters: Vec<(f64, f64)> = clusters.map(|pairs| pairs.net()).collect();
         let n = clusters.iter().map(|(_, pairs)| pairs).sum::<f64>() as usize;
-        difference(&clusters, n)
+        difference(&clusters, squares as f64, n)
     }
 
     #[test]
@@ -156,15 +167,24 @@ mod tests {
         let pairs = [vec![(1, 1, 0); 12], vec![(1, 0, 1); 4], vec![(1, 0, 0); 84]].concat();
         let interval = estimate(&pairs);
         let variance = 100.0 / 99.0 * (16.0 - 100.0 * 0.08 * 0.08) + 2.0;
-        let residuals = pairs
-            .iter()
-            .map(|(_, gained, lost)| (gained - lost) as f64 - 0.08);
-        let degrees = degrees_of_freedom(&residuals.collect::<Vec<_>>());
-        assert!(degrees > 15.0 && degrees < 25.0, "{degrees}");
-        let half = student(degrees) * f64::sqrt(variance) / 102.0;
+        let half = student(99.0) * f64::sqrt(variance) / 102.0;
         assert!((interval.value - 0.08).abs() < 1e-12);
         assert!((interval.low - (8.0 / 102.0 - half)).abs() < 1e-12);
         assert!((interval.high - (8.0 / 102.0 + half)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn few_clusters_with_all_differences_know_their_variance_poorly() {
+        // 24 differences in the same direction: spread over 12 clusters of 20, or in two of them.
+        let spread = estimate(&[(20, 2, 0); 12]);
+        let clumped = estimate(&[vec![(20, 12, 0); 2], vec![(20, 0, 0); 10]].concat());
+        let width = |estimate: Estimate| estimate.high - estimate.low;
+        assert!((spread.value - clumped.value).abs() < 1e-12);
+        // √(12 / 11 · Σr² + 2) / 242 with Σr² = 2 · 10² + 10 · 2²; κ = 12 · (2 · 10⁴ + 10 · 2⁴) / 240² = 4.2.
+        let half = student(12.0 / 3.2) * f64::sqrt(12.0 / 11.0 * 240.0 + 2.0) / 242.0;
+        assert!((width(clumped) - 2.0 * half).abs() < 1e-9, "{clumped:?}");
+        let half = student(11.0) * f64::sqrt(2.0) / 242.0;
+        assert!((width(spread) - 2.0 * half).abs() < 1e-9, "{spread:?}");
     }
 
     #[test]

@@ -279,7 +279,7 @@ fn finding(
     family: Option<&Family>,
 ) -> Option<PooledFinding> {
     let mut clusters = vec![(0_i64, 0_u32); grid.clusters];
-    let (mut right, mut dropped) = ([0_u64; 2], 0);
+    let (mut right, mut squares, mut dropped) = ([0_u64; 2], 0, 0);
     let of_family = items
         .iter()
         .map(|item| (&grid.items[item.index], item.right));
@@ -289,7 +289,9 @@ fn finding(
             continue;
         };
         let (net, count) = &mut clusters[item.cluster as usize];
-        *net += i64::from(first) - i64::from(second);
+        let item_net = i64::from(first) - i64::from(second);
+        *net += item_net;
+        squares += item_net * item_net;
         *count += 1;
         right[0] += u64::from(first);
         right[1] += u64::from(second);
@@ -323,7 +325,7 @@ fn finding(
         },
         first: mean(right[0]),
         second: mean(right[1]),
-        difference: difference(&sums.collect::<Vec<_>>(), n),
+        difference: difference(&sums.collect::<Vec<_>>(), squares as f64 / pairs / pairs, n),
         p: tested.p,
         draws: tested.draws,
         holm: 1.0,

@@ -191,7 +191,7 @@ fn intervals_of_open_scores_hold_the_truth() {
                 );
                 within &= [scores, drops]
                     .iter()
-                    .all(|held| (93.0..=97.0).contains(held));
+                    .all(|held| (93.0..=98.0).contains(held));
             }
         }
     });

@@ -8,14 +8,11 @@ use super::settings::{
     ENCODING, Setting, Settings, address, differing, is_of_people, light, listed, parameter_flags,
     some, without_repeated,
 };
-use crate::report::alert::{Alert, AlertKind};
+use crate::report::alert::{Alert, AlertKind, MAX_UNREAD};
 use crate::score::cluster::MIN_SCENES;
 use crate::score::findings::Findings;
 use crate::types::manifest::{RunManifest, Status};
 use crate::types::{Detail, QuestionId, RunQuestion, UnreadReason};
-
-/// The share of unreadable replies above which a model is named; chosen.
-const MAX_UNREAD: f64 = 0.02;
 
 /// The flags that decide the orders in which choices are shown.
 const ORDERS: [&str; 2] = ["--shuffle-options", "--circular"];

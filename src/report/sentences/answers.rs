@@ -1,6 +1,7 @@
 //! Sentences about the replies: how many could not be read, and whether fidelity predicts right ones.
 
 use super::sentence::{Numbers, Sentence, Tone};
+use crate::report::alert::MAX_UNREAD;
 use crate::score::fidelity::{ConditionFidelity, FidelityFindings};
 use crate::score::findings::Findings;
 use crate::score::pooled::{PooledFinding, PooledKind};
@@ -15,7 +16,7 @@ pub(super) fn unread(findings: &Findings<'_>) -> Option<Sentence> {
         unread += health.unread.values().sum::<usize>();
     }
     let share = unread as f64 / replies.max(1) as f64;
-    if unread == 0 || share > MANY_UNREAD {
+    if unread == 0 || share > MAX_UNREAD {
         return None;
     }
     let mut numbers = Numbers::of(findings.unit);

@@ -63,15 +63,17 @@ pub(super) fn change(
     };
     let (first, second) = (means(first), means(second));
     let mut sums = BTreeMap::<usize, (f64, f64)>::new();
-    let mut n = 0;
+    let (mut squares, mut n) = (0.0, 0);
     for (question, (sum, count)) in &first {
         let Some((other, others)) = second.get(question) else {
             continue;
         };
         let (net, pairs) = sums.entry(cluster(*question)).or_default();
-        (*net, *pairs) = (*net + sum / count - other / others, *pairs + 1.0);
+        let change = sum / count - other / others;
+        (*net, *pairs) = (*net + change, *pairs + 1.0);
+        squares += change * change;
         n += 1;
     }
     let sums: Vec<(f64, f64)> = sums.into_values().collect();
-    (n > 0).then(|| difference(&sums, n))
+    (n > 0).then(|| difference(&sums, squares, n))
 }
