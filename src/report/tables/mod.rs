@@ -2,6 +2,7 @@
 
 mod agreement;
 mod answers;
+mod best;
 mod comparisons;
 mod families;
 mod flips;
@@ -31,6 +32,7 @@ pub fn tables(findings: &Findings<'_>) -> Vec<Table> {
         vec![levels::levels(findings)],
         vec![subjects::subjects(&findings.summary)],
         thresholds::thresholds(findings),
+        vec![best::best(findings)],
         vec![families::families(findings)],
         pooled::pooled(findings),
         comparisons::comparisons(findings),
