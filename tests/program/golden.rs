@@ -70,6 +70,6 @@ fn open_questions_with_marks_and_an_enhancer() {
     assert_eq!(digest(&house.0, "run"), OPENEQA);
 }
 
-const EVALUATION: &str = "05c47f25360236fa";
-const READINGS: &str = "2d1c691b0b2686af";
+const EVALUATION: &str = "ea28d2700b69a9c8";
+const READINGS: &str = "49c28f3759ffccac";
 const OPENEQA: &str = "8afee46475f53581";

@@ -3,6 +3,7 @@
 mod agreement;
 mod answers;
 mod baseline;
+mod best;
 mod comparisons;
 mod families;
 mod fidelity;
@@ -36,6 +37,7 @@ pub(crate) fn tables(findings: &Findings<'_>) -> Vec<Table> {
         levels::levels(findings),
         vec![subjects::subjects(&findings.summary)],
         thresholds::thresholds(findings),
+        vec![best::best(findings)],
         vec![families::families(findings)],
         pooled::pooled(findings),
         comparisons::comparisons(findings),
