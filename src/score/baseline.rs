@@ -15,7 +15,7 @@ pub(crate) struct BaselineRow {
     pub subject: Subject,
     /// New less old on the items that both answered about the same image.
     pub paired: PairedComparison,
-    /// p-value after Holm's correction over the conditions of the model; 1 if too few items are shared.
+    /// p-value after Holm's correction over the conditions of the model.
     pub holm: f64,
     pub significance: Significance,
     /// Number of items that both asked about different images; they do not count.
@@ -70,14 +70,12 @@ pub(crate) fn baseline_rows(
     });
     let mut rows: Vec<BaselineRow> = rows.collect();
     for same_model in rows.chunk_by_mut(|one, other| one.subject.model == other.subject.model) {
-        let tested = same_model.iter_mut();
-        let mut tested: Vec<&mut BaselineRow> = tested
-            .filter(|row| row.paired.difference.n >= MIN_PAIRS)
-            .collect();
-        let values: Vec<f64> = tested.iter().map(|row| row.paired.p).collect();
-        for (row, holm) in tested.iter_mut().zip(holm(&values)) {
+        let values: Vec<f64> = same_model.iter().map(|row| row.paired.p).collect();
+        for (row, holm) in same_model.iter_mut().zip(holm(&values)) {
             row.holm = holm;
-            row.significance = significance(row.paired.difference.value, holm);
+            if row.paired.difference.n >= MIN_PAIRS {
+                row.significance = significance(row.paired.difference.value, holm);
+            }
         }
     }
     rows

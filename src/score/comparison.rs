@@ -95,7 +95,6 @@ pub struct Comparison {
     pub paired: PairedComparison,
     /// p-value after Holm's correction over all comparisons of this kind and these models. Another model in the report
     /// therefore changes no result. Comparisons by family are corrected separately.
-    /// `1` if the sides share too few items.
     pub holm: f64,
     pub significance: Significance,
 }
@@ -139,11 +138,7 @@ pub(crate) fn comparisons(grid: &Grid<'_>) -> Vec<Comparison> {
 /// The comparisons with their significance, after Holm's correction within each set.
 fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
     let mut sets = BTreeMap::<_, Vec<usize>>::new();
-    for (index, comparison) in all.iter_mut().enumerate() {
-        if comparison.is_too_small() {
-            comparison.significance = Significance::TooFew;
-            continue;
-        }
+    for (index, comparison) in all.iter().enumerate() {
         let models = (
             comparison.first.model.clone(),
             comparison.second.model.clone(),
@@ -156,7 +151,11 @@ fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
         for (index, holm) in set.into_iter().zip(holm(&values)) {
             let comparison = &mut all[index];
             comparison.holm = holm;
-            comparison.significance = significance(comparison.paired.difference.value, holm);
+            comparison.significance = if comparison.is_too_small() {
+                Significance::TooFew
+            } else {
+                significance(comparison.paired.difference.value, holm)
+            };
         }
     }
     all

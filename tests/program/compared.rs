@@ -239,7 +239,7 @@ fn models_of_one_name_are_named_by_what_differs() {
     });
     let three = scene.bench.complete(&words("report a b c"));
     check_rows(["m (a)", "m (b)", "m (c)"], |name| {
-        assert!(three.contains(name), "{name}: {three}")
+        assert!(three.contains(name), "{name}: {three}");
     });
 }
 

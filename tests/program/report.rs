@@ -385,7 +385,7 @@ fn people_enter_as_a_model() {
         "odd.jsonl, line 2: \"F\" is no choice of q1: red, blue, brown",
     ];
     check_rows(rows, |text| {
-        assert!(read.stderr.contains(text), "{text}: {read:?}")
+        assert!(read.stderr.contains(text), "{text}: {read:?}");
     });
     let counted = "! 2 of 3 answers of people are no choice of their question, and count as wrong.";
     assert!(read.stdout.contains(counted), "{read:?}");
