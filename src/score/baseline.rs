@@ -15,7 +15,7 @@ pub(crate) struct BaselineRow {
     pub subject: Subject,
     /// New less old on the items that both answered about the same image.
     pub paired: PairedComparison,
-    /// p-value after Holm's correction over the conditions of the model; 1 if too few items are shared.
+    /// p-value after Holm's correction over the conditions of the model.
     pub holm: f64,
     pub significance: Significance,
     /// Number of items that both asked about different images; they do not count.
@@ -70,21 +70,19 @@ pub(crate) fn baseline_rows(
     });
     let mut rows: Vec<BaselineRow> = rows.collect();
     for same_model in rows.chunk_by_mut(|one, other| one.subject.model == other.subject.model) {
-        let tested = same_model.iter_mut();
-        let mut tested: Vec<&mut BaselineRow> = tested
-            .filter(|row| row.paired.difference.n >= MIN_PAIRS)
-            .collect();
         let adjusted = |of: fn(&PairedComparison) -> f64| {
-            let values = tested.iter().map(|row| of(&row.paired));
+            let values = same_model.iter().map(|row| of(&row.paired));
             holm(&values.collect::<Vec<_>>())
         };
         let (corrected, least) = (
             adjusted(|paired| paired.p),
             adjusted(|paired| least_p(paired.clusters)),
         );
-        for ((row, holm), least) in tested.iter_mut().zip(corrected).zip(least) {
+        for ((row, holm), least) in same_model.iter_mut().zip(corrected).zip(least) {
             row.holm = holm;
-            row.significance = Significance::of(row.paired.difference.value, holm, least);
+            if row.paired.difference.n >= MIN_PAIRS {
+                row.significance = Significance::of(row.paired.difference.value, holm, least);
+            }
         }
     }
     rows

@@ -69,7 +69,6 @@ pub struct Comparison {
     pub paired: PairedComparison,
     /// p-value after Holm's correction over all comparisons of this kind and these models. Another model in the report
     /// therefore changes no result. Comparisons by family are corrected separately.
-    /// `1` if the sides share too few items.
     pub holm: f64,
     /// The smallest p-value after correction that the clusters of this comparison allow, however large the difference is.
     pub least_holm: f64,
@@ -116,11 +115,7 @@ pub(crate) fn comparisons(grid: &Grid<'_>) -> Vec<Comparison> {
 /// The comparisons with their significance, after Holm's correction within each set.
 fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
     let mut sets = BTreeMap::<_, Vec<usize>>::new();
-    for (index, comparison) in all.iter_mut().enumerate() {
-        if comparison.is_too_small() {
-            comparison.significance = Significance::TooFew;
-            continue;
-        }
+    for (index, comparison) in all.iter().enumerate() {
         let models = (
             comparison.first.model.clone(),
             comparison.second.model.clone(),
@@ -140,7 +135,11 @@ fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
             let difference = comparison.paired.difference.value;
             comparison.holm = holm;
             comparison.least_holm = least_holm;
-            comparison.significance = Significance::of(difference, holm, least_holm);
+            comparison.significance = if comparison.is_too_small() {
+                Significance::TooFew
+            } else {
+                Significance::of(difference, holm, least_holm)
+            };
         }
     }
     all

@@ -54,8 +54,14 @@ fn of_progress(runs: &[JoinedRun]) -> Vec<Alert> {
         .filter(|run| run.manifest.status != Status::Complete);
     let alerts = unfinished.map(|run| {
         let (status, counts) = (run.manifest.status, run.manifest.counts);
+        // A run that is merged of some of its parts has answers to all of their trials.
+        let rest = if counts.answered < counts.trials {
+            " The same command asks the rest."
+        } else {
+            ""
+        };
         let text = format!(
-            "{}: {status}: {} of {} trials answered, {} failed. The same command asks the rest.",
+            "{}: {status}: {} of {} trials answered, {} failed.{rest}",
             run.name, counts.answered, counts.trials, counts.failed
         );
         Alert::new(AlertKind::NotComplete, text)

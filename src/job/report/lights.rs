@@ -93,29 +93,9 @@ impl Lights {
         }
         let seen = Seen::of(runs);
         let manifests: Vec<&RunManifest> = runs.iter().map(|run| &run.manifest).collect();
-        let mut partitions = BTreeMap::<&Curve, Vec<Vec<usize>>>::new();
-        for (curve, having) in &seen.curves {
-            let agree = |one: usize, other: usize| {
-                let pair = (curve.clone(), one.min(other), one.max(other));
-                match seen.pairs.get(&pair) {
-                    Some(agreement) => agreement.differing == 0,
-                    None => same_by_manifest(curve, manifests[one], manifests[other]),
-                }
-            };
-            let mut groups: Vec<Vec<usize>> = Vec::new();
-            for run in order.iter().copied().filter(|run| having.contains(run)) {
-                match groups
-                    .iter_mut()
-                    .find(|group| group.iter().all(|other| agree(run, *other)))
-                {
-                    Some(group) => group.push(run),
-                    None => groups.push(vec![run]),
-                }
-            }
-            partitions.insert(curve, groups);
-        }
+        let partitions = seen.partitions(&manifests, order);
         let mut lights = Self {
-            undigested: seen.undigested,
+            undigested: seen.undigested.clone(),
             ..Self::default()
         };
         for (curve, groups) in &partitions {
@@ -137,14 +117,13 @@ impl Lights {
                     lights.groups.extend(own);
                 }
             }
-            let pairs = seen.pairs.iter().filter(|((of, ..), _)| of == *curve);
-            let pairs: Vec<&Agreement> = pairs.map(|(_, agreement)| agreement).collect();
             if groups.len() > 1 {
+                let agreement = seen.between(curve, groups);
                 lights.split.push(SplitCurve {
                     curve: (*curve).clone(),
                     groups: parted,
-                    shared: pairs.iter().map(|pair| pair.shared).sum(),
-                    differing: pairs.iter().map(|pair| pair.differing).sum(),
+                    shared: agreement.shared,
+                    differing: agreement.differing,
                 });
             }
         }
@@ -192,7 +171,46 @@ struct Seen {
     undigested: Vec<usize>,
 }
 
+/// Groups of runs that show the same images, by curve.
+type Partitions<'a> = BTreeMap<&'a Curve, Vec<Vec<usize>>>;
+
 impl Seen {
+    /// The groups of runs that agree on each curve.
+    fn partitions(&self, manifests: &[&RunManifest], order: &[usize]) -> Partitions<'_> {
+        let curves = self.curves.iter().map(|(curve, having)| {
+            let agree = |one: usize, other: usize| {
+                let pair = (curve.clone(), one.min(other), one.max(other));
+                match self.pairs.get(&pair) {
+                    Some(agreement) => agreement.differing == 0,
+                    None => same_by_manifest(curve, manifests[one], manifests[other]),
+                }
+            };
+            let mut groups: Vec<Vec<usize>> = Vec::new();
+            for run in order.iter().copied().filter(|run| having.contains(run)) {
+                let mut known = groups.iter_mut();
+                match known.find(|group| group.iter().all(|other| agree(run, *other))) {
+                    Some(group) => group.push(run),
+                    None => groups.push(vec![run]),
+                }
+            }
+            (curve, groups)
+        });
+        curves.collect()
+    }
+
+    /// The images of a curve that runs of different groups share.
+    fn between(&self, curve: &Curve, groups: &[Vec<usize>]) -> Agreement {
+        let place = |run: usize| groups.iter().position(|group| group.contains(&run));
+        let mut all = Agreement::default();
+        for ((of, one, other), agreement) in &self.pairs {
+            if of == curve && place(*one) != place(*other) {
+                all.shared += agreement.shared;
+                all.differing += agreement.differing;
+            }
+        }
+        all
+    }
+
     fn of<D: Detail>(runs: &[StoredRun<D>]) -> Self {
         let mut curves = HashMap::<&Condition, BTreeSet<usize>>::new();
         let mut images = HashMap::<(&Condition, &str), Vec<(usize, Digest)>>::new();

@@ -74,7 +74,7 @@ fn a_blind_model_sees_words_alone() {
     );
     let table = bench.complete(&words(&line));
     assert!(
-        table.contains("gpt without images: 33.3 ±")
+        table.contains("gpt without images: 33.3 [")
             && table.contains(", n 3, unparsed 0, failed 0"),
         "{table}"
     );
