@@ -80,7 +80,7 @@ impl Scene {
 
     /// The lines above the report of runs.
     fn alerts(&self, line: &str) -> Vec<String> {
-        let text = self.bench.complete(&words(line));
+        let text = self.bench.complete(&words(&format!("{line} --full")));
         let lines = text.lines().map_while(|line| line.strip_prefix("! "));
         lines.map(str::to_owned).collect()
     }
@@ -233,11 +233,11 @@ fn models_of_one_name_are_named_by_what_differs() {
     scene.run("", "a");
     scene.run("--detail low", "b");
     scene.run("--detail low --temperature 1 --max-tokens 9", "c");
-    let pair = scene.bench.complete(&words("report a b"));
+    let pair = scene.bench.complete(&words("report a b --full"));
     check_rows(["m (--detail unset)", "m (--detail low)"], |name| {
         assert!(pair.contains(name), "{name}: {pair}");
     });
-    let three = scene.bench.complete(&words("report a b c"));
+    let three = scene.bench.complete(&words("report a b c --full"));
     check_rows(["m (a)", "m (b)", "m (c)"], |name| {
         assert!(three.contains(name), "{name}: {three}");
     });
@@ -248,7 +248,7 @@ fn models_that_were_asked_other_questions_are_compared_by_the_shared_ones() {
     let scene = Scene::new();
     scene.run("", "a");
     scene.run("--model n --limit 20", "b");
-    let text = scene.bench.complete(&words("report a b"));
+    let text = scene.bench.complete(&words("report a b --full"));
     let alert = "! Models were asked different questions: n was asked 20 of 40 questions. Compare by the 20 shared";
     assert!(text.contains(alert), "{text}");
     assert!(

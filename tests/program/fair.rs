@@ -13,7 +13,7 @@ fn args(more: &str) -> Vec<&str> {
 
 /// The output of a complete run in the folder `run`.
 fn run(bench: &Bench, more: &str) -> String {
-    bench.complete(&[args("--out run"), words(more)].concat())
+    bench.complete(&[args("--out run --full"), words(more)].concat())
 }
 
 #[test]
@@ -165,7 +165,7 @@ fn kept_replies_are_read_again_without_a_call() {
     let bench = Bench::with_questions(6);
     bench.file("script.jsonl", "{\"default\":\"C\"}");
     let table = run(&bench, "--model script:script.jsonl");
-    let report = bench.complete(&["report", "run"]);
+    let report = bench.complete(&["report", "run", "--full"]);
     assert_eq!(report, table, "the same from the records alone");
     // As an earlier version might have read them.
     let path = bench.path("run/records.jsonl");
@@ -180,14 +180,14 @@ fn kept_replies_are_read_again_without_a_call() {
         })
         .collect();
     fs::write(&path, &old).unwrap();
-    assert!(bench.complete(&["report", "run"]).contains("   0.0"));
-    let rescored = bench.complete(&["report", "run", "--rescore"]);
+    assert!(bench.complete(&["report", "run", "--full"]).contains("   0.0"));
+    let rescored = bench.complete(&["report", "run", "--rescore", "--full"]);
     assert!(
         rescored.starts_with("6 of 6 records now read differently\n"),
         "{rescored}"
     );
     assert!(rescored.ends_with(&table), "{rescored}");
-    let again = bench.complete(&["report", "run", "--rescore"]);
+    let again = bench.complete(&["report", "run", "--rescore", "--full"]);
     assert!(again.starts_with("0 of 6"), "{again}");
     let stored = fs::read_to_string(&path).unwrap();
     assert!(stored.starts_with(&old), "what was kept is never changed");

@@ -30,7 +30,7 @@ fn several_runs_become_one_comparison() {
     bench.complete(&words(
         "--model script:said.jsonl --data set.jsonl --levels L0,L5 --out three",
     ));
-    let called = bench.call(&["report", "one", "two", "three", "--out", "all"]);
+    let called = bench.call(&["report", "one", "two", "three", "--out", "all", "--full"]);
     assert_eq!(called.code, Some(0), "{called:?}");
     // The seed of the light is that of the guesses, too: the model stands twice. Its noise is that of another light.
     let rows = [
@@ -195,7 +195,7 @@ fn runs_of_earlier_versions_are_read() {
         format!("{record}\n")
     });
     fs::write(bench.path("run/records.jsonl"), lines.collect::<String>()).unwrap();
-    let called = bench.call(&["report", "run"]);
+    let called = bench.call(&["report", "run", "--full"]);
     assert_eq!(called.code, Some(0), "{called:?}");
     assert!(called.stdout.contains("chance: 33.33 over 3 questions"));
     assert!(bench.path("run/report.html").is_file());
@@ -315,7 +315,9 @@ fn an_item_is_drawn_as_one_picture() {
 #[test]
 fn people_enter_as_a_model() {
     let bench = Bench::with_questions(6);
-    run(&bench, "run", "");
+    bench.file("said.jsonl", "{\"default\": \"A\"}\n");
+    let line = "--model script:said.jsonl --data set.jsonl --levels L0,L5 --out run";
+    bench.complete(&words(line));
     let packed = bench.call(&["study", "pack", "run", "--out", "pack"]);
     assert_eq!(packed.code, Some(0), "{packed:?}");
     assert!(
@@ -376,7 +378,7 @@ fn people_enter_as_a_model() {
         .iter()
         .find(|row| row[0] == "model" && row[2] == "L0")
         .unwrap();
-    assert_eq!((&*held[1], &*held[3], &*held[6]), ("people", "random", "6"));
+    assert_eq!((&*held[1], &*held[3], &*held[6]), ("people", "script:said.jsonl", "6"));
     // What is no choice is named with its place, and counted in the report.
     let odd = line("q0", "L0", 3, json!("castle"))
         + &line("q1", "L0", 3, json!("F"))

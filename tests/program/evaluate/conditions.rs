@@ -15,7 +15,7 @@ use crate::support::table::check_rows;
 #[test]
 fn the_built_in_rooms_run_without_anything() {
     let bench = Bench::new();
-    let args = words("--model observer --blind-model observer --out run");
+    let args = words("--model observer --blind-model observer --out run --full");
     let table = bench.complete(&args);
     assert!(
         table.contains("untouched")

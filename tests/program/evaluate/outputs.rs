@@ -13,7 +13,7 @@ fn a_record_and_a_row_keep_the_contract() {
     let bench = Bench::with_frames();
     bench.file("script.jsonl", "{\"question\":\"a1\",\"reply\":\"No.\"}\n{\"question\":\"b1\",\"condition\":\"L1-ev\",\"reply\":\"too dark to see\"}\n{\"default\":\"**A**\"}\n");
     let table = bench.complete(&words(
-        "--data frames --model script:script.jsonl --levels L0,L1 --variant ev --out run",
+        "--data frames --model script:script.jsonl --levels L0,L1 --variant ev --out run --full",
     ));
     assert!(
         table.contains("(66.7)"),

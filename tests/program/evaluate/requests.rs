@@ -70,7 +70,7 @@ fn a_blind_model_sees_words_alone() {
     let endpoint = MockEndpoint::start([Answer::text("A")]);
     let url = endpoint.base_url();
     let line = format!(
-        "--data frames --model random --blind-model gpt --base-url {url} --levels L0 --out run"
+        "--data frames --model random --blind-model gpt --base-url {url} --levels L0 --out run --full"
     );
     let table = bench.complete(&words(&line));
     assert!(
