@@ -193,13 +193,20 @@ fn changed(grid: &Grid<'_>, subject: &Subject, change: impl FnOnce(&mut Subject)
     grid.find(&other).into_iter().collect()
 }
 
-/// Later models of the grid in the same condition, so that each pair occurs once.
+/// Later models of the grid in the same condition, so that each pair occurs once. Built-in reference models are compared
+/// only if there are no others.
 fn later_models(grid: &Grid<'_>, index: usize) -> Vec<usize> {
     let subject = &grid.subjects[index];
+    let has_others = grid.subjects.iter().any(|other| !other.is_reference());
+    let is_left_out = |subject: &Subject| has_others && subject.is_reference();
+    if is_left_out(subject) {
+        return Vec::new();
+    }
     let later = grid.subjects.iter().enumerate().skip(index + 1);
     let condition = |of: &Subject| (of.view, of.level, of.variant.clone(), of.enhancer.clone());
     later
         .filter(|(_, other)| other.model != subject.model && condition(other) == condition(subject))
+        .filter(|(_, other)| !is_left_out(other))
         .map(|(other, _)| other)
         .collect()
 }

@@ -6,6 +6,17 @@ use crate::types::{AxisLevel, Condition, EnhancerName, KindReading, Record, View
 
 /// The model name of the chance line.
 pub(crate) const CHANCE: &str = "chance";
+/// The model name of the built-in observer.
+pub(crate) const OBSERVER: &str = "observer";
+/// Start of the model names of the observer's controls, for example `observer:other-room`.
+pub(crate) const CONTROL_PREFIX: &str = "observer:";
+
+/// Whether a model of this name is built in and stands for comparison only: `random`, `observer` and its controls
+/// (`observer:…`). It is no model under test, so rankings and comparisons of models leave it out.
+#[must_use]
+pub(crate) fn is_reference(model: &str) -> bool {
+    model == "random" || model == OBSERVER || model.starts_with(CONTROL_PREFIX)
+}
 
 /// A model in a condition; every cell of a table belongs to one.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -41,6 +52,12 @@ impl Subject {
         }
     }
 
+    /// Whether the model is built in and stands for comparison only: `random`, `observer` or one of its controls.
+    #[must_use]
+    pub fn is_reference(&self) -> bool {
+        is_reference(&self.model)
+    }
+
     /// The condition as text, for example `L3-noise+zerodce`; `blind` without images.
     #[must_use]
     pub fn condition(&self) -> String {
@@ -74,6 +91,26 @@ impl Subject {
                 variant.clone()
             },
             enhancer: enhancer.filter(|_| !is_clean).cloned(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_built_in_models_are_references() {
+        for (model, expected) in [
+            ("random", true),
+            ("observer", true),
+            ("observer:other-room", true),
+            ("observers", false),
+            ("random-forest", false),
+            ("gpt-4o", false),
+            (CHANCE, false),
+        ] {
+            assert_eq!(Subject::new(model, None).is_reference(), expected, "{model}");
         }
     }
 }

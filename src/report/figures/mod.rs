@@ -12,7 +12,7 @@ use crate::error::Result;
 use crate::score::choice::ReadingMode;
 use crate::score::estimate::Estimate;
 use crate::score::findings::Findings;
-use crate::score::subject::{CHANCE, Subject};
+use crate::score::subject::{CHANCE, Subject, is_reference};
 use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
 
 pub(crate) use story::{StoryCurves, story_curves};
@@ -42,9 +42,6 @@ pub(crate) fn figures(findings: &Findings<'_>) -> Result<Vec<Figure>> {
     figures.extend(thresholds::figure(findings)?);
     Ok(figures)
 }
-
-/// The built-in models. They stand for comparison, and are not models under test.
-const BUILT_IN: [&str; 2] = ["random", "observer"];
 
 /// Style of lines that belong to no model: chance, and the most frequent true answer.
 const REFERENCE: LineStyle = LineStyle(27);
@@ -125,7 +122,7 @@ impl<'a> Overview<'a> {
 
     /// The models over which a mean is taken: without the built-in ones, if there are others.
     fn averaged_models(&self) -> Vec<&'a str> {
-        let others = self.models.iter().filter(|model| !BUILT_IN.contains(model));
+        let others = self.models.iter().filter(|model| !is_reference(model));
         let others: Vec<&str> = others.copied().collect();
         if others.is_empty() {
             self.models.clone()
