@@ -17,8 +17,8 @@ pub fn products<'a>(
     tables: &[Table],
     inputs: &PageInputs<'a>,
 ) -> Result<Vec<(String, Vec<u8>)>> {
-    let figures = figures(findings)?;
-    let page = page(findings, tables, &figures, inputs)?;
+    let figures = figures(findings.shown())?;
+    let page = page(findings.shown(), tables, &figures, inputs)?;
     let mut files = table_files(tables, "Tables")?;
     files.extend(chart::files(figures));
     if let Some(samples) = samples(inputs.thumbnails) {

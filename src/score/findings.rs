@@ -13,7 +13,8 @@ use super::curve::{Curve, curves};
 use super::flips::{FirstFailure, first_failures};
 use super::grid::Grid;
 use super::health::{Health, healths};
-use super::subject::Subject;
+use super::observed::ObserverSummary;
+use super::subject::{CONTROL_PREFIX, OBSERVER, Subject};
 use crate::types::{Family, FrameId, Record};
 
 /// All results that are computed from the records of a run.
@@ -39,6 +40,10 @@ pub struct Findings<'a> {
     pub first_failures: Vec<FirstFailure>,
     /// Agreement of models in each condition.
     pub agreements: Vec<Agreement>,
+    /// Results of the observer and its controls. The controls are in no other result.
+    pub observer: ObserverSummary,
+    /// The results without the observer, if one of its controls is not at chance; these are shown then.
+    pub without_observer: Option<Box<Self>>,
 }
 
 impl<'a> Findings<'a> {
@@ -54,12 +59,38 @@ impl<'a> Findings<'a> {
             .iter()
             .map(|record| (&record.question, &record.detail.frame));
         let clusters = Clusters::new(pairs, scenes);
-        let grid = Grid::new(records, &clusters);
+        let questions: Vec<OfferedChoices> = questions.into_iter().collect();
+        let observer = ObserverSummary::of(records, &clusters);
+        let is_model = |model: &str| !model.starts_with(CONTROL_PREFIX);
+        let is_shown = |model: &str| is_model(model) && model != OBSERVER;
+        let without_observer = observer.is_refuted().then(|| {
+            let grid = Grid::of_models(records, &clusters, is_shown);
+            Box::new(Self::of(grid, &clusters, &questions, observer.clone()))
+        });
+        let grid = Grid::of_models(records, &clusters, is_model);
+        Self {
+            without_observer,
+            ..Self::of(grid, &clusters, &questions, observer)
+        }
+    }
+
+    /// What is shown: without the observer, if one of its controls is not at chance.
+    #[must_use]
+    pub fn shown(&self) -> &Self {
+        self.without_observer.as_deref().unwrap_or(self)
+    }
+
+    fn of(
+        grid: Grid<'a>,
+        clusters: &Clusters,
+        questions: &[OfferedChoices],
+        observer: ObserverSummary,
+    ) -> Self {
         let draws = Resamples::new(clusters.count());
         let health = healths(&grid);
         Self {
             unit: clusters.unit(),
-            summary: summarize(&grid, &health, questions),
+            summary: summarize(&grid, &health, questions.iter().cloned()),
             health,
             comparisons: comparisons(&grid),
             curves: grid
@@ -71,6 +102,8 @@ impl<'a> Findings<'a> {
             hallucinations: hallucinations(&grid),
             first_failures: first_failures(&grid),
             agreements: agreements(&grid, &draws),
+            observer,
+            without_observer: None,
             grid,
         }
     }

@@ -110,7 +110,11 @@ mod tests {
             ("gpt-4o", false),
             (CHANCE, false),
         ] {
-            assert_eq!(Subject::new(model, None).is_reference(), expected, "{model}");
+            assert_eq!(
+                Subject::new(model, None).is_reference(),
+                expected,
+                "{model}"
+            );
         }
     }
 }

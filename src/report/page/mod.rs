@@ -16,6 +16,7 @@ use serde_json::{Value, json};
 
 use super::chart::Figure;
 use super::table::Table;
+use super::tables::observer_notes;
 use super::template::filled;
 use crate::error::Result;
 use crate::score::findings::Findings;
@@ -56,7 +57,7 @@ pub(crate) fn page<'a>(
         PAGE,
         Page {
             title: title(inputs),
-            alerts: alerts(inputs),
+            alerts: [alerts(inputs), observer_notes(&findings.observer)].concat(),
             intro: intro(findings),
             sections: sections::sections(tables, figures, inputs.thumbnails),
             runs: inputs.runs.iter().map(facts).collect(),

@@ -7,6 +7,7 @@ mod families;
 mod flips;
 mod health;
 mod levels;
+mod observer;
 mod sections;
 mod subjects;
 mod summary;
@@ -19,15 +20,27 @@ use crate::score::findings::Findings;
 use crate::score::subject::Subject;
 use crate::types::{EnhancerName, Family, KindReading};
 
+pub(super) use observer::notes as observer_notes;
 pub(super) use sections::{ENHANCERS, SECTIONS};
 pub(super) use summary::{SUMMARY, reading};
 
-/// All tables of an evaluation; the first is the summary.
+/// All tables of an evaluation; the first is the summary. What is not shown is in the files alone.
 #[must_use]
 pub fn tables(findings: &Findings<'_>) -> Vec<Table> {
+    let Some(shown) = &findings.without_observer else {
+        return all(findings);
+    };
+    let files = all(findings).into_iter().map(Table::in_files_only);
+    files
+        .chain(all(shown).into_iter().map(Table::without_file))
+        .collect()
+}
+
+fn all(findings: &Findings<'_>) -> Vec<Table> {
     [
         vec![summary::summary(&findings.summary)],
         vec![levels::levels(findings)],
+        observer::observer(findings),
         vec![subjects::subjects(&findings.summary)],
         thresholds::thresholds(findings),
         vec![families::families(findings)],
