@@ -8,11 +8,19 @@ use super::call::Call;
 use super::failure::AskError;
 use super::random::Random;
 use crate::types::question::letter;
-use crate::types::{Digest, FailureKind, Question, Reply};
+use crate::types::{Digest, FailureKind, Observed, Question, Reply};
 
-/// A function that answers a question: the index of a choice, or `None` if it does not know.
-pub(crate) type Opinion =
-    dyn Fn(&Question, &Call<'_>) -> Result<Option<usize>, String> + Send + Sync;
+/// The answer of a function.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub(crate) struct LocalAnswer {
+    /// Index of the choice; `None` if the function does not know.
+    pub(crate) choice: Option<usize>,
+    /// What it saw, for the record; `None` without an image.
+    pub(crate) observed: Option<Observed>,
+}
+
+/// A function that answers a question.
+pub(crate) type Opinion = dyn Fn(&Question, &Call<'_>) -> Result<LocalAnswer, String> + Send + Sync;
 
 /// A model whose answers a function gives. If the function does not know, a choice is guessed as [`Random`] does: the same
 /// seed, question, condition and turn give the same guess.
@@ -32,7 +40,7 @@ impl fmt::Debug for Local {
 impl Local {
     /// A model with a name; `digest` is the digest of everything that decides the function's answers.
     #[must_use]
-    pub fn new(name: String, digest: Digest, prior: Random, opinion: Box<Opinion>) -> Self {
+    pub(crate) fn new(name: String, digest: Digest, prior: Random, opinion: Box<Opinion>) -> Self {
         Self {
             name,
             digest,
@@ -50,10 +58,15 @@ impl Local {
     }
 
     pub(super) fn answer(&self, question: &Question, call: Call<'_>) -> Result<Reply, AskError> {
-        match (self.opinion)(question, &call) {
-            Ok(Some(choice)) => Ok(Reply::local(letter(choice).to_string())),
-            Ok(None) => Ok(Reply::local(self.prior.answer(question, call))),
-            Err(message) => Err(AskError::new(FailureKind::Request, message, 1)),
-        }
+        let answer = (self.opinion)(question, &call);
+        let answer = answer.map_err(|message| AskError::new(FailureKind::Request, message, 1))?;
+        let text = match answer.choice {
+            Some(choice) => letter(choice).to_string(),
+            None => self.prior.answer(question, call),
+        };
+        Ok(Reply {
+            observed: answer.observed,
+            ..Reply::local(text)
+        })
     }
 }

@@ -45,7 +45,7 @@ pub use endpoint::Endpoint;
 pub use failure::{AskError, Reach};
 pub(crate) use image_limit::ImageLimit;
 pub(crate) use key_header::KeyHeader;
-pub(crate) use local::Local;
+pub(crate) use local::{Local, LocalAnswer};
 pub use model::Model;
 pub(crate) use pace::Bounds;
 pub use pace::Quota;

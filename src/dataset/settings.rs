@@ -28,6 +28,10 @@ pub(crate) struct SelectionArgs {
     /// The questions about a folder of frames; default: questions.jsonl in it, else made by rule from its maps
     #[arg(long, value_name = "FILE", add = Decides::Reply)]
     pub questions: Option<PathBuf>,
+    /// The rulebook that makes the questions of data that have none, and that the observer answers by; default: the one built in
+    /// (src/questions/rules.toml)
+    #[arg(long, value_name = "FILE", add = Decides::Reply)]
+    pub rules: Option<PathBuf>,
     /// Only the first N questions; default: all
     #[arg(long, value_name = "N", add = Decides::Trials)]
     pub limit: Option<NonZeroUsize>,

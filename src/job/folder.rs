@@ -58,7 +58,7 @@ fn label(ask: &AskSettings) -> String {
     let models = ask.models.iter().chain(&ask.blind_models);
     let names = models.map(|name| match name {
         ModelName::Random => "random".to_owned(),
-        ModelName::Observer => observer::NAME.to_owned(),
+        ModelName::Observer(control) => observer::name(*control),
         ModelName::Script(path) => path.file_stem().map_or_else(
             || "script".to_owned(),
             |stem| stem.to_string_lossy().into_owned(),

@@ -10,14 +10,15 @@ use strsim::damerau_levenshtein;
 
 use crate::ask::{AccessArgs, Endpoint, Model, Parameters, Remote, Script, Sending, Server, Wire};
 use crate::error::{Error, Result};
+use crate::questions::observer::controls::Control;
 use crate::types::{Condition, Decides, View};
 
 /// Flags that name the models to ask.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Model")]
 pub(crate) struct ModelArgs {
-    /// The model to ask, by its name at the endpoint; repeatable; built in: observer (frames with maps), random, script:FILE;
-    /// default: none, one must be named
+    /// The model to ask, by its name at the endpoint; repeatable; built in: observer (frames with maps), its controls
+    /// (observer:CONTROL), random, script:FILE; default: none, one must be named
     #[arg(long, value_name = "NAME", add = Decides::Trials)]
     pub model: Vec<ModelName>,
     /// Show the models no image, only text
@@ -40,8 +41,8 @@ impl ModelArgs {
 pub(crate) enum ModelName {
     /// Built-in model that guesses.
     Random,
-    /// Built-in model that answers what the rules can still tell from the pixels.
-    Observer,
+    /// Built-in model that answers what can still be read from the pixels by one who knows the frame; or one of its controls.
+    Observer(Option<Control>),
     /// Built-in model that answers from this file.
     Script(PathBuf),
     /// Model of this name at the endpoint.
@@ -59,7 +60,7 @@ impl ModelName {
     pub(crate) fn require_open_answers(&self) -> Result<()> {
         let name = match self {
             Self::Random => "random",
-            Self::Observer => "observer",
+            Self::Observer(_) => "observer",
             Self::Script(_) | Self::Remote(_) => return Ok(()),
         };
         let problem = format_args!("{name} can only choose, and these questions are open");
@@ -74,10 +75,13 @@ impl FromStr for ModelName {
     fn from_str(text: &str) -> Result<Self, String> {
         let text = text.trim();
         let near = |name: &&&str| damerau_levenshtein(name, &text.to_lowercase()) <= 2;
+        if let Some(control) = text.strip_prefix("observer:") {
+            return Ok(Self::Observer(Some(control.parse()?)));
+        }
         match text {
             "" => Err("the name of a model is empty".to_owned()),
             "random" => Ok(Self::Random),
-            "observer" => Ok(Self::Observer),
+            "observer" => Ok(Self::Observer(None)),
             "script" => Err("script:FILE expected, a file of replies".to_owned()),
             name => match (
                 name.strip_prefix("script:"),
@@ -163,19 +167,22 @@ impl ModelUnderTest {
 }
 
 /// The opened models, those that see images and those that do not. A model that is named twice is an error. Nothing is sent.
-/// `built_in` makes the built-in models that only one experiment has.
+/// `added` are asked too, with images, although no flag names them. `built_in` makes the built-in models that only one
+/// experiment has.
 pub(crate) fn open_all(
     ask: &AskSettings,
+    added: &[ModelName],
     built_in: impl Fn(&ModelName) -> Result<Model>,
 ) -> Result<Vec<ModelUnderTest>> {
     let server = ask.server.as_ref();
     let endpoint = endpoint(server)?;
     let named = ask.models.iter().map(|name| (name, ask.view));
+    let named = named.chain(added.iter().map(|name| (name, View::Image)));
     let blind = ask.blind_models.iter().map(|name| (name, View::Blind));
     let mut models: Vec<ModelUnderTest> = Vec::new();
     for (name, view) in named.chain(blind) {
         let model = match name {
-            ModelName::Random | ModelName::Observer => built_in(name)?,
+            ModelName::Random | ModelName::Observer(_) => built_in(name)?,
             name => open(name, endpoint.as_ref(), &ask.parameters)?,
         };
         let name = model.name();
@@ -223,7 +230,7 @@ pub(crate) fn open(
             let model = Remote::open(Arc::clone(endpoint), Wire::Chat, parameters)?;
             Ok(Model::Remote(model))
         }
-        ModelName::Random | ModelName::Observer => Err(Error::usage(
+        ModelName::Random | ModelName::Observer(_) => Err(Error::usage(
             "--model",
             "a model that can answer open questions expected",
         )),

@@ -1,33 +1,96 @@
-//! The observer as a built-in model: [`open`].
+//! The observer and its controls as built-in models: [`Observer`].
 
 use std::sync::Arc;
 
-use crate::ask::{Call, Local, Random};
+use crate::ask::{Call, Local, LocalAnswer, Random};
 use crate::dataset::{DataPlace, Dataset};
 use crate::error::{Error, Result};
 use crate::questions::colors::Palette;
+use crate::questions::observer::controls::Control;
 use crate::questions::observer::{Observation, ObservedFrame, VERSION, understood};
 use crate::questions::rules::Rules;
 use crate::types::recent::Recent;
-use crate::types::{Digest, FrameId, Labels, Question};
+use crate::types::{AnswerSource, Digest, FrameId, Labels, Observed, Question};
 
 /// Name of the model in records and tables.
 pub(crate) const NAME: &str = "observer";
 
-/// Number of cached frames and observations. A few are enough, because questions about one image follow each other.
-const CACHE_SIZE: usize = 40;
+/// Number of cached observations. A few are enough, because questions about one image follow each other; with all controls,
+/// each image has one observation for each of them.
+const OBSERVATIONS: usize = 64;
 
-/// The data set, the rules and the caches of the observer.
-struct Observer {
+/// The data set, the rules and the caches that the observer and its controls share.
+pub(crate) struct Observer {
     dataset: Arc<Dataset>,
     labels: Labels,
     rules: Rules,
     palette: Palette,
     frames: Recent<FrameId, Arc<ObservedFrame>>,
-    observations: Recent<(FrameId, Digest), Arc<Observation>>,
+    observations: Recent<(FrameId, Digest, Option<Control>), Arc<Observation>>,
+}
+
+/// Name of the observer, or of one of its controls, in records and tables.
+pub(crate) fn name(control: Option<Control>) -> String {
+    control.map_or_else(|| NAME.to_owned(), |control| format!("{NAME}:{control}"))
 }
 
 impl Observer {
+    /// Opens the observer of a data set. It answers by the rules that make its questions.
+    ///
+    /// # Errors
+    /// If the frames have no maps, or a question is not one of the rulebook's.
+    pub(crate) fn open(
+        dataset: &Arc<Dataset>,
+        place: &DataPlace,
+        questions: &[Question],
+        rules: Rules,
+    ) -> Result<Arc<Self>> {
+        let unusable = |problem: String| Error::usage("--model", format!("{NAME}: {problem}"));
+        let labels = Dataset::labels_at(place)?.ok_or_else(|| {
+            unusable(format!(
+                "{} has no maps: frames with segments or classes (frames.jsonl, classes.json) are needed",
+                dataset.name()
+            ))
+        })?;
+        if let Some(unknown) = questions
+            .iter()
+            .find(|question| !understood(question, &rules))
+        {
+            return Err(unusable(format!(
+                "the question {:?} ({:?}) is not one of the rulebook's, and the observer understands no others; if another \
+                 rulebook made it, name that with --rules",
+                unknown.id.0, unknown.text
+            )));
+        }
+        // Each thread works on one frame, and a control may look at the image of another frame.
+        let threads = std::thread::available_parallelism().map_or(1, usize::from);
+        let observer = Self {
+            dataset: Arc::clone(dataset),
+            labels,
+            rules,
+            palette: Palette::built_in()?,
+            frames: Recent::new(2 * threads + 2),
+            observations: Recent::new(OBSERVATIONS),
+        };
+        if let Some(first) = questions.first() {
+            observer.observed_frame(&first.frame).map_err(unusable)?;
+        }
+        Ok(Arc::new(observer))
+    }
+
+    /// The observer as a model, or one of its controls. Guesses, and what a control draws at random, follow from the seed.
+    pub(crate) fn model(self: &Arc<Self>, control: Option<Control>, prior: Random) -> Local {
+        let (observer, seed) = (Arc::clone(self), prior.seed);
+        let rules = self.rules.digest();
+        let mut parts = vec![VERSION.to_le_bytes().to_vec(), rules.as_bytes().to_vec()];
+        parts.extend(control.map(|control| control.name().as_bytes().to_vec()));
+        let digest = Digest::of_parts(parts.iter().map(|part| &part[..]));
+        let opinion = move |question: &Question, call: &Call<'_>| {
+            observer.answer(question, call, control, seed)
+        };
+        Local::new(name(control), digest, prior, Box::new(opinion))
+    }
+
     fn observed_frame(&self, frame: &FrameId) -> Result<Arc<ObservedFrame>, String> {
         self.frames.get(frame, || {
             let maps = self.dataset.frame(frame).map_err(|e| e.to_string())?;
@@ -37,61 +100,49 @@ impl Observer {
         })
     }
 
-    fn answer(&self, question: &Question, call: &Call<'_>) -> Result<Option<usize>, String> {
+    fn answer(
+        &self,
+        question: &Question,
+        call: &Call<'_>,
+        control: Option<Control>,
+        seed: u64,
+    ) -> Result<LocalAnswer, String> {
         let Some(image) = call.message.images.first() else {
-            return Ok(None);
+            return Ok(LocalAnswer::default());
         };
         let frame = &question.frame;
-        let key = (frame.clone(), image.facts().digest);
+        let key = (frame.clone(), image.facts().digest, control);
         let observation = self.observations.get(&key, || {
             let observed = self.observed_frame(frame)?;
-            let pixels = image.decode().map_err(|e| e.to_string())?;
-            Ok::<_, String>(Arc::new(observed.look(&pixels, &self.palette)))
+            let mut pixels = image.decode().map_err(|e| e.to_string())?;
+            if let Some(control) = control {
+                let key = Digest::of_parts([&seed.to_le_bytes()[..], frame.0.as_bytes()]);
+                pixels = control.spoiled(&pixels, &observed, &key);
+            }
+            Ok::<_, String>(Arc::new(observed.look(&pixels)))
         })?;
-        Ok(observation.answer(question, &self.rules))
+        let choice = observation.answer(question, &self.rules, &self.palette);
+        Ok(LocalAnswer {
+            choice,
+            observed: Some(observed(&observation, choice)),
+        })
     }
 }
 
-/// Opens the observer of a data set.
-///
-/// # Errors
-/// If the frames have no maps, or a question is not one of the rulebook's.
-pub(crate) fn open(
-    dataset: &Arc<Dataset>,
-    place: &DataPlace,
-    questions: &[Question],
-    prior: Random,
-) -> Result<Local> {
-    let unusable = |problem: String| Error::usage("--model", format!("{NAME}: {problem}"));
-    let labels = Dataset::labels_at(place)?.ok_or_else(|| {
-        unusable(format!(
-            "{} has no maps: frames with segments or classes (frames.jsonl, classes.json) are needed",
-            dataset.name()
-        ))
-    })?;
-    let rules = Rules::built_in()?;
-    if let Some(unknown) = questions
-        .iter()
-        .find(|question| !understood(question, &rules))
-    {
-        return Err(unusable(format!(
-            "the question {:?} ({:?}) is not one of the rulebook's, and the observer understands no others",
-            unknown.id.0, unknown.text
-        )));
+/// What is kept of an observation in the record of an answer.
+fn observed(observation: &Observation, choice: Option<usize>) -> Observed {
+    let outlines = observation.outlines();
+    Observed {
+        from: match choice {
+            Some(_) => AnswerSource::Evidence,
+            None => AnswerSource::Guess,
+        },
+        things: observation.things(),
+        seen: observation.seen(),
+        detected: observation.detected(),
+        explained_ppm: (1e6 * observation.explained() + 0.5) as u32,
+        outlines: outlines
+            .map(|(id, confirmed, _)| (id, (100.0 * confirmed) as u8))
+            .collect(),
     }
-    let digest = Digest::of_parts([&VERSION.to_le_bytes()[..], rules.digest().as_bytes()]);
-    let observer = Observer {
-        dataset: Arc::clone(dataset),
-        labels,
-        rules,
-        palette: Palette::built_in()?,
-        frames: Recent::new(CACHE_SIZE),
-        observations: Recent::new(CACHE_SIZE),
-    };
-    if let Some(first) = questions.first() {
-        observer.observed_frame(&first.frame).map_err(unusable)?;
-    }
-    let answer =
-        Box::new(move |question: &Question, call: &Call<'_>| observer.answer(question, call));
-    Ok(Local::new(NAME.to_owned(), digest, prior, answer))
 }

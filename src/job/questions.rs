@@ -1,17 +1,32 @@
-//! The questions of a data set that are asked: [`select`].
+//! The questions of a data set that are asked: [`select`]; and the rules that make them: [`rules`].
 
 use std::collections::BTreeSet;
+use std::path::Path;
 
 use super::progress::Progress;
 use super::questions_by_rule::by_rule;
 use crate::dataset::{DataPlace, Dataset, PixelLimit, SelectionArgs};
 use crate::error::{Error, Result};
+use crate::files::reading;
+use crate::questions::rules::Rules;
 use crate::types::{Family, Question};
+
+/// The rulebook in a file; without one, the one built in.
+///
+/// # Errors
+/// If the file cannot be read, or is not a rulebook.
+pub(crate) fn rules(path: Option<&Path>) -> Result<Rules> {
+    let Some(path) = path else {
+        return Rules::built_in();
+    };
+    Rules::parse(&reading::text(path)?).map_err(|e| e.at(path.display().to_string()))
+}
 
 /// The opened data. If they have no questions, these are made by rule.
 pub(crate) fn open_data(
     place: &DataPlace,
     selection: &SelectionArgs,
+    rules: &Rules,
     limit: PixelLimit,
     progress: &Progress,
 ) -> Result<Dataset> {
@@ -20,7 +35,7 @@ pub(crate) fn open_data(
     if !dataset.questions().is_empty() {
         return Ok(dataset);
     }
-    let questions = by_rule(&dataset, progress)?;
+    let questions = by_rule(&dataset, rules, progress)?;
     Ok(dataset.with_questions(questions))
 }
 

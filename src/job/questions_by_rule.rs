@@ -1,4 +1,4 @@
-//! Questions for data that have none: made by rule, with the built-in rulebook and balance.
+//! Questions for data that have none: made by rule, with the rulebook of `--rules` and the built-in balance.
 
 use std::collections::BTreeSet;
 
@@ -15,24 +15,28 @@ use crate::questions::statistics::{FrameStatistics, measure};
 use crate::questions::{QuestionRequest, generate};
 use crate::types::{Digest, Family, FrameId, Question};
 
-/// The questions that the command `questions` makes without flags.
+/// The questions that the command `questions` makes with these rules, and no other flag.
 ///
 /// # Errors
 /// If a frame cannot be measured, or the rules ask nothing.
-pub(crate) fn by_rule(dataset: &Dataset, progress: &Progress) -> Result<Vec<Question>> {
+pub(crate) fn by_rule(
+    dataset: &Dataset,
+    rules: &Rules,
+    progress: &Progress,
+) -> Result<Vec<Question>> {
     let labels = dataset.labels().ok_or_else(|| {
         Error::data(
             dataset.name(),
             "no questions, and no classes to make them of",
         )
     })?;
-    let (rules, palette) = (Rules::built_in()?, Palette::built_in()?);
+    let palette = Palette::built_in()?;
     let names: Vec<&FrameId> = dataset.frames().collect();
     let bar = progress.bar("making questions", names.len());
     let frames = names.par_iter().map(|name| {
         let frame = dataset.frame(name)?;
         let key = Digest::of(name.0.as_bytes());
-        let statistics = measure(&frame, labels, &rules, &palette, key);
+        let statistics = measure(&frame, labels, rules, &palette, key);
         bar.inc();
         statistics
     });
@@ -41,7 +45,7 @@ pub(crate) fn by_rule(dataset: &Dataset, progress: &Progress) -> Result<Vec<Ques
     let request = QuestionRequest {
         dataset: dataset.title(),
         labels,
-        rules: &rules,
+        rules,
         palette: &palette,
         families: Family::PAPER.into_iter().collect(),
         room_source: RoomSource::default(),

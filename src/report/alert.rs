@@ -58,6 +58,8 @@ pub enum AlertKind {
     Scoring,
     /// Another version of this program.
     Version,
+    /// What the observer's numbers do not show.
+    Observer,
 }
 
 /// The alerts as lines of the terminal, each marked with `!`; empty without an alert.

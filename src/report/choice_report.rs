@@ -1,15 +1,15 @@
 //! All that a report of questions with choices shows: [`ChoiceReport`].
 
-use super::alert::Alert;
+use super::alert::{Alert, AlertKind};
 use super::sentences::{Sentence, sentences};
 use super::table::Table;
-use super::tables::tables;
+use super::tables::{observer_notes, tables};
 use crate::score::findings::Findings;
 
 /// The findings of one run or several, in words and as tables. The terminal, the page and all files are made from it.
 #[derive(Debug)]
 pub struct ChoiceReport<'a> {
-    /// All numbers.
+    /// The numbers that are shown.
     pub findings: &'a Findings<'a>,
     /// What a reader must know before any number.
     pub alerts: Vec<Alert>,
@@ -23,10 +23,15 @@ impl<'a> ChoiceReport<'a> {
     /// The report of these findings.
     #[must_use]
     pub fn new(findings: &'a Findings<'a>, alerts: Vec<Alert>) -> Self {
+        let shown = findings.shown();
+        let notes = observer_notes(&findings.observer);
+        let notes = notes
+            .into_iter()
+            .map(|note| Alert::new(AlertKind::Observer, note));
         Self {
-            findings,
-            alerts,
-            sentences: sentences(findings),
+            findings: shown,
+            alerts: alerts.into_iter().chain(notes).collect(),
+            sentences: sentences(shown),
             tables: tables(findings),
         }
     }

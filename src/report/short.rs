@@ -13,6 +13,8 @@ use super::words::{counted, percent, reach_of, with_interval};
 use crate::score::accuracy::AccuracyCell;
 use crate::score::choice::ReadingMode;
 use crate::score::health::Health;
+use crate::score::observed::OTHER_ROOM;
+use crate::score::subject::OBSERVER;
 use crate::types::AxisLevel;
 use crate::types::manifest::RunManifest;
 
@@ -290,8 +292,33 @@ fn baselines(report: &ChoiceReport<'_>, ladder: &Ladder<'_, AccuracyCell>) -> St
     if !parts.is_empty() {
         text += &wrapped(" ", &parts.join(" · "), " ");
     }
+    text += &observer_control(report);
     if let Some(reasons) = unread(&report.findings.summary) {
         text += &wrapped(" ", &reasons, " ");
     }
     text
+}
+
+/// What the observer is, and its score when it is shown the images of other rooms; empty if it is not shown.
+fn observer_control(report: &ChoiceReport<'_>) -> String {
+    let findings = report.findings;
+    let is_shown = findings
+        .grid
+        .subjects
+        .iter()
+        .any(|subject| subject.model == OBSERVER);
+    let mut control = findings.observer.controls.iter();
+    let control = control.find(|cell| cell.subject.model == OTHER_ROOM);
+    match control {
+        Some(control) if is_shown => {
+            let line = format!(
+                "{OBSERVER}: known-signal observer, given the untouched frame; not a model. Control: shown another room's images it \
+                 scores {}, chance is {}",
+                with_interval(control.score),
+                percent(control.chance)
+            );
+            wrapped(" ", &line, " ")
+        }
+        _ => String::new(),
+    }
 }

@@ -243,6 +243,20 @@ impl<T> TableBuilder<T> {
 }
 
 impl Table {
+    /// The table in files alone: nothing of it is printed, on the page or in LaTeX.
+    pub(super) fn in_files_only(mut self) -> Self {
+        (self.section, self.heading, self.latex) = ("", None, None);
+        self
+    }
+
+    /// The table without its file.
+    pub(super) fn without_file(mut self) -> Self {
+        for column in &mut self.columns {
+            column.heads.csv.clear();
+        }
+        self
+    }
+
     /// The rows that a format shows.
     pub(super) fn rows_in(&self, format: TableFormat) -> impl Iterator<Item = &TableRow> {
         let rows = self.rows.iter();

@@ -16,9 +16,10 @@ use super::fidelity::FidelityFindings;
 use super::flips::{FirstFailure, first_failures};
 use super::grid::Grid;
 use super::health::{Health, healths};
+use super::observed::ObserverSummary;
 use super::pooled::{PooledFinding, pooled};
 use super::significance::Significance;
-use super::subject::Subject;
+use super::subject::{CONTROL_PREFIX, OBSERVER, Subject};
 use crate::types::{Family, FrameId, ImageFidelity, Record};
 
 /// All results that are computed from the records of a run.
@@ -52,6 +53,10 @@ pub struct Findings<'a> {
     pub fidelity: Option<FidelityFindings>,
     /// What the models share; `None` if all were asked the same questions.
     pub common: Option<CommonItems>,
+    /// Results of the observer and its controls. The controls are in no other result.
+    pub observer: ObserverSummary,
+    /// The results without the observer, if one of its controls is not at chance; these are shown then.
+    pub without_observer: Option<Box<Self>>,
 }
 
 impl<'a> Findings<'a> {
@@ -68,12 +73,45 @@ impl<'a> Findings<'a> {
             .iter()
             .map(|record| (&record.question, &record.detail.frame));
         let clusters = Clusters::new(pairs, scenes);
-        let grid = Grid::new(records, &clusters);
+        let questions: Vec<OfferedChoices> = questions.into_iter().collect();
+        let observer = ObserverSummary::of(records, &clusters);
+        let is_model = |model: &str| !model.starts_with(CONTROL_PREFIX);
+        let is_shown = |model: &str| is_model(model) && model != OBSERVER;
+        let without_observer = observer.is_refuted().then(|| {
+            let grid = Grid::of_models(records, &clusters, is_shown);
+            Box::new(Self::of(
+                grid,
+                &clusters,
+                &questions,
+                observer.clone(),
+                measured,
+            ))
+        });
+        let grid = Grid::of_models(records, &clusters, is_model);
+        Self {
+            without_observer,
+            ..Self::of(grid, &clusters, &questions, observer, measured)
+        }
+    }
+
+    /// What is shown: without the observer, if one of its controls is not at chance.
+    #[must_use]
+    pub fn shown(&self) -> &Self {
+        self.without_observer.as_deref().unwrap_or(self)
+    }
+
+    fn of(
+        grid: Grid<'a>,
+        clusters: &Clusters,
+        questions: &[OfferedChoices],
+        observer: ObserverSummary,
+        measured: &[ImageFidelity],
+    ) -> Self {
         let draws = Resamples::new(clusters.count());
         let health = healths(&grid);
         Self {
             unit: clusters.unit(),
-            summary: summarize(&grid, &health, questions),
+            summary: summarize(&grid, &health, questions.iter().cloned()),
             health,
             pooled: pooled(&grid),
             best: best_in_the_dark(&grid),
@@ -89,6 +127,8 @@ impl<'a> Findings<'a> {
             agreements: agreements(&grid),
             fidelity: FidelityFindings::new(&grid, measured),
             common: CommonItems::of(&grid),
+            observer,
+            without_observer: None,
             grid,
         }
     }

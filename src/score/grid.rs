@@ -101,10 +101,20 @@ impl<'a> Grid<'a> {
     /// cluster are ignored.
     #[must_use]
     pub fn new(records: &'a [Record], clusters: &Clusters) -> Self {
+        Self::of_models(records, clusters, |_| true)
+    }
+
+    /// Table of the records of some models, as [`Grid::new`].
+    #[must_use]
+    pub fn of_models(
+        records: &'a [Record],
+        clusters: &Clusters,
+        is_shown: impl Fn(&str) -> bool,
+    ) -> Self {
         let mut subjects = BTreeMap::<Subject, usize>::new();
         let mut item_indices = HashMap::<(&QuestionId, &[String], u32), usize>::new();
         let mut items: Vec<GridItem<'a>> = Vec::new();
-        for record in records {
+        for record in records.iter().filter(|record| is_shown(&record.model)) {
             let Some(cluster) = clusters.of(&record.detail.frame, &record.question) else {
                 continue;
             };

@@ -33,6 +33,7 @@ pub(crate) mod flips;
 pub(crate) mod grid;
 pub(crate) mod health;
 pub(crate) mod llm_match;
+pub(crate) mod observed;
 pub(crate) mod open;
 pub(crate) mod paired;
 pub(crate) mod pooled;

@@ -24,6 +24,10 @@ impl Detail for ChoiceDetail {
         };
         self.strict = Some(strict.into());
         self.lenient = Some(lenient.into());
+        // A stored reply that is read again says nothing of what was seen.
+        if reply.observed.is_some() {
+            self.observed.clone_from(&reply.observed);
+        }
         Ok(())
     }
 

@@ -43,6 +43,8 @@ fn records(model: &str, condition: &str, answers: Answers) -> Vec<Record> {
                 Some(false) => TrialOutcome::Wrong,
             },
             image: None,
+            shown_frame: None,
+            observed: None,
         };
         let key = Digest::of(format!("{item} {model} {condition:?}").as_bytes()).into();
         let question = QuestionId(format!("q{item:02}"));

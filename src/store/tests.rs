@@ -35,6 +35,8 @@ fn record(name: &str, outcome: TrialOutcome) -> Record {
         lenient: None,
         outcome,
         image: None,
+        shown_frame: None,
+        observed: None,
     };
     let key = Digest::of(name.as_bytes()).into();
     Record {

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::condition::Condition;
 use super::digest::Digest;
 use super::frame::FrameId;
+use super::observed::Observed;
 use super::question::{Answer, Family, QuestionId, UnreadReason};
 use super::record::{Failure, Record, Via, View};
 use super::reply::{Finish, Usage};
@@ -87,6 +88,21 @@ details! {
         outcome: TrialOutcome,
         /// The image as it was sent.
         image: Option<ImageFacts>,
+        /// The frame whose image was shown, if it is not the frame of the question: a control of the observer. Not in the file
+        /// otherwise.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        shown_frame: Option<FrameId>,
+        /// What the observer saw; not in the file for other models, and without an image.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        observed: Option<Observed>,
+    }
+}
+
+impl ChoiceDetail {
+    /// The frame whose image was shown.
+    #[must_use]
+    pub fn shown(&self) -> &FrameId {
+        self.shown_frame.as_ref().unwrap_or(&self.frame)
     }
 }
 

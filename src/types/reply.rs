@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::observed::Observed;
+
 /// The reason why a model stopped.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -54,6 +56,8 @@ pub struct Reply {
     pub latency_ms: u64,
     /// The number of requests that were sent.
     pub attempts: u32,
+    /// What the observer saw; `None` for every other model.
+    pub observed: Option<Observed>,
 }
 
 impl Reply {
@@ -68,6 +72,7 @@ impl Reply {
             served_model: None,
             latency_ms: 0,
             attempts: 1,
+            observed: None,
         }
     }
 }

@@ -180,7 +180,11 @@ fn kept_replies_are_read_again_without_a_call() {
         })
         .collect();
     fs::write(&path, &old).unwrap();
-    assert!(bench.complete(&["report", "run", "--full"]).contains("   0.0"));
+    assert!(
+        bench
+            .complete(&["report", "run", "--full"])
+            .contains("   0.0")
+    );
     let rescored = bench.complete(&["report", "run", "--rescore", "--full"]);
     assert!(
         rescored.starts_with("6 of 6 records now read differently\n"),

@@ -378,7 +378,10 @@ fn people_enter_as_a_model() {
         .iter()
         .find(|row| row[0] == "model" && row[2] == "L0")
         .unwrap();
-    assert_eq!((&*held[1], &*held[3], &*held[6]), ("people", "script:said.jsonl", "6"));
+    assert_eq!(
+        (&*held[1], &*held[3], &*held[6]),
+        ("people", "script:said.jsonl", "6")
+    );
     // What is no choice is named with its place, and counted in the report.
     let odd = line("q0", "L0", 3, json!("castle"))
         + &line("q1", "L0", 3, json!("F"))

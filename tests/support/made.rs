@@ -30,6 +30,8 @@ pub fn record(
             TrialOutcome::Wrong
         },
         image: None,
+        shown_frame: None,
+        observed: None,
     };
     let key = Digest::of(format!("{question} {model} {condition}").as_bytes()).into();
     let question = QuestionId(format!("q{question:05}"));

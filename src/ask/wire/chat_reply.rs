@@ -55,6 +55,7 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableR
             .map(str::to_owned),
         latency_ms: 0,
         attempts: 0,
+        observed: None,
     })
 }
 

@@ -10,6 +10,7 @@ mod fidelity;
 mod flips;
 mod health;
 mod levels;
+mod observer;
 mod pooled;
 mod sections;
 mod subjects;
@@ -26,15 +27,27 @@ use crate::types::{EnhancerName, Family, KindReading};
 pub(super) use baseline::BASELINE;
 pub(crate) use baseline::baseline;
 pub(super) use levels::unread;
+pub(super) use observer::notes as observer_notes;
 pub(super) use sections::{ENHANCERS, SECTIONS};
 pub(super) use summary::{SUMMARY, reading};
 
-/// All tables of an evaluation; the first is the summary.
+/// All tables of an evaluation; the first is the summary. What is not shown is in the files alone.
 #[must_use]
 pub(crate) fn tables(findings: &Findings<'_>) -> Vec<Table> {
+    let Some(shown) = &findings.without_observer else {
+        return all(findings);
+    };
+    let files = all(findings).into_iter().map(Table::in_files_only);
+    files
+        .chain(all(shown).into_iter().map(Table::without_file))
+        .collect()
+}
+
+fn all(findings: &Findings<'_>) -> Vec<Table> {
     [
         vec![summary::summary(&findings.summary)],
         levels::levels(findings),
+        observer::observer(findings),
         vec![subjects::subjects(&findings.summary)],
         thresholds::thresholds(findings),
         vec![best::best(findings)],

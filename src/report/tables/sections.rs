@@ -11,7 +11,7 @@ pub(in crate::report) type Section = (
 );
 
 /// The sections of the page in order.
-pub(in crate::report) const SECTIONS: [Section; 10] = [
+pub(in crate::report) const SECTIONS: [Section; 11] = [
     (
         BASELINE,
         "Against the baseline",
@@ -31,6 +31,15 @@ pub(in crate::report) const SECTIONS: [Section; 10] = [
         "The exposure drop at which a model has lost half of what it knows in the light: one number a model. The area is the \
          mean accuracy from L0 to the darkest level, over EV.",
         &["thresholds"],
+    ),
+    (
+        "observer",
+        "Known-signal observer",
+        "Which answers one could still read from the pixels who is given the untouched frame, and must only confirm each thing piece by \
+         piece. It is no model, no bound for models, and no part of any ranking. A lower line after an enhancer says that less of the \
+         outlines agrees with a global tone curve, not that evidence was destroyed. The control is the same observer with the image of \
+         another scene: its score must be that of chance.",
+        &[],
     ),
     (
         "families",

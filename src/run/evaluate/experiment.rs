@@ -1,6 +1,6 @@
 //! The [`Experiment`] of questions with choices.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use serde_json::json;
 
@@ -54,24 +54,28 @@ impl Experiment for ChoiceSetup<'_> {
         let all = self.dataset.questions().iter();
         let places: HashMap<&QuestionId, usize> =
             all.map(|question| &question.id).zip(0..).collect();
-        let questions = self.questions.iter();
+        // In a shard, questions about frames of other shards are asked with images of this one.
+        let ids: HashSet<&QuestionId> =
+            self.questions.iter().map(|question| &question.id).collect();
+        let others = self.with_other_rooms.iter();
+        let others = others.filter(|question| !ids.contains(&question.id));
+        let questions = self.questions.iter().chain(others);
         questions
-            .map(|question| {
-                let source = &self.sources[self.places[&question.frame]];
-                RunQuestion {
-                    image: source.frames.first().map(|frame| frame.digest),
-                    ..RunQuestion::new(
-                        question,
-                        places[&question.id],
-                        &self.dataset.scene(&question.frame),
-                    )
-                }
+            .map(|question| RunQuestion {
+                image: self.digests.get(&question.frame).copied(),
+                ..RunQuestion::new(
+                    question,
+                    places[&question.id],
+                    &self.dataset.scene(&question.frame),
+                )
             })
             .collect()
     }
 
     fn identity(&self) -> Identity {
         let order = self.config.order;
+        let rules = self.config.selection.rules.as_ref();
+        let rules = rules.map(|_| self.config.rules.digest());
         let fields = [
             Some(("--data", json!(self.dataset.name()))),
             Some(("--prompts", json!(self.config.prompts.digest()))),
@@ -79,6 +83,7 @@ impl Experiment for ChoiceSetup<'_> {
                 .shuffle_options
                 .then_some(("--shuffle-options", true.into())),
             order.circular.then_some(("--circular", true.into())),
+            rules.map(|rules| ("--rules", json!(rules))),
         ];
         let fields = fields.into_iter().flatten();
         fields

@@ -1,7 +1,9 @@
 //! The evaluation: questions with choices about each frame ([`evaluate`]).
 
 mod choice_order;
+mod controls;
 mod experiment;
+mod other_room;
 mod plan;
 mod record;
 mod settings;

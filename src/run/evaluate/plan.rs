@@ -3,12 +3,13 @@
 use std::sync::Arc;
 
 use super::choice_order::arrange;
+use super::controls::OTHER_ROOM;
 use super::setup::ChoiceSetup;
 use crate::error::Result;
 use crate::job::models::{ModelUnderTest, asked_in};
 use crate::job::plan::{SourcePlan, TrialGroup};
 use crate::job::trial::{KeyFacts, Prompt, Trial};
-use crate::types::{Condition, Digest, Question, View};
+use crate::types::{Condition, Digest, FrameId, Question, View};
 
 /// A question with its choices in one order.
 #[derive(Debug, Clone)]
@@ -18,6 +19,8 @@ pub(crate) struct ChoiceItem {
     pub(super) repeat: u32,
     /// The number of times that the question was asked before, in any order of its choices.
     pub(super) turn: u32,
+    /// The frame whose image is shown, if it is not the frame of the question.
+    pub(super) shown_frame: Option<FrameId>,
 }
 
 /// One order of a question, with the prompts for models that see the image and for blind models.
@@ -27,50 +30,65 @@ struct QuestionPrompts {
     blind: Prompt,
 }
 
+/// The questions that are asked with the images of one frame.
+#[derive(Default)]
+struct AskedWith {
+    /// Questions about the frame.
+    own: Vec<QuestionPrompts>,
+    /// Questions about other frames, for the control `observer:other-room`.
+    others: Vec<QuestionPrompts>,
+}
+
 /// All trials, grouped by frame: first the trials without an image, then those of each condition.
 pub(super) fn trials(setup: &ChoiceSetup<'_>) -> Result<Vec<SourcePlan<ChoiceItem>>> {
-    let mut by_source: Vec<Vec<&Question>> = vec![Vec::new(); setup.sources.len()];
+    let mut by_source = Vec::new();
+    by_source.resize_with(setup.sources.len(), AskedWith::default);
     for question in &setup.questions {
-        by_source[setup.places[&question.frame]].push(question);
+        let own = &mut by_source[setup.places[&question.frame]].own;
+        own.extend(prompts(setup, question, None)?);
     }
-    let plan = by_source
-        .into_iter()
-        .enumerate()
-        .map(|(source, questions)| {
-            Ok(SourcePlan {
-                source,
-                groups: groups(setup, source, &questions)?,
-            })
-        });
+    for question in &setup.with_other_rooms {
+        if let Some(shown) = setup.other_rooms.of_frame(&question.frame) {
+            let others = &mut by_source[setup.places[shown]].others;
+            others.extend(prompts(setup, question, Some(shown))?);
+        }
+    }
+    let plan = by_source.into_iter().enumerate().map(|(source, asked)| {
+        let all = std::iter::once(None).chain(setup.conditions.iter().map(Some));
+        let groups =
+            all.filter_map(|condition| group(setup, source, condition, &asked).transpose());
+        Ok(SourcePlan {
+            source,
+            groups: groups.collect::<Result<_>>()?,
+        })
+    });
     plan.collect()
 }
 
-fn groups(
+/// A question in each order of its choices, with the frame that is shown if it is not its own.
+fn prompts(
     setup: &ChoiceSetup<'_>,
-    source: usize,
-    questions: &[&Question],
-) -> Result<Vec<TrialGroup<ChoiceItem>>> {
-    let mut shown = Vec::new();
-    for question in questions {
-        for arranged in arrange(question, setup.config.order, setup.recipe.seed)? {
-            let prompt = |view| {
-                let words = setup.config.prompts.render(view, &arranged.question)?;
-                Ok(Prompt::of(words.into()))
-            };
-            shown.push(QuestionPrompts {
-                image: prompt(View::Image)?,
-                blind: prompt(View::Blind)?,
-                item: ChoiceItem {
-                    question: Arc::new(arranged.question),
-                    repeat: arranged.repeat,
-                    turn: arranged.turn,
-                },
-            });
-        }
-    }
-    let all = std::iter::once(None).chain(setup.conditions.iter().map(Some));
-    let groups = all.filter_map(|condition| group(setup, source, condition, &shown).transpose());
-    groups.collect()
+    question: &Question,
+    shown_frame: Option<&FrameId>,
+) -> Result<Vec<QuestionPrompts>> {
+    let arranged = arrange(question, setup.config.order, setup.recipe.seed)?.into_iter();
+    let prompts = arranged.map(|arranged| {
+        let prompt = |view| {
+            let words = setup.config.prompts.render(view, &arranged.question)?;
+            Ok(Prompt::of(words.into()))
+        };
+        Ok(QuestionPrompts {
+            image: prompt(View::Image)?,
+            blind: prompt(View::Blind)?,
+            item: ChoiceItem {
+                question: Arc::new(arranged.question),
+                repeat: arranged.repeat,
+                turn: arranged.turn,
+                shown_frame: shown_frame.cloned(),
+            },
+        })
+    });
+    prompts.collect()
 }
 
 /// The trials in a condition; `None` if no model is asked in it.
@@ -78,7 +96,7 @@ fn group(
     setup: &ChoiceSetup<'_>,
     source: usize,
     condition: Option<&Condition>,
-    shown: &[QuestionPrompts],
+    asked: &AskedWith,
 ) -> Result<Option<TrialGroup<ChoiceItem>>> {
     let view = condition.map_or(View::Blind, |_| View::Image);
     let models = asked_in(&setup.models, condition);
@@ -90,13 +108,18 @@ fn group(
         setup.recipe.stimulus(source, condition)
     });
     let image = image.transpose()?;
-    let mut trials = Vec::with_capacity(shown.len() * models.len());
-    for shown in shown {
+    let is_control =
+        |model: &ModelUnderTest| view == View::Image && model.model.name() == OTHER_ROOM;
+    let own = asked.own.iter().map(|shown| (shown, false));
+    let others = asked.others.iter().map(|shown| (shown, true));
+    let mut trials = Vec::with_capacity((asked.own.len() + asked.others.len()) * models.len());
+    for (shown, is_of_other) in own.chain(others) {
         let prompt = match view {
             View::Image => &shown.image,
             View::Blind => &shown.blind,
         };
-        for &(index, model) in &models {
+        let models = models.iter();
+        for &(index, model) in models.filter(|(_, model)| is_control(model) == is_of_other) {
             trials.push(Trial {
                 key: facts(shown, prompt, model, condition, image).key()?,
                 model: index,

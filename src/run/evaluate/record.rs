@@ -18,7 +18,8 @@ impl Item for ChoiceItem {
     }
 
     fn source(&self) -> &str {
-        &self.question.frame.0
+        let shown = self.shown_frame.as_ref();
+        &shown.unwrap_or(&self.question.frame).0
     }
 
     fn turn(&self) -> u32 {
@@ -38,6 +39,8 @@ impl Item for ChoiceItem {
             lenient: None,
             outcome: TrialOutcome::Failed,
             image: image.map(|image| image.facts().clone()),
+            shown_frame: trial.item.shown_frame.clone(),
+            observed: None,
         };
         let condition = stimulus.condition.clone();
         Record::blank(trial.key, question.id.clone(), model, condition, detail)

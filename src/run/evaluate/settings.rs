@@ -9,7 +9,9 @@ use super::choice_order::ChoiceOrder;
 use crate::ask::{Constrain, Prompts};
 use crate::dataset::{DataArgs, PixelLimit, SelectionArgs};
 use crate::error::Result;
+use crate::job::questions::rules;
 use crate::job::settings::{ExperimentSettings, JobArgs, JobSettings};
+use crate::questions::rules::Rules;
 use crate::types::Decides;
 
 /// The flags of an evaluation, by help heading.
@@ -48,6 +50,9 @@ pub(crate) struct ChoiceArgs {
     /// A folder with custom prompts (choice.txt, blind.txt); default: built in
     #[arg(long, value_name = "DIR", add = Decides::Reply)]
     pub prompts: Option<PathBuf>,
+    /// Ask every control of the observer too (observer:other-room is always asked)
+    #[arg(long, add = Decides::Trials)]
+    pub observer_controls: bool,
 }
 
 /// The flag for the size in which images are sent.
@@ -67,6 +72,10 @@ pub(super) struct Evaluation {
     pub(super) limit: PixelLimit,
     pub(super) order: ChoiceOrder,
     pub(super) prompts: Prompts,
+    /// The rulebook that makes questions, and that the observer answers by.
+    pub(super) rules: Rules,
+    /// Ask every control of the observer, if it is asked.
+    pub(super) observer_controls: bool,
     pub(super) job: JobSettings,
 }
 
@@ -81,6 +90,8 @@ impl EvaluateArgs {
         }
         let prompts = self.choice.prompts.as_deref();
         Ok(Evaluation {
+            rules: rules(self.selection.rules.as_deref())?,
+            observer_controls: self.choice.observer_controls,
             data: self.data,
             selection: self.selection,
             limit: self.limit,

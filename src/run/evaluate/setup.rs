@@ -3,6 +3,8 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use super::controls::{AddedControls, OTHER_ROOM};
+use super::other_room::OtherRooms;
 use super::settings::Evaluation;
 use crate::ask::{Model, Random};
 use crate::dataset::Dataset;
@@ -10,22 +12,27 @@ use crate::enhance::ModelFile;
 use crate::error::Result;
 use crate::job::conditions::conditions;
 use crate::job::models::{self, ModelName, ModelUnderTest};
-use crate::job::observer;
+use crate::job::observer::Observer;
 use crate::job::progress::Progress;
 use crate::job::questions::{open_data, select};
 use crate::job::recipe::Recipe;
 use crate::job::shard::part;
-use crate::job::source::{Source, first_asked, inspect_all};
-use crate::types::{Condition, FrameId, Question};
+use crate::job::source::{Source, SourceFrame, first_asked, inspect_all};
+use crate::types::{Condition, Digest, FrameId, Question};
 
 /// All data and models of an evaluation, opened and checked. Nothing is asked or written yet.
 pub(super) struct ChoiceSetup<'a> {
     pub(super) config: &'a Evaluation,
     pub(super) dataset: Arc<Dataset>,
     pub(super) questions: Vec<Question>,
+    /// The questions of the control `observer:other-room` that are asked with an image of this run or shard.
+    pub(super) with_other_rooms: Vec<Question>,
+    pub(super) other_rooms: OtherRooms,
     pub(super) sources: Vec<Source>,
     /// The index of each frame in `sources`.
     pub(super) places: HashMap<FrameId, usize>,
+    /// The digest of the file of each frame that a question is about; empty if no image is read.
+    pub(super) digests: HashMap<FrameId, Digest>,
     pub(super) models: Vec<ModelUnderTest>,
     pub(super) conditions: Vec<Condition>,
     pub(super) recipe: Recipe,
@@ -45,12 +52,20 @@ impl<'a> ChoiceSetup<'a> {
         } else {
             Vec::new()
         };
-        let dataset = &config.data.data;
-        let dataset = open_data(dataset, &config.selection, config.limit, progress)?;
+        let place = &config.data.data;
+        let dataset = open_data(
+            place,
+            &config.selection,
+            &config.rules,
+            config.limit,
+            progress,
+        )?;
         let dataset = Arc::new(dataset);
-        let questions = select(&dataset, &config.selection)?;
-        let questions = part(questions, job.shard, |question| question.frame.0.clone())?;
-        let models = open_models(config, &dataset, &questions)?;
+        let all = select(&dataset, &config.selection)?;
+        let other_rooms = OtherRooms::of(&all, |frame| dataset.scene(frame));
+        let controls = AddedControls::of(config, other_rooms.is_some())?;
+        let questions = part(all.clone(), job.shard, |question| question.frame.0.clone())?;
+        let models = open_models(config, &controls, &dataset, &all)?;
         let sources = if shows_images {
             inspect_all(&dataset, &questions, progress)?
         } else {
@@ -61,34 +76,78 @@ impl<'a> ChoiceSetup<'a> {
         };
         let recipe = Recipe::new(&job.light.sensor, job.format, job.max_side, &files);
         let names = sources.iter().map(|source| source.name.clone());
-        let setup = Self {
+        let mut setup = Self {
             config,
             places: names.zip(0..).collect(),
+            digests: digests(&sources),
             sources,
             models,
             conditions: conditions(&job.light, job.enhancers.llie_on, &recipe.enhancers),
             recipe,
             questions,
+            with_other_rooms: Vec::new(),
+            other_rooms: other_rooms.unwrap_or_default(),
             dataset,
         };
+        let is_asked = |model: &ModelUnderTest| model.model.name() == OTHER_ROOM;
+        if shows_images && setup.models.iter().any(is_asked) {
+            setup.add_other_rooms(all)?;
+        }
+        controls.say(progress);
         Ok((setup, files))
     }
+
+    /// Adds the questions that are asked with the image of another frame, if that image is of this run or shard.
+    fn add_other_rooms(&mut self, mut all: Vec<Question>) -> Result<()> {
+        all.retain(|question| {
+            let shown = self.other_rooms.of_frame(&question.frame);
+            shown.is_some_and(|shown| self.places.contains_key(shown))
+        });
+        for question in &all {
+            if !self.digests.contains_key(&question.frame) {
+                let frame = SourceFrame::inspect(&*self.dataset, &question.frame)?;
+                self.digests.insert(frame.id, frame.digest);
+            }
+        }
+        self.with_other_rooms = all;
+        Ok(())
+    }
+}
+
+/// The digest of the file of each source.
+fn digests(sources: &[Source]) -> HashMap<FrameId, Digest> {
+    let sources = sources.iter();
+    let digests = sources.filter_map(|source| {
+        let frame = source.frames.first()?;
+        Some((source.name.clone(), frame.digest))
+    });
+    digests.collect()
 }
 
 /// The models, opened; nothing is sent.
 fn open_models(
     config: &Evaluation,
+    controls: &AddedControls,
     dataset: &Arc<Dataset>,
     questions: &[Question],
 ) -> Result<Vec<ModelUnderTest>> {
+    let ask = &config.job.ask;
     let prior = Random {
         seed: config.job.light.sensor.seed,
     };
-    models::open_all(&config.job.ask, |name| match name {
-        ModelName::Observer => {
-            let place = &config.data.data;
-            observer::open(dataset, place, questions, prior).map(Model::Local)
-        }
-        _ => Ok(Model::Random(prior)),
+    let mut named = ask.models.iter().chain(&ask.blind_models);
+    let observer = named.any(|name| matches!(name, ModelName::Observer(_)));
+    let open = || {
+        let rules = config.rules.clone();
+        Observer::open(dataset, &config.data.data, questions, rules)
+    };
+    let observer = observer.then(open).transpose()?;
+    models::open_all(ask, &controls.names, |name| {
+        Ok(match (name, &observer) {
+            (ModelName::Observer(control), Some(observer)) => {
+                Model::Local(observer.model(*control, prior))
+            }
+            _ => Model::Random(prior),
+        })
     })
 }

@@ -17,7 +17,7 @@ use crate::job::enhancers::{self, EnhancerRunArgs, OpenEnhancers};
 use crate::job::frame_work::{FrameWork, ImageSteps};
 use crate::job::image_pipeline::ImagePipeline;
 use crate::job::progress::Progress;
-use crate::job::questions::{open_data, select};
+use crate::job::questions::{open_data, rules, select};
 use crate::job::recipe::Recipe;
 use crate::job::source::{Source, inspect_all};
 use crate::job::timings::Timings;
@@ -65,7 +65,8 @@ pub(crate) struct ExportArgs {
 /// # Errors
 /// If the data cannot be read, a set exists already, or a file cannot be written.
 pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> {
-    let dataset = open_data(&args.data, &args.selection, args.limit, progress)?;
+    let rules = rules(args.selection.rules.as_deref())?;
+    let dataset = open_data(&args.data, &args.selection, &rules, args.limit, progress)?;
     let questions = select(&dataset, &args.selection)?;
     let files = enhancers::read(&args.enhancers.llie)?;
     let light = LightSettings::resolve(&args.light)?;

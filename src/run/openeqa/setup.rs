@@ -47,7 +47,7 @@ impl<'a> OpenSetup<'a> {
         let questions = part(select(all, &config.chosen)?, job.shard, |question| {
             question.episode.clone()
         })?;
-        let models = models::open_all(&job.ask, |name| {
+        let models = models::open_all(&job.ask, &[], |name| {
             models::open(name, None, &job.ask.parameters)
         })?;
         let judge = config.judge.as_ref().map(judge).transpose()?;

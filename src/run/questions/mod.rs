@@ -16,6 +16,7 @@ use crate::error::{Error, Result};
 use crate::files::{reading, write};
 use crate::job::Outcome;
 use crate::job::progress::Progress;
+use crate::job::questions::rules;
 use crate::job::workers::{ThreadArgs, pool};
 use crate::questions::balance::BalanceMode;
 use crate::questions::colors::Palette;
@@ -110,11 +111,10 @@ struct QuestionMaking<'a> {
 
 impl<'a> QuestionMaking<'a> {
     fn read(args: &'a QuestionsArgs) -> Result<Self> {
-        let rules = read(args.rules.as_deref(), Rules::parse)?;
         let palette = read(args.colors.as_deref(), Palette::parse)?;
         Ok(Self {
             args,
-            rules: rules.map_or_else(Rules::built_in, Ok)?,
+            rules: rules(args.rules.as_deref())?,
             palette: palette.map_or_else(Palette::built_in, Ok)?,
         })
     }

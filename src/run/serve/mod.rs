@@ -27,8 +27,9 @@ use crate::dataset::{self, DataPlace, Dataset};
 use crate::error::{Error, Result};
 use crate::job::Outcome;
 use crate::job::interrupt::Interrupt;
-use crate::job::observer;
+use crate::job::observer::Observer;
 use crate::job::progress::Progress;
+use crate::questions::rules::Rules;
 use crate::types::manifest::Status;
 use crate::types::{Choices, Decides, Digest, Family, FrameId, Question, QuestionId};
 
@@ -68,11 +69,9 @@ struct ServerState {
 pub(crate) fn serve(args: &ServeArgs, progress: &Progress) -> Result<Outcome> {
     let dataset = Arc::new(Dataset::open_without_questions(&args.data)?);
     let prior = Random { seed: args.seed };
+    let observer = Observer::open(&dataset, &args.data, &[], Rules::built_in()?)?;
     let models = [
-        (
-            "darkqa-observer",
-            Model::Local(observer::open(&dataset, &args.data, &[], prior)?),
-        ),
+        ("darkqa-observer", Model::Local(observer.model(None, prior))),
         ("darkqa-random", Model::Random(prior)),
     ];
     let likenesses = Likenesses::of(&dataset, progress)?;

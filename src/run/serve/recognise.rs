@@ -4,12 +4,13 @@
 //! with that of every frame. A correlation does not depend on the brightness of the image. So a frame is recognised at
 //! every level that still shows some of it.
 
+use std::sync::LazyLock;
+
 use rayon::prelude::*;
 
 use crate::dataset::Dataset;
 use crate::error::Result;
 use crate::job::progress::Progress;
-use crate::questions::observer::contrast::linear;
 use crate::types::{FrameId, Rgb};
 
 /// The number of grid cells, horizontally and vertically (chosen).
@@ -17,6 +18,19 @@ const GRID: [usize; 2] = [32, 24];
 
 /// The minimum correlation for an image to show a frame (chosen).
 const LEAST: f64 = 0.5;
+
+/// Linear light of each sRGB code, from 0 to 65,535 (IEC 61966-2-1).
+static LINEAR: LazyLock<[u64; 256]> = LazyLock::new(|| {
+    std::array::from_fn(|code| {
+        let value = code as f64 / 255.0;
+        let linear = if value <= 0.04045 {
+            value / 12.92
+        } else {
+            libm::pow((value + 0.055) / 1.055, 2.4)
+        };
+        (linear * 65_535.0 + 0.5) as u64
+    })
+});
 
 /// Each frame with its cell values.
 pub(super) struct Likenesses(Vec<(FrameId, Vec<f64>)>);
@@ -58,7 +72,7 @@ fn likeness(image: &Rgb) -> Vec<f64> {
         let (light, count) = &mut cells[y * GRID[0] + x];
         *light += pixel
             .iter()
-            .map(|code| u64::from(linear(*code)))
+            .map(|code| LINEAR[usize::from(*code)])
             .sum::<u64>();
         *count += 1;
     }

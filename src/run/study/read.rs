@@ -268,6 +268,7 @@ impl People {
         *next = (*next).max(turn + 1);
         let detail = ChoiceDetail {
             repeat: turn,
+            observed: None,
             ..asked.detail.clone()
         };
         let (question, condition) = (asked.question.clone(), asked.condition.clone());

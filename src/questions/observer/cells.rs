@@ -1,0 +1,217 @@
+//! The places at which contrast is measured: [`Cells`] of a frame, and the [`Element`]s of its outlines at three scales.
+//!
+//! The frame is cut into square cells. The pixels of one mask in one cell are a patch. A cell of two or four times the side is
+//! four or sixteen small ones, so that sums over it are sums of theirs.
+
+use std::collections::BTreeMap;
+
+/// Number of the smallest cells along the shorter side of the frame (chosen).
+const CELLS: usize = 60;
+
+/// Sides of the cells of each scale, relative to the smallest. An observer that knows the signal averages over area: with one
+/// scale an enhancer that removes noise would seem to add evidence.
+pub(super) const SCALES: [usize; 3] = [1, 2, 4];
+
+/// Pixels side by side in one row that belong to one patch.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Run {
+    pub(super) patch: u32,
+    pub(super) length: u32,
+}
+
+/// The pixels of one mask in one cell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Patch {
+    /// Index of the cell at the scale of the patch.
+    pub(super) cell: usize,
+    /// Mask, from 1; 0 for pixels without a mask.
+    pub(super) mask: u32,
+    /// Number of pixels.
+    pub(super) count: u32,
+}
+
+/// A piece of outline: a mask, and all else, in one cell.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Element {
+    /// Index of the patch of the mask.
+    pub(super) patch: usize,
+    /// Index of the cell.
+    pub(super) cell: usize,
+    /// The mask, from 1.
+    pub(super) mask: u32,
+    /// Number of pixels of the mask in the cell.
+    pub(super) inside: f64,
+    /// Number of the other pixels in the cell.
+    pub(super) outside: f64,
+}
+
+/// The patches and elements at one scale.
+#[derive(Debug)]
+pub(super) struct Scale {
+    /// For each patch of the smallest cells, the index of the patch of this scale that it belongs to.
+    pub(super) part_of: Vec<u32>,
+    pub(super) patches: Vec<Patch>,
+    /// Number of cells.
+    pub(super) cells: usize,
+    /// Elements in the order of their cells and masks.
+    pub(super) elements: Vec<Element>,
+}
+
+/// The cells of a frame.
+#[derive(Debug)]
+pub(super) struct Cells {
+    /// Side of the smallest cells, in pixels.
+    pub(super) side: usize,
+    /// All pixels, row by row.
+    pub(super) runs: Vec<Run>,
+    /// Number of masks.
+    pub(super) masks: usize,
+    /// The scales, the finest first.
+    pub(super) scales: [Scale; 3],
+}
+
+impl Cells {
+    /// The cells of a map of masks of a given width and height.
+    pub(super) fn of(masks: &[u32], [width, height]: [usize; 2]) -> Self {
+        let side = (width.min(height) / CELLS).next_multiple_of(2).max(4);
+        let (runs, patches) = cut(masks, width, side);
+        let columns = width.div_ceil(side);
+        Self {
+            side,
+            runs,
+            masks: masks.iter().max().map_or(0, |mask| *mask as usize),
+            scales: SCALES.map(|scale| Scale::of(&patches, columns, side, scale)),
+        }
+    }
+
+    /// The mask of each pixel.
+    pub(super) fn mask_of_pixels(&self) -> Vec<u32> {
+        let patches = &self.scales[0].patches;
+        let runs = self.runs.iter();
+        runs.flat_map(|run| {
+            std::iter::repeat_n(patches[run.patch as usize].mask, run.length as usize)
+        })
+        .collect()
+    }
+}
+
+/// The runs and the patches of the smallest cells, in the order of cells and masks.
+fn cut(masks: &[u32], width: usize, side: usize) -> (Vec<Run>, Vec<Patch>) {
+    let columns = width.div_ceil(side);
+    let (mut runs, mut patches) = (Vec::new(), Vec::<Patch>::new());
+    for (band, rows) in masks.chunks(width.max(1) * side).enumerate() {
+        // Pixels of each mask in each cell of this row of cells.
+        let mut counts = BTreeMap::<(usize, u32), u32>::new();
+        let mut found: Vec<(usize, u32, u32)> = Vec::new();
+        for row in rows.chunks(width) {
+            for (column, cell) in row.chunks(side).enumerate() {
+                for run in cell.chunk_by(|a, b| a == b) {
+                    let (mask, length) = (run[0], run.len() as u32);
+                    *counts.entry((column, mask)).or_default() += length;
+                    found.push((column, mask, length));
+                }
+            }
+        }
+        let first = patches.len();
+        patches.extend(counts.iter().map(|(&(column, mask), &count)| Patch {
+            cell: band * columns + column,
+            mask,
+            count,
+        }));
+        let numbers: BTreeMap<(usize, u32), usize> = counts.into_keys().zip(first..).collect();
+        runs.extend(found.into_iter().map(|(column, mask, length)| Run {
+            patch: numbers[&(column, mask)] as u32,
+            length,
+        }));
+    }
+    (runs, patches)
+}
+
+impl Scale {
+    /// The patches in cells of `scale` times the smallest side, from those of the smallest.
+    fn of(smallest: &[Patch], columns: usize, side: usize, scale: usize) -> Self {
+        let wide = columns.div_ceil(scale);
+        let cell_of = |cell: usize| cell / columns / scale * wide + cell % columns / scale;
+        let mut counts = BTreeMap::<(usize, u32), u32>::new();
+        for patch in smallest {
+            *counts.entry((cell_of(patch.cell), patch.mask)).or_default() += patch.count;
+        }
+        let numbers: BTreeMap<(usize, u32), usize> = counts.keys().copied().zip(0..).collect();
+        let part_of = smallest.iter();
+        let part_of = part_of.map(|patch| numbers[&(cell_of(patch.cell), patch.mask)] as u32);
+        let part_of = part_of.collect();
+        let patches = counts.into_iter();
+        let patches = patches.map(|((cell, mask), count)| Patch { cell, mask, count });
+        let patches: Vec<Patch> = patches.collect();
+        let cells = patches.last().map_or(0, |last| last.cell + 1);
+        Self {
+            elements: elements(&patches, cells, side * scale),
+            part_of,
+            patches,
+            cells,
+        }
+    }
+}
+
+/// The elements among patches: the mask, and all else, each have at least 1/16 of the cell, and three pixels.
+fn elements(patches: &[Patch], cells: usize, side: usize) -> Vec<Element> {
+    let least = (side * side / 16).max(3) as u32;
+    let mut totals = vec![0; cells];
+    for patch in patches {
+        totals[patch.cell] += patch.count;
+    }
+    let found = patches.iter().enumerate().filter_map(|(index, patch)| {
+        let outside = totals[patch.cell] - patch.count;
+        (patch.mask > 0 && patch.count.min(outside) >= least).then(|| Element {
+            patch: index,
+            cell: patch.cell,
+            mask: patch.mask,
+            inside: f64::from(patch.count),
+            outside: f64::from(outside),
+        })
+    });
+    found.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_keep_every_pixel_and_coarse_ones_are_sums() {
+        let [width, height] = [37, 29];
+        let mask = |i: usize| (i % width / 9 + i / width / 11) as u32 % 3;
+        let masks: Vec<u32> = (0..width * height).map(mask).collect();
+        let cells = Cells::of(&masks, [width, height]);
+        assert_eq!(cells.side, 4);
+        assert_eq!(cells.mask_of_pixels(), masks);
+        for (scale, times) in cells.scales.iter().zip(SCALES) {
+            let side = cells.side * times;
+            let mut counts = BTreeMap::<(usize, u32), u32>::new();
+            for (i, mask) in masks.iter().enumerate() {
+                let cell = i / width / side * width.div_ceil(side) + i % width / side;
+                *counts.entry((cell, *mask)).or_default() += 1;
+            }
+            let found: BTreeMap<(usize, u32), u32> = scale
+                .patches
+                .iter()
+                .map(|patch| ((patch.cell, patch.mask), patch.count))
+                .collect();
+            assert_eq!(found, counts);
+            assert!(scale.elements.iter().all(|element| element.mask > 0));
+        }
+    }
+
+    #[test]
+    fn frames_without_an_outline_have_no_element() {
+        for (masks, size) in [
+            (vec![], [0, 0]),
+            (vec![1], [1, 1]),
+            (vec![1; 400], [20, 20]),
+            (vec![0; 400], [20, 20]),
+        ] {
+            let cells = Cells::of(&masks, size);
+            assert!(cells.scales.iter().all(|scale| scale.elements.is_empty()));
+        }
+    }
+}

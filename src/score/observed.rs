@@ -1,0 +1,169 @@
+//! What the observer could still read in each condition, and whether its controls are at chance: [`ObserverSummary`].
+
+use std::collections::BTreeMap;
+
+use super::cluster::Clusters;
+use super::estimate::Estimate;
+use super::subject::{CONTROL_PREFIX, OBSERVER, Subject};
+use crate::types::{AnswerSource, FrameId, Observed, QuestionId, Record, TrialOutcome};
+
+/// A guess counts 1 / k and has no noise of its own, so it may count for this many independent replies (chosen).
+const GUESS_WEIGHT: f64 = 16.0;
+
+/// The control whose score is not always that of chance: some outlines still agree after a shift by four pixels.
+const LIMIT: &str = "observer:shift-4";
+
+/// The control that every run with the observer asks.
+pub(crate) const OTHER_ROOM: &str = "observer:other-room";
+
+/// Results of the observer, or of one of its controls, in one condition.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ObserverCell {
+    /// The observer or the control, and the condition.
+    pub subject: Subject,
+    /// Expected score: 1 for a right answer from evidence, 1 / k for a guess among k choices.
+    pub score: Estimate,
+    /// Score of guessing every answer.
+    pub chance: f64,
+    /// Share of the answers that follow from what is seen.
+    pub evidence: f64,
+    /// Share of the things of all frames that are seen.
+    pub seen: f64,
+    /// Share of the things of all frames whose whole outline is detected.
+    pub detected: f64,
+    /// Mean over the frames of the share of the image's variance that the untouched frame explains.
+    pub explained: f64,
+}
+
+impl ObserverCell {
+    /// Whether this is a control of the observer.
+    #[must_use]
+    pub fn is_control(&self) -> bool {
+        self.subject.model.starts_with(CONTROL_PREFIX)
+    }
+
+    /// Whether this is a control whose interval excludes chance, so that the observer's lines prove nothing.
+    #[must_use]
+    pub fn refutes(&self) -> bool {
+        // The two means are sums in different orders.
+        let tolerance = 1e-9;
+        let excludes =
+            self.score.low > self.chance + tolerance || self.score.high < self.chance - tolerance;
+        self.is_control() && self.subject.model != LIMIT && excludes
+    }
+}
+
+/// Results of the observer and its controls.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ObserverSummary {
+    /// By model and condition; empty if the observer was not asked with images.
+    pub cells: Vec<ObserverCell>,
+    /// Each control over all conditions together.
+    pub controls: Vec<ObserverCell>,
+}
+
+impl ObserverSummary {
+    /// The results of these records.
+    #[must_use]
+    pub fn of(records: &[Record], clusters: &Clusters) -> Self {
+        // Of two records for the same item, the later one counts.
+        let mut items = BTreeMap::<Subject, BTreeMap<ItemKey<'_>, &Record>>::new();
+        for record in records {
+            let detail = &record.detail;
+            if detail.observed.is_some() {
+                let key = (&record.question, &detail.choices[..], detail.repeat);
+                let subject = items.entry(Subject::of(record)).or_default();
+                subject.insert(key, record);
+            }
+        }
+        let mut by_control = BTreeMap::<&str, Vec<&Record>>::new();
+        let mut cells = Vec::new();
+        for (subject, records) in &items {
+            let records: Vec<&Record> = records.values().copied().collect();
+            if subject.model.starts_with(CONTROL_PREFIX) {
+                let all = by_control.entry(&subject.model).or_default();
+                all.extend(&records);
+            }
+            cells.extend(cell(subject.clone(), &records, clusters));
+        }
+        let controls = by_control
+            .into_iter()
+            .filter_map(|(model, records)| cell(Subject::new(model, None), &records, clusters));
+        Self {
+            controls: controls.collect(),
+            cells,
+        }
+    }
+
+    /// Whether the observer was asked with images.
+    #[must_use]
+    pub fn is_asked(&self) -> bool {
+        self.cells.iter().any(|cell| cell.subject.model == OBSERVER)
+    }
+
+    /// The control in the condition of a cell that has the highest score above chance, and should be at chance.
+    pub fn refutations(&self) -> impl Iterator<Item = &ObserverCell> {
+        self.cells.iter().filter(|cell| cell.refutes())
+    }
+
+    /// Whether a control is not at chance, so that the observer's lines are not shown.
+    #[must_use]
+    pub fn is_refuted(&self) -> bool {
+        self.is_asked() && self.refutations().next().is_some()
+    }
+
+    /// The control with the image of another scene, in the condition of a cell.
+    #[must_use]
+    pub fn other_room(&self, cell: &ObserverCell) -> Option<&ObserverCell> {
+        let subject = Subject {
+            model: OTHER_ROOM.to_owned(),
+            ..cell.subject.clone()
+        };
+        self.cells.iter().find(|other| other.subject == subject)
+    }
+}
+
+/// What identifies an item: question, order of choices and repeat.
+type ItemKey<'a> = (&'a QuestionId, &'a [String], u32);
+
+/// The results of some records; `None` without records of frames that have a cluster.
+fn cell(subject: Subject, records: &[&Record], clusters: &Clusters) -> Option<ObserverCell> {
+    let mut sums = vec![(0.0, 0.0); clusters.count()];
+    let mut frames = BTreeMap::<(&FrameId, String), &Observed>::new();
+    let (mut guesses, mut evidence, mut n) = (0.0, 0, 0);
+    for record in records {
+        let detail = &record.detail;
+        let cluster = clusters.of(&detail.frame, &record.question);
+        let (Some(cluster), Some(observed)) = (cluster, &detail.observed) else {
+            continue;
+        };
+        let guess = 1.0 / detail.choices.len().max(1) as f64;
+        let score = match observed.from {
+            AnswerSource::Guess => guess,
+            AnswerSource::Evidence => f64::from(u8::from(detail.outcome == TrialOutcome::Right)),
+        };
+        let (sum, count) = &mut sums[cluster as usize];
+        *sum += score;
+        *count += 1.0;
+        guesses += guess;
+        evidence += usize::from(observed.from == AnswerSource::Evidence);
+        n += 1;
+        let condition = record.condition.as_ref().map(ToString::to_string);
+        frames.insert((&detail.frame, condition.unwrap_or_default()), observed);
+    }
+    sums.retain(|(_, count)| *count > 0.0);
+    let sum = |of: fn(&Observed) -> usize| frames.values().map(|frame| of(frame)).sum::<usize>();
+    let things = sum(|frame| frame.things).max(1) as f64;
+    let explained = frames
+        .values()
+        .map(|frame| f64::from(frame.explained_ppm) / 1e6);
+    Some(ObserverCell {
+        subject,
+        score: Estimate::scored(&sums, GUESS_WEIGHT, n)?,
+        chance: guesses / n as f64,
+        evidence: evidence as f64 / n as f64,
+        seen: sum(|frame| frame.seen) as f64 / things,
+        detected: sum(|frame| frame.detected) as f64 / things,
+        explained: explained.sum::<f64>() / frames.len() as f64,
+    })
+}
