@@ -1,8 +1,6 @@
 //! Tests of paired differences: [`mcnemar`], [`sign_flip`] and [`swap_test`], the correction [`holm`], and what comes of them:
 //! [`Significance`].
 
-use rand::Rng as _;
-
 use super::split_mix::SplitMix;
 
 /// The level of the tests (chosen, as usual).
@@ -101,7 +99,7 @@ fn drawn_swaps(differences: &[i64], draws: usize) -> f64 {
     let mut swapped_sum = || -> i64 {
         let blocks = differences.chunks(64);
         let sums = blocks.map(|block| {
-            let bits = random.next_u64();
+            let bits = random.bits();
             let signed = |(bit, d): (usize, &i64)| if bits >> bit & 1 == 0 { *d } else { -d };
             block.iter().enumerate().map(signed).sum::<i64>()
         });

@@ -8,19 +8,26 @@ use rand::rand_core::utils::fill_bytes_via_next_word;
 /// The random generator SplitMix64 (Steele, Lea and Flood 2014, OOPSLA, figure 13), for the distributions of `rand_distr`.
 pub(super) struct SplitMix(pub(super) u64);
 
-impl TryRng for SplitMix {
-    type Error = Infallible;
-
-    fn try_next_u64(&mut self) -> Result<u64, Infallible> {
+impl SplitMix {
+    /// The next 64 random bits.
+    pub(super) fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        Ok(z ^ (z >> 31))
+        z ^ (z >> 31)
+    }
+}
+
+impl TryRng for SplitMix {
+    type Error = Infallible;
+
+    fn try_next_u64(&mut self) -> Result<u64, Infallible> {
+        Ok(self.bits())
     }
 
     fn try_next_u32(&mut self) -> Result<u32, Infallible> {
-        self.try_next_u64().map(|word| word as u32)
+        Ok(self.bits() as u32)
     }
 
     fn try_fill_bytes(&mut self, bytes: &mut [u8]) -> Result<(), Infallible> {
@@ -30,15 +37,13 @@ impl TryRng for SplitMix {
 
 #[cfg(test)]
 mod tests {
-    use rand::Rng as _;
-
     use super::*;
 
     #[test]
     fn draws_are_those_of_the_generator() {
         // The first numbers of the reference implementation (Vigna, splitmix64.c) with seed 1234567.
         let mut random = SplitMix(1_234_567);
-        let first = [random.next_u64(), random.next_u64()];
+        let first = [random.bits(), random.bits()];
         assert_eq!(
             first,
             [6_457_827_717_110_365_317, 3_203_168_211_198_807_973]

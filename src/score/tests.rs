@@ -5,10 +5,12 @@ use std::collections::BTreeMap;
 use super::best::best_in_the_dark;
 use super::choice::ReadingMode;
 use super::cluster::Clusters;
+use super::findings::Findings;
 use super::grid::Grid;
 use super::paired::PairedComparison;
 use super::pooled::{PooledFinding, PooledKind, pooled};
 use super::significance::Significance;
+use super::subject::Subject;
 use crate::types::{
     AnswerReading, ChoiceDetail, Condition, Digest, Family, FrameId, QuestionId, Record,
     TrialOutcome,
@@ -229,4 +231,22 @@ fn the_best_is_shown_better_than_every_other() {
     });
     all.retain(|record| record.model != "guess");
     assert!(with_grid(&all, best_in_the_dark).is_none());
+}
+
+#[test]
+fn below_blind_is_what_the_corrected_test_shows() {
+    let records = [
+        records("m", "", |item| Some(item != 3)),
+        records("m", "L3-noise", |item| Some(item % 8 != 0)),
+        records("m", "L5-noise", |_| Some(false)),
+    ]
+    .concat();
+    let findings = Findings::new(&records, &BTreeMap::new(), []);
+    let below = |condition: &str| {
+        let condition: Condition = condition.parse().unwrap();
+        findings.below_blind(&Subject::new("m", Some(&condition)), None)
+    };
+    // Two points less are below, and not shown to be.
+    assert!(below("L3-noise").is_empty());
+    assert_eq!(below("L5-noise"), ["m"]);
 }

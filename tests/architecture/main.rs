@@ -27,10 +27,7 @@ const LIBRARIES: [(&str, &[&str]); 12] = [
     ("tokio", &["ask", "job", "run/serve"]),
     ("reqwest", &["ask"]),
     ("ort", &["enhance"]),
-    (
-        "rand",
-        &["synthesis", "score/significance.rs", "score/split_mix.rs"],
-    ),
+    ("rand", &["synthesis", "score/split_mix.rs"]),
     ("rand_distr", &["synthesis", "score/bootstrap.rs"]),
     ("image", &["dataset", "enhance/planes.rs", "ask/payload.rs"]),
     ("png", &["dataset/raw_png.rs"]),

@@ -21,7 +21,15 @@ use page::{Block, BlockKind, Page, files, pages, root};
 use regex::Regex;
 
 /// Flags of other programs that pages name: `sbatch`, `pip`, `cargo`, and `inspect eval`.
-const OF_OTHERS: [&str; 4] = ["--array", "--no-deps", "--path", "--no-log-images"];
+const OF_OTHERS: [&str; 7] = [
+    "--array",
+    "--no-deps",
+    "--path",
+    "--no-log-images",
+    "--test",
+    "--ignored",
+    "--nocapture",
+];
 
 /// The words that follow the name of the program in a command; `None` for other commands.
 fn arguments(words: &[String]) -> Option<&[String]> {
