@@ -135,6 +135,8 @@ impl NoEffect {
             ];
             self.because("--study asks no model", &asking.concat());
         }
+        let long = ["full".into(), "findings".into()];
+        self.because("open questions have one table", &long);
         if args.judge.judge.is_none() {
             self.because("no judge is named", &ids::<JudgeArgs>());
         }

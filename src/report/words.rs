@@ -109,6 +109,8 @@ pub(super) fn reach_of(shares: impl Iterator<Item = Estimate>) -> String {
     widest.map_or(String::new(), |reach| {
         let [down, up] = reach.map(percent);
         format!("−{down} +{up}")
+            .replace("−0.0", "0.0")
+            .replace("+0.0", "0.0")
     })
 }
 

@@ -15,7 +15,9 @@ pub(crate) const CONTROL_PREFIX: &str = "observer:";
 /// (`observer:…`). It is no model under test, so rankings and comparisons of models leave it out.
 #[must_use]
 pub(crate) fn is_reference(model: &str) -> bool {
-    model == "random" || model == OBSERVER || model.starts_with(CONTROL_PREFIX)
+    // A report on several runs names the run after the model, as `random (one)`.
+    let name = model.split_once(" (").map_or(model, |(name, _)| name);
+    name == "random" || name == OBSERVER || name.starts_with(CONTROL_PREFIX)
 }
 
 /// A model in a condition; every cell of a table belongs to one.
@@ -129,6 +131,7 @@ mod tests {
             ("random", true),
             ("observer", true),
             ("observer:other-room", true),
+            ("random (one)", true),
             ("observers", false),
             ("random-forest", false),
             ("gpt-4o", false),

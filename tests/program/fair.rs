@@ -211,7 +211,7 @@ fn replies_without_an_answer_are_told_by_reason() {
     ));
     let mock = MockEndpoint::start(answers);
     let base = mock.base_url();
-    let repeated = args("--out run --repeats 2 --concurrency 1");
+    let repeated = args("--out run --full --repeats 2 --concurrency 1");
     let called = bench.call(&[repeated, model_args(&base, "")].concat());
     assert!(
         called.stdout.contains(

@@ -338,6 +338,8 @@ const NOTHING: [&str; 22] = [
     "--prices prices.toml",
     "--dry-run",
     "--timings",
+    "--full",
+    "--findings",
     "--json",
     "--quiet",
     "--config other.toml",

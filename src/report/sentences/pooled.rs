@@ -5,6 +5,7 @@ use crate::score::cluster::ClusterUnit;
 use crate::score::findings::Findings;
 use crate::score::pooled::PooledFinding;
 use crate::score::significance::Significance;
+use crate::score::subject::OBSERVER;
 use crate::types::AxisLevel;
 
 /// Largest number of sentences about one enhancer.
@@ -115,10 +116,27 @@ fn enhancer(
                 ""
             };
             let limit = if of_verdict.len() > 1 { " at most" } else { "" };
-            (
-                format!("{name} {verb} at {at}: {sign}{value} points{limit}."),
-                format!("; at {}", largest.level),
-            )
+            if is_observer(largest) {
+                let more = if verdict == Significance::Better {
+                    "more"
+                } else {
+                    "less"
+                };
+                (
+                    format!(
+                        "With {name} the observer confirms {more} at {at}: {sign}{value} points{limit}."
+                    ),
+                    format!(
+                        "; at {}; local tone and sharpening count as noise, so this does not show that evidence is lost",
+                        largest.level
+                    ),
+                )
+            } else {
+                (
+                    format!("{name} {verb} at {at}: {sign}{value} points{limit}."),
+                    format!("; at {}", largest.level),
+                )
+            }
         }
         _ => (
             format!("{name} at {at}: neither help nor harm is shown."),
@@ -128,6 +146,11 @@ fn enhancer(
     let more = more + &uncorrected(largest, &mut numbers);
     let detail = detail(largest, &mut numbers, &more);
     Some(numbers.sentence("enhancer", verdict.into(), text, detail))
+}
+
+/// Whether a finding is about the observer alone. It has its own words: what it does not confirm need not be lost.
+fn is_observer(finding: &PooledFinding) -> bool {
+    finding.models == [OBSERVER]
 }
 
 /// An interval that leaves out 0 although nothing is shown needs a word.
