@@ -71,5 +71,5 @@ fn open_questions_with_marks_and_an_enhancer() {
 }
 
 const EVALUATION: &str = "05c47f25360236fa";
-const READINGS: &str = "2d1c691b0b2686af";
+const READINGS: &str = "a2cfb4f4654611d4";
 const OPENEQA: &str = "8afee46475f53581";

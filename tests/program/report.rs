@@ -27,8 +27,9 @@ fn several_runs_become_one_comparison() {
     run(&bench, "one", "");
     run(&bench, "two", "--seed 1");
     bench.file("said.jsonl", "{\"default\": \"C\"}\n");
+    bench.file("other.jsonl", "{\"default\": \"A\"}\n");
     bench.complete(&words(
-        "--model script:said.jsonl --data set.jsonl --levels L0,L5 --out three",
+        "--model script:said.jsonl --model script:other.jsonl --data set.jsonl --levels L0,L5 --out three",
     ));
     let called = bench.call(&["report", "one", "two", "three", "--out", "all"]);
     assert_eq!(called.code, Some(0), "{called:?}");
@@ -39,6 +40,16 @@ fn several_runs_become_one_comparison() {
         assert!(called.stdout.contains(label), "{label}: {called:?}");
     });
     assert!(called.stdout.contains("report: all/report.html"));
+    // A model that guesses is compared with no other.
+    let compared = csv(&bench.path("all/comparisons.csv"));
+    let compared: Vec<_> = compared.iter().filter(|row| row[0] == "model").collect();
+    assert!(!compared.is_empty());
+    for row in compared {
+        assert!(
+            !row[1].starts_with("random") && !row[3].starts_with("random"),
+            "{row:?}"
+        );
+    }
     let page = fs::read_to_string(bench.path("all/report.html")).unwrap();
     assert!(page.contains("Seeing in the dark: 3 runs compared"));
     let rows = [
@@ -304,7 +315,8 @@ fn an_item_is_drawn_as_one_picture() {
 #[test]
 fn people_enter_as_a_model() {
     let bench = Bench::with_questions(6);
-    run(&bench, "run", "");
+    bench.file("said.jsonl", "{\"default\": \"C\"}\n");
+    run(&bench, "run", "--model script:said.jsonl");
     let packed = bench.call(&["study", "pack", "run", "--out", "pack"]);
     assert_eq!(packed.code, Some(0), "{packed:?}");
     assert!(
@@ -364,7 +376,10 @@ fn people_enter_as_a_model() {
         .iter()
         .find(|row| row[0] == "model" && row[2] == "L0")
         .unwrap();
-    assert_eq!((&*held[1], &*held[3], &*held[6]), ("people", "random", "6"));
+    assert_eq!(
+        (&*held[1], &*held[3], &*held[6]),
+        ("people", "script:said.jsonl", "6")
+    );
     bench.file("answers.jsonl", "{\"question\": 1}\n");
     let broken = bench.call(&args);
     assert!(
