@@ -24,7 +24,8 @@ pub mod labels {
 pub mod questions {
     pub use crate::questions::balance::BalanceMode;
     pub use crate::questions::colors::Palette;
-    pub use crate::questions::observer::ObservedFrame;
+    pub use crate::questions::observer::controls::Control;
+    pub use crate::questions::observer::{Observation, ObservedFrame};
     pub use crate::questions::room::RoomSource;
     pub use crate::questions::rules::{ClassFlag, Rules};
     pub use crate::questions::statistics::measure;

@@ -122,6 +122,11 @@ impl NoEffect {
 
     fn evaluation(&mut self, args: &EvaluateArgs) {
         let constrain = ["constrain".to_owned()];
+        let models = &args.job.models;
+        if models.blind || !models.model.contains(&ModelName::Observer(None)) {
+            let why = "the observer is not asked about images";
+            self.because(why, &["observer_controls".to_owned()]);
+        }
         self.job(&args.job, &ids::<ShrinkArgs>(), &constrain, None);
     }
 
@@ -266,6 +271,10 @@ mod tests {
             "--constrain: no effect: all models are built in",
         ),
         (
+            "--model random --observer-controls",
+            "--observer-controls: no effect: the observer is not asked",
+        ),
+        (
             "--model m --dry-run --timings",
             "--timings: no effect: --dry-run sends nothing",
         ),
@@ -323,6 +332,7 @@ mod tests {
             "--model m --llie f.onnx --tile whole --profile eld --image jpeg:90 --rpm 9",
             "--model m --blind --seed 3 --temperature 1",
             "--model random --seed 3 --shuffle-options",
+            "--model observer --observer-controls",
             "openeqa --questions q --frames f --model script:a --judge j --judge-temperature 1 --rpm 9",
             "synthesize a --out b --sheet levels --profile eld",
             "export llava a --out b --llie f.onnx --llie-on both",

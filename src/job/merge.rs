@@ -102,6 +102,8 @@ fn merge_all<D: Detail + PartialEq>(
         .flat_map(|part| part.run.questions.clone())
         .collect();
     questions.sort_by_key(|question| question.place);
+    // A control of the observer asks a question of one shard with an image of another.
+    questions.dedup_by(|later, question| later.id == question.id);
     let merged = MergedParts::of(parts, &questions)?;
     manifest.count(count(manifest.counts.trials, &merged.records));
     if missing > 0 {

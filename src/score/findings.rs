@@ -19,7 +19,7 @@ use super::health::{Health, healths};
 use super::observed::ObserverSummary;
 use super::pooled::{PooledFinding, pooled};
 use super::significance::Significance;
-use super::subject::{CONTROL_PREFIX, OBSERVER, Subject};
+use super::subject::{Subject, is_control, is_observer};
 use crate::types::{Family, FrameId, ImageFidelity, Record};
 
 /// All results that are computed from the records of a run.
@@ -75,8 +75,8 @@ impl<'a> Findings<'a> {
         let clusters = Clusters::new(pairs, scenes);
         let questions: Vec<OfferedChoices> = questions.into_iter().collect();
         let observer = ObserverSummary::of(records, &clusters);
-        let is_model = |model: &str| !model.starts_with(CONTROL_PREFIX);
-        let is_shown = |model: &str| is_model(model) && model != OBSERVER;
+        let is_model = |model: &str| !is_control(model);
+        let is_shown = |model: &str| is_model(model) && !is_observer(model);
         let without_observer = observer.is_refuted().then(|| {
             let grid = Grid::of_models(records, &clusters, is_shown);
             Box::new(Self::of(

@@ -4,14 +4,12 @@ use std::collections::BTreeMap;
 
 use super::cluster::Clusters;
 use super::estimate::Estimate;
-use super::subject::{CONTROL_PREFIX, OBSERVER, Subject};
+use super::subject::{OBSERVER, Subject, is_control, is_observer};
 use crate::types::{AnswerSource, FrameId, Observed, QuestionId, Record, TrialOutcome};
 
-/// A guess counts 1 / k and has no noise of its own, so it may count for this many independent replies (chosen).
-const GUESS_WEIGHT: f64 = 16.0;
-
-/// The control whose score is not always that of chance: some outlines still agree after a shift by four pixels.
-const LIMIT: &str = "observer:shift-4";
+/// The controls whose score need not be that of chance: the right image shifted by four pixels, or without detail. In both, enough
+/// is left of some things.
+const LIMITS: [&str; 2] = ["observer:shift-4", "observer:mosaic-12"];
 
 /// The control that every run with the observer asks.
 pub(crate) const OTHER_ROOM: &str = "observer:other-room";
@@ -39,7 +37,7 @@ impl ObserverCell {
     /// Whether this is a control of the observer.
     #[must_use]
     pub fn is_control(&self) -> bool {
-        self.subject.model.starts_with(CONTROL_PREFIX)
+        is_control(&self.subject.model)
     }
 
     /// Whether this is a control whose interval excludes chance, so that the observer's lines prove nothing.
@@ -49,7 +47,10 @@ impl ObserverCell {
         let tolerance = 1e-9;
         let excludes =
             self.score.low > self.chance + tolerance || self.score.high < self.chance - tolerance;
-        self.is_control() && self.subject.model != LIMIT && excludes
+        let is_limit = LIMITS
+            .iter()
+            .any(|limit| self.subject.model.starts_with(limit));
+        self.is_control() && !is_limit && excludes
     }
 }
 
@@ -80,7 +81,7 @@ impl ObserverSummary {
         let mut cells = Vec::new();
         for (subject, records) in &items {
             let records: Vec<&Record> = records.values().copied().collect();
-            if subject.model.starts_with(CONTROL_PREFIX) {
+            if is_control(&subject.model) {
                 let all = by_control.entry(&subject.model).or_default();
                 all.extend(&records);
             }
@@ -98,10 +99,12 @@ impl ObserverSummary {
     /// Whether the observer was asked with images.
     #[must_use]
     pub fn is_asked(&self) -> bool {
-        self.cells.iter().any(|cell| cell.subject.model == OBSERVER)
+        self.cells
+            .iter()
+            .any(|cell| is_observer(&cell.subject.model))
     }
 
-    /// The control in the condition of a cell that has the highest score above chance, and should be at chance.
+    /// The controls that are not at chance.
     pub fn refutations(&self) -> impl Iterator<Item = &ObserverCell> {
         self.cells.iter().filter(|cell| cell.refutes())
     }
@@ -115,11 +118,20 @@ impl ObserverSummary {
     /// The control with the image of another scene, in the condition of a cell.
     #[must_use]
     pub fn other_room(&self, cell: &ObserverCell) -> Option<&ObserverCell> {
-        let subject = Subject {
-            model: OTHER_ROOM.to_owned(),
-            ..cell.subject.clone()
-        };
-        self.cells.iter().find(|other| other.subject == subject)
+        // Where several runs are compared, each may have its own.
+        let run = cell
+            .subject
+            .model
+            .strip_prefix(OBSERVER)
+            .unwrap_or_default();
+        let names = [format!("{OTHER_ROOM}{run}"), OTHER_ROOM.to_owned()];
+        names.into_iter().find_map(|model| {
+            let subject = Subject {
+                model,
+                ..cell.subject.clone()
+            };
+            self.cells.iter().find(|other| other.subject == subject)
+        })
     }
 }
 
@@ -157,9 +169,11 @@ fn cell(subject: Subject, records: &[&Record], clusters: &Clusters) -> Option<Ob
     let explained = frames
         .values()
         .map(|frame| f64::from(frame.explained_ppm) / 1e6);
+    // A guess counts 1 / k and has no noise of its own: the noise of n answers is at least that of those from evidence.
+    let max_weight = n as f64 / f64::max(evidence as f64, 1.0);
     Some(ObserverCell {
         subject,
-        score: Estimate::scored(&sums, GUESS_WEIGHT, n)?,
+        score: Estimate::scored(&sums, max_weight, n)?,
         chance: guesses / n as f64,
         evidence: evidence as f64 / n as f64,
         seen: sum(|frame| frame.seen) as f64 / things,

@@ -9,15 +9,30 @@ pub(crate) const CHANCE: &str = "chance";
 /// The model name of the built-in observer.
 pub(crate) const OBSERVER: &str = "observer";
 /// Start of the model names of the observer's controls, for example `observer:other-room`.
-pub(crate) const CONTROL_PREFIX: &str = "observer:";
+const CONTROL_PREFIX: &str = "observer:";
+
+/// A model name without the run behind it: where several runs are compared, `observer (one)` is the observer of the run `one`.
+fn without_run(model: &str) -> &str {
+    model.split_once(" (").map_or(model, |(name, _)| name)
+}
+
+/// Whether a model of this name is the built-in observer.
+#[must_use]
+pub(crate) fn is_observer(model: &str) -> bool {
+    without_run(model) == OBSERVER
+}
+
+/// Whether a model of this name is a control of the observer.
+#[must_use]
+pub(crate) fn is_control(model: &str) -> bool {
+    model.starts_with(CONTROL_PREFIX)
+}
 
 /// Whether a model of this name is built in and stands for comparison only: `random`, `observer` and its controls
 /// (`observer:…`). It is no model under test, so rankings and comparisons of models leave it out.
 #[must_use]
 pub(crate) fn is_reference(model: &str) -> bool {
-    // A report on several runs names the run after the model, as `random (one)`.
-    let name = model.split_once(" (").map_or(model, |(name, _)| name);
-    name == "random" || name == OBSERVER || name.starts_with(CONTROL_PREFIX)
+    without_run(model) == "random" || is_observer(model) || is_control(model)
 }
 
 /// A model in a condition; every cell of a table belongs to one.
@@ -131,7 +146,9 @@ mod tests {
             ("random", true),
             ("observer", true),
             ("observer:other-room", true),
-            ("random (one)", true),
+            ("observer (one)", true),
+            ("random (two)", true),
+            ("gpt-4o (one)", false),
             ("observers", false),
             ("random-forest", false),
             ("gpt-4o", false),

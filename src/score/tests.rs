@@ -241,7 +241,7 @@ fn below_blind_is_what_the_corrected_test_shows() {
         records("m", "L5-noise", |_| Some(false)),
     ]
     .concat();
-    let findings = Findings::new(&records, &BTreeMap::new(), []);
+    let findings = Findings::new(&records, &BTreeMap::new(), [], &[]);
     let below = |condition: &str| {
         let condition: Condition = condition.parse().unwrap();
         findings.below_blind(&Subject::new("m", Some(&condition)), None)

@@ -65,8 +65,7 @@ const CIRCLES: [(&[&str], &str); 3] = [
 ];
 
 /// The functions that make a digest, and use debug output in what they tell the user alone.
-const DEBUG_IN_MESSAGES: [(&str, &str); 4] = [
-    ("job/observer.rs", "open"),
+const DEBUG_IN_MESSAGES: [(&str, &str); 3] = [
     ("run/questions/mod.rs", "measure_frame"),
     ("run/serve/mod.rs", "answer"),
     ("types/digest.rs", "from_str"),

@@ -88,6 +88,8 @@ impl Scene {
             let text = fs::read_to_string(built_in).unwrap();
             bench.file(&format!("own/{name}"), format!("Look closely.\n{text}"));
         }
+        let rules = include_str!("../../src/questions/rules.toml");
+        bench.file("rules.toml", rules.replace("gap_mm = 300", "gap_mm = 301"));
         onnx::gain(0.5).write(&bench.path(""), "one.onnx");
         onnx::gamma(0.5).write(&bench.path(""), "two.onnx");
         Self {
@@ -203,9 +205,10 @@ fn set(conditions: &str) -> BTreeSet<String> {
 }
 
 /// What refuses an evaluation on the folder of another: the field that the message names, and the flag.
-const REFUSED: [(&str, &str); 24] = [
+const REFUSED: [(&str, &str); 25] = [
     ("--data", "--data elsewhere/frames"),
     ("--questions", "--questions other.jsonl"),
+    ("--rules", "--rules rules.toml"),
     ("--shuffle-options", "--shuffle-options"),
     ("--circular", "--circular"),
     ("--seed", "--seed 7"),
@@ -280,7 +283,7 @@ fn every_field_of_open_questions_refuses_another_value() {
 type Addition = (&'static str, &'static str, usize);
 
 /// What may be added to an evaluation. A part of the noise model that is said makes another light reading.
-const ADDITIONS: [Addition; 17] = [
+const ADDITIONS: [Addition; 18] = [
     ("", "--blind", 3),
     ("", "--model m --model n", 9),
     ("", "--model n", 9),
@@ -298,6 +301,8 @@ const ADDITIONS: [Addition; 17] = [
     ("--limit 2", "--limit 3", 3),
     ("--families presence", "--families presence,color", 3),
     ("", "--repeats 2", 9),
+    // They come with the observer alone.
+    ("", "--observer-controls", 0),
 ];
 
 /// What may be added to a run of open questions.

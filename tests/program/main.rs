@@ -22,6 +22,7 @@ mod golden;
 mod identity;
 mod import;
 mod money;
+mod observer;
 mod openeqa;
 mod pins;
 mod questions;

@@ -27,8 +27,9 @@ fn several_runs_become_one_comparison() {
     run(&bench, "one", "");
     run(&bench, "two", "--seed 1");
     bench.file("said.jsonl", "{\"default\": \"C\"}\n");
+    bench.file("other.jsonl", "{\"default\": \"A\"}\n");
     bench.complete(&words(
-        "--model script:said.jsonl --data set.jsonl --levels L0,L5 --out three",
+        "--model script:said.jsonl --model script:other.jsonl --data set.jsonl --levels L0,L5 --out three",
     ));
     let called = bench.call(&["report", "one", "two", "three", "--out", "all", "--full"]);
     assert_eq!(called.code, Some(0), "{called:?}");
@@ -45,6 +46,16 @@ fn several_runs_become_one_comparison() {
         assert!(called.stdout.contains(label), "{label}: {called:?}");
     });
     assert!(called.stdout.contains("report: all/report.html"));
+    // A model that guesses is compared with no other.
+    let compared = csv(&bench.path("all/comparisons.csv"));
+    let compared: Vec<_> = compared.iter().filter(|row| row[0] == "model").collect();
+    assert!(!compared.is_empty());
+    for row in compared {
+        assert!(
+            !row[1].starts_with("random") && !row[3].starts_with("random"),
+            "{row:?}"
+        );
+    }
     let page = fs::read_to_string(bench.path("all/report.html")).unwrap();
     assert!(page.contains("Seeing in the dark: 3 runs compared"));
     let rows = [

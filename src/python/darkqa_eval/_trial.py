@@ -79,9 +79,19 @@ _IMAGE = {
     "image_format": "category",
 }
 
+# What the observer saw; missing for other models.
+_OBSERVED = {
+    "shown_frame": "string",
+    "observed_from": "category",
+    "observed_things": "Int64",
+    "observed_seen": "Int64",
+    "observed_detected": "Int64",
+    "observed_explained_ppm": "Int64",
+}
+
 # The columns of each kind of run, in the order of the table.
 COLUMNS = {
-    CHOICE: {**_QUESTION, **_CONDITION, **_READINGS, **_REPLY, **_IMAGE},
+    CHOICE: {**_QUESTION, **_CONDITION, **_READINGS, **_REPLY, **_IMAGE, **_OBSERVED},
     OPEN: {**_QUESTION, **_CONDITION, **_MARK, **_REPLY, "image_count": "Int64", **_IMAGE},
 }
 # The columns whose values stand only in questions.jsonl.
@@ -104,6 +114,10 @@ def add_readings(record: Record) -> None:
     """Add the choices as texts, and what the strict and the lenient reading found in the reply."""
     choices, truth = record["choices"], record["truth"]
     record.setdefault("repeat", 0)
+    record.setdefault("shown_frame", None)
+    observed = record.get("observed") or {}
+    for name in ("from", "things", "seen", "detected", "explained_ppm"):
+        record[f"observed_{name}"] = observed.get(name)
     record.update(choices=tuple(choices), choice_count=len(choices), answer=choices[truth])
     for mode, suffix in (("strict", ""), ("lenient", "_lenient")):
         read = record[mode] or {"chosen": None, "why": None}

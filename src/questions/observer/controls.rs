@@ -10,10 +10,11 @@ use crate::types::{Digest, Rgb};
 
 /// A way to spoil an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(crate) enum Control {
+pub enum Control {
     /// The image of a frame of another scene in the same condition. It is shown by the plan of the run; the image is not changed.
     OtherRoom,
-    /// Means of squares of 12 pixels.
+    /// Means of squares of 12 pixels. This is a limit, and not always chance: it is the right image without detail, and of large
+    /// things enough is left.
     Mosaic12,
     /// Means of squares of 40 pixels.
     Mosaic40,
@@ -35,9 +36,9 @@ pub(crate) enum Control {
     Negative,
     /// Blurred by about σ = 20 pixels.
     Blur,
-    /// Shifted by 32 pixels to the right, around the edge.
+    /// Shifted by 32 pixels to the right and down, around the edges.
     Shift32,
-    /// Shifted by 4 pixels. This is a limit, and not always chance: some outlines still agree.
+    /// Shifted by 4 pixels to the right and down. This is a limit, too: some outlines still agree.
     Shift4,
     /// Each mask filled with a colour at random.
     RandomMasks,
@@ -53,7 +54,7 @@ const BOX: usize = 41;
 
 impl Control {
     /// All controls, in the order in which they are asked.
-    pub(crate) const ALL: [Self; 16] = [
+    pub const ALL: [Self; 16] = [
         Self::OtherRoom,
         Self::Mosaic12,
         Self::Mosaic40,
@@ -72,8 +73,15 @@ impl Control {
         Self::Outlines,
     ];
 
+    /// Whether nothing is left to see, so that the score must be that of chance. The others are limits of the observer.
+    #[must_use]
+    pub fn leaves_nothing(self) -> bool {
+        !matches!(self, Self::Shift4 | Self::Mosaic12)
+    }
+
     /// The name, as in `observer:NAME`.
-    pub(crate) fn name(self) -> &'static str {
+    #[must_use]
+    pub fn name(self) -> &'static str {
         match self {
             Self::OtherRoom => "other-room",
             Self::Mosaic12 => "mosaic-12",
@@ -95,7 +103,8 @@ impl Control {
     }
 
     /// The spoiled image. Random numbers are drawn from `key` and the name of the control.
-    pub(crate) fn spoiled(self, image: &Rgb, frame: &ObservedFrame, key: &Digest) -> Rgb {
+    #[must_use]
+    pub fn spoiled(self, image: &Rgb, frame: &ObservedFrame, key: &Digest) -> Rgb {
         let mut draws = Draws::new(key, self);
         let [width, height] = [image.width(), image.height()];
         let at = |from: &dyn Fn(usize, usize) -> [usize; 2]| moved(image, from);
@@ -124,8 +133,8 @@ impl Control {
                 negative
             }
             Self::Blur => blurred(image),
-            Self::Shift32 => at(&|x, y| [(x + width - 32 % width) % width, y]),
-            Self::Shift4 => at(&|x, y| [(x + width - 4 % width) % width, y]),
+            Self::Shift32 => at(&|x, y| shifted([x, y], [width, height], 32)),
+            Self::Shift4 => at(&|x, y| shifted([x, y], [width, height], 4)),
             Self::RandomMasks => random_masks(frame, &mut draws),
             Self::Outlines => drawn_outlines(frame),
         }
@@ -188,6 +197,11 @@ fn moved(image: &Rgb, from: &dyn Fn(usize, usize) -> [usize; 2]) -> Rgb {
         pixel.copy_from_slice(&image.samples()[(y * width + x) * 3..][..3]);
     }
     moved
+}
+
+/// The place `by` pixels to the left and above, around the edges.
+fn shifted(place: [usize; 2], size: [usize; 2], by: usize) -> [usize; 2] {
+    [0, 1].map(|axis| (place[axis] + size[axis] - by % size[axis]) % size[axis])
 }
 
 /// Each square of `side` pixels filled with its mean.

@@ -49,7 +49,7 @@ use crate::types::{Digest, Frame, Labels, Rgb};
 
 use cells::Cells;
 use channel::{Fit, Histogram, histogram};
-use outlines::{Outline, outlines, patch_sums};
+use outlines::{MIN_CONFIRMED, Outline, outlines, patch_sums};
 use resample::area_mean;
 use shade::Shade;
 pub(crate) use wording::understood;
@@ -89,6 +89,12 @@ impl ObservedFrame {
     /// Observes a degraded or enhanced image of the frame. An image of another size is resampled to that of the masks.
     #[must_use]
     pub fn look(&self, image: &Rgb) -> Observation {
+        self.look_with(image, MIN_CONFIRMED)
+    }
+
+    /// The same with another share of the elements that must be confirmed for a thing to be seen.
+    #[must_use]
+    pub fn look_with(&self, image: &Rgb, min_confirmed: f64) -> Observation {
         let image = area_mean(image, [self.untouched.width(), self.untouched.height()]);
         let untouched = self.untouched.samples();
         let fit = Fit::of(untouched, &self.histogram, &image);
@@ -104,7 +110,9 @@ impl ObservedFrame {
                 Some((segment.id, *outline))
             })
             .collect();
-        let seen = outlines.iter().filter(|(_, outline)| outline.is_seen());
+        let seen = outlines
+            .iter()
+            .filter(|(_, outline)| outline.confirmed >= min_confirmed);
         let shades = seen.map(|(id, _)| {
             let mask = masks[id] as u32;
             (*id, Shade::of(&self.cells, &sums, &fit, mask))
@@ -177,6 +185,18 @@ impl Observation {
     pub fn detected(&self) -> usize {
         let outlines = self.outlines.values();
         outlines.filter(|outline| outline.is_detected()).count()
+    }
+
+    /// Whether the segment of this number is seen.
+    #[must_use]
+    pub fn sees(&self, segment: u32) -> bool {
+        self.shades.contains_key(&segment)
+    }
+
+    /// The segments of the frame that are not tiny, each with its number and class.
+    pub fn segments(&self) -> impl Iterator<Item = (u32, &str)> {
+        let segments = self.frame.segments.iter();
+        segments.map(|segment| (segment.id, &*segment.class))
     }
 
     /// For each thing by its number, the share of its outline that is confirmed, from 0 to 1, and the z of the whole outline.

@@ -117,11 +117,6 @@ pub(super) struct Outline {
 }
 
 impl Outline {
-    /// Whether the thing is seen: at least half of the elements at one scale are confirmed. This decides answers.
-    pub(super) fn is_seen(&self) -> bool {
-        self.confirmed >= MIN_CONFIRMED
-    }
-
     /// Whether the thing is detected by its whole outline. This does not decide answers: clutter that happens to agree is
     /// enough for it.
     pub(super) fn is_detected(&self) -> bool {

@@ -14,7 +14,7 @@ pub(super) const OTHER_ROOM: &str = "observer:other-room";
 #[derive(Debug, Default)]
 pub(super) struct AddedControls {
     pub(super) names: Vec<ModelName>,
-    /// A line about them; `None` if there is nothing to say.
+    /// A line about the control that every run has; `None` if it is not asked.
     line: Option<String>,
 }
 
@@ -40,23 +40,21 @@ impl AddedControls {
         });
         let names = controls.map(|control| ModelName::Observer(Some(control)));
         let names: Vec<ModelName> = names.filter(|name| !ask.models.contains(name)).collect();
-        let line = if has_other_scene {
+        if !has_other_scene {
+            tracing::warn!(
+                "the control {OTHER_ROOM} is not possible: all frames are of one scene; that the observer guesses without the \
+                 right image is not shown"
+            );
+        }
+        let line = has_other_scene.then(|| {
             format!(
                 "{OTHER_ROOM} is asked too: the observer with the image of another scene; its score must be that of chance"
             )
-        } else {
-            format!(
-                "the control {OTHER_ROOM} is not possible: all frames are of one scene; that the observer guesses without the \
-                 right image is not tested"
-            )
-        };
-        Ok(Self {
-            names,
-            line: Some(line),
-        })
+        });
+        Ok(Self { names, line })
     }
 
-    /// Prints what is added, or why it is not.
+    /// Prints what is added.
     pub(super) fn say(&self, progress: &Progress) {
         if let Some(line) = &self.line {
             progress.say(line);

@@ -17,6 +17,7 @@ use crate::job::settings::JobSettings;
 use crate::job::source::{Frames, Source};
 use crate::job::stored::StoredRun;
 use crate::job::{Outcome, StdoutFormat};
+use crate::questions::rules::Rules;
 use crate::store::Store;
 use crate::types::{ChoiceDetail, QuestionId, Record, RunQuestion};
 
@@ -74,8 +75,9 @@ impl Experiment for ChoiceSetup<'_> {
 
     fn identity(&self) -> Identity {
         let order = self.config.order;
-        let rules = self.config.selection.rules.as_ref();
-        let rules = rules.map(|_| self.config.rules.digest());
+        let rules = Rules::built_in().map(|rules| rules.digest());
+        let rules =
+            Some(self.config.rules.digest()).filter(|own| rules.is_ok_and(|rules| rules != *own));
         let fields = [
             Some(("--data", json!(self.dataset.name()))),
             Some(("--prompts", json!(self.config.prompts.digest()))),

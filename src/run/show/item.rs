@@ -13,6 +13,8 @@ pub(super) struct ShownAnswer {
     pub(super) condition: Option<Condition>,
     pub(super) outcome: &'static str,
     pub(super) reply: String,
+    /// The frame or walk that was shown.
+    pub(super) shown: FrameId,
     /// The digest of the image that was sent, or of all images of a walk.
     pub(super) sent: Option<Digest>,
 }
@@ -87,6 +89,7 @@ fn choice_answer(record: &Record) -> ShownAnswer {
             types::TrialOutcome::Failed => "failed",
         },
         reply: reply(record.reply.as_deref(), record.failure.as_ref()),
+        shown: record.detail.shown().clone(),
         sent: record.detail.image.as_ref().map(|image| image.digest),
     }
 }
@@ -113,6 +116,7 @@ fn open_answer(record: &Record<OpenDetail>) -> ShownAnswer {
             (None, None) => "answered",
         },
         reply: reply(record.reply.as_deref(), record.failure.as_ref()),
+        shown: FrameId(record.detail.episode.clone()),
         sent: record.detail.images.as_ref().map(|images| images.digest),
     }
 }

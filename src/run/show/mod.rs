@@ -6,6 +6,7 @@ mod sheet;
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
+use std::path::Path;
 use std::sync::Arc;
 
 use crate::ask::Payload;
@@ -16,9 +17,9 @@ use crate::job::Outcome;
 use crate::job::rebuild::ImageRebuilder;
 use crate::job::stored::AnyRun;
 use crate::types::manifest::Status;
-use crate::types::{Condition, Digest};
+use crate::types::{Condition, Digest, FrameId};
 
-use item::{ShownAnswer, read};
+use item::{ShownAnswer, ShownItem, read};
 pub(crate) use settings::ShowArgs;
 
 /// Makes the images again, writes them, and prints for each whether it is the one that was sent; or draws one picture of them.
@@ -44,40 +45,41 @@ pub(crate) fn show(args: ShowArgs) -> Result<Outcome> {
     let conditions = conditions(&item.answers, &args)?;
     let out = args.out.clone().unwrap_or_else(|| folder.join("shown"));
     let mut rebuilder = ImageRebuilder::open(args.rebuild, &manifest, &folder, &conditions)?;
-    let images = rebuilder.images(&item.source, &conditions)?;
-    let mut text = item.text;
+    let mut text = item.text.clone();
     let mut all_same = true;
-    for (condition, images) in conditions.iter().zip(images) {
-        let multiple = images.len() > 1;
-        for (place, image) in images.iter().enumerate() {
-            let place = if multiple {
-                format!("_{place:03}")
-            } else {
-                String::new()
-            };
-            let name = format!(
-                "{}_{condition}{place}.{}",
-                stem(&item.source)?,
-                image.extension()
-            );
-            let path = out.join(name);
-            write(&path, &image.file()?)?;
-            let _ = writeln!(text, "{condition}: {}", path.display());
-        }
-        let digest = joint_digest(&images);
-        let sent = sent(&item.answers, condition);
-        let comparison = if sent.is_empty() {
-            format!("the digest of what was sent is not stored; {digest} now")
-        } else if sent.iter().all(|sent| *sent == digest) {
-            format!("the very bytes that were sent ({digest})")
-        } else {
-            all_same = false;
-            format!("NOT the bytes that were sent: {digest} now")
+    for source in sources(&item) {
+        let answers: Vec<&ShownAnswer> = item
+            .answers
+            .iter()
+            .filter(|answer| answer.shown == source)
+            .collect();
+        let asked = |condition: &&Condition| {
+            let mut answers = answers.iter();
+            answers.any(|answer| answer.condition.as_ref() == Some(condition))
         };
-        let _ = writeln!(text, "{condition}: {comparison}");
-        text += &replies(&item.answers, Some(condition));
+        let conditions: Vec<Condition> = conditions.iter().filter(asked).cloned().collect();
+        if source != item.source && !conditions.is_empty() {
+            let _ = writeln!(text, "with the image of {source}:");
+        }
+        let images = rebuilder.images(&source, &conditions)?;
+        for (condition, images) in conditions.iter().zip(images) {
+            text += &written(&out, &source, condition, &images)?;
+            let digest = joint_digest(&images);
+            let sent = sent(&answers, condition);
+            let comparison = if sent.is_empty() {
+                format!("the digest of what was sent is not stored; {digest} now")
+            } else if sent.iter().all(|sent| *sent == digest) {
+                format!("the very bytes that were sent ({digest})")
+            } else {
+                all_same = false;
+                format!("NOT the bytes that were sent: {digest} now")
+            };
+            let _ = writeln!(text, "{condition}: {comparison}");
+            text += &replies(&answers, Some(condition));
+        }
     }
-    text += &replies(&item.answers, None);
+    let answers: Vec<&ShownAnswer> = item.answers.iter().collect();
+    text += &replies(&answers, None);
     if !all_same {
         text += "the data, an enhancement model or this program has changed since the run\n";
     }
@@ -89,6 +91,42 @@ pub(crate) fn show(args: ShowArgs) -> Result<Outcome> {
         },
         output: text,
     })
+}
+
+/// The frames that were shown with the item: its own first, then those that a control of the observer was shown.
+fn sources(item: &ShownItem) -> Vec<FrameId> {
+    let others = item
+        .answers
+        .iter()
+        .filter(|answer| answer.condition.is_some());
+    let others: BTreeSet<&FrameId> = others.map(|answer| &answer.shown).collect();
+    let others = others.into_iter().filter(|shown| **shown != item.source);
+    std::iter::once(&item.source)
+        .chain(others)
+        .cloned()
+        .collect()
+}
+
+/// Writes the images of a source in a condition; the lines with their paths.
+fn written(
+    out: &Path,
+    source: &FrameId,
+    condition: &Condition,
+    images: &[Arc<Payload>],
+) -> Result<String> {
+    let mut text = String::new();
+    for (place, image) in images.iter().enumerate() {
+        let place = if images.len() > 1 {
+            format!("_{place:03}")
+        } else {
+            String::new()
+        };
+        let name = format!("{}_{condition}{place}.{}", stem(source)?, image.extension());
+        let path = out.join(name);
+        write(&path, &image.file()?)?;
+        let _ = writeln!(text, "{condition}: {}", path.display());
+    }
+    Ok(text)
 }
 
 /// The conditions of the item, limited to those of `--condition`.
@@ -129,7 +167,7 @@ fn joint_digest(images: &[Arc<Payload>]) -> Digest {
 }
 
 /// The digests of the images that were sent in a condition.
-fn sent(answers: &[ShownAnswer], condition: &Condition) -> BTreeSet<Digest> {
+fn sent(answers: &[&ShownAnswer], condition: &Condition) -> BTreeSet<Digest> {
     let matching = answers
         .iter()
         .filter(|answer| answer.condition.as_ref() == Some(condition));
@@ -138,7 +176,7 @@ fn sent(answers: &[ShownAnswer], condition: &Condition) -> BTreeSet<Digest> {
 
 /// The reply of each model in a condition, or without an image. Replies are escaped, so that they cannot send control
 /// characters to the terminal.
-fn replies(answers: &[ShownAnswer], condition: Option<&Condition>) -> String {
+fn replies(answers: &[&ShownAnswer], condition: Option<&Condition>) -> String {
     let mut text = String::new();
     let without = if condition.is_none() {
         " without an image"

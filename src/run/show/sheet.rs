@@ -15,6 +15,7 @@ use crate::job::report::story_curves;
 use crate::job::stored::StoredRun;
 use crate::report::figures::StoryCurves;
 use crate::report::sheet::{Story, StoryCell, StoryMark, StoryRow, story};
+use crate::score::subject::is_control;
 use crate::types::manifest::{RunManifest, Status};
 use crate::types::{AxisLevel, Condition, KindReading, Record, TrialOutcome};
 
@@ -104,6 +105,7 @@ impl SheetItem {
         let records = run.records.iter();
         let shown =
             records.filter(|record| record.question.0 == name && record.condition.is_some());
+        let shown = shown.filter(|record| !is_control(&record.model));
         let records: Vec<Record> = shown.cloned().collect();
         let Some(first) = records.first() else {
             return Err(problem(format!("the run did not ask {name:?} with images")));

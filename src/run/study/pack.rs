@@ -150,7 +150,7 @@ fn chosen(mut questions: Vec<RunQuestion>, count: usize) -> Vec<RunQuestion> {
 /// The digest of each image that was sent, by frame and condition.
 fn sent(records: &[Record]) -> BTreeMap<(FrameId, Condition), Digest> {
     let sent = records.iter().filter_map(|record| {
-        let place = (record.detail.frame.clone(), record.condition.clone()?);
+        let place = (record.detail.shown().clone(), record.condition.clone()?);
         Some((place, record.detail.image.as_ref()?.digest))
     });
     sent.collect()
