@@ -323,7 +323,7 @@ const OPEN_ADDITIONS: [Addition; 9] = [
 ];
 
 /// What changes no answer: given on the folder of a run, it asks nothing.
-const NOTHING: [&str; 22] = [
+const NOTHING: [&str; 24] = [
     "--max-pixels 1000000",
     "--threads 1",
     "--offline",
