@@ -25,7 +25,7 @@ fn by_key(run: &Path) -> BTreeMap<String, Value> {
 #[test]
 fn it_is_asked_with_the_image_of_another_scene_too() {
     let bench = Bench::new();
-    let table = bench.complete(&words(&format!("{RUN} --out run")));
+    let table = bench.complete(&words(&format!("{RUN} --out run --full")));
     assert!(table.contains("Known-signal observer (given the untouched frame; not a model)"));
     let all = records(&bench.path("run"));
     let of = |model: &str| -> Vec<&Value> {
