@@ -1,4 +1,4 @@
-//! Whether the contrast along each outline is the one that the untouched frame predicts: [`PatchSums`].
+//! Whether the contrast along each outline is the one that the untouched frame predicts: [`Outline`].
 //!
 //! In each element (the pixels of a mask, and all else, in one cell) the difference of the means is compared with the one that
 //! is predicted: a matched filter whose template is the prediction, whitened by measured variances. Its amplitude is 1 where the
