@@ -77,10 +77,10 @@ mod tests {
     #[test]
     fn the_next_frame_of_another_scene_is_shown() {
         for (frames, shown) in [
-            ("ab", Some("ba")),
+            ("12", Some("21")),
             ("aAbB", Some("bbaa")),
             ("aAbBc", Some("bbcca")),
-            ("abBA", Some("bAAb")),
+            ("adDA", Some("dAAd")),
             ("aabb", Some("bbaa")),
             ("123", Some("231")),
             ("aA", None),
