@@ -305,6 +305,13 @@ fn a_new_run_is_held_against_a_baseline() {
     let json: Value =
         serde_json::from_slice(&fs::read(scene.bench.path("out/summary.json")).unwrap()).unwrap();
     assert_eq!(json["baseline"].as_array().unwrap().len(), 3);
+    let finding = &json["findings"][0];
+    assert_eq!(
+        finding["text"],
+        "script:m.jsonl is worse than in old at L0, L3-ev, L3-noise, by up to 50.0 points."
+    );
+    assert_eq!(finding["verdict"], "worse");
+    assert!(worse.stdout.contains("is worse than in old"), "{worse:?}");
     let tex = fs::read_to_string(scene.bench.path("out/tables.tex")).unwrap();
     assert!(tex.contains("New less old"), "{tex}");
     let failing = scene
@@ -315,6 +322,8 @@ fn a_new_run_is_held_against_a_baseline() {
         .bench
         .call(&words("report old --baseline old --fail-if-worse"));
     assert_eq!(same.code, Some(0), "{same:?}");
+    let unshown = "It is not shown that any model is worse or better than in old.";
+    assert!(same.stdout.contains(unshown), "{same:?}");
     // Only the same images count.
     scene
         .bench

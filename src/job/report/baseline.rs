@@ -9,13 +9,14 @@ use super::join::join;
 use crate::error::Result;
 use crate::job::stored::StoredRun;
 use crate::report::alert::Alert;
-use crate::report::table::Table;
+use crate::report::choice_report::ChoiceReport;
+use crate::report::sentences::against_baseline;
 use crate::report::tables::baseline;
 use crate::score::baseline::{BaselineRow, baseline_rows};
 use crate::score::grid::Grid;
 use crate::score::health::healths;
 use crate::score::significance::Significance;
-use crate::score::subject::Subject;
+use crate::score::subject::{Subject, is_control};
 use crate::types::{ChoiceDetail, Record};
 
 /// New runs against an old one.
@@ -24,7 +25,7 @@ pub(super) struct Baseline {
     /// The name of the old run.
     old: String,
     /// What differs between the new runs and the old one.
-    pub(super) alerts: Vec<Alert>,
+    alerts: Vec<Alert>,
 }
 
 impl Baseline {
@@ -56,6 +57,8 @@ impl Baseline {
             .subjects
             .iter()
             .enumerate()
+            // A control says whether the observer can be trusted, not whether a model got worse.
+            .filter(|(_, subject)| !is_control(&subject.model))
             .filter_map(|(index, subject)| {
                 let old = Subject {
                     model: mark(combined.models.asked(&subject.model)),
@@ -89,9 +92,18 @@ impl Baseline {
         })
     }
 
-    /// The table of all rows.
-    pub(super) fn table(&self) -> Table {
-        baseline(&self.rows, &self.old)
+    /// Puts the comparison first among the sentences of a report, and below its table of levels.
+    pub(super) fn add_to(&self, report: &mut ChoiceReport<'_>) {
+        let sentences = against_baseline(&self.rows, &self.old, report.findings.unit);
+        report.sentences.splice(..0, sentences);
+        let place = report.tables.len().min(2);
+        report.tables.insert(place, baseline(&self.rows, &self.old));
+        for alert in &self.alerts {
+            if !report.alerts.contains(alert) {
+                report.alerts.push(alert.clone());
+            }
+        }
+        report.alerts.sort_by_key(|alert| alert.kind);
     }
 
     /// Whether any row is shown to be worse.

@@ -150,14 +150,7 @@ fn compare(combined: &Combined, baseline: Option<&Baseline>, args: &ReportArgs) 
     let runs = combined.manifests();
     let mut report = ChoiceReport::new(&findings, alerts(combined, &findings));
     if let Some(baseline) = baseline {
-        // Below the table of levels.
-        let place = report.tables.len().min(2);
-        report.tables.insert(place, baseline.table());
-        let known = report.alerts.clone();
-        let new = baseline.alerts.iter();
-        let new = new.filter(|alert| !known.contains(alert));
-        report.alerts.extend(new.cloned());
-        report.alerts.sort_by_key(|alert| alert.kind);
+        baseline.add_to(&mut report);
     }
     let json = || summary(&report, RunList::Several(&runs));
     let shown = match args.show.format() {

@@ -8,10 +8,12 @@
 //! - A sentence is about the models of the run and names their number; it does not speak of models in general.
 
 mod answers;
+mod baseline;
 mod models;
 mod pooled;
 mod sentence;
 
+pub(crate) use baseline::against_baseline;
 pub(crate) use sentence::Sentence;
 
 use crate::report::words::light;

@@ -1,0 +1,96 @@
+//! Sentences about new runs against an old one.
+
+use super::sentence::{Numbers, Sentence, Tone};
+use crate::score::baseline::BaselineRow;
+use crate::score::cluster::ClusterUnit;
+use crate::score::significance::Significance;
+
+/// Largest number of conditions that a sentence names.
+const MAX_NAMED: usize = 3;
+
+/// What is shown about each model against the run `old`; one sentence if nothing is shown about any.
+pub(crate) fn against_baseline(
+    rows: &[BaselineRow],
+    old: &str,
+    unit: ClusterUnit,
+) -> Vec<Sentence> {
+    let mut sentences = Vec::new();
+    for of_model in rows.chunk_by(|one, other| one.subject.model == other.subject.model) {
+        for verdict in [Significance::Worse, Significance::Better] {
+            let shown = of_model.iter().filter(|row| row.significance == verdict);
+            sentences.extend(shown_against(&shown.collect::<Vec<_>>(), old, unit));
+        }
+    }
+    if sentences.is_empty() {
+        sentences.push(nothing_shown(rows, old, unit));
+    }
+    sentences
+}
+
+/// The sentence about the conditions of a model that have one verdict; `None` if there are none.
+fn shown_against(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Option<Sentence> {
+    let largest = largest(rows)?;
+    let mut numbers = Numbers::of(unit);
+    let verdict = largest.significance;
+    let word = if verdict == Significance::Worse {
+        "worse"
+    } else {
+        "better"
+    };
+    let up_to = if rows.len() > 1 { "up to " } else { "" };
+    let text = format!(
+        "{} is {word} than in {old} at {}, by {up_to}{} points.",
+        largest.subject.model,
+        conditions(rows, &mut numbers),
+        numbers.size("effect", largest.paired.difference.value)
+    );
+    let detail = detail(largest, &mut numbers);
+    Some(numbers.sentence("baseline", verdict.into(), text, detail))
+}
+
+/// That no difference is shown, with the largest one; or that nothing can be compared.
+fn nothing_shown(rows: &[BaselineRow], old: &str, unit: ClusterUnit) -> Sentence {
+    let mut numbers = Numbers::of(unit);
+    let Some(largest) = largest(&rows.iter().collect::<Vec<_>>()) else {
+        let text = format!("Nothing can be compared with {old}.");
+        let detail = "no model answered the same question about the same image in both".to_owned();
+        return numbers.sentence("baseline", Tone::Note, text, detail);
+    };
+    let text = format!("It is not shown that any model is worse or better than in {old}.");
+    let compared = numbers.count("conditions", rows.len());
+    let noun = if rows.len() == 1 { "row" } else { "rows" };
+    let detail = format!(
+        "{compared} {noun} of model and condition compared; largest: {} at {}, {}",
+        largest.subject.model,
+        largest.subject.condition(),
+        detail(largest, &mut numbers)
+    );
+    numbers.sentence("baseline", Tone::NotShown, text, detail)
+}
+
+/// The row with the largest difference in either direction; of several, the first.
+fn largest<'r>(rows: &[&'r BaselineRow]) -> Option<&'r BaselineRow> {
+    let size = |row: &BaselineRow| row.paired.difference.value.abs();
+    rows.iter()
+        .copied()
+        .reduce(|largest, next| if size(next) > size(largest) { next } else { largest })
+}
+
+/// The first conditions by name, and how many there are besides.
+fn conditions(rows: &[&BaselineRow], numbers: &mut Numbers) -> String {
+    let names = rows.iter().map(|row| row.subject.condition());
+    let named = names.take(MAX_NAMED).collect::<Vec<_>>().join(", ");
+    match rows.len().saturating_sub(MAX_NAMED) {
+        0 => named,
+        more => format!("{named} and {} more", numbers.count("more", more)),
+    }
+}
+
+/// Effect, interval, p and n of a row.
+fn detail(row: &BaselineRow, numbers: &mut Numbers) -> String {
+    let difference = numbers.difference("", row.paired.difference);
+    let p = numbers.p("p", row.holm);
+    let items = numbers.count("n", row.paired.difference.n);
+    let clusters = numbers.clusters(row.paired.clusters);
+    format!("{difference}, {p}; n = {items} in {clusters}")
+}
