@@ -24,11 +24,12 @@ pub mod labels {
 pub mod questions {
     pub use crate::questions::balance::BalanceMode;
     pub use crate::questions::colors::Palette;
-    pub use crate::questions::observer::controls::Control;
+    pub use crate::questions::observer::controls::spoiled;
     pub use crate::questions::observer::{Observation, ObservedFrame};
     pub use crate::questions::room::RoomSource;
     pub use crate::questions::rules::{ClassFlag, Rules};
     pub use crate::questions::statistics::measure;
+    pub use crate::types::Control;
 }
 
 pub mod report {

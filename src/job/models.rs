@@ -10,8 +10,7 @@ use strsim::damerau_levenshtein;
 
 use crate::ask::{AccessArgs, Endpoint, Model, Parameters, Remote, Script, Sending, Server, Wire};
 use crate::error::{Error, Result};
-use crate::questions::observer::controls::Control;
-use crate::types::{Condition, Decides, View};
+use crate::types::{Condition, Control, Decides, View};
 
 /// Flags that name the models to ask.
 #[derive(Debug, Clone, Default, Args)]

@@ -6,14 +6,12 @@ use crate::ask::{Call, Local, LocalAnswer, Random};
 use crate::dataset::{DataPlace, Dataset};
 use crate::error::{Error, Result};
 use crate::questions::colors::Palette;
-use crate::questions::observer::controls::Control;
+use crate::questions::observer::controls::spoiled;
 use crate::questions::observer::{Observation, ObservedFrame, VERSION, understood};
 use crate::questions::rules::Rules;
+use crate::types::control::OBSERVER;
 use crate::types::recent::Recent;
-use crate::types::{AnswerSource, Digest, FrameId, Labels, Observed, Question};
-
-/// Name of the model in records and tables.
-pub(crate) const NAME: &str = "observer";
+use crate::types::{AnswerSource, Control, Digest, FrameId, Labels, Observed, Question};
 
 /// Number of cached observations. A few are enough, because questions about one image follow each other; with all controls,
 /// each image has one observation for each of them.
@@ -31,7 +29,7 @@ pub(crate) struct Observer {
 
 /// Name of the observer, or of one of its controls, in records and tables.
 pub(crate) fn name(control: Option<Control>) -> String {
-    control.map_or_else(|| NAME.to_owned(), |control| format!("{NAME}:{control}"))
+    control.map_or_else(|| OBSERVER.to_owned(), Control::model_name)
 }
 
 impl Observer {
@@ -45,7 +43,7 @@ impl Observer {
         questions: &[Question],
         rules: Rules,
     ) -> Result<Arc<Self>> {
-        let unusable = |problem: String| Error::usage("--model", format!("{NAME}: {problem}"));
+        let unusable = |problem: String| Error::usage("--model", format!("{OBSERVER}: {problem}"));
         let labels = Dataset::labels_at(place)?.ok_or_else(|| {
             unusable(format!(
                 "{} has no maps: frames with segments or classes (frames.jsonl, classes.json) are needed",
@@ -117,7 +115,7 @@ impl Observer {
             let mut pixels = image.decode().map_err(|e| e.to_string())?;
             if let Some(control) = control {
                 let key = Digest::of_parts([&seed.to_le_bytes()[..], frame.0.as_bytes()]);
-                pixels = control.spoiled(&pixels, &observed, &key);
+                pixels = spoiled(control, &pixels, &observed, &key);
             }
             Ok::<_, String>(Arc::new(observed.look(&pixels)))
         })?;

@@ -7,15 +7,14 @@ use super::alert::lines;
 use super::choice_report::ChoiceReport;
 use super::ladder::{Ladder, Series, SeriesByLevel};
 use super::sentences::{FIRST, HOW_TO_READ, Sentence};
-use super::tables::unread;
+use super::tables::{unread, what_it_is};
 use super::terminal::render;
 use super::words::{counted, percent, reach_of, with_interval};
 use crate::score::accuracy::AccuracyCell;
 use crate::score::choice::ReadingMode;
 use crate::score::health::Health;
-use crate::score::observed::OTHER_ROOM;
-use crate::score::subject::OBSERVER;
 use crate::types::AxisLevel;
+use crate::types::control::OBSERVER;
 use crate::types::manifest::RunManifest;
 
 /// Width of the text in characters.
@@ -299,7 +298,7 @@ fn baselines(report: &ChoiceReport<'_>, ladder: &Ladder<'_, AccuracyCell>) -> St
     text
 }
 
-/// What the observer is, and its score when it is shown the images of other rooms; empty if it is not shown.
+/// What the observer is, and the score of its standing control; empty if it is not shown.
 fn observer_control(report: &ChoiceReport<'_>) -> String {
     let findings = report.findings;
     let is_shown = findings
@@ -307,13 +306,11 @@ fn observer_control(report: &ChoiceReport<'_>) -> String {
         .subjects
         .iter()
         .any(|subject| subject.model == OBSERVER);
-    let mut control = findings.observer.controls.iter();
-    let control = control.find(|cell| cell.subject.model == OTHER_ROOM);
-    match control {
+    match findings.observer.standing_control() {
         Some(control) if is_shown => {
             let line = format!(
-                "{OBSERVER}: known-signal observer, given the untouched frame; not a model. Control: shown another room's images it \
-                 scores {}, chance is {}",
+                "{OBSERVER}: known-signal observer, given the untouched frame; not a model. Control: {}, scores {}; chance is {}",
+                what_it_is(control),
                 with_interval(control.score),
                 percent(control.chance)
             );

@@ -7,7 +7,7 @@ use super::choice::ReadingMode;
 use super::grid::Grid;
 use super::significance::{Significance, holm};
 use super::subject::Subject;
-use crate::types::{AxisLevel, Digest, EnhancerName, Family, ImageFidelity, KindReading, View};
+use crate::types::{AxisLevel, Digest, EnhancerName, Family, FrameId, ImageFidelity, KindReading, View};
 
 /// What the similarity of images to their clean frames says about the answers.
 ///
@@ -55,8 +55,12 @@ pub struct Prediction {
     pub significance: Significance,
 }
 
-/// PSNR and SSIM of images by their digests.
-type Measured = HashMap<Digest, [Option<f64>; 2]>;
+/// PSNR and SSIM of images.
+type Measured<'a> = HashMap<ImageKey<'a>, [Option<f64>; 2]>;
+
+/// A frame and the digest of an image of it: two frames may have the same image, for example a black one, but not the same clean
+/// frame.
+type ImageKey<'a> = (&'a FrameId, Digest);
 
 /// A condition of the records with its subjects, one for each model.
 type ConditionKey<'a> = (AxisLevel, &'a KindReading, Option<&'a EnhancerName>);
@@ -64,12 +68,12 @@ type ConditionKey<'a> = (AxisLevel, &'a KindReading, Option<&'a EnhancerName>);
 impl FidelityFindings {
     /// The findings for the images that were measured; `None` if no reply is about one of these.
     #[must_use]
-    pub fn new(grid: &Grid<'_>, measured: &[ImageFidelity]) -> Option<Self> {
-        let measured: Measured = measured
+    pub fn new<'a>(grid: &Grid<'a>, measured: &'a [ImageFidelity]) -> Option<Self> {
+        let measured: Measured<'_> = measured
             .iter()
             .map(|image| {
                 (
-                    image.image,
+                    (&image.frame, image.image),
                     [Some(image.psnr.unwrap_or(f64::INFINITY)), image.ssim],
                 )
             })
@@ -123,16 +127,16 @@ impl FidelityFindings {
 }
 
 /// Sums over the replies in one condition.
-struct ConditionSums {
-    images: HashMap<Digest, [Option<f64>; 2]>,
+struct ConditionSums<'a> {
+    images: Measured<'a>,
     right: usize,
     replies: usize,
     /// Pairs by PSNR and by SSIM.
     pairs: [PairCounts; 2],
 }
 
-impl ConditionSums {
-    fn new(grid: &Grid<'_>, subjects: &[usize], measured: &Measured) -> Self {
+impl<'a> ConditionSums<'a> {
+    fn new(grid: &Grid<'a>, subjects: &[usize], measured: &Measured<'a>) -> Self {
         let mut sums = Self {
             images: HashMap::new(),
             right: 0,
@@ -143,17 +147,18 @@ impl ConditionSums {
             let mut strata = BTreeMap::<&Family, [Vec<RankedReply>; 2]>::new();
             for (index, item) in grid.items.iter().enumerate() {
                 let reading = grid.result(subject, index).reading(ReadingMode::Strict);
-                let image = grid
-                    .record(subject, index)
-                    .and_then(|record| record.detail.image.as_ref());
+                let image = grid.record(subject, index).and_then(|record| {
+                    let image = record.detail.image.as_ref()?;
+                    Some((&record.detail.frame, image.digest))
+                });
                 let (Some(reading), Some(image)) = (reading, image) else {
                     continue;
                 };
-                let Some(&numbers) = measured.get(&image.digest) else {
+                let Some(&numbers) = measured.get(&image) else {
                     continue;
                 };
                 let right = item.is_right(reading);
-                sums.images.insert(image.digest, numbers);
+                sums.images.insert(image, numbers);
                 sums.right += usize::from(right);
                 sums.replies += 1;
                 let stratum = strata.entry(&item.record.detail.family).or_default();

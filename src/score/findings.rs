@@ -77,7 +77,7 @@ impl<'a> Findings<'a> {
         let observer = ObserverSummary::of(records, &clusters);
         let is_model = |model: &str| !is_control(model);
         let is_shown = |model: &str| is_model(model) && !is_observer(model);
-        let without_observer = observer.is_refuted().then(|| {
+        let without_observer = observer.is_hidden().then(|| {
             let grid = Grid::of_models(records, &clusters, is_shown);
             Box::new(Self::of(
                 grid,
@@ -94,7 +94,7 @@ impl<'a> Findings<'a> {
         }
     }
 
-    /// What is shown: without the observer, if one of its controls is not at chance.
+    /// What is shown: without the observer, if one of its controls is not at chance or none was asked.
     #[must_use]
     pub fn shown(&self) -> &Self {
         self.without_observer.as_deref().unwrap_or(self)

@@ -4,15 +4,9 @@ use std::collections::BTreeMap;
 
 use super::cluster::Clusters;
 use super::estimate::Estimate;
-use super::subject::{OBSERVER, Subject, is_control, is_observer};
-use crate::types::{AnswerSource, FrameId, Observed, QuestionId, Record, TrialOutcome};
-
-/// The controls whose score need not be that of chance: the right image shifted by four pixels, or without detail. In both, enough
-/// is left of some things.
-const LIMITS: [&str; 2] = ["observer:shift-4", "observer:mosaic-12"];
-
-/// The control that every run with the observer asks.
-pub(crate) const OTHER_ROOM: &str = "observer:other-room";
+use super::subject::{Subject, is_control, is_observer};
+use crate::types::control::OBSERVER;
+use crate::types::{AnswerSource, Control, FrameId, Observed, QuestionId, Record, TrialOutcome};
 
 /// Results of the observer, or of one of its controls, in one condition.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,6 +34,13 @@ impl ObserverCell {
         is_control(&self.subject.model)
     }
 
+    /// Whether this is the control that each run with the observer asks.
+    #[must_use]
+    pub fn is_standing(&self) -> bool {
+        Control::of_model(&self.subject.model)
+            .is_some_and(|control| Control::STANDING.contains(&control))
+    }
+
     /// Whether this is a control whose interval excludes chance, so that the observer's lines prove nothing.
     #[must_use]
     pub fn refutes(&self) -> bool {
@@ -47,10 +48,7 @@ impl ObserverCell {
         let tolerance = 1e-9;
         let excludes =
             self.score.low > self.chance + tolerance || self.score.high < self.chance - tolerance;
-        let is_limit = LIMITS
-            .iter()
-            .any(|limit| self.subject.model.starts_with(limit));
-        self.is_control() && !is_limit && excludes
+        Control::of_model(&self.subject.model).is_some_and(Control::leaves_nothing) && excludes
     }
 }
 
@@ -104,28 +102,45 @@ impl ObserverSummary {
             .any(|cell| is_observer(&cell.subject.model))
     }
 
-    /// The controls that are not at chance.
+    /// The controls that are not at chance, over all conditions or in one. The intervals of the conditions are not corrected for
+    /// their number: rather a sound observer is hidden than a broken one shown.
     pub fn refutations(&self) -> impl Iterator<Item = &ObserverCell> {
-        self.cells.iter().filter(|cell| cell.refutes())
+        let all = self.controls.iter().chain(&self.cells);
+        all.filter(|cell| cell.refutes())
     }
 
-    /// Whether a control is not at chance, so that the observer's lines are not shown.
+    /// Whether the observer's lines are not shown: a control is not at chance, or none was asked.
     #[must_use]
-    pub fn is_refuted(&self) -> bool {
-        self.is_asked() && self.refutations().next().is_some()
+    pub fn is_hidden(&self) -> bool {
+        let is_controlled = self.cells.iter().any(ObserverCell::is_control);
+        self.is_asked() && (!is_controlled || self.refutations().next().is_some())
     }
 
-    /// The control with the image of another scene, in the condition of a cell.
+    /// The standing control over all conditions.
     #[must_use]
-    pub fn other_room(&self, cell: &ObserverCell) -> Option<&ObserverCell> {
+    pub fn standing_control(&self) -> Option<&ObserverCell> {
+        let mut standing = Control::STANDING.into_iter();
+        standing.find_map(|control| {
+            let is_it =
+                |cell: &&ObserverCell| Control::of_model(&cell.subject.model) == Some(control);
+            self.controls.iter().find(is_it)
+        })
+    }
+
+    /// The standing control in the condition of a cell.
+    #[must_use]
+    pub fn control_of(&self, cell: &ObserverCell) -> Option<&ObserverCell> {
         // Where several runs are compared, each may have its own.
         let run = cell
             .subject
             .model
             .strip_prefix(OBSERVER)
             .unwrap_or_default();
-        let names = [format!("{OTHER_ROOM}{run}"), OTHER_ROOM.to_owned()];
-        names.into_iter().find_map(|model| {
+        let mut names = Control::STANDING
+            .into_iter()
+            .map(Control::model_name)
+            .flat_map(|name| [format!("{name}{run}"), name]);
+        names.find_map(|model| {
             let subject = Subject {
                 model,
                 ..cell.subject.clone()
@@ -180,4 +195,52 @@ fn cell(subject: Subject, records: &[&Record], clusters: &Clusters) -> Option<Ob
         detected: sum(|frame| frame.detected) as f64 / things,
         explained: explained.sum::<f64>() / frames.len() as f64,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cell(model: &str, [value, low, high]: [f64; 3]) -> ObserverCell {
+        ObserverCell {
+            subject: Subject::new(model, None),
+            score: Estimate {
+                value,
+                low,
+                high,
+                n: 100,
+            },
+            chance: 0.3,
+            evidence: 0.0,
+            seen: 0.0,
+            detected: 0.0,
+            explained: 0.0,
+        }
+    }
+
+    /// The observer with one control, in one condition and over all.
+    fn summary(control: &str, in_one: [f64; 3], over_all: [f64; 3]) -> ObserverSummary {
+        ObserverSummary {
+            cells: vec![cell(OBSERVER, [0.9, 0.8, 1.0]), cell(control, in_one)],
+            controls: vec![cell(control, over_all)],
+        }
+    }
+
+    #[test]
+    fn a_control_that_is_not_at_chance_in_one_condition_or_over_all_hides_the_observer() {
+        let (chance, above) = ([0.32, 0.28, 0.36], [0.34, 0.31, 0.37]);
+        let hidden = |control, in_one, over_all| summary(control, in_one, over_all).is_hidden();
+        for control in ["observer:other-room", "observer:tiles (night)"] {
+            assert!(!hidden(control, chance, chance));
+            assert!(hidden(control, above, chance));
+            assert!(hidden(control, chance, above));
+        }
+        assert!(
+            !hidden("observer:shift-4", above, above),
+            "a limit refutes nothing"
+        );
+        let mut alone = summary("observer:tiles", chance, chance);
+        alone.cells.pop();
+        assert!(alone.is_hidden(), "without a control");
+    }
 }

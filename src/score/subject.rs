@@ -2,14 +2,13 @@
 
 use serde::Serialize;
 
-use crate::types::{AxisLevel, Condition, EnhancerName, KindReading, LightGroup, Record, View};
+use crate::types::control::OBSERVER;
+use crate::types::{
+    AxisLevel, Condition, Control, EnhancerName, KindReading, LightGroup, Record, View,
+};
 
 /// The model name of the chance line.
 pub(crate) const CHANCE: &str = "chance";
-/// The model name of the built-in observer.
-pub(crate) const OBSERVER: &str = "observer";
-/// Start of the model names of the observer's controls, for example `observer:other-room`.
-const CONTROL_PREFIX: &str = "observer:";
 
 /// A model name without the run behind it: where several runs are compared, `observer (one)` is the observer of the run `one`.
 fn without_run(model: &str) -> &str {
@@ -25,7 +24,7 @@ pub(crate) fn is_observer(model: &str) -> bool {
 /// Whether a model of this name is a control of the observer.
 #[must_use]
 pub(crate) fn is_control(model: &str) -> bool {
-    model.starts_with(CONTROL_PREFIX)
+    Control::of_model(model).is_some()
 }
 
 /// Whether a model of this name is built in and stands for comparison only: `random`, `observer` and its controls

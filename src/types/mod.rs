@@ -3,6 +3,7 @@
 pub(crate) mod axis_level;
 mod canonical;
 pub(crate) mod condition;
+pub(crate) mod control;
 pub(crate) mod decides;
 pub(crate) mod degradation;
 pub(crate) mod detail;
@@ -26,6 +27,7 @@ pub(crate) mod words;
 
 pub use axis_level::{AxisLevel, KindReading};
 pub use condition::{Condition, EnhancerName};
+pub use control::Control;
 pub(crate) use decides::Decides;
 pub use degradation::{Degradation, ReadingName};
 pub use detail::{

@@ -28,13 +28,7 @@ fn findings(
         for question in 0..questions {
             let name = (frame * questions + question, frame);
             let mut reply: Record = record("m", &condition, name, random.random_bool(rate));
-            reply.detail.image = Some(ImageFacts {
-                digest: image,
-                bytes: 1,
-                width: 1,
-                height: 1,
-                format: "png".to_owned(),
-            });
+            reply.detail.image = Some(facts(image));
             records.push(reply);
         }
         measured.push(ImageFidelity {
@@ -47,6 +41,16 @@ fn findings(
     }
     let found = Findings::new(&records, &BTreeMap::new(), [], &measured);
     found.fidelity.unwrap()
+}
+
+fn facts(digest: Digest) -> ImageFacts {
+    ImageFacts {
+        digest,
+        bytes: 1,
+        width: 1,
+        height: 1,
+        format: "png".to_owned(),
+    }
 }
 
 /// How often the interval of the AUC leaves out ½, in percent.
@@ -67,6 +71,31 @@ fn fidelity_that_says_nothing_is_rarely_called_a_predictor() {
     }
     // Fidelity that follows the rate of the frame is found.
     assert!(rejected(2, 60, [52, 20], 8.0) > 90.0);
+}
+
+#[test]
+fn two_frames_with_the_same_dark_image_have_their_own_fidelity() {
+    let condition: Condition = "L5-ev".parse().unwrap();
+    let black = Digest::of(b"black");
+    let (mut records, mut measured) = (Vec::new(), Vec::new());
+    for (frame, psnr) in [(0, 10.0), (1, 30.0)] {
+        let mut reply: Record = record("m", &condition, (frame, frame), true);
+        reply.detail.image = Some(facts(black));
+        measured.push(ImageFidelity {
+            frame: reply.detail.frame.clone(),
+            condition: condition.clone(),
+            image: black,
+            psnr: Some(psnr),
+            ssim: None,
+        });
+        records.push(reply);
+    }
+    for _ in 0..2 {
+        measured.reverse();
+        let found = Findings::new(&records, &BTreeMap::new(), [], &measured);
+        let row = &found.fidelity.unwrap().conditions[0];
+        assert_eq!((row.images, row.means[0]), (2, Some(20.0)));
+    }
 }
 
 #[test]

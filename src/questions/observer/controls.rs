@@ -1,50 +1,10 @@
-//! Controls: images in which there is nothing to see of a frame, so that the observer must guess: [`Control`].
+//! The images of the observer's controls, in which there is nothing to see of a frame, so that the observer must guess:
+//! [`spoiled`].
 //!
 //! An observer that answers more than chance on one of them answers from the labels and not from the pixels.
 
-use std::fmt;
-use std::str::FromStr;
-
 use super::ObservedFrame;
-use crate::types::{Digest, Rgb};
-
-/// A way to spoil an image.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Control {
-    /// The image of a frame of another scene in the same condition. It is shown by the plan of the run; the image is not changed.
-    OtherRoom,
-    /// Means of squares of 12 pixels. This is a limit, and not always chance: it is the right image without detail, and of large
-    /// things enough is left.
-    Mosaic12,
-    /// Means of squares of 40 pixels.
-    Mosaic40,
-    /// Left and right exchanged.
-    Mirrored,
-    /// Top and bottom exchanged.
-    UpsideDown,
-    /// Squares of 80 pixels, none of them in its place.
-    Tiles,
-    /// All pixels black.
-    Black,
-    /// All pixels the mean colour of the image.
-    Flat,
-    /// Independent uniform codes.
-    WhiteNoise,
-    /// Noise with the same power in each octave, like that of natural images.
-    PinkNoise,
-    /// Each code subtracted from 255.
-    Negative,
-    /// Blurred by about σ = 20 pixels.
-    Blur,
-    /// Shifted by 32 pixels to the right and down, around the edges.
-    Shift32,
-    /// Shifted by 4 pixels to the right and down. This is a limit, too: some outlines still agree.
-    Shift4,
-    /// Each mask filled with a colour at random.
-    RandomMasks,
-    /// The outlines of the masks, black on grey.
-    Outlines,
-}
+use crate::types::{Control, Digest, Rgb};
 
 /// Side of the squares that are shuffled, in pixels; smaller in images with fewer than three in a row or column.
 const TILE: usize = 80;
@@ -52,110 +12,41 @@ const TILE: usize = 80;
 /// Width of the three box means that stand for a Gaussian of σ = 20 pixels: σ² = 3 (41² − 1) / 12.
 const BOX: usize = 41;
 
-impl Control {
-    /// All controls, in the order in which they are asked.
-    pub const ALL: [Self; 16] = [
-        Self::OtherRoom,
-        Self::Mosaic12,
-        Self::Mosaic40,
-        Self::Mirrored,
-        Self::UpsideDown,
-        Self::Tiles,
-        Self::Black,
-        Self::Flat,
-        Self::WhiteNoise,
-        Self::PinkNoise,
-        Self::Negative,
-        Self::Blur,
-        Self::Shift32,
-        Self::Shift4,
-        Self::RandomMasks,
-        Self::Outlines,
-    ];
-
-    /// Whether nothing is left to see, so that the score must be that of chance. The others are limits of the observer.
-    #[must_use]
-    pub fn leaves_nothing(self) -> bool {
-        !matches!(self, Self::Shift4 | Self::Mosaic12)
-    }
-
-    /// The name, as in `observer:NAME`.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::OtherRoom => "other-room",
-            Self::Mosaic12 => "mosaic-12",
-            Self::Mosaic40 => "mosaic-40",
-            Self::Mirrored => "mirrored",
-            Self::UpsideDown => "upside-down",
-            Self::Tiles => "tiles",
-            Self::Black => "black",
-            Self::Flat => "flat",
-            Self::WhiteNoise => "white-noise",
-            Self::PinkNoise => "pink-noise",
-            Self::Negative => "negative",
-            Self::Blur => "blur",
-            Self::Shift32 => "shift-32",
-            Self::Shift4 => "shift-4",
-            Self::RandomMasks => "random-masks",
-            Self::Outlines => "outlines",
-        }
-    }
-
-    /// The spoiled image. Random numbers are drawn from `key` and the name of the control.
-    #[must_use]
-    pub fn spoiled(self, image: &Rgb, frame: &ObservedFrame, key: &Digest) -> Rgb {
-        let mut draws = Draws::new(key, self);
-        let [width, height] = [image.width(), image.height()];
-        let at = |from: &dyn Fn(usize, usize) -> [usize; 2]| moved(image, from);
-        match self {
-            Self::OtherRoom => image.clone(),
-            Self::Mosaic12 => mosaic(image, 12),
-            Self::Mosaic40 => mosaic(image, 40),
-            Self::Mirrored => at(&|x, y| [width - 1 - x, y]),
-            Self::UpsideDown => at(&|x, y| [x, height - 1 - y]),
-            Self::Tiles => tiles(image, &mut draws),
-            Self::Black => Rgb::black(height, width),
-            Self::Flat => mosaic(image, width.max(height)),
-            Self::WhiteNoise => {
-                let mut noise = image.clone();
-                for code in noise.samples_mut() {
-                    *code = (draws.next() >> 56) as u8;
-                }
-                noise
+/// An image as a control shows it. Random numbers are drawn from `key` and the name of the control.
+#[must_use]
+pub fn spoiled(control: Control, image: &Rgb, frame: &ObservedFrame, key: &Digest) -> Rgb {
+    let mut draws = Draws::new(key, control);
+    let [width, height] = [image.width(), image.height()];
+    let at = |from: &dyn Fn(usize, usize) -> [usize; 2]| moved(image, from);
+    match control {
+        Control::OtherRoom => image.clone(),
+        Control::Mosaic12 => mosaic(image, 12),
+        Control::Mosaic40 => mosaic(image, 40),
+        Control::Mirrored => at(&|x, y| [width - 1 - x, y]),
+        Control::UpsideDown => at(&|x, y| [x, height - 1 - y]),
+        Control::Tiles => tiles(image, &mut draws),
+        Control::Black => Rgb::black(height, width),
+        Control::Flat => mosaic(image, width.max(height)),
+        Control::WhiteNoise => {
+            let mut noise = image.clone();
+            for code in noise.samples_mut() {
+                *code = (draws.next() >> 56) as u8;
             }
-            Self::PinkNoise => pink_noise(image, &mut draws),
-            Self::Negative => {
-                let mut negative = image.clone();
-                for code in negative.samples_mut() {
-                    *code = 255 - *code;
-                }
-                negative
-            }
-            Self::Blur => blurred(image),
-            Self::Shift32 => at(&|x, y| shifted([x, y], [width, height], 32)),
-            Self::Shift4 => at(&|x, y| shifted([x, y], [width, height], 4)),
-            Self::RandomMasks => random_masks(frame, &mut draws),
-            Self::Outlines => drawn_outlines(frame),
+            noise
         }
-    }
-}
-
-impl fmt::Display for Control {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for Control {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let found = Self::ALL.into_iter().find(|control| control.name() == text);
-        found.ok_or_else(|| {
-            let names = Self::ALL.map(Self::name).join(", ");
-            format!("observer:{text} is not a control; there are: {names}")
-        })
+        Control::PinkNoise => pink_noise(image, &mut draws),
+        Control::Negative => {
+            let mut negative = image.clone();
+            for code in negative.samples_mut() {
+                *code = 255 - *code;
+            }
+            negative
+        }
+        Control::Blur => blurred(image),
+        Control::Shift32 => at(&|x, y| shifted([x, y], [width, height], 32)),
+        Control::Shift4 => at(&|x, y| shifted([x, y], [width, height], 4)),
+        Control::RandomMasks => random_masks(frame, &mut draws),
+        Control::Outlines => drawn_outlines(frame),
     }
 }
 

@@ -71,9 +71,13 @@ fn nothing_shown(rows: &[BaselineRow], old: &str, unit: ClusterUnit) -> Sentence
 /// The row with the largest difference in either direction; of several, the first.
 fn largest<'r>(rows: &[&'r BaselineRow]) -> Option<&'r BaselineRow> {
     let size = |row: &BaselineRow| row.paired.difference.value.abs();
-    rows.iter()
-        .copied()
-        .reduce(|largest, next| if size(next) > size(largest) { next } else { largest })
+    rows.iter().copied().reduce(|largest, next| {
+        if size(next) > size(largest) {
+            next
+        } else {
+            largest
+        }
+    })
 }
 
 /// The first conditions by name, and how many there are besides.

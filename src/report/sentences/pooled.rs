@@ -5,8 +5,8 @@ use crate::score::cluster::ClusterUnit;
 use crate::score::findings::Findings;
 use crate::score::pooled::PooledFinding;
 use crate::score::significance::Significance;
-use crate::score::subject::OBSERVER;
 use crate::types::AxisLevel;
+use crate::types::control::OBSERVER;
 
 /// Largest number of sentences about one enhancer.
 const MAX_PER_ENHANCER: usize = 3;

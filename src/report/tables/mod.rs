@@ -27,7 +27,7 @@ use crate::types::{EnhancerName, Family, KindReading};
 pub(super) use baseline::BASELINE;
 pub(crate) use baseline::baseline;
 pub(super) use levels::unread;
-pub(super) use observer::notes as observer_notes;
+pub(super) use observer::{notes as observer_notes, what_it_is};
 pub(super) use sections::{ENHANCERS, SECTIONS};
 pub(super) use summary::{SUMMARY, reading};
 

@@ -4,7 +4,8 @@ use crate::report::table::ColumnKind::{Count, Percent, Share, Text};
 use crate::report::table::{Table, TableBuilder, TableFormat};
 use crate::report::words::percent;
 use crate::score::findings::Findings;
-use crate::score::observed::{OTHER_ROOM, ObserverCell, ObserverSummary};
+use crate::score::observed::{ObserverCell, ObserverSummary};
+use crate::types::Control;
 
 /// What the observer is, above its table.
 const HEADING: &str = "Known-signal observer (given the untouched frame; not a model)";
@@ -23,18 +24,16 @@ pub(super) fn observer(findings: &Findings<'_>) -> Vec<Table> {
     table.heading = Some(format!(
         "{HEADING}: expected score in % with its 95 % interval, a guess among k choices counts 1/k"
     ));
-    if !observer.is_refuted() && observer.is_asked() {
+    if !observer.is_hidden() && observer.is_asked() {
+        let control = observer.standing_control();
+        let control = control.map(|control| format!(" Control: {}.", what_it_is(control)));
         table.latex = Some(format!(
-            "{HEADING}: expected score in \\% with its 95\\,\\% interval. A guess among $k$ choices counts $1/k$. Control: \
-             the same observer with the image of another scene."
+            "{HEADING}: expected score in \\% with its 95\\,\\% interval. A guess among $k$ choices counts $1/k$.{}",
+            control.unwrap_or_default()
         ));
     }
     let mut tables = vec![table];
-    if observer
-        .controls
-        .iter()
-        .any(|cell| cell.subject.model != OTHER_ROOM)
-    {
+    if observer.controls.iter().any(|cell| !cell.is_standing()) {
         tables.push(controls(observer));
     }
     tables
@@ -42,10 +41,10 @@ pub(super) fn observer(findings: &Findings<'_>) -> Vec<Table> {
 
 /// A row for each condition. The file has rows for the controls, too.
 fn conditions(observer: &ObserverSummary) -> Table {
-    let is_refuted = observer.is_refuted();
+    let is_hidden = observer.is_hidden();
     let mut builder = TableBuilder::new("observer", &observer.cells);
     for format in SHOWN {
-        builder = builder.hide(format, |cell| is_refuted || cell.is_control());
+        builder = builder.hide(format, |cell| is_hidden || cell.is_control());
     }
     builder
         .page("observer", HEADING)
@@ -80,8 +79,8 @@ fn conditions(observer: &ObserverSummary) -> Table {
         .column(Count, "csv n | terminal n | page n | latex $n$", |cell| cell.score.n)
         .column(
             Share,
-            "terminal another room | page control: another room in % [95 %] | latex Control",
-            |cell| observer.other_room(cell).map(|control| control.score),
+            "terminal control | page control in % [95 %] | latex Control",
+            |cell| observer.control_of(cell).map(|control| control.score),
         )
         .build()
 }
@@ -126,23 +125,34 @@ pub(in crate::report) fn notes(observer: &ObserverSummary) -> Vec<String> {
         let [value, low, high] =
             [control.score.value, control.score.low, control.score.high].map(percent);
         return vec![format!(
-            "the observer is not shown: its control {} at {} scores {value} [{low}, {high}], and chance is {}; it answers from the \
-             labels, not from the pixels (observer.csv has all numbers)",
+            "the observer is not shown: its control {}{} scores {value} [{low}, {high}], and chance is {}, so its answers do not \
+             follow from the pixels alone (observer.csv has all numbers)",
             control.subject.model,
-            control.subject.condition(),
+            control.subject.level.map_or_else(String::new, |_| format!(
+                " at {}",
+                control.subject.condition()
+            )),
             percent(control.chance)
         )];
     }
-    let mut notes = Vec::new();
-    if !observer.cells.iter().any(ObserverCell::is_control) {
-        notes.push(
-            "no control was asked: that the observer guesses without the right image is not shown"
+    if observer.is_hidden() {
+        return vec![
+            "the observer is not shown: none of its controls has a reply, so that it guesses without the right image is not shown \
+             (observer.csv has all numbers)"
                 .to_owned(),
-        );
+        ];
     }
     let own = observer.cells.iter().filter(|cell| !cell.is_control());
-    notes.extend(own.filter(|cell| cell.seen <= 0.0).map(blank));
-    notes
+    own.filter(|cell| cell.seen <= 0.0).map(blank).collect()
+}
+
+/// What a standing control is, as `shown …` of it.
+pub(in crate::report) fn what_it_is(control: &ObserverCell) -> &'static str {
+    if Control::of_model(&control.subject.model) == Some(Control::OtherRoom) {
+        "the same observer, shown images of other rooms"
+    } else {
+        "the same observer, shown the tiles of the right images in another order"
+    }
 }
 
 /// The note on a condition in which nothing is seen.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::choice_order::arrange;
-use super::controls::OTHER_ROOM;
+use super::controls::is_other_room;
 use super::setup::ChoiceSetup;
 use crate::error::Result;
 use crate::job::models::{ModelUnderTest, asked_in};
@@ -108,8 +108,7 @@ fn group(
         setup.recipe.stimulus(source, condition)
     });
     let image = image.transpose()?;
-    let is_control =
-        |model: &ModelUnderTest| view == View::Image && model.model.name() == OTHER_ROOM;
+    let is_control = |model: &ModelUnderTest| view == View::Image && is_other_room(model);
     let own = asked.own.iter().map(|shown| (shown, false));
     let others = asked.others.iter().map(|shown| (shown, true));
     let mut trials = Vec::with_capacity((asked.own.len() + asked.others.len()) * models.len());

@@ -50,7 +50,7 @@ pub(crate) struct ChoiceArgs {
     /// A folder with custom prompts (choice.txt, blind.txt); default: built in
     #[arg(long, value_name = "DIR", add = Decides::Reply)]
     pub prompts: Option<PathBuf>,
-    /// Ask every control of the observer too (observer:other-room is always asked)
+    /// Ask every control of the observer too (observer:other-room, or observer:tiles if all frames are of one scene, is always asked)
     #[arg(long, add = Decides::Trials)]
     pub observer_controls: bool,
 }

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use super::controls::{AddedControls, OTHER_ROOM};
+use super::controls::{AddedControls, is_other_room};
 use super::other_room::OtherRooms;
 use super::settings::Evaluation;
 use crate::ask::{Model, Random};
@@ -89,11 +89,10 @@ impl<'a> ChoiceSetup<'a> {
             other_rooms: other_rooms.unwrap_or_default(),
             dataset,
         };
-        let is_asked = |model: &ModelUnderTest| model.model.name() == OTHER_ROOM;
-        if shows_images && setup.models.iter().any(is_asked) {
+        if shows_images && setup.models.iter().any(is_other_room) {
             setup.add_other_rooms(all)?;
         }
-        controls.say(progress);
+        controls.print(progress);
         Ok((setup, files))
     }
 

@@ -8,7 +8,7 @@ use std::sync::LazyLock;
 
 use crate::support::table::check_rows;
 use darkqa_eval::Rgb;
-use darkqa_eval::internals::questions::Control;
+use darkqa_eval::internals::questions::{self, Control};
 use darkqa_eval::internals::rooms::Rooms;
 use darkqa_eval::synthesis::{CameraModel, LightReading, Synthesis};
 use darkqa_eval::types::Digest;
@@ -34,7 +34,7 @@ fn spoiled(set: &Set, place: usize, asked: &Asked, control: Control) -> Rgb {
     let key = Digest::of(asked.id.0.as_bytes());
     match control {
         Control::OtherRoom => set.other(place).image.clone(),
-        control => control.spoiled(&asked.image, &asked.known, &key),
+        control => questions::spoiled(control, &asked.image, &asked.known, &key),
     }
 }
 

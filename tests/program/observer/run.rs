@@ -114,7 +114,7 @@ fn parts_and_interruptions_change_nothing() {
 }
 
 #[test]
-fn with_one_scene_the_control_is_impossible_and_that_is_said() {
+fn with_one_scene_the_control_is_shown_the_tiles_in_another_order() {
     let bench = Bench::new();
     let line = "--model observer --data rooms:frames=2,size=160x120 --levels L0 --out run";
     let called = bench.call(&words(line));
@@ -123,7 +123,23 @@ fn with_one_scene_the_control_is_impossible_and_that_is_said() {
         called.stderr.contains("all frames are of one scene"),
         "{called:?}"
     );
-    assert!(called.stdout.contains("no control was asked"), "{called:?}");
+    let control = "the tiles of the right images in another order, scores ";
+    let stdout = called.stdout.split_whitespace().collect::<Vec<_>>();
+    assert!(stdout.join(" ").contains(control), "{called:?}");
+    // Without the control, the observer is not shown.
+    let path = bench.path("run/records.jsonl");
+    let records = fs::read_to_string(&path).unwrap();
+    let own = records
+        .lines()
+        .filter(|line| !line.contains("observer:tiles"));
+    fs::write(&path, own.collect::<Vec<_>>().join("\n") + "\n").unwrap();
+    let hidden = bench.call(&words("report run --full"));
+    assert!(
+        hidden
+            .stdout
+            .contains("the observer is not shown: none of its controls"),
+        "{hidden:?}"
+    );
     let named = bench.call(&words(&line.replace("observer", "observer:other-room")));
     assert_eq!(named.code, Some(2), "{named:?}");
     assert!(named.stderr.contains("at least two scenes"), "{named:?}");
