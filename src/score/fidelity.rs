@@ -7,7 +7,9 @@ use super::choice::ReadingMode;
 use super::grid::Grid;
 use super::significance::{Significance, holm};
 use super::subject::Subject;
-use crate::types::{AxisLevel, Digest, EnhancerName, Family, FrameId, ImageFidelity, KindReading, View};
+use crate::types::{
+    AxisLevel, Digest, EnhancerName, Family, FrameId, ImageFidelity, KindReading, View,
+};
 
 /// What the similarity of images to their clean frames says about the answers.
 ///

@@ -124,14 +124,14 @@ pub(in crate::report) fn notes(observer: &ObserverSummary) -> Vec<String> {
     if let Some(control) = observer.refutations().next() {
         let [value, low, high] =
             [control.score.value, control.score.low, control.score.high].map(percent);
+        let place = match control.subject.level {
+            Some(_) => format!("at {}", control.subject.condition()),
+            None => "over all conditions".to_owned(),
+        };
         return vec![format!(
-            "the observer is not shown: its control {}{} scores {value} [{low}, {high}], and chance is {}, so its answers do not \
+            "the observer is not shown: its control {} {place} scores {value} [{low}, {high}], and chance is {}, so its answers do not \
              follow from the pixels alone (observer.csv has all numbers)",
             control.subject.model,
-            control.subject.level.map_or_else(String::new, |_| format!(
-                " at {}",
-                control.subject.condition()
-            )),
             percent(control.chance)
         )];
     }

@@ -16,7 +16,7 @@ pub(super) fn is_other_room(model: &ModelUnderTest) -> bool {
 #[derive(Debug, Default)]
 pub(super) struct AddedControls {
     pub(super) names: Vec<ModelName>,
-    /// A line about the standing control; `None` if it is not asked.
+    /// A line about other-room; `None` if it is not added.
     line: Option<&'static str>,
 }
 
@@ -48,13 +48,15 @@ impl AddedControls {
         });
         let names = controls.map(|control| ModelName::Observer(Some(control)));
         let names: Vec<ModelName> = names.filter(|name| !ask.models.contains(name)).collect();
-        let line = if has_other_scene {
-            "observer:other-room is asked too: the observer with the image of another scene; its score must be that of chance"
-        } else {
-            "all frames are of one scene, so observer:other-room is not possible; observer:tiles is asked instead: the observer with \
-             the tiles of the right image in another order; its score must be that of chance"
-        };
-        let line = Some(line);
+        if !has_other_scene {
+            tracing::warn!(
+                "all frames are of one scene, so observer:other-room is not possible; observer:tiles is asked instead: the observer \
+                 with the tiles of the right image in another order; its score must be that of chance"
+            );
+        }
+        let line = has_other_scene.then_some(
+            "observer:other-room is asked too: the observer with the image of another scene; its score must be that of chance",
+        );
         Ok(Self { names, line })
     }
 

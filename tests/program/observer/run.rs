@@ -76,7 +76,7 @@ fn it_is_asked_with_the_image_of_another_scene_too() {
         "{observer}"
     );
     let page = fs::read_to_string(bench.path("run/report.html")).unwrap();
-    assert!(page.contains("control: another room"));
+    assert!(page.contains("control in % [95 %]"));
     // `show` makes the image of the other frame again, too.
     let shown = bench.complete(&["show", "run", text(other[0], "question")]);
     let frame = text(other[0], "shown_frame");
@@ -203,7 +203,7 @@ fn a_control_that_is_not_at_chance_hides_the_observer() {
     fs::write(&path, spoiled).unwrap();
     let called = bench.call(&["report", "run", "--out", "report"]);
     assert_eq!(called.code, Some(0), "{called:?}");
-    let reason = "the observer is not shown: its control observer:other-room at ";
+    let reason = "the observer is not shown: its control observer:other-room over all";
     assert_eq!(called.stdout.matches(reason).count(), 1, "{called:?}");
     let rows = called
         .stdout
