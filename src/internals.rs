@@ -56,7 +56,8 @@ pub mod score {
         AnswerOutcome, Baseline, Group, OpenSummary, QuestionGroups, ScoredAnswer, open_summary,
     };
     pub use crate::score::paired::{PairedComparison, difference};
-    pub use crate::score::pooled::{PooledFinding, PooledKind, pooled};
+    pub use crate::score::pooled::{PooledFinding, pooled};
+    pub use crate::score::pooled_kind::PooledKind;
     pub use crate::score::significance::Significance;
     pub use crate::score::subject::Subject;
     pub use crate::score::threshold::{LevelCounts, NoThreshold};

@@ -1,10 +1,10 @@
-//! Answers given against true answers: [`Confusion`], [`Hallucination`] and [`Collapse`].
+//! Answers given against true answers: [`Confusion`], [`Hallucination`], [`FalseAnswer`] and [`Collapse`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::choice::ReadingMode;
 use super::estimate::Estimate;
-use super::grid::{ClusterCount, Grid};
+use super::grid::{ClusterCount, Grid, GridItem};
 use super::subject::Subject;
 use crate::types::Family;
 
@@ -20,6 +20,8 @@ pub struct Confusion {
     pub labels: Vec<String>,
     /// Number of replies by true answer, then by answer given. The last column counts replies without a readable answer.
     pub counts: Vec<Vec<usize>>,
+    /// The answer given most often; `None` if no answer could be read.
+    pub collapse: Option<Collapse>,
 }
 
 /// Confusion tables of every subject, for families with at most [`MAX_LABELS`] different answers.
@@ -41,12 +43,15 @@ pub(crate) fn confusions(grid: &Grid<'_>) -> Vec<Confusion> {
         for (index, subject) in grid.subjects.iter().enumerate() {
             let counts = counts(grid, index, family, &labels);
             if counts.iter().flatten().any(|count| *count > 0) {
-                all.push(Confusion {
+                let mut confusion = Confusion {
                     subject: subject.clone(),
                     family: family.clone(),
                     labels: labels.clone(),
                     counts,
-                });
+                    collapse: None,
+                };
+                confusion.collapse = Collapse::of(grid, index, &confusion);
+                all.push(confusion);
             }
         }
     }
@@ -71,24 +76,6 @@ fn counts(grid: &Grid<'_>, subject: usize, family: &Family, labels: &[String]) -
     counts
 }
 
-/// Distribution of the answers given, compared with the true answers. A model that no longer sees gives the same answer
-/// to everything.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Collapse {
-    /// The answer given most often.
-    pub top: String,
-    /// Share of that answer among all replies.
-    pub share: f64,
-    /// Share of the same replies for which that answer is true.
-    pub truth: f64,
-    /// Entropy of the answers given, in bits, over replies with a readable answer.
-    pub entropy: f64,
-    /// Entropy of the true answers, in bits, over all replies.
-    pub true_entropy: f64,
-    /// Number of replies, readable or not.
-    pub n: usize,
-}
-
 impl Confusion {
     /// For each answer, the number of times it was given and the number of times it was true.
     #[must_use]
@@ -100,28 +87,88 @@ impl Confusion {
             .collect()
     }
 
-    /// Collapse of the answers; `None` if no answer could be read.
+    /// Share of an answer among all replies, readable or not; 0 if it is not one of the labels.
     #[must_use]
-    pub fn collapse(&self) -> Option<Collapse> {
-        let shares = self.shares();
-        let n: usize = shares.iter().map(|(_, truth)| truth).sum();
-        // Of several most frequent answers, the first by name.
-        let (top, (predicted, truth)) = shares
-            .iter()
-            .enumerate()
-            .rev()
-            .max_by_key(|(_, (predicted, _))| *predicted)?;
+    pub fn share_of(&self, answer: &str) -> f64 {
+        let all: usize = self.counts.iter().flatten().sum();
+        let labels = self.labels.iter().zip(self.shares());
+        let given = labels.filter(|(label, _)| *label == answer);
+        given.map(|(_, (given, _))| given).sum::<usize>() as f64 / all as f64
+    }
+}
+
+/// Distribution of the answers given, compared with the true answers. A model that no longer sees gives the same answer
+/// to everything.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Collapse {
+    /// The answer given most often.
+    pub top: String,
+    /// Share of that answer among all replies, readable or not, with its interval by cluster.
+    pub share: Estimate,
+    /// Share of the same replies for which that answer is true.
+    pub truth: f64,
+    /// Share of that answer that is expected if one of the choices is drawn for each of the same replies.
+    pub guess: f64,
+    /// Entropy of the answers given, in bits, over replies with a readable answer.
+    pub entropy: f64,
+    /// Entropy of the true answers, in bits, over all replies.
+    pub true_entropy: f64,
+    /// Number of clusters of the replies.
+    pub clusters: usize,
+}
+
+/// By how much the share of one answer must exceed its true share to be called a collapse; chosen.
+pub(crate) const MIN_EXCESS: f64 = 0.2;
+
+/// Fewest clusters of a collapse; chosen, as for thresholds.
+const MIN_CLUSTERS: usize = 8;
+
+impl Collapse {
+    /// The answer that a subject gives most often; of several, the first by name.
+    fn of(grid: &Grid<'_>, subject: usize, confusion: &Confusion) -> Option<Self> {
+        let shares = confusion.shares();
+        let labels = shares.iter().enumerate().rev();
+        let (top, (predicted, truth)) = labels.max_by_key(|(_, (predicted, _))| *predicted)?;
         if *predicted == 0 {
             return None;
         }
-        Some(Collapse {
-            top: self.labels[top].clone(),
-            share: *predicted as f64 / n as f64,
-            truth: *truth as f64 / n as f64,
+        let top = &confusion.labels[top];
+        let mut clusters = BTreeMap::<u32, ClusterCount>::new();
+        let mut guess = 0.0;
+        for (item, result) in grid.of_family(subject, Some(&confusion.family)) {
+            let Some(chosen) = result.reading(ReadingMode::Strict) else {
+                continue;
+            };
+            let choices = &item.record.detail.choices;
+            let given = chosen.and_then(|index| choices.get(usize::from(index)));
+            let count = clusters.entry(item.cluster).or_default();
+            count.replies += 1;
+            count.right += u32::from(given == Some(top));
+            if choices.contains(top) {
+                guess += 1.0 / choices.len() as f64;
+            }
+        }
+        let counts: Vec<ClusterCount> = clusters.into_values().collect();
+        let share = Estimate::clustered(&counts)?;
+        Some(Self {
+            top: top.clone(),
+            share,
+            truth: *truth as f64 / share.n as f64,
+            guess: guess / share.n as f64,
             entropy: entropy(shares.iter().map(|(predicted, _)| *predicted)),
             true_entropy: entropy(shares.iter().map(|(_, truth)| *truth)),
-            n,
+            clusters: counts.len(),
         })
+    }
+
+    /// Whether one answer is given far too often: [`MIN_EXCESS`] above its true share, and with an interval above both its true
+    /// share and that of guessing. A model that draws yes or no where few answers are “yes” does not collapse.
+    #[must_use]
+    pub fn is_shown(&self) -> bool {
+        let rounding = 1e-9;
+        self.clusters >= MIN_CLUSTERS
+            && self.share.value - self.truth >= MIN_EXCESS - rounding
+            && self.share.low > f64::max(self.truth, self.guess)
     }
 }
 
@@ -133,6 +180,45 @@ fn entropy(counts: impl Iterator<Item = usize> + Clone) -> f64 {
         -share * libm::log2(share)
     });
     terms.sum()
+}
+
+/// A false answer to a presence question.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum FalseAnswer {
+    /// “no” to what is there: a present object is overlooked.
+    No,
+    /// “yes” to what is not there: an absent object is reported.
+    Yes,
+}
+
+impl FalseAnswer {
+    /// The answer in words.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::No => "no",
+            Self::Yes => "yes",
+        }
+    }
+
+    /// Whether an item is a presence question to which this answer is false: the other word is true.
+    pub(super) fn is_false_for(self, item: &GridItem<'_>) -> bool {
+        let truth = match self {
+            Self::No => Self::Yes,
+            Self::Yes => Self::No,
+        };
+        item.is_of(Some(&Family::Presence)) && truth.is_choice(item, item.record.detail.truth)
+    }
+
+    /// Whether a reading of a reply is this answer. A reply that could not be read is neither word.
+    pub(super) fn is_given(self, item: &GridItem<'_>, chosen: Option<u8>) -> bool {
+        chosen.is_some_and(|index| self.is_choice(item, usize::from(index)))
+    }
+
+    fn is_choice(self, item: &GridItem<'_>, index: usize) -> bool {
+        let choice = item.record.detail.choices.get(index);
+        choice.is_some_and(|choice| choice.eq_ignore_ascii_case(self.word()))
+    }
 }
 
 /// Rates at which a subject reports absent objects and overlooks present ones.
@@ -152,30 +238,24 @@ pub(crate) fn hallucinations(grid: &Grid<'_>) -> Vec<Hallucination> {
     let subjects = grid.subjects.iter().enumerate();
     let rates = subjects.map(|(index, subject)| Hallucination {
         subject: subject.clone(),
-        false_positive: rate(grid, index, "no", "yes"),
-        false_negative: rate(grid, index, "yes", "no"),
+        false_positive: rate(grid, index, FalseAnswer::Yes),
+        false_negative: rate(grid, index, FalseAnswer::No),
     });
     rates
         .filter(|rates| rates.false_positive.is_some() || rates.false_negative.is_some())
         .collect()
 }
 
-/// Share of `answer` among replies to presence questions whose true answer is `truth`.
-fn rate(grid: &Grid<'_>, subject: usize, truth: &str, answer: &str) -> Option<Estimate> {
+/// Share of a false answer among the replies to presence questions to which it is false.
+fn rate(grid: &Grid<'_>, subject: usize, answer: FalseAnswer) -> Option<Estimate> {
     let mut clusters = BTreeMap::<u32, ClusterCount>::new();
     for (item, result) in grid.of_family(subject, Some(&Family::Presence)) {
-        let choices = &item.record.detail.choices;
-        let is = |index: usize, text: &str| {
-            choices
-                .get(index)
-                .is_some_and(|choice| choice.eq_ignore_ascii_case(text))
-        };
         if let Some(chosen) = result.reading(ReadingMode::Strict)
-            && is(item.record.detail.truth, truth)
+            && answer.is_false_for(item)
         {
             let count = clusters.entry(item.cluster).or_default();
             count.replies += 1;
-            count.right += u32::from(chosen.is_some_and(|index| is(usize::from(index), answer)));
+            count.right += u32::from(answer.is_given(item, chosen));
         }
     }
     let counts: Vec<ClusterCount> = clusters.into_values().collect();

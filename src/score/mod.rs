@@ -37,6 +37,7 @@ pub(crate) mod observed;
 pub(crate) mod open;
 pub(crate) mod paired;
 pub(crate) mod pooled;
+pub(crate) mod pooled_kind;
 mod quantiles;
 pub(crate) mod realism;
 mod record;

@@ -10,43 +10,18 @@ use super::choice::ReadingMode;
 use super::estimate::Estimate;
 use super::grid::Grid;
 use super::paired::difference;
+use super::pooled_kind::PooledKind;
 use super::significance::{Significance, holm, least_p, swap_test};
 use super::subject::Subject;
 use crate::types::degradation::Kind;
 use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
 
-/// The two sides of a pooled finding.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum PooledKind {
-    /// A degraded level against L0, without an enhancer.
-    Darkness,
-    /// Sensor noise against exposure drop alone, at the same level.
-    Noise,
-    /// Enhanced against raw, at the same level and variant.
-    Enhancer,
-    /// Raw images against no image.
-    Blind,
-}
-
-impl PooledKind {
-    /// The name of the kind in CSV files.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Darkness => "darkness",
-            Self::Noise => "noise",
-            Self::Enhancer => "enhancer",
-            Self::Blind => "blind",
-        }
-    }
-}
-
 /// Difference of two conditions at one level, for all models of the pool together, in the strict reading.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PooledFinding {
-    /// The two sides.
+    /// The two sides, and what is counted.
     pub kind: PooledKind,
-    /// Question family; `None` for all families together.
+    /// Question family; `None` for all families together. Findings about false answers have [`Family::Presence`] alone.
     pub family: Option<Family>,
     /// Kind of degradation of the first side, with its light reading; [`KindReading::NONE`] for L0 against no image.
     pub variant: KindReading,
@@ -59,11 +34,11 @@ pub struct PooledFinding {
     /// The models without images on the second side, sorted; empty if the finding is not about them. They are the same models
     /// as `models` if these were asked without images too.
     pub blind_models: Vec<String>,
-    /// Accuracy of the first side: mean over the items of the mean over the models.
+    /// Share of the first side that is counted, accuracy or rate of false answers: mean over the items of the mean over the models.
     pub first: f64,
-    /// Accuracy of the second side.
+    /// The same share of the second side.
     pub second: f64,
-    /// The first accuracy minus the second. Its `n` is the number of items.
+    /// The first share minus the second. Its `n` is the number of items.
     pub difference: Estimate,
     /// p-value of swapping the two sides in whole clusters, of all models at once.
     pub p: f64,
@@ -73,7 +48,7 @@ pub struct PooledFinding {
     pub holm: f64,
     /// Number of findings in its set.
     pub levels: usize,
-    /// Result of the test after correction.
+    /// Result of the test after correction. A rate of false answers that is shown to grow is worse.
     pub verdict: Significance,
     /// Number of items that every model answered on both sides.
     pub items: usize,
@@ -87,9 +62,9 @@ pub struct PooledFinding {
     pub least_holm: f64,
 }
 
-/// The models over which findings are pooled: those with images, without reference models if there are others.
+/// The models over which findings are pooled, sorted: those with images, without reference models if there are others.
 #[must_use]
-pub(super) fn pool<'g>(grid: &'g Grid<'_>) -> Vec<&'g str> {
+pub(crate) fn pool<'g>(grid: &'g Grid<'_>) -> Vec<&'g str> {
     models(grid, View::Image)
 }
 
@@ -127,18 +102,12 @@ impl PooledSet {
         let seeing = grid.subjects.iter();
         let seeing = seeing.filter(|subject| subject.view == Some(View::Image));
         let sets = seeing.flat_map(|subject| {
-            let raw: &[PooledKind] = match subject.variant.kind {
-                None => &[PooledKind::Blind],
-                Some(kind) if kind.base().is_some() => {
-                    &[PooledKind::Darkness, PooledKind::Noise, PooledKind::Blind]
-                }
-                Some(_) => &[PooledKind::Darkness, PooledKind::Blind],
-            };
+            let raw = PooledKind::of_raw(subject.variant.kind);
             let kinds = match subject.enhancer {
                 None => raw,
-                Some(_) => &[PooledKind::Enhancer],
+                Some(_) => vec![PooledKind::Enhancer],
             };
-            kinds.iter().map(|&kind| Self {
+            kinds.into_iter().map(|kind| Self {
                 kind,
                 variant: subject.variant.clone(),
                 enhancer: subject.enhancer.clone(),
@@ -158,7 +127,9 @@ impl PooledSet {
         let seeing = |level, variant, enhancer| Subject::seeing(model, level, variant, enhancer);
         let first = seeing(level, &self.variant, self.enhancer.as_ref());
         let second = match self.kind {
-            PooledKind::Darkness => seeing(AxisLevel::L0, &self.variant, None),
+            PooledKind::Darkness | PooledKind::Hallucination(_) => {
+                seeing(AxisLevel::L0, &self.variant, None)
+            }
             PooledKind::Noise => {
                 let base = KindReading {
                     kind: self.variant.kind.and_then(Kind::base),
@@ -206,13 +177,13 @@ impl PooledSet {
     }
 }
 
-/// Right replies of all models to one item on both sides.
+/// Replies of all models to one item on both sides.
 #[derive(Debug, Clone, Copy)]
 struct PooledItem {
     /// Index of the item in the grid.
     index: usize,
-    /// Right replies of each side; `None` if a model has no reply.
-    right: Option<[u32; 2]>,
+    /// Number of replies of each side that are counted: right ones, or false answers; `None` if a model has no reply.
+    counted: Option<[u32; 2]>,
 }
 
 /// All pooled findings, ordered by kind, variant, enhancer, family and level.
@@ -232,8 +203,11 @@ fn of_set(grid: &Grid<'_>, set: &PooledSet) -> Vec<PooledFinding> {
     }
     let at = |level: &AxisLevel| Some((*level, items(grid, set, &models, *level)?));
     let levels: Vec<(AxisLevel, Vec<PooledItem>)> = levels.iter().filter_map(at).collect();
-    let groups = grid.groups().into_iter();
-    let findings = groups.flat_map(|family| {
+    let groups = match set.kind.only_family() {
+        None => grid.groups(),
+        only => vec![only],
+    };
+    let findings = groups.into_iter().flat_map(|family| {
         let levels = levels.iter();
         let of_family = levels
             .filter_map(|(level, items)| finding(grid, set, &models, (*level, items), family));
@@ -252,20 +226,22 @@ fn items(
     let pairs = models.iter();
     let pairs = pairs.map(|[model, other]| set.sides(grid, model, other, level));
     let pairs: Vec<(usize, usize)> = pairs.collect::<Option<_>>()?;
-    let items = grid.items.iter().enumerate().filter_map(|(index, item)| {
-        let (mut right, mut is_asked, mut is_answered) = ([0, 0], false, true);
+    let items = grid.items.iter().enumerate();
+    let items = items.filter(|(_, item)| set.kind.is_about(item));
+    let items = items.filter_map(|(index, item)| {
+        let (mut counted, mut is_asked, mut is_answered) = ([0, 0], false, true);
         for &(first, second) in &pairs {
             let [a, b] = [first, second].map(|subject| grid.result(subject, index));
             is_asked |= a.is_asked() && b.is_asked();
             for (side, result) in [a, b].into_iter().enumerate() {
                 match result.reading(ReadingMode::Strict) {
                     None => is_answered = false,
-                    Some(chosen) => right[side] += u32::from(item.is_right(chosen)),
+                    Some(chosen) => counted[side] += u32::from(set.kind.counts(item, chosen)),
                 }
             }
         }
-        let right = is_answered.then_some(right);
-        is_asked.then_some(PooledItem { index, right })
+        let counted = is_answered.then_some(counted);
+        is_asked.then_some(PooledItem { index, counted })
     });
     Some(items.collect())
 }
@@ -279,10 +255,10 @@ fn finding(
     family: Option<&Family>,
 ) -> Option<PooledFinding> {
     let mut clusters = vec![(0_i64, 0_u32); grid.clusters];
-    let (mut right, mut squares, mut dropped) = ([0_u64; 2], 0, 0);
+    let (mut counted, mut squares, mut dropped) = ([0_u64; 2], 0, 0);
     let of_family = items
         .iter()
-        .map(|item| (&grid.items[item.index], item.right));
+        .map(|item| (&grid.items[item.index], item.counted));
     for (item, answered) in of_family.filter(|(item, _)| item.is_of(family)) {
         let Some([first, second]) = answered else {
             dropped += 1;
@@ -293,8 +269,8 @@ fn finding(
         *net += item_net;
         squares += item_net * item_net;
         *count += 1;
-        right[0] += u64::from(first);
-        right[1] += u64::from(second);
+        counted[0] += u64::from(first);
+        counted[1] += u64::from(second);
     }
     clusters.retain(|(_, count)| *count > 0);
     let n: usize = clusters.iter().map(|(_, count)| *count as usize).sum();
@@ -306,7 +282,7 @@ fn finding(
     let sums = clusters.iter();
     let sums = sums.map(|(net, count)| (*net as f64 / pairs, f64::from(*count)));
     let tested = swap_test(&nets);
-    let mean = |right: u64| right as f64 / pairs / n as f64;
+    let mean = |count: u64| count as f64 / pairs / n as f64;
     let names = |side: usize| {
         let names: BTreeSet<&str> = models.iter().map(|pair| pair[side]).collect();
         names.into_iter().map(str::to_owned).collect()
@@ -323,8 +299,8 @@ fn finding(
         } else {
             Vec::new()
         },
-        first: mean(right[0]),
-        second: mean(right[1]),
+        first: mean(counted[0]),
+        second: mean(counted[1]),
         difference: difference(&sums.collect::<Vec<_>>(), squares as f64 / pairs / pairs, n),
         p: tested.p,
         draws: tested.draws,
@@ -351,7 +327,8 @@ fn corrected(mut set: Vec<PooledFinding>) -> Vec<PooledFinding> {
         finding.holm = holm;
         finding.levels = levels;
         finding.least_holm = least_holm;
-        finding.verdict = Significance::of(finding.difference.value, holm, least_holm);
+        let gain = finding.kind.gain(finding.difference.value);
+        finding.verdict = Significance::of(gain, holm, least_holm);
     }
     set
 }

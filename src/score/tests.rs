@@ -5,10 +5,12 @@ use std::collections::BTreeMap;
 use super::best::best_in_the_dark;
 use super::choice::ReadingMode;
 use super::cluster::Clusters;
+use super::confusion::{FalseAnswer, confusions};
 use super::findings::Findings;
 use super::grid::Grid;
 use super::paired::PairedComparison;
-use super::pooled::{PooledFinding, PooledKind, pooled};
+use super::pooled::{PooledFinding, pooled};
+use super::pooled_kind::PooledKind;
 use super::significance::Significance;
 use super::subject::Subject;
 use crate::types::{
@@ -249,4 +251,89 @@ fn below_blind_is_what_the_corrected_test_shows() {
     // Two points less are below, and not shown to be.
     assert!(below("L3-noise").is_empty());
     assert_eq!(below("L5-noise"), ["m"]);
+}
+
+/// The records of a model about presence, two questions a frame: something is there in the first, and not in the second. `reply` gives
+/// the reply to a question, of which `true` says that something is there.
+fn presence(model: &str, condition: &str, reply: fn(usize, bool) -> Option<bool>) -> Vec<Record> {
+    let mut records = records(model, condition, |_| Some(true));
+    for (item, record) in records.iter_mut().enumerate() {
+        let detail = &mut record.detail;
+        let is_there = item % 2 == 0;
+        detail.family = Family::Presence;
+        detail.choices = ["Yes", "no"].map(str::to_owned).to_vec();
+        detail.truth = usize::from(!is_there);
+        let chosen = reply(item / 2, is_there).map(|yes| usize::from(!yes));
+        detail.strict = Some(AnswerReading { chosen, why: None });
+    }
+    records
+}
+
+#[test]
+fn false_answers_are_the_other_word_and_not_a_missing_one() {
+    let all = [
+        presence("m", "L0", |frame, is_there| Some(is_there && frame != 0)),
+        // In the dark: “no” to eleven of twelve.
+        presence("m", "L3-noise", |frame, _| Some(frame == 3)),
+        // Nothing can be read: wrong, and no “no”.
+        presence("m", "L5-noise", |_, _| None),
+        records("m", "L0", |_| Some(true)),
+    ]
+    .concat();
+    with_grid(&all[..6 * FRAMES], |grid| {
+        let findings = pooled(grid);
+        let of = |answer: FalseAnswer| -> Vec<&PooledFinding> {
+            let kind = PooledKind::Hallucination(answer);
+            let of_kind = findings.iter().filter(|finding| finding.kind == kind);
+            of_kind.collect()
+        };
+        let said_no = of(FalseAnswer::No);
+        assert_eq!(said_no.len(), 2);
+        let (dark, darkest) = (said_no[0], said_no[1]);
+        assert_eq!(dark.family, Some(Family::Presence));
+        assert_eq!((dark.items, dark.clusters, dark.levels), (12, 12, 2));
+        assert!((dark.first - 11.0 / 12.0).abs() < 1e-12, "{dark:?}");
+        assert!((dark.second - 1.0 / 12.0).abs() < 1e-12, "{dark:?}");
+        // Ten frames change, all in one direction, and frame 0 does not; two levels.
+        assert!((dark.p - 2.0 / 1024.0).abs() < 1e-12 && (dark.holm - 2.0 * dark.p).abs() < 1e-12);
+        assert_eq!(dark.verdict, Significance::Worse);
+        assert!((darkest.first - 0.0).abs() < 1e-12 && darkest.verdict == Significance::NotShown);
+        let said_yes = of(FalseAnswer::Yes);
+        assert!((said_yes[0].first - 1.0 / 12.0).abs() < 1e-12 && said_yes[0].second < 1e-12);
+        assert_eq!(said_yes[0].verdict, Significance::NotShown);
+        // Accuracy counts what cannot be read as wrong.
+        let accuracy = find(&findings, PooledKind::Darkness, "L5-noise")[0];
+        assert_eq!(accuracy.verdict, Significance::Worse);
+    });
+    with_grid(&all[6 * FRAMES..], |grid| {
+        let findings = pooled(grid);
+        assert!(
+            findings
+                .iter()
+                .all(|finding| finding.kind.only_family().is_none())
+        );
+    });
+}
+
+#[test]
+fn a_collapse_is_more_than_its_truth_and_more_than_a_guess() {
+    let collapse = |reply: fn(usize, bool) -> Option<bool>| {
+        let mut all = presence("m", "L3-noise", reply);
+        // Something is there in four of 24 questions alone.
+        for (item, record) in all.iter_mut().enumerate() {
+            record.detail.truth = usize::from(item % 2 == 1 || item > 7);
+        }
+        with_grid(&all, |grid| confusions(grid)[0].collapse.clone().unwrap())
+    };
+    let all = collapse(|_, _| Some(true));
+    assert_eq!((&*all.top, all.share.n, all.clusters), ("Yes", 24, 12));
+    assert!((all.share.value - 1.0).abs() < 1e-12 && (all.truth - 4.0 / 24.0).abs() < 1e-12);
+    assert!((all.guess - 0.5).abs() < 1e-12 && all.is_shown());
+    // Half of all: 33 points above the truth, and what a guess gives.
+    let half = collapse(|frame, first| Some(first == (frame % 2 == 0)));
+    assert!((half.share.value - 0.5).abs() < 1e-12 && !half.is_shown());
+    // Unreadable replies count in the share.
+    let some = collapse(|frame, _| (frame < 6).then_some(true));
+    assert!((some.share.value - 0.5).abs() < 1e-12 && !some.is_shown());
+    assert!(some.entropy.abs() < 1e-12);
 }

@@ -29,6 +29,7 @@ mod questions;
 mod realism;
 mod report;
 mod rooms;
+mod sentences;
 mod serve;
 mod shards;
 mod statistics;

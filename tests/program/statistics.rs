@@ -416,9 +416,9 @@ fn a_made_set_gives_the_papers_arithmetic() {
         .iter()
         .find(|c| c.family == Family::Color)
         .unwrap();
-    let collapse = colours.collapse().unwrap();
+    let collapse = colours.collapse.as_ref().unwrap();
     assert_eq!(
-        (&*collapse.top, collapse.share, collapse.truth),
+        (&*collapse.top, collapse.share.value, collapse.truth),
         ("black", 0.75, 0.25)
     );
     assert!((collapse.entropy - 0.811_278_124_459_132_8).abs() < 1e-12);

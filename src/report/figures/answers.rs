@@ -47,8 +47,8 @@ impl Overview<'_> {
                     confusion.family == family && confusion.subject == *subject
                 })?;
                 truth = truth.or_else(|| commonest_truth(confusion));
-                let collapse = confusion.collapse()?;
-                Some(Estimate::exact(collapse.share, collapse.n))
+                let share = confusion.collapse.as_ref()?.share;
+                Some(Estimate::exact(share.value, share.n))
             });
             let (share, n) = truth?;
             lines.push(PlotLine {

@@ -4,7 +4,8 @@ use super::sentence::{Numbers, Sentence, Tone};
 use crate::report::alert::MAX_UNREAD;
 use crate::score::fidelity::{ConditionFidelity, FidelityFindings};
 use crate::score::findings::Findings;
-use crate::score::pooled::{PooledFinding, PooledKind};
+use crate::score::pooled::PooledFinding;
+use crate::score::pooled_kind::PooledKind;
 
 /// Replies that could not be read, if they are few: an alert speaks of many, and of failed trials. Built-in models are not counted.
 pub(super) fn unread(findings: &Findings<'_>) -> Option<Sentence> {

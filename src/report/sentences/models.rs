@@ -3,7 +3,8 @@
 use super::sentence::{Numbers, Sentence, Tone};
 use crate::report::words::family;
 use crate::score::findings::Findings;
-use crate::score::pooled::{PooledFinding, PooledKind};
+use crate::score::pooled::PooledFinding;
+use crate::score::pooled_kind::PooledKind;
 use crate::score::significance::Significance;
 use crate::types::KindReading;
 

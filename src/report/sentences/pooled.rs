@@ -1,4 +1,4 @@
-//! Sentences about all models together: darkness, noise, enhancers, words alone, and what so few clusters can show.
+//! Sentences about all models together: darkness, noise, enhancers, and what so few clusters can show.
 
 use super::sentence::{Numbers, Sentence, Tone, level_runs, models};
 use crate::score::cluster::ClusterUnit;
@@ -57,8 +57,9 @@ pub(super) fn noise(levels: &[&PooledFinding], unit: ClusterUnit) -> Option<Sent
         let Some(largest) = largest(&shown) else {
             continue;
         };
+        let limit = if shown.len() > 1 { "up to " } else { "" };
         let text = format!(
-            "Sensor noise {verb} up to {} points beyond the exposure drop ({}).",
+            "Sensor noise {verb} {limit}{} points beyond the exposure drop ({}).",
             numbers.size("effect", largest.difference.value),
             largest.level
         );
@@ -109,13 +110,8 @@ fn enhancer(
             } else {
                 "helps"
             };
-            let value = numbers.number("effect", 100.0 * largest.difference.value, 1);
-            let sign = if verdict == Significance::Better {
-                "+"
-            } else {
-                ""
-            };
-            let limit = if of_verdict.len() > 1 { " at most" } else { "" };
+            let size = numbers.size("effect", largest.difference.value);
+            let limit = if of_verdict.len() > 1 { "up to " } else { "" };
             if is_observer(largest) {
                 let more = if verdict == Significance::Better {
                     "more"
@@ -124,7 +120,7 @@ fn enhancer(
                 };
                 (
                     format!(
-                        "With {name} the observer confirms {more} at {at}: {sign}{value} points{limit}."
+                        "With {name} the observer confirms {more} at {at}, by {limit}{size} points."
                     ),
                     format!(
                         "; at {}; local tone and sharpening count as noise, so this does not show that evidence is lost",
@@ -133,7 +129,7 @@ fn enhancer(
                 )
             } else {
                 (
-                    format!("{name} {verb} at {at}: {sign}{value} points{limit}."),
+                    format!("{name} {verb} at {at}, by {limit}{size} points."),
                     format!("; at {}", largest.level),
                 )
             }
@@ -168,23 +164,6 @@ fn uncorrected(finding: &PooledFinding, numbers: &mut Numbers) -> String {
     format!(", not shown after correction for {levels} levels (uncorrected {p})")
 }
 
-/// Where the models fall below their replies to the words alone.
-pub(super) fn below_blind(levels: &[&PooledFinding], unit: ClusterUnit) -> Option<Sentence> {
-    let shown = of_verdict(levels, Significance::Worse);
-    let largest = largest(&shown)?;
-    let mut numbers = Numbers::of(unit);
-    let who = match &largest.models[..] {
-        [one] => format!("{one} falls"),
-        _ => "the models fall".to_owned(),
-    };
-    let at = runs(&shown, levels);
-    let text = format!(
-        "In the dark {who} below the words alone at {at}: pictures do more harm than none."
-    );
-    let detail = detail(largest, &mut numbers, &format!("; at {}", largest.level));
-    Some(numbers.sentence("below blind", Tone::Worse, text, detail))
-}
-
 /// That no verdict is possible with so few clusters; `None` if one is possible for some finding.
 pub(super) fn impossible(findings: &Findings<'_>) -> Option<Sentence> {
     let whole = findings
@@ -211,27 +190,44 @@ pub(super) fn impossible(findings: &Findings<'_>) -> Option<Sentence> {
     Some(numbers.sentence("power", Tone::Note, text, detail))
 }
 
-/// That only large effects can be shown, if the widest interval is wide.
-pub(super) fn power(findings: &Findings<'_>) -> Option<Sentence> {
-    let whole = findings.pooled.iter().filter(|finding| {
+/// That only large effects can be shown, if the widest interval is wide. How large differs by finding: the narrowest and the widest
+/// interval say it.
+pub(super) fn power(all: &[PooledFinding], unit: ClusterUnit) -> Option<Sentence> {
+    let whole = all.iter().filter(|finding| {
         finding.family.is_none() && finding.verdict != Significance::TooFewClusters
     });
-    let half = |finding: &&PooledFinding| (finding.difference.high - finding.difference.low) / 2.0;
-    let widest = whole.max_by(|a, b| half(a).total_cmp(&half(b)))?;
-    if half(&widest) <= WIDE {
+    let half = |finding: &PooledFinding| (finding.difference.high - finding.difference.low) / 2.0;
+    let by_width = |a: &&PooledFinding, b: &&PooledFinding| half(a).total_cmp(&half(b));
+    let narrowest = half(whole.clone().min_by(by_width)?);
+    let widest = whole.max_by(by_width)?;
+    if half(widest) <= WIDE {
         return None;
     }
-    let mut numbers = Numbers::of(findings.unit);
+    let mut numbers = Numbers::of(unit);
+    let mut points = |name, half: f64| numbers.number(name, 100.0 * half, 0);
+    let [least, most] = [
+        points("narrowest", narrowest),
+        points("widest", half(widest)),
+    ];
+    let (range, detail) = if least == most {
+        (most, "half of the widest interval")
+    } else {
+        let range = format!("{least} to {most}");
+        (range, "half of the narrowest and of the widest interval")
+    };
     let text = format!(
-        "With {} no effect below about {} points can be shown here.",
-        numbers.clusters(widest.clusters),
-        numbers.number("half_width", 100.0 * half(&widest), 0)
+        "With {} an effect must be larger than about {range} points to be shown here.",
+        numbers.clusters(widest.clusters)
     );
-    let detail = "half of the widest interval of the findings over all families".to_owned();
+    let detail = format!("{detail} of the findings over all families");
     Some(numbers.sentence("power", Tone::Note, text, detail))
 }
 
-fn of_verdict<'f>(levels: &[&'f PooledFinding], verdict: Significance) -> Vec<&'f PooledFinding> {
+/// The findings with a verdict.
+pub(super) fn of_verdict<'f>(
+    levels: &[&'f PooledFinding],
+    verdict: Significance,
+) -> Vec<&'f PooledFinding> {
     let levels = levels.iter().copied();
     levels
         .filter(|finding| finding.verdict == verdict)
@@ -239,7 +235,7 @@ fn of_verdict<'f>(levels: &[&'f PooledFinding], verdict: Significance) -> Vec<&'
 }
 
 /// The finding with the largest difference in either direction; of several, the first.
-fn largest<'f>(levels: &[&'f PooledFinding]) -> Option<&'f PooledFinding> {
+pub(super) fn largest<'f>(levels: &[&'f PooledFinding]) -> Option<&'f PooledFinding> {
     let size = |finding: &PooledFinding| finding.difference.value.abs();
     levels.iter().copied().reduce(|largest, next| {
         if size(next) > size(largest) {
@@ -251,7 +247,7 @@ fn largest<'f>(levels: &[&'f PooledFinding]) -> Option<&'f PooledFinding> {
 }
 
 /// The levels of some findings among all of a set.
-fn runs(some: &[&PooledFinding], all: &[&PooledFinding]) -> String {
+pub(super) fn runs(some: &[&PooledFinding], all: &[&PooledFinding]) -> String {
     let [some, all] = [some, all].map(|findings| {
         let levels = findings.iter().map(|finding| finding.level);
         levels.collect::<Vec<AxisLevel>>()
@@ -260,7 +256,7 @@ fn runs(some: &[&PooledFinding], all: &[&PooledFinding]) -> String {
 }
 
 /// Effect, interval, p and n of a finding, with `more` before n.
-fn detail(finding: &PooledFinding, numbers: &mut Numbers, more: &str) -> String {
+pub(super) fn detail(finding: &PooledFinding, numbers: &mut Numbers, more: &str) -> String {
     let who = models(&finding.models, numbers);
     let difference = numbers.difference("", finding.difference);
     let p = numbers.p("p", finding.holm);

@@ -33,7 +33,8 @@ fn hallucination(rates: &[Hallucination]) -> Table {
 
 fn collapse(confusions: &[Confusion]) -> Table {
     let collapses = confusions.iter();
-    let collapses = collapses.filter_map(|confusion| Some((confusion, confusion.collapse()?)));
+    let collapses =
+        collapses.filter_map(|confusion| Some((confusion, confusion.collapse.as_ref()?)));
     TableBuilder::new("collapse", collapses)
         .page(
             "answers",
@@ -44,8 +45,13 @@ fn collapse(confusions: &[Confusion]) -> Table {
         .column(Text, "csv top_answer | page given most often", |(_, c)| {
             c.top.clone()
         })
-        .column(Percent, "csv top_share | page given in %", |(_, c)| c.share)
+        .column(
+            Share,
+            "csv top_share top_low top_high | page given in % [95 %]",
+            |(_, c)| c.share,
+        )
         .column(Percent, "csv true_share | page true in %", |(_, c)| c.truth)
+        .column(Number, "csv guess_share", |(_, c)| c.guess)
         .column(
             Number,
             "csv entropy_bits | page entropy in bits",
@@ -56,7 +62,8 @@ fn collapse(confusions: &[Confusion]) -> Table {
             "csv true_entropy_bits | page of the truth",
             |(_, c)| c.true_entropy,
         )
-        .column(Count, "csv n | page n", |(_, c)| c.n)
+        .column(Count, "csv n | page n", |(_, c)| c.share.n)
+        .column(Text, "csv shown", |(_, c)| c.is_shown().to_string())
         .build()
 }
 

@@ -3,8 +3,10 @@
 use crate::report::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
 use crate::report::table::{Table, TableBuilder};
 use crate::report::words::{counted, light, p};
+use crate::score::confusion::FalseAnswer;
 use crate::score::findings::Findings;
-use crate::score::pooled::{PooledFinding, PooledKind};
+use crate::score::pooled::PooledFinding;
+use crate::score::pooled_kind::PooledKind;
 
 /// All families together, then by family.
 pub(super) fn pooled(findings: &Findings<'_>) -> Vec<Table> {
@@ -85,11 +87,25 @@ fn title(finding: &PooledFinding) -> String {
     let first = light(&finding.variant, finding.enhancer.as_ref());
     let second = match finding.kind {
         PooledKind::Darkness => "L0",
+        PooledKind::Hallucination(answer) => return false_answers(finding, &first, answer),
         PooledKind::Noise => "exposure drop",
         PooledKind::Enhancer => "raw",
         PooledKind::Blind => "without images",
     };
     format!("{} {first} − {second}", finding.level)
+}
+
+/// The two sides of a finding about false answers, and what is counted.
+fn false_answers(finding: &PooledFinding, first: &str, answer: FalseAnswer) -> String {
+    let to = match answer {
+        FalseAnswer::No => "what is there",
+        FalseAnswer::Yes => "what is not there",
+    };
+    format!(
+        "{} {first} − L0, “{}” to {to}",
+        finding.level,
+        answer.word()
+    )
 }
 
 /// Lines below the table: what is left out, and what so few clusters can show.

@@ -1,11 +1,16 @@
 //! Golden sentences of each kind and verdict, and the check that each number in a sentence is one of its values.
 
-use super::pooled;
+mod hallucination;
+mod words_alone;
+
 use super::sentence::{Sentence, level_runs};
+use super::{pooled, words_alone as below};
 use crate::score::cluster::ClusterUnit;
 use crate::score::estimate::Estimate;
-use crate::score::pooled::{PooledFinding, PooledKind};
+use crate::score::pooled::PooledFinding;
+use crate::score::pooled_kind::PooledKind;
 use crate::score::significance::Significance::{self, Better, NotShown, Worse};
+use crate::types::control::OBSERVER;
 use crate::types::degradation::Kind;
 use crate::types::{AxisLevel, EnhancerName, KindReading, Severity};
 
@@ -27,7 +32,11 @@ fn finding(
         enhancer,
         level: AxisLevel::new(Kind::Sensor, Severity::LADDER[level - 1]),
         models: ["a", "b"].map(str::to_owned).to_vec(),
-        blind_models: Vec::new(),
+        blind_models: if kind == PooledKind::Blind {
+            vec!["a".to_owned(), "b".to_owned()]
+        } else {
+            Vec::new()
+        },
         first: 0.5,
         second: 0.8637,
         difference: Estimate {
@@ -84,7 +93,7 @@ fn checked(sentence: &Sentence) -> String {
 
 #[test]
 fn each_kind_and_verdict_has_its_words() {
-    use PooledKind::{Blind, Darkness, Enhancer, Noise};
+    use PooledKind::{Blind, Darkness, Enhancer, Hallucination, Noise};
     type Levels<'a> = &'a [(f64, Significance)];
     let say = |kind: PooledKind, levels: Levels<'_>| -> Vec<String> {
         let all = findings(kind, levels);
@@ -94,7 +103,8 @@ fn each_kind_and_verdict_has_its_words() {
             Darkness => pooled::darkness(&all, unit).into_iter().collect(),
             Noise => pooled::noise(&all, unit).into_iter().collect(),
             Enhancer => pooled::enhancers(&all, unit),
-            Blind => pooled::below_blind(&all, unit).into_iter().collect(),
+            Blind => below::pooled(&all, unit).into_iter().collect(),
+            Hallucination(_) => Vec::new(),
         };
         sentences.iter().map(checked).collect()
     };
@@ -125,6 +135,10 @@ fn each_kind_and_verdict_has_its_words() {
             .starts_with("− Sensor noise costs up to 9.1 points beyond the exposure drop (L2). (")
     );
     assert!(said[0].contains("; shown at L1–L2;"), "{said:?}");
+    let said = say(Noise, &[(-0.05, Worse), (-0.02, NotShown)]);
+    assert!(
+        said[0].starts_with("− Sensor noise costs 5.0 points beyond the exposure drop (L1). (")
+    );
     let said = say(Noise, &[(0.03, NotShown)]);
     assert!(said[0].starts_with("· It is not shown that sensor noise costs anything beyond"));
     let said = say(
@@ -138,8 +152,8 @@ fn each_kind_and_verdict_has_its_words() {
         ],
     );
     let starts = [
-        "− lift harms at L1–L2: −8.1 points at most. (",
-        "+ lift helps at L4–L5: +5.6 points at most. (",
+        "− lift harms at L1–L2, by up to 8.1 points. (mean of these 2 models: −8.1 [−12.1, −4.1], p < 0.001; at L1;",
+        "+ lift helps at L4–L5, by up to 5.6 points. (",
         "· lift at L3: neither help nor harm is shown. (mean of these 2 models: −5.0 [−9.0, −1.0], p = 0.062; largest at L3, not shown \
          after correction for 5 levels (uncorrected p = 0.012); n = 1,237 in 30 scenes)",
     ];
@@ -147,9 +161,69 @@ fn each_kind_and_verdict_has_its_words() {
     for (said, start) in said.iter().zip(starts) {
         assert!(said.starts_with(start), "{said}");
     }
+    let said = say(
+        Enhancer,
+        &[
+            (-0.081, Worse),
+            (0.05, Better),
+            (0.0, NotShown),
+            (0.22, Better),
+            (0.2, Better),
+        ],
+    );
+    assert!(said[0].starts_with("− lift harms at L1, by 8.1 points. ("));
+    assert!(said[1].starts_with("+ lift helps at L2, L4–L5, by up to 22.0 points. ("));
     assert!(say(Blind, &[(0.2, Better), (0.0, NotShown)]).is_empty());
     let said = say(Blind, &[(0.2, Better), (-0.1, Worse)]);
-    assert!(said[0].starts_with("− In the dark the models fall below the words alone at L2: pictures do more harm than none. ("));
+    assert!(said[0].starts_with("− In the dark the models fall below the words alone at L2. ("));
+}
+
+#[test]
+fn the_observer_confirms_less() {
+    let say = |levels: &[(f64, Significance)]| {
+        let mut all = findings(PooledKind::Enhancer, levels);
+        for finding in &mut all {
+            finding.models = vec![OBSERVER.to_owned()];
+        }
+        let all: Vec<&PooledFinding> = all.iter().collect();
+        let said = pooled::enhancers(&all, ClusterUnit::Scene);
+        said.iter().map(checked).collect::<Vec<String>>()
+    };
+    let said = say(&[(-0.088, Worse), (-0.08, Worse)]);
+    assert!(
+        said[0]
+            .starts_with("− With lift the observer confirms less at L1–L2, by up to 8.8 points. ("),
+        "{said:?}"
+    );
+    let said = say(&[(0.03, Better)]);
+    assert!(
+        said[0].starts_with("+ With lift the observer confirms more at L1, by 3.0 points. ("),
+        "{said:?}"
+    );
+}
+
+#[test]
+fn what_the_sample_can_show_is_a_range() {
+    let say = |halves: &[f64]| {
+        let mut all = findings(PooledKind::Darkness, &vec![(-0.129, Worse); halves.len()]);
+        for (finding, half) in all.iter_mut().zip(halves) {
+            let difference = &mut finding.difference;
+            (difference.low, difference.high) = (-0.129 - half, -0.129 + half);
+        }
+        let said = pooled::power(&all, ClusterUnit::Scene);
+        said.as_ref().map(checked)
+    };
+    assert_eq!(
+        say(&[0.0614, 0.139, 0.08]).unwrap(),
+        "· With 30 scenes an effect must be larger than about 6 to 14 points to be shown here. (half of the narrowest and of the widest \
+         interval of the findings over all families)"
+    );
+    assert_eq!(
+        say(&[0.061, 0.064]).unwrap(),
+        "· With 30 scenes an effect must be larger than about 6 points to be shown here. (half of the widest interval of the findings over \
+         all families)"
+    );
+    assert_eq!(say(&[0.01, 0.049]), None);
 }
 
 #[test]
@@ -178,9 +252,11 @@ fn levels_are_joined_by_runs() {
 #[test]
 fn no_sentence_says_more_than_its_test() {
     let source = [
-        include_str!("pooled.rs"),
-        include_str!("models.rs"),
-        include_str!("answers.rs"),
+        include_str!("../pooled.rs"),
+        include_str!("../models.rs"),
+        include_str!("../answers.rs"),
+        include_str!("../hallucination.rs"),
+        include_str!("../words_alone.rs"),
     ];
     for text in source {
         for word in [

@@ -1,0 +1,157 @@
+//! Sentences about models that fall below their replies to the words alone: all together, or in one family.
+
+use std::collections::BTreeSet;
+
+use super::pooled::{detail, largest, of_verdict, runs};
+use super::sentence::{Numbers, Sentence, Tone, level_runs};
+use crate::report::words::family as family_name;
+use crate::score::cluster::ClusterUnit;
+use crate::score::comparison::{Comparison, ComparisonKind};
+use crate::score::findings::Findings;
+use crate::score::pooled::{PooledFinding, pool};
+use crate::score::significance::Significance;
+use crate::types::{AxisLevel, KindReading};
+
+/// Where the models fall below their replies to the words alone.
+pub(super) fn pooled(levels: &[&PooledFinding], unit: ClusterUnit) -> Option<Sentence> {
+    let shown = of_verdict(levels, Significance::Worse);
+    let largest = largest(&shown)?;
+    let mut numbers = Numbers::of(unit);
+    let who = match &largest.models[..] {
+        [one] => format!("{one} falls"),
+        _ => "the models fall".to_owned(),
+    };
+    let is_own = largest
+        .blind_models
+        .iter()
+        .all(|model| largest.models.contains(model));
+    let below = match &largest.blind_models[..] {
+        _ if is_own => "the words alone".to_owned(),
+        [other] => format!("{other} without images"),
+        _ => "the models without images".to_owned(),
+    };
+    let at = runs(&shown, levels);
+    let text = format!("In the dark {who} below {below} at {at}.");
+    let detail = detail(largest, &mut numbers, &format!("; at {}", largest.level));
+    Some(numbers.sentence("below blind", Tone::Worse, text, detail))
+}
+
+/// The comparisons by family of raw images of a variant with no images, of the models over which findings are pooled.
+pub(super) fn by_family<'f>(
+    findings: &'f Findings<'_>,
+    variant: &KindReading,
+) -> Vec<&'f Comparison> {
+    let models = pool(&findings.grid);
+    let comparisons = findings.comparisons.iter().filter(|comparison| {
+        let first = &comparison.first;
+        comparison.kind == ComparisonKind::Blind
+            && comparison.family.is_some()
+            && first.variant == *variant
+            && first.enhancer.is_none()
+            && models.contains(&&*first.model)
+    });
+    comparisons.collect()
+}
+
+/// The family in which a model falls furthest below the words alone, and how many models do in that family. `all` are the
+/// comparisons of all models and families. `None` if the findings over all families (`pooled`) say it of the same single model.
+pub(super) fn in_a_family(
+    all: &[&Comparison],
+    pooled: &[&PooledFinding],
+    unit: ClusterUnit,
+) -> Option<Sentence> {
+    let difference = |of: &Comparison| of.paired.difference.value;
+    let below = all.iter().copied().filter(|of| is_below(of));
+    let most = below.min_by(|a, b| difference(a).total_cmp(&difference(b)))?;
+    let model = &most.first.model;
+    let said = of_verdict(pooled, Significance::Worse);
+    if said.iter().any(|finding| finding.models == [&**model]) {
+        return None;
+    }
+    let of_family = all.iter().copied().filter(|of| of.family == most.family);
+    let of_family: Vec<&Comparison> = of_family.collect();
+    let below: Vec<&Comparison> = of_family
+        .iter()
+        .copied()
+        .filter(|of| is_below(of))
+        .collect();
+    let [models, fallen] = [&of_family, &below].map(|of| {
+        let models: BTreeSet<&str> = of.iter().map(|of| &*of.first.model).collect();
+        models.len()
+    });
+    let mut numbers = Numbers::of(unit);
+    let family = capitalised(family_name(most.family.as_ref()));
+    let text = if fallen == 1 {
+        let (than, at) = (than(most), levels_below(&of_family, most));
+        format!("{family}: {model} falls below {than} at {at}.")
+    } else {
+        let than = if below.iter().all(|of| is_own(of)) {
+            "the words alone"
+        } else {
+            "a model without images"
+        };
+        let fallen = numbers.count("fallen", fallen);
+        let models = numbers.count("models", models);
+        format!("{family}: {fallen} of {models} models fall below {than}.")
+    };
+    let detail = comparison_detail(most, &mut numbers)?;
+    Some(numbers.sentence("below blind", Tone::Worse, text, detail))
+}
+
+fn is_below(comparison: &Comparison) -> bool {
+    comparison.significance == Significance::Worse
+}
+
+/// Whether a model is compared with its own replies.
+fn is_own(comparison: &Comparison) -> bool {
+    comparison.first.model == comparison.second.model
+}
+
+/// The second side of a comparison with words alone, in words.
+fn than(comparison: &Comparison) -> String {
+    if is_own(comparison) {
+        "the words alone".to_owned()
+    } else {
+        format!("{} without images", comparison.second.model)
+    }
+}
+
+/// The levels at which a model is below the second side of a comparison. A model that was not asked without images is compared with
+/// every model that was: the levels are those of one of them.
+fn levels_below(of_family: &[&Comparison], of: &Comparison) -> String {
+    let pair = of_family.iter().copied();
+    let pair = pair.filter(|other| {
+        other.first.model == of.first.model && other.second.model == of.second.model
+    });
+    let sorted = |pair: Vec<&Comparison>| -> Vec<AxisLevel> {
+        let levels: BTreeSet<AxisLevel> = pair.iter().filter_map(|of| of.first.level).collect();
+        levels.into_iter().collect()
+    };
+    let below = sorted(pair.clone().filter(|of| is_below(of)).collect());
+    level_runs(&below, &sorted(pair.collect()))
+}
+
+/// Effect, interval, p and n of a comparison with words alone.
+fn comparison_detail(comparison: &Comparison, numbers: &mut Numbers) -> Option<String> {
+    let (model, level) = (&comparison.first.model, comparison.first.level?);
+    let against = if is_own(comparison) {
+        String::new()
+    } else {
+        format!(" against {}", comparison.second.model)
+    };
+    let paired = &comparison.paired;
+    let difference = numbers.difference("", paired.difference);
+    let p = numbers.p("p", comparison.holm);
+    let n = numbers.count("n", paired.difference.n);
+    let clusters = numbers.clusters(paired.clusters);
+    Some(format!(
+        "{model} at {level}{against}: {difference}, {p}, corrected over its conditions and families; n = {n} in {clusters}"
+    ))
+}
+
+/// A text with its first letter as a capital.
+fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().into_iter().flat_map(char::to_uppercase);
+    first.chain(letters).collect()
+}
