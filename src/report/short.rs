@@ -13,8 +13,8 @@ use super::words::{counted, percent, reach_of, with_interval};
 use crate::score::accuracy::AccuracyCell;
 use crate::score::choice::ReadingMode;
 use crate::score::health::Health;
-use crate::score::observed::OTHER_ROOM;
-use crate::score::subject::OBSERVER;
+use crate::score::observed::{OTHER_ROOM, ObserverCell};
+use crate::score::subject::{OBSERVER, is_observer, without_run};
 use crate::types::AxisLevel;
 use crate::types::manifest::RunManifest;
 
@@ -299,26 +299,30 @@ fn baselines(report: &ChoiceReport<'_>, ladder: &Ladder<'_, AccuracyCell>) -> St
     text
 }
 
-/// What the observer is, and its score when it is shown the images of other rooms; empty if it is not shown.
+/// What the observer is, and its score when it is shown the images of other rooms, for each run that has its own; empty if it is
+/// not shown.
 fn observer_control(report: &ChoiceReport<'_>) -> String {
     let findings = report.findings;
     let is_shown = findings
         .grid
         .subjects
         .iter()
-        .any(|subject| subject.model == OBSERVER);
-    let mut control = findings.observer.controls.iter();
-    let control = control.find(|cell| cell.subject.model == OTHER_ROOM);
-    match control {
-        Some(control) if is_shown => {
-            let line = format!(
-                "{OBSERVER}: known-signal observer, given the untouched frame; not a model. Control: shown another room's images it \
-                 scores {}, chance is {}",
-                with_interval(control.score),
-                percent(control.chance)
-            );
-            wrapped(" ", &line, " ")
-        }
-        _ => String::new(),
-    }
+        .any(|subject| is_observer(&subject.model));
+    let controls = findings.observer.controls.iter();
+    let controls = controls.filter(|cell| without_run(&cell.subject.model) == OTHER_ROOM);
+    let controls: Vec<&ObserverCell> = controls.collect();
+    let Some(first) = controls.first().filter(|_| is_shown) else {
+        return String::new();
+    };
+    let scores = controls.iter().map(|cell| {
+        let run = &cell.subject.model[OTHER_ROOM.len()..];
+        with_interval(cell.score) + run
+    });
+    let line = format!(
+        "{OBSERVER}: known-signal observer, given the untouched frame; not a model. Control: shown another room's images it scores \
+         {}, chance is {}",
+        scores.collect::<Vec<_>>().join(" and "),
+        percent(first.chance)
+    );
+    wrapped(" ", &line, " ")
 }

@@ -12,7 +12,8 @@ pub(crate) const OBSERVER: &str = "observer";
 const CONTROL_PREFIX: &str = "observer:";
 
 /// A model name without the run behind it: where several runs are compared, `observer (one)` is the observer of the run `one`.
-fn without_run(model: &str) -> &str {
+#[must_use]
+pub(crate) fn without_run(model: &str) -> &str {
     model.split_once(" (").map_or(model, |(name, _)| name)
 }
 

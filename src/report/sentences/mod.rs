@@ -13,7 +13,7 @@ mod models;
 mod pooled;
 mod sentence;
 
-pub(crate) use baseline::against_baseline;
+pub(crate) use baseline::{against_baseline, no_verdict};
 pub(crate) use sentence::Sentence;
 
 use crate::report::words::light;
