@@ -26,6 +26,8 @@ impl Alert {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AlertKind {
+    /// A run that is named again, or that adds no reply to those of the others.
+    Runs,
     /// A run in which trials have no reply yet.
     NotComplete,
     /// Trials without a reply, which are not scored.
@@ -52,10 +54,10 @@ pub enum AlertKind {
     Parameters,
     /// A constraint on the replies of one side.
     Constrain,
+    /// A model that stands apart from itself, because runs asked it in different ways or got other replies.
+    Models,
     /// Other models behind one name, or another address.
     Served,
-    /// Another way of scoring.
-    Scoring,
     /// Another version of this program.
     Version,
     /// What the observer's numbers do not show.

@@ -1,4 +1,4 @@
-//! `summary.json`: a head about the run, and the rows of `summary.csv`.
+//! `summary.json`: a head about the run, and the rows of `summary.csv` that are shown.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -10,7 +10,7 @@ use super::choice_report::ChoiceReport;
 use super::csv::fields;
 use super::sentences::Sentence;
 use super::table::{Table, TableRow};
-use super::tables::BASELINE;
+use super::tables::{BASELINE, summary_rows};
 use crate::error::{Error, Result};
 use crate::types::UnreadReason;
 use crate::types::manifest::RunManifest;
@@ -119,5 +119,5 @@ pub(crate) fn summary(report: &ChoiceReport<'_>, runs: RunList<'_>) -> Result<St
         findings: &report.sentences,
         baseline: tables.iter().find(|table| table.name == BASELINE).map(Rows),
     };
-    document(head, &tables[0])
+    document(head, &summary_rows(&report.findings.summary))
 }

@@ -13,6 +13,7 @@ use super::words::{counted, percent, reach_of, with_interval};
 use crate::score::accuracy::AccuracyCell;
 use crate::score::choice::ReadingMode;
 use crate::score::health::Health;
+use crate::score::subject::{is_observer, without_run};
 use crate::types::AxisLevel;
 use crate::types::control::OBSERVER;
 use crate::types::manifest::RunManifest;
@@ -298,24 +299,27 @@ fn baselines(report: &ChoiceReport<'_>, ladder: &Ladder<'_, AccuracyCell>) -> St
     text
 }
 
-/// What the observer is, and the score of its standing control; empty if it is not shown.
+/// What the observer is, and the score of its standing control, for each run that has its own; empty if it is not shown.
 fn observer_control(report: &ChoiceReport<'_>) -> String {
     let findings = report.findings;
     let is_shown = findings
         .grid
         .subjects
         .iter()
-        .any(|subject| subject.model == OBSERVER);
-    match findings.observer.standing_control() {
-        Some(control) if is_shown => {
-            let line = format!(
-                "{OBSERVER}: known-signal observer, given the untouched frame; not a model. Control: {}, scores {}; chance is {}",
-                what_it_is(control),
-                with_interval(control.score),
-                percent(control.chance)
-            );
-            wrapped(" ", &line, " ")
-        }
-        _ => String::new(),
-    }
+        .any(|subject| is_observer(&subject.model));
+    let controls = findings.observer.standing_controls();
+    let Some(first) = controls.first().filter(|_| is_shown) else {
+        return String::new();
+    };
+    let scores = controls.iter().map(|cell| {
+        let run = &cell.subject.model[without_run(&cell.subject.model).len()..];
+        with_interval(cell.score) + run
+    });
+    let line = format!(
+        "{OBSERVER}: known-signal observer, given the untouched frame; not a model. Control: {}, scores {}; chance is {}",
+        what_it_is(first),
+        scores.collect::<Vec<_>>().join(" and "),
+        percent(first.chance)
+    );
+    wrapped(" ", &line, " ")
 }

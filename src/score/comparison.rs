@@ -95,21 +95,50 @@ pub(crate) fn comparisons(grid: &Grid<'_>) -> Vec<Comparison> {
             jobs.extend(pairs.iter().map(|(a, b)| (kind, *family, *a, *b)));
         }
     }
-    let paired = jobs
-        .into_par_iter()
-        .filter_map(|(kind, family, first, second)| {
-            Some(Comparison {
-                kind,
-                first: grid.subjects[first].clone(),
-                second: grid.subjects[second].clone(),
-                family: family.cloned(),
-                paired: PairedComparison::new(grid, first, second, family, ReadingMode::Strict)?,
-                holm: 1.0,
-                least_holm: 1.0,
-                significance: Significance::NotShown,
-            })
-        });
-    corrected(paired.collect())
+    corrected(paired(grid, jobs))
+}
+
+/// A kind, a family, and the indices of the two sides.
+type Job<'a> = (ComparisonKind, Option<&'a Family>, usize, usize);
+
+/// The comparisons that have items, not yet corrected.
+fn paired(grid: &Grid<'_>, jobs: Vec<Job<'_>>) -> Vec<Comparison> {
+    let jobs = jobs.into_par_iter();
+    let found = jobs.filter_map(|(kind, family, first, second)| {
+        Some(Comparison {
+            kind,
+            first: grid.subjects[first].clone(),
+            second: grid.subjects[second].clone(),
+            family: family.cloned(),
+            paired: PairedComparison::new(grid, first, second, family, ReadingMode::Strict)?,
+            holm: 1.0,
+            least_holm: 1.0,
+            significance: Significance::NotShown,
+        })
+    });
+    found.collect()
+}
+
+/// Comparisons of the kind [`Light`](ComparisonKind::Light) between different names of one model, which was asked in the same way under
+/// each of them.
+#[must_use]
+pub(crate) fn lights_between(grid: &Grid<'_>, names: &[String]) -> Vec<Comparison> {
+    let subjects = grid.subjects.iter().enumerate();
+    let named = subjects.filter(|(_, subject)| names.contains(&subject.model));
+    let named: Vec<(usize, &Subject)> = named.collect();
+    let mut pairs = Vec::new();
+    for (place, (index, subject)) in named.iter().enumerate() {
+        let later = named[place + 1..].iter();
+        let others = later
+            .filter(|(_, other)| other.model != subject.model && is_other_light(subject, other));
+        pairs.extend(others.map(|(other, _)| (*index, *other)));
+    }
+    let families = grid.groups();
+    let jobs = families.iter().flat_map(|family| {
+        let pairs = pairs.iter();
+        pairs.map(|(first, second)| (ComparisonKind::Light, *family, *first, *second))
+    });
+    corrected(paired(grid, jobs.collect()))
 }
 
 /// The comparisons with their significance, after Holm's correction within each set.
@@ -215,14 +244,17 @@ fn later_models(grid: &Grid<'_>, index: usize) -> Vec<usize> {
 fn later_lights(grid: &Grid<'_>, index: usize) -> Vec<usize> {
     let subject = &grid.subjects[index];
     let later = grid.subjects.iter().enumerate().skip(index + 1);
-    let same = |other: &Subject| {
-        (&other.model, other.view, other.level) == (&subject.model, subject.view, subject.level)
-            && (other.variant.kind, &other.enhancer) == (subject.variant.kind, &subject.enhancer)
-    };
     later
-        .filter(|(_, other)| same(other) && other.variant != subject.variant)
+        .filter(|(_, other)| other.model == subject.model && is_other_light(subject, other))
         .map(|(other, _)| other)
         .collect()
+}
+
+/// Whether two subjects show the same level, raw or with the same enhancer, in another light reading or with the images of other runs.
+fn is_other_light(one: &Subject, other: &Subject) -> bool {
+    (one.view, one.level) == (other.view, other.level)
+        && (one.variant.kind, &one.enhancer) == (other.variant.kind, &other.enhancer)
+        && one.variant != other.variant
 }
 
 /// The same model without images; if it was never asked so, all models without images.

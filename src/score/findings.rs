@@ -9,7 +9,7 @@ use super::bootstrap::Resamples;
 use super::chance::OfferedChoices;
 use super::cluster::{ClusterUnit, Clusters};
 use super::common::CommonItems;
-use super::comparison::{Comparison, ComparisonKind, comparisons};
+use super::comparison::{Comparison, ComparisonKind, comparisons, lights_between};
 use super::confusion::{Confusion, Hallucination, confusions, hallucinations};
 use super::curve::{Curve, curves};
 use super::fidelity::FidelityFindings;
@@ -131,6 +131,16 @@ impl<'a> Findings<'a> {
             without_observer: None,
             grid,
         }
+    }
+
+    /// Adds the comparisons of one light with another between different names of one model, which was asked in the same way under
+    /// each of them.
+    #[must_use]
+    pub(crate) fn with_lights_between(mut self, names: &[String]) -> Self {
+        self.comparisons.extend(lights_between(&self.grid, names));
+        let shown = self.without_observer.take();
+        self.without_observer = shown.map(|shown| Box::new(shown.with_lights_between(names)));
+        self
     }
 
     /// The models without images than which a subject is shown to be less accurate: itself, or any if it was not asked without

@@ -116,15 +116,16 @@ impl ObserverSummary {
         self.is_asked() && (!is_controlled || self.refutations().next().is_some())
     }
 
-    /// The standing control over all conditions.
+    /// The standing control over all conditions, of each run that has its own.
     #[must_use]
-    pub fn standing_control(&self) -> Option<&ObserverCell> {
-        let mut standing = Control::STANDING.into_iter();
-        standing.find_map(|control| {
+    pub fn standing_controls(&self) -> Vec<&ObserverCell> {
+        let of = |standing| -> Vec<&ObserverCell> {
             let is_it =
-                |cell: &&ObserverCell| Control::of_model(&cell.subject.model) == Some(control);
-            self.controls.iter().find(is_it)
-        })
+                |cell: &&ObserverCell| Control::of_model(&cell.subject.model) == Some(standing);
+            self.controls.iter().filter(is_it).collect()
+        };
+        let mut all = Control::STANDING.into_iter().map(of);
+        all.find(|cells| !cells.is_empty()).unwrap_or_default()
     }
 
     /// The standing control in the condition of a cell.

@@ -5,7 +5,7 @@ use super::llm_match::{Protocol, mark};
 use crate::error::Result;
 use crate::types::detail::{ChoiceLine, OpenLine};
 use crate::types::{
-    Answer, ChoiceDetail, Choices, Detail, Digest, OpenDetail, Reply, Step, TrialOutcome,
+    Answer, ChoiceDetail, Choices, Detail, Digest, FrameId, OpenDetail, Reply, Step, TrialOutcome,
 };
 
 impl Detail for ChoiceDetail {
@@ -40,7 +40,8 @@ impl Detail for ChoiceDetail {
     }
 
     fn source(&self) -> &str {
-        &self.frame.0
+        let frame: &FrameId = self.shown();
+        &frame.0
     }
 
     fn shown(&self) -> Option<Digest> {

@@ -43,6 +43,12 @@ impl Significance {
         matches!(self, Self::Better | Self::Worse)
     }
 
+    /// Whether there is a verdict at all.
+    #[must_use]
+    pub fn is_possible(self) -> bool {
+        !matches!(self, Self::TooFew | Self::TooFewClusters)
+    }
+
     /// The word for the result in tables; empty if no verdict is possible.
     #[must_use]
     pub fn word(self) -> &'static str {

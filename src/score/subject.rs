@@ -11,7 +11,8 @@ use crate::types::{
 pub(crate) const CHANCE: &str = "chance";
 
 /// A model name without the run behind it: where several runs are compared, `observer (one)` is the observer of the run `one`.
-fn without_run(model: &str) -> &str {
+#[must_use]
+pub(crate) fn without_run(model: &str) -> &str {
     model.split_once(" (").map_or(model, |(name, _)| name)
 }
 

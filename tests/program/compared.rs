@@ -10,13 +10,13 @@ use crate::support::table::check_rows;
 use serde_json::{Value, json};
 
 /// Frames with forty questions of two families, an enhancer, prompts, and an endpoint that answers everything with "A".
-struct Scene {
-    bench: Bench,
+pub(crate) struct Scene {
+    pub(crate) bench: Bench,
     endpoint: MockEndpoint,
 }
 
 impl Scene {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let bench = Bench::new();
         for folder in ["frames", "elsewhere"] {
             let lines = (0..40).map(|i| {
@@ -56,7 +56,7 @@ impl Scene {
     }
 
     /// A run of the model `m`, with these flags in place of others.
-    fn run(&self, otherwise: &str, out: &str) {
+    pub(crate) fn run(&self, otherwise: &str, out: &str) {
         let base = self.endpoint.base_url();
         let otherwise = words(otherwise);
         let flags = [
@@ -79,13 +79,13 @@ impl Scene {
     }
 
     /// The lines above the report of runs.
-    fn alerts(&self, line: &str) -> Vec<String> {
+    pub(crate) fn alerts(&self, line: &str) -> Vec<String> {
         let text = self.bench.complete(&words(&format!("{line} --full")));
         let lines = text.lines().map_while(|line| line.strip_prefix("! "));
         lines.map(str::to_owned).collect()
     }
 
-    fn csv(&self, path: &str) -> Vec<Vec<String>> {
+    pub(crate) fn csv(&self, path: &str) -> Vec<Vec<String>> {
         let text = fs::read_to_string(self.bench.path(path)).unwrap();
         let lines = text.lines();
         lines
@@ -127,14 +127,17 @@ const SETTINGS: [(&str, &str); 31] = [
     ("--families color", "The questions differ: 40 of base and 20 of other share 20 questions."),
     ("--limit 20", "The questions differ: 40 of base and 20 of other share 20 questions."),
     ("--blind-model m", ""),
-    ("", ""),
+    ("", "All 160 replies of other are in the other runs, too, and count once."),
 ];
 
 #[test]
 fn every_setting_that_decides_is_named() {
     let scene = Scene::new();
     scene.run("", "base");
-    assert_eq!(scene.alerts("report base base"), Vec::<String>::new());
+    assert_eq!(
+        scene.alerts("report base base"),
+        ["base is named twice and counted once."]
+    );
     check_rows(SETTINGS, |(otherwise, expected)| {
         let _ = fs::remove_dir_all(scene.bench.path("other-run/other"));
         scene.run(otherwise, "other-run/other");

@@ -6,6 +6,7 @@
 #[path = "../support/mod.rs"]
 mod support;
 
+mod apart;
 mod ask;
 mod batch;
 mod cli;

@@ -6,18 +6,22 @@ use super::alerts::of_runs;
 use super::combine::{Combined, check_comparable, clusters};
 use super::cost::dollars;
 use super::join::join;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::job::stored::StoredRun;
 use crate::report::alert::Alert;
 use crate::report::choice_report::ChoiceReport;
-use crate::report::sentences::against_baseline;
+use crate::report::sentences::{against_baseline, no_verdict};
 use crate::report::tables::baseline;
 use crate::score::baseline::{BaselineRow, baseline_rows};
+use crate::score::cluster::ClusterUnit;
 use crate::score::grid::Grid;
 use crate::score::health::healths;
 use crate::score::significance::Significance;
-use crate::score::subject::{Subject, is_control};
+use crate::score::subject::{Subject, is_control, is_observer};
 use crate::types::{ChoiceDetail, Record};
+
+/// The flag that makes a worse model a failure.
+pub(super) const FAIL_IF_WORSE: &str = "--fail-if-worse";
 
 /// New runs against an old one.
 pub(super) struct Baseline {
@@ -92,12 +96,17 @@ impl Baseline {
         })
     }
 
-    /// Puts the comparison first among the sentences of a report, and below its table of levels.
+    /// Puts the comparison first among the sentences of a report, and below its table of levels. The observer is left out where a
+    /// control shows that it proves nothing.
     pub(super) fn add_to(&self, report: &mut ChoiceReport<'_>) {
-        let sentences = against_baseline(&self.rows, &self.old, report.findings.unit);
+        let is_refuted = report.findings.observer.is_hidden();
+        let rows = self.rows.iter();
+        let rows = rows.filter(|row| !(is_refuted && is_observer(&row.subject.model)));
+        let rows: Vec<BaselineRow> = rows.cloned().collect();
+        let sentences = against_baseline(&rows, &self.old, report.findings.unit);
         report.sentences.splice(..0, sentences);
         let place = report.tables.len().min(2);
-        report.tables.insert(place, baseline(&self.rows, &self.old));
+        report.tables.insert(place, baseline(&rows, &self.old));
         for alert in &self.alerts {
             if !report.alerts.contains(alert) {
                 report.alerts.push(alert.clone());
@@ -106,10 +115,31 @@ impl Baseline {
         report.alerts.sort_by_key(|alert| alert.kind);
     }
 
-    /// Whether any row is shown to be worse.
-    pub(super) fn is_worse(&self) -> bool {
-        self.rows
-            .iter()
-            .any(|row| row.significance == Significance::Worse)
+    /// Whether any model is shown to be worse. `random`, the observer and its controls are no models.
+    ///
+    /// # Errors
+    /// If no model can be compared, or no verdict is possible about any.
+    pub(super) fn is_worse(&self, unit: ClusterUnit) -> Result<bool> {
+        let rows = self.rows.iter();
+        let models: Vec<&BaselineRow> = rows.filter(|row| !row.subject.is_reference()).collect();
+        let old = &self.old;
+        let none = |problem: String| {
+            let problem = format!("{problem}; leave the flag out to see the report");
+            Err(Error::usage(FAIL_IF_WORSE, problem))
+        };
+        if models.is_empty() {
+            return none(format!(
+                "no model can be compared with {old}: none answered the same question about the same image in both (random and the \
+                 observer do not count)"
+            ));
+        }
+        if !models.iter().any(|row| row.significance.is_possible()) {
+            return none(format!(
+                "no verdict against {old} is possible: {}",
+                no_verdict(&models, unit)
+            ));
+        }
+        let mut verdicts = models.iter().map(|row| row.significance);
+        Ok(verdicts.any(|verdict| verdict == Significance::Worse))
     }
 }

@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::job::stored::StoredRun;
 use crate::report::page::{self, PageInputs};
 use crate::score::chance::OfferedChoices;
-use crate::score::cluster::Clusters;
+use crate::score::cluster::{ClusterUnit, Clusters};
 use crate::score::findings::Findings;
 use crate::score::grid::Grid;
 use crate::types::manifest::RunManifest;
@@ -21,12 +21,23 @@ impl Combined {
     /// The results that follow from the records.
     pub(super) fn findings(&self) -> Findings<'_> {
         let offers = offers(&self.records, &self.questions);
-        Findings::new(
+        let findings = Findings::new(
             &self.records,
             &scenes(&self.questions),
             offers,
             &self.fidelity,
-        )
+        );
+        // Replies differ from time to time: that is no other model.
+        let apart = self.models.apart.iter();
+        let by_replies = apart.filter(|apart| apart.differs_by_replies_alone());
+        by_replies.fold(findings, |findings, apart| {
+            findings.with_lights_between(&apart.names)
+        })
+    }
+
+    /// The unit that is treated as independent.
+    pub(super) fn unit(&self) -> ClusterUnit {
+        clusters(&self.records, &self.questions).unit()
     }
 
     /// The records by subject and item.

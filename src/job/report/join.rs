@@ -1,6 +1,6 @@
 //! Joining several runs of either kind: [`join`].
 
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::path::PathBuf;
 
 use super::cost::cost;
@@ -23,7 +23,7 @@ pub(super) struct Joined<D> {
     pub(super) fidelity: Vec<ImageFidelity>,
     /// The images that differ between runs.
     pub(super) lights: Lights,
-    /// The models that were asked in different ways.
+    /// The models that stand apart.
     pub(super) models: Names,
 }
 
@@ -37,10 +37,17 @@ pub(super) struct JoinedRun {
     pub(super) questions: Vec<RunQuestion>,
     /// Places of its records among those of all runs. A record that several runs have is stored once, and listed by each.
     pub(super) records: Vec<usize>,
+    /// Number of its replies.
+    pub(super) replies: usize,
+    /// Number of its replies that no run before it by name has.
+    pub(super) added: usize,
+    /// The names that servers gave for each model, by the name under which it was asked.
+    pub(super) served: BTreeMap<String, BTreeSet<String>>,
 }
 
 /// Joins runs. Conditions whose images differ between runs are kept apart ([`Lights`]), and so are models that were asked in
-/// different ways ([`Names`]). A trial that two runs share counts once. Only records that are `compared` decide about models.
+/// different ways or gave other replies to the same trials ([`Names`]). A trial to which two runs have the same reply counts once.
+/// Only records that are `compared` decide about models.
 ///
 /// The result does not depend on the order of the runs, but for the order of [`Joined::runs`].
 pub(super) fn join<D: Detail>(
@@ -86,7 +93,7 @@ pub(super) fn join<D: Detail>(
     Ok(joined)
 }
 
-/// What the runs before have.
+/// What the runs that are already joined have, so that nothing is added twice.
 #[derive(Default)]
 struct Known {
     /// Places of the records with a reply, by key and by the group of the model's name.
@@ -106,7 +113,10 @@ impl<D: Detail> Joined<D> {
     ) -> Result<JoinedRun> {
         let cost = cost(&run.records)?;
         let mut records = Vec::with_capacity(run.records.len());
+        let (mut replies, mut added) = (0, 0);
+        let served = served(&run.records);
         for mut record in run.records {
+            replies += usize::from(!record.failed());
             let group = self.models.group(&record.model, index);
             let trial = (
                 self.models.key(record.key),
@@ -118,6 +128,7 @@ impl<D: Detail> Joined<D> {
             }
             if !record.failed() {
                 known.trials.insert(trial, self.records.len());
+                added += 1;
             }
             if let Some((_, name)) = group {
                 record.model.clone_from(name);
@@ -143,8 +154,27 @@ impl<D: Detail> Joined<D> {
             cost,
             questions: run.questions,
             records,
+            replies,
+            added,
+            served,
         })
     }
+}
+
+/// The names that servers gave for each model.
+fn served<D>(records: &[Record<D>]) -> BTreeMap<String, BTreeSet<String>> {
+    let pairs = records
+        .iter()
+        .filter_map(|record| Some((&record.model, record.served_model.as_ref()?)));
+    let pairs: BTreeSet<(&String, &String)> = pairs.collect();
+    let mut served = BTreeMap::<String, BTreeSet<String>>::new();
+    for (model, name) in pairs {
+        served
+            .entry(model.clone())
+            .or_default()
+            .insert(name.clone());
+    }
+    served
 }
 
 /// Names of runs: those of their folders, or their paths if two folders have the same name.

@@ -4,18 +4,19 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::settings::{self, some};
 use crate::job::stored::StoredRun;
+use crate::score::subject::is_control;
 use crate::types::degradation::Kind;
 use crate::types::manifest::RunManifest;
 use crate::types::{Condition, Detail, Digest, EnhancerName, KindReading, LightGroup, Record};
 
 /// The conditions of one curve: a kind of degradation in a light reading, raw or with an enhancer, at all levels.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(super) struct Curve {
+pub(super) struct LightCurve {
     pub(super) variant: KindReading,
     pub(super) enhancer: Option<EnhancerName>,
 }
 
-impl Curve {
+impl LightCurve {
     fn of(condition: &Condition) -> Self {
         Self {
             variant: condition.kind_reading(),
@@ -54,7 +55,7 @@ impl Curve {
 
 /// How the images of two runs agree on one curve.
 #[derive(Debug, Clone, Copy, Default)]
-struct Agreement {
+struct ImageAgreement {
     /// Number of images of which both runs hold the digest.
     shared: usize,
     /// Number of those that differ.
@@ -64,7 +65,7 @@ struct Agreement {
 /// A curve whose images differ between runs.
 #[derive(Debug, Clone)]
 pub(super) struct SplitCurve {
-    pub(super) curve: Curve,
+    pub(super) curve: LightCurve,
     /// The names of the groups, without repetition.
     pub(super) groups: BTreeSet<String>,
     /// Number of images of which two runs hold the digest, and of those that differ; both 0 if only the manifests differ.
@@ -78,7 +79,7 @@ pub(super) struct SplitCurve {
 #[derive(Debug, Default)]
 pub(super) struct Lights {
     /// The group of each run, for the curves whose images differ.
-    groups: HashMap<(Curve, usize), LightGroup>,
+    groups: HashMap<(LightCurve, usize), LightGroup>,
     /// The curves whose images differ.
     pub(super) split: Vec<SplitCurve>,
     /// The runs with images whose records hold no digest of them.
@@ -138,7 +139,7 @@ impl Lights {
     /// Names the group of a run in a condition, if the images of its curve differ.
     pub(super) fn mark(&self, condition: &mut Condition, run: usize) {
         if !self.is_one() {
-            condition.group = self.groups.get(&(Curve::of(condition), run)).cloned();
+            condition.group = self.groups.get(&(LightCurve::of(condition), run)).cloned();
         }
     }
 }
@@ -165,14 +166,14 @@ fn parted_by(group: &[usize], bases: &[&Vec<Vec<usize>>]) -> Vec<Vec<usize>> {
 /// What the records of the runs hold about their images.
 struct Seen {
     /// The runs that have each curve.
-    curves: BTreeMap<Curve, BTreeSet<usize>>,
+    curves: BTreeMap<LightCurve, BTreeSet<usize>>,
     /// The agreement of each pair of runs that share images of a curve.
-    pairs: HashMap<(Curve, usize, usize), Agreement>,
+    pairs: HashMap<(LightCurve, usize, usize), ImageAgreement>,
     undigested: Vec<usize>,
 }
 
 /// Groups of runs that show the same images, by curve.
-type Partitions<'a> = BTreeMap<&'a Curve, Vec<Vec<usize>>>;
+type Partitions<'a> = BTreeMap<&'a LightCurve, Vec<Vec<usize>>>;
 
 impl Seen {
     /// The groups of runs that agree on each curve.
@@ -199,9 +200,9 @@ impl Seen {
     }
 
     /// The images of a curve that runs of different groups share.
-    fn between(&self, curve: &Curve, groups: &[Vec<usize>]) -> Agreement {
+    fn between(&self, curve: &LightCurve, groups: &[Vec<usize>]) -> ImageAgreement {
         let place = |run: usize| groups.iter().position(|group| group.contains(&run));
-        let mut all = Agreement::default();
+        let mut all = ImageAgreement::default();
         for ((of, one, other), agreement) in &self.pairs {
             if of == curve && place(*one) != place(*other) {
                 all.shared += agreement.shared;
@@ -232,7 +233,7 @@ impl Seen {
                 undigested.push(index);
             }
         }
-        let mut pairs = HashMap::<(&Condition, usize, usize), Agreement>::new();
+        let mut pairs = HashMap::<(&Condition, usize, usize), ImageAgreement>::new();
         for ((condition, _), digests) in images {
             for (place, (one, digest)) in digests.iter().enumerate() {
                 for (other, other_digest) in &digests[place + 1..] {
@@ -249,14 +250,14 @@ impl Seen {
         };
         for (condition, runs) in curves {
             seen.curves
-                .entry(Curve::of(condition))
+                .entry(LightCurve::of(condition))
                 .or_default()
                 .extend(runs);
         }
         for ((condition, one, other), found) in pairs {
             let pair = seen
                 .pairs
-                .entry((Curve::of(condition), one, other))
+                .entry((LightCurve::of(condition), one, other))
                 .or_default();
             pair.shared += found.shared;
             pair.differing += found.differing;
@@ -265,14 +266,16 @@ impl Seen {
     }
 }
 
-/// The condition, the frame or walk, and the digest of the images of a record; `None` if the model saw none or the trial failed.
+/// The condition, the frame or walk, and the digest of the images of a record; `None` if the model saw none or the trial failed. A
+/// control of the observer is shown a changed image, which says nothing of the light.
 fn image<D: Detail>(record: &Record<D>) -> Option<(&Condition, &str, Option<Digest>)> {
-    let condition = record.condition.as_ref().filter(|_| !record.failed())?;
+    let is_image = !record.failed() && !is_control(&record.model);
+    let condition = record.condition.as_ref().filter(|_| is_image)?;
     Some((condition, record.detail.source(), record.detail.shown()))
 }
 
 /// Whether two runs show the same images on a curve, by their manifests.
-fn same_by_manifest(curve: &Curve, one: &RunManifest, other: &RunManifest) -> bool {
+fn same_by_manifest(curve: &LightCurve, one: &RunManifest, other: &RunManifest) -> bool {
     let runs = [one, other];
     let own = |run: &RunManifest| {
         let mut all = some(run, &settings::ENCODING);

@@ -1,10 +1,10 @@
-//! Models of one name that were asked in different ways in two runs are different models: [`Names`].
+//! Models of one name that were asked in different ways in two runs, or gave other replies to the same trials, stand apart: [`Names`].
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::settings::{Setting, Settings, differing, is_digest, parameters};
 use crate::job::stored::StoredRun;
-use crate::types::{Condition, Detail, Digest, QuestionId, Record, RunQuestion, TrialKey, View};
+use crate::types::{Condition, Detail, QuestionId, Record, RunQuestion, TrialKey, View};
 
 /// The most settings in the name of a model; with more, the run's name stands there.
 const MOST_SETTINGS: usize = 2;
@@ -28,15 +28,46 @@ pub(super) fn item<D: Detail>(record: &Record<D>) -> Item<'_> {
     )
 }
 
-/// The names of models that were asked in different ways, by model and run.
+/// The names of models that stand apart, by model and run.
 #[derive(Debug, Default)]
 pub(super) struct Names {
     /// The number of the group and the name, by model and run.
     by_run: HashMap<String, HashMap<usize, (usize, String)>>,
     /// The keys of trials that repeat another one by image, words, model and parameters, with the key of that one.
     repeated: HashMap<TrialKey, TrialKey>,
-    /// The settings that differ, by model.
-    pub(super) differences: BTreeMap<String, Vec<Setting>>,
+    /// The models that stand apart.
+    pub(super) apart: Vec<ModelApart>,
+}
+
+/// A model that stands in a report under several names, and why.
+#[derive(Debug)]
+pub(super) struct ModelApart {
+    /// The name under which it was asked.
+    pub(super) model: String,
+    /// The names under which it stands.
+    pub(super) names: Vec<String>,
+    /// The runs behind each name.
+    groups: Vec<Vec<usize>>,
+    /// The settings that differ.
+    pub(super) differences: Vec<Setting>,
+    /// How each two runs under different names asked it the same items.
+    overlaps: Vec<Overlap>,
+}
+
+impl ModelApart {
+    /// The overlap of the two runs that differ most.
+    pub(super) fn overlap(&self) -> Overlap {
+        let overlaps = self.overlaps.iter().copied();
+        let most = overlaps.max_by_key(|overlap| overlap.differing());
+        most.unwrap_or_default()
+    }
+
+    /// Whether all runs asked it in the same way, and only its replies differ.
+    pub(super) fn differs_by_replies_alone(&self) -> bool {
+        let mut overlaps = self.overlaps.iter();
+        self.differences.is_empty()
+            && overlaps.all(|overlap| overlap.other_trials + overlap.other_served == 0)
+    }
 }
 
 impl Names {
@@ -52,19 +83,18 @@ impl Names {
         if runs.len() < 2 {
             return found;
         }
-        let mut having = BTreeMap::<&str, BTreeSet<usize>>::new();
-        for (index, run) in runs.iter().enumerate() {
-            for record in run.records.iter().filter(|record| compared(record)) {
-                if !having
-                    .get(&*record.model)
-                    .is_some_and(|runs| runs.contains(&index))
-                {
-                    having.entry(&record.model).or_default().insert(index);
+        // The runs of each model, in the order of their names.
+        let mut having = BTreeMap::<&str, Vec<usize>>::new();
+        for &index in order {
+            for record in runs[index].records.iter().filter(|record| compared(record)) {
+                let runs = having.entry(&record.model).or_default();
+                if runs.last() != Some(&index) {
+                    runs.push(index);
                 }
             }
         }
         having.retain(|_, runs| runs.len() > 1);
-        let (conflicts, repeated) = conflicts(runs, order, compared);
+        let (overlaps, repeated) = overlaps(runs, order, compared);
         found.repeated = repeated;
         for (model, having) in having {
             let settings = runs.iter().enumerate();
@@ -74,33 +104,37 @@ impl Names {
                     settings.filter(|_| having.contains(&index))
                 })
                 .collect();
-            let mut groups: Vec<Vec<usize>> = Vec::new();
-            for run in order.iter().copied().filter(|run| having.contains(run)) {
-                let is_same = |other: &usize| {
-                    let known = settings[run].as_ref().zip(settings[*other].as_ref());
-                    known.is_none_or(|(one, other)| one == other)
-                        && !conflicts.contains(&(model, run.min(*other), run.max(*other)))
-                };
-                match groups.iter_mut().find(|group| group.iter().all(is_same)) {
-                    Some(group) => group.push(run),
-                    None => groups.push(vec![run]),
-                }
-            }
-            let differences = differing(&settings);
+            let overlap = |run: usize, other: usize| {
+                let pair = (model, run.min(other), run.max(other));
+                overlaps.get(&pair).copied().unwrap_or_default()
+            };
+            let groups = grouped(&having, |run, other| {
+                let known = settings[run].as_ref().zip(settings[other].as_ref());
+                known.is_none_or(|(one, other)| one == other) && overlap(run, other).agrees()
+            });
             if groups.len() > 1 {
+                let differences = differing(&settings);
                 let suffixes = suffixes(&groups, &differences, names);
-                let named = groups.iter().zip(suffixes).enumerate();
-                let named = named.flat_map(|(number, (group, suffix))| {
-                    let name = format!("{model} ({suffix})");
-                    group.iter().map(move |run| (*run, (number, name.clone())))
+                let apart = suffixes.iter().map(|suffix| format!("{model} ({suffix})"));
+                found.add(ModelApart {
+                    model: model.to_owned(),
+                    names: apart.collect(),
+                    overlaps: between(&groups, overlap),
+                    differences,
+                    groups,
                 });
-                found.by_run.insert(model.to_owned(), named.collect());
-            }
-            if !differences.is_empty() {
-                found.differences.insert(model.to_owned(), differences);
             }
         }
         found
+    }
+
+    fn add(&mut self, apart: ModelApart) {
+        let named = apart.groups.iter().zip(&apart.names).enumerate();
+        let named = named.flat_map(|(number, (group, name))| {
+            group.iter().map(move |run| (*run, (number, name.clone())))
+        });
+        self.by_run.insert(apart.model.clone(), named.collect());
+        self.apart.push(apart);
     }
 
     /// The group of a run among those that asked a model in different ways, and the name of the model there; `None` if all
@@ -123,6 +157,30 @@ impl Names {
     pub(super) fn key(&self, key: TrialKey) -> TrialKey {
         self.repeated.get(&key).copied().unwrap_or(key)
     }
+}
+
+/// Runs in groups in which each two are the same.
+fn grouped(runs: &[usize], is_same: impl Fn(usize, usize) -> bool) -> Vec<Vec<usize>> {
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    for &run in runs {
+        let mut known = groups.iter_mut();
+        match known.find(|group| group.iter().all(|other| is_same(run, *other))) {
+            Some(group) => group.push(run),
+            None => groups.push(vec![run]),
+        }
+    }
+    groups
+}
+
+/// The overlaps of each two runs of different groups.
+fn between(groups: &[Vec<usize>], overlap: impl Fn(usize, usize) -> Overlap) -> Vec<Overlap> {
+    let mut overlaps = Vec::new();
+    for (place, group) in groups.iter().enumerate() {
+        for other in groups[place + 1..].iter().flatten() {
+            overlaps.extend(group.iter().map(|run| overlap(*run, *other)));
+        }
+    }
+    overlaps
 }
 
 /// What tells the groups of runs apart: the settings if they are few and short, else the name of the first run.
@@ -150,25 +208,52 @@ fn suffixes(groups: &[Vec<usize>], differences: &[Setting], names: &[String]) ->
     distinct.unwrap_or_else(|| groups.iter().map(|group| names[group[0]].clone()).collect())
 }
 
-/// The first record of an item: its run, key and image.
-#[derive(Clone, Copy)]
-struct First {
-    run: usize,
-    key: TrialKey,
-    image: Option<Digest>,
+/// How two runs asked a model the same items.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Overlap {
+    /// Number of trials to which both runs have a reply.
+    pub(super) repeated: usize,
+    /// Number of those with other replies.
+    pub(super) other_replies: usize,
+    /// Number of those for which the server named another model.
+    pub(super) other_served: usize,
+    /// Number of items that are other trials, as their keys tell.
+    pub(super) other_trials: usize,
 }
 
-/// Pairs of runs, by model.
-type Pairs<'a> = BTreeSet<(&'a str, usize, usize)>;
+impl Overlap {
+    /// Whether the runs can stand as one.
+    fn agrees(self) -> bool {
+        self.differing() == 0
+    }
 
-/// The pairs of runs that asked a model the same item in different ways, as their keys tell; and the trials that repeat another
-/// one. The keys of two records may differ although the image, the words, the model and its parameters are the same: the program
-/// may make the same image in two ways.
-fn conflicts<'a, D: Detail>(
+    fn differing(self) -> usize {
+        self.other_replies + self.other_served + self.other_trials
+    }
+
+    /// Adds a trial that both runs asked.
+    fn add<D>(&mut self, one: &Record<D>, other: &Record<D>) {
+        if one.failed() || other.failed() {
+            return;
+        }
+        let served = one.served_model.as_ref().zip(other.served_model.as_ref());
+        self.repeated += 1;
+        self.other_replies +=
+            usize::from((&one.reply, &one.refusal) != (&other.reply, &other.refusal));
+        self.other_served += usize::from(served.is_some_and(|(one, other)| one != other));
+    }
+}
+
+/// The overlap of each two runs, by model.
+type Overlaps<'a> = HashMap<(&'a str, usize, usize), Overlap>;
+
+/// The overlaps of each two runs; and the trials that repeat another one. The keys of two records may differ although the image, the
+/// words, the model and its parameters are the same: the program may make the same image in two ways.
+fn overlaps<'a, D: Detail>(
     runs: &'a [StoredRun<D>],
     order: &[usize],
     compared: impl Fn(&Record<D>) -> bool,
-) -> (Pairs<'a>, HashMap<TrialKey, TrialKey>) {
+) -> (Overlaps<'a>, HashMap<TrialKey, TrialKey>) {
     let texts: Vec<HashMap<&QuestionId, &RunQuestion>> = runs
         .iter()
         .map(|run| {
@@ -178,38 +263,44 @@ fn conflicts<'a, D: Detail>(
                 .collect()
         })
         .collect();
-    let mut firsts = HashMap::<Item<'_>, First>::new();
-    let (mut conflicts, mut repeated) = (BTreeSet::new(), HashMap::new());
+    let is_repeated = |[one, other]: [(usize, &Record<D>); 2]| {
+        let words = [one, other].map(|(run, record)| texts[run].get(&record.question));
+        let same_words = match words {
+            [Some(one), Some(other)] => (&one.text, &one.choices) == (&other.text, &other.choices),
+            _ => false,
+        };
+        let [(run, record), (other_run, other)] = [one, other];
+        let image = record.detail.shown();
+        let same_image =
+            record.view == View::Image && image.is_some() && image == other.detail.shown();
+        let has = |run: usize| parameters_are_known(&runs[run], &record.model);
+        same_words && same_image && has(run) && has(other_run)
+    };
+    // For each item its first record in each run.
+    let mut firsts = HashMap::<Item<'_>, Vec<(usize, &Record<D>)>>::new();
+    let (mut overlaps, mut repeated) = (Overlaps::new(), HashMap::new());
     for &index in order {
-        let run = &runs[index];
-        for record in run.records.iter().filter(|record| compared(record)) {
-            let own = First {
-                run: index,
-                key: record.key,
-                image: record.detail.shown(),
-            };
-            let first = *firsts.entry(item(record)).or_insert(own);
-            if first.key == own.key || first.run == index {
+        for record in runs[index].records.iter().filter(|record| compared(record)) {
+            let known = firsts.entry(item(record)).or_default();
+            if known.last().is_some_and(|(run, _)| *run == index) {
                 continue;
             }
-            let words = [first.run, index].map(|run| texts[run].get(&record.question));
-            let same_words = match words {
-                [Some(one), Some(other)] => {
-                    (&one.text, &one.choices) == (&other.text, &other.choices)
+            for &(run, other) in &*known {
+                let pair = (&*record.model, run.min(index), run.max(index));
+                let overlap: &mut Overlap = overlaps.entry(pair).or_default();
+                if record.key != other.key {
+                    if !is_repeated([(index, record), (run, other)]) {
+                        overlap.other_trials += 1;
+                        continue;
+                    }
+                    repeated.entry(record.key).or_insert(other.key);
                 }
-                _ => false,
-            };
-            let has = |run: usize| parameters_are_known(&runs[run], &record.model);
-            let same_image =
-                record.view == View::Image && own.image.is_some() && own.image == first.image;
-            if same_words && same_image && has(first.run) && has(index) {
-                repeated.insert(own.key, first.key);
-            } else {
-                conflicts.insert((&*record.model, first.run.min(index), first.run.max(index)));
+                overlap.add(record, other);
             }
+            known.push((index, record));
         }
     }
-    (conflicts, repeated)
+    (overlaps, repeated)
 }
 
 fn parameters_are_known<D>(run: &StoredRun<D>, model: &str) -> bool {

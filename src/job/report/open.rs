@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use serde_json::Value;
 
-use super::alerts::of_runs;
+use super::alerts::{of_joining, of_runs};
 use super::join::join;
 use crate::error::{Error, Result};
 use crate::job::outcome::Outcome;
@@ -176,6 +176,7 @@ pub(crate) fn combine(
     }
     let joined = join(runs, |record| record.detail.step == Step::Answer)?;
     let mut alerts = of_runs(&joined);
+    alerts.extend(of_joining(&joined));
     if joined.runs.len() == 1 {
         // The text and the page of one run say more about what is missing.
         alerts.retain(|alert| alert.kind != AlertKind::NotComplete);

@@ -5,16 +5,17 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::alerts::alerts;
-use super::baseline::Baseline;
+use super::alerts::{alerts, named_again};
+use super::baseline::{Baseline, FAIL_IF_WORSE};
 use super::choice::{in_its_folder, text};
 use super::combine::{Combined, combine};
 use super::common::restrict;
 use super::open;
 use crate::error::{Error, Result};
 use crate::files;
-use crate::job::stored::{AnyRun, StoredRun};
+use crate::job::stored::{AnyRun, StoredRun, name};
 use crate::job::{Outcome, ShowArgs, StdoutFormat, count};
+use crate::report::alert::Alert;
 use crate::report::choice_report::ChoiceReport;
 use crate::report::json::{RunList, summary};
 use crate::report::products::{PAGE, products};
@@ -53,7 +54,8 @@ pub(crate) struct BaselineArgs {
     /// default: no comparison
     #[arg(long, value_name = "OLD", add = Decides::Nothing)]
     pub baseline: Option<PathBuf>,
-    /// Exit with 1 if any model is shown to be worse than the baseline in any condition
+    /// Exit with 1 if any model is shown to be worse than the baseline in any condition, and with 2 if no verdict about any is possible;
+    /// random and the observer are no models
     #[arg(long, add = Decides::Nothing)]
     pub fail_if_worse: bool,
 }
@@ -65,18 +67,19 @@ pub(crate) struct BaselineArgs {
 pub(crate) fn report(args: &ReportArgs) -> Result<Outcome> {
     if args.baseline.fail_if_worse && args.baseline.baseline.is_none() {
         let problem = "compares with an old run: name it with --baseline OLD";
-        return Err(Error::usage("--fail-if-worse", problem));
+        return Err(Error::usage(FAIL_IF_WORSE, problem));
     }
+    let (folders, again) = distinct(&args.runs);
     let (mut choice, mut open) = (Vec::new(), Vec::new());
-    for folder in &args.runs {
+    for folder in folders {
         match AnyRun::open(folder)? {
             AnyRun::Choice(run) => choice.push(run),
             AnyRun::Open(run) => open.push(run),
         }
     }
     let (status, output) = match (choice.is_empty(), open.is_empty()) {
-        (_, true) => of_choices(args, choice)?,
-        (true, false) => (Status::Complete, of_open(args, open)?),
+        (_, true) => of_choices(args, choice, &again)?,
+        (true, false) => (Status::Complete, of_open(args, open, &again)?),
         (false, false) => {
             return Err(Error::usage(
                 "RUN",
@@ -87,9 +90,29 @@ pub(crate) fn report(args: &ReportArgs) -> Result<Outcome> {
     Ok(Outcome { status, output })
 }
 
+/// The folders without those that are named before, and the alerts about these.
+fn distinct(folders: &[PathBuf]) -> (Vec<&PathBuf>, Vec<Alert>) {
+    let mut times = Vec::<(PathBuf, &PathBuf, usize)>::new();
+    for folder in folders {
+        // A folder that cannot be read is named when it is opened.
+        let place = folder.canonicalize().unwrap_or_else(|_| folder.clone());
+        match times.iter_mut().find(|(known, ..)| *known == place) {
+            Some((.., times)) => *times += 1,
+            None => times.push((place, folder, 1)),
+        }
+    }
+    let again = times.iter().filter(|(.., times)| *times > 1);
+    let again: Vec<(String, usize)> = again
+        .map(|(_, folder, times)| (name(folder), *times))
+        .collect();
+    let folders = times.into_iter().map(|(_, folder, _)| folder);
+    (folders.collect(), named_again(&again))
+}
+
 fn of_choices(
     args: &ReportArgs,
     mut runs: Vec<StoredRun<ChoiceDetail>>,
+    again: &[Alert],
 ) -> Result<(Status, String)> {
     let mut output = String::new();
     for run in &mut runs {
@@ -121,7 +144,10 @@ fn of_choices(
     }
     let baseline = old.map(|(new, old)| Baseline::new(&combined, new, old));
     let baseline = baseline.transpose()?;
-    let in_folder = args.out.is_none() && !args.common && baseline.is_none();
+    let judged = baseline.as_ref().filter(|_| args.baseline.fail_if_worse);
+    let is_worse = judged.map(|baseline| baseline.is_worse(combined.unit()));
+    let is_worse = is_worse.transpose()?.unwrap_or(false);
+    let in_folder = args.out.is_none() && !args.common && baseline.is_none() && again.is_empty();
     output += &match &*combined.runs {
         [run] if in_folder => match Store::open(&run.folder, &run.manifest, AddressChange::Allowed)
         {
@@ -129,14 +155,13 @@ fn of_choices(
             // A run that another process writes, or in a read-only folder, is shown anyway.
             Err(error) => {
                 tracing::warn!("the report is not written: {error}");
-                compare(&combined, baseline.as_ref(), args)?
+                compare(&combined, baseline.as_ref(), args, again)?
             }
         },
-        _ => compare(&combined, baseline.as_ref(), args)?,
+        _ => compare(&combined, baseline.as_ref(), args, again)?,
     };
-    let is_worse = baseline.is_some_and(|baseline| baseline.is_worse());
     // A command whose outcome is not what was asked for ends with 1.
-    let status = if args.baseline.fail_if_worse && is_worse {
+    let status = if is_worse {
         Status::Incomplete
     } else {
         Status::Complete
@@ -145,10 +170,17 @@ fn of_choices(
 }
 
 /// The text of several runs, joined. Writes the report if `--out` is set.
-fn compare(combined: &Combined, baseline: Option<&Baseline>, args: &ReportArgs) -> Result<String> {
+fn compare(
+    combined: &Combined,
+    baseline: Option<&Baseline>,
+    args: &ReportArgs,
+    again: &[Alert],
+) -> Result<String> {
     let findings = combined.findings();
     let runs = combined.manifests();
-    let mut report = ChoiceReport::new(&findings, alerts(combined, &findings));
+    let mut above = again.to_vec();
+    above.extend(alerts(combined, &findings));
+    let mut report = ChoiceReport::new(&findings, above);
     if let Some(baseline) = baseline {
         baseline.add_to(&mut report);
     }
@@ -186,7 +218,7 @@ fn write_files(
     Ok(text)
 }
 
-fn of_open(args: &ReportArgs, runs: Vec<StoredRun<OpenDetail>>) -> Result<String> {
+fn of_open(args: &ReportArgs, runs: Vec<StoredRun<OpenDetail>>, again: &[Alert]) -> Result<String> {
     let flags = [
         ("--common", args.common),
         ("--baseline", args.baseline.baseline.is_some()),
@@ -198,8 +230,10 @@ fn of_open(args: &ReportArgs, runs: Vec<StoredRun<OpenDetail>>) -> Result<String
     if let Some(run) = runs.iter().find(|run| run.records.is_empty()) {
         return Err(no_records(run.folder.clone()));
     }
-    let is_single = runs.len() == 1;
-    let scores = open::Scores::new(open::combine(runs)?)?;
+    let is_single = runs.len() == 1 && again.is_empty();
+    let (run, mut alerts) = open::combine(runs)?;
+    alerts.splice(..0, again.iter().cloned());
+    let scores = open::Scores::new((run, alerts))?;
     let run = &scores.run;
     if is_single && args.out.is_none() {
         match Store::open(&run.folder, &run.manifest, AddressChange::Allowed) {

@@ -195,10 +195,16 @@ pub(super) fn without_repeated(mut settings: Vec<Setting>) -> Vec<Setting> {
 /// What decides the replies of a model besides question and images; `None` if the run does not have the model, or does not say.
 pub(super) fn parameters(run: &RunManifest, model: &str) -> Option<Settings> {
     let content = run.columns.get("model")?.get(model)?;
-    let prompts = some(run, &["--prompts"]);
+    // A model of this program answers by rules, and reads no prompt.
+    let asked_by = if content.get("local").is_some() {
+        "--rules"
+    } else {
+        "--prompts"
+    };
+    let shared = some(run, &[asked_by]);
     let own =
         leaves(content).filter(|(flag, _)| !["--base-url", "--model"].contains(&flag.as_str()));
-    Some(own.chain(prompts).collect())
+    Some(own.chain(shared).collect())
 }
 
 /// The parameters of all models of a run that have flags: a flag with several values has all of them. `None` if no model has.
@@ -222,15 +228,6 @@ pub(super) fn parameter_flags(run: &RunManifest) -> Option<Settings> {
         .into_iter()
         .map(|(flag, values)| (flag, joined(values)));
     (remote > 0).then(|| values.collect())
-}
-
-/// Some of the settings that decide no reply.
-pub(super) fn noted(run: &RunManifest, fields: &[&str]) -> Settings {
-    let settings = run
-        .settings
-        .iter()
-        .filter(|(flag, value)| fields.contains(&flag.as_str()) && !value.is_null());
-    settings.map(field).collect()
 }
 
 /// The address at which a run asks a model, without user, password and query.

@@ -3,28 +3,67 @@
 use super::sentence::{Numbers, Sentence, Tone};
 use crate::score::baseline::BaselineRow;
 use crate::score::cluster::ClusterUnit;
+use crate::score::comparison::MIN_PAIRS;
 use crate::score::significance::Significance;
 
 /// Largest number of conditions that a sentence names.
 const MAX_NAMED: usize = 3;
 
-/// What is shown about each model against the run `old`; one sentence if nothing is shown about any.
+/// What is shown about each model against the run `old`; one sentence if nothing is shown about any. `random` and the observer are
+/// left out if there are others.
 pub(crate) fn against_baseline(
     rows: &[BaselineRow],
     old: &str,
     unit: ClusterUnit,
 ) -> Vec<Sentence> {
+    let (references, models): (Vec<&BaselineRow>, Vec<&BaselineRow>) =
+        rows.iter().partition(|row| row.subject.is_reference());
+    let rows = if models.is_empty() {
+        references
+    } else {
+        models
+    };
     let mut sentences = Vec::new();
     for of_model in rows.chunk_by(|one, other| one.subject.model == other.subject.model) {
         for verdict in [Significance::Worse, Significance::Better] {
-            let shown = of_model.iter().filter(|row| row.significance == verdict);
+            let shown = of_model.iter().copied();
+            let shown = shown.filter(|row| row.significance == verdict);
             sentences.extend(shown_against(&shown.collect::<Vec<_>>(), old, unit));
         }
     }
     if sentences.is_empty() {
-        sentences.push(nothing_shown(rows, old, unit));
+        sentences.push(nothing_shown(&rows, old, unit));
     }
     sentences
+}
+
+/// Why no verdict about these rows is possible.
+pub(crate) fn no_verdict(rows: &[&BaselineRow], unit: ClusterUnit) -> String {
+    too_few(rows, &mut Numbers::of(unit))
+}
+
+/// Why no verdict is possible: too few questions are shared in every condition, or their clusters are too few for any p-value.
+fn too_few(rows: &[&BaselineRow], numbers: &mut Numbers) -> String {
+    let shared = rows.iter().map(|row| row.paired.difference.n).max();
+    let shared = shared.unwrap_or(0);
+    if shared < MIN_PAIRS {
+        format!(
+            "no condition shares more than {}, and {} are needed",
+            numbers.count("n", shared)
+                + if shared == 1 {
+                    " question"
+                } else {
+                    " questions"
+                },
+            numbers.count("needed", MIN_PAIRS)
+        )
+    } else {
+        let clusters = rows.iter().map(|row| row.paired.clusters).max();
+        format!(
+            "with {} and so many conditions no corrected p-value can be small enough",
+            numbers.clusters(clusters.unwrap_or(0))
+        )
+    }
 }
 
 /// The sentence about the conditions of a model that have one verdict; `None` if there are none.
@@ -48,19 +87,35 @@ fn shown_against(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Option<
     Some(numbers.sentence("baseline", verdict.into(), text, detail))
 }
 
-/// That no difference is shown, with the largest one; or that nothing can be compared.
-fn nothing_shown(rows: &[BaselineRow], old: &str, unit: ClusterUnit) -> Sentence {
+/// That no difference is shown, with the largest one; that no verdict is possible; or that nothing can be compared.
+fn nothing_shown(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Sentence {
     let mut numbers = Numbers::of(unit);
-    let Some(largest) = largest(&rows.iter().collect::<Vec<_>>()) else {
+    if rows.is_empty() {
         let text = format!("Nothing can be compared with {old}.");
         let detail = "no model answered the same question about the same image in both".to_owned();
         return numbers.sentence("baseline", Tone::Note, text, detail);
+    }
+    let possible = rows.iter().copied();
+    let possible: Vec<&BaselineRow> = possible
+        .filter(|row| row.significance.is_possible())
+        .collect();
+    let Some(largest) = largest(&possible) else {
+        let text = format!("No verdict against {old} is possible.");
+        let detail = too_few(rows, &mut numbers);
+        return numbers.sentence("baseline", Tone::Note, text, detail);
     };
     let text = format!("It is not shown that any model is worse or better than in {old}.");
-    let compared = numbers.count("conditions", rows.len());
-    let noun = if rows.len() == 1 { "row" } else { "rows" };
+    let compared = numbers.count("conditions", possible.len());
+    let noun = if possible.len() == 1 { "row" } else { "rows" };
+    let without = match rows.len() - possible.len() {
+        0 => String::new(),
+        more => format!(
+            " ({} more without a verdict)",
+            numbers.count("without", more)
+        ),
+    };
     let detail = format!(
-        "{compared} {noun} of model and condition compared; largest: {} at {}, {}",
+        "{compared} {noun} of model and condition compared{without}; largest: {} at {}, {}",
         largest.subject.model,
         largest.subject.condition(),
         detail(largest, &mut numbers)

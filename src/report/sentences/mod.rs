@@ -15,7 +15,7 @@ mod pooled;
 mod sentence;
 mod words_alone;
 
-pub(crate) use baseline::against_baseline;
+pub(crate) use baseline::{against_baseline, no_verdict};
 pub(crate) use sentence::Sentence;
 
 use self::hallucination::TopAnswer;

@@ -4,7 +4,7 @@ use super::pooled::too_few_clusters;
 use super::sections::ENHANCERS;
 use crate::report::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
 use crate::report::table::{Table, TableBuilder, TableFormat};
-use crate::report::words::counted;
+use crate::report::words::{counted, name};
 use crate::score::comparison::{Comparison, ComparisonKind, MIN_PAIRS};
 use crate::score::findings::Findings;
 use crate::score::significance::Significance;
@@ -204,14 +204,13 @@ fn numbers(builder: TableBuilder<&Comparison>) -> TableBuilder<&Comparison> {
         )
 }
 
-/// What of the second side the first side does not imply: another model, or another condition.
+/// What of the second side the first side does not imply: another model, another condition, or both.
 fn against(comparison: &Comparison) -> String {
     let (first, second) = (&comparison.first, &comparison.second);
-    if first.model != second.model {
-        second.model.clone()
-    } else if comparison.kind == ComparisonKind::Light {
-        second.condition()
-    } else {
-        String::new()
+    match (first.model != second.model, comparison.kind) {
+        (true, ComparisonKind::Light) => name(second),
+        (true, _) => second.model.clone(),
+        (false, ComparisonKind::Light) => second.condition(),
+        (false, _) => String::new(),
     }
 }

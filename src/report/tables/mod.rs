@@ -29,7 +29,7 @@ pub(crate) use baseline::baseline;
 pub(super) use levels::unread;
 pub(super) use observer::{notes as observer_notes, what_it_is};
 pub(super) use sections::{ENHANCERS, SECTIONS};
-pub(super) use summary::{SUMMARY, reading};
+pub(super) use summary::{SUMMARY, reading, summary as summary_rows};
 
 /// All tables of an evaluation; the first is the summary. What is not shown is in the files alone.
 #[must_use]

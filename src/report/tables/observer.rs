@@ -25,7 +25,8 @@ pub(super) fn observer(findings: &Findings<'_>) -> Vec<Table> {
         "{HEADING}: expected score in % with its 95 % interval, a guess among k choices counts 1/k"
     ));
     if !observer.is_hidden() && observer.is_asked() {
-        let control = observer.standing_control();
+        let controls = observer.standing_controls();
+        let control = controls.first();
         let control = control.map(|control| format!(" Control: {}.", what_it_is(control)));
         table.latex = Some(format!(
             "{HEADING}: expected score in \\% with its 95\\,\\% interval. A guess among $k$ choices counts $1/k$.{}",

@@ -1,5 +1,7 @@
 //! Tables of the differences of all models together, and of the models by area.
 
+use std::collections::BTreeSet;
+
 use crate::report::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
 use crate::report::table::{Table, TableBuilder};
 use crate::report::words::{counted, light, p};
@@ -14,21 +16,37 @@ pub(super) fn pooled(findings: &Findings<'_>) -> Vec<Table> {
         .pooled
         .iter()
         .partition(|finding| finding.family.is_none());
-    let models = whole.iter().map(|finding| finding.models.len()).max();
-    let of_models = counted(models.unwrap_or(0), "model");
-    let mut total = table(&format!("Pooled over {of_models}"), &whole);
+    let numbers = findings.pooled.iter().map(|finding| finding.models.len());
+    let numbers: BTreeSet<usize> = numbers.collect();
+    let models = numbers.last().copied();
+    let of_models = if numbers.len() > 1 {
+        // The column of models says over how many each row is pooled.
+        "all models".to_owned()
+    } else {
+        counted(models.unwrap_or(0), "model")
+    };
+    let column = if numbers.len() > 1 {
+        "csv models | terminal models | page models"
+    } else {
+        "csv models"
+    };
+    let mut total = table(&format!("Pooled over {of_models}"), column, &whole);
     if models.is_some_and(|models| models > 1) {
         total.heading = Some(format!(
             "Pooled over {of_models}, paired by question, in percentage points"
         ));
     }
     total.notes = notes(&whole, &findings.unit.to_string());
-    let mut by_family = table(&format!("Pooled over {of_models}, by family"), &by_family);
+    let mut by_family = table(
+        &format!("Pooled over {of_models}, by family"),
+        column,
+        &by_family,
+    );
     by_family.is_folded = true;
     vec![total, by_family]
 }
 
-fn table(caption: &str, findings: &[&PooledFinding]) -> Table {
+fn table(caption: &str, models: &str, findings: &[&PooledFinding]) -> Table {
     let builder = TableBuilder::new("pooled", findings.iter().copied())
         .page("comparisons", caption)
         .column(Text, "csv kind", |finding| finding.kind.name())
@@ -38,7 +56,8 @@ fn table(caption: &str, findings: &[&PooledFinding]) -> Table {
             finding.enhancer.as_ref().map(ToString::to_string)
         })
         .column(Text, "terminal | page difference", |finding| title(finding))
-        .family(|finding| finding.family.as_ref());
+        .family(|finding| finding.family.as_ref())
+        .column(Count, models, |finding| finding.models.len());
     numbers(builder)
         .column(ColumnKind::Significance, "terminal | page", |finding| {
             finding.verdict
@@ -53,7 +72,6 @@ fn table(caption: &str, findings: &[&PooledFinding]) -> Table {
 
 fn numbers(builder: TableBuilder<&PooledFinding>) -> TableBuilder<&PooledFinding> {
     builder
-        .column(Count, "csv models", |finding| finding.models.len())
         .column(Count, "csv n | page n", |finding| finding.items)
         .column(Count, "csv dropped | page dropped", |finding| {
             finding.dropped

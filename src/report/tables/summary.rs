@@ -10,7 +10,8 @@ use crate::types::LightGroup;
 /// Name of the summary table.
 pub(in crate::report) const SUMMARY: &str = "summary";
 
-pub(super) fn summary(summary: &AccuracySummary) -> Table {
+/// A row for each accuracy.
+pub(in crate::report) fn summary(summary: &AccuracySummary) -> Table {
     let builder = TableBuilder::new(SUMMARY, &summary.cells)
         .subject(|cell| &cell.subject, |variant| variant.word().to_owned())
         .family(|cell| cell.family.as_ref())

@@ -32,7 +32,8 @@ impl OtherRooms {
         let count = frames.len();
         let mut others = BTreeMap::new();
         let mut next = 0;
-        // Twice around, from behind: in the first round the last frames of the order do not know their successor yet.
+        // From the last frame to the first, `next` is the nearest later frame of another scene. For the last scene of the order that
+        // is the first frame, which is not known until the loop has gone through all frames once; so it does so twice.
         for place in (0..2 * count).rev().map(|place| place % count) {
             let after = (place + 1) % count;
             if scenes[after] != scenes[place] {

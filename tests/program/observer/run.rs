@@ -224,4 +224,16 @@ fn a_control_that_is_not_at_chance_hides_the_observer() {
         let text = fs::read_to_string(bench.path("report").join(file)).unwrap();
         assert!(text.contains("\nobserver,"), "{file}");
     }
+    let summary = fs::read(bench.path("report/summary.json")).unwrap();
+    let summary: Value = serde_json::from_slice(&summary).unwrap();
+    let models = summary["rows"].as_array().unwrap().iter();
+    let models: BTreeSet<&str> = models.map(|row| row["model"].as_str().unwrap()).collect();
+    assert_eq!(Vec::from_iter(models), ["chance", "random"]);
+    // Against an old run, too.
+    let called = bench.call(&["report", "run", "--baseline", "run", "--full"]);
+    let rows = called
+        .stdout
+        .lines()
+        .filter(|line| line.starts_with(" observer"));
+    assert_eq!(rows.count(), 0, "{called:?}");
 }

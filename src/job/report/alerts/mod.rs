@@ -1,0 +1,102 @@
+//! The lines above a report: what differs between its runs, and what is wrong with its numbers ([`alerts`]).
+
+mod models;
+mod questions;
+mod replies;
+mod servers;
+mod settings;
+mod words;
+
+use self::words::{counted, plural};
+use super::combine::Combined;
+use super::join::{Joined, JoinedRun};
+use crate::report::alert::{Alert, AlertKind};
+use crate::score::cluster::MIN_SCENES;
+use crate::score::findings::Findings;
+use crate::types::Detail;
+use crate::types::manifest::Status;
+
+/// All alerts of a report on questions with choices, in the order of their kinds.
+pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert> {
+    let mut alerts = of_runs(combined);
+    alerts.extend(of_joining(combined));
+    alerts.extend(replies::of_replies(findings));
+    alerts.extend(replies::of_people(combined));
+    alerts.extend(questions::of_repeats(combined));
+    alerts.extend(questions::of_items(findings));
+    if findings.grid.clusters < MIN_SCENES {
+        let (clusters, unit) = (findings.grid.clusters, findings.unit);
+        let text = format!(
+            "There are only {} ({MIN_SCENES} are needed): intervals and tests are rough.",
+            counted(clusters, &unit.to_string())
+        );
+        alerts.push(Alert::new(AlertKind::Clusters, text));
+    }
+    alerts.sort_by_key(|alert| alert.kind);
+    alerts
+}
+
+/// The alerts that follow from manifests and the questions asked, of runs of either kind.
+pub(super) fn of_runs<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
+    let mut alerts = of_progress(&joined.runs);
+    alerts.extend(servers::of_servers(joined));
+    if joined.runs.len() > 1 {
+        alerts.extend(settings::of_settings(joined));
+        alerts.extend(questions::of_questions(joined));
+    }
+    alerts.sort_by_key(|alert| alert.kind);
+    alerts
+}
+
+/// What became of the runs when they were joined: models that stand apart, and runs that add nothing to the others.
+pub(super) fn of_joining<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
+    let repeated = joined
+        .runs
+        .iter()
+        .filter(|run| run.replies > 0 && run.added == 0);
+    let repeated = repeated.map(|run| {
+        let text = format!(
+            "All {} of {} are in the other runs, too, and count once.",
+            plural(run.replies, "reply", "replies"),
+            run.name
+        );
+        Alert::new(AlertKind::Runs, text)
+    });
+    let mut alerts: Vec<Alert> = repeated.collect();
+    alerts.extend(models::of_models(joined));
+    alerts
+}
+
+/// Folders that were named more than once: their names, and how many times.
+pub(super) fn named_again(folders: &[(String, usize)]) -> Vec<Alert> {
+    let alerts = folders.iter().map(|(name, times)| {
+        let times = match times {
+            2 => "twice".to_owned(),
+            more => format!("{more} times"),
+        };
+        let text = format!("{name} is named {times} and counted once.");
+        Alert::new(AlertKind::Runs, text)
+    });
+    alerts.collect()
+}
+
+fn of_progress(runs: &[JoinedRun]) -> Vec<Alert> {
+    let unfinished = runs
+        .iter()
+        .filter(|run| run.manifest.status != Status::Complete);
+    let alerts = unfinished.map(|run| {
+        let (status, counts) = (run.manifest.status, run.manifest.counts);
+        // A run that is merged of some of its parts has answers to all of their trials.
+        let rest = if counts.answered < counts.trials {
+            " The same command asks the rest."
+        } else {
+            ""
+        };
+        let text = format!(
+            "{}: {status}: {} of {} trials answered, {} failed.{rest}",
+            run.name, counts.answered, counts.trials, counts.failed
+        );
+        Alert::new(AlertKind::NotComplete, text)
+    });
+    alerts.collect()
+}

@@ -1,0 +1,60 @@
+//! Replies that cannot be counted, or count as wrong: [`of_replies`], [`of_people`].
+
+use std::collections::BTreeMap;
+
+use super::words::counted;
+use crate::job::report::combine::Combined;
+use crate::job::report::settings::is_of_people;
+use crate::report::alert::{Alert, AlertKind, MAX_UNREAD};
+use crate::score::findings::Findings;
+use crate::types::UnreadReason;
+
+/// Replies that could not be read, and trials without a reply.
+pub(super) fn of_replies(findings: &Findings<'_>) -> Vec<Alert> {
+    let mut counts = BTreeMap::<&str, [usize; 3]>::new();
+    for health in &findings.health {
+        let [replies, unread, failed] = counts.entry(&health.subject.model).or_default();
+        *replies += health.replies;
+        *unread += health.replies - health.read;
+        *failed += health.failures();
+    }
+    let mut alerts = Vec::new();
+    for (model, [replies, unread, failed]) in counts {
+        if unread as f64 > MAX_UNREAD * replies as f64 {
+            let share = 100.0 * unread as f64 / replies as f64;
+            let text = format!(
+                "{unread} of {replies} replies of {model} ({share:.1} %) could not be read, and count as wrong."
+            );
+            alerts.push(Alert::new(AlertKind::Unread, text));
+        }
+        if failed > 0 {
+            let (trials, are) = (
+                counted(failed, "trial"),
+                if failed == 1 { "is" } else { "are" },
+            );
+            let text = format!("{trials} of {model} failed and {are} not scored.");
+            alerts.push(Alert::new(AlertKind::Failed, text));
+        }
+    }
+    alerts
+}
+
+/// Answers of people that are no choice of their question.
+pub(super) fn of_people(combined: &Combined) -> Vec<Alert> {
+    let people = combined
+        .runs
+        .iter()
+        .filter(|run| is_of_people(&run.manifest));
+    let alerts = people.filter_map(|run| {
+        let records = run.records.iter().map(|place| &combined.records[*place]);
+        let unread = records.filter_map(|record| record.detail.strict?.why);
+        let count = unread.filter(|why| *why != UnreadReason::Empty).count();
+        let text = format!(
+            "{} of {} of people are no choice of their question, and count as wrong.",
+            count,
+            counted(run.records.len(), "answer")
+        );
+        (count > 0).then(|| Alert::new(AlertKind::NoChoice, text))
+    });
+    alerts.collect()
+}

@@ -1,0 +1,28 @@
+//! Words of alerts: [`names`], [`sentence`], [`counted`], [`plural`].
+
+use crate::job::report::join::JoinedRun;
+use crate::job::report::settings::Setting;
+
+/// The names of runs.
+pub(super) fn names(runs: &[JoinedRun]) -> Vec<String> {
+    runs.iter().map(|run| run.name.clone()).collect()
+}
+
+/// What differs, with the settings behind it: `The light differs: --seed is 0 in a and 1 in b.`
+pub(super) fn sentence(what: &str, settings: &[Setting], names: &[String]) -> String {
+    let settings: Vec<String> = settings
+        .iter()
+        .map(|setting| setting.words(names))
+        .collect();
+    format!("{what}: {}.", settings.join("; "))
+}
+
+/// A number of things: `1 trial`, `2 trials`.
+pub(super) fn counted(number: usize, noun: &str) -> String {
+    plural(number, noun, &format!("{noun}s"))
+}
+
+/// A number of things by its two words: `1 reply`, `2 replies`.
+pub(super) fn plural(number: usize, one: &str, several: &str) -> String {
+    format!("{number} {}", if number == 1 { one } else { several })
+}
