@@ -210,6 +210,24 @@ mod tests {
     }
 
     #[test]
+    fn the_same_replies_in_more_conditions_are_no_more_evidence() {
+        let mut once = PairCounts::new(12);
+        once.add(&mut spread(12, 0.2));
+        let mut pooled = once.clone();
+        for _ in 1..15 {
+            pooled.extend(&once);
+        }
+        let (once, pooled) = (once.auc().unwrap(), pooled.auc().unwrap());
+        assert!(
+            (once.p - pooled.p).abs() < 1e-9 && once.p > 1e-6,
+            "{once:?}"
+        );
+        let (once, pooled) = (once.estimate, pooled.estimate);
+        assert!((once.low - pooled.low).abs() < 1e-9, "{pooled:?}");
+        assert!((once.high - pooled.high).abs() < 1e-9, "{pooled:?}");
+    }
+
+    #[test]
     fn p_and_interval_agree() {
         for step in 0..40 {
             let found = auc(&spread(12, f64::from(step) * 0.01), 12).unwrap();

@@ -4,13 +4,10 @@ use serde::{Deserialize, Serialize};
 
 use super::grid::ClusterCount;
 use super::quantiles::{degrees_of_freedom, least_share, student};
+use super::residuals::{residuals, unknown_design_effect};
 
 /// The 97.5 % quantile of the standard normal distribution, for 95 % intervals.
 const Z: f64 = 1.959_963_984_540_054;
-
-/// Intraclass correlation that is assumed if all replies are right, or none, so that the records cannot show it (chosen).
-/// The value is high for questions about one frame, so that the interval is not too narrow.
-const UNKNOWN_CORRELATION: f64 = 0.2;
 
 /// A share, or a difference of shares, with its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -39,11 +36,10 @@ impl Estimate {
 
     /// Share of right replies in clusters; `None` without replies.
     ///
-    /// The interval is Wilson's at the effective number of replies n / d. The design effect d ≥ 1 is the variance of the
-    /// share between clusters (linearised, times C / (C − 1) for C clusters) over that of independent replies. Student's
-    /// quantile replaces the normal one. Dean and Pagano 2015 (J. Surv. Stat. Methodol. 3:484) find this interval the best of seven
-    /// for clustered shares. With one reply per cluster it is Wilson's own. If all replies are right, or none, d is
-    /// 1 + 0.2 (m − 1) for clusters of m replies (Kish 1965, section 5.4).
+    /// The interval is Wilson's at the effective number of replies n / d. The design effect d ≥ 1 is the variance of the share between
+    /// clusters, which is the sum of their squared [`residuals`], over that of independent replies. Student's quantile replaces the
+    /// normal one. Dean and Pagano 2015 (J. Surv. Stat. Methodol. 3:484) find this interval the best of seven for clustered shares. With
+    /// one reply per cluster it is Wilson's own. If all replies are right, or none, d is [`unknown_design_effect`].
     ///
     /// The degrees of freedom are those that the clusters' residuals allow ([`degrees_of_freedom`]), and no end is further away than
     /// the share of wholly right and of wholly wrong clusters allows ([`Self::kept_by_whole_clusters`]).
@@ -68,24 +64,21 @@ impl Estimate {
         if all <= 0.0 {
             return None;
         }
-        let c = sums.len() as f64;
         let value = (sums.iter().map(|(sum, _)| sum).sum::<f64>() / all).clamp(0.0, 1.0);
+        let residuals = residuals(sums, value);
         let binomial_variance = value * (1.0 - value) / all;
-        let has_spread = binomial_variance > 1e-12 && sums.len() > 1;
+        let has_spread = binomial_variance > 1e-12 && residuals.len() > 1;
         let design_effect = if has_spread {
-            let squared_error = |(sum, n): &(f64, f64)| (sum - value * n) * (sum - value * n);
-            let between: f64 = sums.iter().map(squared_error).sum();
-            c / (c - 1.0) * between / (all * all) / binomial_variance
+            let between: f64 = residuals.iter().map(|residual| residual * residual).sum();
+            between / (all * all) / binomial_variance
         } else {
-            let squares: f64 = sums.iter().map(|(_, n)| n * n).sum();
-            1.0 + UNKNOWN_CORRELATION * (squares / all - 1.0)
+            unknown_design_effect(sums)
         };
         let effective = all / design_effect.max(1.0 / max_weight);
         // At the minimum design effect no variance was estimated, so Student's quantile is not needed.
         let min_effect = if has_spread { 1.0 / max_weight } else { 1.0 };
-        let quantile = if sums.len() > 1 && design_effect > min_effect {
-            let residuals = sums.iter().map(|(sum, n)| sum - value * n);
-            student(degrees_of_freedom(&residuals.collect::<Vec<_>>()))
+        let quantile = if residuals.len() > 1 && design_effect > min_effect {
+            student(degrees_of_freedom(&residuals))
         } else {
             Z
         };
@@ -199,12 +192,16 @@ mod tests {
             (5, 9),
             (6, 8),
         ];
+        // One cluster has a third of all.
+        let small = [5, 4, 5, 3, 5, 5, 4, 2, 5, 4, 5, 5, 3, 5, 4, 5].map(|right| (right, 5));
+        let third = [&[(14, 40)], &small[..]].concat();
         let even = [5, 6, 4, 5, 5, 6, 4, 5].map(|right| (right, 10));
         for (pairs, low, high) in [
             // Not the 73.1 % that 2 degrees of freedom alone would give.
             (&one_bad[..], 0.897_446_455_347_9, 0.999_177_030_322_5),
             (&few, 0.424_046_756_632_2, 0.924_380_341_940_7),
-            (&unequal, 0.475_340_472_659_7, 0.858_841_117_722_1),
+            (&unequal, 0.475_837_910_733_2, 0.858_599_144_512_9),
+            (&third[..], 0.175_134_913_598_4, 0.959_515_474_172_5),
             (&even, 0.392_974_150_861_2, 0.607_025_849_138_8),
         ] {
             let share = Estimate::clustered(&counts(pairs)).unwrap();

@@ -5,7 +5,7 @@
 //! against the true ones ([`confusion`]) and the agreement of models ([`agreement`]).
 //!
 //! Intervals come from the clusters ([`cluster`]). Each was chosen because its 95 % intervals hold the truth in simulation
-//! (`tests/program/statistics.rs` and `coverage.rs`; `src/docs/numbers.md` says where they do so less than 93 times in a hundred).
+//! (`tests/program/statistics.rs` and `coverage/`; `src/docs/numbers.md` says where they do so less than 93 times in a hundred).
 //! The plain percentile bootstrap does not do so with fewer than about 50 clusters, or near 0 and 1.
 //!
 //! - shares: Wilson's score interval at the clusters' effective number of replies ([`estimate::Estimate::clustered`]);
@@ -41,6 +41,7 @@ pub(crate) mod pooled_kind;
 mod quantiles;
 pub(crate) mod realism;
 mod record;
+mod residuals;
 pub(crate) mod significance;
 mod split_mix;
 pub(crate) mod subject;

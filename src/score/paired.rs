@@ -4,6 +4,7 @@ use super::choice::ReadingMode;
 use super::estimate::Estimate;
 use super::grid::{Grid, GridItem};
 use super::quantiles::{degrees_of_freedom, student};
+use super::residuals::{residuals, unknown_design_effect};
 use super::significance::{mcnemar, sign_flip};
 use crate::types::Family;
 
@@ -108,8 +109,10 @@ impl PairedComparison {
 /// The difference with the interval of Bonett and Price (2012, J. Educ. Behav. Stat. 37:479).
 ///
 /// It adds one pair in each direction, so that few or no discordant pairs do not look like certainty. Here the variance
-/// between clusters replaces that of independent pairs, and Student's quantile the normal one. Where clusters vary more than independent
-/// pairs would, it has the degrees of freedom that their residuals allow ([`degrees_of_freedom`]), else one less than clusters.
+/// between clusters, which is the sum of their squared [`residuals`], replaces that of independent pairs, and Student's quantile the
+/// normal one. Where clusters vary more than independent pairs would, it has the degrees of freedom that their residuals allow
+/// ([`degrees_of_freedom`]), else one less than clusters. If all pairs have the same difference, which is mostly none, the variance of
+/// the two added pairs is multiplied by [`unknown_design_effect`]: differences that come in few clusters may all have been missed.
 ///
 /// `clusters` holds, for each cluster, the sum of the differences of its pairs (of scores between 0 and 1) and their number;
 /// `squares` is the sum of the squared differences of all pairs, and `n` the number of all pairs.
@@ -118,22 +121,21 @@ pub fn difference(clusters: &[(f64, f64)], squares: f64, n: usize) -> Estimate {
     let (all, c) = (n as f64, clusters.len() as f64);
     let sum: f64 = clusters.iter().map(|(net, _)| net).sum();
     let value = sum / all;
-    let residuals = clusters.iter().map(|(net, pairs)| net - value * pairs);
-    let residuals: Vec<f64> = residuals.collect();
-    let between: f64 = residuals.iter().map(|residual| residual * residual).sum();
-    let variance = if clusters.len() > 1 {
-        c / (c - 1.0) * between
-    } else {
-        // One cluster shows no spread between clusters: the interval is the whole range.
-        f64::INFINITY
-    };
+    let residuals = residuals(clusters, value);
+    // One cluster shows no spread between clusters: its residual is infinite and the interval is the whole range.
+    let variance: f64 = residuals.iter().map(|residual| residual * residual).sum();
     let independent = squares - all * value * value;
-    let degrees = if between > independent * (1.0 + ROUNDING) {
+    let added = if independent > all * ROUNDING {
+        2.0
+    } else {
+        2.0 * unknown_design_effect(clusters)
+    };
+    let degrees = if variance * (c - 1.0) / c > independent * (1.0 + ROUNDING) {
         degrees_of_freedom(&residuals)
     } else {
         c - 1.0
     };
-    let half = student(degrees) * (variance + 2.0).sqrt() / (all + 2.0);
+    let half = student(degrees) * (variance + added).sqrt() / (all + 2.0);
     let center = sum / (all + 2.0);
     Estimate {
         value,
@@ -188,12 +190,43 @@ mod tests {
     }
 
     #[test]
-    fn no_difference_is_not_certainty() {
-        let interval = estimate(&[(4, 0, 0); 20]);
+    fn an_interval_by_clusters_of_unequal_size_is_that_of_another_program() {
+        // numpy 2 and scipy 1.17.1, written apart from this program. The first cluster has more than a third of all pairs.
+        let interval = estimate(&[
+            (30, 6, 1),
+            (4, 1, 0),
+            (5, 0, 0),
+            (6, 2, 0),
+            (3, 0, 1),
+            (8, 0, 0),
+            (5, 1, 1),
+            (7, 0, 0),
+            (6, 0, 0),
+            (4, 0, 0),
+        ]);
         assert!(
-            interval.value.abs() < 1e-12 && interval.low < -0.02 && interval.high > 0.02,
+            (interval.low + 0.061_251_861_397_6).abs() < 1e-9,
             "{interval:?}"
         );
+        assert!(
+            (interval.high - 0.236_251_861_397_6).abs() < 1e-9,
+            "{interval:?}"
+        );
+    }
+
+    #[test]
+    fn no_difference_is_not_certainty() {
+        // Neither none at all nor the same one everywhere. The two added pairs count as pairs of clusters of 4: 1 + 0.2 · 3.
+        let half = student(19.0) * f64::sqrt(2.0 * 1.6) / 82.0;
+        let none = estimate(&[(4, 0, 0); 20]);
+        assert!((none.low + half).abs() < 1e-12, "{none:?}");
+        assert!((none.high - half).abs() < 1e-12, "{none:?}");
+        let all = estimate(&[(4, 4, 0); 20]);
+        assert!((all.low - (80.0 / 82.0 - half)).abs() < 1e-12, "{all:?}");
+        // One pair a cluster: Bonett and Price's own.
+        let single = estimate(&[(1, 0, 0); 80]);
+        let half = student(79.0) * f64::sqrt(2.0) / 82.0;
+        assert!((single.high - half).abs() < 1e-12, "{single:?}");
         let single = estimate(&[(4, 1, 0)]);
         assert_eq!((single.low, single.high), (-1.0, 1.0));
     }

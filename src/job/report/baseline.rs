@@ -99,9 +99,9 @@ impl Baseline {
     /// Puts the comparison first among the sentences of a report, and below its table of levels. The observer is left out where a
     /// control shows that it proves nothing.
     pub(super) fn add_to(&self, report: &mut ChoiceReport<'_>) {
-        let is_refuted = report.findings.observer.is_hidden();
+        let is_hidden = report.findings.observer.is_hidden();
         let rows = self.rows.iter();
-        let rows = rows.filter(|row| !(is_refuted && is_observer(&row.subject.model)));
+        let rows = rows.filter(|row| !(is_hidden && is_observer(&row.subject.model)));
         let rows: Vec<BaselineRow> = rows.cloned().collect();
         let sentences = against_baseline(&rows, &self.old, report.findings.unit);
         report.sentences.splice(..0, sentences);
