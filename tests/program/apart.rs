@@ -133,6 +133,29 @@ fn words_are_compared_with_the_first_run_that_has_the_question() {
     });
 }
 
+#[test]
+fn a_row_that_pools_fewer_models_says_so() {
+    let scene = Scene::new();
+    scene.run("--model m --model n --blind-model m", "run");
+    let text = scene.bench.complete(&words("report run --full --out out"));
+    let heading = "Pooled over all models, paired by question, in percentage points";
+    assert!(text.contains(heading), "{text}");
+    let rows = scene.csv("out/pooled.csv");
+    let place = |name: &str| rows[0].iter().position(|head| head == name).unwrap();
+    let models = |kind: &str| {
+        let rows = rows.iter().filter(|row| row[0] == kind);
+        let mut numbers: Vec<&str> = rows.map(|row| &*row[place("models")]).collect();
+        numbers.dedup();
+        numbers
+    };
+    assert_eq!((models("noise"), models("blind")), (vec!["2"], vec!["1"]));
+    let page = fs::read_to_string(scene.bench.path("out/report.html")).unwrap();
+    assert!(page.contains("Pooled over all models"));
+    scene.run("--model m --model n", "even");
+    let even = scene.bench.complete(&words("report even --full"));
+    assert!(even.contains("Pooled over 2 models, paired"), "{even}");
+}
+
 /// A run of the observer on a few small rooms.
 const ROOMS: &str = "--model observer --levels L0,L3 --data rooms:frames=4,size=160x120";
 
@@ -150,7 +173,9 @@ fn shards_of_the_observer_are_one_light() {
 fn runs_by_other_rules_say_so_and_keep_their_controls() {
     let bench = Bench::new();
     let rules = include_str!("../../src/questions/rules.toml");
-    bench.file("own.toml", format!("{rules}\n# my own\n"));
+    let own = rules.replace("detail_ppm = 500 ", "detail_ppm = 501 ");
+    assert_ne!(own, rules);
+    bench.file("own.toml", own);
     bench.complete(&words(&format!("{ROOMS} --out a")));
     bench.complete(&words(&format!("{ROOMS} --rules own.toml --out b")));
     let full = bench.complete(&words("report a b --full"));
