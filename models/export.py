@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Exports published enhancement models from their authors' repositories to ONNX, with a sidecar, and compares each export with the original.
+"""Exports published enhancement models from their repositories to ONNX, each with a sidecar, and compares it with the original.
 
     pip install torch onnx onnxruntime einops     # einops is for RetinexFormer alone; a GPU is not needed
 
@@ -11,14 +11,14 @@
     git clone https://github.com/caiyuanhao1998/Retinexformer   # MIT, weights behind the links of its README
     git clone https://github.com/cidautai/DarkIR                # MIT, weights behind the links of its README
 
-    python export.py zero-dce      Zero-DCE      Zero-DCE/Zero-DCE_code/snapshots/Epoch99.pth  zerodce.onnx
-    python export.py zero-dce++    Zero-DCE_extension Zero-DCE_extension/Zero-DCE++/snapshots_Zero_DCE++/Epoch99.pth zerodcepp.onnx
-    python export.py ruas-lol      RUAS          RUAS/ckpt/lol.pt                              ruas_lol.onnx
-    python export.py ruas-upe      RUAS          RUAS/ckpt/upe.pt                              ruas_upe.onnx
-    python export.py sci           SCI           SCI/weights/medium.pt                         sci.onnx
-    python export.py pairlie       PairLIE       PairLIE/weights/PairLIE.pth                   pairlie.onnx
-    python export.py retinexformer Retinexformer LOL_v2_real.pth                               retinexformer.onnx
-    python export.py darkir        DarkIR        DarkIR_1k.pt                                  darkir_1280x720.onnx --size 1280x720
+    python export.py zero-dce Zero-DCE Zero-DCE/Zero-DCE_code/snapshots/Epoch99.pth zerodce.onnx
+    python export.py zero-dce++ Zero-DCE_extension Zero-DCE_extension/Zero-DCE++/snapshots_Zero_DCE++/Epoch99.pth zerodcepp.onnx
+    python export.py ruas-lol RUAS RUAS/ckpt/lol.pt ruas_lol.onnx
+    python export.py ruas-upe RUAS RUAS/ckpt/upe.pt ruas_upe.onnx
+    python export.py sci SCI SCI/weights/medium.pt sci.onnx
+    python export.py pairlie PairLIE PairLIE/weights/PairLIE.pth pairlie.onnx
+    python export.py retinexformer Retinexformer LOL_v2_real.pth retinexformer.onnx
+    python export.py darkir DarkIR DarkIR_1k.pt darkir_1280x720.onnx --size 1280x720
 
 An export takes images of any size, or with `--size` of one. DarkIR needs `--size`, for its Fourier transforms become products with
 fixed matrices: ONNX Runtime's own DFT is many times slower, and most exporters have none.
@@ -40,15 +40,17 @@ import subprocess
 import sys
 import types
 import warnings
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Callable, Iterator
 
 import numpy as np
 import onnx
 import onnxruntime
 import torch
 
-MOST = 1.0  # largest accepted difference between export and original, in codes of 255
+# Largest accepted difference between export and original, in codes of 255. Rounding makes less than 0.001, and one wrong factor
+# in a Fourier transform of DarkIR made 0.86.
+MOST = 0.05
 SIZES = [(96, 132), (75, 109)]  # heights and widths of the images of the comparison, rounded down to the model's multiple
 
 
@@ -71,8 +73,8 @@ class Published:
     commit: str  # that this script was tried with
     files: tuple[str, ...]  # of the repository, that are loaded
     build: Callable[..., torch.nn.Module]  # from the repository's folder, the file of weights, and the weights in it
-    tile: str = "none"
-    rounding: str = "round"
+    tile: str
+    rounding: str
     multiple: int = 1
     pad: str = "reflect"
     any_size: bool = True
@@ -161,7 +163,7 @@ def pairlie(repo, _, held, exponent):
 
 
 def retinexformer(repo, _, held):
-    arch = module(repo / "basicsr/models/archs/RetinexFormer_arch.py")
+    arch = module(repo / RETINEXFORMER)
     return filled(arch.RetinexFormer(n_feat=40, stage=1, num_blocks=[1, 2, 2]), held)  # as in all its Options/RetinexFormer_*.yml
 
 
@@ -173,63 +175,27 @@ def darkir(repo, _, held):
     return filled(module(repo / "archs/DarkIR.py", "archs.DarkIR").DarkIR(width=width), held, unused=r"adapter|^side_out\.")
 
 
-RUAS = {
-    "url": "https://github.com/dut-media-lab/RUAS",
-    "commit": "22b1cd6",
-    "files": ("model.py", "operations.py", "genotypes.py", "model/denoise.pt"),
-    "rounding": "truncate",
-    "tile": "exact:8",
-}
-PAIRLIE = {
-    "url": "https://github.com/zhenqifu/PairLIE",
-    "commit": "3fd5c15",
-    "files": ("net/net.py",),
-    "rounding": "truncate",
-    "tile": "exact:10",
-}
+GITHUB = "https://github.com/"
+RUAS = (GITHUB + "dut-media-lab/RUAS", "22b1cd6", ("model.py", "operations.py", "genotypes.py", "model/denoise.pt"))
+PAIRLIE = (GITHUB + "zhenqifu/PairLIE", "3fd5c15", ("net/net.py",))
+RETINEXFORMER = "basicsr/models/archs/RetinexFormer_arch.py"
+DARKIR = ("archs/DarkIR.py", "archs/arch_model.py", "archs/arch_util.py")
 MODELS = {
-    "zero-dce": Published(
-        url="https://github.com/Li-Chongyi/Zero-DCE",
-        commit="e0f4adc",
-        files=("Zero-DCE_code/model.py",),
-        build=zero_dce,
-        tile="exact:8",
-    ),
+    # A convolution of 3 × 3 reaches 1 pixel: Zero-DCE has seven, SCI three, PairLIE ten. Each of RUAS's three cells reaches 3,
+    # its denoiser 8. Each test script saves by `save_image`, `img_as_ubyte` (which round), or by `astype`, `ToPILImage` (which truncate).
+    "zero-dce": Published(GITHUB + "Li-Chongyi/Zero-DCE", "e0f4adc", ("Zero-DCE_code/model.py",), zero_dce, "exact:8", "round"),
     "zero-dce++": Published(
-        url="https://github.com/Li-Chongyi/Zero-DCE_extension",
-        commit="09f202b",
-        files=("Zero-DCE++/model.py",),
-        build=zero_dce_pp,
-        multiple=12,
-        pad="crop",
+        GITHUB + "Li-Chongyi/Zero-DCE_extension", "09f202b", ("Zero-DCE++/model.py",), zero_dce_pp, "none", "round", 12, "crop"
     ),
-    "ruas-lol": Published(**RUAS, build=functools.partial(ruas, image=-1)),
-    "ruas-upe": Published(**RUAS, build=functools.partial(ruas, image=-2)),
-    "sci": Published(
-        url="https://github.com/vis-opt-group/SCI",
-        commit="9d28a3f",
-        files=("model.py", "loss.py"),
-        build=sci,
-        rounding="truncate",
-        tile="exact:8",
-    ),
-    "pairlie": Published(**PAIRLIE, build=functools.partial(pairlie, exponent=0.2)),
-    "pairlie-lol": Published(**PAIRLIE, build=functools.partial(pairlie, exponent=0.14)),  # as its eval.py says for LOL
+    "ruas-lol": Published(*RUAS, functools.partial(ruas, image=-1), "exact:17", "truncate"),
+    "ruas-upe": Published(*RUAS, functools.partial(ruas, image=-2), "exact:9", "truncate"),
+    "sci": Published(GITHUB + "vis-opt-group/SCI", "9d28a3f", ("model.py", "loss.py"), sci, "exact:8", "truncate"),
+    "pairlie": Published(*PAIRLIE, functools.partial(pairlie, exponent=0.2), "exact:10", "truncate"),
+    "pairlie-lol": Published(*PAIRLIE, functools.partial(pairlie, exponent=0.14), "exact:10", "truncate"),  # eval.py says so for LOL
     "retinexformer": Published(
-        url="https://github.com/caiyuanhao1998/Retinexformer",
-        commit="ad5c091",
-        files=("basicsr/models/archs/RetinexFormer_arch.py",),
-        build=retinexformer,
-        multiple=4,
+        GITHUB + "caiyuanhao1998/Retinexformer", "ad5c091", (RETINEXFORMER,), retinexformer, "none", "round", 4, "reflect"
     ),
-    "darkir": Published(
-        url="https://github.com/cidautai/DarkIR",
-        commit="0910291",
-        files=("archs/DarkIR.py", "archs/arch_model.py", "archs/arch_util.py"),
-        build=darkir,
-        rounding="truncate",
-        any_size=False,
-    ),
+    "darkir": Published(GITHUB + "cidautai/DarkIR", "0910291", DARKIR, darkir, "none", "truncate", any_size=False),
 }
 
 
@@ -267,11 +233,11 @@ def frequencies_by_products(mlp, x):
     return a @ (scale * across[0].T) - b @ (scale * across[1].T)
 
 
-def images(height: int, width: int) -> list[torch.Tensor]:
-    """A dark image, brighter to the right with noise, and one of random samples, both of whole codes of 255."""
-    random = torch.rand(2, 1, 3, height, width, generator=torch.Generator().manual_seed(0))
-    dark = 0.06 * torch.linspace(0, 1, width) + 0.06 * random[0]
-    return [torch.round(255 * image) / 255 for image in (dark, random[1])]
+def images(height: int, width: int) -> dict[str, torch.Tensor]:
+    """A dark image, brighter to the right with noise, and one of random samples, both of whole codes of 255, by name."""
+    noise, random = torch.rand(2, 1, 3, height, width, generator=torch.Generator().manual_seed(0))
+    dark = 0.06 * torch.linspace(0, 1, width) + 0.06 * noise
+    return {f"{name} {width}x{height}": torch.round(255 * image) / 255 for name, image in (("dark", dark), ("random", random))}
 
 
 def exported(net: torch.nn.Module, example: torch.Tensor, any_size: bool) -> bytes:
@@ -282,7 +248,7 @@ def exported(net: torch.nn.Module, example: torch.Tensor, any_size: bool) -> byt
             type(part).forward = frequencies_by_products
     file = io.BytesIO()
     with warnings.catch_warnings(), torch.no_grad():
-        # That values could have been frozen: the comparison at another size finds it. That `dynamo=False` will go: it is chosen.
+        # They say that tracing may freeze a size, which the comparison at another size finds, and that this exporter is an old one.
         warnings.simplefilter("ignore")
         names = {"input_names": ["input"], "output_names": ["output"]}
         torch.onnx.export(net, (example,), file, **names, dynamic_axes=axes, opset_version=17, dynamo=False)
@@ -306,18 +272,16 @@ def origin(repo: pathlib.Path) -> dict[str, str]:
     return {"source": url or "unknown", "commit": commit or "unknown"}
 
 
-def compare(model: bytes, inputs: list[torch.Tensor], wanted: list[np.ndarray]) -> None:
+def compare(model: bytes, inputs: dict[str, torch.Tensor], wanted: dict[str, np.ndarray]) -> None:
     """Prints how far the export's images are from the original's; above `MOST` the program ends."""
     session = onnxruntime.InferenceSession(model, providers=["CPUExecutionProvider"])
-    for index, (image, expected) in enumerate(zip(inputs, wanted)):
+    for name, image in inputs.items():
         (given,) = session.run(["output"], {"input": image.numpy()})
-        if given.shape != image.shape:
-            sys.exit(f"the export gives {given.shape} for {tuple(image.shape)}")
-        difference = 255 * np.abs(given - expected)
-        height, width = given.shape[2:]
-        kind = ("dark", "random")[index % 2]
-        print(f"{kind} {width}x{height}: differs from the original by at most {difference.max():.6f} of 255, {difference.mean():.6f} in the mean")
-        if not difference.max() <= MOST:  # nor is it if that is no number
+        if given.shape != wanted[name].shape:
+            sys.exit(f"{name}: the export gives {given.shape}, the original {wanted[name].shape}; nothing was written")
+        difference = 255 * np.abs(given - wanted[name])
+        print(f"{name}: at most {difference.max():.6f} of 255 from the original, {difference.mean():.6f} in the mean")
+        if not difference.max() <= MOST:  # so is what is no number
             sys.exit("the export is not the model; nothing was written")
 
 
@@ -344,6 +308,8 @@ def arguments() -> argparse.Namespace:
         parser.error(f"{said.model} is exported for one size: give --size WIDTHxHEIGHT")
     if said.size and any(side % model.multiple for side in said.size):
         parser.error(f"{said.model} takes multiples of {model.multiple} pixels: give another --size")
+    if not said.out.resolve().parent.is_dir():
+        parser.error(f"{said.out} cannot be written: its folder is missing")
     for path in [*(said.repo / file for file in model.files), said.weights]:
         if not path.is_file():
             sys.exit(f"{path} is missing; {said.model} is exported from a clone of {model.url} (tried at commit {model.commit})")
@@ -351,6 +317,7 @@ def arguments() -> argparse.Namespace:
 
 
 def main() -> None:
+    """Exports a model, and writes it only if it is like the original."""
     said = arguments()
     model, any_size = MODELS[said.model], said.size is None
     came = origin(said.repo)
@@ -364,10 +331,10 @@ def main() -> None:
     except ValueError as error:
         sys.exit(f"{said.weights}: {error}")
     sizes = [[side - side % model.multiple for side in sides] for sides in SIZES] if any_size else [said.size]
-    inputs = [image for sides in sizes for image in images(*sides)]
+    inputs = {name: image for sides in sizes for name, image in images(*sides).items()}
     with torch.no_grad():
-        wanted = [net(image).numpy() for image in inputs]
-    graph = onnx.load_from_string(exported(net, inputs[0], any_size))
+        wanted = {name: net(image).numpy() for name, image in inputs.items()}
+    graph = onnx.load_from_string(exported(net, next(iter(inputs.values())), any_size))
     onnx.helper.set_model_props(graph, came)
     onnx.checker.check_model(graph)
     compare(graph.SerializeToString(), inputs, wanted)
