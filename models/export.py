@@ -119,7 +119,7 @@ def weights(path: pathlib.Path) -> dict[str, torch.Tensor]:
     try:
         held = torch.load(path, weights_only=True)
     except (pickle.UnpicklingError, RuntimeError, EOFError) as error:
-        raise ValueError(f"PyTorch reads no weights from it: {error}") from error
+        raise ValueError("PyTorch reads no weights from it; files that could run code are not loaded") from error
     held = next((held[key] for key in ("params", "state_dict", "model_state_dict") if key in held), held)
     return {name.removeprefix("module."): value for name, value in held.items()}
 
