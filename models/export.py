@@ -1,45 +1,63 @@
 #!/usr/bin/env python3
-"""Exports the official weights of four enhancement models to ONNX, with a sidecar, and checks the export against the original.
+"""Exports published enhancement models from their repositories to ONNX, each with a sidecar, and compares it with the original.
 
-    git clone https://github.com/Li-Chongyi/Zero-DCE           # CC BY-NC 4.0, weights in it
-    git clone https://github.com/dut-media-lab/RUAS            # no licence stated, weights in it
-    git clone https://github.com/caiyuanhao1998/Retinexformer  # MIT, weights behind the links of its README
-    git clone https://github.com/cidautai/DarkIR               # MIT, weights behind the links of its README
-    pip install torch onnx onnxruntime einops huggingface_hub
+    pip install torch onnx onnxruntime einops     # einops is for RetinexFormer alone; a GPU is not needed
 
-    python export.py zero-dce      Zero-DCE      Zero-DCE/Zero-DCE_code/snapshots/Epoch99.pth  zerodce.onnx
-    python export.py ruas-lol      RUAS          RUAS/ckpt/lol.pt                              ruas_lol.onnx
-    python export.py ruas-upe      RUAS          RUAS/ckpt/upe.pt                              ruas_upe.onnx
-    python export.py retinexformer Retinexformer LOL_v2_real.pth                               retinexformer.onnx
-    python export.py darkir        DarkIR        DarkIR_1k.pt                                  darkir_1280x720.onnx --size 1280x720
+    git clone https://github.com/Li-Chongyi/Zero-DCE            # CC BY-NC 4.0, weights in it
+    git clone https://github.com/Li-Chongyi/Zero-DCE_extension  # CC BY-NC 4.0, weights in it
+    git clone https://github.com/dut-media-lab/RUAS             # no licence stated, weights in it
+    git clone https://github.com/vis-opt-group/SCI              # MIT, weights in it
+    git clone https://github.com/zhenqifu/PairLIE               # no licence stated, weights in it
+    git clone https://github.com/caiyuanhao1998/Retinexformer   # MIT, weights behind the links of its README
+    git clone https://github.com/cidautai/DarkIR                # MIT, weights behind the links of its README
 
-Zero-DCE, RUAS and RetinexFormer take images of any size; DarkIR those of one, for its Fourier transforms become products with
+    python export.py zero-dce Zero-DCE Zero-DCE/Zero-DCE_code/snapshots/Epoch99.pth zerodce.onnx
+    python export.py zero-dce++ Zero-DCE_extension Zero-DCE_extension/Zero-DCE++/snapshots_Zero_DCE++/Epoch99.pth zerodcepp.onnx
+    python export.py ruas-lol RUAS RUAS/ckpt/lol.pt ruas_lol.onnx
+    python export.py ruas-upe RUAS RUAS/ckpt/upe.pt ruas_upe.onnx
+    python export.py sci SCI SCI/weights/medium.pt sci.onnx
+    python export.py pairlie PairLIE PairLIE/weights/PairLIE.pth pairlie.onnx
+    python export.py retinexformer Retinexformer LOL_v2_real.pth retinexformer.onnx
+    python export.py darkir DarkIR DarkIR_1k.pt darkir_1280x720.onnx --size 1280x720
+
+An export takes images of any size, or with `--size` of one. DarkIR needs `--size`, for its Fourier transforms become products with
 fixed matrices: ONNX Runtime's own DFT is many times slower, and most exporters have none.
 """
 
+from __future__ import annotations
+
 import argparse
+import contextlib
+import functools
 import importlib.util
+import io
 import math
 import os
 import pathlib
+import pickle
+import re
+import subprocess
 import sys
+import types
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
+import onnx
+import onnxruntime
 import torch
 
-SIDECARS = {
-    "zero-dce": 'tile = "exact:8"\n',
-    "ruas-lol": 'rounding = "truncate"\ntile = "exact:8"\n',
-    "ruas-upe": 'rounding = "truncate"\ntile = "exact:8"\n',
-    "retinexformer": 'multiple = 4\npad = "reflect"\ntile = "none"\n',
-    "darkir": 'rounding = "truncate"\ntile = "none"\n',
-}
+# Largest accepted difference between export and original, in codes of 255. Rounding makes less than 0.001, and one wrong factor
+# in a Fourier transform of DarkIR made 0.86.
+MOST = 0.05
+SIZES = [(96, 132), (75, 109)]  # heights and widths of the images of the comparison, rounded down to the model's multiple
 
 
 class OneOutput(torch.nn.Module):
     """A model that gives its image alone."""
 
-    def __init__(self, model, image):
+    def __init__(self, model: torch.nn.Module, image: Callable):
         super().__init__()
         self.model, self.image = model, image
 
@@ -47,7 +65,48 @@ class OneOutput(torch.nn.Module):
         return self.image(self.model(dark))
 
 
-def module(path, name):
+@dataclass(frozen=True)
+class Published:
+    """A published model: its repository, and what its authors do before and after it."""
+
+    url: str
+    commit: str  # that this script was tried with
+    files: tuple[str, ...]  # of the repository, that are loaded
+    build: Callable[..., torch.nn.Module]  # from the repository's folder, the file of weights, and the weights in it
+    tile: str
+    rounding: str
+    multiple: int = 1
+    pad: str = "reflect"
+    any_size: bool = True
+
+    def sidecar(self, any_size: bool) -> str:
+        """The text of the sidecar. A multiple matters only to a graph that takes any size."""
+        lines = ['range_in = "0..1"', 'range_out = "0..1"', f'rounding = "{self.rounding}"', f'tile = "{self.tile}"']
+        if any_size and self.multiple > 1:
+            lines += [f"multiple = {self.multiple}", f'pad = "{self.pad}"']
+        return "\n".join(lines) + "\n"
+
+
+def without_gpu() -> None:
+    """Lets code that asks for CUDA run on the processor."""
+    torch.load = functools.partial(torch.load, map_location="cpu")
+    torch.Tensor.cuda = torch.nn.Module.cuda = lambda self, *_, **__: self
+
+
+@contextlib.contextmanager
+def working_in(repo: pathlib.Path) -> Iterator[None]:
+    """Lets a repository's code find its files and modules as if it were started there, without leaving compiled files in it."""
+    back, sys.dont_write_bytecode = os.getcwd(), True
+    os.chdir(repo)
+    sys.path.insert(0, str(repo))
+    try:
+        yield
+    finally:
+        sys.path.remove(str(repo))
+        os.chdir(back)
+
+
+def module(path: pathlib.Path, name: str = "published") -> types.ModuleType:
     """The Python file of a repository, without its package."""
     spec = importlib.util.spec_from_file_location(name, path)
     loaded = importlib.util.module_from_spec(spec)
@@ -55,61 +114,92 @@ def module(path, name):
     return loaded
 
 
-def weights(path, *keys):
-    """The weights in a file, below the first of these keys that it has."""
-    loaded = torch.load(path, map_location="cpu", weights_only=True)
-    for key in keys:
-        if key in loaded:
-            loaded = loaded[key]
-            break
-    return {name.removeprefix("module."): value for name, value in loaded.items()}
-
-
-def zero_dce(repo, path):
-    net = module(repo / "Zero-DCE_code" / "model.py", "zero_dce").enhance_net_nopool()
-    net.load_state_dict(weights(path))
-    return OneOutput(net, lambda outputs: outputs[1])  # of x4, x8 and the curves: the image after all eight
-
-
-def ruas(repo, path, index):
-    # Its constructor loads a file by a relative path and asks for CUDA.
-    if not torch.cuda.is_available():
-        torch.Tensor.cuda = torch.nn.Module.cuda = lambda self, *_, **__: self
-    back = os.getcwd()
-    path = path.resolve()
-    os.chdir(repo)
-    sys.path.insert(0, str(pathlib.Path.cwd()))
+def weights(path: pathlib.Path) -> dict[str, torch.Tensor]:
+    """The weights in a file of weights or in a checkpoint of a training."""
     try:
-        from model import Network
-
-        net = Network()
-    finally:
-        os.chdir(back)
-    net.load_state_dict(weights(path))
-    return OneOutput(net, lambda outputs: outputs[0][index])  # of the images and the illuminations
+        held = torch.load(path, weights_only=True)
+    except (pickle.UnpicklingError, RuntimeError, EOFError) as error:
+        raise ValueError("PyTorch reads no weights from it; files that could run code are not loaded") from error
+    held = next((held[key] for key in ("params", "state_dict", "model_state_dict") if key in held), held)
+    return {name.removeprefix("module."): value for name, value in held.items()}
 
 
-def retinexformer(repo, path):
-    arch = module(repo / "basicsr/models/archs/RetinexFormer_arch.py", "retinexformer")
-    net = arch.RetinexFormer(in_channels=3, out_channels=3, n_feat=40, stage=1, num_blocks=[1, 2, 2])
-    net.load_state_dict(weights(path, "params", "state_dict"))
+def filled(net: torch.nn.Module, held: dict[str, torch.Tensor], unused: str = "$^") -> torch.nn.Module:
+    """The network with these weights. Both must have the same names, but for those that match the pattern `unused`."""
+    try:
+        differing = net.load_state_dict(held, strict=False)
+    except RuntimeError as error:
+        raise ValueError(f"its weights are of another model: {error}") from error
+    for what, names in (("lacks", differing.missing_keys), ("has too many weights:", differing.unexpected_keys)):
+        names = [name for name in names if not re.search(unused, name)]
+        if names:
+            raise ValueError(f"its weights are of another model: it {what} {', '.join(names[:3])}{' …' if names[3:] else ''}")
     return net
 
 
-def darkir(repo, path):
-    sys.path[:0] = [str(repo), str(repo / "archs")]
-    from archs.DarkIR import DarkIR
-
-    held = weights(path, "params", "model_state_dict")
-    net = DarkIR(width=held["intro.weight"].shape[0])  # 32 (m) or 64 (l)
-    net.load_state_dict(held, strict=False)
-    missing = [name for name in net.state_dict() if name not in held and "adapter" not in name and "side_out" not in name]
-    if missing:
-        sys.exit(f"{path} has no {', '.join(missing)}")
-    return net
+def zero_dce(repo, _, held):
+    net = module(repo / "Zero-DCE_code/model.py").enhance_net_nopool()
+    return OneOutput(filled(net, held), lambda outputs: outputs[1])  # of x4, x8 and the curves: the image after all eight
 
 
-def waves(rows, columns):
+def zero_dce_pp(repo, _, held):
+    net = module(repo / "Zero-DCE++/model.py").enhance_net_nopool(scale_factor=12)  # as in its lowlight_test.py
+    return OneOutput(filled(net, held), lambda outputs: outputs[0])  # of the image and the curves
+
+
+def ruas(repo, _, held, image):
+    net = module(repo / "model.py").Network()
+    return OneOutput(filled(net, held), lambda outputs: outputs[0][image])  # of the images and the illuminations
+
+
+def sci(repo, path, held):
+    net = module(repo / "model.py").Finetunemodel(str(path))
+    return OneOutput(filled(net, held, unused=r"^calibrate\."), lambda outputs: outputs[1])  # of the illumination and the image
+
+
+def pairlie(repo, _, held, exponent):
+    net = module(repo / "net/net.py").net()
+    return OneOutput(filled(net, held), lambda outputs: outputs[0] ** exponent * outputs[1])  # of light, reflectance, denoised input
+
+
+def retinexformer(repo, _, held):
+    arch = module(repo / RETINEXFORMER)
+    return filled(arch.RetinexFormer(n_feat=40, stage=1, num_blocks=[1, 2, 2]), held)  # as in all its Options/RetinexFormer_*.yml
+
+
+def darkir(repo, _, held):
+    # In place of the repository's package, whose `__init__` imports what only training needs.
+    package = sys.modules["archs"] = types.ModuleType("archs")
+    package.__path__ = [str(repo / "archs")]
+    width = len(held.get("intro.weight", range(32)))  # 32 (m) or 64 (l)
+    return filled(module(repo / "archs/DarkIR.py", "archs.DarkIR").DarkIR(width=width), held, unused=r"adapter|^side_out\.")
+
+
+GITHUB = "https://github.com/"
+RUAS = (GITHUB + "dut-media-lab/RUAS", "22b1cd6", ("model.py", "operations.py", "genotypes.py", "model/denoise.pt"))
+PAIRLIE = (GITHUB + "zhenqifu/PairLIE", "3fd5c15", ("net/net.py",))
+RETINEXFORMER = "basicsr/models/archs/RetinexFormer_arch.py"
+DARKIR = ("archs/DarkIR.py", "archs/arch_model.py", "archs/arch_util.py")
+MODELS = {
+    # A convolution of 3 × 3 reaches 1 pixel: Zero-DCE has seven, SCI three, PairLIE ten. Each of RUAS's three cells reaches 3,
+    # its denoiser 8. Each test script saves by `save_image`, `img_as_ubyte` (which round), or by `astype`, `ToPILImage` (which truncate).
+    "zero-dce": Published(GITHUB + "Li-Chongyi/Zero-DCE", "e0f4adc", ("Zero-DCE_code/model.py",), zero_dce, "exact:8", "round"),
+    "zero-dce++": Published(
+        GITHUB + "Li-Chongyi/Zero-DCE_extension", "09f202b", ("Zero-DCE++/model.py",), zero_dce_pp, "none", "round", 12, "crop"
+    ),
+    "ruas-lol": Published(*RUAS, functools.partial(ruas, image=-1), "exact:17", "truncate"),
+    "ruas-upe": Published(*RUAS, functools.partial(ruas, image=-2), "exact:9", "truncate"),
+    "sci": Published(GITHUB + "vis-opt-group/SCI", "9d28a3f", ("model.py", "loss.py"), sci, "exact:8", "truncate"),
+    "pairlie": Published(*PAIRLIE, functools.partial(pairlie, exponent=0.2), "exact:10", "truncate"),
+    "pairlie-lol": Published(*PAIRLIE, functools.partial(pairlie, exponent=0.14), "exact:10", "truncate"),  # eval.py says so for LOL
+    "retinexformer": Published(
+        GITHUB + "caiyuanhao1998/Retinexformer", "ad5c091", (RETINEXFORMER,), retinexformer, "none", "round", 4, "reflect"
+    ),
+    "darkir": Published(GITHUB + "cidautai/DarkIR", "0910291", DARKIR, darkir, "none", "truncate", any_size=False),
+}
+
+
+def waves(rows: int, columns: int) -> list[torch.Tensor]:
     """cos and sin of 2π·row·column / rows, in double precision until the last."""
     angle = 2 * math.pi / rows * np.outer(np.arange(rows), np.arange(columns)) % (2 * math.pi)
     return [torch.from_numpy(wave.astype(np.float32)) for wave in (np.cos(angle), np.sin(angle))]
@@ -143,57 +233,115 @@ def frequencies_by_products(mlp, x):
     return a @ (scale * across[0].T) - b @ (scale * across[1].T)
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("model", choices=SIDECARS)
-    parser.add_argument("repo", type=pathlib.Path)
-    parser.add_argument("weights", type=pathlib.Path)
-    parser.add_argument("out", type=pathlib.Path)
-    parser.add_argument("--size", default="640x360", help="WIDTHxHEIGHT, of DarkIR; default: 640x360")
-    said = parser.parse_args()
-    width, height = map(int, said.size.split("x"))
-    repo = said.repo.resolve()
-    net = {
-        "zero-dce": lambda: zero_dce(repo, said.weights),
-        "ruas-lol": lambda: ruas(repo, said.weights, -1),
-        "ruas-upe": lambda: ruas(repo, said.weights, -2),
-        "retinexformer": lambda: retinexformer(repo, said.weights),
-        "darkir": lambda: darkir(repo, said.weights),
-    }[said.model]()
-    net.eval()
-    fixed = said.model == "darkir"
-    sizes = [(height, width)] if fixed else [(96, 128), (64, 72)]
-    generator = torch.Generator().manual_seed(0)
-    images = [0.3 * torch.rand(1, 3, *size, generator=generator) for size in sizes]
-    with torch.no_grad():
-        expected = [net(image).numpy() for image in images]
-        if fixed:
-            mlps = {type(part) for part in net.modules() if type(part).__name__ == "FreMLP"}
-            for mlp in mlps:
-                mlp.forward = frequencies_by_products
-        axes = {} if fixed else {name: {2: "height", 3: "width"} for name in ("input", "output")}
-        torch.onnx.export(
-            net,
-            (images[0],),
-            str(said.out),
-            input_names=["input"],
-            output_names=["output"],
-            dynamic_axes=axes,
-            opset_version=17,
-            dynamo=False,
-        )
-    said.out.with_name(said.out.name + ".toml").write_text(SIDECARS[said.model])
+def images(height: int, width: int) -> dict[str, torch.Tensor]:
+    """A dark image, brighter to the right with noise, and one of random samples, both of whole codes of 255, by name."""
+    noise, random = torch.rand(2, 1, 3, height, width, generator=torch.Generator().manual_seed(0))
+    dark = 0.06 * torch.linspace(0, 1, width) + 0.06 * noise
+    return {f"{name} {width}x{height}": torch.round(255 * image) / 255 for name, image in (("dark", dark), ("random", random))}
 
-    import onnxruntime
 
-    session = onnxruntime.InferenceSession(str(said.out), providers=["CPUExecutionProvider"])
-    worst = 0.0
-    for image, wanted in zip(images, expected):
+def exported(net: torch.nn.Module, example: torch.Tensor, any_size: bool) -> bytes:
+    """The ONNX file of a network, for images of the example's size or of any."""
+    axes = {name: {2: "height", 3: "width"} for name in ("input", "output")} if any_size else {}
+    for part in net.modules():
+        if type(part).__name__ == "FreMLP":
+            type(part).forward = frequencies_by_products
+    file = io.BytesIO()
+    with warnings.catch_warnings(), torch.no_grad():
+        # They say that tracing may freeze a size, which the comparison at another size finds, and that this exporter is an old one.
+        warnings.simplefilter("ignore")
+        names = {"input_names": ["input"], "output_names": ["output"]}
+        torch.onnx.export(net, (example,), file, **names, dynamic_axes=axes, opset_version=17, dynamo=False)
+    return file.getvalue()
+
+
+def origin(repo: pathlib.Path) -> dict[str, str]:
+    """URL and commit of a checkout, for the model's metadata; "-dirty" where tracked files were changed, "unknown" where it is none."""
+
+    def git(*words: str) -> str:
+        with contextlib.suppress(OSError):
+            return subprocess.run(["git", "-C", repo, *words], capture_output=True, text=True, check=False).stdout.strip()
+        return ""
+
+    # A folder in a checkout of something else is none of its own.
+    top = git("rev-parse", "--show-toplevel")
+    if not top or pathlib.Path(top).resolve() != repo:
+        return {"source": "unknown", "commit": "unknown"}
+    url = re.sub(r"//[^/@]*@", "//", git("config", "--get", "remote.origin.url"))  # without a password
+    commit = git("describe", "--always", "--dirty", "--abbrev=40", "--exclude=*")
+    return {"source": url or "unknown", "commit": commit or "unknown"}
+
+
+def compare(model: bytes, inputs: dict[str, torch.Tensor], wanted: dict[str, np.ndarray]) -> None:
+    """Prints how far the export's images are from the original's; above `MOST` the program ends."""
+    session = onnxruntime.InferenceSession(model, providers=["CPUExecutionProvider"])
+    for name, image in inputs.items():
         (given,) = session.run(["output"], {"input": image.numpy()})
-        worst = max(worst, float(np.abs(given - wanted).max()))
-    print(f"{said.out}: at most {255 * worst:.6f} of 255 from the original")
-    if worst * 255 > 0.05:
-        sys.exit("the export is not the model")
+        if given.shape != wanted[name].shape:
+            sys.exit(f"{name}: the export gives {given.shape}, the original {wanted[name].shape}; nothing was written")
+        difference = 255 * np.abs(given - wanted[name])
+        print(f"{name}: at most {difference.max():.6f} of 255 from the original, {difference.mean():.6f} in the mean")
+        if not difference.max() <= MOST:  # so is what is no number
+            sys.exit("the export is not the model; nothing was written")
+
+
+def size(text: str) -> tuple[int, int]:
+    """Height and width of WIDTHxHEIGHT."""
+    match = re.fullmatch(r"([1-9]\d*)x([1-9]\d*)", text)
+    if not match:
+        raise argparse.ArgumentTypeError(f"{text} is not WIDTHxHEIGHT, such as 1280x720")
+    return int(match[2]), int(match[1])
+
+
+def arguments() -> argparse.Namespace:
+    """The command line; what is missing ends the program."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("model", choices=MODELS)
+    parser.add_argument("repo", type=pathlib.Path, help="folder of the repository")
+    parser.add_argument("weights", type=pathlib.Path, help="file of weights")
+    parser.add_argument("out", type=pathlib.Path, help="ONNX file that is written, and its sidecar OUT.toml beside it")
+    parser.add_argument("--size", type=size, help="WIDTHxHEIGHT of all images; default: any size")
+    said = parser.parse_args()
+    said.repo, said.weights = said.repo.resolve(), said.weights.resolve()
+    model = MODELS[said.model]
+    if said.size is None and not model.any_size:
+        parser.error(f"{said.model} is exported for one size: give --size WIDTHxHEIGHT")
+    if said.size and any(side % model.multiple for side in said.size):
+        parser.error(f"{said.model} takes multiples of {model.multiple} pixels: give another --size")
+    if not said.out.resolve().parent.is_dir():
+        parser.error(f"{said.out} cannot be written: its folder is missing")
+    for path in [*(said.repo / file for file in model.files), said.weights]:
+        if not path.is_file():
+            sys.exit(f"{path} is missing; {said.model} is exported from a clone of {model.url} (tried at commit {model.commit})")
+    return said
+
+
+def main() -> None:
+    """Exports a model, and writes it only if it is like the original."""
+    said = arguments()
+    model, any_size = MODELS[said.model], said.size is None
+    came = origin(said.repo)
+    print(f"code: {came['source']}, commit {came['commit']}")
+    if not came["commit"].startswith(model.commit) or came["commit"].endswith("-dirty"):
+        print(f"this script was tried with {model.url} at commit {model.commit}", file=sys.stderr)
+    without_gpu()
+    try:
+        with working_in(said.repo):
+            net = model.build(said.repo, said.weights, weights(said.weights)).eval()
+    except ValueError as error:
+        sys.exit(f"{said.weights}: {error}")
+    sizes = [[side - side % model.multiple for side in sides] for sides in SIZES] if any_size else [said.size]
+    inputs = {name: image for sides in sizes for name, image in images(*sides).items()}
+    with torch.no_grad():
+        wanted = {name: net(image).numpy() for name, image in inputs.items()}
+    graph = onnx.load_from_string(exported(net, next(iter(inputs.values())), any_size))
+    onnx.helper.set_model_props(graph, came)
+    onnx.checker.check_model(graph)
+    compare(graph.SerializeToString(), inputs, wanted)
+    onnx.save(graph, said.out)
+    sidecar = said.out.with_name(said.out.name + ".toml")
+    sidecar.write_text(model.sidecar(any_size), encoding="utf-8")
+    print(f"{said.out}, {sidecar.name}")
 
 
 if __name__ == "__main__":
