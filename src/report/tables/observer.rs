@@ -6,6 +6,7 @@ use crate::report::words::percent;
 use crate::score::findings::Findings;
 use crate::score::observed::{ObserverCell, ObserverSummary};
 use crate::types::Control;
+use crate::types::control::OBSERVER;
 
 /// What the observer is, above its table.
 const HEADING: &str = "Known-signal observer (given the untouched frame; not a model)";
@@ -50,10 +51,15 @@ fn conditions(observer: &ObserverSummary) -> Table {
     builder
         .page("observer", HEADING)
         .column(Text, "csv model", |cell| cell.subject.model.clone())
+        .column(Text, "csv condition", |cell| cell.subject.condition())
         .column(
             Text,
-            "csv condition | terminal condition | page condition | latex Condition",
-            |cell| cell.subject.condition(),
+            "terminal condition | page condition | latex Condition",
+            |cell| {
+                // Where several runs are compared, each may have an observer of its own.
+                let run = cell.subject.model.strip_prefix(OBSERVER).unwrap_or_default();
+                cell.subject.condition() + run
+            },
         )
         .column(
             Share,

@@ -8,6 +8,7 @@ use crate::job::report::join::{Joined, JoinedRun};
 use crate::job::report::settings::{is_of_people, listed};
 use crate::report::alert::{Alert, AlertKind};
 use crate::score::findings::Findings;
+use crate::score::subject::is_control;
 use crate::types::{Detail, QuestionId, RunQuestion};
 
 /// What differs between the questions of the runs, and between the files that they are about.
@@ -15,6 +16,8 @@ pub(super) fn of_questions<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let mut asked = Vec::<BTreeMap<&QuestionId, Option<&RunQuestion>>>::new();
     for run in &joined.runs {
         let records = run.records.iter().map(|place| &joined.records[*place]);
+        // A control is shown frames of its own choice, in a shard others than the models.
+        let records = records.filter(|record| !is_control(&record.model));
         let mut ids: BTreeMap<&QuestionId, Option<&RunQuestion>> =
             records.map(|record| (&record.question, None)).collect();
         for question in &run.questions {
