@@ -1,5 +1,7 @@
 //! Which model sees best in the dark: [`BestInTheDark`].
 
+use std::collections::BTreeSet;
+
 use super::choice::ReadingMode;
 use super::estimate::Estimate;
 use super::grid::{ClusterCount, Grid};
@@ -17,6 +19,10 @@ pub struct BestInTheDark {
     pub variant: KindReading,
     /// The levels that every model was asked, from L0.
     pub levels: Vec<AxisLevel>,
+    /// The levels that some model was asked, from L0.
+    pub asked: Vec<AxisLevel>,
+    /// Models with images that are not compared, because they were not asked at L0 and at a degraded level of this variant.
+    pub without: Vec<String>,
     /// The models with their areas, largest area first. The first one leads.
     pub models: Vec<ModelArea>,
     /// The models that the leader is not shown to be better than, in the order of `models`. If it is empty, the leader is shown
@@ -39,6 +45,13 @@ impl BestInTheDark {
     #[must_use]
     pub fn leader(&self) -> &ModelArea {
         &self.models[0]
+    }
+
+    /// Whether the clusters allow a verdict on any pair.
+    #[must_use]
+    pub fn is_possible(&self) -> bool {
+        let mut pairs = self.pairs.iter();
+        pairs.any(|pair| pair.significance.is_possible())
     }
 
     /// Whether the leader is shown to be better than every other model.
@@ -76,19 +89,27 @@ pub struct AreaPair {
     pub significance: Significance,
 }
 
+/// A model and the levels at which it was asked.
+type Asked<'g> = (&'g str, BTreeSet<AxisLevel>);
+
 /// The comparison of the models by area; `None` if fewer than two of them were asked at L0 and at a degraded level, or if they share
 /// no item.
 #[must_use]
 pub(crate) fn best_in_the_dark(grid: &Grid<'_>) -> Option<BestInTheDark> {
     let variant = grid.main_variant()?;
-    let curves: Vec<(&str, Vec<AxisLevel>)> = pool(grid)
+    let models = pool(grid)
         .into_iter()
-        .map(|model| (model, levels(grid, model, &variant)))
-        .filter(|(_, levels)| levels.len() > 1 && levels[0] == AxisLevel::L0)
-        .collect();
+        .map(|model| (model, levels(grid, model, &variant)));
+    let (curves, without): (Vec<Asked<'_>>, Vec<Asked<'_>>) =
+        models.partition(|(_, levels)| levels.len() > 1 && levels.contains(&AxisLevel::L0));
     let shared = |level: &AxisLevel| curves.iter().all(|(_, levels)| levels.contains(level));
     let levels = curves.first()?.1.iter().copied().filter(shared);
     let levels: Vec<AxisLevel> = levels.collect();
+    let asked: BTreeSet<AxisLevel> = curves
+        .iter()
+        .flat_map(|(_, levels)| levels)
+        .copied()
+        .collect();
     if curves.len() < 2 || levels.len() < 2 {
         return None;
     }
@@ -111,6 +132,11 @@ pub(crate) fn best_in_the_dark(grid: &Grid<'_>) -> Option<BestInTheDark> {
         not_shown_better_than: unshown.map(|pair| pair.second.clone()).collect(),
         variant,
         levels,
+        asked: asked.into_iter().collect(),
+        without: without
+            .iter()
+            .map(|(model, _)| (*model).to_owned())
+            .collect(),
         items: scores.items.len(),
         dropped: scores.dropped,
         clusters,
@@ -120,17 +146,15 @@ pub(crate) fn best_in_the_dark(grid: &Grid<'_>) -> Option<BestInTheDark> {
     })
 }
 
-/// The levels at which a model was asked about raw images of a variant, sorted, with L0.
-fn levels(grid: &Grid<'_>, model: &str, variant: &KindReading) -> Vec<AxisLevel> {
+/// The levels at which a model was asked about raw images of a variant, with L0 if its clean frames are those of the same runs.
+fn levels(grid: &Grid<'_>, model: &str, variant: &KindReading) -> BTreeSet<AxisLevel> {
+    let clean = Subject::seeing(model, AxisLevel::L0, variant, None);
     let subjects = grid.subjects.iter().filter(|subject| {
-        let is_clean = subject.level == Some(AxisLevel::L0);
-        subject.model == model
-            && subject.enhancer.is_none()
-            && (is_clean || subject.variant == *variant)
+        let is_degraded =
+            subject.model == model && subject.enhancer.is_none() && subject.variant == *variant;
+        is_degraded || subject.is_for(&clean)
     });
-    let mut levels: Vec<AxisLevel> = subjects.filter_map(|subject| subject.level).collect();
-    levels.sort_unstable();
-    levels
+    subjects.filter_map(|subject| subject.level).collect()
 }
 
 /// Right replies of all models to an item that every model answered at every level.

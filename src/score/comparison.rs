@@ -1,12 +1,12 @@
 //! Paired differences between subjects, with their tests: [`Comparison`].
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::choice::ReadingMode;
 use super::grid::Grid;
 use super::paired::PairedComparison;
 use super::significance::{Significance, holm, least_p};
-use super::subject::Subject;
+use super::subject::{Subject, judged};
 use crate::types::{AxisLevel, Family, KindReading, View};
 use rayon::prelude::*;
 
@@ -177,6 +177,7 @@ fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
 /// The indices of the subjects that a kind compares.
 pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)> {
     let mut pairs = Vec::new();
+    let judged = judged(grid.subjects.iter().map(|subject| &*subject.model));
     for (index, subject) in grid.subjects.iter().enumerate() {
         let against: Vec<usize> = match kind {
             // Only raw images show what darkness costs. The curves show how much of it an enhancer recovers.
@@ -204,7 +205,7 @@ pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)
             ComparisonKind::Enhancer if subject.enhancer.is_some() => {
                 changed(grid, subject, |other| other.enhancer = None)
             }
-            ComparisonKind::Model => later_models(grid, index),
+            ComparisonKind::Model => later_models(grid, index, &judged),
             ComparisonKind::Light => later_lights(grid, index),
             ComparisonKind::Blind if subject.view == Some(View::Image) => blind(grid, subject),
             _ => Vec::new(),
@@ -221,20 +222,17 @@ fn changed(grid: &Grid<'_>, subject: &Subject, change: impl FnOnce(&mut Subject)
     grid.stand_in(&other).into_iter().collect()
 }
 
-/// Later models of the grid in the same condition, so that each pair occurs once. Built-in reference models are compared
-/// only if there are no others.
-fn later_models(grid: &Grid<'_>, index: usize) -> Vec<usize> {
+/// Later models of the grid in the same condition, so that each pair occurs once. Only those of `judged` are compared.
+fn later_models(grid: &Grid<'_>, index: usize, judged: &BTreeSet<&str>) -> Vec<usize> {
     let subject = &grid.subjects[index];
-    let has_others = grid.subjects.iter().any(|other| !other.is_reference());
-    let is_left_out = |subject: &Subject| has_others && subject.is_reference();
-    if is_left_out(subject) {
+    if !judged.contains(&*subject.model) {
         return Vec::new();
     }
     let later = grid.subjects.iter().enumerate().skip(index + 1);
     let condition = |of: &Subject| (of.view, of.level, of.variant.clone(), of.enhancer.clone());
     later
         .filter(|(_, other)| other.model != subject.model && condition(other) == condition(subject))
-        .filter(|(_, other)| !is_left_out(other))
+        .filter(|(_, other)| judged.contains(&*other.model))
         .map(|(other, _)| other)
         .collect()
 }

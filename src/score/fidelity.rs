@@ -6,7 +6,7 @@ use super::auc::{Auc, PairCounts, RankedReply};
 use super::choice::ReadingMode;
 use super::grid::Grid;
 use super::significance::{Significance, holm};
-use super::subject::Subject;
+use super::subject::{Subject, pooled_models};
 use crate::types::{
     AxisLevel, Digest, EnhancerName, Family, FrameId, ImageFidelity, KindReading, View,
 };
@@ -14,7 +14,7 @@ use crate::types::{
 /// What the similarity of images to their clean frames says about the answers.
 ///
 /// Within a condition, replies are compared of the same model and family alone: pairs over conditions would only show that
-/// darker is worse. Models are pooled; built-in reference models are left out if there are others.
+/// darker is worse. Models are pooled; built-in reference models are left out if there are others, and never mixed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FidelityFindings {
     /// The models whose replies are counted.
@@ -83,12 +83,13 @@ impl FidelityFindings {
         if measured.is_empty() {
             return None;
         }
-        let has_others = grid.subjects.iter().any(|subject| !subject.is_reference());
+        let seeing = grid.subjects.iter();
+        let seeing = seeing.filter(|subject| subject.view == Some(View::Image));
+        let pool = pooled_models(seeing.map(|subject| &*subject.model));
         let mut conditions = BTreeMap::<ConditionKey<'_>, Vec<usize>>::new();
         let mut models = BTreeSet::new();
         for (index, subject) in grid.subjects.iter().enumerate() {
-            let is_counted =
-                subject.view == Some(View::Image) && !(has_others && subject.is_reference());
+            let is_counted = subject.view == Some(View::Image) && pool.contains(&*subject.model);
             if let (true, Some(level)) = (is_counted, subject.level) {
                 let key = (level, &subject.variant, subject.enhancer.as_ref());
                 conditions.entry(key).or_default().push(index);

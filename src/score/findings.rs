@@ -17,7 +17,7 @@ use super::flips::{FirstFailure, first_failures};
 use super::grid::Grid;
 use super::health::{Health, healths};
 use super::observed::ObserverSummary;
-use super::pooled::{PooledFinding, pooled};
+use super::pooled::{LevelsLeftOut, PooledFinding, levels_left_out, pooled};
 use super::significance::Significance;
 use super::subject::{Subject, is_control, is_observer};
 use crate::types::{Family, FrameId, ImageFidelity, Record};
@@ -35,6 +35,8 @@ pub struct Findings<'a> {
     pub health: Vec<Health>,
     /// Differences of all models together, ordered by kind, variant, enhancer, family and level.
     pub pooled: Vec<PooledFinding>,
+    /// Levels that the pooled findings leave out, because some of their models were not asked there.
+    pub(crate) left_out: Vec<LevelsLeftOut>,
     /// The models by their mean accuracy in the dark, if there are two or more.
     pub best: Option<BestInTheDark>,
     /// Paired differences between subjects.
@@ -114,6 +116,7 @@ impl<'a> Findings<'a> {
             summary: summarize(&grid, &health, questions.iter().cloned()),
             health,
             pooled: pooled(&grid),
+            left_out: levels_left_out(&grid),
             best: best_in_the_dark(&grid),
             comparisons: comparisons(&grid),
             curves: grid

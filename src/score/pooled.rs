@@ -2,7 +2,7 @@
 //!
 //! The models are fixed: a finding is about these models, not about models in general. Items, grouped in clusters, are the sample.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 
@@ -12,7 +12,7 @@ use super::grid::Grid;
 use super::paired::difference;
 use super::pooled_kind::PooledKind;
 use super::significance::{Significance, holm, least_p, swap_test};
-use super::subject::Subject;
+use super::subject::{Subject, pooled_models};
 use crate::types::degradation::Kind;
 use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
 
@@ -62,30 +62,19 @@ pub struct PooledFinding {
     pub least_holm: f64,
 }
 
-/// The models over which findings are pooled, sorted: those with images, without reference models if there are others.
+/// The models over which findings are pooled, sorted: those with images, without reference models if there are others; else one
+/// reference alone.
 #[must_use]
 pub(crate) fn pool<'g>(grid: &'g Grid<'_>) -> Vec<&'g str> {
     models(grid, View::Image)
 }
 
-/// Models with images or without, sorted; without reference models if there are others.
+/// The [`pooled_models`] with images or without.
 fn models<'g>(grid: &'g Grid<'_>, view: View) -> Vec<&'g str> {
     let subjects = grid.subjects.iter();
     let asked = subjects.filter(|subject| subject.view == Some(view));
-    let names = |subjects: Vec<&'g Subject>| -> BTreeSet<&'g str> {
-        subjects
-            .into_iter()
-            .map(|subject| &*subject.model)
-            .collect()
-    };
-    let (references, others): (Vec<&Subject>, Vec<&Subject>) =
-        asked.partition(|subject| subject.is_reference());
-    let chosen = if others.is_empty() {
-        references
-    } else {
-        others
-    };
-    names(chosen).into_iter().collect()
+    let models = pooled_models(asked.map(|subject| &*subject.model));
+    models.into_iter().collect()
 }
 
 /// A kind, variant and enhancer: one set of Holm's correction for each family.
@@ -192,6 +181,52 @@ pub fn pooled(grid: &Grid<'_>) -> Vec<PooledFinding> {
     let sets: Vec<PooledSet> = PooledSet::all(grid).into_iter().collect();
     let findings = sets.into_par_iter().flat_map_iter(|set| of_set(grid, &set));
     findings.collect()
+}
+
+/// Levels that a set of findings leaves out, because some of its models were not asked on both sides there and others were.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct LevelsLeftOut {
+    pub(crate) kind: PooledKind,
+    pub(crate) variant: KindReading,
+    pub(crate) enhancer: Option<EnhancerName>,
+    /// The levels, sorted.
+    pub(crate) levels: Vec<AxisLevel>,
+    /// All levels at which some model was asked on both sides, sorted.
+    pub(crate) asked: Vec<AxisLevel>,
+    /// The models that were not asked on both sides at these levels, sorted.
+    pub(crate) models: Vec<String>,
+}
+
+/// The levels that the findings leave out, by set and by the models that were not asked there.
+#[must_use]
+pub(crate) fn levels_left_out(grid: &Grid<'_>) -> Vec<LevelsLeftOut> {
+    let mut all = Vec::new();
+    for set in PooledSet::all(grid) {
+        let mut levels = set.levels(grid);
+        let models = set.models(grid, &levels);
+        let mut by_models = BTreeMap::<BTreeSet<&str>, Vec<AxisLevel>>::new();
+        levels.retain(|level| {
+            let (asked, lacking): (Vec<[&str; 2]>, Vec<[&str; 2]>) = models
+                .iter()
+                .copied()
+                .partition(|[model, other]| set.sides(grid, model, other, *level).is_some());
+            if !asked.is_empty() && !lacking.is_empty() {
+                let lacking = lacking.into_iter().map(|[model, _]| model);
+                by_models.entry(lacking.collect()).or_default().push(*level);
+            }
+            !asked.is_empty()
+        });
+        let asked: Vec<AxisLevel> = levels.into_iter().collect();
+        all.extend(by_models.into_iter().map(|(models, levels)| LevelsLeftOut {
+            kind: set.kind,
+            variant: set.variant.clone(),
+            enhancer: set.enhancer.clone(),
+            levels,
+            asked: asked.clone(),
+            models: models.into_iter().map(str::to_owned).collect(),
+        }));
+    }
+    all
 }
 
 /// The findings of a set, with all families together and with each family.

@@ -1,5 +1,7 @@
 //! A model in a condition: [`Subject`].
 
+use std::collections::BTreeSet;
+
 use serde::Serialize;
 
 use crate::types::control::OBSERVER;
@@ -33,6 +35,27 @@ pub(crate) fn is_control(model: &str) -> bool {
 #[must_use]
 pub(crate) fn is_reference(model: &str) -> bool {
     without_run(model) == "random" || is_observer(model) || is_control(model)
+}
+
+/// The models that results are about, sorted: references only if there are no others.
+#[must_use]
+pub(crate) fn judged<'m>(models: impl IntoIterator<Item = &'m str>) -> BTreeSet<&'m str> {
+    let all: BTreeSet<&str> = models.into_iter().collect();
+    let others = all.iter().copied().filter(|model| !is_reference(model));
+    let others: BTreeSet<&str> = others.collect();
+    if others.is_empty() { all } else { others }
+}
+
+/// The models whose replies are counted together, sorted: those that are [`judged`]. Of references it is one alone, the observer if
+/// it is there: a mean of the observer and `random` would say nothing of either.
+#[must_use]
+pub(crate) fn pooled_models<'m>(models: impl IntoIterator<Item = &'m str>) -> BTreeSet<&'m str> {
+    let judged = judged(models);
+    if !judged.iter().all(|model| is_reference(model)) {
+        return judged;
+    }
+    let observer = judged.iter().find(|model| is_observer(model));
+    observer.or(judged.first()).copied().into_iter().collect()
 }
 
 /// A model in a condition; every cell of a table belongs to one.
@@ -139,6 +162,33 @@ impl Subject {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn references_are_judged_alone_and_never_pooled() {
+        for (models, expected, pooled) in [
+            (
+                &["gpt-4o", "observer", "m", "random"][..],
+                &["gpt-4o", "m"][..],
+                &["gpt-4o", "m"][..],
+            ),
+            (
+                &["random", "observer"],
+                &["observer", "random"],
+                &["observer"],
+            ),
+            (
+                &["random (a)", "observer (b)"],
+                &["observer (b)", "random (a)"],
+                &["observer (b)"],
+            ),
+            (&["random"], &["random"], &["random"]),
+            (&[], &[], &[]),
+        ] {
+            let names = |found: BTreeSet<&'static str>| found.into_iter().collect::<Vec<_>>();
+            assert_eq!(names(judged(models.iter().copied())), expected);
+            assert_eq!(names(pooled_models(models.iter().copied())), pooled);
+        }
+    }
 
     #[test]
     fn only_built_in_models_are_references() {

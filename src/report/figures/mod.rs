@@ -12,7 +12,7 @@ use crate::error::Result;
 use crate::score::choice::ReadingMode;
 use crate::score::estimate::Estimate;
 use crate::score::findings::Findings;
-use crate::score::subject::{CHANCE, Subject, is_reference};
+use crate::score::subject::{CHANCE, Subject, judged};
 use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
 
 pub(crate) use story::{StoryCurves, story_curves};
@@ -123,13 +123,9 @@ impl<'a> Overview<'a> {
 
     /// The models over which a mean is taken: without the built-in ones, if there are others.
     fn averaged_models(&self) -> Vec<&'a str> {
-        let others = self.models.iter().filter(|model| !is_reference(model));
-        let others: Vec<&str> = others.copied().collect();
-        if others.is_empty() {
-            self.models.clone()
-        } else {
-            others
-        }
+        let judged = judged(self.models.iter().copied());
+        let models = self.models.iter().copied();
+        models.filter(|model| judged.contains(model)).collect()
     }
 
     fn style(&self, model: &str) -> LineStyle {

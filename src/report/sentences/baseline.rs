@@ -5,6 +5,7 @@ use crate::score::baseline::BaselineRow;
 use crate::score::cluster::ClusterUnit;
 use crate::score::comparison::MIN_PAIRS;
 use crate::score::significance::Significance;
+use crate::score::subject::judged;
 
 /// Largest number of conditions that a sentence names.
 const MAX_NAMED: usize = 3;
@@ -16,13 +17,11 @@ pub(crate) fn against_baseline(
     old: &str,
     unit: ClusterUnit,
 ) -> Vec<Sentence> {
-    let (references, models): (Vec<&BaselineRow>, Vec<&BaselineRow>) =
-        rows.iter().partition(|row| row.subject.is_reference());
-    let rows = if models.is_empty() {
-        references
-    } else {
-        models
-    };
+    let judged = judged(rows.iter().map(|row| &*row.subject.model));
+    let rows = rows.iter();
+    let rows: Vec<&BaselineRow> = rows
+        .filter(|row| judged.contains(&*row.subject.model))
+        .collect();
     let mut sentences = Vec::new();
     for of_model in rows.chunk_by(|one, other| one.subject.model == other.subject.model) {
         for verdict in [Significance::Worse, Significance::Better] {

@@ -9,20 +9,24 @@
 
 mod answers;
 mod baseline;
+mod darkness;
 mod hallucination;
+mod lights;
 mod models;
 mod pooled;
+mod sample;
 mod sentence;
 mod words_alone;
 
 pub(crate) use baseline::{against_baseline, no_verdict};
+pub(in crate::report) use models::over_levels;
+pub(in crate::report) use sample::left_out;
 pub(crate) use sentence::Sentence;
 
 use self::hallucination::TopAnswer;
-use crate::report::words::light;
+use self::lights::{in_each_light, of_set};
 use crate::score::confusion::FalseAnswer;
 use crate::score::findings::Findings;
-use crate::score::pooled::PooledFinding;
 use crate::score::pooled_kind::PooledKind;
 use crate::types::{Family, KindReading};
 
@@ -30,55 +34,29 @@ use crate::types::{Family, KindReading};
 pub(in crate::report) const FIRST: usize = 8;
 
 /// What is said about the sentences as a whole, in the line below them.
-pub(in crate::report) const HOW_TO_READ: &str = "p is Holm's, over the levels of a finding. An interval is of one level, uncorrected: effects outside it are ruled out at 95 %.";
+pub(in crate::report) const HOW_TO_READ: &str = "p is corrected by Holm over the levels of a finding (best: over pairs of models; below blind in one family: over the conditions and families of a model; baseline: over the conditions of a model; fidelity: one test). An interval is uncorrected: effects outside it are ruled out at 95 %. Interval and test are two methods, and may disagree where p is near 0.05.";
 
 /// All sentences, in the order of their importance.
 #[must_use]
 pub(crate) fn sentences(findings: &Findings<'_>) -> Vec<Sentence> {
     let mut sentences = Vec::new();
-    if let Some(impossible) = pooled::impossible(findings) {
-        sentences.push(impossible);
-    } else {
-        sentences.extend(in_each_light(findings, about_light));
-        sentences.extend(models::best(findings));
-        sentences.extend(in_each_light(findings, about_answers));
-    }
+    sentences.extend(sample::impossible(findings));
+    sentences.extend(sample::left_out(findings));
+    sentences.extend(darkness::darkness(findings));
+    sentences.extend(in_each_light(findings, about_light));
+    sentences.extend(models::best(findings));
+    sentences.extend(in_each_light(findings, about_answers));
     sentences.extend(answers::fidelity(findings));
     sentences.extend(answers::unread(findings));
-    sentences.extend(pooled::power(&findings.pooled, findings.unit));
+    sentences.extend(sample::power(&findings.pooled, findings.unit));
     sentences
 }
 
-/// Sentences about the last kind of degradation that was asked. If it was asked in several lights, each sentence names its own.
-fn in_each_light(
-    findings: &Findings<'_>,
-    about: fn(&Findings<'_>, &KindReading) -> Vec<Sentence>,
-) -> Vec<Sentence> {
-    let variants = findings.grid.variants();
-    let last = variants.last().map(|variant| variant.kind);
-    let variants: Vec<&KindReading> = variants
-        .into_iter()
-        .filter(|variant| Some(variant.kind) == last)
-        .collect();
-    let mut all = Vec::new();
-    for variant in &variants {
-        let mut sentences = about(findings, variant);
-        if variants.len() > 1 {
-            for sentence in &mut sentences {
-                sentence.text = format!("{}: {}", light(variant, None), sentence.text);
-            }
-        }
-        all.extend(sentences);
-    }
-    all
-}
-
-/// Sentences about darkness, noise, enhancers and words alone.
+/// Sentences about noise, enhancers and words alone.
 fn about_light(findings: &Findings<'_>, variant: &KindReading) -> Vec<Sentence> {
     let unit = findings.unit;
     let of = |kind| of_set(findings, kind, variant);
     let mut sentences = Vec::new();
-    sentences.extend(pooled::darkness(&of(PooledKind::Darkness), unit));
     sentences.extend(pooled::noise(&of(PooledKind::Noise), unit));
     sentences.extend(pooled::enhancers(&of(PooledKind::Enhancer), unit));
     let blind = of(PooledKind::Blind);
@@ -104,21 +82,6 @@ fn about_answers(findings: &Findings<'_>, variant: &KindReading) -> Vec<Sentence
     sentences.extend(hallucination::collapse(&answers, unit));
     sentences.extend(models::families(findings, variant));
     sentences
-}
-
-/// The findings of one kind and variant over all families that the kind is about, in the order of enhancers and levels.
-fn of_set<'f>(
-    findings: &'f Findings<'_>,
-    kind: PooledKind,
-    variant: &KindReading,
-) -> Vec<&'f PooledFinding> {
-    let pooled = findings.pooled.iter();
-    let of_set = pooled.filter(|finding| {
-        finding.kind == kind
-            && finding.family.as_ref() == kind.only_family()
-            && finding.variant == *variant
-    });
-    of_set.collect()
 }
 
 #[cfg(test)]

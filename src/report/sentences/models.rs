@@ -1,7 +1,9 @@
 //! Sentences about single models and single families: which model sees best, and which family loses most.
 
-use super::sentence::{Numbers, Sentence, Tone};
+use super::lights::{lights, named_light};
+use super::sentence::{Numbers, Sentence, Tone, level_runs};
 use crate::report::words::family;
+use crate::score::best::BestInTheDark;
 use crate::score::findings::Findings;
 use crate::score::pooled::PooledFinding;
 use crate::score::pooled_kind::PooledKind;
@@ -10,18 +12,19 @@ use crate::types::KindReading;
 
 /// The model that sees best over all levels, and those that it is not shown to be better than.
 pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
-    let best = findings.best.as_ref()?;
+    let best = findings.best.as_ref().filter(|best| best.is_possible())?;
     let (leader, second) = (best.leader(), best.models.get(1)?);
     let mut numbers = Numbers::of(findings.unit);
+    let over = over_levels(best).map_or(String::new(), |over| format!(" {over}"));
     let (tone, text) = if best.is_shown() {
         (
             Tone::Better,
-            format!("{} sees best in the dark.", leader.model),
+            format!("{} sees best in the dark{over}.", leader.model),
         )
     } else {
         let others = best.not_shown_better_than.join(", ");
         let text = format!(
-            "{} sees best in the dark by its mean, but is not shown to be better than {others}.",
+            "{} sees best in the dark by its mean{over}, but is not shown to be better than {others}.",
             leader.model
         );
         (Tone::NotShown, text)
@@ -43,14 +46,26 @@ pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
     let p = numbers.p("p", pair.holm);
     let items = numbers.count("n", best.items);
     let clusters = numbers.clusters(best.clusters);
+    let without = match &best.without[..] {
+        [] => String::new(),
+        models => format!("; without {}, not asked in this way", models.join(", ")),
+    };
     let detail = format!(
-        "mean accuracy over EV {value} % [{low}, {high}]{loss}; {difference} against {}, {p}; n = {items} in {clusters}",
+        "mean accuracy over EV {value} % [{low}, {high}]{loss}; {difference} against {}, {p}; n = {items} in {clusters}{without}",
         second.model
     );
-    Some(numbers.sentence("best", tone, text, detail))
+    let (lights, _) = lights(findings);
+    let sentence = numbers.sentence("best", tone, text, detail);
+    Some(named_light(&lights, &best.variant, sentence))
 }
 
-/// The families that lose most and least at the darkest level, if their intervals do not meet.
+/// The levels that the comparison of areas rests on, as `over L0, L3`; `None` if they are all that some model was asked.
+pub(in crate::report) fn over_levels(best: &BestInTheDark) -> Option<String> {
+    let is_all = best.levels == best.asked;
+    (!is_all).then(|| format!("over {}", level_runs(&best.levels, &best.asked)))
+}
+
+/// The families that lose most and least at the darkest level, one against the other, if their intervals do not meet.
 pub(super) fn families(findings: &Findings<'_>, variant: &KindReading) -> Option<Sentence> {
     let pooled = findings.pooled.iter();
     let of_families = pooled.filter(|finding| {
@@ -72,10 +87,11 @@ pub(super) fn families(findings: &Findings<'_>, variant: &KindReading) -> Option
     }
     let mut numbers = Numbers::of(findings.unit);
     let text = format!(
-        "Darkness costs most in {} ({} points at {darkest}), least in {}.",
+        "Darkness costs more in {} ({} points at {darkest}) than in {} ({}).",
         family(most.family.as_ref()),
-        numbers.number("effect", 100.0 * most.difference.value, 1),
-        family(least.family.as_ref())
+        numbers.points("effect_most", most.difference.value),
+        family(least.family.as_ref()),
+        numbers.points("effect_least", least.difference.value)
     );
     let [of_most, of_least] = [("_most", most), ("_least", least)]
         .map(|(at, finding)| numbers.difference(at, finding.difference));
@@ -83,8 +99,10 @@ pub(super) fn families(findings: &Findings<'_>, variant: &KindReading) -> Option
         .map(|(name, finding)| numbers.count(name, finding.items));
     let p = numbers.p("p", most.holm);
     let detail = format!(
-        "{of_most}, {p}, n = {}; against {of_least}, n = {}; the two intervals do not meet",
-        sample[0], sample[1]
+        "{of_most}, n = {}, against {of_least}, n = {}: the two intervals do not meet; {p} is that of the loss in {}",
+        sample[0],
+        sample[1],
+        family(most.family.as_ref())
     );
     Some(numbers.sentence("families", Tone::Worse, text, detail))
 }

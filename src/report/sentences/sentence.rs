@@ -133,6 +133,12 @@ impl Numbers {
         self.number(name, 100.0 * difference.abs(), 1)
     }
 
+    /// A difference in points with its sign, as `−4.8`.
+    pub(super) fn points(&mut self, name: &str, difference: f64) -> String {
+        self.note(name, 100.0 * difference, 1);
+        points(difference)
+    }
+
     /// A difference in points with its interval, as `−4.8 [−8.5, −1.0]`. The names end in `at`.
     pub(super) fn difference(&mut self, at: &str, difference: Estimate) -> String {
         let ends = [
@@ -140,10 +146,8 @@ impl Numbers {
             ("low", difference.low),
             ("high", difference.high),
         ];
-        let [value, low, high] = ends.map(|(name, value)| {
-            self.note(&format!("{name}{at}"), 100.0 * value, 1);
-            points(value)
-        });
+        let [value, low, high] =
+            ends.map(|(name, value)| self.points(&format!("{name}{at}"), value));
         format!("{value} [{low}, {high}]")
     }
 
@@ -207,6 +211,13 @@ pub(super) fn models(names: &[String], numbers: &mut Numbers) -> String {
             numbers.count("models", several.len())
         ),
     }
+}
+
+/// A text with its first letter as a capital.
+pub(super) fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().into_iter().flat_map(char::to_uppercase);
+    first.chain(letters).collect()
 }
 
 /// Levels that follow each other in `all` joined by a dash, as `L1–L3, L5`.

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::pooled::{detail, largest, of_verdict, runs};
-use super::sentence::{Numbers, Sentence, Tone, level_runs};
+use super::sentence::{Numbers, Sentence, Tone, capitalised, level_runs};
 use crate::report::words::family as family_name;
 use crate::score::cluster::ClusterUnit;
 use crate::score::comparison::{Comparison, ComparisonKind};
@@ -147,11 +147,4 @@ fn comparison_detail(comparison: &Comparison, numbers: &mut Numbers) -> Option<S
     Some(format!(
         "{model} at {level}{against}: {difference}, {p}, corrected over its conditions and families; n = {n} in {clusters}"
     ))
-}
-
-/// A text with its first letter as a capital.
-fn capitalised(text: &str) -> String {
-    let mut letters = text.chars();
-    let first = letters.next().into_iter().flat_map(char::to_uppercase);
-    first.chain(letters).collect()
 }

@@ -1,5 +1,6 @@
 //! The table of the models by area: each less each other, with its test.
 
+use crate::report::sentences::over_levels;
 use crate::report::table::ColumnKind::{Count, Number, P, Percent, Points, Significance, Text};
 use crate::report::table::{Table, TableBuilder};
 use crate::report::words::{light, points};
@@ -16,8 +17,10 @@ pub(super) fn best(findings: &Findings<'_>) -> Table {
         .best
         .as_ref()
         .map(|best| light(&best.variant, None));
+    let levels = findings.best.as_ref().and_then(over_levels);
     let caption = format!(
-        "Mean accuracy from L0 to the darkest level, {}: model less model, on shared items",
+        "Mean accuracy {}, {}: model less model, on shared items",
+        levels.unwrap_or_else(|| "from L0 to the darkest level".to_owned()),
         variant.unwrap_or_default()
     );
     let mut table = TableBuilder::new("best", pairs)

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use crate::report::sentences::left_out;
 use crate::report::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
 use crate::report::table::{Table, TableBuilder};
 use crate::report::words::{counted, light, p};
@@ -36,7 +37,11 @@ pub(super) fn pooled(findings: &Findings<'_>) -> Vec<Table> {
             "Pooled over {of_models}, paired by question, in percentage points"
         ));
     }
-    total.notes = notes(&whole, &findings.unit.to_string());
+    let left_out = left_out(findings).into_iter();
+    total.notes = left_out
+        .map(|sentence| sentence.text.trim_end_matches('.').to_owned())
+        .chain(notes(&whole, &findings.unit.to_string()))
+        .collect();
     let mut by_family = table(
         &format!("Pooled over {of_models}, by family"),
         column,

@@ -1,16 +1,16 @@
 //! Golden sentences of each kind and verdict, and the check that each number in a sentence is one of its values.
 
 mod hallucination;
+mod made;
 mod words_alone;
 
 use super::sentence::{Sentence, level_runs};
-use super::{pooled, words_alone as below};
+use super::{darkness, pooled, sample, words_alone as below};
 use crate::score::cluster::ClusterUnit;
 use crate::score::estimate::Estimate;
 use crate::score::pooled::PooledFinding;
 use crate::score::pooled_kind::PooledKind;
-use crate::score::significance::Significance::{self, Better, NotShown, Worse};
-use crate::types::control::OBSERVER;
+use crate::score::significance::Significance::{self, Better, NotShown, TooFewClusters, Worse};
 use crate::types::degradation::Kind;
 use crate::types::{AxisLevel, EnhancerName, KindReading, Severity};
 
@@ -100,8 +100,11 @@ fn each_kind_and_verdict_has_its_words() {
         let all: Vec<&PooledFinding> = all.iter().collect();
         let unit = ClusterUnit::Scene;
         let sentences: Vec<Sentence> = match kind {
-            Darkness => pooled::darkness(&all, unit).into_iter().collect(),
-            Noise => pooled::noise(&all, unit).into_iter().collect(),
+            Darkness => {
+                let said = darkness::with_variant(&all, None, unit);
+                said.into_iter().collect()
+            }
+            Noise => pooled::noise(&all, unit),
             Enhancer => pooled::enhancers(&all, unit),
             Blind => below::pooled(&all, unit).into_iter().collect(),
             Hallucination(_) => Vec::new(),
@@ -130,17 +133,26 @@ fn each_kind_and_verdict_has_its_words() {
     let said = say(Darkness, &[(0.1, Better)]);
     assert!(said[0].starts_with("+ At L1 accuracy is 10.0 points higher than at L0. ("));
     let said = say(Noise, &[(-0.05, Worse), (-0.091, Worse), (0.01, NotShown)]);
-    assert!(
-        said[0]
-            .starts_with("− Sensor noise costs up to 9.1 points beyond the exposure drop (L2). (")
-    );
+    assert!(said[0].starts_with(
+        "− With noise, accuracy is up to 9.1 points lower than by the exposure drop alone (L2). ("
+    ));
     assert!(said[0].contains("; shown at L1–L2;"), "{said:?}");
     let said = say(Noise, &[(-0.05, Worse), (-0.02, NotShown)]);
-    assert!(
-        said[0].starts_with("− Sensor noise costs 5.0 points beyond the exposure drop (L1). (")
-    );
+    assert!(said[0].starts_with(
+        "− With noise, accuracy is 5.0 points lower than by the exposure drop alone (L1). ("
+    ));
+    // Both verdicts are said.
+    let said = say(Noise, &[(-0.644, Worse), (0.0, NotShown), (0.644, Better)]);
+    assert_eq!(said.len(), 2, "{said:?}");
+    assert!(said[0].starts_with("− With noise, accuracy is 64.4 points lower than"));
+    assert!(said[1].starts_with("+ With noise, accuracy is 64.4 points higher than"));
+    assert!(said[1].contains("; shown at L3;"), "{said:?}");
+    assert!(say(Noise, &[(-0.5, TooFewClusters)]).is_empty());
+    assert!(say(Darkness, &[(-1.0, TooFewClusters)]).is_empty());
     let said = say(Noise, &[(0.03, NotShown)]);
-    assert!(said[0].starts_with("· It is not shown that sensor noise costs anything beyond"));
+    assert!(said[0].starts_with(
+        "· It is not shown that accuracy with noise differs from that by the exposure drop alone. ("
+    ));
     let said = say(
         Enhancer,
         &[
@@ -180,22 +192,23 @@ fn each_kind_and_verdict_has_its_words() {
 
 #[test]
 fn the_observer_confirms_less() {
-    let say = |levels: &[(f64, Significance)]| {
+    let say = |model: &str, levels: &[(f64, Significance)]| {
         let mut all = findings(PooledKind::Enhancer, levels);
         for finding in &mut all {
-            finding.models = vec![OBSERVER.to_owned()];
+            finding.models = vec![model.to_owned()];
         }
         let all: Vec<&PooledFinding> = all.iter().collect();
         let said = pooled::enhancers(&all, ClusterUnit::Scene);
         said.iter().map(checked).collect::<Vec<String>>()
     };
-    let said = say(&[(-0.088, Worse), (-0.08, Worse)]);
+    // Of several runs, the name has the run.
+    let said = say("observer (a)", &[(-0.088, Worse), (-0.08, Worse)]);
     assert!(
         said[0]
             .starts_with("− With lift the observer confirms less at L1–L2, by up to 8.8 points. ("),
         "{said:?}"
     );
-    let said = say(&[(0.03, Better)]);
+    let said = say("observer", &[(0.03, Better)]);
     assert!(
         said[0].starts_with("+ With lift the observer confirms more at L1, by 3.0 points. ("),
         "{said:?}"
@@ -203,25 +216,25 @@ fn the_observer_confirms_less() {
 }
 
 #[test]
-fn what_the_sample_can_show_is_a_range() {
+fn how_far_intervals_reach_is_a_range() {
     let say = |halves: &[f64]| {
         let mut all = findings(PooledKind::Darkness, &vec![(-0.129, Worse); halves.len()]);
         for (finding, half) in all.iter_mut().zip(halves) {
             let difference = &mut finding.difference;
             (difference.low, difference.high) = (-0.129 - half, -0.129 + half);
         }
-        let said = pooled::power(&all, ClusterUnit::Scene);
+        let said = sample::power(&all, ClusterUnit::Scene);
         said.as_ref().map(checked)
     };
     assert_eq!(
         say(&[0.0614, 0.139, 0.08]).unwrap(),
-        "· With 30 scenes an effect must be larger than about 6 to 14 points to be shown here. (half of the narrowest and of the widest \
-         interval of the findings over all families)"
+        "· With 30 scenes the intervals of the findings reach about 6 to 14 points to each side. (over all families; an effect much \
+         smaller than that cannot be shown with so small a sample)"
     );
     assert_eq!(
         say(&[0.061, 0.064]).unwrap(),
-        "· With 30 scenes an effect must be larger than about 6 points to be shown here. (half of the widest interval of the findings over \
-         all families)"
+        "· With 30 scenes the intervals of the findings reach about 6 points to each side. (over all families; an effect much smaller \
+         than that cannot be shown with so small a sample)"
     );
     assert_eq!(say(&[0.01, 0.049]), None);
 }
@@ -231,7 +244,7 @@ fn one_model_and_lost_items_are_named() {
     let mut one = finding(PooledKind::Darkness, 5, -0.3, Worse);
     one.models = vec!["gpt-4o".to_owned()];
     (one.dropped, one.draws, one.clusters) = (100, Some(100_000), 1);
-    let said = checked(&pooled::darkness(&[&one], ClusterUnit::Frame).unwrap());
+    let said = checked(&darkness::with_variant(&[&one], None, ClusterUnit::Frame).unwrap());
     assert!(
         said.ends_with(
             "(gpt-4o: −30.0 [−34.0, −26.0], p < 0.001; a loss is shown at L5; n = 1,237 in 1 frame, 100 left out because a model has no \
@@ -252,7 +265,9 @@ fn levels_are_joined_by_runs() {
 #[test]
 fn no_sentence_says_more_than_its_test() {
     let source = [
+        include_str!("../darkness.rs"),
         include_str!("../pooled.rs"),
+        include_str!("../sample.rs"),
         include_str!("../models.rs"),
         include_str!("../answers.rs"),
         include_str!("../hallucination.rs"),

@@ -1,0 +1,105 @@
+//! Sentences about what darkness costs all models together, with each variant.
+
+use super::lights::{lights, named_light, of_set};
+use super::pooled::{detail, of_verdict, runs};
+use super::sentence::{Numbers, Sentence, Tone, capitalised};
+use crate::report::words::light;
+use crate::score::cluster::ClusterUnit;
+use crate::score::findings::Findings;
+use crate::score::pooled::PooledFinding;
+use crate::score::pooled_kind::PooledKind;
+use crate::score::significance::Significance;
+use crate::types::degradation::Kind;
+use crate::types::{KindReading, LightGroup};
+
+/// What darkness costs with the last kind of degradation, in each of its lights; then what it costs with another kind, if the last
+/// does not show it. If the two differ, both are named.
+pub(super) fn darkness(findings: &Findings<'_>) -> Vec<Sentence> {
+    let (lights, others) = lights(findings);
+    let levels = |variant: &KindReading| of_set(findings, PooledKind::Darkness, variant);
+    let verdict_with = |variant: &KindReading| verdict(&levels(variant));
+    let is_of_runs = |one: &KindReading, other: &KindReading| {
+        LightGroup::meet(one.group.as_ref(), other.group.as_ref())
+    };
+    let mut sentences = Vec::new();
+    for variant in &lights {
+        let mut beside = others.iter().filter(|other| is_of_runs(other, variant));
+        let found = verdict_with(variant);
+        let differs = beside.any(|other| verdict_with(other).is_some_and(|of| Some(of) != found));
+        let name = (differs && lights.len() == 1).then(|| name(variant));
+        let sentence = with_variant(&levels(variant), name.as_deref(), findings.unit);
+        sentences.extend(sentence.map(|sentence| named_light(&lights, variant, sentence)));
+    }
+    for other in &others {
+        let found = verdict_with(other);
+        let mut beside = lights.iter().filter(|variant| is_of_runs(other, variant));
+        let is_said = beside.any(|variant| verdict_with(variant) == found);
+        if !is_said && found.is_some_and(Significance::is_shown) {
+            let name = name(other);
+            sentences.extend(with_variant(&levels(other), Some(&name), findings.unit));
+        }
+    }
+    sentences
+}
+
+/// What is shown over all levels: a loss, else a gain, else nothing; `None` without a verdict.
+fn verdict(levels: &[&PooledFinding]) -> Option<Significance> {
+    let mut verdicts = [
+        Significance::Worse,
+        Significance::Better,
+        Significance::NotShown,
+    ]
+    .into_iter();
+    verdicts.find(|verdict| !of_verdict(levels, *verdict).is_empty())
+}
+
+/// A variant at the beginning of a sentence.
+fn name(variant: &KindReading) -> String {
+    match variant.kind {
+        Some(Kind::Exposure) => format!("By the exposure drop alone{}", variant.group_suffix()),
+        _ => capitalised(&light(variant, None)),
+    }
+}
+
+/// What darkness costs with one variant, at the darkest level where it is shown; else that nothing is shown at the darkest level.
+/// The sentence begins with `name`.
+pub(super) fn with_variant(
+    levels: &[&PooledFinding],
+    name: Option<&str>,
+    unit: ClusterUnit,
+) -> Option<Sentence> {
+    let mut numbers = Numbers::of(unit);
+    let verdict = verdict(levels)?;
+    let found = of_verdict(levels, verdict);
+    let darkest = found.last()?;
+    let size = darkest.difference.value;
+    let (text, more) = match verdict {
+        Significance::Worse => (
+            format!(
+                "darkness costs {} points at {}, from {} % at L0.",
+                numbers.size("cost", size),
+                darkest.level,
+                numbers.percent("L0", darkest.second)
+            ),
+            format!("; a loss is shown at {}", runs(&found, levels)),
+        ),
+        Significance::Better => (
+            format!(
+                "at {} accuracy is {} points higher than at L0.",
+                darkest.level,
+                numbers.size("gain", size)
+            ),
+            format!("; at {}", darkest.level),
+        ),
+        _ => (
+            "it is not shown that darkness costs anything at any level.".to_owned(),
+            format!("; at {}", darkest.level),
+        ),
+    };
+    let text = match name {
+        None => capitalised(&text),
+        Some(name) => format!("{name}, {text}"),
+    };
+    let detail = detail(darkest, &mut numbers, &more);
+    Some(numbers.sentence("darkness", Tone::from(verdict), text, detail))
+}
