@@ -70,6 +70,6 @@ fn open_questions_with_marks_and_an_enhancer() {
     assert_eq!(digest(&house.0, "run"), OPENEQA);
 }
 
-const EVALUATION: &str = "c1b5e0213cfcff5c";
-const READINGS: &str = "87c95a7a40a2126c";
+const EVALUATION: &str = "8de8b97321865f94";
+const READINGS: &str = "991b763c9dbf128d";
 const OPENEQA: &str = "ef1f0b7f46f0f526";

@@ -34,7 +34,7 @@ use crate::types::{Family, KindReading};
 pub(in crate::report) const FIRST: usize = 8;
 
 /// What is said about the sentences as a whole, in the line below them.
-pub(in crate::report) const HOW_TO_READ: &str = "p is corrected by Holm over the levels of a finding (best: over pairs of models; below blind in one family: over the conditions and families of a model; baseline: over the conditions of a model; fidelity: one test). An interval is uncorrected: effects outside it are ruled out at 95 %. Interval and test are two methods, and may disagree where p is near 0.05.";
+pub(in crate::report) const HOW_TO_READ: &str = "p is Holm's, over the levels of a finding (best: pairs of models; one family below blind: conditions and families of a model; old run: conditions of a model; fidelity: one test). An interval is uncorrected: effects outside it are ruled out at 95 %. Interval and test are two methods: near p = 0.05 they may disagree.";
 
 /// All sentences, in the order of their importance.
 #[must_use]
