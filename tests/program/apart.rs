@@ -191,9 +191,9 @@ fn runs_by_other_rules_say_so_and_keep_their_controls() {
     check_rows(
         [
             "observer: known-signal observer",
-            "it scores",
+            "shown images of other rooms, scores ",
             " (a) and ",
-            " (b), chance is ",
+            " (b); chance is ",
         ],
         |part| assert!(joined.contains(part), "{part}: {joined}"),
     );

@@ -26,6 +26,7 @@ const OF_OTHERS: [&str; 7] = [
     "--no-deps",
     "--path",
     "--no-log-images",
+    "--bench",
     "--test",
     "--ignored",
     "--nocapture",
