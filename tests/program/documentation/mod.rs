@@ -21,7 +21,7 @@ use page::{Block, BlockKind, Page, files, pages, root};
 use regex::Regex;
 
 /// Flags of other programs that pages name: `sbatch`, `pip`, `cargo`, and `inspect eval`.
-const OF_OTHERS: [&str; 7] = [
+const OF_OTHERS: [&str; 8] = [
     "--array",
     "--no-deps",
     "--path",
