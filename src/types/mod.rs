@@ -8,7 +8,9 @@ pub(crate) mod decides;
 pub(crate) mod degradation;
 pub(crate) mod detail;
 pub(crate) mod digest;
+pub(crate) mod enhancer_note;
 pub(crate) mod flag;
+mod flaw;
 pub(crate) mod frame;
 pub(crate) mod image_notes;
 pub(crate) mod kind_set;
@@ -34,6 +36,7 @@ pub use detail::{
     AnswerReading, ChoiceDetail, ImageFacts, OpenDetail, Step, TrialOutcome, WalkFacts,
 };
 pub use digest::Digest;
+pub use flaw::Flaw;
 pub use frame::{DepthKind, Frame, FrameId, Intrinsics, Rgb, Segmentation};
 pub use image_notes::{ImageFidelity, Thumbnail};
 pub use kind_set::KindSet;

@@ -1,0 +1,157 @@
+//! What a run records of an enhancer: [`EnhancerNote`].
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::Flaw;
+
+/// How a run used an enhancer, and whether its images can be enhanced images.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct EnhancerNote {
+    /// How the model is fed and read.
+    #[serde(default)]
+    pub convention: Vec<ConventionLine>,
+    /// What was done to the images because of their sizes; empty before the first image.
+    #[serde(default)]
+    pub sizes: String,
+    /// Whether an image was resized for the model, so that its results are not those of the model at the image's own size.
+    #[serde(default)]
+    pub resized: bool,
+    /// What the probe found before the first question; `None` if it was not run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub probe: Option<ProbeNote>,
+    /// What its images of dark frames looked like during the run.
+    #[serde(default)]
+    pub judged: JudgedImages,
+}
+
+/// One statement of how a model is fed or read.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ConventionLine {
+    /// The key of the sidecar, or a fact of the graph.
+    pub key: String,
+    /// The value.
+    pub value: String,
+    /// Where the value is from: the sidecar, a preset, the graph, the probe, or what is usual.
+    pub source: String,
+}
+
+/// What the probe of an enhancer found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ProbeNote {
+    /// The number of dark frames.
+    pub frames: usize,
+    /// The value ranges with which its images can be enhanced images.
+    pub plausible: Vec<String>,
+    /// What was wrong; `None` if nothing was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub problem: Option<String>,
+    /// What follows.
+    pub outcome: ProbeOutcome,
+}
+
+/// What follows from a probe.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ProbeOutcome {
+    /// The images can be enhanced images.
+    Plausible,
+    /// The images are odd, but the user states how the model is fed and read, and some models do that.
+    Doubtful,
+    /// The images cannot be enhanced images; the run went on because the user said so.
+    Overruled,
+}
+
+/// The enhanced images of dark frames that were looked at, and those with a flaw.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct JudgedImages {
+    /// The number of images.
+    pub images: usize,
+    /// The numbers of images with a flaw, by flaw.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub flawed: BTreeMap<Flaw, usize>,
+    /// The first of them, at most [`JudgedImages::EXAMPLES`].
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub examples: Vec<FlawedImage>,
+}
+
+/// One image with a flaw.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct FlawedImage {
+    /// The frame or walk.
+    pub frame: String,
+    /// The condition.
+    pub condition: String,
+    /// What is wrong with it.
+    pub flaw: Flaw,
+}
+
+impl JudgedImages {
+    /// Largest number of examples; chosen.
+    pub const EXAMPLES: usize = 6;
+
+    /// The number of images with a flaw.
+    #[must_use]
+    pub fn flaws(&self) -> usize {
+        self.flawed.values().sum()
+    }
+
+    /// Counts one more image.
+    pub fn count(&mut self, flawed: Option<FlawedImage>) {
+        self.images += 1;
+        let Some(image) = flawed else { return };
+        *self.flawed.entry(image.flaw).or_default() += 1;
+        // The same examples whatever the order of the images.
+        let place = self.examples.partition_point(|known| *known < image);
+        self.examples.insert(place, image);
+        self.examples.truncate(Self::EXAMPLES);
+    }
+
+    /// Adds the images of an earlier command or of another part.
+    pub fn add(&mut self, other: &Self) {
+        self.images += other.images;
+        for (flaw, count) in &other.flawed {
+            *self.flawed.entry(*flaw).or_default() += count;
+        }
+        self.examples.extend(other.examples.iter().cloned());
+        self.examples.sort();
+        self.examples.dedup();
+        self.examples.truncate(Self::EXAMPLES);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image(frame: &str) -> FlawedImage {
+        FlawedImage {
+            frame: frame.to_owned(),
+            condition: "L3+noise+m".to_owned(),
+            flaw: Flaw::Flat,
+        }
+    }
+
+    #[test]
+    fn examples_do_not_depend_on_the_order() {
+        let names: Vec<String> = (0..9).map(|i| format!("f{i}")).collect();
+        let [mut one, mut other] = [JudgedImages::default(), JudgedImages::default()];
+        names.iter().for_each(|name| one.count(Some(image(name))));
+        names
+            .iter()
+            .rev()
+            .for_each(|name| other.count(Some(image(name))));
+        assert_eq!(one, other);
+        assert_eq!((one.flaws(), one.examples.len()), (9, 6));
+        let mut parts = JudgedImages::default();
+        parts.count(None);
+        parts.count(Some(image("f0")));
+        let mut rest = JudgedImages::default();
+        names[1..]
+            .iter()
+            .for_each(|name| rest.count(Some(image(name))));
+        parts.add(&rest);
+        assert_eq!((parts.images, &parts.examples), (10, &one.examples));
+    }
+}
