@@ -50,6 +50,14 @@ pub enum Error {
         /// What is wrong with it, and how to fix it.
         problem: String,
     },
+    /// An enhancement model that cannot be used any further, so that the run ends.
+    #[error("{}: {problem}", path.display())]
+    EnhancerEnded {
+        /// The path of the ONNX file.
+        path: PathBuf,
+        /// What it did, and how to go on.
+        problem: String,
+    },
     /// The library of ONNX Runtime was not found, is not suitable or could not be installed.
     #[error("ONNX Runtime: {0}")]
     Runtime(String),

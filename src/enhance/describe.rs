@@ -8,6 +8,7 @@ use super::graph::Graph;
 use super::preset::Preset;
 use super::sidecar::ModelSidecar;
 use super::tiles::MULTIPLES;
+use crate::types::enhancer_note::ConventionLine;
 
 /// Source of values that the graph itself states.
 const GRAPH: &str = "graph";
@@ -19,23 +20,28 @@ pub(super) struct Description {
     pub(super) sidecar: ModelSidecar,
     /// The preset, if one was named.
     pub(super) preset: Option<Preset>,
+    /// Whether the probe confirmed the ranges that nothing states.
+    pub(super) probed: bool,
     /// Number of subnormal weights that were set to zero.
     pub(super) flushed: usize,
 }
 
 /// Rows of a table: name, value, source.
-struct Lines(Vec<[String; 3]>);
+struct Lines(Vec<ConventionLine>);
 
 impl Lines {
     fn add(&mut self, name: &str, value: impl std::fmt::Display, source: impl Into<String>) {
-        self.0
-            .push([name.to_owned(), value.to_string(), source.into()]);
+        self.0.push(ConventionLine {
+            key: name.to_owned(),
+            value: value.to_string(),
+            source: source.into(),
+        });
     }
 }
 
 impl Description {
-    /// The table as text.
-    pub(super) fn text(&self, path: &Path, graph: &Graph, convention: &ModelSidecar) -> String {
+    /// How the model is fed and read.
+    pub(super) fn lines(&self, graph: &Graph, convention: &ModelSidecar) -> Vec<ConventionLine> {
         let mut lines = Lines(Vec::new());
         self.input(&mut lines, graph, convention);
         self.output(&mut lines, graph);
@@ -44,6 +50,12 @@ impl Description {
             None => "not stated; --tile N tries it and checks every seam".to_owned(),
         };
         lines.add("tile", convention.tile.unwrap_or(Tile::None), source);
+        lines.0
+    }
+
+    /// The table as text.
+    pub(super) fn text(&self, path: &Path, graph: &Graph, convention: &ModelSidecar) -> String {
+        let mut lines = Lines(self.lines(graph, convention));
         lines.add(
             "subnormal weights",
             self.flushed,
@@ -67,7 +79,10 @@ impl Description {
         let usual = "usual; a graph cannot state it";
         let source = self.source(|s| s.color.is_some(), usual);
         lines.add("color", feeding.color, source);
-        let source = self.source(|s| s.range_in.is_some(), "usual for its type");
+        let source = self.source(
+            |s| s.range_in.is_some(),
+            self.range_source("usual for its type"),
+        );
         lines.add("range_in", feeding.range, source);
         if convention.mean.is_some() || convention.std.is_some() {
             let value = format!("{:?}, {:?}", feeding.mean, feeding.std);
@@ -120,10 +135,15 @@ impl Description {
             source,
         );
         let checked = "as the input; the actual output is checked";
-        let source = self.source(|s| s.range_out.is_some(), checked);
+        let source = self.source(|s| s.range_out.is_some(), self.range_source(checked));
         lines.add("range_out", reading.range, source);
         let source = self.source(|s| s.rounding.is_some(), "usual");
         lines.add("rounding", reading.rounding, source);
+    }
+
+    /// Source of a range that nothing states.
+    fn range_source(&self, otherwise: &'static str) -> &'static str {
+        if self.probed { "probed" } else { otherwise }
     }
 
     /// Source of a value: sidecar or preset if they state it, else `otherwise`.
@@ -136,17 +156,18 @@ impl Description {
     }
 }
 
-fn aligned(path: &Path, lines: &[[String; 3]]) -> String {
-    let widths = [0, 1].map(|column| {
-        let cells = lines.iter().map(|line| line[column].chars().count());
+fn aligned(path: &Path, lines: &[ConventionLine]) -> String {
+    let width = |cell: fn(&ConventionLine) -> &str| {
+        let cells = lines.iter().map(|line| cell(line).chars().count());
         cells.max().unwrap_or(0)
-    });
+    };
+    let widths = [width(|line| &line.key), width(|line| &line.value)];
     let mut text = format!("{}\n", path.display());
-    for [name, value, source] in lines {
+    for ConventionLine { key, value, source } in lines {
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,
-            "  {name:0$}  {value:1$}  {source}",
+            "  {key:0$}  {value:1$}  {source}",
             widths[0], widths[1]
         );
     }

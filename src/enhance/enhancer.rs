@@ -1,22 +1,26 @@
 //! A user's ONNX model on ONNX Runtime's CPU provider: [`Enhancer`].
 
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
+use crate::types::enhancer_note::{ProbeNote, ProbeOutcome};
 use crate::types::{EnhancerName, Rgb};
 
-use super::convention::{Padding, Tile};
+use super::convention::{ElementType, Padding, Tile, ValueRange};
 use super::describe::Description;
 use super::file::ModelFile;
 use super::graph::{Graph, RunResult};
 use super::memory::{self, MemoryCost, PROBES};
 use super::planes::Planes;
+use super::probe::RangePair;
+use super::probe_run::of_type;
 use super::reading::OutOfRange;
 use super::runtime::Runtime;
 use super::session::{GraphSource, Stopper};
 use super::sidecar::ModelSidecar;
 use super::tiles::{Cutting, MULTIPLES, TilePlan, TileWindow, TiledImage, Tiling};
+use super::usage::Usage;
 
 /// Side of a tile with `--tile auto`, in pixels: measured to be as fast as the whole image, with a twelfth of its memory.
 const TILE: usize = 256;
@@ -46,6 +50,7 @@ pub struct Enhancer {
     max_side: Option<NonZeroUsize>,
     cost: MemoryEstimate,
     description: Description,
+    usage: Usage,
 }
 
 impl Enhancer {
@@ -76,7 +81,7 @@ impl Enhancer {
             let path = file.path.clone();
             Error::Enhancer { path, problem }
         })?;
-        Ok(Self {
+        let enhancer = Self {
             path: file.path,
             name: file.name,
             graph,
@@ -87,9 +92,79 @@ impl Enhancer {
             description: Description {
                 sidecar: file.sidecar,
                 preset: file.preset,
+                probed: false,
                 flushed,
             },
-        })
+            usage: Usage::default(),
+        };
+        enhancer.note_convention();
+        Ok(enhancer)
+    }
+
+    /// Notes how the model is fed and read, with the source of each value.
+    fn note_convention(&self) {
+        let lines = self.description.lines(&self.graph, &self.convention);
+        self.usage.update(|note| note.convention = lines);
+    }
+
+    /// A handle to what it did so far.
+    #[must_use]
+    pub(crate) fn usage(&self) -> Usage {
+        self.usage.clone()
+    }
+
+    /// Path of the model's file.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    pub(super) fn graph(&self) -> &Graph {
+        &self.graph
+    }
+
+    /// What sidecar and preset state.
+    pub(super) fn convention(&self) -> &ModelSidecar {
+        &self.convention
+    }
+
+    /// The ranges in which it is fed and read now.
+    pub(super) fn ranges(&self) -> RangePair {
+        RangePair {
+            input: self.graph.feeding.range,
+            output: self.graph.reading.range,
+        }
+    }
+
+    /// The ranges of input and output that the sidecar, a preset or the element types state. A preset that states none stands for
+    /// 0..1, which all authors of presets use.
+    pub(super) fn stated_ranges(&self) -> [Option<ValueRange>; 2] {
+        let signature = &self.graph.signature;
+        let of = |stated: Option<ValueRange>, element: &ElementType| {
+            let preset = self.description.preset.as_ref().map(|_| ValueRange::Unit);
+            stated.or(of_type(element)).or(preset)
+        };
+        let Self { convention, .. } = self;
+        [
+            of(convention.range_in, &signature.input.port.element),
+            of(convention.range_out, &signature.output.port.element),
+        ]
+    }
+
+    /// Height and width of a frame of the probe: the given ones, in the model's multiples, or those that it fixes.
+    pub(super) fn probe_size(&self, [height, width]: [usize; 2]) -> [usize; 2] {
+        let multiple = self.convention.multiple.map_or(1, NonZeroUsize::get);
+        let signature = &self.graph.signature;
+        let side = |fixed: Option<usize>, wanted: usize| {
+            fixed.unwrap_or_else(|| wanted.next_multiple_of(multiple))
+        };
+        [side(signature.height, height), side(signature.width, width)]
+    }
+
+    /// Notes what the probe found. Ranges that were open are known now.
+    pub(super) fn set_probed(&mut self, probe: ProbeNote) {
+        self.description.probed = probe.outcome == ProbeOutcome::Plausible;
+        self.usage.update(|note| note.probe = Some(probe));
+        self.note_convention();
     }
 
     /// Sets how images are cut into tiles; the default is [`Tiling::Auto`].
@@ -342,7 +417,7 @@ impl Enhancer {
             .ok_or_else(|| self.fault("gave no pixels".to_owned()))
     }
 
-    fn fault(&self, problem: String) -> Error {
+    pub(super) fn fault(&self, problem: String) -> Error {
         Error::Enhancer {
             path: self.path.clone(),
             problem,

@@ -8,6 +8,8 @@ use ort::session::Session;
 use super::convention::TensorLayout;
 use super::feeding::{Feeding, Input};
 use super::planes::Planes;
+use super::plausible::Codes;
+use super::port::Port;
 use super::reading::{OutOfRange, OutputReading, TensorSamples};
 use super::runtime::Runtime;
 use super::session::{GraphSource, SessionOptions, Stopper, builder, one_line, ports, run};
@@ -25,6 +27,8 @@ pub(super) struct Graph {
     runtime: Runtime,
     session: Arc<Mutex<Session>>,
     options: Arc<SessionOptions>,
+    /// All inputs and outputs, by name, type and dimensions.
+    ports: Arc<[Vec<Port>; 2]>,
 }
 
 /// Result of a run of a model.
@@ -62,17 +66,46 @@ impl Graph {
         convention: &ModelSidecar,
         runtime: &Runtime,
     ) -> std::result::Result<Self, String> {
-        let (inputs, outputs) = (ports(session.inputs()), ports(session.outputs()));
-        let signature = Signature::of(&inputs, &outputs, convention)?;
+        let ports = [ports(session.inputs()), ports(session.outputs())];
+        let session = Arc::new(Mutex::new(session));
+        Self::of_session(session, Arc::new(ports), convention, runtime)
+    }
+
+    fn of_session(
+        session: Arc<Mutex<Session>>,
+        ports: Arc<[Vec<Port>; 2]>,
+        convention: &ModelSidecar,
+        runtime: &Runtime,
+    ) -> std::result::Result<Self, String> {
+        let [inputs, outputs] = &*ports;
+        let signature = Signature::of(inputs, outputs, convention)?;
         let options = SessionOptions::of(&signature.output.port.name).map_err(|e| one_line(&e))?;
         Ok(Self {
             feeding: Feeding::of(&signature, convention),
             reading: Arc::new(OutputReading::of(&signature, convention)),
             signature: Arc::new(signature),
             runtime: runtime.clone(),
-            session: Arc::new(Mutex::new(session)),
+            session,
             options: Arc::new(options),
+            ports,
         })
+    }
+
+    /// The same session, fed and read by another convention.
+    ///
+    /// # Errors
+    /// If the graph contradicts it; the message follows the file's name.
+    pub(super) fn with_convention(
+        &self,
+        convention: &ModelSidecar,
+    ) -> std::result::Result<Self, String> {
+        let (session, ports) = (Arc::clone(&self.session), Arc::clone(&self.ports));
+        Self::of_session(session, ports, convention, &self.runtime)
+    }
+
+    /// Outputs of the graph, used or not.
+    pub(super) fn outputs(&self) -> &[Port] {
+        &self.ports[1]
     }
 
     /// The ONNX Runtime that runs it.
@@ -111,6 +144,15 @@ impl Graph {
         let reading = Arc::clone(&self.reading);
         self.run(input, size, move |samples, layout| {
             reading.planes(samples, layout, size)
+        })
+    }
+
+    /// Runs the model on a whole image; returns codes of 0..255 that are neither clamped nor rounded.
+    pub(super) fn codes(&self, image: &Rgb) -> Result<RunResult<Codes>> {
+        Ok(match self.planes(&Planes::of(image))? {
+            RunResult::Output(planes) => RunResult::Output(Codes::of_planes(&planes)),
+            RunResult::Failed(problem) => RunResult::Failed(problem),
+            RunResult::Unusable(values) => RunResult::Unusable(values),
         })
     }
 

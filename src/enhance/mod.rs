@@ -27,6 +27,7 @@ mod plausible;
 mod port;
 mod preset;
 mod probe;
+mod probe_run;
 mod protobuf;
 mod reading;
 pub(crate) mod runtime;
@@ -36,14 +37,19 @@ mod settings;
 mod sidecar;
 mod signature;
 mod tiles;
+mod usage;
 mod weights;
 
 pub use enhancer::Enhancer;
 pub use file::ModelFile;
+pub(crate) use plausible::{DARK, brightness};
+pub(crate) use probe::FRAMES;
+pub(crate) use probe_run::Implausible;
 pub use runtime::{Install, Runtime, RuntimeSearch, forbid_telemetry};
 pub(crate) use session::Stopper;
-pub(crate) use settings::{EnhancerArgs, RuntimeArgs, SizeArgs};
+pub(crate) use settings::{EnhancerArgs, ProbeArgs, RuntimeArgs, SizeArgs};
 pub use tiles::Tiling;
+pub(crate) use usage::Usage;
 
 /// Version of feeding and reading models, raised whenever a pixel changes, so that results of an older version are not
 /// reused.

@@ -6,12 +6,15 @@
 
 use std::fmt;
 
+use super::planes::Planes;
 use crate::types::{Flaw, Rgb};
 
 /// Largest mean luma, in codes, of an image that is judged: on bright images the rules flag good models. Measured.
-pub(super) const DARK: f64 = 64.0;
+pub(crate) const DARK: f64 = 64.0;
 /// Weights of red, green and blue in luma: ITU-R BT.601.
 const LUMA: [f64; 3] = [0.299, 0.587, 0.114];
+/// Longer side of the images that are judged, in pixels: that of the images from which the thresholds come.
+const JUDGED_SIDE: usize = 160;
 /// Side of the blocks whose means are compared, in pixels; chosen, so that noise is averaged out.
 const BLOCK: usize = 4;
 
@@ -34,39 +37,22 @@ pub(super) struct Verdict {
 }
 
 impl fmt::Display for Verdict {
-    /// What was seen, as a clause: `it is flat: …`.
+    /// What was seen, as it follows "the images": `are flat (their brightness varies by 0.2 of 255)`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let figure = self.figure;
+        let percent = 100.0 * figure;
+        write!(f, "{} (", self.flaw.words())?;
         match self.flaw {
-            Flaw::Nan => write!(f, "{:.0} % of its values are not numbers", 100.0 * figure),
-            Flaw::Range => write!(
-                f,
-                "{:.0} % of its values are far outside the range that it is read in",
-                100.0 * figure
-            ),
-            Flaw::Flat => write!(f, "it is flat: its brightness varies by {figure:.1} of 255"),
-            Flaw::Unlit => write!(
-                f,
-                "it is not brighter than the dark image: {figure:+.1} of 255"
-            ),
-            Flaw::White => write!(f, "{:.0} % of it is white", 100.0 * figure),
-            Flaw::Inverted => write!(
-                f,
-                "it is bright where the dark image is dark: rank correlation {figure:.2}"
-            ),
-            Flaw::Shuffled => write!(
-                f,
-                "its edges are not those of the dark image: {figure:.2} of them agree, 1 at best"
-            ),
-            Flaw::Hue => write!(
-                f,
-                "it is blue where the dark image is red: cosine {figure:.2}"
-            ),
-            Flaw::Haze => write!(
-                f,
-                "it has no dark pixel: 99 % of it is brighter than {figure:.0} of 255"
-            ),
-        }
+            Flaw::Nan | Flaw::Range => write!(f, "{percent:.0} % of the values"),
+            Flaw::Flat => write!(f, "brightness varies by {figure:.1} of 255"),
+            Flaw::Unlit => write!(f, "mean brightness {figure:+.1} of 255"),
+            Flaw::White => write!(f, "{percent:.0} % of the pixels"),
+            Flaw::Inverted => write!(f, "rank correlation {figure:.2}"),
+            Flaw::Shuffled => write!(f, "{figure:.2} of the edges agree, 1 at best"),
+            Flaw::Hue => write!(f, "cosine {figure:.2}"),
+            Flaw::Haze => write!(f, "99 % of the pixels are above {figure:.0} of 255"),
+        }?;
+        f.write_str(")")
     }
 }
 
@@ -90,6 +76,50 @@ impl Codes {
                 .iter()
                 .map(|byte| f32::from(*byte))
                 .collect(),
+        }
+    }
+
+    /// The codes of an image, reduced by a whole factor to at most [`JUDGED_SIDE`] pixels: each sample is the mean of a square. The
+    /// rest at the right and below is left out.
+    pub(super) fn small(image: &Rgb) -> Self {
+        let longer = image.height().max(image.width());
+        let factor = longer.div_ceil(JUDGED_SIDE);
+        let [height, width] = [image.height(), image.width()].map(|side| side / factor);
+        if factor == 1 || height == 0 || width == 0 {
+            return Self::of(image);
+        }
+        let mut samples = vec![0.0; height * width * 3];
+        let lines = image.samples().chunks_exact(3 * image.width());
+        for (y, line) in lines.take(height * factor).enumerate() {
+            let sums = &mut samples[y / factor * width * 3..][..width * 3];
+            let squares = line.chunks_exact(3 * factor);
+            for (sum, square) in sums.chunks_exact_mut(3).zip(squares) {
+                for pixel in square.chunks_exact(3) {
+                    for (sum, byte) in sum.iter_mut().zip(pixel) {
+                        *sum += f32::from(*byte);
+                    }
+                }
+            }
+        }
+        let pixels = (factor * factor) as f32;
+        samples.iter_mut().for_each(|sum| *sum /= pixels);
+        Self {
+            height,
+            width,
+            samples,
+        }
+    }
+
+    /// The codes of an image of floats.
+    pub(super) fn of_planes(planes: &Planes) -> Self {
+        let pixels = planes.height * planes.width;
+        let samples = (0..pixels).flat_map(|pixel| {
+            [0, 1, 2].map(|channel| 255.0 * planes.samples[channel * pixels + pixel])
+        });
+        Self {
+            height: planes.height,
+            width: planes.width,
+            samples: samples.collect(),
         }
     }
 
@@ -126,7 +156,7 @@ impl Codes {
 }
 
 /// Mean luma of an image, in codes of 0..255.
-pub(super) fn brightness(image: &Rgb) -> f64 {
+pub(crate) fn brightness(image: &Rgb) -> f64 {
     let mut sums = [0_u64; 3];
     for pixel in image.samples().chunks_exact(3) {
         for (sum, byte) in sums.iter_mut().zip(pixel) {

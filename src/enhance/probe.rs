@@ -105,8 +105,7 @@ impl fmt::Display for FlawedFrames {
         } = self;
         write!(
             f,
-            "on {flawed} of {frames} dark frames its images {}: for example, {example}",
-            example.flaw.words()
+            "on {flawed} of {frames} dark frames its images {example}"
         )
     }
 }
@@ -198,7 +197,7 @@ impl Probe {
                 let list: Vec<String> = pairs.iter().map(ToString::to_string).collect();
                 let likely = bytes_of_units(&pairs).map_or_else(String::new, |pair| {
                     format!(
-                        "; most likely {}, because a model for 0..1 is seldom plausible with them",
+                        "; perhaps {}: of 9 trained models for 0..1, none was plausible with these",
                         stated(&pair)
                     )
                 });

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::probe_run::Implausible;
 use super::runtime::{Install, RuntimeSearch};
 use super::tiles::Tiling;
 use crate::types::{Decides, KindSet};
@@ -35,6 +36,26 @@ pub(crate) struct SizeArgs {
     /// need the whole image and too much memory for it; default: no limit
     #[arg(long, value_name = "PIXELS", add = Decides::Pixels)]
     pub llie_max_side: Option<NonZeroUsize>,
+}
+
+/// What happens to an enhancer whose images cannot be enhanced images.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Enhancement")]
+pub(crate) struct ProbeArgs {
+    /// Use an enhancer even if its images of dark frames cannot be enhanced images: flat, inverted, in swapped colours, or in
+    /// another value range than it is read in; the report marks it
+    #[arg(long, add = Decides::Nothing)]
+    pub llie_anyway: bool,
+}
+
+impl ProbeArgs {
+    pub(crate) fn implausible(&self) -> Implausible {
+        if self.llie_anyway {
+            Implausible::Used
+        } else {
+            Implausible::Refused
+        }
+    }
 }
 
 /// Source of the library of ONNX Runtime.

@@ -124,6 +124,11 @@ impl CircuitBreaker {
         self.stop(EndReason::Interrupted);
     }
 
+    /// Stops the run because an enhancer cannot be used any further.
+    pub(crate) fn enhancer_ended(&mut self, error: Error) {
+        self.stop(EndReason::Stopped(error));
+    }
+
     /// Stops the run because one more question could exceed `--max-cost`.
     pub(crate) fn over_budget(&mut self) {
         self.stop(EndReason::OverBudget);

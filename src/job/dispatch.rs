@@ -19,7 +19,7 @@ use super::trial::{Item, PreparedGroup, Stimulus, Trial};
 use super::workers::unstarted;
 use crate::ask::{AskError, Call, Reach};
 use crate::enhance::Stopper;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::store::Store;
 use crate::types::{Failure, FailureKind, Finish, Reply};
 
@@ -259,9 +259,15 @@ impl<I: Item> ReplySink<'_, I> {
             trial,
             stimulus: Arc::clone(&stimulus),
         });
-        let Some(message) = problem else {
+        let Some(problem) = problem else {
             return Ok(ready.collect());
         };
+        // Its trials are asked when the command is given again.
+        if let Error::EnhancerEnded { .. } = problem {
+            self.breaker.enhancer_ended(problem);
+            return Ok(Vec::new());
+        }
+        let message = problem.to_string();
         let error = AskError {
             failure: Failure {
                 kind: FailureKind::Image,

@@ -81,6 +81,9 @@ impl<'a, E: Experiment> Job<'a, E> {
         let timings = Timings::default();
         let enhancers = OpenEnhancers::load(self.files, &settings.loading)?;
         let mut pipeline = pipeline(experiment, enhancers.enhancers, None, &timings);
+        for plan in &plans {
+            pipeline.probe(experiment.sources(), &plan.sources)?;
+        }
         let forecast = estimate::estimate(experiment, &plans, &stored, &mut pipeline)?;
         Ok(Outcome {
             status: Status::Complete,

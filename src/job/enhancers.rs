@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::workers::ThreadArgs;
-use crate::enhance::{Enhancer, ModelFile, RuntimeArgs, SizeArgs};
+use crate::enhance::{Enhancer, ModelFile, ProbeArgs, RuntimeArgs, SizeArgs};
 use crate::error::{Error, Result};
 
 /// Flags for running enhancement models.
@@ -14,6 +14,9 @@ pub(crate) struct EnhancerRunArgs {
     /// Size of the images and tiles that models take.
     #[command(flatten)]
     pub size: SizeArgs,
+    /// Whether their images can be enhanced images.
+    #[command(flatten)]
+    pub probe: ProbeArgs,
     /// The ONNX Runtime that runs them.
     #[command(flatten)]
     pub runtime: RuntimeArgs,

@@ -109,6 +109,11 @@ impl<'a> FrameWork<'a> {
         }
     }
 
+    /// The name of the frame.
+    pub(crate) fn frame(&self) -> &FrameId {
+        &self.frame
+    }
+
     /// The frame in a condition: as it is sent, or as the enhancer takes it.
     pub(crate) fn stage(&mut self, condition: &Condition) -> Result<StagedFrame> {
         if let Some(payload) = self.unchanged_file(condition)? {

@@ -10,6 +10,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use rayon::prelude::*;
 use tokio::sync::mpsc::Sender;
 
+use super::dark_frames::dark_frames;
 use super::frame_work::{FrameWork, ImageSteps, StagedFrame};
 use super::image_notes::{ImageNotes, MissingNotes, WantedNotes, fidelity};
 use super::plan::{SourcePlan, TrialGroup};
@@ -19,7 +20,7 @@ use super::timings::TimedStep;
 use super::trial::{Item, PreparedGroup, Stimulus};
 use super::workers::Workers;
 use crate::ask::{ImageLimit, Payload};
-use crate::enhance::Enhancer;
+use crate::enhance::{Enhancer, Implausible};
 use crate::error::{Error, Result};
 use crate::types::{Condition, EnhancerName, FrameId, ImageFacts, Rgb, Thumbnail};
 
@@ -30,6 +31,8 @@ const LARGE_IMAGE: usize = 5_000_000;
 pub(crate) struct ImagePipeline<'a> {
     pub(crate) steps: ImageSteps<'a>,
     pub(crate) enhancers: Vec<Enhancer>,
+    /// What happens to an enhancer whose images cannot be enhanced images.
+    pub(crate) implausible: Implausible,
 }
 
 /// A source in progress.
@@ -39,7 +42,7 @@ enum SourceWork<'a> {
     /// A walk, whose images are all made, by condition.
     Walk(BTreeMap<Condition, Vec<Arc<Payload>>>),
     /// A source whose images cannot be made, and the reason.
-    Failed(String),
+    Failed(Error),
 }
 
 impl<'a> ImagePipeline<'a> {
@@ -48,6 +51,7 @@ impl<'a> ImagePipeline<'a> {
     /// of the endpoint is unknown.
     pub(crate) fn check<I>(&mut self, sources: &[Source], plan: &[SourcePlan<I>]) -> Result<()> {
         self.try_enhancers(sources, plan)?;
+        self.probe(sources, plan)?;
         if let Some(limit) = self.steps.limit {
             warn_of_large(self.largest(sources, plan)?.as_ref(), limit);
         }
@@ -69,6 +73,19 @@ impl<'a> ImagePipeline<'a> {
                     let mut work = FrameWork::planned(self.steps, source, frame);
                     self.image(&mut work, condition)?;
                 }
+            }
+        }
+        Ok(())
+    }
+
+    /// Tries each enhancer of the plan on a few of its own dark frames, so that one whose images cannot be enhanced images, or whose value
+    /// ranges are unknown, is found before anything is asked.
+    pub(crate) fn probe<I>(&mut self, sources: &[Source], plan: &[SourcePlan<I>]) -> Result<()> {
+        for enhancer in &mut self.enhancers {
+            let dark = dark_frames(self.steps, sources, plan, enhancer.name())?;
+            if !dark.is_empty() {
+                let probe = || enhancer.probe(&dark, self.implausible);
+                self.steps.timings.time(TimedStep::Enhance, probe)?;
             }
         }
         Ok(())
@@ -139,6 +156,7 @@ impl<'a> ImagePipeline<'a> {
                 let mut pipeline = ImagePipeline {
                     steps,
                     enhancers: Vec::new(),
+                    implausible: self.implausible,
                 };
                 scope.spawn(move || {
                     worker.install(|| {
@@ -186,10 +204,7 @@ impl<'a> ImagePipeline<'a> {
                 let result = self.group(&mut work, condition.as_ref(), source, missing);
                 let (images, notes, problem) = match result {
                     Ok((images, notes)) => (images, notes, None),
-                    Err(problem) => {
-                        let problem = Some(problem.to_string());
-                        (Vec::new(), ImageNotes::default(), problem)
-                    }
+                    Err(problem) => (Vec::new(), ImageNotes::default(), Some(problem)),
                 };
                 take(PreparedGroup {
                     stimulus: Stimulus { condition, images },
@@ -214,7 +229,7 @@ impl<'a> ImagePipeline<'a> {
                     let conditions = conditions.iter().map(|condition| (*condition).clone());
                     SourceWork::Walk(conditions.zip(images).collect())
                 }
-                Err(problem) => SourceWork::Failed(problem.to_string()),
+                Err(problem) => SourceWork::Failed(problem),
             },
         }
     }
@@ -247,6 +262,10 @@ impl<'a> ImagePipeline<'a> {
                     fidelity: None,
                 };
                 Ok((images, notes))
+            }
+            SourceWork::Failed(Error::EnhancerEnded { path, problem }) => {
+                let (path, problem) = (path.clone(), problem.clone());
+                Err(Error::EnhancerEnded { path, problem })
             }
             SourceWork::Failed(problem) => Err(Error::data(condition, problem)),
         }
@@ -308,8 +327,9 @@ impl<'a> ImagePipeline<'a> {
                 staged.collect::<Result<Vec<StagedFrame>>>()
             });
             for staged in staged.collect::<Result<Vec<_>>>()? {
-                for (staged, images) in staged.into_iter().zip(&mut images) {
-                    images.push(self.finish(staged)?);
+                let conditions = conditions.iter().zip(&mut images);
+                for (staged, (condition, images)) in staged.into_iter().zip(conditions) {
+                    images.push(self.finish(staged, [&source.name, condition])?);
                 }
             }
         }
@@ -340,29 +360,43 @@ impl<'a> ImagePipeline<'a> {
         work: &'w mut FrameWork<'_>,
         condition: &Condition,
     ) -> Result<Cow<'w, Rgb>> {
+        let frame = work.frame().clone();
         let degraded = work.degraded(condition.degradation.as_ref())?;
         match &condition.enhancer {
             None => Ok(Cow::Borrowed(degraded)),
-            Some(name) => self.enhanced(degraded, name).map(Cow::Owned),
+            Some(name) => {
+                let enhanced = self.enhanced(degraded, name, [&frame, condition]);
+                enhanced.map(Cow::Owned)
+            }
         }
     }
 
-    fn finish(&mut self, staged: StagedFrame) -> Result<Arc<Payload>> {
+    fn finish(&mut self, staged: StagedFrame, place: [&dyn ToString; 2]) -> Result<Arc<Payload>> {
         match staged {
             StagedFrame::Ready(payload) => Ok(payload),
             StagedFrame::ToEnhance(image, name) => {
-                let image = self.enhanced(&image, &name)?;
+                let image = self.enhanced(&image, &name, place)?;
                 Ok(self.steps.payload(&image)?.0)
             }
         }
     }
 
-    fn enhanced(&mut self, image: &Rgb, name: &EnhancerName) -> Result<Rgb> {
+    /// The enhanced image of a frame in a condition, which are named where the image cannot be an enhanced one.
+    fn enhanced(
+        &mut self,
+        image: &Rgb,
+        name: &EnhancerName,
+        place: [&dyn ToString; 2],
+    ) -> Result<Rgb> {
         let mut enhancers = self.enhancers.iter_mut();
         let enhancer = enhancers
             .find(|enhancer| enhancer.name() == name)
             .ok_or_else(|| Error::data(name, "this enhancer is not open"))?;
-        let enhance = || enhancer.enhance(image);
+        let enhance = || {
+            let enhanced = enhancer.enhance(image)?;
+            enhancer.judge([image, &enhanced], place, self.implausible)?;
+            Ok(enhanced)
+        };
         self.steps.timings.time(TimedStep::Enhance, enhance)
     }
 }

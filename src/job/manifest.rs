@@ -34,6 +34,7 @@ pub(crate) fn of<E: Experiment>(experiment: &E, stored: Option<RunManifest>) -> 
         platform: identity::platform(),
         identity: experiment.identity(),
         columns,
+        enhancers: BTreeMap::new(),
         shard: job.shard.is_part().then(|| job.shard.to_string()),
         settings,
         images: job.image_flags.clone(),
@@ -46,6 +47,7 @@ pub(crate) fn of<E: Experiment>(experiment: &E, stored: Option<RunManifest>) -> 
     if stored.status != Status::Complete {
         return RunManifest {
             created: stored.created,
+            enhancers: stored.enhancers,
             images,
             ..manifest
         };

@@ -24,7 +24,7 @@ use super::thumbnail::MissingThumbnails;
 use super::timings::Timings;
 use super::workers::Workers;
 use crate::ask::ImageLimit;
-use crate::enhance::Enhancer;
+use crate::enhance::{Enhancer, Usage};
 use crate::error::Result;
 use crate::report::forecast::money;
 use crate::store::{self, Store};
@@ -134,6 +134,10 @@ impl<E: Experiment> OpenRun<'_, E> {
         let timings = Timings::default();
         let limit = limit(settings);
         let stoppers = enhancers.iter().map(Enhancer::stopper).collect();
+        let usages: Vec<(String, Usage)> = enhancers
+            .iter()
+            .map(|enhancer| (enhancer.name().to_string(), enhancer.usage()))
+            .collect();
         let mut pipeline = pipeline(experiment, enhancers, limit, &timings);
         workers
             .all
@@ -150,6 +154,11 @@ impl<E: Experiment> OpenRun<'_, E> {
         let end = dispatcher.run(counts, budget, &mut self.store, stoppers, |groups| {
             pipeline.develop(sources, plan.sources, &missing, &workers, groups);
         })?;
+        for (name, usage) in usages {
+            let earlier = self.manifest.enhancers.remove(&name);
+            let note = usage.note().after(earlier);
+            self.manifest.enhancers.insert(name, note);
+        }
         if settings.show_timings {
             let threads = workers.each.len();
             let line = timings.summary(started.elapsed(), threads);
@@ -238,6 +247,7 @@ pub(crate) fn pipeline<'a, E: Experiment>(
             timings,
         },
         enhancers,
+        implausible: experiment.settings().loading.probe.implausible(),
     }
 }
 

@@ -16,7 +16,7 @@ use super::walk::{Walk, WalkFolder};
 use super::workers::ThreadArgs;
 use crate::ask::Payload;
 use crate::dataset::{DataPlace, Dataset, place};
-use crate::enhance::{Enhancer, RuntimeArgs};
+use crate::enhance::{Enhancer, Implausible, ProbeArgs, RuntimeArgs};
 use crate::error::{Error, Result};
 use crate::synthesis::SensorSettings;
 use crate::types::manifest::RunManifest;
@@ -91,6 +91,7 @@ impl ImageRebuilder {
         };
         let loading = EnhancerRunArgs {
             size: flags.size,
+            probe: ProbeArgs::default(),
             runtime: args.runtime,
             threads: args.threads,
         };
@@ -124,6 +125,7 @@ impl ImageRebuilder {
                 timings: &Timings::default(),
             },
             enhancers: std::mem::take(&mut self.enhancers),
+            implausible: Implausible::NotLookedFor,
         };
         let conditions: Vec<&Condition> = conditions.iter().collect();
         let images = pipeline.images(&source, &conditions);

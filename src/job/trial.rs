@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::image_notes::ImageNotes;
 use super::models::ModelUnderTest;
 use crate::ask::{Message, Payload, Query};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::types::{Condition, Detail, Digest, QuestionId, Record, TrialKey};
 
 /// The subject of a trial: a question with choices, an open question, or an answer to judge.
@@ -146,7 +146,7 @@ pub(crate) struct PreparedGroup<I> {
     pub(crate) stimulus: Stimulus,
     pub(crate) trials: Vec<Trial<I>>,
     /// Reason why the images could not be made; else `None`.
-    pub(crate) problem: Option<String>,
+    pub(crate) problem: Option<Error>,
     /// What the report needs to know of the images.
     pub(crate) notes: ImageNotes,
 }

@@ -7,14 +7,15 @@ use clap::Args;
 use crate::ask::png;
 use crate::dataset::PixelLimit;
 use crate::dataset::inputs::{InputFrame, Inputs};
-use crate::enhance::{Enhancer, ModelFile};
+use crate::enhance::{Enhancer, FRAMES, ModelFile};
 use crate::error::{Error, Result};
 use crate::files::write;
 use crate::job::Outcome;
+use crate::job::dark_frames::{darkened, evenly};
 use crate::job::enhancers::{EnhancerRunArgs, OpenEnhancers};
 use crate::job::progress::Progress;
-use crate::types::Decides;
 use crate::types::manifest::Status;
+use crate::types::{Decides, Rgb};
 
 /// The flags of `enhance`.
 #[derive(Debug, Args)]
@@ -61,6 +62,13 @@ pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome
         });
     };
     let images = Inputs::open(&args.inputs, args.limit.max_pixels.get())?;
+    let sample = evenly(images.entries.len(), FRAMES).into_iter();
+    let sample = sample.map(|place| images.picture(&images.entries[place])?.decode());
+    // An image that cannot be read is named when its turn comes.
+    let sample: Vec<Rgb> = sample.filter_map(Result::ok).collect();
+    if !sample.is_empty() {
+        enhancer.probe(&darkened(&sample), args.loading.probe.implausible())?;
+    }
     let bar = progress.bar("images", images.entries.len());
     let (mut written, mut unchanged, mut failed) = (0, 0, 0);
     for entry in &images.entries {

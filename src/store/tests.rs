@@ -19,6 +19,7 @@ fn manifest(seed: u64) -> RunManifest {
         settings: BTreeMap::new(),
         images: BTreeMap::new(),
         columns: BTreeMap::new(),
+        enhancers: BTreeMap::new(),
         shard: None,
         counts: Counts::default(),
     }

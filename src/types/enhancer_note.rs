@@ -87,6 +87,21 @@ pub struct FlawedImage {
     pub flaw: Flaw,
 }
 
+impl EnhancerNote {
+    /// The note of a run that used the enhancer before, with this one for what came later.
+    #[must_use]
+    pub fn after(mut self, earlier: Option<Self>) -> Self {
+        let Some(earlier) = earlier else { return self };
+        self.judged.add(&earlier.judged);
+        self.resized |= earlier.resized;
+        self.probe = self.probe.or(earlier.probe);
+        if self.sizes.is_empty() {
+            self.sizes = earlier.sizes;
+        }
+        self
+    }
+}
+
 impl JudgedImages {
     /// Largest number of examples; chosen.
     pub const EXAMPLES: usize = 6;

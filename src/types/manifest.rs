@@ -6,6 +6,8 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::enhancer_note::EnhancerNote;
+
 /// The progress of a run, and how it ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -139,6 +141,9 @@ pub struct RunManifest {
     /// get further values; the meaning of an existing value never changes.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub columns: BTreeMap<String, BTreeMap<String, Value>>,
+    /// How each enhancer was used, by its name; empty in runs of earlier versions.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub enhancers: BTreeMap<String, EnhancerNote>,
     /// The part of an evaluation, as `2/4`; `None` for the whole evaluation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shard: Option<String>,

@@ -75,7 +75,7 @@ fn write<E: Experiment>(
             bar.advance(group.trials.len());
             if let Some(problem) = &group.problem {
                 tracing::debug!("{problem}");
-                problems.push(problem.clone());
+                problems.push(problem.to_string());
                 return Ok(());
             }
             requests.add(&group)

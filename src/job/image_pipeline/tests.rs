@@ -52,6 +52,7 @@ fn pipeline_output(
     let mut pipeline = ImagePipeline {
         steps,
         enhancers: Vec::new(),
+        implausible: Implausible::default(),
     };
     let mut work = FrameWork::planned(steps, &source, &source.frames[0]);
     let condition = condition.parse().unwrap();

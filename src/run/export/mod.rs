@@ -83,6 +83,7 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
             timings: &Timings::default(),
         },
         enhancers: OpenEnhancers::load(files, &args.loading)?.take()?,
+        implausible: args.loading.probe.implausible(),
     };
     let frames: BTreeMap<&FrameId, &Source> = sources
         .iter()

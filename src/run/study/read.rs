@@ -221,6 +221,7 @@ fn of_people(run: &RunManifest, args: &ReadArgs) -> RunManifest {
             .map(|(name, value)| (name.to_owned(), value))
             .into(),
         columns: BTreeMap::new(),
+        enhancers: BTreeMap::new(),
         shard: None,
         settings: BTreeMap::new(),
         images: run.images.clone(),

@@ -1,0 +1,163 @@
+//! Running the probe of a model on dark frames: [`Enhancer::probe`].
+
+use super::convention::{ElementType, ValueRange};
+use super::enhancer::Enhancer;
+use super::graph::{Graph, RunResult};
+use super::planes::Planes;
+use super::plausible::Codes;
+use super::probe::{Conclusion, PairTrial, Probe, RangePair, Ranges};
+use super::sidecar::ModelSidecar;
+use crate::error::{Error, Result};
+use crate::types::Rgb;
+use crate::types::enhancer_note::{ProbeNote, ProbeOutcome};
+
+/// Sizes that are tried one after another, longer and shorter side in pixels: most multiples that models need divide one of them.
+const SIZES: [[usize; 2]; 3] = [[144, 96], [160, 120], [128, 128]];
+
+/// What happens to a model whose images cannot be enhanced images.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum Implausible {
+    /// It is refused.
+    #[default]
+    Refused,
+    /// It is used (`--llie-anyway`).
+    Used,
+    /// Its images are not looked at, because they are those of a run that is there.
+    NotLookedFor,
+}
+
+impl Enhancer {
+    /// Tries the model on dark frames, and decides in which value ranges it is fed and read where they are not stated.
+    ///
+    /// # Errors
+    /// If its images cannot be enhanced images, or several ranges would do, with the lines of a sidecar that would mend it; not if
+    /// implausible images are used.
+    pub(crate) fn probe(&mut self, dark: &[Rgb], implausible: Implausible) -> Result<()> {
+        let Some(probe) = self.run_probe(dark)? else {
+            tracing::warn!(
+                "{}: it takes none of the small sizes of the probe, so nothing is known of whether its images can be enhanced images",
+                self.name()
+            );
+            return Ok(());
+        };
+        let outcome = match probe.conclusion() {
+            Conclusion::Plausible => ProbeOutcome::Plausible,
+            Conclusion::Doubtful(_) => ProbeOutcome::Doubtful,
+            _ => ProbeOutcome::Overruled,
+        };
+        let problem = probe.problem();
+        match (&problem, outcome, implausible) {
+            (Some(problem), ProbeOutcome::Overruled, Implausible::Refused) => {
+                return Err(self.fault(format!(
+                    "{problem}. `darkqa-eval enhance {} FRAMES… --doctor --out DIR` draws what it makes with each convention; --llie-anyway uses it as it is",
+                    self.path().display()
+                )));
+            }
+            (Some(problem), ..) => tracing::warn!("{}: {problem}", self.name()),
+            (None, ..) => {}
+        }
+        let note = ProbeNote {
+            frames: dark.len(),
+            plausible: probe.plausible().iter().map(ToString::to_string).collect(),
+            problem,
+            outcome,
+        };
+        self.set_probed(note);
+        Ok(())
+    }
+
+    /// Looks at what it made of a frame in a condition.
+    ///
+    /// # Errors
+    /// If most of its images of dark frames so far cannot be enhanced images.
+    pub(crate) fn judge(
+        &self,
+        images: [&Rgb; 2],
+        place: [&dyn ToString; 2],
+        implausible: Implausible,
+    ) -> Result<()> {
+        let judged = self.usage().judge(images, place, implausible);
+        judged.map_err(|problem| Error::EnhancerEnded {
+            path: self.path().to_owned(),
+            problem,
+        })
+    }
+
+    /// What the model makes of dark frames with each pair of ranges that is not ruled out; `None` if it fails at all sizes that are
+    /// tried.
+    pub(super) fn run_probe(&self, dark: &[Rgb]) -> Result<Option<Probe>> {
+        let usual = self.ranges();
+        let [input, output] = self.stated_ranges();
+        let ranges = match (input, output) {
+            (Some(_), Some(_)) => Ranges::Stated,
+            _ => Ranges::Open,
+        };
+        for size in SIZES {
+            let frames: Vec<Rgb> = dark
+                .iter()
+                .map(|frame| self.probe_image(frame, size))
+                .collect::<Result<_>>()?;
+            let seen: Vec<Codes> = frames.iter().map(Codes::of).collect();
+            let mut pairs = Vec::new();
+            for ranges in RangePair::all(input, output) {
+                let convention = ModelSidecar {
+                    range_in: Some(ranges.input),
+                    range_out: Some(ranges.output),
+                    ..self.convention().clone()
+                };
+                let graph = self.graph().with_convention(&convention);
+                let graph = graph.map_err(|problem| self.fault(problem))?;
+                let Some(made) = made(&graph, &frames)? else {
+                    break;
+                };
+                pairs.push(PairTrial::new(ranges, &seen, made));
+            }
+            if !pairs.is_empty() {
+                return Ok(Some(Probe {
+                    ranges,
+                    usual,
+                    pairs,
+                }));
+            }
+        }
+        Ok(None)
+    }
+
+    /// A frame in a size of the probe, or in the size that the graph fixes.
+    pub(super) fn probe_image(&self, frame: &Rgb, [longer, shorter]: [usize; 2]) -> Result<Rgb> {
+        let size = if frame.height() > frame.width() {
+            [longer, shorter]
+        } else {
+            [shorter, longer]
+        };
+        let [height, width] = self.probe_size(size);
+        let planes = Planes::of(frame).resized(height, width);
+        let planes = planes.map_err(|problem| self.fault(problem))?;
+        planes
+            .to_rgb(super::convention::Rounding::Round)
+            .ok_or_else(|| self.fault("a frame of the probe has no pixel".to_owned()))
+    }
+}
+
+/// What a model makes of each frame; `None` if it fails on one.
+pub(super) fn made(graph: &Graph, frames: &[Rgb]) -> Result<Option<Vec<Codes>>> {
+    let mut all = Vec::with_capacity(frames.len());
+    for frame in frames {
+        match graph.codes(frame)? {
+            RunResult::Output(codes) => all.push(codes),
+            RunResult::Failed(_) => return Ok(None),
+            // The rules name it.
+            RunResult::Unusable(_) => all.push(Codes {
+                height: frame.height(),
+                width: frame.width(),
+                samples: vec![f32::NAN; frame.samples().len()],
+            }),
+        }
+    }
+    Ok(Some(all))
+}
+
+/// Range that the element type states: bytes are 0..255.
+pub(super) fn of_type(element: &ElementType) -> Option<ValueRange> {
+    (*element == ElementType::Uint8).then_some(ValueRange::Bytes)
+}

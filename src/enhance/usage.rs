@@ -1,0 +1,122 @@
+//! What an enhancer did in a run, shared by all threads that use it: [`Usage`].
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::plausible::{Codes, DARK, Gravity, brightness, judge};
+use super::probe_run::Implausible;
+use crate::types::Rgb;
+use crate::types::enhancer_note::{EnhancerNote, FlawedImage};
+
+/// Number of dark images from which on a verdict on the enhancer is possible; chosen as the number of frames of the probe.
+const ENOUGH: usize = super::probe::FRAMES;
+
+/// A handle to the note of an enhancer, which grows while it is used.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Usage(Arc<Mutex<State>>);
+
+#[derive(Debug, Default)]
+struct State {
+    note: EnhancerNote,
+    /// Number of images that cannot be enhanced images.
+    impossible: usize,
+}
+
+impl Usage {
+    /// The note as it is now.
+    pub(crate) fn note(&self) -> EnhancerNote {
+        self.with(|state| state.note.clone())
+    }
+
+    /// Changes the note.
+    pub(super) fn update(&self, change: impl FnOnce(&mut EnhancerNote)) {
+        self.with(|state| change(&mut state.note));
+    }
+
+    /// Looks at what an enhancer made of a frame in a condition. Images that are not dark are not judged, because good models fail
+    /// the rules on them.
+    ///
+    /// # Errors
+    /// What was seen, if more than half of at least six images cannot be enhanced images, unless such images are used.
+    pub(crate) fn judge(
+        &self,
+        [dark, made]: [&Rgb; 2],
+        [frame, condition]: [&dyn ToString; 2],
+        implausible: Implausible,
+    ) -> Result<(), String> {
+        if implausible == Implausible::NotLookedFor || brightness(dark) > DARK {
+            return Ok(());
+        }
+        let verdict = judge(&Codes::small(dark), &Codes::small(made));
+        let flawed = verdict.map(|verdict| FlawedImage {
+            frame: frame.to_string(),
+            condition: condition.to_string(),
+            flaw: verdict.flaw,
+        });
+        self.with(|state| {
+            state.note.judged.count(flawed);
+            let impossible = verdict.filter(|verdict| verdict.gravity == Gravity::Impossible);
+            state.impossible += usize::from(impossible.is_some());
+            let judged = state.note.judged.images;
+            match (impossible, implausible) {
+                (Some(example), Implausible::Refused)
+                    if judged >= ENOUGH && 2 * state.impossible > judged =>
+                {
+                    Err(format!(
+                        "{} of its {judged} images of dark frames cannot be enhanced images; they {example}. `darkqa-eval enhance MODEL FRAMES… --doctor --out DIR` draws what it makes with each convention; --llie-anyway uses it as it is",
+                        state.impossible
+                    ))
+                }
+                _ => Ok(()),
+            }
+        })
+    }
+
+    fn with<T>(&self, use_state: impl FnOnce(&mut State) -> T) -> T {
+        use_state(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An image of squares of different light, `gain` times as bright.
+    fn squares(gain: f32) -> Rgb {
+        let samples = (0..96 * 96).flat_map(|place| {
+            let light = (place / 12 % 8 * 5 + place / 1152 * 3) as f32;
+            [gain * light; 3].map(|code| code as u8)
+        });
+        Rgb::new(96, 96, samples.collect()).unwrap()
+    }
+
+    fn judged(usage: &Usage, made: &Rgb, how: Implausible) -> Result<(), String> {
+        usage.judge([&squares(1.0), made], [&"frame", &"L3+ev+m"], how)
+    }
+
+    #[test]
+    fn an_enhancer_ends_when_most_of_its_images_are_impossible() {
+        let usage = Usage::default();
+        let (good, flat) = (squares(3.0), Rgb::black(96, 96));
+        for _ in 0..3 {
+            judged(&usage, &good, Implausible::Refused).unwrap();
+        }
+        for _ in 0..3 {
+            judged(&usage, &flat, Implausible::Refused).unwrap();
+        }
+        let problem = judged(&usage, &flat, Implausible::Refused).unwrap_err();
+        assert!(problem.starts_with("4 of its 7 images"), "{problem}");
+        judged(&usage, &flat, Implausible::Used).unwrap();
+        assert_eq!(usage.note().judged.flaws(), 5);
+    }
+
+    #[test]
+    fn bright_frames_are_not_judged() {
+        let usage = Usage::default();
+        let bright = squares(6.0);
+        let made = Rgb::black(96, 96);
+        usage
+            .judge([&bright, &made], [&"frame", &"L0"], Implausible::Refused)
+            .unwrap();
+        assert_eq!(usage.note().judged.images, 0);
+    }
+}
