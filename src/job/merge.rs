@@ -1,6 +1,6 @@
 //! `merge`: joins the shards of a run into one run.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -280,6 +280,12 @@ fn merged_manifest<D>(parts: &[MergePart<D>]) -> Result<RunManifest> {
             let all = manifest.columns.entry(column.clone()).or_default();
             all.extend(values.clone());
         }
+    }
+    manifest.enhancers = BTreeMap::new();
+    for (name, note) in manifests.clone().flat_map(|other| &other.enhancers) {
+        let earlier = manifest.enhancers.remove(name);
+        let note = note.clone().after(earlier);
+        manifest.enhancers.insert(name.clone(), note);
     }
     let created = manifests
         .clone()

@@ -134,10 +134,7 @@ impl<E: Experiment> OpenRun<'_, E> {
         let timings = Timings::default();
         let limit = limit(settings);
         let stoppers = enhancers.iter().map(Enhancer::stopper).collect();
-        let usages: Vec<(String, Usage)> = enhancers
-            .iter()
-            .map(|enhancer| (enhancer.name().to_string(), enhancer.usage()))
-            .collect();
+        let usages = usages(&enhancers);
         let mut pipeline = pipeline(experiment, enhancers, limit, &timings);
         workers
             .all
@@ -154,11 +151,7 @@ impl<E: Experiment> OpenRun<'_, E> {
         let end = dispatcher.run(counts, budget, &mut self.store, stoppers, |groups| {
             pipeline.develop(sources, plan.sources, &missing, &workers, groups);
         })?;
-        for (name, usage) in usages {
-            let earlier = self.manifest.enhancers.remove(&name);
-            let note = usage.note().after(earlier);
-            self.manifest.enhancers.insert(name, note);
-        }
+        self.note_enhancers(usages);
         if settings.show_timings {
             let threads = workers.each.len();
             let line = timings.summary(started.elapsed(), threads);
@@ -169,6 +162,15 @@ impl<E: Experiment> OpenRun<'_, E> {
             self.progress.note(&line);
         }
         Ok(end)
+    }
+
+    /// Adds to the manifest how the enhancers were used.
+    pub(super) fn note_enhancers(&mut self, usages: Vec<(String, Usage)>) {
+        for (name, usage) in usages {
+            let earlier = self.manifest.enhancers.remove(&name);
+            let note = usage.note().after(earlier);
+            self.manifest.enhancers.insert(name, note);
+        }
     }
 
     /// Writes the numbers of trials into the manifest, so that those of a killed run are known.
@@ -230,6 +232,14 @@ impl<E: Experiment> OpenRun<'_, E> {
             _ => Ok(outcome),
         }
     }
+}
+
+/// The enhancers' notes, by name.
+pub(super) fn usages(enhancers: &[Enhancer]) -> Vec<(String, Usage)> {
+    let enhancers = enhancers.iter();
+    enhancers
+        .map(|enhancer| (enhancer.name().to_string(), enhancer.usage()))
+        .collect()
 }
 
 /// The image pipeline of an experiment.

@@ -46,6 +46,8 @@ pub enum AlertKind {
     Data,
     /// Other images by the seed, the noise model, an enhancer or the program.
     Light,
+    /// An enhancer whose images may be read in a wrong way, or were resized for it.
+    Enhancer,
     /// Images of another size or encoding.
     Images,
     /// Other words around the questions.

@@ -3,7 +3,7 @@
 use super::alert::{Alert, AlertKind};
 use super::sentences::{Sentence, sentences};
 use super::table::Table;
-use super::tables::{observer_notes, tables};
+use super::tables::{EnhancerRow, enhancers, observer_notes, tables};
 use crate::score::findings::Findings;
 
 /// The findings of one run or several, in words and as tables. The terminal, the page and all files are made from it.
@@ -34,5 +34,11 @@ impl<'a> ChoiceReport<'a> {
             sentences: sentences(shown),
             tables: tables(findings),
         }
+    }
+
+    /// The report with how each enhancer was used.
+    pub(crate) fn with_enhancers(mut self, used: &[EnhancerRow]) -> Self {
+        self.tables.extend(enhancers(used));
+        self
     }
 }

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use super::BatchFileArgs;
 use super::requests::{Requests, require_remote, summary};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::job::experiment::Experiment;
-use crate::job::open_run::{OpenRun, Remaining, limit, missing_notes, pipeline};
+use crate::job::open_run::{OpenRun, Remaining, limit, missing_notes, pipeline, usages};
 use crate::job::outcome::Outcome;
 use crate::job::plan::Plan;
 use crate::job::timings::Timings;
@@ -62,10 +62,14 @@ fn write<E: Experiment>(
         run.enhancers.take()?
     };
     let limit = limit(settings);
+    let usages = usages(&enhancers);
     let mut pipeline = pipeline(experiment, enhancers, limit, &timings);
     let missing = missing_notes(experiment, run.store.folder())?;
     let sources = experiment.sources();
-    workers.install(|| pipeline.largest(sources, &plan.sources))?;
+    workers.install(|| {
+        pipeline.probe(sources, &plan.sources)?;
+        pipeline.largest(sources, &plan.sources)
+    })?;
     let bar = run.progress.bar("writing requests", plan.remaining());
     let mut requests = Requests::<E::Item>::new(experiment.models(phase), files, &mut run.store)?;
     let mut problems = Vec::new();
@@ -73,12 +77,15 @@ fn write<E: Experiment>(
     workers.install(|| {
         pipeline.for_each_group(sources, plan, &missing, |group| {
             bar.advance(group.trials.len());
-            if let Some(problem) = &group.problem {
-                tracing::debug!("{problem}");
-                problems.push(problem.to_string());
-                return Ok(());
+            match group.problem {
+                Some(ended @ Error::EnhancerEnded { .. }) => return Err(ended),
+                Some(problem) => {
+                    tracing::debug!("{problem}");
+                    problems.push(problem.to_string());
+                    Ok(())
+                }
+                None => requests.add(&group),
             }
-            requests.add(&group)
         })
     })?;
     drop(bar);
@@ -88,5 +95,8 @@ fn write<E: Experiment>(
             problems.len()
         );
     }
-    requests.finish()
+    let written = requests.finish()?;
+    run.note_enhancers(usages);
+    run.store.write_manifest(&run.manifest)?;
+    Ok(written)
 }

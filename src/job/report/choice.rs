@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::alerts::alerts;
 use super::combine::{Combined, combine};
+use super::enhancers;
 use crate::error::Result;
 use crate::job::outcome::Outcome;
 use crate::job::outcome::StdoutFormat;
@@ -38,7 +39,8 @@ pub(super) fn in_its_folder(
     show: StdoutFormat,
 ) -> Result<String> {
     let (folder, findings) = (store.folder(), combined.findings());
-    let report = ChoiceReport::new(&findings, alerts(combined, &findings));
+    let report = ChoiceReport::new(&findings, alerts(combined, &findings))
+        .with_enhancers(&enhancers::rows(&combined.runs));
     for (name, content) in products(&report, &combined.shown())? {
         store.write(&name, &content)?;
     }

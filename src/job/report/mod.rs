@@ -6,6 +6,7 @@ pub(crate) mod choice;
 mod combine;
 mod common;
 mod cost;
+mod enhancers;
 mod join;
 mod lights;
 mod models;

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use serde_json::Value;
 
 use super::alerts::{of_joining, of_runs};
+use super::enhancers;
 use super::join::join;
 use crate::error::{Error, Result};
 use crate::job::outcome::Outcome;
@@ -15,6 +16,7 @@ use crate::job::stored::{StoredRun, in_order};
 use crate::report::alert::{Alert, AlertKind};
 use crate::report::openeqa::{OpenReport, ReportedAnswer, products, render, summary_json, tables};
 use crate::report::table::Table;
+use crate::report::tables::EnhancerRow;
 use crate::score::llm_match::{Protocol, mark};
 use crate::score::open::{AnswerOutcome, OpenSummary, QuestionGroups, ScoredAnswer, open_summary};
 use crate::store::Store;
@@ -35,11 +37,17 @@ pub(crate) struct Scores {
     summary: OpenSummary,
     answers: Vec<ReportedAnswer>,
     alerts: Vec<Alert>,
+    enhancers: Vec<EnhancerRow>,
 }
 
 impl Scores {
     /// The scores of a run, from the marks of the judge in its manifest.
-    pub(crate) fn new((run, alerts): (StoredRun<OpenDetail>, Vec<Alert>)) -> Result<Self> {
+    pub(super) fn new(joined: JoinedRuns) -> Result<Self> {
+        let JoinedRuns {
+            run,
+            alerts,
+            enhancers,
+        } = joined;
         let setting = |name| run.manifest.settings.get(name).and_then(Value::as_str);
         let judge = setting(JUDGE).map(str::to_owned);
         let protocol = setting(PROTOCOL).map_or(Ok(Protocol::Upstream), read_word)?;
@@ -70,6 +78,7 @@ impl Scores {
             protocol,
             answers,
             alerts,
+            enhancers,
         })
     }
 
@@ -84,6 +93,7 @@ impl Scores {
             summary: &self.summary,
             manifest: &self.run.manifest,
             alerts: &self.alerts,
+            enhancers: &self.enhancers,
             judge: self.judge.as_deref(),
             protocol: self.protocol,
             name: self.run.name(),
@@ -132,13 +142,20 @@ impl Scores {
     }
 }
 
+/// Several runs, joined to one.
+pub(super) struct JoinedRuns {
+    pub(super) run: StoredRun<OpenDetail>,
+    /// What differs between the runs, and what is wrong with their numbers.
+    pub(super) alerts: Vec<Alert>,
+    /// How their enhancers were used.
+    enhancers: Vec<EnhancerRow>,
+}
+
 /// Several runs, joined to one by [`join`], with what differs between them.
 ///
 /// # Errors
 /// If the runs have different judges or protocols, or different questions under the same name.
-pub(crate) fn combine(
-    runs: Vec<StoredRun<OpenDetail>>,
-) -> Result<(StoredRun<OpenDetail>, Vec<Alert>)> {
+pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
     let mut questions = HashMap::<QuestionId, RunQuestion>::new();
     let mut marked: Option<(PathBuf, [Option<Value>; 2])> = None;
     for run in &runs {
@@ -181,6 +198,7 @@ pub(crate) fn combine(
         // The text and the page of one run say more about what is missing.
         alerts.retain(|alert| alert.kind != AlertKind::NotComplete);
     }
+    let enhancers = enhancers::rows(&joined.runs);
     let first = joined.runs.into_iter().next();
     let first = first.ok_or_else(|| Error::usage("RUN", "no run is named"))?;
     let run = StoredRun {
@@ -191,7 +209,11 @@ pub(crate) fn combine(
         thumbnails: joined.thumbnails,
         fidelity: joined.fidelity,
     };
-    Ok((run, alerts))
+    Ok(JoinedRuns {
+        run,
+        alerts,
+        enhancers,
+    })
 }
 
 /// Scores a run, and writes its report and manifest into its folder. The run is incomplete if a mark cannot be read.

@@ -10,6 +10,7 @@ use super::baseline::{Baseline, FAIL_IF_WORSE};
 use super::choice::{in_its_folder, text};
 use super::combine::{Combined, combine};
 use super::common::restrict;
+use super::enhancers;
 use super::open;
 use crate::error::{Error, Result};
 use crate::files;
@@ -180,7 +181,8 @@ fn compare(
     let runs = combined.manifests();
     let mut above = again.to_vec();
     above.extend(alerts(combined, &findings));
-    let mut report = ChoiceReport::new(&findings, above);
+    let mut report =
+        ChoiceReport::new(&findings, above).with_enhancers(&enhancers::rows(&combined.runs));
     if let Some(baseline) = baseline {
         baseline.add_to(&mut report);
     }
@@ -231,9 +233,9 @@ fn of_open(args: &ReportArgs, runs: Vec<StoredRun<OpenDetail>>, again: &[Alert])
         return Err(no_records(run.folder.clone()));
     }
     let is_single = runs.len() == 1 && again.is_empty();
-    let (run, mut alerts) = open::combine(runs)?;
-    alerts.splice(..0, again.iter().cloned());
-    let scores = open::Scores::new((run, alerts))?;
+    let mut joined = open::combine(runs)?;
+    joined.alerts.splice(..0, again.iter().cloned());
+    let scores = open::Scores::new(joined)?;
     let run = &scores.run;
     if is_single && args.out.is_none() {
         match Store::open(&run.folder, &run.manifest, AddressChange::Allowed) {

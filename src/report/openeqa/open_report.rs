@@ -1,6 +1,7 @@
 //! The data of a report on open questions: [`OpenReport`].
 
 use crate::report::alert::Alert;
+use crate::report::tables::EnhancerRow;
 use crate::score::llm_match::Protocol;
 use crate::score::open::{AnswerOutcome, OpenSummary};
 use crate::score::subject::Subject;
@@ -14,6 +15,8 @@ pub(crate) struct OpenReport<'a> {
     pub manifest: &'a RunManifest,
     /// What stands above everything, if there are several runs.
     pub alerts: &'a [Alert],
+    /// How the enhancers were used.
+    pub enhancers: &'a [EnhancerRow],
     /// Name of the judge; `None` if no judge was named.
     pub judge: Option<&'a str>,
     /// Protocol by which the answers are judged.

@@ -5,7 +5,7 @@ use crate::report::ladder::{Ladder, Series, SeriesByLevel};
 use crate::report::latex::escaped;
 use crate::report::table::ColumnKind::{Accuracy, Count, Points, Share, Text};
 use crate::report::table::{ColumnKind, Table, TableBuilder, TableCell};
-use crate::report::tables::{SUMMARY, reading};
+use crate::report::tables::{SUMMARY, enhancers, reading};
 use crate::report::terminal::texts;
 use crate::report::words::ends;
 use crate::score::estimate::Estimate;
@@ -32,6 +32,11 @@ pub(crate) fn tables(report: &OpenReport<'_>) -> Vec<Table> {
         let series = whole.series.keys();
         tables.extend(series.map(|series| by_group(report.summary, series, &whole, &groups)));
     }
+    let used = enhancers(report.enhancers);
+    tables.extend(used.map(|table| Table {
+        section: SECTION,
+        ..table
+    }));
     tables
 }
 

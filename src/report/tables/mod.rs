@@ -5,6 +5,7 @@ mod answers;
 mod baseline;
 mod best;
 mod comparisons;
+mod enhancers;
 mod families;
 mod fidelity;
 mod flips;
@@ -26,6 +27,8 @@ use crate::types::{EnhancerName, Family, KindReading};
 
 pub(super) use baseline::BASELINE;
 pub(crate) use baseline::baseline;
+pub(crate) use enhancers::EnhancerRow;
+pub(super) use enhancers::enhancers;
 pub(super) use levels::unread;
 pub(super) use observer::{notes as observer_notes, what_it_is};
 pub(super) use sections::{ENHANCERS, SECTIONS};

@@ -9,6 +9,7 @@ mod words;
 
 use self::words::{counted, plural};
 use super::combine::Combined;
+use super::enhancers::of_enhancers;
 use super::join::{Joined, JoinedRun};
 use crate::report::alert::{Alert, AlertKind};
 use crate::score::cluster::MIN_SCENES;
@@ -40,6 +41,7 @@ pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert>
 pub(super) fn of_runs<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let mut alerts = of_progress(&joined.runs);
     alerts.extend(servers::of_servers(joined));
+    alerts.extend(of_enhancers(&joined.runs));
     if joined.runs.len() > 1 {
         alerts.extend(settings::of_settings(joined));
         alerts.extend(questions::of_questions(joined));

@@ -1,0 +1,128 @@
+//! How the enhancers of runs were used, in words: [`rows`] and [`of_enhancers`].
+
+use super::join::JoinedRun;
+use crate::report::alert::{Alert, AlertKind};
+use crate::report::tables::EnhancerRow;
+use crate::types::enhancer_note::{EnhancerNote, JudgedImages, ProbeOutcome};
+
+/// A row for each enhancer; several runs that used it in the same way have one.
+pub(super) fn rows(runs: &[JoinedRun]) -> Vec<EnhancerRow> {
+    let mut rows: Vec<(EnhancerRow, Vec<&str>)> = Vec::new();
+    for (run, name, note) in notes(runs) {
+        let row = EnhancerRow {
+            name: name.to_owned(),
+            how: how(note),
+            looks: looks(note),
+        };
+        match rows.iter_mut().find(|(known, _)| *known == row) {
+            Some((_, runs)) => runs.push(&run.name),
+            None => rows.push((row, vec![&run.name])),
+        }
+    }
+    let names: Vec<String> = rows.iter().map(|(row, _)| row.name.clone()).collect();
+    let named = rows.into_iter().map(|(mut row, runs)| {
+        if names.iter().filter(|name| **name == row.name).count() > 1 {
+            row.name = format!("{} in {}", row.name, runs.join(", "));
+        }
+        row
+    });
+    named.collect()
+}
+
+/// What a reader must know of the enhancers before any number.
+pub(super) fn of_enhancers(runs: &[JoinedRun]) -> Vec<Alert> {
+    let mut alerts: Vec<Alert> = Vec::new();
+    for (_, name, note) in notes(runs) {
+        let mut add = |text: String| {
+            let alert = Alert::new(AlertKind::Enhancer, text);
+            if !alerts.contains(&alert) {
+                alerts.push(alert);
+            }
+        };
+        let probe = note.probe.as_ref();
+        match probe.map(|probe| (probe.outcome, probe.problem.as_deref())) {
+            Some((ProbeOutcome::Overruled, Some(problem))) => add(format!(
+                "{name} was used because of --llie-anyway although its images may be read in a wrong way: {problem}."
+            )),
+            Some((ProbeOutcome::Doubtful, Some(problem))) => {
+                add(format!(
+                    "{name}, used as its sidecar or preset states: {problem}."
+                ));
+            }
+            _ => {}
+        }
+        if note.resized {
+            add(format!(
+                "Images were resized for {name}, so its results are not those of the model at their own size."
+            ));
+        }
+        let JudgedImages { images, .. } = note.judged;
+        if note.judged.flaws() > 0 && probe.is_none_or(|probe| probe.problem.is_none()) {
+            add(format!(
+                "{} of {images} images that {name} made of dark frames cannot be enhanced images: {}.",
+                note.judged.flaws(),
+                flaws(&note.judged)
+            ));
+        }
+    }
+    alerts
+}
+
+fn notes(runs: &[JoinedRun]) -> impl Iterator<Item = (&JoinedRun, &str, &EnhancerNote)> {
+    runs.iter().flat_map(|run| {
+        let notes = run.manifest.enhancers.iter();
+        notes.map(move |(name, note)| (run, &**name, note))
+    })
+}
+
+/// How a model was fed and read, each with its source.
+fn how(note: &EnhancerNote) -> String {
+    let said = |key: &str, before: &str| {
+        let line = note.convention.iter().find(|line| line.key == key)?;
+        Some(format!("{before}{} ({})", line.value, line.source))
+    };
+    let parts = [
+        said("range_in", "fed "),
+        said("color", "as "),
+        said("output", "read from "),
+        said("range_out", "as "),
+        said("rounding", ""),
+        Some(note.sizes.clone()).filter(|sizes| !sizes.is_empty()),
+    ];
+    let parts: Vec<String> = parts.into_iter().flatten().collect();
+    parts.join(", ")
+}
+
+/// What the probe and the run's images of dark frames looked like.
+fn looks(note: &EnhancerNote) -> String {
+    let probe = match &note.probe {
+        None => "no probe was run".to_owned(),
+        Some(probe) => match probe.outcome {
+            ProbeOutcome::Plausible => format!("plausible on {} of the probe", probe.frames),
+            ProbeOutcome::Doubtful => "odd in the probe".to_owned(),
+            ProbeOutcome::Overruled => "refused by the probe, used all the same".to_owned(),
+        },
+    };
+    let judged = &note.judged;
+    match (judged.images, judged.flaws()) {
+        (0, _) => format!("{probe}; none looked at in the run"),
+        (images, 0) => format!("{probe}; {images} looked at in the run, no flaw"),
+        (images, flawed) => format!(
+            "{probe}; {flawed} of {images} looked at in the run have a flaw: {}",
+            flaws(judged)
+        ),
+    }
+}
+
+/// The flaws with their numbers, and a few of the images.
+fn flaws(judged: &JudgedImages) -> String {
+    let flaws = judged.flawed.iter();
+    let flaws: Vec<String> = flaws
+        .map(|(flaw, count)| format!("{count} {}", flaw.words()))
+        .collect();
+    let examples = judged.examples.iter();
+    let examples: Vec<String> = examples
+        .map(|image| format!("{} at {}", image.frame, image.condition))
+        .collect();
+    format!("{} (for example {})", flaws.join(", "), examples.join("; "))
+}
