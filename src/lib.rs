@@ -59,7 +59,8 @@
 //!
 //! # The map
 //!
-//! Data flows one way. Each folder is a stage; the stages do not know each other. What is asked (words) and what is seen (light) meet
+//! Data flows one way. Each folder is a stage; the stages do not know each other (a model that takes noise has it drawn by the
+//! generator of synthesis). What is asked (words) and what is seen (light) meet
 //! only where a question is put to a model.
 //!
 //! ```text
@@ -126,7 +127,7 @@
 //! | `files` | `error` |
 //! | `questions` | `types`, `error` |
 //! | `synthesis` | `types`, `error` |
-//! | `enhance` | `types`, `error` |
+//! | `enhance` | `synthesis`, `types`, `error` |
 //! | `ask` | `types`, `error` |
 //! | `score` | `types`, `error` |
 //! | `labels` | `files`, `types`, `error` |

@@ -8,7 +8,7 @@ use clap::{ArgMatches, Args, Command as Clap};
 use super::command::{BatchCommand, Cli, Command};
 use super::layers;
 use crate::ask::{AccessArgs, ImageArgs, Parameters, Sending};
-use crate::enhance::{EnhancerArgs, RuntimeArgs, SizeArgs};
+use crate::enhance::{EnhancerArgs, ProbeArgs, RuntimeArgs, SizeArgs};
 use crate::job::batch::BatchFileArgs;
 use crate::job::models::ModelName;
 use crate::job::settings::JobArgs;
@@ -16,7 +16,6 @@ use crate::run::evaluate::{EvaluateArgs, ShrinkArgs};
 use crate::run::openeqa::{JudgeArgs, OpenEqaArgs};
 use crate::score::realism::residual::Bins;
 use crate::synthesis::{LightArgs, SensorArgs};
-use crate::types::KindSet;
 use crate::types::degradation::Kind;
 
 /// One line for each reason why flags of the call have no effect.
@@ -41,7 +40,7 @@ pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
         }
         Some(Command::Export(args)) => {
             idle.light(&args.light);
-            idle.enhancement(&args.light, &args.enhancers);
+            idle.enhancement(&args.enhancers);
         }
         Some(Command::Realism(args)) if args.kl_bins == Bins::Kousha => {
             let why = "the bins of kousha have one count added to each";
@@ -83,6 +82,7 @@ fn enhancement() -> Vec<String> {
     [
         ids::<EnhancerArgs>(),
         ids::<SizeArgs>(),
+        ids::<ProbeArgs>(),
         ids::<RuntimeArgs>(),
     ]
     .concat()
@@ -168,7 +168,7 @@ impl NoEffect {
             self.because("no model is shown an image", &shown);
         }
         self.light(&args.light);
-        self.enhancement(&args.light, &args.enhancers);
+        self.enhancement(&args.enhancers);
         let mut names = models.model.iter().chain(&models.blind_model).chain(judge);
         if !names.any(|name| matches!(name, ModelName::Remote(_))) {
             let sent = [
@@ -195,26 +195,19 @@ impl NoEffect {
     fn light(&mut self, args: &LightArgs) {
         let kinds: Vec<Kind> = args.variant.kinds().collect();
         if args.levels.0.iter().all(|level| level.severity().is_none()) {
-            let idle = [sensor(), enhancement(), vec!["variant".into()]].concat();
+            let idle = [sensor(), vec!["variant".into()]].concat();
             self.because("the only level is L0, which is not degraded", &idle);
         } else if !kinds.iter().any(|kind| kind.has_readings()) {
             self.because("no variant has noise", &sensor());
         }
     }
 
-    /// Checks the flags of enhancement against the enhancers.
-    fn enhancement(&mut self, light: &LightArgs, args: &EnhancerArgs) {
+    /// Checks the flags of enhancement. Enhancers that no condition uses are an error.
+    fn enhancement(&mut self, args: &EnhancerArgs) {
         if args.llie.is_empty() {
             self.because("no --llie is named", &enhancement());
-        } else if !overlap(light.variant, args.llie_on) {
-            let why = "--llie-on names no variant of --variant";
-            self.because(why, &enhancement());
         }
     }
-}
-
-fn overlap(first: KindSet, second: KindSet) -> bool {
-    first.kinds().any(|kind| second.includes(kind))
 }
 
 #[cfg(test)]
@@ -243,10 +236,6 @@ mod tests {
             "--image, --max-side, --detail: no effect: no model is shown",
         ),
         (
-            "--model m --llie f.onnx --levels L0",
-            "--llie: no effect: the only level is L0",
-        ),
-        (
             "--model m --levels L0 --variant ev --ratio 9 --fixed",
             "--ratio, --fixed, --variant: no effect: the only level is L0",
         ),
@@ -259,8 +248,8 @@ mod tests {
             "--tile, --offline: no effect: no --llie is named",
         ),
         (
-            "--model m --llie f.onnx --variant ev",
-            "--llie: no effect: --llie-on names no variant of --variant",
+            "--model m --levels L0 --llie-on l0 --ort-lib x --llie-max-side 9",
+            "--llie-on, --llie-max-side, --ort-lib: no effect: no --llie is named",
         ),
         (
             "--model random --temperature 0 --rpm 9 --max-cost 1",
@@ -336,6 +325,7 @@ mod tests {
             "openeqa --questions q --frames f --model script:a --judge j --judge-temperature 1 --rpm 9",
             "synthesize a --out b --sheet levels --profile eld",
             "export llava a --out b --llie f.onnx --llie-on both",
+            "--model m --levels L0 --llie f.onnx --llie-on l0 --tile whole",
             "realism a --kl-empty drop",
             "enhance m a --out b --tile whole",
         ] {

@@ -24,7 +24,7 @@ const ALL: [BuiltIn; 2] = [
     BuiltIn {
         name: "gray-gain",
         model: include_bytes!("../../models/gray-gain.onnx"),
-        sidecar: "",
+        sidecar: include_str!("../../models/gray-gain.onnx.toml"),
     },
 ];
 

@@ -1,5 +1,5 @@
-//! Parts of a model's convention, which its graph may not state: [`TensorLayout`], [`ChannelOrder`], [`ValueRange`],
-//! [`Padding`], [`Tile`], [`Rounding`].
+//! Parts of a model's convention, which its graph may not state: [`TensorLayout`], [`Channels`], [`ChannelOrder`],
+//! [`ValueRange`], [`Padding`], [`Tile`], [`Rounding`].
 //!
 //! The words are those of the sidecar, `MODEL.onnx.toml`.
 
@@ -32,13 +32,13 @@ impl TensorLayout {
         matches!(self, Self::Nchw | Self::Chw)
     }
 
-    /// Dimensions of one image of three channels.
-    pub(super) fn dims(self, [height, width]: [usize; 2]) -> Vec<usize> {
+    /// Dimensions of one image of so many channels.
+    pub(super) fn dims(self, [height, width]: [usize; 2], channels: usize) -> Vec<usize> {
         match self {
-            Self::Nchw => vec![1, 3, height, width],
-            Self::Nhwc => vec![1, height, width, 3],
-            Self::Chw => vec![3, height, width],
-            Self::Hwc => vec![height, width, 3],
+            Self::Nchw => vec![1, channels, height, width],
+            Self::Nhwc => vec![1, height, width, channels],
+            Self::Chw => vec![channels, height, width],
+            Self::Hwc => vec![height, width, channels],
         }
     }
 
@@ -61,6 +61,40 @@ impl TensorLayout {
 }
 
 words!(TensorLayout { Nchw = "NCHW", Nhwc = "NHWC", Chw = "CHW", Hwc = "HWC" });
+
+/// Channels of an image that a model takes and gives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Channels {
+    /// Red, green and blue.
+    #[default]
+    Rgb,
+    /// The luma alone ([`LUMA`]), 0..1. The image keeps its chroma: the change of its luma is added to each channel.
+    Y,
+}
+
+/// Weights of red, green and blue in the luma: ITU-R BT.601, full range.
+pub(super) const LUMA: [f32; 3] = [0.299, 0.587, 0.114];
+
+impl Channels {
+    /// Their number in words, for messages.
+    pub(super) fn words(self) -> &'static str {
+        match self {
+            Self::Rgb => "three channels",
+            Self::Y => "one channel (channels = \"y\")",
+        }
+    }
+
+    /// Number of the channels.
+    pub(super) fn count(self) -> usize {
+        match self {
+            Self::Rgb => 3,
+            Self::Y => 1,
+        }
+    }
+}
+
+words!(Channels { Rgb = "RGB", Y = "Y" });
 
 /// Order of the colour channels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -143,6 +177,25 @@ pub(super) enum Padding {
     Crop,
 }
 
+impl Padding {
+    /// Index of the pixel that is copied to position `at`, which may be beyond the end of the side; `None` for black.
+    pub(super) fn source(self, at: usize, side: usize) -> Option<usize> {
+        if at < side {
+            return Some(at);
+        }
+        match self {
+            Self::Zero => None,
+            Self::Replicate | Self::Crop => Some(side - 1),
+            Self::Reflect => {
+                // Mirrored at the last pixel, and again at the first if the padding is larger than the image.
+                let period = (2 * (side - 1)).max(1);
+                let within = at % period;
+                Some(within.min(period - within).min(side - 1))
+            }
+        }
+    }
+}
+
 impl fmt::Display for Padding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.serialize(f)
@@ -204,14 +257,29 @@ as_text!(Tile);
 /// Type of a tensor's elements.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum ElementType {
-    Float32,
-    Float16,
+    Bool,
+    Int8,
+    Int16,
+    Int32,
+    Int64,
     Uint8,
-    /// Any other type, by its name; not supported for images.
+    Uint16,
+    Uint32,
+    Uint64,
+    Float16,
+    Bfloat16,
+    Float32,
+    Float64,
+    /// Any other type, by its name; not supported.
     Other(String),
 }
 
 impl ElementType {
+    /// Value range that the type states: bytes are 0..255.
+    pub(super) fn certain_range(&self) -> Option<ValueRange> {
+        (*self == Self::Uint8).then_some(ValueRange::Bytes)
+    }
+
     /// Value range that images of this type usually have.
     pub(super) fn usual_range(&self) -> ValueRange {
         match self {
@@ -219,14 +287,29 @@ impl ElementType {
             _ => ValueRange::Unit,
         }
     }
+
+    /// Whether images of this type can be fed and read.
+    pub(super) fn holds_images(&self) -> bool {
+        matches!(self, Self::Float32 | Self::Float16 | Self::Uint8)
+    }
 }
 
 impl fmt::Display for ElementType {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Float32 => "float32",
-            Self::Float16 => "float16",
+            Self::Bool => "bool",
+            Self::Int8 => "int8",
+            Self::Int16 => "int16",
+            Self::Int32 => "int32",
+            Self::Int64 => "int64",
             Self::Uint8 => "uint8",
+            Self::Uint16 => "uint16",
+            Self::Uint32 => "uint32",
+            Self::Uint64 => "uint64",
+            Self::Float16 => "float16",
+            Self::Bfloat16 => "bfloat16",
+            Self::Float32 => "float32",
+            Self::Float64 => "float64",
             Self::Other(name) => name,
         })
     }

@@ -7,7 +7,8 @@ use super::convention::Tile;
 use super::graph::Graph;
 use super::preset::Preset;
 use super::sidecar::ModelSidecar;
-use super::tiles::MULTIPLES;
+use super::size_plan::SizeRule;
+use super::size_search::MULTIPLES;
 use crate::types::enhancer_note::ConventionLine;
 
 /// Source of values that the graph itself states.
@@ -43,6 +44,12 @@ impl Description {
     /// How the model is fed and read.
     pub(super) fn lines(&self, graph: &Graph, convention: &ModelSidecar) -> Vec<ConventionLine> {
         let mut lines = Lines(Vec::new());
+        if let Some(preset) = &self.preset {
+            lines.add("preset", &preset.name, preset.content.to_string());
+        }
+        if let Some(differing) = &graph.differing {
+            lines.add("warning", differing, "graph");
+        }
         self.input(&mut lines, graph, convention);
         self.output(&mut lines, graph);
         let source = match convention.tile {
@@ -76,8 +83,27 @@ impl Description {
         lines.add("layout_in", feeding.layout, source);
         let height_width = format!("{} × {}", side(signature.height), side(signature.width));
         lines.add("height × width", height_width, GRAPH);
+        if let Some([width, height]) = convention.fixed {
+            let source = self.source(|s| s.fixed.is_some(), "");
+            lines.add("fixed", format!("{height} × {width}"), source);
+        }
+        if graph.batch() > 1 {
+            let cost = format!(
+                "graph: each image is given {0} times, which takes {0} times as long",
+                graph.batch()
+            );
+            lines.add("batch", graph.batch(), cost);
+        }
         let usual = "usual; a graph cannot state it";
-        let source = self.source(|s| s.color.is_some(), usual);
+        if let Some(input) = &convention.input {
+            let source = self.source(|s| s.input.is_some(), "");
+            lines.add("input = ", input, source);
+        }
+        if let Some(channels) = convention.channels {
+            let source = self.source(|s| s.channels.is_some(), "");
+            lines.add("channels", channels, source);
+        }
+        let source = self.source(|s| s.color.is_some(), "usual, cannot be checked");
         lines.add("color", feeding.color, source);
         let source = self.source(
             |s| s.range_in.is_some(),
@@ -89,6 +115,7 @@ impl Description {
             let source = self.source(|s| s.mean.is_some() || s.std.is_some(), usual);
             lines.add("mean, std", value, source);
         }
+        let fixed = [signature.height, signature.width];
         match convention.multiple {
             Some(multiple) => {
                 lines.add(
@@ -97,48 +124,71 @@ impl Description {
                     self.source(|s| s.multiple.is_some(), ""),
                 );
             }
-            None if signature.takes_any_size() => {
+            None if SizeRule::of(fixed, convention, feeding.pad).takes_any_size() => {
                 let others = MULTIPLES[1..].iter().map(ToString::to_string);
                 let others = others.collect::<Vec<_>>().join(", ");
                 let source = format!("tried first, then {others} if it fails");
                 lines.add("multiple", MULTIPLES[0], source);
             }
-            None => lines.add("multiple", 1, "its size is fixed"),
+            None => lines.add(
+                "multiple",
+                1,
+                "its size is fixed: other images are filled or cut, if it is local",
+            ),
         }
         lines.add(
             "pad",
             feeding.pad,
             self.source(|s| s.pad.is_some(), "usual"),
         );
+        if convention.pad_always == Some(true) {
+            let source = self.source(|s| s.pad_always.is_some(), "");
+            lines.add("pad_always", "one row and column at least", source);
+        }
         for extra in &signature.extras {
             let source = self.source(|s| s.extra.contains_key(&extra.port.name), "");
-            lines.add(&format!("extra.{}", extra.port.name), extra.value, source);
+            lines.add(&format!("extra.{}", extra.port.name), &extra.value, source);
         }
     }
 
     /// Adds the lines about the output.
     fn output(&self, lines: &mut Lines, graph: &Graph) {
-        let (output, reading) = (&graph.signature.output, &graph.reading);
-        let source = match output.reason {
-            "stated" => self.source(|s| s.output.is_some(), GRAPH),
-            reason => reason.to_owned(),
-        };
-        lines.add("output", &output.port, source);
-        let fallback = match reading.layout {
-            Some(_) => "graph: the dimension of size 3",
-            None => "as the input; the actual output decides",
-        };
-        let source = self.source(|s| s.layout_out.is_some(), fallback);
-        lines.add(
-            "layout_out",
-            reading.layout.unwrap_or(reading.preferred),
-            source,
-        );
+        let (outputs, composition) = (&graph.signature.outputs, &graph.reading);
+        if let Some(image) = &graph.convention.image {
+            let preset = self.preset.as_ref();
+            let preset =
+                preset.map_or(GRAPH.to_owned(), |preset| format!("preset {}", preset.name));
+            let source = self.source(|s| s.image.is_some(), &preset);
+            lines.add("image = ", image, source);
+        }
+        for (output, reading) in outputs.iter().zip(&composition.outputs) {
+            let source = match (output.reason, &self.preset) {
+                ("stated", Some(preset)) => {
+                    self.source(|s| s.output.is_some(), &format!("preset {}", preset.name))
+                }
+                ("stated", None) => "sidecar".to_owned(),
+                (reason, _) => reason.to_owned(),
+            };
+            lines.add("output", &output.port, source);
+            let fallback = match reading.layout {
+                Some(_) => "graph: the dimension of size 3",
+                None => "as the input; the actual output decides",
+            };
+            let source = self.source(|s| s.layout_out.is_some(), fallback);
+            let layout = reading.layout.unwrap_or(reading.preferred);
+            lines.add("layout_out", layout, source);
+        }
+        for port in &graph.signature.unread {
+            lines.add("not read", port, GRAPH);
+        }
+        let reading = &composition.outputs[0];
+        let source = self.source(|s| s.color_out.is_some(), "as the input");
+        lines.add("color_out", reading.color, source);
         let checked = "as the input; the actual output is checked";
         let source = self.source(|s| s.range_out.is_some(), self.range_source(checked));
         lines.add("range_out", reading.range, source);
         let source = self.source(|s| s.rounding.is_some(), "usual");
-        lines.add("rounding", reading.rounding, source);
+        lines.add("rounding", composition.rounding, source);
     }
 
     /// Source of a range that nothing states.
@@ -150,7 +200,7 @@ impl Description {
     fn source(&self, states: impl Fn(&ModelSidecar) -> bool, otherwise: &str) -> String {
         match &self.preset {
             _ if states(&self.sidecar) => "sidecar".to_owned(),
-            Some(preset) if states(&preset.convention) => format!("preset {}", preset.name),
+            Some(preset) if states(&preset.content.sidecar) => format!("preset {}", preset.name),
             _ => otherwise.to_owned(),
         }
     }

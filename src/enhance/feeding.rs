@@ -1,14 +1,18 @@
 //! Conversion of an image of bytes to the tensor that a model takes: [`Feeding`].
 //!
-//! It takes one pass: a table of 256 values per channel combines range, mean and deviation.
+//! It takes one pass: a table of 256 values per channel combines range, mean and deviation. With an expression, or for a model
+//! of the luma, the image goes through floats: `input`, channels, range, mean and deviation, in this order.
 
 use half::f16;
 
-use super::convention::{ChannelOrder, ElementType, Padding, TensorLayout, ValueRange};
+use super::convention::{ChannelOrder, Channels, ElementType, Padding, TensorLayout, ValueRange};
+use super::expression::Expression;
+use super::fed_image::FedImage;
 use super::planes::Planes;
 use super::reading::nearest;
 use super::sidecar::ModelSidecar;
 use super::signature::Signature;
+use super::tensor::{Tensor, TensorData};
 use super::tiles::TileWindow;
 use crate::types::Rgb;
 
@@ -17,42 +21,15 @@ use crate::types::Rgb;
 pub(super) struct Feeding {
     pub(super) layout: TensorLayout,
     pub(super) element: ElementType,
+    pub(super) channels: Channels,
+    /// What is fed, as an expression of `image`, the dark image in 0..1; `None` for the image itself.
+    pub(super) input: Option<Expression>,
     pub(super) color: ChannelOrder,
     pub(super) range: ValueRange,
     /// Subtracted from each channel, in the model's channel order and range; then `std` divides it.
     pub(super) mean: [f32; 3],
     pub(super) std: [f32; 3],
     pub(super) pad: Padding,
-}
-
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Input {
-    pub(super) dims: Vec<usize>,
-    pub(super) data: TensorData,
-}
-
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum TensorData {
-    Float32(Vec<f32>),
-    Float16(Vec<f16>),
-    Uint8(Vec<u8>),
-}
-
-/// Index of the pixel that is copied to position `at`, which may be beyond the end of the side; `None` for black.
-fn source(at: usize, side: usize, pad: Padding) -> Option<usize> {
-    if at < side {
-        return Some(at);
-    }
-    match pad {
-        Padding::Zero => None,
-        Padding::Replicate | Padding::Crop => Some(side - 1),
-        Padding::Reflect => {
-            // Mirrored at the last pixel, and again at the first if the padding is larger than the image.
-            let period = (2 * (side - 1)).max(1);
-            let within = at % period;
-            Some(within.min(period - within).min(side - 1))
-        }
-    }
 }
 
 impl Feeding {
@@ -63,6 +40,8 @@ impl Feeding {
             layout: signature.input.layout,
             range: convention.range_in.unwrap_or(element.usual_range()),
             element,
+            channels: convention.channels.unwrap_or_default(),
+            input: convention.input.clone(),
             color: convention.color.unwrap_or_default(),
             mean: convention.mean.unwrap_or([0.0; 3]),
             std: convention.std.unwrap_or([1.0; 3]),
@@ -70,10 +49,34 @@ impl Feeding {
         }
     }
 
+    /// The tensor of an image, or `None` if the sidecar's expression gives values that are not finite.
+    pub(super) fn tensor(&self, fed: &FedImage<'_>) -> Option<Tensor> {
+        match fed {
+            FedImage::Window { dark, window, .. }
+                if self.input.is_none() && self.channels == Channels::Rgb =>
+            {
+                Some(self.window(dark.rgb, *window))
+            }
+            _ => {
+                let dark = fed.planes();
+                match &self.input {
+                    None => Some(self.planes(&dark.into_owned().with_channels(self.channels))),
+                    Some(expression) => {
+                        let image =
+                            expression.of(&vec![&*dark; expression.names().len()], fed.size());
+                        let finite = image.samples.iter().all(|sample| sample.is_finite());
+                        let image = image.spread().with_channels(self.channels);
+                        finite.then(|| self.planes(&image))
+                    }
+                }
+            }
+        }
+    }
+
     /// The tensor of a window of an image, padded beyond the image's edges.
-    pub(super) fn window(&self, image: &Rgb, window: TileWindow) -> Input {
+    fn window(&self, image: &Rgb, window: TileWindow) -> Tensor {
         let sources = |from: usize, to: usize, side: usize| -> Vec<Option<usize>> {
-            (from..to).map(|at| source(at, side, self.pad)).collect()
+            (from..to).map(|at| self.pad.source(at, side)).collect()
         };
         let rows = sources(window.top, window.bottom, image.height());
         let columns = sources(window.left, window.right, image.width());
@@ -103,39 +106,43 @@ impl Feeding {
             ElementType::Uint8 => {
                 let mut data = vec![0; 3 * size[0] * size[1]];
                 fill(&mut data, order, &rows, size[1], row_of, |_, byte| byte);
-                self.tensor(size, TensorData::Uint8(data))
+                self.shaped(size, TensorData::Uint8(data))
             }
             ElementType::Float16 => {
                 let table = self.table().map(|values| values.map(f16::from_f32));
                 let mut data = vec![f16::ZERO; 3 * size[0] * size[1]];
                 let value = |channel: usize, byte: u8| table[channel][usize::from(byte)];
                 fill(&mut data, order, &rows, size[1], row_of, value);
-                self.tensor(size, TensorData::Float16(data))
+                self.shaped(size, TensorData::Float16(data))
             }
             _ => {
                 let table = self.table();
                 let mut data = vec![0.0; 3 * size[0] * size[1]];
                 let value = |channel: usize, byte: u8| table[channel][usize::from(byte)];
                 fill(&mut data, order, &rows, size[1], row_of, value);
-                self.tensor(size, TensorData::Float32(data))
+                self.shaped(size, TensorData::Float32(data))
             }
         }
     }
 
-    /// The tensor of a whole image of floats.
-    pub(super) fn planes(&self, planes: &Planes) -> Input {
+    /// The tensor of an image of floats that has the model's channels.
+    fn planes(&self, planes: &Planes) -> Tensor {
         let [height, width] = [planes.height, planes.width];
         let value = |channel: usize, pixel: usize| {
-            let unit = planes.samples[self.color.rgb_channel(channel) * height * width + pixel];
-            (channel, unit)
+            let plane = match self.channels {
+                Channels::Rgb => self.color.rgb_channel(channel),
+                Channels::Y => channel,
+            };
+            (channel, planes.samples[plane * height * width + pixel])
         };
+        let channels = self.channels.count();
         let order: Vec<(usize, f32)> = if self.layout.is_planar() {
-            (0..3)
+            (0..channels)
                 .flat_map(|channel| (0..height * width).map(move |pixel| value(channel, pixel)))
                 .collect()
         } else {
             (0..height * width)
-                .flat_map(|pixel| (0..3).map(move |channel| value(channel, pixel)))
+                .flat_map(|pixel| (0..channels).map(move |channel| value(channel, pixel)))
                 .collect()
         };
         let values = order.into_iter();
@@ -155,12 +162,12 @@ impl Feeding {
             }
             _ => TensorData::Float32(values.map(float).collect()),
         };
-        self.tensor([height, width], data)
+        self.shaped([height, width], data)
     }
 
-    fn tensor(&self, size: [usize; 2], data: TensorData) -> Input {
-        Input {
-            dims: self.layout.dims(size),
+    fn shaped(&self, size: [usize; 2], data: TensorData) -> Tensor {
+        Tensor {
+            dims: self.layout.dims(size, self.channels.count()),
             data,
         }
     }

@@ -1,6 +1,7 @@
 //! An enhancement model on disk: [`ModelFile`].
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::{Component, Path, PathBuf};
 
 use serde::Serialize;
@@ -9,13 +10,16 @@ use crate::error::{Error, Result};
 use crate::types::{Digest, EnhancerName};
 
 use super::built_in::BuiltIn;
-use super::preset::Preset;
-use super::sidecar::{self, ModelSidecar};
+use super::preset::{Preset, PresetOutputs};
+use super::protobuf::{FieldValue, fields};
+use super::sidecar::{self, ModelSidecar, OutputChoice};
 use super::weights::Weights;
 
 /// An ONNX file with its sidecar, read and checked as far as possible without ONNX Runtime.
 #[derive(Debug)]
 pub struct ModelFile {
+    /// The words that name it, as the user gave them.
+    pub(super) named: PathBuf,
     /// Path of the file; for an enhancer of the program, what messages call it.
     pub(super) path: PathBuf,
     pub(super) name: EnhancerName,
@@ -39,14 +43,23 @@ impl ModelFile {
         if let Some(built_in) = BuiltIn::named(model)? {
             let path = PathBuf::from(format!("{} (built in)", built_in.name));
             let name = EnhancerName::new(built_in.name)?;
-            return Self::of(path, name, None, built_in.model.to_vec(), built_in.sidecar);
+            let bytes = built_in.model.to_vec();
+            let file = Self::of(path, name, None, bytes, built_in.sidecar)?;
+            return Ok(Self {
+                named: model.to_owned(),
+                ..file
+            });
         }
         let (preset, path) = Preset::split(model)?;
-        let bytes = std::fs::read(&path).map_err(|e| Error::file(&path, "read", e))?;
+        let bytes = read_model(&path)?;
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         let name = EnhancerName::new(&stem)?;
         let text = sidecar::text_for(&path)?;
-        Self::of(path, name, preset, bytes, &text)
+        let file = Self::of(path, name, preset, bytes, &text)?;
+        Ok(Self {
+            named: model.to_owned(),
+            ..file
+        })
     }
 
     /// The model of these bytes, with the text of its sidecar.
@@ -61,6 +74,7 @@ impl ModelFile {
         let sidecar = ModelSidecar::parse(&path, sidecar)?;
         Ok(Self {
             digest: digest(&path, &bytes, &sidecar, &weights, preset.as_ref())?,
+            named: path.clone(),
             path,
             name,
             sidecar,
@@ -68,6 +82,13 @@ impl ModelFile {
             bytes,
             weights,
         })
+    }
+
+    /// The same file, of which the output at this place is read if nothing states another one.
+    pub(crate) fn with_output(mut self, place: usize) -> Self {
+        let stated = &mut self.sidecar.output;
+        *stated = stated.take().or(Some(OutputChoice::Index(place)));
+        self
     }
 
     /// Name in tables and records: the file's name without its extension, or that of an enhancer of the program.
@@ -90,6 +111,8 @@ struct EnhancementFacts<'a> {
     /// Digests of external data, by the location that the model states.
     external: BTreeMap<&'a str, Digest>,
     convention: ModelSidecar,
+    /// What decides which of several outputs is taken, where no sidecar says it.
+    outputs: Option<PresetOutputs<'a>>,
 }
 
 /// Digest of a model's content, its external data and the convention of sidecar and preset. Each file is hashed alone, so
@@ -110,14 +133,31 @@ fn digest(
     let sidecar = sidecar.clone();
     let convention = match preset {
         None => sidecar,
-        Some(preset) => sidecar.with_defaults(&preset.convention),
+        Some(preset) => sidecar.with_defaults(&preset.content.sidecar),
     };
+    // A sidecar says it, or there is no choice.
+    let read_by_preset =
+        convention.output.is_none() && convention.image.is_none() && output_count(bytes) != 1;
     let facts = EnhancementFacts {
         file: Digest::of(bytes),
         external,
         convention: convention.without_defaults(),
+        outputs: preset.filter(|_| read_by_preset).map(Preset::outputs),
     };
     Digest::canonical("darkqa.enhancer/2", &facts)
+}
+
+/// Number of outputs of a model: field 12 of its `GraphProto`, which is field 7 of the `ModelProto` (`onnx/onnx.proto`).
+fn output_count(model: &[u8]) -> usize {
+    let within = |range: Range<usize>, wanted: u64| {
+        let found = fields(model, range).filter_map(Result::ok);
+        found.filter_map(move |field| match field {
+            (number, FieldValue::Bytes(bytes)) if number == wanted => Some(bytes),
+            _ => None,
+        })
+    };
+    let graphs = within(0..model.len(), 7);
+    graphs.map(|graph| within(graph, 12).count()).sum()
 }
 
 /// Path of a file with external data, which must be in the model's folder or below (ONNX Runtime refuses others too).
@@ -135,6 +175,25 @@ fn external_path(model: &Path, location: &str) -> Result<PathBuf> {
         });
     }
     Ok(model.with_file_name("").join(relative))
+}
+
+/// Largest ONNX file in bytes: what a protobuf message can hold (2³¹ − 1, <https://protobuf.dev/programming-guides/encoding/>).
+const MOST_BYTES: u64 = i32::MAX as u64;
+
+/// The bytes of an ONNX file. A file that is too large to be one is refused before it is read.
+fn read_model(path: &Path) -> Result<Vec<u8>> {
+    let unreadable = |e| Error::file(path, "read", e);
+    let size = std::fs::metadata(path).map_err(unreadable)?.len();
+    if size > MOST_BYTES {
+        return Err(Error::Enhancer {
+            path: path.to_owned(),
+            problem: format!(
+                "has {:.1} GB, and an ONNX file holds at most 2.1 GB; export it with its weights in a file beside it (external data)",
+                size as f64 / 1e9
+            ),
+        });
+    }
+    std::fs::read(path).map_err(unreadable)
 }
 
 fn not_onnx(path: &Path, bytes: &[u8]) -> Error {
@@ -213,6 +272,53 @@ mod tests {
         }
     }
 
+    /// A digest is of the canonical JSON of what is stated, so that keys of later versions change no digest.
+    #[test]
+    fn what_is_not_stated_is_not_in_the_digest() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.onnx");
+        let file = model("a.bin");
+        std::fs::write(&path, &file).unwrap();
+        std::fs::write(folder.path().join("a.bin"), [1]).unwrap();
+        let hash = |bytes: &[u8]| serde_json::to_string(&Digest::of(bytes)).unwrap();
+        for (sidecar, convention) in [
+            ("", ""),
+            (
+                "color_out = \"rgb\"\nchannels = \"rgb\"\ninput = \"image\"",
+                "",
+            ),
+            (
+                "range_in = \"-1..1\"\noutput = 0\n[extra]\na = 0.5\nb = 1",
+                r#""extra":{"a":0.5,"b":1.0},"output":0,"range_in":"-1..1""#,
+            ),
+            (
+                "image = \"L ^ 0.2 * R\"\n[extra]\nr = { map = 5 }",
+                r#""extra":{"r":{"map":5.0}},"image":"L ^ 0.2 * R""#,
+            ),
+        ] {
+            std::fs::write(folder.path().join("a.onnx.toml"), sidecar).unwrap();
+            let facts = format!(
+                r#"darkqa.enhancer/2{}{{"convention":{{{convention}}},"external":{{"a.bin":{}}},"file":{}}}"#,
+                '\0',
+                hash(&[1]),
+                hash(&file)
+            );
+            let found = ModelFile::read(&path).unwrap().digest();
+            assert_eq!(found, Digest::of(facts.as_bytes()), "{sidecar}");
+        }
+    }
+
+    #[test]
+    fn outputs_are_counted() {
+        let field = |number: u8, content: &[u8]| {
+            [&[number << 3 | 2, content.len() as u8], content].concat()
+        };
+        let graph = [field(12, b""), field(11, b""), field(12, b"")].concat();
+        assert_eq!(output_count(&field(7, &graph)), 2);
+        assert_eq!(output_count(&model("a.bin")), 0);
+        assert_eq!(output_count(&[0xFF]), 0);
+    }
+
     #[test]
     fn a_file_that_cannot_be_used_is_refused_with_the_reason() {
         let folder = tempfile::tempdir().unwrap();
@@ -233,6 +339,12 @@ mod tests {
             let message = ModelFile::read(&path).unwrap_err().to_string();
             assert!(message.contains(part), "{message}");
         }
+        // Empty, but for its size.
+        let large = folder.path().join("large.onnx");
+        let file = std::fs::File::create(&large).unwrap();
+        file.set_len(MOST_BYTES + 1).unwrap();
+        let message = ModelFile::read(&large).unwrap_err().to_string();
+        assert!(message.contains("2.1 GB"), "{message}");
         let missing = ModelFile::read(Path::new("missing.onnx")).unwrap_err();
         assert!(
             missing

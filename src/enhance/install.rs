@@ -10,6 +10,8 @@ use sha2::{Digest as _, Sha256};
 use zip::ZipArchive;
 
 use super::library::PINNED;
+use super::library_file::LibraryFormat;
+use super::receipt::{self, hex};
 
 /// Library of one platform in the wheel of version [`PINNED`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,6 +68,11 @@ impl Pin {
         Self::of(consts::OS, consts::ARCH)
     }
 
+    /// Whether a file has the name of the library that is installed.
+    pub(super) fn is_for(self, path: &Path) -> bool {
+        path.file_name().is_some_and(|name| name == self.file)
+    }
+
     fn of(os: &str, arch: &str) -> Option<Self> {
         PINS.into_iter()
             .find(|pin| pin.os == os && pin.arch == arch)
@@ -102,10 +109,21 @@ pub(super) fn install(pin: Pin, folder: &Path) -> Result<PathBuf, String> {
     fs::create_dir_all(folder).map_err(|e| path_error(folder, "cannot be created", &e))?;
     match fs::rename(&unpacked, &library) {
         // Windows does not replace a library that another process has loaded. That one is the same file.
-        Err(_) if library.is_file() => Ok(library),
-        Err(error) => Err(path_error(&library, "cannot be written", &error)),
-        Ok(()) => Ok(library),
+        Err(_) if library.is_file() => {}
+        Err(error) => return Err(path_error(&library, "cannot be written", &error)),
+        Ok(()) => {}
     }
+    check_installed(&library, pin).map_err(|e| format!("{} {e}", library.display()))?;
+    Ok(library)
+}
+
+/// Checks that a library in the cache is the pinned one, whole and unchanged.
+///
+/// # Errors
+/// What is wrong with it; the message follows its path.
+pub(super) fn check_installed(library: &Path, pin: Pin) -> Result<(), String> {
+    LibraryFormat::of_this_system().check(library)?;
+    receipt::check(library, pin.sha256)
 }
 
 /// Downloads the wheel into `folder` with the first pip that is present.
@@ -199,13 +217,6 @@ fn copy(source: &mut impl Read, target: &Path, hasher: &mut Sha256) -> io::Resul
         hasher.update(&buffer[..length]);
         file.write_all(&buffer[..length])?;
     }
-}
-
-fn hex(bytes: &[u8]) -> String {
-    let digits = bytes.iter().flat_map(|byte| [byte >> 4, byte & 15]);
-    digits
-        .filter_map(|digit| char::from_digit(digit.into(), 16))
-        .collect()
 }
 
 fn path_error(path: &Path, what: &str, error: &io::Error) -> String {

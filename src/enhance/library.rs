@@ -7,6 +7,8 @@ use std::path::Path;
 use libloading::{Library, Symbol};
 use ort::sys::OrtApiBase;
 
+use super::library_file::LibraryFormat;
+
 /// Version of the library that is installed if none is found; its pins are in `install.rs`.
 pub(super) const PINNED: &str = "1.31.1";
 
@@ -27,9 +29,9 @@ pub(super) fn is_library_name(os: &str, name: &str) -> bool {
     }
 }
 
-/// Loads a library, asks it for its version and unloads it; returns the version.
+/// Checks a library's file, loads it, asks it for its version and unloads it; returns the version.
 ///
-/// All that could fail later is tried here, because `ort` panics if a library does not give it the API.
+/// Nothing is loaded that is not a whole library with ONNX Runtime's entry; libraries of custom operators never are. All that could fail later is tried here, because `ort` panics if a library does not give it the API.
 ///
 /// # Errors
 /// What is wrong with the file; the message follows its path.
@@ -38,6 +40,7 @@ pub(super) fn probe(path: &Path) -> Result<String, String> {
     if !metadata.is_file() {
         return Err("is not a file; name the library itself".to_owned());
     }
+    LibraryFormat::of_this_system().check(path)?;
     let version = version_of(path)?;
     match minor(&version) {
         Some(minor) if minor >= OLDEST => Ok(version),
@@ -137,7 +140,7 @@ mod tests {
         for (path, part) in [
             (folder.path().join("missing.so"), "cannot be read"),
             (folder.path().to_owned(), "is not a file"),
-            (text, "cannot be loaded"),
+            (text, "is not a dynamic library"),
         ] {
             let problem = probe(&path).unwrap_err();
             assert!(problem.contains(part), "{problem}");

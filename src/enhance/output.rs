@@ -1,7 +1,9 @@
-//! Choice of the output of a graph that is the enhanced image: [`Output::choose`].
+//! Choice of the outputs of a graph that are the enhanced image, or from which it is made: [`Output`].
 
-use super::convention::TensorLayout;
+use super::convention::{Channels, TensorLayout};
+use super::expression::Expression;
 use super::port::{Dim, Port, list};
+use super::preset;
 use super::sidecar::OutputChoice;
 
 /// Names that exporters give the enhanced image if a model has other outputs too.
@@ -16,13 +18,15 @@ const IMAGE_NAMES: [&str; 8] = [
     "image",
 ];
 
-/// The output that is the enhanced image.
+/// An output that is the enhanced image, or a name in the expression of it.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Output {
     /// Name, type and dimensions in the graph.
     pub(super) port: Port,
     /// Order of its dimensions; `None` if only a run shows it.
     pub(super) layout: Option<TensorLayout>,
+    /// Numbers of channels that it may have.
+    pub(super) channels: &'static [usize],
     /// Reason for the choice, for users; `stated` if sidecar or preset state it.
     pub(super) reason: &'static str,
 }
@@ -36,19 +40,25 @@ impl Output {
     pub(super) fn choose(
         outputs: &[Port],
         stated: Option<&OutputChoice>,
-        fits: impl Fn(&Port) -> bool,
+        channels: Channels,
+        fits: impl Fn(&Port, usize) -> bool,
     ) -> Result<Self, String> {
+        let fits = |port: &Port| fits(port, channels.count());
         let images: Vec<usize> = (0..outputs.len()).filter(|&i| fits(&outputs[i])).collect();
         let (index, reason) = match (images.as_slice(), stated) {
             ([only], None) => (*only, "the only output that can be the image"),
-            // A preset's index counts the outputs of the authors' model. An export may have fewer.
+            // An index may count the outputs of the authors' model. An export may have fewer.
             ([only], Some(OutputChoice::Index(_))) if outputs.len() == 1 => {
                 (*only, "the only output")
             }
-            (_, Some(choice)) => (stated_output(outputs, choice, &fits)?, "stated"),
+            (_, Some(choice)) => (stated_output(outputs, choice, fits)?, "stated"),
             ([], None) => {
+                let what = match channels {
+                    Channels::Rgb => "an image",
+                    Channels::Y => "an image of one channel (channels = \"y\")",
+                };
                 return Err(format!(
-                    "has no output that is an image of the input's size; it has {}",
+                    "has no output that is {what} of the input's size; it has {}",
                     list(outputs)
                 ));
             }
@@ -56,21 +66,89 @@ impl Output {
                 (Some(name), None) => (name, "its name"),
                 (None, Some(structure)) => (structure, "the second of Zero-DCE's three outputs"),
                 (Some(name), Some(structure)) if name == structure => (name, "its name"),
-                _ => {
-                    return Err(format!(
-                        "has several outputs that could be the image: {}; say which in MODEL.onnx.toml beside it: `output = \"NAME\"` or `output = INDEX`, counted from 0; or name a preset, as --llie ruas-lol:FILE",
-                        list(outputs)
-                    ));
-                }
+                _ => return Err(ambiguous(outputs)),
             },
         };
         let port = outputs[index].clone();
         Ok(Self {
-            layout: port.layout(),
+            layout: port.layout(channels.count()),
             port,
+            channels: match channels {
+                Channels::Rgb => &[3],
+                Channels::Y => &[1],
+            },
             reason,
         })
     }
+
+    /// The outputs that an expression of the image names, in its order.
+    ///
+    /// # Errors
+    /// If a name is neither an output nor `input`, or an output is no image of one or three channels.
+    pub(super) fn named(
+        outputs: &[Port],
+        image: &Expression,
+        channels: Channels,
+        fits: impl Fn(&Port, usize) -> bool,
+    ) -> Result<Vec<Self>, String> {
+        let channels: &'static [usize] = match channels {
+            Channels::Rgb => &[3, 1],
+            Channels::Y => &[1],
+        };
+        let names = outputs.iter().map(|port| port.name.as_str());
+        let known: Vec<&str> = names.chain([INPUT]).collect();
+        let unknown = |problem| {
+            format!(
+                "cannot be read: {problem}; its outputs are {}",
+                list(outputs)
+            )
+        };
+        image.check_names("image", &known).map_err(unknown)?;
+        let names = image.names().iter().filter(|name| *name != INPUT);
+        let outputs = names.filter_map(|name| outputs.iter().find(|port| port.name == *name));
+        let outputs: Vec<Self> = outputs
+            .map(|port| {
+                if !channels.iter().any(|count| fits(port, *count)) {
+                    return Err(format!(
+                        "gives {port}, which image = \"{image}\" names, but which is no image of {}",
+                        if channels == [1] { "one channel (channels = \"y\")" } else { "one or three channels" }
+                    ));
+                }
+                Ok(Self {
+                    layout: channels.iter().find_map(|count| port.layout(*count)),
+                    port: port.clone(),
+                    channels,
+                    reason: "stated",
+                })
+            })
+            .collect::<Result<_, _>>()?;
+        if outputs.is_empty() {
+            return Err(format!(
+                "is not used: image = \"{image}\" names none of its outputs, which are {}",
+                known[..known.len() - 1].join(", ")
+            ));
+        }
+        Ok(outputs)
+    }
+}
+
+/// Name of the dark image in an expression of the image.
+pub(super) const INPUT: &str = "input";
+
+/// What is asked where nothing tells which output is the image. Presets are named if they know such a list.
+fn ambiguous(outputs: &[Port]) -> String {
+    let presets = preset::that_know(outputs);
+    let presets = match presets.as_slice() {
+        [] => String::new(),
+        names => {
+            let known = "; the models of these presets have such outputs:";
+            format!("{known} {} (--llie PRESET:FILE)", names.join(", "))
+        }
+    };
+    format!(
+        "has several outputs that could be the image: {}; say which in MODEL.onnx.toml beside it: `output = \"NAME\"` or `output = INDEX`, counted from 0{presets}; `darkqa-eval enhance --doctor` draws what each gives, and which are plausible",
+        list(outputs)
+    )
 }
 
 /// Index of the stated output, which must exist and be able to be the image.
@@ -96,27 +174,13 @@ fn stated_output(
 
 /// The only image output that has one of [`IMAGE_NAMES`].
 ///
-/// An exporter that gets fewer names than outputs names the first ones and numbers the rest. `output` is then the first
-/// output, whatever that is (for Zero-DCE, the wrong one). So a name of the first output counts only if the others are
-/// named too.
+/// A name of the first output counts only if the others are named too: see [`Port::is_numbered`].
 fn by_name(outputs: &[Port], images: &[usize]) -> Option<usize> {
     let named = |i: &usize| IMAGE_NAMES.contains(&outputs[*i].name.as_str());
     let mut matching = images.iter().copied().filter(named);
     let only = matching.next().filter(|_| matching.next().is_none())?;
-    let named_by_hand = only > 0 || !outputs.iter().any(|port| is_numbered(&port.name));
+    let named_by_hand = only > 0 || !outputs.iter().any(Port::is_numbered);
     named_by_hand.then_some(only)
-}
-
-/// Whether an exporter generated this name: a number, a path of modules, or an operator's name.
-fn is_numbered(name: &str) -> bool {
-    const OPERATORS: [&str; 19] = [
-        "add", "cat", "clamp", "clip", "concat", "conv", "conv2d", "div", "getitem", "identity",
-        "max", "min", "mul", "pow", "relu", "sigmoid", "slice", "sub", "tanh",
-    ];
-    let word = name
-        .trim_end_matches(|c: char| c.is_ascii_digit() || c == '_')
-        .to_ascii_lowercase();
-    word.is_empty() || name.contains(['/', ':', '.']) || OPERATORS.contains(&word.as_str())
 }
 
 /// Index of the second of Zero-DCE's three outputs, which is the image whatever their names are.

@@ -1,17 +1,18 @@
-//! Images of floats, for models of a fixed size: [`Planes`].
+//! Images of floats, for models of a fixed size, and for expressions: [`Planes`].
 
 use image::imageops::{FilterType, resize};
 use image::{ImageBuffer, Luma};
 
-use super::convention::Rounding;
+use super::convention::{Channels, Rounding};
+use super::term::Sample;
 use crate::types::Rgb;
 
-/// Image of three planes, red, green, blue, one after the other, with samples in 0..1.
+/// Image of planes, one after the other, with samples in 0..1: red, green and blue, or a single one.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Planes {
     pub(super) height: usize,
     pub(super) width: usize,
-    /// The samples, 3 × height × width.
+    /// The samples, channels × height × width.
     pub(super) samples: Vec<f32>,
 }
 
@@ -30,6 +31,53 @@ impl Planes {
             height: image.height(),
             width: image.width(),
             samples,
+        }
+    }
+
+    /// Height and width in pixels.
+    pub(super) fn size(&self) -> [usize; 2] {
+        [self.height, self.width]
+    }
+
+    /// The image with another luma, a single plane: the difference is added to each channel, which keeps the chroma.
+    pub(super) fn with_luma(&self, luma: &Self) -> Self {
+        let plane = self.height * self.width;
+        let changes: Vec<f32> = (0..plane)
+            .map(|pixel| luma.samples[pixel] - self.sample(pixel).luma())
+            .collect();
+        let samples = self.samples.iter().zip(changes.iter().cycle());
+        Self {
+            samples: samples.map(|(sample, change)| sample + change).collect(),
+            ..*self
+        }
+    }
+
+    /// Value of a pixel, counted row by row.
+    pub(super) fn sample(&self, pixel: usize) -> Sample {
+        let plane = self.height * self.width;
+        match self.samples.get(2 * plane + pixel) {
+            Some(blue) => Sample::Three([self.samples[pixel], self.samples[plane + pixel], *blue]),
+            None => Sample::One(self.samples[pixel]),
+        }
+    }
+
+    /// The image with three planes; a single one is copied.
+    pub(super) fn spread(mut self) -> Self {
+        if self.samples.len() == self.height * self.width {
+            self.samples = self.samples.repeat(3);
+        }
+        self
+    }
+
+    /// The image with these channels: as it is, or its luma.
+    pub(super) fn with_channels(self, channels: Channels) -> Self {
+        match channels {
+            Channels::Rgb => self,
+            Channels::Y => {
+                let pixels = 0..self.height * self.width;
+                let samples = pixels.map(|pixel| self.sample(pixel).luma()).collect();
+                Self { samples, ..self }
+            }
         }
     }
 

@@ -102,7 +102,9 @@ impl Codes {
             }
         }
         let pixels = (factor * factor) as f32;
-        samples.iter_mut().for_each(|sum| *sum /= pixels);
+        for sum in &mut samples {
+            *sum /= pixels;
+        }
         Self {
             height,
             width,
@@ -120,6 +122,29 @@ impl Codes {
             height: planes.height,
             width: planes.width,
             samples: samples.collect(),
+        }
+    }
+
+    /// The codes as an image, clamped and rounded; values that are not numbers are black.
+    pub(super) fn to_rgb(&self) -> Rgb {
+        let mut image = Rgb::black(self.height, self.width);
+        let samples = image.samples_mut().iter_mut().zip(&self.samples);
+        samples.for_each(|(byte, code)| *byte = code.round().clamp(0.0, 255.0) as u8);
+        image
+    }
+
+    /// Figures of the brightness and of what clamping cuts off.
+    pub(super) fn facts(&self) -> Facts {
+        let luma = self.luma().samples;
+        let clipped = self
+            .samples
+            .iter()
+            .filter(|code| !(0.0..=255.0).contains(*code));
+        Facts {
+            brightness: mean(&luma),
+            darkest: percentile(&luma, 0.01),
+            brightest: percentile(&luma, 0.99),
+            clipped: clipped.count() as f64 / self.samples.len().max(1) as f64,
         }
     }
 
@@ -153,6 +178,18 @@ impl Codes {
             .map(|((red, green), blue)| (red - blue) / (red + green + blue + 3.0))
             .collect()
     }
+}
+
+/// Figures of an image, in codes of 0..255.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Facts {
+    /// Mean luma.
+    pub(crate) brightness: f64,
+    /// The 1st and the 99th percentile of luma.
+    pub(crate) darkest: f64,
+    pub(crate) brightest: f64,
+    /// Share of the samples that were beyond 0..255.
+    pub(crate) clipped: f64,
 }
 
 /// Mean luma of an image, in codes of 0..255.

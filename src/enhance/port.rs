@@ -63,14 +63,14 @@ impl fmt::Display for Port {
 }
 
 impl Port {
-    /// Layout of an image of three channels; `None` if the dimensions do not determine it.
-    pub(super) fn layout(&self) -> Option<TensorLayout> {
+    /// Layout of an image of so many channels; `None` if the dimensions do not determine it.
+    pub(super) fn layout(&self, channels: usize) -> Option<TensorLayout> {
         let mut fitting = TensorLayout::ALL.into_iter().filter(|layout| {
             self.dims.len() == layout.rank()
-                && self.dims[layout.places()[0]].known() == Some(3)
+                && self.dims[layout.places()[0]].known() == Some(channels)
                 && (layout.rank() == 3 || self.dims[0].can_be(1))
         });
-        // With a size of 3 in two places, the layout is ambiguous.
+        // With such a size in two places, the layout is ambiguous.
         fitting.next().filter(|_| fitting.next().is_none())
     }
 
@@ -81,21 +81,50 @@ impl Port {
         (3..=4).contains(&self.dims.len()) && !grey && last.iter().any(|dim| dim.can_be(3))
     }
 
-    /// Whether it can be an image of this height and width in a layout. Open dimensions can have any size.
-    pub(super) fn can_be_image(&self, layout: TensorLayout, [height, width]: [&Dim; 2]) -> bool {
+    /// Whether it can be an image of so many channels and this height and width in a layout. Open dimensions can have any size.
+    pub(super) fn can_be_image(
+        &self,
+        layout: TensorLayout,
+        count: usize,
+        [height, width]: [&Dim; 2],
+    ) -> bool {
         let [channels, rows, columns] = layout.places();
         let shape = self.dims.is_empty()
             || self.dims.len() == layout.rank()
-                && self.dims[channels].can_be(3)
+                && self.dims[channels].can_be(count)
                 && self.dims[rows].can_equal(height)
                 && self.dims[columns].can_equal(width)
                 && (layout.rank() == 3 || self.dims[0].can_be(1));
-        shape && !matches!(self.element, ElementType::Other(_))
+        shape && self.element.holds_images()
     }
 
-    /// Whether it holds one number.
+    /// Number of channels that the graph states for an image; `None` if it does not.
+    pub(super) fn channels(&self) -> Option<usize> {
+        let three = self.layout(3).map(|_| 3);
+        let first = self.dims.len().checked_sub(3);
+        three.or_else(|| self.dims.get(first?).and_then(Dim::known))
+    }
+
+    /// Whether an exporter generated its name: a number, a path of modules, or an operator's name.
+    ///
+    /// An exporter that gets fewer names than outputs names the first ones and numbers the rest. `output` is then the first
+    /// output, whatever that is (for Zero-DCE, the wrong one).
+    pub(super) fn is_numbered(&self) -> bool {
+        const OPERATORS: [&str; 19] = [
+            "add", "cat", "clamp", "clip", "concat", "conv", "conv2d", "div", "getitem",
+            "identity", "max", "min", "mul", "pow", "relu", "sigmoid", "slice", "sub", "tanh",
+        ];
+        let name = &self.name;
+        let word = name
+            .trim_end_matches(|c: char| c.is_ascii_digit() || c == '_')
+            .to_ascii_lowercase();
+        word.is_empty() || name.contains(['/', ':', '.']) || OPERATORS.contains(&word.as_str())
+    }
+
+    /// Whether it holds one number: all dimensions are 1, except that one may be free, as a batch is.
     pub(super) fn is_scalar(&self) -> bool {
-        self.dims.iter().all(|dim| dim.known() == Some(1))
+        let others = || self.dims.iter().filter(|dim| dim.known() != Some(1));
+        others().count() <= 1 && others().all(|dim| dim.can_be(1))
     }
 }
 

@@ -153,25 +153,19 @@ impl Probe {
         let usual = self.pairs.iter().find(|pair| pair.ranges == self.usual);
         let seen = usual.and_then(PairTrial::verdict);
         match (self.ranges, seen, self.plausible().as_slice()) {
-            (Ranges::Stated, None, _) => Conclusion::Plausible,
+            (Ranges::Stated, None, _) | (Ranges::Open, None, [] | [_]) => Conclusion::Plausible,
             (Ranges::Stated, Some(seen), _) if seen.gravity == Gravity::Doubtful => {
                 Conclusion::Doubtful(seen)
             }
             (_, Some(seen), []) | (Ranges::Stated, Some(seen), _) => Conclusion::Implausible(seen),
             (Ranges::Open, Some(seen), [other]) => Conclusion::Other(*other, seen),
-            (Ranges::Open, None, [] | [_]) => Conclusion::Plausible,
             (Ranges::Open, _, several) => Conclusion::Several(several.to_vec()),
         }
     }
 
-    /// The ranges that are proposed; `None` if nothing speaks for one pair.
-    pub(super) fn proposed(&self) -> Option<RangePair> {
-        match self.conclusion() {
-            Conclusion::Plausible => Some(self.usual),
-            Conclusion::Other(pair, _) => Some(pair),
-            Conclusion::Several(pairs) => bytes_of_units(&pairs),
-            Conclusion::Doubtful(_) | Conclusion::Implausible(_) => None,
-        }
+    /// The first plausible pair, else the usual one.
+    pub(super) fn best(&self) -> RangePair {
+        self.plausible().first().copied().unwrap_or(self.usual)
     }
 
     /// What was seen and the lines of the sidecar that would mend it, as it follows the file's name; `None` if the images are
@@ -236,6 +230,7 @@ fn mend(flaw: Flaw, ranges: Ranges) -> &'static str {
         (Flaw::Unlit | Flaw::White | Flaw::Haze, Ranges::Open) => {
             "If it is meant to do that, state its ranges in MODEL.onnx.toml beside it: `range_in = \"0..1\"` and `range_out = \"0..1\"`, or those that its authors use"
         }
+        (Flaw::Nan, _) => "Check its weights and its divisions by zero",
         (_, Ranges::Stated) => {
             "Check `range_in`, `range_out` and `output` in its sidecar, and the preset"
         }
@@ -313,7 +308,11 @@ mod tests {
             vec![pair(UNIT, &[None; 6]), pair(BYTES, &[None; 6])],
         );
         assert_eq!(both.conclusion(), Conclusion::Several(vec![UNIT, BYTES]));
-        assert_eq!(both.proposed(), Some(BYTES));
+        let problem = both.problem().unwrap();
+        assert!(
+            problem.contains("perhaps `range_in = \"0..255\"`"),
+            "{problem}"
+        );
         let signed = RangePair {
             input: ValueRange::Signed,
             ..UNIT
@@ -322,8 +321,9 @@ mod tests {
             Ranges::Open,
             vec![pair(UNIT, &[None; 6]), pair(signed, &[None; 6])],
         );
-        assert_eq!(other.proposed(), None);
-        assert!(other.problem().unwrap().contains("-1..1 in and 0..1 out"));
+        let problem = other.problem().unwrap();
+        assert!(problem.contains("-1..1 in and 0..1 out"), "{problem}");
+        assert!(!problem.contains("perhaps"), "{problem}");
     }
 
     #[test]

@@ -1,12 +1,13 @@
 //! Running the probe of a model on dark frames: [`Enhancer::probe`].
 
-use super::convention::{ElementType, ValueRange};
+use super::convention::{Rounding, ValueRange};
 use super::enhancer::Enhancer;
 use super::graph::{Graph, RunResult};
 use super::planes::Planes;
 use super::plausible::Codes;
 use super::probe::{Conclusion, PairTrial, Probe, RangePair, Ranges};
 use super::sidecar::ModelSidecar;
+use super::usage::Implausible;
 use crate::error::{Error, Result};
 use crate::types::Rgb;
 use crate::types::enhancer_note::{ProbeNote, ProbeOutcome};
@@ -14,16 +15,11 @@ use crate::types::enhancer_note::{ProbeNote, ProbeOutcome};
 /// Sizes that are tried one after another, longer and shorter side in pixels: most multiples that models need divide one of them.
 const SIZES: [[usize; 2]; 3] = [[144, 96], [160, 120], [128, 128]];
 
-/// What happens to a model whose images cannot be enhanced images.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) enum Implausible {
-    /// It is refused.
-    #[default]
-    Refused,
-    /// It is used (`--llie-anyway`).
-    Used,
-    /// Its images are not looked at, because they are those of a run that is there.
-    NotLookedFor,
+/// What a model made of dark frames.
+pub(super) struct Trials {
+    /// The frames as they were fed.
+    pub(super) frames: Vec<Rgb>,
+    pub(super) probe: Probe,
 }
 
 impl Enhancer {
@@ -33,7 +29,13 @@ impl Enhancer {
     /// If its images cannot be enhanced images, or several ranges would do, with the lines of a sidecar that would mend it; not if
     /// implausible images are used.
     pub(crate) fn probe(&mut self, dark: &[Rgb], implausible: Implausible) -> Result<()> {
-        let Some(probe) = self.run_probe(dark)? else {
+        let mut trials = self.trials(dark, self.convention(), self.stated_ranges())?;
+        if let (None, Some(frame)) = (&trials, dark.first()) {
+            // It may take the size of a frame, or show which sizes it takes.
+            self.enhance(frame)?;
+            trials = self.trials(dark, self.convention(), self.stated_ranges())?;
+        }
+        let Some(Trials { probe, .. }) = trials else {
             tracing::warn!(
                 "{}: it takes none of the small sizes of the probe, so nothing is known of whether its images can be enhanced images",
                 self.name()
@@ -62,8 +64,7 @@ impl Enhancer {
             problem,
             outcome,
         };
-        self.set_probed(note);
-        Ok(())
+        self.set_probed(note)
     }
 
     /// Looks at what it made of a frame in a condition.
@@ -83,11 +84,15 @@ impl Enhancer {
         })
     }
 
-    /// What the model makes of dark frames with each pair of ranges that is not ruled out; `None` if it fails at all sizes that are
-    /// tried.
-    pub(super) fn run_probe(&self, dark: &[Rgb]) -> Result<Option<Probe>> {
+    /// What the model makes of dark frames by a convention, with each pair of ranges that is not stated; `None` if it fails at all
+    /// sizes that are tried.
+    pub(super) fn trials(
+        &self,
+        dark: &[Rgb],
+        convention: &ModelSidecar,
+        [input, output]: [Option<ValueRange>; 2],
+    ) -> Result<Option<Trials>> {
         let usual = self.ranges();
-        let [input, output] = self.stated_ranges();
         let ranges = match (input, output) {
             (Some(_), Some(_)) => Ranges::Stated,
             _ => Ranges::Open,
@@ -103,9 +108,9 @@ impl Enhancer {
                 let convention = ModelSidecar {
                     range_in: Some(ranges.input),
                     range_out: Some(ranges.output),
-                    ..self.convention().clone()
+                    ..convention.clone()
                 };
-                let graph = self.graph().with_convention(&convention);
+                let graph = self.graph().with_convention(convention);
                 let graph = graph.map_err(|problem| self.fault(problem))?;
                 let Some(made) = made(&graph, &frames)? else {
                     break;
@@ -113,11 +118,12 @@ impl Enhancer {
                 pairs.push(PairTrial::new(ranges, &seen, made));
             }
             if !pairs.is_empty() {
-                return Ok(Some(Probe {
+                let probe = Probe {
                     ranges,
                     usual,
                     pairs,
-                }));
+                };
+                return Ok(Some(Trials { frames, probe }));
             }
         }
         Ok(None)
@@ -134,7 +140,7 @@ impl Enhancer {
         let planes = Planes::of(frame).resized(height, width);
         let planes = planes.map_err(|problem| self.fault(problem))?;
         planes
-            .to_rgb(super::convention::Rounding::Round)
+            .to_rgb(Rounding::Round)
             .ok_or_else(|| self.fault("a frame of the probe has no pixel".to_owned()))
     }
 }
@@ -143,6 +149,7 @@ impl Enhancer {
 pub(super) fn made(graph: &Graph, frames: &[Rgb]) -> Result<Option<Vec<Codes>>> {
     let mut all = Vec::with_capacity(frames.len());
     for frame in frames {
+        graph.restart_clock();
         match graph.codes(frame)? {
             RunResult::Output(codes) => all.push(codes),
             RunResult::Failed(_) => return Ok(None),
@@ -155,9 +162,4 @@ pub(super) fn made(graph: &Graph, frames: &[Rgb]) -> Result<Option<Vec<Codes>>> 
         }
     }
     Ok(Some(all))
-}
-
-/// Range that the element type states: bytes are 0..255.
-pub(super) fn of_type(element: &ElementType) -> Option<ValueRange> {
-    (*element == ElementType::Uint8).then_some(ValueRange::Bytes)
 }

@@ -5,9 +5,10 @@
 use half::f16;
 
 use super::convention::{ChannelOrder, ElementType, Rounding, TensorLayout, ValueRange};
+use super::output::Output;
 use super::planes::Planes;
 use super::sidecar::ModelSidecar;
-use super::signature::Signature;
+use super::signature::ImageInput;
 use super::tiles::TileWindow;
 
 /// Conversion of an output tensor to an image.
@@ -17,6 +18,8 @@ pub(super) struct OutputReading {
     pub(super) layout: Option<TensorLayout>,
     /// Layout that is chosen if several fit: that of the input.
     pub(super) preferred: TensorLayout,
+    /// Numbers of channels that it may have, the likely one first.
+    pub(super) channels: &'static [usize],
     pub(super) color: ChannelOrder,
     pub(super) range: ValueRange,
     /// Whether the range is known or must be checked against the values.
@@ -33,11 +36,13 @@ pub(super) enum Certainty {
     Assumed,
 }
 
-/// Problem with the values of an output.
+/// Problem with the values of an output, or of an input.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum OutOfRange {
     /// Some values are not numbers (NaN).
     NotNumbers,
+    /// The expressions in the sidecar make values that are not finite of the image, which are not fed.
+    NotFed,
     /// The values have another range than the assumed one.
     Beyond {
         min: f32,
@@ -56,9 +61,8 @@ pub(super) enum TensorSamples<'a> {
 }
 
 impl OutputReading {
-    /// The conversion that signature and convention define.
-    pub(super) fn of(signature: &Signature, convention: &ModelSidecar) -> Self {
-        let output = &signature.output;
+    /// The conversion that an output, the input and the convention define.
+    pub(super) fn of(output: &Output, input: &ImageInput, convention: &ModelSidecar) -> Self {
         let (range, certainty) = match (convention.range_out, &output.port.element) {
             (Some(range), _) => (range, Certainty::Known),
             (None, ElementType::Uint8) => (ValueRange::Bytes, Certainty::Known),
@@ -66,39 +70,47 @@ impl OutputReading {
             (None, _) => (
                 convention
                     .range_in
-                    .unwrap_or(signature.input.port.element.usual_range()),
+                    .unwrap_or(input.port.element.usual_range()),
                 Certainty::Assumed,
             ),
         };
         Self {
             layout: convention.layout_out.or(output.layout),
-            preferred: signature.input.layout,
-            color: convention.color.unwrap_or_default(),
+            preferred: input.layout,
+            channels: output.channels,
+            color: convention
+                .color_out
+                .or(convention.color)
+                .unwrap_or_default(),
             range,
             certainty,
             rounding: convention.rounding.unwrap_or_default(),
         }
     }
 
-    /// Layout of an output with dimensions `dims` for an image of this size; `None` if it cannot be one.
-    pub(super) fn layout(&self, dims: &[i64], size: [usize; 2]) -> Option<TensorLayout> {
-        let fits = |layout: &TensorLayout| {
-            let wanted = layout.dims(size);
+    /// Layout and number of channels of an output with dimensions `dims` for an image of this size; `None` if it cannot be one.
+    pub(super) fn layout(&self, dims: &[i64], size: [usize; 2]) -> Option<(TensorLayout, usize)> {
+        let fits = |layout: TensorLayout, channels: usize| {
+            let wanted = layout.dims(size, channels);
             wanted.len() == dims.len()
                 && wanted
                     .iter()
                     .zip(dims)
                     .all(|(a, b)| usize::try_from(*b) == Ok(*a))
         };
-        match self.layout {
-            Some(layout) => Some(layout).filter(fits),
+        let layouts: Vec<TensorLayout> = match self.layout {
+            Some(layout) => vec![layout],
             None => std::iter::once(self.preferred)
                 .chain(TensorLayout::ALL)
-                .find(fits),
-        }
+                .collect(),
+        };
+        let channels = self.channels.iter();
+        let mut all =
+            channels.flat_map(|count| layouts.iter().map(move |layout| (*layout, *count)));
+        all.find(|(layout, count)| fits(*layout, *count))
     }
 
-    /// The bytes of a part of an output, as red, green and blue of each pixel; `size` is that of the whole output.
+    /// The bytes of a part of an output of three channels, as red, green and blue of each pixel; `size` is that of the whole output.
     pub(super) fn bytes(
         &self,
         samples: TensorSamples<'_>,
@@ -113,7 +125,7 @@ impl OutputReading {
                 self.bytes(TensorSamples::Float32(&values), layout, size, part)
             }
             TensorSamples::Float32(values) => {
-                self.check(values)?;
+                check(values, self.range, self.certainty)?;
                 let (range, rounding) = (self.range, self.rounding);
                 Ok(self.gather(values, layout, size, part, |value| {
                     let code = range.code(value).clamp(0.0, 255.0);
@@ -126,37 +138,47 @@ impl OutputReading {
         }
     }
 
-    /// The whole output as floats in 0..1.
+    /// A part of an output as floats in 0..1; `size` is that of the whole output. Of the values nothing is checked but `certainty`.
     pub(super) fn planes(
         &self,
         samples: TensorSamples<'_>,
-        layout: TensorLayout,
+        (layout, channels): (TensorLayout, usize),
         [height, width]: [usize; 2],
+        part: TileWindow,
+        certainty: Certainty,
     ) -> Result<Planes, OutOfRange> {
         let values: Vec<f32> = match samples {
             TensorSamples::Uint8(bytes) => bytes.iter().map(|byte| f32::from(*byte)).collect(),
             TensorSamples::Float16(values) => values.iter().map(|value| value.to_f32()).collect(),
             TensorSamples::Float32(values) => values.to_vec(),
         };
-        self.check(&values)?;
-        let at = |channel: usize, pixel: usize| {
-            let channel = self.color.rgb_channel(channel);
+        check(&values, self.range, certainty)?;
+        let at = |channel: usize, row: usize, column: usize| {
+            let pixel = row * width + column;
+            let channel = match channels {
+                3 => self.color.rgb_channel(channel),
+                _ => channel,
+            };
             let value = if layout.is_planar() {
                 values[channel * height * width + pixel]
             } else {
-                values[3 * pixel + channel]
+                values[channels * pixel + channel]
             };
             match self.range {
                 ValueRange::Unit => value,
                 ValueRange::Bytes | ValueRange::Signed => self.range.code(value) / 255.0,
             }
         };
-        let channels = 0..3;
-        let samples = channels.flat_map(|channel| (0..height * width).map(move |i| (channel, i)));
+        let mut samples = Vec::with_capacity(channels * part.size()[0] * part.size()[1]);
+        for channel in 0..channels {
+            for row in part.top..part.bottom {
+                samples.extend((part.left..part.right).map(|column| at(channel, row, column)));
+            }
+        }
         Ok(Planes {
-            height,
-            width,
-            samples: samples.map(|(channel, pixel)| at(channel, pixel)).collect(),
+            height: part.size()[0],
+            width: part.size()[1],
+            samples,
         })
     }
 
@@ -190,36 +212,40 @@ impl OutputReading {
         }
         bytes
     }
+}
 
-    /// Refuses values that are not numbers, and values that do not fit the assumed range.
-    ///
-    /// Models that do not clamp overshoot by a little. So the range counts as wrong only if more than one sample in 20 is far
-    /// outside.
-    fn check(&self, values: &[f32]) -> Result<(), OutOfRange> {
-        let (mut nans, mut below, mut above) = (0_usize, 0_usize, 0_usize);
-        let mut max = f32::NEG_INFINITY;
-        for value in values {
-            max = if *value > max { *value } else { max };
-            nans += usize::from(value.is_nan());
-            below += usize::from(*value < -0.2);
-            above += usize::from(*value > 8.0);
-        }
-        if nans > 0 {
-            return Err(OutOfRange::NotNumbers);
-        }
-        let tolerated = values.len() / 20;
-        let likely = match (self.certainty, self.range) {
-            (Certainty::Assumed, ValueRange::Unit) if above > tolerated => ValueRange::Bytes,
-            (Certainty::Assumed, ValueRange::Unit) if below > tolerated => ValueRange::Signed,
-            (Certainty::Assumed, ValueRange::Bytes) if max <= 1.5 => ValueRange::Unit,
-            _ => return Ok(()),
-        };
-        Err(OutOfRange::Beyond {
-            min: values.iter().copied().fold(f32::INFINITY, f32::min),
-            max,
-            likely,
-        })
+/// Refuses values that are not numbers, and values that do not fit the assumed range.
+///
+/// Models that do not clamp overshoot by a little. So the range counts as wrong only if more than one sample in 20 is far
+/// outside.
+pub(super) fn check(
+    values: &[f32],
+    range: ValueRange,
+    certainty: Certainty,
+) -> Result<(), OutOfRange> {
+    let (mut nans, mut below, mut above) = (0_usize, 0_usize, 0_usize);
+    let mut max = f32::NEG_INFINITY;
+    for value in values {
+        max = if *value > max { *value } else { max };
+        nans += usize::from(value.is_nan());
+        below += usize::from(*value < -0.2);
+        above += usize::from(*value > 8.0);
     }
+    if nans > 0 {
+        return Err(OutOfRange::NotNumbers);
+    }
+    let tolerated = values.len() / 20;
+    let likely = match (certainty, range) {
+        (Certainty::Assumed, ValueRange::Unit) if above > tolerated => ValueRange::Bytes,
+        (Certainty::Assumed, ValueRange::Unit) if below > tolerated => ValueRange::Signed,
+        (Certainty::Assumed, ValueRange::Bytes) if max <= 1.5 => ValueRange::Unit,
+        _ => return Ok(()),
+    };
+    Err(OutOfRange::Beyond {
+        min: values.iter().copied().fold(f32::INFINITY, f32::min),
+        max,
+        likely,
+    })
 }
 
 /// The code nearest to a value of 0..255; halves are rounded away from zero.

@@ -7,7 +7,6 @@
 //! variable [`TELEMETRY_SWITCH`] acts before that, so programs must call [`forbid_telemetry`] first.
 
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use ort::environment::Environment;
@@ -15,8 +14,9 @@ use ort::logging::LogLevel;
 
 use crate::error::{Error, Result};
 
-use super::install::{Pin, install};
+use super::install::{Pin, check_installed, install};
 use super::library::{OLDEST, PINNED, probe};
+use super::runtime_thread::RuntimeThread;
 use super::search::{LibraryPlace, Surroundings};
 
 /// Whether the library may be installed if it is not found.
@@ -47,10 +47,8 @@ struct OpenRuntime {
     /// Where it was found, as `beside the program`.
     place: String,
     environment: Environment,
-    jobs: Sender<Job>,
+    thread: RuntimeThread,
 }
-
-type Job = Box<dyn FnOnce() + Send>;
 
 /// Environment variable that switches off ONNX Runtime's telemetry from the start if it is `1`.
 pub(crate) const TELEMETRY_SWITCH: &str = "ORT_DISABLE_TELEMETRY";
@@ -131,7 +129,7 @@ struct FoundLibrary {
 fn find(surroundings: &Surroundings, allowed: Install) -> Result<FoundLibrary> {
     let mut rejected = Vec::new();
     for (place, path) in surroundings.candidates() {
-        match probe(&path) {
+        match check(place, &path) {
             Ok(version) => {
                 let place = place.to_string();
                 return Ok(FoundLibrary {
@@ -139,6 +137,14 @@ fn find(surroundings: &Surroundings, allowed: Install) -> Result<FoundLibrary> {
                     version,
                     place,
                 });
+            }
+            Err(problem) if place == LibraryPlace::Cache && allowed == Install::Allowed => {
+                rejected.push(format!("{} {problem}", path.display()));
+                // What this program installed is replaced, so that no other version is used instead.
+                match install_here(surroundings, &rejected) {
+                    Ok(found) => return Ok(found),
+                    Err(problem) => tracing::warn!("it cannot be installed again: {problem}"),
+                }
             }
             Err(problem) => {
                 tracing::debug!("{} {problem}", path.display());
@@ -162,6 +168,17 @@ fn find(surroundings: &Surroundings, allowed: Install) -> Result<FoundLibrary> {
     installed.map_err(|problem| Error::Runtime(not_found_message(&problem, &rejected)))
 }
 
+/// Checks a candidate, one of the cache against its receipt too; returns its version.
+fn check(place: LibraryPlace, path: &Path) -> Result<String, String> {
+    if place == LibraryPlace::Cache
+        && let Some(pin) = Pin::of_this_platform()
+        && pin.is_for(path)
+    {
+        check_installed(path, pin)?;
+    }
+    probe(path)
+}
+
 /// Installs the pinned library into the cache.
 fn install_here(surroundings: &Surroundings, rejected: &[String]) -> Result<FoundLibrary, String> {
     let pin = Pin::of_this_platform().ok_or_else(|| {
@@ -180,7 +197,7 @@ fn install_here(surroundings: &Surroundings, rejected: &[String]) -> Result<Foun
         format!("{variables}, so there is no cache folder to install it into")
     })?;
     tracing::warn!(
-        "ONNX Runtime was not found{}; installing version {PINNED} with pip, once, into {}",
+        "no usable ONNX Runtime was found{}; installing version {PINNED} with pip, once, into {}",
         skipped(rejected),
         folder.display()
     );
@@ -245,14 +262,30 @@ impl Runtime {
             .build()
             .map_err(|e| fault(&e))?;
         environment.set_log_level(LogLevel::Warning);
-        let jobs = start_thread().map_err(|e| fault(&e))?;
+        let thread = RuntimeThread::start().map_err(|e| fault(&e))?;
         tracing::debug!("ONNX Runtime {version} from {}", path.display());
         Ok(Self(Arc::new(OpenRuntime {
             path,
             version,
             place,
             environment,
-            jobs,
+            thread,
+        })))
+    }
+
+    /// The same library with another thread, on which other sessions work at the same time.
+    ///
+    /// The thread is started by the first one: on Linux it inherits the setting that treats subnormal numbers as zero. Elsewhere they may
+    /// be slower there, which changes no byte.
+    pub(super) fn beside(&self) -> Result<Self> {
+        let thread = self.0.thread.run(RuntimeThread::start)?;
+        let thread = thread.map_err(|e| Error::Runtime(e.to_string()))?;
+        Ok(Self(Arc::new(OpenRuntime {
+            path: self.0.path.clone(),
+            version: self.0.version.clone(),
+            place: self.0.place.clone(),
+            environment: self.0.environment.clone(),
+            thread,
         })))
     }
 
@@ -278,31 +311,17 @@ impl Runtime {
     }
 
     /// Runs a job on the runtime's thread, waits for it and returns its result.
-    ///
-    /// Sessions are created and run there because the setting that treats subnormal numbers as zero belongs to the calling
-    /// thread, and only the first session sets it. So it holds for every model, but for no other thread of the program, whose
-    /// results thus do not depend on whether a model was loaded before.
     pub(super) fn run<T: Send + 'static>(
         &self,
         job: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T> {
-        let ended = || Error::Runtime("its thread ended, which is a bug of this program".into());
-        let (sender, result) = channel();
-        let job = Box::new(move || {
-            // Sending fails only if the waiting thread has ended.
-            drop(sender.send(job()));
-        });
-        self.0.jobs.send(job).map_err(|_| ended())?;
-        result.recv().map_err(|_| ended())
+        self.0.thread.run(job)
     }
-}
 
-fn start_thread() -> std::io::Result<Sender<Job>> {
-    let (sender, jobs) = channel::<Job>();
-    std::thread::Builder::new()
-        .name("onnxruntime".to_owned())
-        .spawn(move || jobs.into_iter().for_each(|job| job()))?;
-    Ok(sender)
+    /// The thread that sessions are created and run on.
+    pub(super) fn thread(&self) -> &RuntimeThread {
+        &self.0.thread
+    }
 }
 
 #[cfg(test)]

@@ -6,22 +6,26 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::probe_run::Implausible;
+use super::enhancer::Fitting;
 use super::runtime::{Install, RuntimeSearch};
 use super::tiles::Tiling;
-use crate::types::{Decides, KindSet};
+use super::time_limit::TimeLimit;
+use super::usage::Implausible;
+use crate::types::{Decides, TreatmentSet};
 
 /// The enhancers, and the images that they enhance.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Enhancement")]
 pub(crate) struct EnhancerArgs {
     /// An enhancer: lift or gray-gain, which are built in; FILE.onnx; or PRESET:FILE.onnx (zero-dce, zero-dce++, ruas-lol,
-    /// ruas-upe, retinexformer, darkir, sci, iat, pairlie, enlightengan); repeatable: each is shown beside raw; default: none
+    /// ruas-upe, ruas-dark, sci, iat, pairlie, pairlie-lol, enlightengan, uretinex, retinexformer, darkir, cidnet, llformer,
+    /// restormer, mirnet, kind); repeatable: each is shown beside raw; default: none
     #[arg(long, value_name = "NAME|FILE", add = Decides::Trials)]
     pub llie: Vec<PathBuf>,
-    /// Which degraded variants are enhanced
-    #[arg(long, value_name = "noise|ev|both", default_value_t = KindSet::NOISE, add = Decides::Trials)]
-    pub llie_on: KindSet,
+    /// Which images are enhanced: the dark ones of a variant, or l0, the untouched ones, for photographs that are dark already;
+    /// several with commas; both is ev,noise
+    #[arg(long, value_name = "l0|noise|ev|both|all", default_value_t = TreatmentSet::NOISE, add = Decides::Trials)]
+    pub llie_on: TreatmentSet,
 }
 
 /// Size in which images are enhanced.
@@ -36,6 +40,22 @@ pub(crate) struct SizeArgs {
     /// need the whole image and too much memory for it; default: no limit
     #[arg(long, value_name = "PIXELS", add = Decides::Pixels)]
     pub llie_max_side: Option<NonZeroUsize>,
+    /// Resize images to the fixed size of an enhancer, and the results back (bilinear), instead of filling and cutting them;
+    /// for enhancers that need the whole image; it blurs, and moves brightness by some codes of 255
+    #[arg(long, add = Decides::Pixels)]
+    pub llie_resize: bool,
+}
+
+impl SizeArgs {
+    /// How images reach an enhancer of a fixed size.
+    #[must_use]
+    pub(crate) fn fitting(&self) -> Fitting {
+        if self.llie_resize {
+            Fitting::Resize
+        } else {
+            Fitting::Tiles
+        }
+    }
 }
 
 /// What happens to an enhancer whose images cannot be enhanced images.
@@ -58,7 +78,7 @@ impl ProbeArgs {
     }
 }
 
-/// Source of the library of ONNX Runtime.
+/// Source of the library of ONNX Runtime, and the time that it may take.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Enhancement")]
 pub(crate) struct RuntimeArgs {
@@ -69,6 +89,10 @@ pub(crate) struct RuntimeArgs {
     /// Never install ONNX Runtime
     #[arg(long, add = Decides::Nothing)]
     pub offline: bool,
+    /// Seconds that an enhancer may take for one image; a slower one is an error of that image, and after three in a row the
+    /// enhancer is not run any more; 0 is no limit
+    #[arg(long, value_name = "SECONDS", default_value_t, add = Decides::Nothing)]
+    pub llie_timeout: TimeLimit,
 }
 
 impl RuntimeArgs {

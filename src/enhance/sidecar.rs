@@ -8,7 +8,11 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::convention::{ChannelOrder, Padding, Rounding, TensorLayout, Tile, ValueRange};
+use super::convention::{
+    ChannelOrder, Channels, Padding, Rounding, TensorLayout, Tile, ValueRange,
+};
+use super::expression::Expression;
+use super::extra::ExtraValue;
 use crate::error::{Error, Result};
 
 /// Statements of a sidecar. Every key may be missing; an unknown key is an error.
@@ -21,6 +25,14 @@ pub(super) struct ModelSidecar {
     pub(super) layout_out: Option<TensorLayout>,
     /// Order of the channels of input and output.
     pub(super) color: Option<ChannelOrder>,
+    /// Order of the channels of the output, if it is another.
+    pub(super) color_out: Option<ChannelOrder>,
+    /// Channels of input and output.
+    pub(super) channels: Option<Channels>,
+    /// What is fed, as an expression of `image`, the dark image in 0..1.
+    pub(super) input: Option<Expression>,
+    /// The enhanced image, as an expression of outputs in 0..1 and of `input`, the dark image in 0..1.
+    pub(super) image: Option<Expression>,
     /// Values of black and white in the input.
     pub(super) range_in: Option<ValueRange>,
     /// Values of black and white in the output.
@@ -33,15 +45,21 @@ pub(super) struct ModelSidecar {
     pub(super) multiple: Option<NonZeroUsize>,
     /// Pixels that fill an image up to a multiple.
     pub(super) pad: Option<Padding>,
+    /// Whether at least one row and one column are filled, even if the sides are multiples already.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) pad_always: Option<bool>,
+    /// Width and height that a graph takes alone, which tracing has frozen although the graph says any size.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) fixed: Option<[NonZeroUsize; 2]>,
     /// Output that is the enhanced image.
     pub(super) output: Option<OutputChoice>,
     /// Whether tiles are exact, and with which context.
     pub(super) tile: Option<Tile>,
     /// Rounding of values to bytes.
     pub(super) rounding: Option<Rounding>,
-    /// Values of further inputs, which are single numbers, by their names.
+    /// Values of further inputs, by their names.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub(super) extra: BTreeMap<String, f32>,
+    pub(super) extra: BTreeMap<String, ExtraValue>,
 }
 
 /// Output of a graph, by index or by name.
@@ -82,6 +100,9 @@ pub(super) fn text_for(model: &Path) -> Result<String> {
     }
 }
 
+/// Largest side and multiple, in pixels, that a sidecar may state; chosen: no image of this program is larger.
+const MOST_PIXELS: usize = 1 << 16;
+
 impl ModelSidecar {
     /// Parses the text of the sidecar of `model`.
     ///
@@ -102,11 +123,25 @@ impl ModelSidecar {
         {
             return Err(wrong("mean and std must be three numbers each, std not 0"));
         }
-        if let Some((name, value)) = sidecar.extra.iter().find(|(_, value)| !value.is_finite()) {
+        let stated = sidecar.fixed.into_iter().flatten().chain(sidecar.multiple);
+        if stated.max().is_some_and(|most| most.get() > MOST_PIXELS) {
             return Err(wrong(&format!(
-                "extra.{name} is {value}; expected a finite number"
+                "multiple and the sides of fixed are at most {MOST_PIXELS} pixels"
             )));
         }
+        if sidecar.output.is_some() && sidecar.image.is_some() {
+            return Err(wrong(
+                "output and image are both stated; state image alone, which names its outputs",
+            ));
+        }
+        let values = sidecar.extra.iter();
+        let mut checks = values.map(|(name, value)| value.check(name));
+        let input = sidecar.input.as_ref();
+        let input = input.map_or(Ok(()), |input| input.check_names("input", &["image"]));
+        checks
+            .find(Result::is_err)
+            .unwrap_or(input)
+            .map_err(|problem| wrong(&problem))?;
         Ok(sidecar)
     }
 
@@ -115,12 +150,17 @@ impl ModelSidecar {
         fn unless<T: PartialEq>(value: Option<T>, default: &T) -> Option<T> {
             value.filter(|value| value != default)
         }
+        let color = self.color.unwrap_or_default();
         Self {
             color: unless(self.color, &ChannelOrder::default()),
+            color_out: unless(self.color_out, &color),
+            channels: unless(self.channels, &Channels::default()),
+            input: self.input.filter(|input| !input.is_name("image")),
             mean: unless(self.mean, &[0.0; 3]),
             std: unless(self.std, &[1.0; 3]),
             multiple: unless(self.multiple, &NonZeroUsize::MIN),
             pad: unless(self.pad, &Padding::default()),
+            pad_always: unless(self.pad_always, &false),
             rounding: unless(self.rounding, &Rounding::default()),
             ..self
         }
@@ -130,17 +170,28 @@ impl ModelSidecar {
     pub(super) fn with_defaults(self, preset: &Self) -> Self {
         let mut extra = preset.extra.clone();
         extra.extend(self.extra);
+        // Each says what is read.
+        let (output, image) = match (self.output, self.image) {
+            (None, None) => (preset.output.clone(), preset.image.clone()),
+            stated => stated,
+        };
         Self {
             layout_in: self.layout_in.or(preset.layout_in),
             layout_out: self.layout_out.or(preset.layout_out),
             color: self.color.or(preset.color),
+            color_out: self.color_out.or(preset.color_out),
+            channels: self.channels.or(preset.channels),
+            input: self.input.or_else(|| preset.input.clone()),
+            image,
             range_in: self.range_in.or(preset.range_in),
             range_out: self.range_out.or(preset.range_out),
             mean: self.mean.or(preset.mean),
             std: self.std.or(preset.std),
             multiple: self.multiple.or(preset.multiple),
             pad: self.pad.or(preset.pad),
-            output: self.output.or_else(|| preset.output.clone()),
+            pad_always: self.pad_always.or(preset.pad_always),
+            fixed: self.fixed.or(preset.fixed),
+            output,
             tile: self.tile.or(preset.tile),
             rounding: self.rounding.or(preset.rounding),
             extra,
@@ -164,16 +215,27 @@ mod tests {
             std = [1, 1, 1]
             multiple = 8
             pad = "replicate"
+            pad_always = true
+            fixed = [64, 48]
             output = "enhanced"
             tile = "exact:12"
             rounding = "truncate"
+            color_out = "rgb"
+            channels = "y"
+            input = "image ^ 0.8"
             [extra]
             exposure = 0.5
+            z = { noise = "normal", std = 0.9 }
         "#;
         let read = ModelSidecar::parse(Path::new("m.onnx"), text).unwrap();
         assert_eq!(read.layout_in, Some(TensorLayout::Nhwc));
         assert_eq!(read.tile, Some(Tile::Exact(12)));
-        assert_eq!(read.extra, [("exposure".to_owned(), 0.5)].into());
+        assert_eq!(read.extra.len(), 2);
+        assert_eq!(
+            (read.color_out, read.channels),
+            (Some(ChannelOrder::Rgb), Some(Channels::Y))
+        );
+        assert_eq!(read.input, "image ^ 0.8".parse().ok());
         assert_eq!(read.output, Some(OutputChoice::Name("enhanced".into())));
         assert_eq!(ModelSidecar::default().with_defaults(&read), read);
         let own = ModelSidecar {
@@ -193,9 +255,19 @@ mod tests {
             ("output = [1]", "index from 0"),
             ("output", "expected"),
             ("multiple = 0", "nonzero"),
+            ("multiple = 65537", "at most 65536"),
+            ("fixed = [64, 0]", "nonzero"),
+            ("fixed = [64]", "length"),
+            ("fixed = [99999999999, 8]", "at most 65536"),
+            ("pad_always = 1", "boolean"),
             ("std = [1, 0, 1]", "std not 0"),
             ("tile = \"exact\"", "exact:8"),
             ("[extra]\ngamma = nan", "extra.gamma"),
+            ("[extra]\na = { from = \"image +\" }", "the end"),
+            ("channels = \"yuv\"", "yuv"),
+            ("input = \"2 * imag\"", "names `imag`"),
+            ("image = \"(1\"", "a closing parenthesis"),
+            ("output = \"a\"\nimage = \"a\"", "state image alone"),
         ] {
             let message = ModelSidecar::parse(model, text).unwrap_err().to_string();
             assert!(message.starts_with("a/model.onnx.toml: "), "{message}");

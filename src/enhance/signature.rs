@@ -1,9 +1,10 @@
-//! Roles of a graph's tensors: the degraded image, the enhanced image and further numbers ([`Signature::of`]).
+//! Roles of a graph's tensors: the degraded image, the enhanced image and further inputs ([`Signature::of`]).
 //!
 //! A graph states element types, ranks and fixed sizes. Value range and colour order come from a sidecar or a preset; by
 //! default they are those of the published models: RGB, 0..1.
 
-use super::convention::{ElementType, TensorLayout};
+use super::convention::{Channels, TensorLayout};
+use super::further_input::{ATTENTION, FurtherInput};
 use super::output::Output;
 use super::port::{Port, list};
 use super::sidecar::ModelSidecar;
@@ -17,10 +18,12 @@ pub(super) struct Signature {
     pub(super) height: Option<usize>,
     /// Width that the input must have, in pixels; `None` for any.
     pub(super) width: Option<usize>,
-    /// Further inputs, which are single numbers.
-    pub(super) extras: Vec<NumberInput>,
-    /// The output that is the enhanced image.
-    pub(super) output: Output,
+    /// Further inputs.
+    pub(super) extras: Vec<FurtherInput>,
+    /// The output that is the enhanced image, or those that its expression names, in its order.
+    pub(super) outputs: Vec<Output>,
+    /// The outputs that are not read.
+    pub(super) unread: Vec<Port>,
 }
 
 /// An input that is an image.
@@ -30,15 +33,6 @@ pub(super) struct ImageInput {
     pub(super) port: Port,
     /// Order of its dimensions.
     pub(super) layout: TensorLayout,
-}
-
-/// An input of one number.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct NumberInput {
-    /// Name, type and dimensions in the graph.
-    pub(super) port: Port,
-    /// Value that every run uses.
-    pub(super) value: f32,
 }
 
 impl Signature {
@@ -53,40 +47,57 @@ impl Signature {
     ) -> Result<Self, String> {
         let (image, layout) = image_input(inputs, convention)?;
         let [_, height, width] = layout.places().map(|place| &image.dims[place]);
+        let channels = convention.channels.unwrap_or_default();
+        let not_one = |key: &str, numbers: Option<[f32; 3]>| {
+            let numbers = numbers
+                .filter(|[a, b, c]| a.to_bits() != b.to_bits() || b.to_bits() != c.to_bits());
+            numbers.map(|numbers| format!("has one channel (channels = \"y\"), but {key} = {numbers:?} in its sidecar or preset has three different numbers; state the same one thrice"))
+        };
+        let mismatch = not_one("mean", convention.mean).or(not_one("std", convention.std));
+        if let (Channels::Y, Some(problem)) = (channels, mismatch) {
+            return Err(problem);
+        }
         let extras = inputs.iter().filter(|port| port.name != image.name);
-        let extras = extras.map(|port| extra(port, convention));
-        let extras = extras.collect::<Result<Vec<_>, String>>()?;
-        if let Some(name) = convention
-            .extra
-            .keys()
-            .find(|name| !extras.iter().any(|extra| extra.port.name == **name))
-            && !extras.is_empty()
+        let extras = extras
+            .map(|port| FurtherInput::of(port, convention.extra.get(&port.name), layout))
+            .collect::<Result<Vec<_>, String>>()?;
+        let mut stated = convention.extra.keys();
+        if let Some(name) =
+            stated.find(|name| !extras.iter().any(|extra| extra.port.name == **name))
         {
             return Err(format!(
-                "its sidecar or preset gives a value for {name:?}, which is not one of its inputs; it has {}",
+                "its sidecar gives a value for {name:?}, which is not one of its further inputs; it has {}",
                 list(inputs)
             ));
         }
-        let fits = |port: &Port| {
-            let layout = convention.layout_out.or(port.layout()).unwrap_or(layout);
-            port.can_be_image(layout, [height, width])
+        let fits = |port: &Port, count: usize| {
+            let layout = convention
+                .layout_out
+                .or(port.layout(count))
+                .unwrap_or(layout);
+            port.can_be_image(layout, count, [height, width])
         };
-        let output = Output::choose(outputs, convention.output.as_ref(), fits)?;
+        let read = match &convention.image {
+            Some(expression) => Output::named(outputs, expression, channels, fits)?,
+            None => vec![Output::choose(
+                outputs,
+                convention.output.as_ref(),
+                channels,
+                fits,
+            )?],
+        };
+        let is_unread = |port: &&Port| !read.iter().any(|output| output.port.name == port.name);
         Ok(Self {
             height: height.known(),
             width: width.known(),
             extras,
-            output,
+            unread: outputs.iter().filter(is_unread).cloned().collect(),
+            outputs: read,
             input: ImageInput {
                 port: image.clone(),
                 layout,
             },
         })
-    }
-
-    /// Whether the graph fixes neither height nor width.
-    pub(super) fn takes_any_size(&self) -> bool {
-        self.height.is_none() && self.width.is_none()
     }
 }
 
@@ -95,25 +106,21 @@ fn image_input<'a>(
     inputs: &'a [Port],
     convention: &ModelSidecar,
 ) -> Result<(&'a Port, TensorLayout), String> {
-    let unsupported = |port: &Port| matches!(port.element, ElementType::Other(_));
-    let images: Vec<&Port> = inputs.iter().filter(|port| !port.is_scalar()).collect();
-    let image = match images.as_slice() {
-        [image] => *image,
-        [] => {
-            return Err(format!(
-                "has no image among its inputs; it has {}",
-                list(inputs)
-            ));
-        }
-        several => {
-            return Err(format!(
-                "takes {} images, but only one can be given: {}; export it so that the graph makes the others",
-                several.len(),
-                list(inputs)
-            ));
-        }
+    let channels = convention.channels.unwrap_or_default();
+    let is_free = |port: &&Port| !port.is_scalar() && !convention.extra.contains_key(&port.name);
+    let images: Vec<&Port> = inputs.iter().filter(is_free).collect();
+    // Of several, all but one lack a value, and the message names the first of those.
+    let likely = |port: &&&Port| {
+        let name = port.name.to_lowercase();
+        port.layout(channels.count()).is_some() && !ATTENTION.iter().any(|word| name.contains(word))
     };
-    if unsupported(image) {
+    let Some(image) = images.iter().find(likely).or(images.first()).copied() else {
+        return Err(format!(
+            "has no image among its inputs; it has {}",
+            list(inputs)
+        ));
+    };
+    if !image.element.holds_images() {
         return Err(format!(
             "takes {image}; export it with float32, float16 or uint8"
         ));
@@ -125,55 +132,40 @@ fn image_input<'a>(
             "takes {image}, several images at a time; export it for a batch of 1 or of any size"
         ));
     }
-    let layout = match (convention.layout_in, image.layout()) {
+    let layout = match (convention.layout_in, image.layout(channels.count())) {
         (Some(stated), Some(found)) if stated != found => None,
         (Some(stated), _) => Some(stated).filter(|stated| stated.rank() == image.dims.len()),
         (None, Some(found)) => Some(found),
+        (None, None) if channels == Channels::Rgb && image.layout(1).is_some() => {
+            return Err(format!(
+                "takes {image}, an image of one channel; if that is the luma, state it in MODEL.onnx.toml beside it: `channels = \"y\"`"
+            ));
+        }
+        (None, None) if channels == Channels::Y && image.layout(3).is_some() => {
+            return Err(format!(
+                "takes {image}, an image of three channels, but its sidecar or preset states one (channels = \"y\"); leave that line out"
+            ));
+        }
         (None, None) if image.may_be_image() => {
             return Err(format!(
-                "takes {image}, whose dimensions do not show which are the three channels; state it in MODEL.onnx.toml beside it: `layout_in = \"nchw\"` (or nhwc, chw, hwc)"
+                "takes {image}, whose dimensions do not show which are the {}; state it in MODEL.onnx.toml beside it: `layout_in = \"nchw\"` (or nhwc, chw, hwc)",
+                channels.words()
             ));
         }
         (None, None) => {
             return Err(format!(
-                "takes {image}, which is not an image of three channels"
+                "takes {image}, which is not an image of {}",
+                channels.words()
             ));
         }
     };
     match layout {
-        Some(layout) if image.dims[layout.places()[0]].can_be(3) => Ok((image, layout)),
+        Some(layout) if image.dims[layout.places()[0]].can_be(channels.count()) => {
+            Ok((image, layout))
+        }
         _ => Err(format!(
             "takes {image}, which contradicts layout_in in its sidecar or preset"
         )),
-    }
-}
-
-/// The value of an input that is a single number.
-fn extra(port: &Port, convention: &ModelSidecar) -> Result<NumberInput, String> {
-    if !matches!(port.element, ElementType::Float32 | ElementType::Float16) {
-        return Err(format!(
-            "takes {port} in addition to the image, but only single floats are supported; export it with the value inside the graph"
-        ));
-    }
-    let value = convention.extra.get(&port.name).ok_or_else(|| {
-        format!(
-            "takes {port} in addition to the image, and its value is unknown; state it in MODEL.onnx.toml beside the model: `[extra]` and below it `{} = 0.5`, or the value that its authors use",
-            quoted(&port.name)
-        )
-    })?;
-    Ok(NumberInput {
-        port: port.clone(),
-        value: *value,
-    })
-}
-
-/// A name as a key of a TOML file, in quotes if needed.
-fn quoted(name: &str) -> String {
-    let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-    if !name.is_empty() && name.chars().all(bare) {
-        name.to_owned()
-    } else {
-        format!("{name:?}")
     }
 }
 

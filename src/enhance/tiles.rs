@@ -10,9 +10,6 @@ use std::str::FromStr;
 
 use crate::types::Rgb;
 
-/// Multiples to which sides are padded, tried in this order, if sidecar and preset state none.
-pub(super) const MULTIPLES: [usize; 6] = [1, 4, 8, 12, 16, 32];
-
 /// Pixels beyond a seam that a tile contributes too, for the comparison; chosen.
 pub(super) const GUARD: usize = 2;
 
@@ -236,9 +233,18 @@ impl TiledImage {
         }
     }
 
-    /// The assembled image, and the comparison of its overlaps.
-    pub(super) fn finish(self) -> (Rgb, Seam) {
-        (self.rgb, self.seam)
+    /// The top left part, of this height and width, of the assembled image, and the comparison of its overlaps.
+    pub(super) fn finish(self, [height, width]: [usize; 2]) -> (Rgb, Seam) {
+        let (rgb, seam) = (self.rgb, self.seam);
+        if [rgb.height(), rgb.width()] == [height, width] {
+            return (rgb, seam);
+        }
+        let mut part = Rgb::black(height, width);
+        let lines = part.samples_mut().chunks_exact_mut(3 * width);
+        for (to, from) in lines.zip(rgb.samples().chunks_exact(3 * rgb.width())) {
+            to.copy_from_slice(&from[..3 * width]);
+        }
+        (part, seam)
     }
 }
 
@@ -292,7 +298,7 @@ mod tests {
                 };
                 canvas.add(row, column, &pixels.flat_map(byte).collect::<Vec<_>>());
             }
-            canvas.finish()
+            canvas.finish([37, 50])
         };
         let (image, seam) = tiled(0);
         let expected = (0..37 * 50).flat_map(|i| [(i / 50 * 5 + i % 50 * 3) as u8; 3]);

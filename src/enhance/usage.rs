@@ -1,14 +1,27 @@
-//! What an enhancer did in a run, shared by all threads that use it: [`Usage`].
+//! What an enhancer did in a run, shared by all threads that use it: [`Usage`]; and what follows if that is odd: [`Implausible`].
 
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::plausible::{Codes, DARK, Gravity, brightness, judge};
-use super::probe_run::Implausible;
+use super::sizes::SizeLog;
 use crate::types::Rgb;
 use crate::types::enhancer_note::{EnhancerNote, FlawedImage};
 
 /// Number of dark images from which on a verdict on the enhancer is possible; chosen as the number of frames of the probe.
 const ENOUGH: usize = super::probe::FRAMES;
+
+/// What happens to a model whose images cannot be enhanced images.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum Implausible {
+    /// It is refused.
+    #[default]
+    Refused,
+    /// It is used (`--llie-anyway`).
+    Used,
+    /// Its images are not looked at, because they are those of a run that is there.
+    NotLookedFor,
+}
 
 /// A handle to the note of an enhancer, which grows while it is used.
 #[derive(Debug, Clone, Default)]
@@ -19,12 +32,25 @@ struct State {
     note: EnhancerNote,
     /// Number of images that cannot be enhanced images.
     impossible: usize,
+    /// What each twin did because of sizes.
+    sizes: BTreeMap<usize, SizeLog>,
 }
 
 impl Usage {
     /// The note as it is now.
     pub(crate) fn note(&self) -> EnhancerNote {
         self.with(|state| state.note.clone())
+    }
+
+    /// Notes what a twin did so far because of sizes.
+    pub(super) fn set_sizes(&self, twin: usize, log: &SizeLog) {
+        self.with(|state| {
+            state.sizes.insert(twin, log.clone());
+            let mut all = SizeLog::default();
+            state.sizes.values().for_each(|log| all.add(log));
+            state.note.sizes = all.summary();
+            state.note.resized = all.resized + all.reduced > 0;
+        });
     }
 
     /// Changes the note.

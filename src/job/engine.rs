@@ -4,6 +4,7 @@ use std::collections::HashSet;
 use std::path::PathBuf;
 
 use super::batch::{self, BatchFileArgs};
+use super::dark_already;
 use super::enhancers::OpenEnhancers;
 use super::estimate;
 use super::experiment::{DetailOf, Experiment, RecordOf};
@@ -77,6 +78,9 @@ impl<'a, E: Experiment> Job<'a, E> {
             let mut plan = Plan::new(experiment.plan(phase, &stored)?);
             plan.exclude(|key| answered.contains(key));
             plans.push(plan);
+        }
+        if plans.iter().any(|plan| !plan.conditions().is_empty()) {
+            dark_already::warn(experiment);
         }
         let timings = Timings::default();
         let enhancers = OpenEnhancers::load(self.files, &settings.loading)?;

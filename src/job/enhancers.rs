@@ -81,7 +81,9 @@ impl<'a> OpenEnhancers<'a> {
         for file in files {
             let enhancer = Enhancer::open(file, &runtime, settings.threads.threads)?
                 .with_tiling(settings.size.tile)
-                .with_max_side(settings.size.llie_max_side);
+                .with_max_side(settings.size.llie_max_side)
+                .with_fitting(settings.size.fitting())
+                .with_time_limit(settings.runtime.llie_timeout);
             opened.enhancers.push(enhancer);
         }
         opened.version = Some(runtime.version().to_owned());

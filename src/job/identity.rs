@@ -92,11 +92,16 @@ fn flag(parameter: &str) -> String {
 /// those of the whole image.
 fn enhancer(digest: &Digest, size: &SizeArgs) -> Value {
     let tile = (size.tile != Tiling::Auto).then(|| size.tile.to_string());
-    json!({
+    let mut content = json!({
         "--llie": digest,
         "--tile": tile,
         "--llie-max-side": size.llie_max_side,
-    })
+    });
+    // Left out if unset, so that runs from before the flag go on.
+    if size.llie_resize {
+        content["--llie-resize"] = json!(true);
+    }
+    content
 }
 
 /// Settings of a light reading, by flag.

@@ -61,9 +61,11 @@ impl MissingNotes {
             let image = (frame.clone(), condition.clone());
             self.measured.contains(&image)
         };
+        // An untouched frame may be dark itself, so that it is no reference for its enhanced image.
+        let has_reference = condition.degradation.is_some();
         WantedNotes {
             thumbnail: self.thumbnails.lacks(frame, condition),
-            fidelity: *condition != Condition::L0 && !is_measured(),
+            fidelity: has_reference && !is_measured(),
         }
     }
 }

@@ -3,34 +3,34 @@
 //! The images of a frame are made condition by condition, those of a walk all at once. The channel is bounded. So memory holds only the
 //! images in flight, one or two more groups, and the frame of each worker.
 
+mod preparation;
+
 use std::borrow::Cow;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use rayon::prelude::*;
 use tokio::sync::mpsc::Sender;
 
-use super::dark_frames::dark_frames;
 use super::frame_work::{FrameWork, ImageSteps, StagedFrame};
 use super::image_notes::{ImageNotes, MissingNotes, WantedNotes, fidelity};
 use super::plan::{SourcePlan, TrialGroup};
-use super::source::{Source, SourceFrame};
+use super::source::Source;
 use super::thumbnail::thumbnail;
 use super::timings::TimedStep;
 use super::trial::{Item, PreparedGroup, Stimulus};
 use super::workers::Workers;
-use crate::ask::{ImageLimit, Payload};
+use crate::ask::Payload;
 use crate::enhance::{Enhancer, Implausible};
 use crate::error::{Error, Result};
-use crate::types::{Condition, EnhancerName, FrameId, ImageFacts, Rgb, Thumbnail};
-
-/// Size in bytes above which some servers and proxies refuse an image.
-const LARGE_IMAGE: usize = 5_000_000;
+use crate::types::{Condition, EnhancerName, FrameId, Rgb, Thumbnail};
 
 /// The steps from a frame to an image, with the enhancement models that they need.
 pub(crate) struct ImagePipeline<'a> {
     pub(crate) steps: ImageSteps<'a>,
     pub(crate) enhancers: Vec<Enhancer>,
+    /// Further sets of the enhancers, each for a worker of its own; empty if one image is enhanced at a time.
+    pub(crate) sets: Vec<Vec<Enhancer>>,
     /// What happens to an enhancer whose images cannot be enhanced images.
     pub(crate) implausible: Implausible,
 }
@@ -46,90 +46,10 @@ enum SourceWork<'a> {
 }
 
 impl<'a> ImagePipeline<'a> {
-    /// Makes a few images before anything is paid for, to find errors that would stop a run later. These are the first image of each
-    /// enhancer and, if an endpoint is asked, those of the largest frame without an enhancer. Warns if these are large and the limit
-    /// of the endpoint is unknown.
-    pub(crate) fn check<I>(&mut self, sources: &[Source], plan: &[SourcePlan<I>]) -> Result<()> {
-        self.try_enhancers(sources, plan)?;
-        self.probe(sources, plan)?;
-        if let Some(limit) = self.steps.limit {
-            warn_of_large(self.largest(sources, plan)?.as_ref(), limit);
-        }
-        Ok(())
-    }
-
-    /// Makes the first image of each enhancer, so that a broken one is found before anything is asked.
-    fn try_enhancers<I>(&mut self, sources: &[Source], plan: &[SourcePlan<I>]) -> Result<()> {
-        let mut tried = BTreeSet::new();
-        for part in plan {
-            let source = &sources[part.source];
-            let Some(frame) = source.middle() else {
-                continue;
-            };
-            for condition in part.conditions() {
-                if let Some(name) = &condition.enhancer
-                    && tried.insert(name)
-                {
-                    let mut work = FrameWork::planned(self.steps, source, frame);
-                    self.image(&mut work, condition)?;
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// Tries each enhancer of the plan on a few of its own dark frames, so that one whose images cannot be enhanced images, or whose value
-    /// ranges are unknown, is found before anything is asked.
-    pub(crate) fn probe<I>(&mut self, sources: &[Source], plan: &[SourcePlan<I>]) -> Result<()> {
-        for enhancer in &mut self.enhancers {
-            let dark = dark_frames(self.steps, sources, plan, enhancer.name())?;
-            if !dark.is_empty() {
-                let probe = || enhancer.probe(&dark, self.implausible);
-                self.steps.timings.time(TimedStep::Enhance, probe)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// The largest image of the frame with the most pixels, in the conditions without an enhancer. An image that is too large for
-    /// the endpoint is found before anything is paid for.
-    pub(crate) fn largest<I>(
-        &mut self,
-        sources: &[Source],
-        plan: &[SourcePlan<I>],
-    ) -> Result<Option<ImageFacts>> {
-        let frames = plan.iter().flat_map(|part| {
-            let source = &sources[part.source];
-            source.frames.iter().map(move |frame| (part, source, frame))
-        });
-        let pixels = |frame: &SourceFrame| u64::from(frame.size.0) * u64::from(frame.size.1);
-        let Some((part, source, frame)) = frames.max_by_key(|(.., frame)| pixels(frame)) else {
-            return Ok(None);
-        };
-        let mut work = FrameWork::planned(self.steps, source, frame);
-        let mut largest: Option<ImageFacts> = None;
-        for condition in part
-            .conditions()
-            .filter(|condition| condition.enhancer.is_none())
-        {
-            let image = self
-                .image(&mut work, condition)
-                .map_err(|e| e.at(format!("frame {} at {condition}", frame.id)))?;
-            let facts = image.facts();
-            if largest
-                .as_ref()
-                .is_none_or(|known| facts.bytes > known.bytes)
-            {
-                largest = Some(facts.clone());
-            }
-        }
-        Ok(largest)
-    }
-
     /// Makes the images of all sources, until they are done or the channel is closed.
     ///
-    /// Normally each worker has one thread and works on one frame at a time. All workers share one source in three cases: with
-    /// enhancers, which have their own threads and take one image at a time; with walks; and with few frames.
+    /// Normally each worker has one thread and works on one frame at a time, with a set of enhancers of its own. All workers share one
+    /// source in three cases: with enhancers that are open only once and have their own threads; with walks; and with few frames.
     pub(crate) fn develop<I: Item>(
         mut self,
         sources: &[Source],
@@ -138,12 +58,7 @@ impl<'a> ImagePipeline<'a> {
         workers: &Workers,
         groups: &Sender<PreparedGroup<I>>,
     ) {
-        let one_source_each = self.enhancers.is_empty()
-            && plan.len() >= 2 * workers.each.len()
-            && plan
-                .iter()
-                .all(|part| sources[part.source].frames.len() < 2);
-        if !one_source_each {
+        if !self.enhancers.is_empty() || !one_frame_each(sources, &plan, workers.each.len()) {
             return workers
                 .all
                 .install(|| self.send_groups(sources, plan.into_iter(), missing, groups));
@@ -151,11 +66,16 @@ impl<'a> ImagePipeline<'a> {
         let steps = self.steps;
         let plan = Mutex::new(plan.into_iter());
         let next = || plan.lock().unwrap_or_else(PoisonError::into_inner).next();
+        let sets = match self.sets.len() {
+            0 => workers.each.iter().map(|_| Vec::new()).collect(),
+            _ => self.sets,
+        };
         std::thread::scope(|scope| {
-            for worker in &workers.each {
+            for (worker, enhancers) in workers.each.iter().zip(sets) {
                 let mut pipeline = ImagePipeline {
                     steps,
-                    enhancers: Vec::new(),
+                    enhancers,
+                    sets: Vec::new(),
                     implausible: self.implausible,
                 };
                 scope.spawn(move || {
@@ -401,6 +321,12 @@ impl<'a> ImagePipeline<'a> {
     }
 }
 
+/// Whether each worker can work on frames of its own: there are enough of them, and no walks.
+fn one_frame_each<I>(sources: &[Source], plan: &[SourcePlan<I>], workers: usize) -> bool {
+    let mut parts = plan.iter();
+    plan.len() >= 2 * workers && parts.all(|part| sources[part.source].frames.len() < 2)
+}
+
 /// The thumbnail of an image, or a warning and `None`: an answer must not fail because of a picture for the report.
 fn try_thumbnail(
     name: &FrameId,
@@ -414,20 +340,6 @@ fn try_thumbnail(
             tracing::warn!("the report has no thumbnail of {name} at {condition}: {problem}");
         })
         .ok()
-}
-
-/// Warns if images are large and the limit of the endpoint is unknown.
-fn warn_of_large(largest: Option<&ImageFacts>, limit: ImageLimit) {
-    if let Some(image) = largest
-        && image.bytes > LARGE_IMAGE
-        && limit == ImageLimit::UNKNOWN
-    {
-        tracing::warn!(
-            "images are up to {:.1} MB, {:.1} MB as sent; if the server answers 413, make them smaller with --max-side or --image jpeg:95",
-            image.bytes as f64 / 1e6,
-            image.bytes as f64 / 0.75e6
-        );
-    }
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ pub(crate) mod bilinear;
 pub(crate) mod budget;
 mod circuit_breaker;
 pub(crate) mod conditions;
+mod dark_already;
 pub(crate) mod dark_frames;
 mod dispatch;
 mod engine;

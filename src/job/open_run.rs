@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use super::budget::Budget;
 use super::circuit_breaker::EndReason;
+use super::dark_already;
 use super::dispatch::{Dispatcher, TrialCounts};
 use super::enhancers::OpenEnhancers;
 use super::experiment::{DetailOf, Experiment, RecordOf};
@@ -133,12 +134,16 @@ impl<E: Experiment> OpenRun<'_, E> {
         let workers = Workers::start(settings.loading.threads.threads)?;
         let timings = Timings::default();
         let limit = limit(settings);
-        let stoppers = enhancers.iter().map(Enhancer::stopper).collect();
-        let usages = usages(&enhancers);
+        let (sources, usages) = (experiment.sources(), usages(&enhancers));
         let mut pipeline = pipeline(experiment, enhancers, limit, &timings);
-        workers
-            .all
-            .install(|| pipeline.check(experiment.sources(), &plan.sources))?;
+        workers.all.install(|| {
+            if shows_images {
+                dark_already::warn(experiment);
+            }
+            pipeline.check(sources, &plan.sources)
+        })?;
+        pipeline.open_sets(sources, &plan.sources, &workers)?;
+        let stoppers = pipeline.stoppers();
         let dispatcher = Dispatcher {
             models,
             progress: self.progress,
@@ -147,7 +152,6 @@ impl<E: Experiment> OpenRun<'_, E> {
         };
         let missing = missing_notes(experiment, self.store.folder())?;
         let started = Instant::now();
-        let sources = experiment.sources();
         let end = dispatcher.run(counts, budget, &mut self.store, stoppers, |groups| {
             pipeline.develop(sources, plan.sources, &missing, &workers, groups);
         })?;
@@ -257,6 +261,7 @@ pub(crate) fn pipeline<'a, E: Experiment>(
             timings,
         },
         enhancers,
+        sets: Vec::new(),
         implausible: experiment.settings().loading.probe.implausible(),
     }
 }

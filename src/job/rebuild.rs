@@ -125,6 +125,7 @@ impl ImageRebuilder {
                 timings: &Timings::default(),
             },
             enhancers: std::mem::take(&mut self.enhancers),
+            sets: Vec::new(),
             implausible: Implausible::NotLookedFor,
         };
         let conditions: Vec<&Condition> = conditions.iter().collect();

@@ -6,6 +6,7 @@ use std::path::{self, Path, PathBuf};
 
 use clap::Args;
 
+use super::conditions::check_used;
 use super::enhancers::{self, EnhancerRunArgs};
 use super::image_words::ImageWords;
 use super::models::{AskSettings, ModelArgs};
@@ -136,9 +137,10 @@ impl JobSettings {
         self.ask.view == View::Image && !self.ask.models.is_empty()
     }
 
-    /// The files of the enhancement models. ONNX Runtime is opened, too, so that an error is found before anything that takes time. An
-    /// existing run may not need the runtime any more.
+    /// The files of the enhancement models, each of which works on some images of the run. ONNX Runtime is opened, too, so that an
+    /// error is found before anything that takes time. An existing run may not need the runtime any more.
     pub(crate) fn enhancers(&self) -> Result<Vec<ModelFile>> {
+        check_used(&self.light, &self.enhancers)?;
         let files = enhancers::read(&self.enhancers.llie)?;
         let exists = match &self.place {
             RunPlace::Automatic => false,

@@ -64,8 +64,8 @@ impl<'a, C> Ladder<'a, C> {
         ladder
     }
 
-    /// Adds the cells of the clean frames to every series of the same model. They stay a separate series only if the model has
-    /// no other.
+    /// Adds the cells of the clean frames to every series of the same model without an enhancer, and those of the enhanced clean
+    /// frames to every series with that enhancer. They stay a separate series only if the model has no such series.
     pub(super) fn with_clean(mut self) -> Self {
         let is_clean = |series: &Series<'_>| series.variant.kind.is_none();
         let (clean, mut degraded): (BTreeMap<_, _>, BTreeMap<_, _>) = self
@@ -77,7 +77,8 @@ impl<'a, C> Ladder<'a, C> {
             let mut same_model = same_model
                 .filter(|(other, _)| {
                     let groups = [other, &series].map(|series| series.variant.group.as_ref());
-                    other.model == series.model && LightGroup::meet(groups[0], groups[1])
+                    (other.model, other.enhancer) == (series.model, series.enhancer)
+                        && LightGroup::meet(groups[0], groups[1])
                 })
                 .peekable();
             if same_model.peek().is_some() {
@@ -88,6 +89,21 @@ impl<'a, C> Ladder<'a, C> {
         }
         self.series = degraded;
         self
+    }
+
+    /// The cell of a series at L0, [with the clean frames](Self::with_clean); for an enhancer that was not asked about them, the cell
+    /// without an enhancer.
+    pub(super) fn start(&self, series: &Series<'_>) -> Option<&'a C> {
+        let raw = self.series.iter().filter(|(other, _)| {
+            let is_clean = other.variant.kind.is_none();
+            let groups = [*other, series].map(|series| series.variant.group.as_ref());
+            (other.model, other.enhancer) == (series.model, None)
+                && (other.variant == series.variant
+                    || is_clean && LightGroup::meet(groups[0], groups[1]))
+        });
+        let own = self.series.get(series).into_iter();
+        let mut cells = own.chain(raw.map(|(_, cells)| cells));
+        cells.find_map(|cells| cells.get(&AxisLevel::L0).copied())
     }
 
     /// A table with a row for each series and a column for each level. The page and LaTeX also have a row for each subject

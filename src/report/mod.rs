@@ -4,6 +4,7 @@ pub(crate) mod alert;
 pub(crate) mod chart;
 pub(crate) mod choice_report;
 mod csv;
+pub(crate) mod doctor;
 pub(crate) mod figures;
 pub(crate) mod forecast;
 pub(crate) mod histogram;

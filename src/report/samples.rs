@@ -42,16 +42,7 @@ pub(super) fn samples(thumbnails: &[Thumbnail]) -> Option<SamplePage> {
     frames.dedup();
     let level = |thumbnail: &Thumbnail| thumbnail.condition.level();
     let levels: BTreeSet<AxisLevel> = thumbnails.iter().map(level).collect();
-    let lines: BTreeSet<(KindReading, Option<&EnhancerName>)> = thumbnails
-        .iter()
-        .map(|t| (t.condition.kind_reading(), t.condition.enhancer.as_ref()))
-        .filter(|(variant, _)| variant.kind.is_some())
-        .collect();
-    let lines = if lines.is_empty() {
-        BTreeSet::from([(KindReading::NONE, None)])
-    } else {
-        lines
-    };
+    let lines = lines(thumbnails);
     let mut rows = Vec::new();
     for frame in frames.into_iter().take(MAX_FRAMES) {
         for (variant, enhancer) in &lines {
@@ -60,7 +51,7 @@ pub(super) fn samples(thumbnails: &[Thumbnail]) -> Option<SamplePage> {
                     && (condition.kind_reading() == *variant
                         && condition.enhancer.as_ref() == *enhancer
                         || at == AxisLevel::L0
-                            && enhancer.is_none()
+                            && condition.enhancer.as_ref() == *enhancer
                             && LightGroup::meet(condition.group.as_ref(), variant.group.as_ref()))
             };
             let images = levels.iter().map(|at| {
@@ -89,6 +80,22 @@ pub(super) fn samples(thumbnails: &[Thumbnail]) -> Option<SamplePage> {
         levels: level_names.collect(),
         rows,
     })
+}
+
+/// The rows of a frame: each variant, raw and with each enhancer. The clean frames stand in the rows of the degraded ones; they have a
+/// row of their own if there is no other, raw or with the same enhancer.
+fn lines(thumbnails: &[Thumbnail]) -> BTreeSet<(KindReading, Option<&EnhancerName>)> {
+    let all = thumbnails
+        .iter()
+        .map(|t| (t.condition.kind_reading(), t.condition.enhancer.as_ref()));
+    let (mut lines, clean): (BTreeSet<_>, BTreeSet<_>) =
+        all.partition(|(variant, _)| variant.kind.is_some());
+    for (_, enhancer) in clean {
+        if lines.iter().all(|(_, other)| *other != enhancer) {
+            lines.insert((KindReading::NONE, enhancer));
+        }
+    }
+    lines
 }
 
 /// Width and height of an image in the figure, and width of the names and height of the levels, in pixels.
@@ -169,6 +176,19 @@ mod tests {
         assert_eq!(rows[0], ["data:L0", "data:L3-ev"]);
         assert_eq!(rows[1], ["data:L0", "data:L3-noise"]);
         assert_eq!(rows[2], ["", "data:L3-noise+lift"]);
+        let enhanced = ["L0", "L0+lift", "L3-ev", "L3-noise", "L3-noise+lift"].map(thumbnail);
+        let enhanced = super::samples(&enhanced).unwrap();
+        let rows: Vec<Vec<String>> = enhanced.rows.iter().map(urls).collect();
+        assert_eq!(rows[1], ["data:L0", "data:L3-noise"]);
+        assert_eq!(rows[2], ["data:L0+lift", "data:L3-noise+lift"]);
+        let clean = ["L0", "L0+lift", "L3-noise"].map(thumbnail);
+        let clean = super::samples(&clean).unwrap();
+        let rows: BTreeSet<Vec<String>> = clean.rows.iter().map(urls).collect();
+        let expected = [["data:L0", "data:L3-noise"], ["data:L0+lift", ""]];
+        assert_eq!(
+            rows,
+            expected.map(|row| row.map(str::to_owned).to_vec()).into()
+        );
         let svg = figure(&samples);
         assert_eq!(svg.matches("<image").count(), 5);
         assert!(svg.contains("a&lt;b&gt;&amp;c") && !svg.contains("a<b>"));

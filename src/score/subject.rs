@@ -132,8 +132,8 @@ impl Subject {
         subject
     }
 
-    /// A model with images, at a level of a variant, raw or enhanced. L0 is the clean frame of every variant and enhancer; it
-    /// keeps the group of runs, so that [`is_for`](Self::is_for) finds the clean frames of these runs.
+    /// A model with images, at a level of a variant, raw or enhanced. L0 is the clean frame of every variant; it keeps the group
+    /// of runs, so that [`is_for`](Self::is_for) finds the clean frames of these runs.
     #[must_use]
     pub fn seeing(
         model: &str,
@@ -154,7 +154,7 @@ impl Subject {
             } else {
                 variant.clone()
             },
-            enhancer: enhancer.filter(|_| !is_clean).cloned(),
+            enhancer: enhancer.cloned(),
         }
     }
 }

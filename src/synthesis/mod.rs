@@ -45,6 +45,7 @@ pub use exposures::Exposures;
 pub(crate) use exposures::{is_random, version};
 pub(crate) use negative::{Negative, ladder};
 pub use random::NoiseKey;
+pub(crate) use random::{Component, Site};
 pub(crate) use reading::Readings;
 pub use reading::{Amplify, Coupling, Draws, LightReading, Synthesis, Tone};
 pub(crate) use settings::{LightArgs, LightSettings, SensorArgs, SensorSettings};

@@ -66,7 +66,7 @@ impl NoiseKey {
     pub fn stream(&self, component: Component) -> Stream {
         let key = match component {
             Component::Camera => self.camera,
-            Component::Row | Component::RandomField => self.noise,
+            Component::Row | Component::RandomField | Component::ModelInput => self.noise,
         };
         let digest = Digest::of_parts([key.as_bytes(), component.name().as_bytes()]);
         let [low, high] = [0, 4].map(|at| {
@@ -87,6 +87,8 @@ pub enum Component {
     Row,
     /// Numbers of each sensor site: see [`RandomField`].
     RandomField,
+    /// Noise that an enhancer takes as an input.
+    ModelInput,
 }
 
 impl Component {
@@ -96,6 +98,7 @@ impl Component {
             Self::Camera => "camera",
             Self::Row => "row",
             Self::RandomField => "field",
+            Self::ModelInput => "model input",
         }
     }
 }

@@ -152,7 +152,9 @@ mod tests {
     fn examples_do_not_depend_on_the_order() {
         let names: Vec<String> = (0..9).map(|i| format!("f{i}")).collect();
         let [mut one, mut other] = [JudgedImages::default(), JudgedImages::default()];
-        names.iter().for_each(|name| one.count(Some(image(name))));
+        for name in &names {
+            one.count(Some(image(name)));
+        }
         names
             .iter()
             .rev()

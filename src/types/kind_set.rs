@@ -13,9 +13,6 @@ impl KindSet {
     /// The two kinds of the paper, `both`.
     pub const BOTH: Self = Self(1 << Kind::Exposure as u16 | 1 << Kind::Sensor as u16);
 
-    /// Sensor noise, the default input of enhancers.
-    pub const NOISE: Self = Self(1 << Kind::Sensor as u16);
-
     /// The set of a single kind.
     #[must_use]
     pub fn only(kind: Kind) -> Self {

@@ -24,6 +24,7 @@ pub(crate) mod record;
 pub(crate) mod reply;
 pub(crate) mod run_question;
 pub(crate) mod severity;
+pub(crate) mod treatment_set;
 pub(crate) mod trial_key;
 pub(crate) mod words;
 
@@ -48,6 +49,7 @@ pub use record::{Detail, Failure, FailureKind, Via, View};
 pub use reply::{Finish, Reply, Usage};
 pub use run_question::RunQuestion;
 pub use severity::{Axis, Severity};
+pub use treatment_set::TreatmentSet;
 pub use trial_key::TrialKey;
 
 /// The record of a trial; by default of a question with choices.

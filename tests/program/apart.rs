@@ -120,12 +120,12 @@ fn a_run_in_other_light_is_compared_although_replies_at_l0_differ() {
 #[test]
 fn words_are_compared_with_the_first_run_that_has_the_question() {
     let scene = Scene::new();
-    scene.run("--levels L0", "a");
+    scene.run("--levels L0 --llie-on l0", "a");
     copied(&scene.bench, "a", "b", |record| answer(record, 2));
     let path = scene.bench.path("b/questions.jsonl");
     let text = fs::read_to_string(&path).unwrap();
     fs::write(&path, text.replace("What color", "Which color")).unwrap();
-    scene.run("--levels L0 --limit 1 --model n", "one");
+    scene.run("--levels L0 --llie-on l0 --limit 1 --model n", "one");
     let expected = "The words of 40 shared questions differ.";
     check_rows(["report a b", "report a b one", "report one a b"], |line| {
         let alerts = scene.alerts(line);

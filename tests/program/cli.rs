@@ -220,7 +220,7 @@ fn wrong_enhancers_name_their_file() {
     // Where ONNX Runtime is not there yet, its first use installs it and says so.
     onnx::identity().write(&bench.path(""), "fine.onnx");
     bench.complete(&words(
-        "--model random --limit 1 --levels L1 --out first --llie fine.onnx",
+        "--model random --limit 1 --levels L1 --out first --llie-anyway --llie fine.onnx",
     ));
     let line = |file: &str| format!("--model random --out run --llie {file}");
     refused(&bench, &line("nowhere.onnx"), &["nowhere.onnx"]);

@@ -205,7 +205,7 @@ fn set(conditions: &str) -> BTreeSet<String> {
 }
 
 /// What refuses an evaluation on the folder of another: the field that the message names, and the flag.
-const REFUSED: [(&str, &str); 25] = [
+const REFUSED: [(&str, &str); 26] = [
     ("--data", "--data elsewhere/frames"),
     ("--questions", "--questions other.jsonl"),
     ("--rules", "--rules rules.toml"),
@@ -219,6 +219,7 @@ const REFUSED: [(&str, &str); 25] = [
     ("--tile", "--tile 64"),
     ("--tile", "--tile whole"),
     ("--llie-max-side", "--llie-max-side 8"),
+    ("--llie-resize", "--llie-resize"),
     ("--image", "--image jpeg:90"),
     ("--max-side", "--max-side 16"),
     ("--base-url", "--base-url http://127.0.0.1:9/v1"),
@@ -234,7 +235,7 @@ const REFUSED: [(&str, &str); 25] = [
 ];
 
 /// The same for open questions.
-const OPEN_REFUSED: [(&str, &str); 22] = [
+const OPEN_REFUSED: [(&str, &str); 23] = [
     ("--questions", "--questions other.json"),
     ("--num-frames", "--num-frames 2"),
     ("--image-size", "--image-size 32"),
@@ -248,6 +249,7 @@ const OPEN_REFUSED: [(&str, &str); 22] = [
     ("--fixed", "--fixed"),
     ("--tile", "--tile 64"),
     ("--llie-max-side", "--llie-max-side 8"),
+    ("--llie-resize", "--llie-resize"),
     ("--image", "--image jpeg:90"),
     ("--base-url", "--base-url http://127.0.0.1:9/v1"),
     ("--temperature", "--temperature 0.5"),
@@ -262,7 +264,7 @@ const OPEN_REFUSED: [(&str, &str); 22] = [
 #[test]
 fn every_field_of_an_evaluation_refuses_another_value() {
     let scene = Scene::new();
-    let enhanced = |otherwise: &str| format!("--limit 1 --llie one.onnx {otherwise}");
+    let enhanced = |otherwise: &str| format!("--limit 1 --llie one.onnx --llie-anyway {otherwise}");
     scene.complete(&EVALUATION, &enhanced(""), "run");
     for (field, otherwise) in REFUSED {
         scene.refuses(&EVALUATION, &enhanced(otherwise), "run", field);
@@ -272,7 +274,7 @@ fn every_field_of_an_evaluation_refuses_another_value() {
 #[test]
 fn every_field_of_open_questions_refuses_another_value() {
     let scene = Scene::new();
-    let enhanced = |otherwise: &str| format!("--limit 1 --llie one.onnx {otherwise}");
+    let enhanced = |otherwise: &str| format!("--limit 1 --llie one.onnx --llie-anyway {otherwise}");
     scene.complete(&OPEN, &enhanced(""), "run");
     for (field, otherwise) in OPEN_REFUSED {
         scene.refuses(&OPEN, &enhanced(otherwise), "run", field);
@@ -283,7 +285,7 @@ fn every_field_of_open_questions_refuses_another_value() {
 type Addition = (&'static str, &'static str, usize);
 
 /// What may be added to an evaluation. A part of the noise model that is said makes another light reading.
-const ADDITIONS: [Addition; 18] = [
+const ADDITIONS: [Addition; 19] = [
     ("", "--blind", 3),
     ("", "--model m --model n", 9),
     ("", "--model n", 9),
@@ -291,8 +293,21 @@ const ADDITIONS: [Addition; 18] = [
     ("--levels L0,L3", "--levels L0,L3,L5", 6),
     ("--levels L0", "--levels L3", 6),
     ("--variant ev", "--variant both", 3),
-    ("--llie one.onnx", "--llie one.onnx --llie two.onnx", 3),
-    ("--llie one.onnx", "--llie one.onnx --llie-on both", 3),
+    (
+        "--llie one.onnx --llie-anyway",
+        "--llie one.onnx --llie two.onnx --llie-anyway",
+        3,
+    ),
+    (
+        "--llie one.onnx --llie-anyway",
+        "--llie one.onnx --llie-on both --llie-anyway",
+        3,
+    ),
+    (
+        "--llie one.onnx --llie-anyway",
+        "--llie one.onnx --llie-on l0,noise --llie-anyway",
+        3,
+    ),
     ("", "--profile physical", 3),
     ("", "--amplify all", 3),
     ("", "--tone before-ev", 3),
@@ -312,10 +327,14 @@ const OPEN_ADDITIONS: [Addition; 9] = [
     ("", "--blind-model m", 3),
     ("--levels L0,L3", "--levels L0,L3,L5", 3),
     ("--variant noise", "--variant both", 3),
-    ("--llie one.onnx", "--llie one.onnx --llie two.onnx", 3),
     (
-        "--variant both --llie one.onnx",
-        "--variant both --llie one.onnx --llie-on both",
+        "--llie one.onnx --llie-anyway",
+        "--llie one.onnx --llie two.onnx --llie-anyway",
+        3,
+    ),
+    (
+        "--variant both --llie one.onnx --llie-anyway",
+        "--variant both --llie one.onnx --llie-on both --llie-anyway",
         3,
     ),
     ("", "--profile physical", 3),
@@ -323,10 +342,11 @@ const OPEN_ADDITIONS: [Addition; 9] = [
 ];
 
 /// What changes no answer: given on the folder of a run, it asks nothing.
-const NOTHING: [&str; 24] = [
+const NOTHING: [&str; 25] = [
     "--max-pixels 1000000",
     "--threads 1",
     "--offline",
+    "--llie-timeout 60",
     "--api-key-env none",
     "--api-key-file key.txt",
     "--key-header api-key",
@@ -358,7 +378,7 @@ fn what_decides_nothing_asks_nothing() {
     bench.file("other.toml", "retries = 3\n");
     let prices = "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 1, output = 1 }\n";
     bench.file("prices.toml", prices);
-    let enhanced = |otherwise: &str| format!("--limit 1 --llie one.onnx {otherwise}");
+    let enhanced = |otherwise: &str| format!("--limit 1 --llie one.onnx --llie-anyway {otherwise}");
     scene.complete(&EVALUATION, &enhanced(""), "run");
     for otherwise in NOTHING {
         scene.adds(&EVALUATION, &enhanced(otherwise), "run", 0);
@@ -366,7 +386,8 @@ fn what_decides_nothing_asks_nothing() {
 }
 
 /// Flags that the tables here leave out, and where they are held.
-const ELSEWHERE: [(&str, &str); 17] = [
+const ELSEWHERE: [(&str, &str); 18] = [
+    ("--llie-anyway", "tests/program/enhance/probe.rs"),
     ("--splits", "tests/program/openeqa/"),
     ("--categories", "tests/program/openeqa/"),
     ("--file-size", "tests/program/batch.rs"),
@@ -481,7 +502,7 @@ fn a_run_to_which_something_is_added_is_no_longer_complete_until_it_is_asked() {
 fn the_key_of_a_trial_has_what_decides_its_image() {
     let scene = Scene::new();
     let keys = |otherwise: &str| scene.keys(&EVALUATION, otherwise);
-    let enhanced = |otherwise: &str| keys(&format!("--llie one.onnx {otherwise}"));
+    let enhanced = |otherwise: &str| keys(&format!("--llie one.onnx --llie-anyway {otherwise}"));
     let (raw, first) = (keys(""), enhanced(""));
     assert_eq!((raw.len(), first.len()), (9, 12));
     assert_eq!(first, enhanced(""), "the same command again");
@@ -505,7 +526,7 @@ fn the_key_of_a_trial_has_what_decides_its_image() {
 fn the_key_of_an_answer_has_what_decides_its_images() {
     let scene = Scene::new();
     let keys = |otherwise: &str| scene.keys(&OPEN, otherwise);
-    let enhanced = |otherwise: &str| keys(&format!("--llie one.onnx {otherwise}"));
+    let enhanced = |otherwise: &str| keys(&format!("--llie one.onnx --llie-anyway {otherwise}"));
     let (raw, first) = (keys(""), enhanced(""));
     assert_eq!((raw.len(), first.len()), (6, 9));
     assert_eq!(first, enhanced(""), "the same command again");
@@ -533,7 +554,7 @@ fn the_key_of_an_answer_has_what_decides_its_images() {
 
 /// Models with what stands in their sidecars, and what else may stand there for other pixels.
 #[rustfmt::skip]
-const SIDECARS: [(&str, &str, &[&str]); 3] = [
+const SIDECARS: [(&str, &str, &[&str]); 4] = [
     ("one.onnx", "", &[
         "color = \"bgr\"",
         "range_in = \"-1..1\"",
@@ -544,9 +565,18 @@ const SIDECARS: [(&str, &str, &[&str]); 3] = [
         "multiple = 16\npad = \"zero\"",
         "multiple = 16\npad = \"replicate\"",
         "rounding = \"truncate\"",
+        "color_out = \"bgr\"",
+        "input = \"image ^ 0.8\"",
+        "image = \"output ^ 0.8\"",
     ]),
     ("outputs.onnx", "output = 0", &["output = 1"]),
     ("inputs.onnx", "[extra]\nexposure = 0.5", &["[extra]\nexposure = 0.75"]),
+    ("noise.onnx", "[extra]\nz = { noise = \"normal\", std = 0.01 }", &[
+        "[extra]\nz = { noise = \"normal\", std = 0.02 }",
+        "[extra]\nz = { noise = \"normal\", std = 0.01, seed = 1 }",
+        "[extra]\nz = { map = 0.1 }",
+        "[extra]\nz = { from = \"0.1 * image\" }",
+    ]),
 ];
 
 #[test]
@@ -555,10 +585,11 @@ fn what_a_sidecar_says_of_pixels_is_another_enhancer() {
     let bench = &scene.house.0;
     onnx::two_outputs().write(&bench.path(""), "outputs.onnx");
     onnx::two_inputs().write(&bench.path(""), "inputs.onnx");
+    onnx::plus_noise().write(&bench.path(""), "noise.onnx");
     let mut seen = BTreeSet::new();
     for (model, before, others) in SIDECARS {
         let sidecar = format!("{model}.toml");
-        let said = format!("--levels L3 --variant noise --limit 1 --llie {model}");
+        let said = format!("--levels L3 --variant noise --limit 1 --llie-anyway --llie {model}");
         bench.file(&sidecar, before);
         let first = scene.fresh();
         scene.complete(&EVALUATION, &said, &first);
@@ -580,7 +611,8 @@ fn what_a_sidecar_says_of_pixels_is_another_enhancer() {
 #[test]
 fn what_a_preset_says_of_pixels_is_another_enhancer() {
     let scene = Scene::new();
-    let said = |model: &str| format!("--levels L3 --variant noise --limit 1 --llie {model}");
+    let said =
+        |model: &str| format!("--levels L3 --variant noise --limit 1 --llie-anyway --llie {model}");
     scene.complete(&EVALUATION, &said("one.onnx"), "run");
     let plain = scene.keys_in("run");
     let preset = said("ruas-upe:one.onnx");
@@ -590,8 +622,11 @@ fn what_a_preset_says_of_pixels_is_another_enhancer() {
 }
 
 /// What a model is taken to be where nothing is said, and what is no statement at all.
-const DEFAULTS: [&str; 8] = [
+const DEFAULTS: [&str; 11] = [
     "color = \"rgb\"",
+    "color_out = \"rgb\"",
+    "channels = \"rgb\"",
+    "input = \"image\"",
     "pad = \"reflect\"",
     "rounding = \"round\"",
     "multiple = 1",
@@ -604,19 +639,19 @@ const DEFAULTS: [&str; 8] = [
 #[test]
 fn a_default_that_is_written_out_changes_nothing() {
     let scene = Scene::new();
-    let said = "--levels L3 --limit 1 --llie one.onnx";
+    let said = "--levels L3 --limit 1 --llie-anyway --llie one.onnx";
     scene.complete(&EVALUATION, said, "run");
     for default in DEFAULTS {
         scene.house.0.file("one.onnx.toml", default);
         scene.adds(&EVALUATION, said, "run", 0);
     }
     // What a preset says may stand beside the model, too.
-    let preset = "--levels L3 --limit 1 --llie darkir:two.onnx";
+    let preset = "--levels L3 --limit 1 --llie-anyway --llie darkir:two.onnx";
     scene.complete(&EVALUATION, preset, "preset");
     let states = "multiple = 8\npad = \"zero\"\nrounding = \"truncate\"\n";
     scene.house.0.file("two.onnx.toml", states);
     scene.adds(&EVALUATION, preset, "preset", 0);
-    let alone = "--levels L3 --limit 1 --llie two.onnx";
+    let alone = "--levels L3 --limit 1 --llie-anyway --llie two.onnx";
     let states = format!("{states}tile = \"none\"\n");
     scene.house.0.file("two.onnx.toml", states);
     scene.adds(&EVALUATION, alone, "preset", 0);

@@ -325,7 +325,8 @@ fn a_limit_that_cuts_most_replies_is_warned_of() {
 
 // ---- Open questions about enhanced walks ----
 
-const OPEN: &str = "--model m --judge j --levels L0,L3 --llie bright.onnx --out run --base-url";
+const OPEN: &str =
+    "--model m --judge j --levels L0,L3 --llie bright.onnx --llie-anyway --out run --base-url";
 
 /// A house, and a model that makes everything brighter.
 fn bright_house() -> House {

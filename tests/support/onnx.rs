@@ -49,14 +49,18 @@ use Size::{Known, Named};
 pub enum Type {
     Float = 1,
     Byte = 2,
+    Int = 6,
     Long = 7,
+    Bool = 9,
     Half = 10,
+    Double = 11,
 }
 
 /// The value of an attribute of an operator.
 pub enum Attribute {
     Int(u64),
     Ints(&'static [u64]),
+    Body(Graph),
 }
 
 /// 1 × channels × height × width of any size.
@@ -65,6 +69,7 @@ fn image(channels: u64) -> [Size; 4] {
 }
 
 /// A model that is being made.
+#[derive(Clone)]
 pub struct Graph {
     nodes: Vec<Message>,
     constants: Vec<Message>,
@@ -121,6 +126,15 @@ impl Graph {
         self
     }
 
+    /// An initialiser of 64-bit integers.
+    pub fn shape(mut self, name: &str, values: &[i64]) -> Self {
+        let raw: Vec<u8> = values.iter().flat_map(|x| x.to_le_bytes()).collect();
+        let tensor = Message::default().int(1, values.len() as u64).int(2, 7);
+        self.constants
+            .push(tensor.bytes(8, name.as_bytes()).bytes(9, &raw));
+        self
+    }
+
     /// A float initialiser whose values lie in another file.
     pub fn external(mut self, name: &str, shape: &[u64], file: &str) -> Self {
         let dims = shape
@@ -165,6 +179,7 @@ impl Graph {
                     let listed = values.iter().fold(attribute, |a, value| a.int(8, *value));
                     listed.int(20, 7)
                 }
+                Attribute::Body(body) => attribute.message(6, &body.message()).int(20, 5),
             };
             node.message(5, &attribute)
         });
@@ -172,8 +187,7 @@ impl Graph {
         self
     }
 
-    /// The bytes of an ONNX file: IR version 8, operator set 13.
-    pub fn model(&self) -> Vec<u8> {
+    fn message(&self) -> Message {
         let graph = Message::default();
         let graph = self.nodes.iter().fold(graph, |g, node| g.message(1, node));
         let graph = graph.bytes(2, b"graph");
@@ -182,13 +196,23 @@ impl Graph {
             .inputs
             .iter()
             .fold(graph, |g, port| g.message(11, port));
-        let graph = self
-            .outputs
+        self.outputs
             .iter()
-            .fold(graph, |g, port| g.message(12, port));
-        let opset = Message::default().bytes(1, b"").int(2, 13);
-        let model = Message::default().int(1, 8).bytes(2, b"darkqa-eval");
-        model.message(7, &graph).message(8, &opset).0
+            .fold(graph, |g, port| g.message(12, port))
+    }
+
+    /// The bytes of an ONNX file: IR version 8, operator set 13.
+    pub fn model(&self) -> Vec<u8> {
+        self.model_of(8, 13)
+    }
+
+    /// The bytes of an ONNX file of an IR version and an operator set.
+    pub fn model_of(&self, ir_version: u64, operators: u64) -> Vec<u8> {
+        let opset = Message::default().bytes(1, b"").int(2, operators);
+        let model = Message::default()
+            .int(1, ir_version)
+            .bytes(2, b"darkqa-eval");
+        model.message(7, &self.message()).message(8, &opset).0
     }
 
     /// Writes the model into a folder.
@@ -263,6 +287,89 @@ pub fn fixed(height: u64, width: u64) -> Graph {
         .output("output", Type::Float, &shape)
 }
 
+/// The same graph for images of one size, which may be another batch.
+pub fn of_size(graph: &Graph, batch: u64, [height, width]: [u64; 2]) -> Graph {
+    let shape = [Known(batch), Known(3), Known(height), Known(width)];
+    Graph {
+        inputs: vec![Graph::port("input", Type::Float, &shape)],
+        outputs: vec![Graph::port("output", Type::Float, &shape)],
+        ..graph.clone()
+    }
+}
+
+/// The image as it is, frozen by tracing: it says any size, and takes 48 × 64 alone.
+pub fn traced() -> Graph {
+    Graph::new()
+        .shape("windows", &[1, 3, 6, 8, 8, 8])
+        .shape("whole", &[1, 3, 48, 64])
+        .node("Reshape", &["input", "windows"], "cut")
+        .node("Reshape", &["cut", "whole"], "output")
+        .giving_image()
+}
+
+/// The image enlarged by two.
+pub fn doubled() -> Graph {
+    let shape = [
+        Known(1),
+        Known(3),
+        Named("double_height"),
+        Named("double_width"),
+    ];
+    let blocks = [("blocksize", Attribute::Int(2))];
+    Graph::new()
+        .node_with(
+            "Concat",
+            &["input"; 4],
+            "deep",
+            &[("axis", Attribute::Int(1))],
+        )
+        .node_with("DepthToSpace", &["deep"], "output", &blocks)
+        .output("output", Type::Float, &shape)
+}
+
+/// The mean of the image and of 2³⁰ others like it.
+pub fn of_much_memory() -> Graph {
+    Graph::new()
+        .shape("many", &[1 << 30, 3, 1, 1])
+        .node("Expand", &["input", "many"], "large")
+        .node_with(
+            "ReduceMean",
+            &["large"],
+            "output",
+            &[("axes", Attribute::Ints(&[0]))],
+        )
+        .giving_image()
+}
+
+/// The image after 2⁴⁰ turns of a loop where it is brighter than a half, and after one where it is not.
+pub fn endless_if_bright() -> Graph {
+    let body = Graph::empty()
+        .input("turn", Type::Long, &[])
+        .input("goes_on", Type::Bool, &[])
+        .input("before", Type::Float, &image(3))
+        .node("Identity", &["is_bright"], "still")
+        .node("Identity", &["before"], "after")
+        .output("still", Type::Bool, &[])
+        .output("after", Type::Float, &image(3));
+    Graph::new()
+        .shape("turns", &[1 << 40])
+        .constant("half", &[], &[0.5])
+        .node_with(
+            "ReduceMax",
+            &["input"],
+            "most",
+            &[("keepdims", Attribute::Int(0))],
+        )
+        .node("Greater", &["most", "half"], "is_bright")
+        .node_with(
+            "Loop",
+            &["turns", "is_bright", "input"],
+            "output",
+            &[("body", Attribute::Body(body))],
+        )
+        .giving_image()
+}
+
 /// The image as it is, of such a type and shape.
 pub fn shaped(element: Type, shape: &[Size]) -> Graph {
     Graph::empty()
@@ -301,7 +408,12 @@ pub fn mean_added() -> Graph {
 
 /// The image as it is, where its sides are multiples of eight.
 pub fn of_eights() -> Graph {
-    let blocks = [("blocksize", Attribute::Int(8))];
+    of_multiples(8)
+}
+
+/// The image as it is, where its sides are multiples of a number.
+pub fn of_multiples(multiple: u64) -> Graph {
+    let blocks = [("blocksize", Attribute::Int(multiple))];
     Graph::new()
         .node_with("SpaceToDepth", &["input"], "deep", &blocks)
         .node_with("DepthToSpace", &["deep"], "output", &blocks)
@@ -429,4 +541,139 @@ pub fn gray_gain() -> Graph {
             "enhanced",
         )
         .output("enhanced", Type::Float, &image(3))
+}
+
+/// An enhancer, the power 0.4 of each sample, that takes values from `low_in` to `high_in` and gives them from `low_out` to `high_out`.
+pub fn enhancer_in_ranges([low_in, high_in]: [f32; 2], [low_out, high_out]: [f32; 2]) -> Graph {
+    Graph::new()
+        .constant("low in", &[], &[low_in])
+        .constant("span in", &[], &[high_in - low_in])
+        .constant("zero", &[], &[0.0])
+        .constant("exponent", &[], &[0.4])
+        .constant("span out", &[], &[high_out - low_out])
+        .constant("low out", &[], &[low_out])
+        .node("Sub", &["input", "low in"], "from black")
+        .node("Div", &["from black", "span in"], "unit")
+        .node("Max", &["unit", "zero"], "light")
+        .node("Pow", &["light", "exponent"], "enhanced")
+        .node("Mul", &["enhanced", "span out"], "spread")
+        .node("Add", &["spread", "low out"], "output")
+        .giving_image()
+}
+
+/// What follows the power 0.4 of each sample, which is `enhanced`.
+fn after_enhancing(then: impl FnOnce(Graph) -> Graph) -> Graph {
+    let enhanced = Graph::new().constant("exponent", &[], &[0.4]).node(
+        "Pow",
+        &["input", "exponent"],
+        "enhanced",
+    );
+    then(enhanced).giving_image()
+}
+
+/// An enhancer that gives blue first.
+pub fn blue_first() -> Graph {
+    after_enhancing(|graph| {
+        let axis = [("axis", Attribute::Int(1))];
+        graph.shape("order", &[2, 1, 0]).node_with(
+            "Gather",
+            &["enhanced", "order"],
+            "output",
+            &axis,
+        )
+    })
+}
+
+/// An enhancer that gives a negative.
+pub fn negative() -> Graph {
+    after_enhancing(|graph| {
+        graph
+            .constant("white", &[], &[1.0])
+            .node("Sub", &["white", "enhanced"], "output")
+    })
+}
+
+/// An enhancer that gives a plain colour.
+pub fn flat() -> Graph {
+    after_enhancing(|graph| {
+        let axes = [("axes", Attribute::Ints(&[2, 3]))];
+        graph
+            .constant("zero", &[], &[0.0])
+            .node_with("ReduceMean", &["enhanced"], "mean", &axes)
+            .node("Mul", &["enhanced", "zero"], "black")
+            .node("Add", &["black", "mean"], "output")
+    })
+}
+
+/// An enhancer whose packed pixels are called planes.
+pub fn mislabelled() -> Graph {
+    after_enhancing(|graph| {
+        let packed = [("perm", Attribute::Ints(&[0, 2, 3, 1]))];
+        graph
+            .node_with("Transpose", &["enhanced"], "packed", &packed)
+            .node("Shape", &["enhanced"], "shape")
+            .node("Reshape", &["packed", "shape"], "output")
+    })
+}
+
+/// The image times a further input, `factor`.
+pub fn times_input(element: Type, shape: &[Size]) -> Graph {
+    Graph::new()
+        .input("factor", element, shape)
+        .node_with(
+            "Cast",
+            &["factor"],
+            "number",
+            &[("to", Attribute::Int(Type::Float as u64))],
+        )
+        .node("Mul", &["input", "number"], "output")
+        .giving_image()
+}
+
+/// The image times a plane of its size, a further input.
+pub fn times_plane(name: &str) -> Graph {
+    Graph::new()
+        .input(name, Type::Float, &image(1))
+        .node("Mul", &["input", name], "output")
+        .giving_image()
+}
+
+/// The image and noise, added: three channels of its size.
+pub fn plus_noise() -> Graph {
+    Graph::new()
+        .input("z", Type::Float, &image(3))
+        .node("Add", &["input", "z"], "output")
+        .giving_image()
+}
+
+/// The image and the mean of noise of another size, added.
+pub fn plus_mean_of_noise() -> Graph {
+    let shape = [Known(1), Known(4), Named("rows"), Named("columns")];
+    let axes = [("axes", Attribute::Ints(&[1, 2, 3]))];
+    Graph::new()
+        .input("z", Type::Float, &shape)
+        .node_with("ReduceMean", &["z"], "mean", &axes)
+        .node("Add", &["input", "mean"], "output")
+        .giving_image()
+}
+
+/// A plane times a number: a model of the luma.
+pub fn luma_gain(factor: f32) -> Graph {
+    Graph::empty()
+        .input("input", Type::Float, &image(1))
+        .constant("factor", &[], &[factor])
+        .node("Mul", &["input", "factor"], "output")
+        .output("output", Type::Float, &image(1))
+}
+
+/// Light, which is the largest of the three channels, and reflectance, which is the image divided by it.
+pub fn light_and_reflectance() -> Graph {
+    let axes = [("axes", Attribute::Ints(&[1]))];
+    Graph::new()
+        .constant("black", &[], &[1e-3])
+        .node_with("ReduceMax", &["input"], "largest", &axes)
+        .node("Max", &["largest", "black"], "L")
+        .node("Div", &["input", "L"], "R")
+        .output("L", Type::Float, &image(1))
+        .output("R", Type::Float, &image(3))
 }

@@ -125,6 +125,7 @@ fn every_flag_can_be_set_by_word_variable_and_file() {
                     words.retain(|word| word != "abc");
                     words.push("--normal=abc".to_owned());
                 }
+                "write" => words.push("--doctor".to_owned()),
                 "fail_if_worse" => words.push("--baseline=abc".to_owned()),
                 _ => {}
             }

@@ -86,7 +86,7 @@ fn each_wrong_reading_has_its_flaw() {
         (each(&good, |code| 255.0 - code), Flaw::Inverted),
         (relabelled, Flaw::Shuffled),
         (swapped, Flaw::Hue),
-        (each(&good, |code| (code + 255.0) / 2.0), Flaw::Haze),
+        (each(&good, |code| f32::midpoint(code, 255.0)), Flaw::Haze),
     ];
     for (made, expected) in cases {
         assert_eq!(flaw(&made), Some(expected));

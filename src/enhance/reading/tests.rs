@@ -1,11 +1,15 @@
 use super::*;
-use crate::enhance::convention::Padding;
-use crate::enhance::feeding::{Feeding, Input, TensorData};
+use crate::enhance::convention::{Channels, Padding};
+use crate::enhance::fed_image::{DarkImage, FedImage};
+use crate::enhance::feeding::Feeding;
+use crate::enhance::tensor::{Tensor, TensorData};
 use crate::types::Rgb;
 
 const FEEDING: Feeding = Feeding {
     layout: TensorLayout::Nchw,
     element: ElementType::Float32,
+    channels: Channels::Rgb,
+    input: None,
     color: ChannelOrder::Rgb,
     range: ValueRange::Unit,
     mean: [0.0; 3],
@@ -15,6 +19,7 @@ const FEEDING: Feeding = Feeding {
 const READING: OutputReading = OutputReading {
     layout: None,
     preferred: TensorLayout::Nchw,
+    channels: &[3],
     color: ChannelOrder::Rgb,
     range: ValueRange::Unit,
     certainty: Certainty::Known,
@@ -44,7 +49,18 @@ fn near(a: &TensorData, b: &TensorData) -> bool {
     }
 }
 
-fn floats(input: &Input) -> &[f32] {
+/// The tensor of a window of an image.
+fn fed(feeding: &Feeding, image: &Rgb, window: TileWindow) -> Tensor {
+    let dark = DarkImage::new(image);
+    let fed = FedImage::Window {
+        dark: &dark,
+        window,
+        pad: feeding.pad,
+    };
+    feeding.tensor(&fed).unwrap()
+}
+
+fn floats(input: &Tensor) -> &[f32] {
     match &input.data {
         TensorData::Float32(values) => values,
         other => panic!("{other:?}"),
@@ -70,7 +86,7 @@ fn every_convention_gives_every_byte_back() {
                     range,
                     ..FEEDING
                 };
-                let input = feeding.window(&image, whole(&image));
+                let input = fed(&feeding, &image, whole(&image));
                 let reading = OutputReading {
                     preferred: layout,
                     color,
@@ -81,13 +97,14 @@ fn every_convention_gives_every_byte_back() {
                     TensorData::Float32(values) => TensorSamples::Float32(values),
                     TensorData::Float16(values) => TensorSamples::Float16(values),
                     TensorData::Uint8(values) => TensorSamples::Uint8(values),
+                    other => panic!("{other:?}"),
                 };
                 let dims: Vec<i64> = input
                     .dims
                     .iter()
                     .map(|dim| i64::try_from(*dim).unwrap())
                     .collect();
-                assert_eq!(reading.layout(&dims, [11, 24]), Some(layout));
+                assert_eq!(reading.layout(&dims, [11, 24]), Some((layout, 3)));
                 let bytes = reading
                     .bytes(samples, layout, [11, 24], whole(&image))
                     .unwrap();
@@ -101,10 +118,16 @@ fn every_convention_gives_every_byte_back() {
                 let bytes = reading.bytes(samples, layout, [11, 24], part).unwrap();
                 assert_eq!(bytes, image.samples()[(2 * 24 + 3) * 3..][..12]);
                 // Planes of floats, for models of a fixed size, are fed and read in the same way.
-                let planes = reading.planes(samples, layout, [11, 24]).unwrap();
-                assert_eq!(planes.to_rgb(Rounding::Round).unwrap(), image);
+                let certainty = Certainty::Known;
+                let read = |part| {
+                    let planes = reading.planes(samples, (layout, 3), [11, 24], part, certainty);
+                    planes.unwrap().to_rgb(Rounding::Round).unwrap()
+                };
+                assert_eq!(read(part).samples(), bytes);
+                assert_eq!(read(whole(&image)), image);
                 if element != ElementType::Float16 {
-                    let fed = feeding.planes(&Planes::of(&image));
+                    let planes = Planes::of(&image);
+                    let fed = feeding.tensor(&FedImage::Whole(&planes)).unwrap();
                     assert!(near(&fed.data, &input.data) && fed.dims == input.dims);
                 }
             }
@@ -120,13 +143,13 @@ fn mean_and_deviation_are_the_models_channels() {
         std: [0.5, 0.25, 0.1],
         ..FEEDING
     };
-    let input = feeding.window(&image, whole(&image));
+    let input = fed(&feeding, &image, whole(&image));
     assert_eq!(floats(&input), [1.0, -1.0, 2.0]);
     let blue_first = Feeding {
         color: ChannelOrder::Bgr,
         ..feeding
     };
-    let input = blue_first.window(&image, whole(&image));
+    let input = fed(&blue_first, &image, whole(&image));
     assert_eq!(floats(&input), [(0.2 - 0.5) / 0.5, -1.0, 10.0]);
 }
 
@@ -149,7 +172,7 @@ fn pixels_beyond_the_image_are_padded() {
             range: ValueRange::Bytes,
             ..FEEDING
         };
-        let TensorData::Uint8(bytes) = feeding.window(&image, wide).data else {
+        let TensorData::Uint8(bytes) = fed(&feeding, &image, wide).data else {
             panic!("no bytes");
         };
         assert_eq!(bytes[..8], row, "{pad}");
@@ -188,14 +211,7 @@ fn samples_are_clamped_and_rounded() {
 
 #[test]
 fn values_of_another_range_are_refused() {
-    let checked = |values: &[f32], range, certainty| {
-        let reading = OutputReading {
-            range,
-            certainty,
-            ..READING
-        };
-        reading.check(values).err()
-    };
+    let checked = |values: &[f32], range, certainty| check(values, range, certainty).err();
     let likely = |values: &[f32], range| match checked(values, range, Certainty::Assumed) {
         Some(OutOfRange::Beyond { likely, .. }) => Some(likely),
         other => {
@@ -227,4 +243,37 @@ fn values_of_another_range_are_refused() {
     );
     let broken = checked(&[0.0, f32::NAN], ValueRange::Unit, Certainty::Known);
     assert_eq!(broken, Some(OutOfRange::NotNumbers));
+}
+
+#[test]
+fn the_luma_of_an_expression_is_fed_in_its_range() {
+    let image = Rgb::new(1, 2, vec![255, 0, 51, 51, 51, 51]).unwrap();
+    let luma = Feeding {
+        channels: Channels::Y,
+        range: ValueRange::Signed,
+        ..FEEDING
+    };
+    let input = fed(&luma, &image, whole(&image));
+    assert_eq!(input.dims, [1, 1, 1, 2]);
+    let near = |values: &[f32], expected: [f32; 2]| {
+        let pairs = values.iter().zip(expected);
+        assert!(
+            pairs.clone().all(|(a, b)| (a - b).abs() < 1e-6),
+            "{values:?}"
+        );
+    };
+    near(floats(&input), [2.0 * (0.299 + 0.114 * 0.2) - 1.0, -0.6]);
+    // The expression is of the dark image in 0..1, before luma and range.
+    let squared = Feeding {
+        input: "image ^ 2".parse().ok(),
+        ..luma
+    };
+    let input = fed(&squared, &image, whole(&image));
+    near(floats(&input), [2.0 * (0.299 + 0.114 * 0.04) - 1.0, -0.92]);
+    let endless = Feeding {
+        input: "image / 0".parse().ok(),
+        ..FEEDING
+    };
+    let planes = Planes::of(&image);
+    assert_eq!(endless.tensor(&FedImage::Whole(&planes)), None);
 }

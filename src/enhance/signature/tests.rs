@@ -1,4 +1,6 @@
 use super::*;
+use crate::enhance::convention::ElementType;
+use crate::enhance::extra::{ExtraValue, Number};
 use crate::enhance::port::Dim;
 use crate::enhance::sidecar::OutputChoice;
 
@@ -28,7 +30,7 @@ fn of(inputs: &[Port], outputs: &[Port]) -> Result<Signature, String> {
 }
 
 fn choose(outputs: &[Port]) -> Result<String, String> {
-    of(&[image("input")], outputs).map(|signature| signature.output.port.name)
+    of(&[image("input")], outputs).map(|signature| signature.outputs[0].port.name.clone())
 }
 
 #[test]
@@ -100,7 +102,7 @@ fn a_stated_output_is_taken_where_it_can_be_an_image() {
             ..ModelSidecar::default()
         };
         let found = Signature::of(&[image("input")], outputs, &sidecar);
-        found.map(|signature| signature.output.port.name)
+        found.map(|signature| signature.outputs[0].port.name.clone())
     };
     let index = OutputChoice::Index;
     assert_eq!(stated(&outputs, index(0)), Ok("1".into()));
@@ -154,11 +156,14 @@ fn layouts_and_elements_are_read() {
                 ..port("x", dims)
             };
             let found = of(&[input], &[port("y", &[])]).unwrap();
-            assert_eq!((found.input.layout, found.output.layout), (layout, None));
+            assert_eq!(
+                (found.input.layout, found.outputs[0].layout),
+                (layout, None)
+            );
         }
     }
     let out = of(&[image("x")], &[port("y", &[0, 0, 3])]).unwrap();
-    assert_eq!(out.output.layout, Some(TensorLayout::Hwc));
+    assert_eq!(out.outputs[0].layout, Some(TensorLayout::Hwc));
 }
 
 #[test]
@@ -177,44 +182,178 @@ fn a_layout_that_the_graph_leaves_open_must_be_stated() {
     }
 }
 
+/// A convention of these lines.
+fn sidecar(text: &str) -> ModelSidecar {
+    ModelSidecar::parse(std::path::Path::new("m.onnx"), text).unwrap()
+}
+
+fn typed(element: ElementType, port: Port) -> Port {
+    Port { element, ..port }
+}
+
 #[test]
 fn further_numbers_need_values() {
-    let inputs = [image("x"), port("exposure", &[1])];
+    let inputs = [image("x"), port("strength", &[1])];
     let message = of(&inputs, &[image("y")]).unwrap_err();
-    assert!(message.contains("exposure = 0.5"), "{message}");
-    let sidecar = |name: &str| ModelSidecar {
-        extra: [(name.to_owned(), 0.25)].into(),
-        ..ModelSidecar::default()
-    };
-    let found = Signature::of(&inputs, &[image("y")], &sidecar("exposure")).unwrap();
-    assert_eq!(found.extras[0].value.to_bits(), 0.25_f32.to_bits());
-    assert!(Signature::of(&inputs, &[image("y")], &sidecar("gamma")).is_err());
-    let whole = Port {
-        element: ElementType::Other("int64".into()),
-        ..port("n", &[])
-    };
-    let message = of(&[image("x"), whole], &[image("y")]).unwrap_err();
+    assert!(message.contains("`strength = NUMBER`"), "{message}");
+    // A value is proposed only where a preset knows the name.
+    let known = [image("x"), port("exposure", &[])];
+    let message = of(&known, &[image("y")]).unwrap_err();
     assert!(
-        message.contains("only single floats are supported"),
+        message.contains("`exposure = 0.2`, as preset pairlie has it"),
+        "{message}"
+    );
+    let switch = [image("x"), typed(ElementType::Bool, port("on", &[1]))];
+    let message = of(&switch, &[image("y")]).unwrap_err();
+    assert!(message.contains("`on = true` or `on = false`"), "{message}");
+    let given = |text: &str| Signature::of(&inputs, &[image("y")], &sidecar(text));
+    let found = given("[extra]\nstrength = 0.25").unwrap();
+    assert_eq!(
+        found.extras[0].value,
+        ExtraValue::Number(Number::Float(0.25))
+    );
+    let message = given("[extra]\ngamma = 1").unwrap_err();
+    assert!(message.contains("its value is unknown"), "{message}");
+    let message = given("[extra]\nstrength = 1\ngamma = 1").unwrap_err();
+    assert!(
+        message.contains("\"gamma\", which is not one of its further inputs"),
         "{message}"
     );
 }
 
 #[test]
-fn other_conventions_are_refused_by_name() {
-    let double = Port {
-        element: ElementType::Other("float64".into()),
-        ..image("double")
+fn further_inputs_take_what_fits_them() {
+    let small = |port| typed(ElementType::Int32, port);
+    let plane = || port("a", &[1, 1, 0, 0]);
+    let noise = "{ noise = \"normal\" }";
+    let rows = [
+        (small(port("a", &[1])), "3", None),
+        (small(port("a", &[])), "3", None),
+        (small(port("a", &[0])), "3", None),
+        (
+            small(port("a", &[1])),
+            "3.5",
+            Some("3.5 does not fit its type int32"),
+        ),
+        (
+            typed(ElementType::Bool, port("a", &[])),
+            "1",
+            Some("type bool"),
+        ),
+        (
+            port("a", &[1]),
+            "{ map = 1 }",
+            Some("single number: `a = NUMBER`"),
+        ),
+        (plane(), "0.5", Some("`a = { map = 0.5 }`")),
+        (plane(), "{ map = 0.5 }", None),
+        (port("a", &[1, 7, 0, 0]), "{ map = 0.5 }", None),
+        (port("a", &[0, 0]), "{ map = 0.5 }", None),
+        (small(plane()), "{ map = 0.5 }", Some("type int32")),
+        (port("a", &[1, 4, 0, 0]), noise, None),
+        (small(plane()), noise, Some("export it with floats")),
+        (plane(), "{ from = \"max(image)\" }", None),
+        (
+            plane(),
+            "{ from = \"1 - image\" }",
+            Some("max(…) or mean(…)"),
+        ),
+        (port("a", &[1, 3, 0, 0]), "{ from = \"1 - image\" }", None),
+        (
+            port("a", &[1, 4, 0, 0]),
+            "{ from = \"image\" }",
+            Some("4 channels"),
+        ),
+        (
+            port("a", &[5, 1, 0, 0]),
+            "{ map = 1 }",
+            Some("a dimension of 5"),
+        ),
+    ];
+    for (further, value, problem) in rows {
+        let inputs = [image("x"), further];
+        let convention = sidecar(&format!("[extra]\na = {value}"));
+        let found = Signature::of(&inputs, &[image("y")], &convention).err();
+        let words = format!("{} {value}: {found:?}", inputs[1]);
+        match problem {
+            None => assert_eq!(found, None, "{words}"),
+            Some(part) => assert!(found.is_some_and(|found| found.contains(part)), "{words}"),
+        }
+    }
+}
+
+#[test]
+fn what_a_further_input_may_be_is_told_by_its_shape_and_name() {
+    for (further, part) in [
+        (port("ratio", &[1, 1, 0, 0]), "`ratio = { map = 5.0 }`"),
+        (
+            port("z", &[1, 1, 0, 0]),
+            "`z = { noise = \"normal\", std = NUMBER, seed = 0 }`",
+        ),
+        (port("second", &[1, 3, 0, 0]), "of three channels"),
+        (
+            image("attention"),
+            "`attention = { from = \"1 - max(image)\" }`",
+        ),
+        (port("gray.1", &[1, 1, 0, 0]), "`\"gray.1\" = { from ="),
+        (
+            typed(ElementType::Other("string".into()), port("s", &[])),
+            "whose type is not supported",
+        ),
+    ] {
+        let name = further.to_string();
+        let message = of(&[image("x"), further], &[image("y")]).unwrap_err();
+        assert!(message.contains(&name), "{message}");
+        assert!(message.contains(part), "{message}");
+    }
+    // An input of such a name is not the image, even if it is the first.
+    let message = of(&[image("mask"), image("x")], &[image("y")]).unwrap_err();
+    assert!(message.starts_with("takes \"mask\""), "{message}");
+}
+
+#[test]
+fn an_expression_of_the_image_names_outputs() {
+    let outputs = [port("L", &[1, 1, 0, 0]), image("R"), curves("c")];
+    let read = |text: &str| {
+        let convention = sidecar(&format!("image = \"{text}\""));
+        let found = Signature::of(&[image("x")], &outputs, &convention)?;
+        let names = found.outputs.into_iter().map(|output| output.port.name);
+        Ok::<_, String>(names.collect::<Vec<_>>())
     };
+    assert_eq!(read("L ^ 0.2 * R"), Ok(vec!["L".into(), "R".into()]));
+    assert_eq!(read("R + 0 * input"), Ok(vec!["R".into()]));
+    for (text, part) in [
+        ("L * Q", "names `Q`, which is not there"),
+        ("c * R", "no image of one or three channels"),
+        ("input * 2", "names none of its outputs"),
+    ] {
+        let message = read(text).unwrap_err();
+        assert!(message.contains(part), "{message}");
+    }
+}
+
+#[test]
+fn one_channel_must_be_stated_to_be_the_luma() {
+    let inputs = [port("a", &[1, 1, 0, 0])];
+    let outputs = [port("b", &[1, 1, 0, 0])];
+    let message = of(&inputs, &outputs).unwrap_err();
+    assert!(message.contains("`channels = \"y\"`"), "{message}");
+    let stated = |text: &str| Signature::of(&inputs, &outputs, &sidecar(text));
+    let found = stated("channels = \"y\"").unwrap();
+    assert_eq!(found.input.layout, TensorLayout::Nchw);
+    let message = stated("channels = \"y\"\nmean = [0, 0, 1]").unwrap_err();
+    assert!(message.contains("three different numbers"), "{message}");
+    let colour = Signature::of(&[image("a")], &outputs, &sidecar("channels = \"y\""));
+    assert!(colour.unwrap_err().contains("leave that line out"));
+}
+
+#[test]
+fn other_conventions_are_refused_by_name() {
+    let double = typed(ElementType::Float64, image("double"));
     let cases = [
         (vec![], "no image among its inputs; it has none"),
-        (vec![image("a"), image("b")], "takes 2 images"),
-        (
-            vec![image("a"), port("gray", &[1, 1, 0, 0])],
-            "takes 2 images",
-        ),
+        (vec![image("a"), image("b")], "\"b\" (float32 [1, 3, n, n])"),
         (vec![double], "float64"),
-        (vec![port("a", &[1, 1, 0, 0])], "not an image of three"),
         (vec![port("a", &[2, 3, 0, 0])], "several images"),
         (vec![port("a", &[])], "no image among"),
         (vec![port("a", &[1, 85])], "not an image of three"),

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use super::BatchFileArgs;
 use super::requests::{Requests, require_remote, summary};
 use crate::error::{Error, Result};
+use crate::job::dark_already;
 use crate::job::experiment::Experiment;
 use crate::job::open_run::{OpenRun, Remaining, limit, missing_notes, pipeline, usages};
 use crate::job::outcome::Outcome;
@@ -56,10 +57,11 @@ fn write<E: Experiment>(
     let (experiment, settings) = (run.experiment, run.experiment.settings());
     let workers = pool(settings.loading.threads.threads)?;
     let timings = Timings::default();
-    let enhancers = if plan.conditions().is_empty() {
-        Vec::new()
-    } else {
+    let shows_images = !plan.conditions().is_empty();
+    let enhancers = if shows_images {
         run.enhancers.take()?
+    } else {
+        Vec::new()
     };
     let limit = limit(settings);
     let usages = usages(&enhancers);
@@ -68,6 +70,9 @@ fn write<E: Experiment>(
     let sources = experiment.sources();
     workers.install(|| {
         pipeline.probe(sources, &plan.sources)?;
+        if shows_images {
+            dark_already::warn(experiment);
+        }
         pipeline.largest(sources, &plan.sources)
     })?;
     let bar = run.progress.bar("writing requests", plan.remaining());
@@ -78,7 +83,7 @@ fn write<E: Experiment>(
         pipeline.for_each_group(sources, plan, &missing, |group| {
             bar.advance(group.trials.len());
             match group.problem {
-                Some(ended @ Error::EnhancerEnded { .. }) => return Err(ended),
+                Some(ended @ Error::EnhancerEnded { .. }) => Err(ended),
                 Some(problem) => {
                     tracing::debug!("{problem}");
                     problems.push(problem.to_string());

@@ -7,6 +7,7 @@ use crate::ask::PayloadFormat;
 use crate::dataset::Dataset;
 use crate::job::recipe::Recipe;
 use crate::job::scaling::Scaling;
+use crate::job::source::SourceFrame;
 use crate::job::timings::Timings;
 use crate::job::walk::{CameraOf, DegradedAt};
 use crate::synthesis::Readings;
@@ -52,6 +53,7 @@ fn pipeline_output(
     let mut pipeline = ImagePipeline {
         steps,
         enhancers: Vec::new(),
+        sets: Vec::new(),
         implausible: Implausible::default(),
     };
     let mut work = FrameWork::planned(steps, &source, &source.frames[0]);

@@ -1,5 +1,7 @@
 //! How the enhancers of runs were used, in words: [`rows`] and [`of_enhancers`].
 
+use std::collections::BTreeSet;
+
 use super::join::JoinedRun;
 use crate::report::alert::{Alert, AlertKind};
 use crate::report::tables::EnhancerRow;
@@ -7,7 +9,7 @@ use crate::types::enhancer_note::{EnhancerNote, JudgedImages, ProbeOutcome};
 
 /// A row for each enhancer; several runs that used it in the same way have one.
 pub(super) fn rows(runs: &[JoinedRun]) -> Vec<EnhancerRow> {
-    let mut rows: Vec<(EnhancerRow, Vec<&str>)> = Vec::new();
+    let mut rows: Vec<(EnhancerRow, BTreeSet<&str>)> = Vec::new();
     for (run, name, note) in notes(runs) {
         let row = EnhancerRow {
             name: name.to_owned(),
@@ -15,13 +17,18 @@ pub(super) fn rows(runs: &[JoinedRun]) -> Vec<EnhancerRow> {
             looks: looks(note),
         };
         match rows.iter_mut().find(|(known, _)| *known == row) {
-            Some((_, runs)) => runs.push(&run.name),
-            None => rows.push((row, vec![&run.name])),
+            Some((_, runs)) => drop(runs.insert(&run.name)),
+            None => rows.push((row, BTreeSet::from([&*run.name]))),
         }
     }
+    // The order of the runs does not matter.
+    rows.sort_by(|(one, in_one), (other, in_other)| {
+        (&one.name, in_one).cmp(&(&other.name, in_other))
+    });
     let names: Vec<String> = rows.iter().map(|(row, _)| row.name.clone()).collect();
     let named = rows.into_iter().map(|(mut row, runs)| {
         if names.iter().filter(|name| **name == row.name).count() > 1 {
+            let runs: Vec<&str> = runs.into_iter().collect();
             row.name = format!("{} in {}", row.name, runs.join(", "));
         }
         row
@@ -82,15 +89,26 @@ fn how(note: &EnhancerNote) -> String {
         Some(format!("{before}{} ({})", line.value, line.source))
     };
     let parts = [
+        said("preset", "preset "),
         said("range_in", "fed "),
-        said("color", "as "),
-        said("output", "read from "),
-        said("range_out", "as "),
-        said("rounding", ""),
+        said("color", "colours "),
+        said("input = ", "input = "),
+        said("channels", "channels "),
+        said("range_out", "read as "),
+        said("image = ", "image = "),
+        said("rounding", "to bytes: "),
+        unread(note),
         Some(note.sizes.clone()).filter(|sizes| !sizes.is_empty()),
     ];
     let parts: Vec<String> = parts.into_iter().flatten().collect();
-    parts.join(", ")
+    parts.join("; ")
+}
+
+/// The outputs of the graph that are not read; `None` if all are.
+fn unread(note: &EnhancerNote) -> Option<String> {
+    let lines = note.convention.iter().filter(|line| line.key == "not read");
+    let outputs: Vec<&str> = lines.map(|line| &*line.value).collect();
+    (!outputs.is_empty()).then(|| format!("not read: {}", outputs.join(", ")))
 }
 
 /// What the probe and the run's images of dark frames looked like.

@@ -74,7 +74,8 @@ impl<'a> Overview<'a> {
         }
     }
 
-    /// A quantity of a model by level, in one variant, raw or enhanced. L0 is the clean frame.
+    /// A quantity of a model by level, in one variant, raw or enhanced. L0 is the clean frame, enhanced if that was asked; empty
+    /// without a point of the enhancer.
     fn points(
         &self,
         model: &str,
@@ -84,11 +85,24 @@ impl<'a> Overview<'a> {
     ) -> Vec<(AxisLevel, Estimate)> {
         let levels = self.levels.iter();
         let points = levels.filter_map(|&level| {
-            let subject = Subject::seeing(model, level, variant, enhancer);
-            let subject = self.findings.grid.stand_in(&subject)?;
-            Some((level, number(&self.findings.grid.subjects[subject])?))
+            let grid = &self.findings.grid;
+            let of = |enhancer| grid.stand_in(&Subject::seeing(model, level, variant, enhancer));
+            let raw = || (level == AxisLevel::L0).then(|| of(None)).flatten();
+            let subject = &grid.subjects[of(enhancer).or_else(raw)?];
+            Some((subject.enhancer.as_ref(), level, number(subject)?))
         });
-        points.collect()
+        let points: Vec<_> = points.collect();
+        if points.iter().all(|(of, ..)| *of != enhancer) {
+            return Vec::new();
+        }
+        let points = points.into_iter();
+        points.map(|(_, level, number)| (level, number)).collect()
+    }
+
+    /// Whether some untouched frames were enhanced.
+    fn has_enhanced_clean(&self) -> bool {
+        let mut subjects = self.findings.grid.subjects.iter();
+        subjects.any(|subject| subject.level == Some(AxisLevel::L0) && subject.enhancer.is_some())
     }
 
     /// Accuracy of a subject on a family, in the strict reading.
@@ -243,8 +257,9 @@ impl<'a> Overview<'a> {
                     let points = self.points(model, &variant, enhancer, |subject| {
                         self.accuracy_of(subject, None)
                     });
-                    // L0 alone is not a line of an enhancer.
-                    (points.len() > 1).then(|| PlotLine {
+                    // One level is not a line; L0 enhanced is a point of its own.
+                    let is_clean = points.first().is_some_and(|(at, _)| *at == AxisLevel::L0);
+                    (points.len() > 1 || is_clean).then(|| PlotLine {
                         name: enhancer.map_or("raw".to_owned(), ToString::to_string),
                         style: LineStyle(index),
                         content: PanelContent::Curve(points),
@@ -258,12 +273,12 @@ impl<'a> Overview<'a> {
                 }
             }
         }
-        self.chart(
-            ACCURACY,
-            panels,
-            2,
-            "Each enhancer against the raw dark images, by level. L0 is the untouched frame.",
-        )
+        let caption = if self.has_enhanced_clean() {
+            "Each enhancer against the raw images, by level. L0 is the untouched frame, in the line of an enhancer enhanced with it where that was asked."
+        } else {
+            "Each enhancer against the raw dark images, by level. L0 is the untouched frame."
+        };
+        self.chart(ACCURACY, panels, 2, caption)
     }
 
     fn families(&self) -> Option<(String, Chart)> {

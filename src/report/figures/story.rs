@@ -34,7 +34,7 @@ pub(crate) fn story_curves(findings: &Findings<'_>) -> Option<StoryCurves> {
             });
             let name =
                 enhancer.map_or_else(|| (*model).to_owned(), |name| format!("{model} + {name}"));
-            // The untouched frame alone is not a line, and without an enhancer the second line is the first.
+            // One level is not a line, and without an enhancer the second line is the first.
             if points.len() > 1 && lines.iter().all(|line: &PlotLine| line.name != name) {
                 lines.push(PlotLine {
                     name,

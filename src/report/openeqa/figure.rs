@@ -5,6 +5,7 @@ use super::tables::ladder;
 use crate::error::Result;
 use crate::report::chart::{Chart, Figure, LineStyle, Panel, PanelContent, PlotLine};
 use crate::score::open::Group;
+use crate::types::AxisLevel;
 
 /// Scores by level: all questions together, and by category if there are several.
 pub(super) fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {
@@ -54,8 +55,11 @@ fn panel(report: &OpenReport<'_>, group: &Group) -> Panel {
     let seeing = ladder.series.len();
     let lines = ladder.series.iter().enumerate();
     let lines = lines.map(|(index, (series, cells))| {
-        let cells = cells.iter();
-        let points = cells.filter_map(|(level, cell)| Some((*level, cell.score?)));
+        let start = ladder.start(series).map(|cell| (AxisLevel::L0, cell));
+        let dark = cells.iter().map(|(level, cell)| (*level, *cell));
+        let dark = dark.filter(|(level, _)| *level != AxisLevel::L0);
+        let points = start.into_iter().chain(dark);
+        let points = points.filter_map(|(level, cell)| Some((level, cell.score?)));
         PlotLine {
             name: format!("{}, {}", series.model, series.light()),
             style: LineStyle(index),

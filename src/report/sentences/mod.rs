@@ -23,6 +23,8 @@ pub(in crate::report) use models::over_levels;
 pub(in crate::report) use sample::left_out;
 pub(crate) use sentence::Sentence;
 
+use std::collections::BTreeSet;
+
 use self::hallucination::TopAnswer;
 use self::lights::{in_each_light, of_set};
 use crate::score::confusion::FalseAnswer;
@@ -44,6 +46,7 @@ pub(crate) fn sentences(findings: &Findings<'_>) -> Vec<Sentence> {
     sentences.extend(sample::left_out(findings));
     sentences.extend(darkness::darkness(findings));
     sentences.extend(in_each_light(findings, about_light));
+    sentences.extend(about_clean(findings));
     sentences.extend(models::best(findings));
     sentences.extend(in_each_light(findings, about_answers));
     sentences.extend(answers::fidelity(findings));
@@ -64,6 +67,20 @@ fn about_light(findings: &Findings<'_>, variant: &KindReading) -> Vec<Sentence> 
     let by_family = words_alone::by_family(findings, variant);
     sentences.extend(words_alone::in_a_family(&by_family, &blind, unit));
     sentences
+}
+
+/// Sentences about enhancers on the clean frames.
+fn about_clean(findings: &Findings<'_>) -> Vec<Sentence> {
+    let clean = findings
+        .pooled
+        .iter()
+        .filter(|finding| finding.kind == PooledKind::Enhancer && finding.variant.kind.is_none());
+    let clean: BTreeSet<&KindReading> = clean.map(|finding| &finding.variant).collect();
+    let sentences = clean.into_iter().flat_map(|variant| {
+        let levels = of_set(findings, PooledKind::Enhancer, variant);
+        pooled::enhancers(&levels, findings.unit)
+    });
+    sentences.collect()
 }
 
 /// Sentences about false answers, one answer to everything, and the families.

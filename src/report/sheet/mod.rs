@@ -1,5 +1,6 @@
-//! Figures made of images with labels: [`levels()`], [`noise()`], [`crops()`] and [`story()`].
+//! Figures made of images with labels: [`levels()`], [`noise()`], [`crops()`], [`story()`] and [`contact()`].
 
+mod contact;
 mod crops;
 mod levels;
 mod noise;
@@ -8,6 +9,7 @@ mod strokes;
 
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 
+pub(crate) use contact::{ContactColumn, contact};
 pub(crate) use crops::{CropRow, crops};
 pub(crate) use levels::{LevelColumn, levels};
 pub(crate) use noise::{Signal, noise};

@@ -12,7 +12,7 @@ use crate::dataset::{self, DataPlace, Dataset, PixelLimit, SelectionArgs};
 use crate::enhance::EnhancerArgs;
 use crate::error::{Error, Result};
 use crate::job::Outcome;
-use crate::job::conditions::conditions;
+use crate::job::conditions::{check_used, conditions};
 use crate::job::enhancers::{self, EnhancerRunArgs, OpenEnhancers};
 use crate::job::frame_work::{FrameWork, ImageSteps};
 use crate::job::image_pipeline::ImagePipeline;
@@ -65,11 +65,12 @@ pub(crate) struct ExportArgs {
 /// # Errors
 /// If the data cannot be read, a set exists already, or a file cannot be written.
 pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> {
+    let light = LightSettings::resolve(&args.light)?;
+    check_used(&light, &args.enhancers)?;
     let rules = rules(args.selection.rules.as_deref())?;
     let dataset = open_data(&args.data, &args.selection, &rules, args.limit, progress)?;
     let questions = select(&dataset, &args.selection)?;
     let files = enhancers::read(&args.enhancers.llie)?;
-    let light = LightSettings::resolve(&args.light)?;
     let recipe = Recipe::lossless(&light.sensor, &files);
     let conditions = conditions(&light, args.enhancers.llie_on, &recipe.enhancers);
     let workers = pool(args.loading.threads.threads)?;
@@ -83,6 +84,7 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
             timings: &Timings::default(),
         },
         enhancers: OpenEnhancers::load(files, &args.loading)?.take()?,
+        sets: Vec::new(),
         implausible: args.loading.probe.implausible(),
     };
     let frames: BTreeMap<&FrameId, &Source> = sources

@@ -35,7 +35,8 @@ pub(super) fn baselines(subject: &Subject) -> Vec<(Baseline, Subject)> {
     };
     let seeing =
         |level, enhancer| Subject::seeing(&subject.model, level, &subject.variant, enhancer);
-    let clean = (level != AxisLevel::L0).then(|| (Baseline::Clean, seeing(AxisLevel::L0, None)));
+    let is_clean = level == AxisLevel::L0 && subject.enhancer.is_none();
+    let clean = (!is_clean).then(|| (Baseline::Clean, seeing(AxisLevel::L0, None)));
     let raw = subject
         .enhancer
         .is_some()

@@ -37,7 +37,7 @@ fn the_command_enhances_files_and_folders() {
             text(output.stderr),
         )
     };
-    let (code, out, err) = call(&["dark", "c.png", "--out", "mended"]);
+    let (code, out, err) = call(&["dark", "c.png", "--out", "mended", "--llie-anyway"]);
     assert_eq!(
         (code, out.as_str()),
         (1, "mended: 2 made by gain, 1 failed\n"),
@@ -48,7 +48,7 @@ fn the_command_enhances_files_and_folders() {
         let enhanced = image::open(at(name)).unwrap().into_rgb8().into_raw();
         assert_eq!(enhanced, map(&dark, |x| 2.0 * x).samples(), "{name}");
     });
-    let (_, out, _) = call(&["c.png", "--out", "mended"]);
+    let (_, out, _) = call(&["c.png", "--out", "mended", "--llie-anyway"]);
     assert!(out.contains("1 kept as they were"), "{out}");
     let (code, out, _) = call(&["--describe"]);
     assert!(

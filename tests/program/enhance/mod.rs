@@ -1,6 +1,10 @@
 //! Stage 3 through its own door: models made by hand, on the ONNX Runtime that is found or installed.
 mod command;
+mod endings;
+mod fixed;
+mod inputs;
 mod models;
+mod probe;
 mod shipped;
 mod sidecars;
 mod sizes;

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use darkqa_eval::enhance::ModelFile;
+use darkqa_eval::types::Rgb;
 
 use super::{fault, image, loaded, map, open, stated};
 use crate::support::onnx;
@@ -63,8 +64,8 @@ fn a_sidecar_says_what_a_graph_cannot() {
 #[test]
 fn a_range_that_nobody_stated_is_checked() {
     let rows = [
-        (onnx::ranged(0.0, 255.0), "range_out = \"0..255\""),
-        (onnx::ranged(-1.0, 1.0), "range_out = \"-1..1\""),
+        (onnx::ranged(0.0, 255.0), "seems to be 0..255"),
+        (onnx::ranged(-1.0, 1.0), "seems to be -1..1"),
     ];
     check_rows(rows, |(graph, likely)| {
         let (_folder, mut enhancer) = loaded(&graph);
@@ -79,8 +80,28 @@ fn a_preset_says_what_its_authors_do() {
     let path = onnx::two_outputs().write(folder.path(), "model.onnx");
     let image = image(8, 8);
     let file = |preset: &str| PathBuf::from(format!("{preset}:{}", path.display()));
-    let enhanced = open(&file("zero-dce")).unwrap().enhance(&image).unwrap();
-    assert_eq!(enhanced, map(&image, |x| 2.0 * x));
+    // The second of two images is SCI's, the first Zero-DCE++'s; Zero-DCE has no such list.
+    for (preset, factor) in [("sci", 2.0), ("zero-dce++", 0.0)] {
+        let mut enhancer = open(&file(preset)).unwrap();
+        let enhanced = enhancer.enhance(&Rgb::new(12, 12, vec![51; 432]).unwrap());
+        let expected = Rgb::new(12, 12, vec![(51.0 * factor) as u8; 432]);
+        assert_eq!(enhanced.unwrap(), expected.unwrap(), "{preset}");
+    }
+    let message = open(&file("zero-dce")).err().unwrap().to_string();
+    assert!(
+        message.contains("outputs of 3, 3, 24 channels"),
+        "{message}"
+    );
+    for names in [
+        ["1", "2", "3"],
+        ["output", "7", "8"],
+        ["a", "enhanced", "c"],
+    ] {
+        let three = onnx::three_outputs(names).write(folder.path(), "three.onnx");
+        let model = PathBuf::from(format!("zero-dce:{}", three.display()));
+        let enhanced = open(&model).unwrap().enhance(&image).unwrap();
+        assert_eq!(enhanced, map(&image, |x| 2.0 * x), "{names:?}");
+    }
     let described = open(&file("sci")).unwrap().describe();
     assert!(
         described.contains("preset sci") && described.contains("truncate"),

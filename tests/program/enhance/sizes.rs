@@ -2,26 +2,12 @@
 
 use std::num::NonZeroUsize;
 
-use darkqa_eval::enhance::{Enhancer, Tiling};
+use darkqa_eval::enhance::Tiling;
 use darkqa_eval::types::Rgb;
 
 use super::{image, loaded, stated};
-use crate::support::onnx::Size::Known;
-use crate::support::onnx::{self, Type};
+use crate::support::onnx;
 use crate::support::table::check_rows;
-
-#[test]
-fn a_model_of_a_fixed_size_is_fed_and_read_by_resizing() {
-    let (_folder, mut enhancer) = loaded(&onnx::fixed(16, 24));
-    // Multiples are tried for a model of any size alone, and nothing else is said.
-    let tried = |enhancer: &Enhancer| enhancer.describe().contains("tried first, then 4");
-    assert!(!tried(&enhancer), "{}", enhancer.describe());
-    assert!(tried(&loaded(&onnx::identity()).1));
-    let same = image(16, 24);
-    assert_eq!(enhancer.enhance(&same).unwrap(), same);
-    let flat = Rgb::new(30, 17, [9, 120, 250].repeat(30 * 17)).unwrap();
-    assert_eq!(enhancer.enhance(&flat).unwrap(), flat);
-}
 
 #[test]
 fn sides_are_filled_up_to_multiples() {
@@ -37,6 +23,31 @@ fn sides_are_filled_up_to_multiples() {
     let (_folder, mut wrong) = stated(&onnx::of_eights(), "multiple = 2");
     let message = wrong.enhance(&image).unwrap_err().to_string();
     assert!(message.contains("multiple = 8"), "{message}");
+}
+
+#[test]
+fn a_row_and_a_column_are_always_filled_if_that_is_stated() {
+    // The mean of the whole, black fill included, shows how much was filled.
+    let sidecar = "multiple = 16\npad = \"zero\"\npad_always = true";
+    let (_folder, mut always) = stated(&onnx::mean_added(), sidecar);
+    let gray = Rgb::new(16, 16, vec![100; 3 * 256]).unwrap();
+    // 32 × 32 pixels, a quarter of them gray.
+    assert_eq!(always.enhance(&gray).unwrap().samples(), [125; 3 * 256]);
+    let (_folder, mut never) = stated(&onnx::mean_added(), "multiple = 16\npad = \"zero\"");
+    assert_eq!(never.enhance(&gray).unwrap().samples(), [200; 3 * 256]);
+}
+
+#[test]
+fn the_smallest_multiple_is_found_by_trial_whatever_the_order_of_images() {
+    check_rows([4, 12, 20, 48, 96], |multiple| {
+        let (_folder, mut found) = loaded(&onnx::of_multiples(multiple));
+        let images = [image(110, 250), image(96, 192), image(31, 97)];
+        for image in &images {
+            assert_eq!(found.enhance(image).unwrap(), *image);
+        }
+        assert_eq!(found.sizes().multiple, Some(multiple as usize));
+        assert!(found.sizes().padded > 0, "{:?}", found.sizes());
+    });
 }
 
 #[test]
@@ -89,17 +100,6 @@ fn tiles_are_exact_or_refused() {
         .unwrap_err()
         .to_string();
     assert!(message.contains("needs the whole image"), "{message}");
-}
-
-#[test]
-fn a_fixed_size_is_a_tile_where_tiles_are_exact() {
-    let shape = [Known(1), Known(3), Known(32), Known(40)];
-    let (_folder, mut exact) = stated(&onnx::shaped(Type::Float, &shape), "tile = \"exact:3\"");
-    let large = image(70, 90);
-    assert_eq!(exact.enhance(&large).unwrap(), large);
-    // Smaller than a tile: resized.
-    let flat = Rgb::new(20, 17, [9, 120, 250].repeat(20 * 17)).unwrap();
-    assert_eq!(exact.enhance(&flat).unwrap(), flat);
 }
 
 #[test]

@@ -56,7 +56,9 @@ fn every_condition_runs_raw_and_enhanced() {
     let bench = Bench::with_frames();
     onnx::gain(3.0).write(&bench.path(""), "bright.onnx");
     onnx::gamma(0.5).write(&bench.path(""), "curve.onnx");
-    let args = words("--data frames --model random --llie bright.onnx --llie curve.onnx --out run");
+    let args = words(
+        "--data frames --model random --llie bright.onnx --llie curve.onnx --llie-anyway --out run",
+    );
     let table = bench.complete(&args);
     assert!(
         table.contains("with noise + bright") && table.contains("with noise + curve"),
@@ -112,6 +114,31 @@ fn threads_and_order_change_no_byte() {
         )
     };
     assert_eq!(images("one", "1", "1"), images("many", "5", "16"));
+}
+
+#[test]
+fn several_images_enhanced_at_once_are_the_same_images() {
+    let bench = Bench::new();
+    let images = |run: &str, threads: &str| -> BTreeMap<String, String> {
+        bench.complete(&words(&format!(
+            "--data rooms:frames=8,size=160x96 --model random --levels L3 --llie lift --llie gray-gain \
+             --threads {threads} --out {run}"
+        )));
+        let records = records(&bench.path(run));
+        let images = records
+            .iter()
+            .map(|r| (r["key"].to_string(), r["image"]["digest"].to_string()));
+        images.collect()
+    };
+    let one = images("one", "1");
+    assert!(one.len() > 24, "{}", one.len());
+    assert_eq!(one, images("many", "3"));
+    let manifest = |run: &str| -> Value {
+        let text = fs::read(bench.path(run).join("manifest.json")).unwrap();
+        serde_json::from_slice(&text).unwrap()
+    };
+    // What became of them is counted together.
+    assert_eq!(manifest("one")["enhancers"], manifest("many")["enhancers"]);
 }
 
 #[test]

@@ -133,7 +133,7 @@ fn an_enhancer_that_fails_is_found_before_anything_is_asked() {
     let run = bench.call(&model_args(&url, "--data frames --llie nan.onnx --out run"));
     assert_eq!(run.code, Some(2), "{run:?}");
     assert!(
-        run.stderr.contains("nan.onnx") && run.stderr.contains("NaN"),
+        run.stderr.contains("nan.onnx") && run.stderr.contains("not numbers"),
         "{run:?}"
     );
     assert_eq!(endpoint.requests().len(), 0);

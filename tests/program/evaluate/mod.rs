@@ -6,6 +6,7 @@ mod interruption;
 mod outputs;
 mod requests;
 mod resume;
+mod untouched;
 
 use serde_json::Value;
 

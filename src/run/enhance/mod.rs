@@ -1,4 +1,6 @@
-//! `enhance`: writing images that an enhancer made, or describing the enhancer.
+//! `enhance`: writing images that an enhancer made, describing the enhancer, or examining it.
+
+mod doctor;
 
 use std::path::{Path, PathBuf};
 
@@ -7,7 +9,7 @@ use clap::Args;
 use crate::ask::png;
 use crate::dataset::PixelLimit;
 use crate::dataset::inputs::{InputFrame, Inputs};
-use crate::enhance::{Enhancer, FRAMES, ModelFile};
+use crate::enhance::{Enhancer, FRAMES, ImageOutput, ModelFile};
 use crate::error::{Error, Result};
 use crate::files::write;
 use crate::job::Outcome;
@@ -16,12 +18,17 @@ use crate::job::enhancers::{EnhancerRunArgs, OpenEnhancers};
 use crate::job::progress::Progress;
 use crate::types::manifest::Status;
 use crate::types::{Decides, Rgb};
+use doctor::DoctorArgs;
+
+/// Number of outputs that are tried as the image; chosen: models that give each of their steps have fewer.
+const MOST_OUTPUTS: usize = 16;
 
 /// The flags of `enhance`.
 #[derive(Debug, Args)]
 pub(crate) struct EnhanceArgs {
     /// The enhancer: lift or gray-gain, which are built in; FILE.onnx; or PRESET:FILE.onnx (zero-dce, zero-dce++, ruas-lol,
-    /// ruas-upe, retinexformer, darkir, sci, iat, pairlie, enlightengan)
+    /// ruas-upe, ruas-dark, sci, iat, pairlie, pairlie-lol, enlightengan, uretinex, retinexformer, darkir, cidnet, llformer,
+    /// restormer, mirnet, kind)
     #[arg(value_name = "MODEL", add = Decides::Trials)]
     pub model: PathBuf,
     /// Images (PNG, JPEG) and folders of frames
@@ -33,6 +40,9 @@ pub(crate) struct EnhanceArgs {
     /// Print how the model's input and output are read, and why; enhances nothing
     #[arg(long, conflicts_with_all = ["inputs", "out"], add = Decides::Nothing)]
     pub describe: bool,
+    /// The flags of the examination.
+    #[command(flatten)]
+    pub doctor: DoctorArgs,
     /// The flags for running enhancers.
     #[command(flatten)]
     pub loading: EnhancerRunArgs,
@@ -51,10 +61,7 @@ pub(crate) struct EnhanceArgs {
 /// # Errors
 /// If the model or an input is missing, two images have the same name, or the folder cannot be written to.
 pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
-    let files = vec![ModelFile::read(&args.model)?];
-    let enhancers = OpenEnhancers::load(files, &args.loading)?.take()?;
-    let [mut enhancer] = <[Enhancer; 1]>::try_from(enhancers)
-        .map_err(|_| Error::usage("MODEL", "one model expected"))?;
+    let (mut enhancer, image) = open(args)?;
     let Some(out) = &args.out else {
         return Ok(Outcome {
             status: Status::Complete,
@@ -66,6 +73,13 @@ pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome
     let sample = sample.map(|place| images.picture(&images.entries[place])?.decode());
     // An image that cannot be read is named when its turn comes.
     let sample: Vec<Rgb> = sample.filter_map(Result::ok).collect();
+    if args.doctor.doctor {
+        if sample.is_empty() {
+            let problem = "needs at least one image that can be read";
+            return Err(Error::usage("INPUT", problem));
+        }
+        return doctor::doctor(&args.doctor, image, &mut enhancer, &darkened(&sample), out);
+    }
     if !sample.is_empty() {
         enhancer.probe(&darkened(&sample), args.loading.probe.implausible())?;
     }
@@ -105,6 +119,28 @@ pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome
             count(failed, "failed")
         ),
     })
+}
+
+/// The enhancer, and whether it is known which of its outputs is the image. If it is not, `--doctor` examines all of them.
+fn open(args: &EnhanceArgs) -> Result<(Enhancer, ImageOutput)> {
+    let load = |file: ModelFile| -> Result<Enhancer> {
+        let enhancers = OpenEnhancers::load(vec![file], &args.loading)?.take()?;
+        let mut enhancers = enhancers.into_iter();
+        let only = enhancers.next();
+        only.ok_or_else(|| Error::usage("MODEL", "one model expected"))
+    };
+    let problem = match load(ModelFile::read(&args.model)?) {
+        Ok(enhancer) => return Ok((enhancer, ImageOutput::Known)),
+        Err(problem) => problem,
+    };
+    if args.doctor.doctor {
+        for place in 0..MOST_OUTPUTS {
+            if let Ok(enhancer) = load(ModelFile::read(&args.model)?.with_output(place)) {
+                return Ok((enhancer, ImageOutput::Unknown));
+            }
+        }
+    }
+    Err(problem)
 }
 
 fn enhance_one(

@@ -1,0 +1,329 @@
+//! Examination of a model whose convention is not known: [`Enhancer::examine`].
+//!
+//! The model runs on a few dark frames with each convention that could be meant. What is proposed is the only convention whose images
+//! can be enhanced images; if there are several or none, nothing is.
+
+use std::collections::BTreeSet;
+
+use super::convention::{ChannelOrder, ValueRange};
+use super::enhancer::Enhancer;
+use super::plausible::{Codes, Facts};
+use super::port::Port;
+use super::probe::{PairTrial, Probe, RangePair};
+use super::probe_run::{Trials, made};
+use super::sidecar::{ModelSidecar, OutputChoice};
+use super::size_search::TakenSizes;
+use crate::error::Result;
+use crate::types::{Flaw, Rgb};
+
+/// What a model makes of dark frames, by convention.
+#[derive(Debug)]
+pub(crate) struct Examination {
+    /// The dark frames as they are fed.
+    pub(crate) frames: Vec<Rgb>,
+    pub(crate) columns: Vec<ExaminedConvention>,
+    /// The lines of a sidecar that are proposed.
+    pub(crate) proposal: Vec<ProposedLine>,
+    /// Why they are proposed, or why nothing is.
+    pub(crate) conclusion: String,
+    /// What was done because of the sizes of the frames, or why it failed.
+    pub(crate) sizes: String,
+    pub(crate) settled: Settled,
+}
+
+/// Whether it is known which output is the image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ImageOutput {
+    Known,
+    /// Several could be, and the first of them is read.
+    Unknown,
+}
+
+/// Whether an examination found one convention.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Settled {
+    /// Exactly one convention is plausible.
+    Yes,
+    /// Several are, or none is.
+    No,
+}
+
+/// The images of one convention.
+#[derive(Debug)]
+pub(crate) struct ExaminedConvention {
+    /// What it is, as a heading.
+    pub(crate) title: String,
+    /// What the model made of each frame.
+    pub(crate) images: Vec<ExaminedImage>,
+    /// What is wrong with at least half of them; `None` if they can be enhanced images.
+    pub(crate) problem: Option<String>,
+}
+
+/// One image of a model.
+#[derive(Debug)]
+pub(crate) struct ExaminedImage {
+    /// The image, clamped and rounded.
+    pub(crate) image: Rgb,
+    /// Its figures before it was clamped.
+    pub(crate) facts: Facts,
+    /// What is wrong with it; `None` if it can be an enhanced image.
+    pub(crate) problem: Option<String>,
+}
+
+/// A line of a sidecar.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct ProposedLine {
+    /// The line, as `range_in = "0..1"`.
+    pub(crate) line: String,
+    /// Why it is proposed.
+    pub(crate) reason: String,
+}
+
+impl Enhancer {
+    /// Runs the model on dark frames with each convention that could be meant.
+    ///
+    /// # Errors
+    /// If it takes none of the sizes of the probe.
+    pub(crate) fn examine(&mut self, dark: &[Rgb], image: ImageOutput) -> Result<Examination> {
+        let sizes = self.try_sizes(dark);
+        let stated = self.convention().clone();
+        let order = swapped(stated.color_out.or(stated.color).unwrap_or_default());
+        let swapped = ModelSidecar {
+            color_out: Some(order),
+            ..stated.clone()
+        };
+        let trials = self.trials(dark, &stated, [None; 2])?.ok_or_else(|| {
+            self.fault("it takes none of the small sizes of the probe; state `multiple` or `fixed` in MODEL.onnx.toml beside it".to_owned())
+        })?;
+        let Trials { frames, probe } = trials;
+        let other = self.trials(dark, &swapped, [None; 2])?;
+        let other = other.map(|trials| trials.probe);
+        let others = self.other_outputs(&frames, probe.best())?;
+        let mut found = match (image, self.stated_pair(&probe)) {
+            (ImageOutput::Unknown, _) => Found::no_output(&self.output_title(), &probe, &others),
+            (ImageOutput::Known, Some(pair)) => Found::stated(pair),
+            (ImageOutput::Known, None) => propose(&probe, other.as_ref(), order),
+        };
+        if !found.lines.is_empty() {
+            found.lines.extend(self.found_size());
+        }
+        let mut columns = columns(&probe, "");
+        if let Some(other) = &other {
+            let swapped = self::columns(other, ", red and blue swapped in the output");
+            // Nine more pictures of what cannot be would only distract.
+            columns.extend(
+                swapped
+                    .into_iter()
+                    .filter(|column| column.problem.is_none()),
+            );
+        }
+        for output in others.iter().filter(|output| output.problem.is_none()) {
+            if image == ImageOutput::Known {
+                let also = " gives plausible images, too, so check which output its authors use.";
+                found.conclusion += &[" The ", &*output.title, also].concat();
+            }
+        }
+        columns.extend(others);
+        // Where something is plausible, the rest would only distract.
+        if columns.iter().any(|column| column.problem.is_none()) {
+            columns.retain(|column| column.problem.is_none());
+        }
+        Ok(Examination {
+            settled: found.settled,
+            frames,
+            columns,
+            proposal: found.lines,
+            conclusion: found.conclusion,
+            sizes,
+        })
+    }
+
+    /// The output that is read, as a title.
+    fn output_title(&self) -> String {
+        format!("output {:?}", self.graph().signature.outputs[0].port.name)
+    }
+
+    /// The ranges that are stated, if the images are plausible with them.
+    fn stated_pair(&self, probe: &Probe) -> Option<RangePair> {
+        let [input, output] = self.stated_ranges();
+        let pair = RangePair {
+            input: input?,
+            output: output?,
+        };
+        probe.plausible().contains(&pair).then_some(pair)
+    }
+
+    /// Runs the model on a frame of each size, which shows what it takes. What is wrong with its images is not looked at here.
+    fn try_sizes(&mut self, frames: &[Rgb]) -> String {
+        let mut tried = BTreeSet::new();
+        for frame in frames {
+            if tried.insert([frame.height(), frame.width()])
+                && let Err(problem) = self.enhance(frame)
+            {
+                return problem.to_string();
+            }
+        }
+        self.usage().note().sizes
+    }
+
+    /// The line for the size that was found by trial.
+    fn found_size(&self) -> Option<ProposedLine> {
+        let line = match self.found_sizes()? {
+            TakenSizes::Multiple(multiple) => format!("multiple = {multiple}"),
+            TakenSizes::Traced([height, width]) => format!("fixed = [{width}, {height}]"),
+        };
+        let reason = "found by trial: it fails at other sizes".to_owned();
+        Some(ProposedLine { line, reason })
+    }
+
+    /// The images of the outputs that are not read.
+    fn other_outputs(&self, frames: &[Rgb], ranges: RangePair) -> Result<Vec<ExaminedConvention>> {
+        let mut columns = Vec::new();
+        for Port { name, .. } in &self.graph().signature.unread {
+            let convention = ModelSidecar {
+                output: Some(OutputChoice::Name(name.clone())),
+                image: None,
+                range_in: Some(ranges.input),
+                range_out: Some(ranges.output),
+                ..self.convention().clone()
+            };
+            // An output that is no image, such as curves, is left out.
+            let Ok(graph) = self.graph().with_convention(convention) else {
+                continue;
+            };
+            let seen: Vec<Codes> = frames.iter().map(Codes::of).collect();
+            if let Some(made) = made(&graph, frames)? {
+                let pair = PairTrial::new(ranges, &seen, made);
+                columns.push(column(&pair, format!("output {name:?}, {ranges}")));
+            }
+        }
+        Ok(columns)
+    }
+}
+
+fn swapped(order: ChannelOrder) -> ChannelOrder {
+    match order {
+        ChannelOrder::Rgb => ChannelOrder::Bgr,
+        ChannelOrder::Bgr => ChannelOrder::Rgb,
+    }
+}
+
+fn columns(probe: &Probe, suffix: &str) -> Vec<ExaminedConvention> {
+    let pairs = probe.pairs.iter();
+    pairs
+        .map(|pair| column(pair, format!("{}{suffix}", pair.ranges)))
+        .collect()
+}
+
+fn column(pair: &PairTrial, title: String) -> ExaminedConvention {
+    let images = pair.made.iter().zip(&pair.verdicts);
+    let images = images.map(|(made, verdict)| ExaminedImage {
+        image: made.to_rgb(),
+        facts: made.facts(),
+        problem: verdict.map(|verdict| verdict.to_string()),
+    });
+    ExaminedConvention {
+        title,
+        images: images.collect(),
+        problem: pair.verdict().map(|seen| seen.to_string()),
+    }
+}
+
+/// What an examination found.
+struct Found {
+    lines: Vec<ProposedLine>,
+    conclusion: String,
+    settled: Settled,
+}
+
+impl Found {
+    fn nothing(conclusion: String) -> Self {
+        Self {
+            lines: Vec::new(),
+            conclusion,
+            settled: Settled::No,
+        }
+    }
+
+    /// The ranges that are stated are plausible.
+    fn stated(pair: RangePair) -> Self {
+        let conclusion = format!(
+            "With {pair}, as its sidecar, its preset or its types state, its images can be enhanced images."
+        );
+        Self {
+            settled: Settled::Yes,
+            ..Self::nothing(conclusion)
+        }
+    }
+
+    /// Several outputs could be the image.
+    fn no_output(first: &str, probe: &Probe, others: &[ExaminedConvention]) -> Self {
+        let mut plausible: Vec<&str> = Vec::new();
+        if !probe.plausible().is_empty() {
+            plausible.push(first);
+        }
+        let others = others.iter().filter(|output| output.problem.is_none());
+        plausible.extend(others.map(|output| &*output.title));
+        Self::nothing(format!(
+            "Which output is the image is not stated, and cannot be found: plausible are {}. State the one that its authors use, `output = \"NAME\"`, or name their preset.",
+            if plausible.is_empty() {
+                "none".to_owned()
+            } else {
+                plausible.join("; ")
+            }
+        ))
+    }
+
+    fn ranges(pair: RangePair, conclusion: String) -> Self {
+        let reason = "the only value ranges with which its images can be enhanced images";
+        let line = |key: &str, range: ValueRange| ProposedLine {
+            line: format!("{key} = \"{range}\""),
+            reason: reason.to_owned(),
+        };
+        Self {
+            lines: vec![line("range_in", pair.input), line("range_out", pair.output)],
+            conclusion,
+            settled: Settled::Yes,
+        }
+    }
+}
+
+/// What follows from the pairs of ranges: the only plausible one is proposed. `swapped` is the probe with the other order of the
+/// output's colours, which is considered if the colours are why nothing else is plausible.
+fn propose(probe: &Probe, swapped: Option<&Probe>, order: ChannelOrder) -> Found {
+    match probe.plausible().as_slice() {
+        [pair] => {
+            let conclusion = format!(
+                "With {pair}, and with no other ranges, its images can be enhanced images."
+            );
+            return Found::ranges(*pair, conclusion);
+        }
+        [] => {}
+        several => {
+            let list: Vec<String> = several.iter().map(ToString::to_string).collect();
+            return Found::nothing(format!(
+                "Its images can be enhanced images with several value ranges: {}. Compare them below with the model's own examples, and state those that its authors use.",
+                list.join("; ")
+            ));
+        }
+    }
+    let is_hue = probe.pairs.iter().any(|pair| {
+        let seen = pair.verdict();
+        pair.ranges == probe.usual && seen.is_some_and(|seen| seen.example.flaw == Flaw::Hue)
+    });
+    if let Some(swapped) = swapped.filter(|_| is_hue)
+        && let [pair] = swapped.plausible().as_slice()
+    {
+        let conclusion =
+            format!("With {pair} and {order} in the output its images can be enhanced images.");
+        let mut found = Found::ranges(*pair, conclusion);
+        found.lines.push(ProposedLine {
+            line: format!("color_out = \"{}\"", order.to_string().to_lowercase()),
+            reason: "with the other order, its images are blue where the frames are red".to_owned(),
+        });
+        return found;
+    }
+    Found::nothing(
+        "With none of the conventions below its images can be enhanced images. Perhaps another output is the image, the dimensions have another order, or the export has lost its weights.".to_owned(),
+    )
+}

@@ -1,0 +1,106 @@
+//! What is known of an enhancer, for its probe and its examination.
+
+use std::path::Path;
+
+use super::Enhancer;
+use crate::enhance::convention::{ElementType, ValueRange};
+use crate::enhance::graph::Graph;
+use crate::enhance::probe::RangePair;
+use crate::enhance::sidecar::ModelSidecar;
+use crate::enhance::size_search::TakenSizes;
+use crate::enhance::sizes::SizeLog;
+use crate::enhance::usage::Usage;
+use crate::error::Result;
+use crate::types::enhancer_note::{ProbeNote, ProbeOutcome};
+
+impl Enhancer {
+    /// Path of the model's file; for an enhancer of the program, what messages call it.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// A handle to what it did so far.
+    #[must_use]
+    pub(crate) fn usage(&self) -> Usage {
+        self.usage.clone()
+    }
+
+    pub(in crate::enhance) fn graph(&self) -> &Graph {
+        &self.graph
+    }
+
+    /// What sidecar and preset state.
+    pub(in crate::enhance) fn convention(&self) -> &ModelSidecar {
+        &self.graph.convention
+    }
+
+    /// The ranges in which it is fed and read now.
+    pub(in crate::enhance) fn ranges(&self) -> RangePair {
+        RangePair {
+            input: self.graph.feeding.range,
+            output: self.graph.reading.range(),
+        }
+    }
+
+    /// The ranges of input and output that the sidecar, a preset or the element types state. A preset that states none stands for
+    /// 0..1, which all authors of presets use.
+    pub(in crate::enhance) fn stated_ranges(&self) -> [Option<ValueRange>; 2] {
+        let signature = &self.graph.signature;
+        let of = |stated: Option<ValueRange>, element: &ElementType| {
+            let preset = self.description.preset.as_ref().map(|_| ValueRange::Unit);
+            stated.or(element.certain_range()).or(preset)
+        };
+        let convention = self.convention();
+        [
+            of(convention.range_in, &signature.input.port.element),
+            of(convention.range_out, &signature.outputs[0].port.element),
+        ]
+    }
+
+    /// Height and width of a frame of the probe: the given ones, in the model's multiples, or those that it fixes.
+    pub(in crate::enhance) fn probe_size(&self, size: [usize; 2]) -> [usize; 2] {
+        let mut rule = self.rule(size);
+        match self.search.found() {
+            Some(TakenSizes::Multiple(multiple)) => rule.multiple = multiple,
+            Some(TakenSizes::Traced(traced)) => rule.fixed = traced.map(Some),
+            None => {}
+        }
+        rule.whole(size)
+    }
+
+    /// Counts from now on what is done because of sizes.
+    pub(crate) fn count_anew(&mut self) {
+        self.log = SizeLog::default();
+        self.usage.set_sizes(self.twin, &self.log);
+    }
+
+    /// Sizes that were found by trial.
+    pub(in crate::enhance) fn found_sizes(&self) -> Option<TakenSizes> {
+        self.search.found()
+    }
+
+    /// Notes what the probe found. From now on it is fed and read in the ranges that were tried, and no value is out of range.
+    ///
+    /// # Errors
+    /// If the graph contradicts its own convention, which is a bug.
+    pub(in crate::enhance) fn set_probed(&mut self, probe: ProbeNote) -> Result<()> {
+        let ranges = self.ranges();
+        let convention = ModelSidecar {
+            range_in: Some(ranges.input),
+            range_out: Some(ranges.output),
+            ..self.convention().clone()
+        };
+        let graph = self.graph.with_convention(convention);
+        self.graph = graph.map_err(|problem| self.fault(problem))?;
+        self.description.probed = probe.outcome == ProbeOutcome::Plausible;
+        self.usage.update(|note| note.probe = Some(probe));
+        self.note_convention();
+        Ok(())
+    }
+
+    /// Notes how the model is fed and read, with the source of each value.
+    pub(super) fn note_convention(&self) {
+        let lines = self.description.lines(&self.graph, self.convention());
+        self.usage.update(|note| note.convention = lines);
+    }
+}

@@ -1,0 +1,280 @@
+//! Check of a library's file by its header, before it is loaded: [`LibraryFormat::check`].
+//!
+//! The system's loader maps a library without looking whether all of it is there: a library that lacks its last megabyte
+//! kills the program with SIGBUS, and one that lacks its last 4,096 bytes loads by chance. So the size that the header
+//! promises is compared with the size of the file. Offsets are those of the ELF specification (gabi, chapters 4 and 5), of
+//! Apple's `mach-o/loader.h` and `mach-o/fat.h`, and of Microsoft's "PE Format".
+
+use std::env::consts;
+use std::fs::File;
+use std::io::{ErrorKind, Read, Seek, SeekFrom};
+use std::path::Path;
+
+/// Format of a system's dynamic libraries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum LibraryFormat {
+    /// Linux and most other systems.
+    Elf,
+    /// macOS.
+    MachO,
+    /// Windows.
+    Pe,
+}
+
+/// Most load commands, segments, sections or architectures that are read; chosen, ONNX Runtime's library has below 50.
+const MOST_PARTS: u64 = 4096;
+
+/// Symbol by which ONNX Runtime's library is known.
+const ENTRY: &[u8] = b"OrtGetApiBase\0";
+
+/// Largest table of dynamic names that is searched for [`ENTRY`], in bytes; chosen, ONNX Runtime's has 30 kB.
+const MOST_NAMES: u64 = 16 << 20;
+
+impl LibraryFormat {
+    /// The format of this build's system.
+    pub(super) fn of_this_system() -> Self {
+        match consts::OS {
+            "windows" => Self::Pe,
+            "macos" => Self::MachO,
+            _ => Self::Elf,
+        }
+    }
+
+    /// Checks that a file is a whole library for this build's processor, and that no other process writes it meanwhile.
+    ///
+    /// # Errors
+    /// What is wrong with it; the message follows its path.
+    pub(super) fn check(self, path: &Path) -> Result<(), String> {
+        let unreadable = |e: std::io::Error| format!("cannot be read: {e}");
+        let mut file = File::open(path).map_err(unreadable)?;
+        let state = |file: &File| file.metadata().map(|m| (m.len(), m.modified().ok()));
+        let before = state(&file).map_err(unreadable)?;
+        self.check_content(&mut file, before.0, consts::ARCH)?;
+        if state(&file).map_err(unreadable)? != before {
+            return Err(
+                "is being written by another process; wait until that has ended".to_owned(),
+            );
+        }
+        Ok(())
+    }
+
+    /// Checks a library of `size` bytes for a processor (named as in [`std::env::consts::ARCH`]).
+    fn check_content(
+        self,
+        file: &mut (impl Read + Seek),
+        size: u64,
+        arch: &str,
+    ) -> Result<(), String> {
+        let mut header = Header { file, start: 0 };
+        let needed = match self {
+            Self::Elf => header.elf(arch),
+            Self::MachO => header.mach_o(arch),
+            Self::Pe => header.pe(arch),
+        };
+        match needed {
+            Ok(needed) if needed <= size => Ok(()),
+            Ok(needed) => Err(cut_short(&format!("{size} of {needed} bytes"))),
+            Err(Flaw::Cut) => Err(cut_short(&format!(
+                "{size} bytes, fewer than its header names"
+            ))),
+            Err(Flaw::Wrong(problem)) => Err(problem.to_owned()),
+            Err(Flaw::Unreadable(e)) => Err(format!("cannot be read: {e}")),
+        }
+    }
+}
+
+/// Message for an incomplete file.
+fn cut_short(sizes: &str) -> String {
+    format!(
+        "is cut short: {sizes}; copy or install it again, or wait if another process is still writing it"
+    )
+}
+
+/// Reason why a header gives no size.
+enum Flaw {
+    /// The file ends within its header.
+    Cut,
+    /// It is not a library that this build can load.
+    Wrong(&'static str),
+    Unreadable(std::io::Error),
+}
+
+const NOT_A_LIBRARY: Flaw = Flaw::Wrong("is not a dynamic library of this system");
+const OTHER_PROCESSOR: Flaw = Flaw::Wrong("is a library for another processor");
+
+/// Header of a library that begins at `start` in a file.
+struct Header<'a, F> {
+    file: &'a mut F,
+    start: u64,
+}
+
+impl<F: Read + Seek> Header<'_, F> {
+    fn bytes<const N: usize>(&mut self, at: u64) -> Result<[u8; N], Flaw> {
+        let mut bytes = [0; N];
+        let at = self.start.checked_add(at).ok_or(Flaw::Cut)?;
+        let read = self.file.seek(SeekFrom::Start(at));
+        let read = read.and_then(|_| self.file.read_exact(&mut bytes));
+        match read {
+            Ok(()) => Ok(bytes),
+            Err(e) if e.kind() == ErrorKind::UnexpectedEof => Err(Flaw::Cut),
+            Err(e) if e.kind() == ErrorKind::InvalidInput => Err(Flaw::Cut),
+            Err(e) => Err(Flaw::Unreadable(e)),
+        }
+    }
+
+    fn u16(&mut self, at: u64) -> Result<u64, Flaw> {
+        self.bytes(at).map(|b| u64::from(u16::from_le_bytes(b)))
+    }
+
+    fn u32(&mut self, at: u64) -> Result<u64, Flaw> {
+        self.bytes(at).map(|b| u64::from(u32::from_le_bytes(b)))
+    }
+
+    fn u64(&mut self, at: u64) -> Result<u64, Flaw> {
+        self.bytes(at).map(u64::from_le_bytes)
+    }
+
+    /// Size that an ELF library needs: the end of its last table or segment. The table of sections stands last in ONNX
+    /// Runtime's releases, so that one missing byte shows.
+    fn elf(&mut self, arch: &str) -> Result<u64, Flaw> {
+        // Magic, 64 bits, little-endian; ET_DYN is 3.
+        if self.bytes::<6>(0)? != *b"\x7fELF\x02\x01" || self.u16(16)? != 3 {
+            return Err(NOT_A_LIBRARY);
+        }
+        let machine = match arch {
+            "x86_64" => Some(62),
+            "aarch64" => Some(183),
+            _ => None,
+        };
+        let found = self.u16(18)?;
+        if machine.is_some_and(|machine| machine != found) {
+            return Err(OTHER_PROCESSOR);
+        }
+        let (segments, sections) = (self.u64(32)?, self.u64(40)?);
+        let [segment_size, segment_count] = [self.u16(54)?, self.u16(56)?];
+        let [section_size, section_count] = [self.u16(58)?, self.u16(60)?];
+        let mut needed = end(segments, segment_size * segment_count)?
+            .max(end(sections, section_size * section_count)?);
+        for index in 0..segment_count.min(MOST_PARTS) {
+            let segment = end(segments, index * segment_size)?;
+            needed = needed.max(end(self.u64(segment + 8)?, self.u64(segment + 32)?)?);
+        }
+        let size = self.file.seek(SeekFrom::End(0)).map_err(Flaw::Unreadable)?;
+        if needed <= size && section_count > 0 {
+            self.exports_entry(sections, section_size, section_count.min(MOST_PARTS))?;
+        }
+        Ok(needed)
+    }
+
+    /// Refuses an ELF library whose table of dynamic names (SHT_STRTAB that is loaded, SHF_ALLOC) lacks [`ENTRY`]: a library
+    /// of custom operators or any other, whose initialisers must not run.
+    fn exports_entry(&mut self, sections: u64, size: u64, count: u64) -> Result<(), Flaw> {
+        for index in 0..count {
+            let section = end(sections, index * size)?;
+            let is_table = self.u32(section + 4)? == 3 && self.u64(section + 8)? & 2 != 0;
+            let [offset, length] = [self.u64(section + 24)?, self.u64(section + 32)?];
+            if !is_table || length > MOST_NAMES {
+                continue;
+            }
+            let mut names = vec![0; usize::try_from(length).map_err(|_| Flaw::Cut)?];
+            let read = self.file.seek(SeekFrom::Start(offset));
+            let read = read.and_then(|_| self.file.read_exact(&mut names));
+            read.map_err(Flaw::Unreadable)?;
+            if !names.windows(ENTRY.len()).any(|name| name == ENTRY) {
+                return Err(Flaw::Wrong(
+                    "is not ONNX Runtime: it exports no OrtGetApiBase",
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Size that a Mach-O library needs: the end of its last segment, in a universal file from the part of this processor.
+    fn mach_o(&mut self, arch: &str) -> Result<u64, Flaw> {
+        // CPU_TYPE_X86_64 and CPU_TYPE_ARM64.
+        let cpu = match arch {
+            "x86_64" => 0x0100_0007,
+            _ => 0x0100_000c,
+        };
+        if self.bytes(0)? == [0xca, 0xfe, 0xba, 0xbe] {
+            return self.universal(cpu);
+        }
+        self.mach_o_part(cpu)
+    }
+
+    /// Size that a Mach-O library for one processor needs, from the start of its file.
+    fn mach_o_part(&mut self, cpu: u64) -> Result<u64, Flaw> {
+        // MH_MAGIC_64; MH_DYLIB is 6.
+        if self.u32(0)? != 0xfeed_facf || self.u32(12)? != 6 {
+            return Err(NOT_A_LIBRARY);
+        }
+        if self.u32(4)? != cpu {
+            return Err(OTHER_PROCESSOR);
+        }
+        let (count, mut at) = (self.u32(16)?.min(MOST_PARTS), 32);
+        let mut needed = end(at, self.u32(20)?)?;
+        for _ in 0..count {
+            let (command, length) = (self.u32(at)?, self.u32(at + 4)?);
+            // LC_SEGMENT_64
+            if command == 0x19 {
+                needed = needed.max(end(self.u64(at + 40)?, self.u64(at + 48)?)?);
+            }
+            at = end(at, length.max(8))?;
+        }
+        end(self.start, needed)
+    }
+
+    /// Size that a universal Mach-O file needs; its header is big-endian.
+    fn universal(&mut self, cpu: u64) -> Result<u64, Flaw> {
+        let count = u64::from(u32::from_be_bytes(self.bytes(4)?)).min(MOST_PARTS);
+        for index in 0..count {
+            let part = 8 + 20 * index;
+            if u64::from(u32::from_be_bytes(self.bytes(part)?)) == cpu {
+                let start = u64::from(u32::from_be_bytes(self.bytes(part + 8)?));
+                let length = u64::from(u32::from_be_bytes(self.bytes(part + 12)?));
+                let mut inner = Header {
+                    file: &mut *self.file,
+                    start,
+                };
+                return Ok(inner.mach_o_part(cpu)?.max(end(start, length)?));
+            }
+        }
+        Err(OTHER_PROCESSOR)
+    }
+
+    /// Size that a PE library needs: the end of the raw data of its last section.
+    fn pe(&mut self, arch: &str) -> Result<u64, Flaw> {
+        if self.bytes(0)? != *b"MZ" {
+            return Err(NOT_A_LIBRARY);
+        }
+        let at = self.u32(0x3c)?;
+        // IMAGE_FILE_DLL is 0x2000.
+        if self.bytes(at)? != *b"PE\0\0" || self.u16(at + 22)? & 0x2000 == 0 {
+            return Err(NOT_A_LIBRARY);
+        }
+        let machine = match arch {
+            "x86_64" => Some(0x8664),
+            "aarch64" => Some(0xaa64),
+            _ => None,
+        };
+        let found = self.u16(at + 4)?;
+        if machine.is_some_and(|machine| machine != found) {
+            return Err(OTHER_PROCESSOR);
+        }
+        let sections = at + 24 + self.u16(at + 20)?;
+        let mut needed = 0;
+        for index in 0..self.u16(at + 6)?.min(MOST_PARTS) {
+            let section = sections + 40 * index;
+            needed = needed.max(end(self.u32(section + 20)?, self.u32(section + 16)?)?);
+        }
+        Ok(needed)
+    }
+}
+
+/// End of a part of a file; a file whose parts end beyond 2^64 cannot be whole.
+fn end(start: u64, length: u64) -> Result<u64, Flaw> {
+    start.checked_add(length).ok_or(Flaw::Cut)
+}
+
+#[cfg(test)]
+mod tests;

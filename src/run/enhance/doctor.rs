@@ -1,0 +1,159 @@
+//! `enhance --doctor`: what a model makes of dark frames with each convention, as a page, a picture and a proposed sidecar.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use crate::ask::{Payload, PayloadFormat, png};
+use crate::enhance::{Enhancer, Examination, ImageOutput, Settled};
+use crate::error::{Error, Result};
+use crate::files::write;
+use crate::job::Outcome;
+use crate::report::doctor::{DoctorCell, DoctorColumn, DoctorPage, page};
+use crate::report::sheet::{ContactColumn, contact};
+use crate::types::manifest::Status;
+use crate::types::{Decides, Rgb};
+
+/// Names of the page and of the picture.
+const PAGE: &str = "doctor.html";
+const PICTURE: &str = "doctor.png";
+
+/// The flags of the examination.
+#[derive(Debug, Args)]
+pub(crate) struct DoctorArgs {
+    /// Run the model on dark versions of the images with each convention that could be meant, and write doctor.html and doctor.png
+    /// into the folder of --out, with the sidecar that would mend it; ends with 0 if there is one plausible convention, else with 1
+    #[arg(long, conflicts_with = "describe", requires = "out", add = Decides::Nothing)]
+    pub doctor: bool,
+    /// Write the sidecar that --doctor proposes beside the model; an existing one is never replaced
+    #[arg(long, requires = "doctor", add = Decides::Nothing)]
+    pub write: bool,
+}
+
+/// Examines the model on dark frames, and writes page and picture; with `--write`, the proposed sidecar, too.
+///
+/// # Errors
+/// If the model takes none of the sizes of the probe, a file cannot be written, or `--write` finds a sidecar that is there already.
+pub(super) fn doctor(
+    args: &DoctorArgs,
+    image: ImageOutput,
+    enhancer: &mut Enhancer,
+    dark: &[Rgb],
+    out: &Path,
+) -> Result<Outcome> {
+    let examination = enhancer.examine(dark, image)?;
+    let model = enhancer.path();
+    let lines: Vec<&str> = examination
+        .proposal
+        .iter()
+        .map(|line| &*line.line)
+        .collect();
+    let mut sidecar = String::new();
+    for line in &examination.proposal {
+        let _ = writeln!(sidecar, "{} # {}", line.line, line.reason);
+    }
+    let html = html(model, enhancer, &examination, &sidecar)?;
+    write(&out.join(PAGE), html.as_bytes())?;
+    write(&out.join(PICTURE), &png(&picture(&examination))?)?;
+    let mut output = format!("{}\n", examination.conclusion);
+    if !lines.is_empty() {
+        let _ = writeln!(output, "\n{sidecar}");
+        if args.write {
+            if !model.is_file() {
+                let problem = "the enhancers of the program are no files, so they have no sidecar";
+                return Err(Error::usage("--write", problem));
+            }
+            let path = sidecar_path(model);
+            if path.exists() {
+                return Err(Error::usage(
+                    "--write",
+                    format_args!(
+                        "{} exists already and is never replaced; add the lines by hand: {}",
+                        path.display(),
+                        lines.join(", ")
+                    ),
+                ));
+            }
+            write(&path, sidecar.as_bytes())?;
+            let _ = writeln!(output, "written: {}", path.display());
+        }
+    }
+    if lines.is_empty() && args.write {
+        output += "no sidecar is written, because no line is proposed\n";
+    }
+    let _ = writeln!(output, "page: {}", out.join(PAGE).display());
+    let _ = writeln!(output, "picture: {}", out.join(PICTURE).display());
+    Ok(Outcome {
+        status: match examination.settled {
+            Settled::Yes => Status::Complete,
+            Settled::No => Status::Incomplete,
+        },
+        output,
+    })
+}
+
+/// Path of the sidecar of a model file.
+fn sidecar_path(model: &Path) -> PathBuf {
+    let mut path = model.as_os_str().to_owned();
+    path.push(".toml");
+    path.into()
+}
+
+fn html(
+    model: &Path,
+    enhancer: &Enhancer,
+    examination: &Examination,
+    sidecar: &str,
+) -> Result<String> {
+    let columns = examination.columns.iter().map(|column| {
+        let cells = column.images.iter().map(|image| {
+            let facts = image.facts;
+            Ok(DoctorCell {
+                image: data_url(&image.image)?,
+                facts: format!(
+                    "mean {:.0}, {:.0} to {:.0}, {:.0} % cut off",
+                    facts.brightness,
+                    facts.darkest,
+                    facts.brightest,
+                    100.0 * facts.clipped
+                ),
+                problem: image.problem.clone(),
+            })
+        });
+        Ok(DoctorColumn {
+            title: column.title.clone(),
+            problem: column.problem.clone(),
+            cells: cells.collect::<Result<_>>()?,
+        })
+    });
+    let frames = examination.frames.iter().map(data_url);
+    let file = model.file_name().unwrap_or_default();
+    page(&DoctorPage {
+        model: file.to_string_lossy().into_owned(),
+        conclusion: examination.conclusion.clone(),
+        is_settled: examination.settled == Settled::Yes,
+        sidecar: sidecar.to_owned(),
+        frames: frames.collect::<Result<_>>()?,
+        columns: columns.collect::<Result<_>>()?,
+        description: enhancer.describe(),
+        sizes: examination.sizes.clone(),
+    })
+}
+
+fn data_url(image: &Rgb) -> Result<String> {
+    let payload = Payload::encode(image, PayloadFormat::Png, None)?;
+    Ok(String::from_utf8_lossy(&payload.data_url()).into_owned())
+}
+
+fn picture(examination: &Examination) -> Rgb {
+    let mut columns = vec![ContactColumn {
+        label: "dark frame".to_owned(),
+        images: examination.frames.iter().collect(),
+    }];
+    columns.extend(examination.columns.iter().map(|column| ContactColumn {
+        label: column.title.clone(),
+        images: column.images.iter().map(|image| &image.image).collect(),
+    }));
+    contact(&columns)
+}

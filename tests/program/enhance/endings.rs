@@ -1,0 +1,72 @@
+//! Runs that give no image: sizes that no trial mends, memory, time, and files that are too new.
+
+use std::time::{Duration, Instant};
+
+use darkqa_eval::enhance::TimeLimit;
+use darkqa_eval::types::Rgb;
+
+use super::{fault, image, loaded, open};
+use crate::support::onnx;
+use crate::support::table::check_rows;
+
+#[test]
+fn what_no_size_mends_is_named_without_a_multiple() {
+    let rows = [
+        (onnx::doubled(), "enlarges by 2"),
+        (onnx::halved(), "[1, 3, 20, 24]"),
+        (onnx::of_much_memory(), "free"),
+    ];
+    check_rows(rows, |(graph, part)| {
+        let (_folder, mut enhancer) = loaded(&graph);
+        let message = enhancer.enhance(&image(40, 48)).unwrap_err().to_string();
+        assert!(message.contains(part), "{message}");
+        assert!(!message.contains("multiple ="), "{message}");
+    });
+}
+
+#[test]
+fn an_image_that_takes_too_long_is_an_error_and_others_go_on() {
+    let (_folder, enhancer) = loaded(&onnx::endless_if_bright());
+    let limit = TimeLimit::of(Duration::from_millis(300));
+    let mut enhancer = enhancer.with_time_limit(limit);
+    let (dark, bright) = (
+        Rgb::new(4, 4, vec![50; 48]).unwrap(),
+        Rgb::new(4, 4, vec![200; 48]).unwrap(),
+    );
+    assert_eq!(enhancer.enhance(&dark).unwrap(), dark);
+    for _ in 0..2 {
+        let start = Instant::now();
+        let message = enhancer.enhance(&bright).unwrap_err().to_string();
+        assert!(message.contains("longer than 0.3 s"), "{message}");
+        assert!(
+            start.elapsed() < Duration::from_mins(1),
+            "{:?}",
+            start.elapsed()
+        );
+    }
+    // The session serves again, and the count begins again.
+    assert_eq!(enhancer.enhance(&dark).unwrap(), dark);
+    for _ in 0..3 {
+        let message = enhancer.enhance(&bright).unwrap_err().to_string();
+        assert!(message.contains("longer than"), "{message}");
+    }
+    let message = enhancer.enhance(&dark).unwrap_err().to_string();
+    assert!(message.contains("is not run any more"), "{message}");
+    assert_eq!(enhancer.sizes().too_long, 5);
+}
+
+#[test]
+fn a_file_that_is_too_new_for_the_library_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("new.onnx");
+    for (versions, part) in [((99, 13), "IR version 99"), ((8, 999), "operator set 999")] {
+        let bytes = onnx::identity().model_of(versions.0, versions.1);
+        std::fs::write(&path, bytes).unwrap();
+        let message = open(&path).err().unwrap().to_string();
+        assert!(
+            message.contains(part) && message.contains("--ort-lib"),
+            "{message}"
+        );
+    }
+    assert!(fault(&onnx::no_image()).contains("no output"));
+}

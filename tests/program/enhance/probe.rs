@@ -1,0 +1,188 @@
+//! Models whose images cannot be enhanced images: in an evaluation, and examined by `enhance --doctor`.
+
+use std::fs;
+
+use serde_json::Value;
+
+use crate::support::onnx::{self, Graph};
+use crate::support::run::{Bench, Called, words};
+
+/// An evaluation of the built-in rooms with the enhancer `model.onnx`.
+const ASK: &str =
+    "--model random --data rooms:frames=3,size=144x96 --levels L3 --limit 9 --out run";
+
+const UNIT: [f32; 2] = [0.0, 1.0];
+const BYTES: [f32; 2] = [0.0, 255.0];
+const SIGNED: [f32; 2] = [-1.0, 1.0];
+
+/// A bench with a model, and with a sidecar if it is not empty.
+fn bench(graph: &Graph, sidecar: &str) -> Bench {
+    let bench = Bench::new();
+    graph.write(&bench.path(""), "model.onnx");
+    if !sidecar.is_empty() {
+        bench.file("model.onnx.toml", sidecar);
+    }
+    bench
+}
+
+fn ask(bench: &Bench, flags: &str) -> Called {
+    bench.call(&words(&format!("{ASK} --llie model.onnx {flags}")))
+}
+
+fn manifest(bench: &Bench) -> Value {
+    let text = fs::read_to_string(bench.path("run/manifest.json")).unwrap();
+    serde_json::from_str(&text).unwrap()
+}
+
+/// The value and the source of a statement about the enhancer.
+fn stated(manifest: &Value, key: &str) -> (String, String) {
+    let lines = manifest["enhancers"]["model"]["convention"].as_array();
+    let line = lines.unwrap().iter().find(|line| line["key"] == key);
+    let text = |field: &str| line.unwrap()[field].as_str().unwrap().to_owned();
+    (text("value"), text("source"))
+}
+
+#[test]
+fn a_right_model_is_asked_and_its_ranges_are_confirmed() {
+    let bench = bench(&onnx::enhancer_in_ranges(UNIT, UNIT), "");
+    let called = ask(&bench, "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    let manifest = manifest(&bench);
+    assert_eq!(
+        stated(&manifest, "range_in"),
+        ("0..1".to_owned(), "probed".to_owned())
+    );
+    let note = &manifest["enhancers"]["model"];
+    assert_eq!(note["probe"]["outcome"], "plausible");
+    assert!(note["judged"]["images"].as_u64().unwrap() > 0, "{note}");
+    assert!(note["judged"]["flawed"].is_null(), "{note}");
+    let page = fs::read_to_string(bench.path("run/report.html")).unwrap();
+    assert!(page.contains("fed 0..1 (probed)"), "the page says how");
+}
+
+#[test]
+fn wrong_ranges_stop_the_run_and_name_the_lines_that_mend_it() {
+    for (input, output, lines) in [
+        (SIGNED, SIGNED, ["-1..1", "-1..1"]),
+        (BYTES, UNIT, ["0..255", "0..1"]),
+        (UNIT, BYTES, ["0..1", "0..255"]),
+        (BYTES, BYTES, ["0..255", "0..255"]),
+        (UNIT, SIGNED, ["0..1", "-1..1"]),
+    ] {
+        let graph = onnx::enhancer_in_ranges(input, output);
+        let unstated = bench(&graph, "");
+        let called = ask(&unstated, "");
+        assert_eq!(called.code, Some(2), "{called:?}");
+        assert!(
+            !unstated.path("run/records.jsonl").exists() || {
+                let records = fs::read_to_string(unstated.path("run/records.jsonl")).unwrap();
+                records.is_empty()
+            }
+        );
+        let [range_in, range_out] = lines;
+        let sidecar = format!("range_in = \"{range_in}\"\nrange_out = \"{range_out}\"\n");
+        for line in sidecar.lines() {
+            assert!(called.stderr.contains(line), "{line}: {called:?}");
+        }
+        // The proposed lines mend it.
+        let stated = bench(&graph, &sidecar);
+        let called = ask(&stated, "");
+        assert_eq!(called.code, Some(0), "{called:?}");
+    }
+}
+
+#[test]
+fn images_that_cannot_be_enhanced_ones_stop_the_run_with_what_was_seen() {
+    for (graph, seen) in [
+        (onnx::blue_first(), "blue where the frames are red"),
+        (onnx::negative(), "bright where the frames are dark"),
+        (onnx::flat(), "are flat"),
+        (
+            onnx::mislabelled(),
+            "edges that are not those of the frames",
+        ),
+    ] {
+        let bench = bench(&graph, "");
+        let called = ask(&bench, "");
+        assert_eq!(called.code, Some(2), "{seen}: {called:?}");
+        assert!(called.stderr.contains(seen), "{seen}: {called:?}");
+        assert!(called.stderr.contains("--llie-anyway"), "{called:?}");
+        // It is not asked about, but it can be.
+        let called = ask(&bench, "--llie-anyway");
+        assert_eq!(called.code, Some(0), "{called:?}");
+        assert!(
+            called.stdout.contains("because of --llie-anyway"),
+            "{called:?}"
+        );
+        let page = fs::read_to_string(bench.path("run/report.html")).unwrap();
+        assert!(page.contains("because of --llie-anyway"));
+        assert_eq!(
+            manifest(&bench)["enhancers"]["model"]["probe"]["outcome"],
+            "overruled"
+        );
+    }
+}
+
+#[test]
+fn a_wrong_statement_is_found_too() {
+    for wrong in ["-1..1", "0..255"] {
+        let sidecar = format!("range_in = \"{wrong}\"\nrange_out = \"{wrong}\"\n");
+        let bench = bench(&onnx::enhancer_in_ranges(UNIT, UNIT), &sidecar);
+        let called = ask(&bench, "");
+        assert_eq!(called.code, Some(2), "{wrong}: {called:?}");
+    }
+}
+
+#[test]
+fn a_model_that_does_nothing_is_used_only_if_its_ranges_are_stated() {
+    let unstated = bench(&onnx::identity(), "");
+    let called = ask(&unstated, "");
+    assert_eq!(called.code, Some(2), "{called:?}");
+    assert!(called.stderr.contains("not brighter"), "{called:?}");
+    let stated = bench(
+        &onnx::identity(),
+        "range_in = \"0..1\"\nrange_out = \"0..1\"",
+    );
+    let called = ask(&stated, "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert!(called.stdout.contains("not brighter"), "{called:?}");
+}
+
+#[test]
+fn the_doctor_proposes_a_sidecar_that_mends_the_model() {
+    for (graph, settled) in [
+        (onnx::enhancer_in_ranges(SIGNED, SIGNED), true),
+        (onnx::enhancer_in_ranges(BYTES, UNIT), true),
+        (onnx::enhancer_in_ranges(UNIT, BYTES), true),
+        (onnx::blue_first(), true),
+        (onnx::negative(), false),
+        (onnx::gain(4.0), false),
+    ] {
+        let bench = bench(&graph, "");
+        bench.complete(&words("rooms --out rooms --frames 3 --size 144x96"));
+        let line = "enhance --doctor model.onnx rooms --out doctor --write";
+        let called = bench.call(&words(line));
+        assert_eq!(called.code, Some(i32::from(!settled)), "{called:?}");
+        let page = fs::read_to_string(bench.path("doctor/doctor.html")).unwrap();
+        assert!(page.contains("base64,") && page.contains(" in and "));
+        assert!(bench.path("doctor/doctor.png").exists());
+        assert_eq!(
+            bench.path("model.onnx.toml").exists(),
+            settled,
+            "{called:?}"
+        );
+        if settled {
+            let called = ask(&bench, "");
+            assert_eq!(called.code, Some(0), "{called:?}");
+            // What is stated needs no other line.
+            let again = bench.call(&words(line));
+            assert_eq!(again.code, Some(0), "{again:?}");
+            assert!(again.stdout.contains("no sidecar is written"), "{again:?}");
+            // A sidecar is never replaced.
+            bench.file("model.onnx.toml", "# mine");
+            let again = bench.call(&words(line));
+            assert_eq!(again.code, Some(2), "{again:?}");
+            assert!(again.stderr.contains("never replaced"), "{again:?}");
+        }
+    }
+}
