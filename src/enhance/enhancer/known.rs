@@ -43,14 +43,15 @@ impl Enhancer {
     }
 
     /// The ranges of input and output that the sidecar, a preset or the element types state. A preset that states none stands for
-    /// 0..1, which all authors of presets use.
+    /// 0..1, which all authors of presets use, and so does a sidecar with an expression, which is of values in 0..1.
     pub(in crate::enhance) fn stated_ranges(&self) -> [Option<ValueRange>; 2] {
-        let signature = &self.graph.signature;
+        let (signature, convention) = (&self.graph.signature, self.convention());
         let of = |stated: Option<ValueRange>, element: &ElementType| {
-            let preset = self.description.preset.as_ref().map(|_| ValueRange::Unit);
-            stated.or(element.certain_range()).or(preset)
+            let is_preset = self.description.preset.is_some();
+            let is_composed = convention.input.is_some() || convention.image.is_some();
+            let implied = (is_preset || is_composed).then_some(ValueRange::Unit);
+            stated.or(element.certain_range()).or(implied)
         };
-        let convention = self.convention();
         [
             of(convention.range_in, &signature.input.port.element),
             of(convention.range_out, &signature.outputs[0].port.element),

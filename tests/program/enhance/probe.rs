@@ -124,6 +124,13 @@ fn images_that_cannot_be_enhanced_ones_stop_the_run_with_what_was_seen() {
 }
 
 #[test]
+fn an_expression_mends_a_negative() {
+    let bench = bench(&onnx::negative(), "image = \"1 - output\"");
+    let called = ask(&bench, "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+}
+
+#[test]
 fn a_wrong_statement_is_found_too() {
     for wrong in ["-1..1", "0..255"] {
         let sidecar = format!("range_in = \"{wrong}\"\nrange_out = \"{wrong}\"\n");
