@@ -40,6 +40,8 @@ const DASHES: [(i32, i32); 4] = [(0, 0), (9, 5), (2, 4), (14, 4)];
 const PANEL: (i32, i32) = (400, 300);
 /// Margins of a panel around its axes in pixels: left, top, right, bottom.
 const MARGIN: [i32; 4] = [52, 34, 14, 58];
+/// Width of a letter of a level's label in pixels, with room to the next label.
+const LETTER: i32 = 8;
 /// Height of a line of text in pixels.
 const ROW: i32 = 20;
 
@@ -257,6 +259,19 @@ impl AxisFrame {
         self.left + 10 + ((self.width - 20) as f32 * share).round() as i32
     }
 
+    /// The levels whose labels have room on the axis, from L0: each that does not overlap the one before.
+    fn labelled(&self) -> Vec<AxisLevel> {
+        let reach = |level: AxisLevel| level.to_string().len() as i32 * LETTER / 2;
+        let mut labelled: Vec<AxisLevel> = Vec::new();
+        for level in &self.levels {
+            let end = labelled.last().map(|last| self.x(*last) + reach(*last));
+            if end.is_none_or(|end| end < self.x(*level) - reach(*level)) {
+                labelled.push(*level);
+            }
+        }
+        labelled
+    }
+
     /// Title of the horizontal axis.
     fn axis_title(&self) -> String {
         let axis = self.levels.iter().find_map(|level| level.axis());
@@ -283,9 +298,13 @@ impl AxisFrame {
             &[(self.left, bottom), (right, bottom)],
             INK.stroke_width(1),
         )?;
+        let labelled = self.labelled();
         for level in &self.levels {
             let x = self.x(*level);
             draw_path(root, &[(x, bottom), (x, bottom + 4)], INK.stroke_width(1))?;
+            if !labelled.contains(level) {
+                continue;
+            }
             let drop = level.value();
             draw_text(root, &level.to_string(), (x, bottom + 7), 12, BELOW)?;
             draw_text(root, &drop.to_string(), (x, bottom + 22), 11, BELOW)?;
@@ -401,4 +420,35 @@ pub(super) fn draw_text(
 ) -> Result<(), String> {
     root.draw(&Text::new(text.to_owned(), place, text_style(size, anchor)))
         .map_err(|e| e.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::types::Severity;
+    use crate::types::degradation::Kind;
+
+    /// Names of the labelled levels of an axis with L0 and these drops in hundredths of an EV.
+    fn labelled(drops: impl IntoIterator<Item = u16>) -> Vec<String> {
+        let of = |drop| AxisLevel::new(Kind::Sensor, Severity::hundredths(drop));
+        let frame = AxisFrame {
+            left: 0,
+            top: 0,
+            width: PANEL.0 - MARGIN[0] - MARGIN[2],
+            height: 1,
+            levels: std::iter::once(AxisLevel::L0)
+                .chain(drops.into_iter().map(of))
+                .collect(),
+        };
+        frame.labelled().iter().map(ToString::to_string).collect()
+    }
+
+    #[test]
+    fn labels_of_levels_do_not_overlap() {
+        let paper = [200, 400, 600, 750, 900];
+        assert_eq!(labelled(paper), ["L0", "L1", "L2", "L3", "L4", "L5"]);
+        let halves = labelled((1..=20).map(|step| 50 * step));
+        assert!(halves.len() > 5 && halves.len() < 12, "{halves:?}");
+        assert_eq!(labelled([1, 900]), ["L0", "L5"]);
+    }
 }

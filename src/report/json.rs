@@ -8,6 +8,7 @@ use serde::{Serialize, Serializer};
 use super::alert::Alert;
 use super::choice_report::ChoiceReport;
 use super::csv::fields;
+use super::light_readings::LightReadings;
 use super::sentences::Sentence;
 use super::table::{Table, TableRow};
 use super::tables::{BASELINE, summary_rows};
@@ -72,6 +73,8 @@ struct Head<'a> {
     run: Option<&'a RunManifest>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     runs: Vec<ComparedRun<'a>>,
+    /// The light readings of the noisy images.
+    readings: LightReadings,
     unread: &'a BTreeMap<UnreadReason, usize>,
     alerts: &'a [Alert],
     findings: &'a [Sentence],
@@ -114,6 +117,7 @@ pub(crate) fn summary(report: &ChoiceReport<'_>, runs: RunList<'_>) -> Result<St
         folder,
         run,
         runs: runs.collect(),
+        readings: LightReadings::of(&report.findings.grid.subjects),
         unread: &report.findings.summary.unread,
         alerts: &report.alerts,
         findings: &report.sentences,

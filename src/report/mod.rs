@@ -11,6 +11,7 @@ pub(crate) mod histogram;
 pub(crate) mod json;
 mod ladder;
 mod latex;
+mod light_readings;
 pub(crate) mod openeqa;
 pub(crate) mod page;
 pub(crate) mod products;

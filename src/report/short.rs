@@ -6,6 +6,7 @@ use std::path::Path;
 use super::alert::lines;
 use super::choice_report::ChoiceReport;
 use super::ladder::{Ladder, Series, SeriesByLevel};
+use super::light_readings::LightReadings;
 use super::sentences::{FIRST, HOW_TO_READ, Sentence};
 use super::tables::{unread, what_it_is};
 use super::terminal::render;
@@ -31,6 +32,9 @@ const MAX_NAME: usize = 40;
 /// Maximum number of rows of the table.
 const MAX_ROWS: usize = 24;
 
+/// Maximum number of levels side by side in the table: so many leave room for names.
+const MAX_LEVELS: usize = 7;
+
 /// Mark of an accuracy that is shown to be below that without images.
 const BELOW: char = '▼';
 
@@ -40,6 +44,7 @@ pub(crate) fn short(report: &ChoiceReport<'_>, runs: &[(&RunManifest, &Path)]) -
     let mut text = findings(report);
     text.push('\n');
     text += &table(report);
+    text += &open_question(report);
     for (_, folder) in runs {
         let _ = writeln!(text, "run: {}", folder.display());
     }
@@ -57,6 +62,7 @@ pub(crate) fn full(report: &ChoiceReport<'_>, runs: &[(&RunManifest, &Path)]) ->
         let _ = writeln!(text, " {HOW_TO_READ}\n");
     }
     text += &render(&report.tables);
+    text += &open_question(report);
     for (_, folder) in runs {
         let _ = writeln!(text, "run: {}", folder.display());
     }
@@ -82,6 +88,13 @@ pub(crate) fn findings(report: &ChoiceReport<'_>) -> String {
         text += &wrapped(" ", HOW_TO_READ, " ");
     }
     text
+}
+
+/// What a single light reading leaves open; empty without noise or with several readings.
+fn open_question(report: &ChoiceReport<'_>) -> String {
+    let readings = LightReadings::of(&report.findings.grid.subjects);
+    let open = readings.open_question();
+    open.map_or_else(String::new, |open| wrapped(" ", &open, " "))
 }
 
 /// A sentence with its sign, and its detail beneath.
@@ -149,6 +162,9 @@ fn wrapped(first: &str, text: &str, rest: &str) -> String {
     lines + line.trim_end() + "\n"
 }
 
+/// Title of the block, name of the row, and the cells by level.
+type TableLine<'a> = (String, String, &'a SeriesByLevel<'a, AccuracyCell>);
+
 /// Accuracies by level: a block for each light with a row for each model, or one block if there is one model.
 fn table(report: &ChoiceReport<'_>) -> String {
     let common = report.findings.common.as_ref();
@@ -157,7 +173,7 @@ fn table(report: &ChoiceReport<'_>) -> String {
     let ladder = Ladder::new(cells.map(|cell| (&cell.subject, cell))).with_clean();
     let mut models: Vec<&str> = ladder.series.keys().map(|series| series.model).collect();
     models.dedup();
-    let mut rows: Vec<(String, String, &SeriesByLevel<'_, AccuracyCell>)> = Vec::new();
+    let mut rows: Vec<TableLine<'_>> = Vec::new();
     let one = models.len() == 1;
     for (series, cells) in &ladder.series {
         let (block, name) = block_and_name(series, one);
@@ -171,7 +187,7 @@ fn table(report: &ChoiceReport<'_>) -> String {
     let longest = rows.iter().map(|(_, name, _)| name.chars().count()).max();
     let titles = rows.iter().map(|(block, ..)| block.chars().count()).max();
     let room = WIDTH
-        .saturating_sub(1 + levels.len() * LEVEL + REACH)
+        .saturating_sub(1 + levels.len().min(MAX_LEVELS) * LEVEL + REACH)
         .max(12);
     let name_width = longest.max(titles).unwrap_or(0).min(room.min(MAX_NAME));
     let shared = common.map(|common| {
@@ -180,28 +196,37 @@ fn table(report: &ChoiceReport<'_>) -> String {
     });
     let mut text = format!(" accuracy in %{}\n", shared.unwrap_or_default());
     for block in rows.chunk_by(|a, b| a.0 == b.0) {
-        text += &line(
-            &block[0].0,
-            name_width,
-            levels.iter().map(|level| format!("{level} ")),
-            "95 %",
-        );
-        for (_, name, cells) in block {
-            let values = levels
-                .iter()
-                .map(|level| value(report, cells.get(level).copied()));
-            text += &line(
-                name,
-                name_width,
-                values,
-                &reach_of(cells.values().filter_map(|cell| cell.accuracy)),
-            );
+        for levels in levels.chunks(MAX_LEVELS) {
+            text += &block_lines(report, block, levels, name_width);
         }
     }
     if hidden > 0 {
         let _ = writeln!(text, " {} --full", counted(hidden, "more row"));
     }
     text + &baselines(report, &ladder)
+}
+
+/// The rows of a block at some levels, below a line with its title and the levels; empty if no row has a cell there.
+fn block_lines(
+    report: &ChoiceReport<'_>,
+    block: &[TableLine<'_>],
+    levels: &[AxisLevel],
+    width: usize,
+) -> String {
+    let mut text = String::new();
+    for (title, name, cells) in block {
+        let here = || levels.iter().map(|level| cells.get(level).copied());
+        if here().all(|cell| cell.is_none()) {
+            continue;
+        }
+        if text.is_empty() {
+            let heads = levels.iter().map(|level| format!("{level} "));
+            text += &line(title, width, heads, "95 %");
+        }
+        let reach = reach_of(here().flatten().filter_map(|cell| cell.accuracy));
+        text += &line(name, width, here().map(|cell| value(report, cell)), &reach);
+    }
+    text
 }
 
 /// The title of the block and the name of the row of a series.

@@ -362,6 +362,24 @@ mod tests {
         );
     }
 
+    /// Levels beyond L5, at uneven steps of their own.
+    #[test]
+    fn any_levels_carry_a_threshold_and_an_area_on_the_ev_axis() {
+        let levels = [(0, 9, 9), (1025, 9, 9), (1100, 3, 9), (1600, 3, 9)];
+        let summary = counts(&levels).summary(&Resamples::new(12)).unwrap();
+        // The middle of 1 and 1/4 is 5/8; from 10.25 to 11 EV accuracy falls from 1 to 1/3.
+        let threshold = summary.threshold.unwrap().value;
+        assert!((threshold - (10.25 + 0.75 * 9.0 / 16.0)).abs() < 1e-6);
+        let area = summary.area.unwrap().value;
+        let expected = (10.25 + 0.75 * 2.0 / 3.0 + 5.0 / 3.0) / 16.0;
+        assert!((area - expected).abs() < 1e-12, "{area}");
+        assert!((summary.darkest.value() - 16.0).abs() < 1e-12);
+        // All is kept to the end: beyond 16 EV.
+        let kept = counts(&[(0, 9, 9), (1025, 9, 9), (1600, 9, 9)]);
+        let kept = kept.summary(&Resamples::new(12)).unwrap();
+        assert!(kept.threshold.unwrap().value.is_infinite());
+    }
+
     #[test]
     fn thin_levels_carry_no_threshold() {
         let draws = Resamples::new(12);

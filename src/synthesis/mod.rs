@@ -29,6 +29,7 @@ pub(crate) mod exposure;
 mod exposures;
 mod isp;
 pub(crate) mod lanes;
+mod levels;
 pub(crate) mod negative;
 pub(crate) mod noise;
 pub(crate) mod piecewise;

@@ -3,21 +3,20 @@
 
 use std::fs;
 use std::path::Path;
-use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
 
+use super::levels::Levels;
 use super::reading::{Amplify, Coupling, Draws, LightReading, Readings, Synthesis, Tone};
 use super::{Calibration, CameraModel, Sampling};
 use crate::error::{Error, Result};
-use crate::types::degradation::Kind;
-use crate::types::{AxisLevel, Decides, Degradation, KindSet, ReadingName, Severity};
+use crate::types::{AxisLevel, Decides, Degradation, KindSet, ReadingName};
 
 /// The levels and kinds of degradation.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Light")]
 pub(crate) struct LightArgs {
-    /// Levels, as L0-L5 or L0,L3, and exposure drops in EV up to 16, as L0,3.3
+    /// Levels, as L0-L5 or L0,L3, exposure drops in EV up to 16, as L0,3.3, and ranges of them, as 0..10:0.5
     #[arg(long, value_name = "LEVELS", default_value = "L0-L5", add = Decides::Trials)]
     pub levels: Levels,
     /// Which of the paired variants: ev (exposure drop alone), noise (with sensor noise), both
@@ -37,6 +36,9 @@ pub(crate) struct SensorArgs {
     pub seed: u64,
     /// Light readings, ways to understand the paper's noise, one or several as paper,eld; the four flags below replace choices
     /// of a single reading and make it custom
+    ///
+    /// By default the noise variant has the same signal-to-noise ratio at every level: the levels are one noisy image at five
+    /// brightnesses. `--profile physical` loses photons with the light; `--profile all` asks under every reading of the paper.
     ///
     /// Conditions with noise carry the reading's name, as L3-noise@physical; that of paper is bare, L3-noise.
     #[arg(
@@ -77,10 +79,6 @@ pub(crate) struct SensorArgs {
     #[arg(long, add = Decides::Pixels)]
     pub fixed: bool,
 }
-
-/// Levels in ascending order of degradation, without duplicates.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Levels(pub Vec<AxisLevel>);
 
 /// Word of `--profile`: a light reading or all of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -258,101 +256,11 @@ fn is_file(path: &Path) -> bool {
     path.extension().is_some() || path.components().count() > 1
 }
 
-/// Maximum number of levels of a run; chosen.
-const MAX_LEVELS: usize = 200;
-
-/// Kind whose labels (L1 to L5) the light levels have.
-const LIGHT: Kind = Kind::ALL[0];
-
-impl FromStr for Levels {
-    type Err = String;
-
-    /// Parses `L0-L5`, `L0,L3` or numbers of EV, in any order; sorts them and removes duplicates.
-    fn from_str(text: &str) -> Result<Self, String> {
-        let mut levels = Vec::new();
-        for part in text.split(',').map(str::trim) {
-            let Some((first, last)) = part.split_once('-') else {
-                levels.push(level(part)?);
-                continue;
-            };
-            let (first, last) = (level(first.trim())?, level(last.trim())?);
-            if !part.to_ascii_uppercase().starts_with('L') {
-                return Err(format!(
-                    "{part:?} is not a range; write levels as L0-L5 and numbers of EV one by one, as {first},{last}"
-                ));
-            }
-            if first > last {
-                return Err(format!("{part:?} runs backwards; write {last}-{first}"));
-            }
-            let named = LIGHT.ladder().iter();
-            let named = named.map(|severity| AxisLevel::new(LIGHT, *severity));
-            let all = std::iter::once(AxisLevel::L0).chain(named);
-            levels.extend(all.filter(|level| (first..=last).contains(level)));
-        }
-        levels.sort_unstable();
-        levels.dedup();
-        if levels.len() > MAX_LEVELS {
-            return Err(format!(
-                "{} levels; at most {MAX_LEVELS} are possible",
-                levels.len()
-            ));
-        }
-        Ok(Self(levels))
-    }
-}
-
-/// Parses one level: a name, or a number of EV.
-fn level(text: &str) -> Result<AxisLevel, String> {
-    let number = text.starts_with(|c: char| c.is_ascii_digit());
-    if text.eq_ignore_ascii_case("L0") || number && text.parse::<f64>() == Ok(0.0) {
-        return Ok(AxisLevel::L0);
-    }
-    let severity = if number {
-        text.parse::<Severity>()
-    } else {
-        LIGHT.severity(text)
-    };
-    let severity = severity.map_err(|e| e.to_string())?;
-    if severity > LIGHT.largest() {
-        return Err(format!(
-            "{text} EV is above {}, the maximum",
-            LIGHT.largest()
-        ));
-    }
-    Ok(AxisLevel::new(LIGHT, severity))
-}
-
 #[cfg(test)]
 mod tests {
     use clap::FromArgMatches as _;
 
     use super::*;
-
-    #[test]
-    fn levels_are_read_in_any_form() {
-        let names = |text: &str| -> Vec<String> {
-            let Levels(levels) = text.parse().unwrap();
-            levels.iter().map(ToString::to_string).collect()
-        };
-        assert_eq!(names("L0-L5"), ["L0", "L1", "L2", "L3", "L4", "L5"]);
-        assert_eq!(names("l3, L0,L3"), ["L0", "L3"]);
-        assert_eq!(
-            names("L4-L5,3.30,6,0,E11"),
-            ["L0", "E3.3", "L3", "L4", "L5", "E11"]
-        );
-        for (wrong, part) in [
-            ("L6", "\"L6\" is not one of"),
-            ("", "\"\" is not one of"),
-            ("L3-L1", "runs backwards"),
-            ("0-5", "is not a range"),
-            ("3.333", "two decimals"),
-            ("16.5", "above 16"),
-            ("-2", "not one of"),
-        ] {
-            let error = wrong.parse::<Levels>().unwrap_err();
-            assert!(error.contains(part), "{error}");
-        }
-    }
 
     /// The sensor settings of these command-line words.
     fn sensor(words: &[&str]) -> Result<SensorSettings> {

@@ -52,6 +52,12 @@ impl Severity {
         }
     }
 
+    /// The severity in hundredths of the kind's unit.
+    #[must_use]
+    pub const fn in_hundredths(self) -> u16 {
+        self.0.get()
+    }
+
     /// The severity in the kind's unit.
     #[must_use]
     pub fn value(self) -> f64 {

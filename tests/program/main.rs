@@ -22,6 +22,7 @@ mod fidelity;
 mod golden;
 mod identity;
 mod import;
+mod levels;
 mod money;
 mod observer;
 mod openeqa;

@@ -18,6 +18,7 @@ pub(crate) use tables::tables;
 use self::coverage::coverage;
 use crate::error::Result;
 use crate::report::alert::{Alert, lines};
+use crate::report::light_readings::LightReadings;
 use crate::report::products::{PAGE, table_files};
 use crate::report::table::Table;
 use crate::report::{chart, json, terminal};
@@ -52,6 +53,8 @@ struct Head<'a> {
     protocol: String,
     clustered_by: &'static str,
     clusters: usize,
+    /// The light readings of the noisy images.
+    readings: LightReadings,
     alerts: &'a [Alert],
 }
 
@@ -73,6 +76,7 @@ pub(crate) fn summary_json(
         protocol: report.protocol.to_string(),
         clustered_by: report.summary.unit,
         clusters: report.summary.clusters,
+        readings: report.light_readings(),
         alerts: report.alerts,
     };
     json::document(head, &tables[0])
@@ -89,6 +93,9 @@ pub(crate) fn render(report: &OpenReport<'_>, tables: &[Table], folder: &Path) -
         None => text += "No answer is marked: name a judge with --judge NAME\n",
     }
     for line in coverage(report) {
+        let _ = writeln!(text, "{line}");
+    }
+    if let Some(line) = report.light_readings().open_question() {
         let _ = writeln!(text, "{line}");
     }
     let _ = writeln!(text, "run: {}", folder.display());

@@ -1,6 +1,7 @@
 //! The data of a report on open questions: [`OpenReport`].
 
 use crate::report::alert::Alert;
+use crate::report::light_readings::LightReadings;
 use crate::report::tables::EnhancerRow;
 use crate::score::llm_match::Protocol;
 use crate::score::open::{AnswerOutcome, OpenSummary};
@@ -29,6 +30,13 @@ pub(crate) struct OpenReport<'a> {
     pub answers: &'a [ReportedAnswer],
     /// Thumbnails of images, by walk and condition.
     pub thumbnails: &'a [Thumbnail],
+}
+
+impl OpenReport<'_> {
+    /// The light readings of the noisy images.
+    pub(super) fn light_readings(&self) -> LightReadings {
+        LightReadings::of(self.answers.iter().map(|answer| &answer.subject))
+    }
 }
 
 /// One answer of one subject to one question.

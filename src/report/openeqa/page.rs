@@ -79,7 +79,7 @@ fn alerts(report: &OpenReport<'_>) -> Vec<String> {
 
 fn intro(report: &OpenReport<'_>) -> Vec<String> {
     let (summary, judge) = (report.summary, report.judge.unwrap_or("nobody"));
-    vec![
+    let mut lines = vec![
         format!(
             "{} questions about {} walks. Score: 100 · mean((mark − 1) / 4), marks from 1 to 5 by {judge}, protocol {}. Intervals are \
              95 %, by {} ({} clusters); drops are of unrounded means, on the questions that are scored in both.",
@@ -95,7 +95,9 @@ fn intro(report: &OpenReport<'_>) -> Vec<String> {
             summary.clusters
         ),
         coverage(report).join("; ") + ".",
-    ]
+    ];
+    lines.extend(report.light_readings().open_question());
+    lines
 }
 
 /// The walks in the order of their questions, each with its thumbnails and questions.

@@ -16,6 +16,7 @@ use serde_json::{Value, json};
 
 use super::chart::Figure;
 use super::choice_report::ChoiceReport;
+use super::light_readings::LightReadings;
 use super::sentences::{HOW_TO_READ, Sentence};
 use super::template::filled;
 use crate::error::Result;
@@ -108,7 +109,7 @@ fn intro(findings: &Findings<'_>) -> Vec<String> {
         .iter()
         .map(|item| &item.record.detail.frame)
         .collect();
-    vec![format!(
+    let facts = format!(
         "{} items about {} frames, {} subjects (model × condition). Strict reading. Intervals are 95 %, by {unit} \
          ({} clusters); differences are paired by item, tested by swapping whole {unit}s, and corrected by Holm over the comparisons of one kind and model; \
          “not shown” does not say that there is no difference.",
@@ -116,7 +117,11 @@ fn intro(findings: &Findings<'_>) -> Vec<String> {
         frames.len(),
         grid.subjects.len(),
         grid.clusters
-    )]
+    );
+    let readings = LightReadings::of(&grid.subjects);
+    std::iter::once(facts)
+        .chain(readings.open_question())
+        .collect()
 }
 
 fn facts(run: &PageRun<'_>) -> Value {

@@ -100,7 +100,7 @@ const fill = (select, values, value) => {
 };
 const unique = (values) => [...new Set(values)];
 
-const everyLevel = () => unique(data.subjects.filter((s) => s.level).map((s) => s.level)).sort();
+const everyLevel = () => unique(data.subjects.filter((s) => s.level).map((s) => s.level)).sort((a, b) => data.drops[a] - data.drops[b]);
 const lights = (model) => unique(data.subjects.filter((s) => s.model === model).map((s) => s.light));
 const levels = (model, light) => {
   const there = data.subjects.filter((s) => s.model === model && s.light === light && s.level).map((s) => s.level);

@@ -1,0 +1,225 @@
+//! The value of `--levels`: [`Levels`].
+
+use std::str::FromStr;
+
+use crate::types::degradation::Kind;
+use crate::types::{AxisLevel, Severity};
+
+/// Levels in ascending order of degradation, without duplicates.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Levels(pub Vec<AxisLevel>);
+
+/// Maximum number of levels of a run; chosen.
+const MAX_LEVELS: usize = 200;
+
+/// Kind whose labels (L1 to L5) the light levels have.
+const LIGHT: Kind = Kind::ALL[0];
+
+impl FromStr for Levels {
+    type Err = String;
+
+    /// Parses items between commas, in any order: `L3`, `L0-L5`, a number of EV, or `0..10:0.5`. Sorts the levels and removes
+    /// duplicates.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut levels = Vec::new();
+        for item in text.split(',').map(str::trim) {
+            if item.is_empty() {
+                return Err("a level is missing; write levels as L3, L0-L5, 3.3 (EV) or 0..10:0.5, between commas".to_owned());
+            } else if let Some((from, rest)) = item.split_once("..") {
+                levels.extend(steps(item, from.trim(), rest.trim())?);
+            } else if let Some((first, last)) = item.split_once('-') {
+                levels.extend(named(item, first.trim(), last.trim())?);
+            } else {
+                levels.push(level(item)?);
+            }
+        }
+        levels.sort_unstable();
+        levels.dedup();
+        if levels.len() > MAX_LEVELS {
+            return Err(format!(
+                "{} levels; at most {MAX_LEVELS} are possible",
+                levels.len()
+            ));
+        }
+        Ok(Self(levels))
+    }
+}
+
+/// The paper's levels from one to another, as `L1-L4`; `item` is the text of the range.
+fn named(item: &str, first: &str, last: &str) -> Result<Vec<AxisLevel>, String> {
+    let is_number = |end: &str| end.starts_with(|c: char| c.is_ascii_digit());
+    if first.is_empty() {
+        return Err(format!(
+            "{item:?} is below 0; an exposure drop is a number of EV from 0 to {}",
+            LIGHT.largest()
+        ));
+    }
+    if is_number(first) && is_number(last) {
+        return Err(format!(
+            "{item:?} is not a range; write L0-L5 for the paper's levels, or {first}..{last}:0.5 for exposure drops in EV with a step of 0.5"
+        ));
+    }
+    let (from, to) = (level(first)?, level(last)?);
+    let ladder = LIGHT.ladder().iter();
+    let ladder = ladder.map(|severity| AxisLevel::new(LIGHT, *severity));
+    let paper: Vec<AxisLevel> = std::iter::once(AxisLevel::L0).chain(ladder).collect();
+    let is_named = |end: &str, level| !is_number(end) && paper.contains(level);
+    if !is_named(first, &from) || !is_named(last, &to) {
+        return Err(format!(
+            "{item:?}: the ends of a range with a dash are two of L0, L1, L2, L3, L4, L5; write {}..{}:0.5 for exposure drops in EV with a step of 0.5",
+            from.value(),
+            to.value()
+        ));
+    }
+    if from > to {
+        return Err(format!("{item:?} runs backwards; write {to}-{from}"));
+    }
+    let range = from..=to;
+    Ok(paper.into_iter().filter(|at| range.contains(at)).collect())
+}
+
+/// The exposure drops of a range with a step, as `0..10:0.5`; its end is one of them if a step ends there. `item` is the text of
+/// the range.
+fn steps(item: &str, from: &str, rest: &str) -> Result<Vec<AxisLevel>, String> {
+    let Some((to, step)) = rest.split_once(':') else {
+        return Err(format!(
+            "{item:?} has no step; write FROM..TO:STEP in EV, as {from}..{rest}:0.5"
+        ));
+    };
+    let (from, to) = (hundredths(item, from)?, hundredths(item, to)?);
+    let step = hundredths(item, step)?;
+    if step == 0 {
+        return Err(format!(
+            "{item:?} has a step of 0; the step is at least 0.01 EV"
+        ));
+    }
+    let ev = |hundredths: u16| f64::from(hundredths) / 100.0;
+    if from > to {
+        return Err(format!(
+            "{item:?} runs backwards; write {}..{}:{}",
+            ev(to),
+            ev(from),
+            ev(step)
+        ));
+    }
+    let drops = (from..=to).step_by(usize::from(step));
+    Ok(drops
+        .map(|drop| match drop {
+            0 => AxisLevel::L0,
+            drop => AxisLevel::new(LIGHT, Severity::hundredths(drop)),
+        })
+        .collect())
+}
+
+/// A number of EV of a range, in hundredths.
+fn hundredths(item: &str, number: &str) -> Result<u16, String> {
+    let number = number.trim();
+    let is_number = number.starts_with(|c: char| c.is_ascii_digit());
+    if !is_number {
+        return Err(format!(
+            "{item:?}: {number:?} is not a number; write FROM..TO:STEP in EV, as 0..10:0.5"
+        ));
+    }
+    let level = level(number).map_err(|problem| format!("{item:?}: {problem}"))?;
+    Ok(level.severity().map_or(0, Severity::in_hundredths))
+}
+
+/// Parses one level: a name, or a number of EV.
+fn level(text: &str) -> Result<AxisLevel, String> {
+    let number = text.starts_with(|c: char| c.is_ascii_digit());
+    if text.eq_ignore_ascii_case("L0") || number && text.parse::<f64>() == Ok(0.0) {
+        return Ok(AxisLevel::L0);
+    }
+    let is_above = |ev: f64| ev > LIGHT.largest().value();
+    if number && text.parse().is_ok_and(is_above) {
+        return Err(format!(
+            "{text:?} is above {} EV, the maximum",
+            LIGHT.largest()
+        ));
+    }
+    let severity = if number {
+        text.parse::<Severity>()
+    } else {
+        LIGHT.severity(text)
+    };
+    let severity = severity.map_err(|e| e.to_string())?;
+    Ok(AxisLevel::new(LIGHT, severity))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(text: &str) -> Vec<String> {
+        let Levels(levels) = text.parse().unwrap();
+        levels.iter().map(ToString::to_string).collect()
+    }
+
+    #[test]
+    fn levels_are_read_in_any_form() {
+        assert_eq!(names("L0-L5"), ["L0", "L1", "L2", "L3", "L4", "L5"]);
+        assert_eq!(names("l3, L0,L3"), ["L0", "L3"]);
+        assert_eq!(
+            names("L4-L5,3.30,6,0,E11"),
+            ["L0", "E3.3", "L3", "L4", "L5", "E11"]
+        );
+    }
+
+    #[test]
+    fn a_range_has_a_step_and_the_papers_names_where_it_meets_them() {
+        assert_eq!(
+            names("0..10:2.5"),
+            ["L0", "E2.5", "E5", "L4", "E10"],
+            "both ends"
+        );
+        assert_eq!(names("2 .. 7 : 2"), ["L1", "L2", "L3"], "no step ends at 7");
+        assert_eq!(names("9..9:1,L5,9.0"), ["L5"], "once");
+        assert_eq!(names("0..16:0.1").len(), 161);
+        assert_eq!(names("14.01..16:0.01").len(), 200);
+        assert_eq!(names("L0,3..4:0.25,L1-L2").len(), 7);
+    }
+
+    #[test]
+    fn a_wrong_level_is_named_with_the_right_form() {
+        for (wrong, part) in [
+            ("L6", "\"L6\" is not one of L0, L1"),
+            ("", "a level is missing; write levels as"),
+            ("L0,,L3", "a level is missing"),
+            ("L3-L1", "\"L3-L1\" runs backwards; write L1-L3"),
+            ("0-5", "write L0-L5 for the paper's levels, or 0..5:0.5"),
+            (
+                "L0,L1-E5",
+                "\"L1-E5\": the ends of a range with a dash are two of L0",
+            ),
+            ("L1-5", "write 2..5:0.5"),
+            ("3.333", "\"3.333\" has more than two decimals"),
+            ("16.5", "\"16.5\" is above 16 EV"),
+            ("700", "\"700\" is above 16 EV"),
+            ("99999", "\"99999\" is above 16 EV"),
+            ("-2", "\"-2\" is below 0"),
+            ("E2", "is written L1"),
+            (
+                "0..10",
+                "\"0..10\" has no step; write FROM..TO:STEP in EV, as 0..10:0.5",
+            ),
+            ("10..0:2", "\"10..0:2\" runs backwards; write 0..10:2"),
+            ("0..10:0", "a step of 0; the step is at least 0.01 EV"),
+            (
+                "0..10:0.001",
+                "\"0..10:0.001\": level: \"0.001\" has more than two decimals",
+            ),
+            ("0..20:1", "\"0..20:1\": \"20\" is above 16 EV"),
+            (
+                "L0..L5:1",
+                "\"L0..L5:1\": \"L0\" is not a number; write FROM..TO:STEP in EV",
+            ),
+            ("0..10:", "\"\" is not a number"),
+            ("..10:1", "\"\" is not a number"),
+            ("0..10:1:2", "is not a decimal number"),
+            ("0..16:0.01", "1601 levels; at most 200 are possible"),
+        ] {
+            let error = wrong.parse::<Levels>().unwrap_err();
+            assert!(error.contains(part), "{wrong}: {error}");
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! Levels other than the paper's: their order, thresholds and areas over EV, and a table of many levels.
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+use std::fs;
+
+use serde_json::{Value, json};
+
+use crate::support::frames::png;
+use crate::support::run::{Bench, records, words};
+
+/// Number of frames, each with one question: enough replies and clusters for a threshold.
+const FRAMES: usize = 32;
+
+/// Frames with questions, and a scripted model that answers rightly but at these conditions.
+fn bench(wrong: &[&str]) -> Bench {
+    let bench = Bench::new();
+    let (mut questions, mut replies) = (String::new(), String::new());
+    for frame in 0..FRAMES {
+        bench.file(&format!("frames/{frame}.png"), png(40 + frame as u8));
+        let question = json!({
+            "id": format!("q{frame}"), "frame": format!("{frame}.png"), "family": "presence",
+            "question": format!("Is there thing {frame}?"), "choices": ["yes", "no"], "answer": "yes",
+        });
+        let _ = writeln!(questions, "{question}");
+        for condition in wrong {
+            let reply =
+                json!({"question": format!("q{frame}"), "condition": condition, "reply": "no"});
+            let _ = writeln!(replies, "{reply}");
+        }
+    }
+    let _ = writeln!(replies, "{}", json!({"default": "yes"}));
+    bench.file("frames/questions.jsonl", questions);
+    bench.file("m.jsonl", replies);
+    bench
+}
+
+/// The rows of a table of the run, each with the names of its columns.
+fn rows(bench: &Bench, file: &str) -> Vec<Vec<(String, String)>> {
+    let table = fs::read_to_string(bench.path("run").join(file)).unwrap();
+    let mut lines = table.lines();
+    let head: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let rows = lines.map(|line| {
+        let cells = head.iter().zip(line.split(','));
+        cells
+            .map(|(name, cell)| ((*name).to_owned(), cell.to_owned()))
+            .collect()
+    });
+    rows.collect()
+}
+
+fn cell<'r>(row: &'r [(String, String)], name: &str) -> &'r str {
+    let found = row.iter().find(|(column, _)| column == name);
+    found.map_or("", |(_, cell)| cell)
+}
+
+#[test]
+fn a_range_of_drops_has_a_threshold_over_ev() {
+    let bench = bench(&["L4-noise", "E10-noise", "E11-noise"]);
+    let line = "--model script:m.jsonl --data frames --variant noise --out run --levels";
+    let text = bench.complete(&[words(line), vec!["0..10:1.25,11"]].concat());
+    let names = [
+        "L0", "E1.25", "E2.5", "E3.75", "E5", "E6.25", "L4", "E8.75", "E10", "E11",
+    ];
+    let conditions: BTreeSet<String> = records(&bench.path("run"))
+        .iter()
+        .map(|record| record["condition"].as_str().unwrap().to_owned())
+        .collect();
+    let expected = names.map(|name| match name {
+        "L0" => name.to_owned(),
+        name => format!("{name}-noise"),
+    });
+    assert_eq!(conditions, BTreeSet::from(expected));
+    let thresholds = rows(&bench, "thresholds.csv");
+    let all = thresholds.iter().find(|row| cell(row, "family") == "all");
+    let all = all.unwrap();
+    assert_eq!(cell(all, "darkest_ev"), "11");
+    // Right to 6.25 EV, wrong at 7.5, right at 8.75, wrong at 10 and 11. The fit that never rises has 1/2 at 7.5 and 8.75; the
+    // middle of 1 and chance, 3/4, lies between 6.25 and 7.5.
+    let threshold: f64 = cell(all, "threshold_ev").parse().unwrap();
+    assert!((threshold - 6.875).abs() < 1e-3, "{threshold}");
+    // The levels are side by side in the order of their light, in blocks that fit the line.
+    let (_, table) = text.split_once("accuracy in %").unwrap();
+    let heads = table.split_whitespace().filter(|word| names.contains(word));
+    assert_eq!(heads.collect::<Vec<_>>(), names, "{text}");
+    let widest = table.lines().map(|line| line.chars().count()).max();
+    assert!(widest <= Some(80), "{text}");
+}
+
+#[test]
+fn levels_without_l0_have_accuracies_and_no_threshold() {
+    let bench = bench(&["E13.5-noise"]);
+    let line = "--model script:m.jsonl --data frames --variant noise --out run --levels";
+    let text = bench.complete(&[words(line), vec!["11..16:2.5"]].concat());
+    assert!(text.contains("E11 ") && text.contains("E16 "), "{text}");
+    assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
+    assert!(!bench.path("run/thresholds.csv").exists());
+    let summary = rows(&bench, "summary.csv");
+    let of = |level: &str| {
+        let mut rows = summary.iter();
+        let row = rows.find(|row| {
+            cell(row, "level") == level
+                && cell(row, "family") == "all"
+                && cell(row, "mode") == "strict"
+        });
+        cell(row.unwrap(), "value").parse::<f64>().unwrap()
+    };
+    let accuracies = ["E11", "E13.5", "E16"].map(|level| of(level).to_string());
+    assert_eq!(accuracies, ["1", "0", "1"]);
+}
+
+#[test]
+fn one_light_reading_is_named_with_what_it_leaves_open() {
+    let bench = bench(&[]);
+    let line = "--model script:m.jsonl --data frames --levels L0,L3 --limit 2";
+    let said = "One reading of the paper was run (paper).";
+    for (more, readings, is_said) in [
+        ("--out one", json!(["paper"]), true),
+        ("--out ev --variant ev", json!([]), false),
+        (
+            "--out two --profile paper,physical",
+            json!(["paper", "physical"]),
+            false,
+        ),
+    ] {
+        let text = bench.complete(&[words(line), words(more)].concat());
+        let folder = bench.path(more.split(' ').nth(1).unwrap());
+        let page = fs::read_to_string(folder.join("report.html")).unwrap();
+        let summary = fs::read(folder.join("summary.json")).unwrap();
+        let summary: Value = serde_json::from_slice(&summary).unwrap();
+        assert_eq!(summary["readings"], readings);
+        assert_eq!(
+            [text.matches(said).count(), page.matches(said).count()],
+            [usize::from(is_said); 2],
+            "{text}"
+        );
+    }
+}
