@@ -5,15 +5,15 @@ use std::num::NonZeroUsize;
 
 use super::{ImagePipeline, one_frame_each};
 use crate::ask::ImageLimit;
-use crate::enhance::{Enhancer, Stopper, sets_in_memory};
+use crate::enhance::{Enhancer, FRAMES, Stopper, sets_in_memory};
 use crate::error::Result;
-use crate::job::dark_frames::dark_frames;
+use crate::job::dark_frames::{dark_frames, darkened, evenly};
 use crate::job::frame_work::FrameWork;
 use crate::job::plan::SourcePlan;
 use crate::job::source::{Source, SourceFrame};
 use crate::job::timings::TimedStep;
 use crate::job::workers::Workers;
-use crate::types::ImageFacts;
+use crate::types::{ImageFacts, Rgb};
 
 /// Size in bytes above which some servers and proxies refuse an image.
 const LARGE_IMAGE: usize = 5_000_000;
@@ -68,6 +68,26 @@ impl ImagePipeline<'_> {
                 let probe = || enhancer.probe(&dark, self.implausible);
                 self.steps.timings.time(TimedStep::Enhance, probe)?;
             }
+        }
+        Ok(())
+    }
+
+    /// The same without a plan: on a few frames of these sources, darkened where they are not dark.
+    pub(crate) fn probe_sources(&mut self, sources: &[Source]) -> Result<()> {
+        if self.enhancers.is_empty() {
+            return Ok(());
+        }
+        let mut frames: Vec<Rgb> = Vec::new();
+        for place in evenly(sources.len(), FRAMES) {
+            let source = &sources[place];
+            if let Some(frame) = source.middle() {
+                let mut work = FrameWork::planned(self.steps, source, frame);
+                frames.push(Rgb::clone(work.clean()?));
+            }
+        }
+        let dark = darkened(&frames);
+        for enhancer in self.enhancers.iter_mut().filter(|_| !dark.is_empty()) {
+            enhancer.probe(&dark, self.implausible)?;
         }
         Ok(())
     }

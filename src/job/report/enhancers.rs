@@ -66,7 +66,7 @@ pub(super) fn of_enhancers(runs: &[JoinedRun]) -> Vec<Alert> {
         let JudgedImages { images, .. } = note.judged;
         if note.judged.flaws() > 0 && probe.is_none_or(|probe| probe.problem.is_none()) {
             add(format!(
-                "{} of {images} images that {name} made of dark frames cannot be enhanced images: {}.",
+                "{} of {images} images that {name} made of dark frames have a flaw: {}.",
                 note.judged.flaws(),
                 flaws(&note.judged)
             ));

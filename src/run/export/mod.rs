@@ -87,6 +87,7 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
         sets: Vec::new(),
         implausible: args.loading.probe.implausible(),
     };
+    workers.install(|| pipeline.probe_sources(&sources))?;
     let frames: BTreeMap<&FrameId, &Source> = sources
         .iter()
         .map(|source| (&source.name, source))

@@ -124,6 +124,17 @@ fn images_that_cannot_be_enhanced_ones_stop_the_run_with_what_was_seen() {
 }
 
 #[test]
+fn sets_for_other_tools_are_not_made_with_it_either() {
+    let bench = bench(&onnx::negative(), "");
+    bench.complete(&words("rooms --out rooms --frames 3 --size 144x96"));
+    let line = "export llava rooms --out sets --llie model.onnx --levels L3 --limit 3";
+    let called = bench.call(&words(line));
+    assert_eq!(called.code, Some(2), "{called:?}");
+    assert!(called.stderr.contains("bright where"), "{called:?}");
+    bench.complete(&words(&format!("{line} --llie-anyway")));
+}
+
+#[test]
 fn an_expression_mends_a_negative() {
     let bench = bench(&onnx::negative(), "image = \"1 - output\"");
     let called = ask(&bench, "");
