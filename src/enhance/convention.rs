@@ -74,7 +74,7 @@ pub(super) enum Channels {
 }
 
 /// Weights of red, green and blue in the luma: ITU-R BT.601, full range.
-pub(super) const LUMA: [f32; 3] = [0.299, 0.587, 0.114];
+pub(super) const LUMA: [f64; 3] = [0.299, 0.587, 0.114];
 
 impl Channels {
     /// Their number in words, for messages.

@@ -178,6 +178,7 @@ impl Enhancer {
 
     /// The images of the outputs that are not read.
     fn other_outputs(&self, frames: &[Rgb], ranges: RangePair) -> Result<Vec<ExaminedConvention>> {
+        let seen: Vec<Codes> = frames.iter().map(Codes::of).collect();
         let mut columns = Vec::new();
         for Port { name, .. } in &self.graph().signature.unread {
             let convention = ModelSidecar {
@@ -191,7 +192,6 @@ impl Enhancer {
             let Ok(graph) = self.graph().with_convention(convention) else {
                 continue;
             };
-            let seen: Vec<Codes> = frames.iter().map(Codes::of).collect();
             if let Some(made) = made(&graph, frames)? {
                 let pair = PairTrial::new(ranges, &seen, made);
                 columns.push(column(&pair, format!("output {name:?}, {ranges}")));

@@ -6,13 +6,12 @@
 
 use std::fmt;
 
+use super::convention::LUMA;
 use super::planes::Planes;
 use crate::types::{Flaw, Rgb};
 
 /// Largest mean luma, in codes, of an image that is judged: on bright images the rules flag good models. Measured.
 pub(crate) const DARK: f64 = 64.0;
-/// Weights of red, green and blue in luma: ITU-R BT.601.
-const LUMA: [f64; 3] = [0.299, 0.587, 0.114];
 /// Longer side of the images that are judged, in pixels: that of the images from which the thresholds come.
 const JUDGED_SIDE: usize = 160;
 /// Side of the blocks whose means are compared, in pixels; chosen, so that noise is averaged out.

@@ -53,7 +53,10 @@ impl Sample {
     pub(super) fn luma(self) -> f32 {
         match self {
             Self::One(value) => value,
-            Self::Three([red, green, blue]) => LUMA[0] * red + LUMA[1] * green + LUMA[2] * blue,
+            Self::Three([red, green, blue]) => {
+                let weights = LUMA.map(|weight| weight as f32);
+                weights[0] * red + weights[1] * green + weights[2] * blue
+            }
         }
     }
 

@@ -1,12 +1,12 @@
 //! What is known of an enhancer, for its probe and its examination.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::Enhancer;
 use crate::enhance::convention::{ElementType, ValueRange};
 use crate::enhance::graph::Graph;
 use crate::enhance::probe::RangePair;
-use crate::enhance::sidecar::ModelSidecar;
+use crate::enhance::sidecar::{self, ModelSidecar};
 use crate::enhance::size_search::TakenSizes;
 use crate::enhance::sizes::SizeLog;
 use crate::enhance::usage::Usage;
@@ -17,6 +17,11 @@ impl Enhancer {
     /// Path of the model's file; for an enhancer of the program, what messages call it.
     pub(crate) fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// Path of the model's sidecar, which may not be there.
+    pub(crate) fn sidecar_path(&self) -> PathBuf {
+        sidecar::path_for(&self.path)
     }
 
     /// A handle to what it did so far.
@@ -61,10 +66,8 @@ impl Enhancer {
     /// Height and width of a frame of the probe: the given ones, in the model's multiples, or those that it fixes.
     pub(in crate::enhance) fn probe_size(&self, size: [usize; 2]) -> [usize; 2] {
         let mut rule = self.rule(size);
-        match self.search.found() {
-            Some(TakenSizes::Multiple(multiple)) => rule.multiple = multiple,
-            Some(TakenSizes::Traced(traced)) => rule.fixed = traced.map(Some),
-            None => {}
+        if let Some(TakenSizes::Multiple(multiple)) = self.search.found() {
+            rule.multiple = multiple;
         }
         rule.whole(size)
     }

@@ -1,7 +1,7 @@
 //! `enhance --doctor`: what a model makes of dark frames with each convention, as a page, a picture and a proposed sidecar.
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use clap::Args;
 
@@ -64,7 +64,7 @@ pub(super) fn doctor(
                 let problem = "the enhancers of the program are no files, so they have no sidecar";
                 return Err(Error::usage("--write", problem));
             }
-            let path = sidecar_path(model);
+            let path = enhancer.sidecar_path();
             if path.exists() {
                 return Err(Error::usage(
                     "--write",
@@ -91,13 +91,6 @@ pub(super) fn doctor(
         },
         output,
     })
-}
-
-/// Path of the sidecar of a model file.
-fn sidecar_path(model: &Path) -> PathBuf {
-    let mut path = model.as_os_str().to_owned();
-    path.push(".toml");
-    path.into()
 }
 
 fn html(
