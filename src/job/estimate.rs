@@ -14,8 +14,8 @@ use super::trial::Item as _;
 use crate::ask::Price;
 use crate::ask::Server;
 use crate::error::Result;
-use crate::report::forecast::{CostLine, Forecast};
-use crate::types::{Condition, ImageFacts, View};
+use crate::report::forecast::{CostLine, Forecast, ReadingCost};
+use crate::types::{Condition, Degradation, ImageFacts, ReadingName, View};
 
 /// Number of sources whose images are made to measure their size; with enhancers, only the first source.
 const SAMPLED: usize = 3;
@@ -130,11 +130,14 @@ fn lines<E: Experiment>(
     let remote = models.filter(|(_, model)| model.model.is_remote());
     let lines = remote.map(|(index, model)| {
         let price = experiment.settings().money.prices.of(model.model.name());
-        let mut tokens = Tokens {
-            image: Some(0.0),
-            ..Tokens::default()
-        };
+        let mut by_reading = BTreeMap::<Option<ReadingName>, Tokens>::new();
         for (place, group) in plan.groups() {
+            let degradation = group
+                .condition
+                .as_ref()
+                .and_then(|c| c.degradation.as_ref());
+            let reading = degradation.and_then(Degradation::reading).cloned();
+            let tokens = by_reading.entry(reading).or_default();
             let own = group.trials.iter().filter(|trial| trial.model == index);
             let before = tokens.requests;
             for trial in own {
@@ -150,15 +153,16 @@ fn lines<E: Experiment>(
             }
         }
         for request in expected.iter().filter(|request| request.model == index) {
+            let tokens = by_reading.entry(None).or_default();
             tokens.add(request.text_tokens, request.reply_tokens);
         }
-        line(model, price, &tokens, E::PHASES[phase])
+        line(model, price, &by_reading, E::PHASES[phase])
     });
     lines.filter(|line| line.requests > 0).collect()
 }
 
 /// Numbers of requests to one model and of their tokens.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Tokens {
     requests: usize,
     text: f64,
@@ -167,7 +171,32 @@ struct Tokens {
     image: Option<f64>,
 }
 
+impl Default for Tokens {
+    fn default() -> Self {
+        Self {
+            requests: 0,
+            text: 0.0,
+            reply: 0.0,
+            image: Some(0.0),
+        }
+    }
+}
+
 impl Tokens {
+    fn sum<'t>(parts: impl Iterator<Item = &'t Self>) -> Self {
+        parts.fold(Self::default(), |sum, part| Self {
+            requests: sum.requests + part.requests,
+            text: sum.text + part.text,
+            reply: sum.reply + part.reply,
+            image: sum.image.zip(part.image).map(|(sum, part)| sum + part),
+        })
+    }
+
+    /// The cost if each reply has this many tokens in all; `None` if no price or number of tokens is known.
+    fn dollars(&self, price: Option<Price>, reply: f64) -> Option<f64> {
+        Some(price?.of(self.text + self.image?, reply))
+    }
+
     fn add(&mut self, text: f64, reply: f64) {
         self.requests += 1;
         self.text += text;
@@ -175,8 +204,14 @@ impl Tokens {
     }
 }
 
-/// The cost line of one model.
-fn line(model: &ModelUnderTest, price: Option<Price>, tokens: &Tokens, phase: &str) -> CostLine {
+/// The cost line of one model, by the light reading of what it is shown.
+fn line(
+    model: &ModelUnderTest,
+    price: Option<Price>,
+    by_reading: &BTreeMap<Option<ReadingName>, Tokens>,
+    phase: &str,
+) -> CostLine {
+    let tokens = Tokens::sum(by_reading.values());
     let requests = tokens.requests as f64;
     let longest = model
         .model
@@ -187,7 +222,7 @@ fn line(model: &ModelUnderTest, price: Option<Price>, tokens: &Tokens, phase: &s
         (_, View::Blind) => " (blind)",
         (_, View::Image) => "",
     };
-    let dollars = |reply: f64| Some(price?.of(tokens.text + tokens.image?, reply));
+    let readings = by_reading.iter().filter(|(_, part)| part.requests > 0);
     CostLine {
         model: format!("{}{role}", model.model.name()),
         requests: tokens.requests,
@@ -195,8 +230,15 @@ fn line(model: &ModelUnderTest, price: Option<Price>, tokens: &Tokens, phase: &s
         image_tokens: tokens.image,
         reply_tokens: tokens.reply,
         longest_reply_tokens: longest,
-        dollars: dollars(tokens.reply),
-        most_dollars: longest.and_then(dollars),
+        dollars: tokens.dollars(price, tokens.reply),
+        most_dollars: longest.and_then(|longest| tokens.dollars(price, longest)),
+        readings: readings
+            .map(|(reading, part)| ReadingCost {
+                reading: reading.clone(),
+                requests: part.requests,
+                dollars: part.dollars(price, part.reply),
+            })
+            .collect(),
     }
 }
 

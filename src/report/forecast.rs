@@ -1,5 +1,6 @@
 //! The estimated tokens, costs and time of a run before it starts: [`Forecast`].
 
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use serde::Serialize;
@@ -8,6 +9,7 @@ use super::table::ColumnKind::{Count, Text};
 use super::table::TableBuilder;
 use super::terminal;
 use crate::error::{Error, Result};
+use crate::types::ReadingName;
 
 /// Estimate of the requests that are left for one model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -28,6 +30,19 @@ pub(crate) struct CostLine {
     pub dollars: Option<f64>,
     /// Cost in dollars if each reply is as long as `--max-tokens` allows.
     pub most_dollars: Option<f64>,
+    /// The same requests by the light reading of what is shown.
+    pub readings: Vec<ReadingCost>,
+}
+
+/// Requests of one light reading.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct ReadingCost {
+    /// The light reading; `None` for what all readings share: L0, images without noise, and no image at all.
+    pub reading: Option<ReadingName>,
+    /// Number of requests left.
+    pub requests: usize,
+    /// Cost in dollars if each reply is short; `None` if no price is known.
+    pub dollars: Option<f64>,
 }
 
 /// Estimate of a run.
@@ -117,6 +132,7 @@ pub(crate) fn render(forecast: &Forecast) -> String {
         return text + ".\n";
     }
     let _ = write!(text, ".\n{table}");
+    text += &by_reading(&forecast.lines);
     let _ = writeln!(
         text,
         "dollars: from {} a reply to every reply as long as --max-tokens allows; {prices}; by the Batch API {:.0} % of it",
@@ -145,6 +161,29 @@ pub(crate) fn render(forecast: &Forecast) -> String {
         let _ = writeln!(text, "the run would not start: {problem}");
     }
     text
+}
+
+/// The requests of all models by light reading; empty with fewer than two readings.
+fn by_reading(lines: &[CostLine]) -> String {
+    let mut sums = BTreeMap::<Option<&ReadingName>, (usize, Option<f64>)>::new();
+    for cost in lines.iter().flat_map(|line| &line.readings) {
+        let (requests, dollars) = sums.entry(cost.reading.as_ref()).or_insert((0, Some(0.0)));
+        *requests += cost.requests;
+        *dollars = dollars.zip(cost.dollars).map(|(sum, cost)| sum + cost);
+    }
+    if sums.keys().flatten().count() < 2 {
+        return String::new();
+    }
+    let parts = sums.into_iter().map(|(reading, (requests, dollars))| {
+        let name = reading.map_or(
+            "shared by all (L0, exposure drop, blind)",
+            ReadingName::as_str,
+        );
+        let price = dollars.map_or("price unknown".to_owned(), money);
+        format!("{name} {} ({price})", count(requests as f64))
+    });
+    let parts: Vec<String> = parts.collect();
+    format!("requests by reading: {}\n", parts.join(", "))
 }
 
 /// A number rounded to an integer, with digits in groups of three.
@@ -199,6 +238,39 @@ fn hours(seconds: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn several_readings_are_counted_apart() {
+        let cost = |reading: Option<&str>, requests, dollars| ReadingCost {
+            reading: reading.map(|name| ReadingName::new(name).unwrap()),
+            requests,
+            dollars,
+        };
+        let line = |readings| CostLine {
+            model: "m".to_owned(),
+            requests: 0,
+            text_tokens: 0.0,
+            image_tokens: None,
+            reply_tokens: 0.0,
+            longest_reply_tokens: None,
+            dollars: None,
+            most_dollars: None,
+            readings,
+        };
+        let shared = cost(None, 6, Some(0.5));
+        let one = line(vec![shared.clone(), cost(Some("paper"), 5, Some(0.25))]);
+        assert_eq!(by_reading(std::slice::from_ref(&one)), "");
+        let two = line(vec![
+            shared,
+            cost(Some("paper"), 5, Some(0.25)),
+            cost(Some("physical"), 1005, None),
+        ]);
+        assert_eq!(
+            by_reading(&[one, two]),
+            "requests by reading: shared by all (L0, exposure drop, blind) 12 ($1.00), paper 10 ($0.5000), \
+             physical 1,005 (price unknown)\n"
+        );
+    }
 
     #[test]
     fn numbers_are_easy_to_read() {

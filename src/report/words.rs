@@ -52,6 +52,11 @@ pub(super) fn points(difference: f64) -> String {
     }
 }
 
+/// Both ends of the interval of a difference in percentage points, as `−1.2, +5.0`.
+pub(super) fn ends_in_points(difference: Estimate) -> String {
+    format!("{}, {}", points(difference.low), points(difference.high))
+}
+
 /// A p-value with three decimals, or "< 0.001".
 pub(super) fn p(value: f64) -> String {
     if value < 0.001 {

@@ -6,6 +6,7 @@ use super::accuracy::{AccuracySummary, summarize};
 use super::agreement::{Agreement, agreements};
 use super::best::{BestInTheDark, best_in_the_dark};
 use super::bootstrap::Resamples;
+use super::by_reading::{FindingByReading, by_reading};
 use super::chance::OfferedChoices;
 use super::cluster::{ClusterUnit, Clusters};
 use super::common::CommonItems;
@@ -37,6 +38,8 @@ pub struct Findings<'a> {
     pub pooled: Vec<PooledFinding>,
     /// Levels that the pooled findings leave out, because some of their models were not asked there.
     pub(crate) left_out: Vec<LevelsLeftOut>,
+    /// Whether each finding about noise holds under every light reading; empty with one reading.
+    pub by_reading: Vec<FindingByReading>,
     /// The models by their mean accuracy in the dark, if there are two or more.
     pub best: Option<BestInTheDark>,
     /// Paired differences between subjects.
@@ -117,6 +120,7 @@ impl<'a> Findings<'a> {
             health,
             pooled: pooled(&grid),
             left_out: levels_left_out(&grid),
+            by_reading: by_reading(&grid),
             best: best_in_the_dark(&grid),
             comparisons: comparisons(&grid),
             curves: grid

@@ -19,6 +19,7 @@ pub(crate) mod auc;
 pub(crate) mod baseline;
 pub(crate) mod best;
 pub(crate) mod bootstrap;
+pub(crate) mod by_reading;
 pub(crate) mod chance;
 pub mod choice;
 pub(crate) mod cluster;

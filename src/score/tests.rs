@@ -22,10 +22,10 @@ use crate::types::{
 const FRAMES: usize = 12;
 
 /// Whether a model is right about an item; `None` if the trial failed.
-type Answers = fn(usize) -> Option<bool>;
+pub(super) type Answers = fn(usize) -> Option<bool>;
 
 /// The records of a model in a condition; without images if the condition is empty.
-fn records(model: &str, condition: &str, answers: Answers) -> Vec<Record> {
+pub(super) fn records(model: &str, condition: &str, answers: Answers) -> Vec<Record> {
     let condition: Option<Condition> = (!condition.is_empty()).then(|| condition.parse().unwrap());
     let record = |item: usize| {
         let right = answers(item);
@@ -58,7 +58,7 @@ fn records(model: &str, condition: &str, answers: Answers) -> Vec<Record> {
 }
 
 /// Runs a check on the grid of records.
-fn with_grid<T>(records: &[Record], check: impl FnOnce(&Grid<'_>) -> T) -> T {
+pub(super) fn with_grid<T>(records: &[Record], check: impl FnOnce(&Grid<'_>) -> T) -> T {
     let asked = records
         .iter()
         .map(|record| (&record.question, &record.detail.frame));

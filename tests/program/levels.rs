@@ -136,3 +136,90 @@ fn one_light_reading_is_named_with_what_it_leaves_open() {
         );
     }
 }
+
+#[test]
+fn findings_stand_beside_each_other_under_every_reading() {
+    let bench = bench(&[
+        "L3-noise",
+        "L4-noise",
+        "L5-noise",
+        "L3-noise@eld",
+        "L4-noise@eld",
+        "L5-noise@eld",
+        "L5-noise@physical",
+    ]);
+    let line = "--model script:m.jsonl --data frames --levels L0,L3-L5 --out";
+    // One reading first, the others added later: only what is missing is asked.
+    let text = bench.complete(&[words(line), vec!["run"]].concat());
+    assert!(!text.contains("Does each finding hold"), "{text}");
+    assert!(!bench.path("run/readings.csv").exists());
+    let first = records(&bench.path("run"));
+    assert_eq!(first.len(), FRAMES * (1 + 3 + 3));
+    let all = ["run", "--profile", "paper,eld,physical", "--full"];
+    let text = bench.complete(&[words(line), all.to_vec()].concat());
+    let records = records(&bench.path("run"));
+    assert_eq!(records.len(), FRAMES * (1 + 3 + 3 * 3));
+    assert_eq!(records[..first.len()], first);
+    let of_kind = |kind: &str| {
+        let conditions = records.iter().map(|record| record["condition"].as_str());
+        conditions
+            .filter(|name| name.unwrap().ends_with(kind))
+            .count()
+    };
+    assert_eq!(of_kind("-ev"), FRAMES * 3);
+    assert_eq!(of_kind("@eld"), FRAMES * 3);
+    let table = rows(&bench, "readings.csv");
+    let find = |finding: &str, levels: &str, reading: &str| {
+        let mut rows = table.iter();
+        let is = |row: &&Vec<(String, String)>| {
+            (
+                cell(row, "finding"),
+                cell(row, "levels"),
+                cell(row, "reading"),
+            ) == (finding, levels, reading)
+        };
+        rows.find(is).cloned().unwrap()
+    };
+    for (reading, effect, verdict) in [
+        ("paper", 1.0, "holds"),
+        ("eld", 1.0, "holds"),
+        ("physical", 1.0 / 3.0, "holds"),
+    ] {
+        let row = find("noise_compounds", "L3;L4;L5", reading);
+        let found: f64 = cell(&row, "effect").parse().unwrap();
+        assert!((found - effect).abs() < 1e-9, "{row:?}");
+        assert_eq!((cell(&row, "verdict"), cell(&row, "n")), (verdict, "32"));
+        assert_eq!(cell(&row, "holds"), "under all");
+    }
+    let row = find("noise_compounds", "L4", "physical");
+    assert_eq!(
+        [cell(&row, "verdict"), cell(&row, "holds")],
+        ["open", "under some"]
+    );
+    for part in [
+        "Does each finding hold under every reading?",
+        "Noise compounds the drop: holds under paper, eld, physical.",
+        "the break (threshold EV)",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    let page = fs::read_to_string(bench.path("run/report.html")).unwrap();
+    let words = "Noise compounds the drop at L4: holds under paper, eld; open under physical";
+    assert!(page.contains(words), "no words on the page");
+}
+
+#[test]
+fn a_dry_run_counts_the_requests_of_each_reading() {
+    let bench = bench(&[]);
+    let line = "--model gpt-4o --data frames --levels L0,L5 --dry-run --out run";
+    let one = bench.complete(&words(line));
+    assert!(!one.contains("requests by reading"), "{one}");
+    let two = bench.complete(&[words(line), words("--profile paper,level")].concat());
+    let found = two
+        .lines()
+        .find(|line| line.starts_with("requests by reading: "));
+    let found = found.unwrap();
+    for part in ["blind) 64 ($", ", paper 32 ($", ", level 32 ($"] {
+        assert!(found.contains(part), "{two}");
+    }
+}

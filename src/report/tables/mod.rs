@@ -4,6 +4,7 @@ mod agreement;
 mod answers;
 mod baseline;
 mod best;
+mod by_reading;
 mod comparisons;
 mod enhancers;
 mod families;
@@ -53,6 +54,7 @@ fn all(findings: &Findings<'_>) -> Vec<Table> {
         observer::observer(findings),
         vec![subjects::subjects(&findings.summary)],
         thresholds::thresholds(findings),
+        by_reading::by_reading(findings),
         vec![best::best(findings)],
         vec![families::families(findings)],
         pooled::pooled(findings),

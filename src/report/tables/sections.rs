@@ -11,7 +11,7 @@ pub(in crate::report) type Section = (
 );
 
 /// The sections of the page in order.
-pub(in crate::report) const SECTIONS: [Section; 11] = [
+pub(in crate::report) const SECTIONS: [Section; 12] = [
     (
         BASELINE,
         "Against the baseline",
@@ -31,6 +31,14 @@ pub(in crate::report) const SECTIONS: [Section; 11] = [
         "The exposure drop at which a model has lost half of what it knows in the light: one number a model. The area is the \
          mean accuracy from L0 to the darkest level, over EV.",
         &["thresholds"],
+    ),
+    (
+        "readings",
+        "Does each finding hold under every reading?",
+        "The paper’s noise can be read in several ways. Each finding is computed under every reading on the same items, at L1–L5. It \
+         holds where the whole 95 % interval is on its side, is reversed where all of it is on the other side, and is open where it \
+         covers 0. “Under some” is corrected by Holm over the readings; “under all” needs no correction.",
+        &[],
     ),
     (
         "observer",
