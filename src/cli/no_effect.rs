@@ -25,6 +25,11 @@ pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
         None => idle.evaluation(&cli.evaluate),
         Some(Command::Batch(BatchCommand::Export(args))) => idle.evaluation(&args.evaluate),
         Some(Command::OpenEqa(args)) => idle.open(args),
+        Some(Command::Synthesize(args)) if args.check.is_some() => {
+            let mut others = ids::<LightArgs>();
+            others.extend(["max_pixels".into(), "threads".into()]);
+            idle.because("--check makes no image", &others);
+        }
         Some(Command::Synthesize(args)) => {
             if args.from.is_some() {
                 let why = "--from makes an image with the settings in its file";

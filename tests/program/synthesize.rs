@@ -97,10 +97,123 @@ fn what_is_there_is_kept_unless_it_is_another() {
         other.stdout,
         "out: 0 made of 1 frames, 1 kept as they were (--force makes them again), 1 failed\n"
     );
-    assert!(other.stderr.contains("a_L2-noise.json") && other.stderr.contains("--force"));
+    assert!(other.stderr.contains("a_L2-noise.png") && other.stderr.contains("--force"));
     let before = fs::read(bench.path("out/a_L2-noise.png")).unwrap();
     assert_eq!(call(&["--seed", "1", "--force"]).code, Some(0));
     assert_ne!(before, fs::read(bench.path("out/a_L2-noise.png")).unwrap());
+}
+
+/// Writes the bytes of a JPEG with the pixels of an image: another encoder's file.
+fn as_jpeg(path: &Path) -> Vec<u8> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let image = image::open(path).unwrap();
+    image
+        .write_to(&mut bytes, image::ImageFormat::Jpeg)
+        .unwrap();
+    bytes.into_inner()
+}
+
+/// The same pixels in another file: no filter, no compression.
+fn encoded_again(path: &Path) -> Vec<u8> {
+    use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+    let image = image::open(path).unwrap();
+    let mut bytes = Vec::new();
+    let encoder =
+        PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::NoFilter);
+    image.write_with_encoder(encoder).unwrap();
+    bytes
+}
+
+#[test]
+fn a_json_file_vouches_for_the_bytes_of_its_image() {
+    let bench = Bench::new();
+    frames(&bench);
+    let call = |more: &str| {
+        let line = format!("synthesize frames/a.png --out out --levels L2 --variant ev {more}");
+        bench.call(&words(&line))
+    };
+    let (image, json) = (
+        bench.path("out/a_L2-ev.png"),
+        bench.path("out/a_L2-ev.json"),
+    );
+    assert_eq!(call("").code, Some(0));
+    let written = fs::read(&image).unwrap();
+    let output = &json_of(&json)["output"];
+    assert_eq!(output["file"], "a_L2-ev.png");
+    assert_eq!(output["bytes"], written.len());
+    assert_eq!(output["digest"], blake3::hash(&written).to_hex().as_str());
+    let kept = "out: 0 made of 1 frames, 1 kept as they were (--force makes them again)\n";
+
+    // Cut: made again, and said.
+    fs::write(&image, &written[..written.len() / 2]).unwrap();
+    let again = call("");
+    assert_eq!(again.stdout, "out: 1 made of 1 frames\n");
+    assert!(
+        again
+            .stderr
+            .contains("a_L2-ev.png: cut or damaged; it is made again")
+    );
+    assert_eq!(fs::read(&image).unwrap(), written);
+
+    // The same pixels from another encoder: kept, and the JSON file vouches for the new bytes.
+    fs::write(&image, encoded_again(&image)).unwrap();
+    assert_ne!(fs::read(&image).unwrap(), written);
+    assert_eq!(bench.call(&words("synthesize --check out")).code, Some(1));
+    assert_eq!(call("").stdout, kept);
+    assert_eq!(bench.call(&words("synthesize --check out")).code, Some(0));
+
+    // Edited: refused by name, and nothing is written.
+    let edited = as_jpeg(&image);
+    fs::write(&image, &edited).unwrap();
+    let refused = call("");
+    assert_eq!(refused.code, Some(1));
+    assert!(
+        refused.stderr.contains("a_L2-ev.png: has") && refused.stderr.contains("--force"),
+        "{}",
+        refused.stderr
+    );
+    assert_eq!(fs::read(&image).unwrap(), edited);
+    assert_eq!(call("--force").stdout, "out: 1 made of 1 frames\n");
+    assert_eq!(fs::read(&image).unwrap(), written);
+
+    // Killed between the two files: the JSON file is written; beside a foreign image it is not.
+    fs::remove_file(&json).unwrap();
+    assert_eq!(call("").stdout, kept);
+    assert!(json.exists());
+    fs::remove_file(&json).unwrap();
+    fs::write(&image, fs::read(bench.path("frames/a.png")).unwrap()).unwrap();
+    let refused = call("");
+    assert!(
+        refused.stderr.contains("no JSON file vouches for it"),
+        "{}",
+        refused.stderr
+    );
+    assert!(!json.exists());
+
+    // A JSON file without its image, and one of the first schema, which had no digest.
+    assert_eq!(call("--force").code, Some(0));
+    fs::remove_file(&image).unwrap();
+    let missing = bench.call(&words("synthesize --check out"));
+    assert_eq!(missing.code, Some(1));
+    assert!(missing.stderr.contains("a_L2-ev.png"), "{}", missing.stderr);
+    assert_eq!(call("").stdout, "out: 1 made of 1 frames\n");
+    let mut old = json_of(&json);
+    old["schema"] = "darkqa.image/1".into();
+    old.as_object_mut().unwrap().remove("output");
+    fs::write(&json, old.to_string()).unwrap();
+    let unvouched = bench.call(&words("synthesize --check out"));
+    assert!(
+        unvouched.stderr.contains("has no digest"),
+        "{}",
+        unvouched.stderr
+    );
+    assert_eq!(call("").stdout, kept);
+    assert_eq!(json_of(&json)["schema"], "darkqa.image/2");
+    let checked = bench.call(&words("synthesize --check out"));
+    assert_eq!(
+        checked.stdout,
+        "out: 1 images are as they were written, 0 are not\n"
+    );
 }
 
 /// Fresh draws and a camera of another make leave the level's own traces in the file: nothing else is needed.
@@ -147,7 +260,7 @@ fn one_broken_frame_does_not_stop_the_others() {
     ));
     assert_eq!(made.code, Some(1));
     assert_eq!(made.stdout, "out: 2 made of 2 frames, 2 failed\n");
-    assert!(made.stderr.contains("b.png"), "{}", made.stderr);
+    assert_eq!(made.stderr.matches("b.png").count(), 1, "{}", made.stderr);
     assert!(bench.path("out/a_L1-noise.png").exists());
     assert!(!bench.path("out/b_L1-noise.json").exists());
 }
@@ -197,5 +310,30 @@ fn sheets_are_drawn_for_each_frame() {
         assert_eq!(made.code, Some(0), "{made:?}");
         let sheet = image::open(bench.path(&format!("out/a_{kind}.png"))).unwrap();
         assert!(sheet.width() > 500);
+        let recipe = json_of(&bench.path(&format!("out/a_{kind}.json")));
+        assert_eq!(recipe["schema"], "darkqa.sheet/1");
     }
+    let call = |more: &str| {
+        let line = format!("synthesize frames --out out --sheet levels {more}");
+        bench.call(&words(&line))
+    };
+    let kept = "out: 0 made of 1 frames, 1 kept as they were (--force makes them again)\n";
+    assert_eq!(call("").stdout, kept);
+    // Another recipe: an intact figure is made again, an edited one is not.
+    let first = image::open(bench.path("out/a_levels.png")).unwrap();
+    let other = call("--profile all");
+    assert_eq!(other.stdout, "out: 1 made of 1 frames\n");
+    assert!(
+        other
+            .stderr
+            .contains("with other settings; it is made again"),
+        "{}",
+        other.stderr
+    );
+    let second = image::open(bench.path("out/a_levels.png")).unwrap();
+    assert!(second.height() > first.height(), "no row for each reading");
+    first.save(bench.path("out/a_levels.png")).unwrap();
+    let refused = call("");
+    assert_eq!(refused.code, Some(1));
+    assert!(refused.stderr.contains("--force"), "{}", refused.stderr);
 }

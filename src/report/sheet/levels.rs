@@ -1,6 +1,6 @@
 //! The paper's figure of examples, both variants by level: [`levels()`].
 
-use super::{CELL, GAP, LINE, SheetCanvas, fitted, letter_width, mean};
+use super::{CELL, GAP, LINE, SheetCanvas, fitted, letter_width, lines, mean};
 use crate::types::degradation::Axis;
 use crate::types::{AxisLevel, Rgb};
 
@@ -8,42 +8,43 @@ use crate::types::{AxisLevel, Rgb};
 #[derive(Debug, Clone)]
 pub(crate) struct LevelColumn {
     pub level: AxisLevel,
-    /// Image with exposure drop alone.
-    pub exposure: Rgb,
-    /// Image with sensor noise.
-    pub noise: Rgb,
+    /// An image for each row.
+    pub images: Vec<Rgb>,
 }
 
-/// A sheet with the frame and its levels, exposure drop above noise, as the paper's figure of examples (DarkQA, Fig. 3).
+/// A sheet with the frame and its levels, exposure drop above noise, as the paper's figure of examples (DarkQA, Fig. 3); `rows` are
+/// the names of the rows, and `foot` stands below them.
 ///
 /// Images are scaled down by means of pixels. As in the paper's insets, the lower right corner of L3, L4 and L5 shows the
 /// middle of the image (half of each side, a quarter of the area) with 10, 20 and 50 times its light. Pixels of insets are
 /// picked, not averaged, so that the noise keeps its strength. The paper says "pixel intensities amplified". Multiplied codes
-/// would make a bright room white, so we take this to mean the light.
+/// would make a bright room white, so we take this to mean the light, and say so below the images.
 #[must_use]
-pub(crate) fn levels(clean: &Rgb, columns: &[LevelColumn]) -> Rgb {
+pub(crate) fn levels(clean: &Rgb, rows: &[String], columns: &[LevelColumn], foot: &str) -> Rgb {
     let size = fitted(clean.height(), clean.width());
     let [height, width] = size;
-    let margin = 6 * letter_width() + GAP;
+    let longest = rows.iter().map(|row| row.chars().count()).max();
+    let margin = (longest.unwrap_or(0) + 1) * letter_width() + GAP;
     // A label needs its width even if the image is small.
     let cell = width.max(CELL / 2);
-    let mut sheet = SheetCanvas::new(
-        GAP + LINE + 2 * (GAP + height.max(LINE)) + GAP,
-        margin + (columns.len() + 1) * (cell + GAP),
-    );
-    let tops = [0, 1].map(|row| GAP + LINE + GAP + row * (GAP + height.max(LINE)));
-    for (top, name) in tops.into_iter().zip(["EV", "noise"]) {
-        sheet.write(
-            [top + height.saturating_sub(LINE) / 2, GAP],
-            margin,
-            name,
-            [0; 3],
-        );
+    let below = GAP + LINE + GAP + rows.len() * (GAP + height.max(LINE));
+    let sheet_width = margin + (columns.len() + 1) * (cell + GAP);
+    let levels: Vec<AxisLevel> = columns.iter().map(|column| column.level).collect();
+    let foot = [foot.to_owned(), how_inset(&levels)];
+    let foot: Vec<String> = foot
+        .iter()
+        .flat_map(|text| lines(text, sheet_width))
+        .collect();
+    let mut sheet = SheetCanvas::new(below + foot.len() * LINE + GAP, sheet_width);
+    let top = |row: usize| GAP + LINE + GAP + row * (GAP + height.max(LINE));
+    for (row, name) in rows.iter().enumerate() {
+        let middle = top(row) + height.saturating_sub(LINE) / 2;
+        sheet.write([middle, GAP], margin, name, [0; 3]);
     }
     let left = |column: usize| margin + column * (cell + GAP);
     sheet.write([GAP, left(0)], cell, "L0", [0; 3]);
-    for top in tops {
-        sheet.fill([top, left(0)], size, |row, column| {
+    for row in 0..rows.len() {
+        sheet.fill([top(row), left(0)], size, |row, column| {
             mean(clean, size, row, column)
         });
     }
@@ -52,7 +53,8 @@ pub(crate) fn levels(clean: &Rgb, columns: &[LevelColumn]) -> Rgb {
         let unit = column.level.axis().unwrap_or(Axis::LIGHT).unit;
         let label = format!("{} -{} {unit}", column.level, column.level.value());
         sheet.write([GAP, left], cell, &label, [0; 3]);
-        for (top, image) in tops.into_iter().zip([&column.exposure, &column.noise]) {
+        for (row, image) in column.images.iter().enumerate() {
+            let top = top(row);
             sheet.fill([top, left], size, |row, column| {
                 mean(image, size, row, column)
             });
@@ -61,7 +63,31 @@ pub(crate) fn levels(clean: &Rgb, columns: &[LevelColumn]) -> Rgb {
             }
         }
     }
+    for (line, text) in foot.iter().enumerate() {
+        sheet.write([below + line * LINE, GAP], sheet_width, text, [90; 3]);
+    }
     sheet.finish()
+}
+
+/// The factors of light of the insets at these levels, without duplicates.
+#[must_use]
+pub(crate) fn insets(levels: &[AxisLevel]) -> Vec<u16> {
+    let mut factors: Vec<u16> = levels.iter().copied().filter_map(amplification).collect();
+    factors.dedup();
+    factors
+}
+
+/// What the insets show; empty without one.
+fn how_inset(levels: &[AxisLevel]) -> String {
+    let factors = insets(levels);
+    if factors.is_empty() {
+        return String::new();
+    }
+    let factors: Vec<String> = factors.iter().map(|factor| format!("×{factor}")).collect();
+    format!(
+        "Insets: the middle of the image, linear light {}",
+        factors.join(", ")
+    )
 }
 
 /// Factor by which the light of an inset is amplified; `None` below 5 EV, where the image itself is visible.
@@ -127,11 +153,11 @@ mod tests {
     fn sheet(height: usize, width: usize, levels_of: &[Severity]) -> Rgb {
         let column = |level: &Severity| LevelColumn {
             level: AxisLevel::new(Kind::ALL[0], *level),
-            exposure: grey(height, width, 3),
-            noise: grey(height, width, 4),
+            images: vec![grey(height, width, 3), grey(height, width, 4)],
         };
         let columns: Vec<_> = levels_of.iter().map(column).collect();
-        levels(&grey(height, width, 100), &columns)
+        let rows = ["EV", "noise"].map(str::to_owned);
+        levels(&grey(height, width, 100), &rows, &columns, "paper: K 0.77")
     }
 
     #[test]
@@ -145,6 +171,23 @@ mod tests {
         assert!(has(100) >= 2 * 100 * 300);
         assert!(has(3) > 100 * 300 && has(3) < 2 * 100 * 300);
         assert!(has(18) > 4000 && has(24) > 4000);
+    }
+
+    #[test]
+    fn each_reading_has_a_row_and_the_insets_are_explained() {
+        let image = || grey(100, 300, 3);
+        let columns = [LevelColumn {
+            level: AxisLevel::new(Kind::ALL[0], Severity::L5),
+            images: vec![image(), image(), image()],
+        }];
+        let rows = ["EV", "noise", "@physical"].map(str::to_owned);
+        let of = |rows: &[String]| levels(&grey(100, 300, 100), rows, &columns, "paper").height();
+        assert_eq!(of(&rows) - of(&rows[..2]), 100 + GAP);
+        assert_eq!(
+            how_inset(&[columns[0].level]),
+            "Insets: the middle of the image, linear light ×50"
+        );
+        assert_eq!(how_inset(&[AxisLevel::L0]), "");
     }
 
     #[test]

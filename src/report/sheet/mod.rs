@@ -11,11 +11,14 @@ use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_wid
 
 pub(crate) use contact::{ContactColumn, contact};
 pub(crate) use crops::{CropRow, crops};
-pub(crate) use levels::{LevelColumn, levels};
+pub(crate) use levels::{LevelColumn, insets, levels};
 pub(crate) use noise::{Signal, noise};
 pub(crate) use story::{Story, StoryCell, StoryMark, StoryRow, story};
 
 use crate::types::Rgb;
+
+/// Version of the drawing, raised whenever a pixel of a figure of levels or of noise changes for the same images.
+pub(crate) const VERSION: u32 = 1;
 
 /// Height of a line of text in pixels.
 const LINE: usize = RasterHeight::Size20.val();
@@ -96,6 +99,22 @@ impl SheetCanvas {
         sheet.samples_mut().copy_from_slice(&self.samples);
         sheet
     }
+}
+
+/// A text in lines of a width in pixels, cut between words; none for an empty text.
+fn lines(text: &str, width: usize) -> Vec<String> {
+    let letters = width.saturating_sub(2 * GAP) / letter_width();
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + 1 + word.chars().count() <= letters => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
 }
 
 fn letter_width() -> usize {

@@ -2,7 +2,7 @@
 
 use ndarray::Array2;
 
-use super::{CELL, GAP, LINE, SheetCanvas};
+use super::{CELL, GAP, LINE, SheetCanvas, lines};
 use crate::types::Rgb;
 
 /// One noise term on the sensor.
@@ -17,9 +17,10 @@ pub(crate) struct Signal {
 /// A sheet with the middle of each signal at full resolution around mid grey, with its mean and standard deviation, which are
 /// those of the whole signal.
 ///
-/// Black is three standard deviations below the mean, and white three above it.
+/// Black is three standard deviations below the mean, and white three above it. So all signals look alike, and each has its own scale
+/// in ADU beside it. `foot` stands below them.
 #[must_use]
-pub(crate) fn noise(signals: &[Signal]) -> Rgb {
+pub(crate) fn noise(signals: &[Signal], foot: &str) -> Rgb {
     const COLUMNS: usize = 3;
     let side = |length: fn(&Array2<f32>) -> usize, max: usize| {
         signals
@@ -30,11 +31,11 @@ pub(crate) fn noise(signals: &[Signal]) -> Rgb {
             .min(max)
     };
     let (height, width) = (side(Array2::nrows, CELL * 3 / 4), side(Array2::ncols, CELL));
-    let step = [GAP + 2 * LINE + height, GAP + CELL];
-    let mut sheet = SheetCanvas::new(
-        signals.len().div_ceil(COLUMNS) * step[0] + GAP,
-        COLUMNS * step[1] + GAP,
-    );
+    let step = [GAP + 3 * LINE + height, GAP + CELL];
+    let below = signals.len().div_ceil(COLUMNS) * step[0] + GAP;
+    let sheet_width = COLUMNS * step[1] + GAP;
+    let foot = lines(foot, sheet_width);
+    let mut sheet = SheetCanvas::new(below + foot.len() * LINE + GAP, sheet_width);
     for (index, signal) in signals.iter().enumerate() {
         let top = GAP + index / COLUMNS * step[0];
         let left = GAP + index % COLUMNS * step[1];
@@ -42,19 +43,21 @@ pub(crate) fn noise(signals: &[Signal]) -> Rgb {
         sheet.write([top, left], CELL, &signal.name, [0; 3]);
         let numbers = format!("mean {mean:.3}, std {deviation:.3} ADU");
         sheet.write([top + LINE, left], CELL, &numbers, [0; 3]);
+        let reach = 3.0 * deviation;
+        let ends = format!("black {:.3}, white {:.3} ADU", mean - reach, mean + reach);
+        sheet.write([top + 2 * LINE, left], CELL, &ends, [90; 3]);
         let first = [
             (signal.adu.nrows() - height) / 2,
             (signal.adu.ncols() - width) / 2,
         ];
-        let scale = if deviation > 0.0 {
-            127.5 / (3.0 * deviation)
-        } else {
-            0.0
-        };
-        sheet.fill([top + 2 * LINE, left], [height, width], |row, column| {
+        let scale = if deviation > 0.0 { 127.5 / reach } else { 0.0 };
+        sheet.fill([top + 3 * LINE, left], [height, width], |row, column| {
             let value = f64::from(signal.adu[[first[0] + row, first[1] + column]]);
             [(127.5 + (value - mean) * scale).round().clamp(0.0, 255.0) as u8; 3]
         });
+    }
+    for (line, text) in foot.iter().enumerate() {
+        sheet.write([below + line * LINE, GAP], sheet_width, text, [90; 3]);
     }
     sheet.finish()
 }
@@ -81,7 +84,7 @@ mod tests {
         let [mean, deviation] = moments(&adu);
         assert!((mean - 2.0).abs() < 1e-9 && (deviation - 1.0).abs() < 1e-9);
         let name = "row".to_owned();
-        let sheet = noise(&[Signal { name, adu }]);
+        let sheet = noise(&[Signal { name, adu }], "");
         let has = |code: u8| sheet.samples().contains(&code);
         assert!(has(85) && has(170));
     }
@@ -92,13 +95,16 @@ mod tests {
             name: "a name that is longer than its place on the sheet is".to_owned(),
             adu: Array2::zeros(size),
         };
-        let sheet = noise(&[
-            signal((1, 1)),
-            signal((500, 2)),
-            signal((2, 500)),
-            signal((9, 9)),
-        ]);
+        let sheet = noise(
+            &[
+                signal((1, 1)),
+                signal((500, 2)),
+                signal((2, 500)),
+                signal((9, 9)),
+            ],
+            "sony-a7s2, seed 0",
+        );
         assert!(sheet.samples().contains(&128));
-        assert_eq!(noise(&[]).width(), 3 * (GAP + CELL) + GAP);
+        assert_eq!(noise(&[], "").width(), 3 * (GAP + CELL) + GAP);
     }
 }

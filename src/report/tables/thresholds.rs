@@ -1,11 +1,14 @@
 //! Tables of darkness thresholds and areas: all families together, and by family.
 
+use std::collections::BTreeSet;
+
 use crate::report::table::ColumnKind::{Number, Share, Text, Threshold};
 use crate::report::table::{Table, TableBuilder, TableCell};
 use crate::report::words::{counted, light};
 use crate::score::curve::Curve;
 use crate::score::findings::Findings;
 use crate::score::threshold::{NoThreshold, ThinLevel};
+use crate::types::AxisLevel;
 
 pub(super) fn thresholds(findings: &Findings<'_>) -> Vec<Table> {
     let curves = findings.curves.iter();
@@ -18,6 +21,7 @@ pub(super) fn thresholds(findings: &Findings<'_>) -> Vec<Table> {
     let mut whole = table("Thresholds and areas", &whole);
     whole.heading = (!whole.rows.is_empty()).then_some(heading);
     whole.notes = notes(findings.curves.iter());
+    whole.notes.extend(finer(findings));
     let mut by_family = table("Thresholds and areas by family", &by_family);
     by_family.is_folded = true;
     vec![whole, by_family]
@@ -101,4 +105,69 @@ fn notes<'a>(curves: impl Iterator<Item = &'a Curve>) -> Vec<String> {
         )
     });
     notes.collect()
+}
+
+/// Number of levels that [`finer`] proposes.
+const MORE_LEVELS: usize = 3;
+
+/// The smallest step in EV that [`finer`] proposes: finer levels differ by less than the intervals of thresholds.
+const LEAST_STEP: f64 = 0.25;
+
+/// The levels to add where the thresholds of all raw curves lie, evenly spaced between the levels around them; `None` if the levels
+/// there are close already, a threshold lies beyond them, or none is known.
+///
+/// All items and models are then asked there alike. A search that places levels by the answers of each model gains little, since the
+/// spread between items makes most of the error, and it would compare models at different levels.
+fn finer(findings: &Findings<'_>) -> Option<String> {
+    let curves = findings.curves.iter();
+    let raw = curves.filter(|curve| curve.family.is_none() && curve.enhancer.is_none());
+    let intervals: Vec<[f64; 2]> = raw
+        .filter_map(|curve| {
+            let threshold = curve.summary.threshold.as_ref().ok()?;
+            Some([threshold.low, threshold.high])
+        })
+        .collect();
+    let subjects = findings.grid.subjects.iter();
+    let levels: BTreeSet<AxisLevel> = subjects.filter_map(|subject| subject.level).collect();
+    let drops: Vec<f64> = levels.iter().map(|level| level.value()).collect();
+    let more = levels_within(&intervals, &drops)?;
+    let more: Vec<String> = more.iter().map(ToString::to_string).collect();
+    Some(format!(
+        "for a finer threshold, add {} EV to --levels and ask again with --resume: all models, all items, these levels alone",
+        more.join(", ")
+    ))
+}
+
+/// Exposure drops in EV, evenly spaced between the two of `drops` that enclose all intervals; `drops` is in ascending order.
+fn levels_within(intervals: &[[f64; 2]], drops: &[f64]) -> Option<Vec<f64>> {
+    let (low, high) = intervals
+        .iter()
+        .fold((f64::INFINITY, 0.0_f64), |(low, high), ends| {
+            (low.min(ends[0]), high.max(ends[1]))
+        });
+    let below = drops.iter().rev().find(|drop| **drop <= low)?;
+    let above = drops.iter().find(|drop| **drop >= high)?;
+    let step = (above - below) / (MORE_LEVELS + 1) as f64;
+    let places = (1..=MORE_LEVELS).map(|index| below + step * index as f64);
+    let rounded = places.map(|drop| (drop * 100.0).round() / 100.0);
+    let new: Vec<f64> = rounded.filter(|drop| !drops.contains(drop)).collect();
+    (step >= LEAST_STEP && !new.is_empty()).then_some(new)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn levels_are_added_around_the_thresholds_alone() {
+        let ladder = [0.0, 2.0, 4.0, 6.0, 7.5, 9.0];
+        let within = |intervals: &[[f64; 2]]| levels_within(intervals, &ladder);
+        assert_eq!(within(&[[2.2, 3.9]]), Some(vec![2.5, 3.0, 3.5]));
+        // The union spans two steps; the level between them was asked.
+        assert_eq!(within(&[[2.2, 3.0], [5.0, 5.5]]), Some(vec![3.0, 5.0]));
+        // Beyond the darkest level, or unknown at all.
+        assert_eq!(within(&[[8.0, f64::INFINITY]]), None);
+        assert_eq!(within(&[]), None);
+        assert_eq!(levels_within(&[[1.1, 1.3]], &[0.0, 1.0, 1.5, 2.0]), None);
+    }
 }

@@ -1,19 +1,20 @@
 //! `synthesize`: writing low-light versions of images, the same as an evaluation of the same folder would send.
 
+mod check;
+mod placed;
 mod sheet;
 mod sidecar;
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use rayon::prelude::*;
 
-use crate::ask::png;
 use crate::dataset::inputs::{InputFrame, Inputs, stem};
 use crate::dataset::{Picture, PixelLimit};
 use crate::error::{Error, Result};
-use crate::files::write;
 use crate::job::Outcome;
 use crate::job::frame_work::{FrameWork, ImageSteps};
 use crate::job::progress::{Progress, StepBar};
@@ -23,18 +24,20 @@ use crate::job::timings::Timings;
 use crate::job::workers::{ThreadArgs, pool};
 use crate::synthesis::{LightArgs, LightSettings, NoiseKey};
 use crate::types::manifest::Status;
-use crate::types::{Condition, Decides, Degradation, FrameId, Rgb};
-use sidecar::ImageSidecar;
+use crate::types::{Condition, Decides, Degradation, FrameId};
+use placed::{ImageOutcome, Placed, Sidecar};
+use sheet::{Sheet, SheetRecipe};
+use sidecar::ImageRecipe;
 
 /// The flags of `synthesize`.
 #[derive(Debug, Args)]
 pub(crate) struct SynthesizeArgs {
     /// Images, folders of images, or folders of frames (frames.jsonl)
-    #[arg(required = true, value_name = "INPUT", add = Decides::Pixels)]
+    #[arg(required_unless_present = "check", value_name = "INPUT", add = Decides::Pixels)]
     pub inputs: Vec<PathBuf>,
-    /// Where the images go, each with a JSON file of all settings that made it
-    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
-    pub out: PathBuf,
+    /// Where the images go, each with a JSON file of all settings that made it; default: none, it is needed but for --check
+    #[arg(long, value_name = "DIR", required_unless_present = "check", add = Decides::Nothing)]
+    pub out: Option<PathBuf>,
     /// The flags for the degradations.
     #[command(flatten)]
     pub light: LightArgs,
@@ -44,7 +47,11 @@ pub(crate) struct SynthesizeArgs {
     /// One figure per input instead; default: images
     #[arg(long, value_enum, help_heading = "Synthesis", conflicts_with = "from", add = Decides::Nothing)]
     pub sheet: Option<Sheet>,
-    /// Replace images that exist already
+    /// Hold the images of a folder to the digests in their JSON files; nothing is made or changed; default: make images
+    #[arg(long, value_name = "DIR", help_heading = "Synthesis",
+        conflicts_with_all = ["inputs", "out", "from", "sheet", "force"], add = Decides::Nothing)]
+    pub check: Option<PathBuf>,
+    /// Write over whatever is in the place of an image
     #[arg(long, help_heading = "Synthesis", add = Decides::Nothing)]
     pub force: bool,
     /// The maximum size of an image.
@@ -55,18 +62,11 @@ pub(crate) struct SynthesizeArgs {
     pub threads: ThreadArgs,
 }
 
-/// The kind of a figure of one frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Sheet {
-    /// Both variants by level, with amplified crops
-    Levels,
-    /// Each term of the noise alone
-    Noise,
-}
-
 /// The flags, and the light settings that they give.
 struct ImageMaking<'a> {
     args: &'a SynthesizeArgs,
+    /// The folder of the images.
+    out: &'a Path,
     light: LightSettings,
 }
 
@@ -77,15 +77,21 @@ struct ImageMaking<'a> {
 /// # Errors
 /// If an input is missing, two frames have the same name, or the folder cannot be written to.
 pub(crate) fn synthesize(args: &SynthesizeArgs, progress: &Progress) -> Result<Outcome> {
+    let out = match (&args.check, &args.out) {
+        (Some(folder), _) => return check::check(folder),
+        (None, Some(out)) => out,
+        (None, None) => return Err(Error::usage("--out", "a folder for the images is missing")),
+    };
     let making = &ImageMaking {
         args,
+        out,
         light: LightSettings::resolve(&args.light)?,
     };
     let frames = Inputs::open(&args.inputs, args.limit.max_pixels.get())?;
     let workers = pool(args.threads.threads)?;
-    fs::create_dir_all(&args.out).map_err(|e| Error::file(&args.out, "make", e))?;
+    fs::create_dir_all(out).map_err(|e| Error::file(out, "make", e))?;
     if let Some(file) = &args.from {
-        return workers.install(|| replay(args, &frames, file));
+        return workers.install(|| replay(making, &frames, file));
     }
     let files = files(making);
     let bar = progress.bar("images", frames.entries.len() * files.len());
@@ -103,7 +109,7 @@ pub(crate) fn synthesize(args: &SynthesizeArgs, progress: &Progress) -> Result<O
             unchanged: sum.unchanged + counts.unchanged,
             failed: sum.failed + counts.failed,
         });
-    Ok(total.outcome(&args.out, frames.entries.len()))
+    Ok(total.outcome(out, frames.entries.len()))
 }
 
 /// The numbers of images by outcome.
@@ -187,17 +193,20 @@ fn write_files(
         counts.failed = files.len();
         return counts;
     }
+    // What is wrong with the input is wrong with each of its images, and is said once.
+    let mut said = BTreeSet::new();
     for file in files {
         let outcome = match file {
             FrameFile::Image(degradation) => work.image(degradation.as_ref()),
-            FrameFile::Sheet(Sheet::Levels) => work.sheet("levels", sheet::levels),
-            FrameFile::Sheet(Sheet::Noise) => work.sheet("noise", sheet::terms),
+            FrameFile::Sheet(sheet) => work.sheet(*sheet),
         };
         match outcome {
             Ok(ImageOutcome::Written) => counts.written += 1,
             Ok(ImageOutcome::Unchanged) => counts.unchanged += 1,
             Err(e) => {
-                tracing::error!("{e}");
+                if said.insert(e.to_string()) {
+                    tracing::error!("{e}");
+                }
                 counts.failed += 1;
             }
         }
@@ -225,12 +234,6 @@ struct SynthesisWork<'a> {
     frame: FrameWork<'a>,
 }
 
-/// The outcome of one output file.
-enum ImageOutcome {
-    Written,
-    Unchanged,
-}
-
 impl SynthesisWork<'_> {
     fn image(&mut self, how: Option<&Degradation>) -> Result<ImageOutcome> {
         let light = &self.making.light;
@@ -238,44 +241,25 @@ impl SynthesisWork<'_> {
         let condition = Condition::raw(how.cloned());
         let name = format!("{}_{condition}", self.entry.stem);
         let picture = self.frame.picture()?;
-        let sidecar = ImageSidecar::new(&self.entry.id, picture, how, light, &key)?;
-        let [image, json] =
-            [".png", ".json"].map(|end| self.making.args.out.join(name.clone() + end));
-        if !self.making.args.force && image.exists() && json.exists() {
-            if sidecar.is_at(&json)? {
-                return Ok(ImageOutcome::Unchanged);
-            }
-            let problem = "made from another image or with other settings; --force makes it again, another --out keeps both";
-            return Err(Error::data(json.display(), problem));
-        }
-        write(&image, &png(self.frame.degraded(how)?)?)?;
-        write(&json, sidecar.text().as_bytes())?;
-        Ok(ImageOutcome::Written)
+        let recipe = ImageRecipe::new(&self.entry.id, picture, how, light, &key)?;
+        let place = Placed::new(self.making.out, &name, self.making.args.force);
+        place.put(&recipe, || Ok(self.frame.degraded(how)?.clone()))
     }
 
-    /// Writes a figure. It has no JSON file, so an existing figure is not replaced even if its settings differ.
-    fn sheet(
-        &mut self,
-        kind: &str,
-        draw: fn(&Rgb, &FrameId, &LightSettings) -> Result<Rgb>,
-    ) -> Result<ImageOutcome> {
-        let path = self
-            .making
-            .args
-            .out
-            .join(format!("{}_{kind}.png", self.entry.stem));
-        if !self.making.args.force && path.exists() {
-            return Ok(ImageOutcome::Unchanged);
-        }
-        let figure = draw(self.frame.clean()?, &self.entry.id, &self.making.light)?;
-        write(&path, &png(&figure)?)?;
-        Ok(ImageOutcome::Written)
+    fn sheet(&mut self, kind: Sheet) -> Result<ImageOutcome> {
+        let light = &self.making.light;
+        let recipe = SheetRecipe::new(kind, &self.entry.id, self.frame.picture()?, light)?;
+        let name = format!("{}_{kind}", self.entry.stem);
+        let place = Placed::new(self.making.out, &name, self.making.args.force);
+        place.put(&recipe, || {
+            kind.draw(self.frame.clean()?, &self.entry.id, light)
+        })
     }
 }
 
 /// Makes the image of a JSON file again.
-fn replay(args: &SynthesizeArgs, frames: &Inputs, file: &Path) -> Result<Outcome> {
-    let sidecar = ImageSidecar::read(file)?;
+fn replay(making: &ImageMaking<'_>, frames: &Inputs, file: &Path) -> Result<Outcome> {
+    let sidecar = Sidecar::<ImageRecipe>::read(file)?;
     let [entry] = &frames.entries[..] else {
         let problem = format_args!(
             "one INPUT expected, the image that FILE was made from; got {}",
@@ -284,16 +268,13 @@ fn replay(args: &SynthesizeArgs, frames: &Inputs, file: &Path) -> Result<Outcome
         return Err(Error::usage("--from", problem));
     };
     let picture = frames.picture(entry)?;
-    let degraded = sidecar.replay(&picture, file)?;
-    let path = args.out.join(sidecar.name(&stem(&sidecar.frame())?));
-    if !args.force && path.exists() {
-        let problem = "the file exists already; --force makes it again";
-        return Err(Error::data(path.display(), problem));
+    let degraded = ImageRecipe::replay(&sidecar, &picture, file)?;
+    let name = sidecar.recipe.name(&stem(&sidecar.recipe.frame())?);
+    let place = Placed::new(making.out, &name, making.args.force);
+    let mut counts = ImageCounts::default();
+    match place.put(&sidecar.recipe, || Ok(degraded))? {
+        ImageOutcome::Written => counts.written = 1,
+        ImageOutcome::Unchanged => counts.unchanged = 1,
     }
-    write(&path, &png(&degraded)?)?;
-    let counts = ImageCounts {
-        written: 1,
-        ..ImageCounts::default()
-    };
-    Ok(counts.outcome(&args.out, 1))
+    Ok(counts.outcome(making.out, 1))
 }

@@ -1,13 +1,13 @@
-//! The JSON file of an image with everything needed to make it again: [`ImageSidecar`].
+//! Everything needed to make an image again, as the JSON file beside it holds it: [`ImageRecipe`].
 
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::placed::{ImageOrigin, Sidecar};
 use crate::dataset::Picture;
 use crate::error::{Error, Result};
-use crate::files::reading;
 use crate::synthesis::LightSettings;
 use crate::synthesis::noise::Term;
 use crate::synthesis::{
@@ -16,15 +16,9 @@ use crate::synthesis::{
 };
 use crate::types::{Condition, Degradation, FrameId, ReadingName, Rgb};
 
-/// The value of `schema` in these files.
-const SCHEMA: &str = "darkqa.image/1";
-
 /// Everything that decides the pixels of an image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct ImageSidecar {
-    schema: String,
-    /// The version of this program, for information only; [`Self::synthesis`] is what is checked.
-    darkqa_eval: String,
+pub(super) struct ImageRecipe {
     frame: String,
     /// The digest of the image that this one was made from.
     source: String,
@@ -52,7 +46,13 @@ struct SensorRecord {
     state: CameraState,
 }
 
-impl ImageSidecar {
+impl ImageOrigin for ImageRecipe {
+    // The first schema had no digest of the image.
+    const SCHEMAS: &'static [&'static str] = &["darkqa.image/2", "darkqa.image/1"];
+    const IS_REPLACED: bool = false;
+}
+
+impl ImageRecipe {
     pub(super) fn new(
         frame: &FrameId,
         picture: &Picture,
@@ -74,8 +74,6 @@ impl ImageSidecar {
             })
         });
         Ok(Self {
-            schema: SCHEMA.to_owned(),
-            darkqa_eval: env!("CARGO_PKG_VERSION").to_owned(),
             frame: frame.0.clone(),
             source: picture.digest().to_string(),
             condition: Condition::raw(how.cloned()),
@@ -85,48 +83,24 @@ impl ImageSidecar {
         })
     }
 
-    pub(super) fn read(path: &Path) -> Result<Self> {
-        let text = reading::text(path)?;
-        let read: Self = serde_json::from_str(&text).map_err(|e| {
-            Error::data(
-                path.display(),
-                format_args!("not a JSON file of an image: {e}"),
-            )
-        })?;
-        if read.schema != SCHEMA {
-            let problem = format_args!("schema {:?}; {SCHEMA:?} expected", read.schema);
-            return Err(Error::data(path.display(), problem));
-        }
-        Ok(read)
-    }
-
-    /// Whether the file at `path` describes the same image, even if another program version wrote it.
-    pub(super) fn is_at(&self, path: &Path) -> Result<bool> {
-        let stored = Self::read(path)?;
-        Ok(Self {
-            darkqa_eval: stored.darkqa_eval.clone(),
-            ..self.clone()
-        } == stored)
-    }
-
-    pub(super) fn text(&self) -> String {
-        format!("{:#}\n", serde_json::json!(self))
-    }
-
     pub(super) fn frame(&self) -> FrameId {
         FrameId(self.frame.clone())
     }
 
-    /// The name of the image file.
+    /// The name of the image file without its ending.
     pub(super) fn name(&self, stem: &str) -> String {
-        format!("{stem}_{}.png", self.condition)
+        format!("{stem}_{}", self.condition)
     }
 
-    /// The image, made again from the same picture.
+    /// The image of the JSON file at `path`, made again from the same picture.
     ///
     /// # Errors
     /// If the picture has other content, or the synthesis of this program has another version.
-    pub(super) fn replay(&self, picture: &Picture, path: &Path) -> Result<Rgb> {
+    pub(super) fn replay(file: &Sidecar<Self>, picture: &Picture, path: &Path) -> Result<Rgb> {
+        file.recipe.image(picture, file.program(), path)
+    }
+
+    fn image(&self, picture: &Picture, program: &str, path: &Path) -> Result<Rgb> {
         let wrong = |problem: String| Error::data(path.display(), problem);
         let how = self.condition.degradation.as_ref();
         if self.source != picture.digest().to_string() {
@@ -137,7 +111,7 @@ impl ImageSidecar {
             return Err(wrong(format!(
                 "made by synthesis {} of darkqa-eval {}; this program has synthesis {}",
                 self.synthesis,
-                self.darkqa_eval,
+                program,
                 version(how)
             )));
         }

@@ -89,6 +89,11 @@ impl CameraModel {
         })
     }
 
+    /// The name of the calibration.
+    pub(crate) fn name(&self) -> &str {
+        &self.calibration.name
+    }
+
     /// Sets whether states are drawn or fixed (`--fixed`).
     pub fn set_sampling(&mut self, sampling: Sampling) {
         self.sampling = sampling;

@@ -1,0 +1,233 @@
+//! An image in the output folder with the JSON file that vouches for it: [`Placed`].
+//!
+//! A JSON file holds the recipe of its image and the digest of the image's bytes. What lies in the folder is judged by both, in this
+//! order: bytes, then pixels, then refusal. An image is in its place before its JSON file is, so that no JSON file vouches for an
+//! image that is not there.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use crate::ask::png;
+use crate::dataset::Picture;
+use crate::error::{Error, Result};
+use crate::files::{reading, write};
+use crate::types::{Digest, Rgb};
+
+/// What an image was made from, as its JSON file holds it.
+pub(super) trait ImageOrigin: Clone + PartialEq + Serialize + DeserializeOwned {
+    /// The values of `schema` that are read; the first is written.
+    const SCHEMAS: &'static [&'static str];
+    /// Whether an intact image with other settings is replaced; else it is refused.
+    const IS_REPLACED: bool;
+}
+
+/// The content of a JSON file beside an image.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Sidecar<R> {
+    schema: String,
+    /// The version of this program, for information only.
+    darkqa_eval: String,
+    #[serde(flatten)]
+    pub(super) recipe: R,
+    /// The image file; `None` in files of the first schema.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    output: Option<OutputFile>,
+}
+
+/// An image file as it was written.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct OutputFile {
+    /// The name of the file, in the folder of the JSON file.
+    pub(super) file: String,
+    /// Its length.
+    bytes: u64,
+    /// The BLAKE3 digest of its bytes.
+    digest: String,
+}
+
+impl OutputFile {
+    fn of(path: &Path, bytes: &[u8]) -> Self {
+        let name = path.file_name().unwrap_or_default();
+        Self {
+            file: name.to_string_lossy().into_owned(),
+            bytes: bytes.len() as u64,
+            digest: Digest::of(bytes).to_string(),
+        }
+    }
+
+    /// What is wrong with the bytes of the file; `None` if they are those that were written.
+    pub(super) fn fault(&self, bytes: &[u8]) -> Option<String> {
+        if bytes.len() as u64 != self.bytes {
+            let found = bytes.len();
+            return Some(format!(
+                "has {found} bytes, was written with {}",
+                self.bytes
+            ));
+        }
+        let is_same = Digest::of(bytes).to_string() == self.digest;
+        (!is_same).then(|| "has other bytes than were written".to_owned())
+    }
+}
+
+impl<R: ImageOrigin> Sidecar<R> {
+    /// Reads a JSON file.
+    ///
+    /// # Errors
+    /// If it cannot be read, is not of this form, or has a schema that this program does not know.
+    pub(super) fn read(path: &Path) -> Result<Self> {
+        let text = reading::text(path)?;
+        let wrong = |problem: String| Error::data(path.display(), problem);
+        let read: Self = serde_json::from_str(&text)
+            .map_err(|e| wrong(format!("not a JSON file of an image: {e}")))?;
+        if !R::SCHEMAS.contains(&&*read.schema) {
+            let expected = R::SCHEMAS.join(" or ");
+            return Err(wrong(format!(
+                "schema {:?}; {expected} expected",
+                read.schema
+            )));
+        }
+        Ok(read)
+    }
+
+    /// The version of the program that wrote the file.
+    pub(super) fn program(&self) -> &str {
+        &self.darkqa_eval
+    }
+
+    fn new(recipe: R, image: &Path, bytes: &[u8]) -> Self {
+        Self {
+            schema: R::SCHEMAS[0].to_owned(),
+            darkqa_eval: env!("CARGO_PKG_VERSION").to_owned(),
+            recipe,
+            output: Some(OutputFile::of(image, bytes)),
+        }
+    }
+
+    fn write(&self, path: &Path) -> Result<()> {
+        let text = format!("{:#}\n", serde_json::json!(self));
+        write(path, text.as_bytes())
+    }
+}
+
+/// What became of one output file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum ImageOutcome {
+    /// The image was made.
+    Written,
+    /// The image was there.
+    Unchanged,
+}
+
+/// What to do with what lies in the folder.
+enum Verdict {
+    /// It is the image; nothing is to be done.
+    Keep,
+    /// It must be made. The text says why, if something else was there.
+    Make(Option<&'static str>),
+    /// It is the image if its pixels are, and then gets its JSON file; else the text says what is wrong.
+    Compare(Rgb, String),
+}
+
+/// The place of an image and of its JSON file.
+pub(super) struct Placed {
+    image: PathBuf,
+    json: PathBuf,
+    /// Whether to write over whatever is there.
+    is_forced: bool,
+}
+
+impl Placed {
+    /// The place of the image `name` in a folder.
+    pub(super) fn new(folder: &Path, name: &str, is_forced: bool) -> Self {
+        let [image, json] = [".png", ".json"].map(|end| folder.join(name.to_owned() + end));
+        Self {
+            image,
+            json,
+            is_forced,
+        }
+    }
+
+    /// Puts the image of a recipe in its place, unless it is there.
+    ///
+    /// # Errors
+    /// If another image or JSON file is there, or a file cannot be read or written.
+    pub(super) fn put<R: ImageOrigin>(
+        &self,
+        recipe: &R,
+        make: impl FnOnce() -> Result<Rgb>,
+    ) -> Result<ImageOutcome> {
+        match self.verdict(recipe)? {
+            Verdict::Keep => Ok(ImageOutcome::Unchanged),
+            Verdict::Make(why) => {
+                if let Some(why) = why {
+                    tracing::warn!("{}: {why}; it is made again", self.image.display());
+                }
+                self.write(recipe, &png(&make()?)?)
+            }
+            Verdict::Compare(there, problem) => {
+                if there != make()? {
+                    return Err(self.refusal(&problem));
+                }
+                let bytes =
+                    fs::read(&self.image).map_err(|e| Error::file(&self.image, "read", e))?;
+                Sidecar::new(recipe.clone(), &self.image, &bytes).write(&self.json)?;
+                Ok(ImageOutcome::Unchanged)
+            }
+        }
+    }
+
+    fn write<R: ImageOrigin>(&self, recipe: &R, bytes: &[u8]) -> Result<ImageOutcome> {
+        write(&self.image, bytes)?;
+        Sidecar::new(recipe.clone(), &self.image, bytes).write(&self.json)?;
+        Ok(ImageOutcome::Written)
+    }
+
+    fn verdict<R: ImageOrigin>(&self, recipe: &R) -> Result<Verdict> {
+        if self.is_forced || !self.image.exists() {
+            return Ok(Verdict::Make(None));
+        }
+        let bytes = fs::read(&self.image).map_err(|e| Error::file(&self.image, "read", e))?;
+        if !self.json.exists() {
+            let problem = "no JSON file vouches for it, and its pixels are others";
+            let there = decoded(&self.image, &bytes).ok_or_else(|| self.refusal(problem))?;
+            return Ok(Verdict::Compare(there, problem.to_owned()));
+        }
+        let stored = Sidecar::<R>::read(&self.json)?;
+        let fault = stored.output.as_ref().map(|output| output.fault(&bytes));
+        if stored.recipe != *recipe {
+            if R::IS_REPLACED && fault == Some(None) {
+                return Ok(Verdict::Make(Some(
+                    "made from another image or with other settings",
+                )));
+            }
+            return Err(self.refusal("made from another image or with other settings"));
+        }
+        Ok(match (fault, decoded(&self.image, &bytes)) {
+            (Some(None), _) => Verdict::Keep,
+            (_, None) => Verdict::Make(Some("cut or damaged")),
+            (fault, Some(there)) => {
+                let fault = fault.flatten();
+                let fault = fault.unwrap_or_else(|| "its JSON file has no digest".to_owned());
+                Verdict::Compare(there, format!("{fault}, and its pixels are others"))
+            }
+        })
+    }
+
+    fn refusal(&self, problem: &str) -> Error {
+        let mend = "--force writes over it, another --out keeps both";
+        Error::data(self.image.display(), format_args!("{problem}; {mend}"))
+    }
+}
+
+/// The pixels of a PNG; `None` if it cannot be decoded.
+fn decoded(path: &Path, bytes: &[u8]) -> Option<Rgb> {
+    let picture = Picture::Encoded {
+        bytes: bytes.to_vec(),
+        place: path.display().to_string(),
+        most_pixels: u64::MAX / 8,
+    };
+    picture.decode().ok()
+}
