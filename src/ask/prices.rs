@@ -16,6 +16,8 @@ pub(crate) struct Price {
     pub input: f64,
     /// The price of replies, hidden reasoning included, in dollars per million tokens.
     pub output: f64,
+    /// The price of what the server had in its cache, in dollars per million tokens; `None` if it is that of `input`.
+    pub cached_input: Option<f64>,
     /// The number of tokens of an image; `None` to use the rule of the model's family.
     pub image_tokens: Option<u64>,
 }
@@ -31,7 +33,10 @@ impl Price {
     #[must_use]
     pub(crate) fn charged(&self, usage: Usage) -> f64 {
         let tokens = |tokens: Option<u64>| tokens.unwrap_or(0) as f64;
-        self.of(tokens(usage.prompt_tokens), tokens(usage.completion_tokens))
+        let prompt = tokens(usage.prompt_tokens);
+        let cached = tokens(usage.cached_tokens).min(prompt);
+        let saved = self.input - self.cached_input.unwrap_or(self.input);
+        self.of(prompt, tokens(usage.completion_tokens)) - cached * saved / 1e6
     }
 }
 
@@ -70,7 +75,8 @@ impl Prices {
         };
         let prices: Self = toml::from_str(&text).map_err(|e| wrong(e.message().to_owned()))?;
         let numbers = prices.models.iter().flat_map(|(name, price)| {
-            [(name, price.input), (name, price.output)].map(|(name, n)| (name.as_str(), n))
+            let cached = price.cached_input.unwrap_or(0.0);
+            [price.input, price.output, cached].map(|n| (name.as_str(), n))
         });
         let is_price = |n: f64| n.is_finite() && n >= 0.0;
         let mut numbers = numbers.chain([("batch", prices.batch)]);
@@ -137,8 +143,18 @@ mod tests {
         let usage = Usage {
             prompt_tokens: Some(1_000_000),
             completion_tokens: Some(100_000),
+            cached_tokens: None,
         };
         assert!((price.charged(usage) - 3.5).abs() < 1e-12);
+        // Half of the prompt from the cache, at half the price; a server cannot cache more than the prompt.
+        let cached = |tokens| Usage {
+            cached_tokens: Some(tokens),
+            ..usage
+        };
+        assert!((price.charged(cached(500_000)) - 2.875).abs() < 1e-12);
+        assert!((price.charged(cached(u64::MAX)) - 2.25).abs() < 1e-12);
+        let opus = prices.of("claude-opus-4-8").unwrap();
+        assert!((opus.charged(usage) - opus.charged(cached(9))).abs() < 1e-12);
     }
 
     #[test]

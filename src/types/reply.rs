@@ -27,6 +27,9 @@ pub struct Usage {
     pub prompt_tokens: Option<u64>,
     /// The number of tokens in the reply, hidden reasoning included.
     pub completion_tokens: Option<u64>,
+    /// The number of tokens of the prompt that the server had in its cache, which may cost less.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cached_tokens: Option<u64>,
 }
 
 impl Usage {

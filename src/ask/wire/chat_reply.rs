@@ -139,9 +139,17 @@ fn finish(reason: Option<&str>) -> Finish {
 
 fn usage(usage: Option<&Value>) -> Option<Usage> {
     let tokens = |field| usage?.get(field)?.as_u64();
+    let details = || {
+        usage?
+            .get("prompt_tokens_details")?
+            .get("cached_tokens")?
+            .as_u64()
+    };
+    let cached = details().filter(|cached| *cached > 0);
     let usage = Usage {
         prompt_tokens: tokens("prompt_tokens"),
         completion_tokens: tokens("completion_tokens"),
+        cached_tokens: cached,
     };
     (usage != Usage::default()).then_some(usage)
 }
@@ -202,6 +210,12 @@ mod tests {
         assert_eq!(reply.finish, Finish::Length);
         assert_eq!(reply.served_model.as_deref(), Some("m-1"));
         assert_eq!(reply.usage.unwrap().prompt_tokens, Some(9));
+        assert_eq!(reply.usage.unwrap().cached_tokens, None);
+        let cached = whole.replace(
+            "\"prompt_tokens\":9",
+            "\"prompt_tokens\":9,\"prompt_tokens_details\":{\"cached_tokens\":5}",
+        );
+        assert_eq!(json(&cached).unwrap().usage.unwrap().cached_tokens, Some(5));
         assert_eq!(reply.usage.unwrap().completion_tokens, None);
         let bare = r#"{"model":7,"choices":[{"finish_reason":null,"message":{"content":"B"}}],"usage":null}"#;
         let reply = json(bare).unwrap();
