@@ -28,8 +28,8 @@ pub(super) const NAME: &str = "darkqa-eval";
 const AFTER_HELP: &str = "\
 Precedence: flag, then environment (DARKQA_CONCURRENCY=16 for --concurrency 16), then --config FILE, then default.
 OPENAI_BASE_URL, OPENAI_API_KEY and ORT_DYLIB_PATH are defaults: a flag, a DARKQA_ variable or a file replaces them.
-Exit codes: 0 everything scored; 1 finished with failures; 2 usage, configuration or a fatal error; 130 interrupted,
-or stopped by --max-cost.
+Exit codes: 0 everything scored; 1 finished with failures; 2 usage, configuration or a fatal error; 3 stopped by
+--max-cost; 130 interrupted.
 [trials], [reply] and [pixels] mark what a flag decides: which trials there are, what a model is sent, the content of images. No other flag
 changes an answer.
 Results go to standard output, progress and logs to standard error (RUST_LOG=darkqa_eval=debug shows more).";

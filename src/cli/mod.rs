@@ -36,7 +36,9 @@ use command::Cli;
 const WITH_FAILURES: u8 = 1;
 /// Exit code: wrong usage or configuration, or an error that stops everything.
 const FATAL: u8 = 2;
-/// Exit code: interrupted, or stopped by `--max-cost`; the same command continues.
+/// Exit code: stopped by `--max-cost`. The same command would stop again, so a scheduler must not start it again by itself.
+const OVER_BUDGET: u8 = 3;
+/// Exit code: interrupted; the same command continues.
 const INTERRUPTED: u8 = 130;
 
 /// Printed after the error of a call without any word.
@@ -164,6 +166,7 @@ fn finish(Outcome { status, output }: Outcome) -> ExitCode {
     let written = std::io::stdout().lock().write_all(output.as_bytes());
     match (status, written) {
         (Status::Cancelled, _) => ExitCode::from(INTERRUPTED),
+        (Status::OverBudget, _) => ExitCode::from(OVER_BUDGET),
         // A reader of the output, such as `head`, may close the pipe early.
         (_, Err(e)) if e.kind() != std::io::ErrorKind::BrokenPipe => fail(&e.to_string()),
         (Status::Complete, _) => ExitCode::SUCCESS,
@@ -171,12 +174,9 @@ fn finish(Outcome { status, output }: Outcome) -> ExitCode {
     }
 }
 
-#[expect(
-    clippy::print_stderr,
-    reason = "the one place where an error reaches the user"
-)]
+/// The one place where an error reaches the user, if standard error is still read by somebody.
 fn fail(problem: &str) -> ExitCode {
-    eprintln!("error: {problem}");
+    let _ = writeln!(std::io::stderr(), "error: {problem}");
     ExitCode::from(FATAL)
 }
 

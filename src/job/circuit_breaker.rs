@@ -34,7 +34,8 @@ impl EndReason {
         match self {
             _ if counts.answered == counts.trials => Status::Complete,
             Self::AllAsked => Status::Incomplete,
-            Self::Interrupted | Self::OverBudget => Status::Cancelled,
+            Self::Interrupted => Status::Cancelled,
+            Self::OverBudget => Status::OverBudget,
             Self::Stopped(_) | Self::ModelStopped(_) => Status::Stopped,
         }
     }
@@ -336,6 +337,7 @@ mod tests {
         assert_eq!(EndReason::Interrupted.status(all), Status::Complete);
         let some = Counts { answered: 1, ..all };
         assert_eq!(EndReason::Interrupted.status(some), Status::Cancelled);
+        assert_eq!(EndReason::OverBudget.status(some), Status::OverBudget);
         assert_eq!(EndReason::AllAsked.status(some), Status::Incomplete);
     }
 }

@@ -1,4 +1,5 @@
-//! Interrupts: Ctrl-C, and SIGTERM, which batch systems send before they kill a process.
+//! Interrupts: Ctrl-C; SIGTERM, which batch systems send before they kill a process; and SIGHUP, which a terminal sends when it is
+//! closed.
 
 use crate::error::{Error, Result};
 
@@ -7,6 +8,9 @@ use crate::error::{Error, Result};
 pub(crate) struct Interrupt {
     #[cfg(unix)]
     terminate: tokio::signal::unix::Signal,
+    /// `None` if it is ignored, as under `nohup`.
+    #[cfg(unix)]
+    hang_up: Option<tokio::signal::unix::Signal>,
 }
 
 impl Interrupt {
@@ -14,9 +18,13 @@ impl Interrupt {
         #[cfg(unix)]
         {
             use tokio::signal::unix::{SignalKind, signal};
-            let cannot_listen = |e| Error::file("SIGTERM", "listen for", e);
+            let listen = |kind, name| signal(kind).map_err(|e| Error::file(name, "listen for", e));
             Ok(Self {
-                terminate: signal(SignalKind::terminate()).map_err(cannot_listen)?,
+                terminate: listen(SignalKind::terminate(), "SIGTERM")?,
+                hang_up: match is_hang_up_ignored() {
+                    true => None,
+                    false => Some(listen(SignalKind::hangup(), "SIGHUP")?),
+                },
             })
         }
         #[cfg(not(unix))]
@@ -29,8 +37,26 @@ impl Interrupt {
         tokio::select! {
             _ = tokio::signal::ctrl_c() => {}
             _ = self.terminate.recv() => {}
+            Some(()) = async { self.hang_up.as_mut()?.recv().await } => {}
         }
         #[cfg(not(unix))]
         let _ = tokio::signal::ctrl_c().await;
     }
+}
+
+/// Whether the process was started with SIGHUP ignored, as `nohup` does; a listener would undo that.
+///
+/// Linux tells the ignored signals in /proc. Elsewhere a terminal as standard error says that there was no `nohup`.
+#[cfg(unix)]
+fn is_hang_up_ignored() -> bool {
+    /// The bit of SIGHUP, signal 1.
+    const HANG_UP: u64 = 1;
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mut lines = status.lines();
+    let mask = lines.find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    mask.map_or_else(
+        || !std::io::IsTerminal::is_terminal(&std::io::stderr()),
+        |mask| mask & HANG_UP != 0,
+    )
 }

@@ -113,12 +113,15 @@ impl Drop for StepBar {
 pub(crate) struct LogWriter(MultiProgress);
 
 impl Write for LogWriter {
+    /// A terminal that was closed, or a reader that has gone, is no reason to stop: what cannot be written is dropped.
     fn write(&mut self, line: &[u8]) -> io::Result<usize> {
-        self.0.suspend(|| io::stderr().write(line))
+        let _ = self.0.suspend(|| io::stderr().write_all(line));
+        Ok(line.len())
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        io::stderr().flush()
+        let _ = io::stderr().flush();
+        Ok(())
     }
 }
 

@@ -10,7 +10,7 @@ use super::enhancer_note::EnhancerNote;
 
 /// The progress of a run, and how it ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "snake_case")]
 pub enum Status {
     /// Running, or killed while it ran.
     Started,
@@ -20,13 +20,18 @@ pub enum Status {
     Incomplete,
     /// Interrupted by the user.
     Cancelled,
+    /// Stopped because the next question could have gone beyond `--max-cost`.
+    OverBudget,
     /// Stopped by an error that would fail every further trial.
     Stopped,
 }
 
 impl fmt::Display for Status {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.serialize(f)
+        match self {
+            Self::OverBudget => f.write_str("over budget"),
+            other => other.serialize(f),
+        }
     }
 }
 

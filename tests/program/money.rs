@@ -62,19 +62,19 @@ fn a_run_stops_before_it_costs_too_much_and_goes_on_with_more() {
         bench.call(&args(&base, &more))
     };
     let stopped = call("0.5");
-    assert_eq!(stopped.code, Some(130), "{stopped:?}");
+    assert_eq!(stopped.code, Some(3), "{stopped:?}");
     assert!(stopped.stderr.contains("--max-cost"), "{stopped:?}");
     assert!(
         stopped
             .stdout
-            .contains("cancelled: 5 of 12 trials answered"),
+            .contains("over budget: 5 of 12 trials answered"),
         "{}",
         stopped.stdout
     );
     let again = call("0.5");
     assert_eq!(
         (again.code, mock.requests().len()),
-        (Some(130), 5),
+        (Some(3), 5),
         "nothing is asked beyond it"
     );
     let on = call("2");

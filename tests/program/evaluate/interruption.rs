@@ -2,7 +2,7 @@
 #![cfg(unix)]
 
 use std::fs;
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 use std::thread;
 use std::time::Duration;
 
@@ -56,4 +56,63 @@ fn an_interrupt_does_not_wait_for_retries() {
         1,
         "what was given up has not failed"
     );
+}
+
+/// A closed terminal asks to stop, as SIGTERM does; under `nohup` it does not.
+#[test]
+fn a_closed_terminal_interrupts_unless_it_is_ignored() {
+    let bench = Bench::with_frames();
+    let endpoint = MockEndpoint::answering(|_| {
+        thread::sleep(Duration::from_millis(300));
+        Answer::text("A")
+    });
+    let url = endpoint.base_url();
+    let args = model_args(&url, "--data frames --levels L0 --concurrency 1 --out run");
+    let mut program = bench.spawn(&args, Stdio::null());
+    wait_until(|| !endpoint.requests().is_empty());
+    signal(&program, "-HUP");
+    assert_eq!(program.wait().unwrap().code(), Some(130));
+    let kept = records(&bench.path("run")).len();
+    assert!(
+        (1..3).contains(&kept),
+        "what is on the wire is waited for: {kept}"
+    );
+
+    let program = assert_cmd::cargo::cargo_bin("darkqa-eval");
+    let mut ignoring = Command::new("sh")
+        .args(["-c", "trap '' HUP; exec \"$0\" \"$@\""])
+        .arg(program)
+        .args(&args)
+        .current_dir(bench.path(""))
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let before = endpoint.requests().len();
+    wait_until(|| endpoint.requests().len() > before);
+    signal(&ignoring, "-HUP");
+    assert_eq!(ignoring.wait().unwrap().code(), Some(0));
+    assert_eq!(records(&bench.path("run")).len(), 3);
+}
+
+/// Whoever read standard error has gone: warnings and errors go nowhere, and nothing panics.
+#[test]
+fn a_closed_standard_error_ends_nothing() {
+    let bench = Bench::with_frames();
+    let endpoint = MockEndpoint::start([Answer::error(500, "broken", "no"), Answer::text("A")]);
+    let url = endpoint.base_url();
+    let line = "--data frames --levels L0 --concurrency 1 --out run --image jpeg:95";
+    for (args, code) in [
+        (model_args(&url, line), 0),
+        (vec!["--model", "random", "--data", "none"], 2),
+    ] {
+        let status = Command::new("sh")
+            .args(["-c", "\"$0\" \"$@\" 2>&-"])
+            .arg(assert_cmd::cargo::cargo_bin("darkqa-eval"))
+            .args(&args)
+            .current_dir(bench.path(""))
+            .stdout(Stdio::null())
+            .status();
+        assert_eq!(status.unwrap().code(), Some(code), "{args:?}");
+    }
 }

@@ -48,7 +48,7 @@ fn a_budget_holds_for_answers_and_marks_together() {
         )))
     };
     let called = call("1.1");
-    assert_eq!(called.code, Some(130), "{called:?}");
+    assert_eq!(called.code, Some(3), "{called:?}");
     assert_eq!(mock.requests().len(), 4);
     let called = call("9");
     assert_eq!(called.code, Some(0), "{called:?}");
