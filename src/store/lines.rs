@@ -8,7 +8,8 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::error::{Error, Result};
-use crate::types::{Detail, ImageFidelity, Record, RunQuestion, Thumbnail};
+use crate::files::write_synced;
+use crate::types::{Detail, ImageFidelity, Record, RunQuestion, Thumbnail, Usage};
 
 /// Appends lines to a file, which is created if it does not exist.
 pub(super) fn append<T: Serialize>(path: &Path, values: &[T]) -> Result<File> {
@@ -53,25 +54,122 @@ pub(super) fn lines<T: StoredLine>(path: &Path) -> Result<Vec<T>> {
         if line.pop() != Some(b'\n') {
             break;
         }
+        if line.trim_ascii().is_empty() {
+            // A line that was set aside.
+            continue;
+        }
         values.push(serde_json::from_slice(&line).map_err(|e| {
-            let problem = format!(
-                "not {}: {e}; restore the file, or use another --out",
-                T::WHAT
-            );
+            let problem = format!("not {}: {e}; {}", T::WHAT, T::MEND);
             Error::line(path, number, problem)
         })?);
     }
     Ok(values)
 }
 
+/// Moves the lines that are no `T` into the file `aside`, and leaves blanks in their place. So one damaged line costs its own trial
+/// alone, and nothing of it is lost.
+///
+/// # Errors
+/// If no line at all is a `T`: then it is another file.
+pub(super) fn set_aside<T: StoredLine>(path: &Path, aside: &Path) -> Result<()> {
+    let content = std::fs::read(path).map_err(|e| Error::file(path, "read", e))?;
+    let (mut start, mut good) = (0, 0_usize);
+    let mut bad: Vec<BadLine<'_>> = Vec::new();
+    for (index, line) in content.split_inclusive(|byte| *byte == b'\n').enumerate() {
+        if !line.trim_ascii().is_empty() {
+            match serde_json::from_slice::<T>(line) {
+                Ok(_) => good += 1,
+                Err(e) => bad.push(BadLine {
+                    number: index + 1,
+                    start,
+                    line,
+                    problem: e.to_string(),
+                }),
+            }
+        }
+        start += line.len();
+    }
+    let Some(first) = bad.first() else {
+        return Ok(());
+    };
+    if good == 0 {
+        let problem = format!("not {}: {}; {}", T::WHAT, first.problem, T::MEND);
+        return Err(Error::line(path, first.number, problem));
+    }
+    let mut lines = std::fs::read(aside).unwrap_or_default();
+    lines.extend(bad.iter().flat_map(|bad| bad.line));
+    write_synced(aside, &lines)?;
+    let mut file = OpenOptions::new()
+        .write(true)
+        .open(path)
+        .map_err(|e| Error::file(path, "open", e))?;
+    for bad in &bad {
+        let blanks = vec![b' '; bad.line.len() - 1];
+        let written = file
+            .seek(SeekFrom::Start(bad.start as u64))
+            .and_then(|_| file.write_all(&blanks));
+        written.map_err(|e| Error::file(path, "write", e))?;
+    }
+    file.sync_all().map_err(|e| Error::file(path, "write", e))?;
+    let (what, whose) = match bad.len() {
+        1 => (format!("line {} is", first.number), "its trial is"),
+        n => (
+            format!("{n} lines are, the first of them line {},", first.number),
+            "their trials are",
+        ),
+    };
+    tracing::warn!(
+        "{}: {what} not {} ({}); moved to {}, and {whose} asked again; {}",
+        path.display(),
+        T::WHAT,
+        first.problem,
+        aside.display(),
+        paid(&bad)
+    );
+    Ok(())
+}
+
+/// A line that cannot be read.
+struct BadLine<'f> {
+    /// Its number, from 1.
+    number: usize,
+    /// The place of its first byte in the file.
+    start: usize,
+    /// The line with its end.
+    line: &'f [u8],
+    problem: String,
+}
+
+/// What the replies of some lines were charged, as far as they can still be read.
+fn paid(bad: &[BadLine<'_>]) -> String {
+    let tokens = |bad: &BadLine<'_>| {
+        let value: serde_json::Value = serde_json::from_slice(bad.line).ok()?;
+        let usage: Usage = serde_json::from_value(value.get("usage")?.clone()).ok()?;
+        usage.total()
+    };
+    let known: Vec<u64> = bad.iter().filter_map(tokens).collect();
+    match known.len() {
+        0 => "what was paid for it cannot be read".to_owned(),
+        n if n == bad.len() => format!("{} tokens were paid for it", known.iter().sum::<u64>()),
+        n => format!(
+            "{} tokens were paid for {n} of them",
+            known.iter().sum::<u64>()
+        ),
+    }
+}
+
 /// The content of one line in a file of a run.
 pub(super) trait StoredLine: DeserializeOwned {
     /// The name in error messages, with its article.
     const WHAT: &str;
+    /// What a user can do about a line that is none.
+    const MEND: &str = "restore the file, or use another --out";
 }
 
 impl<D: Detail> StoredLine for Record<D> {
     const WHAT: &str = "a record";
+    const MEND: &str = "the command that made the run, called again, sets single such lines aside and asks their trials again; \
+                        or restore the file";
 }
 
 impl StoredLine for RunQuestion {

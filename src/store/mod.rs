@@ -23,7 +23,7 @@ use crate::types::{
 use folder::{
     FIDELITY, QUESTIONS, RECORDS, THUMBNAILS, check_same_run, create_run, write, write_manifest,
 };
-use lines::{append, json_lines, lines, repair};
+use lines::{append, json_lines, lines, repair, set_aside};
 
 pub(crate) use folder::{
     AddressChange, find, read_fidelity, read_manifest, read_questions, read_records,
@@ -34,6 +34,9 @@ pub(crate) use folder::{
 pub(crate) const BATCH: &str = "batch";
 /// The trials that were sent in batches.
 const TRIALS: &str = "trials.jsonl";
+
+/// Lines of the records that could not be read.
+const SET_ASIDE: &str = "set-aside.jsonl";
 
 /// The interval at which records are forced to the disk: the most that a power cut may lose. A killed process loses nothing.
 /// Chosen.
@@ -51,7 +54,8 @@ pub(crate) struct Store<D = ChoiceDetail> {
 impl<D: Detail> Store<D> {
     /// Opens a run folder, which is created if it does not exist.
     ///
-    /// An incomplete last line is removed, so that the next record begins on a new line.
+    /// An incomplete last line is removed, so that the next record begins on a new line. Other lines that are no records are
+    /// moved to [`SET_ASIDE`], and their trials are asked again.
     ///
     /// # Errors
     /// If the folder holds other files or another run (the message names the flag that differs), or if another process has
@@ -82,6 +86,7 @@ impl<D: Detail> Store<D> {
             TryLockError::Error(e) => Error::file(&path, "lock", e),
         })?;
         repair(&path, &records)?;
+        set_aside::<Record<D>>(&path, &folder.join(SET_ASIDE))?;
         Ok(Self {
             folder: folder.to_owned(),
             records,

@@ -98,7 +98,7 @@ fn only_the_last_record_of_each_trial_is_read() {
 }
 
 #[test]
-fn an_incomplete_last_line_is_removed_and_a_broken_line_is_an_error() {
+fn an_incomplete_last_line_is_removed_and_a_broken_line_is_set_aside() {
     let base = tempfile::tempdir().unwrap();
     let mut store = Store::open(base.path(), &manifest(0), AddressChange::Refused).unwrap();
     store.append(&record("a", TrialOutcome::Right)).unwrap();
@@ -115,8 +115,34 @@ fn an_incomplete_last_line_is_removed_and_a_broken_line_is_an_error() {
     let path = base.path().join(RECORDS);
     let text = fs::read_to_string(&path).unwrap();
     fs::write(&path, text.replacen("{\"key\"", "{\"kex\"", 1)).unwrap();
-    let store = Store::open(base.path(), &manifest(0), AddressChange::Refused).unwrap();
-    let error = store.records().unwrap_err().to_string();
+    // Whoever only reads is told.
+    let error = read_records::<ChoiceDetail>(base.path())
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("records.jsonl, line 1: not a record"),
+        "{error}"
+    );
+    // The run goes on without the line, which is kept, and whose place is blank.
+    let open = || Store::open(base.path(), &manifest(0), AddressChange::Refused);
+    let mut store = open().unwrap();
+    assert_eq!(store.records().unwrap().len(), 1);
+    let aside = fs::read_to_string(base.path().join(SET_ASIDE)).unwrap();
+    assert!(
+        aside.starts_with("{\"kex\"") && aside.lines().count() == 1,
+        "{aside}"
+    );
+    store.append(&record("a", TrialOutcome::Right)).unwrap();
+    drop(store);
+    assert_eq!(open().unwrap().records().unwrap().len(), 2);
+    assert_eq!(
+        fs::read_to_string(base.path().join(SET_ASIDE)).unwrap(),
+        aside
+    );
+    assert_eq!(read_records::<ChoiceDetail>(base.path()).unwrap().len(), 2);
+    // A file of something else is no run with damage.
+    fs::write(&path, "{}\n[]\n").unwrap();
+    let error = open().unwrap_err().to_string();
     assert!(
         error.contains("records.jsonl, line 1: not a record"),
         "{error}"

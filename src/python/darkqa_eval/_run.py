@@ -130,6 +130,9 @@ def _lines(path: Path) -> Iterator[tuple[int, Record]]:
             if not line.endswith(b"\n"):
                 warnings.warn(f"{path}:{number}: the last line is incomplete and was left out")
                 return
+            if not line.strip():
+                # A damaged line stood here, and was set aside.
+                continue
             try:
                 yield number, json.loads(line)
             except ValueError as error:
