@@ -14,6 +14,7 @@ mod hallucination;
 mod lights;
 mod models;
 mod pooled;
+mod readings;
 mod sample;
 mod sentence;
 mod words_alone;
@@ -44,6 +45,7 @@ pub(crate) fn sentences(findings: &Findings<'_>) -> Vec<Sentence> {
     let mut sentences = Vec::new();
     sentences.extend(sample::impossible(findings));
     sentences.extend(sample::left_out(findings));
+    sentences.extend(readings::readings(&findings.by_reading, findings.unit));
     sentences.extend(darkness::darkness(findings));
     sentences.extend(in_each_light(findings, about_light));
     sentences.extend(about_clean(findings));

@@ -1,0 +1,44 @@
+//! The sentence about light readings: how many findings hold under all of them.
+
+use super::sentence::{Numbers, Sentence, Tone};
+use crate::score::by_reading::{FindingByReading, LightClaim, Robustness};
+use crate::score::cluster::ClusterUnit;
+
+/// How many findings about noise hold under which readings; `None` with one reading. The levels of one finding count once.
+pub(super) fn readings(found: &[FindingByReading], unit: ClusterUnit) -> Option<Sentence> {
+    let readings = found.first()?.effects.len();
+    let whole = found.iter();
+    let whole = whole.filter(|one| !matches!(one.claim, LightClaim::NoiseCompounds(Some(_))));
+    let whole: Vec<&FindingByReading> = whole.collect();
+    let of = |robustness: Robustness| {
+        let mut findings = whole.iter();
+        findings
+            .by_ref()
+            .filter(|one| one.robustness == robustness)
+            .count()
+    };
+    let [all, some, none, open] = [
+        Robustness::All,
+        Robustness::Some,
+        Robustness::None,
+        Robustness::Open,
+    ]
+    .map(of);
+    let mut numbers = Numbers::of(unit);
+    let text = format!(
+        "Of {} findings about noise, {} under all {} readings, {} under some, {} under none; {} open.",
+        numbers.count("findings", whole.len()),
+        verb(&numbers.count("all", all), "holds", "hold"),
+        numbers.count("readings", readings),
+        numbers.count("some", some),
+        numbers.count("none", none),
+        verb(&numbers.count("open", open), "is", "are"),
+    );
+    let detail = "a finding that does not hold under all is one about a reading: the table by reading names them";
+    Some(numbers.sentence("readings", Tone::Note, text, detail.to_owned()))
+}
+
+fn verb(count: &str, one: &str, several: &str) -> String {
+    let verb = if count == "1" { one } else { several };
+    format!("{count} {verb}")
+}
