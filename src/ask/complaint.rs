@@ -1,6 +1,10 @@
 //! The error in a server's response, in any of the known JSON shapes: [`Complaint`].
 
+use std::time::Duration;
+
 use serde_json::Value;
+
+use super::pace::{protobuf_duration, wait_in_words};
 
 /// An error as the server states it; secrets are not yet removed.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -15,17 +19,36 @@ pub(super) struct Complaint {
     pub(super) param: Option<String>,
     /// Whether moderation refused the content of the request, and not the account.
     pub(super) moderated: bool,
+    /// The wait that the error states, in a field or in words.
+    pub(super) wait: Option<Duration>,
+    /// Ids of the limits that were reached, as `GenerateRequestsPerDayPerProject`.
+    limits: Vec<String>,
 }
+
+/// The number of errors within errors that are opened: routers pass on a server's error as text.
+const MOST_NESTED: usize = 3;
+
+/// Words and ids of a limit that resets once a day.
+const DAILY: [&str; 6] = ["(rpd)", "(tpd)", "perday", "per day", "per-day", "daily"];
 
 impl Complaint {
     /// The error at the top level of a body, if there is one: `error` as an object or text, or the flat shapes of vLLM, FastAPI
     /// and problem+json.
     pub(super) fn of(body: &Value) -> Option<Self> {
-        Self::in_error(body).or_else(|| {
+        // Gemini sends a list with one error.
+        if let Value::Array(items) = body {
+            return items.first().and_then(Self::of);
+        }
+        let found = Self::in_error(body).or_else(|| {
             ["message", "detail", "title"]
                 .iter()
                 .any(|field| body.get(field).is_some_and(is_filled))
                 .then(|| Self::of_error(body))
+        });
+        found.map(|found| Self {
+            // Hugging Face states it beside the error.
+            wait: found.wait.max(stated_wait(body)),
+            ..found
         })
     }
 
@@ -37,6 +60,39 @@ impl Complaint {
 
     /// The error in the value of a field `error`.
     pub(super) fn of_error(error: &Value) -> Self {
+        Self::nested(error, MOST_NESTED)
+    }
+
+    /// The error in a value, or in its message if that is an error as text or as an object; at most `depth` levels are opened.
+    fn nested(error: &Value, depth: usize) -> Self {
+        let own = Self::flat(error);
+        let message = error.get("message").or_else(|| error.get("error"));
+        let inner = message
+            .filter(|_| depth > 0)
+            .and_then(|message| match message {
+                Value::Object(_) => Some(message.clone()),
+                Value::String(text) => object_in(text),
+                _ => None,
+            });
+        let Some(inner) = inner else {
+            return own;
+        };
+        let inner = match inner.get("error").filter(|error| error.is_object()) {
+            Some(error) => Self::nested(error, depth - 1),
+            None => Self::nested(&inner, depth - 1),
+        };
+        Self {
+            kind: inner.kind.or(own.kind),
+            code: inner.code.or(own.code),
+            param: inner.param.or(own.param),
+            moderated: inner.moderated || own.moderated,
+            wait: inner.wait.max(own.wait),
+            limits: [inner.limits, own.limits].concat(),
+            message: inner.message,
+        }
+    }
+
+    fn flat(error: &Value) -> Self {
         let metadata = error.get("metadata");
         let mut message = text(error)
             .or_else(|| {
@@ -51,14 +107,24 @@ impl Complaint {
         }
         let field = |name| error.get(name).and_then(text_or_number);
         Self {
-            message,
             kind: field("type"),
             code: field("code").or_else(|| field("status")),
-            param: field("param"),
+            param: field("param").or_else(|| located(error)),
             moderated: metadata.is_some_and(|metadata| {
                 metadata.get("reasons").is_some() || metadata.get("flagged_input").is_some()
             }),
+            wait: wait_in_words(&message).max(stated_wait(error)),
+            limits: limits(error),
+            message,
         }
+    }
+
+    /// Whether the limit that was reached resets once a day.
+    pub(super) fn is_daily(&self) -> bool {
+        let message = self.message.to_lowercase();
+        let limits = self.limits.iter().map(|limit| limit.to_lowercase());
+        let mut texts = limits.chain([message]);
+        texts.any(|text| DAILY.iter().any(|words| text.contains(words)))
     }
 
     /// The error in the body of a refused request: JSON, an HTML page or plain text.
@@ -117,6 +183,61 @@ pub(super) fn page_title(body: &str) -> Option<String> {
         })
         .map_or("", str::trim);
     Some(format!("an HTML page titled {title:?}"))
+}
+
+/// The JSON object in a text that may have words before it; `None` if there is none.
+fn object_in(text: &str) -> Option<Value> {
+    let object = &text[text.find('{')?..];
+    let mut values = serde_json::Deserializer::from_str(object).into_iter::<Value>();
+    let value = values.next()?.ok()?;
+    let is_error = ["error", "message", "detail"]
+        .iter()
+        .any(|field| value.get(field).is_some());
+    is_error.then_some(value)
+}
+
+/// The field that a list of `detail` or of errors points to: the last part of its first `loc`.
+fn located(error: &Value) -> Option<String> {
+    let list = [error.get("detail"), Some(error)].into_iter().flatten();
+    let mut items = list.filter_map(Value::as_array).flatten();
+    items.find_map(|item| text_or_number(item.get("loc")?.as_array()?.last()?))
+}
+
+/// The entries of Google's `details`.
+fn details(error: &Value) -> impl Iterator<Item = &Value> {
+    error
+        .get("details")
+        .and_then(Value::as_array)
+        .into_iter()
+        .flatten()
+}
+
+/// The wait that an error states in a field: Google's `retryDelay`, OpenRouter's `retry_after_seconds` and headers, Hugging Face's
+/// `estimated_time`.
+fn stated_wait(error: &Value) -> Option<Duration> {
+    let delays =
+        details(error).filter_map(|detail| protobuf_duration(detail.get("retryDelay")?.as_str()?));
+    let metadata = error.get("metadata");
+    let headers = metadata.and_then(|metadata| metadata.get("headers")?.as_object());
+    let header = headers.and_then(|headers| {
+        let mut headers = headers.iter();
+        let (_, value) = headers.find(|(name, _)| name.eq_ignore_ascii_case("retry-after"))?;
+        text_or_number(value)
+    });
+    let field = metadata.and_then(|metadata| text_or_number(metadata.get("retry_after_seconds")?));
+    let estimated = error.get("estimated_time").and_then(text_or_number);
+    let seconds = [header, field, estimated].into_iter().flatten();
+    let seconds = seconds.filter_map(|seconds| protobuf_duration(&format!("{seconds}s")));
+    delays.chain(seconds).max()
+}
+
+/// The ids of the limits in Google's `details`.
+fn limits(error: &Value) -> Vec<String> {
+    let violations = details(error)
+        .filter_map(|detail| detail.get("violations")?.as_array())
+        .flatten();
+    let ids = violations.filter_map(|violation| text_or_number(violation.get("quotaId")?));
+    ids.collect()
 }
 
 fn is_filled(value: &Value) -> bool {
@@ -206,6 +327,85 @@ mod tests {
             let complaint = Complaint::of_body(body);
             assert_eq!(complaint.message, message, "{body}");
             assert_eq!(complaint.code.as_deref(), code, "{body}");
+        }
+    }
+
+    #[test]
+    fn errors_within_errors_and_lists_are_opened() {
+        for (body, message, code, param) in [
+            (
+                r#"[{"error":{"message":"m","code":429}}]"#,
+                "m",
+                Some("429"),
+                None,
+            ),
+            (
+                r#"{"object":"error","message":{"detail":[{"type":"extra_forbidden","loc":["body","max_completion_tokens"],"msg":"Extra inputs are not permitted"}]}}"#,
+                "Extra inputs are not permitted",
+                None,
+                Some("max_completion_tokens"),
+            ),
+            (
+                r#"{"error":{"message":"litellm.BadRequestError: {\"error\":{\"message\":\"deep\",\"param\":\"temperature\"}}","code":"400"}}"#,
+                "deep",
+                Some("400"),
+                Some("temperature"),
+            ),
+            (
+                r#"{"detail":[{"loc":["body","logprobs"],"msg":"m"}]}"#,
+                "m",
+                None,
+                Some("logprobs"),
+            ),
+            // Five levels: the fourth is shown as it is.
+            (
+                r#"{"error":{"message":{"message":{"message":{"message":{"message":"x"}}}}}}"#,
+                r#"{"message":{"message":"x"}}"#,
+                None,
+                None,
+            ),
+            // Braces that are no error stay a part of the words.
+            (
+                r#"{"error":{"message":"use {\"a\": 1}"}}"#,
+                r#"use {"a": 1}"#,
+                None,
+                None,
+            ),
+        ] {
+            let complaint = Complaint::of_body(body);
+            assert_eq!(complaint.message, message, "{body}");
+            assert_eq!(complaint.code.as_deref(), code, "{body}");
+            assert_eq!(complaint.param.as_deref(), param, "{body}");
+        }
+    }
+
+    #[test]
+    fn waits_and_days_are_read_from_every_shape() {
+        let gemini = |id: &str| {
+            format!(
+                r#"[{{"error":{{"code":429,"message":"You exceeded your current quota.","details":[{{"violations":[{{"quotaId":"{id}"}}]}},{{"@type":"type.googleapis.com/google.rpc.RetryInfo","retryDelay":"45.837906927s"}}]}}}}]"#
+            )
+        };
+        for (body, seconds, is_daily) in [
+            (gemini("GenerateRequestsPerMinutePerProject"), Some(45.837_906_927), false),
+            (gemini("GenerateRequestsPerDayPerProject"), Some(45.837_906_927), true),
+            (
+                r#"{"error":{"message":"m","metadata":{"retry_after_seconds":7,"headers":{"RETRY-AFTER":"9"}}}}"#.to_owned(),
+                Some(9.0),
+                false,
+            ),
+            (r#"{"error":"loading","estimated_time":20.5}"#.to_owned(), Some(20.5), false),
+            (
+                r#"{"error":{"message":"Rate limit reached on requests per day (RPD): Limit 200. Please try again in 7m12s."}}"#.to_owned(),
+                Some(432.0),
+                true,
+            ),
+            (r#"{"error":{"message":"slow down"}}"#.to_owned(), None, false),
+        ] {
+            let complaint = Complaint::of_body(&body);
+            let wait = complaint.wait.map(|wait| wait.as_secs_f64());
+            assert_eq!(wait, seconds, "{body}");
+            assert_eq!(complaint.is_daily(), is_daily, "{body}");
         }
     }
 

@@ -8,7 +8,7 @@ use tokio::time::Instant;
 
 use super::access::{Access, with_causes};
 use super::body::Parts;
-use super::failure::FailedTry;
+use super::failure::{Again, FailedTry};
 use super::secret::Scrub;
 use super::url::BaseUrl;
 use crate::error::Result;
@@ -128,7 +128,7 @@ impl Connection {
             (FailureKind::Connection, message)
         };
         FailedTry {
-            retryable: true,
+            again: Again::Later,
             ..FailedTry::new(kind, message)
         }
     }

@@ -1,9 +1,8 @@
 //! A server and the way requests are sent to it: [`Endpoint`].
 
-use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, SystemTime};
 
-use backon::{ExponentialBuilder, Retryable as _};
+use backon::{BackoffBuilder as _, ExponentialBuilder};
 use reqwest::header::{CONTENT_TYPE, HeaderMap, LOCATION};
 use tokio::sync::watch;
 use tokio::time::{Instant, sleep};
@@ -13,7 +12,7 @@ use super::access::Access;
 use super::body::Parts;
 use super::complaint::{Complaint, UnreadableReply};
 use super::connection::{Connection, HttpReply};
-use super::failure::{AskError, FailedTry, Reach};
+use super::failure::{Again, AskError, FailedTry, Reach};
 use super::failure_class::FailureClass;
 use super::field::SentFields;
 use super::pace::{Allowance, Gate, Window, asked_wait};
@@ -99,8 +98,8 @@ impl Endpoint {
         let _ = self.closing.subscribe().wait_for(|closing| *closing).await;
     }
 
-    /// Waits until the request may be sent; an error if the endpoint is closed before.
-    async fn wait_turn(&self) -> Result<(), FailedTry> {
+    /// Waits until the request may be sent, and tells when that is; an error if the endpoint is closed before.
+    async fn wait_turn(&self) -> Result<Instant, FailedTry> {
         let message = "the run ended before it was asked";
         tokio::select! {
             biased;
@@ -108,57 +107,73 @@ impl Endpoint {
                 reach: Reach::Interrupted,
                 ..FailedTry::new(FailureKind::Connection, message.to_owned())
             }),
-            () = self.gate.pass() => Ok(()),
+            turn = self.gate.pass() => Ok(turn),
         }
     }
 
-    /// Sends a request, with retries after failures that may pass. The future may be dropped at any time.
+    /// Sends a request, with retries after failures that may pass. While the endpoint takes no more, the request waits without spending
+    /// a retry, for at most [`Sending::patience`]. The future may be dropped at any time.
     pub(super) async fn ask(&self, request: &Request<'_>) -> Result<Reply, AskError> {
-        let attempts = AtomicU32::new(0);
-        let backoff = ExponentialBuilder::new()
+        let mut tries = ExponentialBuilder::new()
             .with_jitter()
             .with_min_delay(self.sending.first_delay)
             .with_max_delay(MAX_DELAY)
-            .with_max_times(self.sending.retries as usize);
-        let closing = self.closing.subscribe();
-        let outcome = (|| async {
-            self.wait_turn().await?;
-            attempts.fetch_add(1, Ordering::Relaxed);
-            self.send(request).await
-        })
-        .retry(backoff)
-        .sleep(move |wait| {
-            let mut closing = closing.clone();
-            async move {
-                tokio::select! {
-                    _ = closing.wait_for(|closing| *closing) => (),
-                    () = sleep(wait) => (),
+            .with_max_times(self.sending.retries as usize)
+            .build();
+        let mut attempts = 0;
+        loop {
+            let sent = self.wait_turn().await.map_err(|e| e.after(attempts))?;
+            attempts += 1;
+            let mut failed = match self.send(request, sent).await {
+                Ok(reply) => return Ok(Reply { attempts, ..reply }),
+                Err(failed) => failed,
+            };
+            let delay = match failed.again {
+                Again::Never => None,
+                Again::Later => tries.next().map(|delay| failed.wait.unwrap_or(delay)),
+                Again::WhenTaken if self.gate.refused_for() > self.sending.patience => {
+                    failed = self.out_of_patience(failed);
+                    None
                 }
-            }
-        })
-        .when(|failed: &FailedTry| failed.retryable)
-        // `None` if the retries are used up.
-        .adjust(|failed, delay| delay.map(|delay| failed.wait.unwrap_or(delay)))
-        .notify(|failed, wait| {
-            debug!(endpoint = %self.base(), ?wait, problem = failed.failure.message, "trying again");
-        })
-        .await;
-        let attempts = attempts.into_inner();
-        match outcome {
-            Ok(reply) => Ok(Reply { attempts, ..reply }),
-            Err(failed) => Err(failed.after(attempts)),
+                // The gate holds all requests for as long as the server asked.
+                Again::WhenTaken if failed.wait.is_some() => Some(Duration::ZERO),
+                Again::WhenTaken => Some(self.sending.first_delay),
+            };
+            let Some(delay) = delay else {
+                return Err(failed.after(attempts));
+            };
+            debug!(endpoint = %self.base(), ?delay, problem = failed.failure.message, "trying again");
+            self.rest(delay).await;
         }
     }
 
-    /// Sends the request once.
-    async fn send(&self, request: &Request<'_>) -> Result<Reply, FailedTry> {
+    /// Sleeps, or until the endpoint is closed.
+    async fn rest(&self, delay: Duration) {
+        tokio::select! {
+            () = self.closed() => {}
+            () = sleep(delay) => {}
+        }
+    }
+
+    /// The failure of a request that was turned away for too long: every other one is, too.
+    fn out_of_patience(&self, mut failed: FailedTry) -> FailedTry {
+        failed.reach = Reach::Endpoint;
+        failed.failure.message = format!(
+            "{} (nothing was taken for {:.0} s, beyond --patience; go on later with --resume)",
+            failed.failure.message,
+            self.gate.refused_for().as_secs_f64()
+        );
+        failed
+    }
+
+    /// Sends the request once; `sent` is the time of its turn.
+    async fn send(&self, request: &Request<'_>, sent: Instant) -> Result<Reply, FailedTry> {
         let Request { wire, headers, .. } = *request;
-        let started = Instant::now();
         let body = request.body.clone();
         let posted = self.connection.post(wire.path(), headers, body).await;
         let answer = posted.inspect_err(|failed| {
             if failed.failure.kind == FailureKind::Timeout {
-                self.window.overloaded(started);
+                self.window.overloaded(sent);
             }
         })?;
         let status = answer.status.as_u16();
@@ -166,29 +181,29 @@ impl Endpoint {
         debug!(endpoint = %self.base(), status, ?took, request_id, "answered");
         if !answer.status.is_success() {
             if asks_for_pause(status) {
-                self.window.overloaded(started);
+                self.window.overloaded(sent);
             }
             let mut complaint = wire.complaint(&answer.body);
             if answer.status.is_redirection() {
                 complaint.message = format!("moved to {}", answer.header(LOCATION.as_str()));
             }
-            return Err(self.refused_try(status, &complaint, &answer, request));
+            return Err(self.refused_try(status, &complaint, &answer, request, sent));
         }
         let unreadable = match wire.reply(&answer.body, answer.header(CONTENT_TYPE.as_str())) {
-            Ok(reply) => return Ok(self.succeeded(reply, &answer)),
+            Ok(reply) => return Ok(self.succeeded(reply, &answer, sent)),
             Err(unreadable) => unreadable,
         };
         let mut failed = match unreadable {
             // An error without a code is a failure of the server, which may pass.
             UnreadableReply::Complaint(complaint) => {
                 let code = complaint.status().unwrap_or(500);
-                self.refused_try(code, &complaint, &answer, request)
+                self.refused_try(code, &complaint, &answer, request, sent)
             }
             UnreadableReply::Other(what) => {
                 let what = self.connection.scrub.line(&what);
                 let message = format!("{} answered with {what}", self.base());
                 FailedTry {
-                    retryable: true,
+                    again: Again::Later,
                     ..FailedTry::new(FailureKind::Response, message)
                 }
             }
@@ -198,12 +213,12 @@ impl Endpoint {
     }
 
     /// The reply without keys; its tokens and the remaining limits are noted in the gate.
-    fn succeeded(&self, reply: Reply, answer: &HttpReply) -> Reply {
+    fn succeeded(&self, reply: Reply, answer: &HttpReply, sent: Instant) -> Reply {
         self.window.succeeded(answer.took);
         let allowance = Allowance::read(&answer.headers, SystemTime::now());
         let tokens = reply.usage.and_then(|usage| usage.total());
         self.gate
-            .succeeded(tokens, allowance, self.sending.max_wait);
+            .succeeded(sent, tokens, allowance, self.sending.max_wait);
         let scrubbed = |text: String| self.connection.scrub.reply(text);
         Reply {
             text: scrubbed(reply.text),
@@ -221,6 +236,7 @@ impl Endpoint {
         complaint: &Complaint,
         answer: &HttpReply,
         request: &Request<'_>,
+        sent: Instant,
     ) -> FailedTry {
         let mut class = FailureClass::of(status, complaint, request.wire, request.sent);
         match answer.header("x-should-retry") {
@@ -230,7 +246,17 @@ impl Endpoint {
         }
         let hint = class.hint.as_deref();
         let message = self.message(status, complaint, hint, &self.request_id(answer));
-        let wait = asked_wait(&answer.headers, SystemTime::now()).filter(|_| class.retryable);
+        let now = SystemTime::now();
+        let stated = asked_wait(&answer.headers, now).max(complaint.wait);
+        let reset = || Allowance::read(&answer.headers, now).pause();
+        let wait = stated
+            .or_else(|| reset().filter(|_| status == 429))
+            .filter(|_| class.retryable);
+        let again = match class.retryable {
+            false => Again::Never,
+            true if status == 429 || (asks_for_pause(status) && wait.is_some()) => Again::WhenTaken,
+            true => Again::Later,
+        };
         let mut failed = FailedTry {
             failure: Failure {
                 kind: class.kind,
@@ -238,11 +264,11 @@ impl Endpoint {
                 message,
             },
             reach: class.reach,
-            retryable: class.retryable,
+            again,
             wait,
             refused_field: class.refused_field,
         };
-        self.pause(status, &mut failed);
+        self.pause(status, sent, &mut failed);
         failed
     }
 
@@ -268,12 +294,13 @@ impl Endpoint {
         message
     }
 
-    /// Makes all requests wait as long as the server asked; a request that would wait more than `--max-wait` is given up.
-    fn pause(&self, status: u16, failed: &mut FailedTry) {
+    /// Makes all requests wait as long as the server asked; a request that would wait more than `--max-wait` is given up, and
+    /// the time at which it could go on is said.
+    fn pause(&self, status: u16, sent: Instant, failed: &mut FailedTry) {
         let max_wait = self.sending.max_wait;
         match failed.wait {
             Some(wait) if wait > max_wait => {
-                failed.retryable = false;
+                failed.again = Again::Never;
                 if asks_for_pause(status) {
                     failed.reach = Reach::Endpoint;
                 }
@@ -284,10 +311,12 @@ impl Endpoint {
                     max_wait.as_secs_f64()
                 );
             }
-            Some(wait) if status == 429 => self.gate.rate_limited(wait),
+            wait if status == 429 && failed.again != Again::Never => {
+                self.gate.rate_limited(sent, wait);
+            }
             Some(wait) if asks_for_pause(status) => self.gate.pause(wait),
             // The server states no time: all wait as long as the refused request does before its first retry.
-            None if asks_for_pause(status) && failed.retryable => {
+            None if asks_for_pause(status) && failed.again != Again::Never => {
                 self.gate.pause(self.sending.first_delay);
             }
             _ => {}

@@ -37,12 +37,22 @@ impl AskError {
     }
 }
 
+/// Whether a request without a reply is sent again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Again {
+    /// The same request would fail again.
+    Never,
+    /// The same request may succeed later; this spends one of `--retries`.
+    Later,
+    /// The endpoint takes no more at the moment. This is a wait and no try: only `--patience` ends it.
+    WhenTaken,
+}
+
 /// One request without a reply.
 pub(super) struct FailedTry {
     pub(super) failure: Failure,
     pub(super) reach: Reach,
-    /// Whether the same request may succeed later.
-    pub(super) retryable: bool,
+    pub(super) again: Again,
     /// The wait that the server asked for; `None` if it asked for none.
     pub(super) wait: Option<Duration>,
     /// The field that the server refused, if the program can change how it is sent.
@@ -59,7 +69,7 @@ impl FailedTry {
                 message,
             },
             reach: Reach::Trial,
-            retryable: false,
+            again: Again::Never,
             wait: None,
             refused_field: None,
         }

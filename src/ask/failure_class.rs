@@ -66,6 +66,15 @@ const NO_IMAGES: [&str; 7] = [
     "no endpoints found that support image input",
 ];
 
+/// The words of servers, with status 413 or 429, for a request that is larger than a whole minute's limit: no wait helps.
+const TOO_LARGE: [&str; 2] = ["request too large", "request is too large"];
+
+/// The remedy for a request that is too large.
+const SMALLER: &str = "send smaller images: --max-side, or --image jpeg:95";
+
+/// The remedy for a limit that resets once a day.
+const NEXT_DAY: &str = "a limit for the day is reached: go on with --resume when it is over";
+
 /// The remedy for an account without credit.
 const ADD_CREDIT: &str = "the account has no credit left: add some, then go on with --resume";
 
@@ -115,8 +124,16 @@ impl FailureClass {
             )),
             408 | 425 => Self::transient(FailureKind::Timeout),
             413 => Self {
-                hint: Some("send smaller images: --max-side, or --image jpeg:95".to_owned()),
+                hint: Some(SMALLER.to_owned()),
                 ..Self::request_refused()
+            },
+            429 if complaint.mentions_any(&TOO_LARGE) => Self {
+                hint: Some(SMALLER.to_owned()),
+                ..Self::request_refused()
+            },
+            429 if complaint.is_daily() => Self {
+                kind: FailureKind::RateLimit,
+                ..Self::permanent(NEXT_DAY)
             },
             429 => Self::transient(FailureKind::RateLimit),
             // 498 is Groq's status for no capacity, 499 is nginx's for a connection that the client closed.

@@ -46,7 +46,7 @@ pub(super) struct SentFields<'a> {
 }
 
 /// Words by which servers say that they do not support a field or its value, and not that the value is wrong.
-const UNSUPPORTED: [&str; 10] = [
+const UNSUPPORTED: [&str; 18] = [
     "unsupported",
     "not supported",
     "does not support",
@@ -56,6 +56,14 @@ const UNSUPPORTED: [&str; 10] = [
     "not permitted",
     "not allowed",
     "extra inputs",
+    "extra_forbidden",
+    "deprecated",
+    "only the default",
+    "no longer",
+    "removed",
+    "cannot be set",
+    "must be set to",
+    "not enabled",
     "instead",
 ];
 

@@ -26,6 +26,9 @@ pub struct Remote {
     parameters: Parameters,
     /// The fields that the server accepts, as far as is known.
     fields: Mutex<RequestFields>,
+    /// Whether a question to the model has come to an end. Until the first has, the others wait: what the server refuses in all requests
+    /// is then found out by one.
+    scouted: tokio::sync::Mutex<bool>,
     /// Whether the warning about an unconstrained reply was printed.
     warned_unconstrained: AtomicBool,
 }
@@ -42,6 +45,7 @@ impl Remote {
             endpoint,
             wire,
             parameters,
+            scouted: tokio::sync::Mutex::new(false),
             warned_unconstrained: AtomicBool::new(false),
         })
     }
@@ -93,6 +97,18 @@ impl Remote {
 
     /// Sends the single message of a conversation with this number of choices; 0 if the question is open.
     pub async fn ask(&self, message: Message<'_>, choices: usize) -> Result<Reply, AskError> {
+        let mut scouted = self.scouted.lock().await;
+        if *scouted {
+            drop(scouted);
+            return self.ask_adapting(message, choices).await;
+        }
+        let outcome = self.ask_adapting(message, choices).await;
+        *scouted = true;
+        outcome
+    }
+
+    /// Asks, and again after each field that is adapted.
+    async fn ask_adapting(&self, message: Message<'_>, choices: usize) -> Result<Reply, AskError> {
         let mut attempts = 0;
         loop {
             let fields = self.fields();

@@ -29,6 +29,9 @@ pub struct Sending {
     /// by up to its length.
     #[arg(skip = FIRST_DELAY)]
     pub first_delay: Duration,
+    /// Seconds for which an endpoint may turn all requests away (status 429) before the run stops; none of them spends a retry
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "1800", add = Decides::Nothing)]
+    pub patience: Duration,
     /// The longest wait, in seconds, that a server may ask for; beyond it the request is given up
     #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "120", add = Decides::Nothing)]
     pub max_wait: Duration,
@@ -48,6 +51,7 @@ impl Default for Sending {
             timeout: Duration::from_mins(2),
             retries: 5,
             first_delay: FIRST_DELAY,
+            patience: Duration::from_mins(30),
             max_wait: Duration::from_mins(2),
             max_image: None,
         }

@@ -128,6 +128,7 @@ pub(crate) fn settings(job: &JobSettings) -> BTreeMap<String, Value> {
             ("--timeout", json!(sending.timeout.as_secs_f64())),
             ("--retries", json!(sending.retries)),
             ("--max-wait", json!(sending.max_wait.as_secs_f64())),
+            ("--patience", json!(sending.patience.as_secs_f64())),
             ("--rpm", json!(sending.quota.requests)),
             ("--tpm", json!(sending.quota.tokens)),
         ]);

@@ -342,7 +342,7 @@ const OPEN_ADDITIONS: [Addition; 9] = [
 ];
 
 /// What changes no answer: given on the folder of a run, it asks nothing.
-const NOTHING: [&str; 25] = [
+const NOTHING: [&str; 26] = [
     "--max-pixels 1000000",
     "--threads 1",
     "--offline",
@@ -357,6 +357,7 @@ const NOTHING: [&str; 25] = [
     "--timeout 60",
     "--retries 1",
     "--max-wait 9",
+    "--patience 60",
     "--max-image 3",
     "--max-failures 4",
     "--max-cost 5",

@@ -7,13 +7,16 @@
 mod allowance;
 mod gate;
 mod learned;
+mod quota;
 mod wait;
+mod wait_words;
 mod window;
 
 pub(super) use allowance::Allowance;
 pub(super) use gate::Gate;
-pub(super) use wait::asked_wait;
+pub(super) use wait::{asked_wait, protobuf_duration};
+pub(super) use wait_words::wait_in_words;
 pub(super) use window::Window;
 
-pub use gate::Quota;
+pub use quota::Quota;
 pub(crate) use window::Bounds;

@@ -4,23 +4,26 @@ use std::time::{Duration, SystemTime};
 
 use reqwest::header::{DATE, HeaderMap, RETRY_AFTER};
 
-/// The wait that a server asks for: `retry-after-ms`, otherwise `Retry-After` in seconds (fractions too) or as a date. A date is
-/// compared with the server's clock if it sends `Date`. `None` without a header, for no wait, or in an unknown form.
+/// The wait that a server asks for in its headers: the longer of `retry-after-ms` and `Retry-After` in seconds (fractions too) or as a
+/// date. A date is compared with the server's clock if it sends `Date`. `None` without a header, for no wait, or in an unknown form.
 pub(in crate::ask) fn asked_wait(headers: &HeaderMap, now: SystemTime) -> Option<Duration> {
     let text = |name: &str| headers.get(name)?.to_str().ok();
     let after = || text(RETRY_AFTER.as_str());
     let date = |text: &str| httpdate::parse_http_date(text.trim()).ok();
-    text("retry-after-ms")
-        .and_then(|ms| seconds(ms, 1e-3))
-        .or_else(|| seconds(after()?, 1.0))
-        .or_else(|| {
-            let until = date(after()?)?;
-            let now = text(DATE.as_str()).and_then(date).unwrap_or(now);
-            until
-                .duration_since(now)
-                .ok()
-                .filter(|wait| !wait.is_zero())
-        })
+    let until = || {
+        let until = date(after()?)?;
+        let now = text(DATE.as_str()).and_then(date).unwrap_or(now);
+        let wait = until.duration_since(now).ok();
+        wait.filter(|wait| !wait.is_zero())
+    };
+    let exact = text("retry-after-ms").and_then(|ms| seconds(ms, 1e-3));
+    let after = after().and_then(|after| seconds(after, 1.0)).or_else(until);
+    exact.max(after)
+}
+
+/// A duration as Google's services write it, `45.837906927s`.
+pub(in crate::ask) fn protobuf_duration(text: &str) -> Option<Duration> {
+    seconds(text.trim().strip_suffix('s')?, 1.0)
 }
 
 /// A positive number of units as a duration, at most [`Duration::MAX`].
@@ -49,7 +52,11 @@ mod tests {
         for (pairs, expected) in [
             (vec![("retry-after", "2")], ms(2000)),
             (vec![("retry-after", " 0.25 ")], ms(250)),
-            (vec![("retry-after", "2"), ("retry-after-ms", "50")], ms(50)),
+            (
+                vec![("retry-after", "2"), ("retry-after-ms", "50")],
+                ms(2000),
+            ),
+            (vec![("retry-after", "0"), ("retry-after-ms", "50")], ms(50)),
             (
                 vec![("retry-after", "2"), ("retry-after-ms", "soon")],
                 ms(2000),

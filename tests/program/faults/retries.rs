@@ -121,10 +121,9 @@ fn what_may_pass_is_tried_again() {
 /// Retries come to an end, with the last failure.
 #[test]
 fn retries_come_to_an_end() {
-    use FailureKind::{Connection, RateLimit, Response, Server, Timeout};
+    use FailureKind::{Connection, Response, Server, Timeout};
     let cases = [
         ("500", Answer::error(500, "x", "oops"), Server, Some(500)),
-        ("429", Answer::error(429, "x", "slow"), RateLimit, Some(429)),
         (
             "nonsense",
             Answer::new(200, "nonsense"),
@@ -180,9 +179,22 @@ fn waits_are_kept_and_capped() {
         ("seconds", limited("retry-after", "1"), 1000),
         ("a fraction", limited("retry-after", "0.2"), 200),
         (
-            "milliseconds before seconds",
-            limited("retry-after", "60").header("retry-after-ms", "200"),
-            200,
+            "the longer of two",
+            limited("retry-after", "0.1").header("retry-after-ms", "300"),
+            300,
+        ),
+        (
+            "in words",
+            Answer::error(429, "x", "Rate limit reached. Please try again in 400ms."),
+            400,
+        ),
+        (
+            "in a list, as Google states it",
+            Answer::json(
+                429,
+                &json!([{"error": {"message": "quota", "details": [{"retryDelay": "0.35s"}]}}]),
+            ),
+            350,
         ),
         ("a date of a clock that is wrong", skewed, 1000),
         (
@@ -215,4 +227,46 @@ fn waits_are_kept_and_capped() {
         assert_eq!((error.attempts, error.reach), (1, Reach::Endpoint));
         assert!(outcome.time < Duration::from_secs(2));
     });
+}
+
+/// Being turned away is a wait: it spends no retry, and only `--patience` ends it. A limit for the day ends it at once.
+#[test]
+fn a_request_that_is_turned_away_waits_and_spends_no_retry() {
+    let away = || Answer::error(429, "x", "slow").header("retry-after", "0.02");
+    let patient = Sending {
+        retries: 1,
+        ..sending()
+    };
+    let mut answers: Vec<Answer> = (0..8).map(|_| away()).collect();
+    answers.push(Answer::text("B"));
+    let outcome = ask_with(answers, patient, Parameters::new("m".into()));
+    assert_eq!(outcome.result.unwrap().attempts, 9);
+    let impatient = Sending {
+        patience: Duration::from_millis(200),
+        ..patient
+    };
+    let outcome = ask_with(vec![away()], impatient, Parameters::new("m".into()));
+    let error = outcome.result.unwrap_err();
+    assert_eq!(
+        (error.failure.kind, error.reach),
+        (FailureKind::RateLimit, Reach::Endpoint)
+    );
+    assert!(error.failure.message.contains("--patience"), "{error}");
+    assert!(error.attempts > 2, "{}", error.attempts);
+    let daily =
+        "Rate limit reached on requests per day (RPD): Limit 200. Please try again in 20ms.";
+    let too_large = "Request too large for m on tokens per minute: Limit 1, Requested 2. Please try again in 2ms.";
+    for (message, reach, words) in [
+        (daily, Reach::Endpoint, "--resume"),
+        (too_large, Reach::Trial, "--max-side"),
+    ] {
+        let outcome = ask_with(
+            vec![Answer::error(429, "x", message)],
+            patient,
+            Parameters::new("m".into()),
+        );
+        let error = outcome.result.unwrap_err();
+        assert_eq!((error.attempts, error.reach), (1, reach), "{error}");
+        assert!(error.failure.message.contains(words), "{error}");
+    }
 }
