@@ -9,7 +9,9 @@ pub mod ask {
 }
 
 pub mod dataset {
-    pub use crate::dataset::picture::{MOST_PIXELS, Picture};
+    pub use crate::dataset::image_file::ImageFile;
+    pub use crate::dataset::picture::Picture;
+    pub use crate::dataset::reading_rule::{ColourRule, MOST_PIXELS, ReadingRule, Transfer};
     pub use crate::dataset::{DataPlace, Dataset};
 }
 
@@ -64,6 +66,8 @@ pub mod score {
 }
 
 pub mod synthesis {
+    pub use crate::synthesis::bayer::Bayer;
+    pub use crate::synthesis::blur::{blur, blurred_codes};
     pub use crate::synthesis::exposure::{expose, expose_into};
     pub use crate::synthesis::negative::{Negative, ladder};
     pub use crate::synthesis::noise::{Term, add as add_noise};

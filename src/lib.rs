@@ -19,7 +19,7 @@
 //! let clean = Rgb::new(2, 2, vec![128; 12])?;
 //! let how: Degradation = "L3-noise".parse()?;
 //! let key = NoiseKey::new(0, &FrameId("kitchen/0001".to_owned()));
-//! let degraded = degrade(&clean, Some(&how), &key, &Synthesis::default());
+//! let degraded = degrade(&clean, Some(&how), &key, &Synthesis::default())?;
 //! assert!(degraded.samples().iter().all(|sample| *sample < 64));
 //! # Ok::<(), darkqa_eval::Error>(())
 //! ```
@@ -82,6 +82,7 @@
 //! - [`questions`]: a frame with its maps → questions with one true answer, by rule; pure integers. And the observer: what the rules
 //!   could still answer from given pixels.
 //! - [`synthesis`]: a clean image × a degradation → a degraded one; pure, given a noise key.
+//! - [`calibrate`]: frames of a sensor → the camera that the synthesis takes its noise from.
 //! - [`enhance`]: a degraded image → an enhanced one, by the user's ONNX model.
 //! - [`ask`]: a prompt and images → a reply; the only asynchronous stage. `ask/wire`: one file an API.
 //! - [`score`]: a reply → a choice or a mark; records → numbers with their intervals.
@@ -134,17 +135,19 @@
 //! | `rooms` | `labels`, `types`, `error` |
 //! | `dataset` | `rooms`, `labels`, `files`, `types`, `error` |
 //! | `import` | `dataset`, `labels`, `files`, `types`, `error` |
+//! | `calibrate` | `dataset`, `synthesis`, `files`, `types`, `error` |
 //! | `store` | `files`, `types`, `error` |
-//! | `report` | `types`, `error`, `score`, `questions` |
+//! | `report` | `types`, `error`, `score`, `questions`, `calibrate` |
 //! | `job` | `files`, `types`, `error`, `rooms`, `labels`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `report` |
-//! | `run` | `job`, `files`, `types`, `error`, `rooms`, `labels`, `import`, `dataset`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `report` |
+//! | `run` | `job`, `files`, `types`, `error`, `rooms`, `labels`, `import`, `dataset`, `calibrate`, `questions`, `synthesis`, `enhance`, `ask`, `score`, `store`, `report` |
 //! | `internals` | `ask`, `dataset`, `enhance`, `job`, `labels`, `questions`, `report`, `rooms`, `score`, `synthesis`, `types`, `error` |
-//! | `cli` | `run`, `job`, `files`, `rooms`, `ask`, `enhance`, `score`, `synthesis`, `types`, `error` |
+//! | `cli` | `run`, `job`, `files`, `rooms`, `dataset`, `ask`, `enhance`, `score`, `synthesis`, `types`, `error` |
 //! | `main` | `cli`, `enhance` |
 
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 
 mod ask;
+mod calibrate;
 #[doc(hidden)]
 pub mod cli;
 mod dataset;

@@ -8,9 +8,27 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::io::Cursor;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
-use darkqa_eval::internals::dataset::{MOST_PIXELS, Picture};
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use darkqa_eval::internals::dataset::{ImageFile, MOST_PIXELS, ReadingRule};
 use image::{DynamicImage, ImageFormat, Rgb};
+
+#[path = "support/exr_files.rs"]
+#[allow(dead_code, unreachable_pub, reason = "a part of it is used")]
+mod exr_files;
+#[path = "support/icc_files.rs"]
+#[allow(dead_code, unreachable_pub, reason = "a part of it is used")]
+mod icc_files;
+#[path = "support/image_files.rs"]
+#[allow(dead_code, unreachable_pub, reason = "a part of it is used")]
+mod image_files;
+
+use exr::prelude::Compression;
+use exr_files::compressed;
+use icc_files::{DISPLAY_P3, rgb_profile, srgb_curve};
+use image_files::{png_with_profile, turned_png, webp_with_profile};
 
 /// The system's allocator, with the largest single request remembered.
 struct Watched;
@@ -59,7 +77,8 @@ impl Random {
     }
 }
 
-/// One file of each kind that is read: colour, grey, 16 bits, alpha; PNG and JPEG, baseline and progressive.
+/// One file of each kind that is read: colour, grey, 16 bits, alpha; PNG, WebP and TIFF; JPEG, baseline and progressive; a lossy
+/// WebP file of libwebp; files with a profile and with an orientation; OpenEXR in its compressions.
 fn corpus() -> Vec<Vec<u8>> {
     let colour = DynamicImage::ImageRgb8(image::ImageBuffer::from_fn(37, 21, |x, y| {
         Rgb([(x * 7) as u8, (y * 11) as u8, (x * y) as u8])
@@ -71,14 +90,35 @@ fn corpus() -> Vec<Vec<u8>> {
         DynamicImage::ImageRgba8(colour.to_rgba8()),
         DynamicImage::ImageLumaA8(colour.to_luma_alpha8()),
     ];
-    let mut files: Vec<Vec<u8>> = kinds
-        .iter()
-        .map(|image| {
+    let formats = [ImageFormat::Png, ImageFormat::WebP, ImageFormat::Tiff];
+    let written = kinds.iter().flat_map(|image| {
+        formats.map(|format| {
             let mut file = Cursor::new(Vec::new());
-            image.write_to(&mut file, ImageFormat::Png).unwrap();
-            file.into_inner()
+            let written = image.write_to(&mut file, format);
+            // WebP has no 16 bits, and TIFF no alpha channel beside grey.
+            written.is_ok().then(|| file.into_inner())
         })
-        .collect();
+    });
+    let mut files: Vec<Vec<u8>> = written.flatten().collect();
+    assert!(files.len() > 10);
+    let lossy = "UklGRloAAABXRUJQVlA4IE4AAADQAgCdASoQABAAAMASJbACdHMBMAH6ALEAE3ctuVroAP7/25Ju3CH22WwE6y5cQSCFn/xykcgP6B0+y8YTRif/7lC9F//3pm9Ank0AAAA=";
+    files.push(STANDARD.decode(lossy).unwrap());
+    let pixels = colour.to_rgb8();
+    let profile = rgb_profile("Display P3", DISPLAY_P3, &srgb_curve());
+    files.push(png_with_profile(&pixels, &profile));
+    files.push(webp_with_profile(&pixels, &profile));
+    files.push(turned_png(&pixels, 6));
+    let light: Vec<f32> = pixels.iter().map(|code| f32::from(*code) / 64.0).collect();
+    for compression in [
+        Compression::Uncompressed,
+        Compression::RLE,
+        Compression::ZIP16,
+        Compression::PIZ,
+        Compression::PXR24,
+        Compression::B44,
+    ] {
+        files.push(compressed([37, 21], &light, compression));
+    }
     for progressive in [false, true] {
         let mut file = Vec::new();
         let mut encoder = jpeg_encoder::Encoder::new(&mut file, 80);
@@ -150,11 +190,7 @@ fn read_mutated(rounds: usize) -> [usize; 2] {
     for round in 0..rounds {
         let bytes = mutate(&corpus[round % corpus.len()], &mut random);
         let place = format!("mutation {round}");
-        let picture = Picture::Encoded {
-            bytes,
-            place,
-            most_pixels: MOST_PIXELS,
-        };
+        let picture = ImageFile::new(bytes, place, ReadingRule::default());
         // What passes the check may still not decode: an error, no more.
         let _ = picture.check();
         match picture.decode() {
@@ -171,11 +207,29 @@ fn read_mutated(rounds: usize) -> [usize; 2] {
     counts
 }
 
-/// What a whole image of the most pixels takes, at 8 bytes a pixel.
-const MOST_BYTES: usize = MOST_PIXELS as usize * 8;
+/// What a whole image of the most pixels takes, at 12 bytes a pixel: three floats.
+const MOST_BYTES: usize = MOST_PIXELS as usize * 12;
+
+/// The tests of this file run one after another, because the allocator counts for all of them.
+static ALONE: Mutex<()> = Mutex::new(());
+
+#[test]
+fn a_profile_that_grows_without_bound_takes_no_memory() {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let pixels = image::RgbImage::new(4, 4);
+    let bytes = png_with_profile(&pixels, &vec![0; 256 << 20]);
+    let file = ImageFile::new(bytes, "a bomb".to_owned(), ReadingRule::default());
+    LARGEST.store(0, Ordering::Relaxed);
+    let (digest, error) = (file.digest(), file.decode().unwrap_err());
+    assert_eq!(digest, file.digest());
+    assert!(error.to_string().contains("ICC profile"), "{error}");
+    assert!(LARGEST.load(Ordering::Relaxed) <= 16 << 20);
+}
 
 #[test]
 fn ten_thousand_broken_images_are_read_or_refused() {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    LARGEST.store(0, Ordering::Relaxed);
     let [read, refused] = read_mutated(10_000);
     assert!(
         read > 500 && refused > 5000,
@@ -187,6 +241,8 @@ fn ten_thousand_broken_images_are_read_or_refused() {
 #[test]
 #[ignore = "a million files"]
 fn a_million_broken_images_are_read_or_refused() {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    LARGEST.store(0, Ordering::Relaxed);
     read_mutated(1_000_000);
     assert!(LARGEST.load(Ordering::Relaxed) <= MOST_BYTES);
 }

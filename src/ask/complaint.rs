@@ -161,7 +161,7 @@ impl Complaint {
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum UnreadableReply {
     /// The body states an error.
-    Complaint(Complaint),
+    Complaint(Box<Complaint>),
     /// The body is not a reply of the API; the text says what it is.
     Other(String),
 }

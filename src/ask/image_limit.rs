@@ -108,6 +108,8 @@ mod tests {
             width,
             height: 10,
             format: "png".into(),
+            orientation: None,
+            exposure: None,
         };
         let limit = ImageLimit::of(&"https://api.anthropic.com/v1".parse().unwrap());
         assert!(limit.check(&image(3_750_000, 8000)).is_ok());

@@ -14,7 +14,7 @@ use image::{ExtendedColorType, ImageBuffer, ImageEncoder as _, imageops};
 
 use super::plain_png;
 use crate::error::{Error, Result};
-use crate::types::{Decides, Digest, ImageFacts, Rgb};
+use crate::types::{Decides, Digest, ExposureFacts, ImageFacts, Rgb};
 
 /// The file format in which images are sent: PNG or JPEG, because servers refuse others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -140,6 +140,20 @@ impl Payload {
         fitted(width, height, max_side).unwrap_or((width, height))
     }
 
+    /// The same payload, of a frame that was turned by this EXIF orientation when its file was read.
+    #[must_use]
+    pub(crate) fn turned_by(mut self, orientation: Option<u8>) -> Self {
+        self.facts.orientation = orientation;
+        self
+    }
+
+    /// The image with what the camera did for it.
+    #[must_use]
+    pub(crate) fn exposed_by(mut self, exposure: Option<ExposureFacts>) -> Self {
+        self.facts.exposure = exposure;
+        self
+    }
+
     /// The facts for the record: digest and size of the encoded file, width, height and format.
     #[must_use]
     pub fn facts(&self) -> &ImageFacts {
@@ -206,6 +220,8 @@ impl Payload {
                 width: width as usize,
                 height: height as usize,
                 format: format.name().to_owned(),
+                orientation: None,
+                exposure: None,
             },
             data_url: url.into(),
         }

@@ -9,6 +9,7 @@ use crate::job::batch::BatchFileArgs;
 use crate::job::merge::MergeArgs;
 use crate::job::report::ReportArgs;
 use crate::run::batch::BatchImportArgs;
+use crate::run::calibrate::CalibrateArgs;
 use crate::run::enhance::EnhanceArgs;
 use crate::run::evaluate::EvaluateArgs;
 use crate::run::export::ExportArgs;
@@ -78,6 +79,8 @@ pub(crate) enum Command {
     Synthesize(Box<SynthesizeArgs>),
     /// Compare the synthesis with real pairs of images in normal and low light
     Realism(Box<RealismArgs>),
+    /// Measure your own camera, from bias frames and pairs of flats of its sensor, as a file for --camera
+    Calibrate(Box<CalibrateArgs>),
     /// Make multiple-choice questions about frames, by rule, from their depth, class and segment maps
     Questions(Box<QuestionsArgs>),
     /// Import frames of another data set as a folder of frames

@@ -116,6 +116,7 @@ fn carry_out(cli: Cli, progress: &Progress) -> Result<Outcome> {
     match command {
         Command::Synthesize(args) => run::synthesize::synthesize(&args, progress),
         Command::Realism(args) => run::realism::realism(&args, progress),
+        Command::Calibrate(args) => run::calibrate::calibrate(&args, progress),
         Command::Questions(args) => run::questions::questions(&args, progress),
         Command::Import(args) => run::import::import(&args, progress),
         Command::Export(args) => run::export::export(&args, progress),

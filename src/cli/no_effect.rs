@@ -8,14 +8,16 @@ use clap::{ArgMatches, Args, Command as Clap};
 use super::command::{BatchCommand, Cli, Command};
 use super::layers;
 use crate::ask::{AccessArgs, ImageArgs, Parameters, Sending};
+use crate::dataset::CodesArgs;
 use crate::enhance::{EnhancerArgs, ProbeArgs, RuntimeArgs, SizeArgs};
 use crate::job::batch::BatchFileArgs;
 use crate::job::models::ModelName;
 use crate::job::settings::JobArgs;
 use crate::run::evaluate::{EvaluateArgs, ShrinkArgs};
 use crate::run::openeqa::{JudgeArgs, OpenEqaArgs};
+use crate::run::synthesize::Sheet;
 use crate::score::realism::residual::Bins;
-use crate::synthesis::{LightArgs, SensorArgs};
+use crate::synthesis::{CameraArgs, LightArgs, SensorArgs};
 use crate::types::degradation::Kind;
 
 /// One line for each reason why flags of the call have no effect.
@@ -35,11 +37,9 @@ pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
                 let why = "--from makes an image with the settings in its file";
                 idle.because(why, &light());
             }
-            if args.sheet.is_some() {
-                idle.because(
-                    "a sheet decides which variants it shows",
-                    &["variant".into()],
-                );
+            if args.sheet == Some(Sheet::Noise) {
+                let why = "this sheet shows the noise variant";
+                idle.because(why, &[vec!["variant".into()], camera()].concat());
             }
             idle.light(&args.light);
         }
@@ -54,7 +54,8 @@ pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
         Some(Command::Enhance(args)) if args.describe => {
             let others = ["force".into(), "max_pixels".into()];
             let why = "--describe enhances nothing";
-            idle.because(why, &[ids::<SizeArgs>(), others.to_vec()].concat());
+            let flags = [ids::<SizeArgs>(), ids::<CodesArgs>(), others.to_vec()];
+            idle.because(why, &flags.concat());
         }
         _ => {}
     }
@@ -77,6 +78,14 @@ fn light() -> Vec<String> {
 fn sensor() -> Vec<String> {
     without_seed(ids::<SensorArgs>())
 }
+
+/// The flags that decide only automatic exposure and motion blur.
+fn camera() -> Vec<String> {
+    ids::<CameraArgs>()
+}
+
+/// The flags of the sensor that automatic exposure takes: the others decide only the noise variant.
+const OF_AUTO: [&str; 2] = ["camera", "fixed"];
 
 fn without_seed(mut ids: Vec<String>) -> Vec<String> {
     ids.retain(|id| id != "seed");
@@ -168,7 +177,13 @@ impl NoEffect {
     ) {
         let models = &args.models;
         if models.blind || models.model.is_empty() {
-            let shown = [light(), enhancement(), ids::<ImageArgs>(), images.to_vec()];
+            let shown = [
+                light(),
+                enhancement(),
+                ids::<ImageArgs>(),
+                ids::<CodesArgs>(),
+                images.to_vec(),
+            ];
             let shown = [shown.concat(), vec!["detail".into(), "max_image".into()]].concat();
             self.because("no model is shown an image", &shown);
         }
@@ -200,10 +215,23 @@ impl NoEffect {
     fn light(&mut self, args: &LightArgs) {
         let kinds: Vec<Kind> = args.variant.kinds().collect();
         if args.levels.0.iter().all(|level| level.severity().is_none()) {
-            let idle = [sensor(), vec!["variant".into()]].concat();
+            let idle = [sensor(), camera(), vec!["variant".into()]].concat();
             self.because("the only level is L0, which is not degraded", &idle);
-        } else if !kinds.iter().any(|kind| kind.has_readings()) {
+            return;
+        }
+        if !kinds.iter().any(|kind| kind.has_noise()) {
             self.because("no variant has noise", &sensor());
+        } else if !kinds.iter().any(|kind| kind.has_readings()) {
+            let mut idle = sensor();
+            idle.retain(|id| !OF_AUTO.contains(&&**id));
+            let why = "automatic exposure has the reading physical, and a gain of its own (--auto)";
+            self.because(why, &idle);
+        }
+        if !kinds.contains(&Kind::Auto) {
+            self.because("no variant has automatic exposure", &["auto".into()]);
+        }
+        if !kinds.iter().any(|kind| kind.has_motion()) {
+            self.because("no variant has motion blur", &["motion".into()]);
         }
     }
 
@@ -239,6 +267,10 @@ mod tests {
         (
             "--blind-model m --max-side 9 --image jpeg:9 --detail low",
             "--image, --max-side, --detail: no effect: no model is shown",
+        ),
+        (
+            "--blind-model m --colour ignore --transfer linear --exposure 1",
+            "--colour, --transfer, --exposure: no effect: no model is shown",
         ),
         (
             "--model m --levels L0 --variant ev --ratio 9 --fixed",
@@ -294,7 +326,27 @@ mod tests {
         ),
         (
             "synthesize a --out b --sheet noise --variant ev",
-            "--variant: no effect: a sheet",
+            "--variant: no effect: this sheet",
+        ),
+        (
+            "--model m --motion speed=3",
+            "--motion: no effect: no variant has motion blur",
+        ),
+        (
+            "--model m --auto gain=3",
+            "--auto: no effect: no variant has automatic exposure",
+        ),
+        (
+            "--model m --variant motion --profile eld --gain 1",
+            "--profile, --gain: no effect: no variant has noise",
+        ),
+        (
+            "--model m --variant auto --profile eld --gain 1 --camera nikon-d850",
+            "--profile, --gain: no effect: automatic exposure has",
+        ),
+        (
+            "export llava a --out b --levels L0 --auto gain=3",
+            "--auto: no effect: the only level is L0",
         ),
         (
             "synthesize a --out b --levels L0 --tone none",
@@ -329,6 +381,9 @@ mod tests {
             "--model observer --observer-controls",
             "openeqa --questions q --frames f --model script:a --judge j --judge-temperature 1 --rpm 9",
             "synthesize a --out b --sheet levels --profile eld",
+            "synthesize a --out b --sheet levels --variant ev",
+            "--model m --variant ev,motion --motion speed=3",
+            "--model m --variant auto --auto gain=3 --motion speed=3 --camera nikon-d850 --fixed",
             "export llava a --out b --llie f.onnx --llie-on both",
             "--model m --levels L0 --llie f.onnx --llie-on l0 --tile whole",
             "realism a --kl-empty drop",

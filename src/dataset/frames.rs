@@ -11,7 +11,7 @@
 //! - `dataset.json`: `{"schema": "darkqa.dataset/1", "name", "depth_kind"}`; the last two are optional.
 //! - `scenes/<scene>/segments.json`: the segments that have names, `{"7": {"name", "canonical", "region"}}`.
 //!
-//! Without the list, every PNG and JPEG file in the folder is a frame, named by its file name. The questions are in
+//! Without the list, every PNG, JPEG, WebP and TIFF file in the folder is a frame, named by its file name. The questions are in
 //! `questions.jsonl` in the same folder.
 
 use std::collections::BTreeMap;
@@ -21,11 +21,13 @@ use std::sync::Arc;
 
 use serde::Deserialize;
 
+use super::image_file::format::READ;
+use super::image_names::{ImageNames, is_image};
 use super::maps::{DepthFile, MapPaths};
 use super::view::FrameFacts;
 use super::{Dataset, ImageSource, questions, stem};
 use crate::error::{Error, Result};
-use crate::files::reading::{entries, is_image, json, json_lines};
+use crate::files::reading::{entries, json, json_lines};
 use crate::labels;
 use crate::types::{DepthKind, FrameId, Intrinsics, Labels, SegmentName, Segmentation};
 
@@ -241,17 +243,16 @@ fn frames_of_list(folder: &Path, list: &Path) -> Result<BTreeMap<FrameId, ImageS
 
 fn images(folder: &Path) -> Result<BTreeMap<FrameId, ImageSource>> {
     let mut sources = BTreeMap::new();
-    let (images, others): (Vec<PathBuf>, Vec<PathBuf>) = entries(folder)?
-        .into_iter()
-        .partition(|path| is_image(path));
-    for path in images {
+    let all = entries(folder)?;
+    let names = ImageNames::of(all.clone());
+    for path in &names.images {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        sources.insert(FrameId(name.into_owned()), ImageSource::image(path));
+        sources.insert(FrameId(name.into_owned()), ImageSource::image(path.clone()));
     }
     if sources.is_empty() {
         let has_images =
             |inner: &&PathBuf| entries(inner).is_ok_and(|of| of.iter().any(|path| is_image(path)));
-        let remedy = others
+        let remedy = all
             .iter()
             .find(has_images)
             .map_or_else(String::new, |inner| {
@@ -260,10 +261,14 @@ fn images(folder: &Path) -> Result<BTreeMap<FrameId, ImageSource>> {
                     inner.display()
                 )
             });
+        let unread = names
+            .unread()
+            .map_or(String::new(), |unread| format!("; {unread}"));
         let problem =
-            format_args!("neither a {FRAMES} nor any PNG or JPEG image in this folder{remedy}");
+            format_args!("neither a {FRAMES} nor any {READ} image in this folder{unread}{remedy}");
         return Err(Error::data(folder.display(), problem));
     }
+    names.warn_of_unread(folder);
     Ok(sources)
 }
 

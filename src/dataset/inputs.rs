@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 
-use super::{Dataset, Picture};
+use super::{Dataset, Picture, ReadingRule};
 use crate::error::{Error, Result};
 use crate::types::FrameId;
 
@@ -26,10 +26,10 @@ impl Inputs {
     ///
     /// # Errors
     /// If an input is missing, two frames would have the same name, or a name leads out of the output folder.
-    pub(crate) fn open(inputs: &[PathBuf], most_pixels: u64) -> Result<Self> {
+    pub(crate) fn open(inputs: &[PathBuf], rule: ReadingRule) -> Result<Self> {
         let sets: Vec<Dataset> = inputs
             .iter()
-            .map(|path| Ok(Dataset::of_images(path)?.with_most_pixels(most_pixels)))
+            .map(|path| Ok(Dataset::of_images(path)?.with_rule(rule)))
             .collect::<Result<_>>()?;
         let mut entries = Vec::new();
         let mut used_names: BTreeMap<String, String> = BTreeMap::new();
@@ -52,6 +52,11 @@ impl Inputs {
 
     pub(crate) fn picture(&self, entry: &InputFrame) -> Result<Picture> {
         self.sets[entry.set].picture(&entry.id)
+    }
+
+    /// The focal length of a frame along a row, in pixels of its image; `None` if it is not known.
+    pub(crate) fn focal(&self, entry: &InputFrame) -> Option<f64> {
+        self.sets[entry.set].focal(&entry.id)
     }
 }
 

@@ -108,6 +108,30 @@ impl MapPaths {
         segments: None,
     };
 
+    /// Whether the frame has no maps.
+    pub(super) fn is_empty(&self) -> bool {
+        self.depth.is_none() && self.semantic.is_none() && self.segments.is_none()
+    }
+
+    /// The paths of the files with height and width of the maps, from their headers.
+    ///
+    /// # Errors
+    /// If a file cannot be read or is not a map; the error names it.
+    pub(super) fn sizes(&self) -> Result<Vec<(&Path, Size)>> {
+        let depth = self.depth.as_ref().map(DepthFile::path);
+        let files = [depth, self.semantic.as_deref(), self.segments.as_deref()];
+        let sizes = files.into_iter().flatten().map(|path| {
+            let bytes = fs::read(path).map_err(|e| Error::file(path, "read", e))?;
+            let size = if is_npy(path) {
+                Npy::parse(&bytes).map(|npy| npy.size)
+            } else {
+                RawPng::open(&bytes, &SampleForm::ALL).map(|png| png.size)
+            };
+            Ok((path, in_file(path, size)?))
+        });
+        sizes.collect()
+    }
+
     /// The bytes of the files, not decoded.
     ///
     /// # Errors
@@ -182,11 +206,10 @@ impl MapFiles<'_> {
 }
 
 /// Height and width in pixels.
-type Size = (usize, usize);
+pub(super) type Size = (usize, usize);
 
 fn semantic(bytes: &[u8], size: Size) -> Result<Array2<u16>, String> {
-    let forms = [SampleForm::Grey8, SampleForm::Grey16, SampleForm::Palette];
-    let ids = png(bytes, &forms, size, |id| id)?;
+    let ids = png(bytes, &SampleForm::ALL, size, |id| id)?;
     Array2::from_shape_vec(size, ids).map_err(|e| e.to_string())
 }
 

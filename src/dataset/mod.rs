@@ -3,11 +3,13 @@
 //! The entry point is [`Dataset::open`]. The path decides the reader: a folder of frames ([`frames`]) or a
 //! ready-made multiple-choice set ([`multiple_choice`]). Without a path the data are the built-in rooms ([`rooms`]).
 
+mod colour;
 mod dialect;
 pub(crate) mod frame_folder;
 pub(crate) mod frames;
+pub(crate) mod image_file;
+pub(crate) mod image_names;
 pub(crate) mod inputs;
-mod jpeg;
 pub(crate) mod maps;
 pub(crate) mod multiple_choice;
 pub(crate) mod npy;
@@ -16,13 +18,13 @@ pub(crate) mod pairs;
 pub(crate) mod picture;
 pub(crate) mod questions;
 pub(crate) mod raw_png;
+pub(crate) mod reading_rule;
 mod settings;
 mod sibling_files;
 mod table;
 mod view;
 
 use std::collections::{BTreeMap, HashSet};
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
@@ -30,10 +32,11 @@ use crate::error::{Error, Result};
 use crate::rooms::{self, Rooms};
 use crate::types::{Frame, FrameId, Labels, Question};
 
+pub(crate) use image_file::ImageFile;
 use maps::MapPaths;
-use picture::MOST_PIXELS;
 pub(crate) use picture::Picture;
-pub(crate) use settings::{DataArgs, PixelLimit, SelectionArgs, place};
+pub(crate) use reading_rule::ReadingRule;
+pub(crate) use settings::{CodesArgs, DataArgs, PixelLimit, SelectionArgs, place};
 use view::FrameFacts;
 pub(crate) use view::FrameFiles;
 
@@ -81,7 +84,7 @@ pub struct Dataset {
     pub(crate) sources: BTreeMap<FrameId, ImageSource>,
     questions: Vec<Question>,
     labels: Option<Labels>,
-    most_pixels: u64,
+    rule: ReadingRule,
 }
 
 impl Dataset {
@@ -96,7 +99,7 @@ impl Dataset {
             sources,
             questions,
             labels: None,
-            most_pixels: MOST_PIXELS,
+            rule: ReadingRule::default(),
         }
     }
 
@@ -188,13 +191,10 @@ impl Dataset {
         self.labels.as_ref()
     }
 
-    /// The same data set with another limit of pixels per image than [`MOST_PIXELS`].
+    /// The same data set, whose images are read by this rule.
     #[must_use]
-    pub fn with_most_pixels(self, most_pixels: u64) -> Self {
-        Self {
-            most_pixels,
-            ..self
-        }
+    pub fn with_rule(self, rule: ReadingRule) -> Self {
+        Self { rule, ..self }
     }
 
     /// The ids of the frames, in alphabetical order.
@@ -275,21 +275,31 @@ impl Dataset {
     }
 
     /// The image of a frame as it is stored, not decoded.
+    ///
+    /// # Errors
+    /// If there is no such frame, its file cannot be read, or the image is to be turned and its maps do not fit.
     pub fn picture(&self, frame: &FrameId) -> Result<Picture> {
         match self.sources.get(frame) {
-            Some(ImageSource::File { rgb: path, .. }) => fs::read(path)
-                .map(|bytes| Picture::Encoded {
-                    bytes,
-                    place: path.display().to_string(),
-                    most_pixels: self.most_pixels,
-                })
-                .map_err(|e| Error::file(path, "read", e)),
-            Some(ImageSource::Cell(cell)) => cell.picture(self.most_pixels),
-            Some(ImageSource::Room(room)) => Ok(Picture::Drawn(room.clone())),
+            Some(ImageSource::File { rgb, maps, .. }) => {
+                let file = ImageFile::open(rgb, self.rule)?;
+                file.beside(maps).map(Picture::Encoded)
+            }
+            Some(ImageSource::Cell(cell)) => cell.image(self.rule).map(Picture::Encoded),
+            Some(ImageSource::Room(room)) => Ok(Picture::Drawn(room.clone(), self.rule)),
             None => Err(Error::data(
                 &self.name,
                 format_args!("no frame {:?} in it", frame.0),
             )),
+        }
+    }
+
+    /// The focal length of a frame along a row, in pixels of its image; `None` if the data set does not state it.
+    #[must_use]
+    pub fn focal(&self, frame: &FrameId) -> Option<f64> {
+        match self.sources.get(frame)? {
+            ImageSource::File { view, .. } => view.intrinsics.map(|camera| camera.fx),
+            ImageSource::Room(room) => Some(room.focal()),
+            ImageSource::Cell(_) => None,
         }
     }
 
@@ -355,6 +365,8 @@ fn stem(path: &Path) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]

@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use super::image_names::ImageNames;
 use crate::error::{Error, Result};
-use crate::files::reading::{entries, is_image};
+use crate::files::reading::entries;
 
 /// The folder names of pairs, normal light first, as in LISU, in LOL and by plain words.
 const FOLDERS: [[&str; 2]; 3] = [
@@ -61,7 +62,7 @@ impl Pairs {
         }
         let mut sides = [BTreeMap::new(), BTreeMap::new()];
         let mut unmatched = Vec::new();
-        for path in images(entries) {
+        for path in images(entries, folder) {
             match role(&stem(&path)) {
                 (name, Some(light)) => add(&mut sides[light as usize], name, &path)?,
                 (_, None) => unmatched.push(path),
@@ -80,7 +81,7 @@ impl Pairs {
     pub(crate) fn of_folders(normal: &Path, low: &Path) -> Result<Self> {
         let mut sides = [BTreeMap::new(), BTreeMap::new()];
         for (side, folder) in sides.iter_mut().zip([normal, low]) {
-            for path in images(entries(folder)?) {
+            for path in images(entries(folder)?, folder) {
                 add(side, role(&stem(&path)).0, &path)?;
             }
         }
@@ -142,8 +143,11 @@ fn role(stem: &str) -> (String, Option<PairSide>) {
     }
 }
 
-fn images(paths: Vec<PathBuf>) -> impl Iterator<Item = PathBuf> {
-    paths.into_iter().filter(|path| is_image(path))
+/// The images among the paths of a folder. Says how many others look like images and are not read.
+fn images(paths: Vec<PathBuf>, folder: &Path) -> Vec<PathBuf> {
+    let names = ImageNames::of(paths);
+    names.warn_of_unread(folder);
+    names.images
 }
 
 fn file_name(path: &Path) -> String {

@@ -7,7 +7,7 @@ use std::io::Cursor;
 
 use png::{BitDepth, ColorType, Decoder, DecodingError, Reader, Transformations};
 
-use super::picture::MOST_PIXELS;
+use super::reading_rule::MOST_PIXELS;
 use crate::types::words::words;
 
 /// The form of the samples of a PNG file.
@@ -17,6 +17,10 @@ pub(crate) enum SampleForm {
     Grey16,
     /// Palette indices of 1 to 8 bits.
     Palette,
+}
+
+impl SampleForm {
+    pub(super) const ALL: [Self; 3] = [Self::Grey8, Self::Grey16, Self::Palette];
 }
 
 words!(SampleForm { Grey8 = "8-bit grey", Grey16 = "16-bit grey", Palette = "palette" });

@@ -1,4 +1,4 @@
-//! The flags for data: [`DataArgs`], [`SelectionArgs`], [`PixelLimit`].
+//! The flags for data: [`DataArgs`], [`SelectionArgs`], [`PixelLimit`], [`CodesArgs`].
 
 use std::convert::Infallible;
 use std::fmt;
@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::DataPlace;
-use super::picture::MOST_PIXELS;
+use super::reading_rule::{ColourRule, MOST_PIXELS, ReadingRule, Transfer};
 use crate::rooms::Rooms;
 use crate::types::{Decides, Family};
 
@@ -16,7 +16,7 @@ use crate::types::{Decides, Family};
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Data")]
 pub(crate) struct DataArgs {
-    /// A folder of frames, a ready-made set (.tsv, .jsonl), or built-in rooms, rooms:frames=N,seed=N,size=WIDTHxHEIGHT
+    /// A folder of frames, a ready-made set (.tsv, .jsonl), or built-in rooms, rooms:frames=N,seed=N,size=WIDTHxHEIGHT,light=linear
     #[arg(long, value_name = "DIR|FILE|rooms:…", value_parser = place, default_value_t, add = Decides::Reply)]
     pub data: DataPlace,
 }
@@ -47,6 +47,40 @@ pub(crate) struct PixelLimit {
     /// The maximum number of pixels of an image; a larger one is refused before it is decoded
     #[arg(long, value_name = "N", default_value_t = NonZeroU64::new(MOST_PIXELS).unwrap_or(NonZeroU64::MIN), add = Decides::Nothing)]
     pub max_pixels: NonZeroU64,
+}
+
+/// The flags for what the codes of images mean.
+#[derive(Debug, Clone, Copy, Default, Args)]
+#[command(next_help_heading = "Data")]
+pub(crate) struct CodesArgs {
+    /// What is done about images whose file states other colours than sRGB (an ICC profile, cICP, gAMA)
+    #[arg(long, value_enum, default_value_t, add = Decides::Pixels)]
+    pub colour: ColourRule,
+    /// What the samples of 16-bit PNG and TIFF images are; OpenEXR images are always linear light, 8 bits never
+    #[arg(long, value_enum, default_value_t, add = Decides::Pixels)]
+    pub transfer: Transfer,
+    /// Scale linear light by this many EV before everything else, -20 to 20; default: not at all
+    #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = exposure, add = Decides::Pixels)]
+    pub exposure: Option<f32>,
+}
+
+/// The number of EV in a text by which light is scaled.
+fn exposure(text: &str) -> Result<f32, String> {
+    let ev = text.parse().ok();
+    let ev = ev.filter(|ev| (-20.0..=20.0).contains(ev));
+    ev.ok_or_else(|| "a number from -20 to 20 expected".to_owned())
+}
+
+impl CodesArgs {
+    /// The rule by which images are read.
+    pub(crate) fn rule(self, limit: PixelLimit) -> ReadingRule {
+        ReadingRule {
+            most_pixels: limit.max_pixels.get(),
+            colour: self.colour,
+            transfer: self.transfer,
+            exposure_ev: self.exposure,
+        }
+    }
 }
 
 /// The place in a text: a path, `rooms` or `rooms:frames=48,seed=7,size=1280x720`. A file or folder named `rooms` is a path.

@@ -13,7 +13,7 @@ use base64::engine::general_purpose::STANDARD;
 use csv::{ByteRecord, Position, Reader, ReaderBuilder, StringRecord};
 
 use super::sibling_files::SiblingFiles;
-use super::{ImageSource, Picture, questions};
+use super::{ImageFile, ImageSource, ReadingRule, questions};
 use crate::error::{Error, Result};
 use crate::types::question::letter;
 use crate::types::{Choices, Family, FrameId, Question, QuestionId};
@@ -199,7 +199,7 @@ pub(crate) struct ImageCell {
 }
 
 impl ImageCell {
-    pub(super) fn picture(&self, most_pixels: u64) -> Result<Picture> {
+    pub(super) fn image(&self, rule: ReadingRule) -> Result<ImageFile> {
         let place = format!("{}, line {}", self.file.display(), self.position.line());
         let mut reader = reader(&self.file)?;
         let mut row = ByteRecord::new();
@@ -224,10 +224,6 @@ impl ImageCell {
         let bytes = STANDARD
             .decode(&text)
             .map_err(|e| Error::data(&place, format_args!("the image is not base64: {e}")))?;
-        Ok(Picture::Encoded {
-            bytes,
-            place,
-            most_pixels,
-        })
+        Ok(ImageFile::new(bytes, place, rule))
     }
 }

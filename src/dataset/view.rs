@@ -8,7 +8,9 @@ use serde::{Serialize, Serializer};
 use super::Picture;
 use super::maps::MapFiles;
 use crate::error::Result;
-use crate::types::{DepthKind, Digest, Frame, FrameId, Intrinsics, SegmentName, Segmentation};
+use crate::types::{
+    DepthKind, Digest, Frame, FrameId, InputNote, Intrinsics, SegmentName, Segmentation,
+};
 
 /// The facts about a frame that are not in its images: scene, camera, names of segments, room.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -55,13 +57,22 @@ impl FrameFiles<'_> {
         ))
     }
 
+    /// What reading the image does besides taking its codes.
+    #[must_use]
+    pub fn note(&self) -> InputNote {
+        self.picture.note()
+    }
+
     /// The frame with its image and maps decoded.
     ///
     /// # Errors
     /// If an image or a map is broken, or a map has another size than the image; the error names the file.
     pub fn decode(&self) -> Result<Frame> {
-        if let Picture::Drawn(room) = &self.picture {
-            return Ok(room.frame()?.as_ref().clone());
+        if let Picture::Drawn(room, _) = &self.picture {
+            return Ok(Frame {
+                rgb: self.picture.decode()?,
+                ..room.frame()?.as_ref().clone()
+            });
         }
         let rgb = self.picture.decode()?;
         let size = (rgb.height(), rgb.width());

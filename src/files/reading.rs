@@ -21,12 +21,6 @@ pub(crate) fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-/// Whether a path is a file with the ending of an image: png, jpg or jpeg.
-pub(crate) fn is_image(path: &Path) -> bool {
-    let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
-    path.is_file() && ["png", "jpg", "jpeg"].iter().any(|known| ending == *known)
-}
-
 /// The bytes of a file.
 ///
 /// # Errors

@@ -7,11 +7,14 @@ use ndarray::Array2;
 
 use crate::dataset::maps::DepthFile;
 use crate::dataset::npy::Npy;
-use crate::dataset::picture::{MOST_PIXELS, Picture};
 use crate::dataset::raw_png::{RawPng, SampleForm};
+use crate::dataset::{ImageFile, ReadingRule};
 use crate::error::{Error, Result};
 use crate::files::reading::{bytes, entries, text};
 use crate::types::Rgb;
+
+/// The endings of the names of images.
+pub(super) const IMAGES: [&str; 7] = [".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".exr"];
 
 /// The folders in a folder, sorted by name.
 pub(super) fn folders(folder: &Path) -> Result<Vec<PathBuf>> {
@@ -44,16 +47,10 @@ pub(super) fn first_folder(folder: &Path, names: &[&str]) -> Option<PathBuf> {
         .find(|path| path.is_dir())
 }
 
-/// Reads and decodes an image.
+/// Reads and decodes an image of ids as it is stored.
 pub(super) fn image(path: &Path) -> Result<Rgb> {
-    let bytes = bytes(path)?;
-    let place = path.display().to_string();
-    Picture::Encoded {
-        bytes,
-        place,
-        most_pixels: MOST_PIXELS,
-    }
-    .decode()
+    let file = ImageFile::open(path, ReadingRule::default())?;
+    file.never_turned().decode()
 }
 
 /// The last part of a path, as text.

@@ -6,9 +6,13 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, StatedArgs, labels};
-use super::files::{check_same_size, depth_of, files, first_folder, folders, png, segments};
+use super::files::{
+    IMAGES, check_same_size, depth_of, files, first_folder, folders, png, segments,
+};
+use crate::dataset::image_names::ImageNames;
 use crate::dataset::raw_png::SampleForm;
 use crate::error::{Error, Result};
+use crate::files::reading::entries;
 use crate::types::{Labels, Rgb};
 
 /// Names of the folders of images, depth, classes and segments.
@@ -41,6 +45,8 @@ pub(super) struct Folder {
     depth_scale: Option<f64>,
     /// Conversion from the numbers of the class maps to those of the label space.
     offset: NumberOffset,
+    /// The files in the folders of images.
+    beside: Vec<PathBuf>,
 }
 
 /// Offset of the numbers of class maps from those of the label space.
@@ -89,6 +95,7 @@ impl Folder {
             maps: Vec::new(),
             depth_scale: stated.depth_scale,
             offset,
+            beside: Vec::new(),
         };
         if first_folder(folder, &RGB).is_some() {
             set.add(folder)?;
@@ -100,6 +107,7 @@ impl Folder {
                 }
             }
         }
+        ImageNames::of(std::mem::take(&mut set.beside)).warn_of_unread(folder);
         Ok(set)
     }
 
@@ -113,7 +121,10 @@ impl Folder {
             Some(folder) => files(&folder, endings),
             None => Ok(BTreeMap::new()),
         };
-        let images = in_any(&RGB, &[".png", ".jpg", ".jpeg"])?;
+        let images = in_any(&RGB, &IMAGES)?;
+        if let Some(folder) = first_folder(folder, &RGB) {
+            self.beside.extend(entries(&folder)?);
+        }
         let mut depths = in_any(&DEPTH, &[".npy", ".png"])?;
         let mut classes = in_any(&CLASSES, &[".png"])?;
         let mut segments = in_any(&SEGMENTS, &[".npy", ".png"])?;

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, StatedArgs, class_numbers};
-use super::files::{check_same_size, depth_of, file_name, files, folders, segments};
+use super::files::{IMAGES, check_same_size, depth_of, file_name, files, folders, segments};
 use super::{hm3d, mp3d, replica};
 use crate::error::{Error, Result};
 use crate::files::reading::{json_lines, text};
@@ -75,7 +75,7 @@ impl Habitat {
     fn add(&mut self, folder: &Path) -> Result<()> {
         let name = file_name(folder);
         let (scene, names) = self.scene(folder)?;
-        let images = files(&folder.join("rgb"), &[".png", ".jpg", ".jpeg"])?;
+        let images = files(&folder.join("rgb"), &IMAGES)?;
         let depths = files(&folder.join("depth"), &[".npy", ".png"])?;
         let semantics = files(&folder.join("semantic"), &[".npy", ".png"])?;
         let mut steps = steps(&folder.join("trajectory.jsonl"))?;

@@ -12,7 +12,9 @@ use ndarray::Array2;
 use serde::Deserialize;
 
 use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, StatedArgs};
-use super::files::{check_same_size, depth, file_name, files, first_folder, folders, numbers, png};
+use super::files::{
+    IMAGES, check_same_size, depth, file_name, files, first_folder, folders, numbers, png,
+};
 use crate::dataset::raw_png::SampleForm;
 use crate::error::{Error, Result};
 use crate::files::reading::{json, text};
@@ -108,7 +110,7 @@ impl Scannet {
         };
         let depths = within(&["depth"])?;
         let poses = files(&folder.join("pose"), &[".txt"])?;
-        for (frame, rgb) in files(&folder.join("color"), &[".jpg", ".jpeg", ".png"])? {
+        for (frame, rgb) in files(&folder.join("color"), &IMAGES)? {
             let pose = poses.get(&frame).map(|path| numbers(path)).transpose()?;
             if pose
                 .as_ref()

@@ -13,7 +13,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing};
-use super::files::{check_same_size, file_name, files, folders, numbers, png};
+use super::files::{IMAGES, check_same_size, file_name, files, folders, numbers, png};
 use super::polygons::{Polygon, draw};
 use crate::dataset::raw_png::SampleForm;
 use crate::error::{Error, Result};
@@ -93,10 +93,7 @@ impl SunRgbd {
     }
 
     fn add(&mut self, folder: &Path, parents: &[String], annotation: PathBuf) -> Result<()> {
-        let Some(rgb) = files(&folder.join("image"), &[".jpg", ".jpeg", ".png"])?
-            .into_values()
-            .next()
-        else {
+        let Some(rgb) = files(&folder.join("image"), &IMAGES)?.into_values().next() else {
             return Err(Error::data(
                 folder.join("image").display(),
                 "no image in this folder",

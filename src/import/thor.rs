@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use ndarray::Array2;
 
 use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, StatedArgs, class_numbers};
-use super::files::{check_same_size, depth_of, file_name, files, folders, image};
+use super::files::{IMAGES, check_same_size, depth_of, file_name, files, folders, image};
 use crate::error::{Error, Result};
 use crate::files::reading::json;
 use crate::labels::names;
@@ -50,7 +50,7 @@ impl Thor {
         let (colors, names) = scene(&folder.join("colors.json"))?;
         let depths = files(&folder.join("depth"), &[".npy", ".png"])?;
         let instances = files(&folder.join("instance"), &[".png"])?;
-        for (frame, rgb) in files(&folder.join("rgb"), &[".png", ".jpg", ".jpeg"])? {
+        for (frame, rgb) in files(&folder.join("rgb"), &IMAGES)? {
             let Some(instance) = instances.get(&frame) else {
                 let problem = format_args!("no instances of the frame {frame:?}");
                 return Err(Error::data(folder.join("instance").display(), problem));

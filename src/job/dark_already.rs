@@ -46,8 +46,8 @@ fn median_luma(frames: &dyn Frames, sources: &[Source]) -> Option<f64> {
         let frame = all[index * all.len() / number];
         let picture = frames.picture(&frame.id).ok()?;
         match picture {
-            Picture::Encoded { .. } => Some(brightness(&picture.decode().ok()?)),
-            Picture::Drawn(_) => None,
+            Picture::Encoded(_) => Some(brightness(&picture.decode().ok()?)),
+            Picture::Drawn(..) => None,
         }
     });
     let mut sample: Vec<f64> = sample.collect();

@@ -63,7 +63,7 @@ pub(super) fn dark_frames<I>(
     for drop in DROPS {
         for work in &mut works {
             if found.len() < FRAMES {
-                found.push(expose(work.clean()?, drop));
+                found.push(expose(work.pixels()?, drop));
             }
         }
     }

@@ -14,6 +14,7 @@ use super::open_run::{OpenRun, answered, pipeline};
 use super::outcome::{Outcome, StdoutFormat};
 use super::plan::Plan;
 use super::progress::Progress;
+use super::source::{input_summary, warn_of_inputs};
 use super::timings::Timings;
 use crate::enhance::ModelFile;
 use crate::error::Result;
@@ -52,6 +53,7 @@ impl<'a, E: Experiment> Job<'a, E> {
     /// # Errors
     /// If nothing can be asked, or no further trial could succeed. Replies that had arrived are kept.
     pub(crate) fn run(self) -> Result<Outcome> {
+        warn_of_inputs(&input_summary(self.experiment.sources()));
         if self.experiment.settings().money.dry_run {
             self.estimate()
         } else {
@@ -64,6 +66,7 @@ impl<'a, E: Experiment> Job<'a, E> {
     /// # Errors
     /// If a model is built in, an image is larger than the endpoint takes, or a file cannot be written.
     pub(crate) fn export_batch(self, files: &BatchFileArgs) -> Result<Outcome> {
+        warn_of_inputs(&input_summary(self.experiment.sources()));
         batch::export::export(self.open()?, files)
     }
 

@@ -12,8 +12,10 @@ use super::walk::DegradedAt;
 use crate::ask::{ImageLimit, Payload, PayloadFormat};
 use crate::dataset::Picture;
 use crate::error::{Error, Result};
-use crate::synthesis::{Exposures, NoiseKey};
-use crate::types::{Condition, Degradation, Digest, EnhancerName, FrameId, Rgb};
+use crate::synthesis::{AppliedDegradation, Exposures, FrameView, NoiseKey};
+use crate::types::{
+    Condition, Degradation, Digest, EnhancerName, ExposureFacts, FrameId, InputNote, Pixels, Rgb,
+};
 
 /// Files, settings and timings that all images share.
 #[derive(Clone, Copy)]
@@ -26,12 +28,19 @@ pub(crate) struct ImageSteps<'a> {
 }
 
 impl ImageSteps<'_> {
-    /// The image as it is sent, and the pixels that were encoded.
-    pub(crate) fn payload<'p>(&self, image: &'p Rgb) -> Result<(Arc<Payload>, Cow<'p, Rgb>)> {
+    /// The image as it is sent, with what the camera did, and the pixels that were encoded. `note` says how the file of its frame was
+    /// read.
+    pub(crate) fn payload<'p>(
+        &self,
+        image: &'p Rgb,
+        note: &InputNote,
+        exposure: Option<ExposureFacts>,
+    ) -> Result<(Arc<Payload>, Cow<'p, Rgb>)> {
         let (payload, encoded) = self.timings.time(TimedStep::Encode, || {
             let encoded = self.scaled(image)?;
             let payload = Payload::encode(&encoded, self.recipe.format, None)?;
-            Ok((payload, encoded))
+            let payload = payload.turned_by(note.orientation);
+            Ok((payload.exposed_by(exposure), encoded))
         })?;
         Ok((self.checked(payload)?, encoded))
     }
@@ -60,11 +69,19 @@ fn longer_side(image: &Rgb) -> usize {
 }
 
 /// A frame in one condition, before enhancement.
+#[expect(clippy::large_enum_variant, reason = "few are alive at a time")]
 pub(crate) enum StagedFrame {
     /// The image as it is sent.
     Ready(Arc<Payload>),
-    /// The pixels to enhance, and the enhancer.
-    ToEnhance(Rgb, EnhancerName),
+    /// The pixels to enhance.
+    ToEnhance {
+        degraded: Rgb,
+        /// How the file of the frame was read.
+        note: InputNote,
+        /// What the camera did; `None` for a kind that leaves it open.
+        exposure: Option<ExposureFacts>,
+        enhancer: EnhancerName,
+    },
 }
 
 /// Cached steps of one frame. Each is computed once, when it is first needed.
@@ -74,7 +91,11 @@ pub(crate) struct FrameWork<'a> {
     key: NoiseKey,
     /// Digest of the file when the plan was made; `None` if any file is accepted.
     planned: Option<Digest>,
+    /// Width and height of the file, in pixels.
+    size: Option<(u32, u32)>,
     picture: Option<Picture>,
+    pixels: Option<Pixels>,
+    /// The clean frame as 8-bit codes.
     clean: Option<Arc<Rgb>>,
     /// The clean frame in the size sent.
     clean_as_sent: Option<Arc<Rgb>>,
@@ -86,7 +107,10 @@ impl<'a> FrameWork<'a> {
     /// Work on a frame of a planned source. Its file is read when it is needed, and must still have the same digest.
     pub(crate) fn planned(steps: ImageSteps<'a>, source: &Source, frame: &SourceFrame) -> Self {
         let key = steps.recipe.noise(source, &frame.id);
-        Self::new(steps, frame.id.clone(), key, Some(frame.digest))
+        Self {
+            size: Some(frame.size),
+            ..Self::new(steps, frame.id.clone(), key, Some(frame.digest))
+        }
     }
 
     /// Work on a frame alone, without a check of its digest.
@@ -101,7 +125,9 @@ impl<'a> FrameWork<'a> {
             frame,
             key,
             planned,
+            size: None,
             picture: None,
+            pixels: None,
             clean: None,
             clean_as_sent: None,
             exposures: Exposures::default(),
@@ -120,11 +146,25 @@ impl<'a> FrameWork<'a> {
             return Ok(StagedFrame::Ready(payload));
         }
         let steps = self.steps;
+        let note = self.note()?;
+        let exposure = self.exposure(condition)?;
         let degraded = self.degraded(condition.degradation.as_ref())?;
         match &condition.enhancer {
-            None => Ok(StagedFrame::Ready(steps.payload(degraded)?.0)),
-            Some(name) => Ok(StagedFrame::ToEnhance(degraded.clone(), name.clone())),
+            None => Ok(StagedFrame::Ready(
+                steps.payload(degraded, &note, exposure)?.0,
+            )),
+            Some(name) => Ok(StagedFrame::ToEnhance {
+                degraded: degraded.clone(),
+                note,
+                exposure,
+                enhancer: name.clone(),
+            }),
         }
+    }
+
+    /// How the file of the frame is read.
+    pub(crate) fn note(&mut self) -> Result<InputNote> {
+        self.picture().map(Picture::note)
     }
 
     /// The file itself, if it is a plain PNG that can be sent as it is; else `None`.
@@ -140,10 +180,10 @@ impl<'a> FrameWork<'a> {
         if *condition != Condition::L0 || format != PayloadFormat::Png {
             return Ok(None);
         }
-        let Picture::Encoded { bytes, .. } = self.picture()? else {
+        let Picture::Encoded(file) = self.picture()? else {
             return Ok(None);
         };
-        let payload = Payload::of_plain_png(bytes, side);
+        let payload = Payload::of_plain_png(file.bytes(), side);
         payload
             .map(|payload| self.steps.checked(payload))
             .transpose()
@@ -163,21 +203,34 @@ impl<'a> FrameWork<'a> {
         })
     }
 
-    /// The clean frame: in its own size, or scaled if its light is reduced after scaling.
-    pub(crate) fn clean(&mut self) -> Result<&Arc<Rgb>> {
-        if self.clean.is_none() {
+    /// The pixels of the clean frame in the depth of its file: in its own size, or scaled if its light is reduced after scaling.
+    ///
+    /// # Errors
+    /// If the file is broken, or a frame of more than 8 bits is to be scaled before its light is reduced.
+    pub(crate) fn pixels(&mut self) -> Result<&Pixels> {
+        if self.pixels.is_none() {
             let ImageSteps {
                 recipe, timings, ..
             } = self.steps;
             let picture = self.picture()?;
-            let clean = timings.time(TimedStep::Decode, || picture.decode())?;
-            let clean = match (recipe.degraded_at, recipe.scaling) {
-                (DegradedAt::Resized, Scaling::LongerSide(side)) if longer_side(&clean) != side => {
-                    bilinear(&clean, side)?
+            let pixels = timings.time(TimedStep::Decode, || picture.pixels())?;
+            let pixels = match (recipe.degraded_at, recipe.scaling) {
+                (DegradedAt::Resized, Scaling::LongerSide(side)) => {
+                    resized(pixels, side).map_err(|problem| Error::data(&self.frame, problem))?
                 }
-                _ => clean,
+                _ => pixels,
             };
-            self.clean = Some(Arc::new(clean));
+            self.pixels = Some(pixels);
+        }
+        once(&mut self.pixels, || {
+            Err(Error::data(&self.frame, "the frame was not read"))
+        })
+    }
+
+    /// The clean frame as 8-bit codes, of the size of [`Self::pixels`].
+    pub(crate) fn clean(&mut self) -> Result<&Arc<Rgb>> {
+        if self.clean.is_none() {
+            self.clean = Some(self.pixels()?.codes());
         }
         once(&mut self.clean, || {
             Err(Error::data(&self.frame, "the frame was not read"))
@@ -198,27 +251,60 @@ impl<'a> FrameWork<'a> {
         Ok(Arc::clone(self.clean_as_sent.insert(scaled)))
     }
 
+    /// What a degradation does to this frame.
+    pub(crate) fn applied(&mut self, how: &Degradation) -> Result<AppliedDegradation> {
+        let recipe = self.steps.recipe;
+        let view = if how.kind().has_motion() {
+            self.view()?
+        } else {
+            FrameView::default()
+        };
+        let applied = recipe.kinds.apply(how, view, &self.key);
+        applied.map_err(|e| Error::data(format_args!("{} at {how}", self.frame), e))
+    }
+
+    /// What the camera did in a condition; `None` for a kind that leaves it open.
+    pub(crate) fn exposure(&mut self, condition: &Condition) -> Result<Option<ExposureFacts>> {
+        let how = condition.degradation.as_ref();
+        let how = how.filter(|how| how.kind().has_motion());
+        let applied = how.map(|how| self.applied(how)).transpose()?;
+        Ok(applied.and_then(|applied| applied.exposure()))
+    }
+
+    /// The clean frame as the camera saw it.
+    fn view(&mut self) -> Result<FrameView> {
+        let steps = self.steps;
+        let size = match self.size {
+            Some(size) => size,
+            None => self.picture()?.check()?,
+        };
+        self.size = Some(size);
+        Ok(steps.recipe.view(size, steps.frames.focal(&self.frame)))
+    }
+
     /// Whether the file was decoded.
     #[cfg(test)]
     pub(crate) fn is_decoded(&self) -> bool {
-        self.clean.is_some()
+        self.pixels.is_some()
     }
 
     /// The frame in one degradation. The last one is cached for the enhancers that follow.
     pub(crate) fn degraded(&mut self, how: Option<&Degradation>) -> Result<&Rgb> {
-        self.clean()?;
+        match how {
+            None => drop(self.clean()?),
+            Some(_) => drop(self.pixels()?),
+        }
+        let applied = how.map(|how| self.applied(how)).transpose()?;
         let Self {
             steps,
             frame,
             key,
+            pixels,
             clean,
             exposures,
             degraded,
             ..
         } = self;
-        let Some(clean) = clean else {
-            return Err(Error::data(&*frame, "the frame was not read"));
-        };
         if degraded
             .as_ref()
             .is_some_and(|(cached, _)| cached.as_ref() != how)
@@ -226,15 +312,32 @@ impl<'a> FrameWork<'a> {
             *degraded = None;
         }
         let (_, image) = once(degraded, || {
-            let reading = steps.recipe.readings.of(how)?;
-            let degrade = || exposures.degrade(clean, how, key, reading);
-            Ok((
-                how.cloned(),
-                steps.timings.time(TimedStep::Degrade, degrade),
-            ))
+            let degrade = || match (&applied, &*pixels, &*clean) {
+                (Some(applied), Some(pixels), _) => {
+                    Some(exposures.degrade(pixels.into(), applied, key))
+                }
+                (None, _, Some(clean)) => Some((**clean).clone()),
+                _ => None,
+            };
+            let image = steps.timings.time(TimedStep::Degrade, degrade);
+            let image = image.ok_or_else(|| Error::data(&*frame, "the frame was not read"))?;
+            Ok((how.cloned(), image))
         })?;
         Ok(image)
     }
+}
+
+/// A frame with this longer side.
+fn resized(pixels: Pixels, side: usize) -> Result<Pixels, String> {
+    if pixels.height().max(pixels.width()) == side {
+        return Ok(pixels);
+    }
+    let Pixels::Codes8(codes) = &pixels else {
+        let problem = "the frame has more than 8 bits, and --degrade resized scales frames of 8 bits; take --degrade native";
+        return Err(problem.to_owned());
+    };
+    let resized = bilinear(codes, side).map_err(|e| e.to_string())?;
+    Ok(Pixels::Codes8(Arc::new(resized)))
 }
 
 /// The value in a slot; computed first if the slot is empty.

@@ -9,7 +9,7 @@ use super::recipe::Recipe;
 use super::scaling::Scaling;
 use super::settings::JobSettings;
 use crate::enhance::{self, SizeArgs, Tiling};
-use crate::synthesis::{Synthesis, version};
+use crate::synthesis::{KindSettings, Synthesis, version};
 use crate::types::degradation::Kind;
 use crate::types::{Degradation, Digest, ReadingName};
 
@@ -18,6 +18,10 @@ pub(crate) type Identity = BTreeMap<String, Value>;
 
 /// Definition of each value in a column of the tables, by column and value.
 pub(crate) type Columns = BTreeMap<String, BTreeMap<String, Value>>;
+
+/// The kinds of the paper, whose versions stand in the identity. Those of the others stand in the column of variants, where they
+/// are asked, so that a run may get them later.
+const PAPER: [Kind; 2] = [Kind::Exposure, Kind::Sensor];
 
 /// Settings of this recipe that all trials share.
 pub(crate) fn images(recipe: &Recipe) -> impl Iterator<Item = (String, Value)> {
@@ -29,14 +33,14 @@ pub(crate) fn images(recipe: &Recipe) -> impl Iterator<Item = (String, Value)> {
     let fields = [
         ("--image", json!(recipe.format.to_string())),
         ("--seed", json!(recipe.seed)),
-        ("synthesis", json!(Kind::ALL.map(version))),
+        ("synthesis", json!(PAPER.map(version))),
         ("enhancement", json!(enhance::VERSION)),
     ];
     let fields = fields.into_iter().chain(scaling);
     fields.map(|(field, value)| (field.to_owned(), value))
 }
 
-/// Definitions of the models, enhancers and light readings of a run.
+/// Definitions of the models, enhancers, light readings and further variants of a run.
 pub(crate) fn columns<'a>(
     models: impl IntoIterator<Item = &'a ModelUnderTest>,
     recipe: &Recipe,
@@ -55,13 +59,21 @@ pub(crate) fn columns<'a>(
         .flatten()
         .filter_map(Degradation::reading);
     let readings: BTreeSet<&ReadingName> = readings.collect();
-    let noise = recipe.readings.iter();
+    let kinds: BTreeSet<Kind> = degradations
+        .iter()
+        .flatten()
+        .map(Degradation::kind)
+        .collect();
+    let kinds = kinds.into_iter().filter(|kind| !PAPER.contains(kind));
+    let kinds = kinds.map(|kind| (kind.word().to_owned(), variant(kind, &recipe.kinds)));
+    let noise = recipe.kinds.sensor.readings.iter();
     let noise = noise.filter(|(name, _)| readings.contains(name));
     let noise = noise.map(|(name, content)| (name.to_string(), reading(content)));
-    let columns: [(&str, BTreeMap<String, Value>); 3] = [
+    let columns: [(&str, BTreeMap<String, Value>); 4] = [
         ("model", models.collect()),
         ("enhancer", enhancers.collect()),
         ("reading", noise.collect()),
+        ("variant", kinds.collect()),
     ];
     let filled = columns.into_iter().filter(|(_, values)| !values.is_empty());
     filled
@@ -113,6 +125,16 @@ fn reading(synthesis: &Synthesis) -> Value {
         "--coupling": synthesis.coupling,
         "--camera, --gain, --ratio or --fixed": synthesis.camera,
     })
+}
+
+/// Settings of a kind that the paper does not have, by flag.
+fn variant(kind: Kind, kinds: &KindSettings) -> Value {
+    let mut content = json!({"synthesis": version(kind), "--motion": kinds.motion.to_string()});
+    if kind == Kind::Auto {
+        content["--auto"] = json!(kinds.auto.to_string());
+        content["--camera or --fixed"] = json!(kinds.sensor.readings.camera());
+    }
+    content
 }
 
 /// Settings that do not decide a reply, but may explain how a run went.

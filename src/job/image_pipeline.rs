@@ -213,8 +213,9 @@ impl<'a> ImagePipeline<'a> {
             return Ok((image, notes));
         }
         let clean = wanted.fidelity.then(|| work.clean_as_sent()).transpose()?;
+        let (read, exposure) = (work.note()?, work.exposure(condition)?);
         let pixels = self.pixels(work, condition)?;
-        let (image, encoded) = steps.payload(&pixels)?;
+        let (image, encoded) = steps.payload(&pixels, &read, exposure)?;
         if wanted.thumbnail {
             notes.thumbnail = thumbnail(&image, &encoded);
         }
@@ -269,9 +270,10 @@ impl<'a> ImagePipeline<'a> {
         if let Some(image) = work.unchanged_file(condition)? {
             return Ok(image);
         }
-        let steps = work.steps;
+        let (steps, note) = (work.steps, work.note()?);
+        let exposure = work.exposure(condition)?;
         let pixels = self.pixels(work, condition)?;
-        Ok(steps.payload(&pixels)?.0)
+        Ok(steps.payload(&pixels, &note, exposure)?.0)
     }
 
     /// The pixels of a frame in a condition, in the size of the frame.
@@ -294,9 +296,14 @@ impl<'a> ImagePipeline<'a> {
     fn finish(&mut self, staged: StagedFrame, place: [&dyn ToString; 2]) -> Result<Arc<Payload>> {
         match staged {
             StagedFrame::Ready(payload) => Ok(payload),
-            StagedFrame::ToEnhance(image, name) => {
-                let image = self.enhanced(&image, &name, place)?;
-                Ok(self.steps.payload(&image)?.0)
+            StagedFrame::ToEnhance {
+                degraded,
+                note,
+                exposure,
+                enhancer,
+            } => {
+                let image = self.enhanced(&degraded, &enhancer, place)?;
+                Ok(self.steps.payload(&image, &note, exposure)?.0)
             }
         }
     }

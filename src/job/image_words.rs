@@ -10,10 +10,10 @@ use serde_json::Value;
 
 use super::walk::Walk;
 use crate::ask::ImageArgs;
-use crate::dataset::{DataArgs, PixelLimit};
+use crate::dataset::{CodesArgs, DataArgs, PixelLimit};
 use crate::enhance::SizeArgs;
 use crate::error::{Error, Result};
-use crate::synthesis::SensorArgs;
+use crate::synthesis::{CameraArgs, SensorArgs};
 use crate::types::Decides;
 
 /// Flags by their long names: a text, a list of texts, or `true` for a switch.
@@ -28,7 +28,11 @@ pub(crate) struct ImageFlags {
     #[command(flatten)]
     pub(crate) limit: PixelLimit,
     #[command(flatten)]
+    pub(crate) codes: CodesArgs,
+    #[command(flatten)]
     pub(crate) sensor: SensorArgs,
+    #[command(flatten)]
+    pub(crate) camera: CameraArgs,
     #[arg(long, add = Decides::Trials)]
     pub(crate) llie: Vec<PathBuf>,
     #[command(flatten)]

@@ -21,9 +21,10 @@ impl Interrupt {
             let listen = |kind, name| signal(kind).map_err(|e| Error::file(name, "listen for", e));
             Ok(Self {
                 terminate: listen(SignalKind::terminate(), "SIGTERM")?,
-                hang_up: match is_hang_up_ignored() {
-                    true => None,
-                    false => Some(listen(SignalKind::hangup(), "SIGHUP")?),
+                hang_up: if is_hang_up_ignored() {
+                    None
+                } else {
+                    Some(listen(SignalKind::hangup(), "SIGHUP")?)
                 },
             })
         }

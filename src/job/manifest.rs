@@ -8,8 +8,9 @@ use super::experiment::{DetailOf, Experiment};
 use super::folder::now;
 use super::identity;
 use super::image_words::ImageWords;
+use super::source::input_summary;
 use crate::types::manifest::{Counts, RunManifest, Status};
-use crate::types::{Detail as _, Record};
+use crate::types::{Detail as _, InputSummary, Record};
 
 /// The manifest of a run. A stored one passes on its date, columns and image flags; one of a complete run all but its identity.
 pub(crate) fn of<E: Experiment>(experiment: &E, stored: Option<RunManifest>) -> RunManifest {
@@ -35,6 +36,7 @@ pub(crate) fn of<E: Experiment>(experiment: &E, stored: Option<RunManifest>) -> 
         identity: experiment.identity(),
         columns,
         enhancers: BTreeMap::new(),
+        inputs: inputs(experiment),
         shard: job.shard.is_part().then(|| job.shard.to_string()),
         settings,
         images: job.image_flags.clone(),
@@ -48,6 +50,7 @@ pub(crate) fn of<E: Experiment>(experiment: &E, stored: Option<RunManifest>) -> 
         return RunManifest {
             created: stored.created,
             enhancers: stored.enhancers,
+            inputs: manifest.inputs.or(stored.inputs),
             images,
             ..manifest
         };
@@ -56,10 +59,17 @@ pub(crate) fn of<E: Experiment>(experiment: &E, stored: Option<RunManifest>) -> 
     RunManifest {
         identity: manifest.identity,
         columns: manifest.columns,
+        inputs: manifest.inputs.or(stored.inputs),
         shard: manifest.shard,
         images,
         ..stored
     }
+}
+
+/// What was done to the frames when they were read; `None` if nothing was.
+fn inputs<E: Experiment>(experiment: &E) -> Option<InputSummary> {
+    let summary = input_summary(experiment.sources());
+    (!summary.is_plain()).then_some(summary)
 }
 
 /// Records that a run continues, with the settings of this command and this version.

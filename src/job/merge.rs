@@ -15,8 +15,8 @@ use crate::error::{Error, Result};
 use crate::store::{self, AddressChange, Store};
 use crate::types::manifest::{RunManifest, Status, differences};
 use crate::types::{
-    ChoiceDetail, Decides, Detail, ImageFidelity, OpenDetail, Record, RunQuestion, Thumbnail,
-    TrialKey,
+    ChoiceDetail, Decides, Detail, ImageFidelity, InputSummary, OpenDetail, Record, RunQuestion,
+    Thumbnail, TrialKey,
 };
 
 /// The flags of `merge`.
@@ -287,6 +287,11 @@ fn merged_manifest<D>(parts: &[MergePart<D>]) -> Result<RunManifest> {
         let note = note.clone().after(earlier);
         manifest.enhancers.insert(name.clone(), note);
     }
+    let mut inputs: Option<InputSummary> = None;
+    for other in manifests.clone().filter_map(|other| other.inputs.as_ref()) {
+        inputs.get_or_insert_default().join(other);
+    }
+    manifest.inputs = inputs;
     let created = manifests
         .clone()
         .map(|manifest| manifest.created.clone())

@@ -22,6 +22,7 @@ pub(crate) mod identity;
 pub(crate) mod image_notes;
 pub(crate) mod image_pipeline;
 pub(crate) mod image_words;
+pub(crate) mod input_tally;
 pub(crate) mod interrupt;
 mod manifest;
 pub(crate) mod merge;

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::progress::Progress;
 use super::questions_by_rule::by_rule;
-use crate::dataset::{DataPlace, Dataset, PixelLimit, SelectionArgs};
+use crate::dataset::{DataPlace, Dataset, ReadingRule, SelectionArgs};
 use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::questions::rules::Rules;
@@ -27,11 +27,10 @@ pub(crate) fn open_data(
     place: &DataPlace,
     selection: &SelectionArgs,
     rules: &Rules,
-    limit: PixelLimit,
+    rule: ReadingRule,
     progress: &Progress,
 ) -> Result<Dataset> {
-    let dataset = Dataset::open(place, selection.questions.as_deref())?
-        .with_most_pixels(limit.max_pixels.get());
+    let dataset = Dataset::open(place, selection.questions.as_deref())?.with_rule(rule);
     if !dataset.questions().is_empty() {
         return Ok(dataset);
     }

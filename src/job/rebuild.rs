@@ -18,7 +18,7 @@ use crate::ask::Payload;
 use crate::dataset::{DataPlace, Dataset, place};
 use crate::enhance::{Enhancer, Implausible, ProbeArgs, RuntimeArgs};
 use crate::error::{Error, Result};
-use crate::synthesis::SensorSettings;
+use crate::synthesis::KindSettings;
 use crate::types::manifest::RunManifest;
 use crate::types::{Condition, Decides, FrameId};
 
@@ -78,15 +78,15 @@ impl ImageRebuilder {
         let enhanced = conditions.any(|condition| condition.enhancer.is_some());
         let models = if enhanced { &*flags.llie } else { &[] };
         let files = enhancers::read(models)?;
-        let sensor = SensorSettings::resolve(&flags.sensor)?;
-        let recipe = Recipe::new(&sensor, flags.images.image, flags.max_side, &files);
+        let kinds = KindSettings::resolve(&flags.sensor, &flags.camera)?;
+        let recipe = Recipe::new(&kinds, flags.images.image, flags.max_side, &files);
         let (frames, recipe) = if let Some(walk) = flags.walk {
             let recipe = recipe.of_walks(&walk);
-            let folder = WalkFolder::new(&walk, flags.limit);
+            let folder = WalkFolder::new(&walk, flags.codes.rule(flags.limit));
             (FrameFolder::Walks(folder, walk), recipe)
         } else {
             let dataset = frames(&flags.data.data)?;
-            let dataset = dataset.with_most_pixels(flags.limit.max_pixels.get());
+            let dataset = dataset.with_rule(flags.codes.rule(flags.limit));
             (FrameFolder::Frames(dataset), recipe)
         };
         let loading = EnhancerRunArgs {

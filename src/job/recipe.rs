@@ -1,5 +1,6 @@
 //! The settings that decide the pixels that are sent: [`Recipe`].
 
+use std::collections::BTreeSet;
 use std::num::NonZeroU32;
 
 use serde::Serialize;
@@ -9,16 +10,18 @@ use super::source::{Source, SourceFrame};
 use super::walk::{CameraOf, DegradedAt, Walk};
 use crate::ask::PayloadFormat;
 use crate::enhance::{self, ModelFile};
-use crate::error::Result;
-use crate::synthesis::{self, NoiseKey, Readings, SensorSettings, Synthesis};
+use crate::error::{Error, Result};
+use crate::synthesis::{self, AppliedDegradation, FrameView, KindSettings, NoiseKey, Synthesis};
 use crate::types::degradation::Kind;
-use crate::types::{Condition, Digest, EnhancerName, FrameId, Severity};
+use crate::types::{
+    Condition, Degradation, Digest, EnhancerName, ExposureFacts, FrameId, Severity,
+};
 
 /// All settings that decide an image, except its frame and its condition.
 #[derive(Debug)]
 pub(crate) struct Recipe {
     pub(crate) seed: u64,
-    pub(crate) readings: Readings,
+    pub(crate) kinds: KindSettings,
     pub(crate) format: PayloadFormat,
     pub(crate) scaling: Scaling,
     /// Whether light is reduced before or after scaling.
@@ -30,7 +33,7 @@ pub(crate) struct Recipe {
 
 impl Recipe {
     pub(crate) fn new(
-        sensor: &SensorSettings,
+        kinds: &KindSettings,
         format: PayloadFormat,
         max_side: Option<NonZeroU32>,
         files: &[ModelFile],
@@ -38,16 +41,16 @@ impl Recipe {
         Self {
             format,
             scaling: max_side.map_or(Scaling::Never, Scaling::MaxSide),
-            ..Self::lossless(sensor, files)
+            ..Self::lossless(kinds, files)
         }
     }
 
     /// The recipe for PNG images in the size of their frames.
-    pub(crate) fn lossless(sensor: &SensorSettings, files: &[ModelFile]) -> Self {
+    pub(crate) fn lossless(kinds: &KindSettings, files: &[ModelFile]) -> Self {
         let enhancers = files.iter();
         Self {
-            seed: sensor.seed,
-            readings: sensor.readings.clone(),
+            seed: kinds.sensor.seed,
+            kinds: kinds.clone(),
             format: PayloadFormat::Png,
             scaling: Scaling::Never,
             degraded_at: DegradedAt::Native,
@@ -100,23 +103,7 @@ impl Recipe {
         condition: &Condition,
     ) -> Result<ImageKeyFacts<'a>> {
         let how = condition.degradation.as_ref();
-        let degradation = how.map(|how| {
-            let kind = how.kind();
-            let random = synthesis::is_random(kind);
-            let of_source = random && self.camera_of == CameraOf::Episode;
-            Ok(DegradationFacts {
-                kind,
-                severity: how.severity(),
-                version: synthesis::version(kind),
-                reading: how
-                    .reading()
-                    .map(|_| self.readings.of(Some(how)))
-                    .transpose()?,
-                seed: random.then_some(self.seed),
-                frame: random.then_some(&frame.id),
-                camera_of: of_source.then_some(&source.name),
-            })
-        });
+        let degradation = how.map(|how| self.degradation(source, frame, how));
         let enhancer = condition.enhancer.as_ref();
         let enhancer =
             enhancer.and_then(|name| self.enhancers.iter().find(|(known, _)| known == name));
@@ -131,6 +118,76 @@ impl Recipe {
             scaling: self.scaling,
             scaled_before: (self.degraded_at == DegradedAt::Resized).then_some(true),
         })
+    }
+}
+
+impl Recipe {
+    /// Checks that the camera can make each image, which depends on the sizes of the frames.
+    ///
+    /// # Errors
+    /// If a picture would move too far during an exposure; names the frame.
+    pub(crate) fn check(&self, sources: &[Source], conditions: &[Condition]) -> Result<()> {
+        let moved = conditions
+            .iter()
+            .filter_map(|condition| condition.degradation.as_ref());
+        let moved: BTreeSet<&Degradation> = moved.filter(|how| how.kind().has_motion()).collect();
+        for source in sources {
+            for frame in &source.frames {
+                for how in &moved {
+                    self.applied(source, frame, how)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn applied(
+        &self,
+        source: &Source,
+        frame: &SourceFrame,
+        how: &Degradation,
+    ) -> Result<AppliedDegradation> {
+        let key = self.noise(source, &frame.id);
+        let view = self.view(frame.size, frame.focal);
+        let applied = self.kinds.apply(how, view, &key);
+        applied.map_err(|e| Error::data(format_args!("{} at {how}", frame.id), e))
+    }
+
+    fn degradation<'a>(
+        &'a self,
+        source: &'a Source,
+        frame: &'a SourceFrame,
+        how: &Degradation,
+    ) -> Result<DegradationFacts<'a>> {
+        let kind = how.kind();
+        let applied = self.applied(source, frame, how)?;
+        let random = kind.has_noise();
+        let of_source = random && self.camera_of == CameraOf::Episode;
+        Ok(DegradationFacts {
+            kind,
+            severity: how.severity(),
+            version: synthesis::version(kind),
+            reading: applied.synthesis().cloned(),
+            seed: random.then_some(self.seed),
+            frame: random.then_some(&frame.id),
+            camera_of: of_source.then_some(&source.name),
+            exposure: applied.exposure(),
+        })
+    }
+
+    /// A frame of this width and height as the camera saw it, in the size in which it is degraded. `focal` is in pixels of the
+    /// frame.
+    pub(crate) fn view(&self, size: (u32, u32), focal: Option<f64>) -> FrameView {
+        let own = size.0 as usize;
+        let width = match self.degraded_at {
+            DegradedAt::Native => own,
+            DegradedAt::Resized => self.scaling.of(size).0,
+        };
+        let scale = width as f64 / own as f64;
+        FrameView {
+            width,
+            focal: focal.map(|focal| focal * scale),
+        }
     }
 }
 
@@ -152,11 +209,13 @@ struct DegradationFacts<'a> {
     kind: Kind,
     severity: Severity,
     version: u32,
-    reading: Option<&'a Synthesis>,
+    reading: Option<Synthesis>,
     seed: Option<u64>,
     frame: Option<&'a FrameId>,
     /// Source whose frames share one state of the camera; `None` if each frame has its own.
     camera_of: Option<&'a FrameId>,
+    /// What the camera does for this frame: it decides the pixels of kinds with motion blur.
+    exposure: Option<ExposureFacts>,
 }
 
 #[derive(Serialize)]

@@ -7,17 +7,24 @@ use rayon::prelude::*;
 use super::progress::Progress;
 use crate::dataset::{Dataset, Picture};
 use crate::error::{Error, Result};
-use crate::types::{Digest, FrameId, Question};
+use crate::types::{Digest, FrameId, InputNote, InputSummary, Question};
 
 /// A reader of frames' files.
 pub(crate) trait Frames: Sync {
     /// The file of a frame, which is not decoded.
     fn picture(&self, frame: &FrameId) -> Result<Picture>;
+
+    /// The focal length of a frame along a row, in pixels of its image; `None` if it is not known.
+    fn focal(&self, frame: &FrameId) -> Option<f64>;
 }
 
 impl Frames for Dataset {
     fn picture(&self, frame: &FrameId) -> Result<Picture> {
         self.picture(frame)
+    }
+
+    fn focal(&self, frame: &FrameId) -> Option<f64> {
+        self.focal(frame)
     }
 }
 
@@ -26,10 +33,14 @@ impl Frames for Dataset {
 pub(crate) struct SourceFrame {
     /// Name of the frame. Its noise is drawn from it.
     pub(crate) id: FrameId,
-    /// Digest of the file.
+    /// Digest of the file and of the rule by which it is read.
     pub(crate) digest: Digest,
+    /// What reading the file does besides taking its codes.
+    pub(crate) note: InputNote,
     /// Width and height, in pixels.
     pub(crate) size: (u32, u32),
+    /// Focal length along a row, in pixels; `None` if it is not known.
+    pub(crate) focal: Option<f64>,
 }
 
 impl SourceFrame {
@@ -40,6 +51,8 @@ impl SourceFrame {
             id: id.clone(),
             size: picture.check()?,
             digest: picture.digest(),
+            note: picture.note(),
+            focal: frames.focal(id),
         })
     }
 }
@@ -91,6 +104,22 @@ impl Source {
             [only] => *only,
             _ => Digest::of_parts(digests.iter().map(|digest| &digest.as_bytes()[..])),
         }
+    }
+}
+
+/// What was done to the frames of these sources when they were read.
+pub(crate) fn input_summary(sources: &[Source]) -> InputSummary {
+    let mut summary = InputSummary::default();
+    for frame in sources.iter().flat_map(|source| &source.frames) {
+        summary.add(&frame.id, &frame.note);
+    }
+    summary
+}
+
+/// Says what was done to images when they were read, in one line for each thing.
+pub(crate) fn warn_of_inputs(summary: &InputSummary) {
+    for line in summary.lines() {
+        tracing::warn!("{line}");
     }
 }
 

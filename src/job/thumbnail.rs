@@ -64,10 +64,12 @@ pub(crate) fn thumbnail(
 ) -> Result<Thumbnail> {
     let image = sent.received(encoded)?;
     let ev = match condition.enhancer {
-        None => condition
-            .degradation
-            .as_ref()
-            .map_or(0.0, |how| how.kind().relight(how.severity())),
+        // Of automatic exposure, what the camera left dark.
+        None => match (&condition.degradation, sent.facts().exposure) {
+            (Some(_), Some(exposure)) => exposure.dark.unwrap_or_default() as f32,
+            (Some(how), None) => how.kind().relight(how.severity()),
+            (None, _) => 0.0,
+        },
         Some(_) => 0.0,
     };
     let jpeg: PayloadFormat = FORMAT

@@ -1,7 +1,6 @@
 //! Walks through houses: their folder (`WalkFolder`), and the flags that decide which frames are shown and how ([`Walk`]).
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
@@ -13,8 +12,8 @@ use super::progress::Progress;
 use super::scaling::Scaling;
 use super::source::{Frames, Source, SourceFrame};
 use crate::dataset::openeqa::{sampled, walk};
-use crate::dataset::{Picture, PixelLimit};
-use crate::error::{Error, Result};
+use crate::dataset::{ImageFile, Picture, ReadingRule};
+use crate::error::Result;
 use crate::types::{Decides, FrameId};
 
 /// Flags that decide which frames of a walk are shown, and how.
@@ -74,26 +73,26 @@ fn longer_side(text: &str) -> Result<Scaling, String> {
 #[derive(Debug)]
 pub(crate) struct WalkFolder {
     folder: PathBuf,
-    max_pixels: u64,
+    rule: ReadingRule,
 }
 
 impl Frames for WalkFolder {
     fn picture(&self, frame: &FrameId) -> Result<Picture> {
         let path = self.folder.join(format!("{frame}.png"));
-        let bytes = fs::read(&path).map_err(|e| Error::file(&path, "read", e))?;
-        Ok(Picture::Encoded {
-            bytes,
-            place: path.display().to_string(),
-            most_pixels: self.max_pixels,
-        })
+        ImageFile::open(&path, self.rule).map(Picture::Encoded)
+    }
+
+    /// Folders of walks do not state it.
+    fn focal(&self, _: &FrameId) -> Option<f64> {
+        None
     }
 }
 
 impl WalkFolder {
-    pub(crate) fn new(walk: &Walk, limit: PixelLimit) -> Self {
+    pub(crate) fn new(walk: &Walk, rule: ReadingRule) -> Self {
         Self {
             folder: walk.folder.clone(),
-            max_pixels: limit.max_pixels.get(),
+            rule,
         }
     }
 

@@ -48,6 +48,8 @@ pub enum AlertKind {
     Light,
     /// An enhancer whose images may be read in a wrong way, or were resized for it.
     Enhancer,
+    /// Images that were turned when their files were read, or of which the file states a turn that was not made.
+    Read,
     /// Images of another size or encoding.
     Images,
     /// Other words around the questions.

@@ -275,7 +275,7 @@ impl AxisFrame {
     /// Title of the horizontal axis.
     fn axis_title(&self) -> String {
         let axis = self.levels.iter().find_map(|level| level.axis());
-        let Axis { title, unit } = axis.unwrap_or(Axis::LIGHT);
+        let Axis { title, unit, .. } = axis.unwrap_or(Axis::LIGHT);
         format!("level; {title} in {unit}")
     }
 

@@ -7,6 +7,19 @@ use crate::error::{Error, Result};
 /// Minimum share that is drawn.
 const MIN_SHARE: f64 = 1e-7;
 
+/// Colours of the lines in their order (chosen): one for the real images, and two for each of four light readings.
+const COLOURS: [RGBColor; 9] = [
+    BLACK,
+    RED,
+    BLUE,
+    GREEN,
+    MAGENTA,
+    CYAN,
+    RGBColor(230, 159, 0),
+    RGBColor(110, 110, 110),
+    RGBColor(120, 60, 20),
+];
+
 /// One line of the figure.
 #[derive(Debug, Clone)]
 pub(crate) struct HistogramLine {
@@ -52,8 +65,7 @@ pub(crate) fn histogram(title: &str, lines: &[HistogramLine]) -> Result<String> 
             .y_label_formatter(&|share| format!("{share:.0e}"))
             .draw()
             .map_err(|e| failed(e.to_string()))?;
-        let colours = [BLACK, RED, BLUE, GREEN];
-        for (line, colour) in lines.iter().zip(colours.into_iter().cycle()) {
+        for (line, colour) in lines.iter().zip(COLOURS.iter().cycle()) {
             let runs = line.shares.split(|(difference, share)| {
                 *share <= MIN_SHARE || difference.abs() > max_difference
             });

@@ -6,6 +6,7 @@ use super::table::ColumnKind::Text;
 use super::table::{ColumnKind, TableBuilder, TableCell, TableFormat};
 use super::words::light;
 use crate::score::subject::Subject;
+use crate::types::degradation::{Axis, Kind};
 use crate::types::{AxisLevel, EnhancerName, KindReading, LightGroup, View};
 
 /// A model in one variant, raw or with one enhancer.
@@ -23,6 +24,11 @@ impl<'a> Series<'a> {
             enhancer: subject.enhancer.as_ref(),
             variant: &subject.variant,
         }
+    }
+
+    /// The quantity over which the series runs; `None` for untouched frames.
+    pub(super) fn axis(&self) -> Option<Axis> {
+        self.variant.kind.map(Kind::axis)
     }
 
     /// The variant and the enhancer in words.
@@ -89,6 +95,36 @@ impl<'a, C> Ladder<'a, C> {
         }
         self.series = degraded;
         self
+    }
+
+    /// The ladder of each axis, light first. Series and cells without an axis are in each of them.
+    pub(super) fn by_axis(&self) -> Vec<(Axis, Self)> {
+        let is_on = |series: &Series<'_>, axis| series.axis() == Some(axis);
+        let axes = Axis::ALL.into_iter();
+        let axes: Vec<Axis> = axes
+            .filter(|axis| self.series.keys().any(|series| is_on(series, *axis)))
+            .collect();
+        let axes = if axes.is_empty() {
+            vec![Axis::LIGHT]
+        } else {
+            axes
+        };
+        let ladders = axes.into_iter().map(|axis| {
+            let series = self.series.iter();
+            let series = series.filter(|(series, _)| series.axis().is_none_or(|on| on == axis));
+            let levels = self.levels.iter().copied();
+            let ladder = Self {
+                levels: levels
+                    .filter(|level| level.axis().is_none_or(|on| on == axis))
+                    .collect(),
+                series: series
+                    .map(|(series, cells)| (series.clone(), cells.clone()))
+                    .collect(),
+                without_level: self.without_level.clone(),
+            };
+            (axis, ladder)
+        });
+        ladders.collect()
     }
 
     /// The cell of a series at L0, [with the clean frames](Self::with_clean); for an enhancer that was not asked about them, the cell

@@ -1,6 +1,7 @@
 //! Stage 7, SHOW: reports from the records alone, and [`sheet`], figures of images that the caller passes in.
 
 pub(crate) mod alert;
+pub(crate) mod calibration;
 pub(crate) mod chart;
 pub(crate) mod choice_report;
 mod csv;

@@ -21,11 +21,9 @@ pub fn products<'a>(
     let page = page(report, &figures, inputs)?;
     let mut files = table_files(&report.tables, &report.sentences, "Findings and tables")?;
     files.extend(chart::files(figures));
-    if let Some(samples) = samples(inputs.thumbnails) {
-        files.push((
-            "figures/samples.svg".to_owned(),
-            figure(&samples).into_bytes(),
-        ));
+    for samples in samples(inputs.thumbnails) {
+        let name = format!("figures/{}.svg", samples.name);
+        files.push((name, figure(&samples).into_bytes()));
     }
     files.push((PAGE.to_owned(), page.into_bytes()));
     Ok(files)

@@ -11,8 +11,12 @@ use crate::types::{
     AxisLevel, Condition, EnhancerName, FrameId, KindReading, LightGroup, Thumbnail,
 };
 
+/// The samples of one axis.
 #[derive(Serialize)]
 pub(super) struct SamplePage {
+    /// Name of the figure's file.
+    #[serde(skip)]
+    pub(super) name: &'static str,
     levels: Vec<String>,
     rows: Vec<SampleRow>,
 }
@@ -32,16 +36,39 @@ struct SampleImage {
 /// Maximum number of frames that are shown.
 const MAX_FRAMES: usize = 3;
 
-/// The first frames by level, with a row for each variant and enhancer; `None` without thumbnails.
-pub(super) fn samples(thumbnails: &[Thumbnail]) -> Option<SamplePage> {
+/// The first frames by level, with a row for each variant and enhancer: a page for each axis. Empty without thumbnails.
+pub(super) fn samples(thumbnails: &[Thumbnail]) -> Vec<SamplePage> {
+    let axis = |thumbnail: &Thumbnail| thumbnail.condition.level().axis();
+    let axes = Axis::ALL.into_iter();
+    let axes: Vec<Axis> = axes
+        .filter(|other| thumbnails.iter().any(|of| axis(of) == Some(*other)))
+        .collect();
+    // The clean frames are on every axis; alone, on that of light.
+    let axes = if axes.is_empty() {
+        vec![Axis::LIGHT]
+    } else {
+        axes
+    };
+    let pages = axes.into_iter().filter_map(|on| {
+        let all = thumbnails.iter();
+        let all: Vec<&Thumbnail> = all
+            .filter(|of| axis(of).is_none_or(|axis| axis == on))
+            .collect();
+        of_axis(&all, on)
+    });
+    pages.collect()
+}
+
+/// The page of the thumbnails of one axis; `None` without any.
+fn of_axis(thumbnails: &[&Thumbnail], axis: Axis) -> Option<SamplePage> {
     let mut frames: Vec<&FrameId> = thumbnails
         .iter()
         .map(|thumbnail| &thumbnail.frame)
         .collect();
     frames.sort_unstable();
     frames.dedup();
-    let level = |thumbnail: &Thumbnail| thumbnail.condition.level();
-    let levels: BTreeSet<AxisLevel> = thumbnails.iter().map(level).collect();
+    let levels = thumbnails.iter().map(|of| of.condition.level());
+    let levels: BTreeSet<AxisLevel> = levels.collect();
     let lines = lines(thumbnails);
     let mut rows = Vec::new();
     for frame in frames.into_iter().take(MAX_FRAMES) {
@@ -70,13 +97,14 @@ pub(super) fn samples(thumbnails: &[Thumbnail]) -> Option<SamplePage> {
             });
         }
     }
-    // The clean frames are on the axis of the degraded ones.
-    let axis = levels.iter().find_map(|level| level.axis());
-    let unit = axis.unwrap_or(Axis::LIGHT).unit;
     let level_names = levels
         .iter()
-        .map(|level| format!("{level}, {} {unit}", level.value()));
+        .map(|level| format!("{level}, {} {}", level.value(), axis.unit));
     (!rows.is_empty()).then(|| SamplePage {
+        name: match axis {
+            Axis::MOTION => "blur_samples",
+            _ => "samples",
+        },
         levels: level_names.collect(),
         rows,
     })
@@ -84,7 +112,7 @@ pub(super) fn samples(thumbnails: &[Thumbnail]) -> Option<SamplePage> {
 
 /// The rows of a frame: each variant, raw and with each enhancer. The clean frames stand in the rows of the degraded ones; they have a
 /// row of their own if there is no other, raw or with the same enhancer.
-fn lines(thumbnails: &[Thumbnail]) -> BTreeSet<(KindReading, Option<&EnhancerName>)> {
+fn lines<'a>(thumbnails: &[&'a Thumbnail]) -> BTreeSet<(KindReading, Option<&'a EnhancerName>)> {
     let all = thumbnails
         .iter()
         .map(|t| (t.condition.kind_reading(), t.condition.enhancer.as_ref()));
@@ -153,6 +181,36 @@ mod tests {
     use super::*;
     use crate::types::Digest;
 
+    /// The samples of thumbnails of one axis.
+    fn only(thumbnails: &[Thumbnail]) -> SamplePage {
+        let mut pages = samples(thumbnails);
+        assert_eq!(pages.len(), 1);
+        pages.remove(0)
+    }
+
+    #[test]
+    fn each_axis_has_its_page() {
+        let thumbnail = |condition: &str| Thumbnail {
+            frame: FrameId("a".into()),
+            condition: condition.parse().unwrap(),
+            image: Digest::of(condition.as_bytes()),
+            small: format!("data:{condition}"),
+            crop: String::new(),
+            stops: 0.0,
+        };
+        let all = ["L0", "L3-auto", "T8.33-motion", "T33.33-motion"].map(thumbnail);
+        let pages = samples(&all);
+        let names: Vec<&str> = pages.iter().map(|page| page.name).collect();
+        assert_eq!(names, ["samples", "blur_samples"]);
+        assert_eq!(pages[0].levels, ["L0, 0 EV", "L3, 6 EV"]);
+        assert_eq!(
+            pages[1].levels,
+            ["L0, 0 ms", "T8.33, 8.33 ms", "T33.33, 33.33 ms"]
+        );
+        assert!(pages[1].rows.len() == 1 && pages[1].rows[0].images.iter().all(Option::is_some));
+        assert!(samples(&[]).is_empty());
+    }
+
     #[test]
     fn each_row_has_its_images_and_names_are_escaped() {
         let thumbnail = |condition: &str| Thumbnail {
@@ -164,7 +222,7 @@ mod tests {
             stops: 0.0,
         };
         let thumbnails = ["L0", "L3-ev", "L3-noise", "L3-noise+lift"].map(thumbnail);
-        let samples = samples(&thumbnails).unwrap();
+        let samples = only(&thumbnails);
         let urls = |row: &SampleRow| -> Vec<String> {
             let urls = row
                 .images
@@ -177,12 +235,12 @@ mod tests {
         assert_eq!(rows[1], ["data:L0", "data:L3-noise"]);
         assert_eq!(rows[2], ["", "data:L3-noise+lift"]);
         let enhanced = ["L0", "L0+lift", "L3-ev", "L3-noise", "L3-noise+lift"].map(thumbnail);
-        let enhanced = super::samples(&enhanced).unwrap();
+        let enhanced = only(&enhanced);
         let rows: Vec<Vec<String>> = enhanced.rows.iter().map(urls).collect();
         assert_eq!(rows[1], ["data:L0", "data:L3-noise"]);
         assert_eq!(rows[2], ["data:L0+lift", "data:L3-noise+lift"]);
         let clean = ["L0", "L0+lift", "L3-noise"].map(thumbnail);
-        let clean = super::samples(&clean).unwrap();
+        let clean = only(&clean);
         let rows: BTreeSet<Vec<String>> = clean.rows.iter().map(urls).collect();
         let expected = [["data:L0", "data:L3-noise"], ["data:L0+lift", ""]];
         assert_eq!(

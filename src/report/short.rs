@@ -15,9 +15,9 @@ use crate::score::accuracy::AccuracyCell;
 use crate::score::choice::ReadingMode;
 use crate::score::health::Health;
 use crate::score::subject::{is_observer, without_run};
-use crate::types::AxisLevel;
 use crate::types::control::OBSERVER;
 use crate::types::manifest::RunManifest;
+use crate::types::{Axis, AxisLevel};
 
 /// Width of the text in characters.
 const WIDTH: usize = 80;
@@ -186,8 +186,15 @@ fn table(report: &ChoiceReport<'_>) -> String {
     let levels: Vec<AxisLevel> = ladder.levels.iter().copied().collect();
     let longest = rows.iter().map(|(_, name, _)| name.chars().count()).max();
     let titles = rows.iter().map(|(block, ..)| block.chars().count()).max();
+    let most = Axis::ALL.map(|axis| {
+        let on = levels
+            .iter()
+            .filter(|level| level.axis().is_none_or(|on| on == axis));
+        on.count()
+    });
+    let most = most.into_iter().max().unwrap_or_default();
     let room = WIDTH
-        .saturating_sub(1 + levels.len().min(MAX_LEVELS) * LEVEL + REACH)
+        .saturating_sub(1 + most.min(MAX_LEVELS) * LEVEL + REACH)
         .max(12);
     let name_width = longest.max(titles).unwrap_or(0).min(room.min(MAX_NAME));
     let shared = common.map(|common| {
@@ -196,8 +203,17 @@ fn table(report: &ChoiceReport<'_>) -> String {
     });
     let mut text = format!(" accuracy in %{}\n", shared.unwrap_or_default());
     for block in rows.chunk_by(|a, b| a.0 == b.0) {
-        for levels in levels.chunks(MAX_LEVELS) {
-            text += &block_lines(report, block, levels, name_width);
+        for axis in Axis::ALL {
+            let is_on = |level: &AxisLevel| level.axis().is_none_or(|on| on == axis);
+            let has_level = |(.., cells): &&TableLine<'_>| {
+                let mut axes = cells.keys().filter_map(|level| level.axis());
+                axes.next().unwrap_or(Axis::LIGHT) == axis
+            };
+            let block: Vec<TableLine<'_>> = block.iter().filter(has_level).cloned().collect();
+            let levels: Vec<AxisLevel> = levels.iter().copied().filter(is_on).collect();
+            for levels in levels.chunks(MAX_LEVELS) {
+                text += &block_lines(report, &block, levels, name_width);
+            }
         }
     }
     if hidden > 0 {

@@ -23,16 +23,21 @@ pub(super) struct Camera {
 /// Half of the width of the view at a distance of 1 (chosen): an angle of about 84° across.
 const HALF_WIDTH: f32 = 0.9;
 
+/// The focal length for images of a size, in pixels.
+pub(super) fn focal(size: [usize; 2]) -> f32 {
+    let longer = size[0].max(size[1] * 4 / 3);
+    longer as f32 / 2.0 / HALF_WIDTH
+}
+
 impl Camera {
     /// A camera at a place, for images of a size in pixels.
     pub(super) fn new(at: Vec3, angle: f32, tilt: f32, size: [usize; 2]) -> Self {
-        let longer = size[0].max(size[1] * 4 / 3);
         Self {
             at,
             angle,
             tilt,
             size,
-            focal: longer as f32 / 2.0 / HALF_WIDTH,
+            focal: focal(size),
         }
     }
 

@@ -15,6 +15,7 @@ mod mesh;
 mod paint;
 mod plan;
 mod render;
+mod room_light;
 mod scene;
 mod spot;
 mod surface;
@@ -25,17 +26,21 @@ use std::fmt;
 use std::str::FromStr;
 use std::sync::{Arc, LazyLock};
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use ndarray::Array2;
 
 use self::dice::Dice;
 use self::kinds::RoomKind;
 use self::plan::FloorPlan;
+pub(crate) use self::room_light::RoomLight;
 use self::viewpoint::Height;
 use crate::error::{Error, Result};
 use crate::labels;
 use crate::types::recent::Recent;
-use crate::types::{Decides, DepthKind, Digest, Frame, FrameId, Labels, SegmentName, Segmentation};
+use crate::types::{
+    Decides, DepthKind, Digest, Frame, FrameId, Labels, Light, Pixels, Rgb, SegmentName,
+    Segmentation,
+};
 
 /// The version of the generator. Any change of a pixel or a name needs another version.
 pub const VERSION: u32 = 1;
@@ -48,10 +53,16 @@ const CACHE_BYTES: usize = 104 << 20;
 
 /// The bytes per pixel: three for colour, four for depth, two for the class, four for the segment.
 const BYTES_PER_PIXEL: usize = 13;
+/// The further bytes per pixel of linear light.
+const BYTES_OF_LIGHT: usize = 12;
 
 /// The number of frames of a size that fit into the cache; at least one.
-fn cached_frames([width, height]: [usize; 2]) -> usize {
-    (CACHE_BYTES / (width * height * BYTES_PER_PIXEL).max(1)).max(1)
+fn cached_frames([width, height]: [usize; 2], light: RoomLight) -> usize {
+    let bytes = match light {
+        RoomLight::Display => BYTES_PER_PIXEL,
+        RoomLight::Linear => BYTES_PER_PIXEL + BYTES_OF_LIGHT,
+    };
+    (CACHE_BYTES / (width * height * bytes).max(1)).max(1)
 }
 
 /// The settings of the rooms, as `frames=48,seed=7,size=1280x720`.
@@ -66,6 +77,9 @@ pub struct Rooms {
     /// Width and height in pixels
     #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size, default_value = "640x480", add = Decides::Pixels)]
     pub size: [usize; 2],
+    /// What the pixels are; with linear light, OpenEXR files are written beside the PNG files
+    #[arg(long, value_enum, default_value_t, add = Decides::Pixels)]
+    pub light: RoomLight,
 }
 
 impl Default for Rooms {
@@ -74,6 +88,7 @@ impl Default for Rooms {
             frames: 48,
             seed: 7,
             size: [640, 480],
+            light: RoomLight::default(),
         }
     }
 }
@@ -90,7 +105,11 @@ impl fmt::Display for Rooms {
             f,
             "frames={},seed={},size={width}x{height}",
             self.frames, self.seed
-        )
+        )?;
+        match self.light {
+            RoomLight::Display => Ok(()),
+            RoomLight::Linear => write!(f, ",light={}", self.light),
+        }
     }
 }
 
@@ -99,7 +118,15 @@ impl fmt::Display for Rooms {
 pub struct Room {
     rooms: Rooms,
     index: usize,
-    cache: Arc<Recent<usize, Arc<Frame>>>,
+    cache: Arc<Recent<usize, DrawnRoom>>,
+}
+
+/// A frame that is drawn.
+#[derive(Debug, Clone)]
+struct DrawnRoom {
+    frame: Arc<Frame>,
+    /// Its linear light; `None` if only codes of a display are drawn.
+    light: Option<Arc<Light>>,
 }
 
 /// The ground truth of a frame, for checking questions.
@@ -143,9 +170,14 @@ impl FromStr for Rooms {
                     rooms.seed = seed.map_err(|_| wrong("a whole number expected".to_owned()))?;
                 }
                 ("size", value) => rooms.size = size(value).map_err(wrong)?,
+                ("light", value) => {
+                    let light = RoomLight::from_str(value, false);
+                    rooms.light =
+                        light.map_err(|_| wrong("display or linear expected".to_owned()))?;
+                }
                 _ => {
                     return Err(wrong(
-                        "frames=N, seed=N or size=WIDTHxHEIGHT expected".to_owned(),
+                        "frames=N, seed=N, size=WIDTHxHEIGHT or light=linear expected".to_owned(),
                     ));
                 }
             }
@@ -181,7 +213,7 @@ impl Rooms {
 
     /// The frames with their ids. Nothing is drawn yet.
     pub fn all(self) -> impl Iterator<Item = (FrameId, Room)> {
-        let cache = Arc::new(Recent::new(cached_frames(self.size)));
+        let cache = Arc::new(Recent::new(cached_frames(self.size, self.light)));
         (0..self.frames).map(move |index| {
             let room = Room {
                 rooms: self,
@@ -233,20 +265,33 @@ impl Room {
     #[must_use]
     pub fn digest(&self) -> Digest {
         let [width, height] = self.rooms.size.map(|side| (side as u64).to_le_bytes());
-        Digest::of_parts([
-            "darkqa.room/2".as_bytes(),
-            &VERSION.to_le_bytes(),
-            &self.rooms.seed.to_le_bytes(),
+        let (version, seed) = (VERSION.to_le_bytes(), self.rooms.seed.to_le_bytes());
+        let id = self.id().0;
+        let parts: [&[u8]; 6] = [
+            b"darkqa.room/2",
+            &version,
+            &seed,
             &width,
             &height,
-            self.id().0.as_bytes(),
-        ])
+            id.as_bytes(),
+        ];
+        let light: Option<&[u8]> = match self.rooms.light {
+            RoomLight::Display => None,
+            RoomLight::Linear => Some(b"linear light"),
+        };
+        Digest::of_parts(parts.into_iter().chain(light))
     }
 
     /// Width and height in pixels.
     #[must_use]
     pub fn size(&self) -> [usize; 2] {
         self.rooms.size
+    }
+
+    /// The focal length in pixels.
+    #[must_use]
+    pub fn focal(&self) -> f64 {
+        f64::from(camera::focal(self.rooms.size))
     }
 
     fn plan(&self) -> FloorPlan {
@@ -291,14 +336,31 @@ impl Room {
     /// # Errors
     /// If a map has another size than the image, which cannot happen.
     pub fn frame(&self) -> Result<Arc<Frame>> {
-        let draw = || self.draw().map(Arc::new);
-        self.cache.get(&self.index, draw)
+        Ok(self.drawn()?.frame)
     }
 
-    fn draw(&self) -> Result<Frame> {
+    /// The linear light of the frame; `None` if only codes of a display are drawn.
+    ///
+    /// # Errors
+    /// As of [`Self::frame`].
+    pub fn light(&self) -> Result<Option<Arc<Light>>> {
+        Ok(self.drawn()?.light)
+    }
+
+    /// Whether the pixels of the frame are linear light.
+    #[must_use]
+    pub fn is_light(&self) -> bool {
+        self.rooms.light == RoomLight::Linear
+    }
+
+    fn drawn(&self) -> Result<DrawnRoom> {
+        self.cache.get(&self.index, || self.draw())
+    }
+
+    fn draw(&self) -> Result<DrawnRoom> {
         let plan = self.plan();
         let camera = self.camera(&plan);
-        let view = render::render(&plan.scene, &camera);
+        let view = render::render(&plan.scene, &camera, self.rooms.light);
         let [width, height] = self.rooms.size;
         let numbers = plan
             .scene
@@ -317,7 +379,11 @@ impl Room {
             };
             (number, name)
         });
-        Ok(Frame {
+        let (light, pixels) = match view.pixels {
+            Pixels::Light(light) => (Some(Arc::clone(&light)), Pixels::Light(light)),
+            pixels => (None, pixels),
+        };
+        let frame = Frame {
             id: self.id(),
             scene: self.scene(),
             depth: Some(Array2::from_shape_vec((height, width), view.depth).map_err(shape)?),
@@ -328,7 +394,11 @@ impl Room {
             segmentation: Segmentation::Instances,
             names: Arc::new(names.collect()),
             room: Some(self.kind().name().to_owned()),
-            rgb: view.rgb,
+            rgb: Rgb::clone(&pixels.codes()),
+        };
+        Ok(DrawnRoom {
+            frame: Arc::new(frame),
+            light,
         })
     }
 
@@ -362,6 +432,7 @@ mod tests {
             frames: 120,
             seed: 1,
             size: [64, 48],
+            light: RoomLight::Display,
         };
         let mut kinds = BTreeMap::new();
         for (_, room) in rooms.all().step_by(2) {
@@ -391,12 +462,15 @@ mod tests {
             frames: 2,
             seed: 1,
             size: [64, 48],
+            light: RoomLight::Display,
         };
         let all: Vec<Room> = rooms.all().map(|(_, room)| room).collect();
         let first = all[0].frame().unwrap();
         assert!(Arc::ptr_eq(&first, &all[0].frame().unwrap()));
         let sizes = [[640, 480], [3000, 2000], [4000, 4000]];
-        assert_eq!(sizes.map(cached_frames), [27, 1, 1]);
+        let cached = |size| cached_frames(size, RoomLight::Display);
+        assert_eq!(sizes.map(cached), [27, 1, 1]);
+        assert_eq!(cached_frames([640, 480], RoomLight::Linear), 14);
     }
 
     #[test]
@@ -404,6 +478,7 @@ mod tests {
         for text in [
             "frames=3,seed=9,size=1280x720",
             "frames=48,seed=7,size=640x480",
+            "frames=48,seed=7,size=640x480,light=linear",
         ] {
             let rooms: Rooms = text.parse().unwrap();
             assert_eq!(rooms.to_string(), text);

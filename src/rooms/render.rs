@@ -4,7 +4,7 @@
 //! pixel of every second row, smoothed between points of the same plane, and interpolated. A point without a similar
 //! neighbour gets its own samples.
 
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -12,14 +12,15 @@ use rayon::prelude::*;
 use super::bvh::{Bvh, Ray};
 use super::camera::Camera;
 use super::light::{LightSample, Lighting, STRATA, brightness};
+use super::room_light::RoomLight;
 use super::scene::Scene;
 use super::spot::{Gloss, Spot, reflected};
-use crate::types::Rgb;
+use crate::types::{Light, Pixels, Rgb};
 
 /// The image and the maps of a view.
 #[derive(Debug)]
 pub(super) struct RenderedView {
-    pub(super) rgb: Rgb,
+    pub(super) pixels: Pixels,
     /// The depth of each pixel in millimetres along the optical axis; 0 if there is none.
     pub(super) depth: Vec<u32>,
     /// The number of the thing at each pixel, from 1; 0 if there is none.
@@ -37,8 +38,8 @@ const SUBPIXELS: [[f32; 2]; 4] = [
 /// The minimum difference of linear colours between neighbouring pixels that makes an edge (chosen).
 const EDGE: f32 = 0.06;
 
-/// The image and the maps of a scene, as a camera sees it.
-pub(super) fn render(scene: &Scene, camera: &Camera) -> RenderedView {
+/// The image and the maps of a scene, as a camera sees it. The image has the codes of a display, or linear light.
+pub(super) fn render(scene: &Scene, camera: &Camera, shown: RoomLight) -> RenderedView {
     let tree = scene.tree();
     let [width, height] = camera.size;
     let spots: Vec<Option<Spot>> = (0..width * height)
@@ -50,7 +51,11 @@ pub(super) fn render(scene: &Scene, camera: &Camera) -> RenderedView {
         })
         .collect();
     let lighting = lighting(scene, &tree, &spots);
-    let light = LightGrid::new(&lighting, &spots, camera.size);
+    let radiances = match shown {
+        RoomLight::Display => Vec::new(),
+        RoomLight::Linear => scene.radiances(),
+    };
+    let light = LightGrid::new(&lighting, &spots, camera.size, radiances);
     let colors: Vec<Vec3> = spots
         .par_iter()
         .enumerate()
@@ -63,25 +68,38 @@ pub(super) fn render(scene: &Scene, camera: &Camera) -> RenderedView {
         })
         .collect();
     let exposure = 1.2 / light.typical().max(1e-6);
-    let samples: Vec<[u8; 3]> = colors
-        .par_iter()
-        .enumerate()
-        .map(|(i, color)| {
-            let at = [i % width, i / width];
-            let mapped = if is_edge(&spots, &colors, camera.size, at, exposure) {
-                let rays = SUBPIXELS.map(|[dx, dy]| [at[0] as f32 + dx, at[1] as f32 + dy]);
-                let colors = rays.map(|[x, y]| {
-                    let spot = Spot::through_mirror(scene, &tree, &camera.ray(x, y));
-                    let color = spot.map_or(*color, |spot| light.shade(&spot, camera.at, [x, y]));
-                    tone_mapped(color * exposure)
-                });
-                colors.iter().sum::<Vec3>() / 4.0
-            } else {
-                tone_mapped(*color * exposure)
-            };
-            mapped.to_array().map(srgb_code)
-        })
-        .collect();
+    // The light of a pixel, each of its rays after a curve.
+    let pixel = |i: usize, curve: fn(Vec3) -> Vec3| {
+        let (at, color) = ([i % width, i / width], colors[i]);
+        if is_edge(&spots, &colors, camera.size, at, exposure) {
+            let rays = SUBPIXELS.map(|[dx, dy]| [at[0] as f32 + dx, at[1] as f32 + dy]);
+            let colors = rays.map(|[x, y]| {
+                let spot = Spot::through_mirror(scene, &tree, &camera.ray(x, y));
+                let color = spot.map_or(color, |spot| light.shade(&spot, camera.at, [x, y]));
+                curve(color * exposure)
+            });
+            colors.iter().sum::<Vec3>() / 4.0
+        } else {
+            curve(color * exposure)
+        }
+    };
+    let places = (0..width * height).into_par_iter();
+    let pixels = match shown {
+        RoomLight::Display => {
+            let codes = places.map(|i| pixel(i, tone_mapped).to_array().map(srgb_code));
+            let codes: Vec<[u8; 3]> = codes.collect();
+            let codes = Rgb::new(height, width, codes.concat());
+            let codes = codes.unwrap_or_else(|_| Rgb::black(height, width));
+            Pixels::Codes8(Arc::new(codes))
+        }
+        RoomLight::Linear => {
+            let light = places.map(|i| pixel(i, |light| light.max(Vec3::ZERO)).to_array());
+            let light: Vec<[f32; 3]> = light.collect();
+            let light = Light::new(height, width, light.concat());
+            let light = light.unwrap_or_else(|_| Light::black(height, width));
+            Pixels::Light(Arc::new(light))
+        }
+    };
     let axis = camera.axis();
     let depth = spots.iter().enumerate().map(|(i, spot)| {
         let ray = camera.ray((i % width) as f32, (i / width) as f32);
@@ -95,8 +113,7 @@ pub(super) fn render(scene: &Scene, camera: &Camera) -> RenderedView {
             .iter()
             .map(|spot| spot.map_or(0, |spot| spot.thing as u32 + 1))
             .collect(),
-        rgb: Rgb::new(height, width, samples.concat())
-            .unwrap_or_else(|_| Rgb::black(height, width)),
+        pixels,
     }
 }
 
@@ -150,13 +167,20 @@ struct LightGrid<'a> {
     places: Vec<Option<Spot>>,
     /// The direct light, and the indirect light, which is smoother.
     incoming: [Vec<Vec3>; 2],
+    /// The radiance of each thing that is a source of light; empty if sources are shown relative to the room.
+    radiances: Vec<Option<Vec3>>,
 }
 
 /// The distances between smoothed neighbours in each pass, for direct and for indirect light (chosen).
 const PASSES: [&[usize]; 2] = [&[1, 2, 1], &[1, 2, 4, 8, 2]];
 
 impl<'a> LightGrid<'a> {
-    fn new(lighting: &'a Lighting<'a>, spots: &[Option<Spot>], size: [usize; 2]) -> Self {
+    fn new(
+        lighting: &'a Lighting<'a>,
+        spots: &[Option<Spot>],
+        size: [usize; 2],
+        radiances: Vec<Option<Vec3>>,
+    ) -> Self {
         let grid = size.map(|side| side.div_ceil(2));
         let places: Vec<Option<Spot>> = (0..grid[0] * grid[1])
             .map(|i| spots[(i / grid[0]) * 2 * size[0] + (i % grid[0]) * 2])
@@ -179,6 +203,7 @@ impl<'a> LightGrid<'a> {
             grid,
             places,
             incoming: [0, 1].map(|part| incoming.iter().map(|light| light[part]).collect()),
+            radiances,
         };
         for (part, passes) in PASSES.iter().enumerate() {
             for step in *passes {
@@ -253,8 +278,7 @@ impl<'a> LightGrid<'a> {
     /// The light that a point of the image sends to the camera.
     fn shade(&self, spot: &Spot, from: Vec3, at: [f32; 2]) -> Vec3 {
         if spot.glow != Vec3::ZERO {
-            // The brightness of a lamp is relative to that of the room, so that it never looks grey.
-            return spot.glow * self.typical();
+            return self.glow(spot);
         }
         let incoming = self.at(spot, at);
         let matte = spot.color * incoming;
@@ -272,9 +296,19 @@ impl<'a> LightGrid<'a> {
         );
         let back = Spot::first(self.lighting.scene, self.lighting.tree, &ray);
         let back = back.map_or(Vec3::ZERO, |back| {
-            back.color * self.lighting.ambient * 1.6 + back.glow * self.typical()
+            back.color * self.lighting.ambient * 1.6 + self.glow(&back)
         });
         matte * (1.0 - 0.5 * share) + back * (0.5 * share)
+    }
+
+    /// The light of a point that glows. On a display the brightness of a lamp is relative to that of the room, so that it never looks
+    /// grey. As linear light, it is the radiance that lights the room.
+    fn glow(&self, spot: &Spot) -> Vec3 {
+        let radiance = self.radiances.get(spot.thing).copied().flatten();
+        match radiance.filter(|_| spot.glow != Vec3::ZERO) {
+            Some(radiance) => spot.color * radiance,
+            None => spot.glow * self.typical(),
+        }
     }
 
     /// The typical brightness of the light in the view.

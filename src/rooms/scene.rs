@@ -142,6 +142,8 @@ pub(super) struct Scene {
     pub(super) mesh: Mesh,
     /// The index of the thing that each face belongs to.
     pub(super) owners: Vec<usize>,
+    /// The index of the thing that each light belongs to.
+    lamps: Vec<usize>,
 }
 
 impl Scene {
@@ -149,13 +151,42 @@ impl Scene {
     pub(super) fn add(&mut self, piece: &Piece, pose: Pose) {
         self.mesh.add(&piece.mesh, pose.at, pose.angle);
         self.owners.resize(self.mesh.faces.len(), self.things.len());
-        self.lights
-            .extend(piece.light.map(|light| light.placed(&pose)));
+        if let Some(light) = piece.light {
+            self.lights.push(light.placed(&pose));
+            self.lamps.push(self.things.len());
+        }
         self.things.push(Thing {
             kind: piece.kind,
             color: piece.color,
             pose,
         });
+    }
+
+    /// The radiance of each thing that is a source of light: of a window that of the daylight, and of a lamp that of its shade. The
+    /// flux of a bulb, 4π²r² times its radiance, leaves through the shade, which is taken for a Lambertian surface: π times its
+    /// area times its radiance.
+    pub(super) fn radiances(&self) -> Vec<Option<Vec3>> {
+        let mut areas = vec![0.0_f32; self.things.len()];
+        for (place, (face, owner)) in self.mesh.faces.iter().zip(&self.owners).enumerate() {
+            if matches!(self.surface(place).finish, SurfaceFinish::Glow(_)) {
+                let [a, b, c] = face.corners.map(|corner| corner.at);
+                areas[*owner] += (b - a).cross(c - a).length() / 2.0;
+            }
+        }
+        let mut radiances = vec![None; self.things.len()];
+        for (light, owner) in self.lights.iter().zip(&self.lamps) {
+            radiances[*owner] = match *light {
+                LightSource::Panel { radiance, .. } => Some(radiance),
+                LightSource::Bulb {
+                    radius, radiance, ..
+                } => {
+                    let share = 4.0 * std::f32::consts::PI * radius * radius;
+                    let area = areas[*owner];
+                    (area > 0.0).then(|| radiance * (share / area))
+                }
+            };
+        }
+        radiances
     }
 
     /// The surface of a face.

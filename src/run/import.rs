@@ -1,7 +1,6 @@
 //! `import`: writing the frames of another data set in the common interface.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 use clap::Args;
@@ -11,15 +10,16 @@ use serde_json::{Map, Value, json};
 
 use crate::ask::png;
 use crate::dataset::frame_folder::{self, FramePaths};
-use crate::dataset::{Picture, PixelLimit};
+use crate::dataset::{CodesArgs, ImageFile, PixelLimit};
 use crate::error::{Error, Result};
 use crate::import::keyframes::{KeyFrameArgs, choose};
 use crate::import::{Adapter, DataSetKind, FrameMaps, ListedFrame, StatedArgs, open};
 use crate::job::Outcome;
+use crate::job::input_tally::InputTally;
 use crate::job::progress::Progress;
 use crate::job::workers::{ThreadArgs, pool};
-use crate::types::Decides;
 use crate::types::manifest::Status;
+use crate::types::{Decides, FrameId, InputNote, Rgb};
 
 /// Plausible median depths of a frame in millimetres (chosen). Outside this range the scale is wrong, or it shows a wall.
 const ROOM: std::ops::RangeInclusive<u32> = 300..=15_000;
@@ -54,6 +54,9 @@ pub(crate) struct ImportArgs {
     /// The maximum size of an image.
     #[command(flatten)]
     pub limit: PixelLimit,
+    /// What the codes of images mean.
+    #[command(flatten)]
+    pub codes: CodesArgs,
     /// The number of threads.
     #[command(flatten)]
     pub threads: ThreadArgs,
@@ -80,10 +83,10 @@ pub(crate) fn import(args: &ImportArgs, progress: &Progress) -> Result<Outcome> 
         args.key_frames.fps,
     )?;
     let workers = pool(args.threads.threads)?;
-    let bar = progress.bar("frames", frames.len());
+    let (bar, tally) = (progress.bar("frames", frames.len()), InputTally::default());
     let written: Vec<Option<WrittenFrame>> = workers.install(|| {
         let frames = frames.par_iter().map(|frame| {
-            let written = write_frame(args, &*adapter, frame);
+            let written = write_frame(args, &*adapter, frame, &tally);
             bar.inc();
             written
                 .map_err(|e| tracing::error!("{}/{}: {e}", frame.scene, frame.frame))
@@ -92,6 +95,7 @@ pub(crate) fn import(args: &ImportArgs, progress: &Progress) -> Result<Outcome> 
         frames.collect()
     });
     drop(bar);
+    tally.warn();
     let failed = written.iter().filter(|written| written.is_none()).count();
     let written: Vec<WrittenFrame> = written.into_iter().flatten().collect();
     if written.is_empty() {
@@ -148,10 +152,34 @@ struct WrittenFrame {
     depth: Option<u32>,
 }
 
+/// The image of a frame with its maps. Maps belong to the image as it is stored; an image without maps is turned as its file
+/// states.
+struct ImportedImage {
+    file: ImageFile,
+    rgb: Rgb,
+    maps: FrameMaps,
+}
+
+impl ImportedImage {
+    fn read(args: &ImportArgs, adapter: &dyn Adapter, frame: &ListedFrame) -> Result<Self> {
+        let file = ImageFile::open(&frame.rgb, args.codes.rule(args.limit))?.never_turned();
+        let rgb = file.decode()?;
+        let maps = adapter.read(frame, &rgb)?;
+        let has_maps = maps.depth.is_some() || maps.semantic.is_some() || maps.segments.is_some();
+        if has_maps || file.note() == InputNote::default() {
+            return Ok(Self { file, rgb, maps });
+        }
+        let file = file.turned_as_stated();
+        let rgb = file.decode()?;
+        Ok(Self { file, rgb, maps })
+    }
+}
+
 fn write_frame(
     args: &ImportArgs,
     adapter: &dyn Adapter,
     frame: &ListedFrame,
+    tally: &InputTally,
 ) -> Result<WrittenFrame> {
     for name in [&frame.scene, &frame.frame] {
         let mut parts = Path::new(name).components();
@@ -160,19 +188,9 @@ fn write_frame(
             return Err(Error::data(format_args!("{name:?}"), problem));
         }
     }
-    let bytes = fs::read(&frame.rgb).map_err(|e| Error::file(&frame.rgb, "read", e))?;
-    let picture = Picture::Encoded {
-        bytes,
-        place: frame.rgb.display().to_string(),
-        most_pixels: args.limit.max_pixels.get(),
-    };
-    let rgb = picture.decode()?;
-    let FrameMaps {
-        depth,
-        semantic,
-        segments,
-        room,
-    } = adapter.read(frame, &rgb)?;
+    let ImportedImage { file, rgb, maps } = ImportedImage::read(args, adapter, frame)?;
+    let note = file.note();
+    tally.add(&FrameId(frame.rgb.display().to_string()), &note);
     let paths = FramePaths {
         out: &args.out,
         scene: &frame.scene,
@@ -181,17 +199,19 @@ fn write_frame(
     let mut line = paths.line(&rgb);
     let source = frame.rgb.file_name().map(|name| name.to_string_lossy());
     line.insert("source".to_owned(), json!(source));
-    // A JPEG file is copied as it is, so that its pixels stay the same.
-    let jpeg = frame
-        .rgb
-        .extension()
-        .is_some_and(|end| !end.eq_ignore_ascii_case("png"));
-    let content = match picture {
-        Picture::Encoded { bytes, .. } if jpeg => bytes,
-        _ => png(&rgb)?,
+    // All but plain PNG files are copied as they are, so that they are read here as anywhere else.
+    let image = if file.ending() == "png" && note == InputNote::default() {
+        paths.write("rgb", "png", &png(&rgb)?)?
+    } else {
+        paths.write("rgb", file.ending(), file.bytes())?
     };
-    let image = paths.write("rgb", if jpeg { "jpg" } else { "png" }, &content)?;
     line.insert("rgb".to_owned(), json!(image));
+    let FrameMaps {
+        depth,
+        semantic,
+        segments,
+        room,
+    } = maps;
     let median = depth.as_ref().and_then(median);
     if let Some(depth) = &depth {
         paths.depth(&mut line, depth, adapter.listing().depth_kind)?;
@@ -202,10 +222,13 @@ fn write_frame(
     if let Some(segments) = &segments {
         paths.segments(&mut line, segments, adapter.listing().segmentation)?;
     }
+    // The camera of a data set is that of the image as it is stored.
+    let is_stored = note.orientation.is_none();
+    let intrinsics = is_stored.then(|| adapter.camera(frame, &rgb)).flatten();
     for (key, value) in [
         ("t", json!(frame.time)),
         ("pose", json!(frame.pose)),
-        ("intrinsics", json!(adapter.camera(frame, &rgb))),
+        ("intrinsics", json!(intrinsics)),
         ("room_gt", json!(frame.room.clone().or(room))),
     ] {
         if !value.is_null() {

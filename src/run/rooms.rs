@@ -96,7 +96,12 @@ fn write_frame(args: &RoomsArgs, room: &Room) -> Result<WrittenFrame> {
         frame: room.view(),
     };
     let mut line = paths.line(&frame.rgb);
-    let image = paths.write("rgb", "png", &png(&frame.rgb)?)?;
+    let codes = paths.write("rgb", "png", &png(&frame.rgb)?)?;
+    // The frame is its light; the PNG file beside it is for looking at.
+    let image = match room.light()? {
+        Some(light) => paths.write("rgb", "exr", &frame_folder::exr(&light)?)?,
+        None => codes,
+    };
     line.insert("rgb".to_owned(), json!(image));
     if let Some(depth) = &frame.depth {
         paths.depth(&mut line, depth, frame.depth_kind)?;

@@ -5,7 +5,8 @@ use super::choice::ReadingMode;
 use super::grid::{Grid, TrialResult};
 use super::subject::Subject;
 use super::threshold::{CurveSummary, LevelCounts};
-use crate::types::{AxisLevel, EnhancerName, Family, KindReading, LightGroup, View};
+use crate::types::degradation::Kind;
+use crate::types::{Axis, AxisLevel, EnhancerName, Family, KindReading, LightGroup, View};
 
 /// Summary of one model over all levels, in one variant, raw or with one enhancer.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,6 +19,14 @@ pub struct Curve {
     pub family: Option<Family>,
     /// Threshold and area.
     pub summary: CurveSummary,
+}
+
+impl Curve {
+    /// The quantity over which the curve runs.
+    #[must_use]
+    pub fn axis(&self) -> Axis {
+        self.variant.kind.map_or(Axis::LIGHT, Kind::axis)
+    }
 }
 
 /// The points of one curve: one model in one variant, raw or with one enhancer.

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use super::choice::ReadingMode;
 use super::cluster::Clusters;
 use super::subject::Subject;
+use crate::types::degradation::Kind;
 use crate::types::{AnswerReading, Family, KindReading, QuestionId, Record, TrialOutcome};
 
 /// Result of one item for one subject.
@@ -181,11 +182,14 @@ impl<'a> Grid<'a> {
         variants.filter(|variant| variant.kind.is_some()).collect()
     }
 
-    /// The variant where only one is shown: the last kind that was asked, in its first light reading.
+    /// The variant where only one is shown: of the first kind that was asked and those that extend it the last, in its first light
+    /// reading. So noise stays the main one if other kinds are asked too.
     #[must_use]
     pub fn main_variant(&self) -> Option<KindReading> {
         let variants = self.variants();
-        let kind = variants.last()?.kind;
+        let root = variants.first()?.kind.map(Kind::root);
+        let of_root = |variant: &&KindReading| variant.kind.map(Kind::root) == root;
+        let kind = variants.iter().copied().rfind(of_root)?.kind;
         variants
             .into_iter()
             .find(|variant| variant.kind == kind)

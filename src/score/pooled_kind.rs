@@ -49,6 +49,15 @@ impl PooledKind {
         }
     }
 
+    /// The name of the kind for images of a kind of degradation: what costs accuracy there, if the kind is about that.
+    #[must_use]
+    pub fn name_on(self, degradation: Option<Kind>) -> &'static str {
+        match (self, degradation) {
+            (Self::Darkness, Some(degradation)) => degradation.axis().cause,
+            _ => self.name(),
+        }
+    }
+
     /// The only family that findings of this kind are about; `None` if they are about each and about all together.
     #[must_use]
     pub fn only_family(self) -> Option<&'static Family> {

@@ -20,6 +20,7 @@ fn manifest(seed: u64) -> RunManifest {
         images: BTreeMap::new(),
         columns: BTreeMap::new(),
         enhancers: BTreeMap::new(),
+        inputs: None,
         shard: None,
         counts: Counts::default(),
     }

@@ -2,9 +2,10 @@
 
 use rayon::prelude::*;
 
+use super::clean::Clean;
 use super::curve;
 use super::lanes::{Isa, Kernel};
-use crate::types::{Rgb, Severity};
+use crate::types::{Codes16, Light, Rgb, Severity};
 
 /// Version of the exposure branch, raised whenever a pixel changes.
 pub(crate) const VERSION: u32 = 1;
@@ -15,9 +16,17 @@ const CHUNK: usize = 1 << 16;
 /// 2^23: adding it to a number from 0 to 255 leaves the nearest whole number in the lowest byte.
 const ROUND: f32 = 8_388_608.0;
 
-/// The image after an exposure drop, without noise (DarkQA, eqs. 1–3): each code is looked up in the [`table`].
+/// The image after an exposure drop, without noise (DarkQA, eqs. 1–3): each code is looked up in the [`table`]. Codes of 16 bits
+/// and light are rounded to 8 bits after the drop.
 #[must_use]
-pub fn expose(clean: &Rgb, drop: Severity) -> Rgb {
+pub fn expose<'a>(clean: impl Into<Clean<'a>>, drop: Severity) -> Rgb {
+    match clean.into() {
+        Clean::Codes(codes) => expose_codes(codes, drop),
+        deep => expose_by(deep, drop.value()),
+    }
+}
+
+fn expose_codes(clean: &Rgb, drop: Severity) -> Rgb {
     let table = table(drop);
     let codes: [u8; 256] = std::array::from_fn(|code| code as u8);
     let mut scaled = [0; 256];
@@ -39,12 +48,49 @@ pub fn expose(clean: &Rgb, drop: Severity) -> Rgb {
     degraded
 }
 
-/// The image after any exposure drop in EV, without noise; ties between codes are rounded as in single precision.
+/// The image after any exposure drop in EV, without noise; ties between 8-bit codes are rounded as in single precision.
 #[must_use]
-pub(crate) fn expose_by(clean: &Rgb, drop_ev: f64) -> Rgb {
+pub(crate) fn expose_by<'a>(clean: impl Into<Clean<'a>>, drop_ev: f64) -> Rgb {
+    let clean = clean.into();
     let mut degraded = Rgb::black(clean.height(), clean.width());
-    expose_into(clean, drop_ev, &mut degraded);
+    match clean {
+        Clean::Codes(codes) => expose_into(codes, drop_ev, &mut degraded),
+        Clean::Codes16(codes) => expose_16_bits(codes, drop_ev, &mut degraded),
+        Clean::Light(light) | Clean::Scene(light) => expose_light(light, drop_ev, &mut degraded),
+    }
     degraded
+}
+
+/// The codes floor(2^(−ΔEV/2.2) · 255 · v/65535 + ½) of 16-bit codes v, at most 255; ties are rounded up.
+fn expose_16_bits(clean: &Codes16, drop_ev: f64, degraded: &mut Rgb) {
+    let factor = 255.0 * curve::display_factor(drop_ev);
+    let code = |code: u16| {
+        let scaled = factor * (f64::from(code) / 65_535.0) + 0.5 + TIE;
+        scaled.floor().min(255.0) as u8
+    };
+    let table: Vec<u8> = (0..=u16::MAX).map(code).collect();
+    let chunks = degraded.samples_mut().par_chunks_mut(CHUNK);
+    let clean = clean.samples().par_chunks(CHUNK);
+    chunks.zip(clean).for_each(|(codes, clean)| {
+        for (code, clean) in codes.iter_mut().zip(clean) {
+            *code = table[usize::from(*clean)];
+        }
+    });
+}
+
+/// The codes floor(255 · min(1, 2^(−ΔEV) · L)^(1/2.2) + ½) of light L, which is clipped after the drop.
+fn expose_light(clean: &Light, drop_ev: f64, degraded: &mut Rgb) {
+    // The least light of each code above 0: halfway, in codes, from the code below.
+    let drop = libm::exp2(drop_ev);
+    let steps: [f64; 255] =
+        std::array::from_fn(|below| libm::pow((below as f64 + 0.5) / 255.0, curve::GAMMA) * drop);
+    let chunks = degraded.samples_mut().par_chunks_mut(CHUNK);
+    let clean = clean.samples().par_chunks(CHUNK);
+    chunks.zip(clean).for_each(|(codes, clean)| {
+        for (code, light) in codes.iter_mut().zip(clean) {
+            *code = steps.partition_point(|step| *step <= f64::from(*light)) as u8;
+        }
+    });
 }
 
 /// Writes the image after an exposure drop into `degraded`, an image of the same size.

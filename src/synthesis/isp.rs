@@ -30,6 +30,8 @@ pub(super) struct Developer {
     /// Matrix from camera colours to linear sRGB.
     matrix: [[f32; 3]; 3],
     tone: Tone,
+    /// Light at which the sensor saturates, in EV above white.
+    headroom_ev: f64,
     isa: Isa,
 }
 
@@ -40,15 +42,39 @@ impl Developer {
                 .map(|balance| (balance * state.rgb_gain) as f32),
             matrix: state.camera_to_rgb.map(|row| row.map(|value| value as f32)),
             tone,
+            headroom_ev: 0.0,
             isa,
         }
     }
 
-    /// Multiplies a sensor row by the white-balance and brightness gains and clips it to [0, 1].
+    /// The same for light in front of a sensor that saturates this many EV above white. Display values are then in units of its
+    /// saturation, and no tone curve stands before the drop.
+    pub(super) fn of_light(self, headroom_ev: f64) -> Self {
+        let tone = match self.tone {
+            Tone::BeforeEv => Tone::None,
+            tone => tone,
+        };
+        Self {
+            tone,
+            headroom_ev,
+            ..self
+        }
+    }
+
+    /// Light at which the sensor saturates; 1 is white.
+    fn headroom(&self) -> f32 {
+        libm::exp2(self.headroom_ev) as f32
+    }
+
+    /// Multiplies a sensor row by the white-balance and brightness gains and clips it between 0 and the sensor's saturation.
     pub(super) fn balance(&self, row: usize, line: &mut RawRow<'_>) {
         for (parity, samples) in line.planes().into_iter().enumerate() {
             let gain = self.gains[Plane::at(row, parity) as usize];
-            self.isa.run(WhiteBalance { gain, samples });
+            self.isa.run(WhiteBalance {
+                gain,
+                most: self.headroom(),
+                samples,
+            });
         }
     }
 
@@ -76,7 +102,7 @@ impl Developer {
     pub(super) fn encode(&self, display: &[f32], drop_ev: f64, codes: &mut [u8]) {
         self.isa.run(Encode {
             display,
-            factor: curve::display_factor(drop_ev) as f32,
+            factor: curve::display_factor(drop_ev - self.headroom_ev) as f32,
             tone: self.tone,
             codes,
         });
@@ -85,6 +111,7 @@ impl Developer {
 
 struct WhiteBalance<'a> {
     gain: f32,
+    most: f32,
     samples: &'a mut [Lanes<f32>],
 }
 
@@ -92,7 +119,13 @@ impl Kernel for WhiteBalance<'_> {
     #[inline(always)]
     fn run(self) {
         for sample in self.samples.as_flattened_mut() {
-            *sample = clip(*sample * self.gain);
+            let balanced = *sample * self.gain;
+            let balanced = if balanced > 0.0 { balanced } else { 0.0 };
+            *sample = if balanced < self.most {
+                balanced
+            } else {
+                self.most
+            };
         }
     }
 }
@@ -116,10 +149,11 @@ impl Kernel for Display<'_> {
     #[inline(always)]
     fn run(self) {
         let gamma = &*GAMMA;
+        let scale = 1.0 / self.developer.headroom();
         let mut colours = [[[0.0; LANES]; 3]; 2];
         for (index, values) in self.values.chunks_mut(6 * LANES).enumerate() {
             bayer::demosaic(self.rows, self.row, index, &mut colours);
-            self.developer.to_linear_srgb(&mut colours);
+            self.developer.to_linear_srgb(&mut colours, scale);
             let [even, odd] = &colours;
             for (lane, values) in values.chunks_mut(6).enumerate().take(LANES) {
                 let (even, odd) = (even.each_ref(), odd.each_ref());
@@ -152,15 +186,17 @@ impl Kernel for Display<'_> {
 }
 
 impl Developer {
-    /// Converts camera colours to linear sRGB, clipped to [`DARKEST`] to 1.
+    /// Converts camera colours to linear sRGB in units of the sensor's saturation, clipped to [`DARKEST`] to 1. `scale` is 1 / that
+    /// unit.
     #[inline(always)]
-    fn to_linear_srgb(&self, colours: &mut bayer::Colours) {
+    fn to_linear_srgb(&self, colours: &mut bayer::Colours, scale: f32) {
         let [red, green, blue] = self.matrix;
         for [r, g, b] in colours {
             for i in 0..LANES {
                 let camera = [r[i], g[i], b[i]];
                 let product = |row: [f32; 3]| {
                     let x = row[0] * camera[0] + row[1] * camera[1] + row[2] * camera[2];
+                    let x = x * scale;
                     let x = if x > DARKEST { x } else { DARKEST };
                     if x < 1.0 { x } else { 1.0 }
                 };

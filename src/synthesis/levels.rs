@@ -1,9 +1,11 @@
 //! The value of `--levels`: [`Levels`].
 
+use std::fmt::Display;
 use std::str::FromStr;
 
-use crate::types::degradation::Kind;
-use crate::types::{AxisLevel, Severity};
+use crate::error::{Error, Result};
+use crate::types::degradation::{Axis, Kind};
+use crate::types::{AxisLevel, KindSet, Severity};
 
 /// Levels in ascending order of degradation, without duplicates.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -18,13 +20,13 @@ const LIGHT: Kind = Kind::ALL[0];
 impl FromStr for Levels {
     type Err = String;
 
-    /// Parses items between commas, in any order: `L3`, `L0-L5`, a number of EV, or `0..10:0.5`. Sorts the levels and removes
-    /// duplicates.
-    fn from_str(text: &str) -> Result<Self, String> {
+    /// Parses items between commas, in any order: `L3`, `L0-L5`, a number of EV, `0..10:0.5`, or exposure times as `T33.33`. Sorts
+    /// the levels and removes duplicates.
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
         let mut levels = Vec::new();
         for item in text.split(',').map(str::trim) {
             if item.is_empty() {
-                return Err("a level is missing; write levels as L3, L0-L5, 3.3 (EV) or 0..10:0.5, between commas".to_owned());
+                return Err("a level is missing; write levels as L3, L0-L5, 3.3 (EV), 0..10:0.5 or T33.33 (ms), between commas".to_owned());
             } else if let Some((from, rest)) = item.split_once("..") {
                 levels.extend(steps(item, from.trim(), rest.trim())?);
             } else if let Some((first, last)) = item.split_once('-') {
@@ -45,8 +47,40 @@ impl FromStr for Levels {
     }
 }
 
-/// The paper's levels from one to another, as `L1-L4`; `item` is the text of the range.
-fn named(item: &str, first: &str, last: &str) -> Result<Vec<AxisLevel>, String> {
+/// The kind on whose axis a text lies, and the text without the letter of that axis.
+fn on_axis(text: &str) -> (Kind, &str) {
+    let is_number = |rest: &&str| rest.starts_with(|c: char| c.is_ascii_digit());
+    match text.strip_prefix(['T', 't']).filter(is_number) {
+        Some(number) => (Kind::Motion, number),
+        None => (LIGHT, text),
+    }
+}
+
+/// A level of the axis of a kind, as it is written in a range.
+fn written(kind: Kind, number: impl Display) -> String {
+    match kind {
+        Kind::Motion => format!("T{number}"),
+        _ => number.to_string(),
+    }
+}
+
+/// A range with a step, as an example on the axis of a kind.
+fn example(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Motion => "T10..T100:10",
+        _ => "0..10:0.5",
+    }
+}
+
+/// The levels of a kind's own ladder, from L0.
+fn ladder(kind: Kind) -> Vec<AxisLevel> {
+    let ladder = kind.ladder().iter();
+    let ladder = ladder.map(|severity| AxisLevel::new(kind, *severity));
+    std::iter::once(AxisLevel::L0).chain(ladder).collect()
+}
+
+/// The named levels from one to another, as `L1-L4` or `T8.33-T133.33`; `item` is the text of the range.
+fn named(item: &str, first: &str, last: &str) -> std::result::Result<Vec<AxisLevel>, String> {
     let is_number = |end: &str| end.starts_with(|c: char| c.is_ascii_digit());
     if first.is_empty() {
         return Err(format!(
@@ -59,91 +93,175 @@ fn named(item: &str, first: &str, last: &str) -> Result<Vec<AxisLevel>, String> 
             "{item:?} is not a range; write L0-L5 for the paper's levels, or {first}..{last}:0.5 for exposure drops in EV with a step of 0.5"
         ));
     }
+    let (kind, _) = on_axis(last);
     let (from, to) = (level(first)?, level(last)?);
-    let ladder = LIGHT.ladder().iter();
-    let ladder = ladder.map(|severity| AxisLevel::new(LIGHT, *severity));
-    let paper: Vec<AxisLevel> = std::iter::once(AxisLevel::L0).chain(ladder).collect();
-    let is_named = |end: &str, level| !is_number(end) && paper.contains(level);
+    let ladder = ladder(kind);
+    let is_named = |end: &str, level| !is_number(end) && ladder.contains(level);
     if !is_named(first, &from) || !is_named(last, &to) {
+        let names: Vec<String> = ladder.iter().map(ToString::to_string).collect();
         return Err(format!(
-            "{item:?}: the ends of a range with a dash are two of L0, L1, L2, L3, L4, L5; write {}..{}:0.5 for exposure drops in EV with a step of 0.5",
-            from.value(),
-            to.value()
+            "{item:?}: the ends of a range with a dash are two of {}; write {}..{}:{} for {}s in {} with a step of {}",
+            names.join(", "),
+            written(kind, from.value()),
+            written(kind, to.value()),
+            step(kind),
+            kind.axis().title,
+            kind.axis().unit,
+            step(kind)
         ));
     }
     if from > to {
         return Err(format!("{item:?} runs backwards; write {to}-{from}"));
     }
     let range = from..=to;
-    Ok(paper.into_iter().filter(|at| range.contains(at)).collect())
+    Ok(ladder.into_iter().filter(|at| range.contains(at)).collect())
 }
 
-/// The exposure drops of a range with a step, as `0..10:0.5`; its end is one of them if a step ends there. `item` is the text of
-/// the range.
-fn steps(item: &str, from: &str, rest: &str) -> Result<Vec<AxisLevel>, String> {
-    let Some((to, step)) = rest.split_once(':') else {
+/// The step of an example on the axis of a kind.
+fn step(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Motion => "10",
+        _ => "0.5",
+    }
+}
+
+/// The severities of a range with a step, as `0..10:0.5`; its end is one of them if a step ends there. `item` is the text of the
+/// range.
+fn steps(item: &str, from: &str, rest: &str) -> std::result::Result<Vec<AxisLevel>, String> {
+    let (kind, number) = on_axis(from);
+    let unit = kind.axis().unit;
+    let Some((to, by)) = rest.split_once(':') else {
         return Err(format!(
-            "{item:?} has no step; write FROM..TO:STEP in EV, as {from}..{rest}:0.5"
+            "{item:?} has no step; write FROM..TO:STEP in {unit}, as {from}..{rest}:{}",
+            step(kind)
         ));
     };
-    let (from, to) = (hundredths(item, from)?, hundredths(item, to)?);
-    let step = hundredths(item, step)?;
+    let to = match on_axis(to.trim()) {
+        (of, number) if of == kind => number,
+        _ => to,
+    };
+    let (from, to) = (hundredths(item, kind, number)?, hundredths(item, kind, to)?);
+    let step = hundredths(item, kind, by)?;
     if step == 0 {
         return Err(format!(
-            "{item:?} has a step of 0; the step is at least 0.01 EV"
+            "{item:?} has a step of 0; the step is at least 0.01 {unit}"
         ));
     }
-    let ev = |hundredths: u16| f64::from(hundredths) / 100.0;
+    let value = |hundredths: u16| f64::from(hundredths) / 100.0;
     if from > to {
         return Err(format!(
             "{item:?} runs backwards; write {}..{}:{}",
-            ev(to),
-            ev(from),
-            ev(step)
+            written(kind, value(to)),
+            written(kind, value(from)),
+            value(step)
         ));
     }
-    let drops = (from..=to).step_by(usize::from(step));
-    Ok(drops
-        .map(|drop| match drop {
+    let severities = (from..=to).step_by(usize::from(step));
+    Ok(severities
+        .map(|severity| match severity {
             0 => AxisLevel::L0,
-            drop => AxisLevel::new(LIGHT, Severity::hundredths(drop)),
+            severity => AxisLevel::new(kind, Severity::hundredths(severity)),
         })
         .collect())
 }
 
-/// A number of EV of a range, in hundredths.
-fn hundredths(item: &str, number: &str) -> Result<u16, String> {
+/// A number of a range on the axis of a kind, in hundredths of its unit.
+fn hundredths(item: &str, kind: Kind, number: &str) -> std::result::Result<u16, String> {
     let number = number.trim();
     let is_number = number.starts_with(|c: char| c.is_ascii_digit());
     if !is_number {
         return Err(format!(
-            "{item:?}: {number:?} is not a number; write FROM..TO:STEP in EV, as 0..10:0.5"
+            "{item:?}: {number:?} is not a number; write FROM..TO:STEP in {}, as {}",
+            kind.axis().unit,
+            example(kind)
         ));
     }
-    let level = level(number).map_err(|problem| format!("{item:?}: {problem}"))?;
+    let level = measured(kind, number).map_err(|problem| format!("{item:?}: {problem}"))?;
     Ok(level.severity().map_or(0, Severity::in_hundredths))
 }
 
-/// Parses one level: a name, or a number of EV.
-fn level(text: &str) -> Result<AxisLevel, String> {
-    let number = text.starts_with(|c: char| c.is_ascii_digit());
-    if text.eq_ignore_ascii_case("L0") || number && text.parse::<f64>() == Ok(0.0) {
+/// Parses one level: a name, a number of EV, or an exposure time as T33.33.
+fn level(text: &str) -> std::result::Result<AxisLevel, String> {
+    let (kind, number) = on_axis(text);
+    let is_number = number.starts_with(|c: char| c.is_ascii_digit());
+    if text.eq_ignore_ascii_case("L0") {
         return Ok(AxisLevel::L0);
     }
-    let is_above = |ev: f64| ev > LIGHT.largest().value();
-    if number && text.parse().is_ok_and(is_above) {
+    if is_number {
+        return measured(kind, number);
+    }
+    let severity = kind.severity(text).map_err(|e| e.to_string())?;
+    Ok(AxisLevel::new(kind, severity))
+}
+
+/// The level of a number on the axis of a kind.
+fn measured(kind: Kind, number: &str) -> std::result::Result<AxisLevel, String> {
+    if number.parse::<f64>() == Ok(0.0) {
+        return Ok(AxisLevel::L0);
+    }
+    let is_above = |value: f64| value > kind.largest().value();
+    if number.parse().is_ok_and(is_above) {
         return Err(format!(
-            "{text:?} is above {} EV, the maximum",
-            LIGHT.largest()
+            "{number:?} is above {} {}, the maximum",
+            kind.largest(),
+            kind.axis().unit
         ));
     }
-    let severity = if number {
-        text.parse::<Severity>()
-    } else {
-        LIGHT.severity(text)
-    };
-    let severity = severity.map_err(|e| e.to_string())?;
-    Ok(AxisLevel::new(LIGHT, severity))
+    let severity = number.parse::<Severity>().map_err(|e| e.to_string())?;
+    Ok(AxisLevel::new(kind, severity))
+}
+
+impl Levels {
+    /// The levels of a run with these kinds. Kinds of an axis on which no level is named have their own ladder, if L0 to L5 are
+    /// named, as by default.
+    ///
+    /// # Errors
+    /// If a kind has no level, or a level no kind.
+    pub(super) fn of_kinds(&self, kinds: KindSet) -> Result<Vec<AxisLevel>> {
+        let mut levels = self.0.clone();
+        let on = |axis: Axis| move |level: &&AxisLevel| level.axis() == Some(axis);
+        let is_clean = levels.iter().all(|level| level.severity().is_none());
+        let light = levels
+            .iter()
+            .filter(|level| level.axis() != Some(Axis::MOTION));
+        let has_ladders = light.eq(&ladder(LIGHT));
+        for axis in Axis::ALL.into_iter().filter(|_| !is_clean) {
+            let mut of_axis = kinds.kinds().filter(|kind| kind.axis() == axis);
+            match (of_axis.next(), self.0.iter().find(on(axis))) {
+                (Some(kind), None) if has_ladders => levels.extend(ladder(kind)),
+                (Some(kind), None) => {
+                    let [first, last] = ends(kind);
+                    let problem = format_args!(
+                        "no level of {kind} is named; add {first}-{last}, or leave out {kind} in --variant"
+                    );
+                    return Err(Error::usage("--levels", problem));
+                }
+                (None, Some(_)) if axis == Axis::LIGHT && has_ladders => {
+                    levels.retain(|level| level.axis() != Some(axis));
+                }
+                (None, Some(level)) => {
+                    let all = Kind::ALL.into_iter().filter(|kind| kind.axis() == axis);
+                    let words: Vec<&str> = all.map(Kind::word).collect();
+                    let problem = format_args!(
+                        "{level} is a level of {}, of which --variant {kinds} names none",
+                        words.join(", ")
+                    );
+                    return Err(Error::usage("--levels", problem));
+                }
+                (Some(_), Some(_)) | (None, None) => {}
+            }
+        }
+        levels.sort_unstable();
+        levels.dedup();
+        Ok(levels)
+    }
+}
+
+/// The first and the last level of a kind's own ladder.
+fn ends(kind: Kind) -> [String; 2] {
+    let ladder = kind.ladder();
+    [ladder.first(), ladder.last()]
+        .map(|severity| severity.map_or(String::new(), |severity| kind.label(*severity)))
 }
 
 #[cfg(test)]
@@ -177,6 +295,90 @@ mod tests {
         assert_eq!(names("0..16:0.1").len(), 161);
         assert_eq!(names("14.01..16:0.01").len(), 200);
         assert_eq!(names("L0,3..4:0.25,L1-L2").len(), 7);
+    }
+
+    #[test]
+    fn exposure_times_have_a_letter() {
+        assert_eq!(names("T33.33, t5,T0,L1"), ["L0", "L1", "T5", "T33.33"]);
+        assert_eq!(names("T8.33-T33.33"), ["T8.33", "T16.67", "T33.33"]);
+        assert_eq!(
+            names("L0-T133.33").len(),
+            6,
+            "L0 and the ladder of exposure times"
+        );
+        assert_eq!(names("T10..T30:10"), ["T10", "T20", "T30"]);
+        assert_eq!(names("T0..30:15,T5.50"), ["L0", "T5.5", "T15", "T30"]);
+        for (wrong, part) in [
+            ("T600", "\"600\" is above 500 ms, the maximum"),
+            ("T3.333", "has more than two decimals"),
+            (
+                "T10..T50",
+                "\"T10..T50\" has no step; write FROM..TO:STEP in ms, as T10..T50:10",
+            ),
+            ("T50..T10:5", "runs backwards; write T10..T50:5"),
+            (
+                "10..T50:5",
+                "\"T50\" is not a number; write FROM..TO:STEP in EV",
+            ),
+            (
+                "T10-T20",
+                "are two of L0, T8.33, T16.67, T33.33, T66.67, T133.33; write T10..T20:10 for exposure times in ms",
+            ),
+            ("T33.33-T8.33", "runs backwards; write T8.33-T33.33"),
+            ("L1-T33.33", "are two of L0, T8.33"),
+            ("typo", "\"typo\" is not one of L0, L1"),
+        ] {
+            let error = wrong.parse::<Levels>().unwrap_err();
+            assert!(error.contains(part), "{wrong}: {error}");
+        }
+    }
+
+    #[test]
+    fn each_kind_has_its_levels() {
+        let of = |levels: &str, kinds: &str| {
+            let levels: Levels = levels.parse().unwrap();
+            let levels = levels.of_kinds(kinds.parse().unwrap());
+            let levels = levels.map_err(|e| e.to_string())?;
+            let names: Vec<String> = levels.iter().map(ToString::to_string).collect();
+            Ok::<String, String>(names.join(" "))
+        };
+        let light = "L0 L1 L2 L3 L4 L5";
+        let times = "T8.33 T16.67 T33.33 T66.67 T133.33";
+        for (levels, kinds, expected) in [
+            ("L0-L5", "both", light.to_owned()),
+            ("L0-L5", "auto", light.to_owned()),
+            ("L0-L5", "motion", format!("L0 {times}")),
+            ("L0-L5", "all", format!("{light} {times}")),
+            ("L0-L5,T5", "ev,motion", format!("{light} T5")),
+            ("L0,T5", "motion", "L0 T5".to_owned()),
+            ("L3,T5", "noise,motion", "L3 T5".to_owned()),
+            ("L0,3.3", "auto", "L0 E3.3".to_owned()),
+            ("L0", "all", "L0".to_owned()),
+        ] {
+            assert_eq!(of(levels, kinds), Ok(expected), "{levels} {kinds}");
+        }
+        for (levels, kinds, part) in [
+            (
+                "L0,L3",
+                "noise,motion",
+                "--levels: no level of motion is named; add T8.33-T133.33, or leave out motion in --variant",
+            ),
+            ("T5", "both,motion", "no level of ev is named; add L1-L5"),
+            (
+                "L0,L3",
+                "motion",
+                "L3 is a level of ev, noise, auto, of which --variant motion names none",
+            ),
+            ("L0-L5,2.5", "motion", "L1 is a level of ev, noise, auto"),
+            (
+                "L0-L5,T5",
+                "both",
+                "T5 is a level of motion, of which --variant both names none",
+            ),
+        ] {
+            let error = of(levels, kinds).unwrap_err();
+            assert!(error.contains(part), "{levels} {kinds}: {error}");
+        }
     }
 
     #[test]

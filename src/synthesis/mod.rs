@@ -5,6 +5,8 @@
 //! Sensor     sRGB ─ unprocess ─ RAW ─ shot, read, row, quantisation ─ balance ─┐
 //!                                                     a Negative, drawn once ◄─┘
 //!            Negative ─ demosaic ─ camera → sRGB ─ × 2^−ΔEV ─ gamma⁻¹ ─ 8 bit     for each level
+//! Motion     sRGB ─ gamma ─ blur ─ gamma⁻¹ ─ 8 bit                                the mean over the path of an exposure
+//! Auto       sRGB ─ gamma ─ blur ─ unprocess ─ … the sensor branch, physical, at the camera's own gain
 //! ```
 //!
 //! The sensor branch has no forward tone curve, because the paper lists none. Before the drop, its shadows are therefore
@@ -21,8 +23,14 @@
     reason = "only inlined code is compiled for a kernel's instruction set, see lanes"
 )]
 
+mod applied;
+mod auto;
 pub(crate) mod bayer;
+pub(crate) mod blur;
 pub(crate) mod camera;
+mod clean;
+mod clean_raw;
+mod codes;
 pub(crate) mod colour;
 pub(crate) mod curve;
 pub(crate) mod exposure;
@@ -30,6 +38,7 @@ mod exposures;
 mod isp;
 pub(crate) mod lanes;
 mod levels;
+mod motion;
 pub(crate) mod negative;
 pub(crate) mod noise;
 pub(crate) mod piecewise;
@@ -38,19 +47,28 @@ pub(crate) mod quantile;
 pub(crate) mod random;
 mod reading;
 mod settings;
+mod streak;
 pub(crate) mod unprocess;
 
+pub use applied::AppliedDegradation;
+pub use auto::{AutoExposure, AutoShot};
 pub use camera::{Calibration, CameraModel, CameraState, Sampling};
+pub use clean::Clean;
+pub(crate) use clean_raw::CleanRaw;
 pub(crate) use exposure::{expose, expose_by};
 pub use exposures::Exposures;
-pub(crate) use exposures::{is_random, version};
-pub(crate) use negative::{Negative, ladder};
+pub(crate) use exposures::version;
+pub use motion::{FrameView, Motion, MotionAngle};
+pub(crate) use negative::{Negative, develop_with_state};
 pub use random::NoiseKey;
 pub(crate) use random::{Component, Site};
-pub(crate) use reading::Readings;
 pub use reading::{Amplify, Coupling, Draws, LightReading, Synthesis, Tone};
-pub(crate) use settings::{LightArgs, LightSettings, SensorArgs, SensorSettings};
+pub(crate) use settings::{
+    CameraArgs, KindSettings, LightArgs, LightSettings, SensorArgs, SensorSettings,
+};
+pub use streak::{Streak, Tap};
 
+use crate::error::Result;
 use crate::types::{Degradation, Rgb};
 
 /// Version of the sensor branch, raised whenever a pixel changes, so that results of an older version are not reused.
@@ -59,18 +77,32 @@ pub const VERSION: u32 = 2;
 
 /// The frame after a degradation; without one, the frame itself.
 ///
-/// `synthesis` is the content of the degradation's light reading. For several degradations of one frame, [`Exposures`] gives
-/// the same images with less work.
-#[must_use]
+/// `synthesis` is the content of the degradation's light reading. Automatic exposure and the camera's motion are as by default, and
+/// the focal length is not known. For other settings, and for several degradations of one frame, [`Exposures`] makes the images of
+/// [`AppliedDegradation`]s with less work.
+///
+/// # Errors
+/// If the sensor lacks the gain of an automatic exposure, or the picture would move too far during the exposure.
 pub fn degrade(
     clean: &Rgb,
     degradation: Option<&Degradation>,
     key: &NoiseKey,
     synthesis: &Synthesis,
-) -> Rgb {
-    Exposures::default().degrade(clean, degradation, key, synthesis)
+) -> Result<Rgb> {
+    let Some(how) = degradation else {
+        return Ok(clean.clone());
+    };
+    let view = FrameView {
+        width: clean.width(),
+        focal: None,
+    };
+    let camera = (&AutoExposure::default(), &Motion::default());
+    let applied = AppliedDegradation::new(how, synthesis, camera, view, key)?;
+    Ok(Exposures::default().degrade(clean.into(), &applied, key))
 }
 
+#[cfg(test)]
+mod signal_to_noise;
 #[cfg(test)]
 mod statistics;
 #[cfg(test)]

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::bayer::Bayer;
 use super::camera::CameraState;
+use super::clean::Clean;
 use super::isp::Developer;
 use super::lanes::Isa;
 use super::noise::{Noise, Term};
@@ -31,39 +32,54 @@ pub struct Negative {
 impl Negative {
     /// The negative of `clean` for a level, with camera and noise drawn from the key.
     #[must_use]
-    pub fn new(clean: &Rgb, key: &NoiseKey, synthesis: &Synthesis, severity: Severity) -> Self {
+    pub fn new<'a>(
+        clean: impl Into<Clean<'a>>,
+        key: &NoiseKey,
+        synthesis: &Synthesis,
+        severity: Severity,
+    ) -> Self {
+        let clean = clean.into();
         let capture = Capture::new(key, synthesis, severity, Isa::best());
+        let capture = capture.of(clean, synthesis.headroom_ev(severity.value()));
         Self {
             only_level: (!synthesis.shares_negative()).then_some(severity),
-            ..Self::of(clean, capture)
+            ..Self::developed_by(clean, capture)
         }
     }
 
     /// The negative of `clean` for a camera in the given state and with the given terms of noise, for all levels.
+    /// `headroom_ev` is that of the light reading ([`Synthesis::headroom_ev`]); it matters for light alone.
     #[must_use]
-    pub fn with_state(
-        clean: &Rgb,
+    pub fn with_state<'a>(
+        clean: impl Into<Clean<'a>>,
         key: &NoiseKey,
         state: &CameraState,
         amplify: Amplify,
         tone: Tone,
         terms: &[Term],
+        headroom_ev: f64,
     ) -> Self {
-        let isa = Isa::best();
-        Self::of(clean, Capture::with(key, state, amplify, tone, terms, isa))
+        let clean = clean.into();
+        let capture = Capture::with(key, state, amplify, tone, terms, Isa::best());
+        Self::developed_by(clean, capture.of(clean, headroom_ev))
     }
 
-    fn of(clean: &Rgb, capture: Capture) -> Self {
+    /// The negative of a noisy, white-balanced RAW image that covers `size`, for all levels.
+    pub(super) fn of_balanced(developer: Developer, balanced: Bayer, size: [usize; 2]) -> Self {
+        Self {
+            developer,
+            balanced,
+            only_level: None,
+            size,
+        }
+    }
+
+    fn developed_by(clean: Clean<'_>, capture: Capture) -> Self {
         let (height, width) = (clean.height(), clean.width());
         let mut balanced = Bayer::covering(height, width);
         let lines = balanced.lines_mut().enumerate();
         lines.for_each(|(row, mut line)| capture.capture_row(clean, row, &mut line));
-        Self {
-            developer: capture.developer,
-            balanced,
-            only_level: None,
-            size: [height, width],
-        }
+        Self::of_balanced(capture.developer, balanced, [height, width])
     }
 
     /// Whether a level may be developed from this negative.
@@ -101,24 +117,58 @@ impl Negative {
 ///
 /// # Panics
 /// If an image has another size, or there are more levels than images.
-pub fn ladder(
-    clean: &Rgb,
+pub fn ladder<'a>(
+    clean: impl Into<Clean<'a>>,
     key: &NoiseKey,
     synthesis: &Synthesis,
     levels: &[Severity],
     images: &mut [Rgb],
 ) {
-    let isa = Isa::best();
+    let (clean, isa) = (clean.into(), Isa::best());
     if synthesis.shares_negative() {
         if let Some(level) = levels.first() {
-            Capture::new(key, synthesis, *level, isa).develop(clean, levels, images);
+            let drops: Vec<f64> = levels.iter().map(|level| level.value()).collect();
+            let capture = Capture::new(key, synthesis, *level, isa);
+            capture.of(clean, 0.0).develop(clean, &drops, images);
         }
     } else {
         for (level, image) in levels.iter().zip(images) {
             let capture = Capture::new(key, synthesis, *level, isa);
-            capture.develop(clean, &[*level], std::slice::from_mut(image));
+            let capture = capture.of(clean, synthesis.headroom_ev(level.value()));
+            capture.develop(clean, &[level.value()], std::slice::from_mut(image));
         }
     }
+}
+
+/// A frame after an exposure drop, with the noise of this sensor in this state of its frame.
+#[must_use]
+pub(super) fn develop_by(
+    clean: Clean<'_>,
+    key: &NoiseKey,
+    synthesis: &Synthesis,
+    drop_ev: f64,
+) -> Rgb {
+    let state = synthesis.state_by(key, drop_ev);
+    let Synthesis { amplify, tone, .. } = *synthesis;
+    let headroom = synthesis.headroom_ev(drop_ev);
+    develop_with_state(clean, key, &state, (amplify, tone), [drop_ev, headroom])
+}
+
+/// A frame after an exposure drop, with the noise of a camera in the given state; the drop and the headroom of the light reading
+/// ([`Synthesis::headroom_ev`]) are in EV.
+#[must_use]
+pub(crate) fn develop_with_state(
+    clean: Clean<'_>,
+    key: &NoiseKey,
+    state: &CameraState,
+    (amplify, tone): (Amplify, Tone),
+    [drop_ev, headroom_ev]: [f64; 2],
+) -> Rgb {
+    let capture = Capture::with(key, state, amplify, tone, &Term::ALL, Isa::best());
+    let capture = capture.of(clean, headroom_ev);
+    let mut image = Rgb::black(clean.height(), clean.width());
+    capture.develop(clean, &[drop_ev], std::slice::from_mut(&mut image));
+    image
 }
 
 /// One exposure of the sensor: camera state and noise, ready for any row.
@@ -154,20 +204,34 @@ impl Capture {
         }
     }
 
+    /// The same exposure, ready for a clean frame. Codes end at white, and so does the sensor. For light in front of the camera the
+    /// sensor saturates this many EV above white, and the tone curve before the drop is left out: it undoes what the
+    /// inverse tone curve does to codes, and light has none.
+    fn of(self, clean: Clean<'_>, headroom_ev: f64) -> Self {
+        if !matches!(clean, Clean::Scene(_)) {
+            return self;
+        }
+        Self {
+            unprocess: self.unprocess.with_headroom(libm::exp2(headroom_ev) as f32),
+            developer: self.developer.of_light(headroom_ev),
+            ..self
+        }
+    }
+
     /// Fills a sensor row with the frame's samples, noisy and white-balanced.
-    fn capture_row(&self, clean: &Rgb, row: usize, line: &mut super::bayer::RawRow<'_>) {
+    fn capture_row(&self, clean: Clean<'_>, row: usize, line: &mut super::bayer::RawRow<'_>) {
         self.unprocess.fill(clean, row, line);
         self.noise.apply(row, line);
         self.developer.balance(row, line);
         line.repeat_edges();
     }
 
-    /// Develops all levels band by band.
-    fn develop(&self, clean: &Rgb, levels: &[Severity], images: &mut [Rgb]) {
+    /// Develops the frame after each of these exposure drops, band by band.
+    fn develop(&self, clean: Clean<'_>, drops: &[f64], images: &mut [Rgb]) {
         let (height, width) = (clean.height(), clean.width());
         let mut bands: Vec<Vec<&mut [u8]>> = Vec::new();
         bands.resize_with(height.div_ceil(BAND), Vec::new);
-        for image in &mut images[..levels.len()] {
+        for image in &mut images[..drops.len()] {
             assert_eq!((image.height(), image.width()), (height, width));
             let parts = image.samples_mut().chunks_mut(BAND * 3 * width);
             for (band, part) in bands.iter_mut().zip(parts) {
@@ -191,9 +255,9 @@ impl Capture {
                 }
                 for row in 0..rows {
                     self.developer.display(raw, lead + row, display);
-                    for (level, part) in levels.iter().zip(&mut parts) {
+                    for (drop_ev, part) in drops.iter().zip(&mut parts) {
                         let codes = &mut part[row * 3 * width..][..3 * width];
-                        self.developer.encode(display, level.value(), codes);
+                        self.developer.encode(display, *drop_ev, codes);
                     }
                 }
             },
@@ -219,6 +283,12 @@ impl Synthesis {
                 ..drawn
             },
         }
+    }
+
+    /// How many EV above white the sensor saturates after an exposure drop ([`Coupling::headroom_ev`]).
+    #[must_use]
+    pub fn headroom_ev(&self, drop_ev: f64) -> f64 {
+        self.coupling.headroom_ev(drop_ev)
     }
 
     /// Whether all levels of a frame are developed from one negative.
@@ -261,7 +331,8 @@ mod tests {
                 let develop = |isa: &Isa| {
                     let capture = Capture::with(&key, &state, amplify, tone, &Term::ALL, *isa);
                     let mut images = Severity::LADDER.map(|_| Rgb::black(40, 150));
-                    capture.develop(&clean, &Severity::LADDER, &mut images);
+                    let drops = Severity::LADDER.map(Severity::value);
+                    capture.develop((&clean).into(), &drops, &mut images);
                     images
                 };
                 let baseline = develop(&Isa::Baseline);

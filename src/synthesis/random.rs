@@ -66,7 +66,11 @@ impl NoiseKey {
     pub fn stream(&self, component: Component) -> Stream {
         let key = match component {
             Component::Camera => self.camera,
-            Component::Row | Component::RandomField | Component::ModelInput => self.noise,
+            Component::Row
+            | Component::RandomField
+            | Component::ModelInput
+            | Component::Motion
+            | Component::Resamples => self.noise,
         };
         let digest = Digest::of_parts([key.as_bytes(), component.name().as_bytes()]);
         let [low, high] = [0, 4].map(|at| {
@@ -89,6 +93,10 @@ pub enum Component {
     RandomField,
     /// Noise that an enhancer takes as an input.
     ModelInput,
+    /// Frames that a bootstrap draws.
+    Resamples,
+    /// The direction in which the camera turns.
+    Motion,
 }
 
 impl Component {
@@ -99,6 +107,8 @@ impl Component {
             Self::Row => "row",
             Self::RandomField => "field",
             Self::ModelInput => "model input",
+            Self::Resamples => "resamples",
+            Self::Motion => "motion",
         }
     }
 }

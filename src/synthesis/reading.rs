@@ -120,6 +120,12 @@ impl Readings {
         self.0.iter()
     }
 
+    /// The sensor of all readings, with neither its gain nor its ratio pinned.
+    pub(crate) fn camera(&self) -> CameraModel {
+        let camera = self.0.values().next().map(|content| &content.camera);
+        camera.map_or_else(CameraModel::default, CameraModel::unpinned)
+    }
+
     /// Content of a degradation's light reading. For a kind without readings it is any of them, because the pixels do not
     /// depend on it.
     ///
@@ -128,7 +134,7 @@ impl Readings {
     pub(crate) fn of(&self, degradation: Option<&Degradation>) -> Result<&Synthesis> {
         let content = match degradation.and_then(Degradation::reading) {
             None => self.0.values().next(),
-            Some(name) => self.0.get(name),
+            Some(name) => self.get(name),
         };
         content.ok_or_else(|| {
             let names: Vec<&str> = self.0.keys().map(ReadingName::as_str).collect();
@@ -139,6 +145,11 @@ impl Readings {
             );
             Error::usage("--profile", problem)
         })
+    }
+
+    /// Content of the reading of this name; `None` if the run does not have it.
+    pub(crate) fn get(&self, name: &ReadingName) -> Option<&Synthesis> {
+        self.0.get(name)
     }
 
     /// The content of the only reading.
@@ -201,6 +212,19 @@ pub enum Coupling {
     Independent,
     /// The level: r = 2^ΔEV, so that less light means fewer photons.
     Photon,
+}
+
+impl Coupling {
+    /// How many EV above white the sensor saturates, in front of a scene and after an exposure drop. In the paper's chain light is
+    /// clipped at white before the drop (0). If less light means fewer photons, the light is gone before it reaches the
+    /// sensor, which then saturates that much later.
+    #[must_use]
+    pub fn headroom_ev(self, drop_ev: f64) -> f64 {
+        match self {
+            Self::Independent => 0.0,
+            Self::Photon => drop_ev.max(0.0),
+        }
+    }
 }
 
 flag_words!(Amplify, Tone, Draws, Coupling);

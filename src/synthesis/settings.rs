@@ -5,26 +5,57 @@ use std::fs;
 use std::path::Path;
 
 use clap::{Args, ValueEnum};
+use serde::Serialize;
 
+use super::applied::AppliedDegradation;
+use super::auto::AutoExposure;
 use super::levels::Levels;
+use super::motion::{FrameView, Motion};
+use super::random::NoiseKey;
 use super::reading::{Amplify, Coupling, Draws, LightReading, Readings, Synthesis, Tone};
 use super::{Calibration, CameraModel, Sampling};
 use crate::error::{Error, Result};
+use crate::types::degradation::Kind;
 use crate::types::{AxisLevel, Decides, Degradation, KindSet, ReadingName};
 
 /// The levels and kinds of degradation.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Light")]
 pub(crate) struct LightArgs {
-    /// Levels, as L0-L5 or L0,L3, exposure drops in EV up to 16, as L0,3.3, and ranges of them, as 0..10:0.5
+    /// Levels, as L0-L5 or L0,L3, exposure drops in EV up to 16, as L0,3.3, and ranges of them, as 0..10:0.5; of motion,
+    /// exposure times in ms, as T33.33 or T8.33-T133.33
+    ///
+    /// L0-L5 is also the ladder of motion, T8.33-T133.33, unless exposure times are named.
     #[arg(long, value_name = "LEVELS", default_value = "L0-L5", add = Decides::Trials)]
     pub levels: Levels,
-    /// Which of the paired variants: ev (exposure drop alone), noise (with sensor noise), both
-    #[arg(long, value_name = "ev|noise|both", default_value_t = KindSet::BOTH, add = Decides::Trials)]
+    /// Which variants, one or several as ev,auto: ev (exposure drop alone), noise (with sensor noise), both (of these two), auto (as
+    /// a camera with automatic exposure meets the drop), motion (motion blur alone), all
+    #[arg(long, value_name = "LIST", default_value_t = KindSet::BOTH, add = Decides::Trials)]
     pub variant: KindSet,
     /// The sensor and its noise.
     #[command(flatten)]
     pub sensor: SensorArgs,
+    /// The camera's automatic exposure and its motion.
+    #[command(flatten)]
+    pub camera: CameraArgs,
+}
+
+/// The camera's automatic exposure and its motion.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Light")]
+pub(crate) struct CameraArgs {
+    /// How the automatic exposure of the variant auto meets a drop: at most so many stops of longer exposure, then of gain, from a
+    /// system gain K in ADU per electron and an exposure time in seconds at L0; what is left stays dark
+    ///
+    /// What is not named is as by default. The noise is that of the light reading physical at this gain, in the sensor of --camera.
+    #[arg(long, value_name = "KEY=VALUE,…", default_value_t = AutoExposure::default(), add = Decides::Pixels)]
+    pub auto: AutoExposure,
+    /// How the camera turns during an exposure, in the variants motion and auto: speed in degrees per second, horizontal field of view
+    /// in degrees where the data do not state the camera, angle in degrees (0: to the side, 90: up or down) or random for each image
+    ///
+    /// What is not named is as by default.
+    #[arg(long, value_name = "KEY=VALUE,…", default_value_t = Motion::default(), add = Decides::Pixels)]
+    pub motion: Motion,
 }
 
 /// The sensor and its noise.
@@ -68,8 +99,8 @@ pub(crate) struct SensorArgs {
     /// The sensor: sony-a7s2, nikon-d850, canon-eos-5d4, canon-eos-70d, canon-eos-700d, or a TOML file of a calibration
     #[arg(long, value_name = "NAME|FILE", default_value = "sony-a7s2", add = Decides::Pixels)]
     pub camera: String,
-    /// Pin the system gain K of the sensor, in ADU per electron; default: log-uniform in the camera's range (0.1–6 for
-    /// sony-a7s2) for each image
+    /// Pin the system gain K of the noise variant's sensor, in ADU per electron; default: log-uniform in the camera's range (0.1–6
+    /// for sony-a7s2) for each image
     #[arg(long, value_name = "K", add = Decides::Pixels)]
     pub gain: Option<f64>,
     /// Pin the light ratio r of the sensor noise; default: uniform in 100–300 for each image
@@ -110,16 +141,27 @@ impl Profile {
 /// Degradations that a run applies to its frames.
 #[derive(Debug)]
 pub(crate) struct LightSettings {
-    /// Levels in ascending order of degradation, without duplicates.
+    /// Levels in ascending order of degradation, axis by axis, without duplicates.
     pub levels: Vec<AxisLevel>,
-    /// Kinds of degradation at all levels except L0.
+    /// Kinds of degradation at all levels of their axis except L0.
     pub variants: KindSet,
+    /// Settings of each kind.
+    pub kinds: KindSettings,
+}
+
+/// Settings of each kind of degradation.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub(crate) struct KindSettings {
     /// Settings of the sensor branch.
     pub sensor: SensorSettings,
+    /// The automatic exposure.
+    pub auto: AutoExposure,
+    /// The motion of the camera.
+    pub motion: Motion,
 }
 
 /// Settings of the sensor branch, which makes the noisy images.
-#[derive(Debug)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub(crate) struct SensorSettings {
     /// Seed of all random draws.
     pub seed: u64,
@@ -133,11 +175,15 @@ impl LightSettings {
     /// # Errors
     /// [`Error::Usage`] with the flag that cannot be used.
     pub(crate) fn resolve(args: &LightArgs) -> Result<Self> {
-        Ok(Self {
-            levels: args.levels.0.clone(),
+        let light = Self {
+            levels: args.levels.of_kinds(args.variant)?,
             variants: args.variant,
-            sensor: SensorSettings::resolve(&args.sensor)?,
-        })
+            kinds: KindSettings::resolve(&args.sensor, &args.camera)?,
+        };
+        for how in light.degradations().iter().flatten() {
+            light.kinds.check(how)?;
+        }
+        Ok(light)
     }
 
     /// Degradations of each frame, level by level: each kind, in each light reading if it has readings; `None` is L0.
@@ -151,7 +197,7 @@ impl LightSettings {
             let kinds = self.variants.kinds();
             for kind in kinds.filter(|kind| AxisLevel::new(*kind, severity) == *level) {
                 let readings: Vec<Option<ReadingName>> = if kind.has_readings() {
-                    let readings = self.sensor.readings.iter();
+                    let readings = self.kinds.sensor.readings.iter();
                     readings.map(|(name, _)| Some(name.clone())).collect()
                 } else {
                     vec![None]
@@ -163,6 +209,48 @@ impl LightSettings {
             }
         }
         all
+    }
+}
+
+impl KindSettings {
+    /// Resolves the flags; reads the camera's file if `--camera` names one.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with the flag that cannot be used.
+    pub(crate) fn resolve(sensor: &SensorArgs, camera: &CameraArgs) -> Result<Self> {
+        Ok(Self {
+            sensor: SensorSettings::resolve(sensor)?,
+            auto: camera.auto,
+            motion: camera.motion,
+        })
+    }
+
+    /// What a degradation does to a frame.
+    ///
+    /// # Errors
+    /// If the light reading is not among those of `--profile`, the sensor lacks the gain of an automatic exposure, or the picture would
+    /// move too far.
+    pub(crate) fn apply(
+        &self,
+        how: &Degradation,
+        view: FrameView,
+        key: &NoiseKey,
+    ) -> Result<AppliedDegradation> {
+        let synthesis = self.sensor.readings.of(Some(how))?;
+        let camera = (&self.auto, &self.motion);
+        AppliedDegradation::new(how, synthesis, camera, view, key)
+    }
+
+    /// Checks what can be known of a degradation without its frame.
+    ///
+    /// # Errors
+    /// If the sensor lacks the gain of an automatic exposure.
+    fn check(&self, how: &Degradation) -> Result<()> {
+        if how.kind() == Kind::Auto {
+            let camera = self.sensor.readings.camera();
+            self.auto.shot(how.severity()).synthesis(&camera)?;
+        }
+        Ok(())
     }
 }
 

@@ -1,6 +1,7 @@
 //! Tests of the whole pipeline: its figures, and that pixels depend on its arguments alone.
 
 use super::camera::tests::median;
+use super::negative::ladder;
 use super::noise::Term;
 use super::*;
 use crate::types::degradation::Kind;
@@ -50,7 +51,7 @@ fn statistics(image: &Rgb) -> [[f64; 2]; 3] {
 #[test]
 fn without_a_degradation_the_frame_is_unchanged() {
     let clean = ramps(5, 7);
-    let same = degrade(&clean, None, &key(1, "a"), &Synthesis::default());
+    let same = degrade(&clean, None, &key(1, "a"), &Synthesis::default()).unwrap();
     assert_eq!(same, clean);
 }
 
@@ -59,9 +60,9 @@ fn one_negative_gives_the_images_of_degrade() {
     let (clean, key, paper) = (ramps(10, 14), key(1, "a"), Synthesis::default());
     let negative = Negative::new(&clean, &key, &paper, Severity::L1);
     for level in Severity::LADDER {
-        let alone = degrade(&clean, Some(&sensor(level)), &key, &paper);
+        let alone = degrade(&clean, Some(&sensor(level)), &key, &paper).unwrap();
         assert_eq!(alone, negative.develop(level));
-        let exposed = degrade(&clean, Some(&exposure_of(level)), &key, &paper);
+        let exposed = degrade(&clean, Some(&exposure_of(level)), &key, &paper).unwrap();
         assert_eq!(exposed, expose(&clean, level));
     }
 }
@@ -158,6 +159,7 @@ fn seed_and_frame_change_the_image() {
             Amplify::ShotOnly,
             Tone::None,
             &Term::ALL,
+            0.0,
         );
         negative.develop(Severity::L1)
     };
@@ -183,7 +185,7 @@ fn every_size_is_kept() {
     ] {
         let clean = ramps(height, width);
         let how = sensor(Severity::L2);
-        let degraded = degrade(&clean, Some(&how), &key(1, "a"), &Synthesis::default());
+        let degraded = degrade(&clean, Some(&how), &key(1, "a"), &Synthesis::default()).unwrap();
         assert_eq!((degraded.height(), degraded.width()), (height, width));
     }
 }
@@ -206,6 +208,7 @@ fn flat_greys_have_their_figures() {
             Amplify::ShotOnly,
             Tone::None,
             &Term::ALL,
+            0.0,
         );
         let found = statistics(&negative.develop(level));
         for (found, expected) in found.iter().flatten().zip(expected.iter().flatten()) {
@@ -224,6 +227,7 @@ fn noise_shrinks_with_the_light() {
         Amplify::ShotOnly,
         Tone::None,
         &Term::ALL,
+        0.0,
     );
     let [lower, higher] = [Severity::L1, Severity::L2]
         .map(|level| statistics(&negative.develop(level)).map(|[_, deviation]| deviation));
@@ -244,8 +248,15 @@ fn without_noise_a_mid_grey_and_white_are_the_exposure_branchs() {
             if code == 255 && state.rgb_gain < 1.0 {
                 continue;
             }
-            let negative =
-                Negative::with_state(&clean, &key, &state, Amplify::ShotOnly, Tone::None, &[]);
+            let negative = Negative::with_state(
+                &clean,
+                &key,
+                &state,
+                Amplify::ShotOnly,
+                Tone::None,
+                &[],
+                0.0,
+            );
             for level in Severity::LADDER {
                 assert_eq!(
                     negative.develop(level),
@@ -266,7 +277,8 @@ fn a_grey_ramp_comes_back_from_the_sensor_branch() {
         let state = CameraState::draw(&key(seed, "a"), &CameraModel::default());
         let tone = Tone::BeforeEv;
         let key = key(seed, "a");
-        let negative = Negative::with_state(&clean, &key, &state, Amplify::ShotOnly, tone, &[]);
+        let negative =
+            Negative::with_state(&clean, &key, &state, Amplify::ShotOnly, tone, &[], 0.0);
         let back = negative.develop_by(0.0);
         for (column, codes) in back.samples().chunks(3).enumerate() {
             for code in codes {
@@ -284,8 +296,15 @@ fn a_grey_ramp_comes_back_from_the_sensor_branch() {
 fn the_tone_curve_is_applied_where_it_is_set() {
     let clean = flat(100, 4);
     let develop = |tone| {
-        let negative =
-            Negative::with_state(&clean, &key(1, "a"), &median(), Amplify::All, tone, &[]);
+        let negative = Negative::with_state(
+            &clean,
+            &key(1, "a"),
+            &median(),
+            Amplify::All,
+            tone,
+            &[],
+            0.0,
+        );
         negative.develop(Severity::L1)
     };
     assert_eq!(develop(Tone::BeforeEv), expose(&clean, Severity::L1));
@@ -367,16 +386,17 @@ fn a_state_is_serialised_with_all_its_numbers() {
 #[test]
 fn every_kind_of_degradation_is_made_described_and_tested() {
     use crate::types::degradation::Kind;
-    use crate::types::{Degradation, FrameId, Rgb};
+    use crate::types::{Degradation, FrameId};
 
-    let clean = Rgb::new(4, 4, vec![200; 48]).unwrap();
+    let clean = ramps(32, 64);
     let key = super::NoiseKey::new(0, &FrameId("a".to_owned()));
     let described = include_str!("../../results/README.md");
     let tested = include_str!("../../tests/program/synthesize.rs");
     let mut missing = Vec::new();
     for kind in Kind::ALL {
         let how = Degradation::new(kind, kind.ladder()[2], None).unwrap();
-        if super::degrade(&clean, Some(&how), &key, &super::Synthesis::default()) == clean {
+        let degraded = degrade(&clean, Some(&how), &key, &Synthesis::default());
+        if degraded.unwrap() == clean {
             missing.push(format!("{kind:?} changes no pixel"));
         }
         let word = kind.word();

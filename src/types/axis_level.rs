@@ -6,9 +6,10 @@ use super::degradation::{Axis, Degradation, Kind, ReadingName, Severity};
 use super::light_group::LightGroup;
 use super::words::written_as_text;
 
-/// A point on the axis of a curve: L0 (the untouched frame) or a severity. All kinds of one axis share their points.
+/// A point on the axis of a curve: L0 (the untouched frame) or a severity. All kinds of one axis share their points. The points of
+/// an axis follow each other by severity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct AxisLevel(Option<(Severity, Kind)>);
+pub struct AxisLevel(Option<(Kind, Severity)>);
 
 impl AxisLevel {
     /// The untouched frame, the first point of every axis.
@@ -20,19 +21,19 @@ impl AxisLevel {
         // The first kind of an axis represents all kinds of that axis.
         let mut kinds = Kind::ALL.into_iter();
         let first = kinds.find(|other| other.axis() == kind.axis());
-        Self(Some((severity, first.unwrap_or(kind))))
+        Self(Some((first.unwrap_or(kind), severity)))
     }
 
     /// The severity; `None` for L0.
     #[must_use]
     pub fn severity(self) -> Option<Severity> {
-        self.0.map(|(severity, _)| severity)
+        self.0.map(|(_, severity)| severity)
     }
 
     /// The axis; `None` for L0, which is on all axes.
     #[must_use]
     pub fn axis(self) -> Option<Axis> {
-        self.0.map(|(_, kind)| kind.axis())
+        self.0.map(|(kind, _)| kind.axis())
     }
 
     /// The distance from L0 in the unit of the axis.
@@ -52,7 +53,7 @@ impl fmt::Display for AxisLevel {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.0 {
             None => f.pad("L0"),
-            Some((severity, kind)) => f.pad(&kind.label(severity)),
+            Some((kind, severity)) => f.pad(&kind.label(severity)),
         }
     }
 }

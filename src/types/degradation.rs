@@ -1,6 +1,7 @@
 //! The degradation of a frame, [`Degradation`], and the list of its kinds, [`Kind`].
 
 use std::borrow::Cow;
+use std::cmp::Ordering;
 use std::fmt;
 use std::str::FromStr;
 
@@ -13,9 +14,8 @@ use crate::error::Error;
 /// A kind of degradation at one severity, in one light reading if the kind has readings.
 ///
 /// The untouched frame, L0, is not a degradation: it is the `None` of an `Option`.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Degradation {
-    // The derived order compares fields from top to bottom, so the severity comes first.
     severity: Severity,
     kind: Kind,
     reading: Option<ReadingName>,
@@ -82,6 +82,26 @@ impl Degradation {
     }
 }
 
+impl Ord for Degradation {
+    /// By level, kind and light reading: the levels of one axis follow each other.
+    fn cmp(&self, other: &Self) -> Ordering {
+        // The first kind of an axis stands for the axis, as in the order of levels.
+        let axis = |kind: Kind| {
+            let mut kinds = Kind::ALL.into_iter();
+            kinds.find(|other| other.axis() == kind.axis())
+        };
+        let key = |how: &Self| (axis(how.kind), how.severity, how.kind);
+        let order = key(self).cmp(&key(other));
+        order.then_with(|| self.reading.cmp(&other.reading))
+    }
+}
+
+impl PartialOrd for Degradation {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
 impl fmt::Display for Degradation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}-{}", self.label(), self.kind)?;
@@ -97,7 +117,8 @@ impl FromStr for Degradation {
 
     fn from_str(text: &str) -> Result<Self, Error> {
         let wrong = |problem: &dyn fmt::Display| {
-            let form = "the form is L0, L3-ev, L3-noise, E3.3-noise or L3-noise@READING";
+            let form =
+                "the form is L0, L3-ev, L3-noise, E3.3-noise, L3-noise@READING or T33.33-motion";
             Error::usage("condition", format_args!("{text:?}: {problem}; {form}"))
         };
         let (plain, reading) = match text.split_once('@') {
@@ -125,11 +146,15 @@ pub enum Kind {
     Exposure,
     /// Less light, with sensor noise.
     Sensor,
+    /// Less light, met by a camera with automatic exposure: a longer exposure, gain, and what is left dark.
+    Auto,
+    /// The motion blur of an exposure, without less light.
+    Motion,
 }
 
 impl Kind {
     /// All kinds, in the order of tables.
-    pub const ALL: [Self; 2] = [Self::Exposure, Self::Sensor];
+    pub const ALL: [Self; 4] = [Self::Exposure, Self::Sensor, Self::Auto, Self::Motion];
 
     /// The word in conditions, in the column `variant` and in `--variant`.
     #[must_use]
@@ -137,6 +162,8 @@ impl Kind {
         match self {
             Self::Exposure => "ev",
             Self::Sensor => "noise",
+            Self::Auto => "auto",
+            Self::Motion => "motion",
         }
     }
 
@@ -146,6 +173,8 @@ impl Kind {
         match self {
             Self::Exposure => "exposure drop",
             Self::Sensor => "with noise",
+            Self::Auto => "automatic exposure",
+            Self::Motion => "motion blur",
         }
     }
 
@@ -153,15 +182,17 @@ impl Kind {
     #[must_use]
     pub fn axis(self) -> Axis {
         match self {
-            Self::Exposure | Self::Sensor => Axis::LIGHT,
+            Self::Exposure | Self::Sensor | Self::Auto => Axis::LIGHT,
+            Self::Motion => Axis::MOTION,
         }
     }
 
-    /// The severities of the paper, which are the default.
+    /// The severities of the paper, or of a kind that the paper does not have, which are the default.
     #[must_use]
     pub fn ladder(self) -> &'static [Severity] {
         match self {
-            Self::Exposure | Self::Sensor => &Severity::LADDER,
+            Self::Exposure | Self::Sensor | Self::Auto => &Severity::LADDER,
+            Self::Motion => &Severity::TIMES,
         }
     }
 
@@ -170,7 +201,9 @@ impl Kind {
     pub fn largest(self) -> Severity {
         match self {
             // There fewer than three of the 256 codes are left.
-            Self::Exposure | Self::Sensor => Severity::hundredths(1600),
+            Self::Exposure | Self::Sensor | Self::Auto => Severity::hundredths(1600),
+            // Half a second; chosen. Most cameras move too far in less.
+            Self::Motion => Severity::hundredths(50_000),
         }
     }
 
@@ -180,31 +213,68 @@ impl Kind {
         self == Self::Sensor
     }
 
+    /// Whether the kind has sensor noise.
+    #[must_use]
+    pub fn has_noise(self) -> bool {
+        matches!(self, Self::Sensor | Self::Auto)
+    }
+
+    /// Whether the kind has the motion blur of an exposure.
+    #[must_use]
+    pub fn has_motion(self) -> bool {
+        matches!(self, Self::Auto | Self::Motion)
+    }
+
     /// The kind that this one extends and is compared with: noise extends the exposure drop.
     #[must_use]
     pub fn base(self) -> Option<Self> {
         (self == Self::Sensor).then_some(Self::Exposure)
     }
 
-    /// The gain that brightens a small copy of a degraded image, in EV; 0 for a kind that does not reduce the light.
+    /// The kind that all findings about this one and those that extend it share: the base, or the kind itself.
+    #[must_use]
+    pub fn root(self) -> Self {
+        self.base().unwrap_or(self)
+    }
+
+    /// The gain that brightens a small copy of a degraded image, in EV; 0 for a kind that does not reduce the light, or of which
+    /// the camera's settings decide how dark it is.
     #[must_use]
     pub fn relight(self, severity: Severity) -> f32 {
         match self {
             Self::Exposure | Self::Sensor => severity.value() as f32,
+            Self::Auto | Self::Motion => 0.0,
         }
     }
 
-    /// The name of a severity: `L1` to `L5` for the exposure drops of the paper, otherwise as `E3.3`.
+    /// The letter before the number of a severity that has no name: `E` for exposure drops, `T` for exposure times.
+    #[must_use]
+    pub fn letter(self) -> char {
+        match self {
+            Self::Exposure | Self::Sensor | Self::Auto => 'E',
+            Self::Motion => 'T',
+        }
+    }
+
+    /// The name of a severity: `L1` to `L5` for the exposure drops of the paper, otherwise as `E3.3`; of exposure times, as `T33.33`.
     #[must_use]
     pub fn label(self, severity: Severity) -> String {
-        let index = self.ladder().iter().position(|named| *named == severity);
+        let index = self.named().iter().position(|named| *named == severity);
         match index {
             Some(index) => format!("L{}", index + 1),
-            None => format!("E{severity}"),
+            None => format!("{}{severity}", self.letter()),
         }
     }
 
-    /// The severity with a name, as `L3` or `E3.3`.
+    /// The severities with names of their own, L1 to L5.
+    fn named(self) -> &'static [Severity] {
+        match self {
+            Self::Exposure | Self::Sensor | Self::Auto => self.ladder(),
+            Self::Motion => &[],
+        }
+    }
+
+    /// The severity with a name, as `L3`, `E3.3` or `T33.33`.
     ///
     /// # Errors
     /// If no severity has the name, or if the severity has another name: `E6` is `L3`.
@@ -212,16 +282,20 @@ impl Kind {
         let wrong = |problem: String| Error::usage("level", problem);
         let upper = label.to_ascii_uppercase();
         let named = self
-            .ladder()
+            .named()
             .iter()
             .find(|severity| self.label(**severity) == upper);
         if let Some(severity) = named {
             return Ok(*severity);
         }
-        let Some(number) = upper.strip_prefix('E') else {
-            return Err(wrong(format!(
-                "{label:?} is not one of L0, L1, L2, L3, L4, L5 and not a number of stops such as 3.3 or E3.3"
-            )));
+        let Some(number) = upper.strip_prefix(self.letter()) else {
+            let expected = match self {
+                Self::Exposure | Self::Sensor | Self::Auto => {
+                    "one of L0, L1, L2, L3, L4, L5 and not a number of stops such as 3.3 or E3.3"
+                }
+                Self::Motion => "L0 and not an exposure time in milliseconds such as T33.33",
+            };
+            return Err(wrong(format!("{label:?} is not {expected}")));
         };
         let severity = number.parse::<Severity>()?;
         if self.label(severity) != upper {
@@ -229,7 +303,11 @@ impl Kind {
             return Err(wrong(format!("{label:?} is written {expected}")));
         }
         if severity > self.largest() {
-            return Err(wrong(format!("{label:?} is above E{}", self.largest())));
+            return Err(wrong(format!(
+                "{label:?} is above {}{}",
+                self.letter(),
+                self.largest()
+            )));
         }
         Ok(severity)
     }
@@ -293,14 +371,14 @@ impl ReadingName {
 
 impl Ord for ReadingName {
     /// `paper` first, then in alphabetical order.
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+    fn cmp(&self, other: &Self) -> Ordering {
         let is_other = |name: &Self| *name != Self::PAPER;
         (is_other(self), &self.0).cmp(&(is_other(other), &other.0))
     }
 }
 
 impl PartialOrd for ReadingName {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }

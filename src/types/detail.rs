@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::condition::Condition;
 use super::digest::Digest;
+use super::exposure_facts::ExposureFacts;
 use super::frame::FrameId;
 use super::observed::Observed;
 use super::question::{Answer, Family, QuestionId, UnreadReason};
@@ -159,6 +160,9 @@ pub struct WalkFacts {
     pub height: usize,
     /// The file format: `png` or `jpeg`.
     pub format: String,
+    /// What the camera did in all frames alike; not in the file for kinds that leave it open.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exposure: Option<ExposureFacts>,
 }
 
 /// The result of a trial in the strict reading.
@@ -212,4 +216,10 @@ pub struct ImageFacts {
     pub height: usize,
     /// The file format: `png` or `jpeg`.
     pub format: String,
+    /// The EXIF orientation by which the frame was turned when its file was read, 2 to 8; not in the file if it was not turned.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub orientation: Option<u8>,
+    /// What the camera did for the image; not in the file for kinds that leave it open.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exposure: Option<ExposureFacts>,
 }

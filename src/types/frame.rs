@@ -18,15 +18,9 @@ impl FrameId {
     /// The name without the ending of an image file, if it has one.
     #[must_use]
     pub fn bare(&self) -> &str {
-        let is_image = |ending: &str| {
-            let endings = ["png", "jpg", "jpeg"];
-            endings
-                .iter()
-                .any(|known| ending.eq_ignore_ascii_case(known))
-        };
         match self.0.rsplit_once('.') {
             Some((bare, ending))
-                if is_image(ending) && !bare.is_empty() && !bare.ends_with('/') =>
+                if is_image_ending(ending) && !bare.is_empty() && !bare.ends_with('/') =>
             {
                 bare
             }
@@ -39,6 +33,15 @@ impl fmt::Display for FrameId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(&self.0)
     }
+}
+
+/// The endings of the names of image files that are read, in lower case.
+pub(crate) const IMAGE_ENDINGS: [&str; 7] = ["png", "jpg", "jpeg", "webp", "tif", "tiff", "exr"];
+
+/// Whether the ending of a name is that of an image file that is read, in any case of its letters.
+pub(crate) fn is_image_ending(ending: &str) -> bool {
+    let mut known = IMAGE_ENDINGS.iter();
+    known.any(|known| ending.eq_ignore_ascii_case(known))
 }
 
 /// An 8-bit sRGB image, height × width × 3, contiguous, at least one pixel.
@@ -173,6 +176,8 @@ mod tests {
         for (name, bare) in [
             ("a/b.PNG", "a/b"),
             ("a.b.jpeg", "a.b"),
+            ("a.WebP", "a"),
+            ("a.heic", "a.heic"),
             ("a.b", "a.b"),
             ("a/.png", "a/.png"),
             ("scene/1", "scene/1"),

@@ -13,6 +13,9 @@ impl KindSet {
     /// The two kinds of the paper, `both`.
     pub const BOTH: Self = Self(1 << Kind::Exposure as u16 | 1 << Kind::Sensor as u16);
 
+    /// All kinds, `all`.
+    pub const ALL: Self = Self((1 << Kind::ALL.len()) - 1);
+
     /// The set of a single kind.
     #[must_use]
     pub fn only(kind: Kind) -> Self {
@@ -38,6 +41,9 @@ impl fmt::Display for KindSet {
         if *self == Self::BOTH {
             return f.pad("both");
         }
+        if *self == Self::ALL {
+            return f.pad("all");
+        }
         let words: Vec<&str> = self.kinds().map(Kind::word).collect();
         f.pad(&words.join(","))
     }
@@ -47,18 +53,20 @@ impl FromStr for KindSet {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        if text == "both" {
-            return Ok(Self::BOTH);
+        let mut set = Self(0);
+        for word in text.split(',') {
+            let part = match word.trim() {
+                "both" => Self::BOTH,
+                "all" => Self::ALL,
+                word => {
+                    let words = Kind::ALL.map(Kind::word).join(", ");
+                    let kind = Kind::of_word(word).map(Self::only);
+                    kind.ok_or_else(|| format!("{word:?} is not one of {words}, both, all"))?
+                }
+            };
+            set.0 |= part.0;
         }
-        let kinds = text.split(',').map(|word| {
-            let words = Kind::ALL.map(Kind::word).join(", ");
-            Kind::of_word(word)
-                .map(Self::only)
-                .ok_or_else(|| format!("{word:?} is not one of {words}, both"))
-        });
-        kinds
-            .reduce(|set, kind| Ok(Self(set?.0 | kind?.0)))
-            .unwrap_or(Ok(Self::BOTH))
+        Ok(set)
     }
 }
 
@@ -73,10 +81,18 @@ mod tests {
             ("noise", "noise"),
             ("both", "both"),
             ("noise,ev", "both"),
+            ("motion,ev", "ev,motion"),
+            ("both,auto", "ev,noise,auto"),
+            ("auto, both, motion", "all"),
+            ("all", "all"),
         ] {
             assert_eq!(text.parse::<KindSet>().unwrap().to_string(), written);
         }
         let wrong = "raw".parse::<KindSet>().unwrap_err();
-        assert!(wrong.contains("one of ev, noise, both"), "{wrong}");
+        assert!(
+            wrong.contains("one of ev, noise, auto, motion, both, all"),
+            "{wrong}"
+        );
+        assert!("".parse::<KindSet>().is_err() && "ev,".parse::<KindSet>().is_err());
     }
 }

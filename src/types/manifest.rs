@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::enhancer_note::EnhancerNote;
+use super::input_note::InputSummary;
 
 /// The progress of a run, and how it ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -149,6 +150,9 @@ pub struct RunManifest {
     /// How each enhancer was used, by its name; empty in runs of earlier versions.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub enhancers: BTreeMap<String, EnhancerNote>,
+    /// What was done to the images when their files were read; `None` if nothing was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub inputs: Option<InputSummary>,
     /// The part of an evaluation, as `2/4`; `None` for the whole evaluation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shard: Option<String>,

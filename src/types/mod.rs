@@ -1,7 +1,8 @@
-//! The types that all rooms share, without input, output or pixel arithmetic.
+//! The types that all rooms share, without input or output. The only arithmetic on pixels is how more than 8 bits are shown.
 
 pub(crate) mod axis_level;
 mod canonical;
+mod codes16;
 pub(crate) mod condition;
 pub(crate) mod control;
 pub(crate) mod decides;
@@ -9,26 +10,33 @@ pub(crate) mod degradation;
 pub(crate) mod detail;
 pub(crate) mod digest;
 pub(crate) mod enhancer_note;
+pub(crate) mod exposure_facts;
 pub(crate) mod flag;
 mod flaw;
 pub(crate) mod frame;
 pub(crate) mod image_notes;
+mod input_note;
+pub(crate) mod key_values;
 pub(crate) mod kind_set;
 pub(crate) mod labels;
+pub(crate) mod light;
 pub(crate) mod light_group;
 pub(crate) mod manifest;
 pub(crate) mod observed;
+pub(crate) mod pixels;
 pub(crate) mod question;
 pub(crate) mod recent;
 pub(crate) mod record;
 pub(crate) mod reply;
 pub(crate) mod run_question;
 pub(crate) mod severity;
+mod shown_codes;
 pub(crate) mod treatment_set;
 pub(crate) mod trial_key;
 pub(crate) mod words;
 
 pub use axis_level::{AxisLevel, KindReading};
+pub use codes16::Codes16;
 pub use condition::{Condition, EnhancerName};
 pub use control::Control;
 pub(crate) use decides::Decides;
@@ -37,13 +45,17 @@ pub use detail::{
     AnswerReading, ChoiceDetail, ImageFacts, OpenDetail, Step, TrialOutcome, WalkFacts,
 };
 pub use digest::Digest;
+pub use exposure_facts::ExposureFacts;
 pub use flaw::Flaw;
 pub use frame::{DepthKind, Frame, FrameId, Intrinsics, Rgb, Segmentation};
 pub use image_notes::{ImageFidelity, Thumbnail};
+pub use input_note::{ColourHandling, ColourNote, DepthNote, InputNote, InputSummary};
 pub use kind_set::KindSet;
 pub use labels::{Label, Labels, SegmentName};
+pub use light::Light;
 pub use light_group::LightGroup;
 pub use observed::{AnswerSource, Observed};
+pub use pixels::Pixels;
 pub use question::{Answer, Choices, Family, Question, QuestionId, UnreadReason};
 pub use record::{Detail, Failure, FailureKind, Via, View};
 pub use reply::{Finish, Reply, Usage};

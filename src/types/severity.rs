@@ -15,6 +15,10 @@ pub struct Axis {
     pub title: &'static str,
     /// The unit of the quantity, as `EV`.
     pub unit: &'static str,
+    /// What more of the quantity brings, as `darkness`: findings say what it costs.
+    pub cause: &'static str,
+    /// Where there is much of it, as `in the dark`.
+    pub place: &'static str,
 }
 
 impl Axis {
@@ -22,7 +26,20 @@ impl Axis {
     pub const LIGHT: Self = Self {
         title: "exposure drop",
         unit: "EV",
+        cause: "darkness",
+        place: "in the dark",
     };
+
+    /// The exposure time of a moving camera, in milliseconds.
+    pub const MOTION: Self = Self {
+        title: "exposure time",
+        unit: "ms",
+        cause: "motion blur",
+        place: "with motion blur",
+    };
+
+    /// All axes, in the order of tables.
+    pub const ALL: [Self; 2] = [Self::LIGHT, Self::MOTION];
 }
 
 /// The strength of a degradation in hundredths of its kind's unit, so that equality and order are exact.
@@ -42,6 +59,14 @@ impl Severity {
     pub const L5: Self = Self::hundredths(900);
     /// The exposure drops of the paper (DarkQA, section III), smallest first.
     pub const LADDER: [Self; 5] = [Self::L1, Self::L2, Self::L3, Self::L4, Self::L5];
+    /// Exposure times in milliseconds: 1/120 s, half a frame of a video with 60 frames a second, doubled four times; chosen.
+    pub const TIMES: [Self; 5] = [
+        Self::hundredths(833),
+        Self::hundredths(1667),
+        Self::hundredths(3333),
+        Self::hundredths(6667),
+        Self::hundredths(13333),
+    ];
 
     /// A severity in hundredths of the kind's unit; 0 becomes 1, because a severity is never zero.
     #[must_use]

@@ -129,7 +129,9 @@ mod tests {
             ("noise,ev", "both"),
             ("noise,l0", "l0,noise"),
             ("ev,l0", "l0,ev"),
-            ("l0,both", "all"),
+            ("l0,both", "l0,ev,noise"),
+            ("motion,auto", "auto,motion"),
+            ("l0,both,auto,motion", "all"),
             ("all", "all"),
             ("noise,all", "all"),
         ] {
@@ -139,7 +141,10 @@ mod tests {
         }
         for wrong in ["L0", "raw", "", "l0,", "l0,raw"] {
             let error = wrong.parse::<TreatmentSet>().unwrap_err();
-            assert!(error.contains("one of l0, ev, noise, both, all"), "{error}");
+            assert!(
+                error.contains("one of l0, ev, noise, auto, motion, both, all"),
+                "{error}"
+            );
         }
     }
 

@@ -18,7 +18,7 @@ use files::Files;
 use map::Map;
 
 /// The libraries that stand in some places (folders or files in `src/`) alone. Test code may use them anywhere.
-const LIBRARIES: [(&str, &[&str]); 12] = [
+const LIBRARIES: [(&str, &[&str]); 15] = [
     ("axum", &["run/serve"]),
     ("glam", &["rooms"]),
     ("plotters", &["report"]),
@@ -31,6 +31,9 @@ const LIBRARIES: [(&str, &[&str]); 12] = [
     ("rand_distr", &["synthesis", "score/bootstrap.rs"]),
     ("image", &["dataset", "enhance/planes.rs", "ask/payload.rs"]),
     ("png", &["dataset/raw_png.rs"]),
+    ("tiff", &["calibrate/mosaic"]),
+    ("exr", &["dataset/frame_folder.rs", "dataset/image_file"]),
+    ("moxcms", &["dataset/colour"]),
 ];
 
 /// The places where a future may be awaited. Test code may await anywhere.

@@ -1,5 +1,5 @@
-//! What an image costs: one 2560×1440 frame through the ladder of both branches and through each part of it, and a
-//! 1280×720 frame from pixels to request.
+//! What an image costs: one 2560×1440 frame through the ladder of both branches and through each part of it, a 1000×1000 frame
+//! blurred by the motion of its camera, and a 1280×720 frame from pixels to request.
 //!
 //! `cargo bench --bench light` runs it; `RAYON_NUM_THREADS=1 cargo bench --bench light` on one core.
 
@@ -9,9 +9,13 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use darkqa_eval::internals::ask::{Payload, PayloadFormat};
 use darkqa_eval::internals::job::bilinear;
 use darkqa_eval::internals::synthesis::{
-    Negative, Term, add_noise, expose, expose_into, ladder as develop_ladder, unprocess,
+    Negative, Term, add_noise, blur, blurred_codes, expose, expose_into, ladder as develop_ladder,
+    unprocess,
 };
-use darkqa_eval::synthesis::{Amplify, Draws, NoiseKey, Synthesis};
+use darkqa_eval::synthesis::{
+    Amplify, AppliedDegradation, AutoExposure, CameraModel, Draws, Exposures, FrameView,
+    LightReading, Motion, NoiseKey, Streak, Synthesis,
+};
 use darkqa_eval::types::{FrameId, Rgb, Severity};
 
 /// A frame with edges, ramps and some texture, made by integer arithmetic.
@@ -113,6 +117,52 @@ fn parts(c: &mut Criterion) {
     group.finish();
 }
 
+/// A megapixel, so that the milliseconds are those of a megapixel: motion blur alone, the light that automatic exposure takes, and
+/// whole images of both kinds.
+#[expect(clippy::unwrap_used, reason = "the paths are short enough")]
+fn motion(c: &mut Criterion) {
+    let clean = frame(1000, 1000);
+    let mut group = c.benchmark_group("1000x1000");
+    group.sample_size(10);
+    group.throughput(Throughput::Elements(1_000_000));
+    for (length, angle) in [
+        (1.69, 0.0),
+        (6.78, 0.0),
+        (16.0, 0.0),
+        (64.0, 0.0),
+        (4.0, 30.0),
+        (16.0, 30.0),
+        (16.0, 90.0),
+        (64.0, 30.0),
+    ] {
+        let streak = Streak::new(length, angle).unwrap();
+        group.bench_function(format!("motion, {length} px at {angle}°"), |b| {
+            b.iter(|| blurred_codes(black_box(&clean), streak));
+        });
+    }
+    for angle in [0.0, 30.0] {
+        let streak = Streak::new(16.0, angle).unwrap();
+        group.bench_function(format!("blurred light, 16 px at {angle}°"), |b| {
+            b.iter(|| blur(black_box(&clean).into(), streak));
+        });
+    }
+    let view = FrameView {
+        width: 1000,
+        focal: None,
+    };
+    let (auto, motion) = (AutoExposure::default(), Motion::default());
+    for how in ["L5-auto", "L5-noise@physical"] {
+        let how: darkqa_eval::Degradation = how.parse().unwrap();
+        let camera = (&auto, &motion);
+        let physical = Synthesis::of(LightReading::Physical, CameraModel::default());
+        let applied = AppliedDegradation::new(&how, &physical, camera, view, &key()).unwrap();
+        group.bench_function(how.to_string(), |b| {
+            b.iter(|| Exposures::default().degrade(black_box((&clean).into()), &applied, &key()));
+        });
+    }
+    group.finish();
+}
+
 fn request(c: &mut Criterion) {
     let clean = frame(720, 1280);
     let (key, paper) = (key(), Synthesis::default());
@@ -156,5 +206,5 @@ fn walk(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, ladder, parts, request, walk);
+criterion_group!(benches, ladder, parts, motion, request, walk);
 criterion_main!(benches);

@@ -19,6 +19,7 @@ fn rooms(size: [usize; 2]) -> Vec<Room> {
         frames: 12,
         seed: 7,
         size,
+        ..Rooms::default()
     };
     rooms.all().map(|(_, room)| room).step_by(2).collect()
 }

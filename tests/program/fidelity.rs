@@ -50,6 +50,8 @@ fn facts(digest: Digest) -> ImageFacts {
         width: 1,
         height: 1,
         format: "png".to_owned(),
+        orientation: None,
+        exposure: None,
     }
 }
 

@@ -285,7 +285,7 @@ fn every_field_of_open_questions_refuses_another_value() {
 type Addition = (&'static str, &'static str, usize);
 
 /// What may be added to an evaluation. A part of the noise model that is said makes another light reading.
-const ADDITIONS: [Addition; 19] = [
+const ADDITIONS: [Addition; 22] = [
     ("", "--blind", 3),
     ("", "--model m --model n", 9),
     ("", "--model n", 9),
@@ -293,6 +293,13 @@ const ADDITIONS: [Addition; 19] = [
     ("--levels L0,L3", "--levels L0,L3,L5", 6),
     ("--levels L0", "--levels L3", 6),
     ("--variant ev", "--variant both", 3),
+    ("", "--variant both,auto", 3),
+    ("", "--variant all --levels L0,L3,T33.33", 6),
+    (
+        "--variant all --levels L0,L3,T9",
+        "--variant all --levels L0,L3,T9,T33.33",
+        3,
+    ),
     (
         "--llie one.onnx --llie-anyway",
         "--llie one.onnx --llie two.onnx --llie-anyway",
@@ -321,12 +328,13 @@ const ADDITIONS: [Addition; 19] = [
 ];
 
 /// What may be added to a run of open questions.
-const OPEN_ADDITIONS: [Addition; 9] = [
+const OPEN_ADDITIONS: [Addition; 10] = [
     ("", "--model m --model n", 6),
     ("", "--model n", 6),
     ("", "--blind-model m", 3),
     ("--levels L0,L3", "--levels L0,L3,L5", 3),
     ("--variant noise", "--variant both", 3),
+    ("", "--variant noise,auto,motion --levels L0,L3,T33.33", 6),
     (
         "--llie one.onnx --llie-anyway",
         "--llie one.onnx --llie two.onnx --llie-anyway",
@@ -387,7 +395,24 @@ fn what_decides_nothing_asks_nothing() {
 }
 
 /// Flags that the tables here leave out, and where they are held.
-const ELSEWHERE: [(&str, &str); 18] = [
+const ELSEWHERE: [(&str, &str); 23] = [
+    (
+        "--transfer",
+        "it changes images of 16 bits: tests/program/inputs/depth.rs",
+    ),
+    (
+        "--exposure",
+        "it changes linear light: tests/program/inputs/light.rs",
+    ),
+    (
+        "--colour",
+        "it changes images of other colours than sRGB: tests/program/inputs/colour.rs",
+    ),
+    ("--auto", "settings_of_the_camera_are_those_of_its_variants"),
+    (
+        "--motion",
+        "settings_of_the_camera_are_those_of_its_variants",
+    ),
     ("--llie-anyway", "tests/program/enhance/probe.rs"),
     ("--splits", "tests/program/openeqa/"),
     ("--categories", "tests/program/openeqa/"),
@@ -521,6 +546,63 @@ fn the_key_of_a_trial_has_what_decides_its_image() {
     onnx::gain(0.75).write(&scene.house.0.path(""), "one.onnx");
     let other = enhanced("");
     assert_eq!(compared(&first, &other), (set("L3-noise+one"), of_raw));
+}
+
+/// The camera's settings are in the keys, and in the manifest, of the variants that they decide, and of no other.
+#[test]
+fn settings_of_the_camera_are_those_of_its_variants() {
+    const ALL: &str = "--variant all --levels L0,L3,T33.33";
+    let scene = Scene::new();
+    let keys = |otherwise: &str| scene.keys(&EVALUATION, &format!("{ALL} {otherwise}"));
+    let (plain, first) = (scene.keys(&EVALUATION, ""), keys(""));
+    let others = set("L0 L3-ev L3-noise");
+    assert_eq!(compared(&plain, &first), (set(""), others));
+    let differ = |one: &str, other: &str| compared(&keys(one), &keys(other)).0;
+    for (otherwise, expected) in [
+        ("--motion speed=30,hfov=79,angle=0", ""),
+        ("--motion speed=31", "L3-auto T33.33-motion"),
+        ("--motion hfov=60", "L3-auto T33.33-motion"),
+        ("--motion angle=1", "L3-auto T33.33-motion"),
+        ("--auto shutter=1,gain=4", "L3-auto"),
+        ("--auto base-gain=0.3", "L3-auto"),
+        ("--auto base-time=1/100", "L3-auto"),
+        // The gain and the ratio of the noise variant are not those of automatic exposure.
+        ("--gain 2 --ratio 150", "L3-noise"),
+        ("--fixed", "L3-auto L3-noise"),
+        ("--seed 7", "L3-auto L3-noise"),
+    ] {
+        assert_eq!(differ("", otherwise), set(expected), "{otherwise}");
+    }
+    let random = "--motion angle=random";
+    let moved = set("L3-auto L3-noise T33.33-motion");
+    assert_eq!(differ(random, &format!("{random} --seed 7")), moved);
+    // A run of the paper's variants holds nothing of the camera, and goes on whatever is said of it.
+    scene.complete(&EVALUATION, "", "run");
+    let manifest = |out: &str| -> Value {
+        let path = scene.house.0.path(&format!("{out}/manifest.json"));
+        serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+    };
+    let before = manifest("run");
+    assert_eq!(before["identity"]["synthesis"], json!([1, 2]));
+    assert!(before["columns"].get("variant").is_none());
+    scene.adds(&EVALUATION, "--motion speed=31", "run", 0);
+    scene.adds(&EVALUATION, &format!("{ALL} --motion speed=31"), "run", 6);
+    let after = manifest("run");
+    assert_eq!(after["identity"], before["identity"]);
+    let variants = &after["columns"]["variant"];
+    assert_eq!(variants["motion"]["--motion"], "speed=31,hfov=79,angle=0");
+    assert!(variants["auto"]["--auto"].is_string() && variants["ev"].is_null());
+    for (otherwise, field) in [
+        ("", "the variant auto has another --motion in this run"),
+        (
+            "--motion speed=31 --auto gain=3",
+            "the variant auto has another --auto",
+        ),
+        ("--motion speed=31 --fixed", "has another --camera"),
+    ] {
+        let otherwise = format!("{ALL} {otherwise}");
+        scene.refuses(&EVALUATION, &otherwise, "run", field);
+    }
 }
 
 #[test]

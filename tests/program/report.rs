@@ -311,7 +311,7 @@ fn an_item_is_drawn_as_one_picture() {
     check_rows(
         [
             ("run", "nothing", "did not ask \"nothing\" with images"),
-            ("light", id, "no model was shown a dark image"),
+            ("light", id, "no model was shown a degraded image"),
         ],
         |(run, id, problem)| {
             let refused = bench.call(&["show", run, id, "--sheet", "item.png"]);

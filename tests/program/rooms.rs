@@ -140,6 +140,7 @@ fn many(seed: u64) -> Rooms {
         frames: 204,
         seed,
         size: [240, 180],
+        ..Rooms::default()
     }
 }
 
@@ -217,6 +218,7 @@ fn a_seed_gives_the_same_bytes_everywhere() {
         frames: 12,
         seed: 7,
         size: [160, 120],
+        ..Rooms::default()
     };
     let all = |threads: usize| -> Vec<Digest> {
         let cores = rayon::ThreadPoolBuilder::new()

@@ -337,3 +337,204 @@ fn sheets_are_drawn_for_each_frame() {
     assert_eq!(refused.code, Some(1));
     assert!(refused.stderr.contains("--force"), "{}", refused.stderr);
 }
+
+/// The numbers of an exposure in a file or a record.
+fn exposure(of: &Value) -> [Option<f64>; 7] {
+    let fields = [
+        "shutter",
+        "gain",
+        "dark",
+        "time_ms",
+        "system_gain",
+        "blur_px",
+        "blur_angle",
+    ];
+    fields.map(|field| of["exposure"][field].as_f64())
+}
+
+/// Automatic exposure and motion blur: their files hold what the camera did, make the image again byte for byte, and are what an
+/// evaluation sends.
+#[test]
+fn a_camera_that_meets_the_dark_and_moves() {
+    let bench = Bench::new();
+    frames(&bench);
+    let light = words(
+        "--variant auto,motion --levels L0,L3,L5,T66.67 --motion speed=200,angle=30 --auto shutter=1,gain=3 --seed 4",
+    );
+    let made = bench.call(&[&["synthesize", "frames", "--out", "out"], &light[..]].concat());
+    assert_eq!(made.code, Some(0), "{made:?}");
+    assert_eq!(made.stdout, "out: 4 made of 1 frames\n");
+    let focal = 37.0 / 2.0 / (39.5_f64.to_radians()).tan();
+    let blur = |seconds: f64| focal * 200_f64.to_radians() * seconds;
+    let auto = |dark| {
+        let all = [1.0, 3.0, dark, 1000.0 / 60.0, 3.0, blur(1.0 / 60.0), 30.0];
+        all.map(Some)
+    };
+    let motion = [
+        None,
+        None,
+        None,
+        Some(66.67),
+        None,
+        Some(blur(0.06667)),
+        Some(30.0),
+    ];
+    check_rows(
+        [
+            ("L3-auto", auto(2.0), 6.0),
+            ("L5-auto", auto(5.0), 9.0),
+            ("T66.67-motion", motion, 0.0),
+        ],
+        |(condition, expected, drop)| {
+            let file = json_of(&bench.path(&format!("out/a_{condition}.json")));
+            for (found, expected) in exposure(&file).iter().zip(expected) {
+                let off = found.zip(expected).map_or(0.0, |(a, b)| (a - b).abs());
+                assert!(
+                    found.is_some() == expected.is_some() && off < 1e-9,
+                    "{file}"
+                );
+            }
+            assert_eq!(file["drop"], drop);
+            let from = format!("out/a_{condition}.json");
+            let again = bench.call(&words(&format!(
+                "synthesize frames/a.png --out again --from {from}"
+            )));
+            assert_eq!(again.code, Some(0), "{again:?}");
+            let [old, new] = ["out", "again"].map(|folder| {
+                fs::read(bench.path(&format!("{folder}/a_{condition}.png"))).unwrap()
+            });
+            assert_eq!(old, new);
+        },
+    );
+    let sensor = json_of(&bench.path("out/a_L5-auto.json"))["sensor"].clone();
+    assert_eq!(
+        (&sensor["reading"], &sensor["state"]["system_gain"]),
+        (&json!("physical"), &json!(3.0))
+    );
+    assert_eq!(sensor["state"]["ratio"], 32.0);
+    let run = words("--data frames --model random --out run");
+    let run = bench.call(&[&run[..], &light[..]].concat());
+    assert_eq!(run.code, Some(0), "{run:?}");
+    let records = fs::read_to_string(bench.path("run/records.jsonl")).unwrap();
+    for record in records.lines() {
+        let record: Value = serde_json::from_str(record).unwrap();
+        let condition = record["condition"].as_str().unwrap();
+        let image = fs::read(bench.path(&format!("out/a_{condition}.png"))).unwrap();
+        let digest = blake3::hash(&image).to_hex().to_string();
+        assert_eq!(record["image"]["digest"], digest, "{condition}");
+        let file = json_of(&bench.path(&format!("out/a_{condition}.json")));
+        assert_eq!(exposure(&record["image"]), exposure(&file), "{condition}");
+    }
+    assert_eq!(records.lines().count(), 4);
+}
+
+/// A focal length that the data state counts, and the field of view of the flag does not.
+#[test]
+fn frames_with_a_known_camera_use_it() {
+    let bench = Bench::new();
+    let rooms = bench.call(&words("rooms --out rooms --frames 1 --size 96x64"));
+    assert_eq!(rooms.code, Some(0), "{rooms:?}");
+    let call = |input: &str, motion: &str, out: &str| {
+        let light = format!("--variant motion --levels T33.33 --motion {motion}");
+        let made = bench.call(&words(&format!("synthesize {input} --out {out} {light}")));
+        assert_eq!(made.code, Some(0), "{made:?}");
+        let found = walk(&bench.path(out), "_T33.33-motion.json");
+        json_of(&found)["exposure"]["blur_px"].as_f64().unwrap()
+    };
+    let image = walk(&bench.path("rooms"), ".png");
+    let image = image.to_str().unwrap();
+    // The rooms' camera has a half width of 0.9 at the distance 1.
+    let known = 48.0 / 0.9 * 30_f64.to_radians() * 0.03333;
+    assert!((call("rooms", "speed=30", "a") - known).abs() < 1e-6);
+    assert!((call("rooms", "hfov=20", "b") - known).abs() < 1e-6);
+    assert!((call(image, "hfov=20", "c") - known).abs() > 1.0);
+}
+
+/// The only file below a folder whose name ends so; of several, the first.
+fn walk(folder: &Path, end: &str) -> std::path::PathBuf {
+    let mut found: Vec<std::path::PathBuf> = Vec::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.to_str().unwrap().ends_with(end) {
+                found.push(path);
+            }
+        }
+    }
+    found.sort();
+    found.swap_remove(0)
+}
+
+#[test]
+fn what_the_camera_cannot_do_is_refused() {
+    let bench = Bench::new();
+    frames(&bench);
+    check_rows(
+        [
+            (
+                "--variant auto --auto gain=5",
+                "--auto: at 5 stops of gain, K is 12, but sony-a7s2 has K from 0.1 to 6",
+            ),
+            ("--variant auto --auto gian=5", "did you mean gain?"),
+            (
+                "--variant motion --motion sped=5",
+                "there is no setting \"sped\"; the settings are speed, hfov, angle; did you mean speed?",
+            ),
+            (
+                "--variant motion --levels L3",
+                "--levels: L3 is a level of ev, noise, auto, of which --variant motion names none",
+            ),
+            (
+                "--variant blur",
+                "\"blur\" is not one of ev, noise, auto, motion, both, all",
+            ),
+        ],
+        |(flags, message)| {
+            let call = format!("synthesize frames --out out {flags}");
+            let refused = bench.call(&words(&call));
+            assert_eq!(refused.code, Some(2), "{refused:?}");
+            assert!(refused.stderr.contains(message), "{}", refused.stderr);
+        },
+    );
+    // How far a picture moves depends on its size: the image fails, with its name.
+    let far = "--variant motion --levels T33.33,T500 --motion speed=900";
+    let far = bench.call(&words(&format!("synthesize frames --out out {far}")));
+    assert_eq!(far.code, Some(1), "{far:?}");
+    assert_eq!(far.stdout, "out: 1 made of 1 frames, 1 failed\n");
+    let message = "a.png at T500-motion: --motion: the picture would move by 176.";
+    assert!(far.stderr.contains(message), "{}", far.stderr);
+    // An evaluation is refused before anything is asked.
+    let run =
+        "--data frames --model random --out run --variant motion --levels T500 --motion speed=900";
+    let run = bench.call(&words(run));
+    assert_eq!(run.code, Some(2), "{run:?}");
+    assert!(run.stderr.contains(message) && !bench.path("run").exists());
+}
+
+/// A sheet has a row for each variant, and a block of its own for exposure times.
+#[test]
+fn sheets_show_the_variants_that_are_asked() {
+    let bench = Bench::new();
+    frames(&bench);
+    let height = |variant: &str, out: &str| {
+        let call = format!("synthesize frames --out {out} --sheet levels --variant {variant}");
+        let made = bench.call(&words(&call));
+        assert_eq!((made.code, &*made.stderr), (Some(0), ""), "{made:?}");
+        let sheet = image::open(bench.path(&format!("{out}/a_levels.png")));
+        sheet.unwrap().height()
+    };
+    let (one, two, three) = (
+        height("ev", "a"),
+        height("both", "b"),
+        height("ev,noise,auto", "c"),
+    );
+    assert_eq!(
+        (two - one, three - two),
+        (49, 29),
+        "a row of 21 pixels and its space; with noise a line about the camera, too"
+    );
+    assert!(height("all", "d") > three + 29);
+}

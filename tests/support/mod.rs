@@ -11,13 +11,17 @@
 
 pub mod browser;
 pub mod endpoint;
+pub mod exr_files;
 pub mod frames;
 pub mod house;
+pub mod icc_files;
+pub mod image_files;
 pub mod made;
 pub mod onnx;
 pub mod process;
 pub mod run;
 pub mod table;
+pub mod tiff_files;
 
 /// Keeps the ONNX Runtime of this test program from reporting anything; to be called before it is opened.
 #[expect(unsafe_code, reason = "the environment is how ONNX Runtime is told")]

@@ -23,11 +23,13 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableR
         None => Complaint::of(&completion),
     };
     if let Some(complaint) = complaint {
-        return Err(UnreadableReply::Complaint(complaint));
+        return Err(UnreadableReply::Complaint(Box::new(complaint)));
     }
     let choice = choice(&completion)?;
     if let Some(error) = choice.get("error").filter(|error| !error.is_null()) {
-        return Err(UnreadableReply::Complaint(Complaint::of_error(error)));
+        return Err(UnreadableReply::Complaint(Box::new(Complaint::of_error(
+            error,
+        ))));
     }
     let reason = choice.get("finish_reason").and_then(Value::as_str);
     if reason == Some("error") {

@@ -53,6 +53,8 @@ fn sample(arg: &Arg) -> String {
     let text = match arg.get_id().as_str() {
         "levels" => "L3",
         "variant" | "llie_on" => "ev",
+        "auto" => "gain=3",
+        "motion" => "speed=3",
         "temperature" | "judge_temperature" => "0.7",
         "concurrency" => "4",
         "image" => "jpeg:90",
@@ -62,12 +64,14 @@ fn sample(arg: &Arg) -> String {
         "condition" => "L3-noise",
         "url" => "/v1/responses",
         "families" => "color",
+        "crop" => "0,0,256,256",
         "top_p" => "0.9",
         "data" | "model" | "judge" => "abc",
         _ => match arg.get_value_names() {
             Some([name])
                 if [
                     "N", "SECONDS", "PIXELS", "MB", "DOLLARS", "EV", "K", "R", "METRES", "DEGREES",
+                    "CODE",
                 ]
                 .contains(&name.as_str()) =>
             {

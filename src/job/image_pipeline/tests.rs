@@ -10,7 +10,7 @@ use crate::job::scaling::Scaling;
 use crate::job::source::SourceFrame;
 use crate::job::timings::Timings;
 use crate::job::walk::{CameraOf, DegradedAt};
-use crate::synthesis::Readings;
+use crate::synthesis::KindSettings;
 
 /// A folder with one frame as a plain PNG file, and the frame as a source.
 fn frame() -> (tempfile::TempDir, Dataset, Source) {
@@ -37,7 +37,7 @@ fn pipeline_output(
     let max_side = max_side.and_then(NonZeroU32::new);
     let recipe = Recipe {
         seed: 0,
-        readings: Readings::default(),
+        kinds: KindSettings::default(),
         format: format.parse().unwrap(),
         scaling: max_side.map_or(Scaling::Never, Scaling::MaxSide),
         degraded_at: DegradedAt::Native,

@@ -285,6 +285,9 @@ fn same_by_manifest(curve: &LightCurve, one: &RunManifest, other: &RunManifest) 
         if curve.variant.kind == Some(Kind::Exposure) {
             all.remove("--seed");
         }
+        if let Some(kind) = curve.variant.kind {
+            all.extend(settings::variant(run, kind));
+        }
         if curve.variant.reading.is_some() {
             all.extend(settings::noise(run, &runs));
         }

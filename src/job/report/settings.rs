@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::Value;
 
+use crate::types::degradation::Kind;
 use crate::types::manifest::RunManifest;
 
 /// Settings by flag, as text.
@@ -29,6 +30,9 @@ const PIXELS: [&str; 6] = [
 const NOISE: [&str; 9] = [
     "profile", "amplify", "tone", "draws", "coupling", "camera", "gain", "ratio", "fixed",
 ];
+
+/// The column of the kinds that the paper does not have.
+const VARIANT: &str = "variant";
 
 /// Stands between the flag of a setting and the value of a column for which it is set, as in `--llie of ruas`.
 const OF: &str = " of ";
@@ -134,7 +138,8 @@ pub(super) fn some(run: &RunManifest, fields: &[&str]) -> Settings {
 
 /// Everything in a manifest that decides images besides their size and encoding, for a comparison of these runs.
 pub(super) fn light(run: &RunManifest, runs: &[&RunManifest]) -> Settings {
-    let parts = [pixels(run), noise(run, runs), enhancers(run)];
+    let variants = of_column(run, VARIANT);
+    let parts = [pixels(run), noise(run, runs), variants, enhancers(run)];
     parts.into_iter().flatten().collect()
 }
 
@@ -165,6 +170,13 @@ pub(super) fn noise(run: &RunManifest, runs: &[&RunManifest]) -> Settings {
 /// The content of the enhancers.
 pub(super) fn enhancers(run: &RunManifest) -> Settings {
     of_column(run, "enhancer")
+}
+
+/// The settings of a kind that the paper does not have; empty for the others.
+pub(super) fn variant(run: &RunManifest, kind: Kind) -> Settings {
+    let mut settings = of_column(run, VARIANT);
+    settings.retain(|flag, _| flag.ends_with(&format!("{OF}{kind}")));
+    settings
 }
 
 /// The settings behind the values of a column of a run.

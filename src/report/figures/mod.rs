@@ -13,6 +13,7 @@ use crate::score::choice::ReadingMode;
 use crate::score::estimate::Estimate;
 use crate::score::findings::Findings;
 use crate::score::subject::{CHANCE, Subject, judged};
+use crate::types::degradation::{Axis, Kind};
 use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
 
 pub(crate) use story::{StoryCurves, story_curves};
@@ -39,7 +40,7 @@ pub(crate) fn figures(findings: &Findings<'_>) -> Result<Vec<Figure>> {
         let svg = chart.svg()?;
         figures.push(Figure { name, caption, svg });
     }
-    figures.extend(thresholds::figure(findings)?);
+    figures.extend(thresholds::figures(findings)?);
     Ok(figures)
 }
 
@@ -147,7 +148,7 @@ impl<'a> Overview<'a> {
         LineStyle(index.unwrap_or(self.models.len()))
     }
 
-    /// The variant for figures that show only one: the last kind that was asked, in its first light reading.
+    /// The variant for figures that show only one: noise, if it was asked.
     fn main_variant(&self) -> Option<KindReading> {
         self.findings.grid.main_variant()
     }
@@ -206,13 +207,44 @@ impl<'a> Overview<'a> {
         self.chart(ACCURACY, panels, 2, caption)
     }
 
-    /// Mean over the models for each variant, with the range of the models.
+    /// Mean over the models for each variant, with the range of the models: a panel for each axis with several variants.
     fn variants(&self) -> Option<(String, Chart)> {
-        let (variants, models) = (self.tested_variants(), self.averaged_models());
-        if variants.len() < 2 {
-            return None;
+        let models = self.averaged_models();
+        let title = match &*models {
+            [single] => format!("{single}, n {}", self.n(None)),
+            several => format!("mean of {} models, n {} each", several.len(), self.n(None)),
+        };
+        let all = self.tested_variants();
+        let mut panels = Vec::new();
+        for axis in Axis::ALL {
+            let is_on = |variant: &&KindReading| variant.kind.map(Kind::axis) == Some(axis);
+            let variants: Vec<&KindReading> = all.iter().filter(is_on).collect();
+            if variants.len() > 1 {
+                panels.push(Panel {
+                    title: title.clone(),
+                    lines: self.lines_of_variants(&variants, &models),
+                });
+            }
         }
-        let line = |(index, variant): (usize, &KindReading)| {
+        let is_auto = all.iter().any(|variant| variant.kind == Some(Kind::Auto));
+        let caption = if is_auto {
+            "Exposure drop alone, with sensor noise, and as a camera with automatic exposure meets it, as far as they were asked."
+        } else {
+            "Exposure drop alone against exposure drop with sensor noise."
+        };
+        let (caption, mut chart) = self.chart(ACCURACY, panels, 1, caption)?;
+        if models.len() > 1 {
+            chart.note = format!(
+                "bands are the range of the {} models, not intervals; strict reading",
+                models.len()
+            );
+        }
+        Some((caption, chart))
+    }
+
+    /// A line for each of these variants, the mean over the models, and chance.
+    fn lines_of_variants(&self, variants: &[&KindReading], models: &[&str]) -> Vec<PlotLine> {
+        let line = |(index, variant): (usize, &&KindReading)| {
             let curves = models.iter();
             let curves: Vec<Vec<(AxisLevel, Estimate)>> = curves
                 .map(|model| {
@@ -230,23 +262,7 @@ impl<'a> Overview<'a> {
         let mut lines: Vec<PlotLine> = variants.iter().enumerate().map(line).collect();
         let flat_lines = self.flat_lines(None).into_iter();
         lines.extend(flat_lines.filter(|line| line.name == CHANCE));
-        let title = match &*models {
-            [single] => format!("{single}, n {}", self.n(None)),
-            several => format!("mean of {} models, n {} each", several.len(), self.n(None)),
-        };
-        let (caption, mut chart) = self.chart(
-            ACCURACY,
-            vec![Panel { title, lines }],
-            1,
-            "Exposure drop alone against exposure drop with sensor noise.",
-        )?;
-        if models.len() > 1 {
-            chart.note = format!(
-                "bands are the range of the {} models, not intervals; strict reading",
-                models.len()
-            );
-        }
-        Some((caption, chart))
+        lines
     }
 
     fn enhancers(&self) -> Option<(String, Chart)> {

@@ -1,4 +1,4 @@
-//! The figure of the darkness thresholds.
+//! The figures of the thresholds, one for each axis.
 
 use plotters::prelude::*;
 
@@ -10,21 +10,57 @@ use crate::error::{Error, Result};
 use crate::score::curve::Curve;
 use crate::score::findings::Findings;
 use crate::score::threshold::Threshold;
+use crate::types::degradation::Axis;
 
 /// Widths of the names, of the axis and of the numbers, in pixels.
 const NAMES: i32 = 330;
 const AXIS: i32 = 400;
 const NUMBERS: i32 = 150;
 const ROW: i32 = 24;
-/// End of the axis in EV: the exposure drop of L5, the darkest named level.
-const MAX_EV: f64 = 9.0;
 
-/// A row for each curve, with its threshold and interval on an axis of exposure drops. `None` if no curve has a threshold.
-pub(super) fn figure(findings: &Findings<'_>) -> Result<Option<Figure>> {
+/// The scale of an axis: the exposure drops to L5, the darkest named level, or the exposure times of the ladder.
+struct Scale {
+    end: f64,
+    /// Distance of two ticks.
+    step: i32,
+    /// Name of the threshold.
+    title: &'static str,
+    unit: &'static str,
+}
+
+impl Scale {
+    fn of(axis: Axis) -> Self {
+        let (end, step, title) = if axis == Axis::MOTION {
+            (140.0, 20, "threshold of motion blur")
+        } else {
+            (9.0, 1, "darkness threshold")
+        };
+        Self {
+            end,
+            step,
+            title,
+            unit: axis.unit,
+        }
+    }
+
+    fn x(&self, value: f64) -> i32 {
+        NAMES + (value.clamp(0.0, self.end) / self.end * f64::from(AXIS)).round() as i32
+    }
+}
+
+/// The figure of each axis on which a curve has a threshold.
+pub(super) fn figures(findings: &Findings<'_>) -> Result<Vec<Figure>> {
+    let figures = Axis::ALL.map(|axis| figure(findings, axis));
+    let figures = figures.into_iter().filter_map(Result::transpose);
+    figures.collect()
+}
+
+/// A row for each curve, with its threshold and interval on an axis. `None` if no curve has a threshold.
+fn figure(findings: &Findings<'_>, axis: Axis) -> Result<Option<Figure>> {
     let rows = findings
         .curves
         .iter()
-        .filter(|curve| curve.family.is_none());
+        .filter(|curve| curve.family.is_none() && curve.axis() == axis);
     let rows: Vec<(&Curve, Threshold)> = rows
         .filter_map(|curve| Some((curve, *curve.summary.threshold.as_ref().ok()?)))
         .collect();
@@ -38,27 +74,38 @@ pub(super) fn figure(findings: &Findings<'_>) -> Result<Option<Figure>> {
     let mut svg = String::new();
     let drawn = {
         let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
-        draw(&root, &rows, &findings.unit.to_string())
+        draw(&root, &rows, &Scale::of(axis), &findings.unit.to_string())
     };
     drawn.map_err(|e| Error::data("figure", e))?;
-    let caption =
-        "Darkness threshold: the exposure drop at which accuracy is half-way between that at L0 and chance. Arrows: \
-         beyond the darkest level asked."
-            .to_owned();
-    Ok(Some(Figure {
-        name: "thresholds",
-        caption,
-        svg,
-    }))
+    let (name, caption) = if axis == Axis::MOTION {
+        (
+            "blur_thresholds",
+            "Threshold of motion blur: the exposure time at which accuracy is half-way between that at L0 and chance. Arrows: \
+             beyond the longest time asked.",
+        )
+    } else {
+        (
+            "thresholds",
+            "Darkness threshold: the exposure drop at which accuracy is half-way between that at L0 and chance. Arrows: \
+             beyond the darkest level asked.",
+        )
+    };
+    let caption = caption.to_owned();
+    Ok(Some(Figure { name, caption, svg }))
 }
 
-fn draw(root: &FigureArea<'_>, rows: &[(&Curve, Threshold)], unit: &str) -> Result<(), String> {
+fn draw(
+    root: &FigureArea<'_>,
+    rows: &[(&Curve, Threshold)],
+    scale: &Scale,
+    unit: &str,
+) -> Result<(), String> {
     let failed = |e: DrawingAreaErrorKind<_>| e.to_string();
-    let x = |ev: f64| NAMES + (ev.clamp(0.0, MAX_EV) / MAX_EV * f64::from(AXIS)).round() as i32;
+    let x = |value: f64| scale.x(value);
     let colour = LineStyle(0).colour();
     root.fill(&BACKGROUND).map_err(failed)?;
     let bottom = 12 + rows.len() as i32 * ROW;
-    for tick in 0..=9 {
+    for tick in (0..=scale.end as i32).step_by(scale.step as usize) {
         let at = x(f64::from(tick));
         draw_path(root, &[(at, 8), (at, bottom)], GRID.stroke_width(1))?;
         draw_text(root, &tick.to_string(), (at, bottom + 6), 13, BELOW)?;
@@ -71,7 +118,8 @@ fn draw(root: &FigureArea<'_>, rows: &[(&Curve, Threshold)], unit: &str) -> Resu
         let ends = [(x(threshold.low), y), (x(threshold.high), y)];
         draw_path(root, &ends, colour.stroke_width(2))?;
         if threshold.high.is_infinite() {
-            let tip = vec![(x(MAX_EV) + 8, y), (x(MAX_EV), y - 5), (x(MAX_EV), y + 5)];
+            let end = x(scale.end);
+            let tip = vec![(end + 8, y), (end, y - 5), (end, y + 5)];
             root.draw(&Polygon::new(tip, colour)).map_err(failed)?;
         }
         if threshold.value.is_finite() {
@@ -89,7 +137,10 @@ fn draw(root: &FigureArea<'_>, rows: &[(&Curve, Threshold)], unit: &str) -> Resu
         let place = (NAMES + AXIS + 16, y);
         draw_text(root, &number, place, 13, LEFT)?;
     }
-    let axis_title = format!("darkness threshold in EV, with 95 % interval by {unit}");
+    let Scale {
+        title, unit: of, ..
+    } = scale;
+    let axis_title = format!("{title} in {of}, with 95 % interval by {unit}");
     let place = (NAMES + AXIS / 2, bottom + 30);
     draw_text(root, &axis_title, place, 13, BELOW)?;
     root.present().map_err(failed)

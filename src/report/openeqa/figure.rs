@@ -4,7 +4,8 @@ use super::open_report::OpenReport;
 use super::tables::ladder;
 use crate::error::Result;
 use crate::report::chart::{Chart, Figure, LineStyle, Panel, PanelContent, PlotLine};
-use crate::score::open::Group;
+use crate::report::ladder::Ladder;
+use crate::score::open::{Group, OpenCell};
 use crate::types::AxisLevel;
 
 /// Scores by level: all questions together, and by category if there are several.
@@ -15,7 +16,9 @@ pub(super) fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {
     }
     let groups = report.summary.groups().into_iter();
     let categories = groups.filter(|group| matches!(group, Group::Category(_)));
-    let categories: Vec<Panel> = categories.map(|group| panel(report, group)).collect();
+    let categories: Vec<Panel> = categories
+        .flat_map(|group| panels(report, group, &whole))
+        .collect();
     let note = format!(
         "bands are 95 % intervals by {} ({} clusters)",
         report.summary.unit, report.summary.clusters
@@ -24,7 +27,7 @@ pub(super) fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {
         (
             "scores",
             "Score by level. Broken lines: without images.",
-            vec![panel(report, &Group::All)],
+            panels(report, &Group::All, &whole),
             1,
         ),
         ("categories", "Score by category.", categories, 3),
@@ -49,12 +52,26 @@ pub(super) fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {
     Ok(figures)
 }
 
-/// The panel of a group: a curve for each series, and a flat line for each model without images.
-fn panel(report: &OpenReport<'_>, group: &Group) -> Panel {
-    let ladder = ladder(report.summary, group);
-    let seeing = ladder.series.len();
-    let lines = ladder.series.iter().enumerate();
-    let lines = lines.map(|(index, (series, cells))| {
+/// The panels of a group, one for each axis.
+fn panels(report: &OpenReport<'_>, group: &Group, whole: &Ladder<'_, OpenCell>) -> Vec<Panel> {
+    let ladders = ladder(report.summary, group).by_axis().into_iter();
+    ladders
+        .map(|(_, ladder)| panel(report, group, whole, &ladder))
+        .collect()
+}
+
+/// A panel of a group: a curve for each series, and a flat line for each model without images. The style of a series is its place
+/// in the `whole`.
+fn panel(
+    report: &OpenReport<'_>,
+    group: &Group,
+    whole: &Ladder<'_, OpenCell>,
+    ladder: &Ladder<'_, OpenCell>,
+) -> Panel {
+    let seeing = whole.series.len();
+    let lines = ladder.series.iter();
+    let lines = lines.map(|(series, cells)| {
+        let index = whole.series.keys().position(|other| other == series);
         let start = ladder.start(series).map(|cell| (AxisLevel::L0, cell));
         let dark = cells.iter().map(|(level, cell)| (*level, *cell));
         let dark = dark.filter(|(level, _)| *level != AxisLevel::L0);
@@ -62,7 +79,7 @@ fn panel(report: &OpenReport<'_>, group: &Group) -> Panel {
         let points = points.filter_map(|(level, cell)| Some((level, cell.score?)));
         PlotLine {
             name: format!("{}, {}", series.model, series.light()),
-            style: LineStyle(index),
+            style: LineStyle(index.unwrap_or(seeing)),
             content: PanelContent::Curve(points.collect()),
         }
     });

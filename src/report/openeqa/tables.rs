@@ -11,6 +11,7 @@ use crate::report::words::ends;
 use crate::score::estimate::Estimate;
 use crate::score::open::{Baseline, Group, OpenCell, OpenSummary};
 use crate::score::subject::Subject;
+use crate::types::degradation::Axis;
 
 /// Name of the page section that has all tables.
 pub(super) const SECTION: &str = "scores";
@@ -18,7 +19,8 @@ pub(super) const SECTION: &str = "scores";
 /// All tables of a run; the first is the summary.
 #[must_use]
 pub(crate) fn tables(report: &OpenReport<'_>) -> Vec<Table> {
-    let mut tables = vec![summary(report.summary), levels(report)];
+    let mut tables = vec![summary(report.summary)];
+    tables.extend(levels(report));
     let of = |group| ladder(report.summary, group);
     let groups: Vec<(&Group, Ladder<'_, OpenCell>)> = report
         .summary
@@ -82,14 +84,31 @@ fn summary(summary: &OpenSummary) -> Table {
         .build()
 }
 
-fn levels(report: &OpenReport<'_>) -> Table {
+/// The table of each axis.
+fn levels(report: &OpenReport<'_>) -> Vec<Table> {
+    let whole = ladder(report.summary, &Group::All);
+    let ladders = whole.by_axis().into_iter();
+    let mut tables: Vec<Table> = ladders
+        .map(|(axis, ladder)| of_axis(report, axis, &ladder))
+        .collect();
+    if let Some(last) = tables.last_mut() {
+        last.notes = without_images(report.summary, &whole);
+    }
+    tables
+}
+
+fn of_axis(report: &OpenReport<'_>, axis: Axis, ladder: &Ladder<'_, OpenCell>) -> Table {
     let summary = report.summary;
-    let ladder = ladder(summary, &Group::All);
+    let of = if axis == Axis::LIGHT {
+        String::new()
+    } else {
+        format!(" by {} of {}", axis.title, axis.cause)
+    };
     let mut table = ladder
         .table("levels", |cell| score(summary, cell))
         .page(
             SECTION,
-            "Score in % with 95 % intervals (difference from L0)",
+            &format!("Score in %{of} with 95 % intervals (difference from L0)"),
         )
         .column(Count, "terminal scored", |line| {
             format!(
@@ -102,14 +121,19 @@ fn levels(report: &OpenReport<'_>) -> Table {
     let judge = report.judge.unwrap_or("nobody");
     let protocol = report.protocol;
     table.heading = Some(format!(
-        "Score in % (LLM-Match, marked by {judge}, protocol {protocol}): mean (drop from L0), and how far the widest 95 % interval over {} {}s reaches down and up",
+        "Score in %{of} (LLM-Match, marked by {judge}, protocol {protocol}): mean (drop from L0), and how far the widest 95 % interval over {} {}s reaches down and up",
         summary.clusters, summary.unit
     ));
     table.latex = Some(format!(
-        "OpenEQA by LLM-Match in \\% (marked by {}, protocol {protocol}), with the difference from L0; {} questions.",
+        "OpenEQA by LLM-Match in \\%{of} (marked by {}, protocol {protocol}), with the difference from L0; {} questions.",
         escaped(judge),
         report.questions.len()
     ));
+    table
+}
+
+/// A note for each model without images.
+fn without_images(summary: &OpenSummary, ladder: &Ladder<'_, OpenCell>) -> Vec<String> {
     let without_level = ladder.without_level.iter();
     let notes = without_level.map(|(subject, cell)| {
         let text = texts(ColumnKind::Accuracy, &score(summary, Some(cell))).concat();
@@ -123,8 +147,7 @@ fn levels(report: &OpenReport<'_>) -> Table {
         };
         format!("{} without images: {text}, n {scored}{of}", subject.model)
     });
-    table.notes = notes.collect();
-    table
+    notes.collect()
 }
 
 /// The scores of one series, with a row for each split and category. In the terminal, the tables of all series are one table,

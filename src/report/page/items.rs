@@ -1,6 +1,6 @@
 //! The items as the page's script reads them, as compressed JSON in base64: [`packed`].
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io::Write;
 
 use base64::Engine as _;
@@ -15,7 +15,9 @@ use crate::error::{Error, Result};
 use crate::score::choice::ReadingMode;
 use crate::score::findings::Findings;
 use crate::score::grid::{Grid, TrialResult};
-use crate::types::{AxisLevel, FrameId, QuestionId, RunQuestion, Thumbnail, UnreadReason, View};
+use crate::types::{
+    Axis, AxisLevel, FrameId, QuestionId, RunQuestion, Thumbnail, UnreadReason, View,
+};
 
 /// Codes of results that are not the index of a choice.
 const UNREAD: u8 = 26;
@@ -54,7 +56,7 @@ struct SizeLimit {
 #[derive(Serialize)]
 struct PageData<'a> {
     runs: Vec<String>,
-    drops: BTreeMap<String, f64>,
+    levels: Vec<[String; 2]>,
     families: Vec<&'a str>,
     frames: Vec<&'a str>,
     subjects: Vec<Subject<'a>>,
@@ -214,7 +216,7 @@ fn data<'a>(findings: &'a Findings<'a>, inputs: &PageInputs<'a>, limit: SizeLimi
     let (reasons, why) = reasons(grid);
     PageData {
         runs: inputs.runs.iter().map(|run| run.name.clone()).collect(),
-        drops: drops(grid),
+        levels: levels(grid),
         thumbnails: thumbnails(inputs.thumbnails, &frames.indices, limit.pictures),
         families: families.list,
         frames: frames.list,
@@ -232,12 +234,15 @@ fn data<'a>(findings: &'a Findings<'a>, inputs: &PageInputs<'a>, limit: SizeLimi
     }
 }
 
-/// Severity of each level of the grid, by the level's name.
-fn drops(grid: &Grid<'_>) -> BTreeMap<String, f64> {
+/// The name of each level of the grid, in the order of tables, and its severity in words: `6 EV`.
+fn levels(grid: &Grid<'_>) -> Vec<[String; 2]> {
     let levels = grid.subjects.iter().filter_map(|subject| subject.level);
-    levels
-        .map(|level| (level.to_string(), level.value()))
-        .collect()
+    let levels: BTreeSet<AxisLevel> = levels.collect();
+    let named = levels.into_iter().map(|level| {
+        let unit = level.axis().unwrap_or(Axis::LIGHT).unit;
+        [level.to_string(), format!("{} {unit}", level.value())]
+    });
+    named.collect()
 }
 
 fn code(result: TrialResult, mode: ReadingMode) -> u8 {

@@ -100,7 +100,8 @@ const fill = (select, values, value) => {
 };
 const unique = (values) => [...new Set(values)];
 
-const everyLevel = () => unique(data.subjects.filter((s) => s.level).map((s) => s.level)).sort((a, b) => data.drops[a] - data.drops[b]);
+const everyLevel = () => data.levels.map(([name]) => name);
+const severity = (level) => data.levels.find(([name]) => name === level)[1];
 const lights = (model) => unique(data.subjects.filter((s) => s.model === model).map((s) => s.light));
 const levels = (model, light) => {
   const there = data.subjects.filter((s) => s.model === model && s.light === light && s.level).map((s) => s.level);
@@ -206,7 +207,7 @@ const pictures = (question) => {
   slider.max = Math.max(there.length - 1, 0);
   const level = state.pictured && there.includes(state.pictured) ? state.pictured : (state.level || there[0]);
   slider.value = Math.max(there.indexOf(level), 0);
-  $("i-level-name").textContent = level ? level + " (" + data.drops[level] + " EV)" : "";
+  $("i-level-name").textContent = level ? level + " (" + severity(level) + ")" : "";
   $("i-pictures").hidden = !kept;
   const remake = "darkqa-eval show " + data.runs[0] + " " + question.id;
   $("i-remake").textContent = (kept ? "Small copies. " : "No small copy of this frame is kept. ") + "The images as they were sent, proved by digest: " + remake;

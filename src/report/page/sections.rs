@@ -16,7 +16,7 @@ pub(super) struct PageSection<'a> {
     title: &'static str,
     note: &'static str,
     figures: Vec<&'a Figure>,
-    samples: Option<SamplePage>,
+    samples: Vec<SamplePage>,
     tables: Vec<tables::PageTable<'a>>,
 }
 
@@ -33,9 +33,12 @@ pub(super) fn sections<'a>(
                 .iter()
                 .filter(|figure| figure_names.contains(&figure.name));
             let figures: Vec<&Figure> = figures.collect();
-            let samples = samples(thumbnails).filter(|_| id == ENHANCERS);
+            let samples = match id {
+                ENHANCERS => samples(thumbnails),
+                _ => Vec::new(),
+            };
             let tables = tables::page_tables(tables, id);
-            let has_content = !tables.is_empty() || !figures.is_empty() || samples.is_some();
+            let has_content = !tables.is_empty() || !figures.is_empty() || !samples.is_empty();
             has_content.then_some(PageSection {
                 id,
                 title,

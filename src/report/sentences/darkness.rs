@@ -1,6 +1,6 @@
 //! Sentences about what darkness costs all models together, with each variant.
 
-use super::lights::{lights, named_light, of_set};
+use super::lights::{Topic, of_set};
 use super::pooled::{detail, of_verdict, runs};
 use super::sentence::{Numbers, Sentence, Tone, capitalised};
 use crate::report::words::light;
@@ -9,28 +9,35 @@ use crate::score::findings::Findings;
 use crate::score::pooled::PooledFinding;
 use crate::score::pooled_kind::PooledKind;
 use crate::score::significance::Significance;
-use crate::types::degradation::Kind;
+use crate::types::degradation::{Axis, Kind};
 use crate::types::{KindReading, LightGroup};
+
+/// What darkness, or another cause, costs in each topic.
+pub(super) fn darkness(findings: &Findings<'_>) -> Vec<Sentence> {
+    let topics = Topic::all(findings);
+    let sentences = topics.iter().flat_map(|topic| of_topic(findings, topic));
+    sentences.collect()
+}
 
 /// What darkness costs with the last kind of degradation, in each of its lights; then what it costs with another kind, if the last
 /// does not show it. If the two differ, both are named.
-pub(super) fn darkness(findings: &Findings<'_>) -> Vec<Sentence> {
-    let (lights, others) = lights(findings);
+fn of_topic(findings: &Findings<'_>, topic: &Topic<'_>) -> Vec<Sentence> {
+    let Topic { lights, others, .. } = topic;
     let levels = |variant: &KindReading| of_set(findings, PooledKind::Darkness, variant);
     let verdict_with = |variant: &KindReading| verdict(&levels(variant));
     let is_of_runs = |one: &KindReading, other: &KindReading| {
         LightGroup::meet(one.group.as_ref(), other.group.as_ref())
     };
     let mut sentences = Vec::new();
-    for variant in &lights {
+    for variant in lights {
         let mut beside = others.iter().filter(|other| is_of_runs(other, variant));
         let found = verdict_with(variant);
         let differs = beside.any(|other| verdict_with(other).is_some_and(|of| Some(of) != found));
         let name = (differs && lights.len() == 1).then(|| name(variant));
         let sentence = with_variant(&levels(variant), name.as_deref(), findings.unit);
-        sentences.extend(sentence.map(|sentence| named_light(&lights, variant, sentence)));
+        sentences.extend(sentence.map(|sentence| topic.named(variant, sentence)));
     }
-    for other in &others {
+    for other in others {
         let found = verdict_with(other);
         let mut beside = lights.iter().filter(|variant| is_of_runs(other, variant));
         let is_said = beside.any(|variant| verdict_with(variant) == found);
@@ -73,10 +80,11 @@ pub(super) fn with_variant(
     let found = of_verdict(levels, verdict);
     let darkest = found.last()?;
     let size = darkest.difference.value;
+    let cause = darkest.level.axis().unwrap_or(Axis::LIGHT).cause;
     let (text, more) = match verdict {
         Significance::Worse => (
             format!(
-                "darkness costs {} points at {}, from {} % at L0.",
+                "{cause} costs {} points at {}, from {} % at L0.",
                 numbers.size("cost", size),
                 darkest.level,
                 numbers.percent("L0", darkest.second)
@@ -92,7 +100,7 @@ pub(super) fn with_variant(
             format!("; at {}", darkest.level),
         ),
         _ => (
-            "it is not shown that darkness costs anything at any level.".to_owned(),
+            format!("it is not shown that {cause} costs anything at any level."),
             format!("; at {}", darkest.level),
         ),
     };

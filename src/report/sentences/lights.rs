@@ -7,40 +7,65 @@ use crate::score::findings::Findings;
 use crate::score::pooled::PooledFinding;
 use crate::score::pooled_kind::PooledKind;
 use crate::types::KindReading;
+use crate::types::degradation::Kind;
 
-/// The variants of the last kind of degradation that was asked, one for each light; and the variants of the other kinds.
-pub(super) fn lights<'f>(
-    findings: &'f Findings<'_>,
-) -> (Vec<&'f KindReading>, Vec<&'f KindReading>) {
-    let variants = findings.grid.variants();
-    let last = variants.last().map(|variant| variant.kind);
-    let variants = variants.into_iter();
-    variants.partition(|variant| Some(variant.kind) == last)
+/// The variants that sentences speak of together: a kind and those that extend it.
+#[derive(Debug)]
+pub(super) struct Topic<'f> {
+    /// The variants of the last kind, one for each light.
+    pub(super) lights: Vec<&'f KindReading>,
+    /// The variants of the other kinds.
+    pub(super) others: Vec<&'f KindReading>,
+    /// Whether another topic has the same levels, so that the level does not tell what a sentence is about.
+    shares_levels: bool,
 }
 
-/// A sentence about a variant, which is named if there are several lights.
-pub(super) fn named_light(
-    lights: &[&KindReading],
-    variant: &KindReading,
-    mut sentence: Sentence,
-) -> Sentence {
-    if lights.len() > 1 {
-        sentence.text = format!("{}: {}", light(variant, None), sentence.text);
+impl<'f> Topic<'f> {
+    /// The topics of all variants that were asked, in the order of tables. The first one is the main one.
+    pub(super) fn all(findings: &'f Findings<'_>) -> Vec<Self> {
+        let mut topics: Vec<Self> = Vec::new();
+        let variants: Vec<&KindReading> = findings.grid.variants().into_iter().collect();
+        let root = |variant: &KindReading| variant.kind.map(Kind::root);
+        let axis = |variant: &KindReading| variant.kind.map(Kind::axis);
+        for group in variants.chunk_by(|a, b| root(a) == root(b)) {
+            let last = group.last().map(|variant| variant.kind);
+            let (lights, others) = group
+                .iter()
+                .copied()
+                .partition(|variant| Some(variant.kind) == last);
+            let mut earlier = topics.iter().flat_map(|topic| &topic.lights);
+            let shares_levels = earlier.any(|other| axis(other) == axis(group[0]));
+            topics.push(Self {
+                lights,
+                others,
+                shares_levels,
+            });
+        }
+        topics
     }
-    sentence
+
+    /// A sentence about a variant, which is named if there are several lights, or if the levels do not tell it.
+    pub(super) fn named(&self, variant: &KindReading, mut sentence: Sentence) -> Sentence {
+        if self.lights.len() > 1 || self.shares_levels {
+            sentence.text = format!("{}: {}", light(variant, None), sentence.text);
+        }
+        sentence
+    }
 }
 
-/// Sentences about the last kind of degradation that was asked. If it was asked in several lights, each sentence names its own.
+/// Sentences about the last kind of each topic. If it was asked in several lights, each sentence names its own.
 pub(super) fn in_each_light(
     findings: &Findings<'_>,
     about: fn(&Findings<'_>, &KindReading) -> Vec<Sentence>,
 ) -> Vec<Sentence> {
-    let (lights, _) = lights(findings);
-    let sentences = lights.iter().flat_map(|variant| {
-        let of_light = about(findings, variant).into_iter();
-        of_light.map(|sentence| named_light(&lights, variant, sentence))
-    });
-    sentences.collect()
+    let mut sentences = Vec::new();
+    for topic in Topic::all(findings) {
+        for variant in &topic.lights {
+            let of_light = about(findings, variant).into_iter();
+            sentences.extend(of_light.map(|sentence| topic.named(variant, sentence)));
+        }
+    }
+    sentences
 }
 
 /// The findings of one kind and variant over all families that the kind is about, in the order of enhancers and levels. Sets in which

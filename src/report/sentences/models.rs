@@ -1,7 +1,7 @@
 //! Sentences about single models and single families: which model sees best, and which family loses most.
 
-use super::lights::{lights, named_light};
-use super::sentence::{Numbers, Sentence, Tone, level_runs};
+use super::lights::Topic;
+use super::sentence::{Numbers, Sentence, Tone, capitalised, level_runs};
 use crate::report::words::family;
 use crate::score::best::BestInTheDark;
 use crate::score::findings::Findings;
@@ -9,6 +9,7 @@ use crate::score::pooled::PooledFinding;
 use crate::score::pooled_kind::PooledKind;
 use crate::score::significance::Significance;
 use crate::types::KindReading;
+use crate::types::degradation::{Axis, Kind};
 
 /// The model that sees best over all levels, and those that it is not shown to be better than.
 pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
@@ -16,15 +17,17 @@ pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
     let (leader, second) = (best.leader(), best.models.get(1)?);
     let mut numbers = Numbers::of(findings.unit);
     let over = over_levels(best).map_or(String::new(), |over| format!(" {over}"));
+    let axis = best.variant.kind.map_or(Axis::LIGHT, Kind::axis);
+    let (place, unit) = (axis.place, axis.unit);
     let (tone, text) = if best.is_shown() {
         (
             Tone::Better,
-            format!("{} sees best in the dark{over}.", leader.model),
+            format!("{} sees best {place}{over}.", leader.model),
         )
     } else {
         let others = best.not_shown_better_than.join(", ");
         let text = format!(
-            "{} sees best in the dark by its mean{over}, but is not shown to be better than {others}.",
+            "{} sees best {place} by its mean{over}, but is not shown to be better than {others}.",
             leader.model
         );
         (Tone::NotShown, text)
@@ -51,12 +54,15 @@ pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
         models => format!("; without {}, not asked in this way", models.join(", ")),
     };
     let detail = format!(
-        "mean accuracy over EV {value} % [{low}, {high}]{loss}; {difference} against {}, {p}; n = {items} in {clusters}{without}",
+        "mean accuracy over {unit} {value} % [{low}, {high}]{loss}; {difference} against {}, {p}; n = {items} in {clusters}{without}",
         second.model
     );
-    let (lights, _) = lights(findings);
     let sentence = numbers.sentence("best", tone, text, detail);
-    Some(named_light(&lights, &best.variant, sentence))
+    let topics = Topic::all(findings);
+    Some(match topics.first() {
+        Some(main) => main.named(&best.variant, sentence),
+        None => sentence,
+    })
 }
 
 /// The levels that the comparison of areas rests on, as `over L0, L3`; `None` if they are all that some model was asked.
@@ -87,7 +93,8 @@ pub(super) fn families(findings: &Findings<'_>, variant: &KindReading) -> Option
     }
     let mut numbers = Numbers::of(findings.unit);
     let text = format!(
-        "Darkness costs more in {} ({} points at {darkest}) than in {} ({}).",
+        "{} costs more in {} ({} points at {darkest}) than in {} ({}).",
+        capitalised(darkest.axis().unwrap_or(Axis::LIGHT).cause),
         family(most.family.as_ref()),
         numbers.points("effect_most", most.difference.value),
         family(least.family.as_ref()),

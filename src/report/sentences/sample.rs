@@ -6,7 +6,7 @@ use crate::score::cluster::ClusterUnit;
 use crate::score::findings::Findings;
 use crate::score::pooled::{LevelsLeftOut, PooledFinding};
 use crate::score::pooled_kind::PooledKind;
-use crate::types::EnhancerName;
+use crate::types::{EnhancerName, KindReading};
 
 /// Half-width of an interval in points above which the sample is called small.
 const WIDE: f64 = 0.05;
@@ -15,11 +15,11 @@ const WIDE: f64 = 0.05;
 const MAX_NAMED: usize = 3;
 
 /// What findings of a kind are about.
-fn topic(kind: PooledKind, enhancer: Option<&EnhancerName>) -> String {
+fn topic(kind: PooledKind, variant: &KindReading, enhancer: Option<&EnhancerName>) -> String {
     match (kind, enhancer) {
         (PooledKind::Enhancer, Some(name)) => name.to_string(),
         (PooledKind::Blind, _) => "the words alone".to_owned(),
-        _ => kind.name().to_owned(),
+        _ => kind.name_on(variant.kind).to_owned(),
     }
 }
 
@@ -49,7 +49,7 @@ pub(super) fn impossible(findings: &Findings<'_>) -> Option<Sentence> {
         if first.variant.kind != last {
             continue;
         }
-        let mut topic = topic(first.kind, first.enhancer.as_ref());
+        let mut topic = topic(first.kind, &first.variant, first.enhancer.as_ref());
         let is_same = |other: &PooledFinding| {
             (other.kind, &other.enhancer) == (first.kind, &first.enhancer)
                 && other.variant.kind.is_some()
@@ -123,7 +123,7 @@ pub(in crate::report) fn left_out(findings: &Findings<'_>) -> Vec<Sentence> {
         }
         let about = format!(
             "{} ({})",
-            topic(set.kind, set.enhancer.as_ref()),
+            topic(set.kind, &set.variant, set.enhancer.as_ref()),
             light(&set.variant, None)
         );
         let is_same =

@@ -10,7 +10,7 @@ use crate::score::comparison::{Comparison, ComparisonKind};
 use crate::score::findings::Findings;
 use crate::score::pooled::{PooledFinding, pool};
 use crate::score::significance::Significance;
-use crate::types::{AxisLevel, KindReading};
+use crate::types::{Axis, AxisLevel, KindReading};
 
 /// Where the models fall below their replies to the words alone.
 pub(super) fn pooled(levels: &[&PooledFinding], unit: ClusterUnit) -> Option<Sentence> {
@@ -31,7 +31,8 @@ pub(super) fn pooled(levels: &[&PooledFinding], unit: ClusterUnit) -> Option<Sen
         _ => "the models without images".to_owned(),
     };
     let at = runs(&shown, levels);
-    let text = format!("In the dark {who} below {below} at {at}.");
+    let place = capitalised(largest.level.axis().unwrap_or(Axis::LIGHT).place);
+    let text = format!("{place} {who} below {below} at {at}.");
     let detail = detail(largest, &mut numbers, &format!("; at {}", largest.level));
     Some(numbers.sentence("below blind", Tone::Worse, text, detail))
 }

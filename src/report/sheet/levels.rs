@@ -1,66 +1,91 @@
-//! The paper's figure of examples, both variants by level: [`levels()`].
+//! The paper's figure of examples, each variant by level: [`levels()`].
+
+use std::collections::BTreeSet;
 
 use super::{CELL, GAP, LINE, SheetCanvas, fitted, letter_width, lines, mean};
 use crate::types::degradation::Axis;
 use crate::types::{AxisLevel, Rgb};
 
-/// The images of a frame at one level.
+/// The images of a frame at the levels of one axis.
 #[derive(Debug, Clone)]
-pub(crate) struct LevelColumn {
-    pub level: AxisLevel,
-    /// An image for each row.
-    pub images: Vec<Rgb>,
+pub(crate) struct LevelBlock {
+    /// The levels without L0, from left to right.
+    pub levels: Vec<AxisLevel>,
+    pub rows: Vec<LevelRow>,
 }
 
-/// A sheet with the frame and its levels, exposure drop above noise, as the paper's figure of examples (DarkQA, Fig. 3); `rows` are
-/// the names of the rows, and `foot` stands below them.
+/// The images of one kind of degradation, in one light reading.
+#[derive(Debug, Clone)]
+pub(crate) struct LevelRow {
+    pub name: String,
+    /// One image for each level of the block.
+    pub images: Vec<LevelImage>,
+}
+
+/// An image at a level.
+#[derive(Debug, Clone)]
+pub(crate) struct LevelImage {
+    pub image: Rgb,
+    /// How much darker than the frame it is shown, in EV.
+    pub dark_ev: f64,
+}
+
+/// Letters of the longest names of the paper's rows.
+const NAME: usize = 6;
+
+/// A sheet with the frame and its levels, block below block and kind below kind, as the paper's figure of examples (DarkQA, Fig. 3);
+/// `foot` stands below them.
 ///
 /// Images are scaled down by means of pixels. As in the paper's insets, the lower right corner of L3, L4 and L5 shows the
 /// middle of the image (half of each side, a quarter of the area) with 10, 20 and 50 times its light. Pixels of insets are
 /// picked, not averaged, so that the noise keeps its strength. The paper says "pixel intensities amplified". Multiplied codes
 /// would make a bright room white, so we take this to mean the light, and say so below the images.
 #[must_use]
-pub(crate) fn levels(clean: &Rgb, rows: &[String], columns: &[LevelColumn], foot: &str) -> Rgb {
+pub(crate) fn levels(clean: &Rgb, blocks: &[LevelBlock], foot: &str) -> Rgb {
     let size = fitted(clean.height(), clean.width());
     let [height, width] = size;
-    let longest = rows.iter().map(|row| row.chars().count()).max();
-    let margin = (longest.unwrap_or(0) + 1) * letter_width() + GAP;
+    let rows = blocks.iter().flat_map(|block| &block.rows);
+    let letters = rows.map(|row| row.name.chars().count()).max();
+    let margin = letters.unwrap_or_default().max(NAME) * letter_width() + GAP;
     // A label needs its width even if the image is small.
     let cell = width.max(CELL / 2);
-    let below = GAP + LINE + GAP + rows.len() * (GAP + height.max(LINE));
-    let sheet_width = margin + (columns.len() + 1) * (cell + GAP);
-    let levels: Vec<AxisLevel> = columns.iter().map(|column| column.level).collect();
-    let foot = [foot.to_owned(), how_inset(&levels)];
+    let columns = blocks.iter().map(|block| block.levels.len()).max();
+    let row_height = GAP + height.max(LINE);
+    let heights = blocks
+        .iter()
+        .map(|block| GAP + LINE + block.rows.len() * row_height);
+    let sheet_width = margin + (columns.unwrap_or_default() + 1) * (cell + GAP);
+    let foot = [foot.to_owned(), how_inset(blocks)];
     let foot: Vec<String> = foot
         .iter()
         .flat_map(|text| lines(text, sheet_width))
         .collect();
-    let mut sheet = SheetCanvas::new(below + foot.len() * LINE + GAP, sheet_width);
-    let top = |row: usize| GAP + LINE + GAP + row * (GAP + height.max(LINE));
-    for (row, name) in rows.iter().enumerate() {
-        let middle = top(row) + height.saturating_sub(LINE) / 2;
-        sheet.write([middle, GAP], margin, name, [0; 3]);
-    }
+    let below = heights.sum::<usize>() + GAP;
+    let foot_height = match foot.len() {
+        0 => 0,
+        number => number * LINE + GAP,
+    };
+    let mut sheet = SheetCanvas::new(below + foot_height, sheet_width);
     let left = |column: usize| margin + column * (cell + GAP);
-    sheet.write([GAP, left(0)], cell, "L0", [0; 3]);
-    for row in 0..rows.len() {
-        sheet.fill([top(row), left(0)], size, |row, column| {
-            mean(clean, size, row, column)
-        });
-    }
-    for (index, column) in columns.iter().enumerate() {
-        let left = left(index + 1);
-        let unit = column.level.axis().unwrap_or(Axis::LIGHT).unit;
-        let label = format!("{} -{} {unit}", column.level, column.level.value());
-        sheet.write([GAP, left], cell, &label, [0; 3]);
-        for (row, image) in column.images.iter().enumerate() {
-            let top = top(row);
-            sheet.fill([top, left], size, |row, column| {
-                mean(image, size, row, column)
-            });
-            if let Some(factor) = amplification(column.level) {
-                inset(&mut sheet, [top, left], size, image, factor);
+    let mut top = GAP;
+    for block in blocks {
+        sheet.write([top, left(0)], cell, "L0", [0; 3]);
+        for (index, level) in block.levels.iter().enumerate() {
+            sheet.write([top, left(index + 1)], cell, &label(*level), [0; 3]);
+        }
+        top += LINE + GAP;
+        for row in &block.rows {
+            let middle = top + height.saturating_sub(LINE) / 2;
+            sheet.write([middle, GAP], margin, &row.name, [0; 3]);
+            sheet.fill([top, left(0)], size, |y, x| mean(clean, size, y, x));
+            for (index, LevelImage { image, dark_ev }) in row.images.iter().enumerate() {
+                let place = [top, left(index + 1)];
+                sheet.fill(place, size, |y, x| mean(image, size, y, x));
+                if let Some(factor) = amplification(*dark_ev) {
+                    inset(&mut sheet, place, size, image, factor);
+                }
             }
+            top += row_height;
         }
     }
     for (line, text) in foot.iter().enumerate() {
@@ -69,17 +94,19 @@ pub(crate) fn levels(clean: &Rgb, rows: &[String], columns: &[LevelColumn], foot
     sheet.finish()
 }
 
-/// The factors of light of the insets at these levels, without duplicates.
-#[must_use]
-pub(crate) fn insets(levels: &[AxisLevel]) -> Vec<u16> {
-    let mut factors: Vec<u16> = levels.iter().copied().filter_map(amplification).collect();
-    factors.dedup();
-    factors
+/// The factors of light of the insets of some images, without duplicates.
+fn insets(blocks: &[LevelBlock]) -> Vec<u16> {
+    let rows = blocks.iter().flat_map(|block| &block.rows);
+    let images = rows.flat_map(|row| &row.images);
+    let factors: BTreeSet<u16> = images
+        .filter_map(|image| amplification(image.dark_ev))
+        .collect();
+    factors.into_iter().collect()
 }
 
 /// What the insets show; empty without one.
-fn how_inset(levels: &[AxisLevel]) -> String {
-    let factors = insets(levels);
+fn how_inset(blocks: &[LevelBlock]) -> String {
+    let factors = insets(blocks);
     if factors.is_empty() {
         return String::new();
     }
@@ -90,9 +117,19 @@ fn how_inset(levels: &[AxisLevel]) -> String {
     )
 }
 
+/// A level above its column, as `L3 -6 EV` or `T33.33 ms`.
+pub(super) fn label(level: AxisLevel) -> String {
+    let axis = level.axis().unwrap_or(Axis::LIGHT);
+    if axis == Axis::LIGHT {
+        format!("{level} -{} {}", level.value(), axis.unit)
+    } else {
+        format!("{level} {}", axis.unit)
+    }
+}
+
 /// Factor by which the light of an inset is amplified; `None` below 5 EV, where the image itself is visible.
-fn amplification(level: AxisLevel) -> Option<u16> {
-    match level.value() {
+fn amplification(dark_ev: f64) -> Option<u16> {
+    match dark_ev {
         ..5.0 => None,
         5.0..7.0 => Some(10),
         7.0..8.5 => Some(20),
@@ -150,14 +187,25 @@ mod tests {
         Rgb::new(height, width, vec![code; height * width * 3]).unwrap()
     }
 
-    fn sheet(height: usize, width: usize, levels_of: &[Severity]) -> Rgb {
-        let column = |level: &Severity| LevelColumn {
-            level: AxisLevel::new(Kind::ALL[0], *level),
-            images: vec![grey(height, width, 3), grey(height, width, 4)],
+    fn sheet(height: usize, width: usize, severities: &[Severity]) -> Rgb {
+        let row = |code: u8| LevelRow {
+            name: code.to_string(),
+            images: severities
+                .iter()
+                .map(|severity| LevelImage {
+                    image: grey(height, width, code),
+                    dark_ev: severity.value(),
+                })
+                .collect(),
         };
-        let columns: Vec<_> = levels_of.iter().map(column).collect();
-        let rows = ["EV", "noise"].map(str::to_owned);
-        levels(&grey(height, width, 100), &rows, &columns, "paper: K 0.77")
+        let block = LevelBlock {
+            levels: severities
+                .iter()
+                .map(|severity| AxisLevel::new(Kind::Exposure, *severity))
+                .collect(),
+            rows: vec![row(3), row(4)],
+        };
+        levels(&grey(height, width, 100), &[block], "paper: K 0.77")
     }
 
     #[test]
@@ -174,20 +222,36 @@ mod tests {
     }
 
     #[test]
-    fn each_reading_has_a_row_and_the_insets_are_explained() {
-        let image = || grey(100, 300, 3);
-        let columns = [LevelColumn {
-            level: AxisLevel::new(Kind::ALL[0], Severity::L5),
-            images: vec![image(), image(), image()],
-        }];
-        let rows = ["EV", "noise", "@physical"].map(str::to_owned);
-        let of = |rows: &[String]| levels(&grey(100, 300, 100), rows, &columns, "paper").height();
-        assert_eq!(of(&rows) - of(&rows[..2]), 100 + GAP);
-        assert_eq!(
-            how_inset(&[columns[0].level]),
-            "Insets: the middle of the image, linear light ×50"
+    fn blocks_stand_below_each_other() {
+        let block = |kind: Kind, code| LevelBlock {
+            levels: vec![AxisLevel::new(kind, kind.ladder()[2])],
+            rows: vec![LevelRow {
+                name: kind.word().to_owned(),
+                images: vec![LevelImage {
+                    image: grey(50, 80, code),
+                    dark_ev: 0.0,
+                }],
+            }],
+        };
+        let both = levels(
+            &grey(50, 80, 100),
+            &[block(Kind::Auto, 7), block(Kind::Motion, 9)],
+            "",
         );
-        assert_eq!(how_inset(&[AxisLevel::L0]), "");
+        let one = levels(&grey(50, 80, 100), &[block(Kind::Auto, 7)], "");
+        assert_eq!(both.height() - GAP, 2 * (one.height() - GAP));
+        let rows = both.samples().chunks(3 * both.width());
+        let first = |code: u8| {
+            let mut rows = rows.clone();
+            let cells = |row: &[u8]| row.chunks(3).filter(|pixel| *pixel == [code; 3]).count();
+            rows.position(|row| cells(row) == 80)
+        };
+        assert!(first(7).unwrap() + 50 < first(9).unwrap());
+        assert_eq!(
+            label(AxisLevel::new(Kind::Motion, Severity::TIMES[2])),
+            "T33.33 ms"
+        );
+        assert_eq!(label(AxisLevel::new(Kind::Auto, Severity::L3)), "L3 -6 EV");
     }
 
     #[test]

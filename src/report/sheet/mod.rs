@@ -11,7 +11,7 @@ use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_wid
 
 pub(crate) use contact::{ContactColumn, contact};
 pub(crate) use crops::{CropRow, crops};
-pub(crate) use levels::{LevelColumn, insets, levels};
+pub(crate) use levels::{LevelBlock, LevelImage, LevelRow, levels};
 pub(crate) use noise::{Signal, noise};
 pub(crate) use story::{Story, StoryCell, StoryMark, StoryRow, story};
 

@@ -1,8 +1,8 @@
 //! The picture that tells a run's story: one item over the levels, raw above enhanced, and the curves of all items: [`story`].
 
+use super::levels::label;
 use super::{CELL, GAP, LINE, SheetCanvas, letter_width, mean};
 use crate::report::chart::{PanelContent, PlotLine};
-use crate::types::degradation::Axis;
 use crate::types::{AxisLevel, Rgb};
 
 /// Width of a sheet of six levels, in pixels; fewer levels need less.
@@ -62,10 +62,9 @@ pub(crate) fn story(story: &Story) -> Rgb {
     }
     top += GAP;
     for (index, level) in story.levels.iter().enumerate() {
-        let unit = level.axis().unwrap_or(Axis::LIGHT).unit;
-        let label = match level.value() {
-            0.0 => format!("{level} untouched"),
-            value => format!("{level} -{value} {unit}"),
+        let label = match level.severity() {
+            None => format!("{level} untouched"),
+            Some(_) => label(*level),
         };
         sheet.write([top, layout.left(index)], layout.cell[1], &label, INK);
     }

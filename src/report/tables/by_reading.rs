@@ -23,13 +23,15 @@ pub(super) fn by_reading(findings: &Findings<'_>) -> Vec<Table> {
     vec![file(found), shown(findings, &readings)]
 }
 
+/// A row of the file.
+type FileRow<'f> = (&'f FindingByReading, &'f EffectInReading);
+
 fn file(found: &[FindingByReading]) -> Table {
     let rows = found.iter().flat_map(|finding| {
         let effects = finding.effects.iter();
         effects.map(move |effect| (finding, effect))
     });
-    type Row<'f> = (&'f FindingByReading, &'f EffectInReading);
-    let tested = |(_, effect): &Row<'_>| effect.effect;
+    let tested = |(_, effect): &FileRow<'_>| effect.effect;
     TableBuilder::new("readings", rows)
         .column(Text, "csv model", |(finding, _)| subject(finding))
         .column(Text, "csv finding", |(finding, _)| finding.claim.name())

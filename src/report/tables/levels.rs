@@ -9,32 +9,56 @@ use crate::score::accuracy::{AccuracyCell, AccuracySummary};
 use crate::score::choice::ReadingMode;
 use crate::score::findings::Findings;
 use crate::types::UnreadReason;
+use crate::types::degradation::Axis;
 
-/// The table of all items and, if the models were not asked the same ones, the table of the items that they share.
+/// The tables of all items and, if the models were not asked the same ones, those of the items that they share.
 pub(super) fn levels(findings: &Findings<'_>) -> Vec<Table> {
-    let mut tables = vec![of_summary(findings, &findings.summary)];
+    let mut tables = of_summary(findings, &findings.summary, "");
     if let Some(common) = &findings.common {
         let what = format!(
-            "on the {} questions that all models with images answered",
+            " on the {} questions that all models with images answered",
             common.shared_questions
         );
-        let mut table = of_summary(findings, &common.summary);
-        table.heading = Some(format!("Accuracy in % {what}"));
-        table.caption = format!("Accuracy in % by level {what}");
-        table.latex = Some(format!("Accuracy in \\% {what}."));
-        tables.push(table);
+        for mut table in of_summary(findings, &common.summary, &what) {
+            table.latex = Some(format!("Accuracy in \\%{what}."));
+            tables.push(table);
+        }
     }
     tables
 }
 
-fn of_summary(findings: &Findings<'_>, summary: &AccuracySummary) -> Table {
+/// The table of each axis; `what` says on which items, if not on all.
+fn of_summary(findings: &Findings<'_>, summary: &AccuracySummary, what: &str) -> Vec<Table> {
     let strict = summary.of(None, ReadingMode::Strict);
     let ladder = Ladder::new(strict.map(|cell| (&cell.subject, cell)));
+    let notes = notes(summary, &ladder);
+    let ladders = ladder.by_axis().into_iter();
+    let mut tables: Vec<Table> = ladders
+        .map(|(axis, ladder)| of_axis(findings, summary, what, axis, &ladder))
+        .collect();
+    if let Some(last) = tables.last_mut() {
+        last.notes = notes;
+    }
+    tables
+}
+
+fn of_axis(
+    findings: &Findings<'_>,
+    summary: &AccuracySummary,
+    what: &str,
+    axis: Axis,
+    ladder: &Ladder<'_, AccuracyCell>,
+) -> Table {
+    let caption = match (what, axis == Axis::LIGHT) {
+        ("", true) => "Accuracy in % by level, with 95 % intervals".to_owned(),
+        (_, true) => format!("Accuracy in % by level{what}"),
+        (_, false) => format!("Accuracy in % by {} of {}{what}", axis.title, axis.cause),
+    };
     let mut table = ladder
         .table("levels", |cell| {
             cell.map_or(TableCell::Blank, |cell| accuracy(summary, cell))
         })
-        .page("accuracy", "Accuracy in % by level, with 95 % intervals")
+        .page("accuracy", &caption)
         .column(Count, "terminal n", |line| replies(line))
         .column(Count, "terminal unparsed", |line| {
             let strict = line.sum(|cell| cell.unparsed).to_string();
@@ -47,17 +71,24 @@ fn of_summary(findings: &Findings<'_>, summary: &AccuracySummary) -> Table {
             line.sum(|cell| cell.failed)
         })
         .build();
-    add_always(&mut table, &ladder);
-    table.heading = Some(
-        "Accuracy in %: strict (lenient where it differs); n replies at each level; 95 %: how far the widest interval reaches down and up"
-            .to_owned(),
-    );
+    add_always(&mut table, ladder);
+    let of = if axis == Axis::LIGHT {
+        String::new()
+    } else {
+        format!(" by {} of {}", axis.title, axis.cause)
+    };
+    table.heading = Some(if what.is_empty() {
+        format!(
+            "Accuracy in %{of}: strict (lenient where it differs); n replies at each level; 95 %: how far the widest interval reaches down and up"
+        )
+    } else {
+        format!("Accuracy in %{of}{what}")
+    });
     table.latex = Some(format!(
-        "Accuracy in \\% (strict reading) with 95\\,\\% intervals by {}; {} items.",
+        "Accuracy in \\%{of} (strict reading) with 95\\,\\% intervals by {}; {} items.",
         findings.unit,
         findings.grid.items.len()
     ));
-    table.notes = notes(summary, &ladder);
     table
 }
 

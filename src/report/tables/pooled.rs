@@ -54,7 +54,9 @@ pub(super) fn pooled(findings: &Findings<'_>) -> Vec<Table> {
 fn table(caption: &str, models: &str, findings: &[&PooledFinding]) -> Table {
     let builder = TableBuilder::new("pooled", findings.iter().copied())
         .page("comparisons", caption)
-        .column(Text, "csv kind", |finding| finding.kind.name())
+        .column(Text, "csv kind", |finding| {
+            finding.kind.name_on(finding.variant.kind)
+        })
         .column(Text, "csv level", |finding| finding.level.to_string())
         .column(Text, "csv variant", |finding| finding.variant.to_string())
         .column(Text, "csv enhancer", |finding| {

@@ -30,7 +30,7 @@ pub(in crate::report) const SECTIONS: [Section; 12] = [
         "Darkness threshold",
         "The exposure drop at which a model has lost half of what it knows in the light: one number a model. The area is the \
          mean accuracy from L0 to the darkest level, over EV.",
-        &["thresholds"],
+        &["thresholds", "blur_thresholds"],
     ),
     (
         "readings",

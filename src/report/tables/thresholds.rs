@@ -9,53 +9,99 @@ use crate::score::curve::Curve;
 use crate::score::findings::Findings;
 use crate::score::threshold::{NoThreshold, ThinLevel};
 use crate::types::AxisLevel;
+use crate::types::degradation::Axis;
 
 pub(super) fn thresholds(findings: &Findings<'_>) -> Vec<Table> {
-    let curves = findings.curves.iter();
+    let mut tables = Vec::new();
+    for axis in Axis::ALL {
+        let curves = findings.curves.iter();
+        let curves: Vec<&Curve> = curves.filter(|curve| curve.axis() == axis).collect();
+        // Only light has tables without a row: it is what a run is about.
+        if !curves.is_empty() || axis == Axis::LIGHT {
+            tables.extend(of_axis(findings, axis, curves));
+        }
+    }
+    tables
+}
+
+/// The tables of the curves over one axis.
+fn of_axis(findings: &Findings<'_>, axis: Axis, curves: Vec<&Curve>) -> [Table; 2] {
+    let notes = notes(&curves);
     let (whole, by_family): (Vec<&Curve>, Vec<&Curve>) =
-        curves.partition(|curve| curve.family.is_none());
+        curves.into_iter().partition(|curve| curve.family.is_none());
+    let names = Names::of(axis);
     let heading = format!(
-        "Darkness threshold in EV (half-way from L0 to chance) and mean accuracy in %, with 95 % intervals by {}",
-        findings.unit
+        "{} in {} (half-way from L0 to chance) and mean accuracy in %, with 95 % intervals by {}",
+        names.threshold, axis.unit, findings.unit
     );
-    let mut whole = table("Thresholds and areas", &whole);
+    let mut whole = table(&names, names.caption, &whole);
     whole.heading = (!whole.rows.is_empty()).then_some(heading);
-    whole.notes = notes(findings.curves.iter());
-    whole.notes.extend(finer(findings));
-    let mut by_family = table("Thresholds and areas by family", &by_family);
+    whole.notes = notes;
+    if axis == Axis::LIGHT {
+        whole.notes.extend(finer(findings));
+    }
+    let mut by_family = table(&names, &format!("{} by family", names.caption), &by_family);
     by_family.is_folded = true;
-    vec![whole, by_family]
+    [whole, by_family]
+}
+
+/// Names in the tables of an axis.
+struct Names {
+    /// The file.
+    file: &'static str,
+    caption: &'static str,
+    threshold: &'static str,
+    darkest: &'static str,
+    columns: &'static str,
+    range: &'static str,
+}
+
+impl Names {
+    fn of(axis: Axis) -> Self {
+        if axis == Axis::MOTION {
+            return Self {
+                file: "blur_thresholds",
+                caption: "Thresholds and areas of motion blur",
+                threshold: "Exposure time of motion blur",
+                darkest: "csv longest_ms",
+                columns: "csv threshold_ms low high | terminal threshold, interval | page threshold in ms [95 %]",
+                range: "page ms",
+            };
+        }
+        Self {
+            file: "thresholds",
+            caption: "Thresholds and areas",
+            threshold: "Darkness threshold",
+            darkest: "csv darkest_ev",
+            columns: "csv threshold_ev low high | terminal threshold, interval | page threshold in EV [95 %]",
+            range: "page EV",
+        }
+    }
 }
 
 /// A threshold is `inf` beyond the darkest level, and empty if it is not known.
-fn table(caption: &str, curves: &[&Curve]) -> Table {
-    TableBuilder::new("thresholds", curves)
+fn table(names: &Names, caption: &str, curves: &[&Curve]) -> Table {
+    TableBuilder::new(names.file, curves)
         .page("thresholds", caption)
         .line(|curve| (&curve.model, &curve.variant, curve.enhancer.as_ref()))
         .column(Text, "terminal light | page light", |curve| {
             light(&curve.variant, curve.enhancer.as_ref())
         })
         .family(|curve| curve.family.as_ref())
-        .column(Number, "csv darkest_ev", |curve| {
-            curve.summary.darkest.value()
+        .column(Number, names.darkest, |curve| curve.summary.darkest.value())
+        .column(Threshold, names.columns, |curve| {
+            let darkest = curve.summary.darkest.value();
+            match &curve.summary.threshold {
+                Ok(threshold) => TableCell::Threshold(*threshold, darkest),
+                Err(reason) => TableCell::Unknown(why(reason)),
+            }
         })
-        .column(
-            Threshold,
-            "csv threshold_ev low high | terminal threshold, interval | page threshold in EV [95 %]",
-            |curve| {
-                let darkest = curve.summary.darkest.value();
-                match &curve.summary.threshold {
-                    Ok(threshold) => TableCell::Threshold(*threshold, darkest),
-                    Err(reason) => TableCell::Unknown(why(reason)),
-                }
-            },
-        )
         .column(
             Share,
             "csv area area_low area_high n | terminal mean accuracy | page area in % [95 %]",
             |curve| curve.summary.area,
         )
-        .column(Text, "page EV", |curve| {
+        .column(Text, names.range, |curve| {
             format!("0–{}", curve.summary.darkest.value())
         })
         .column(Text, "csv reason", |curve| reason(curve))
@@ -92,8 +138,8 @@ fn reason(curve: &Curve) -> String {
 }
 
 /// A line for each curve of all families together of which levels are left out.
-fn notes<'a>(curves: impl Iterator<Item = &'a Curve>) -> Vec<String> {
-    let curves = curves.filter(|curve| curve.family.is_none());
+fn notes(curves: &[&Curve]) -> Vec<String> {
+    let curves = curves.iter().filter(|curve| curve.family.is_none());
     let thinned = curves.filter(|curve| !curve.summary.left_out.is_empty());
     let notes = thinned.map(|curve| {
         let light = light(&curve.variant, curve.enhancer.as_ref());
@@ -120,7 +166,9 @@ const LEAST_STEP: f64 = 0.25;
 /// spread between items makes most of the error, and it would compare models at different levels.
 fn finer(findings: &Findings<'_>) -> Option<String> {
     let curves = findings.curves.iter();
-    let raw = curves.filter(|curve| curve.family.is_none() && curve.enhancer.is_none());
+    let raw = curves.filter(|curve| {
+        curve.family.is_none() && curve.enhancer.is_none() && curve.axis() == Axis::LIGHT
+    });
     let intervals: Vec<[f64; 2]> = raw
         .filter_map(|curve| {
             let threshold = curve.summary.threshold.as_ref().ok()?;
@@ -128,7 +176,9 @@ fn finer(findings: &Findings<'_>) -> Option<String> {
         })
         .collect();
     let subjects = findings.grid.subjects.iter();
-    let levels: BTreeSet<AxisLevel> = subjects.filter_map(|subject| subject.level).collect();
+    let levels = subjects.filter_map(|subject| subject.level);
+    let levels = levels.filter(|level| level.axis().is_none_or(|axis| axis == Axis::LIGHT));
+    let levels: BTreeSet<AxisLevel> = levels.collect();
     let drops: Vec<f64> = levels.iter().map(|level| level.value()).collect();
     let more = levels_within(&intervals, &drops)?;
     let more: Vec<String> = more.iter().map(ToString::to_string).collect();

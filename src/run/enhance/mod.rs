@@ -7,14 +7,15 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use crate::ask::png;
-use crate::dataset::PixelLimit;
 use crate::dataset::inputs::{InputFrame, Inputs};
+use crate::dataset::{CodesArgs, PixelLimit};
 use crate::enhance::{Enhancer, FRAMES, ImageOutput, ModelFile};
 use crate::error::{Error, Result};
 use crate::files::write;
 use crate::job::Outcome;
 use crate::job::dark_frames::{darkened, evenly};
 use crate::job::enhancers::{EnhancerRunArgs, OpenEnhancers};
+use crate::job::input_tally::InputTally;
 use crate::job::progress::Progress;
 use crate::types::manifest::Status;
 use crate::types::{Decides, Rgb};
@@ -31,7 +32,7 @@ pub(crate) struct EnhanceArgs {
     /// restormer, mirnet, kind)
     #[arg(value_name = "MODEL", add = Decides::Trials)]
     pub model: PathBuf,
-    /// Images (PNG, JPEG) and folders of frames
+    /// Images (PNG, JPEG, WebP, TIFF) and folders of frames
     #[arg(value_name = "INPUT", required_unless_present = "describe", add = Decides::Pixels)]
     pub inputs: Vec<PathBuf>,
     /// Where the enhanced images go, as PNG under their own names; default: nowhere, with --describe
@@ -52,6 +53,9 @@ pub(crate) struct EnhanceArgs {
     /// The maximum size of an image.
     #[command(flatten)]
     pub limit: PixelLimit,
+    /// What the codes of images mean.
+    #[command(flatten)]
+    pub codes: CodesArgs,
 }
 
 /// Enhances the images, or describes the model.
@@ -68,7 +72,7 @@ pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome
             output: enhancer.describe(),
         });
     };
-    let images = Inputs::open(&args.inputs, args.limit.max_pixels.get())?;
+    let images = Inputs::open(&args.inputs, args.codes.rule(args.limit))?;
     let sample = evenly(images.entries.len(), FRAMES).into_iter();
     let sample = sample.map(|place| images.picture(&images.entries[place])?.decode());
     // An image that cannot be read is named when its turn comes.
@@ -83,14 +87,17 @@ pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome
     if !sample.is_empty() {
         enhancer.probe(&darkened(&sample), args.loading.probe.implausible())?;
     }
-    let bar = progress.bar("images", images.entries.len());
+    let (bar, tally) = (
+        progress.bar("images", images.entries.len()),
+        InputTally::default(),
+    );
     let (mut written, mut unchanged, mut failed) = (0, 0, 0);
     for entry in &images.entries {
         let path = out.join(format!("{}.png", entry.stem));
         if path.exists() && !args.force {
             unchanged += 1;
         } else {
-            match enhance_one(&mut enhancer, &images, entry, &path) {
+            match enhance_one(&mut enhancer, &images, entry, &path, &tally) {
                 Ok(()) => written += 1,
                 Err(e) => {
                     failed += 1;
@@ -101,6 +108,7 @@ pub(crate) fn enhance(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome
         bar.inc();
     }
     drop(bar);
+    tally.warn();
     let count = |n: usize, what: &str| match n {
         0 => String::new(),
         n => format!(", {n} {what}"),
@@ -148,8 +156,11 @@ fn enhance_one(
     images: &Inputs,
     entry: &InputFrame,
     path: &Path,
+    tally: &InputTally,
 ) -> Result<()> {
-    let enhanced = enhancer.enhance(&images.picture(entry)?.decode()?);
+    let picture = images.picture(entry)?;
+    tally.add(&entry.id, &picture.note());
+    let enhanced = enhancer.enhance(&picture.decode()?);
     let with_name = |e| Error::data(format_args!("image {:?}", entry.id.0), e);
     write(path, &png(&enhanced.map_err(with_name)?)?)
 }

@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::choice_order::ChoiceOrder;
 use crate::ask::{Constrain, Prompts};
-use crate::dataset::{DataArgs, PixelLimit, SelectionArgs};
+use crate::dataset::{CodesArgs, DataArgs, PixelLimit, ReadingRule, SelectionArgs};
 use crate::error::Result;
 use crate::job::questions::rules;
 use crate::job::settings::{ExperimentSettings, JobArgs, JobSettings};
@@ -29,6 +29,9 @@ pub(crate) struct EvaluateArgs {
     /// The maximum size of an image.
     #[command(flatten)]
     pub limit: PixelLimit,
+    /// What the codes of images mean.
+    #[command(flatten)]
+    pub codes: CodesArgs,
     /// The flags that every experiment has.
     #[command(flatten)]
     pub job: JobArgs,
@@ -69,7 +72,8 @@ pub(crate) struct ShrinkArgs {
 pub(super) struct Evaluation {
     pub(super) data: DataArgs,
     pub(super) selection: SelectionArgs,
-    pub(super) limit: PixelLimit,
+    /// The rule by which images are read.
+    pub(super) rule: ReadingRule,
     pub(super) order: ChoiceOrder,
     pub(super) prompts: Prompts,
     /// The rulebook that makes questions, and that the observer answers by.
@@ -94,7 +98,7 @@ impl EvaluateArgs {
             observer_controls: self.choice.observer_controls,
             data: self.data,
             selection: self.selection,
-            limit: self.limit,
+            rule: self.codes.rule(self.limit),
             order: self.order,
             prompts: prompts.map_or_else(Prompts::built_in, Prompts::load)?,
             job: self.job.resolve(&ExperimentSettings {

@@ -57,7 +57,7 @@ impl<'a> ChoiceSetup<'a> {
             place,
             &config.selection,
             &config.rules,
-            config.limit,
+            config.rule,
             progress,
         )?;
         let dataset = Arc::new(dataset);
@@ -74,7 +74,7 @@ impl<'a> ChoiceSetup<'a> {
                 .map(|question| Source::unseen(question.frame.clone()))
                 .collect()
         };
-        let recipe = Recipe::new(&job.light.sensor, job.format, job.max_side, &files);
+        let recipe = Recipe::new(&job.light.kinds, job.format, job.max_side, &files);
         let names = sources.iter().map(|source| source.name.clone());
         let mut setup = Self {
             config,
@@ -92,6 +92,7 @@ impl<'a> ChoiceSetup<'a> {
         if shows_images && setup.models.iter().any(is_other_room) {
             setup.add_other_rooms(all)?;
         }
+        setup.recipe.check(&setup.sources, &setup.conditions)?;
         controls.print(progress);
         Ok((setup, files))
     }
@@ -132,7 +133,7 @@ fn open_models(
 ) -> Result<Vec<ModelUnderTest>> {
     let ask = &config.job.ask;
     let prior = Random {
-        seed: config.job.light.sensor.seed,
+        seed: config.job.light.kinds.sensor.seed,
     };
     let mut named = ask.models.iter().chain(&ask.blind_models);
     let observer = named.any(|name| matches!(name, ModelName::Observer(_)));

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::ask::png;
-use crate::dataset::{self, DataPlace, Dataset, PixelLimit, SelectionArgs};
+use crate::dataset::{self, CodesArgs, DataPlace, Dataset, PixelLimit, SelectionArgs};
 use crate::enhance::EnhancerArgs;
 use crate::error::{Error, Result};
 use crate::job::Outcome;
@@ -19,7 +19,7 @@ use crate::job::image_pipeline::ImagePipeline;
 use crate::job::progress::Progress;
 use crate::job::questions::{open_data, rules, select};
 use crate::job::recipe::Recipe;
-use crate::job::source::{Source, inspect_all};
+use crate::job::source::{Source, input_summary, inspect_all, warn_of_inputs};
 use crate::job::timings::Timings;
 use crate::job::workers::pool;
 use crate::synthesis::{LightArgs, LightSettings};
@@ -46,6 +46,9 @@ pub(crate) struct ExportArgs {
     /// The maximum size of an image.
     #[command(flatten)]
     pub limit: PixelLimit,
+    /// What the codes of images mean.
+    #[command(flatten)]
+    pub codes: CodesArgs,
     /// The flags for the degradations.
     #[command(flatten)]
     pub light: LightArgs,
@@ -68,13 +71,16 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
     let light = LightSettings::resolve(&args.light)?;
     check_used(&light, &args.enhancers)?;
     let rules = rules(args.selection.rules.as_deref())?;
-    let dataset = open_data(&args.data, &args.selection, &rules, args.limit, progress)?;
+    let rule = args.codes.rule(args.limit);
+    let dataset = open_data(&args.data, &args.selection, &rules, rule, progress)?;
     let questions = select(&dataset, &args.selection)?;
     let files = enhancers::read(&args.enhancers.llie)?;
-    let recipe = Recipe::lossless(&light.sensor, &files);
+    let recipe = Recipe::lossless(&light.kinds, &files);
     let conditions = conditions(&light, args.enhancers.llie_on, &recipe.enhancers);
     let workers = pool(args.loading.threads.threads)?;
     let sources = workers.install(|| inspect_all(&dataset, &questions, progress))?;
+    warn_of_inputs(&input_summary(&sources));
+    recipe.check(&sources, &conditions)?;
     let mut sets = open_sets(args, &dataset, &conditions, &questions)?;
     let mut pipeline = ImagePipeline {
         steps: ImageSteps {

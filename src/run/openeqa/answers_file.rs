@@ -111,13 +111,20 @@ fn condition(entry: &AnswerEntry, variants: KindSet) -> std::result::Result<Cond
         (None, None | Some("L0")) => return Ok(Condition::L0),
         (None, Some(level)) => level,
     };
-    let mut degradations = Vec::new();
-    for kind in Kind::ALL {
+    let of_kind = |kind: Kind| {
         let severity = kind.severity(level).map_err(|e| e.to_string())?;
-        let degradation = Degradation::new(kind, severity, None).map_err(|e| e.to_string())?;
-        degradations.push(degradation);
+        Degradation::new(kind, severity, None).map_err(|e| e.to_string())
+    };
+    // A level is one of the kinds of its axis alone.
+    let mut degradations: Vec<Degradation> = Kind::ALL
+        .into_iter()
+        .filter_map(|kind| of_kind(kind).ok())
+        .collect();
+    if degradations.is_empty() {
+        return Err(of_kind(Kind::Exposure).err().unwrap_or_default());
     }
-    let example = degradations.last().map(ToString::to_string);
+    let noise = degradations.iter().find(|how| how.kind() == Kind::Sensor);
+    let example = noise.or(degradations.last()).map(ToString::to_string);
     degradations.retain(|how| variants.includes(how.kind()));
     match (degradations.pop(), degradations.is_empty()) {
         (Some(degradation), true) => Ok(Condition::raw(Some(degradation))),

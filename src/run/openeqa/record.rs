@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::ask::{Payload, Query};
 use crate::dataset::openeqa::OpenQuestion;
 use crate::job::trial::{Item, Stimulus, Trial};
-use crate::types::{Digest, OpenDetail, Record, Step, WalkFacts};
+use crate::types::{Digest, ExposureFacts, OpenDetail, Record, Step, WalkFacts};
 
 /// The subject of one trial.
 #[derive(Debug, Clone)]
@@ -100,5 +100,6 @@ fn facts(images: &[Arc<Payload>]) -> Option<WalkFacts> {
         width: first.width,
         height: first.height,
         format: first.format.clone(),
+        exposure: ExposureFacts::shared(images.iter().map(|image| image.facts().exposure)),
     })
 }

@@ -7,7 +7,7 @@ use clap::{Arg, Args};
 
 use super::judge::{Judge, JudgeArgs};
 use super::questions::OpenSelectionArgs;
-use crate::dataset::PixelLimit;
+use crate::dataset::{CodesArgs, PixelLimit, ReadingRule};
 use crate::error::Result;
 use crate::job::batch::BatchFileArgs;
 use crate::job::models::ModelName;
@@ -31,6 +31,9 @@ pub(crate) struct OpenEqaArgs {
     /// The maximum size of an image.
     #[command(flatten)]
     pub limit: PixelLimit,
+    /// What the codes of images mean.
+    #[command(flatten)]
+    pub codes: CodesArgs,
     /// What the servers' sampling starts from, or none
     #[arg(
         long,
@@ -81,7 +84,8 @@ pub(super) struct OpenEqa {
     pub(super) questions: PathBuf,
     pub(super) chosen: OpenSelectionArgs,
     pub(super) walk: Walk,
-    pub(super) limit: PixelLimit,
+    /// The rule by which images are read.
+    pub(super) rule: ReadingRule,
     pub(super) answers: Vec<AnswersFile>,
     /// The judge; `None` if the answers are not marked.
     pub(super) judge: Option<Judge>,
@@ -149,7 +153,7 @@ impl OpenEqaArgs {
             questions: self.questions,
             chosen: self.chosen,
             walk: self.walk,
-            limit: self.limit,
+            rule: self.codes.rule(self.limit),
             answers: self.answers,
             judge,
             protocol,

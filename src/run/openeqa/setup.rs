@@ -58,9 +58,9 @@ impl<'a> OpenSetup<'a> {
         } else {
             Vec::new()
         };
-        let recipe = Recipe::new(&job.light.sensor, job.format, None, &files);
+        let recipe = Recipe::new(&job.light.kinds, job.format, None, &files);
         let recipe = recipe.of_walks(&config.walk);
-        let walks = WalkFolder::new(&config.walk, config.limit);
+        let walks = WalkFolder::new(&config.walk, config.rule);
         let names = names(&questions);
         let (sources, conditions) = if shows_frames {
             let sources = walks.inspect(&names, &config.walk, progress);
@@ -71,6 +71,7 @@ impl<'a> OpenSetup<'a> {
             let unseen = |name| Source::unseen(FrameId(name));
             (names.into_iter().map(unseen).collect(), Vec::new())
         };
+        recipe.check(&sources, &conditions)?;
         let mut setup = Self {
             config,
             questions: questions.into_iter().map(Arc::new).collect(),

@@ -11,10 +11,11 @@ use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::dataset::{Dataset, PixelLimit};
+use crate::dataset::{CodesArgs, Dataset, PixelLimit};
 use crate::error::{Error, Result};
 use crate::files::{reading, write};
 use crate::job::Outcome;
+use crate::job::input_tally::InputTally;
 use crate::job::progress::Progress;
 use crate::job::questions::rules;
 use crate::job::workers::{ThreadArgs, pool};
@@ -78,6 +79,9 @@ pub(crate) struct QuestionsArgs {
     /// The maximum size of an image.
     #[command(flatten)]
     pub limit: PixelLimit,
+    /// What the codes of images mean.
+    #[command(flatten)]
+    pub codes: CodesArgs,
     /// The number of threads.
     #[command(flatten)]
     pub threads: ThreadArgs,
@@ -139,7 +143,7 @@ fn read<T>(path: Option<&Path>, parse: fn(&str) -> Result<T>) -> Result<Option<T
 pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Outcome> {
     let making = &QuestionMaking::read(args)?;
     let dataset = Dataset::of_frames(&args.data)?;
-    let dataset = dataset.with_most_pixels(args.limit.max_pixels.get());
+    let dataset = dataset.with_rule(args.codes.rule(args.limit));
     let labels = dataset.labels().ok_or_else(|| {
         let problem = "no classes.json in this folder, which gives the class of each number in its maps; `darkqa-eval import` writes one";
         Error::data(args.data.display(), problem)
@@ -237,18 +241,19 @@ fn measured(
 ) -> Result<(Vec<FrameStatistics>, usize)> {
     let cache = StatisticsCache::open(&statistics_path(&making.args.out))?;
     let workers = pool(making.args.threads.threads)?;
-    let names: Vec<&FrameId> = dataset.frames().collect();
+    let (names, tally): (Vec<&FrameId>, _) = (dataset.frames().collect(), InputTally::default());
     let bar = progress.bar("frames", names.len());
     let context = context(making, labels);
     let results: Vec<Option<FrameStatistics>> = workers.install(|| {
         let frames = names.par_iter().map(|name| {
-            let found = measure_frame(making, dataset, labels, &cache, context, name);
+            let found = measure_frame(making, dataset, labels, (&cache, &tally), context, name);
             bar.inc();
             found.map_err(|e| tracing::error!("{e}")).ok()
         });
         frames.collect()
     });
     drop(bar);
+    tally.warn();
     let failed = results.iter().filter(|result| result.is_none()).count();
     let frames: Vec<FrameStatistics> = results.into_iter().flatten().collect();
     if frames.is_empty() {
@@ -280,11 +285,12 @@ fn measure_frame(
     making: &QuestionMaking<'_>,
     dataset: &Dataset,
     labels: &Labels,
-    cache: &StatisticsCache,
+    (cache, tally): (&StatisticsCache, &InputTally),
     context: Digest,
     name: &FrameId,
 ) -> Result<FrameStatistics> {
     let files = dataset.files(name)?;
+    tally.add(name, &files.note());
     let content = files.digest()?;
     let parts = [
         &context.as_bytes()[..],

@@ -9,8 +9,7 @@ use serde::Deserialize;
 
 use super::completion::{ReplyForm, RequestFault};
 use crate::ask::{Payload, PayloadFormat};
-use crate::dataset::Picture;
-use crate::dataset::picture::MOST_PIXELS;
+use crate::dataset::{ImageFile, ReadingRule};
 use crate::types::Rgb;
 
 /// The fields of a request that are used. Other fields are ignored.
@@ -112,12 +111,8 @@ fn pixels(url: &str) -> Result<(Rgb, Arc<Payload>), RequestFault> {
     let bytes = STANDARD
         .decode(data)
         .map_err(|e| wrong(format!("the image is not base64: {e}")))?;
-    let picture = Picture::Encoded {
-        bytes,
-        place: "image_url".to_owned(),
-        most_pixels: MOST_PIXELS,
-    };
-    let rgb = picture.decode().map_err(|e| wrong(e.to_string()))?;
+    let file = ImageFile::new(bytes, "image_url".to_owned(), ReadingRule::default());
+    let rgb = file.decode().map_err(|e| wrong(e.to_string()))?;
     let payload =
         Payload::encode(&rgb, PayloadFormat::Png, None).map_err(|e| wrong(e.to_string()))?;
     Ok((rgb, Arc::new(payload)))

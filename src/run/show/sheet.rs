@@ -16,6 +16,7 @@ use crate::job::stored::StoredRun;
 use crate::report::figures::StoryCurves;
 use crate::report::sheet::{Story, StoryCell, StoryMark, StoryRow, story};
 use crate::score::subject::is_control;
+use crate::types::degradation::Kind;
 use crate::types::manifest::{RunManifest, Status};
 use crate::types::{AxisLevel, Condition, KindReading, Record, TrialOutcome};
 
@@ -117,12 +118,16 @@ impl SheetItem {
         let choices: Vec<&str> = lines.map(str::trim).collect();
         let manifest = run.manifest.clone();
         let curves = story_curves(run)?
-            .ok_or_else(|| problem("no model was shown a dark image".to_owned()))?;
+            .ok_or_else(|| problem("no model was shown a degraded image".to_owned()))?;
         let conditions = records
             .iter()
             .filter_map(|record| record.condition.as_ref());
+        // The picture has one axis, that of the curves.
+        let axis = curves.variant.kind.map(Kind::axis);
+        let levels = conditions.map(Condition::level);
+        let levels = levels.filter(|level| level.axis().is_none() || level.axis() == axis);
         Ok(Self {
-            levels: conditions.map(Condition::level).collect(),
+            levels: levels.collect(),
             question: vec![question, choices.join("   ").replace("  (true)", " (true)")],
             manifest,
             curves,

@@ -222,6 +222,7 @@ fn of_people(run: &RunManifest, args: &ReadArgs) -> RunManifest {
             .into(),
         columns: BTreeMap::new(),
         enhancers: BTreeMap::new(),
+        inputs: run.inputs.clone(),
         shard: None,
         settings: BTreeMap::new(),
         images: run.images.clone(),

@@ -13,10 +13,11 @@ use clap::Args;
 use rayon::prelude::*;
 
 use crate::dataset::inputs::{InputFrame, Inputs, stem};
-use crate::dataset::{Picture, PixelLimit};
+use crate::dataset::{CodesArgs, Picture, PixelLimit};
 use crate::error::{Error, Result};
 use crate::job::Outcome;
 use crate::job::frame_work::{FrameWork, ImageSteps};
+use crate::job::input_tally::InputTally;
 use crate::job::progress::{Progress, StepBar};
 use crate::job::recipe::Recipe;
 use crate::job::source::Frames;
@@ -26,7 +27,9 @@ use crate::synthesis::{LightArgs, LightSettings, NoiseKey};
 use crate::types::manifest::Status;
 use crate::types::{Condition, Decides, Degradation, FrameId};
 use placed::{ImageOutcome, Placed, Sidecar};
-use sheet::{Sheet, SheetRecipe};
+
+pub(crate) use sheet::Sheet;
+use sheet::SheetRecipe;
 use sidecar::ImageRecipe;
 
 /// The flags of `synthesize`.
@@ -57,6 +60,9 @@ pub(crate) struct SynthesizeArgs {
     /// The maximum size of an image.
     #[command(flatten)]
     pub limit: PixelLimit,
+    /// What the codes of images mean.
+    #[command(flatten)]
+    pub codes: CodesArgs,
     /// The number of threads.
     #[command(flatten)]
     pub threads: ThreadArgs,
@@ -87,21 +93,22 @@ pub(crate) fn synthesize(args: &SynthesizeArgs, progress: &Progress) -> Result<O
         out,
         light: LightSettings::resolve(&args.light)?,
     };
-    let frames = Inputs::open(&args.inputs, args.limit.max_pixels.get())?;
+    let frames = Inputs::open(&args.inputs, args.codes.rule(args.limit))?;
     let workers = pool(args.threads.threads)?;
     fs::create_dir_all(out).map_err(|e| Error::file(out, "make", e))?;
     if let Some(file) = &args.from {
         return workers.install(|| replay(making, &frames, file));
     }
-    let files = files(making);
+    let (files, tally) = (files(making), InputTally::default());
     let bar = progress.bar("images", frames.entries.len() * files.len());
     let counts: Vec<ImageCounts> = workers.install(|| {
         let entries = frames.entries.par_iter();
         entries
-            .map(|entry| write_files(making, &frames, entry, &files, &bar))
+            .map(|entry| write_files(making, &frames, entry, &files, (&bar, &tally)))
             .collect()
     });
     drop(bar);
+    tally.warn();
     let total = counts
         .iter()
         .fold(ImageCounts::default(), |sum, counts| ImageCounts {
@@ -171,11 +178,11 @@ fn write_files(
     frames: &Inputs,
     entry: &InputFrame,
     files: &[FrameFile],
-    bar: &StepBar,
+    (bar, tally): (&StepBar, &InputTally),
 ) -> ImageCounts {
     let mut counts = ImageCounts::default();
     let frames = OneFrame { frames, entry };
-    let recipe = Recipe::lossless(&making.light.sensor, &[]);
+    let recipe = Recipe::lossless(&making.light.kinds, &[]);
     let timings = Timings::default();
     let steps = ImageSteps {
         frames: &frames,
@@ -188,10 +195,13 @@ fn write_files(
         entry,
         frame: FrameWork::of(steps, entry.id.clone()),
     };
-    if let Err(e) = work.frame.picture() {
-        tracing::error!("{e}");
-        counts.failed = files.len();
-        return counts;
+    match work.frame.note() {
+        Ok(note) => tally.add(&entry.id, &note),
+        Err(e) => {
+            tracing::error!("{e}");
+            counts.failed = files.len();
+            return counts;
+        }
     }
     // What is wrong with the input is wrong with each of its images, and is said once.
     let mut said = BTreeSet::new();
@@ -225,6 +235,10 @@ impl Frames for OneFrame<'_> {
     fn picture(&self, _: &FrameId) -> Result<Picture> {
         self.frames.picture(self.entry)
     }
+
+    fn focal(&self, _: &FrameId) -> Option<f64> {
+        self.frames.focal(self.entry)
+    }
 }
 
 /// The state of the work on one frame.
@@ -236,12 +250,13 @@ struct SynthesisWork<'a> {
 
 impl SynthesisWork<'_> {
     fn image(&mut self, how: Option<&Degradation>) -> Result<ImageOutcome> {
-        let light = &self.making.light;
-        let key = NoiseKey::new(light.sensor.seed, &self.entry.id);
+        let seed = self.making.light.kinds.sensor.seed;
+        let key = NoiseKey::new(seed, &self.entry.id);
         let condition = Condition::raw(how.cloned());
         let name = format!("{}_{condition}", self.entry.stem);
+        let applied = how.map(|how| self.frame.applied(how)).transpose()?;
         let picture = self.frame.picture()?;
-        let recipe = ImageRecipe::new(&self.entry.id, picture, how, light, &key)?;
+        let recipe = ImageRecipe::new(&self.entry.id, picture, how, applied.as_ref(), &key, seed);
         let place = Placed::new(self.making.out, &name, self.making.args.force);
         place.put(&recipe, || Ok(self.frame.degraded(how)?.clone()))
     }
@@ -251,9 +266,7 @@ impl SynthesisWork<'_> {
         let recipe = SheetRecipe::new(kind, &self.entry.id, self.frame.picture()?, light)?;
         let name = format!("{}_{kind}", self.entry.stem);
         let place = Placed::new(self.making.out, &name, self.making.args.force);
-        place.put(&recipe, || {
-            kind.draw(self.frame.clean()?, &self.entry.id, light)
-        })
+        place.put(&recipe, || kind.draw(&mut self.frame, light))
     }
 }
 
@@ -268,6 +281,9 @@ fn replay(making: &ImageMaking<'_>, frames: &Inputs, file: &Path) -> Result<Outc
         return Err(Error::usage("--from", problem));
     };
     let picture = frames.picture(entry)?;
+    let tally = InputTally::default();
+    tally.add(&entry.id, &picture.note());
+    tally.warn();
     let degraded = ImageRecipe::replay(&sidecar, &picture, file)?;
     let name = sidecar.recipe.name(&stem(&sidecar.recipe.frame())?);
     let place = Placed::new(making.out, &name, making.args.force);

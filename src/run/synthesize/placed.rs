@@ -11,7 +11,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use crate::ask::png;
-use crate::dataset::Picture;
+use crate::dataset::{ImageFile, ReadingRule};
 use crate::error::{Error, Result};
 use crate::files::{reading, write};
 use crate::types::{Digest, Rgb};
@@ -224,10 +224,10 @@ impl Placed {
 
 /// The pixels of a PNG; `None` if it cannot be decoded.
 fn decoded(path: &Path, bytes: &[u8]) -> Option<Rgb> {
-    let picture = Picture::Encoded {
-        bytes: bytes.to_vec(),
-        place: path.display().to_string(),
+    let rule = ReadingRule {
         most_pixels: u64::MAX / 8,
+        ..ReadingRule::default()
     };
-    picture.decode().ok()
+    let file = ImageFile::new(bytes.to_vec(), path.display().to_string(), rule);
+    file.decode().ok()
 }

@@ -11,20 +11,20 @@ use serde_json::Value;
 use super::placed::ImageOrigin;
 use crate::dataset::Picture;
 use crate::error::Result;
-use crate::report::sheet::{self, LevelColumn, Signal};
+use crate::job::frame_work::FrameWork;
+use crate::report::sheet::{self, LevelBlock, LevelImage, LevelRow, Signal};
 use crate::synthesis::bayer::Bayer;
 use crate::synthesis::noise::{self, Term};
-use crate::synthesis::unprocess::unprocess;
-use crate::synthesis::{
-    self, Coupling, Draws, LightSettings, NoiseKey, Synthesis, expose, exposure, ladder,
-};
-use crate::types::{AxisLevel, FrameId, ReadingName, Rgb, Severity};
+use crate::synthesis::unprocess::unprocess_up_to;
+use crate::synthesis::{Coupling, Draws, LightSettings, NoiseKey, Synthesis, version};
+use crate::types::degradation::{Axis, Kind};
+use crate::types::{AxisLevel, Degradation, FrameId, KindReading, Rgb, Severity};
 
 /// The kind of a figure of one frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Sheet {
-    /// Both variants by level, with amplified crops
+    /// Each variant by level, with amplified crops
     Levels,
     /// Each term of the noise alone
     Noise,
@@ -48,15 +48,12 @@ pub(super) struct SheetRecipe {
     frame: String,
     /// The digest of the image that the figure is of.
     source: String,
-    /// The levels besides L0.
-    levels: Vec<String>,
-    seed: u64,
-    /// The versions of the exposure and the sensor branch.
-    synthesis: [u32; 2],
-    /// The light readings by name, each with its whole definition.
-    readings: Value,
-    /// The factors of light of the insets.
-    insets: Vec<u16>,
+    /// The degradations that may be shown.
+    images: Vec<String>,
+    /// The versions of all kinds of degradation.
+    synthesis: Vec<u32>,
+    /// The settings of the kinds: seed, light readings, automatic exposure and motion.
+    light: Value,
 }
 
 impl ImageOrigin for SheetRecipe {
@@ -72,86 +69,50 @@ impl SheetRecipe {
         light: &LightSettings,
     ) -> Result<Self> {
         if kind == Sheet::Noise {
-            light.sensor.readings.only()?;
+            light.kinds.sensor.readings.only()?;
         }
-        let levels = dark_levels(light);
-        let insets = match kind {
-            Sheet::Levels => sheet::insets(&levels),
-            Sheet::Noise => Vec::new(),
-        };
+        let degradations = light.degradations().into_iter().flatten();
         Ok(Self {
             sheet: kind,
             drawing: sheet::VERSION,
             frame: frame.0.clone(),
             source: picture.digest().to_string(),
-            levels: levels.iter().map(ToString::to_string).collect(),
-            seed: light.sensor.seed,
-            synthesis: [exposure::VERSION, synthesis::VERSION],
-            readings: serde_json::json!(light.sensor.readings),
-            insets,
+            images: degradations.map(|how| how.to_string()).collect(),
+            synthesis: Kind::ALL.map(version).to_vec(),
+            light: serde_json::json!(light.kinds),
         })
     }
 }
 
 impl Sheet {
     /// The figure of a frame.
-    pub(super) fn draw(self, clean: &Rgb, frame: &FrameId, light: &LightSettings) -> Result<Rgb> {
+    pub(super) fn draw(self, frame: &mut FrameWork<'_>, light: &LightSettings) -> Result<Rgb> {
         match self {
-            Self::Levels => Ok(levels(clean, frame, light)),
-            Self::Noise => terms(clean, frame, light),
+            Self::Levels => levels(frame, light),
+            Self::Noise => terms(frame, light),
         }
     }
 }
 
-fn dark_levels(light: &LightSettings) -> Vec<AxisLevel> {
-    let levels = light.levels.iter().copied();
-    levels.filter(|level| *level != AxisLevel::L0).collect()
-}
-
-fn severities(light: &LightSettings) -> Vec<Severity> {
-    let levels = light.levels.iter();
-    levels.filter_map(|level| level.severity()).collect()
-}
-
-/// The figure of a frame at each level, by exposure alone and with noise in each light reading.
-fn levels(clean: &Rgb, frame: &FrameId, light: &LightSettings) -> Rgb {
-    let severities = severities(light);
-    let key = NoiseKey::new(light.sensor.seed, frame);
-    let mut rows = vec!["EV".to_owned()];
-    let exposed = severities.iter().map(|severity| expose(clean, *severity));
-    let mut columns: Vec<LevelColumn> = dark_levels(light)
-        .into_iter()
-        .zip(exposed)
-        .map(|(level, image)| LevelColumn {
-            level,
-            images: vec![image],
-        })
-        .collect();
-    let mut facts = Vec::new();
-    for (name, synthesis) in light.sensor.readings.iter() {
-        let black = || Rgb::black(clean.height(), clean.width());
-        let mut noisy: Vec<Rgb> = severities.iter().map(|_| black()).collect();
-        ladder(clean, &key, synthesis, &severities, &mut noisy);
-        for (column, image) in columns.iter_mut().zip(noisy) {
-            column.images.push(image);
-        }
-        rows.push(match *name == ReadingName::PAPER {
-            true => "noise".to_owned(),
-            false => format!("@{name}"),
-        });
-        facts.push(format!("{name}: {}", state(synthesis, &key)));
+/// What made the images, in words: camera and seed, and gain and light ratio in each light reading.
+fn foot(light: &LightSettings, frame: &FrameId, degradations: &[Degradation]) -> String {
+    if !degradations.iter().any(|how| how.kind() == Kind::Sensor) {
+        return String::new();
     }
-    let foot = format!("{}; {}", camera(light), facts.join("; "));
-    sheet::levels(clean, &rows, &columns, &foot)
+    let key = NoiseKey::new(light.kinds.sensor.seed, frame);
+    let readings = light.kinds.sensor.readings.iter();
+    let facts = readings.map(|(name, synthesis)| format!("{name}: {}", state(synthesis, &key)));
+    let facts: Vec<String> = facts.collect();
+    format!("{}; {}", camera(light), facts.join("; "))
 }
 
 /// Camera and seed in words.
 fn camera(light: &LightSettings) -> String {
-    let mut readings = light.sensor.readings.iter();
+    let mut readings = light.kinds.sensor.readings.iter();
     let camera = readings.next().map_or_else(String::new, |(_, synthesis)| {
         synthesis.camera.name().to_owned()
     });
-    format!("{camera}, seed {}", light.sensor.seed)
+    format!("{camera}, seed {}", light.kinds.sensor.seed)
 }
 
 /// Gain and light ratio of a frame in words.
@@ -160,26 +121,69 @@ fn state(synthesis: &Synthesis, key: &NoiseKey) -> String {
         return "K and r drawn for each level".to_owned();
     }
     let state = synthesis.state(key, Severity::L5);
-    let ratio = match synthesis.coupling == Coupling::Photon {
-        true => "r 2^EV".to_owned(),
-        false => format!("r {:.0}", state.ratio),
+    let ratio = if synthesis.coupling == Coupling::Photon {
+        "r 2^EV".to_owned()
+    } else {
+        format!("r {:.0}", state.ratio)
     };
     format!("K {:.2}, {ratio}", state.system_gain)
 }
 
+/// The figure of a frame at each level, in each variant.
+fn levels(frame: &mut FrameWork<'_>, light: &LightSettings) -> Result<Rgb> {
+    let degradations: Vec<Degradation> = light.degradations().into_iter().flatten().collect();
+    let mut blocks = Vec::new();
+    for axis in Axis::ALL {
+        let on_axis = degradations.iter().filter(|how| how.kind().axis() == axis);
+        let mut of_rows: Vec<(KindReading, Vec<&Degradation>)> = Vec::new();
+        for how in on_axis {
+            let row = KindReading::from(Some(how));
+            match of_rows.iter_mut().find(|(other, _)| *other == row) {
+                Some((_, all)) => all.push(how),
+                None => of_rows.push((row, vec![how])),
+            }
+        }
+        let Some((_, first)) = of_rows.first() else {
+            continue;
+        };
+        let levels = first.iter().map(|how| AxisLevel::from(Some(*how)));
+        let levels = levels.collect();
+        let rows = of_rows.into_iter().map(|(row, all)| {
+            let images = all.into_iter().map(|how| {
+                let dark_ev = frame.applied(how)?.drop_ev();
+                let image = frame.degraded(Some(how))?.clone();
+                Ok(LevelImage { image, dark_ev })
+            });
+            let name = match row.kind {
+                Some(Kind::Exposure) => "EV".to_owned(),
+                _ => row.kind_and_reading(),
+            };
+            let images = images.collect::<Result<_>>()?;
+            Ok(LevelRow { name, images })
+        });
+        let rows = rows.collect::<Result<_>>()?;
+        blocks.push(LevelBlock { levels, rows });
+    }
+    let foot = foot(light, frame.frame(), &degradations);
+    Ok(sheet::levels(frame.clean()?, &blocks, &foot))
+}
+
 /// The figure of the noise terms of a frame, at the darkest level asked for. The level matters if each has its own negative.
-fn terms(clean: &Rgb, frame: &FrameId, light: &LightSettings) -> Result<Rgb> {
-    let level = severities(light).pop().unwrap_or(Severity::L5);
-    let (synthesis, frame) = (
-        light.sensor.readings.only()?,
-        NoiseKey::new(light.sensor.seed, frame),
-    );
+fn terms(frame: &mut FrameWork<'_>, light: &LightSettings) -> Result<Rgb> {
+    let levels = light.levels.iter();
+    let mut levels = levels.filter(|level| level.axis() == Some(Axis::LIGHT));
+    let level = levels.next_back().and_then(|level| level.severity());
+    let level = level.unwrap_or(Severity::L5);
+    let sensor = &light.kinds.sensor;
+    let synthesis = sensor.readings.only()?;
+    let clean = frame.pixels()?.clone();
+    let frame = NoiseKey::new(sensor.seed, frame.frame());
     let key = match synthesis.draws {
         Draws::Shared => frame,
         Draws::Fresh => frame.at(level),
     };
     let state = synthesis.state(&frame, level);
-    let raw = unprocess(clean, &state);
+    let raw = unprocess_up_to(&clean, &state, synthesis.headroom_ev(level.value()));
     let range = state.adu_range as f32;
     let with_terms = |terms: &[Term]| {
         let mut noisy = raw.clone();

@@ -8,13 +8,13 @@ use serde_json::Value;
 use super::placed::{ImageOrigin, Sidecar};
 use crate::dataset::Picture;
 use crate::error::{Error, Result};
-use crate::synthesis::LightSettings;
-use crate::synthesis::noise::Term;
+use crate::synthesis::blur::{blur, blurred_codes};
 use crate::synthesis::{
-    self, Amplify, CameraState, Coupling, Draws, Negative, NoiseKey, Synthesis, Tone, degrade,
-    exposure,
+    self, Amplify, AppliedDegradation, CameraState, Clean, Coupling, Draws, NoiseKey, Streak, Tone,
+    develop_with_state, expose, exposure,
 };
-use crate::types::{Condition, Degradation, FrameId, ReadingName, Rgb};
+use crate::types::degradation::{Axis, Kind};
+use crate::types::{Condition, Degradation, ExposureFacts, FrameId, InputNote, ReadingName, Rgb};
 
 /// Everything that decides the pixels of an image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -22,15 +22,21 @@ pub(super) struct ImageRecipe {
     frame: String,
     /// The digest of the image that this one was made from.
     source: String,
+    /// What reading the file did besides taking its codes; no fields if nothing.
+    #[serde(flatten)]
+    read: InputNote,
     condition: Condition,
     /// The exposure drop in EV.
     drop: f64,
-    /// The version of the synthesis branch (exposure or sensor) that made the image.
+    /// The version of the kind of degradation that made the image.
     synthesis: u32,
     sensor: Option<SensorRecord>,
+    /// What the camera did; not in the file for kinds that leave it open.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    exposure: Option<ExposureFacts>,
 }
 
-/// The inputs of the sensor branch.
+/// The inputs of the sensor branch; those of automatic exposure are the light reading `physical` at its own gain.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct SensorRecord {
     seed: u64,
@@ -53,34 +59,42 @@ impl ImageOrigin for ImageRecipe {
 }
 
 impl ImageRecipe {
+    /// The recipe of an image of a frame; `how` and `applied` are both `None` for the clean frame.
     pub(super) fn new(
         frame: &FrameId,
         picture: &Picture,
         how: Option<&Degradation>,
-        light: &LightSettings,
+        applied: Option<&AppliedDegradation>,
         key: &NoiseKey,
-    ) -> Result<Self> {
-        let synthesis = light.sensor.readings.of(how)?;
-        let sensor = how.and_then(|how| {
+        seed: u64,
+    ) -> Self {
+        let drop = how
+            .filter(|how| how.kind().axis() == Axis::LIGHT)
+            .map_or(0.0, |how| how.severity().value());
+        let sensor = applied.and_then(|applied| {
+            let synthesis = applied.synthesis()?;
+            let named = how.and_then(Degradation::reading).cloned();
             Some(SensorRecord {
-                seed: light.sensor.seed,
-                reading: how.reading()?.clone(),
+                seed,
+                reading: named.unwrap_or_else(|| synthesis.name()),
                 amplify: synthesis.amplify,
                 tone: synthesis.tone,
                 draws: synthesis.draws,
                 coupling: synthesis.coupling,
                 model: serde_json::json!(synthesis.camera),
-                state: synthesis.state(key, how.severity()),
+                state: synthesis.state_by(key, applied.drop_ev()),
             })
         });
-        Ok(Self {
+        Self {
             frame: frame.0.clone(),
             source: picture.digest().to_string(),
+            read: picture.note(),
             condition: Condition::raw(how.cloned()),
-            drop: how.map_or(0.0, |how| how.severity().value()),
+            drop,
             synthesis: version(how),
             sensor,
-        })
+            exposure: applied.and_then(AppliedDegradation::exposure),
+        }
     }
 
     pub(super) fn frame(&self) -> FrameId {
@@ -104,7 +118,7 @@ impl ImageRecipe {
         let wrong = |problem: String| Error::data(path.display(), problem);
         let how = self.condition.degradation.as_ref();
         if self.source != picture.digest().to_string() {
-            let problem = "made from another image than INPUT (their contents differ)";
+            let problem = "made from another image than INPUT (their contents differ, or the flags by which they are read)";
             return Err(wrong(problem.to_owned()));
         }
         if self.synthesis != version(how) {
@@ -115,27 +129,43 @@ impl ImageRecipe {
                 version(how)
             )));
         }
-        let clean = picture.decode()?;
-        let (severity, sensor) = match (how, &self.sensor) {
-            (None, _) => return Ok(clean),
-            (Some(how), Some(sensor)) => (how.severity(), sensor),
-            (Some(how), None) if how.reading().is_some() => {
-                return Err(wrong("the state of the sensor is missing".to_owned()));
-            }
-            (how, None) => {
-                let key = NoiseKey::new(0, &self.frame());
-                return Ok(degrade(&clean, how, &key, &Synthesis::default()));
-            }
+        let clean = picture.pixels()?;
+        let missing = |what: &str| wrong(format!("{what} is missing"));
+        let Some(how) = how else {
+            return Ok(Rgb::clone(&clean.codes()));
+        };
+        let (severity, kind) = (how.severity(), how.kind());
+        if kind == Kind::Exposure {
+            return Ok(expose(&clean, severity));
+        }
+        let exposure = self.exposure.filter(|_| kind.has_motion());
+        let path = exposure.and_then(|exposure| exposure.blur_px.zip(exposure.blur_angle));
+        let streak = match path {
+            Some((length, angle)) => Streak::new(length, angle)?,
+            None if kind.has_motion() => return Err(missing("the motion blur")),
+            None => Streak::STILL,
+        };
+        let clean = Clean::from(&clean);
+        if !kind.has_noise() {
+            return Ok(blurred_codes(clean, streak));
+        }
+        let sensor = self.sensor.as_ref();
+        let sensor = sensor.ok_or_else(|| missing("the state of the sensor"))?;
+        let drop_ev = match exposure {
+            Some(exposure) => exposure.dark.ok_or_else(|| missing("what was left dark"))?,
+            None => severity.value(),
         };
         let frame = NoiseKey::new(sensor.seed, &self.frame());
         let key = match sensor.draws {
             Draws::Shared => frame,
             Draws::Fresh => frame.at(severity),
         };
-        let SensorRecord { amplify, tone, .. } = *sensor;
-        let state = sensor.state.clone();
-        let negative = Negative::with_state(&clean, &key, &state, amplify, tone, &Term::ALL);
-        Ok(negative.develop(severity))
+        let how = (sensor.amplify, sensor.tone);
+        let blurred = (!streak.is_still()).then(|| blur(clean, streak));
+        let light = blurred.as_ref();
+        let light = light.map_or(clean, |light| clean.of_its_light(light));
+        let drops = [drop_ev, sensor.coupling.headroom_ev(drop_ev)];
+        Ok(develop_with_state(light, &key, &sensor.state, how, drops))
     }
 }
 

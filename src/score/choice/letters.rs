@@ -4,13 +4,16 @@ use std::sync::LazyLock;
 
 use regex::Regex;
 
+use super::clauses::Clauses;
 use super::clean::compiled;
-use super::names::{Delimiting, Name, continues_word, index_of};
+use super::names::{Delimiting, Name, State, continues_word, index_of, unspaced};
+use super::plain::RANGE;
+use super::words::Role;
 
 /// Words that can follow the letter A but not the article.
 pub(super) static AFTER_A: LazyLock<Regex> = LazyLock::new(|| {
     compiled(
-        r"(?i)\A(?:and|or|but|because|since|as|is|isn't|was|are|would|could|can|cannot|must|should|may|might|seems|appears|has|shows|does|doesn't|fits|for|due|not|nor|if|then|&|/|=|[a-z])(?:[^\w-]|\z)",
+        r"(?i)\A(?:and|or|but|because|since|as|is|isn't|was|are|would|could|can|cannot|must|should|may|might|seems|appears|has|shows|does|doesn't|fits|for|due|not|nor|if|then|rather than|instead of|as opposed to|unlike|over|&|/|=|[a-z])(?:[^\w-]|\z)",
     )
 });
 
@@ -20,27 +23,28 @@ pub(super) static AFTER_I: LazyLock<Regex> =
 
 /// Every letter that names a choice, from left to right. A letter beyond the choices is included only if it is firmly
 /// delimited.
-pub(super) fn letters(text: &str, choices: usize) -> Vec<Name> {
+pub(super) fn letters(text: &str, choices: usize, clauses: &Clauses<'_>) -> Vec<Name> {
     let candidates = text
         .bytes()
         .enumerate()
         .filter(|(_, byte)| byte.is_ascii_alphabetic());
     let names = candidates.filter_map(|(start, byte)| {
         let letter = char::from(byte);
-        let delimiting = delimiting(text, start, letter)?;
+        let delimiting = delimiting(text, start, letter, clauses)?;
         let choice = index_of(letter).filter(|index| *index < choices);
         (choice.is_some() || delimiting == Delimiting::Firm).then_some(Name {
             start,
             end: start + 1,
             choice,
             delimiting,
+            state: State::Affirmed,
         })
     });
     names.collect()
 }
 
 /// How clearly the letter at byte `start` is delimited as a choice; `None` for a part of a word, an article or a pronoun.
-fn delimiting(text: &str, start: usize, letter: char) -> Option<Delimiting> {
+fn delimiting(text: &str, start: usize, letter: char, clauses: &Clauses<'_>) -> Option<Delimiting> {
     let (left, right) = (&text[..start], &text[start + 1..]);
     let (before, after) = (left.chars().next_back(), right.chars().next());
     if continues_word(before)
@@ -67,7 +71,8 @@ fn delimiting(text: &str, start: usize, letter: char) -> Option<Delimiting> {
         && !(letter == 'I' && after == Some(','));
     let bracket = matches!(before, Some('(' | '['));
     let name = match letter {
-        _ if called_letter(left) => true,
+        _ if called_letter(left) || after.is_some_and(unspaced) => true,
+        'A' | 'I' | 'E' | 'O' | 'Y' | 'U' if joined_to_letter(clauses, start + 1) => true,
         'A' => AFTER_A.is_match(words),
         'I' => AFTER_I.is_match(words),
         // One-letter words of other languages: "E", "O", "Y", "U", "W", "Z".
@@ -82,9 +87,20 @@ fn delimiting(text: &str, start: usize, letter: char) -> Option<Delimiting> {
     }
 }
 
+/// Whether an alternative letter follows a byte: "A ou C", "A oder B".
+fn joined_to_letter(clauses: &Clauses<'_>, end: usize) -> bool {
+    let or = clauses.index(end);
+    let other = clauses.elements.get(or + 1);
+    clauses
+        .elements
+        .get(or)
+        .is_some_and(|element| element.has(Role::Or))
+        && other.is_some_and(|other| other.of(clauses.folded).len() == 1)
+}
+
 /// Whether a letter is part of a hyphenated word: "T-shirt", "Plan-B".
 pub(super) fn hyphenated(left: &str, right: &str) -> bool {
-    let dash = |c: Option<char>| matches!(c, Some('-' | '‐' | '‑'));
+    let dash = |c: Option<char>| matches!(c, Some('-' | '‐' | '‑' | RANGE));
     let (mut before, mut after) = (left.chars().rev(), right.chars());
     (dash(before.next()) && continues_word(before.next()))
         || (dash(after.next()) && continues_word(after.next()))
@@ -111,7 +127,7 @@ pub(super) fn called_letter(left: &str) -> bool {
 }
 
 /// Whether a letter is part of an abbreviation: "U.S.", "e.g.", "N/A".
-fn abbreviated(left: &str, right: &str) -> bool {
+pub(super) fn abbreviated(left: &str, right: &str) -> bool {
     let mut before = left.chars().rev();
     let mut after = right.chars();
     let preceded = before.next() == Some('.')

@@ -6,7 +6,9 @@ use std::sync::LazyLock;
 
 use regex::Regex;
 
+use super::clauses::Clauses;
 use super::clean::compiled;
+use super::words::Role;
 
 /// How strongly a marker announces an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,6 +19,8 @@ pub(super) enum MarkerKind {
     Decision,
     /// "option", "letter": a choice is mentioned, perhaps not as the answer.
     Mention,
+    /// "Which leaves": what follows is the answer.
+    Remainder,
 }
 
 /// One marker in a text.
@@ -69,9 +73,7 @@ pub(super) fn markers(folded: &str) -> impl Iterator<Item = Marker> {
 static LEAD: LazyLock<Regex> = LazyLock::new(|| {
     compiled(concat!(
         r"\A[\s]*(?:(?P<colon>[:=]|=>|->|[→⇒⟶])",
-        r"|(?P<deny>(?:(?:is|was|are|would|should|could|must|can)\s*(?:not|n't)(?: be)?|cannot be|can't be|not|never|ist nicht|nicht|n'est pas",
-        r"|no es|non è|não é|is niet|не|nie jest|değil)\b|不是|并非|並非|不为|不選|不选)",
-        r"|(?P<link>(?:is|was|are|be|(?:would|should|must|will|could|may|might) be|(?:has|have|seems|appears) to be|seems|appears|becomes|being|ist|wäre|lautet|est|serait",
+        r"|(?P<link>(?:is|was|are|be|would|should|must|could|can|(?:would|should|must|will|could|may|might) be|(?:has|have|seems|appears) to be|seems|appears|becomes|being|ist|wäre|lautet|est|serait",
         r"|es|sería|è|sarebbe|é|seria|zou|to|jest|brzmi|это|este|je|är|er|on|là|adalah|ialah|είναι)\b|'s\b|[–—-]",
         r"|هي|هو|है|是|应该是|應該是|应为|應為|应选|應選|为|為|选|選|は|が|은|는|이|가|คือ|הוא|היא|است)",
         r"|(?P<fill>(?:option|choice|letter|answer|clearly|likely|probably|most|definitely|therefore|indeed|still|thus|simply|just|actually",
@@ -103,30 +105,36 @@ pub(super) struct Lead {
     pub(super) linked: bool,
     /// Whether there is a colon, so that all the rest is the answer.
     pub(super) colon: bool,
-    /// Whether the name is stated not to be the answer.
-    pub(super) denied: bool,
 }
 
 /// Maximum number of words between a marker and a name.
 const MAX_LEAD_WORDS: usize = 12;
 
-/// The lead after a marker that ends at byte `end`.
-pub(super) fn lead(folded: &str, end: usize) -> Lead {
+/// The lead after a marker that ends at byte `end`. A denial in it is passed: it shows in the state of the name.
+pub(super) fn lead(clauses: &Clauses<'_>, end: usize) -> Lead {
+    let folded = clauses.folded;
     let mut lead = Lead {
         steps: vec![past_space(folded, end)],
         linked: false,
         colon: false,
-        denied: false,
     };
     let mut at = end;
     for _ in 0..MAX_LEAD_WORDS {
+        let denial = clauses
+            .from(at)
+            .filter(|word| word.roles.has_any(&[Role::Not, Role::Exclude]));
+        if let Some(denial) = denial {
+            at = denial.end;
+            lead.linked = true;
+            lead.steps.push(past_space(folded, at));
+            continue;
+        }
         let Some(found) = LEAD.captures(&folded[at..]) else {
             break;
         };
         let has = |name: &str| found.name(name).is_some();
         lead.colon |= has("colon");
-        lead.denied |= has("deny");
-        lead.linked |= has("link") || has("colon") || has("deny");
+        lead.linked |= has("link") || has("colon");
         at += found.get(0).map_or(0, |whole| whole.end());
         lead.steps.push(past_space(folded, at));
     }
@@ -151,7 +159,7 @@ static CONFIRMATION: LazyLock<Regex> = LazyLock::new(|| {
 static LETTER_CONFIRMATION: LazyLock<Regex> = LazyLock::new(|| {
     compiled(concat!(
         r"\A[)\].]*\s*(?:is|seems|would be|must be)\s+(?:clearly |definitely |probably |most likely |likely )?(?:correct|right|best|true)\b",
-        r"|\A[)\].]*\s*(?:是)?(?:正确|正確|对的|對的)"
+        r"|\A[)\].]*\s+it (?:is|must be)(?:\z|[.,;!\n])|\A[)\].]*\s*(?:是)?(?:正确|正確|对的|對的)"
     ))
 });
 

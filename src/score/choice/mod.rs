@@ -7,19 +7,38 @@
 //! A reply passes through `clean` (which removes hidden reasoning, invisible characters and leaked tokens), then `strict`,
 //! then the steps of `lenient`, in the order of its functions `steps` and `read_plain`.
 
+mod choice_views;
+mod clauses;
 mod clean;
+mod conditions;
+mod contradiction;
+mod denials;
+mod determiner;
+mod exclusions;
+mod first_line;
+mod image_words;
 mod lenient;
 mod letters;
 mod markers;
+mod named;
 mod names;
 mod plain;
+mod questions;
+mod ranges;
+mod reach;
 mod refusal;
+mod repetitions;
 mod stated;
 mod strict;
 mod structured;
 #[cfg(test)]
 mod tests;
+mod texts;
+mod ticks;
+mod tokens;
 mod view;
+mod words;
+mod yes_no;
 
 use serde::Serialize;
 

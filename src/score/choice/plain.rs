@@ -26,6 +26,11 @@ static TAG: LazyLock<Regex> =
     LazyLock::new(|| compiled(r#"</?[A-Za-z][A-Za-z0-9_-]{0,30}(?:\s+[a-z-]+="[^"<>]*")*\s*/?>"#));
 static LINE_START: LazyLock<Regex> =
     LazyLock::new(|| compiled(r"(?m)^[ \t]*(?:(?:#{1,6}|>|[-+•·▪◦‣●○■–—])[ \t]+)+"));
+/// The box of a task list, before its text.
+static TASK: LazyLock<Regex> =
+    LazyLock::new(|| compiled(r"(?m)^[ \t]*(?:(?:[-+*•]|\d+[.)])[ \t]+)?\[[ xX]\][ \t]+"));
+/// A box anywhere, in a text that has an empty one.
+static BOX: LazyLock<Regex> = LazyLock::new(|| compiled(r"\[[ xX]\]"));
 static SPACES: LazyLock<Regex> = LazyLock::new(|| compiled(r"[^\S\n]+"));
 static LINES: LazyLock<Regex> = LazyLock::new(|| compiled(r" ?\n[\s]*"));
 
@@ -45,13 +50,21 @@ pub(super) fn plain(text: &str) -> String {
     let text = LATEX_SIGN.replace_all(&text, " ");
     let text = BREAK_TAG.replace_all(&text, "\n");
     let text = TAG.replace_all(&text, "");
+    let text = if text.contains("[ ]") {
+        BOX.replace_all(&text, " ")
+    } else {
+        TASK.replace_all(&text, "")
+    };
     let text = without_signs(&text);
     let text = LINE_START.replace_all(&text, "");
     let text = SPACES.replace_all(&text, " ");
     LINES.replace_all(text.trim(), "\n").into_owned()
 }
 
-/// The text without emphasis, quotes and pictographs; a cross mark becomes "not".
+/// An en dash between two letters, in one byte, as long as a hyphen: "living–room" is a name, "kitchen–bathroom" is two.
+pub(super) const RANGE: char = '\u{1e}';
+
+/// The text without emphasis, quotes and pictographs. A cross mark becomes "not", any hyphen between letters "-".
 fn without_signs(text: &str) -> String {
     let mut plain = String::with_capacity(text.len());
     let mut previous = None;
@@ -60,7 +73,12 @@ fn without_signs(text: &str) -> String {
         let next = rest.peek().copied();
         let inside =
             previous.is_some_and(char::is_alphanumeric) && next.is_some_and(char::is_alphanumeric);
+        let compound =
+            previous.is_some_and(char::is_alphabetic) && next.is_some_and(char::is_alphabetic);
         match c {
+            '‐' | '‑' | '‒' | '−' if compound => plain.push('-'),
+            '–' if compound => plain.push(RANGE),
+            RANGE => plain.push(' '),
             '\'' | '’' | '‘' | 'ʼ' if inside => plain.push('\''),
             '_' if inside => plain.push('_'),
             '*' | '`' | '$' | '_' | '\'' | '’' | '‘' | '‚' | '"' | '“' | '”' | '„' | '‟' | '«'
@@ -69,7 +87,7 @@ fn without_signs(text: &str) -> String {
             '【' | '〔' | '〖' => plain.push('['),
             '】' | '〕' | '〗' => plain.push(']'),
             '|' => plain.push('\n'),
-            '❌' | '✗' | '✘' | '❎' | '✖' => plain.push_str(" not "),
+            '❌' | '✗' | '✘' | '❎' | '✖' | '👎' | '☐' => plain.push_str(" not "),
             '~'
             | '\u{20e3}'
             | '\u{2600}'..='\u{27bf}'
@@ -82,7 +100,8 @@ fn without_signs(text: &str) -> String {
     plain
 }
 
-/// The text in lower case with the same byte positions: a character whose lower case has another length stays as it is.
+/// The text in lower case with the same byte positions: a character whose lower case has another length stays as it is. A
+/// hyphen between two letters becomes a blank, and "grey" becomes "gray".
 pub(super) fn fold(text: &str) -> String {
     let lower = |c: char| {
         let mut lower = c.to_lowercase();
@@ -91,5 +110,17 @@ pub(super) fn fold(text: &str) -> String {
             _ => c,
         }
     };
-    text.chars().map(lower).collect()
+    let mut folded = String::with_capacity(text.len());
+    let mut rest = text.chars().peekable();
+    let mut letter = false;
+    while let Some(c) = rest.next() {
+        let compound =
+            matches!(c, '-' | RANGE) && letter && rest.peek().is_some_and(|c| c.is_alphabetic());
+        folded.push(if compound { ' ' } else { lower(c) });
+        letter = c.is_alphabetic();
+    }
+    if folded.contains("grey") {
+        folded = folded.replace("grey", "gray");
+    }
+    folded
 }

@@ -1,16 +1,12 @@
 //! Answers that are announced: "the answer is B", "Answer: kitchen", "I'd go with (B)", "B is correct".
 
-use std::sync::LazyLock;
-
-use regex::Regex;
-
-use super::clean::compiled;
 use super::lenient;
-use super::letters::{AFTER_A, AFTER_I, called_letter, hyphenated};
+use super::letters::{AFTER_A, AFTER_I, abbreviated, called_letter, hyphenated};
 use super::markers::{self, Lead, Marker, MarkerKind};
-use super::names::{Delimiting, Name, continues_word, index_of};
+use super::names::{Delimiting, Name, State, continues_word, index_of};
 use super::plain::fold;
 use super::view::ReplyView;
+use super::words::Role;
 use crate::types::question::{Answer, UnreadReason};
 
 /// A statement about a choice at one place in a reply.
@@ -33,10 +29,20 @@ enum Statement {
 /// The answer that a text announces: the last one that is stated to be the answer, else the only one that is chosen, else
 /// the only one that is mentioned.
 pub(super) fn stated(view: &ReplyView<'_>) -> Option<Answer> {
-    let found: Vec<Marker> = markers::markers(view.folded).collect();
+    let mut found: Vec<Marker> = markers::markers(view.folded)
+        .chain(leftovers(view))
+        .collect();
+    found.sort_by_key(|marker| marker.start);
     let mut announcements: Vec<Announcement> = confirmed(view).collect();
     let mut end = view.text.len();
     for marker in found.into_iter().rev() {
+        // What is asked, what would be and what repeats the prompt announces nothing.
+        if matches!(
+            view.state(marker.start),
+            State::Questioned | State::Conditional | State::Repeated
+        ) {
+            continue;
+        }
         announcements.extend(announcement(view, marker, end));
         if marker.kind == MarkerKind::Answer {
             end = marker.start;
@@ -49,13 +55,30 @@ pub(super) fn stated(view: &ReplyView<'_>) -> Option<Answer> {
             .filter(|announcement| announcement.kind == kind);
         same.copied().collect()
     };
-    last(&of(MarkerKind::Answer))
-        .or_else(|| only(&of(MarkerKind::Decision), &[]))
-        .or_else(|| only(&of(MarkerKind::Mention), &view.letters))
+    last(view, &of(MarkerKind::Answer))
+        .or_else(|| only(&of(MarkerKind::Decision), None))
+        .or_else(|| only(&of(MarkerKind::Mention), Some(view)))
+}
+
+/// The markers of what is left over, if a choice was denied before: "A and C are out, which leaves B".
+fn leftovers<'a>(view: &'a ReplyView<'_>) -> impl Iterator<Item = Marker> + 'a {
+    let denied = view
+        .names
+        .all()
+        .filter(|name| matches!(name.state, State::Denied | State::Excluded));
+    let first = denied.map(|name| name.start).min().unwrap_or(usize::MAX);
+    let elements = view.clauses.elements.iter();
+    elements
+        .filter(move |element| element.has(Role::Leaves) && element.start > first)
+        .map(|element| Marker {
+            start: element.start,
+            end: element.end,
+            kind: MarkerKind::Remainder,
+        })
 }
 
 /// The last answer that is stated, unless it is denied later.
-fn last(announcements: &[Announcement]) -> Option<Answer> {
+fn last(view: &ReplyView<'_>, announcements: &[Announcement]) -> Option<Answer> {
     let readable = |answer: Answer| {
         !matches!(
             answer,
@@ -72,19 +95,26 @@ fn last(announcements: &[Announcement]) -> Option<Answer> {
         .filter_map(answer_of)
         .find(|(_, answer)| readable(*answer))
         .or_else(|| announcements.iter().rev().find_map(answer_of))?;
-    let retracts = |announcement: &Announcement| {
-        announcement.at > at
-            && matches!((announcement.statement, answer), (Statement::IsNot(a), Answer::Chosen(b)) if a == b)
+    let Answer::Chosen(chosen) = answer else {
+        return Some(answer);
     };
-    Some(if announcements.iter().any(retracts) {
-        Answer::Unparsed(UnreadReason::Negated)
-    } else {
-        answer
-    })
+    let denies = |announcement: &Announcement| {
+        announcement.at > at && announcement.statement == Statement::IsNot(chosen)
+    };
+    let excludes = |name: &Name| {
+        name.start > at && name.choice == Some(chosen) && name.state == State::Excluded
+    };
+    Some(
+        if announcements.iter().any(denies) || view.names.all().any(excludes) {
+            Answer::Unparsed(UnreadReason::Negated)
+        } else {
+            answer
+        },
+    )
 }
 
-/// The only choice that is announced; `other_letters` must not name another one.
-fn only(announcements: &[Announcement], other_letters: &[Name]) -> Option<Answer> {
+/// The only choice that is announced; if a view is given, no other one may be named in it by a letter, or said by a text.
+fn only(announcements: &[Announcement], view: Option<&ReplyView<'_>>) -> Option<Answer> {
     let mut chosen = None;
     for announcement in announcements {
         match announcement.statement {
@@ -108,8 +138,12 @@ fn only(announcements: &[Announcement], other_letters: &[Name]) -> Option<Answer
             Statement::Is(_) => {}
         }
     }
-    let other = |name: &Name| name.choice != Some(chosen);
-    Some(if other_letters.iter().any(other) {
+    let other = |name: &&Name| name.choice != Some(chosen);
+    let named = view.is_some_and(|view| {
+        let mut letters = view.names.letters.iter().filter(|name| name.state.counts());
+        letters.any(|name| other(&name)) || view.affirmed_texts().any(|name| other(&name))
+    });
+    Some(if named {
         Answer::Unparsed(UnreadReason::Ambiguous)
     } else {
         Answer::Chosen(chosen)
@@ -118,14 +152,24 @@ fn only(announcements: &[Announcement], other_letters: &[Name]) -> Option<Answer
 
 /// The announcement of a marker; `end` is the byte at which the next answer is announced.
 fn announcement(view: &ReplyView<'_>, marker: Marker, end: usize) -> Option<Announcement> {
-    let lead = markers::lead(view.folded, marker.end);
+    let lead = markers::lead(&view.clauses, marker.end);
     let kind = match marker.kind {
         MarkerKind::Answer if !lead.linked => MarkerKind::Mention,
+        MarkerKind::Remainder => MarkerKind::Answer,
         kind => kind,
     };
     let statement = match announced(view, &lead) {
-        Some((name, _)) if lead.denied || view.denies(&name) => Statement::IsNot(name.choice?),
-        Some((_, answer)) => Statement::Is(answer),
+        Some((name, answer)) => match view.state(name.start) {
+            State::Affirmed => Statement::Is(answer),
+            State::Denied => Statement::IsNot(name.choice?),
+            State::Excluded
+            | State::OfImage
+            | State::Conditional
+            | State::Questioned
+            | State::Repeated => {
+                return None;
+            }
+        },
         None if lead.colon && kind == MarkerKind::Answer => {
             let rest = view.text.get(*lead.steps.last()?..end)?.trim();
             Statement::Is(read_rest(view, rest)?)
@@ -158,10 +202,16 @@ fn announced(view: &ReplyView<'_>, lead: &Lead) -> Option<(Name, Answer)> {
     let last_step = *lead.steps.last()?;
     let longer = |name: &Name| name.end - name.start > 1;
     let name = view
+        .names
         .text_from(last_step)
         .filter(longer)
         .or_else(|| letter_at(view, last_step))
-        .or_else(|| lead.steps.iter().rev().find_map(|&at| view.text_at(at)))?;
+        .or_else(|| {
+            lead.steps
+                .iter()
+                .rev()
+                .find_map(|&at| view.names.text_at(at))
+        })?;
     let after = &view.text[name.end..];
     if after.trim_start_matches([')', ']']).starts_with('?') {
         return None;
@@ -171,7 +221,7 @@ fn announced(view: &ReplyView<'_>, lead: &Lead) -> Option<(Name, Answer)> {
     };
     let contradicts = |text: Name| text.choice != Some(index);
     let answer = if name.delimiting == Delimiting::Firm
-        && view.labelled_text(&name).is_some_and(contradicts)
+        && view.names.labelled_text(&name).is_some_and(contradicts)
     {
         Answer::Unparsed(UnreadReason::Contradiction)
     } else if alternative(view, &name) {
@@ -182,21 +232,38 @@ fn announced(view: &ReplyView<'_>, lead: &Lead) -> Option<(Name, Answer)> {
     Some((name, answer))
 }
 
-static ALTERNATIVE: LazyLock<Regex> = LazyLock::new(|| {
-    compiled(concat!(
-        r"\A[)\].]*\s*(?:,\s*(?:or|and)?\b|/|&|\+|;|(?:or|and|and/or|oder|und|ou|et|o|u|y|e|of|en|или|и|lub|i|veya|ve|أو|و|या|और)\b",
-        r"|或者?|和|与|與|还是|または|か|と|또는|와|과|、)\s*(?:either\s+|option\s+|choice\s+|possibly\s+|maybe\s+|perhaps\s+)?"
-    ))
-});
-
 /// Whether another choice follows as an alternative: "B or C", "B/C", "kitchen or bathroom".
 pub(super) fn alternative(view: &ReplyView<'_>, name: &Name) -> bool {
-    let Some(link) = ALTERNATIVE.find(&view.folded[name.end..]) else {
+    let clauses = &view.clauses;
+    let mut at = clauses.index(name.end);
+    while clauses.is_sign(at, &[')', ']', '.']) {
+        at += 1;
+    }
+    let comma = clauses.is_sign(at, &[',']);
+    at += usize::from(comma);
+    let joined = clauses.is_sign(at, &['/', '&', '+', ';', '、'])
+        || clauses
+            .elements
+            .get(at)
+            .is_some_and(|element| element.roles.has_any(&[Role::Or, Role::And]));
+    at += usize::from(joined);
+    if !comma && !joined {
+        return false;
+    }
+    while clauses
+        .elements
+        .get(at)
+        .is_some_and(|element| element.has(Role::Hedge))
+    {
+        at += 1;
+    }
+    let Some(element) = clauses.elements.get(at) else {
         return false;
     };
-    let at = name.end + link.end();
-    let other = letter_at(view, at).or_else(|| view.text_at(at));
-    other.is_some_and(|other| other.choice != name.choice && !view.denies(&other))
+    let other = letter_at(view, element.start).or_else(|| view.names.text_at(element.start));
+    other.is_some_and(|other| {
+        other.choice != name.choice && view.state(other.start) == State::Affirmed
+    })
 }
 
 /// The letter at a byte where one is expected: upper or lower case, with or without brackets.
@@ -213,10 +280,12 @@ fn letter_at(view: &ReplyView<'_>, at: usize) -> Option<Name> {
         end: start + 1,
         choice: index_of(letter).filter(|index| *index < view.offered.texts.len()),
         delimiting: Delimiting::Firm,
+        state: State::Affirmed,
     };
     let after = right.chars().next();
     if continues_word(after)
         || hyphenated(left, right)
+        || abbreviated(left, right)
         || (after == Some('\'') && !turkish_copula(right))
     {
         return None;
@@ -229,7 +298,7 @@ fn letter_at(view: &ReplyView<'_>, at: usize) -> Option<Name> {
         _ if open || ends || (letter.is_ascii_uppercase() && called_letter(left)) => true,
         'A' | 'a' => AFTER_A.is_match(words),
         'I' | 'i' => AFTER_I.is_match(words),
-        'a'..='z' => AFTER_A.is_match(words) || view.labelled_text(&name).is_some(),
+        'a'..='z' => AFTER_A.is_match(words) || view.names.labelled_text(&name).is_some(),
         _ => true,
     };
     fits.then_some(name)
@@ -242,19 +311,20 @@ fn turkish_copula(right: &str) -> bool {
         .any(|end| right.starts_with(end))
 }
 
-/// Names that the text after them calls the answer: "B is the correct answer".
+/// Names that the text after them calls the answer: "B is the correct answer", "only B remains".
 fn confirmed<'a>(view: &'a ReplyView<'_>) -> impl Iterator<Item = Announcement> + 'a {
-    let letters = view
-        .letters
-        .iter()
-        .filter(|name| markers::confirms_letter(&view.folded[name.end..]));
+    let letters =
+        view.names.letters.iter().filter(|name| {
+            markers::confirms_letter(&view.folded[name.end..]) || remains(view, name)
+        });
     let texts = view
+        .names
         .texts
         .iter()
-        .filter(|name| markers::confirms_text(&view.folded[name.end..]));
+        .filter(|name| markers::confirms_text(&view.folded[name.end..]) || remains(view, name));
     letters
         .chain(texts)
-        .filter(|name| !view.denies(name))
+        .filter(|name| name.is_affirmed())
         .map(|name| Announcement {
             at: name.start,
             kind: MarkerKind::Answer,
@@ -263,4 +333,30 @@ fn confirmed<'a>(view: &'a ReplyView<'_>) -> impl Iterator<Item = Announcement> 
                 None => Answer::Unparsed(UnreadReason::OutOfRange),
             }),
         })
+}
+
+/// Number of elements between "only" and a name: "only option B".
+const ONLY_WITHIN: usize = 3;
+
+/// Whether a name is called the only one that is left: "only B remains"; behind an excluded name, "B remains".
+fn remains(view: &ReplyView<'_>, name: &Name) -> bool {
+    let elements = &view.clauses.elements;
+    let mut behind = view.clauses.index(name.end);
+    while view.clauses.is_sign(behind, &[')', ']']) {
+        behind += 1;
+    }
+    let Some(verb) = elements
+        .get(behind)
+        .filter(|element| element.has(Role::Remains))
+    else {
+        return false;
+    };
+    let first = view.clauses.index(name.start);
+    let only = elements[first.saturating_sub(ONLY_WITHIN)..first]
+        .iter()
+        .any(|element| element.of(view.folded) == "only");
+    let verb = verb.of(view.folded);
+    let is_left = verb.starts_with("remain") || verb.ends_with("left");
+    let excluded = |other: &Name| other.state == State::Excluded && other.start < name.start;
+    only || (is_left && view.names.all().any(excluded))
 }

@@ -5,10 +5,10 @@ use std::sync::LazyLock;
 use regex::Regex;
 use serde_json::Value;
 
+use super::choice_views::ChoiceViews;
 use super::clean::compiled;
 use super::lenient;
-use super::plain::{fold, plain};
-use super::view::{ChoiceViews, ReplyView};
+
 use crate::types::question::{Answer, UnreadReason};
 
 /// JSON keys whose value is the answer, in lower case without spaces and punctuation.
@@ -145,8 +145,7 @@ fn boxes(text: &str) -> impl Iterator<Item = &str> {
 }
 
 fn text_answer(text: &str, choices: &ChoiceViews) -> Answer {
-    let text = plain(text);
-    lenient::read_plain(&ReplyView::new(&text, &fold(&text), choices))
+    lenient::read_part(text, choices)
 }
 
 /// The choice on which all answers agree. Answers that could not be read are ignored if there are others.

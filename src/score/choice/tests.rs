@@ -2,6 +2,10 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod by_rule;
+mod properties;
+mod words;
+
 use proptest::prelude::*;
 use serde::Deserialize;
 
@@ -61,6 +65,19 @@ fn choices(set: &str) -> Choices {
         None => (1..=26).map(|i| format!("item{i}")).collect(),
     };
     Choices::new(texts, 0).unwrap()
+}
+
+/// Choices with these texts.
+fn choices_of(texts: &[&str]) -> Choices {
+    Choices::new(texts.iter().map(|&text| text.to_owned()).collect(), 0).unwrap()
+}
+
+/// The replies of the table.
+fn table_of_replies() -> Vec<String> {
+    let lines = include_str!("../../../tests/data/replies.jsonl").lines();
+    lines
+        .map(|line| serde_json::from_str::<Case>(line).unwrap().reply)
+        .collect()
 }
 
 #[test]

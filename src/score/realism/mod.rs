@@ -1,16 +1,23 @@
 //! Similarity of a synthetic image to a real one: [`psnr`], [`ssim`](ssim::ssim), and the divergence of their noise
-//! ([`residual`]).
+//! ([`residual`]); the gain that a real image's noise speaks for ([`gain`]), and whether two images are a pair ([`scene`]).
 
+pub(crate) mod gain;
 pub(crate) mod mean;
+mod quantile;
 pub(crate) mod residual;
+pub(crate) mod scene;
+pub(crate) mod smooth;
 pub(crate) mod ssim;
 
+use std::fmt;
+
 use residual::Divergence;
+use scene::SceneMatch;
 use serde::Serialize;
 pub(crate) use ssim::same_size;
 
 use crate::error::{Error, Result};
-use crate::types::Rgb;
+use crate::types::{ReadingName, Rgb};
 
 /// Similarity of one synthetic image to the real one.
 #[derive(Debug, Clone, Copy, Serialize)]
@@ -25,19 +32,90 @@ pub(crate) struct ImageComparison {
     pub kl_other: Divergence,
 }
 
+impl ImageComparison {
+    /// Difference of the PSNR in dB, of the SSIM and of the divergence in nats from those of another image of the same pair.
+    #[must_use]
+    pub(crate) fn differences(&self, other: &Self) -> [f64; 3] {
+        let numbers = |image: &Self| [image.psnr, image.ssim, image.kl.nats];
+        let (of_self, of_other) = (numbers(self), numbers(other));
+        std::array::from_fn(|i| {
+            // Two perfect images differ by 0, though both have an infinite PSNR.
+            let is_equal = of_self[i].total_cmp(&of_other[i]).is_eq();
+            if is_equal {
+                0.0
+            } else {
+                of_self[i] - of_other[i]
+            }
+        })
+    }
+}
+
 /// Comparison of the synthetic images of one pair with its real image.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone)]
 pub(crate) struct PairComparison {
     /// Name of the pair.
     pub pair: String,
     /// Exposure drop of the pair in EV.
     pub drop: f32,
+    /// How far both images show one scene.
+    pub scene: SceneMatch,
     /// The image made by exposure drop alone.
     pub exposure: ImageComparison,
-    /// The image made with sensor noise.
-    pub noise: ImageComparison,
+    /// The images made with sensor noise, in the same order for all pairs.
+    pub noise: Vec<NoiseComparison>,
+}
+
+/// Comparison of one image made with sensor noise.
+#[derive(Debug, Clone)]
+pub(crate) struct NoiseComparison {
+    /// How the image was made.
+    pub method: NoiseMethod,
+    pub image: ImageComparison,
     /// PSNR in dB of the sensor branch without noise, which shows the error of its tones alone.
     pub clean_psnr: f64,
+}
+
+/// A way to make images with sensor noise.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub(crate) struct NoiseMethod {
+    /// Name of the light reading.
+    pub reading: ReadingName,
+    pub camera: CameraOrigin,
+}
+
+/// Where the gain of the camera comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum CameraOrigin {
+    /// From the settings.
+    Given,
+    /// It was fitted to the other pairs.
+    OtherPairs,
+    /// It was fitted to the same pairs that it is judged by.
+    SamePairs,
+}
+
+impl CameraOrigin {
+    /// The word in CSV and JSON.
+    #[must_use]
+    pub(crate) fn word(self) -> &'static str {
+        match self {
+            Self::Given => "given",
+            Self::OtherPairs => "other-pairs",
+            Self::SamePairs => "same-pairs",
+        }
+    }
+}
+
+impl fmt::Display for NoiseMethod {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let fitted = match self.camera {
+            CameraOrigin::Given => "",
+            CameraOrigin::OtherPairs => ", gain fitted to the other pairs",
+            CameraOrigin::SamePairs => ", gain fitted to the same pairs",
+        };
+        f.pad(&format!("{}{fitted}", self.reading))
+    }
 }
 
 /// Peak signal-to-noise ratio in dB, peak 255, over all samples; infinite for equal images.
@@ -101,6 +179,28 @@ mod tests {
         let other = Rgb::black(3, 2);
         let error = psnr(&a, &other).unwrap_err().to_string();
         assert!(error.contains("2 × 2 pixels against 2 × 3"), "{error}");
+    }
+
+    #[test]
+    fn equal_numbers_do_not_differ_even_if_infinite() {
+        let comparison = |psnr, ssim| ImageComparison {
+            psnr,
+            ssim,
+            kl: residual::Divergence {
+                nats: 0.5,
+                empty: 0,
+            },
+            kl_other: residual::Divergence {
+                nats: 0.5,
+                empty: 0,
+            },
+        };
+        let perfect = comparison(f64::INFINITY, 1.0);
+        let same = perfect.differences(&perfect);
+        assert!(same.iter().all(|difference| difference.abs() < 1e-12));
+        let [psnr, ssim, kl] = comparison(30.0, 0.75).differences(&perfect);
+        assert!(psnr.is_infinite() && psnr < 0.0);
+        assert!((ssim + 0.25).abs() < 1e-12 && kl.abs() < 1e-12);
     }
 
     #[test]

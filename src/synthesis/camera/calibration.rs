@@ -28,8 +28,9 @@ pub struct Calibration {
     pub gain: [f64; 2],
     /// Range that the ratio r is drawn from, uniform.
     pub ratio: [f64; 2],
-    /// K at the first step, in ADU per electron; each further step doubles it.
-    pub first_gain: f64,
+    /// K at the first step, in ADU per electron; each further step doubles it. `None` if each step has its own gain.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub first_gain: Option<f64>,
     /// Scale σ_TL of the read noise, in ADU.
     pub read_scale: LogFit,
     /// Standard deviation σ_r of the row noise, in ADU.
@@ -55,6 +56,9 @@ pub struct LogFit {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GainStep {
+    /// K of the step, in ADU per electron; either all steps have it or none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gain: Option<f64>,
     /// Shapes λ of the read noise's Tukey-λ distribution.
     pub shape: Vec<f64>,
     /// Offsets of the planes, in ADU, in the calibration's order R, G1, B, G2.
@@ -107,16 +111,17 @@ impl Calibration {
         Ok(calibration)
     }
 
+    /// The calibration as a file that [`Calibration::parse`] reads, below lines of comments.
+    ///
+    /// # Errors
+    /// If a number cannot be written.
+    pub(crate) fn to_toml(&self, comments: &[String]) -> Result<String> {
+        let keys = toml::to_string(self).map_err(|e| Error::data(&self.name, e))?;
+        let comments = comments.iter().flat_map(|line| ["# ", line, "\n"]);
+        Ok(comments.chain([keys.as_str()]).collect())
+    }
+
     fn check(&self) -> std::result::Result<(), String> {
-        let within = |key: &str, value: f64, [low, high]: [f64; 2]| {
-            if value >= low && value <= high {
-                Ok(())
-            } else {
-                Err(format!(
-                    "{key}: {value} is not a number from {low} to {high}"
-                ))
-            }
-        };
         let range = |key: &str, [low, high]: [f64; 2], limits| {
             within(key, low, limits)?;
             within(key, high, limits)?;
@@ -128,7 +133,6 @@ impl Calibration {
         within("adu-range", self.adu_range, [1.0, 1e6])?;
         range("gain", self.gain, GAINS)?;
         range("ratio", self.ratio, RATIOS)?;
-        within("first-gain", self.first_gain, GAINS)?;
         for (key, fit) in [
             ("read-scale", self.read_scale),
             ("row-deviation", self.row_deviation),
@@ -140,6 +144,7 @@ impl Calibration {
         if self.steps.is_empty() {
             return Err("step: at least one [[step]] is needed".to_owned());
         }
+        self.check_step_gains()?;
         for (index, step) in self.steps.iter().enumerate() {
             let key = |name| format!("step {}, {name}", index + 1);
             if step.shape.is_empty() || step.bias.is_empty() {
@@ -151,6 +156,38 @@ impl Calibration {
             for offset in step.bias.as_flattened() {
                 within(&key("bias"), *offset, [-1e4, 1e4])?;
             }
+        }
+        Ok(())
+    }
+
+    /// Checks that the gain of every step is known in one of two ways: by `first-gain`, or by a `gain` in each step.
+    fn check_step_gains(&self) -> std::result::Result<(), String> {
+        let given: Vec<f64> = self.steps.iter().filter_map(|step| step.gain).collect();
+        if given.is_empty() {
+            let Some(first) = self.first_gain else {
+                return Err("first-gain: missing, and no [[step]] has a gain".to_owned());
+            };
+            return within("first-gain", first, GAINS);
+        }
+        if let Some(index) = self.steps.iter().position(|step| step.gain.is_none()) {
+            return Err(format!(
+                "step {}, gain: missing, and other steps have it; state it in all steps or in none",
+                index + 1
+            ));
+        }
+        if self.first_gain.is_some() {
+            return Err("first-gain: every [[step]] has a gain; leave out first-gain".to_owned());
+        }
+        for (index, gain) in given.iter().enumerate() {
+            within(&format!("step {}, gain", index + 1), *gain, GAINS)?;
+        }
+        if let Some(index) = given.windows(2).position(|two| two[0] >= two[1]) {
+            return Err(format!(
+                "step {}, gain: {} is not above {}, the gain of the step before it",
+                index + 2,
+                given[index + 1],
+                given[index]
+            ));
         }
         Ok(())
     }
@@ -173,18 +210,44 @@ impl Calibration {
         }
     }
 
-    /// Index of the step with the nearest gain. Steps above the upper end of the gain range are not used.
+    /// Index of the step with the nearest gain, in ln K. Steps above the upper end of the gain range are not used.
     fn step(&self, gain: f64) -> usize {
-        let nearest = |gain: f64| {
-            let step = (libm::log2(gain / self.first_gain) + 0.5).floor();
-            step.clamp(0.0, (self.steps.len() - 1) as f64) as usize
+        let nearest = |gain: f64| match self.first_gain {
+            Some(first) => {
+                let step = (libm::log2(gain / first) + 0.5).floor();
+                step.clamp(0.0, (self.steps.len() - 1) as f64) as usize
+            }
+            None => self.nearest_of_given(gain),
         };
         nearest(gain).min(nearest(self.gain[1]))
+    }
+
+    /// Index of the step whose own gain is nearest in ln K; the lower one of two that are equally near.
+    fn nearest_of_given(&self, gain: f64) -> usize {
+        let distance = |step: &GainStep| {
+            let ratio = step.gain.map(|own| libm::log(own / gain).abs());
+            ratio.unwrap_or(f64::INFINITY)
+        };
+        let steps = self.steps.iter().map(distance).enumerate();
+        steps
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .map_or(0, |(index, _)| index)
+    }
+}
+
+/// Whether a number lies within its limits; the error names its key.
+fn within(key: &str, value: f64, [low, high]: [f64; 2]) -> std::result::Result<(), String> {
+    if value >= low && value <= high {
+        Ok(())
+    } else {
+        Err(format!(
+            "{key}: {value} is not a number from {low} to {high}"
+        ))
     }
 }
 
 /// Allowed range of the system gain K, in ADU per electron; the built-in calibrations lie between 0.094 and 29.
-pub(super) const GAINS: [f64; 2] = [0.01, 100.0];
+pub(in crate::synthesis) const GAINS: [f64; 2] = [0.01, 100.0];
 /// Allowed range of the amplification ratio r.
 pub(super) const RATIOS: [f64; 2] = [1.0, 10000.0];
 
@@ -195,107 +258,4 @@ impl LogFit {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn sony() -> Calibration {
-        Calibration::preset("sony-a7s2").unwrap()
-    }
-
-    #[test]
-    fn presets_are_parsed_and_have_their_names() {
-        for (name, text) in PRESETS {
-            assert_eq!(Calibration::parse(text, name).unwrap().name, name);
-        }
-        assert!(Calibration::preset("sony").is_none());
-    }
-
-    #[test]
-    fn fits_give_the_calibrated_medians() {
-        for (gain, read, row) in [
-            (0.1, 0.6075, 0.1642),
-            (0.3, 1.0094, 0.2932),
-            (1.0, 1.7607, 0.5534),
-            (3.0, 2.9253, 0.9879),
-            (6.0, 4.0297, 1.4241),
-        ] {
-            let noise = sony().noise_at(gain, [0.0; 2], [0.0; 2]);
-            assert!((noise.read_scale - read).abs() < 6e-5, "{gain}");
-            assert!((noise.row_deviation - row).abs() < 6e-5, "{gain}");
-        }
-        let scattered = sony().noise_at(1.0, [1.0, -1.0], [0.0; 2]);
-        assert!((scattered.read_scale.ln() - 0.56571 - 0.26337).abs() < 1e-5);
-        assert!((scattered.row_deviation.ln() + 0.59170 + 0.29429).abs() < 1e-5);
-    }
-
-    #[test]
-    fn measurements_are_those_of_the_nearest_step() {
-        for (gain, step) in [
-            (0.01, 0),
-            (0.1, 0),
-            (0.1328, 0),
-            (0.1329, 1),
-            (0.7746, 3),
-            (4.2, 5),
-            (4.3, 6),
-            (6.0, 6),
-            (100.0, 6),
-        ] {
-            assert_eq!(sony().step(gain), step, "K = {gain}");
-        }
-        for (gain, shape) in [(0.1, 0.1143), (0.7746, -0.0429), (6.0, -0.1143)] {
-            let noise = sony().noise_at(gain, [0.0; 2], [0.0; 2]);
-            assert!((noise.read_shape - shape).abs() < 5e-5);
-        }
-        let first = sony().noise_at(0.7746, [0.0; 2], [0.0, 0.5]);
-        assert!((first.read_shape + 3.0 / 70.0).abs() < 1e-15);
-        let second = sony().noise_at(0.7746, [0.0; 2], [0.5, 0.0]);
-        assert!((second.read_shape + 4.0 / 70.0).abs() < 1e-15);
-        assert!((first.bias[0] - 0.60525787).abs() < 1e-15);
-    }
-
-    /// The calibration's columns are R, G1, B, G2; the planes are R, Gr, Gb, B.
-    #[test]
-    fn offsets_reach_their_planes() {
-        let bias = sony().noise_at(6.0, [0.0; 2], [0.0; 2]).bias;
-        let expected = [-1.5595009, -1.5976678, -1.3571521, -1.3204409];
-        assert!(
-            bias.iter()
-                .zip(expected)
-                .all(|(a, b)| (a - b).abs() < 1e-15)
-        );
-    }
-
-    #[test]
-    fn an_impossible_calibration_is_refused_with_its_key() {
-        let good = PRESETS[0].1;
-        for (from, to, part) in [
-            ("adu-range = 15871.0", "adu-range = nan", "adu-range: NaN"),
-            ("gain = [0.1, 6.0]", "gain = [6.0, 0.1]", "gain: the range"),
-            ("gain = [0.1, 6.0]", "gain = [0.1, inf]", "gain: inf"),
-            ("ratio = [100.0, 300.0]", "ratio = [0.0, 300.0]", "ratio: 0"),
-            ("[read-scale]", "[read-scales]", "read-scale"),
-            ("[read-scale]", "[read-scale]\nshape = 3", "shape"),
-            ("name = ", "nmae = ", "nmae"),
-            ("adu-range = 15871.0\n", "", "adu-range"),
-            (
-                "[[step]]\nshape = [0.1142",
-                "[[step]]\nshape = [9.1142",
-                "step 1, shape: 9.1",
-            ),
-        ] {
-            assert!(good.contains(from), "{from}");
-            let text = good.replacen(from, to, 1);
-            let error = Calibration::parse(&text, "my.toml")
-                .unwrap_err()
-                .to_string();
-            assert!(
-                error.starts_with("my.toml") && error.contains(part),
-                "{error}"
-            );
-        }
-        let bare = good.split("[[step]]").next().unwrap();
-        let error = Calibration::parse(bare, "my.toml").unwrap_err().to_string();
-        assert!(error.contains("step"), "{error}");
-    }
-}
+mod tests;

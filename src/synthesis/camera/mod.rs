@@ -1,6 +1,6 @@
 //! The camera of a frame: the distribution of cameras ([`CameraModel`]) and one drawn from it ([`CameraState`]).
 
-mod calibration;
+pub(super) mod calibration;
 
 use std::sync::Arc;
 
@@ -89,14 +89,31 @@ impl CameraModel {
         })
     }
 
-    /// The name of the calibration.
+    /// Sets whether states are drawn or fixed (`--fixed`).
+    pub fn set_sampling(&mut self, sampling: Sampling) {
+        self.sampling = sampling;
+    }
+
+    /// The same cameras with neither gain nor ratio pinned.
+    #[must_use]
+    pub(crate) fn unpinned(&self) -> Self {
+        Self {
+            gain: None,
+            ratio: None,
+            ..self.clone()
+        }
+    }
+
+    /// Name of the calibration.
+    #[must_use]
     pub(crate) fn name(&self) -> &str {
         &self.calibration.name
     }
 
-    /// Sets whether states are drawn or fixed (`--fixed`).
-    pub fn set_sampling(&mut self, sampling: Sampling) {
-        self.sampling = sampling;
+    /// Range that the system gain K is drawn from, in ADU per electron.
+    #[must_use]
+    pub(crate) fn gain_range(&self) -> [f64; 2] {
+        self.calibration.gain
     }
 
     /// Pins the system gain K, in ADU per electron (`--gain`).
@@ -105,6 +122,22 @@ impl CameraModel {
     /// If K is not within 0.01 to 100.
     pub fn pin_gain(&mut self, gain: f64) -> Result<()> {
         self.gain = Some(check_range("--gain", gain, GAINS)?);
+        Ok(())
+    }
+
+    /// Calibration that cameras are drawn from.
+    pub(crate) fn calibration(&self) -> &Calibration {
+        &self.calibration
+    }
+
+    /// Replaces the range that the system gain K is drawn from, in ADU per electron.
+    ///
+    /// # Errors
+    /// If it is not within 0.01 to 100, or runs backwards.
+    pub(crate) fn set_gain_range(&mut self, range: [f64; 2]) -> Result<()> {
+        let [low, high] = range;
+        check_range("--gain", high, [low, GAINS[1]])?;
+        Arc::make_mut(&mut self.calibration).gain = [check_range("--gain", low, GAINS)?, high];
         Ok(())
     }
 

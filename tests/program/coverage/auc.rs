@@ -132,6 +132,8 @@ impl MadeRun {
                         width: 1,
                         height: 1,
                         format: "png".to_owned(),
+                        orientation: None,
+                        exposure: None,
                     });
                     records.push(reply);
                 }

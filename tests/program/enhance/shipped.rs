@@ -76,6 +76,7 @@ fn the_trained_enhancer_brings_a_room_back() {
         frames: 6,
         seed: 3003,
         size: [240, 180],
+        ..Rooms::default()
     };
     for (id, room) in rooms.all() {
         let lit = room.frame().unwrap().rgb.clone();

@@ -192,7 +192,10 @@ fn an_enhancer_without_an_image_is_an_error() {
             "--llie-on noise is not among the images asked; --llie-on ev is",
         ),
         ("--levels L3 --llie-on l0", "--llie-on both is"),
-        ("--llie-on dark", "is not one of l0, ev, noise, both, all"),
+        (
+            "--llie-on dark",
+            "is not one of l0, ev, noise, auto, motion, both, all",
+        ),
     ];
     check_rows(rows, |(flags, problem)| {
         let called = bench.call(&words(&format!("{ASK} {flags}")));

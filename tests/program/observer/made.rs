@@ -247,6 +247,7 @@ pub(super) fn degraded(asked: &Asked, how: &str, reading: &Synthesis) -> Rgb {
         &NoiseKey::new(0, &asked.id),
         reading,
     )
+    .unwrap()
 }
 
 /// Random numbers: `SplitMix64`.

@@ -16,6 +16,7 @@ fn rooms() -> Set {
         frames: 80,
         seed: 7,
         size: [640, 480],
+        ..Rooms::default()
     };
     Set::rooms(rooms, |id| id.0.ends_with("/eye"))
 }

@@ -21,6 +21,7 @@ static SMALL: LazyLock<Set> = LazyLock::new(|| {
         frames: 48,
         seed: 7,
         size: [320, 240],
+        ..Rooms::default()
     };
     Set::rooms(rooms, |_| true)
 });

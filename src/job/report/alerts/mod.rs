@@ -7,6 +7,8 @@ mod servers;
 mod settings;
 mod words;
 
+use std::collections::BTreeMap;
+
 use self::words::{counted, plural};
 use super::combine::Combined;
 use super::enhancers::of_enhancers;
@@ -14,8 +16,8 @@ use super::join::{Joined, JoinedRun};
 use crate::report::alert::{Alert, AlertKind};
 use crate::score::cluster::MIN_SCENES;
 use crate::score::findings::Findings;
-use crate::types::Detail;
 use crate::types::manifest::Status;
+use crate::types::{Detail, InputSummary};
 
 /// All alerts of a report on questions with choices, in the order of their kinds.
 pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert> {
@@ -42,6 +44,7 @@ pub(super) fn of_runs<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let mut alerts = of_progress(&joined.runs);
     alerts.extend(servers::of_servers(joined));
     alerts.extend(of_enhancers(&joined.runs));
+    alerts.extend(of_inputs(&joined.runs));
     if joined.runs.len() > 1 {
         alerts.extend(settings::of_settings(joined));
         alerts.extend(questions::of_questions(joined));
@@ -78,6 +81,24 @@ pub(super) fn named_again(folders: &[(String, usize)]) -> Vec<Alert> {
         };
         let text = format!("{name} is named {times} and counted once.");
         Alert::new(AlertKind::Runs, text)
+    });
+    alerts.collect()
+}
+
+/// What was done to the images of the runs when they were read.
+fn of_inputs(runs: &[JoinedRun]) -> Vec<Alert> {
+    let mut lines = BTreeMap::<String, Vec<&str>>::new();
+    for run in runs {
+        for line in run.manifest.inputs.iter().flat_map(InputSummary::lines) {
+            lines.entry(line).or_default().push(&run.name);
+        }
+    }
+    let alerts = lines.into_iter().map(|(line, names)| {
+        let text = match runs {
+            [_] => format!("{line}."),
+            _ => format!("{}: {line}.", names.join(", ")),
+        };
+        Alert::new(AlertKind::Read, text)
     });
     alerts.collect()
 }

@@ -1,0 +1,265 @@
+//! The bias frames of a setting: [`BiasFit`].
+//!
+//! They are read twice: first for their mean, which shows light, hot pixels and a fixed pattern, then for their noise without the
+//! hot pixels. So only a few frames are in memory at once.
+
+use std::path::PathBuf;
+
+use super::batches::in_batches;
+use super::checks::{self, BiasCheck};
+use super::frames::{Frame, FrameReader};
+use super::hot_pixels::HotPixels;
+use super::inputs::Inputs;
+use super::mean_frame::MeanFrame;
+use super::read_noise::{PlotFit, ReadNoise, plot_fit};
+use super::recording::SettingFiles;
+use super::sums::{Centres, PairNoise, PairSums, PlaneSums, Residuals};
+use crate::error::{Error, Result};
+
+/// Bias frames of a setting, measured.
+#[derive(Debug)]
+pub(super) struct BiasFit {
+    /// Number of frames.
+    pub(super) frames: usize,
+    pub(super) hot: HotPixels,
+    /// What is left of all frames, for the probability plot.
+    pub(super) residuals: Residuals,
+    /// Read noise by likelihood, before `widened`.
+    pub(super) read: ReadNoise,
+    pub(super) plot: PlotFit,
+    /// Factor of σ_TL for the noise that a mean frame takes with it.
+    pub(super) widened: f64,
+    /// Sums of the frames, two by two; the last may be of a single frame.
+    groups: Vec<Group>,
+}
+
+/// Two successive frames; or the last one, if their number is odd.
+#[derive(Debug)]
+struct Group {
+    /// Number and sum of the samples of each plane, of both frames together.
+    planes: Vec<[u64; 2]>,
+    /// `None` for a single frame.
+    noise: Option<PairNoise>,
+}
+
+/// Sums of a group, and the residuals of its frames.
+struct GroupWork {
+    group: Group,
+    residuals: Residuals,
+    correlation: f64,
+}
+
+impl BiasFit {
+    /// Measures the bias frames of a setting. Doubts are added to `notes`.
+    ///
+    /// # Errors
+    /// If a frame cannot be read, or a check refuses the frames.
+    pub(super) fn measure(
+        reader: &FrameReader,
+        files: &SettingFiles,
+        inputs: &mut Inputs,
+        notes: &mut Vec<String>,
+    ) -> Result<Self> {
+        let refused = |problem: String| {
+            let place = files.bias[0]
+                .parent()
+                .map(|folder| folder.display().to_string());
+            Error::data(place.unwrap_or_default(), problem)
+        };
+        let first = FirstPass::read(reader, &files.bias, inputs)?;
+        let check = BiasCheck::new(&first.mean, first.noise()).map_err(refused)?;
+        notes.extend(check.notes(files.bias.len()));
+        let takes_pattern = check.takes_off_pattern(files.bias.len());
+        let centres = if takes_pattern {
+            Centres::MeanFrame {
+                sums: &first.mean.sums,
+                frames: first.mean.frames(),
+            }
+        } else {
+            Centres::RowsAndPlanes
+        };
+        let works = second_pass(reader, &files.bias, &check.hot, centres)?;
+        let frames = files.bias.len() as f64;
+        let widened = if takes_pattern {
+            // A mean of n frames takes 1/n of their variance with it.
+            (frames / (frames - 1.0)).sqrt()
+        } else {
+            1.0
+        };
+        let (groups, residuals): (Vec<Group>, Vec<Residuals>) = works
+            .into_iter()
+            .map(|work| (work.group, work.residuals))
+            .unzip();
+        let read = ReadNoise::fit(&residuals).map_err(refused)?;
+        let mut all = Residuals::default();
+        for group in &residuals {
+            all.add(group);
+        }
+        Ok(Self {
+            frames: files.bias.len(),
+            hot: check.hot,
+            plot: plot_fit(&all),
+            residuals: all,
+            read,
+            widened,
+            groups,
+        })
+    }
+
+    /// Number of groups of frames.
+    pub(super) fn groups(&self) -> usize {
+        self.groups.len()
+    }
+
+    /// Number of pairs of frames.
+    pub(super) fn pairs(&self) -> usize {
+        self.groups
+            .iter()
+            .filter(|group| group.noise.is_some())
+            .count()
+    }
+
+    /// Means of the planes in ADU, if each group counts as often as its weight says.
+    pub(super) fn offsets(&self, weights: &[f64]) -> Vec<f64> {
+        let planes = self.groups.first().map_or(0, |group| group.planes.len());
+        let mean = |plane: usize| {
+            let groups = self.groups.iter().zip(weights);
+            let [count, sum] = groups.fold([0.0; 2], |[count, sum], (group, weight)| {
+                let [n, more] = group.planes[plane];
+                [count + weight * n as f64, sum + weight * more as f64]
+            });
+            sum / count
+        };
+        (0..planes).map(mean).collect()
+    }
+
+    /// Variances of the noise within rows and of the row noise in ADU², if each group counts as often as its weight says.
+    pub(super) fn noise(&self, weights: &[f64]) -> PairNoise {
+        let groups = self.groups.iter().zip(weights);
+        mean_noise(groups.filter_map(|(group, weight)| Some((group.noise?, *weight))))
+    }
+}
+
+/// The weighted mean of noises.
+fn mean_noise(noises: impl Iterator<Item = (PairNoise, f64)>) -> PairNoise {
+    let [mut sum, mut within, mut row] = [0.0; 3];
+    for (noise, weight) in noises {
+        sum += weight;
+        within += weight * noise.within;
+        row += weight * noise.row;
+    }
+    PairNoise {
+        within: within / sum,
+        row: row / sum,
+    }
+}
+
+/// What the first reading gives.
+struct FirstPass {
+    mean: MeanFrame,
+    /// Noise of each pair, hot pixels included: they stand still, so that their offset cancels.
+    noises: Vec<PairNoise>,
+}
+
+impl FirstPass {
+    fn read(reader: &FrameReader, files: &[PathBuf], inputs: &mut Inputs) -> Result<Self> {
+        let groups: Vec<&[PathBuf]> = files.chunks(2).collect();
+        let mut pass = Self {
+            mean: MeanFrame::new(reader.layout),
+            noises: Vec::new(),
+        };
+        let none = HotPixels::none(reader.layout.plane_rows());
+        let work = |group: &&[PathBuf]| {
+            let frames = read_group(reader, group)?;
+            for (path, frame) in group.iter().zip(&frames) {
+                checks::codes(&frame.samples)
+                    .map_err(|problem| Error::data(path.display(), problem))?;
+            }
+            let noise = match &frames[..] {
+                [a, b] => {
+                    let sums = PairSums::of(reader.layout, [&a.samples, &b.samples], &none);
+                    Some(sums.noise())
+                }
+                _ => None,
+            };
+            Ok((frames, noise))
+        };
+        in_batches(
+            &groups,
+            2 * reader.bytes_of_frame(),
+            work,
+            |group, result| {
+                let (frames, noise) = result;
+                for (path, frame) in group.iter().zip(&frames) {
+                    inputs.add_bias(path, &frame.facts)?;
+                    pass.mean.add(&frame.samples);
+                }
+                pass.noises.extend(noise);
+                Ok(())
+            },
+        )?;
+        Ok(pass)
+    }
+
+    fn noise(&self) -> PairNoise {
+        mean_noise(self.noises.iter().map(|noise| (*noise, 1.0)))
+    }
+}
+
+/// Sums and residuals of all groups, without hot pixels.
+fn second_pass(
+    reader: &FrameReader,
+    files: &[PathBuf],
+    hot: &HotPixels,
+    centres: Centres<'_>,
+) -> Result<Vec<GroupWork>> {
+    let groups: Vec<&[PathBuf]> = files.chunks(2).collect();
+    let mut works = Vec::with_capacity(groups.len());
+    let work = |group: &&[PathBuf]| {
+        let frames = read_group(reader, group)?;
+        let work = group_work(reader, &frames, hot, centres);
+        checks::correlation(work.correlation)
+            .map_err(|problem| Error::data(group[0].display(), problem))?;
+        Ok(work)
+    };
+    in_batches(&groups, 2 * reader.bytes_of_frame(), work, |_, work| {
+        works.push(work);
+        Ok(())
+    })?;
+    Ok(works)
+}
+
+fn read_group(reader: &FrameReader, group: &[PathBuf]) -> Result<Vec<Frame>> {
+    group.iter().map(|path| reader.read(path)).collect()
+}
+
+fn group_work(
+    reader: &FrameReader,
+    frames: &[Frame],
+    hot: &HotPixels,
+    centres: Centres<'_>,
+) -> GroupWork {
+    let layout = reader.layout;
+    let mut planes = vec![[0; 2]; layout.cfa.planes()];
+    let mut residuals = Residuals::default();
+    for frame in frames {
+        let sums = PlaneSums::of(layout, &frame.samples, hot);
+        for (plane, more) in planes.iter_mut().zip(sums.planes()) {
+            plane[0] += more[0];
+            plane[1] += more[1];
+        }
+        residuals.add(&Residuals::of(layout, &frame.samples, &sums, hot, centres));
+    }
+    let pair = match frames {
+        [a, b] => Some(PairSums::of(layout, [&a.samples, &b.samples], hot)),
+        _ => None,
+    };
+    GroupWork {
+        correlation: pair.as_ref().map_or(0.0, PairSums::correlation),
+        group: Group {
+            planes,
+            noise: pair.as_ref().map(PairSums::noise),
+        },
+        residuals,
+    }
+}

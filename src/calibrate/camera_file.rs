@@ -1,0 +1,160 @@
+//! The TOML file of a measured camera, as `--camera` reads it: [`camera_file`].
+
+use std::fmt::Write as _;
+
+use super::{CameraFit, Measured, NoiseLine, SettingFit, SlopeSource};
+use crate::error::{Error, Result};
+use crate::synthesis::Calibration;
+
+/// The file of a camera. Its comments hold what the numbers were made from, their standard errors, and every doubt.
+///
+/// # Errors
+/// If a number is outside of what a camera file may hold.
+pub(crate) fn camera_file(camera: &CameraFit) -> Result<String> {
+    let mut text = head(camera);
+    let gains: Vec<String> = camera
+        .settings
+        .iter()
+        .map(|fit| number(fit.gain.value))
+        .collect();
+    let [low, high] = [gains.first(), gains.last()].map(|gain| gain.map_or("", String::as_str));
+    let _ = writeln!(
+        text,
+        "name = {}\nadu-range = {:.1}",
+        toml::Value::from(&*camera.name),
+        camera.adu_range()
+    );
+    let _ = writeln!(
+        text,
+        "# The least and the greatest K that was measured.\ngain = [{low}, {high}]"
+    );
+    text += "# Of the DarkQA paper, for every camera: a recording of a sensor says nothing of r.\nratio = [100.0, 300.0]\n";
+    line(&mut text, "read-scale", &camera.read_scale);
+    line(&mut text, "row-deviation", &camera.row_deviation);
+    for fit in &camera.settings {
+        step(&mut text, camera, fit);
+    }
+    // What --camera would refuse is not written.
+    Calibration::parse(&text, "the measured camera").map_err(|e| {
+        let problem = format!("{e}; leave out the setting, or see its frames");
+        Error::data(&camera.name, problem)
+    })?;
+    Ok(text)
+}
+
+/// The comments before the first key.
+fn head(camera: &CameraFit) -> String {
+    let version = env!("CARGO_PKG_VERSION");
+    let mut text = format!("# Measured by darkqa-eval {version} calibrate");
+    let _ = match &camera.camera {
+        Some(name) => writeln!(text, ", from frames of {}.", one_line(name)),
+        None => writeln!(text, "."),
+    };
+    let [width, height] = camera.size;
+    let _ = writeln!(
+        text,
+        "# {} frames of {width} × {height} sites, filters {}, black {}, white {}; BLAKE3 of the list of frames:\n# {}",
+        camera.frames, camera.cfa, camera.black, camera.white, camera.frames_digest
+    );
+    if let Some([first, last]) = &camera.dates {
+        let _ = writeln!(
+            text,
+            "# Taken from {} to {}.",
+            one_line(first),
+            one_line(last)
+        );
+    }
+    text += "# ± is a standard error by bootstrap over frame pairs.\n";
+    for warning in &camera.warnings {
+        let _ = writeln!(text, "# Warning: {}", one_line(warning));
+    }
+    text
+}
+
+/// The table of a line, with what its numbers are worth.
+fn line(text: &mut String, key: &str, line: &NoiseLine) {
+    let settings = match line.settings {
+        1 => "1 setting".to_owned(),
+        n => format!("{n} settings"),
+    };
+    let source = match line.slope_from {
+        SlopeSource::Settings => format!("# Fitted to {settings}."),
+        SlopeSource::Preset => format!(
+            "# The slope is that of the preset sony-a7s2, because a slope needs 3 settings; the line passes through {settings}."
+        ),
+        SlopeSource::NoNoise => "# No setting has noise of this kind.".to_owned(),
+    };
+    let error = match line.deviation_error() {
+        Some(error) => format!(
+            "# The deviation is known to ± {:.0} % of itself.",
+            100.0 * error
+        ),
+        None => "# A single setting has no deviation.".to_owned(),
+    };
+    let _ = writeln!(
+        text,
+        "\n[{key}]\n{source}\nslope = {}\nintercept = {}\n{error}\ndeviation = {}",
+        number(line.slope),
+        number(line.intercept),
+        number(line.deviation)
+    );
+}
+
+/// The table of a setting.
+fn step(text: &mut String, camera: &CameraFit, fit: &SettingFit) {
+    let _ = writeln!(
+        text,
+        "\n[[step]]\n# {}: {} bias frames, {} pairs of flats at {} exposures; K {}, σ_TL {} ADU, λ {} ({:.4} by the probability plot), σ_r {} ADU",
+        one_line(&fit.name),
+        fit.frames.bias,
+        fit.frames.flat_pairs,
+        fit.frames.exposures,
+        with_error(fit.gain),
+        with_error(fit.read_scale),
+        with_error(fit.read_shape),
+        fit.plot.shape,
+        with_error(fit.row_deviation)
+    );
+    let bias = camera.bias(fit);
+    let of = |plane: usize| {
+        bias.get(plane)
+            .or(bias.first())
+            .map_or(0.0, |bias| bias.value)
+    };
+    // Planes are R, G1, G2, B; the columns of a camera file are R, G1, B, G2.
+    let [r, g1, b, g2] = [0, 1, 3, 2].map(|plane| number(of(plane)));
+    let _ = writeln!(
+        text,
+        "gain = {}\nshape = [{}]\nbias = [[{r}, {g1}, {b}, {g2}]]",
+        number(fit.gain.value),
+        number(fit.read_shape.value)
+    );
+}
+
+/// A number with its standard error.
+fn with_error(number: Measured) -> String {
+    match number.error {
+        Some(error) => format!("{:.4} ± {error:.4}", number.value),
+        None => format!("{:.4}", number.value),
+    }
+}
+
+/// A number of six significant digits, as TOML reads it.
+fn number(value: f64) -> String {
+    if value == 0.0 {
+        return "0.0".to_owned();
+    }
+    let magnitude = libm::log10(value.abs()).floor() as i32;
+    let decimals = (5 - magnitude).clamp(1, 12) as usize;
+    format!("{value:.decimals$}")
+}
+
+/// A text without line breaks, for a comment.
+fn one_line(text: &str) -> String {
+    text.chars()
+        .map(|c| if c.is_control() { ' ' } else { c })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests;

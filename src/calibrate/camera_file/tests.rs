@@ -1,0 +1,128 @@
+use super::*;
+use crate::calibrate::lines::NoiseKind;
+use crate::calibrate::setting::{FigurePoints, FrameCounts};
+use crate::calibrate::{Cfa, Measured};
+use crate::types::Digest;
+
+fn measured(value: f64) -> Measured {
+    Measured {
+        value,
+        error: Some(0.001),
+    }
+}
+
+fn setting(name: &str, gain: f64) -> SettingFit {
+    SettingFit {
+        name: name.to_owned(),
+        frames: FrameCounts {
+            bias: 10,
+            exposures: 5,
+            flat_pairs: 10,
+        },
+        gain: measured(gain),
+        read_scale: measured(1.5 * gain.sqrt()),
+        read_shape: measured(-0.04),
+        plot: crate::calibrate::read_noise::PlotFit {
+            shape: -0.03,
+            scale: 1.6,
+        },
+        row_deviation: measured(0.4 * gain.sqrt()),
+        offsets: [512.1, 511.9, 512.3, 512.0].map(measured).to_vec(),
+        read_deviation: 2.7,
+        hot_pixels: 0,
+        gain_by_plane: vec![Some(gain); 4],
+        bend: 0.0,
+        intercept: measured(0.0),
+        figure: FigurePoints::default(),
+    }
+}
+
+fn camera(settings: Vec<SettingFit>) -> CameraFit {
+    let line = |kind: NoiseKind, of: fn(&SettingFit) -> f64| {
+        let points: Vec<[f64; 2]> = settings
+            .iter()
+            .map(|fit| [fit.gain.value, of(fit)])
+            .collect();
+        NoiseLine::fit(&points, kind)
+    };
+    CameraFit {
+        schema: "darkqa.calibration/1",
+        name: "my \"night\" cam".to_owned(),
+        camera: None,
+        cfa: Cfa::Rggb,
+        size: [512, 512],
+        black: 512,
+        white: 16383,
+        read_scale: line(NoiseKind::Read, |fit| fit.read_scale.value),
+        row_deviation: line(NoiseKind::Row, |fit| fit.row_deviation.value),
+        settings,
+        frames: 30,
+        frames_digest: Digest::of(b"frames"),
+        dates: Some(["2026:01:01".to_owned(), "2026:01:02\nx = 1".to_owned()]),
+        warnings: vec!["iso100: doubtful\n[gain]".to_owned()],
+    }
+}
+
+#[test]
+fn a_camera_file_is_what_was_measured() {
+    let camera = camera(
+        ["a", "b", "c"]
+            .iter()
+            .zip([0.1, 0.5, 2.5])
+            .map(|(n, k)| setting(n, k))
+            .collect(),
+    );
+    let text = camera_file(&camera).unwrap();
+    let read = Calibration::parse(&text, "camera.toml").unwrap();
+    assert_eq!(read.name, camera.name);
+    assert!((read.adu_range - 15871.0).abs() < 1e-9);
+    assert!((read.gain[0] - 0.1).abs() < 1e-9 && (read.gain[1] - 2.5).abs() < 1e-9);
+    assert!((read.read_scale.slope - 0.5).abs() < 1e-5);
+    assert!((read.row_deviation.intercept - 0.4_f64.ln()).abs() < 1e-5);
+    let noise = read.noise_at(0.6, [0.0; 2], [0.5; 2]);
+    assert!((noise.read_shape + 0.04).abs() < 1e-9);
+    // The planes R, Gr, Gb, B, whatever the order of the columns.
+    let bias = noise.bias.iter().zip([0.1, -0.1, 0.3, 0.0]);
+    assert!(
+        bias.into_iter().all(|(a, b)| (a - b).abs() < 1e-5),
+        "{:?}",
+        noise.bias
+    );
+    for part in [
+        "± 71 % of itself",
+        "# Warning: iso100: doubtful [gain]",
+        "K 0.5000 ± 0.0010",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+}
+
+#[test]
+fn what_a_camera_file_may_not_hold_is_not_written() {
+    let twice = camera(vec![setting("a", 0.5), setting("b", 0.5)]);
+    let error = camera_file(&twice).unwrap_err().to_string();
+    assert!(
+        error.contains("step 2, gain: 0.5 is not above 0.5"),
+        "{error}"
+    );
+    let far = camera(vec![setting("a", 300.0)]);
+    assert!(
+        camera_file(&far)
+            .unwrap_err()
+            .to_string()
+            .contains("gain: 300")
+    );
+}
+
+#[test]
+fn numbers_have_six_digits() {
+    for (value, text) in [
+        (0.093_900_04, "0.0939000"),
+        (-1.234_567_89, "-1.23457"),
+        (15871.0, "15871.0"),
+        (0.0, "0.0"),
+        (1e-20, "0.000000000000"),
+    ] {
+        assert_eq!(number(value), text);
+    }
+}

@@ -1,0 +1,286 @@
+//! The flats of a setting: pairs of evenly lit frames at several exposures, as points of photon transfer ([`Flats`]).
+
+mod checks;
+mod transfer;
+
+use std::path::{Path, PathBuf};
+
+use super::batches::in_batches;
+use super::frames::{Frame, FrameReader};
+use super::hot_pixels::HotPixels;
+use super::inputs::Inputs;
+use super::recording::{ExposureFiles, LEAST, SettingFiles};
+use super::sums::{PairNoise, PairSums, PlaneSums, Tile, TopCode};
+use crate::error::{Error, Result};
+use checks::{ExposureCheck, PairFacts};
+pub(super) use transfer::{Point, Transfer, gain};
+
+/// Range of light that is used, as shares of white above the offset (EMVA 1288 release 4 Linear fits up to 70 % of saturation; the
+/// lower end is chosen: below it an error of the offset counts. 1.5 % are the corners of a frame with 2 % in its middle).
+const RANGE: [f64; 2] = [0.015, 0.7];
+
+/// Exposures of a setting that are used.
+#[derive(Debug)]
+pub(super) struct Flats {
+    exposures: Vec<Exposure>,
+}
+
+/// Pairs of flats of one exposure.
+#[derive(Debug)]
+struct Exposure {
+    /// Tiles of each pair that are in the range of light.
+    pairs: Vec<Vec<Tile>>,
+    dark: Option<Dark>,
+}
+
+/// Frames of the exposure without light.
+#[derive(Debug)]
+struct Dark {
+    /// Means of the planes in ADU.
+    offsets: Vec<f64>,
+    /// Variance of the noise within rows, in ADU².
+    within: f64,
+}
+
+/// What bias frames say of the flats.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Base<'a> {
+    /// Means of the planes in ADU.
+    pub(super) offsets: &'a [f64],
+    /// Variance of the noise within rows, in ADU².
+    pub(super) within: f64,
+}
+
+/// Where light ends, and what is left out.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FlatSettings<'a> {
+    /// The code of white.
+    pub(super) white: u16,
+    pub(super) hot: &'a HotPixels,
+}
+
+impl Flats {
+    /// Reads the flats of a setting. What is left out, and doubts, are added to `notes`.
+    ///
+    /// # Errors
+    /// If a frame cannot be read, the two of a pair differ in light, neighbours correlate, or too few exposures are left.
+    pub(super) fn measure(
+        reader: &FrameReader,
+        files: &SettingFiles,
+        settings: FlatSettings<'_>,
+        base: Base<'_>,
+        inputs: &mut Inputs,
+        notes: &mut Vec<String>,
+    ) -> Result<Self> {
+        let mut exposures = Vec::new();
+        let mut left_out = Vec::new();
+        for (exposure, facts) in
+            files
+                .exposures
+                .iter()
+                .zip(read(reader, files, settings.hot, inputs)?)
+        {
+            let dark = dark(reader, exposure, settings.hot, inputs)?;
+            let offsets = dark.as_ref().map_or(base.offsets, |dark| &dark.offsets[..]);
+            let check = ExposureCheck {
+                name: &exposure.name,
+                facts: &facts,
+                offset: offsets.iter().sum::<f64>() / offsets.len() as f64,
+            };
+            if let Some(reason) = check.clipped() {
+                left_out.push(reason);
+                continue;
+            }
+            notes.extend(check.pairs()?);
+            let pairs: Vec<Vec<Tile>> = facts
+                .iter()
+                .map(|pair| in_range(&pair.tiles, offsets, settings.white))
+                .collect();
+            if let Some(reason) = check.out_of_range(&pairs, RANGE) {
+                left_out.push(reason);
+                continue;
+            }
+            exposures.push(Exposure { pairs, dark });
+        }
+        if exposures.len() < LEAST[1] {
+            return Err(too_few(files, exposures.len(), &left_out));
+        }
+        notes.extend(
+            left_out
+                .into_iter()
+                .map(|reason| format!("{reason}; left out")),
+        );
+        Ok(Self { exposures })
+    }
+
+    /// Number of exposures that are used.
+    pub(super) fn exposures(&self) -> usize {
+        self.exposures.len()
+    }
+
+    /// Number of pairs of all exposures.
+    pub(super) fn pairs(&self) -> usize {
+        self.exposures
+            .iter()
+            .map(|exposure| exposure.pairs.len())
+            .sum()
+    }
+
+    /// Whether all exposures have dark frames of their own.
+    pub(super) fn have_dark(&self) -> bool {
+        self.exposures
+            .iter()
+            .all(|exposure| exposure.dark.is_some())
+    }
+
+    /// The points of photon transfer if each pair counts as often as its weight says.
+    pub(super) fn points(&self, base: Base<'_>, weights: &[f64]) -> Vec<Point> {
+        let mut points = Vec::new();
+        let mut weights = weights.iter();
+        for (index, exposure) in self.exposures.iter().enumerate() {
+            let dark = exposure.dark.as_ref();
+            let offsets = dark.map_or(base.offsets, |dark| &dark.offsets);
+            let within = dark.map_or(base.within, |dark| dark.within);
+            for (pair, weight) in exposure.pairs.iter().zip(weights.by_ref()) {
+                if *weight <= 0.0 {
+                    continue;
+                }
+                points.extend(pair.iter().map(|tile| Point {
+                    exposure: index,
+                    plane: tile.plane,
+                    weight: weight * tile.count,
+                    signal: tile.mean - offsets[tile.plane],
+                    variance: tile.variance - within,
+                    within,
+                }));
+            }
+        }
+        points
+    }
+}
+
+/// The error for a setting with too few exposures, with the reasons.
+fn too_few(files: &SettingFiles, left: usize, reasons: &[String]) -> Error {
+    let problem = format!(
+        "{left} of {} exposures can be used, at least {} are needed: {}",
+        files.exposures.len(),
+        LEAST[1],
+        reasons.join("; ")
+    );
+    Error::data(format_args!("flats of {}", files.name), problem)
+}
+
+/// The tiles whose light is in the range.
+fn in_range(tiles: &[Tile], offsets: &[f64], white: u16) -> Vec<Tile> {
+    let used = tiles.iter().filter(|tile| {
+        let offset = offsets[tile.plane];
+        let share = (tile.mean - offset) / (f64::from(white) - offset);
+        (RANGE[0]..=RANGE[1]).contains(&share)
+    });
+    used.copied().collect()
+}
+
+/// Reads all pairs of all exposures.
+fn read(
+    reader: &FrameReader,
+    files: &SettingFiles,
+    hot: &HotPixels,
+    inputs: &mut Inputs,
+) -> Result<Vec<Vec<PairFacts>>> {
+    let exposures = files.exposures.iter().enumerate();
+    let pairs: Vec<(usize, &[PathBuf])> = exposures
+        .flat_map(|(index, exposure)| exposure.flats.chunks(2).map(move |pair| (index, pair)))
+        .collect();
+    let layout = reader.layout;
+    let work = |(_, pair): &(usize, &[PathBuf])| {
+        let [a, b] = read_pair(reader, pair)?;
+        let sums = PairSums::of(layout, [&a.samples, &b.samples], hot);
+        let top = [&a, &b].map(|frame| TopCode::of(layout, &frame.samples, hot).largest_share());
+        let facts = PairFacts {
+            names: [&pair[0], &pair[1]].map(|path| path.display().to_string()),
+            top: top[0].max(top[1]),
+            means: sums.means(),
+            correlation: sums.correlation(),
+            tiles: sums.tiles(),
+            are_equal: a.facts.digest == b.facts.digest,
+        };
+        Ok((facts, [a.facts, b.facts]))
+    };
+    let mut read: Vec<Vec<PairFacts>> = files.exposures.iter().map(|_| Vec::new()).collect();
+    in_batches(
+        &pairs,
+        2 * reader.bytes_of_frame(),
+        work,
+        |item, (facts, of_files)| {
+            let (exposure, pair) = item;
+            for (path, facts) in pair.iter().zip(&of_files) {
+                inputs.add(path, facts);
+            }
+            read[*exposure].push(facts);
+            Ok(())
+        },
+    )?;
+    Ok(read)
+}
+
+/// Reads two frames on two threads.
+fn read_pair(reader: &FrameReader, pair: &[PathBuf]) -> Result<[Frame; 2]> {
+    let (first, second): (&Path, &Path) = (&pair[0], &pair[1]);
+    let (a, b) = rayon::join(|| reader.read(first), || reader.read(second));
+    Ok([a?, b?])
+}
+
+/// Reads the dark frames of an exposure; `None` if it has none.
+fn dark(
+    reader: &FrameReader,
+    exposure: &ExposureFiles,
+    hot: &HotPixels,
+    inputs: &mut Inputs,
+) -> Result<Option<Dark>> {
+    let layout = reader.layout;
+    let mut planes = vec![[0_u64; 2]; layout.cfa.planes()];
+    let mut noises: Vec<PairNoise> = Vec::new();
+    let groups: Vec<&[PathBuf]> = exposure.dark.chunks(2).collect();
+    let work = |group: &&[PathBuf]| {
+        let frames = group.iter().map(|path| reader.read(path));
+        let frames: Vec<Frame> = frames.collect::<Result<_>>()?;
+        let sums = frames
+            .iter()
+            .map(|frame| PlaneSums::of(layout, &frame.samples, hot).planes());
+        let noise = match &frames[..] {
+            [a, b] => Some(PairSums::of(layout, [&a.samples, &b.samples], hot).noise()),
+            _ => None,
+        };
+        let sums: Vec<Vec<[u64; 2]>> = sums.collect();
+        let facts = frames.into_iter().map(|frame| frame.facts);
+        Ok((sums, noise, facts.collect::<Vec<_>>()))
+    };
+    in_batches(
+        &groups,
+        2 * reader.bytes_of_frame(),
+        work,
+        |group, (sums, noise, facts)| {
+            for (path, facts) in group.iter().zip(&facts) {
+                inputs.add(path, facts);
+            }
+            for sums in &sums {
+                for (plane, more) in planes.iter_mut().zip(sums) {
+                    plane[0] += more[0];
+                    plane[1] += more[1];
+                }
+            }
+            noises.extend(noise);
+            Ok(())
+        },
+    )?;
+    if noises.is_empty() {
+        return Ok(None);
+    }
+    let offsets = planes
+        .iter()
+        .map(|[count, sum]| *sum as f64 / (*count).max(1) as f64);
+    Ok(Some(Dark {
+        offsets: offsets.collect(),
+        within: noises.iter().map(|noise| noise.within).sum::<f64>() / noises.len() as f64,
+    }))
+}

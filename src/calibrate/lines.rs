@@ -1,0 +1,155 @@
+//! How a deviation depends on K: [`NoiseLine`], ln σ = slope · ln K + intercept.
+
+use serde::Serialize;
+
+use crate::synthesis::Calibration;
+
+/// Least number of settings whose line has a slope of its own.
+const LEAST: usize = 3;
+
+/// The line of a deviation σ over the settings.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub(crate) struct NoiseLine {
+    pub slope: f64,
+    /// ln σ at K = 1.
+    pub intercept: f64,
+    /// Standard deviation of ln σ about the line.
+    pub deviation: f64,
+    /// Number of settings that it was fitted to.
+    pub settings: usize,
+    pub slope_from: SlopeSource,
+}
+
+/// Where a slope is from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum SlopeSource {
+    /// Fitted to the settings.
+    Settings,
+    /// That of the preset `sony-a7s2`, because there are fewer than three settings.
+    Preset,
+    /// None: no setting has such noise.
+    NoNoise,
+}
+
+/// Which deviation a line is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum NoiseKind {
+    Read,
+    Row,
+}
+
+impl NoiseLine {
+    /// The line through points (K, σ); points without noise are left out.
+    pub(super) fn fit(points: &[[f64; 2]], kind: NoiseKind) -> Self {
+        let logs: Vec<[f64; 2]> = points
+            .iter()
+            .filter(|[_, sigma]| *sigma > 0.0)
+            .map(|point| point.map(libm::log))
+            .collect();
+        let n = logs.len() as f64;
+        if logs.is_empty() {
+            // e^−20 ADU: the least that a camera file may hold.
+            return Self {
+                slope: 0.0,
+                intercept: -20.0,
+                deviation: 0.0,
+                settings: 0,
+                slope_from: SlopeSource::NoNoise,
+            };
+        }
+        let [x, y] = [0, 1].map(|i| logs.iter().map(|log| log[i]).sum::<f64>() / n);
+        let products: f64 = logs.iter().map(|log| (log[0] - x) * (log[1] - y)).sum();
+        let squares: f64 = logs.iter().map(|log| (log[0] - x).powi(2)).sum();
+        let fits = logs.len() >= LEAST && squares > 0.0;
+        let slope = if fits {
+            products / squares
+        } else {
+            preset_slope(kind)
+        };
+        let left: f64 = logs
+            .iter()
+            .map(|log| (log[1] - y - slope * (log[0] - x)).powi(2))
+            .sum();
+        // Numbers that are fitted: the intercept, and the slope if it is.
+        let free = n - if fits { 2.0 } else { 1.0 };
+        Self {
+            slope,
+            intercept: y - slope * x,
+            deviation: if free > 0.0 {
+                (left / free).sqrt()
+            } else {
+                0.0
+            },
+            settings: logs.len(),
+            slope_from: if fits {
+                SlopeSource::Settings
+            } else {
+                SlopeSource::Preset
+            },
+        }
+    }
+
+    /// The relative standard error of the deviation, 1 / √(2 · degrees of freedom); `None` without any.
+    pub(crate) fn deviation_error(&self) -> Option<f64> {
+        let fitted = match self.slope_from {
+            SlopeSource::Settings => 2,
+            SlopeSource::Preset => 1,
+            SlopeSource::NoNoise => return None,
+        };
+        let free = self.settings.checked_sub(fitted).filter(|free| *free > 0)?;
+        Some(1.0 / (2.0 * free as f64).sqrt())
+    }
+
+    /// σ on the line at a gain, in ADU.
+    pub(crate) fn at(&self, gain: f64) -> f64 {
+        libm::exp(self.slope * libm::log(gain) + self.intercept)
+    }
+}
+
+fn preset_slope(kind: NoiseKind) -> f64 {
+    let preset = Calibration::preset("sony-a7s2");
+    preset.map_or(0.5, |preset| match kind {
+        NoiseKind::Read => preset.read_scale.slope,
+        NoiseKind::Row => preset.row_deviation.slope,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_fitted_from_three_settings_on() {
+        let on_line = |k: f64| [k, 2.0 * k.powf(0.4)];
+        let three = NoiseLine::fit(&[0.1, 1.0, 5.0].map(on_line), NoiseKind::Read);
+        assert!((three.slope - 0.4).abs() < 1e-12);
+        assert!((three.intercept - 2.0_f64.ln()).abs() < 1e-12);
+        assert!(three.deviation < 1e-12);
+        assert_eq!(three.slope_from, SlopeSource::Settings);
+        assert!((three.at(0.5) - on_line(0.5)[1]).abs() < 1e-12);
+        let seven = NoiseLine {
+            settings: 7,
+            ..three
+        };
+        assert!((seven.deviation_error().unwrap() - 0.316).abs() < 1e-3);
+        for gains in [&[2.0][..], &[0.5, 4.0]] {
+            let points: Vec<[f64; 2]> = gains.iter().map(|k| on_line(*k)).collect();
+            let line = NoiseLine::fit(&points, NoiseKind::Row);
+            assert_eq!(line.slope_from, SlopeSource::Preset);
+            assert!((line.slope - 0.5275360468633209).abs() < 1e-15);
+            // It passes through the middle of the points.
+            let middle: f64 = points.iter().map(|p| p[1].ln() - line.at(p[0]).ln()).sum();
+            assert!(middle.abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_setting_without_noise_is_left_out() {
+        let line = NoiseLine::fit(&[[0.1, 0.0], [1.0, 2.0], [2.0, 3.0]], NoiseKind::Row);
+        assert_eq!((line.settings, line.slope_from), (2, SlopeSource::Preset));
+        let none = NoiseLine::fit(&[[0.1, 0.0]], NoiseKind::Row);
+        assert!(none.at(3.0) < 1e-8 && none.slope_from == SlopeSource::NoNoise);
+        assert_eq!(none.deviation_error(), None);
+    }
+}

@@ -1,0 +1,307 @@
+//! The mean of all bias frames of a setting, and what it shows: [`MeanFrame`].
+
+use rayon::prelude::*;
+
+use super::hot_pixels::HotPixels;
+use super::layout::{Layout, TILES};
+use super::sums::PairNoise;
+
+/// A site is hot if its mean is further from the median of its plane than this many deviations of the read noise, and each of its
+/// samples is further, on the same side, than half as many (chosen). A single sample far out is noise with long tails.
+const HOT: f64 = 10.0;
+
+/// The sum of frames at each site.
+#[derive(Debug)]
+pub(super) struct MeanFrame {
+    layout: Layout,
+    pub(super) sums: Vec<u32>,
+    /// The least and the greatest sample at each site.
+    extremes: Vec<[u16; 2]>,
+    frames: u32,
+}
+
+/// How far the means of tiles differ over a plane, in ADU.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Unevenness {
+    pub(super) plane: usize,
+    /// The greatest mean of a tile less the smallest.
+    pub(super) difference: f64,
+    /// Standard error of the mean of a tile.
+    pub(super) error: f64,
+}
+
+/// A site of the mean frame.
+#[derive(Debug, Clone, Copy)]
+struct Site {
+    plane_row: usize,
+    /// Column of its plane.
+    column: usize,
+    /// Mean of all frames, in ADU.
+    mean: f64,
+}
+
+impl MeanFrame {
+    pub(super) fn new(layout: Layout) -> Self {
+        Self {
+            layout,
+            sums: vec![0; layout.width * layout.height],
+            extremes: vec![[u16::MAX, 0]; layout.width * layout.height],
+            frames: 0,
+        }
+    }
+
+    /// Adds a frame.
+    pub(super) fn add(&mut self, samples: &[u16]) {
+        let width = self.layout.width;
+        let rows = self.sums.par_chunks_mut(width);
+        let rows = rows.zip(self.extremes.par_chunks_mut(width));
+        rows.zip(samples.par_chunks(width))
+            .for_each(|((sums, extremes), row)| {
+                for ((sum, [least, greatest]), sample) in sums.iter_mut().zip(extremes).zip(row) {
+                    *sum += u32::from(*sample);
+                    *least = (*least).min(*sample);
+                    *greatest = (*greatest).max(*sample);
+                }
+            });
+        self.frames += 1;
+    }
+
+    /// Number of frames.
+    pub(super) fn frames(&self) -> f64 {
+        f64::from(self.frames)
+    }
+
+    /// The values of the sites of a part of a row.
+    fn part<'a, T>(&self, of: &'a [T], plane_row: usize) -> impl Iterator<Item = &'a T> {
+        let [row, parity] = self.layout.place(plane_row);
+        let row = &of[row * self.layout.width..][..self.layout.width];
+        row[parity..].iter().step_by(self.layout.cfa.step())
+    }
+
+    /// Plane of a part of a row.
+    fn plane(&self, plane_row: usize) -> usize {
+        let [row, parity] = self.layout.place(plane_row);
+        self.layout.cfa.plane(row, parity)
+    }
+
+    /// The sites whose mean is far from the median of their plane; `within` is the variance of the read noise.
+    pub(super) fn hot_pixels(&self, within: f64) -> HotPixels {
+        let medians = self.medians();
+        let limit = HOT * within.sqrt();
+        let parts = (0..self.layout.plane_rows())
+            .into_par_iter()
+            .with_min_len(64);
+        let columns = parts.map(|plane_row| {
+            let median = f64::from(medians[self.plane(plane_row)]) / self.frames();
+            let extremes = self.part(&self.extremes, plane_row);
+            let sites = self.part(&self.sums, plane_row).zip(extremes);
+            let hot = sites.enumerate().filter(|(_, (sum, [least, greatest]))| {
+                let mean = f64::from(**sum) / self.frames() - median;
+                let (above, below) = (f64::from(*least) - median, median - f64::from(*greatest));
+                mean.abs() > limit && above.max(below) > 0.5 * limit
+            });
+            hot.map(|(column, _)| column as u32).collect()
+        });
+        HotPixels::new(columns.collect())
+    }
+
+    /// The median sum of each plane; the upper one of two.
+    fn medians(&self) -> Vec<u32> {
+        let planes = (0..self.layout.cfa.planes()).into_par_iter();
+        let medians = planes.map(|plane| {
+            let parts = (0..self.layout.plane_rows()).filter(|part| self.plane(*part) == plane);
+            let sums = parts.flat_map(|part| self.part(&self.sums, part));
+            let mut sums: Vec<u32> = sums.copied().collect();
+            let middle = sums.len() / 2;
+            *sums.select_nth_unstable(middle).1
+        });
+        medians.collect()
+    }
+
+    /// Sums of parts of rows, to which `add` adds each site that is not hot, in the order of the rows.
+    fn by_part<const N: usize>(
+        &self,
+        hot: &HotPixels,
+        add: impl Fn(&mut [f64; N], Site) + Sync,
+    ) -> Vec<[f64; N]> {
+        let parts = (0..self.layout.plane_rows())
+            .into_par_iter()
+            .with_min_len(64);
+        let sums = parts.map(|plane_row| {
+            let mut hot = hot.columns(plane_row).peekable();
+            let mut sums = [0.0; N];
+            for (column, sum) in self.part(&self.sums, plane_row).enumerate() {
+                if hot.next_if_eq(&column).is_none() {
+                    let site = Site {
+                        plane_row,
+                        column,
+                        mean: f64::from(*sum) / self.frames(),
+                    };
+                    add(&mut sums, site);
+                }
+            }
+            sums
+        });
+        sums.collect()
+    }
+
+    /// The variance of the fixed pattern: that of the mean frame about the means of its planes, less what noise of this size
+    /// leaves in a mean, in ADU². It may be below 0 by chance.
+    pub(super) fn pattern(&self, hot: &HotPixels, noise: PairNoise) -> f64 {
+        // About the medians, so that the squares are small.
+        let medians = self.medians();
+        let median = |plane_row: usize| f64::from(medians[self.plane(plane_row)]) / self.frames();
+        let parts = self.by_part(hot, |sums: &mut [f64; 3], site| {
+            let d = site.mean - median(site.plane_row);
+            sums[0] += 1.0;
+            sums[1] += d;
+            sums[2] += d * d;
+        });
+        let mut planes = vec![[0.0; 3]; self.layout.cfa.planes()];
+        for (plane_row, part) in parts.into_iter().enumerate() {
+            let plane = &mut planes[self.plane(plane_row)];
+            plane
+                .iter_mut()
+                .zip(part)
+                .for_each(|(sum, more)| *sum += more);
+        }
+        let count: f64 = planes.iter().map(|[count, ..]| count).sum();
+        let about = |[count, sum, squares]: &[f64; 3]| squares - sum * sum / count.max(1.0);
+        let squares: f64 = planes.iter().map(about).sum();
+        let free = count - planes.len() as f64;
+        squares / free - (noise.within + noise.row) / self.frames()
+    }
+
+    /// The plane whose tiles differ most. Row noise of this variance shifts the rows of a tile together.
+    pub(super) fn unevenness(&self, hot: &HotPixels, noise: PairNoise) -> Unevenness {
+        let [rows, columns] = self.layout.plane_size();
+        let tile_of = |column: usize| {
+            let tile = (0..TILES).find(|tile| Layout::tile(columns, *tile).contains(&column));
+            tile.unwrap_or(TILES - 1)
+        };
+        let tiles: Vec<usize> = (0..columns).map(tile_of).collect();
+        // Number and sum of each tile column.
+        let parts = self.by_part(hot, |sums: &mut [f64; 2 * TILES], site| {
+            let tile = 2 * tiles[site.column];
+            sums[tile] += 1.0;
+            sums[tile + 1] += site.mean;
+        });
+        let mut sums = vec![[0.0; 2]; self.layout.cfa.planes() * TILES * TILES];
+        for (plane_row, part) in parts.into_iter().enumerate() {
+            let [row, _] = self.layout.place(plane_row);
+            let first = (self.plane(plane_row) * TILES + self.layout.tile_row(row)) * TILES;
+            for (tile, [count, sum]) in sums[first..].iter_mut().zip(part.as_chunks().0) {
+                tile[0] += count;
+                tile[1] += sum;
+            }
+        }
+        let sites = (rows / TILES * (columns / TILES)) as f64;
+        let error =
+            (noise.within / sites + noise.row.max(0.0) / (rows / TILES) as f64) / self.frames();
+        let planes = sums.chunks(TILES * TILES).enumerate();
+        let uneven = planes.map(|(plane, tiles)| {
+            let filled = tiles.iter().filter(|[count, _]| *count > 0.0);
+            let means = filled.map(|[count, sum]| sum / count);
+            let [low, high] = means
+                .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], mean| {
+                    [mean.min(low), mean.max(high)]
+                });
+            Unevenness {
+                plane,
+                difference: high - low,
+                error: error.sqrt(),
+            }
+        });
+        let most = uneven.max_by(|a, b| a.difference.total_cmp(&b.difference));
+        most.unwrap_or(Unevenness {
+            plane: 0,
+            difference: 0.0,
+            error: 0.0,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibrate::layout::Cfa;
+
+    const LAYOUT: Layout = Layout {
+        cfa: Cfa::Rggb,
+        height: 64,
+        width: 64,
+    };
+
+    /// Frames of whole noise of the variance 2 (−2 to 2 evenly) about 100, changed by site and frame.
+    fn mean_of(frames: usize, change: impl Fn(usize, usize) -> u16) -> MeanFrame {
+        let mut mean = MeanFrame::new(LAYOUT);
+        let mut state = 1_u64;
+        for frame in 0..frames {
+            let samples: Vec<u16> = (0..LAYOUT.height * LAYOUT.width)
+                .map(|site| {
+                    state = state
+                        .wrapping_mul(6_364_136_223_846_793_005)
+                        .wrapping_add(1);
+                    98 + ((state >> 33) % 5) as u16 + change(frame, site)
+                })
+                .collect();
+            mean.add(&samples);
+        }
+        mean
+    }
+
+    const NOISE: PairNoise = PairNoise {
+        within: 2.0,
+        row: 0.0,
+    };
+
+    #[test]
+    fn sites_that_stay_far_out_are_hot() {
+        let sites = [5, 64 * 9 + 8, 64 * 63 + 63];
+        let hot = mean_of(4, |_, site| if sites.contains(&site) { 30 } else { 0 });
+        let found = hot.hot_pixels(NOISE.within);
+        assert_eq!(found.count(), 3);
+        // Site 5 is column 2 of the odd columns of row 0; row 9, column 8 is column 4 of the even ones.
+        assert_eq!(found.columns(1).collect::<Vec<_>>(), [2]);
+        assert_eq!(found.columns(2 * 9).collect::<Vec<_>>(), [4]);
+        // As far in the mean, but by one sample.
+        let single = mean_of(4, |frame, site| {
+            if frame == 0 && sites.contains(&site) {
+                120
+            } else {
+                0
+            }
+        });
+        assert_eq!(single.hot_pixels(NOISE.within).count(), 0);
+    }
+
+    #[test]
+    fn light_and_pattern_are_told_from_noise() {
+        let none = HotPixels::none(LAYOUT.plane_rows());
+        let plain = mean_of(8, |_, _| 0);
+        assert!(plain.pattern(&none, NOISE).abs() < 0.05);
+        let even = plain.unevenness(&none, NOISE);
+        // 16 sites a tile and 8 frames.
+        assert!((even.error - (2.0_f64 / 128.0).sqrt()).abs() < 1e-12);
+        assert!(even.difference < 6.0 * even.error, "{}", even.difference);
+        // Green in the rows of blue alone is lit, from 0 to 3 ADU over the rows.
+        let lit = mean_of(8, |_, site| {
+            let (row, column) = (site / 64, site % 64);
+            if row % 2 == 1 && column % 2 == 0 {
+                (row / 16) as u16
+            } else {
+                0
+            }
+        });
+        let found = lit.unevenness(&none, NOISE);
+        assert_eq!(found.plane, 2);
+        assert!(
+            (found.difference - 3.0).abs() < 6.0 * found.error,
+            "{}",
+            found.difference
+        );
+        // Each third site is 3 ADU above: a variance of 2.
+        let pattern = mean_of(8, |_, site| if site % 3 == 0 { 3 } else { 0 });
+        assert!((pattern.pattern(&none, NOISE) - 2.0).abs() < 0.1);
+    }
+}

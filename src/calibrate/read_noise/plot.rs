@@ -1,0 +1,102 @@
+//! The fit of read noise by its probability plot: [`plot_fit`].
+
+use serde::Serialize;
+
+use super::super::sums::{Residuals, STEPS};
+
+/// Range of λ that is searched.
+const SHAPES: [f64; 2] = [-0.4, 0.5];
+
+/// Read noise by the probability plot.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub(crate) struct PlotFit {
+    /// Shape λ.
+    pub shape: f64,
+    /// Scale σ_TL in ADU.
+    pub scale: f64,
+}
+
+/// The shape whose quantiles correlate best with the sorted residuals, and the slope of the plot as the scale (Wei et al. 2021,
+/// section 3.2; Filliben 1975). It takes the rounding of codes for noise.
+///
+/// Equal residuals fill an interval of probability; they stand at the mean quantile of that interval.
+pub(in super::super) fn plot_fit(residuals: &Residuals) -> PlotFit {
+    let counts = residuals.counts();
+    let total: f64 = counts.iter().map(|(_, count)| *count as f64).sum();
+    let mean = |power: i32| {
+        let terms = counts
+            .iter()
+            .map(|(steps, count)| *count as f64 * (*steps as f64 / STEPS as f64).powi(power));
+        terms.sum::<f64>() / total.max(1.0)
+    };
+    let centre = mean(1);
+    // The mean of quantile times residual.
+    let product = |shape: f64| {
+        let (mut below, mut sum) = (0.0, 0.0);
+        let mut integral_below = integral(0.0, shape);
+        for (steps, count) in &counts {
+            below += *count as f64;
+            let integral_above = integral(below / total, shape);
+            sum += (*steps as f64 / STEPS as f64 - centre) * (integral_above - integral_below);
+            integral_below = integral_above;
+        }
+        sum
+    };
+    let correlation = |shape: f64| product(shape) / variance(shape).sqrt();
+    let shape = golden(SHAPES, &correlation);
+    PlotFit {
+        shape,
+        scale: product(shape) / variance(shape),
+    }
+}
+
+/// The integral of the quantile function Q from 0 to u: Σ ±(u^(λ+1)) / (λ(λ + 1)) up to a constant.
+fn integral(u: f64, shape: f64) -> f64 {
+    let part = |u: f64| {
+        if u <= 0.0 {
+            return 0.0;
+        }
+        let log = libm::log(u);
+        if shape == 0.0 {
+            u * log
+        } else {
+            u * libm::expm1(shape * log) / shape
+        }
+    };
+    (part(u) + part(1.0 - u)) / (shape + 1.0)
+}
+
+/// The variance of a distribution of scale 1: 2/λ² · (1/(2λ + 1) − Γ(λ + 1)²/Γ(2λ + 2)), and π²/3 at λ = 0.
+fn variance(shape: f64) -> f64 {
+    let exact = |shape: f64| {
+        let gamma = 2.0 * libm::lgamma(shape + 1.0) - libm::lgamma(2.0 * shape + 2.0);
+        2.0 / (shape * shape) * (1.0 / (2.0 * shape + 1.0) - libm::exp(gamma))
+    };
+    // Near 0 the difference cancels, and the variance is linear to 10⁻⁶ of itself.
+    let near = 1e-3;
+    if shape.abs() >= near {
+        return exact(shape);
+    }
+    let [below, above] = [-near, near].map(exact);
+    below + (above - below) * (shape + near) / (2.0 * near)
+}
+
+/// The place of the greatest value of a function with one peak in a range, by the golden section.
+fn golden([mut low, mut high]: [f64; 2], function: &impl Fn(f64) -> f64) -> f64 {
+    let ratio = (5.0_f64.sqrt() - 1.0) / 2.0;
+    let inner = |low: f64, high: f64| [high - ratio * (high - low), low + ratio * (high - low)];
+    let [mut a, mut b] = inner(low, high);
+    let [mut at_a, mut at_b] = [function(a), function(b)];
+    while high - low > 1e-6 {
+        if at_a > at_b {
+            (high, b, at_b) = (b, a, at_a);
+            [a, _] = inner(low, high);
+            at_a = function(a);
+        } else {
+            (low, a, at_a) = (a, b, at_b);
+            [_, b] = inner(low, high);
+            at_b = function(b);
+        }
+    }
+    low.midpoint(high)
+}

@@ -1,0 +1,88 @@
+//! A recording in folders: a folder a setting, in it `bias`, `flat-NAME` for each exposure, and, where they exist, `dark-NAME`
+//! of the same exposures and `white`.
+
+use std::path::{Path, PathBuf};
+
+use super::files::{Recording, SettingFiles, TABLE};
+use crate::error::{Error, Result};
+use crate::files::reading::entries;
+
+/// How the folders are named.
+const NAMES: &str =
+    "bias/, flat-NAME/ for each exposure, and if you have them dark-NAME/ and white/";
+
+/// Finds the frames of a folder. Files and folders with other names are left out, and named.
+pub(super) fn read(folder: &Path) -> Result<Recording> {
+    let mut recording = Recording {
+        settings: Vec::new(),
+        notes: Vec::new(),
+    };
+    for path in visible(folder)? {
+        if !path.is_dir() {
+            let problem = "no folder of a setting, left out";
+            recording
+                .notes
+                .push(format!("{}: {problem}", path.display()));
+            continue;
+        }
+        let setting = setting(&path, &mut recording.notes)?;
+        recording.settings.push(setting);
+    }
+    if recording.settings.is_empty() {
+        let problem = format!(
+            "no folder of a setting in it; expected: DIR/SETTING/ (such as DIR/iso800/), in it {NAMES}; or a list DIR/{TABLE}"
+        );
+        return Err(Error::data(folder.display(), problem));
+    }
+    Ok(recording)
+}
+
+/// The frames of a setting.
+fn setting(folder: &Path, notes: &mut Vec<String>) -> Result<SettingFiles> {
+    let mut setting = SettingFiles {
+        name: name(folder),
+        ..SettingFiles::default()
+    };
+    let mut found = 0;
+    for path in visible(folder)? {
+        let Some(frames) = place_of(&mut setting, &path) else {
+            let problem = format!("none of {NAMES}; left out");
+            notes.push(format!("{}: {problem}", path.display()));
+            continue;
+        };
+        *frames = visible(&path)?;
+        found += 1;
+    }
+    if found == 0 {
+        let problem = format!("no frames of a setting; expected in it: {NAMES}");
+        return Err(Error::data(folder.display(), problem));
+    }
+    Ok(setting)
+}
+
+/// Where the frames of a folder belong; `None` for a file or a folder with another name.
+fn place_of<'a>(setting: &'a mut SettingFiles, path: &Path) -> Option<&'a mut Vec<PathBuf>> {
+    let kind = name(path);
+    if !path.is_dir() {
+        return None;
+    }
+    match (kind.strip_prefix("flat-"), kind.strip_prefix("dark-")) {
+        (Some(exposure), _) => Some(&mut setting.exposure(exposure).flats),
+        (_, Some(exposure)) => Some(&mut setting.exposure(exposure).dark),
+        _ if kind == "bias" => Some(&mut setting.bias),
+        _ if kind == "white" => Some(&mut setting.white),
+        _ => None,
+    }
+}
+
+/// The files and folders in a folder by name, without hidden ones.
+fn visible(folder: &Path) -> Result<Vec<PathBuf>> {
+    let mut paths = entries(folder)?;
+    paths.retain(|path| !name(path).starts_with('.'));
+    Ok(paths)
+}
+
+fn name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
+}

@@ -1,0 +1,53 @@
+//! The files of a recording, by setting and exposure: [`Recording`], found in folders or listed in `frames.csv`.
+
+mod files;
+mod folders;
+mod table;
+
+use std::path::{Path, PathBuf};
+
+use crate::error::Result;
+pub(crate) use files::Recording;
+use files::TABLE;
+pub(super) use files::{ExposureFiles, LEAST, SettingFiles};
+
+impl Recording {
+    /// Finds the frames of a folder: by its `frames.csv` if it has one, else by the names of the folders in it.
+    ///
+    /// # Errors
+    /// If the folder cannot be read, or a setting has too few frames.
+    pub(crate) fn open(folder: &Path) -> Result<Self> {
+        let list = folder.join(TABLE);
+        let mut recording = if list.exists() {
+            table::read(folder, &list)?
+        } else {
+            folders::read(folder)?
+        };
+        recording.settings.sort_by(|a, b| {
+            let number = |setting: &SettingFiles| setting.number().unwrap_or(f64::INFINITY);
+            let by_number = number(a).total_cmp(&number(b));
+            by_number.then_with(|| a.name.cmp(&b.name))
+        });
+        for setting in &mut recording.settings {
+            setting.pair_up(folder, &mut recording.notes)?;
+        }
+        Ok(recording)
+    }
+
+    /// The first frame: the first bias frame of the first setting.
+    pub(super) fn first(&self) -> &Path {
+        let first = self
+            .settings
+            .iter()
+            .find_map(|setting| setting.bias.first());
+        first.map_or(Path::new(""), PathBuf::as_path)
+    }
+
+    /// Number of settings.
+    pub(crate) fn settings(&self) -> usize {
+        self.settings.len()
+    }
+}
+
+#[cfg(test)]
+mod tests;

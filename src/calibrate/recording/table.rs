@@ -1,0 +1,87 @@
+//! A recording listed in `frames.csv`, with the columns `file`, `setting`, `kind` and `exposure`.
+
+use std::path::Path;
+
+use serde::Deserialize;
+
+use super::files::{Recording, SettingFiles};
+use crate::error::{Error, Result};
+
+/// A line of the list.
+#[derive(Deserialize)]
+struct Line {
+    /// Path of the frame from the folder of the list.
+    file: String,
+    setting: String,
+    kind: FrameKind,
+    /// Name of the exposure of a flat or dark frame.
+    #[serde(default)]
+    exposure: String,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum FrameKind {
+    Bias,
+    Flat,
+    Dark,
+    White,
+}
+
+/// Reads the list of a folder.
+pub(super) fn read(folder: &Path, list: &Path) -> Result<Recording> {
+    let mut reader = csv::ReaderBuilder::new();
+    let reader = reader.trim(csv::Trim::All).from_path(list);
+    let mut reader = reader.map_err(|e| Error::data(list.display(), e))?;
+    let mut settings: Vec<SettingFiles> = Vec::new();
+    // The heads are line 1.
+    for (number, line) in (2..).zip(reader.deserialize::<Line>()) {
+        let line = line.map_err(|e| {
+            let problem = format!(
+                "{}; columns file, setting, kind (bias, flat, dark or white) and exposure expected",
+                plain(&e)
+            );
+            Error::line(list, number, problem)
+        })?;
+        let path = folder.join(&line.file);
+        if !path.is_file() {
+            let problem = format!("{}: no such file", path.display());
+            return Err(Error::line(list, number, problem));
+        }
+        let is_lit = matches!(line.kind, FrameKind::Flat | FrameKind::Dark);
+        if is_lit && line.exposure.is_empty() {
+            let problem = "a flat or dark frame needs the name of its exposure";
+            return Err(Error::line(list, number, problem));
+        }
+        let known = settings.iter().position(|known| known.name == line.setting);
+        let index = known.unwrap_or_else(|| {
+            settings.push(SettingFiles {
+                name: line.setting.clone(),
+                ..SettingFiles::default()
+            });
+            settings.len() - 1
+        });
+        let setting = &mut settings[index];
+        match line.kind {
+            FrameKind::Bias => setting.bias.push(path),
+            FrameKind::White => setting.white.push(path),
+            FrameKind::Flat => setting.exposure(&line.exposure).flats.push(path),
+            FrameKind::Dark => setting.exposure(&line.exposure).dark.push(path),
+        }
+    }
+    if settings.is_empty() {
+        return Err(Error::data(list.display(), "no frames in the list"));
+    }
+    Ok(Recording {
+        settings,
+        notes: Vec::new(),
+    })
+}
+
+/// The error of a line without the position that the parser adds.
+fn plain(error: &csv::Error) -> String {
+    match error.kind() {
+        csv::ErrorKind::Deserialize { err, .. } => err.kind().to_string(),
+        _ => error.to_string(),
+    }
+}

@@ -1,0 +1,157 @@
+use std::fs;
+
+use super::*;
+
+/// A folder with empty files of these names.
+fn folder(files: &[&str]) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for file in files {
+        let path = folder.path().join(file);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, "").unwrap();
+    }
+    folder
+}
+
+/// The files of a setting with 2 bias frames and 3 exposures of a pair.
+fn least(setting: &str) -> Vec<String> {
+    let bias = (0..2).map(|i| format!("{setting}/bias/{i}.png"));
+    let flats = (1..4).flat_map(|e| (0..2).map(move |i| format!("{setting}/flat-{e}/{i}.png")));
+    bias.chain(flats).collect()
+}
+
+fn opened(files: &[String]) -> (tempfile::TempDir, Result<Recording>) {
+    let files: Vec<&str> = files.iter().map(String::as_str).collect();
+    let folder = folder(&files);
+    let recording = Recording::open(folder.path());
+    (folder, recording)
+}
+
+#[test]
+fn settings_are_ordered_by_number() {
+    let files = ["iso800", "iso1600", "iso100", "low"].map(least).concat();
+    let (_folder, recording) = opened(&files);
+    let recording = recording.unwrap();
+    let names = recording.settings.iter().map(|setting| &*setting.name);
+    assert_eq!(
+        names.collect::<Vec<_>>(),
+        ["iso100", "iso800", "iso1600", "low"]
+    );
+    let numbers = recording.settings.iter().map(SettingFiles::number);
+    let numbers: Vec<_> = numbers.collect();
+    assert_eq!(numbers, [Some(100.0), Some(800.0), Some(1600.0), None]);
+    assert_eq!(recording.notes, [""; 0]);
+    assert!(recording.first().ends_with("iso100/bias/0.png"));
+}
+
+#[test]
+fn odd_flats_and_strange_names_are_left_out_and_named() {
+    let mut files = least("iso100");
+    files.extend(
+        [
+            "iso100/flat-2/2.png",
+            "iso100/flats/0.png",
+            "iso100/notes.txt",
+            "iso100/dark-1/0.png",
+            "iso100/dark-9/0.png",
+            "iso100/dark-9/1.png",
+            "iso100/.hidden",
+            "readme.md",
+            ".hidden",
+        ]
+        .map(str::to_owned),
+    );
+    let (_folder, recording) = opened(&files);
+    let recording = recording.unwrap();
+    for part in [
+        "readme.md: no folder of a setting",
+        "flats: none of bias/, flat-NAME/",
+        "notes.txt: none of",
+        "flat-2/2.png: without a partner",
+        "dark-1/0.png: at least 2 dark frames",
+        "dark frames of 9, an exposure without flats",
+    ] {
+        assert!(
+            recording.notes.iter().any(|note| note.contains(part)),
+            "{part}"
+        );
+    }
+    assert_eq!(recording.notes.len(), 6, "{:?}", recording.notes);
+    let exposures = &recording.settings[0].exposures;
+    assert_eq!(exposures.len(), 3);
+    assert!(exposures.iter().all(|exposure| exposure.flats.len() == 2));
+    assert!(exposures.iter().all(|exposure| exposure.dark.is_empty()));
+}
+
+#[test]
+fn too_few_frames_are_refused() {
+    let without = |part: &str| -> Vec<String> {
+        let mut files = least("iso100");
+        files.retain(|file| !file.contains(part));
+        files
+    };
+    for (files, part) in [
+        (without("bias/0"), "1 bias frames and 3 exposures"),
+        (without("flat-2/1"), "2 bias frames and 2 exposures"),
+        (vec!["a.png".to_owned()], "no folder of a setting in it"),
+        (vec!["iso100/a.png".to_owned()], "no frames of a setting"),
+    ] {
+        let (_folder, recording) = opened(&files);
+        let error = recording.unwrap_err().to_string();
+        assert!(error.contains(part), "{error}");
+    }
+    assert!(Recording::open(Path::new("nowhere")).is_err());
+}
+
+const LIST: &str = "file,setting,kind,exposure
+b0,100,bias,
+b1,100,bias,
+f0, 100, flat, short
+f1,100,flat,short
+f2,100,flat,middle
+f3,100,flat,middle
+f4,100,flat,long
+f5,100,flat,long
+d0,100,dark,long
+d1,100,dark,long
+w0,100,white,
+";
+
+#[test]
+fn a_list_names_the_frames() {
+    let folder = folder(&[
+        "b0", "b1", "f0", "f1", "f2", "f3", "f4", "f5", "d0", "d1", "w0",
+    ]);
+    let list = folder.path().join("frames.csv");
+    fs::write(&list, LIST).unwrap();
+    let recording = Recording::open(folder.path()).unwrap();
+    let [setting] = &recording.settings[..] else {
+        panic!("{recording:?}");
+    };
+    assert_eq!((setting.bias.len(), setting.white.len()), (2, 1));
+    assert_eq!(setting.exposures[2].name, "long");
+    assert_eq!(setting.exposures[2].dark.len(), 2);
+    for (from, to, part) in [
+        ("b1,100,bias", "b9,100,bias", "line 3: "),
+        ("b1,100,bias", "b1,100,biass", "line 3: "),
+        (
+            "b1,100,bias",
+            "b1,100,biass",
+            "kind (bias, flat, dark or white)",
+        ),
+        (
+            "f1,100,flat,short",
+            "f1,100,flat,",
+            "line 5: a flat or dark frame needs",
+        ),
+        ("file,", "files,", "columns file, setting, kind"),
+        (LIST, "", "no frames in the list"),
+    ] {
+        fs::write(&list, LIST.replacen(from, to, 1)).unwrap();
+        let error = Recording::open(folder.path()).unwrap_err().to_string();
+        assert!(
+            error.contains("frames.csv") && error.contains(part),
+            "{error}"
+        );
+    }
+}

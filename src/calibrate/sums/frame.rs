@@ -1,0 +1,133 @@
+//! Sums of single frames: [`PlaneSums`] and [`TopCode`].
+
+use rayon::prelude::*;
+
+use super::super::hot_pixels::HotPixels;
+use super::super::layout::Layout;
+use super::gather;
+
+/// Sums of the samples of a frame by part of a row, without hot pixels.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(in super::super) struct PlaneSums {
+    layout: Layout,
+    /// Number and sum of the samples of each part of a row.
+    rows: Vec<[u64; 2]>,
+}
+
+impl PlaneSums {
+    pub(in super::super) fn of(layout: Layout, samples: &[u16], hot: &HotPixels) -> Self {
+        let parts = (0..layout.plane_rows()).into_par_iter().with_min_len(64);
+        let rows = parts.map_init(Vec::new, |part, plane_row| {
+            gather(layout, samples, plane_row, part);
+            let sum: u64 = part.iter().map(|sample| u64::from(*sample)).sum();
+            let hot = hot.columns(plane_row).map(|column| part[column]);
+            hot.fold([part.len() as u64, sum], |[count, sum], sample| {
+                [count - 1, sum - u64::from(sample)]
+            })
+        });
+        Self {
+            layout,
+            rows: rows.collect(),
+        }
+    }
+
+    /// Number and sum of the samples of each part of a row.
+    pub(in super::super) fn rows(&self) -> &[[u64; 2]] {
+        &self.rows
+    }
+
+    /// Number and sum of the samples of each plane.
+    pub(in super::super) fn planes(&self) -> Vec<[u64; 2]> {
+        let mut planes = vec![[0; 2]; self.layout.cfa.planes()];
+        for (plane_row, [count, sum]) in self.rows.iter().enumerate() {
+            let [row, parity] = self.layout.place(plane_row);
+            let plane = &mut planes[self.layout.cfa.plane(row, parity)];
+            plane[0] += count;
+            plane[1] += sum;
+        }
+        planes
+    }
+}
+
+/// The greatest code of each plane of a frame, and how many samples have it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(in super::super) struct TopCode {
+    /// For each plane: number of samples, greatest code, and number of samples with this code.
+    pub(in super::super) planes: Vec<(u64, u16, u64)>,
+}
+
+impl TopCode {
+    pub(in super::super) fn of(layout: Layout, samples: &[u16], hot: &HotPixels) -> Self {
+        let parts = (0..layout.plane_rows()).into_par_iter().with_min_len(64);
+        let rows = parts.map_init(Vec::new, |part, plane_row| {
+            gather(layout, samples, plane_row, part);
+            let n = part.len();
+            for (removed, column) in hot.columns(plane_row).enumerate() {
+                // Each removal moves the columns behind it by one.
+                part.remove(column - removed);
+            }
+            debug_assert!(part.len() <= n);
+            let top = part.iter().copied().max().unwrap_or(0);
+            let with_it = part.iter().filter(|sample| **sample == top).count();
+            (part.len() as u64, top, with_it as u64)
+        });
+        let rows: Vec<(u64, u16, u64)> = rows.collect();
+        let mut planes = vec![(0, 0, 0); layout.cfa.planes()];
+        for (plane_row, (count, top, with_it)) in rows.into_iter().enumerate() {
+            let [row, parity] = layout.place(plane_row);
+            let plane = &mut planes[layout.cfa.plane(row, parity)];
+            plane.0 += count;
+            if top > plane.1 {
+                (plane.1, plane.2) = (top, 0);
+            }
+            if top == plane.1 {
+                plane.2 += with_it;
+            }
+        }
+        Self { planes }
+    }
+
+    /// The largest share of samples at the greatest code of their plane.
+    pub(in super::super) fn largest_share(&self) -> f64 {
+        let shares = self.planes.iter().map(|(count, _, with_it)| {
+            if *count == 0 {
+                0.0
+            } else {
+                *with_it as f64 / *count as f64
+            }
+        });
+        shares.fold(0.0, f64::max)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibrate::layout::Cfa;
+
+    const LAYOUT: Layout = Layout {
+        cfa: Cfa::Rggb,
+        height: 2,
+        width: 6,
+    };
+    const SAMPLES: [u16; 12] = [1, 10, 2, 10, 3, 10, 5, 7, 5, 7, 9, 8];
+
+    #[test]
+    fn planes_are_summed_apart() {
+        let sums = PlaneSums::of(LAYOUT, &SAMPLES, &HotPixels::none(4));
+        assert_eq!(sums.planes(), [[3, 6], [3, 30], [3, 19], [3, 22]]);
+        let hot = HotPixels::new(vec![vec![0, 2], vec![], vec![1], vec![]]);
+        let sums = PlaneSums::of(LAYOUT, &SAMPLES, &hot);
+        assert_eq!(sums.planes(), [[1, 2], [3, 30], [2, 14], [3, 22]]);
+    }
+
+    #[test]
+    fn samples_at_the_greatest_code_are_counted() {
+        let top = TopCode::of(LAYOUT, &SAMPLES, &HotPixels::none(4));
+        assert_eq!(top.planes, [(3, 3, 1), (3, 10, 3), (3, 9, 1), (3, 8, 1)]);
+        assert!((top.largest_share() - 1.0).abs() < 1e-15);
+        let hot = HotPixels::new(vec![vec![], vec![0, 1], vec![2], vec![]]);
+        let top = TopCode::of(LAYOUT, &SAMPLES, &hot);
+        assert_eq!(top.planes, [(3, 3, 1), (1, 10, 1), (2, 5, 2), (3, 8, 1)]);
+    }
+}

@@ -1,0 +1,19 @@
+//! Sums over frames, all of whole numbers: they are exact, and the same in any order and on any number of threads.
+
+mod frame;
+mod pair;
+mod residuals;
+
+pub(super) use frame::{PlaneSums, TopCode};
+pub(super) use pair::{PairNoise, PairSums, Tile};
+pub(super) use residuals::{Centres, Residuals, STEPS};
+
+use super::layout::Layout;
+
+/// Samples of the part of a row that belongs to one plane.
+fn gather(layout: Layout, samples: &[u16], plane_row: usize, part: &mut Vec<u16>) {
+    let [row, parity] = layout.place(plane_row);
+    let row = &samples[row * layout.width..][..layout.width];
+    part.clear();
+    part.extend(row[parity..].iter().step_by(layout.cfa.step()));
+}

@@ -1,0 +1,172 @@
+use super::*;
+use crate::calibrate::layout::Cfa;
+
+const BAYER: Layout = Layout {
+    cfa: Cfa::Rggb,
+    height: 64,
+    width: 48,
+};
+
+/// Numbers from 0 to 2³² − 1 that look random.
+struct Numbers(u64);
+
+impl Iterator for Numbers {
+    type Item = u32;
+
+    fn next(&mut self) -> Option<u32> {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        Some((self.0 >> 32) as u32)
+    }
+}
+
+/// A frame of codes about `level`, spread evenly over 2 · `spread` + 1 codes.
+fn frame(layout: Layout, seed: u64, level: u16, spread: u32) -> Vec<u16> {
+    let numbers = Numbers(seed).take(layout.height * layout.width);
+    numbers
+        .map(|number| level + (number % (2 * spread + 1)) as u16 - spread as u16)
+        .collect()
+}
+
+/// The same by loops over sites, for a pair of planes without hot pixels.
+fn noise_by_sites(layout: Layout, a: &[u16], b: &[u16]) -> [f64; 2] {
+    let planes = layout.cfa.planes();
+    let plane = |site: usize| {
+        let (row, column) = (site / layout.width, site % layout.width);
+        layout.cfa.plane(row, column % layout.cfa.step())
+    };
+    let mut d: Vec<f64> = a
+        .iter()
+        .zip(b)
+        .map(|(a, b)| f64::from(*a) - f64::from(*b))
+        .collect();
+    for wanted in 0..planes {
+        let sites: Vec<usize> = (0..d.len()).filter(|site| plane(*site) == wanted).collect();
+        let mean = sites.iter().map(|site| d[*site]).sum::<f64>() / sites.len() as f64;
+        for site in &sites {
+            d[*site] -= mean;
+        }
+    }
+    let (mut within, mut means) = (0.0, Vec::new());
+    for row in d.chunks(layout.width) {
+        let mean = row.iter().sum::<f64>() / layout.width as f64;
+        within += row.iter().map(|d| (d - mean).powi(2)).sum::<f64>();
+        means.push(mean);
+    }
+    let step = layout.cfa.step();
+    let free = d.len() - layout.height - (planes - step);
+    let within = within / free as f64 / 2.0;
+    let row = means.iter().map(|mean| mean * mean).sum::<f64>() / (layout.height - step) as f64;
+    [within, row / 2.0 - within / layout.width as f64]
+}
+
+#[test]
+fn noise_is_that_of_the_definition() {
+    for cfa in [Cfa::Rggb, Cfa::Mono] {
+        let layout = Layout { cfa, ..BAYER };
+        let (a, b) = (frame(layout, 1, 500, 9), frame(layout, 2, 510, 9));
+        let hot = HotPixels::none(layout.plane_rows());
+        let found = PairSums::of(layout, [&a, &b], &hot).noise();
+        let [within, row] = noise_by_sites(layout, &a, &b);
+        assert!((found.within - within).abs() < 1e-9 * within, "{cfa}");
+        assert!((found.row - row).abs() < 1e-9, "{cfa}");
+        // Uniform over 19 codes: the variance is (19² − 1) / 12 = 30.
+        assert!((found.within - 30.0).abs() < 2.0, "{}", found.within);
+    }
+}
+
+/// What stands still in both frames changes nothing, and offsets of whole rows are row noise alone.
+#[test]
+fn fixed_pattern_cancels_and_rows_are_row_noise() {
+    let hot = HotPixels::none(BAYER.plane_rows());
+    let (a, b) = (frame(BAYER, 3, 500, 9), frame(BAYER, 4, 500, 9));
+    let plain = PairSums::of(BAYER, [&a, &b], &hot).noise();
+    let pattern = frame(BAYER, 5, 1000, 400);
+    let with =
+        |frame: &[u16]| -> Vec<u16> { frame.iter().zip(&pattern).map(|(a, b)| a + b).collect() };
+    let fixed = PairSums::of(BAYER, [&with(&a), &with(&b)], &hot).noise();
+    assert_eq!(plain, fixed);
+    let rows: Vec<u16> = b
+        .chunks(BAYER.width)
+        .zip(Numbers(6))
+        .flat_map(|(row, number)| row.iter().map(move |code| code + (number % 20) as u16))
+        .collect();
+    let shifted = PairSums::of(BAYER, [&a, &rows], &hot).noise();
+    assert!((shifted.within - plain.within).abs() < 1e-9);
+    // Uniform over 20 codes: variance 33.25, in one frame of two.
+    assert!((shifted.row - plain.row - 33.25 / 2.0).abs() < 5.0);
+}
+
+#[test]
+fn hot_pixels_are_in_no_sum() {
+    let (mut a, b) = (frame(BAYER, 7, 500, 9), frame(BAYER, 8, 500, 9));
+    let columns: Vec<Vec<u32>> = (0..BAYER.plane_rows())
+        .map(|plane_row| match plane_row {
+            0 => vec![0, 1, 2],
+            5 => vec![9, 11, 23],
+            _ => Vec::new(),
+        })
+        .collect();
+    let hot = HotPixels::new(columns);
+    let clean = PairSums::of(BAYER, [&a, &b], &hot);
+    let (tiles, noise, correlation) = (clean.tiles(), clean.noise(), clean.correlation());
+    for plane_row in [0, 5] {
+        let [row, parity] = BAYER.place(plane_row);
+        for column in hot.columns(plane_row) {
+            a[row * BAYER.width + 2 * column + parity] = 60_000;
+        }
+    }
+    let spoiled = PairSums::of(BAYER, [&a, &b], &hot);
+    assert_eq!(spoiled.tiles(), tiles);
+    assert_eq!(spoiled.noise(), noise);
+    assert!((spoiled.correlation() - correlation).abs() < 1e-15);
+    // The control: without the mask they are.
+    let unmasked = PairSums::of(BAYER, [&a, &b], &HotPixels::none(BAYER.plane_rows()));
+    assert!(unmasked.noise().within > 1000.0 * noise.within);
+    assert_eq!(hot.count(), 6);
+}
+
+#[test]
+fn smoothing_shows_as_correlation() {
+    let layout = Layout {
+        height: 256,
+        width: 256,
+        ..BAYER
+    };
+    let hot = HotPixels::none(layout.plane_rows());
+    let (a, b) = (frame(layout, 9, 500, 90), frame(layout, 10, 500, 90));
+    let plain = PairSums::of(layout, [&a, &b], &hot).correlation();
+    assert!(plain.abs() < 0.015, "{plain}");
+    let smooth = |frame: &[u16]| -> Vec<u16> {
+        let rows = frame.chunks(layout.width);
+        rows.flat_map(|row| (0..row.len()).map(|x| row[x].midpoint(row[(x + 2) % row.len()])))
+            .collect()
+    };
+    let smoothed = PairSums::of(layout, [&smooth(&a), &smooth(&b)], &hot).correlation();
+    assert!((smoothed - 0.5).abs() < 0.02, "{smoothed}");
+}
+
+#[test]
+fn tiles_have_the_light_and_the_noise_of_their_place() {
+    let hot = HotPixels::none(BAYER.plane_rows());
+    let mut lit = [frame(BAYER, 11, 500, 9), frame(BAYER, 12, 500, 9)];
+    // The lower right tile of green in the rows of red is brighter.
+    for frame in &mut lit {
+        for row in (56..64).step_by(2) {
+            for column in (43..48).step_by(2) {
+                frame[row * BAYER.width + column] += 300;
+            }
+        }
+    }
+    let tiles = PairSums::of(BAYER, [&lit[0], &lit[1]], &hot).tiles();
+    assert_eq!(tiles.len(), 4 * TILES * TILES);
+    for (index, tile) in tiles.iter().enumerate() {
+        assert_eq!((tile.plane, tile.count), (index / 64, 12.0));
+        let level = if index == 127 { 800.0 } else { 500.0 };
+        assert!((tile.mean - level).abs() < 5.0, "{index}: {}", tile.mean);
+    }
+    let variance = tiles.iter().map(|tile| tile.variance).sum::<f64>() / tiles.len() as f64;
+    assert!((variance - 30.0).abs() < 2.0, "{variance}");
+}

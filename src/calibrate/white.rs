@@ -1,0 +1,75 @@
+//! The code of white, from overexposed frames: [`of_frames`].
+
+use std::path::PathBuf;
+
+use super::batches::in_batches;
+use super::frames::FrameReader;
+use super::inputs::Inputs;
+use super::recording::Recording;
+use crate::error::{Error, Result};
+
+/// Least share of the samples of an overexposed frame at its greatest code (chosen).
+const AT_WHITE: f64 = 0.5;
+
+/// The greatest code of all overexposed frames.
+///
+/// # Errors
+/// If there are none, one is not overexposed, or they end at different codes.
+pub(super) fn of_frames(
+    reader: &FrameReader,
+    recording: &Recording,
+    folder: &std::path::Path,
+    inputs: &mut Inputs,
+) -> Result<u16> {
+    let files: Vec<&PathBuf> = recording
+        .settings
+        .iter()
+        .flat_map(|setting| &setting.white)
+        .collect();
+    let mut white: Option<(u16, &PathBuf)> = None;
+    let work = |path: &&PathBuf| {
+        let frame = reader.read(path)?;
+        let top = frame.samples.iter().copied().max().unwrap_or(0);
+        let with_it = frame
+            .samples
+            .iter()
+            .filter(|sample| **sample == top)
+            .count();
+        let share = with_it as f64 / frame.samples.len() as f64;
+        if share < AT_WHITE {
+            let problem = format!(
+                "{:.1} % of the samples are at the greatest code, {top}, and a frame in white/ needs {:.0} %: overexpose it more, or state the code of white with --white",
+                100.0 * share,
+                100.0 * AT_WHITE
+            );
+            return Err(Error::data(path.display(), problem));
+        }
+        Ok((top, frame.facts))
+    };
+    in_batches(
+        &files,
+        reader.bytes_of_frame(),
+        work,
+        |path, (top, facts)| {
+            inputs.add(path, &facts);
+            match white {
+                Some((known, first)) if known != top => {
+                    let problem = format!(
+                        "white is {top}, but {known} in {}: state one code of white with --white",
+                        first.display()
+                    );
+                    Err(Error::data(path.display(), problem))
+                }
+                _ => {
+                    white = Some((top, path));
+                    Ok(())
+                }
+            }
+        },
+    )?;
+    let problem = "the code of white is not known: state it with --white, or add overexposed frames in SETTING/white/";
+    white.map_or_else(
+        || Err(Error::data(folder.display(), problem)),
+        |(code, _)| Ok(code),
+    )
+}

@@ -1,0 +1,139 @@
+//! Curves from the values of a channel to linear light: [`ToneCurve`].
+
+use moxcms::ToneReprCurve;
+
+use super::srgb;
+
+/// A curve from values in [0, 1] to linear light in [0, 1].
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum ToneCurve {
+    /// The curve of sRGB.
+    Srgb,
+    /// The curve of BT.709.
+    Bt709,
+    /// A power.
+    Gamma(f64),
+    /// Light at equal distances, interpolated; at least two values.
+    Table(Vec<f64>),
+    /// The segmented curve of ICC.1:2022, section 10.18, with its parameters g, a, b, c, d, e and f.
+    Segments([f64; 7]),
+}
+
+impl ToneCurve {
+    /// The curve of a profile.
+    ///
+    /// # Errors
+    /// If a number of it is not finite.
+    pub(super) fn of_profile(curve: &ToneReprCurve) -> Result<Self, String> {
+        let numbers = match curve {
+            ToneReprCurve::Lut(table) => match table[..] {
+                [] => return Ok(Self::Gamma(1.0)),
+                // An unsigned number of 8 bits before the point and 8 behind it.
+                [gamma] => return Ok(Self::Gamma(f64::from(gamma) / 256.0)),
+                _ => {
+                    let values = table.iter().map(|value| f64::from(*value) / 65_535.0);
+                    return Ok(Self::Table(values.collect()));
+                }
+            },
+            ToneReprCurve::Parametric(numbers) => numbers,
+        };
+        if numbers.iter().any(|number| !number.is_finite()) {
+            return Err("a curve of the ICC profile has a number that is not finite".to_owned());
+        }
+        let numbers: Vec<f64> = numbers.iter().map(|number| f64::from(*number)).collect();
+        Ok(Self::Segments(match numbers[..] {
+            [g] => [g, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            [g, a, b] => [g, a, b, 0.0, -b / a, 0.0, 0.0],
+            [g, a, b, c] => [g, a, b, 0.0, -b / a, c, c],
+            [g, a, b, c, d] => [g, a, b, c, d, 0.0, 0.0],
+            [g, a, b, c, d, e, f] => [g, a, b, c, d, e, f],
+            _ => return Err("a curve of the ICC profile has an unknown form".to_owned()),
+        }))
+    }
+
+    /// Linear light of a value in [0, 1], clamped to [0, 1].
+    pub(super) fn light(&self, value: f64) -> f64 {
+        let light = match self {
+            Self::Srgb => srgb::light(value),
+            Self::Bt709 => bt709(value),
+            Self::Gamma(gamma) => libm::pow(value, *gamma),
+            Self::Table(values) => interpolated(values, value),
+            Self::Segments([g, a, b, c, d, e, f]) => {
+                if value >= *d {
+                    libm::pow((a * value + b).max(0.0), *g) + e
+                } else {
+                    c * value + f
+                }
+            }
+        };
+        // Also a number that is none, as of 0 to a negative power, becomes 0.
+        if light > 0.0 { light.min(1.0) } else { 0.0 }
+    }
+}
+
+/// Linear light of a value by BT.709-6, item 1.2, whose curve is inverted.
+fn bt709(value: f64) -> f64 {
+    const ALPHA: f64 = 1.099_296_826_809_44;
+    const BETA: f64 = 0.018_053_968_510_807;
+    if value < 4.5 * BETA {
+        value / 4.5
+    } else {
+        libm::pow((value + ALPHA - 1.0) / ALPHA, 1.0 / 0.45)
+    }
+}
+
+fn interpolated(values: &[f64], at: f64) -> f64 {
+    let place = at * (values.len() - 1) as f64;
+    let low = (place as usize).min(values.len() - 2);
+    let share = place - low as f64;
+    values[low] + share * (values[low + 1] - values[low])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn curves_of_profiles_follow_the_specification() {
+        let of = |curve: ToneReprCurve, at: f64| ToneCurve::of_profile(&curve).unwrap().light(at);
+        let segments = |numbers: &[f32]| ToneReprCurve::Parametric(numbers.to_vec());
+        let table = |numbers: &[u16]| ToneReprCurve::Lut(numbers.to_vec());
+        let srgb = [2.4, 1.0 / 1.055, 0.055 / 1.055, 1.0 / 12.92, 0.04045];
+        for (curve, at, expected) in [
+            (table(&[]), 0.3, 0.3),
+            (table(&[512]), 0.5, 0.25),
+            (table(&[0, 65_535]), 0.3, 0.3),
+            (table(&[0, 0, 65_535]), 0.75, 0.5),
+            (table(&[0, 0, 65_535]), 1.0, 1.0),
+            (segments(&[2.0]), 0.5, 0.25),
+            (segments(&[2.0, 2.0, -0.5]), 0.5, 0.25),
+            (segments(&[2.0, 2.0, -0.5]), 0.2, 0.0),
+            (segments(&[2.0, 2.0, -0.5, 0.125]), 0.2, 0.125),
+            (segments(&[2.0, 2.0, -0.5, 0.125]), 0.5, 0.375),
+            (segments(&srgb), 0.03, 0.03 / 12.92),
+            (segments(&srgb), 0.5, srgb::light(0.5)),
+            (segments(&[2.0, 1.0, 0.0, 0.5, 0.4, 0.01, 0.02]), 0.2, 0.12),
+            (segments(&[2.0, 1.0, 0.0, 0.5, 0.4, 0.01, 0.02]), 0.5, 0.26),
+        ] {
+            let found = of(curve.clone(), at);
+            assert!(
+                (found - expected).abs() < 1e-7,
+                "{curve:?} at {at}: {found}"
+            );
+        }
+        let is_one = |found: f64| (found - 1.0).abs() < f64::EPSILON;
+        assert!(is_one(of(segments(&[-1.0]), 0.0)));
+        assert!(is_one(of(segments(&[2.0, 9.0, 0.0]), 1.0)));
+        assert!(ToneCurve::of_profile(&segments(&[f32::NAN])).is_err());
+        assert!(ToneCurve::of_profile(&segments(&[1.0, 1.0])).is_err());
+    }
+
+    #[test]
+    fn the_curve_of_video_is_continuous() {
+        let join = 4.5 * 0.018_053_968_510_807;
+        let step = bt709(join + 1e-9) - bt709(join - 1e-9);
+        assert!(step.abs() < 1e-8, "{step}");
+        // With the rounded constants 1.099 and 0.018 it is 0.25959.
+        assert!((bt709(0.5) - 0.25959).abs() < 2e-4, "{}", bt709(0.5));
+    }
+}

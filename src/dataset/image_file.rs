@@ -1,0 +1,420 @@
+//! An image file in memory: [`ImageFile`].
+
+mod exr_layers;
+mod facts;
+pub(super) mod format;
+mod guarded;
+mod jpeg_markers;
+mod png_chunks;
+mod tiff_tags;
+mod webp_chunks;
+
+use std::borrow::Cow;
+use std::fs;
+use std::io::Cursor;
+use std::path::Path;
+use std::sync::Arc;
+
+use image::metadata::Orientation;
+use image::{ColorType, DynamicImage, ImageDecoder, ImageReader, Limits};
+
+use self::exr_layers::ExrFile;
+use self::facts::{Depth, FileFacts, fault, unshowable};
+use self::format::FileFormat;
+use self::guarded::guarded;
+use super::colour::{CodeDepth, ColourSpace, ColourTag, Meaning};
+use super::maps::MapPaths;
+use super::reading_rule::{ColourRule, ReadingRule, Transfer};
+use crate::error::{Error, Result};
+use crate::types::{
+    Codes16, ColourHandling, ColourNote, DepthNote, Digest, InputNote, Light, Pixels, Rgb,
+};
+
+/// A PNG, JPEG, WebP, TIFF or OpenEXR file that is not decoded.
+#[derive(Debug)]
+pub struct ImageFile {
+    bytes: Vec<u8>,
+    place: String,
+    rule: ReadingRule,
+    turning: Turning,
+}
+
+/// Whether an image is turned as the EXIF orientation of its file states.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Turning {
+    AsStated,
+    /// Never, because maps belong to the image as it is stored.
+    Never,
+}
+
+impl ImageFile {
+    /// The image file with these bytes. `place` is its path and line, for messages.
+    #[must_use]
+    pub fn new(bytes: Vec<u8>, place: String, rule: ReadingRule) -> Self {
+        Self {
+            bytes,
+            place,
+            rule,
+            turning: Turning::AsStated,
+        }
+    }
+
+    /// The file at a path.
+    ///
+    /// # Errors
+    /// If it cannot be read.
+    pub(crate) fn open(path: &Path, rule: ReadingRule) -> Result<Self> {
+        let bytes = fs::read(path).map_err(|e| Error::file(path, "read", e))?;
+        Ok(Self::new(bytes, path.display().to_string(), rule))
+    }
+
+    /// The same file, whose image is never turned.
+    #[must_use]
+    pub(crate) fn never_turned(self) -> Self {
+        Self {
+            turning: Turning::Never,
+            ..self
+        }
+    }
+
+    /// The same file, whose image is turned as it states.
+    #[must_use]
+    pub(crate) fn turned_as_stated(self) -> Self {
+        Self {
+            turning: Turning::AsStated,
+            ..self
+        }
+    }
+
+    /// The same file with maps beside it. Maps are not turned, so the image is not turned either if they have the size of
+    /// the image as stored.
+    ///
+    /// # Errors
+    /// If the file states a turn and a map has another size than the image as stored.
+    pub(super) fn beside(self, maps: &MapPaths) -> Result<Self> {
+        let stated = self.facts().orientation;
+        if maps.is_empty() || stated == Orientation::NoTransforms {
+            return Ok(self);
+        }
+        // A broken image is named when it is decoded. Formats of light state no turn.
+        let Ok((width, height)) = self.decoder().map(|decoder| decoder.dimensions()) else {
+            return Ok(self);
+        };
+        let stored = (height as usize, width as usize);
+        for (path, size) in maps.sizes()? {
+            if size != stored {
+                let problem = format_args!(
+                    "{} × {} pixels (height × width), but its image {} is stored with {height} × {width} and turned by its EXIF orientation {}; maps must have the size of the image as stored, which is then not turned, or the file no orientation",
+                    size.0,
+                    size.1,
+                    self.place,
+                    stated.to_exif()
+                );
+                return Err(Error::data(path.display(), problem));
+            }
+        }
+        Ok(self.never_turned())
+    }
+
+    /// The bytes of the file.
+    #[must_use]
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
+    /// The digest of the file and of what its reading does besides taking the codes. Of an image whose codes are taken as
+    /// they are, it is the digest of the file.
+    #[must_use]
+    pub fn digest(&self) -> Digest {
+        let file = Digest::of(&self.bytes);
+        match self.note().rule() {
+            None => file,
+            Some(rule) => {
+                Digest::of_parts([&b"darkqa.reading/1"[..], file.as_bytes(), rule.as_bytes()])
+            }
+        }
+    }
+
+    /// What reading the file does besides taking its codes.
+    #[must_use]
+    pub fn note(&self) -> InputNote {
+        let facts = self.facts();
+        let stated = facts.orientation;
+        let stated = (stated != Orientation::NoTransforms).then(|| stated.to_exif());
+        let (orientation, orientation_ignored) = match self.turning {
+            Turning::AsStated => (stated, None),
+            Turning::Never => (None, stated),
+        };
+        let samples = self.samples(&facts);
+        let depth = match (&samples, facts.depth) {
+            (Ok(Samples::Light(_)), _) => Some(DepthNote::Light),
+            (Ok(Samples::Codes(_)), Depth::Sixteen) => Some(DepthNote::Codes16),
+            _ => None,
+        };
+        let is_light = depth == Some(DepthNote::Light);
+        InputNote {
+            orientation,
+            orientation_ignored,
+            first_of: facts.first_of.map(str::to_owned),
+            colour: self.colour_note(&facts),
+            depth,
+            ..self.rule.note_of(is_light)
+        }
+    }
+
+    /// What is done about the colours of the file; `None` if they are sRGB, or cannot be shown.
+    fn colour_note(&self, facts: &FileFacts<'_>) -> Option<ColourNote> {
+        let FileFacts { colour, depth, .. } = facts;
+        match (self.rule.colour, colour.meaning(depth.of_codes())) {
+            (ColourRule::Convert, Err(_) | Ok(Meaning::Linear)) | (_, Ok(Meaning::Srgb)) => None,
+            (ColourRule::Convert, Ok(Meaning::Other(space))) => {
+                Some(space.note(ColourHandling::Converted))
+            }
+            (ColourRule::Ignore, Ok(Meaning::Other(space))) => {
+                Some(space.note(ColourHandling::Ignored))
+            }
+            (ColourRule::Ignore, Ok(Meaning::Linear) | Err(_)) => Some(ColourNote {
+                from: colour.kind().to_owned(),
+                profile: None,
+                handling: ColourHandling::Ignored,
+            }),
+        }
+    }
+
+    /// What the samples of the file are, by its colour information and by the rule.
+    ///
+    /// # Errors
+    /// If it cannot be known, or the two contradict each other.
+    fn samples(&self, facts: &FileFacts<'_>) -> Result<Samples, String> {
+        let ReadingRule {
+            colour, transfer, ..
+        } = self.rule;
+        let meaning = match colour {
+            ColourRule::Ignore => Meaning::Srgb,
+            ColourRule::Convert => facts.colour.meaning(facts.depth.of_codes())?,
+        };
+        let is_linear = transfer == Transfer::Linear && facts.depth == Depth::Sixteen;
+        Ok(match (meaning, facts.depth) {
+            (Meaning::Linear, _) | (Meaning::Srgb, Depth::Float) => Samples::Light(None),
+            (Meaning::Other(space), Depth::Float) => Samples::Light(Some(space)),
+            (Meaning::Srgb, _) if is_linear => {
+                if colour == ColourRule::Convert && facts.colour != ColourTag::None {
+                    return Err(contradiction(&facts.colour));
+                }
+                Samples::Light(None)
+            }
+            (Meaning::Other(_), _) if is_linear => return Err(contradiction(&facts.colour)),
+            (Meaning::Srgb, _) => Samples::Codes(None),
+            (Meaning::Other(space), _) => Samples::Codes(Some(space)),
+        })
+    }
+
+    /// The usual ending of a name for the file: by its content, not by its own name.
+    #[must_use]
+    pub(crate) fn ending(&self) -> &'static str {
+        FileFormat::of(&self.bytes).map_or("", FileFormat::ending)
+    }
+
+    /// The width and height in pixels, after a check that the file can be decoded.
+    ///
+    /// For an RGB PNG the checksums are enough: they find any damage at a hundredth of the cost of decompressing. Every
+    /// other file is decoded, because JPEG has no checksums and an alpha channel may be transparent.
+    pub fn check(&self) -> Result<(u32, u32)> {
+        if FileFormat::of(&self.bytes) == Ok(FileFormat::Png) {
+            let decoder = self.decoder()?;
+            if matches!(decoder.color_type(), ColorType::Rgb8 | ColorType::Rgb16) {
+                let (width, height) = decoder.dimensions();
+                self.check_complete()?;
+                self.samples_of(false)?;
+                return Ok(match self.orientation().to_exif() {
+                    5.. => (height, width),
+                    _ => (width, height),
+                });
+            }
+        }
+        let pixels = self.pixels()?;
+        Ok((pixels.width() as u32, pixels.height() as u32))
+    }
+
+    /// The pixels as 8-bit sRGB, as they are shown undarkened.
+    ///
+    /// # Errors
+    /// As of [`Self::pixels`].
+    pub fn decode(&self) -> Result<Rgb> {
+        let codes = self.pixels()?.codes();
+        Ok(Arc::try_unwrap(codes).unwrap_or_else(|shared| (*shared).clone()))
+    }
+
+    /// The pixels in the depth of the file. A truncated file, or a PNG with a wrong checksum, is refused.
+    ///
+    /// Grey becomes three equal channels, and a palette becomes its colours. An alpha channel is dropped if it is opaque
+    /// everywhere. CMYK and transparency are refused: there is no one right way to show them. The image is turned as its EXIF
+    /// orientation states, unless it has maps. Colours are converted to sRGB by the rule.
+    ///
+    /// # Errors
+    /// If the file is broken, or cannot be shown as it is; the error names the file.
+    pub fn pixels(&self) -> Result<Pixels> {
+        if FileFormat::of(&self.bytes) == Ok(FileFormat::OpenExr) {
+            return self.light_of_layers();
+        }
+        let decoder = self.decoder()?;
+        // The PNG decoder stops after the last sample, and the JPEG decoder accepts fewer samples than it should.
+        self.check_complete()?;
+        let decode = || {
+            let image = DynamicImage::from_decoder(decoder);
+            image.map_err(|e| format!("not a whole image: {e}"))
+        };
+        let mut image = guarded(decode).map_err(|problem| self.wrong(problem))?;
+        if image.color().has_alpha()
+            && !image.to_rgba8().pixels().all(|pixel| pixel.0[3] == u8::MAX)
+        {
+            return Err(self.wrong("the image is transparent in places; flatten it first"));
+        }
+        let samples = self.samples_of(!image.color().has_color())?;
+        image.apply_orientation(self.orientation());
+        let (width, height) = (image.width() as usize, image.height() as usize);
+        let is_deep = self.facts().depth == Depth::Sixteen;
+        let pixels = match samples {
+            Samples::Codes(space) if is_deep => {
+                let mut codes = image.into_rgb16().into_raw();
+                if let Some(space) = space {
+                    space.conversion.convert_16(&mut codes);
+                }
+                Codes16::new(height, width, codes).map(|codes| Pixels::Codes16(Arc::new(codes)))
+            }
+            Samples::Codes(space) => {
+                let mut codes = image.into_rgb8().into_raw();
+                if let Some(space) = space {
+                    space.conversion.convert_8(&mut codes);
+                }
+                Rgb::new(height, width, codes).map(|codes| Pixels::Codes8(Arc::new(codes)))
+            }
+            Samples::Light(_) => {
+                let codes = image.into_rgb16().into_raw().into_iter();
+                let light = codes.map(|code| f32::from(code) / 65_535.0);
+                self.scaled_light(height, width, light.collect())
+            }
+        };
+        pixels.map_err(|e| e.at(self.place.clone()))
+    }
+
+    /// The pixels of an OpenEXR file.
+    fn light_of_layers(&self) -> Result<Pixels> {
+        let read = || {
+            let file = guarded(|| ExrFile::open(&self.bytes, &self.rule))?;
+            let samples = self.samples(&self.facts())?;
+            let mut light = guarded(|| file.light(&self.bytes))?;
+            if let Samples::Light(Some(space)) = samples {
+                space.conversion.convert_light(&mut light);
+            }
+            let (width, height) = (file.size.0 as usize, file.size.1 as usize);
+            self.scaled_light(height, width, light)
+                .map_err(|e| e.to_string())
+        };
+        read().map_err(|problem| self.wrong(problem))
+    }
+
+    /// Light after `--exposure`.
+    fn scaled_light(&self, height: usize, width: usize, light: Vec<f32>) -> Result<Pixels> {
+        let light = Arc::new(Light::new(height, width, light)?);
+        Ok(Pixels::Light(self.rule.scaled(light)))
+    }
+
+    /// What the samples are, after a check that an image with colours has no profile of grey.
+    fn samples_of(&self, is_grey: bool) -> Result<Samples> {
+        let samples = self.samples(&self.facts()).and_then(|samples| {
+            if let Samples::Codes(Some(space)) = &samples {
+                space.check(is_grey)?;
+            }
+            Ok(samples)
+        });
+        samples.map_err(|problem| self.wrong(problem))
+    }
+
+    fn wrong(&self, problem: impl std::fmt::Display) -> Error {
+        Error::data(&self.place, problem)
+    }
+
+    /// The orientation by which the image is turned.
+    fn orientation(&self) -> Orientation {
+        match self.turning {
+            Turning::AsStated => self.facts().orientation,
+            Turning::Never => Orientation::NoTransforms,
+        }
+    }
+
+    /// The facts of the file beside its pixels; of a file that is no image, none.
+    fn facts(&self) -> FileFacts<'_> {
+        FileFormat::of(&self.bytes)
+            .map_or(FileFacts::NONE, |format| FileFacts::of(&self.bytes, format))
+    }
+
+    /// The decoder of a file of codes.
+    fn decoder(&self) -> Result<impl ImageDecoder + '_> {
+        let format = FileFormat::of(&self.bytes).map_err(|problem| self.wrong(problem))?;
+        if let Some(problem) = unshowable(&self.bytes, format) {
+            return Err(self.wrong(problem));
+        }
+        let samples = match format {
+            FileFormat::Png => png_chunks::samples_alone(&self.bytes),
+            _ => Cow::Borrowed(&*self.bytes),
+        };
+        let mut reader = ImageReader::new(Cursor::new(samples));
+        if let Some(format) = format.decoder() {
+            reader.set_format(format);
+        }
+        let most_pixels = self.rule.most_pixels;
+        let mut limits = Limits::default();
+        limits.max_alloc = Some(most_pixels.saturating_mul(8));
+        reader.limits(limits);
+        let open = || {
+            let decoder = reader.into_decoder();
+            decoder.map_err(|e| format!("not a readable image: {e}"))
+        };
+        let decoder = guarded(open).map_err(|problem| self.wrong(problem))?;
+        let (width, height) = decoder.dimensions();
+        if u64::from(width) * u64::from(height) > most_pixels {
+            let (width, height) = (width as usize, height as usize);
+            return Err(self.wrong(self.rule.too_large(width, height)));
+        }
+        Ok(decoder)
+    }
+
+    /// Checks that the file reaches its end, and that the checksums of a PNG are right.
+    fn check_complete(&self) -> Result<()> {
+        match FileFormat::of(&self.bytes).map(|format| fault(&self.bytes, format)) {
+            Ok(Some(fault)) => Err(self.wrong(format_args!(
+                "not a whole image: {fault}; copy or export it again"
+            ))),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// What the samples of a file are, and the colours from which they are converted.
+enum Samples {
+    /// Codes, which are sRGB after the conversion.
+    Codes(Option<Arc<ColourSpace>>),
+    /// Linear light.
+    Light(Option<Arc<ColourSpace>>),
+}
+
+impl Depth {
+    /// The bits of a code; of floats, which have none, it does not matter.
+    fn of_codes(self) -> CodeDepth {
+        match self {
+            Self::Eight => CodeDepth::Eight,
+            Self::Sixteen | Self::Float => CodeDepth::Sixteen,
+        }
+    }
+}
+
+fn contradiction(colour: &ColourTag<'_>) -> String {
+    format!(
+        "the file states what its codes mean ({}), and --transfer linear states something else; leave the flag out, or take the flag's word with --colour ignore",
+        colour.kind()
+    )
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,152 @@
+//! The facts of an image file beside its pixels: [`FileFacts`]; what cannot be shown, and what is cut or damaged.
+
+use std::borrow::Cow;
+
+use image::metadata::Orientation;
+
+use super::exr_layers::ExrFile;
+use super::format::FileFormat;
+use super::guarded::guarded;
+use super::jpeg_markers::{self, JpegOutline};
+use super::png_chunks::{self, PngFault, PngOutline};
+use super::tiff_tags::TiffOutline;
+use super::webp_chunks::{self, WebpOutline};
+use crate::dataset::colour::ColourTag;
+use crate::dataset::reading_rule::ReadingRule;
+
+/// The facts of a file beside its pixels.
+pub(super) struct FileFacts<'a> {
+    /// The orientation that the file states; no turn if it states none, or none of the eight values.
+    pub(super) orientation: Orientation,
+    /// The kind of file, if it has several pictures of which the first is read.
+    pub(super) first_of: Option<&'static str>,
+    pub(super) colour: ColourTag<'a>,
+    pub(super) depth: Depth,
+}
+
+/// The numbers that the samples of a file are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Depth {
+    /// Codes of at most 8 bits.
+    Eight,
+    /// Codes of 16 bits.
+    Sixteen,
+    /// Floats, which are linear light.
+    Float,
+}
+
+impl<'a> FileFacts<'a> {
+    pub(super) const NONE: Self = Self {
+        orientation: Orientation::NoTransforms,
+        first_of: None,
+        colour: ColourTag::None,
+        depth: Depth::Eight,
+    };
+
+    pub(super) fn of(file: &'a [u8], format: FileFormat) -> Self {
+        let of_exif = |exif: Option<&[u8]>| exif.and_then(Orientation::from_exif_chunk);
+        let several = |pictures: usize, kind| (pictures > 1).then_some(kind);
+        let profile =
+            |profile: Option<Cow<'a, [u8]>>| profile.map_or(ColourTag::None, ColourTag::Profile);
+        let turn = |stated: Option<Orientation>| stated.unwrap_or(Orientation::NoTransforms);
+        let deep = |bits| {
+            if bits == 16 {
+                Depth::Sixteen
+            } else {
+                Depth::Eight
+            }
+        };
+        match format {
+            FileFormat::Png => {
+                let outline = PngOutline::of(file);
+                Self {
+                    orientation: turn(of_exif(outline.exif)),
+                    first_of: several(outline.frames, "animated PNG"),
+                    colour: outline.colour,
+                    depth: deep(outline.bits.into()),
+                }
+            }
+            FileFormat::Jpeg => {
+                let outline = JpegOutline::of(file);
+                Self {
+                    orientation: turn(of_exif(outline.exif)),
+                    colour: profile(outline.profile().map(Cow::Owned)),
+                    ..Self::NONE
+                }
+            }
+            FileFormat::WebP => {
+                let outline = WebpOutline::of(file);
+                Self {
+                    orientation: turn(of_exif(outline.exif)),
+                    first_of: several(outline.frames, "animated WebP"),
+                    colour: profile(outline.profile.map(Cow::Borrowed)),
+                    ..Self::NONE
+                }
+            }
+            FileFormat::Tiff => {
+                let outline = TiffOutline::of(file);
+                let stated = u8::try_from(outline.orientation).ok();
+                Self {
+                    orientation: turn(stated.and_then(Orientation::from_exif)),
+                    first_of: several(outline.pages, "TIFF of several pages"),
+                    colour: profile(outline.profile.map(Cow::Borrowed)),
+                    depth: deep(outline.bits),
+                }
+            }
+            FileFormat::OpenExr => {
+                let opened = guarded(|| ExrFile::open(file, &ReadingRule::UNBOUNDED)).ok();
+                let layers = opened.as_ref().map_or(0, |file| file.layers);
+                let primaries = opened.and_then(|file| file.primaries);
+                Self {
+                    first_of: several(layers, "OpenEXR of several layers"),
+                    colour: primaries.map_or(ColourTag::None, ColourTag::Primaries),
+                    depth: Depth::Float,
+                    ..Self::NONE
+                }
+            }
+        }
+    }
+}
+
+/// Why a file cannot be shown as it is, before it is decoded; `None` if nothing is known.
+pub(super) fn unshowable(file: &[u8], format: FileFormat) -> Option<String> {
+    match format {
+        FileFormat::Jpeg if JpegOutline::of(file).components == Some(4) => {
+            Some("a CMYK image (four components: CMYK or YCCK); convert it to RGB first".to_owned())
+        }
+        FileFormat::Tiff => {
+            let outline = TiffOutline::of(file);
+            if outline.is_raw {
+                let problem = "a camera's RAW file, of which only a preview could be read; develop it to a 16-bit TIFF or PNG first";
+                return Some(problem.to_owned());
+            }
+            if outline.is_float {
+                let problem = "a TIFF of floating-point samples; 8 or 16 bits expected, or OpenEXR for linear light: convert it first";
+                return Some(problem.to_owned());
+            }
+            let colours = outline.colours?;
+            Some(format!("{colours}; convert it to RGB first"))
+        }
+        _ => None,
+    }
+}
+
+/// The first fault of a file that is cut or damaged; `None` if there is none.
+pub(super) fn fault(file: &[u8], format: FileFormat) -> Option<String> {
+    let cut = || format!("the file ends before its end mark, at byte {}", file.len());
+    let short = |whole: u64| format!("the file ends at byte {} of {whole}", file.len());
+    match format {
+        FileFormat::Png => png_chunks::fault(file).map(|fault| match fault {
+            PngFault::Cut => cut(),
+            PngFault::Checksum => "a checksum in it is wrong".to_owned(),
+        }),
+        FileFormat::Jpeg => (!jpeg_markers::ends(file)).then(cut),
+        FileFormat::WebP => webp_chunks::missing(file).map(short),
+        FileFormat::Tiff => {
+            let end = TiffOutline::of(file).end;
+            (end > file.len() as u64).then(|| short(end))
+        }
+        // Its reader names what is missing.
+        FileFormat::OpenExr => None,
+    }
+}

@@ -1,0 +1,158 @@
+//! The facts of a JPEG file that its markers hold: [`JpegOutline`]; and whether it has its end: [`ends`].
+//!
+//! The decoder converts CMYK to RGB without an error, and fills the missing part of a truncated file with grey. Models
+//! would be asked about either as if it were the image.
+
+/// Start of the segment with the EXIF data (EXIF 2.32, section 4.5.5).
+const EXIF: &[u8] = b"Exif\0\0";
+
+/// Start of a segment with a part of an ICC profile.
+const PROFILE: &[u8] = b"ICC_PROFILE\0";
+
+/// Markers of the application segments with EXIF data (APP1) and with a profile (APP2).
+const APP1: u8 = 0xE1;
+const APP2: u8 = 0xE2;
+
+/// Marker before the coded samples (SOS), after which no header follows.
+const SAMPLES: u8 = 0xDA;
+
+/// The facts of a JPEG file in its headers (ITU-T T.81, annex B).
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(super) struct JpegOutline<'a> {
+    /// The components of a pixel: 1 for grey, 3 for colour, 4 for CMYK or YCCK; `None` without a frame header.
+    pub(super) components: Option<u8>,
+    /// The EXIF data, a TIFF structure; `None` if there are none.
+    pub(super) exif: Option<&'a [u8]>,
+    /// The parts of the ICC profile, each with its number from 1 (ICC.1:2022, section B.4).
+    profile: Vec<(u8, &'a [u8])>,
+}
+
+impl<'a> JpegOutline<'a> {
+    /// Reads the markers one after another up to the samples; a truncated file is read up to its end.
+    pub(super) fn of(file: &'a [u8]) -> Self {
+        let mut outline = Self::default();
+        let headers = Segments(file).take_while(|(marker, _)| *marker != SAMPLES);
+        for (marker, segment) in headers {
+            if is_frame_header(marker) && outline.components.is_none() {
+                // It follows the precision (1 byte), the height and the width (2 bytes each).
+                outline.components = segment.get(5).copied();
+            }
+            if marker == APP1 && outline.exif.is_none() {
+                outline.exif = segment.strip_prefix(EXIF);
+            }
+            let part = segment.strip_prefix(PROFILE).filter(|_| marker == APP2);
+            if let Some([number, _, part @ ..]) = part {
+                outline.profile.push((*number, part));
+            }
+        }
+        outline
+    }
+
+    /// The ICC profile; `None` if there is none.
+    pub(super) fn profile(mut self) -> Option<Vec<u8>> {
+        if self.profile.is_empty() {
+            return None;
+        }
+        self.profile.sort_by_key(|(number, _)| *number);
+        let parts: Vec<&[u8]> = self.profile.iter().map(|(_, part)| *part).collect();
+        Some(parts.concat())
+    }
+}
+
+/// Whether the file has its end marker (EOI).
+pub(super) fn ends(file: &[u8]) -> bool {
+    Segments(file).any(|(marker, _)| marker == END)
+}
+
+/// Marker at the end of the file (EOI).
+const END: u8 = 0xD9;
+
+/// The markers of a file with their segments, up to the end marker, or to the point where the file breaks off.
+struct Segments<'a>(&'a [u8]);
+
+impl<'a> Iterator for Segments<'a> {
+    type Item = (u8, &'a [u8]);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let (marker, rest) = next_marker(self.0)?;
+        // A file that breaks off within a segment has no further one.
+        self.0 = &[];
+        match marker {
+            END => {}
+            // Markers without a segment: the start, a restart within the samples, private use.
+            0x01 | 0xD0..=0xD8 => self.0 = rest,
+            _ => {
+                let (segment, rest) = segment(rest)?;
+                self.0 = rest;
+                return Some((marker, segment));
+            }
+        }
+        Some((marker, &[]))
+    }
+}
+
+/// The code of the next marker, and the bytes after it. In coded samples, 0xFF is followed by 0.
+fn next_marker(bytes: &[u8]) -> Option<(u8, &[u8])> {
+    let at = bytes
+        .windows(2)
+        .position(|two| two[0] == 0xFF && !matches!(two[1], 0 | 0xFF))?;
+    Some((bytes[at + 1], &bytes[at + 2..]))
+}
+
+/// The content of the first segment, and the bytes after it. Its length field counts its own two bytes.
+fn segment(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
+    let (length, rest) = bytes.split_first_chunk::<2>()?;
+    rest.split_at_checked(usize::from(u16::from_be_bytes(*length)).checked_sub(2)?)
+}
+
+/// Whether a marker is one of SOF0 to SOF15. Three codes in that range mean something else (DHT, JPG, DAC).
+fn is_frame_header(marker: u8) -> bool {
+    matches!(marker, 0xC0..=0xCF) && !matches!(marker, 0xC4 | 0xC8 | 0xCC)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEAD: [u8; 12] = [0xFF, 0xD8, 0xFF, 0xC2, 0, 8, 8, 0, 1, 0, 1, 4];
+    const TAIL: [u8; 11] = [0xFF, 0xDA, 0, 3, 9, 0xFF, 0, 0xFF, 0xD3, 0xFF, 0xD9];
+
+    #[test]
+    fn a_truncated_file_is_read_up_to_its_end() {
+        // A thumbnail in an application segment has its own header and end.
+        let inner = [&[0xFF, 0xE1, 0, 16][..], &HEAD, &[0xFF, 0xD9]].concat();
+        let mut grey = HEAD;
+        grey[11] = 1;
+        let file = [&grey[..2], &inner[..], &grey[2..], &TAIL].concat();
+        let components = |file| JpegOutline::of(file).components;
+        assert_eq!((components(&file), ends(&file)), (Some(1), true));
+        for length in 0..file.len() {
+            let expected = (length >= file.len() - TAIL.len()).then_some(1);
+            let cut = &file[..length];
+            assert_eq!(
+                (components(cut), ends(cut)),
+                (expected, false),
+                "cut at {length}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_wrong_length_ends_the_reading() {
+        for length in [[0, 0], [0, 1], [0xFF, 0xFF]] {
+            let file = [&[0xFF, 0xD8, 0xFF, 0xC0][..], &length, &TAIL].concat();
+            assert_eq!(JpegOutline::of(&file), JpegOutline::default());
+            assert!(!ends(&file));
+        }
+    }
+
+    #[test]
+    fn exif_data_are_found_before_the_samples_only() {
+        let exif = [0xFF, 0xE1, 0, 10, b'E', b'x', b'i', b'f', 0, 0, 7, 9];
+        let other = [0xFF, 0xE1, 0, 6, b'h', b't', b't', b'p'];
+        let file = [&HEAD[..2], &other, &exif, &HEAD[2..], &TAIL].concat();
+        assert_eq!(JpegOutline::of(&file).exif, Some(&[7, 9][..]));
+        let late = [&HEAD[..], &TAIL[..5], &exif, &TAIL[5..]].concat();
+        assert_eq!(JpegOutline::of(&late).exif, None);
+    }
+}

@@ -1,0 +1,154 @@
+use image::{GrayImage, ImageFormat, RgbImage, RgbaImage};
+
+use super::*;
+
+fn encoded(bytes: Vec<u8>, place: impl Into<String>) -> ImageFile {
+    ImageFile::new(bytes, place.into(), ReadingRule::default())
+}
+
+fn png(image: &DynamicImage) -> ImageFile {
+    let mut bytes = Vec::new();
+    image
+        .write_to(&mut Cursor::new(&mut bytes), ImageFormat::Png)
+        .unwrap();
+    encoded(bytes, "test.png")
+}
+
+#[test]
+fn grey_and_opaque_alpha_become_rgb() {
+    let grey = png(&GrayImage::from_raw(2, 1, vec![7, 9]).unwrap().into());
+    assert_eq!(grey.decode().unwrap().samples(), [7, 7, 7, 9, 9, 9]);
+    let opaque = png(&RgbaImage::from_raw(1, 1, vec![1, 2, 3, 255])
+        .unwrap()
+        .into());
+    assert_eq!(opaque.decode().unwrap().samples(), [1, 2, 3]);
+}
+
+#[test]
+fn sixteen_bits_become_the_nearest_eight() {
+    let deep =
+        image::ImageBuffer::<image::Luma<u16>, _>::from_raw(3, 1, vec![0, 32_896, 65_535]).unwrap();
+    assert_eq!(
+        png(&deep.into()).decode().unwrap().samples(),
+        [0, 0, 0, 128, 128, 128, 255, 255, 255]
+    );
+}
+
+#[test]
+fn what_cannot_be_shown_is_refused_by_name() {
+    let clear = png(&RgbaImage::from_raw(1, 1, vec![1, 2, 3, 9]).unwrap().into());
+    assert!(
+        clear
+            .decode()
+            .unwrap_err()
+            .to_string()
+            .contains("transparent")
+    );
+    let text = encoded(b"no image".to_vec(), "a.png");
+    assert!(
+        text.check()
+            .unwrap_err()
+            .to_string()
+            .starts_with("a.png: not an image")
+    );
+}
+
+#[test]
+fn a_truncated_file_is_named() {
+    let mut picture = png(&GrayImage::new(64, 64).into());
+    picture.bytes.truncate(picture.bytes.len() / 2);
+    let error = picture.decode().unwrap_err().to_string();
+    assert!(error.starts_with("test.png: not a whole image"), "{error}");
+    assert!(error.contains("at byte"), "{error}");
+}
+
+#[test]
+fn the_limit_on_pixels_can_be_moved() {
+    let mut picture = png(&GrayImage::new(64, 64).into());
+    picture.decode().unwrap();
+    picture.rule.most_pixels = 4095;
+    let error = picture.decode().unwrap_err().to_string();
+    assert!(
+        error.contains("64 × 64 pixels") && error.contains("--max-pixels"),
+        "{error}"
+    );
+}
+
+/// The error for bytes that are not a complete picture. It is one line and begins with the file.
+fn fault(bytes: Vec<u8>) -> String {
+    let place = "a.png";
+    let error = encoded(bytes, place).decode().unwrap_err();
+    let error = error.to_string();
+    assert!(error.starts_with("a.png: "), "{error}");
+    assert_eq!(error.lines().count(), 1, "{error}");
+    error
+}
+
+#[test]
+fn a_corrupt_png_is_named() {
+    let image = RgbImage::from_fn(64, 64, |x, y| image::Rgb([x as u8, y as u8, (x * y) as u8]));
+    let bytes = png(&image.into()).bytes;
+    let data = bytes.windows(4).position(|four| four == b"IDAT").unwrap() + 4;
+    let end = bytes.len() - 12;
+    for at in [data, data + 40, end - 5] {
+        let mut flipped = bytes.clone();
+        flipped[at] ^= 0x10;
+        assert!(fault(flipped).contains("not a "), "data at {at}");
+    }
+    for at in end - 4..end {
+        let mut flipped = bytes.clone();
+        flipped[at] ^= 1;
+        assert!(fault(flipped).contains("checksum"), "checksum at {at}");
+    }
+    for length in [data + 9, end - 4, end, end + 4, end + 8, end + 11] {
+        let cut = fault(bytes[..length].to_vec());
+        assert!(cut.contains("not a whole image"), "{length}: {cut}");
+    }
+    assert!(encoded(bytes, "").decode().is_ok());
+}
+
+fn jpeg(color: jpeg_encoder::ColorType, channels: usize) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let samples: Vec<u8> = (0..32 * 32 * channels).map(|i| (i * 7) as u8).collect();
+    jpeg_encoder::Encoder::new(&mut bytes, 90)
+        .encode(&samples, 32, 32, color)
+        .unwrap();
+    bytes
+}
+
+#[test]
+fn cmyk_is_refused_by_name() {
+    for color in [
+        jpeg_encoder::ColorType::Cmyk,
+        jpeg_encoder::ColorType::CmykAsYcck,
+    ] {
+        let error = fault(jpeg(color, 4));
+        assert!(
+            error.contains("CMYK") && error.contains("convert it"),
+            "{error}"
+        );
+    }
+    for (color, channels) in [
+        (jpeg_encoder::ColorType::Rgb, 3),
+        (jpeg_encoder::ColorType::Luma, 1),
+    ] {
+        let (bytes, place) = (jpeg(color, channels), String::new());
+        assert!(encoded(bytes, place).decode().is_ok());
+    }
+}
+
+#[test]
+fn a_truncated_jpeg_is_named() {
+    let bytes = jpeg(jpeg_encoder::ColorType::Rgb, 3);
+    for length in [bytes.len() / 2, bytes.len() - 40, bytes.len() - 2] {
+        let cut = fault(bytes[..length].to_vec());
+        assert!(cut.contains("not a "), "{length}: {cut}");
+    }
+}
+
+#[test]
+fn a_bomb_is_refused_before_it_is_decompressed() {
+    let mut bomb = png(&GrayImage::new(1, 1).into());
+    bomb.bytes[16..24].copy_from_slice(&[0, 1, 0, 0, 0, 1, 0, 0]);
+    assert!(bomb.check().is_err());
+}

@@ -1,0 +1,111 @@
+//! The settings that decide how image files are read: [`ReadingRule`].
+
+use std::sync::Arc;
+
+use clap::ValueEnum;
+
+use crate::types::flag::flag_words;
+use crate::types::{DepthNote, InputNote, Light};
+
+/// The default of the maximum number of pixels in an image (chosen).
+pub const MOST_PIXELS: u64 = 100_000_000;
+
+/// The settings that decide how image files are read.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ReadingRule {
+    /// The maximum number of pixels. A larger image is refused before it is decompressed.
+    pub most_pixels: u64,
+    /// What is done about colours that are not sRGB.
+    pub colour: ColourRule,
+    /// What the samples of 16-bit PNG and TIFF images are.
+    pub transfer: Transfer,
+    /// By how many EV linear light is scaled when it is read.
+    pub exposure_ev: Option<f32>,
+}
+
+impl ReadingRule {
+    /// The default without a limit, for files whose facts alone are read.
+    pub(super) const UNBOUNDED: Self = Self {
+        most_pixels: u64::MAX,
+        colour: ColourRule::Convert,
+        transfer: Transfer::Srgb,
+        exposure_ev: None,
+    };
+
+    /// The problem with an image of this width and height.
+    pub(super) fn too_large(&self, width: usize, height: usize) -> String {
+        format!(
+            "{width} × {height} pixels are more than the {} that are read; shrink it first, or raise --max-pixels",
+            self.most_pixels
+        )
+    }
+
+    /// What reading does to an image besides its colours and its orientation: of light, or of codes of 8 bits.
+    pub(super) fn note_of(&self, is_light: bool) -> InputNote {
+        InputNote {
+            depth: is_light.then_some(DepthNote::Light),
+            exposure_ev: self.exposure_ev.filter(|_| is_light),
+            no_light: if is_light {
+                Vec::new()
+            } else {
+                self.of_light()
+            },
+            ..InputNote::default()
+        }
+    }
+
+    /// Light after `--exposure`.
+    pub(super) fn scaled(&self, light: Arc<Light>) -> Arc<Light> {
+        let Some(ev) = self.exposure_ev else {
+            return light;
+        };
+        let mut light = Arc::unwrap_or_clone(light);
+        let factor = libm::exp2(f64::from(ev));
+        for sample in light.samples_mut() {
+            let scaled = f64::from(*sample) * factor;
+            *sample = scaled.min(f64::from(f32::MAX)) as f32;
+        }
+        Arc::new(light)
+    }
+
+    /// The flags for linear light that were given.
+    fn of_light(&self) -> Vec<String> {
+        let linear = (self.transfer == Transfer::Linear).then_some("--transfer linear");
+        let exposure = self.exposure_ev.map(|_| "--exposure");
+        let flags = [linear, exposure].into_iter().flatten();
+        flags.map(str::to_owned).collect()
+    }
+}
+
+/// What the samples of 16-bit images are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum Transfer {
+    /// Codes of sRGB
+    #[default]
+    Srgb,
+    /// Linear light
+    Linear,
+}
+
+/// What is done about images whose file states other colours than sRGB.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum ColourRule {
+    /// Convert them to sRGB
+    #[default]
+    Convert,
+    /// Take their codes as sRGB
+    Ignore,
+}
+
+flag_words!(ColourRule, Transfer);
+
+impl Default for ReadingRule {
+    fn default() -> Self {
+        Self {
+            most_pixels: MOST_PIXELS,
+            colour: ColourRule::default(),
+            transfer: Transfer::default(),
+            exposure_ev: None,
+        }
+    }
+}

@@ -1,0 +1,249 @@
+//! Report of a comparison with real pairs: [`RealismSummary`], its files and its figures.
+
+mod files;
+mod fits;
+mod rows;
+
+use serde::Serialize;
+
+pub(crate) use files::{PooledResiduals, by_code, crops, figure, pairs};
+pub(crate) use fits::{AS_SAVED, csv as fits_csv};
+use rows::{MethodRow, NoiseRow, difference_text, mean_text};
+
+use super::table::ColumnKind::{Count, Text};
+use super::table::TableBuilder;
+use super::terminal;
+use super::words::counted;
+use crate::error::{Error, Result};
+use crate::score::realism::gain::ReadingFit;
+use crate::score::realism::mean::{LEAST_VALUES, Mean};
+use crate::score::realism::residual::{Bins, EmptyBins};
+use crate::score::realism::{ImageComparison, PairComparison};
+
+/// Summary over all pairs.
+#[derive(Debug, Serialize)]
+pub(crate) struct RealismSummary {
+    pairs: usize,
+    #[serde(flatten)]
+    source: ComparedData,
+    /// Bins and rule for empty bins of the divergence, in words.
+    kl_rule: String,
+    /// The same with the other rule for empty bins; `None` for bins that are never empty.
+    kl_other_rule: Option<String>,
+    /// Mean exposure drop in EV.
+    drop: Mean,
+    exposure: MethodRow,
+    /// A row for each light reading and camera.
+    noise: Vec<NoiseRow>,
+    /// Fitted gains by light reading; empty without `--fit`.
+    fits: Vec<ReadingFit>,
+    /// A line of text for each pair.
+    #[serde(skip)]
+    by_pair: Vec<String>,
+}
+
+/// The rules by which residuals are compared.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ResidualRules {
+    /// Bins of the histograms.
+    pub bins: Bins,
+    /// Rule for empty bins.
+    pub empty: EmptyBins,
+}
+
+impl ResidualRules {
+    fn named(self, empty: EmptyBins) -> String {
+        match self.bins {
+            Bins::Fu => format!("{}; {empty}", self.bins),
+            Bins::Kousha => self.bins.to_string(),
+        }
+    }
+}
+
+/// The data and settings of a comparison.
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct ComparedData {
+    /// Seed of the noise.
+    pub seed: u64,
+    /// Settings of the synthesis, by light reading.
+    pub synthesis: serde_json::Value,
+    /// Number of images without a partner.
+    pub unmatched: usize,
+    #[serde(flatten)]
+    pub left_out: LeftOut,
+}
+
+/// Names of the pairs that were not compared, by the reason.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+pub(crate) struct LeftOut {
+    /// Their images cannot be read or compared.
+    pub failed: Vec<String>,
+    /// The image in low light is brighter than the other one.
+    pub swapped: Vec<String>,
+    /// The two images show two scenes.
+    pub two_scenes: Vec<String>,
+}
+
+impl LeftOut {
+    /// Whether every pair was compared.
+    #[must_use]
+    pub(crate) fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// The reasons with their numbers of pairs.
+    fn parts(&self) -> impl Iterator<Item = String> {
+        let parts = [
+            (&self.failed, "failed"),
+            (&self.swapped, "left out as swapped"),
+            (&self.two_scenes, "left out as images of two scenes"),
+        ];
+        let parts = parts.into_iter().filter(|(names, _)| !names.is_empty());
+        parts.map(|(names, why)| format!("{} {why}", counted(names.len(), "pair")))
+    }
+}
+
+/// The numbers of one pair as lines of text, exposure drop alone first.
+fn lines(pair: &PairComparison) -> impl Iterator<Item = String> {
+    let numbers = |comparison: &ImageComparison| {
+        let (psnr, ssim, kl) = (comparison.psnr, comparison.ssim, comparison.kl.nats);
+        format!("PSNR {psnr:.2} SSIM {ssim:.4} D_KL {kl:.3}")
+    };
+    let head = format!("{}: drop {:.3} EV", pair.pair, pair.drop);
+    let alone = format!("{head}; alone {}", numbers(&pair.exposure));
+    let noise = pair.noise.iter().map(move |noise| {
+        let numbers = numbers(&noise.image);
+        format!("{}: with noise, {}: {numbers}", pair.pair, noise.method)
+    });
+    std::iter::once(alone).chain(noise)
+}
+
+impl RealismSummary {
+    /// Means over all pairs.
+    ///
+    /// # Errors
+    /// If there is no pair.
+    pub(crate) fn new(
+        rules: ResidualRules,
+        source: ComparedData,
+        pairs: &[&PairComparison],
+        fits: Vec<ReadingFit>,
+    ) -> Result<Self> {
+        let drops: Vec<f64> = pairs.iter().map(|pair| f64::from(pair.drop)).collect();
+        let exposures: Vec<&ImageComparison> = pairs.iter().map(|pair| &pair.exposure).collect();
+        let summary = || {
+            Some(Self {
+                pairs: pairs.len(),
+                kl_rule: rules.named(rules.empty),
+                kl_other_rule: (rules.bins == Bins::Fu).then(|| rules.named(rules.empty.other())),
+                drop: Mean::of(&drops)?,
+                exposure: MethodRow::of(&exposures)?,
+                noise: NoiseRow::all(pairs),
+                source,
+                fits,
+                by_pair: pairs.iter().flat_map(|pair| lines(pair)).collect(),
+            })
+        };
+        summary().ok_or_else(|| Error::data("pairs", "none of them could be compared"))
+    }
+
+    /// The summary as JSON.
+    #[must_use]
+    pub(crate) fn json(&self) -> String {
+        format!("{:#}\n", serde_json::json!(self))
+    }
+
+    /// The paper's table with intervals, the differences, the fitted gains, and notes on the rules of the numbers below them.
+    #[must_use]
+    pub(crate) fn table(&self) -> String {
+        let mut text = format!(
+            "Synthetic against real low light, {}: mean ± half of the 95 % interval (Student's t, from {LEAST_VALUES} pairs on)\n{}{}",
+            counted(self.pairs, "pair"),
+            self.methods(),
+            self.differences(),
+        );
+        if !self.fits.is_empty() {
+            text += &fits::table(&self.fits);
+        }
+        format!("{text}{}\n", self.notes().join("\n"))
+    }
+
+    /// The paper's table: a row for each way of making the images.
+    fn methods(&self) -> String {
+        let exposure = ("exposure drop alone".to_owned(), &self.exposure);
+        let noise = self.noise.iter();
+        let noise = noise.map(|row| (format!("with sensor noise, {}", row.method), &row.images));
+        let mut layout = TableBuilder::new("realism", std::iter::once(exposure).chain(noise))
+            .column(Text, "terminal", |(name, _)| name.clone())
+            .column(Text, "terminal PSNR dB", |(_, row)| mean_text(&row.psnr, 2))
+            .column(Text, "terminal SSIM", |(_, row)| mean_text(&row.ssim, 4))
+            .column(Text, "terminal D_KL", |(_, row)| mean_text(&row.kl, 3))
+            .column(Text, "terminal bins empty", |(_, row)| {
+                mean_text(&row.empty_bins, 1)
+            });
+        if self.kl_other_rule.is_some() {
+            let name = "terminal D_KL (other rule)";
+            layout = layout.column(Text, name, |(_, row)| mean_text(&row.kl_other, 3));
+        }
+        terminal::table(&[layout.build()])
+    }
+
+    /// The differences of noise from exposure drop alone, pair by pair.
+    fn differences(&self) -> String {
+        let table = TableBuilder::new("differences", &self.noise)
+            .column(Text, "terminal noise − exposure drop alone", |row| {
+                row.method.to_string()
+            })
+            .column(Text, "terminal PSNR dB", |row| {
+                difference_text(&row.differences.psnr, 2)
+            })
+            .column(Text, "terminal SSIM", |row| {
+                difference_text(&row.differences.ssim, 4)
+            })
+            .column(Text, "terminal D_KL", |row| {
+                difference_text(&row.differences.kl, 3)
+            })
+            .column(Count, "terminal pairs", |row| row.differences.psnr.n)
+            .build();
+        terminal::table(&[table])
+    }
+
+    /// The notes below the tables: the rules of their numbers, and lines for each pair.
+    fn notes(&self) -> Vec<String> {
+        let mut notes = vec![format!(
+            "D_KL(real ‖ synthetic) of residuals over the dropped clean image, in nats: {}",
+            self.kl_rule
+        )];
+        let other = self.kl_other_rule.iter();
+        notes.extend(other.map(|rule| format!("other rule: {rule}")));
+        notes.push(
+            "exposure drop alone has no residual: its D_KL shows the rule, not noise".to_owned(),
+        );
+        notes.push(
+            "D_KL is least with more noise than a picture has, because residuals also hold misalignment and tone: --fit goes by the spread of smooth blocks, never by D_KL"
+                .to_owned(),
+        );
+        let clean = self.noise.iter().map(|row| {
+            let psnr = mean_text(&row.clean_psnr, 2);
+            format!("{} {psnr} dB", row.method.reading)
+        });
+        let mut clean: Vec<String> = clean.collect();
+        clean.dedup();
+        notes.push(format!(
+            "drop {} EV; PSNR of the sensor branch without noise: {}",
+            mean_text(&self.drop, 3),
+            clean.join(", ")
+        ));
+        notes.extend(self.by_pair.iter().cloned());
+        notes.extend(fits::by_pair(&self.fits));
+        let mut left_out: Vec<String> = self.source.left_out.parts().collect();
+        if self.source.unmatched > 0 {
+            let images = counted(self.source.unmatched, "image");
+            left_out.push(format!("{images} without a partner"));
+        }
+        if !left_out.is_empty() {
+            notes.push(left_out.join(", "));
+        }
+        notes
+    }
+}

@@ -1,0 +1,125 @@
+//! `calibrate`: measuring a camera from frames of its sensor, as a file for `--camera`.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use crate::calibrate::{
+    CalibrateSettings, CameraFit, Cfa, Crop, ReadOptions, Recording, calibrate as measure,
+    camera_file,
+};
+use crate::dataset::PixelLimit;
+use crate::error::{Error, Result};
+use crate::files::write;
+use crate::job::Outcome;
+use crate::job::progress::Progress;
+use crate::job::workers::{ThreadArgs, pool};
+use crate::report::calibration;
+use crate::types::Decides;
+use crate::types::manifest::Status;
+
+/// The flags of `calibrate`.
+#[derive(Debug, Args)]
+pub(crate) struct CalibrateArgs {
+    /// The recording: DIR/SETTING/ for each ISO or gain, in it bias/, flat-NAME/ for each exposure (pairs of evenly lit frames), and if
+    /// you have them dark-NAME/ and white/; or DIR/frames.csv with the columns file, setting, kind (bias, flat, dark, white), exposure
+    ///
+    /// Frames are mosaics of one channel as 16-bit PNG, TIFF or binary PGM, as `dcraw -D -4 -T` and rawpy's raw_image give them. RAW
+    /// files of makers (DNG, CR2, NEF) are not read.
+    #[arg(value_name = "DIR", add = Decides::Pixels)]
+    pub recording: PathBuf,
+    /// The camera file to write, for --camera; the figure of the fits goes beside it, as FILE.svg
+    #[arg(long, value_name = "FILE", add = Decides::Nothing)]
+    pub out: PathBuf,
+    /// The colour filters of the upper left corner of the frames, row by row; mono for none
+    #[arg(long, value_enum, default_value_t, add = Decides::Pixels)]
+    pub cfa: Cfa,
+    /// The black level in ADU; default: the whole number nearest to the mean of all bias frames
+    #[arg(long, value_name = "CODE", add = Decides::Pixels)]
+    pub black: Option<u16>,
+    /// The code of white; default: the greatest code of the frames in white/
+    #[arg(long, value_name = "CODE", add = Decides::Pixels)]
+    pub white: Option<u16>,
+    /// Use only this part of each frame, in sites: to leave out a masked border; default: all of it
+    #[arg(long, value_name = "X,Y,WIDTH,HEIGHT", add = Decides::Pixels)]
+    pub crop: Option<Crop>,
+    /// The name of the camera; default: the name of DIR
+    #[arg(long, value_name = "NAME", add = Decides::Pixels)]
+    pub name: Option<String>,
+    /// Print the numbers as JSON instead of a table
+    #[arg(long, help_heading = "Output", add = Decides::Nothing)]
+    pub json: bool,
+    /// The maximum size of a frame.
+    #[command(flatten)]
+    pub limit: PixelLimit,
+    /// The number of threads.
+    #[command(flatten)]
+    pub threads: ThreadArgs,
+}
+
+/// Measures a camera and writes its file and figure.
+///
+/// # Errors
+/// If a frame cannot be used, the recording is refused, or a file cannot be written.
+pub(crate) fn calibrate(args: &CalibrateArgs, progress: &Progress) -> Result<Outcome> {
+    let figure = args.out.with_extension("svg");
+    if figure == args.out {
+        let problem = "the camera file must not end with .svg, which is the ending of its figure";
+        return Err(Error::usage("--out", problem));
+    }
+    let recording = Recording::open(&args.recording)?;
+    let settings = settings(args)?;
+    let workers = pool(args.threads.threads)?;
+    let bar = progress.bar("settings", recording.settings());
+    let camera =
+        workers.install(|| measure(&args.recording, &recording, &settings, || bar.inc()))?;
+    drop(bar);
+    write(&args.out, camera_file(&camera)?.as_bytes())?;
+    write(&figure, calibration::figure(&camera)?.as_bytes())?;
+    Ok(Outcome {
+        status: Status::Complete,
+        output: output(args, &camera, &figure)?,
+    })
+}
+
+fn settings(args: &CalibrateArgs) -> Result<CalibrateSettings> {
+    let name = match &args.name {
+        Some(name) => name.clone(),
+        None => folder_name(&args.recording)?,
+    };
+    Ok(CalibrateSettings {
+        read: ReadOptions {
+            cfa: args.cfa,
+            crop: args.crop,
+            most_pixels: args.limit.max_pixels.get(),
+        },
+        black: args.black,
+        white: args.white,
+        name,
+    })
+}
+
+/// The name of a folder, also of `.`.
+fn folder_name(folder: &Path) -> Result<String> {
+    let whole = folder
+        .canonicalize()
+        .map_err(|e| Error::file(folder, "read", e))?;
+    let name = whole.file_name().unwrap_or_default();
+    Ok(name.to_string_lossy().into_owned())
+}
+
+/// The text for standard output.
+fn output(args: &CalibrateArgs, camera: &CameraFit, figure: &Path) -> Result<String> {
+    if args.json {
+        for warning in &camera.warnings {
+            tracing::warn!("{warning}");
+        }
+        return calibration::json(camera);
+    }
+    Ok(format!(
+        "{}{}: the camera, for --camera; {}: its fits\n",
+        calibration::table(camera),
+        args.out.display(),
+        figure.display()
+    ))
+}

@@ -1,0 +1,136 @@
+//! Comparing each pair with its synthetic images ([`compare`]).
+
+use super::check::{CheckedPair, load};
+use super::fit::fitted_camera;
+use super::settings::RealismArgs;
+use super::workers::PairWorkers;
+use crate::error::Result;
+use crate::score::realism::gain::ReadingFit;
+use crate::score::realism::residual::{Residuals, divergence};
+use crate::score::realism::ssim::ssim;
+use crate::score::realism::{
+    CameraOrigin, ImageComparison, NoiseComparison, NoiseMethod, PairComparison, psnr,
+};
+use crate::synthesis::noise::Term;
+use crate::synthesis::{Negative, NoiseKey, SensorSettings, Synthesis, expose_by};
+use crate::types::{FrameId, Rgb};
+
+/// The maximum number of pairs whose crops are shown (chosen).
+const MOST_CROPS: usize = 8;
+
+/// The comparison of a pair, with the data for the figures.
+pub(super) struct PairWork {
+    pub compared: PairComparison,
+    /// The residuals of the real image, and of those with noise.
+    pub residuals: Vec<Residuals>,
+    /// The real image, the one by exposure alone and those with noise; `None` if no crops are shown.
+    pub images: Option<Vec<Rgb>>,
+}
+
+/// The comparisons of all pairs, and the names of those that failed. A failure is logged.
+pub(super) fn compare(
+    args: &RealismArgs,
+    sensor: &SensorSettings,
+    pairs: &[CheckedPair<'_>],
+    fits: &[ReadingFit],
+    workers: &PairWorkers<'_>,
+) -> (Vec<PairWork>, Vec<String>) {
+    let compared = workers.map("pairs", pairs, |index, checked| {
+        compare_pair(args, sensor, checked, fits, index < MOST_CROPS)
+    });
+    let (mut works, mut failed) = (Vec::new(), Vec::new());
+    for (work, checked) in compared.into_iter().zip(pairs) {
+        match work {
+            Ok(work) => works.push(work),
+            Err(e) => {
+                tracing::error!("{}: {e}", checked.pair.name);
+                failed.push(checked.pair.name.clone());
+            }
+        }
+    }
+    (works, failed)
+}
+
+/// The ways of making noise for a pair: each light reading with the given camera, and with the fitted one.
+fn methods(
+    sensor: &SensorSettings,
+    fits: &[ReadingFit],
+    pair: &str,
+) -> Result<Vec<(NoiseMethod, Synthesis)>> {
+    let mut methods = Vec::new();
+    for (reading, synthesis) in sensor.readings.iter() {
+        let method = |camera| NoiseMethod {
+            reading: reading.clone(),
+            camera,
+        };
+        methods.push((method(CameraOrigin::Given), synthesis.clone()));
+        let fit = fits.iter().find(|fit| fit.reading == *reading);
+        if let Some((fit, (gains, origin))) = fit.and_then(|fit| Some((fit, fit.for_pair(pair)?))) {
+            let camera = fitted_camera(&synthesis.camera, fit, gains.range)?;
+            let fitted = Synthesis {
+                camera,
+                ..synthesis.clone()
+            };
+            methods.push((method(origin), fitted));
+        }
+    }
+    Ok(methods)
+}
+
+fn compare_pair(
+    args: &RealismArgs,
+    sensor: &SensorSettings,
+    checked: &CheckedPair<'_>,
+    fits: &[ReadingFit],
+    shown: bool,
+) -> Result<PairWork> {
+    let (normal, real) = load(args, checked.pair, None)?;
+    let drop = f64::from(checked.drop);
+    let exposure = expose_by(&normal, drop);
+    let key = NoiseKey::new(sensor.seed, &FrameId(checked.pair.name.clone()));
+    let of_real = Residuals::of(&real, &exposure)?;
+    let measured = |image: &Rgb| -> Result<(ImageComparison, Residuals)> {
+        let residuals = Residuals::of(image, &exposure)?;
+        let kl = |rule| divergence(&of_real, &residuals, args.kl_bins, rule);
+        let comparison = ImageComparison {
+            psnr: psnr(&real, image)?,
+            ssim: ssim(&real, image)?,
+            kl: kl(args.kl_empty),
+            kl_other: kl(args.kl_empty.other()),
+        };
+        Ok((comparison, residuals))
+    };
+    let (of_exposure, _) = measured(&exposure)?;
+    let (mut noise, mut residuals, mut images) = (Vec::new(), Vec::new(), Vec::new());
+    for (method, synthesis) in methods(sensor, fits, &checked.pair.name)? {
+        let state = synthesis.state_by(&key, drop);
+        let take = |terms: &[Term]| {
+            let (amplify, tone) = (synthesis.amplify, synthesis.tone);
+            let headroom = synthesis.headroom_ev(drop);
+            Negative::with_state(&normal, &key, &state, amplify, tone, terms, headroom)
+                .develop_by(drop)
+        };
+        let (noisy, clean) = (take(&Term::ALL), take(&[]));
+        let (image, of_noise) = measured(&noisy)?;
+        noise.push(NoiseComparison {
+            method,
+            image,
+            clean_psnr: psnr(&real, &clean)?,
+        });
+        residuals.push(of_noise);
+        images.push(noisy);
+    }
+    residuals.insert(0, of_real.clone());
+    let images = shown.then(|| [vec![real, exposure.clone()], images].concat());
+    Ok(PairWork {
+        compared: PairComparison {
+            pair: checked.pair.name.clone(),
+            drop: checked.drop,
+            scene: checked.scene,
+            exposure: of_exposure,
+            noise,
+        },
+        residuals,
+        images,
+    })
+}

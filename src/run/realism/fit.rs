@@ -1,0 +1,126 @@
+//! Fitting the gain of the sensor to pairs ([`fit`]), and the camera of the fitted gains ([`fitted_camera`]).
+
+use super::check::{CheckedPair, load};
+use super::settings::RealismArgs;
+use super::workers::PairWorkers;
+use crate::error::Result;
+use crate::score::realism::gain::{GAINS, GainFit, LADDER_STEPS, PairFit, ReadingFit, ladder};
+use crate::score::realism::smooth::SmoothBlocks;
+use crate::synthesis::{
+    CameraModel, CameraState, CleanRaw, Coupling, NoiseKey, Sampling, SensorSettings, Synthesis,
+};
+use crate::types::{FrameId, ReadingName, Rgb};
+
+/// The fits of all pairs, light reading by light reading. A pair that cannot be read is logged and left out.
+///
+/// # Errors
+/// If the camera takes none of the gains of the fit.
+pub(super) fn fit(
+    args: &RealismArgs,
+    sensor: &SensorSettings,
+    pairs: &[CheckedPair<'_>],
+    workers: &PairWorkers<'_>,
+) -> Result<Vec<ReadingFit>> {
+    let readings = sensor.readings.iter();
+    let readings = readings.map(|(name, synthesis)| FitReading::new(name, synthesis));
+    let readings: Vec<FitReading> = readings.collect::<Result<_>>()?;
+    let fits = workers.map("pairs fitted", pairs, |_, checked| {
+        // A file that can no longer be read fails in the comparison, where it is logged and counted.
+        let (normal, low) = load(args, checked.pair, None).ok()?;
+        let normal = normal.codes();
+        Some(fit_pair(sensor.seed, &readings, checked, &normal, &low))
+    });
+    let by_reading = readings.iter().enumerate().map(|(index, reading)| {
+        let of_pairs = pairs.iter().zip(&fits);
+        let of_pairs = of_pairs.filter_map(|(checked, fits)| {
+            Some(PairFit {
+                pair: checked.pair.name.clone(),
+                fit: *fits.as_ref()?.get(index)?,
+            })
+        });
+        ReadingFit::new(reading.name.clone(), reading.ratio(), of_pairs.collect())
+    });
+    Ok(by_reading.collect())
+}
+
+/// A light reading with the camera in the middle of its ranges, at each gain of the ladder.
+struct FitReading {
+    name: ReadingName,
+    ladder: [Synthesis; LADDER_STEPS],
+}
+
+impl FitReading {
+    fn new(name: &ReadingName, synthesis: &Synthesis) -> Result<Self> {
+        let mut camera = synthesis.camera.clone();
+        camera.set_sampling(Sampling::Fixed);
+        camera.set_gain_range(GAINS)?;
+        let given = Synthesis {
+            camera,
+            ..synthesis.clone()
+        };
+        let mut at_gains = ladder().map(|_| given.clone());
+        for (synthesis, gain) in at_gains.iter_mut().zip(ladder()) {
+            synthesis.camera.pin_gain(gain)?;
+        }
+        Ok(Self {
+            name: name.clone(),
+            ladder: at_gains,
+        })
+    }
+
+    /// The ratio r, if it does not follow from the light.
+    fn ratio(&self) -> Option<f64> {
+        let [synthesis, ..] = &self.ladder;
+        let is_free = synthesis.coupling == Coupling::Independent;
+        is_free.then(|| fixed_state(synthesis, 0.0).ratio)
+    }
+}
+
+/// State of a camera in the middle of its ranges, which is the same for all frames.
+fn fixed_state(synthesis: &Synthesis, drop_ev: f64) -> CameraState {
+    synthesis.state_by(&NoiseKey::new(0, &FrameId(String::new())), drop_ev)
+}
+
+/// The fits to one pair, one for each light reading.
+fn fit_pair(
+    seed: u64,
+    readings: &[FitReading],
+    checked: &CheckedPair<'_>,
+    normal: &Rgb,
+    low: &Rgb,
+) -> Vec<GainFit> {
+    // Other draws than those of the comparison: the noise of a synthetic low-light image of the same name must not be met again.
+    let key = NoiseKey::new(seed, &FrameId(format!("fit of {}", checked.pair.name)));
+    let drop = f64::from(checked.drop);
+    let smooth = SmoothBlocks::of(normal, drop);
+    let real = smooth.spread(low);
+    // The colours of the camera are the same at all gains and in all readings, and so is the image without noise.
+    let mut raw = None;
+    let fits = readings.iter().map(|reading| {
+        let curves = reading.ladder.each_ref().map(|synthesis| {
+            let state = fixed_state(synthesis, drop);
+            let raw = raw.get_or_insert_with(|| CleanRaw::new(normal, state.clone()));
+            let negative = raw.negative(&key, &state, synthesis.amplify, synthesis.tone);
+            smooth.spread(&negative.develop_by(drop))
+        });
+        GainFit::of(&real, &curves)
+    });
+    fits.collect()
+}
+
+/// The camera of a light reading with its gain drawn from a fitted range, and with the ratio of the fit.
+///
+/// # Errors
+/// If the camera does not take the range or the ratio.
+pub(super) fn fitted_camera(
+    camera: &CameraModel,
+    fit: &ReadingFit,
+    range: [f64; 2],
+) -> Result<CameraModel> {
+    let mut fitted = camera.clone();
+    fitted.set_gain_range(range)?;
+    if let Some(ratio) = fit.ratio {
+        fitted.pin_ratio(ratio)?;
+    }
+    Ok(fitted)
+}

@@ -1,0 +1,104 @@
+//! `realism`: comparing the synthesis with real pairs of images in normal and low light, as the paper does on LLRGBD-real
+//! (DarkQA, Table I), and fitting the sensor's gain to them (`--fit`).
+//!
+//! The image in normal light is made as dark as its partner, by exposure drop alone and with sensor noise. Both results
+//! are compared with the real image. A residual is the difference from the clean image after the exposure drop. The
+//! residuals of the exposure drop alone are 0, so its divergence depends only on how empty bins are counted.
+
+mod check;
+mod compare;
+mod files;
+mod fit;
+mod settings;
+mod workers;
+
+use std::path::Path;
+
+use compare::PairWork;
+pub(crate) use settings::RealismArgs;
+use workers::PairWorkers;
+
+use crate::dataset::pairs::Pairs;
+use crate::error::{Error, Result};
+use crate::job::Outcome;
+use crate::job::progress::Progress;
+use crate::job::workers::pool;
+use crate::report::realism::{ComparedData, RealismSummary, ResidualRules};
+use crate::score::realism::PairComparison;
+use crate::score::realism::gain::ReadingFit;
+use crate::synthesis::SensorSettings;
+use crate::types::manifest::Status;
+
+/// Compares all pairs.
+///
+/// If one pair fails, the error is logged and counted, and the others continue.
+///
+/// # Errors
+/// If there is no pair, none can be compared, most are swapped, or a file cannot be written.
+pub(crate) fn realism(args: &RealismArgs, progress: &Progress) -> Result<Outcome> {
+    let (found, place) = match (&args.pairs, &args.normal, &args.low) {
+        (None, Some(normal), Some(low)) => (Pairs::of_folders(normal, low)?, low.as_path()),
+        (folder, ..) => {
+            let folder = folder.as_deref().unwrap_or(Path::new("."));
+            (Pairs::open(folder)?, folder)
+        }
+    };
+    let sensor = SensorSettings::resolve(&args.sensor)?;
+    for path in &found.unmatched {
+        tracing::warn!("{}: no partner in the other light", path.display());
+    }
+    let workers = PairWorkers {
+        pool: pool(args.threads.threads)?,
+        progress,
+    };
+    let (checked, mut left_out) = check::check(args, &found.pairs, place, &workers)?;
+    let fits = if args.fit {
+        fit::fit(args, &sensor, &checked, &workers)?
+    } else {
+        Vec::new()
+    };
+    let (works, failed) = compare::compare(args, &sensor, &checked, &fits, &workers);
+    left_out.failed.extend(failed);
+    left_out.failed.sort();
+    let status = if left_out.is_empty() {
+        Status::Complete
+    } else {
+        Status::Incomplete
+    };
+    let source = ComparedData {
+        seed: sensor.seed,
+        synthesis: serde_json::json!(sensor.readings),
+        unmatched: found.unmatched.len(),
+        left_out,
+    };
+    let summary = summary(args, source, &works, fits.clone())?;
+    if let Some(out) = &args.out {
+        files::write_files(out, &works, &summary)?;
+        files::write_fits(out, &sensor, &fits)?;
+    }
+    Ok(Outcome {
+        status,
+        output: if args.json {
+            summary.json()
+        } else {
+            summary.table()
+        },
+    })
+}
+
+fn summary(
+    args: &RealismArgs,
+    source: ComparedData,
+    works: &[PairWork],
+    fits: Vec<ReadingFit>,
+) -> Result<RealismSummary> {
+    if works.is_empty() {
+        return Err(Error::data("pairs", "no pair could be compared"));
+    }
+    let compared: Vec<&PairComparison> = works.iter().map(|work| &work.compared).collect();
+    let rules = ResidualRules {
+        bins: args.kl_bins,
+        empty: args.kl_empty,
+    };
+    RealismSummary::new(rules, source, &compared, fits)
+}

@@ -1,0 +1,32 @@
+//! The threads that work on the pairs: [`PairWorkers`].
+
+use rayon::ThreadPool;
+use rayon::prelude::*;
+
+use crate::job::progress::Progress;
+
+/// Threads that work on the pairs, with the display of their progress.
+pub(super) struct PairWorkers<'a> {
+    pub pool: ThreadPool,
+    pub progress: &'a Progress,
+}
+
+impl PairWorkers<'_> {
+    /// What `work` makes of each item and its index, in the order of the items. `what` names them in the progress.
+    pub(super) fn map<I: Sync, T: Send>(
+        &self,
+        what: &'static str,
+        items: &[I],
+        work: impl Fn(usize, &I) -> T + Sync,
+    ) -> Vec<T> {
+        let bar = self.progress.bar(what, items.len());
+        self.pool.install(|| {
+            let results = items.par_iter().enumerate().map(|(index, item)| {
+                let result = work(index, item);
+                bar.inc();
+                result
+            });
+            results.collect()
+        })
+    }
+}

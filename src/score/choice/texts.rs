@@ -1,0 +1,185 @@
+//! The texts of choices in a reply: [`texts`].
+
+use super::choice_views::{ChoiceViews, Naming};
+use super::determiner;
+use super::names::{Delimiting, Name, State, part_of_number, same_word};
+use super::plain::RANGE;
+use super::tokens::{Token, TokenKind};
+use super::words::{Role, phrase_at};
+
+/// A place where the text of a choice may stand.
+struct Candidate {
+    start: usize,
+    end: usize,
+    choice: usize,
+    /// Whether the blanks differ from those of the choice: "livingroom".
+    joined: bool,
+}
+
+/// Every choice's text that occurs as whole words, from left to right. Longer texts take precedence. A hyphen counts as a
+/// blank, and blanks may be left out or put in between two words: "living-room", "livingroom", "arm chair". A thing's name
+/// that only modifies another noun is left out: "table-lamp", "TV stand".
+pub(super) fn texts(
+    text: &str,
+    folded: &str,
+    tokens: &[Token],
+    offered: &ChoiceViews,
+) -> Vec<Name> {
+    let mut candidates = exact(folded, offered);
+    candidates.extend(joined(folded, tokens, offered));
+    candidates.sort_by_key(|c| {
+        (
+            std::cmp::Reverse(c.end - c.start),
+            c.start,
+            c.joined,
+            c.choice,
+        )
+    });
+    let mut covered = vec![false; folded.len()];
+    let mut names: Vec<Name> = Vec::new();
+    let mut last = (0, 0, false);
+    for candidate in candidates {
+        let span = candidate.start..candidate.end;
+        // Two choices may differ only in markup or spelling; then every occurrence names both.
+        let twin = last == (span.start, span.end, candidate.joined);
+        if !twin && covered[span.clone()].contains(&true) {
+            continue;
+        }
+        covered[span.clone()].fill(true);
+        last = (span.start, span.end, candidate.joined);
+        names.push(Name {
+            start: span.start,
+            end: span.end,
+            choice: Some(candidate.choice),
+            delimiting: Delimiting::Plain,
+            state: State::Affirmed,
+        });
+    }
+    names.sort_by_key(|name| name.start);
+    let modifies: Vec<bool> = names
+        .iter()
+        .map(|name| modifies(text, folded, tokens, name, &names, offered))
+        .collect();
+    let mut modifies = modifies.into_iter();
+    names.retain(|_| modifies.next() != Some(true));
+    names
+}
+
+/// The places of the texts as they are.
+fn exact(folded: &str, offered: &ChoiceViews) -> Vec<Candidate> {
+    let mut candidates = Vec::new();
+    for (text, choice) in &offered.folded {
+        for (start, _) in folded.match_indices(text.as_str()) {
+            let end = start + text.len();
+            if stands_alone(folded, start, end) {
+                candidates.push(Candidate {
+                    start,
+                    end,
+                    choice: *choice,
+                    joined: false,
+                });
+            }
+        }
+    }
+    candidates
+}
+
+/// Minimum number of letters of each part of a word that is written as two.
+const MIN_PART: usize = 3;
+
+/// The places of the texts with a blank left out ("livingroom") or put in ("arm chair").
+fn joined<'a>(
+    folded: &'a str,
+    tokens: &'a [Token],
+    offered: &'a ChoiceViews,
+) -> impl Iterator<Item = Candidate> + 'a {
+    let longest = offered.joined.keys().map(String::len).max().unwrap_or(0);
+    let find = move |start: usize, end: usize, letters: &str| {
+        let choices = offered.joined.get(letters).into_iter().flatten();
+        choices
+            .map(move |&choice| Candidate {
+                start,
+                end,
+                choice,
+                joined: true,
+            })
+            .collect::<Vec<_>>()
+    };
+    tokens.iter().enumerate().flat_map(move |(at, token)| {
+        let word = token.of(folded);
+        if longest == 0 || token.kind != TokenKind::Word || word.len() > longest {
+            return Vec::new();
+        }
+        let mut found = find(token.start, token.end, word);
+        if let Some(next) = tokens
+            .get(at + 1)
+            .filter(|next| next.start == token.end + 1)
+        {
+            let second = next.of(folded);
+            let fits =
+                word.len().min(second.len()) >= MIN_PART && word.len() + second.len() <= longest;
+            if fits && folded.as_bytes()[token.end] == b' ' {
+                found.extend(find(token.start, next.end, &format!("{word}{second}")));
+            }
+        }
+        found
+    })
+}
+
+/// Whether a span is not part of a word or a number, not an article, and not a "no" before a noun.
+fn stands_alone(folded: &str, start: usize, end: usize) -> bool {
+    let span = &folded[start..end];
+    let (before, after) = (
+        folded[..start].chars().next_back(),
+        folded[end..].chars().next(),
+    );
+    let inside =
+        same_word(before, span.chars().next()) || same_word(span.chars().next_back(), after);
+    let article = span.len() == 1 && matches!(span, "a" | "i") && after == Some(' ');
+    let determiner = span == "no" && !determiner::answers(folded, start, end);
+    !inside && !article && !determiner && !part_of_number(folded, start, end)
+}
+
+/// Whether a thing's name only modifies the noun behind it. By a hyphen it always does, by a blank before a listed noun. A
+/// hyphen or a dash between two choices joins two names.
+fn modifies(
+    text: &str,
+    folded: &str,
+    tokens: &[Token],
+    name: &Name,
+    names: &[Name],
+    offered: &ChoiceViews,
+) -> bool {
+    let is_thing = name
+        .choice
+        .is_some_and(|choice| offered.naming[choice] == Naming::Thing);
+    if !is_thing {
+        // "Brown-ish" is not brown, but "white-framed" is white.
+        let suffix = folded[name.end..].strip_prefix(' ').unwrap_or_default();
+        return text[name.end..].starts_with(['-', RANGE])
+            && (suffix.starts_with("ish") || suffix.starts_with("like"));
+    }
+    let mut after = text[name.end..].chars();
+    let (joint, next) = (after.next(), after.next());
+    let compound = matches!(joint, Some('-' | RANGE)) && next.is_some_and(char::is_alphabetic);
+    if !compound && joint != Some(' ') {
+        return false;
+    }
+    let next = tokens.partition_point(|token| token.start <= name.end);
+    let next = tokens.get(next).filter(|next| next.start == name.end + 1);
+    let is_head = next.is_some_and(|next| {
+        let known = phrase_at(folded, std::slice::from_ref(next));
+        known.is_some_and(|(_, roles)| roles.has(Role::Head))
+    });
+    // "Kitchen-cum-bathroom" is both.
+    let joins = next.is_some_and(|next| matches!(next.of(folded), "cum" | "and" | "or"));
+    let named = joins
+        || names
+            .binary_search_by_key(&(name.end + 1), |name| name.start)
+            .is_ok();
+    match joint {
+        Some(' ') => is_head,
+        Some(RANGE) => !named,
+        _ => is_head || !named,
+    }
+}

@@ -1,0 +1,80 @@
+//! How a camera exposed a frame: [`ExposureFacts`].
+
+use serde::{Deserialize, Serialize};
+
+/// What a camera did in a simulated exposure, for records and sidecars. All numbers are finite.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ExposureFacts {
+    /// Stops of longer exposure, in EV; `None` without automatic exposure, as the next two.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shutter: Option<f64>,
+    /// Stops of gain, in EV.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gain: Option<f64>,
+    /// What is left dark, in EV.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dark: Option<f64>,
+    /// Exposure time, in milliseconds.
+    pub time_ms: f64,
+    /// System gain K, in ADU per electron; `None` without automatic exposure.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub system_gain: Option<f64>,
+    /// Length of the motion blur, in pixels of the frame; `None` for several frames in which it differs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub blur_px: Option<f64>,
+    /// Direction of the motion blur in degrees, from along a row towards down a column; `None` as for the length.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub blur_angle: Option<f64>,
+}
+
+impl ExposureFacts {
+    /// What is equal in all frames of a walk; `None` if a frame has none.
+    #[must_use]
+    pub fn shared(mut all: impl Iterator<Item = Option<Self>>) -> Option<Self> {
+        let first = all.next()??;
+        all.try_fold(first, |shared, other| {
+            let other = other?;
+            Some(Self {
+                blur_px: shared.blur_px.filter(|px| other.blur_px == Some(*px)),
+                blur_angle: shared
+                    .blur_angle
+                    .filter(|angle| other.blur_angle == Some(*angle)),
+                ..shared
+            })
+        })
+    }
+}
+
+/// No number is NaN.
+impl Eq for ExposureFacts {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_share_what_is_equal() {
+        let facts = |blur_px, blur_angle| {
+            Some(ExposureFacts {
+                shutter: Some(2.0),
+                gain: None,
+                dark: None,
+                time_ms: 8.33,
+                system_gain: None,
+                blur_px: Some(blur_px),
+                blur_angle: Some(blur_angle),
+            })
+        };
+        let shared = |all: &[Option<ExposureFacts>]| ExposureFacts::shared(all.iter().copied());
+        let one = shared(&[facts(2.0, 10.0), facts(2.0, 20.0)]).unwrap();
+        assert_eq!((one.blur_px, one.blur_angle), (Some(2.0), None));
+        assert_eq!(one.shutter, Some(2.0));
+        assert_eq!(shared(&[facts(1.0, 0.0)]), facts(1.0, 0.0));
+        assert_eq!(shared(&[facts(1.0, 0.0), None]), None);
+        assert_eq!(shared(&[]), None);
+        let text = serde_json::to_string(&one).unwrap();
+        assert_eq!(text, r#"{"shutter":2.0,"time_ms":8.33,"blur_px":2.0}"#);
+        assert_eq!(serde_json::from_str::<ExposureFacts>(&text).unwrap(), one);
+    }
+}

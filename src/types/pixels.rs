@@ -1,0 +1,50 @@
+//! The pixels of a clean frame in the depth in which they are known: [`Pixels`].
+
+use std::sync::Arc;
+
+use super::codes16::Codes16;
+use super::frame::Rgb;
+use super::light::Light;
+use super::shown_codes::{of_16_bits, of_light};
+/// The pixels of a clean frame. A copy shares them.
+#[derive(Debug, Clone)]
+pub enum Pixels {
+    /// 8-bit sRGB codes.
+    Codes8(Arc<Rgb>),
+    /// 16-bit sRGB codes.
+    Codes16(Arc<Codes16>),
+    /// Linear light of the scene, with the primaries of sRGB. White is 1, and light may be more.
+    Light(Arc<Light>),
+}
+
+impl Pixels {
+    /// The height in pixels.
+    #[must_use]
+    pub fn height(&self) -> usize {
+        match self {
+            Self::Codes8(codes) => codes.height(),
+            Self::Codes16(codes) => codes.height(),
+            Self::Light(light) => light.height(),
+        }
+    }
+
+    /// The width in pixels.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        match self {
+            Self::Codes8(codes) => codes.width(),
+            Self::Codes16(codes) => codes.width(),
+            Self::Light(light) => light.width(),
+        }
+    }
+
+    /// The 8-bit codes of the frame as it is shown undarkened: L0.
+    #[must_use]
+    pub fn codes(&self) -> Arc<Rgb> {
+        match self {
+            Self::Codes8(codes) => Arc::clone(codes),
+            Self::Codes16(codes) => Arc::new(of_16_bits(codes)),
+            Self::Light(light) => Arc::new(of_light(light)),
+        }
+    }
+}

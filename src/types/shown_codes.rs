@@ -1,0 +1,74 @@
+//! The 8-bit codes of an image of more depth, as it is shown undarkened: [`of_16_bits`] and [`of_light`].
+
+use std::sync::LazyLock;
+
+use super::codes16::Codes16;
+use super::frame::Rgb;
+use super::light::Light;
+
+/// Exponent between light and codes, the same as of the exposure drop, so that an undarkened image is the drop of 0 EV (DarkQA,
+/// eqs. 1 and 3).
+const GAMMA: f64 = 2.2;
+
+/// The nearest 8-bit codes.
+pub(super) fn of_16_bits(codes: &Codes16) -> Rgb {
+    let nearest = |code: u16| ((u32::from(code) + 128) / 257) as u8;
+    filled(
+        codes.height(),
+        codes.width(),
+        codes.samples().iter().map(|code| nearest(*code)),
+    )
+}
+
+/// The codes floor(255 · min(1, L)^(1/2.2) + ½) of light L.
+pub(super) fn of_light(light: &Light) -> Rgb {
+    /// The least light of each code above 0.
+    static STEPS: LazyLock<[f64; 255]> = LazyLock::new(|| {
+        std::array::from_fn(|below| libm::pow((below as f64 + 0.5) / 255.0, GAMMA))
+    });
+    let steps = &*STEPS;
+    let code = |light: f32| steps.partition_point(|step| *step <= f64::from(light)) as u8;
+    filled(
+        light.height(),
+        light.width(),
+        light.samples().iter().map(|light| code(*light)),
+    )
+}
+
+fn filled(height: usize, width: usize, codes: impl Iterator<Item = u8>) -> Rgb {
+    let mut image = Rgb::black(height, width);
+    for (sample, code) in image.samples_mut().iter_mut().zip(codes) {
+        *sample = code;
+    }
+    image
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sixteen_bits_become_the_nearest_eight() {
+        let codes: Vec<u16> = (0..=65_535).chain([0, 0]).collect();
+        let image = of_16_bits(&Codes16::new(1, codes.len() / 3, codes.clone()).unwrap());
+        for (code, shown) in codes.iter().zip(image.samples()) {
+            let expected = (f64::from(*code) / 257.0).round();
+            assert!((f64::from(*shown) - expected).abs() < 0.5, "{code}");
+        }
+    }
+
+    #[test]
+    fn light_becomes_codes_by_the_power_of_the_exposure_drop() {
+        let lights: Vec<f32> = (0..30_000).map(|i| (i as f32 / 20_000.0).powi(2)).collect();
+        let image = of_light(&Light::new(100, 100, lights.clone()).unwrap());
+        for (light, shown) in lights.iter().zip(image.samples()) {
+            let value = 255.0 * f64::from(*light).min(1.0).powf(1.0 / 2.2) + 0.5;
+            // Between two codes both are right.
+            if (value - value.round()).abs() > 1e-9 {
+                assert!((f64::from(*shown) - value.floor()).abs() < 0.5, "{light}");
+            }
+        }
+        assert_eq!(image.samples()[..2], [0, 0]);
+        assert_eq!(image.samples()[29_999], 255);
+    }
+}

@@ -1,0 +1,213 @@
+//! Files and folders that cannot be used: each is named.
+
+use std::fs;
+use std::path::PathBuf;
+use std::sync::LazyLock;
+
+use super::sensor::{Form, Sensor, Shots, WHITE};
+use super::{Bench, check_rows, measured, refused, write};
+
+const SIDE: usize = 256;
+
+static SMALL: LazyLock<Shots> = LazyLock::new(|| {
+    let sensor = Sensor::new("nikon-d850", 1.0, SIDE, 9);
+    Shots::take(&sensor, 2, 1)
+});
+
+/// A recording in the folder `cam`, of which one file is changed.
+fn recording(change: impl FnOnce(&Bench)) -> Bench {
+    let bench = Bench::new();
+    write(&bench, "cam", &SMALL);
+    change(&bench);
+    bench
+}
+
+fn file(bench: &Bench, name: &str) -> PathBuf {
+    bench.path(&format!("cam/iso800/{name}"))
+}
+
+#[test]
+fn files_that_cannot_be_used_are_named() {
+    type Change = fn(&Bench);
+    let rows: Vec<(&str, Change, &[&str])> = vec![
+        (
+            "truncated",
+            |bench| {
+                let path = file(bench, "flat-1/01.pgm");
+                let bytes = fs::read(&path).unwrap();
+                fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+            },
+            &["flat-1/01.pgm: not a whole PGM", "the file ends early"],
+        ),
+        (
+            "foreign",
+            |bench| fs::write(file(bench, "bias/notes.txt"), "shutter closed").unwrap(),
+            &["bias/notes.txt: not a mosaic", "dcraw -D -4 -T"],
+        ),
+        (
+            "raw",
+            |bench| fs::rename(file(bench, "bias/01.pgm"), file(bench, "bias/01.dng")).unwrap(),
+            &[
+                "bias/01.dng: a DNG file, the RAW format of a camera, is not read",
+                "dcraw -D -4 -T",
+                "rawpy's `raw_image`",
+            ],
+        ),
+        (
+            "developed",
+            |bench| {
+                let image = image::RgbImage::new(SIDE as u32, SIDE as u32);
+                fs::remove_file(file(bench, "bias/00.pgm")).unwrap();
+                image.save(file(bench, "bias/00.png")).unwrap();
+            },
+            &[
+                "bias/00.png: an RGB PNG of 8 bits",
+                "a developed image holds no sensor noise",
+            ],
+        ),
+        (
+            "mixed",
+            |bench| {
+                fs::remove_file(file(bench, "flat-2/01.pgm")).unwrap();
+                let bytes = Form::Png.encode(&SMALL.flats[2][1], SIDE);
+                fs::write(file(bench, "flat-2/01.png"), bytes).unwrap();
+            },
+            &[
+                "flat-2/01.png: a 16-bit PNG, but",
+                "bias/00.pgm is a PGM with the maximum 65535",
+            ],
+        ),
+        (
+            "sizes",
+            |bench| {
+                let frame = &SMALL.flats[2][1][..SIDE * (SIDE - 2)];
+                let header = format!("P5 {SIDE} {} 65535 ", SIDE - 2);
+                let samples = frame.iter().flat_map(|sample| sample.to_be_bytes());
+                let bytes: Vec<u8> = header.bytes().chain(samples).collect();
+                fs::write(file(bench, "flat-2/01.pgm"), bytes).unwrap();
+            },
+            &[
+                "flat-2/01.pgm: 256 × 254 sites, but",
+                "bias/00.pgm has 256 × 256",
+            ],
+        ),
+        (
+            "twice",
+            |bench| {
+                fs::copy(file(bench, "bias/00.pgm"), file(bench, "bias/01.pgm")).unwrap();
+            },
+            &["bias/01.pgm: the same frame as", "bias/00.pgm"],
+        ),
+        (
+            "few",
+            |bench| {
+                fs::remove_dir_all(file(bench, "flat-3")).unwrap();
+                fs::remove_dir_all(file(bench, "flat-4")).unwrap();
+                fs::remove_file(file(bench, "flat-0/01.pgm")).unwrap();
+            },
+            &["2 bias frames and 2 exposures with a pair of flats; at least 2 and 3 are needed"],
+        ),
+    ];
+    check_rows(rows, |(name, change, parts)| {
+        let bench = recording(change);
+        let message = refused(&bench, &format!("cam --white {WHITE}"));
+        for part in parts {
+            assert!(message.contains(part), "{name}: {message}");
+        }
+    });
+}
+
+#[test]
+fn white_must_be_known() {
+    let frame = |bench: &Bench, name: &str, frame: &[u16]| {
+        let path = file(bench, name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, Form::Pgm.encode(frame, SIDE)).unwrap();
+    };
+    let bench = recording(|_| ());
+    let message = refused(&bench, "cam");
+    assert!(
+        message.contains("the code of white is not known: state it with --white"),
+        "{message}"
+    );
+    let mut white = vec![WHITE; SIDE * SIDE];
+    white[..SIDE * SIDE * 2 / 3].fill(WHITE - 9);
+    frame(&bench, "white/0.pgm", &white);
+    let message = refused(&bench, "cam");
+    assert!(
+        message.contains("33.3 % of the samples are at the greatest code, 16383"),
+        "{message}"
+    );
+    frame(&bench, "white/0.pgm", &vec![WHITE; SIDE * SIDE]);
+    frame(&bench, "white/1.pgm", &vec![WHITE - 1; SIDE * SIDE]);
+    let message = refused(&bench, "cam");
+    assert!(
+        message.contains("white/1.pgm: white is 16382, but 16383 in"),
+        "{message}"
+    );
+    let message = refused(&bench, "cam --white 400");
+    assert!(message.contains("are not below white, 400"), "{message}");
+    let message = refused(&bench, &format!("cam --white {WHITE} --black 20000"));
+    assert!(
+        message.contains("--black: the black level 20000 is not below white"),
+        "{message}"
+    );
+}
+
+#[test]
+fn wrong_flags_are_named() {
+    let bench = recording(|_| ());
+    check_rows(
+        [
+            ("nowhere", "nowhere"),
+            ("cam --white 70000", "--white"),
+            (
+                "cam --cfa RGB",
+                "possible values: RGGB, BGGR, GRBG, GBRG, mono",
+            ),
+            ("cam --crop 1,2,3", "--crop"),
+            (
+                "cam --white 9999 --crop 0,0,100,100",
+                "100 × 100 sites are too few",
+            ),
+            ("cam --white 9999 --max-pixels 100", "raise --max-pixels"),
+            (
+                "cam --out camera.svg",
+                "--out: the camera file must not end with .svg",
+            ),
+        ],
+        |(line, part)| {
+            let message = refused(&bench, line);
+            assert!(message.contains(part), "{line}: {message}");
+        },
+    );
+}
+
+/// The same frames, found by their folders and by a list.
+#[test]
+fn a_list_of_frames_replaces_folders() {
+    let bench = recording(|_| ());
+    let line = format!("cam --white {WHITE}");
+    let by_folder = measured(&bench, &line);
+    let mut list = "file,setting,kind,exposure\n".to_owned();
+    for kind in ["bias", "flat-0", "flat-1", "flat-2", "flat-3", "flat-4"] {
+        for index in 0..2 {
+            let (kind_word, exposure) = kind.split_once('-').unwrap_or((kind, ""));
+            let file = format!("iso800/{kind}/{index:02}.pgm");
+            let line = [file.as_str(), "iso800", kind_word, &exposure.to_string()].join(",");
+            list += &line;
+            list.push('\n');
+        }
+    }
+    bench.file("cam/frames.csv", list);
+    assert_eq!(measured(&bench, &line), by_folder);
+    // The control: a list that leaves out an exposure leaves it out.
+    let short = fs::read_to_string(bench.path("cam/frames.csv")).unwrap();
+    let short: Vec<&str> = short
+        .lines()
+        .filter(|line| !line.contains("flat-4"))
+        .collect();
+    bench.file("cam/frames.csv", short.join("\n"));
+    let found = measured(&bench, &line);
+    assert_eq!(found["settings"][0]["frames"]["exposures"], 4);
+}

@@ -1,0 +1,110 @@
+//! What is no pair of normal and low light is refused or left out by name, before anything is compared.
+
+use super::*;
+
+const PICTURES: [(&str, u32); 3] = [("a", 1), ("b", 2), ("c", 3)];
+
+/// Exchanges the images of two sides or names.
+fn exchange(bench: &Bench, one: &str, other: &str) {
+    let [one, other, between] = [one, other, "between"].map(|path| bench.path(path));
+    fs::rename(&one, &between).unwrap();
+    fs::rename(&other, &one).unwrap();
+    fs::rename(&between, &other).unwrap();
+}
+
+fn exchange_sides(bench: &Bench, name: &str) {
+    let side = |side: &str| format!("pairs/{side}/{name}.png");
+    exchange(bench, &side("normal"), &side("low"));
+}
+
+#[test]
+fn swapped_folders_are_refused_before_any_work() {
+    let bench = Bench::new();
+    made_pairs(&bench, "pairs", &PICTURES, &["--variant", "noise"]);
+    let call = |words: &[&str]| {
+        let words = [&["realism", "pairs", "--out", "out"], words].concat();
+        bench.call(&words)
+    };
+    exchange(&bench, "pairs/normal", "pairs/low");
+    let swapped = call(&[]);
+    assert_eq!(swapped.code, Some(2), "{swapped:?}");
+    let message = "pairs: low is brighter than normal in 3 of 3 pairs: are the folders swapped?";
+    assert!(swapped.stderr.contains(message), "{swapped:?}");
+    assert!(!bench.path("out").exists() && swapped.stdout.is_empty());
+    // A stated drop does not hide it; one that is meant to brighten is followed.
+    let stated = call(&["--ev", "4"]);
+    assert_eq!(stated.code, Some(2), "{stated:?}");
+    assert!(stated.stderr.contains(message), "{stated:?}");
+    let meant = call(&["--ev", "-4"]);
+    assert_eq!(meant.code, Some(0), "{meant:?}");
+    // Two of three are still more than half.
+    exchange_sides(&bench, "b");
+    let most = call(&[]);
+    assert_eq!(most.code, Some(2), "{most:?}");
+    assert!(most.stderr.contains("in 2 of 3 pairs"), "{most:?}");
+}
+
+#[test]
+fn a_single_swapped_pair_is_named_and_left_out() {
+    let bench = Bench::new();
+    made_pairs(&bench, "pairs", &PICTURES, &["--variant", "noise"]);
+    let whole = json(&bench, &[]);
+    assert_eq!(whole["pairs"], 3);
+    exchange_sides(&bench, "b");
+    let called = bench.call(&["realism", "pairs", "--json"]);
+    assert_eq!(called.code, Some(1), "{called:?}");
+    let message = "b: low is brighter than normal by";
+    assert!(called.stderr.contains(message), "{}", called.stderr);
+    let summary: Value = serde_json::from_str(&called.stdout).unwrap();
+    assert_eq!(summary["pairs"], 2);
+    assert_eq!(summary["swapped"], serde_json::json!(["b"]));
+    let table = bench.call(&["realism", "pairs"]).stdout;
+    assert!(table.contains("1 pair left out as swapped"), "{table}");
+}
+
+#[test]
+fn images_of_two_scenes_are_named_and_left_out() {
+    let bench = Bench::new();
+    made_pairs(&bench, "pairs", &PICTURES, &["--variant", "noise"]);
+    exchange(&bench, "pairs/low/a.png", "pairs/low/c.png");
+    let called = bench.call(&["realism", "pairs", "--json"]);
+    assert_eq!(called.code, Some(1), "{called:?}");
+    for name in ["a", "c"] {
+        let message = format!("{name}: its images show two scenes");
+        assert!(called.stderr.contains(&message), "{}", called.stderr);
+    }
+    let summary: Value = serde_json::from_str(&called.stdout).unwrap();
+    assert_eq!(summary["pairs"], 1);
+    assert_eq!(summary["two_scenes"], serde_json::json!(["a", "c"]));
+    fs::remove_file(bench.path("pairs/low/b.png")).unwrap();
+    let none = bench.call(&["realism", "pairs"]);
+    assert_eq!(none.code, Some(2), "{none:?}");
+    assert!(
+        none.stderr.contains("no pair could be compared"),
+        "{none:?}"
+    );
+}
+
+#[test]
+fn a_pair_of_nearly_the_same_light_is_warned_about() {
+    let bench = Bench::new();
+    pair(&bench, "a", 1);
+    let normal = bench.path("pairs/normal/a.png");
+    let image = image::open(&normal).unwrap().to_rgb8();
+    let darker = image.enumerate_pixels().map(|(_, _, pixel)| {
+        let Rgb(codes) = pixel;
+        codes.map(|code| code - code / 20)
+    });
+    let samples: Vec<u8> = darker.flatten().collect();
+    RgbImage::from_raw(96, 64, samples)
+        .unwrap()
+        .save(bench.path("pairs/low/a.png"))
+        .unwrap();
+    let called = bench.call(&["realism", "pairs"]);
+    assert_eq!(called.code, Some(0), "{called:?}");
+    let message = "a: its exposure drop is 0.";
+    assert!(called.stderr.contains(message), "{}", called.stderr);
+    pair(&bench, "a", 1);
+    let dark = bench.call(&["realism", "pairs"]);
+    assert!(!dark.stderr.contains("exposure drop"), "{}", dark.stderr);
+}
