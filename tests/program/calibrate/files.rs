@@ -194,7 +194,7 @@ fn a_list_of_frames_replaces_folders() {
         for index in 0..2 {
             let (kind_word, exposure) = kind.split_once('-').unwrap_or((kind, ""));
             let file = format!("iso800/{kind}/{index:02}.pgm");
-            let line = [file.as_str(), "iso800", kind_word, &exposure.to_string()].join(",");
+            let line = [file.as_str(), "iso800", kind_word, exposure].join(",");
             list += &line;
             list.push('\n');
         }
