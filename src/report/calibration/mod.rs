@@ -1,4 +1,4 @@
-//! Report of a measured camera: [`table`], [`json`] and [`figure`].
+//! Report of a measured camera: [`table`], [`json`] and [`figure()`].
 
 mod figure;
 

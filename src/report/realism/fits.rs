@@ -1,4 +1,4 @@
-//! The table and the file of fitted gains: [`table`], [`by_pair`] and [`csv`].
+//! The table and the file of fitted gains: [`table`], [`by_pair`] and [`csv()`].
 
 use crate::error::Result;
 use crate::report::csv;
