@@ -1,7 +1,7 @@
 //! Measures how well a vision-language model sees in the dark.
 //!
 //! From well-lit indoor frames it makes low-light versions (levels L0–L5 or any exposure drop, each by exposure drop alone and with the
-//! noise of a sensor), enhances them with any low-light model given as ONNX, asks OpenAI-compatible endpoints questions about each
+//! noise of a sensor; or as a camera with automatic exposure takes them, or blurred by its motion), enhances them with any low-light model given as ONNX, asks OpenAI-compatible endpoints questions about each
 //! image, scores the replies, and compares all of it.
 //!
 //! # The library
@@ -102,7 +102,7 @@
 //! |---|---|
 //! | a flag | the structure of its group, where it acts, the test of what it does, for an evaluation or `openeqa` its row in `tests/program/identity.rs`; where it may be idle, `cli/no_effect.rs` |
 //! | a format to import | `import/<kind>.rs`, `import/mod.rs`, `import/README.md`, `tests/program/import.rs` |
-//! | a kind of degradation | `types/degradation.rs`, `synthesis/<kind>.rs`, `synthesis/mod.rs`, `synthesis/exposures.rs`, `tests/program/synthesize.rs`, `results/README.md` |
+//! | a kind of degradation | `types/degradation.rs`, `synthesis/<kind>.rs`, `synthesis/mod.rs`, `synthesis/applied.rs`, `synthesis/exposures.rs`, `tests/program/synthesize.rs`, `results/README.md`; with an axis of its own `types/severity.rs`, `synthesis/levels.rs` |
 //! | an API of endpoints | `ask/wire/<api>.rs`, `ask/wire/mod.rs`, `job/models.rs`, `tests/support/endpoint.rs`, `tests/program/ask.rs` |
 //! | an experiment | `run/<experiment>/`, its detail in `types/detail.rs` and `score/record.rs`, `job/stored.rs` |
 //!

@@ -3,9 +3,8 @@
 use std::fmt::Display;
 use std::str::FromStr;
 
-use crate::error::{Error, Result};
-use crate::types::degradation::{Axis, Kind};
-use crate::types::{AxisLevel, KindSet, Severity};
+use crate::types::degradation::Kind;
+use crate::types::{AxisLevel, Severity};
 
 /// Levels in ascending order of degradation, without duplicates.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -15,14 +14,14 @@ pub(crate) struct Levels(pub Vec<AxisLevel>);
 const MAX_LEVELS: usize = 200;
 
 /// Kind whose labels (L1 to L5) the light levels have.
-const LIGHT: Kind = Kind::ALL[0];
+pub(super) const LIGHT: Kind = Kind::ALL[0];
 
 impl FromStr for Levels {
     type Err = String;
 
     /// Parses items between commas, in any order: `L3`, `L0-L5`, a number of EV, `0..10:0.5`, or exposure times as `T33.33`. Sorts
     /// the levels and removes duplicates.
-    fn from_str(text: &str) -> std::result::Result<Self, String> {
+    fn from_str(text: &str) -> Result<Self, String> {
         let mut levels = Vec::new();
         for item in text.split(',').map(str::trim) {
             if item.is_empty() {
@@ -73,14 +72,14 @@ fn example(kind: Kind) -> &'static str {
 }
 
 /// The levels of a kind's own ladder, from L0.
-fn ladder(kind: Kind) -> Vec<AxisLevel> {
+pub(super) fn ladder(kind: Kind) -> Vec<AxisLevel> {
     let ladder = kind.ladder().iter();
     let ladder = ladder.map(|severity| AxisLevel::new(kind, *severity));
     std::iter::once(AxisLevel::L0).chain(ladder).collect()
 }
 
 /// The named levels from one to another, as `L1-L4` or `T8.33-T133.33`; `item` is the text of the range.
-fn named(item: &str, first: &str, last: &str) -> std::result::Result<Vec<AxisLevel>, String> {
+fn named(item: &str, first: &str, last: &str) -> Result<Vec<AxisLevel>, String> {
     let is_number = |end: &str| end.starts_with(|c: char| c.is_ascii_digit());
     if first.is_empty() {
         return Err(format!(
@@ -127,7 +126,7 @@ fn step(kind: Kind) -> &'static str {
 
 /// The severities of a range with a step, as `0..10:0.5`; its end is one of them if a step ends there. `item` is the text of the
 /// range.
-fn steps(item: &str, from: &str, rest: &str) -> std::result::Result<Vec<AxisLevel>, String> {
+fn steps(item: &str, from: &str, rest: &str) -> Result<Vec<AxisLevel>, String> {
     let (kind, number) = on_axis(from);
     let unit = kind.axis().unit;
     let Some((to, by)) = rest.split_once(':') else {
@@ -166,7 +165,7 @@ fn steps(item: &str, from: &str, rest: &str) -> std::result::Result<Vec<AxisLeve
 }
 
 /// A number of a range on the axis of a kind, in hundredths of its unit.
-fn hundredths(item: &str, kind: Kind, number: &str) -> std::result::Result<u16, String> {
+fn hundredths(item: &str, kind: Kind, number: &str) -> Result<u16, String> {
     let number = number.trim();
     let is_number = number.starts_with(|c: char| c.is_ascii_digit());
     if !is_number {
@@ -181,7 +180,7 @@ fn hundredths(item: &str, kind: Kind, number: &str) -> std::result::Result<u16, 
 }
 
 /// Parses one level: a name, a number of EV, or an exposure time as T33.33.
-fn level(text: &str) -> std::result::Result<AxisLevel, String> {
+fn level(text: &str) -> Result<AxisLevel, String> {
     let (kind, number) = on_axis(text);
     let is_number = number.starts_with(|c: char| c.is_ascii_digit());
     if text.eq_ignore_ascii_case("L0") {
@@ -195,7 +194,7 @@ fn level(text: &str) -> std::result::Result<AxisLevel, String> {
 }
 
 /// The level of a number on the axis of a kind.
-fn measured(kind: Kind, number: &str) -> std::result::Result<AxisLevel, String> {
+fn measured(kind: Kind, number: &str) -> Result<AxisLevel, String> {
     if number.parse::<f64>() == Ok(0.0) {
         return Ok(AxisLevel::L0);
     }
@@ -209,59 +208,6 @@ fn measured(kind: Kind, number: &str) -> std::result::Result<AxisLevel, String> 
     }
     let severity = number.parse::<Severity>().map_err(|e| e.to_string())?;
     Ok(AxisLevel::new(kind, severity))
-}
-
-impl Levels {
-    /// The levels of a run with these kinds. Kinds of an axis on which no level is named have their own ladder, if L0 to L5 are
-    /// named, as by default.
-    ///
-    /// # Errors
-    /// If a kind has no level, or a level no kind.
-    pub(super) fn of_kinds(&self, kinds: KindSet) -> Result<Vec<AxisLevel>> {
-        let mut levels = self.0.clone();
-        let on = |axis: Axis| move |level: &&AxisLevel| level.axis() == Some(axis);
-        let is_clean = levels.iter().all(|level| level.severity().is_none());
-        let light = levels
-            .iter()
-            .filter(|level| level.axis() != Some(Axis::MOTION));
-        let has_ladders = light.eq(&ladder(LIGHT));
-        for axis in Axis::ALL.into_iter().filter(|_| !is_clean) {
-            let mut of_axis = kinds.kinds().filter(|kind| kind.axis() == axis);
-            match (of_axis.next(), self.0.iter().find(on(axis))) {
-                (Some(kind), None) if has_ladders => levels.extend(ladder(kind)),
-                (Some(kind), None) => {
-                    let [first, last] = ends(kind);
-                    let problem = format_args!(
-                        "no level of {kind} is named; add {first}-{last}, or leave out {kind} in --variant"
-                    );
-                    return Err(Error::usage("--levels", problem));
-                }
-                (None, Some(_)) if axis == Axis::LIGHT && has_ladders => {
-                    levels.retain(|level| level.axis() != Some(axis));
-                }
-                (None, Some(level)) => {
-                    let all = Kind::ALL.into_iter().filter(|kind| kind.axis() == axis);
-                    let words: Vec<&str> = all.map(Kind::word).collect();
-                    let problem = format_args!(
-                        "{level} is a level of {}, of which --variant {kinds} names none",
-                        words.join(", ")
-                    );
-                    return Err(Error::usage("--levels", problem));
-                }
-                (Some(_), Some(_)) | (None, None) => {}
-            }
-        }
-        levels.sort_unstable();
-        levels.dedup();
-        Ok(levels)
-    }
-}
-
-/// The first and the last level of a kind's own ladder.
-fn ends(kind: Kind) -> [String; 2] {
-    let ladder = kind.ladder();
-    [ladder.first(), ladder.last()]
-        .map(|severity| severity.map_or(String::new(), |severity| kind.label(*severity)))
 }
 
 #[cfg(test)]
@@ -330,54 +276,6 @@ mod tests {
         ] {
             let error = wrong.parse::<Levels>().unwrap_err();
             assert!(error.contains(part), "{wrong}: {error}");
-        }
-    }
-
-    #[test]
-    fn each_kind_has_its_levels() {
-        let of = |levels: &str, kinds: &str| {
-            let levels: Levels = levels.parse().unwrap();
-            let levels = levels.of_kinds(kinds.parse().unwrap());
-            let levels = levels.map_err(|e| e.to_string())?;
-            let names: Vec<String> = levels.iter().map(ToString::to_string).collect();
-            Ok::<String, String>(names.join(" "))
-        };
-        let light = "L0 L1 L2 L3 L4 L5";
-        let times = "T8.33 T16.67 T33.33 T66.67 T133.33";
-        for (levels, kinds, expected) in [
-            ("L0-L5", "both", light.to_owned()),
-            ("L0-L5", "auto", light.to_owned()),
-            ("L0-L5", "motion", format!("L0 {times}")),
-            ("L0-L5", "all", format!("{light} {times}")),
-            ("L0-L5,T5", "ev,motion", format!("{light} T5")),
-            ("L0,T5", "motion", "L0 T5".to_owned()),
-            ("L3,T5", "noise,motion", "L3 T5".to_owned()),
-            ("L0,3.3", "auto", "L0 E3.3".to_owned()),
-            ("L0", "all", "L0".to_owned()),
-        ] {
-            assert_eq!(of(levels, kinds), Ok(expected), "{levels} {kinds}");
-        }
-        for (levels, kinds, part) in [
-            (
-                "L0,L3",
-                "noise,motion",
-                "--levels: no level of motion is named; add T8.33-T133.33, or leave out motion in --variant",
-            ),
-            ("T5", "both,motion", "no level of ev is named; add L1-L5"),
-            (
-                "L0,L3",
-                "motion",
-                "L3 is a level of ev, noise, auto, of which --variant motion names none",
-            ),
-            ("L0-L5,2.5", "motion", "L1 is a level of ev, noise, auto"),
-            (
-                "L0-L5,T5",
-                "both",
-                "T5 is a level of motion, of which --variant both names none",
-            ),
-        ] {
-            let error = of(levels, kinds).unwrap_err();
-            assert!(error.contains(part), "{levels} {kinds}: {error}");
         }
     }
 

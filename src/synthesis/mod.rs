@@ -36,6 +36,7 @@ pub(crate) mod curve;
 pub(crate) mod exposure;
 mod exposures;
 mod isp;
+mod kind_levels;
 pub(crate) mod lanes;
 mod levels;
 mod motion;

@@ -18,10 +18,7 @@ impl AxisLevel {
     /// The level of a severity of a kind.
     #[must_use]
     pub fn new(kind: Kind, severity: Severity) -> Self {
-        // The first kind of an axis represents all kinds of that axis.
-        let mut kinds = Kind::ALL.into_iter();
-        let first = kinds.find(|other| other.axis() == kind.axis());
-        Self(Some((first.unwrap_or(kind), severity)))
+        Self(Some((kind.first_of_axis(), severity)))
     }
 
     /// The severity; `None` for L0.

@@ -85,12 +85,7 @@ impl Degradation {
 impl Ord for Degradation {
     /// By level, kind and light reading: the levels of one axis follow each other.
     fn cmp(&self, other: &Self) -> Ordering {
-        // The first kind of an axis stands for the axis, as in the order of levels.
-        let axis = |kind: Kind| {
-            let mut kinds = Kind::ALL.into_iter();
-            kinds.find(|other| other.axis() == kind.axis())
-        };
-        let key = |how: &Self| (axis(how.kind), how.severity, how.kind);
+        let key = |how: &Self| (how.kind.first_of_axis(), how.severity, how.kind);
         let order = key(self).cmp(&key(other));
         order.then_with(|| self.reading.cmp(&other.reading))
     }
@@ -185,6 +180,14 @@ impl Kind {
             Self::Exposure | Self::Sensor | Self::Auto => Axis::LIGHT,
             Self::Motion => Axis::MOTION,
         }
+    }
+
+    /// The first kind of the same axis, which stands for all of them.
+    #[must_use]
+    pub(super) fn first_of_axis(self) -> Self {
+        let mut kinds = Self::ALL.into_iter();
+        let first = kinds.find(|other| other.axis() == self.axis());
+        first.unwrap_or(self)
     }
 
     /// The severities of the paper, or of a kind that the paper does not have, which are the default.
