@@ -4,14 +4,14 @@ use rayon::prelude::*;
 
 use super::bayer::Bayer;
 use super::camera::CameraState;
+use super::clean::Clean;
 use super::isp::Developer;
 use super::lanes::Isa;
 use super::negative::Negative;
 use super::noise::{Noise, Term};
 use super::random::NoiseKey;
 use super::reading::{Amplify, Tone};
-use super::unprocess::unprocess;
-use crate::types::Rgb;
+use super::unprocess::unprocess_up_to;
 
 /// Noise-free RAW image of a frame, by one camera.
 ///
@@ -20,17 +20,26 @@ use crate::types::Rgb;
 pub(crate) struct CleanRaw {
     raw: Bayer,
     camera: CameraState,
+    /// How many EV above white the sensor saturates, if the frame is light in front of the camera.
+    headroom_ev: Option<f64>,
     /// Height and width of the frame, in pixels.
     size: [usize; 2],
 }
 
 impl CleanRaw {
-    /// The noise-free RAW image of `clean` by a camera in the given state.
+    /// The noise-free RAW image of `clean` by a camera in the given state. `headroom_ev` is that of the light reading
+    /// ([`Synthesis::headroom_ev`](super::Synthesis::headroom_ev)); it matters for light alone.
     #[must_use]
-    pub(crate) fn new(clean: &Rgb, camera: CameraState) -> Self {
+    pub(crate) fn new<'a>(
+        clean: impl Into<Clean<'a>>,
+        camera: CameraState,
+        headroom_ev: f64,
+    ) -> Self {
+        let clean = clean.into();
         Self {
-            raw: unprocess(clean, &camera),
+            raw: unprocess_up_to(clean, &camera, headroom_ev),
             camera,
+            headroom_ev: matches!(clean, Clean::Scene(_)).then_some(headroom_ev),
             size: [clean.height(), clean.width()],
         }
     }
@@ -50,6 +59,10 @@ impl CleanRaw {
         let isa = Isa::best();
         let noise = Noise::new(state, key, amplify, &Term::ALL, isa);
         let developer = Developer::new(&self.camera, tone, isa);
+        let developer = match self.headroom_ev {
+            Some(headroom_ev) => developer.of_light(headroom_ev),
+            None => developer,
+        };
         let mut balanced = self.raw.clone();
         balanced
             .lines_mut()
@@ -67,29 +80,33 @@ impl CleanRaw {
 mod tests {
     use super::super::camera::tests::median;
     use super::*;
-    use crate::types::FrameId;
+    use crate::types::{FrameId, Light, Rgb};
 
     #[test]
     fn negatives_are_those_of_the_frame_itself() {
         let samples = (0..21 * 35 * 3).map(|i: u32| (i.wrapping_mul(2_654_435_761) >> 24) as u8);
-        let clean = Rgb::new(21, 35, samples.collect()).unwrap();
+        let codes = Rgb::new(21, 35, samples.collect()).unwrap();
+        let samples = codes.samples().iter().map(|code| f32::from(*code) / 40.0);
+        let light = Light::new(21, 35, samples.collect()).unwrap();
         let key = NoiseKey::new(4, &FrameId("raw".to_owned()));
-        let raw = CleanRaw::new(&clean, median());
-        let mut images = Vec::new();
-        for (gain, tone) in [(0.1, Tone::None), (6.0, Tone::BeforeEv)] {
-            let state = CameraState {
-                system_gain: gain,
-                read_scale: 2.0 * gain,
-                ..median()
-            };
-            let found = raw
-                .negative(&key, &state, Amplify::All, tone)
-                .develop_by(3.0);
-            let whole =
-                Negative::with_state(&clean, &key, &state, Amplify::All, tone, &Term::ALL, 0.0);
-            assert_eq!(found, whole.develop_by(3.0), "K {gain}");
-            images.push(found);
+        for clean in [Clean::Codes(&codes), Clean::Scene(&light)] {
+            let raw = CleanRaw::new(clean, median(), 3.0);
+            let mut images = Vec::new();
+            for (gain, tone) in [(0.1, Tone::None), (6.0, Tone::BeforeEv)] {
+                let state = CameraState {
+                    system_gain: gain,
+                    read_scale: 2.0 * gain,
+                    ..median()
+                };
+                let found = raw.negative(&key, &state, Amplify::All, tone);
+                let found = found.develop_by(3.0);
+                let terms = &Term::ALL;
+                let whole =
+                    Negative::with_state(clean, &key, &state, Amplify::All, tone, terms, 3.0);
+                assert_eq!(found, whole.develop_by(3.0), "K {gain}");
+                images.push(found);
+            }
+            assert_ne!(images[0], images[1]);
         }
-        assert_ne!(images[0], images[1]);
     }
 }

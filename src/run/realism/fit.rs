@@ -9,7 +9,7 @@ use crate::score::realism::smooth::SmoothBlocks;
 use crate::synthesis::{
     CameraModel, CameraState, CleanRaw, Coupling, NoiseKey, Sampling, SensorSettings, Synthesis,
 };
-use crate::types::{FrameId, ReadingName, Rgb};
+use crate::types::{FrameId, Pixels, ReadingName, Rgb};
 
 /// The fits of all pairs, light reading by light reading. A pair that cannot be read is logged and left out.
 ///
@@ -27,7 +27,6 @@ pub(super) fn fit(
     let fits = workers.map("pairs fitted", pairs, |_, checked| {
         // A file that can no longer be read fails in the comparison, where it is logged and counted.
         let (normal, low) = load(args, checked.pair, None).ok()?;
-        let normal = normal.codes();
         Some(fit_pair(sensor.seed, &readings, checked, &normal, &low))
     });
     let by_reading = readings.iter().enumerate().map(|(index, reading)| {
@@ -86,20 +85,21 @@ fn fit_pair(
     seed: u64,
     readings: &[FitReading],
     checked: &CheckedPair<'_>,
-    normal: &Rgb,
+    normal: &Pixels,
     low: &Rgb,
 ) -> Vec<GainFit> {
     // Other draws than those of the comparison: the noise of a synthetic low-light image of the same name must not be met again.
     let key = NoiseKey::new(seed, &FrameId(format!("fit of {}", checked.pair.name)));
     let drop = f64::from(checked.drop);
-    let smooth = SmoothBlocks::of(normal, drop);
+    let smooth = SmoothBlocks::of(&normal.codes(), drop);
     let real = smooth.spread(low);
-    // The colours of the camera are the same at all gains and in all readings, and so is the image without noise.
-    let mut raw = None;
     let fits = readings.iter().map(|reading| {
+        let mut raw = None;
         let curves = reading.ladder.each_ref().map(|synthesis| {
             let state = fixed_state(synthesis, drop);
-            let raw = raw.get_or_insert_with(|| CleanRaw::new(normal, state.clone()));
+            // The colours of the camera, and so the image without noise, are the same at all gains.
+            let headroom = synthesis.headroom_ev(drop);
+            let raw = raw.get_or_insert_with(|| CleanRaw::new(normal, state.clone(), headroom));
             let negative = raw.negative(&key, &state, synthesis.amplify, synthesis.tone);
             smooth.spread(&negative.develop_by(drop))
         });

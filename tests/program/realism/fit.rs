@@ -42,6 +42,43 @@ fn a_known_gain_comes_back_in_every_light_reading() {
     });
 }
 
+/// A picture that holds linear light is fitted as light, as it is compared: its noise is not that of a picture of its codes.
+#[test]
+fn a_known_gain_comes_back_from_linear_light() {
+    let bench = Bench::new();
+    for side in ["normal", "low"] {
+        fs::create_dir_all(bench.path(&format!("pairs/{side}"))).unwrap();
+    }
+    let normal = bench.path("pairs/normal/a.png");
+    let light = image::ImageBuffer::<Rgb<u16>, Vec<u16>>::from_fn(320, 240, {
+        let picture = picture(4);
+        move |x, y| {
+            let linear = |code: u8| (65_535.0 * (f64::from(code) / 255.0).powf(2.2)) as u16;
+            Rgb(picture.get_pixel(x, y).0.map(linear))
+        }
+    });
+    light.save(&normal).unwrap();
+    let words = [
+        "--transfer",
+        "linear",
+        "--profile",
+        "physical",
+        "--gain",
+        "0.7746",
+    ];
+    let words = [&FIXED[..], &words, &["--levels", "L2", "--out", "made"]].concat();
+    bench.complete(&[&["synthesize", normal.to_str().unwrap()], &words[..]].concat());
+    let low = bench.path("made/a_L2-noise@physical.png");
+    fs::rename(low, bench.path("pairs/low/a.png")).unwrap();
+    let fit = ["--fit", "--ev", "4", "--profile", "physical"];
+    let gain = |words: &[&str]| {
+        let summary = json(&bench, &[&fit[..], words].concat());
+        number(&fits(&summary, "physical")[0]["gain"])
+    };
+    let found = gain(&["--transfer", "linear"]);
+    assert!((found / 0.7746 - 1.0).abs() < 0.1, "{found}");
+}
+
 /// A picture without noise, and one whose noise was averaged away: the one has no gain, the other a smaller one.
 #[test]
 fn what_is_not_the_noise_of_a_sensor_is_not_fitted() {
