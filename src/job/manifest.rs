@@ -40,6 +40,7 @@ pub(crate) fn of<E: Experiment>(experiment: &E, stored: Option<RunManifest>) -> 
         shard: job.shard.is_part().then(|| job.shard.to_string()),
         settings,
         images: job.image_flags.clone(),
+        reply_reading: DetailOf::<E>::REPLY_READING.map(str::to_owned),
         counts: Counts::default(),
     };
     let Some(mut stored) = stored else {
@@ -52,6 +53,8 @@ pub(crate) fn of<E: Experiment>(experiment: &E, stored: Option<RunManifest>) -> 
             enhancers: stored.enhancers,
             inputs: manifest.inputs.or(stored.inputs),
             images,
+            // Stored records keep their readings until they are read again.
+            reply_reading: stored.reply_reading,
             ..manifest
         };
     }

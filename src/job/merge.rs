@@ -300,6 +300,9 @@ fn merged_manifest<D>(parts: &[MergePart<D>]) -> Result<RunManifest> {
         .clone()
         .map(|manifest| manifest.updated.clone())
         .max();
+    // The records of all shards are stored as they are; the first version has no name in a manifest.
+    let readings = manifests.clone().map(|manifest| &manifest.reply_reading);
+    manifest.reply_reading = readings.min().cloned().flatten();
     manifest.created = created.unwrap_or_default();
     manifest.updated = updated.unwrap_or_default();
     manifest.counts.trials = manifests.map(|manifest| manifest.counts.trials).sum();

@@ -36,6 +36,8 @@ pub enum AlertKind {
     Unread,
     /// Answers of people that are no choice of their question.
     NoChoice,
+    /// Replies that the lenient reading of this version reads differently.
+    Reading,
     /// Fewer clusters than an interval needs.
     Clusters,
     /// Models that did not answer the same questions.

@@ -1,6 +1,6 @@
 //! Reading of a reply into the record of its trial, for both experiments.
 
-use super::choice::readings;
+use super::choice::{LENIENT_VERSION, readings};
 use super::llm_match::{Protocol, mark};
 use crate::error::Result;
 use crate::types::detail::{ChoiceLine, OpenLine};
@@ -12,6 +12,8 @@ impl Detail for ChoiceDetail {
     type Line = ChoiceLine;
 
     const SCHEMA: &'static str = "darkqa.run/2";
+
+    const REPLY_READING: Option<&'static str> = Some(LENIENT_VERSION);
 
     /// Stores both readings of a reply, and the outcome, which follows from the strict reading.
     fn read(&mut self, reply: &Reply) -> Result<()> {
@@ -53,6 +55,8 @@ impl Detail for OpenDetail {
     type Line = OpenLine;
 
     const SCHEMA: &'static str = "darkqa.openeqa/2";
+
+    const REPLY_READING: Option<&'static str> = None;
 
     /// Stores the marks that the two protocols read in a judge's reply.
     fn read(&mut self, reply: &Reply) -> Result<()> {

@@ -22,6 +22,7 @@ fn manifest(seed: u64) -> RunManifest {
         enhancers: BTreeMap::new(),
         inputs: None,
         shard: None,
+        reply_reading: None,
         counts: Counts::default(),
     }
 }

@@ -126,6 +126,9 @@ fn fields(object: &Value) -> BTreeMap<String, Value> {
         .collect()
 }
 
+/// The version of the lenient reading in runs whose manifest names none.
+pub(crate) const FIRST_REPLY_READING: &str = "lenient/1";
+
 /// The content of `manifest.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunManifest {
@@ -161,6 +164,10 @@ pub struct RunManifest {
     /// The flags that decide the images, as the user wrote them; empty in runs of earlier versions.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub images: BTreeMap<String, Value>,
+    /// The version of the rules by which the lenient reading in the records was made, as `lenient/2`; `None` in runs of open questions,
+    /// and in runs of earlier versions, which read by `lenient/1`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reply_reading: Option<String>,
     /// The number of trials, answered and failed.
     pub counts: Counts,
 }

@@ -200,6 +200,44 @@ fn kept_replies_are_read_again_without_a_call() {
 }
 
 #[test]
+fn a_run_that_an_earlier_version_read_says_what_has_changed() {
+    const CHANGE: &str = "lenient/2 reads 6 of 6 replies differently than lenient/1: the lenient accuracy is 0.0 %, and was 100.0 %";
+    let bench = Bench::with_questions(6);
+    bench.file("script.jsonl", "{\"default\":\"I can rule out option C.\"}");
+    run(&bench, "--model script:script.jsonl");
+    let [records, manifest] =
+        ["run/records.jsonl", "run/manifest.json"].map(|name| bench.path(name));
+    let read_manifest =
+        || -> Value { serde_json::from_slice(&fs::read(&manifest).unwrap()).unwrap() };
+    assert_eq!(read_manifest()["reply_reading"], "lenient/2");
+    assert!(!bench.complete(&["report", "run"]).contains("lenient/1"));
+    // As the first version read them.
+    let old: String = fs::read_to_string(&records)
+        .unwrap()
+        .lines()
+        .map(|line| {
+            let mut record: Value = serde_json::from_str(line).unwrap();
+            assert_eq!(record["lenient"]["chosen"], Value::Null);
+            record["lenient"] = json!({"chosen": record["truth"], "why": null});
+            record.to_string() + "\n"
+        })
+        .collect();
+    fs::write(&records, old).unwrap();
+    let mut earlier = read_manifest();
+    earlier.as_object_mut().unwrap().remove("reply_reading");
+    fs::write(&manifest, earlier.to_string()).unwrap();
+    let report = bench.complete(&["report", "run"]);
+    assert!(report.contains(CHANGE), "{report}");
+    let rescored = bench.complete(&["report", "run", "--rescore"]);
+    assert!(
+        rescored.starts_with(&format!("6 of 6 records now read differently\n{CHANGE}\n")),
+        "{rescored}"
+    );
+    assert_eq!(read_manifest()["reply_reading"], "lenient/2");
+    assert!(!bench.complete(&["report", "run"]).contains("lenient/1"));
+}
+
+#[test]
 fn replies_without_an_answer_are_told_by_reason() {
     let bench = Bench::with_questions(6);
     let thinking = json!({"content": null, "reasoning_content": "hmm"});

@@ -11,6 +11,7 @@ mod join;
 mod lights;
 mod models;
 pub(crate) mod open;
+mod rereading;
 mod runs;
 mod settings;
 mod story;

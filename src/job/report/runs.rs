@@ -12,8 +12,10 @@ use super::combine::{Combined, combine};
 use super::common::restrict;
 use super::enhancers;
 use super::open;
+use super::rereading::LenientChange;
 use crate::error::{Error, Result};
 use crate::files;
+use crate::job::folder::now;
 use crate::job::stored::{AnyRun, StoredRun, name};
 use crate::job::{Outcome, ShowArgs, StdoutFormat, count};
 use crate::report::alert::Alert;
@@ -22,7 +24,7 @@ use crate::report::json::{RunList, summary};
 use crate::report::products::{PAGE, products};
 use crate::store::{AddressChange, Store};
 use crate::types::manifest::Status;
-use crate::types::{ChoiceDetail, Decides, OpenDetail};
+use crate::types::{ChoiceDetail, Decides, Detail as _, OpenDetail};
 
 /// The flags of `report`.
 #[derive(Debug, Args)]
@@ -121,12 +123,7 @@ fn of_choices(
             return Err(no_records(run.folder.clone()));
         }
         if args.rescore {
-            let changed = reread(run)?;
-            let records = run.records.len();
-            let _ = writeln!(
-                output,
-                "{changed} of {records} records now read differently"
-            );
+            output += &reread(run)?;
             run.manifest.counts = count(run.manifest.counts.trials, &run.records);
         }
     }
@@ -250,12 +247,15 @@ fn of_open(args: &ReportArgs, runs: Vec<StoredRun<OpenDetail>>, again: &[Alert])
     write_files(args, scores.shown(args.show.format())?, files)
 }
 
-/// Reads all stored replies again, and stores the readings that changed; returns their number.
-fn reread(run: &mut StoredRun<ChoiceDetail>) -> Result<usize> {
+/// Reads all stored replies again, and stores the readings that changed, with the version of the reading; returns lines about the
+/// change.
+fn reread(run: &mut StoredRun<ChoiceDetail>) -> Result<String> {
     let mut store = Store::open(&run.folder, &run.manifest, AddressChange::Allowed)?;
     let mut changed = 0;
+    let mut lenient = LenientChange::of(&run.manifest);
     for record in &mut run.records {
         let now = record.clone().reread()?;
+        lenient.add(&record.detail, &now.detail);
         if now != *record {
             store.append(&now)?;
             changed += 1;
@@ -263,7 +263,15 @@ fn reread(run: &mut StoredRun<ChoiceDetail>) -> Result<usize> {
         }
     }
     store.sync()?;
-    Ok(changed)
+    let records = run.records.len();
+    let mut lines = format!("{changed} of {records} records now read differently\n");
+    if !lenient.is_current() {
+        let _ = writeln!(lines, "{}", lenient.words());
+        run.manifest.reply_reading = ChoiceDetail::REPLY_READING.map(str::to_owned);
+        run.manifest.updated = now();
+        store.write_manifest(&run.manifest)?;
+    }
+    Ok(lines)
 }
 
 fn no_records(path: PathBuf) -> Error {

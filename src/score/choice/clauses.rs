@@ -16,6 +16,9 @@ pub(super) enum Boundary {
     Sentence,
 }
 
+/// Maximum number of adverbs between a verb and its predicate.
+const MAX_ADVERBS: usize = 8;
+
 /// One word, phrase or sign of a text.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Element {
@@ -110,7 +113,8 @@ impl<'a> Clauses<'a> {
     /// Index of the element before a predicate, behind adverbs: its verb, if it has one.
     pub(super) fn verb_before(&self, at: usize) -> Option<usize> {
         let mut verb = at.checked_sub(1)?;
-        while verb > 0 && self.is_adverb(verb) {
+        let first = verb.saturating_sub(MAX_ADVERBS);
+        while verb > first && self.is_adverb(verb) {
             verb -= 1;
         }
         Some(verb)

@@ -84,12 +84,21 @@ pub(super) fn without_reasoning(reply: &str) -> Result<&str, UnreadReason> {
 /// The text in compatibility form (NFKC) without invisible characters and template tokens. It ends at the first token that
 /// ends a turn with text.
 pub(super) fn tidy(text: &str) -> String {
-    let text: String = text
-        .nfkc()
-        .filter(|&c| !is_invisible(c))
-        .collect::<String>()
-        .replace("\r\n", "\n")
-        .replace(['\r', '\u{2028}', '\u{2029}'], "\n")
+    let mut text: String = if text.is_ascii() {
+        text.to_owned()
+    } else {
+        text.nfkc().filter(|&c| !is_invisible(c)).collect()
+    };
+    if text.contains(['\r', '\u{2028}', '\u{2029}']) {
+        text = text
+            .replace("\r\n", "\n")
+            .replace(['\r', '\u{2028}', '\u{2029}'], "\n");
+    }
+    // Every token has one of these.
+    if !text.contains(['<', '[']) {
+        return text.trim().to_owned();
+    }
+    let text = text
         .replace("<|begin_of_box|>", "<answer>")
         .replace("<|end_of_box|>", "</answer>");
     let end = TURN_END

@@ -60,6 +60,7 @@ fn within(
     if goes_on || in_light || has(Role::Condition) || inverted || is_unmet(elements, head) {
         return vec![(first.start, last.end)];
     }
+    let forced = has(Role::Forced);
     let mut ranges = Vec::new();
     let (mut part, mut expects) = (first.start, None);
     for element in elements {
@@ -68,7 +69,7 @@ fn within(
             part = element.end;
         }
         // "A bedroom would have a bed"; the left part of "… if that is a stove" is unsure, its right part is asked.
-        if element.has(Role::Expected) || (element.has(Role::If) && !has(Role::Forced)) {
+        if element.has(Role::Expected) || (element.has(Role::If) && !forced) {
             expects = Some(part);
         }
     }

@@ -131,10 +131,12 @@ fn subject_end(clauses: &Clauses<'_>, at: usize) -> Option<usize> {
     {
         return Some(before);
     }
-    let verb = clauses.verb_before(at).filter(|verb| *verb > 0);
-    let copula = verb.filter(|verb| elements[*verb].has(Role::Copula));
-    if element.has(Role::Absent) && copula.is_some() {
-        return copula.map(|verb| verb - 1);
+    if element.has(Role::Absent) {
+        let verb = clauses.verb_before(at).filter(|verb| *verb > 0);
+        let verb = verb.filter(|verb| elements[*verb].has(Role::Copula));
+        if let Some(verb) = verb {
+            return Some(verb - 1);
+        }
     }
     let next = elements.get(at + 1);
     let ends = next.is_none_or(|next| next.boundary > Boundary::None);

@@ -27,7 +27,7 @@ pub(super) fn letters(text: &str, choices: usize, clauses: &Clauses<'_>) -> Vec<
     let candidates = text
         .bytes()
         .enumerate()
-        .filter(|(_, byte)| byte.is_ascii_alphabetic());
+        .filter(|(at, byte)| byte.is_ascii_alphabetic() && !is_inside(text.as_bytes(), *at));
     let names = candidates.filter_map(|(start, byte)| {
         let letter = char::from(byte);
         let delimiting = delimiting(text, start, letter, clauses)?;
@@ -41,6 +41,12 @@ pub(super) fn letters(text: &str, choices: usize, clauses: &Clauses<'_>) -> Vec<
         })
     });
     names.collect()
+}
+
+/// Whether a letter has another one beside it.
+fn is_inside(text: &[u8], at: usize) -> bool {
+    let is_letter = |byte: Option<&u8>| byte.is_some_and(u8::is_ascii_alphanumeric);
+    is_letter(text.get(at + 1)) || (at > 0 && is_letter(text.get(at - 1)))
 }
 
 /// How clearly the letter at byte `start` is delimited as a choice; `None` for a part of a word, an article or a pronoun.

@@ -45,6 +45,10 @@ use serde::Serialize;
 use crate::types::question::{Answer, Choices, UnreadReason};
 use crate::types::reply::{Finish, Reply};
 
+/// The version of the lenient reading, raised whenever any reply may read differently. Records of another version are read again by
+/// `report --rescore`. The strict reading has not changed since the first version.
+pub const LENIENT_VERSION: &str = "lenient/2";
+
 /// How much text a reply may have around the answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "lowercase")]

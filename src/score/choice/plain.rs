@@ -31,34 +31,62 @@ static TASK: LazyLock<Regex> =
     LazyLock::new(|| compiled(r"(?m)^[ \t]*(?:(?:[-+*•]|\d+[.)])[ \t]+)?\[[ xX]\][ \t]+"));
 /// A box anywhere, in a text that has an empty one.
 static BOX: LazyLock<Regex> = LazyLock::new(|| compiled(r"\[[ xX]\]"));
-static SPACES: LazyLock<Regex> = LazyLock::new(|| compiled(r"[^\S\n]+"));
-static LINES: LazyLock<Regex> = LazyLock::new(|| compiled(r" ?\n[\s]*"));
-
 /// Maximum depth of LaTeX groups that are unwrapped.
 const LATEX_DEPTH: usize = 4;
 
 /// The text without markup, one space between words, no empty lines, trimmed.
 pub(super) fn plain(text: &str) -> String {
     let text = LETTER_TAG.replace(text.trim(), "($1)");
-    let mut text = FENCE.replace_all(&text, "\n").into_owned();
+    let mut text = if text.contains("```") {
+        FENCE.replace_all(&text, "\n").into_owned()
+    } else {
+        text.into_owned()
+    };
+    if text.contains('\\') {
+        text = without_latex(text);
+    }
+    if text.contains('<') {
+        text = BREAK_TAG.replace_all(&text, "\n").into_owned();
+        text = TAG.replace_all(&text, "").into_owned();
+    }
+    if text.contains("[ ]") {
+        text = BOX.replace_all(&text, " ").into_owned();
+    } else if text.contains('[') {
+        text = TASK.replace_all(&text, "").into_owned();
+    }
+    let text = without_signs(&text);
+    let text = LINE_START.replace_all(&text, "");
+    with_single_spaces(&text)
+}
+
+/// The text with the content of LaTeX groups in their place, and without signs of LaTeX.
+fn without_latex(mut text: String) -> String {
     for _ in 0..LATEX_DEPTH {
         match LATEX_GROUP.replace_all(&text, "$1") {
             std::borrow::Cow::Borrowed(_) => break,
             std::borrow::Cow::Owned(unwrapped) => text = unwrapped,
         }
     }
-    let text = LATEX_SIGN.replace_all(&text, " ");
-    let text = BREAK_TAG.replace_all(&text, "\n");
-    let text = TAG.replace_all(&text, "");
-    let text = if text.contains("[ ]") {
-        BOX.replace_all(&text, " ")
-    } else {
-        TASK.replace_all(&text, "")
-    };
-    let text = without_signs(&text);
-    let text = LINE_START.replace_all(&text, "");
-    let text = SPACES.replace_all(&text, " ");
-    LINES.replace_all(text.trim(), "\n").into_owned()
+    LATEX_SIGN.replace_all(&text, " ").into_owned()
+}
+
+/// The trimmed text with a line break for each stretch of white space that has one, and a space for any other.
+fn with_single_spaces(text: &str) -> String {
+    let mut single = String::with_capacity(text.len());
+    let mut gap = None;
+    for c in text.trim().chars() {
+        if c.is_whitespace() {
+            gap = Some(if c == '\n' || gap == Some('\n') {
+                '\n'
+            } else {
+                ' '
+            });
+            continue;
+        }
+        single.extend(gap.take());
+        single.push(c);
+    }
+    single
 }
 
 /// An en dash between two letters, in one byte, as long as a hyphen: "living–room" is a name, "kitchen–bathroom" is two.
@@ -104,6 +132,9 @@ fn without_signs(text: &str) -> String {
 /// hyphen between two letters becomes a blank, and "grey" becomes "gray".
 pub(super) fn fold(text: &str) -> String {
     let lower = |c: char| {
+        if c.is_ascii() {
+            return c.to_ascii_lowercase();
+        }
         let mut lower = c.to_lowercase();
         match (lower.next(), lower.next()) {
             (Some(l), None) if l.len_utf8() == c.len_utf8() => l,

@@ -27,7 +27,12 @@ enum Mark {
 pub(super) struct Ticks {
     ticked: Vec<usize>,
     crossed: Vec<usize>,
+    /// Whether there are more than [`MAX_MARKS`].
+    is_endless: bool,
 }
+
+/// Maximum number of marks that are read. A reply with more repeats itself, and says nothing.
+const MAX_MARKS: usize = 100;
 
 impl Ticks {
     /// The answer of the marks: the only choice that is ticked. If there are only crosses, `stated` is, if it is not crossed;
@@ -36,6 +41,7 @@ impl Ticks {
         let stated = stated.filter(|answer| matches!(answer, Answer::Chosen(_)));
         let unparsed = |reason| Some(Answer::Unparsed(reason));
         match (self.ticked.first(), stated) {
+            _ if self.is_endless => unparsed(UnreadReason::Ambiguous),
             (None, _) if self.crossed.is_empty() => None,
             (None, Some(Answer::Chosen(index))) if !self.crossed.contains(&index) => stated,
             (None, _) => unparsed(UnreadReason::Negated),
@@ -67,6 +73,10 @@ pub(super) fn ticked(tidy: &str, read: impl Fn(&str) -> Answer) -> Option<Ticks>
         return None;
     }
     let mut ticks = Ticks::default();
+    if MARK.find_iter(tidy).nth(MAX_MARKS).is_some() {
+        ticks.is_endless = true;
+        return Some(ticks);
+    }
     for line in tidy.lines() {
         for (mark, item) in items(line) {
             let Answer::Chosen(index) = read(item.trim_matches([' ', '|', ':', ',', '-', '\t']))

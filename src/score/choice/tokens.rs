@@ -71,22 +71,24 @@ pub(super) fn tokens(text: &str) -> Vec<Token> {
 
 /// Whether a character that ends at byte `end` belongs to the word before it.
 fn joins(text: &str, word: &Token, (previous, c): (char, char), end: usize) -> bool {
+    if !matches!(c, '\'' | ',' | '.') {
+        return spelled(c) && (spelled(previous) || matches!(previous, '\'' | '.' | ','));
+    }
     let mut after = text[end..].chars();
     let (next, second) = (after.next().unwrap_or(' '), after.next().unwrap_or(' '));
     match c {
         '\'' => spelled(previous) && spelled(next),
-        ',' => previous.is_numeric() && next.is_numeric(),
-        '.' if previous.is_numeric() => next.is_numeric(),
-        '.' => {
+        _ if previous.is_numeric() => next.is_numeric(),
+        ',' => false,
+        _ => {
             let letters = word.of(text);
             let begins = letters.len() == 1 && next.is_alphabetic() && !second.is_alphabetic();
             begins || (letters.len() <= 5 && letters.contains('.') && !next.is_alphanumeric())
         }
-        c => spelled(c) && (spelled(previous) || matches!(previous, '\'' | '.' | ',')),
     }
 }
 
 /// Whether a character is part of a word of a script that writes spaces.
 fn spelled(c: char) -> bool {
-    (c.is_alphanumeric() || c == '_') && !unspaced(c)
+    c.is_ascii_alphanumeric() || ((c.is_alphanumeric() || c == '_') && !unspaced(c))
 }

@@ -2,6 +2,7 @@
 
 mod models;
 mod questions;
+mod readings;
 mod replies;
 mod servers;
 mod settings;
@@ -25,6 +26,7 @@ pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert>
     alerts.extend(of_joining(combined));
     alerts.extend(replies::of_replies(findings));
     alerts.extend(replies::of_people(combined));
+    alerts.extend(readings::of_readings(combined));
     alerts.extend(questions::of_repeats(combined));
     alerts.extend(questions::of_items(findings));
     if findings.grid.clusters < MIN_SCENES {

@@ -1,0 +1,29 @@
+//! Replies that were read by another version of the lenient reading: [`of_readings`].
+
+use crate::job::report::combine::Combined;
+use crate::job::report::rereading::LenientChange;
+use crate::report::alert::{Alert, AlertKind};
+
+/// How the lenient reading of each run would change by the rules of this version.
+pub(super) fn of_readings(combined: &Combined) -> Vec<Alert> {
+    let alerts = combined.runs.iter().filter_map(|run| {
+        let change = LenientChange::of(&run.manifest);
+        if change.is_current() {
+            return None;
+        }
+        let records = run.records.iter().map(|place| &combined.records[*place]);
+        let text = match change.through(records) {
+            Ok(change) if change.has_changed() => {
+                format!(
+                    "{}: {}. --rescore stores what it reads now.",
+                    run.name,
+                    change.words()
+                )
+            }
+            Ok(_) => return None,
+            Err(error) => format!("{}: its replies cannot be read again: {error}", run.name),
+        };
+        Some(Alert::new(AlertKind::Reading, text))
+    });
+    alerts.collect()
+}

@@ -1,0 +1,76 @@
+//! What changes if stored replies are read by the rules of this version: [`LenientChange`].
+
+use crate::error::Result;
+use crate::score::choice::LENIENT_VERSION;
+use crate::types::manifest::{FIRST_REPLY_READING, RunManifest};
+use crate::types::{ChoiceDetail, Record};
+
+/// How the lenient reading of stored replies changes.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(super) struct LenientChange {
+    /// The version by which the replies were read.
+    from: String,
+    /// Number of replies.
+    replies: usize,
+    /// Number of replies that read differently.
+    changed: usize,
+    /// Number of replies that read as the true choice, before and now.
+    right: [usize; 2],
+}
+
+impl LenientChange {
+    /// No replies yet, of a run with this manifest.
+    pub(super) fn of(manifest: &RunManifest) -> Self {
+        let from = manifest.reply_reading.as_deref();
+        Self {
+            from: from.unwrap_or(FIRST_REPLY_READING).to_owned(),
+            ..Self::default()
+        }
+    }
+
+    /// Whether the replies were read by the rules of this version.
+    pub(super) fn is_current(&self) -> bool {
+        self.from == LENIENT_VERSION
+    }
+
+    /// The change for stored records.
+    ///
+    /// # Errors
+    /// If the choices of a record are not valid.
+    pub(super) fn through<'a>(
+        mut self,
+        records: impl IntoIterator<Item = &'a Record>,
+    ) -> Result<Self> {
+        for record in records {
+            self.add(&record.detail, &record.clone().reread()?.detail);
+        }
+        Ok(self)
+    }
+
+    /// Counts one reply, as it was read and as it is read now. A trial without a reply does not count.
+    pub(super) fn add(&mut self, before: &ChoiceDetail, now: &ChoiceDetail) {
+        let (Some(old), Some(new)) = (before.lenient, now.lenient) else {
+            return;
+        };
+        self.replies += 1;
+        self.changed += usize::from(old.chosen != new.chosen);
+        for (right, reading) in self.right.iter_mut().zip([old, new]) {
+            *right += usize::from(reading.chosen == Some(now.truth));
+        }
+    }
+
+    /// Whether any reply reads differently.
+    pub(super) fn has_changed(&self) -> bool {
+        self.changed > 0
+    }
+
+    /// The change in words: `lenient/2 reads 3 of 60 replies differently than lenient/1: the lenient accuracy is 45.0 %, and was 50.0 %`.
+    pub(super) fn words(&self) -> String {
+        let percent = |right: usize| 100.0 * right as f64 / self.replies.max(1) as f64;
+        let [before, now] = self.right.map(percent);
+        format!(
+            "{LENIENT_VERSION} reads {} of {} replies differently than {}: the lenient accuracy is {now:.1} %, and was {before:.1} %",
+            self.changed, self.replies, self.from
+        )
+    }
+}
