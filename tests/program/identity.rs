@@ -598,7 +598,7 @@ fn settings_of_the_camera_are_those_of_its_variants() {
             "--motion speed=31 --auto gain=3",
             "the variant auto has another --auto",
         ),
-        ("--motion speed=31 --fixed", "has another --camera"),
+        ("--motion speed=31 --fixed", "or --fixed in this run"),
     ] {
         let otherwise = format!("{ALL} {otherwise}");
         scene.refuses(&EVALUATION, &otherwise, "run", field);

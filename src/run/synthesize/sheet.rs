@@ -94,16 +94,27 @@ impl Sheet {
     }
 }
 
-/// What made the images, in words: camera and seed, and gain and light ratio in each light reading.
+/// What made the images, in words: camera and seed, gain and light ratio in each light reading, and the flags of further variants.
 fn foot(light: &LightSettings, frame: &FrameId, degradations: &[Degradation]) -> String {
-    if !degradations.iter().any(|how| how.kind() == Kind::Sensor) {
-        return String::new();
+    let has = |test: fn(Kind) -> bool| degradations.iter().any(|how| test(how.kind()));
+    let mut facts = Vec::new();
+    if has(Kind::has_noise) {
+        facts.push(camera(light));
     }
-    let key = NoiseKey::new(light.kinds.sensor.seed, frame);
-    let readings = light.kinds.sensor.readings.iter();
-    let facts = readings.map(|(name, synthesis)| format!("{name}: {}", state(synthesis, &key)));
-    let facts: Vec<String> = facts.collect();
-    format!("{}; {}", camera(light), facts.join("; "))
+    if has(Kind::has_readings) {
+        let key = NoiseKey::new(light.kinds.sensor.seed, frame);
+        let readings = light.kinds.sensor.readings.iter();
+        facts.extend(
+            readings.map(|(name, synthesis)| format!("{name}: {}", state(synthesis, &key))),
+        );
+    }
+    if has(|kind| kind == Kind::Auto) {
+        facts.push(format!("--auto {}", light.kinds.auto));
+    }
+    if has(Kind::has_motion) {
+        facts.push(format!("--motion {}", light.kinds.motion));
+    }
+    facts.join("; ")
 }
 
 /// Camera and seed in words.
