@@ -227,7 +227,8 @@ fn a_run_that_an_earlier_version_read_says_what_has_changed() {
     earlier.as_object_mut().unwrap().remove("reply_reading");
     fs::write(&manifest, earlier.to_string()).unwrap();
     let report = bench.complete(&["report", "run"]);
-    assert!(report.contains(CHANGE), "{report}");
+    let said = report.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(said.contains(CHANGE), "{report}");
     let rescored = bench.complete(&["report", "run", "--rescore"]);
     assert!(
         rescored.starts_with(&format!("6 of 6 records now read differently\n{CHANGE}\n")),

@@ -34,6 +34,7 @@ mod questions;
 mod realism;
 mod report;
 mod rooms;
+mod same_bytes;
 mod sentences;
 mod serve;
 mod shards;
