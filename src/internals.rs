@@ -2,9 +2,9 @@
 
 pub mod ask {
     pub use crate::ask::{
-        Access, AskError, BaseUrl, Call, Constrain, Endpoint, ImageDetail, Message, Model,
-        Parameters, Payload, PayloadFormat, Prompts, Query, Quota, Random, Reach, Remote, Script,
-        Secret, Sending, Temperature, TokenField, Wire,
+        Access, AskError, BaseUrl, Call, Constrain, Endpoint, ExtraFields, ImageDetail, Message,
+        Model, Parameters, Payload, PayloadFormat, Prompts, Query, Quota, Random, Reach, Remote,
+        Script, Secret, Sending, Temperature, TokenField, Wire,
     };
 }
 

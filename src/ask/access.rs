@@ -8,8 +8,10 @@ use reqwest::header::{HeaderMap, HeaderName, HeaderValue};
 use reqwest::{Certificate, Client, redirect};
 
 use super::key_header::KeyHeader;
+use super::own_headers::OwnHeaders;
 use super::secret::{Scrub, Secret};
 use super::url::BaseUrl;
+use super::vendor::Vendor;
 use super::wire::Wire;
 use crate::error::{Error, Result};
 
@@ -26,7 +28,9 @@ pub struct Access {
     /// The header that carries the key.
     pub key_header: KeyHeader,
     /// Further headers that name the account and are not secret: `OpenAI-Organization`, `OpenAI-Project`.
-    pub headers: Vec<(&'static str, String)>,
+    pub account: Vec<(String, String)>,
+    /// Headers that the user adds.
+    pub headers: OwnHeaders,
     /// Certificate authorities that are trusted in addition to those of the system.
     pub authorities: Authorities,
     /// Whether a key may be sent unencrypted to another machine.
@@ -41,7 +45,8 @@ impl Access {
             base,
             key: None,
             key_header: KeyHeader::Auto,
-            headers: Vec::new(),
+            account: Vec::new(),
+            headers: OwnHeaders::default(),
             authorities: Authorities::default(),
             allow_http: false,
         }
@@ -50,7 +55,8 @@ impl Access {
     /// The filter that removes keys and passwords from the server's texts.
     pub(super) fn scrub(&self) -> Scrub {
         let key = self.key.as_ref().map(|key| key.expose().to_owned());
-        Scrub::new(self.base.secrets().into_iter().chain(key))
+        let own = self.headers.secrets().iter().cloned();
+        Scrub::new(self.base.secrets().into_iter().chain(key).chain(own))
     }
 
     /// Refuses settings that would send a key unencrypted, or send two keys.
@@ -79,22 +85,27 @@ impl Access {
     /// The headers of every request to an API.
     pub(super) fn headers(&self, wire: Wire) -> Result<HeaderMap> {
         let form = match self.key_header {
-            KeyHeader::Auto if self.base.is_azure() => KeyHeader::ApiKey,
-            KeyHeader::Auto => KeyHeader::Bearer,
+            KeyHeader::Auto => {
+                let vendor = Vendor::of(self.base.host());
+                vendor.map_or(KeyHeader::Bearer, Vendor::key_header)
+            }
             named => named,
         };
         let mut headers = wire.headers(self.key.as_ref(), form)?;
-        for (name, text) in &self.headers {
+        for (name, text) in &self.account {
             let invalid = |_| {
                 Error::usage(
-                    *name,
+                    name.as_str(),
                     "the value has characters that an HTTP header cannot carry",
                 )
             };
-            let name = HeaderName::try_from(*name)
-                .map_err(|_| Error::usage(*name, "this is not a valid name of an HTTP header"))?;
-            headers.insert(name, HeaderValue::try_from(text).map_err(invalid)?);
+            let value = HeaderValue::try_from(text).map_err(invalid)?;
+            let name = HeaderName::try_from(name).map_err(|_| {
+                Error::usage(name.as_str(), "this is not a valid name of an HTTP header")
+            })?;
+            headers.insert(name, value);
         }
+        self.headers.extend(&mut headers)?;
         Ok(headers)
     }
 

@@ -173,7 +173,7 @@ impl FailureClass {
 
     /// The class of a request that may have been refused for one of its fields. If the server names the field, every other
     /// request with it fails too. If only the text mentions it, the cause may be this request alone.
-    fn of_field(complaint: &Complaint, fields: &[RequestField]) -> Self {
+    fn of_field(complaint: &Complaint, fields: &[RequestField<'_>]) -> Self {
         let mut sent = fields.iter().filter(|field| field.sent);
         let (reach, field) = match sent.clone().find(|field| field.is_named(complaint)) {
             Some(field) => (Reach::Endpoint, field),

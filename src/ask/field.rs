@@ -68,8 +68,8 @@ const UNSUPPORTED: [&str; 18] = [
 ];
 
 /// A field of a request, with the remedy if it is refused.
-pub(super) struct RequestField {
-    pub(super) name: &'static str,
+pub(super) struct RequestField<'a> {
+    pub(super) name: &'a str,
     /// Whether the field was sent; otherwise it is not the cause.
     pub(super) sent: bool,
     /// The remedy for the user: the flag that changes the field.
@@ -78,7 +78,7 @@ pub(super) struct RequestField {
     pub(super) adaptable: Option<AdaptableField>,
 }
 
-impl RequestField {
+impl RequestField<'_> {
     /// Whether the server names the field as the cause.
     pub(super) fn is_named(&self, complaint: &Complaint) -> bool {
         let param = complaint.param.as_deref();

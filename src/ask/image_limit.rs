@@ -1,6 +1,7 @@
 //! The maximum size of an image that an endpoint accepts: [`ImageLimit`].
 
 use super::url::BaseUrl;
+use super::vendor::Vendor;
 use crate::error::{Error, Result};
 use crate::types::ImageFacts;
 
@@ -14,24 +15,6 @@ pub(crate) struct ImageLimit {
     /// The provider or setting that the limit comes from.
     pub origin: &'static str,
 }
-
-/// Limits by the end of the host name. A limit on the base64 text allows three quarters of it in bytes of the file.
-const KNOWN: [(&str, ImageLimit); 7] = [
-    // A whole request may have 50 MB; this is less (platform.openai.com/docs/guides/images-vision).
-    ("api.openai.com", limit(20_000_000, None, "OpenAI")),
-    (".azure.com", limit(20_000_000, None, "Azure")),
-    // 5 MB of base64 and 8000 pixels (docs.anthropic.com/en/docs/build-with-claude/vision).
-    (
-        "api.anthropic.com",
-        limit(3_750_000, Some(8000), "Anthropic"),
-    ),
-    // 4 MB of base64 (console.groq.com/docs/vision).
-    ("api.groq.com", limit(3_000_000, None, "Groq")),
-    // 20 MB for a whole request, base64 (ai.google.dev/gemini-api/docs/image-understanding).
-    ("googleapis.com", limit(14_900_000, None, "Gemini")),
-    ("api.x.ai", limit(20_000_000, None, "xAI")),
-    ("api.mistral.ai", limit(10_000_000, None, "Mistral")),
-];
 
 const fn limit(bytes: usize, side: Option<u32>, origin: &'static str) -> ImageLimit {
     ImageLimit {
@@ -48,8 +31,13 @@ impl ImageLimit {
     /// The limit of an endpoint.
     #[must_use]
     pub(crate) fn of(base: &BaseUrl) -> Self {
-        let known = KNOWN.iter().find(|(host, _)| base.host().ends_with(host));
-        known.map_or(Self::UNKNOWN, |(_, limit)| *limit)
+        let Some(vendor) = Vendor::of(base.host()) else {
+            return Self::UNKNOWN;
+        };
+        match (vendor.image_bytes, vendor.image_side) {
+            (None, None) => Self::UNKNOWN,
+            (bytes, side) => limit(bytes.unwrap_or(Self::UNKNOWN.bytes), side, &vendor.name),
+        }
     }
 
     /// Checks that an image is within the limit.
@@ -112,8 +100,8 @@ mod tests {
             exposure: None,
         };
         let limit = ImageLimit::of(&"https://api.anthropic.com/v1".parse().unwrap());
-        assert!(limit.check(&image(3_750_000, 8000)).is_ok());
-        for beyond in [image(3_750_001, 10), image(10, 8001)] {
+        assert!(limit.check(&image(7_500_000, 8000)).is_ok());
+        for beyond in [image(7_500_001, 10), image(10, 8001)] {
             let error = limit.check(&beyond).unwrap_err().to_string();
             assert!(
                 error.contains("Anthropic") && error.contains("--max-side"),

@@ -8,6 +8,8 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 use serde_json::{Value, json};
 
+use super::extra_fields::ExtraFields;
+use super::vendor::Vendor;
 use crate::types::Decides;
 use crate::types::flag::flag_words;
 use crate::types::words::written_as_text;
@@ -34,8 +36,8 @@ pub struct Parameters {
     /// A letter needs 16; a reasoning model burns hundreds before it.
     #[arg(long, value_name = "N", default_value_t = Self::MAX_TOKENS, add = Decides::Reply)]
     pub max_tokens: NonZeroU32,
-    /// The field that carries that limit; auto is max_completion_tokens at OpenAI itself, max_tokens elsewhere, and the other one
-    /// where the server asks for it
+    /// The field that carries that limit; auto is what is known of the endpoint, else max_tokens, and the other one where the
+    /// server asks for it
     #[arg(long, value_name = "FIELD", value_enum, default_value_t = TokenField::Auto, add = Decides::Reply)]
     #[serde(skip)]
     pub token_field: TokenField,
@@ -51,6 +53,10 @@ pub struct Parameters {
     /// The constraint that the server puts on the model's reply.
     #[arg(skip)]
     pub constrain: Constrain,
+    /// What the user adds to requests or leaves out.
+    #[arg(skip)]
+    #[serde(flatten)]
+    pub extra: ExtraFields,
 }
 
 impl Parameters {
@@ -70,6 +76,7 @@ impl Parameters {
             reasoning_effort: None,
             detail: None,
             constrain: Constrain::None,
+            extra: ExtraFields::default(),
         }
     }
 
@@ -131,7 +138,7 @@ impl FromStr for Temperature {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 #[value(rename_all = "snake_case")]
 pub enum TokenField {
-    /// max_completion_tokens at OpenAI itself, max_tokens elsewhere; the other one where the server asks for it
+    /// What is known of the endpoint, else max_tokens; the other one where the server asks for it
     Auto,
     /// What every other server understands
     MaxTokens,
@@ -146,8 +153,7 @@ impl TokenField {
     /// The field for an endpoint of this host: never `Auto`.
     pub(super) fn at(self, host: &str) -> Self {
         match self {
-            Self::Auto if host == "api.openai.com" => Self::MaxCompletionTokens,
-            Self::Auto => Self::MaxTokens,
+            Self::Auto => Vendor::of(host).map_or(Self::MaxTokens, Vendor::token_field),
             field => field,
         }
     }
@@ -205,13 +211,14 @@ mod tests {
         let auto = TokenField::Auto;
         assert_eq!(auto.at("api.openai.com"), TokenField::MaxCompletionTokens);
         assert_eq!(auto.at("localhost"), TokenField::MaxTokens);
+        assert_eq!(auto.at("api.mistral.ai"), TokenField::MaxTokens);
         assert_eq!(TokenField::Omit.at("api.openai.com"), TokenField::Omit);
     }
 
     #[test]
     fn settings_that_decide_a_reply_change_the_content() {
         let base = Parameters::new("m".into());
-        let mut others = vec![base.clone(); 8];
+        let mut others = vec![base.clone(); 12];
         others[0].model = "n".into();
         others[1].temperature = Temperature::Server;
         others[2].token_field = TokenField::Omit;
@@ -220,6 +227,10 @@ mod tests {
         others[5].constrain = Constrain::Json;
         others[6].temperature = Temperature::Of(0.0);
         others[7].seed = Some(0);
+        others[8].extra.deployment = Some("a".into());
+        others[9].extra.system = Some("a".into());
+        others[10].extra.body.insert("a".into(), Value::Null);
+        others[11].extra.omit = vec!["a".into()];
         for other in &others {
             assert_ne!(other.content(), base.content(), "{other:?}");
         }

@@ -14,7 +14,7 @@ use super::failure::AskError;
 use super::field::{AdaptableField, RequestFields, SentFields};
 use super::parameters::{Constrain, Parameters, Temperature, TokenField};
 use super::wire::Wire;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::types::{FailureKind, Reply};
 
 /// One model of an endpoint, asked through one API with one set of parameters.
@@ -37,8 +37,15 @@ impl Remote {
     /// The model that `parameters` name; models of one endpoint share its connections and its pauses.
     ///
     /// # Errors
-    /// If a header value has characters that HTTP does not allow.
+    /// If a header value has characters that HTTP does not allow, or the user's own fields contradict `--constrain`.
     pub fn open(endpoint: Arc<Endpoint>, wire: Wire, parameters: Parameters) -> Result<Self> {
+        let mut formats = ["response_format", "structured_outputs"].into_iter();
+        if parameters.constrain != Constrain::None
+            && let Some(field) = formats.find(|field| parameters.extra.adds(field))
+        {
+            let problem = format_args!("{field} is set by --constrain; leave one of them out");
+            return Err(Error::usage("--extra-body", problem));
+        }
         Ok(Self {
             headers: endpoint.headers(wire)?,
             fields: Mutex::new(RequestFields::first(&parameters, endpoint.host())),

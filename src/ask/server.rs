@@ -6,41 +6,54 @@ use std::{env, fs};
 use clap::Args;
 
 use super::access::{Access, Authorities};
+use super::key_form::looks_like_key;
 use super::key_header::KeyHeader;
+use super::own_headers::OwnHeaders;
 use super::secret::Secret;
 use super::sending::Sending;
 use super::url::BaseUrl;
+use super::vendor::Vendor;
 use crate::error::{Error, Result};
 use crate::types::Decides;
 
 /// The endpoint if neither `--base-url` nor `OPENAI_BASE_URL` names one.
 const BASE_URL: &str = "https://api.openai.com/v1";
 
-/// The environment variable in which Azure's clients look for a key.
-const AZURE_KEY: &str = "AZURE_OPENAI_API_KEY";
+/// The variable that names the endpoint if `--base-url` does not.
+const BASE_URL_VARIABLE: &str = "OPENAI_BASE_URL";
+
+/// The variable that holds the key of endpoints that the table of vendors does not have.
+const KEY_VARIABLE: &str = "OPENAI_API_KEY";
 
 /// The value of `--api-key-env` for an endpoint without keys.
 const NO_KEY: &str = "none";
 
-/// The address of an endpoint and its key.
+/// The address of an endpoint, its key and its headers.
 ///
-/// The address is parsed when it is used: the parser of the command line would print an invalid one, with its password.
-#[derive(Debug, Clone, Default, Args)]
+/// The address and the headers are parsed when they are used: the parser of the command line would print an invalid one, with its
+/// password.
+#[derive(Debug, Clone, Default, PartialEq, Args)]
 #[command(next_help_heading = "Model")]
 pub(crate) struct AccessArgs {
     /// The endpoint; /chat/completions is appended; default: OPENAI_BASE_URL, else OpenAI's own
     #[arg(long, value_name = "URL", add = Decides::Reply)]
     pub base_url: Option<String>,
-    /// The variable that holds the API key, or none for an endpoint without keys; default: OPENAI_API_KEY (at Azure
-    /// AZURE_OPENAI_API_KEY before it)
+    /// The variable that holds the API key, or none for an endpoint without keys; default: that of the vendor's own tools
+    /// (ANTHROPIC_API_KEY, GEMINI_API_KEY …), else OPENAI_API_KEY, which goes to no other vendor of the table by itself
     #[arg(long, value_name = "NAME|none", conflicts_with = "api_key_file", add = Decides::Nothing)]
     pub api_key_env: Option<String>,
     /// A file that holds the API key; default: none, a variable holds it
     #[arg(long, value_name = "FILE", add = Decides::Nothing)]
     pub api_key_file: Option<PathBuf>,
-    /// The header that carries the key; auto is api-key at Azure, else bearer
+    /// The header that carries the key; auto is what is known of the vendor (api-key at Azure), else bearer
     #[arg(long, value_name = "HEADER", value_enum, default_value_t, add = Decides::Nothing)]
     pub key_header: KeyHeader,
+    /// A header that is added to every request; repeatable; default: none
+    #[arg(long, value_name = "NAME: VALUE", add = Decides::Nothing)]
+    pub header: Vec<String>,
+    /// A header that is added to every request, with a variable that holds its value, which is kept secret; repeatable; default: none
+    #[arg(long, value_name = "NAME=VARIABLE", add = Decides::Nothing)]
+    pub header_env: Vec<String>,
     /// A PEM file of certificate authorities to trust besides the system's; default: none
     #[arg(long, value_name = "FILE", add = Decides::Nothing)]
     pub ca_file: Option<PathBuf>,
@@ -65,25 +78,38 @@ impl AccessArgs {
         Self {
             api_key_env: Some(NO_KEY.to_owned()),
             api_key_file: None,
+            header_env: Vec::new(),
             ..self.clone()
         }
     }
 
-    /// Reads the key and the certificates.
+    /// Another endpoint: nothing that authenticates at this one is sent there.
+    #[must_use]
+    pub(crate) fn elsewhere(&self, base_url: String) -> Self {
+        Self {
+            base_url: Some(base_url),
+            ca_file: self.ca_file.clone(),
+            allow_http: self.allow_http,
+            ..Self::default()
+        }
+    }
+
+    /// Reads the key, the headers and the certificates.
     ///
     /// # Errors
-    /// If the address is not valid, or a key or certificate cannot be read.
+    /// If the address is not valid, or a key, header or certificate cannot be read.
     pub(crate) fn server(&self, sending: Sending) -> Result<Server> {
         let named = self
             .base_url
             .clone()
-            .or_else(|| variable("OPENAI_BASE_URL"));
+            .or_else(|| variable(BASE_URL_VARIABLE));
         let base: BaseUrl = named.as_deref().unwrap_or(BASE_URL).parse()?;
         let authorities = self.ca_file.as_deref().map(Authorities::load).transpose()?;
         let access = Access {
             key: self.key(&base)?,
             key_header: self.key_header,
-            headers: account_headers(&base),
+            account: account_headers(&base),
+            headers: OwnHeaders::read(&self.header, &self.header_env)?,
             authorities: authorities.unwrap_or_default(),
             allow_http: self.allow_http,
             ..Access::new(base)
@@ -97,49 +123,84 @@ impl AccessArgs {
             let text = fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))?;
             return Secret::new(&text, "--api-key-file").map(Some);
         }
-        let azure = || base.is_azure() && variable(AZURE_KEY).is_some();
-        let name = match &self.api_key_env {
-            Some(name) => name,
-            None if azure() => AZURE_KEY,
-            None => "OPENAI_API_KEY",
-        };
-        if name == NO_KEY {
-            return Ok(None);
+        if let Some(name) = self.api_key_env.as_deref() {
+            let wrong = |problem: String| Error::usage("--api-key-env", problem);
+            if name == NO_KEY {
+                return Ok(None);
+            }
+            if looks_like_key(name) {
+                return Err(wrong(
+                    "the name of a variable expected; what stands there looks like a key and is not shown here: put it into a \
+                     variable, and name that variable"
+                        .to_owned(),
+                ));
+            }
+            let text = variable(name);
+            let text = text.ok_or_else(|| wrong(format!("the variable {name} is not set")))?;
+            return Secret::new(&text, name).map(Some);
         }
-        match variable(name) {
-            Some(text) => Secret::new(&text, name).map(Some),
-            None if self.api_key_env.is_some() => Err(Error::usage(
-                "--api-key-env",
-                format_args!("the variable {name} is not set"),
-            )),
+        let names = key_variables(base);
+        let mut set = names
+            .iter()
+            .filter_map(|name| Some((*name, variable(name)?)));
+        match set.next() {
+            Some((name, text)) => Secret::new(&text, name).map(Some),
             None if base.is_loopback() || base.has_credentials() => Ok(None),
-            None => Err(Error::usage(
-                name,
-                format_args!(
-                    "no key for {base}: set this variable, or name another with --api-key-env NAME or a file with --api-key-file FILE; \
-                     a server of your own is named by --base-url URL, and --api-key-env none sends no key"
-                ),
-            )),
+            // A header from a variable authenticates, too.
+            None if !self.header_env.is_empty() => Ok(None),
+            None => Err(no_key(base, &names)),
         }
     }
 }
 
-/// OpenAI's headers for accounts with several organizations or projects, from the variables that OpenAI's clients use.
-fn account_headers(base: &BaseUrl) -> Vec<(&'static str, String)> {
-    if base.host() != "api.openai.com" {
-        return Vec::new();
+/// The variables that may hold the key of an endpoint, in order. OpenAI's key goes to another vendor only if `OPENAI_BASE_URL`
+/// names the host.
+fn key_variables(base: &BaseUrl) -> Vec<&'static str> {
+    let Some(vendor) = Vendor::of(base.host()) else {
+        return vec![KEY_VARIABLE];
+    };
+    let mut names: Vec<&str> = vendor.key.iter().map(String::as_str).collect();
+    let named = variable(BASE_URL_VARIABLE).and_then(|text| text.parse::<BaseUrl>().ok());
+    let is_named = named.is_some_and(|named| named.host() == base.host());
+    if is_named && !names.contains(&KEY_VARIABLE) {
+        names.push(KEY_VARIABLE);
     }
-    let headers = [
-        ("openai-organization", "OPENAI_ORG_ID"),
-        ("openai-project", "OPENAI_PROJECT_ID"),
-    ];
-    let headers = headers.into_iter();
+    names
+}
+
+/// The error about an endpoint without a key.
+fn no_key(base: &BaseUrl, names: &[&str]) -> Error {
+    let foreign = !names.contains(&KEY_VARIABLE) && variable(KEY_VARIABLE).is_some();
+    let foreign = if foreign {
+        " (OPENAI_API_KEY is set, and is not sent to another vendor unless --api-key-env names it)"
+    } else {
+        ""
+    };
+    let these = if names.len() == 1 {
+        "this variable"
+    } else {
+        "one of these variables"
+    };
+    Error::usage(
+        names.join(", "),
+        format_args!(
+            "no key for {base}: set {these}{foreign}, or name another with --api-key-env NAME or a file with --api-key-file FILE; \
+             a server of your own is named by --base-url URL, and --api-key-env none sends no key"
+        ),
+    )
+}
+
+/// The headers for accounts with several organizations or projects, from the variables that the vendor's clients use.
+fn account_headers(base: &BaseUrl) -> Vec<(String, String)> {
+    let headers = Vendor::of(base.host())
+        .into_iter()
+        .flat_map(|vendor| &vendor.account);
     headers
-        .filter_map(|(header, name)| Some((header, variable(name)?)))
+        .filter_map(|(header, name)| Some((header.clone(), variable(name)?)))
         .collect()
 }
 
 /// The value of an environment variable; `None` if it is not set or blank.
-fn variable(name: &str) -> Option<String> {
+pub(super) fn variable(name: &str) -> Option<String> {
     env::var(name).ok().filter(|text| !text.trim().is_empty())
 }

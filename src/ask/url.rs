@@ -9,6 +9,7 @@ use base64::engine::general_purpose::STANDARD;
 use percent_encoding::percent_decode_str;
 use reqwest::Url;
 
+use super::vendor::Vendor;
 use super::wire::Wire;
 use crate::error::{Error, Result};
 
@@ -38,12 +39,6 @@ impl BaseUrl {
         host == "localhost"
             || host.ends_with(".localhost")
             || bare.parse::<IpAddr>().is_ok_and(|ip| ip.is_loopback())
-    }
-
-    /// Whether the endpoint is Azure's, which expects the key in the header `api-key`.
-    #[must_use]
-    pub fn is_azure(&self) -> bool {
-        AZURE.iter().any(|domain| self.host().ends_with(domain))
     }
 
     /// Whether requests are sent unencrypted.
@@ -80,13 +75,6 @@ impl BaseUrl {
     }
 }
 
-/// The domains at which Azure serves models, by resource (`R.openai.azure.com`) and by project.
-const AZURE: [&str; 3] = [
-    ".openai.azure.com",
-    ".cognitiveservices.azure.com",
-    ".services.ai.azure.com",
-];
-
 /// A text without percent encoding.
 fn decoded(text: &str) -> String {
     percent_decode_str(text).decode_utf8_lossy().into_owned()
@@ -122,11 +110,14 @@ impl FromStr for BaseUrl {
             }
         }
         let base = Self(url);
-        if base.is_azure() && base.0.path().trim_matches('/').is_empty() {
-            return Err(wrong(
-                "an address of Azure needs a path: https://RESOURCE.openai.azure.com/openai/v1, or \
-                 https://RESOURCE.openai.azure.com/openai/deployments/DEPLOYMENT?api-version=VERSION",
-            ));
+        if let Some(vendor) = Vendor::of(base.host()).filter(|vendor| !vendor.addresses.is_empty())
+            && base.0.path().trim_matches('/').is_empty()
+        {
+            let forms = vendor.addresses.join(", or ");
+            return Err(wrong(&format!(
+                "an address of {} needs a path: {forms}",
+                vendor.name
+            )));
         }
         Ok(base)
     }

@@ -7,7 +7,7 @@ use clap::{ArgMatches, Args, Command as Clap};
 
 use super::command::{BatchCommand, Cli, Command};
 use super::layers;
-use crate::ask::{AccessArgs, ImageArgs, Parameters, Sending};
+use crate::ask::{AccessArgs, ImageArgs, Parameters, RequestArgs, Sending};
 use crate::dataset::CodesArgs;
 use crate::enhance::{EnhancerArgs, ProbeArgs, RuntimeArgs, SizeArgs};
 use crate::job::batch::BatchFileArgs;
@@ -149,6 +149,7 @@ impl NoEffect {
             let asking = [
                 ids::<AccessArgs>(),
                 ids::<Parameters>(),
+                ids::<RequestArgs>(),
                 ids::<Sending>(),
                 ids::<JudgeArgs>(),
             ];
@@ -194,6 +195,7 @@ impl NoEffect {
             let sent = [
                 ids::<AccessArgs>(),
                 ids::<Parameters>(),
+                ids::<RequestArgs>(),
                 ids::<Sending>(),
                 replies.to_vec(),
             ];

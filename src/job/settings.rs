@@ -13,7 +13,9 @@ use super::models::{AskSettings, ModelArgs};
 use super::money::{MoneyArgs, MoneySettings};
 use super::outcome::{ShowArgs, StdoutFormat};
 use super::shard::Shard;
-use crate::ask::{AccessArgs, Bounds, Constrain, ImageArgs, Parameters, PayloadFormat, Sending};
+use crate::ask::{
+    AccessArgs, Bounds, Constrain, ImageArgs, Parameters, PayloadFormat, RequestArgs, Sending,
+};
 use crate::enhance::{EnhancerArgs, ModelFile};
 use crate::error::{Error, Result};
 use crate::synthesis::{LightArgs, LightSettings};
@@ -37,6 +39,9 @@ pub(crate) struct JobArgs {
     /// Parameters of the models.
     #[command(flatten)]
     pub parameters: Parameters,
+    /// What is added to requests or left out.
+    #[command(flatten)]
+    pub request: RequestArgs,
     /// Endpoint and its key.
     #[command(flatten)]
     pub access: AccessArgs,
@@ -178,6 +183,7 @@ impl JobArgs {
         let parameters = Parameters {
             constrain: experiment.constrain,
             seed: experiment.sampling_seed,
+            extra: self.request.resolve()?,
             ..self.parameters
         };
         // A dry run sends nothing, so it needs no key.

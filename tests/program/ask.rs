@@ -8,9 +8,9 @@ use crate::support::table::check_rows;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use darkqa_eval::internals::ask::{
-    Access, BaseUrl, Call, Constrain, Endpoint, ImageDetail, Message, Model, Parameters, Payload,
-    PayloadFormat, Prompts, Query, Random, Remote, Script, Secret, Sending, Temperature,
-    TokenField, Wire,
+    Access, BaseUrl, Call, Constrain, Endpoint, ExtraFields, ImageDetail, Message, Model,
+    Parameters, Payload, PayloadFormat, Prompts, Query, Random, Remote, Script, Secret, Sending,
+    Temperature, TokenField, Wire,
 };
 use darkqa_eval::types::{
     Choices, Digest, FailureKind, Family, Finish, FrameId, Question, QuestionId, Reply, Rgb, View,
@@ -116,6 +116,7 @@ async fn what_is_set_is_sent_and_what_is_not_is_left_out() {
         reasoning_effort: Some("low".into()),
         detail: Some(ImageDetail::High),
         constrain: Constrain::None,
+        extra: ExtraFields::default(),
     };
     let model = Remote::open(endpoint.clone(), Wire::Chat, parameters).unwrap();
     let images = [image(), image()].map(Arc::new);

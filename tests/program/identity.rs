@@ -205,7 +205,7 @@ fn set(conditions: &str) -> BTreeSet<String> {
 }
 
 /// What refuses an evaluation on the folder of another: the field that the message names, and the flag.
-const REFUSED: [(&str, &str); 26] = [
+const REFUSED: [(&str, &str); 30] = [
     ("--data", "--data elsewhere/frames"),
     ("--questions", "--questions other.jsonl"),
     ("--rules", "--rules rules.toml"),
@@ -232,10 +232,14 @@ const REFUSED: [(&str, &str); 26] = [
     ("--detail", "--detail low"),
     ("--constrain", "--constrain json"),
     ("--constrain", "--constrain choice"),
+    ("--extra-body", "--extra-body {\"top_k\":1}"),
+    ("--omit-field", "--omit-field temperature"),
+    ("--system", "--system Look!"),
+    ("--system", "--system-file own/choice.txt"),
 ];
 
 /// The same for open questions.
-const OPEN_REFUSED: [(&str, &str); 23] = [
+const OPEN_REFUSED: [(&str, &str); 27] = [
     ("--questions", "--questions other.json"),
     ("--num-frames", "--num-frames 2"),
     ("--image-size", "--image-size 32"),
@@ -259,6 +263,10 @@ const OPEN_REFUSED: [(&str, &str); 23] = [
     ("--reasoning-effort", "--reasoning-effort low"),
     ("--top-p", "--top-p 0.9"),
     ("--detail", "--detail low"),
+    ("--extra-body", "--extra-body {\"top_k\":1}"),
+    ("--omit-field", "--omit-field temperature"),
+    ("--system", "--system Look!"),
+    ("--system", "--system-file own/choice.txt"),
 ];
 
 #[test]
@@ -350,7 +358,7 @@ const OPEN_ADDITIONS: [Addition; 10] = [
 ];
 
 /// What changes no answer: given on the folder of a run, it asks nothing.
-const NOTHING: [&str; 26] = [
+const NOTHING: [&str; 28] = [
     "--max-pixels 1000000",
     "--threads 1",
     "--offline",
@@ -358,6 +366,8 @@ const NOTHING: [&str; 26] = [
     "--api-key-env none",
     "--api-key-file key.txt",
     "--key-header api-key",
+    "--header X-Team:vision",
+    "--header-env X-Auth=PATH",
     "--allow-http",
     "--concurrency 2",
     "--rpm 6000",

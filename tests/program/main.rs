@@ -29,6 +29,7 @@ mod levels;
 mod money;
 mod observer;
 mod openeqa;
+mod own_requests;
 mod pins;
 mod questions;
 mod realism;

@@ -13,6 +13,7 @@ use crate::ask::parameters::{Constrain, ImageDetail, Parameters, TokenField};
 use crate::ask::payload::Payload;
 use crate::types::question::letter;
 
+/// The body of a request without its messages, which stand at its end.
 #[derive(Serialize)]
 struct ChatRequest<'a> {
     model: &'a str,
@@ -32,7 +33,6 @@ struct ChatRequest<'a> {
     response_format: Option<Value>,
     #[serde(skip_serializing_if = "Option::is_none")]
     structured_outputs: Option<Value>,
-    messages: [Turn<'a>; 1],
 }
 
 #[derive(Serialize)]
@@ -78,7 +78,7 @@ pub(super) fn body(
     let letters: Vec<char> = (0..choices).map(letter).collect();
     let constrained =
         |kind, value: fn(&[char]) -> Value| (parameters.constrain == kind).then(|| value(&letters));
-    let json = serde_json::to_string(&ChatRequest {
+    let fields = serde_json::to_string(&ChatRequest {
         model: &parameters.model,
         temperature: fields.temperature,
         top_p: parameters.top_p,
@@ -88,23 +88,32 @@ pub(super) fn body(
         reasoning_effort: parameters.reasoning_effort.as_deref(),
         response_format: constrained(Constrain::Json, format),
         structured_outputs: constrained(Constrain::Choice, |letters| json!({"choice": letters})),
-        messages: [Turn {
-            role: "user",
-            content: content(message, parameters.detail),
-        }],
     })?;
-    Ok(with_images(json, message.images))
+    let fields = parameters.extra.apply(fields)?;
+    let system = parameters.extra.system.as_deref().map(|words| Turn {
+        role: "system",
+        content: Content::Words(words),
+    });
+    let question = Turn {
+        role: "user",
+        content: content(message, parameters.detail),
+    };
+    let messages: Vec<Turn<'_>> = system.into_iter().chain([question]).collect();
+    let fields = fields.strip_suffix('}').unwrap_or(&fields);
+    let head = format!("{fields},\"messages\":");
+    let messages = serde_json::to_string(&messages)? + "}";
+    Ok(with_images(head, messages, message.images))
 }
 
-/// A body with the images in their places; their bytes are shared, not copied.
-fn with_images(json: String, images: &[Arc<Payload>]) -> Parts {
+/// A body of these two texts with the images in their places in the second; their bytes are shared, not copied.
+fn with_images(head: String, json: String, images: &[Arc<Payload>]) -> Parts {
     if images.is_empty() {
-        return Parts::new([json.into()]);
+        return Parts::new([(head + &json).into()]);
     }
     debug_assert_eq!(json.matches(PLACE).count(), images.len());
     let (open, close) = PLACE.split_at(PLACE.len() - 1);
     let mut pieces = Vec::with_capacity(2 * images.len() + 1);
-    let mut begin = "";
+    let mut begin = &*head;
     let mut images = images.iter();
     for words in json.split(PLACE) {
         match images.next() {
@@ -146,10 +155,22 @@ fn format(letters: &[char]) -> Value {
 }
 
 /// The fields that a server may refuse.
-pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField> {
+pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField<'_>> {
     let parameters = sent.parameters;
     let limit = |field| sent.fields.token_field == field;
-    Vec::from([
+    let own = parameters.extra.names().map(|name| RequestField {
+        name,
+        sent: true,
+        adaptable: None,
+        hint: "leave this field out of --extra-body, or give a value that the server takes",
+    });
+    let system = RequestField {
+        name: "system",
+        sent: parameters.extra.system.is_some(),
+        adaptable: None,
+        hint: "leave --system out: the model takes no system message",
+    };
+    let mut fields = Vec::from([
         RequestField {
             name: "temperature",
             sent: sent.fields.temperature.is_some(),
@@ -198,5 +219,10 @@ pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField> {
             adaptable: None,
             hint: "leave --constrain out, or try --constrain json",
         },
-    ])
+    ]);
+    // A field that is left out is not the cause.
+    fields.retain(|field| !parameters.extra.omit.iter().any(|name| name == field.name));
+    fields.push(system);
+    fields.extend(own);
+    fields
 }

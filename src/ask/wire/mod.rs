@@ -68,7 +68,7 @@ impl Wire {
     }
 
     /// The fields of a request that a server may refuse.
-    pub(super) fn fields(self, sent: SentFields<'_>) -> Vec<RequestField> {
+    pub(super) fn fields(self, sent: SentFields<'_>) -> Vec<RequestField<'_>> {
         match self {
             Self::Chat => chat_request::fields(sent),
         }

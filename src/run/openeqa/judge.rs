@@ -25,8 +25,8 @@ pub(crate) struct JudgeArgs {
     /// The judge's endpoint; default: that of the models
     #[arg(long, value_name = "URL", add = Decides::Reply)]
     pub judge_base_url: Option<String>,
-    /// The variable that holds the key of the judge's endpoint, or none; default: OPENAI_API_KEY, or without
-    /// --judge-base-url that of the models
+    /// The variable that holds the key of the judge's endpoint, or none; default: that of its vendor, or
+    /// without --judge-base-url that of the models
     #[arg(long, value_name = "NAME|none", conflicts_with = "judge_api_key_file", add = Decides::Nothing)]
     pub judge_api_key_env: Option<String>,
     /// A file that holds the key of the judge's endpoint; default: none, a variable holds it
@@ -63,12 +63,15 @@ impl JudgeArgs {
             || self.judge_api_key_env.is_some()
             || self.judge_api_key_file.is_some();
         if own_access {
+            let access_args = match self.judge_base_url {
+                Some(url) => access.elsewhere(url),
+                None => access,
+            };
             access = AccessArgs {
-                base_url: self.judge_base_url.or(access.base_url),
                 api_key_env: self.judge_api_key_env,
                 api_key_file: self.judge_api_key_file,
                 key_header: KeyHeader::Auto,
-                ..access
+                ..access_args
             };
         }
         if job.money.dry_run {

@@ -1,0 +1,144 @@
+//! What is known of a host that serves models: [`Vendor`], from `vendors.toml`.
+
+use std::collections::BTreeMap;
+use std::sync::LazyLock;
+
+use serde::Deserialize;
+
+use super::key_header::KeyHeader;
+use super::parameters::TokenField;
+
+/// A vendor and the particularities of its endpoints; a field that is `None` is not known.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(crate) struct Vendor {
+    /// The vendor's name, for messages.
+    pub(crate) name: String,
+    /// Ends of the host names of its endpoints.
+    hosts: Vec<String>,
+    /// The variables in which the vendor's own tools look for a key, in order.
+    pub(super) key: Vec<String>,
+    /// The header that carries the key.
+    #[serde(default)]
+    header: Header,
+    /// The field that carries the token limit.
+    #[serde(default)]
+    token_field: LimitField,
+    /// The largest image file, in bytes.
+    pub(super) image_bytes: Option<usize>,
+    /// The longest side of an image, in pixels.
+    pub(super) image_side: Option<u32>,
+    /// Headers that name the account and are not secret, each with the variable that holds its value.
+    #[serde(default)]
+    pub(super) account: BTreeMap<String, String>,
+    /// Forms of an address, if an address without a path cannot be used; else empty.
+    #[serde(default)]
+    pub(super) addresses: Vec<String>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Header {
+    #[default]
+    Bearer,
+    ApiKey,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum LimitField {
+    #[default]
+    MaxTokens,
+    MaxCompletionTokens,
+}
+
+/// The table of vendors, with its date.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+struct Vendors {
+    #[cfg_attr(not(test), expect(dead_code, reason = "read by a test and by people"))]
+    as_of: String,
+    vendor: Vec<Vendor>,
+}
+
+static VENDORS: LazyLock<Vendors> = LazyLock::new(|| {
+    toml::from_str(include_str!("vendors.toml"))
+        .unwrap_or_else(|e| unreachable!("a test reads vendors.toml: {e}"))
+});
+
+impl Vendor {
+    /// The vendor of a host; `None` if the host is not in the table.
+    pub(crate) fn of(host: &str) -> Option<&'static Self> {
+        let mut vendors = VENDORS.vendor.iter();
+        vendors.find(|vendor| vendor.hosts.iter().any(|end| is_below(host, end)))
+    }
+
+    /// The header in which this vendor expects the key.
+    pub(super) fn key_header(&self) -> KeyHeader {
+        match self.header {
+            Header::Bearer => KeyHeader::Bearer,
+            Header::ApiKey => KeyHeader::ApiKey,
+        }
+    }
+
+    /// The field in which this vendor expects the token limit.
+    pub(super) fn token_field(&self) -> TokenField {
+        match self.token_field {
+            LimitField::MaxTokens => TokenField::MaxTokens,
+            LimitField::MaxCompletionTokens => TokenField::MaxCompletionTokens,
+        }
+    }
+}
+
+/// Whether a host name is this one or one below it: a name that merely ends with the same letters is another host.
+fn is_below(host: &str, end: &str) -> bool {
+    match host.strip_suffix(end) {
+        Some(rest) => rest.is_empty() || rest.ends_with('.') || end.starts_with('.'),
+        None => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn name(host: &str) -> Option<&'static str> {
+        Vendor::of(host).map(|vendor| &*vendor.name)
+    }
+
+    #[test]
+    fn the_table_is_complete() {
+        assert!(VENDORS.as_of.starts_with("20"));
+        assert!(VENDORS.vendor.len() > 10);
+        let mut hosts = Vec::new();
+        for vendor in &VENDORS.vendor {
+            assert!(!vendor.key.is_empty(), "{}", vendor.name);
+            assert!(!vendor.hosts.is_empty(), "{}", vendor.name);
+            hosts.extend(&vendor.hosts);
+            let variable = |name: &String| !super::super::key_form::looks_like_key(name);
+            assert!(vendor.key.iter().all(variable), "{}", vendor.name);
+        }
+        let count = hosts.len();
+        hosts.sort();
+        hosts.dedup();
+        assert_eq!(hosts.len(), count, "a host stands twice");
+    }
+
+    #[test]
+    fn a_host_is_known_by_its_end() {
+        assert_eq!(name("api.openai.com"), Some("OpenAI"));
+        assert_eq!(name("eu.api.openai.com"), Some("OpenAI"));
+        assert_eq!(name("r.openai.azure.com"), Some("Azure"));
+        assert_eq!(name("dashscope-intl.aliyuncs.com"), Some("DashScope"));
+        for other in [
+            "127.0.0.1",
+            "notapi.openai.com",
+            "evil-openrouter.ai",
+            "openrouter.ai.example",
+            "openai.azure.com",
+            "",
+        ] {
+            assert_eq!(name(other), None, "{other}");
+        }
+    }
+}

@@ -1,0 +1,241 @@
+//! What users add to requests: keys by address, headers, fields of the body, words of a system message.
+
+use std::fs;
+
+use serde_json::{Value, json};
+
+use crate::support::endpoint::{Answer, MockEndpoint, Request};
+use crate::support::run::{Bench, Called, called, files, model_args, records, words};
+
+const SECRET: &str = "gateway-0123456789abcdef";
+
+/// A run of one question without an image at this endpoint, with these variables.
+fn run(bench: &Bench, url: &str, line: &[&str], variables: &[(&str, &str)]) -> Called {
+    let fixed = "--data set.jsonl --limit 1 --blind --retries 0 --out";
+    let args = [&model_args(url, fixed)[..], line].concat();
+    let mut command = bench.command(&args);
+    for (name, value) in variables {
+        command.env(name, value);
+    }
+    called(&mut command)
+}
+
+/// The request of such a run, which must end well.
+fn request(line: &[&str], variables: &[(&str, &str)]) -> (Bench, Request) {
+    let bench = Bench::with_questions(1);
+    let mock = MockEndpoint::start([Answer::text("A")]);
+    let args = [&["run"], line].concat();
+    let called = run(&bench, &mock.base_url(), &args, variables);
+    assert_eq!(called.code, Some(0), "{called:?}");
+    let request = mock.requests().remove(0);
+    (bench, request)
+}
+
+/// The error of a call that must be refused.
+fn refusal(url: &str, line: &[&str], variables: &[(&str, &str)]) -> String {
+    let bench = Bench::with_questions(1);
+    let called = run(&bench, url, &[&["run"], line].concat(), variables);
+    assert_eq!(called.code, Some(2), "{called:?}");
+    assert!(!bench.path("run").exists());
+    called.stderr
+}
+
+#[test]
+fn a_key_goes_to_its_own_vendor_alone() {
+    const ANTHROPIC: &str = "https://api.anthropic.com/v1";
+    let openai = [("OPENAI_API_KEY", "sk-openai-0123456789")];
+    let error = refusal(ANTHROPIC, &[], &openai);
+    for part in [
+        "ANTHROPIC_API_KEY",
+        "OPENAI_API_KEY is set",
+        "--api-key-env",
+    ] {
+        assert!(error.contains(part), "{part}: {error}");
+    }
+    let gemini = "https://generativelanguage.googleapis.com/v1beta/openai";
+    let error = refusal(gemini, &[], &[]);
+    assert!(
+        error.contains("GEMINI_API_KEY, GOOGLE_API_KEY: no key"),
+        "{error}"
+    );
+    assert!(!error.contains("is set, and"), "{error}");
+    // A server that is not in the table may want any key, as ever.
+    let (_, request) = request(&[], &openai);
+    assert_eq!(
+        request.header("authorization"),
+        Some("Bearer sk-openai-0123456789")
+    );
+}
+
+#[test]
+fn a_key_in_place_of_a_name_is_refused_and_not_shown() {
+    for key in [
+        "sk-proj-0123",
+        "AIzaSyAbc",
+        "gsk_abcdef",
+        "0123456789abcdef0123",
+    ] {
+        let error = refusal("https://h.example/v1", &["--api-key-env", key], &[]);
+        assert!(
+            error.contains("--api-key-env: the name of a variable"),
+            "{error}"
+        );
+        assert!(!error.contains(key), "{error}");
+    }
+    let error = refusal("https://h.example/v1", &["--api-key-env", "MY_KEY"], &[]);
+    assert!(error.contains("the variable MY_KEY is not set"), "{error}");
+}
+
+#[test]
+fn headers_are_sent_and_their_secrets_are_nowhere() {
+    let bench = Bench::with_questions(1);
+    let echo = Answer::error(400, "bad", &format!("{SECRET} may not do that"));
+    let mock = MockEndpoint::start([echo, Answer::text(&format!("A {SECRET}"))]);
+    let line = [
+        "run",
+        "--header",
+        "X-Team: vision",
+        "--header-env",
+        "X-Auth=GATEWAY",
+    ];
+    let variables = [("GATEWAY", SECRET), ("RUST_LOG", "trace")];
+    for code in [1, 0] {
+        let called = run(&bench, &mock.base_url(), &line, &variables);
+        assert_eq!(called.code, Some(code), "{called:?}");
+        assert!(!called.stderr.contains(SECRET) && !called.stdout.contains(SECRET));
+    }
+    for request in mock.requests() {
+        assert_eq!(request.header("x-team"), Some("vision"));
+        assert_eq!(request.header("x-auth"), Some(SECRET));
+    }
+    for file in files(&bench.path("run")) {
+        let content = fs::read(&file).unwrap();
+        let text = String::from_utf8_lossy(&content);
+        assert!(!text.contains(SECRET), "{}", file.display());
+    }
+    assert!(records(&bench.path("run"))[1]["reply"] == "A [secret]");
+}
+
+#[test]
+fn a_secret_header_is_not_sent_unencrypted_or_twice() {
+    let variables = [("GATEWAY", SECRET), ("OPENAI_API_KEY", "sk-0123456789")];
+    let url = "http://h.example/v1";
+    let error = refusal(url, &["--header-env", "X-Auth=GATEWAY"], &variables[..1]);
+    assert!(error.contains("--allow-http"), "{error}");
+    let twice = ["--header-env", "Authorization=GATEWAY"];
+    let error = refusal("http://127.0.0.1:9/v1", &twice, &variables);
+    assert!(error.contains("authorization is sent already"), "{error}");
+    let error = refusal(
+        "http://127.0.0.1:9/v1",
+        &["--header-env", "X-A=NOWHERE"],
+        &[],
+    );
+    assert!(error.contains("the variable NOWHERE is not set"), "{error}");
+}
+
+#[test]
+fn the_body_is_merged_and_fields_are_left_out() {
+    let body = r#"{"chat_template_kwargs": {"enable_thinking": false}, "stop": ["\"url\":\"\""], "max": {"a": {}}}"#;
+    let line = [
+        "--extra-body",
+        body,
+        "--omit-field",
+        "temperature",
+        "--system",
+        "Answer briefly.",
+    ];
+    let (bench, request) = request(&line, &[]);
+    let mut sent = request.json();
+    let question = sent["messages"][1]["content"].take();
+    assert!(
+        question.as_str().unwrap().contains("What color"),
+        "{question}"
+    );
+    let expected = json!({
+        "model": "m", "max_tokens": 1024, "max": {"a": {}},
+        "chat_template_kwargs": {"enable_thinking": false}, "stop": ["\"url\":\"\""],
+        "messages": [{"role": "system", "content": "Answer briefly."}, {"role": "user", "content": null}],
+    });
+    assert_eq!(sent, expected);
+    let manifest: Value =
+        serde_json::from_slice(&fs::read(bench.path("run/manifest.json")).unwrap()).unwrap();
+    let model = &manifest["columns"]["model"]["m"];
+    assert_eq!(model["--system"], "Answer briefly.");
+    assert_eq!(model["--omit-field"], json!(["temperature"]));
+    // From a file, and with an image, whose place is found behind whatever the fields hold.
+    bench.file("body.json", body);
+    let mock = MockEndpoint::start([Answer::text("A")]);
+    let url = mock.base_url();
+    let flags = "--data set.jsonl --limit 1 --levels L0 --extra-body @body.json --out seen";
+    bench.complete(&model_args(&url, flags));
+    let mut sent = mock.requests()[0].json();
+    let image = sent["messages"][0]["content"][1]["image_url"]["url"].take();
+    assert!(
+        image
+            .as_str()
+            .unwrap()
+            .starts_with("data:image/png;base64,")
+    );
+    assert_eq!(sent["stop"], json!(["\"url\":\"\""]));
+}
+
+#[test]
+fn what_the_program_sets_is_refused_by_name() {
+    let url = "http://127.0.0.1:9/v1";
+    let error = refusal(url, &["--extra-body", r#"{"temperature": 1}"#], &[]);
+    assert!(
+        error.contains("temperature is set by the program: use --temperature"),
+        "{error}"
+    );
+    let error = refusal(
+        url,
+        &[
+            "--extra-body",
+            r#"{"response_format": {}}"#,
+            "--constrain",
+            "json",
+        ],
+        &[],
+    );
+    assert!(error.contains("--constrain"), "{error}");
+}
+
+#[test]
+fn a_refused_field_of_the_user_is_named() {
+    let bench = Bench::with_questions(1);
+    let refused = json!({"error": {"message": "unknown parameter", "param": "top_k", "code": "unknown_parameter"}});
+    let mock = MockEndpoint::start([Answer::json(400, &refused)]);
+    let line = ["run", "--extra-body", r#"{"top_k": 1}"#];
+    let called = run(&bench, &mock.base_url(), &line, &[]);
+    assert_eq!(called.code, Some(2), "{called:?}");
+    assert!(called.stderr.contains("--extra-body"), "{called:?}");
+    assert_eq!(mock.requests().len(), 1);
+}
+
+/// Keys of trials of the version before the fields of the user: where none of them is set, they are the same.
+#[test]
+fn keys_of_runs_without_own_fields_stay() {
+    let key = |line: &str| {
+        let (bench, _) = request(&words(line), &[]);
+        records(&bench.path("run"))[0]["key"]
+            .as_str()
+            .unwrap()
+            .to_owned()
+    };
+    let plain = key("");
+    assert_eq!(plain, PLAIN_KEY);
+    assert_eq!(key("--header X-Team:vision --header-env X-A=PATH"), plain);
+    let mut keys = vec![plain];
+    for line in [
+        "--system Look!",
+        "--extra-body {\"a\":null}",
+        "--omit-field seed",
+    ] {
+        keys.push(key(line));
+    }
+    keys.sort();
+    keys.dedup();
+    assert_eq!(keys.len(), 4);
+}
+
+const PLAIN_KEY: &str = "925308aaa6dac64b2b07f5933d05d91a";
